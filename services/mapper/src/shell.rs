@@ -1,4 +1,4 @@
-//! `pose`, `ranges`, `target` and `directive` in, `grid` out: a window for each change, a keyframe for each new reader and now and
+//! `pose`, `ranges` and `directive` in, `grid` out: a window for each change, a keyframe for each new reader and now and
 //! then, nothing but a stamp otherwise, so that every tick goes on to the planner.
 
 use std::time::Duration;
@@ -12,8 +12,7 @@ use common::{
     stage::Runner,
     start::StageError,
     step::Step as _,
-    target::TargetReader,
-    topics::{CONTACT, DIRECTIVE, GRID, HEALTH, POSE, RANGES, TARGET},
+    topics::{CONTACT, DIRECTIVE, GRID, HEALTH, POSE, RANGES},
     wiring::{Persists, Wiring},
 };
 
@@ -31,7 +30,6 @@ pub struct Shell {
     ranges: SliceReader<RangesHeader, RangeReading>,
     contact: Reader<ContactSample>,
     directive: Reader<DirectiveSample>,
-    target: TargetReader,
     runner: Runner<Mapper>,
     /// The newest readings that are used, and their tick.
     latest_ranges: Option<(u64, Vec<RangeReading>)>,
@@ -41,7 +39,7 @@ pub struct Shell {
 
 impl Process for Shell {
     const WIRING: &'static Wiring = &Wiring {
-        inputs: &[&RANGES, &CONTACT, &POSE, &DIRECTIVE, &TARGET],
+        inputs: &[&RANGES, &CONTACT, &POSE, &DIRECTIVE],
         // A planner that becomes ready is a new reader of the grid.
         wakes: &[&POSE, &DIRECTIVE, &HEALTH],
         outputs: &[&GRID],
@@ -60,7 +58,6 @@ impl Process for Shell {
             ranges: context.slice_reader(&RANGES)?,
             contact: context.reader(&CONTACT)?,
             directive: context.reader(&DIRECTIVE)?,
-            target: TargetReader::open(context)?,
             runner,
             latest_ranges: None,
             latest_contact: None,
@@ -73,9 +70,7 @@ impl Process for Shell {
             let ranges = self.ranges_of(pose.stamp.tick)?;
             self.runner.out.at = Progress::of(&pose.stamp);
             let contact = self.contact_of(pose.stamp.tick)?;
-            let target = self.target.next(pose.stamp.tick)?.map(|sample| sample.target.position());
-            let target = target.filter(|target| *target != self.runner.stage.target());
-            self.step(Input::Tick { pose, ranges, contact, target })?;
+            self.step(Input::Tick { pose, ranges, contact })?;
         }
         if let Some(DirectiveSample { epoch, .. }) = self.directive.newest()?
             && self.step(Input::Reset { epoch })?

@@ -15,11 +15,10 @@ use crate::{
     error::{SupervisorError, system},
     last_resort::{self, Turns},
     observer::Record,
-    outcome::{Ending, Wheels, allowed_m},
+    outcome::{Ending, Wheels},
     progress::Progress,
     shutdown,
     supervisor::{Options, Supervisor},
-    target_list::{self, TargetResult},
 };
 
 /// The result of a run.
@@ -45,8 +44,6 @@ pub struct Finished {
     pub replans: u32,
     /// Times the sensed map was reset.
     pub resets: u64,
-    /// All targets, in the order in which the robot was sent to them.
-    pub targets: Vec<TargetResult>,
 }
 
 /// A robot that could not be stopped. Its link goes on telling it to stand, by each method of the protocol in turn.
@@ -108,10 +105,7 @@ pub fn run<'a>(
     let deadline = supervisor.deadline();
     let simulator = supervisor.robot.simulator.as_ref();
     let mut truth = simulator.map_or_else(Vec::new, |simulator| simulator.truth().to_vec());
-    let mut record = std::mem::take(&mut supervisor.bus.observer.record);
-    let mut targets = supervisor.targets.clone();
-    targets.compare(&record, &truth, allowed_m(&options.mission));
-    record.arrival.take_if(|_| !targets.is_last());
+    let record = std::mem::take(&mut supervisor.bus.observer.record);
     let decided = decisive::first(
         ending,
         &record,
@@ -121,11 +115,7 @@ pub fn run<'a>(
     );
     let (replans, resets) = supervisor.stall_watch.recoveries(decided.last_tick);
     truth.truncate(decided.truth_ticks);
-    let (ended, at_rest) = (truth.last(), record.pose.as_ref());
-    let place = targets.current().position();
-    let ending = decided.ending.checked(&options.mission, place, ended, at_rest);
-    let targets = targets.results(&ending, decided.last_tick, record.arrival.as_ref(), ended);
-    let ending = target_list::of_all(ending, &targets);
+    let ending = decided.ending.checked(&options.mission, truth.last(), record.pose.as_ref());
     let finished = Finished {
         duration_s: supervisor.clock.duration_s(decided.last_tick, &record, &truth),
         ending: ending.with(wheels),
@@ -137,7 +127,6 @@ pub fn run<'a>(
         resumes: supervisor.state_file.state.resumes,
         replans,
         resets,
-        targets,
     };
     let still_moving =
         (wheels == Wheels::Turning).then_some(StillMoving { supervisor, signals, _lock: lock });

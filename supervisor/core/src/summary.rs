@@ -7,12 +7,7 @@ use common::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    Finished,
-    outcome::Outcome,
-    target_list::{TargetOutcome, TargetResult},
-    totals::LookTotals,
-};
+use crate::{Finished, outcome::Outcome, totals::LookTotals};
 
 /// Quantiles of a duration, microseconds; none if nothing was measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -79,9 +74,6 @@ pub struct Summary {
     pub replans: u32,
     /// Times the sensed part of the map was reset.
     pub resets: u64,
-    /// The targets, in the order in which the robot was sent to them.
-    #[serde(default)]
-    pub targets: Vec<TargetResult>,
     /// Time from the datagram in to the datagram out.
     pub tick_latency_us: Quantiles,
     pub full_solve_us: Quantiles,
@@ -112,7 +104,7 @@ impl Summary {
                 Some(_) if *resumes == 0 => path_length(truth),
                 _ => pose.map_or(0.0, |pose| pose.travelled_m),
             },
-            straight_m: straight_m(&finished.targets),
+            straight_m: mission.target.length(),
             min_clearance_m: clearance
                 .filter(|&clearance| clearance < GroundTruthTick::NOTHING_NEAR),
             collisions,
@@ -122,11 +114,9 @@ impl Summary {
             }),
             pose_error_expected_m: pose.map(PoseSample::position_rms_m),
             pose_within_m: pose.map(PoseSample::position_within_m),
-            true_distance_m: truth.last().and_then(|tick| {
-                let tried = |it: &&TargetResult| it.outcome != TargetOutcome::NotTried;
-                let last = finished.targets.iter().rfind(tried)?;
-                Some((tick.x - last.x_m).hypot(tick.y - last.y_m))
-            }),
+            true_distance_m: truth
+                .last()
+                .map(|tick| (tick.x - mission.target.x).hypot(tick.y - mission.target.y)),
             departed_s: truth
                 .iter()
                 .find(|tick| tick.x.hypot(tick.y) >= DEPARTED_M)
@@ -146,7 +136,6 @@ impl Summary {
             resumes: *resumes,
             replans: finished.replans,
             resets: finished.resets,
-            targets: finished.targets.clone(),
             tick_latency_us: (&record.latency()).into(),
             full_solve_us: (&record.full_solves).into(),
         }
@@ -220,17 +209,6 @@ impl fmt::Display for Summary {
         }
         Ok(())
     }
-}
-
-/// The length of the straight lines from the start to each target in turn, without those that were replaced, metres.
-fn straight_m(targets: &[TargetResult]) -> f64 {
-    let mut here = [0.0, 0.0];
-    let counted = targets.iter().filter(|target| target.outcome != TargetOutcome::Replaced);
-    let legs = counted.map(|target| {
-        let [x, y] = std::mem::replace(&mut here, [target.x_m, target.y_m]);
-        (target.x_m - x).hypot(target.y_m - y)
-    });
-    legs.sum()
 }
 
 fn path_length(truth: &[GroundTruthTick]) -> f64 {

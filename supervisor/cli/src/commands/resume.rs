@@ -3,9 +3,7 @@
 use clap::Args;
 use common::domain::RobotName;
 
-use supervisor::operator;
-
-use crate::console::failure::Failure;
+use crate::console::{failure::Failure, operator};
 
 /// Let a stopped robot go on.
 #[derive(Debug, Args)]
@@ -16,5 +14,5 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
-    Ok(operator::resume(&arguments.robot)?)
+    operator::resume(&arguments.robot)
 }

@@ -1,7 +1,10 @@
 //! `firsthand stop`.
 
 use clap::Args;
-use common::domain::{Domain, RobotName};
+use common::{
+    domain::{Domain, RobotName},
+    samples::RequestKind,
+};
 
 use crate::console::{failure::Failure, operator};
 
@@ -27,7 +30,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
         return Ok(());
     }
     if arguments.through_supervisor {
-        return Ok(supervisor::operator::request_stop(&arguments.robot)?);
+        return operator::ask(&arguments.robot, RequestKind::Stop, "");
     }
     operator::stand(&arguments.robot)
 }

@@ -4,7 +4,7 @@ use std::fmt::Debug;
 
 use common::{
     mission::{Method, Mission},
-    samples::{GridHeader, GuidanceSample, GuidanceStatus, PoseSample, TargetSample},
+    samples::{GridHeader, GuidanceSample, GuidanceStatus, PoseSample},
 };
 use glam::DVec2;
 use serde::{Serialize, de::DeserializeOwned};
@@ -43,8 +43,8 @@ impl Way {
 /// A planner on a copy of the map.
 #[derive(Debug)]
 pub struct Baseline<P> {
-    /// Where the robot is sent; none before the supervisor has said so.
-    target: Option<TargetSample>,
+    /// X_T, metres.
+    target: DVec2,
     looks_around: bool,
     belief: Belief,
     pub planner: P,
@@ -54,7 +54,7 @@ impl<P: Planner> Baseline<P> {
     /// For the robot of `mission`, without a map.
     pub fn new(mission: &Mission) -> Self {
         Self {
-            target: None,
+            target: mission.target,
             looks_around: mission.method == Method::Evidential,
             belief: Belief::default(),
             planner: P::default(),
@@ -66,19 +66,12 @@ impl<P: Planner> Baseline<P> {
         self.belief.follow(header, cells)
     }
 
-    /// The robot is sent to `target`. On the way to another one the planner begins anew.
-    pub fn send_to(&mut self, target: TargetSample) {
-        if self.target.replace(target).is_some() {
-            self.planner = P::default();
-        }
-    }
-
     /// The guidance for the pose of `sample`.
     pub fn guidance(&mut self, sample: &PoseSample) -> GuidanceSample {
         let here = sample.pose().position;
-        let way = match (self.belief.map(), &self.target) {
-            (Some(map), Some(sample)) => self.planner.way(&map, here, sample.target.position()),
-            _ => Way::Unknown,
+        let way = match self.belief.map() {
+            Some(map) => self.planner.way(&map, here, self.target),
+            None => Way::Unknown,
         };
         self.along(way, sample)
     }
@@ -87,6 +80,7 @@ impl<P: Planner> Baseline<P> {
     fn along(&self, way: Way, sample: &PoseSample) -> GuidanceSample {
         let belief = self.belief.header();
         let pose = sample.pose();
+        let to_target = self.target - pose.position;
         // A robot that stands on the point keeps its heading.
         let toward = |point: DVec2| (point - pose.position).normalize_or(pose.axis());
         let (status, direction, limit) = match way {
@@ -102,10 +96,11 @@ impl<P: Planner> Baseline<P> {
         GuidanceSample {
             ex: direction.x,
             ey: direction.y,
+            distance_m: to_target.length(),
             speed_limit_m_s: limit,
             status: status.into(),
             grid_version: belief.part.version,
-            ..GuidanceSample::for_pose(sample, belief, &self.target.unwrap_or_default())
+            ..GuidanceSample::for_pose(sample, belief)
         }
     }
 }
@@ -114,13 +109,13 @@ impl<P: Planner> Baseline<P> {
 mod tests {
     use super::*;
     use crate::baselines::{
-        testing::{pose, sent},
+        testing::{mission, pose},
         wavefront::Wavefront,
     };
 
     #[test]
     fn a_robot_without_a_way_is_told_so_and_looks_around() {
-        let baseline = sent::<Wavefront>([1.0, 0.0]);
+        let baseline = Baseline::<Wavefront>::new(&mission([1.0, 0.0]));
         let guidance = baseline.along(Way::None, &pose([0.0, 0.0]));
         assert_eq!(guidance.status, u8::from(GuidanceStatus::Unreachable));
         assert_eq!((guidance.ex, guidance.ey), (0.0, 1.0));
@@ -128,7 +123,7 @@ mod tests {
 
     #[test]
     fn without_a_map_the_robot_waits() {
-        let guidance = sent::<Wavefront>([0.3, 0.0]).guidance(&pose([0.0, 0.0]));
+        let guidance = Baseline::<Wavefront>::new(&mission([0.3, 0.0])).guidance(&pose([0.0, 0.0]));
         assert_eq!(guidance.status, u8::from(GuidanceStatus::Waiting));
     }
 }

@@ -5,10 +5,9 @@ use std::process::ExitCode;
 use common::{
     bus::{Reader, SliceReader, Writer},
     grid::{Applied, CellState, Replica},
-    samples::{GridHeader, GuidanceSample, GuidanceStatus, PoseSample, TargetSample},
+    samples::{GridHeader, GuidanceSample, GuidanceStatus, PoseSample},
     shell::{self, Context, Process, Progress, StageError},
-    target::TargetReader,
-    topics::{GRID, GUIDANCE, POSE, TARGET},
+    topics::{GRID, GUIDANCE, POSE},
     wiring::Wiring,
 };
 use glam::DVec2;
@@ -20,8 +19,7 @@ struct Planner {
     grid: SliceReader<GridHeader, u8>,
     pose: Reader<PoseSample>,
     guidance: Writer<GuidanceSample>,
-    followed: TargetReader,
-    target: TargetSample,
+    target: DVec2,
     map: Replica<u8>,
     latest: Option<PoseSample>,
     progress: Progress,
@@ -29,7 +27,7 @@ struct Planner {
 
 impl Process for Planner {
     const WIRING: &'static Wiring = &Wiring {
-        inputs: &[&POSE, &GRID, &TARGET],
+        inputs: &[&POSE, &GRID],
         wakes: &[&GRID],
         outputs: &[&GUIDANCE],
         ..Wiring::of("planner")
@@ -40,8 +38,7 @@ impl Process for Planner {
             grid: context.slice_reader(&GRID)?,
             pose: context.reader(&POSE)?,
             guidance: context.writer(&GUIDANCE)?,
-            followed: TargetReader::open(context)?,
-            target: TargetSample::default(),
+            target: context.run.mission.target,
             map: Replica::default(),
             latest: None,
             progress: Progress::default(),
@@ -58,7 +55,6 @@ impl Process for Planner {
             self.progress = Progress { tick, time };
             // The pose of a tick is published before its grid.
             self.latest = self.pose.newest()?.or(self.latest);
-            self.target = self.followed.next(tick)?.unwrap_or(self.target);
             if let Some(pose) = self.latest.take_if(|pose| pose.stamp.tick == tick) {
                 let guidance = self.guide(&pose, &header);
                 self.guidance.publish(tick, time, guidance)?;
@@ -71,7 +67,7 @@ impl Process for Planner {
 impl Planner {
     fn guide(&self, pose: &PoseSample, header: &GridHeader) -> GuidanceSample {
         let here = pose.pose().position;
-        let to_target = self.target.target.position() - here;
+        let to_target = self.target - here;
         let direction = to_target.normalize_or(DVec2::X);
         let ahead = AHEAD_M.min(to_target.length()) / 10.0;
         let mut points = (1..=10).map(|step| here + direction * ahead * f64::from(step));
@@ -82,10 +78,17 @@ impl Planner {
         GuidanceSample {
             ex: direction.x,
             ey: direction.y,
+            distance_m: to_target.length(),
             speed_limit_m_s: f64::INFINITY,
             status: status.into(),
+            pose_ns: pose.stamp.stamp_ns,
+            x_m: pose.x_m,
+            y_m: pose.y_m,
+            heading_rad: pose.heading_rad,
             grid_version: header.part.version,
-            ..GuidanceSample::for_pose(pose, header, &self.target)
+            safety_events: header.safety_events,
+            epoch: header.epoch,
+            ..GuidanceSample::default()
         }
     }
 

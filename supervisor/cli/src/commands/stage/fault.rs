@@ -14,11 +14,9 @@ use common::{
     waiter::Waiter,
 };
 
-use supervisor::operator::{PATIENCE, find, new_id};
-
 use crate::console::{
     failure::{Failure, Refused},
-    operator::known,
+    operator::{PATIENCE, find, known, new_id},
 };
 
 /// Break something in a running stage on purpose, to see what the others do.

@@ -5,9 +5,8 @@ use std::{
     thread::{self, JoinHandle},
 };
 
-use common::domain::RobotName;
+use common::{domain::RobotName, samples::RequestKind};
 use rustix::process::Signal;
-use supervisor::operator as requests;
 
 use crate::console::operator;
 
@@ -38,9 +37,9 @@ impl Action {
             Self::Kill => operator::send(robot, stage, Signal::KILL),
             Self::Freeze => operator::send(robot, stage, Signal::STOP),
             Self::Thaw => operator::send(robot, stage, Signal::CONT),
-            Self::Restart => requests::restart(robot, stage).map_err(Into::into),
+            Self::Restart => operator::ask(robot, RequestKind::Restart, stage),
             Self::Stop => operator::stand(robot),
-            Self::Resume => requests::resume(robot).map_err(Into::into),
+            Self::Resume => operator::resume(robot),
         };
         done.map_err(|error| error.to_string())
     }
