@@ -55,7 +55,7 @@ pub enum CheckpointError {
 /// "firsthand checkpoint", before the version.
 const MAGIC: [u8; 3] = *b"FHC";
 /// The version of the states of all processes. Raise it when the encoding of one of them changes.
-const VERSION: u8 = b'2';
+const VERSION: u8 = b'3';
 /// magic u32, sequence u64, length u32, crc32 u32.
 const HEADER: usize = 20;
 
@@ -316,7 +316,7 @@ mod tests {
         bytes[slot + 3] = b'1';
         std::fs::write(&path, bytes).unwrap();
         let refused = Checkpoint::open::<Vec<u32>>(&path, CAPACITY).unwrap_err().to_string();
-        assert!(refused.contains("version 1, not 2"), "{refused}");
+        assert!(refused.contains("version 1, not 3"), "{refused}");
     }
 
     #[test]

@@ -13,7 +13,6 @@
 //! | [`ground_truth`] | what a simulated robot writes about itself |
 //! | [`signals`] | signals as something to wait for |
 //! | [`checkpoint`], [`journal`] | state that outlives a SIGKILL: small, and large with few changes |
-//! | [`process_status`], [`process_usage`] | what the kernel says of a process; its processor and memory |
 //! | [`samples`] | the payloads of the topics |
 //! | [`topics`] | THE table of topics |
 //! | [`faults`] | THE table of what can be broken in a stage on purpose |
@@ -25,6 +24,7 @@
 //! | [`wiring`] | what a stage's process opens and persists, declared |
 //! | [`stop_socket`] | the operator's stop without middleware |
 //! | [`shell`] | the process shell every stage runs in |
+//! | [`target`] | the target, as a stage follows it |
 //! | [`step`] | what a stage computes: the trait of every stage's pure step |
 //! | [`inputs`], [`replay`] | the inputs of every step, published; their replay |
 //! | [`outputs`], [`stage`] | where a stage's outputs go; its runner: process and replay of every stage, once |
@@ -42,7 +42,6 @@ pub mod latency;
 pub mod latency_budget;
 pub mod outputs;
 pub mod process_status;
-pub mod process_usage;
 pub mod replay;
 pub mod roster;
 pub mod run;
@@ -55,6 +54,7 @@ pub mod stage_command;
 pub mod start;
 pub mod step;
 pub mod stop_socket;
+pub mod target;
 pub mod topics;
 pub mod wiring;
 

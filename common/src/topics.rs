@@ -59,6 +59,10 @@ macro_rules! topics {
 }
 
 topics! {
+    /// Where the robot is sent: the current target, and those after it.
+    TARGET: Topic<TargetSample> {
+        name: "target", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::SMALL, logged: Yes,
+    }
     /// Readings of the sonars and infrared rangers, one for each row of the mission's sensors.
     RANGES: SliceTopic<RangesHeader, RangeReading> {
         name: "ranges", writer: "x80-link", rate: Rate::EachTick, limits: Limits::slices(MOST_SENSORS), logged: Yes,
@@ -139,7 +143,7 @@ topics! {
     STALLS: Topic<StallSample> {
         name: "stalls", writer: SUPERVISOR, rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
     }
-    /// Requests of an operator: restart, stop, resume.
+    /// Requests of an operator: restart, stop, resume, targets.
     REQUESTS: Topic<RequestSample> {
         name: "requests", writer: OPERATOR, rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
     }

@@ -172,6 +172,68 @@ wire_enum! {
     }
 }
 
+/// A place where a robot is sent.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ZeroCopySend)]
+#[type_name("firsthand.TargetPoint")]
+#[repr(C)]
+pub struct TargetPoint {
+    /// X_T, metres in the mission frame.
+    pub x_m: f64,
+    /// X_T, metres in the mission frame.
+    pub y_m: f64,
+    /// The heading to turn to there, radians counter-clockwise from x.
+    pub heading_rad: f64,
+    /// 1: the robot has arrived when it also faces `heading_rad`. 0: any heading will do.
+    pub has_heading: u8,
+}
+
+impl TargetPoint {
+    /// A place, at any heading.
+    pub fn at(place: DVec2) -> Self {
+        Self { x_m: place.x, y_m: place.y, ..Self::default() }
+    }
+
+    pub const fn position(&self) -> DVec2 {
+        DVec2::new(self.x_m, self.y_m)
+    }
+
+    /// The heading to turn to there, radians.
+    pub fn heading(&self) -> Option<f64> {
+        (self.has_heading == 1).then_some(self.heading_rad)
+    }
+}
+
+/// How many targets a list has at most.
+pub const MOST_TARGETS: usize = 16;
+
+payloads! {
+    /// Topic `target`: where the robot is sent.
+    "firsthand.Target" TargetSample {
+        /// The number of this target in the run, from 1. A target that replaces another has a number of its own.
+        number: u64,
+        /// The number of the last target of the list.
+        last: u64,
+        /// The first tick in which it holds. A stage that knows no other target takes it at once.
+        since_tick: u64,
+        target: TargetPoint,
+        /// The targets after this one. The first `last - number` count.
+        ahead: [TargetPoint; MOST_TARGETS],
+    }
+}
+
+impl TargetSample {
+    /// The first target of `mission`.
+    pub fn first(mission: &Mission) -> Self {
+        Self { number: 1, last: 1, target: TargetPoint::at(mission.target), ..Self::default() }
+    }
+
+    /// The targets after this one.
+    pub fn ahead(&self) -> &[TargetPoint] {
+        let count = usize::try_from(self.last.saturating_sub(self.number)).unwrap_or(MOST_TARGETS);
+        &self.ahead[..count.min(MOST_TARGETS)]
+    }
+}
+
 payloads! {
     /// Topic `guidance`: E of (11) at the robot's pose.
     "firsthand.Guidance" GuidanceSample {
@@ -203,13 +265,19 @@ payloads! {
         full_solves: u64,
         /// Wall-clock of the last full solve, nanoseconds.
         full_solve_ns: u64,
+        /// The number of the target that it leads to; 0 for none.
+        target_number: u64,
+        target: TargetPoint,
     }
 }
 
 impl GuidanceSample {
-    /// No direction yet, for the pose `pose` by the belief `belief`.
-    pub fn for_pose(pose: &PoseSample, belief: &GridHeader) -> Self {
+    /// No direction yet, for the pose `pose` by the belief `belief`; `target` is where the robot is sent.
+    pub fn for_pose(pose: &PoseSample, belief: &GridHeader, target: &TargetSample) -> Self {
         Self {
+            target_number: target.number,
+            target: target.target,
+            distance_m: target.target.position().distance(pose.pose().position),
             pose_ns: pose.stamp.stamp_ns,
             x_m: pose.x_m,
             y_m: pose.y_m,
@@ -263,7 +331,7 @@ wire_enum! {
         Halt = 0,
         /// Following the guidance.
         Driving = 1,
-        /// The target is reached: stand for good.
+        /// The target is reached: stand until there is another.
         Arrived = 2,
     }
 }
@@ -286,12 +354,15 @@ payloads! {
         pose_ns: u64,
         /// Mission time of the guidance it follows, nanoseconds. The link checks its age, too.
         guidance_ns: u64,
+        /// The number of the target that it leads to, or that is reached.
+        target_number: u64,
         /// A [`CommandState`].
         state: u8,
     }
 }
 
 layouts! {
+    TargetPoint { x_m y_m heading_rad has_heading }
     ClearBeam { x_m y_m bearing_rad clear_m }
     GridHeader { stamp part safety_events epoch clear_beam_count clear_beams clear_ray_count clear_rays }
     FieldCell { ex ey log2_u }

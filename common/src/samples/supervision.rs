@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize, Serializer, ser::SerializeStruct as _};
 
+use super::navigation::{MOST_TARGETS, TargetPoint};
 use crate::bus::{ZeroCopySend, layouts};
 
 wire_enum! {
@@ -86,6 +87,8 @@ payloads! {
         holds_from_tick: u64,
         /// The belief's epoch since then.
         epoch: u64,
+        /// The number of the current target: no tick follows an arrival before the next target is published.
+        target_number: u64,
     }
 }
 
@@ -134,8 +137,10 @@ payloads! {
         reason: u8,
         /// 1: the robot is a simulated one.
         simulated: u8,
-        /// The request that was taken last; 0 for none.
+        /// The request that was answered last; 0 for none.
         last_request: u64,
+        /// Its answer: a [`RequestAnswer`].
+        answer: u8,
     }
 }
 
@@ -352,6 +357,36 @@ wire_enum! {
         Stop = 2,
         /// The robot is to go on.
         Resume = 3,
+        /// The robot is to go to these targets, and no longer to those that it has.
+        Goto = 4,
+        /// The robot is to go to these targets after those that it has.
+        Append = 5,
+    }
+}
+
+wire_enum! {
+    /// The supervisor's answer to a request. Each text completes "the supervisor refuses: ".
+    RequestAnswer, unknown = Unknown, text = text {
+        /// It is carried out.
+        Taken = 0 "it is not refused",
+        /// No such request.
+        Unknown = 1 "it knows no such request; are both of the same version?",
+        /// The mission does not run.
+        NotRunning = 2 "the mission has not begun, or ends; wait until `firsthand status` says driving",
+        /// An operator stopped the robot.
+        Stopped = 3 "an operator stopped the robot; `firsthand resume` first",
+        /// No list of targets.
+        Malformed = 4 "a target is no place; give 1 to 16 places of finite numbers, metres",
+        /// Too many targets.
+        TooMany = 5 "a list has at most 16 targets; wait until some are reached",
+        /// A target is not inside the perimeter.
+        Outside = 6 "a target is outside the perimeter, or on its rim; name a place inside",
+        /// A target is in a believed hazard.
+        InHazard = 7 "a target is in a believed hazard; name a free place (`firsthand top` shows them)",
+        /// A car does not turn on the spot.
+        NoHeading = 8 "a car does not turn on the spot, so its targets have no heading; leave it out",
+        /// The planner goes where it calibrates.
+        FixedTarget = 9 "a calibration drives where it must; wait until it ends",
     }
 }
 
@@ -364,6 +399,16 @@ payloads! {
         stage: Name,
         /// A [`RequestKind`].
         kind: u8,
+        /// How many of `targets` count.
+        target_count: u8,
+        targets: [TargetPoint; MOST_TARGETS],
+    }
+}
+
+impl RequestSample {
+    /// The targets; none if their number cannot be.
+    pub fn targets(&self) -> Option<&[TargetPoint]> {
+        self.targets.get(..usize::from(self.target_count)).filter(|targets| !targets.is_empty())
     }
 }
 

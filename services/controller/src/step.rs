@@ -4,6 +4,7 @@ mod car;
 
 use common::{
     clock::MissionTime,
+    geometry::wrap_angle,
     kinematics::{Drive, FACES_COSINE, LEAST_SPEED_M_S, Twist},
     mission::{Method, Mission},
     samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus},
@@ -18,6 +19,9 @@ const TURN_GAIN: f64 = 3.0;
 
 /// A robot farther than this from its target has not arrived beside it, whatever the planner says, metres.
 const MOST_OFF_TARGET_M: f64 = 0.5;
+
+/// A robot that is to face a heading faces it within this angle.
+const FACES_WITHIN_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
 
 /// The alignment of the robot with the guidance: (14), with the heading in place of the measured velocity. The velocity has no
 /// direction at rest, where every mission starts.
@@ -51,7 +55,6 @@ enum SpeedLaw {
 #[derive(Clone, Debug)]
 pub struct Controller {
     drive: Drive,
-    target: DVec2,
     tolerance: f64,
     speed: f64,
     turn: f64,
@@ -67,7 +70,8 @@ pub struct Controller {
     law: SpeedLaw,
     /// The direction in which an antipodal robot turns: 1 to the left, -1 to the right.
     side: f64,
-    arrived: bool,
+    /// The number of the target that it has come to, and whether it has also turned to the heading that is asked for there.
+    reached: Option<(u64, bool)>,
 }
 
 impl Step for Controller {
@@ -81,7 +85,6 @@ impl Step for Controller {
         let (settings, hurry) = (&mission.controller, mission.hurry());
         Self {
             drive: body.drive(),
-            target: mission.target,
             tolerance: mission.arrival_tolerance_m,
             speed: mission.speed_m_s(),
             turn: mission.turn_rad_s(),
@@ -97,7 +100,7 @@ impl Step for Controller {
                 Method::Evidential => SpeedLaw::Evidential,
             },
             side: 1.0,
-            arrived: false,
+            reached: None,
         }
     }
 
@@ -112,25 +115,29 @@ impl Step for Controller {
     /// The command under `guidance`, for the pose it was computed for.
     fn step(&mut self, guidance: &GuidanceSample, _: MissionTime) -> CommandSample {
         let pose = guidance.pose();
-        let distance = pose.position.distance(self.target);
-        // The arrival is latched, so that a robot at rest on the edge of the circle does not start again because of one count. A robot
-        // beside a target that is not free has arrived too, if the planner says that it is as near as it can be.
-        let status = GuidanceStatus::from_byte(guidance.status);
-        self.arrived |= distance <= self.tolerance
-            || status == GuidanceStatus::AtTarget && distance <= MOST_OFF_TARGET_M;
+        let distance = pose.position.distance(guidance.target.position());
         let command = CommandSample {
             distance_m: distance,
             pose_ns: guidance.pose_ns,
             guidance_ns: guidance.stamp.stamp_ns,
+            target_number: guidance.target_number,
             ..CommandSample::default()
         };
-        if self.arrived {
+        let reached = self.reaches(guidance, distance);
+        if reached == Some(true) {
             return CommandSample { state: CommandState::Arrived.into(), ..command };
         }
-        let direction = DVec2::new(guidance.ex, guidance.ey);
+        let (status, direction) = match guidance.target.heading().filter(|_| reached.is_some()) {
+            Some(heading) => (GuidanceStatus::Look, DVec2::from_angle(heading)),
+            None => {
+                let direction = DVec2::new(guidance.ex, guidance.ey);
+                (GuidanceStatus::from_byte(guidance.status), direction)
+            }
+        };
         // Shared memory is outside too: only a direction is followed.
         let unit = (direction.length() - 1.0).abs() < 1e-3;
-        let sane = unit && distance.is_finite() && pose.heading.is_finite();
+        let is_sent = guidance.target_number != 0;
+        let sane = is_sent && unit && distance.is_finite() && pose.heading.is_finite();
         let alignment = Alignment::of(pose.axis(), direction);
         let twist = if sane {
             self.motion(status, alignment, distance, guidance.speed_limit_m_s)
@@ -153,6 +160,25 @@ impl Step for Controller {
 }
 
 impl Controller {
+    /// Whether the robot has arrived, or only has to turn to the heading that is asked for there; none if it is on its way.
+    fn reaches(&mut self, guidance: &GuidanceSample, distance: f64) -> Option<bool> {
+        let number = guidance.target_number;
+        // The arrival is latched, so that a robot at rest on the edge of the circle does not start again because of one count. A robot
+        // beside a target that is not free has arrived too, if the planner says that it is as near as it can be.
+        self.reached.take_if(|(of, _)| *of != number);
+        let beside = GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::AtTarget;
+        let is_there = distance <= self.tolerance || beside && distance <= MOST_OFF_TARGET_M;
+        if self.reached.is_none() && !(is_there && number != 0) {
+            return None;
+        }
+        let faces = guidance.target.heading().is_none_or(|heading| {
+            wrap_angle(heading - guidance.heading_rad).abs() <= FACES_WITHIN_RAD
+        });
+        let (_, faced) = self.reached.get_or_insert((number, false));
+        *faced |= faces;
+        Some(*faced)
+    }
+
     /// The motion under guidance of that status; none to stand.
     fn motion(
         &mut self,

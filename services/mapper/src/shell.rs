@@ -1,4 +1,4 @@
-//! `pose`, `ranges` and `directive` in, `grid` out: a window for each change, a keyframe for each new reader and now and
+//! `pose`, `ranges`, `target` and `directive` in, `grid` out: a window for each change, a keyframe for each new reader and now and
 //! then, nothing but a stamp otherwise, so that every tick goes on to the planner.
 
 use std::time::Duration;
@@ -12,7 +12,8 @@ use common::{
     stage::Runner,
     start::StageError,
     step::Step as _,
-    topics::{CONTACT, DIRECTIVE, GRID, HEALTH, POSE, RANGES},
+    target::TargetReader,
+    topics::{CONTACT, DIRECTIVE, GRID, HEALTH, POSE, RANGES, TARGET},
     wiring::{Persists, Wiring},
 };
 
@@ -30,6 +31,7 @@ pub struct Shell {
     ranges: SliceReader<RangesHeader, RangeReading>,
     contact: Reader<ContactSample>,
     directive: Reader<DirectiveSample>,
+    target: TargetReader,
     runner: Runner<Mapper>,
     /// The newest readings that are used, and their tick.
     latest_ranges: Option<(u64, Vec<RangeReading>)>,
@@ -39,7 +41,7 @@ pub struct Shell {
 
 impl Process for Shell {
     const WIRING: &'static Wiring = &Wiring {
-        inputs: &[&RANGES, &CONTACT, &POSE, &DIRECTIVE],
+        inputs: &[&RANGES, &CONTACT, &POSE, &DIRECTIVE, &TARGET],
         // A planner that becomes ready is a new reader of the grid.
         wakes: &[&POSE, &DIRECTIVE, &HEALTH],
         outputs: &[&GRID],
@@ -58,6 +60,7 @@ impl Process for Shell {
             ranges: context.slice_reader(&RANGES)?,
             contact: context.reader(&CONTACT)?,
             directive: context.reader(&DIRECTIVE)?,
+            target: TargetReader::open(context)?,
             runner,
             latest_ranges: None,
             latest_contact: None,
@@ -70,7 +73,9 @@ impl Process for Shell {
             let ranges = self.ranges_of(pose.stamp.tick)?;
             self.runner.out.at = Progress::of(&pose.stamp);
             let contact = self.contact_of(pose.stamp.tick)?;
-            self.step(Input::Tick { pose, ranges, contact })?;
+            let target = self.target.next(pose.stamp.tick)?.map(|sample| sample.target.position());
+            let target = target.filter(|target| *target != self.runner.stage.target());
+            self.step(Input::Tick { pose, ranges, contact, target })?;
         }
         if let Some(DirectiveSample { epoch, .. }) = self.directive.newest()?
             && self.step(Input::Reset { epoch })?

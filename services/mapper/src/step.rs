@@ -5,6 +5,7 @@
 
 use common::{
     clock::MissionTime,
+    geometry::Shapes,
     grid::{Cell, CellState, GridFrame, Part, Window},
     kinematics::Pose2,
     mission::{Method, Mission},
@@ -31,6 +32,8 @@ pub enum Input {
         ranges: Vec<RangeReading>,
         /// Where something holds the wheels at this tick.
         contact: Option<ContactSample>,
+        /// The target that holds from this tick on, metres; none if it is the one before.
+        target: Option<DVec2>,
     },
     /// The supervisor's reset of the sensed belief.
     Reset {
@@ -84,6 +87,8 @@ pub struct Belief {
     sensed: Sensed,
     /// The injected fault.
     fault: FaultKind,
+    /// The target, metres.
+    target: DVec2,
 }
 
 impl Belief {
@@ -105,8 +110,10 @@ impl Belief {
 #[derive(Clone, Debug)]
 pub struct Mapper {
     frame: GridFrame,
-    target_m: DVec2,
+    /// The target's cell.
     target: Option<Cell>,
+    /// The shapes that the mission knows, and how far around them cells are hazard, metres.
+    known: (Shapes, f64),
     /// The paper's Im of (19).
     margin: u32,
     evidential: Evidential,
@@ -135,8 +142,8 @@ impl Step for Mapper {
         };
         let mut mapper = Self {
             frame,
-            target_m: mission.target,
             target: frame.cell_at(mission.target),
+            known: (mission.known.clone(), reach),
             margin,
             evidential,
             sensing: mission.sensing,
@@ -155,9 +162,10 @@ impl Step for Mapper {
                 rolled: 0.0,
                 sensed,
                 fault: FaultKind::Nothing,
+                target: mission.target,
             },
         };
-        mapper.mark_known(mission, reach);
+        mapper.mark_known();
         mapper
     }
 
@@ -174,14 +182,16 @@ impl Step for Mapper {
         if belief.cells.len() != self.frame.area() {
             return Err(ForeignState);
         }
+        self.target = self.frame.cell_at(belief.target);
         self.belief = belief;
         Ok(())
     }
 
     fn step(&mut self, input: Input, _: MissionTime) -> Change {
         match input {
-            Input::Tick { pose, ranges, contact } => {
-                Change::Window(self.map(&pose, &ranges, contact.as_ref()))
+            Input::Tick { pose, ranges, contact, target } => {
+                let moved = target.map_or(Window::default(), |target| self.move_target(target));
+                Change::Window(self.map(&pose, &ranges, contact.as_ref(), moved))
             }
             Input::Reset { epoch } if self.reset_belief(epoch) => Change::Whole,
             Input::Reset { .. } => Change::None,
@@ -203,13 +213,18 @@ impl Mapper {
         self.frame
     }
 
+    /// The target that holds, metres.
+    pub const fn target(&self) -> DVec2 {
+        self.belief.target
+    }
+
     /// Upper bound of an encoded belief, bytes.
     pub const fn saved_bytes(&self) -> usize {
         let evidence = match self.belief.sensed {
             Sensed::Hits => 0,
             Sensed::Evidence(_) => self.evidential.saved_bytes(),
         };
-        self.frame.area() + evidence + 128
+        self.frame.area() + evidence + 160
     }
 
     /// The header of a `grid` sample with `part` of this belief.
@@ -227,10 +242,11 @@ impl Mapper {
     }
 
     /// Mark the perimeter, and every cell within `reach` metres of a shape that the mission knows.
-    fn mark_known(&mut self, mission: &Mission, reach: f64) {
-        let frame = self.frame;
+    fn mark_known(&mut self) {
+        let (frame, (known, reach)) = (self.frame, &self.known);
+        let reach = *reach;
         let last = f64::from(frame.cells) - 1.0;
-        for piece in mission.known.pieces() {
+        for piece in known.pieces() {
             let (least, greatest) = piece.bounds();
             let inside = |corner: DVec2| corner.clamp(DVec2::ZERO, DVec2::splat(last));
             let from = inside(frame.to_cells(least - reach).floor());
@@ -253,16 +269,50 @@ impl Mapper {
         }
     }
 
-    /// Map the readings taken at `pose`, and the contact of that tick. Returns the window that changed, empty for none. A tick given
-    /// twice is mapped once.
+    /// The robot is sent to `target`: its cell is no hazard from now on, and that of the target before may be one again. Returns
+    /// the window that changed.
+    fn move_target(&mut self, target: DVec2) -> Window {
+        self.belief.target = target;
+        let cell = self.frame.cell_at(target).filter(|cell| !self.frame.is_rim(*cell));
+        let before = std::mem::replace(&mut self.target, cell);
+        let mut changed = Window::default();
+        for cell in [before, cell].into_iter().flatten() {
+            let state = self.state_for_target(cell) as u8;
+            let held = &mut self.belief.cells[self.frame.index(cell)];
+            if *held != state {
+                *held = state;
+                changed = changed.including(cell);
+            }
+        }
+        changed
+    }
+
+    /// The state of a cell by the target, the known shapes and the evidence. The paper's method has no record of hits but its map.
+    fn state_for_target(&self, cell: Cell) -> CellState {
+        let (known, reach) = &self.known;
+        let is_target = Some(cell) == self.target;
+        if !is_target && known.clearance(self.frame.centre_of(cell)) <= *reach {
+            return CellState::Known;
+        }
+        match &self.belief.sensed {
+            Sensed::Hits if is_target => CellState::Free,
+            Sensed::Hits => CellState::from_byte(self.belief.cells[self.frame.index(cell)]),
+            Sensed::Evidence(map) => self.evidential.state(map, cell, is_target),
+        }
+    }
+
+    /// Map the readings taken at `pose`, and the contact of that tick. Returns the window that changed with what already `changed`, empty
+    /// for none. A tick given twice is mapped once.
     fn map(
         &mut self,
         pose: &PoseSample,
         ranges: &[RangeReading],
         contact: Option<&ContactSample>,
+        changed: Window,
     ) -> Window {
         if self.belief.tick == Some(pose.stamp.tick) {
-            return Window::default();
+            self.belief.version += u64::from(changed.area() > 0);
+            return changed;
         }
         self.belief.tick = Some(pose.stamp.tick);
         let (last, now) = (self.belief.robot, pose.pose());
@@ -271,13 +321,13 @@ impl Mapper {
             + self.half_track * (now.heading - self.belief.heading).abs();
         (self.belief.robot, self.belief.heading) = (now.position, now.heading);
         let ranges = if self.sensing { ranges } else { &[] };
-        let changed = match &self.belief.sensed {
+        let seen = match &self.belief.sensed {
             Sensed::Hits => self.mark_hit(now, ranges),
             Sensed::Evidence(_) => self.weigh(now, ranges, rolled),
         };
         let contact = contact.and_then(|contact| Touch::of(now, contact));
         let felt = contact.map_or_else(Window::default, |touch| self.mark_touch(&touch));
-        let changed = changed.union(felt).union(self.falsify());
+        let changed = changed.union(seen).union(felt).union(self.falsify());
         self.belief.version += u64::from(changed.area() > 0);
         changed
     }
@@ -402,7 +452,8 @@ impl Mapper {
     /// Mark the hazard of an injected fault. Returns the window that changed.
     fn falsify(&mut self) -> Window {
         let mut changed = Window::default();
-        let Some(area) = fault::hazard(self.belief.fault, self.belief.robot, self.target_m) else {
+        let Some(area) = fault::hazard(self.belief.fault, self.belief.robot, self.belief.target)
+        else {
             return changed;
         };
         for row in 0..self.frame.cells {

@@ -1,4 +1,4 @@
-//! The planner's process: reads `grid` and `pose`, publishes `guidance` each tick and `field` when it changes.
+//! The planner's process: reads `grid`, `pose` and `target`, publishes `guidance` each tick and `field` when it changes.
 
 use std::borrow::Cow;
 
@@ -9,7 +9,8 @@ use common::{
     shell::{Context, Process, Progress},
     stage::Runner,
     start::StageError,
-    topics::{FIELD, GRID, GUIDANCE, POSE},
+    target::TargetReader,
+    topics::{FIELD, GRID, GUIDANCE, POSE, TARGET},
     wiring::Wiring,
 };
 
@@ -24,6 +25,9 @@ use crate::{
 pub struct Shell {
     grid: SliceReader<GridHeader, u8>,
     pose: Reader<PoseSample>,
+    target: TargetReader,
+    /// Without a target no grid counts as followed.
+    has_target: bool,
     runner: Runner<PlannerStage>,
     background: BackgroundSolver,
     field: FieldPublisher,
@@ -38,7 +42,7 @@ pub struct Shell {
 
 impl Process for Shell {
     const WIRING: &'static Wiring = &Wiring {
-        inputs: &[&POSE, &GRID],
+        inputs: &[&POSE, &GRID, &TARGET],
         wakes: &[&GRID],
         outputs: &[&GUIDANCE, &FIELD],
         ..Wiring::of("planner")
@@ -59,6 +63,8 @@ impl Process for Shell {
             runner: Runner::open(context, |_| cells)?,
             grid: context.slice_reader(&GRID)?,
             pose: context.reader(&POSE)?,
+            target: TargetReader::open(context)?,
+            has_target: false,
             background,
             field,
             lockstep,
@@ -70,6 +76,10 @@ impl Process for Shell {
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {
+        let knew_target = self.has_target;
+        if !knew_target {
+            self.take_target(0)?;
+        }
         let asked = self.follow_grid()?;
         let swapped = self.take_solved()?;
         if asked || swapped && !self.lockstep {
@@ -78,7 +88,11 @@ impl Process for Shell {
         if self.field.is_busy() {
             self.publish_field()?;
         }
-        Ok(self.runner.out.at)
+        if !knew_target && self.has_target {
+            // A target wakes nobody, and the first field may follow from it.
+            self.idle()?;
+        }
+        Ok(if self.has_target { self.runner.out.at } else { Progress::default() })
     }
 
     fn inject(&mut self, fault: FaultKind) -> Result<bool, StageError> {
@@ -151,11 +165,22 @@ impl Shell {
         Ok(self.take(Taken::Solved(number))? == Work::SwappedIn)
     }
 
+    /// Take the target of `tick`, if it is another.
+    fn take_target(&mut self, tick: u64) -> Result<(), StageError> {
+        if let Some(target) = self.target.next(tick)? {
+            self.has_target = true;
+            let work = self.take(Taken::Target(target))?;
+            tracing::info!(number = target.number, target = ?target.target, ?work, "target");
+        }
+        Ok(())
+    }
+
     /// Follow every grid sample that came. Says whether an answer is due.
     fn follow_grid(&mut self) -> Result<bool, StageError> {
         let mut asked = false;
         while let Some(grid) = self.grid.take()? {
             let GridHeader { stamp, part, .. } = *grid.header();
+            self.take_target(stamp.tick)?;
             let work = self.take(Taken::Grid((*grid.header(), Cow::Borrowed(&grid))))?;
             if work == Work::Missed {
                 tracing::warn!(version = part.version, "missed a grid version");

@@ -7,7 +7,7 @@ use common::{
     inputs,
     mission::Mission,
     outputs::Outputs,
-    samples::{FaultKind, FieldHeader, GridHeader, GuidanceSample, PoseSample},
+    samples::{FaultKind, FieldHeader, GridHeader, GuidanceSample, PoseSample, TargetSample},
     shell::{Context, Progress},
     stage::Stage,
     start::StageError,
@@ -55,6 +55,8 @@ pub(crate) enum Taken<'a> {
     Field(#[serde(with = "inputs::sample")] Part),
     /// A policy of the field is due.
     Policy,
+    /// The step takes another target.
+    Target(#[serde(with = "inputs::sample")] TargetSample),
 }
 
 /// The step, and what is computed outside of it: by threads of the process, which take the jobs and give the results, or
@@ -116,6 +118,7 @@ impl Stage for PlannerStage {
                 outcome
             }
             Taken::Idle => self.planner.step(Input::Idle, at.time),
+            Taken::Target(target) => self.planner.step(Input::Target(&target), at.time),
             Taken::Solved(number) => {
                 let solved = self.result_of(number);
                 let took_ns = solved.took_ns;

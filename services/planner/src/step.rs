@@ -10,7 +10,10 @@ use common::{
     grid::{Applied, GridFrame, Replica, Window},
     kinematics::Pose2,
     mission::{Method, Mission},
-    samples::{FaultKind, FieldHeader, GridHeader, GuidanceSample, GuidanceStatus, PoseSample},
+    samples::{
+        FaultKind, FieldHeader, GridHeader, GuidanceSample, GuidanceStatus, PoseSample,
+        TargetSample,
+    },
     step::{ForeignState, Step},
 };
 use glam::DVec2;
@@ -42,7 +45,8 @@ enum Advisor {
 /// The planner, (11).
 #[derive(Debug)]
 pub struct Planner {
-    target: DVec2,
+    /// Where the robot is sent; none before the supervisor has said so.
+    target: Option<TargetSample>,
     tolerance_m: f64,
     screening: Screening,
     robot: Robot,
@@ -67,7 +71,7 @@ impl Step for Planner {
     /// It knows nothing until the first keyframe.
     fn new(mission: &Mission) -> Self {
         Self {
-            target: mission.target,
+            target: None,
             tolerance_m: mission.arrival_tolerance_m,
             screening: screening(mission),
             robot: Robot::new(mission),
@@ -97,10 +101,11 @@ impl Step for Planner {
     }
 
     /// # Errors
-    /// When there is no field: the target's cell is hazard, or the map is no map.
+    /// When there is no field: the target is outside the map, or the map is no map.
     fn step(&mut self, input: Input<'_>, _: MissionTime) -> Result<Outcome, SolveError> {
         Ok(match input {
             Input::Grid { header, cells } => self.take_grid(header, cells)?.into(),
+            Input::Target(target) => self.take_target(target)?.into(),
             Input::Pose(pose) => Outcome { guidance: Some(self.guide(pose)), ..Outcome::default() },
             Input::Idle => Outcome { job: self.begin_job(), ..Outcome::default() },
             Input::Solved(solved) => self.swap_in(solved)?.into(),
@@ -122,12 +127,46 @@ impl Planner {
         Ok(work)
     }
 
+    /// The robot is sent elsewhere. A target that is not inside the perimeter is ignored.
+    fn take_target(&mut self, target: &TargetSample) -> Result<Work, SolveError> {
+        let before = self.target.map(|before| before.target.position());
+        let Some(frame) = self.grid.frame() else {
+            self.target = Some(*target);
+            return Ok(Work::None);
+        };
+        let place = target.target.position();
+        if frame.cell_at(place).is_none_or(|cell| frame.is_rim(cell)) {
+            return Ok(Work::None);
+        }
+        self.target = Some(*target);
+        if before == Some(place) {
+            return Ok(Work::None);
+        }
+        let Some(mut live) = self.live.take() else {
+            return self.solve_first();
+        };
+        live.map = self.map(&frame, self.aim(&frame))?;
+        let work = if live.is_solved_at_once() {
+            live.field = Arc::new(self.solver.solve(&live.map, &Cancellation::default())?);
+            self.full_solves += 1;
+            Work::Solved
+        } else {
+            live.target_changed(self.grid.version());
+            Work::Stale
+        };
+        self.live = Some(live);
+        Ok(work)
+    }
+
     /// Solve a map without an earlier field.
     fn solve_first(&mut self) -> Result<Work, SolveError> {
         self.live = None;
         let Some(frame) = self.grid.frame() else {
             return Ok(Work::Missed);
         };
+        if self.target.is_none() {
+            return Ok(Work::None);
+        }
         let map = self.map(&frame, self.aim(&frame))?;
         let field = self.solver.solve(&map, &Cancellation::default())?;
         self.full_solves += 1;
@@ -165,22 +204,31 @@ impl Planner {
         Ok(work)
     }
 
-    /// The map of the newest cells, with the target `aim`.
+    /// The map of the newest cells, with the target `aim`. Its cell counts as free: the mapper may not know of a new target yet.
     fn map(&self, frame: &GridFrame, aim: Option<Cell>) -> Result<Domain, SolveError> {
         let side = frame.cells as usize;
         let blocked = self.grid.cells().iter().map(|&cell| is_hazard(cell));
+        let mut blocked: Vec<_> = blocked.collect();
         // The solver refuses a target outside the map.
         let aim = aim.unwrap_or(Cell::new(side, side));
-        Domain::new(side, side, blocked.collect(), aim)?.with_screening(&self.screening)
+        if let Some(cell) = blocked.get_mut(aim.row * side + aim.col) {
+            *cell = false;
+        }
+        Domain::new(side, side, blocked, aim)?.with_screening(&self.screening)
+    }
+
+    /// Where the robot is sent, metres.
+    fn place(&self) -> Option<DVec2> {
+        self.target.map(|target| target.target.position())
     }
 
     /// The cell that the field is to lead to: the target's, or a free one near it where that one cannot be entered or, by the
     /// evidential method, the body does not fit.
     fn aim(&self, frame: &GridFrame) -> Option<Cell> {
-        let cells = self.grid.cells();
+        let (cells, target) = (self.grid.cells(), self.place()?);
         let aim = match self.advisor {
-            Advisor::Follow => aim::cell_with_a_way_in(frame, cells, self.target, self.tolerance_m),
-            Advisor::LookFirst(_) | Advisor::Steer(_) => aim::cell(frame, cells, self.target),
+            Advisor::Follow => aim::cell_with_a_way_in(frame, cells, target, self.tolerance_m),
+            Advisor::LookFirst(_) | Advisor::Steer(_) => aim::cell(frame, cells, target),
         };
         aim.map(field_cell)
     }
@@ -224,9 +272,9 @@ impl Planner {
     fn guide(&mut self, sample: &PoseSample) -> GuidanceSample {
         let pose = sample.pose();
         let cells = self.grid.cells();
-        let (status, direction) = match &self.live {
-            None => (GuidanceStatus::Waiting, DVec2::ZERO),
-            Some(live) => live.guide(&self.robot, &pose, self.target, cells),
+        let (status, direction) = match (&self.live, self.place()) {
+            (Some(live), Some(target)) => live.guide(&self.robot, &pose, target, cells),
+            _ => (GuidanceStatus::Waiting, DVec2::ZERO),
         };
         let (status, direction, limit) = if self.on_a_saddle {
             (GuidanceStatus::Along, DVec2::ZERO, 0.0)
@@ -236,12 +284,11 @@ impl Planner {
         GuidanceSample {
             ex: direction.x,
             ey: direction.y,
-            distance_m: self.target.distance(pose.position),
             speed_limit_m_s: limit,
             status: status.into(),
             grid_version: self.grid.version(),
             full_solves: self.full_solves,
-            ..GuidanceSample::for_pose(sample, &self.belief)
+            ..GuidanceSample::for_pose(sample, &self.belief, &self.target.unwrap_or_default())
         }
     }
 
@@ -252,14 +299,14 @@ impl Planner {
         status: GuidanceStatus,
         direction: DVec2,
     ) -> (GuidanceStatus, DVec2, f64) {
-        let Some(live) = &self.live else {
+        let (Some(live), Some(target)) = (&self.live, self.place()) else {
             return (status, direction, f64::INFINITY);
         };
         let view = live.view(self.grid.cells());
         let sensing = match (&mut self.advisor, status) {
             (Advisor::LookFirst(sensing), _) => sensing,
             (Advisor::Steer(arcs), GuidanceStatus::Along | GuidanceStatus::WayOut) => {
-                let distance = pose.position.distance(self.target);
+                let distance = pose.position.distance(target);
                 let (direction, limit) = arcs.advise(&view, pose, distance);
                 return (status, direction, limit);
             }
@@ -282,12 +329,12 @@ impl Planner {
 
     /// The field as it is now; none before the first solve.
     pub fn snapshot(&self) -> Option<Snapshot> {
-        let live = self.live.as_ref()?;
+        let (live, target) = (self.live.as_ref()?, self.place()?);
         let verification = live.field.verification();
         let header = FieldHeader {
             grid_version: live.field_version(self.grid.version()),
-            target_x_m: self.target.x,
-            target_y_m: self.target.y,
+            target_x_m: target.x,
+            target_y_m: target.y,
             worst_residual: verification.worst_residual,
             reachable: verification.reachable as u64,
             ..FieldHeader::default()

@@ -135,7 +135,8 @@ impl Process for Shell {
         }
         // The limit is read after the order, because the supervisor publishes the first limit before the order.
         if let Some(limit) = self.tick_limit.newest()? {
-            self.take(Event::TickLimit(limit.last_tick), monotonic_ns())?;
+            let TickLimitSample { last_tick, target_number, .. } = limit;
+            self.take(Event::TickLimit { last_tick, target_number }, monotonic_ns())?;
         }
         while let Some(command) = self.command.take()? {
             self.take(Event::Command(&command), monotonic_ns())?;

@@ -47,7 +47,7 @@ pub enum Taken<'a> {
     /// [`Event::Order`] with the order and the reason as bytes.
     Order(u8, u8),
     /// [`Event::TickLimit`].
-    TickLimit(u64),
+    TickLimit(u64, u64),
     /// [`Event::Quiet`].
     Quiet,
     /// As [`Event::Operator`]: whether to stop.
@@ -62,7 +62,9 @@ impl<'a> Taken<'a> {
             Event::Wire(open) => Self::Wire(open),
             Event::Command(command) => Self::Command(*command),
             Event::Order(order, reason) => Self::Order(order.into(), reason.into()),
-            Event::TickLimit(last) => Self::TickLimit(last),
+            Event::TickLimit { last_tick, target_number } => {
+                Self::TickLimit(last_tick, target_number)
+            }
             Event::Quiet => Self::Quiet,
             Event::Operator(request) => Self::Operator(request == Request::Stop),
         }
@@ -76,7 +78,9 @@ impl<'a> Taken<'a> {
             Self::Order(order, reason) => {
                 Event::Order(Order::from_byte(*order), HoldReason::from_byte(*reason))
             }
-            Self::TickLimit(last) => Event::TickLimit(*last),
+            Self::TickLimit(last_tick, target_number) => {
+                Event::TickLimit { last_tick: *last_tick, target_number: *target_number }
+            }
             Self::Quiet => Event::Quiet,
             Self::Operator(true) => Event::Operator(Request::Stop),
             Self::Operator(false) => Event::Operator(Request::Resume),

@@ -96,6 +96,8 @@ pub struct Link {
     open: Option<OpenTick>,
     /// In lockstep, the last tick that may begin; `None` if there is no limit.
     last_tick: Option<u64>,
+    /// In lockstep, the number of the current target.
+    target_number: u64,
     newest_command: Option<CommandSample>,
     repeat: Option<Repeat>,
     decision: Decision,
@@ -131,6 +133,7 @@ impl Step for Link {
             time: MissionTime::default(),
             open: None,
             last_tick: None,
+            target_number: 0,
             newest_command: None,
             repeat: None,
             decision: Decision { action: Action::Stop, cause: Cause::NotOrdered },
@@ -164,7 +167,9 @@ impl Step for Link {
             Event::Order(order, reason) => self.take_order(order, reason, now_ns, &mut effects),
             Event::Operator(Request::Stop) => self.observe(Observation::Stopped, now_ns),
             Event::Operator(Request::Resume) => self.observe(Observation::Resumed, now_ns),
-            Event::TickLimit(last_tick) => self.last_tick = Some(last_tick),
+            Event::TickLimit { last_tick, target_number } => {
+                (self.last_tick, self.target_number) = (Some(last_tick), target_number);
+            }
             Event::Quiet => {}
         }
         self.keep_connected(now_ns, &mut effects);
@@ -274,10 +279,12 @@ impl Link {
         self.state.pace == Pace::Max
     }
 
-    /// Whether the newest command was the mission's last. In lockstep no tick follows it.
+    /// Whether the newest command says that the current target is reached. In lockstep no tick follows it before there is another target.
     fn arrived(&self) -> bool {
-        self.newest_command
-            .is_some_and(|command| CommandState::from_byte(command.state) == CommandState::Arrived)
+        self.newest_command.is_some_and(|command| {
+            CommandState::from_byte(command.state) == CommandState::Arrived
+                && command.target_number >= self.target_number
+        })
     }
 
     fn begin_tick(&mut self, sensors: &MotorSensors, now_ns: u64, effects: &mut Vec<Effect>) {
@@ -287,7 +294,7 @@ impl Link {
         if self.in_ticks() {
             // When several answers are due, only the last shows the robot's present state.
             self.due = self.due.saturating_sub(1);
-            if self.open.is_some() || self.due > 0 || self.arrived() {
+            if self.open.is_some() || self.due > 0 {
                 return;
             }
         }
@@ -404,6 +411,7 @@ impl Link {
     fn is_due(&mut self, open: &mut OpenTick, now_ns: u64, effects: &mut Vec<Effect>) -> bool {
         let (tick, in_ticks) = (self.open_number(), self.in_ticks());
         match open.given_ns {
+            None if in_ticks && self.arrived() => return false,
             None if in_ticks && self.last_tick.is_some_and(|last| tick > last) => {
                 if !passed(Some(open.began_ns), now_ns, LIMIT_WAITED) {
                     return false;

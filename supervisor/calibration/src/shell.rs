@@ -8,7 +8,10 @@ use common::{
     kinematics::Pose2,
     mission::{Body, CalibrationPlan, Procedure},
     run,
-    samples::{GridHeader, GuidanceSample, GuidanceStatus, PoseSample, RangeReading, RangesHeader},
+    samples::{
+        GridHeader, GuidanceSample, GuidanceStatus, PoseSample, RangeReading, RangesHeader,
+        TargetSample,
+    },
     saved::Saved,
     shell::{Context, Process, Progress, StageError},
     topics::{GUIDANCE, POSE, RANGES},
@@ -70,7 +73,7 @@ pub struct Shell {
     saved: Saved,
     body: Body,
     /// Where the robot faces the wall.
-    target: DVec2,
+    target: TargetSample,
     drive: Drive,
     poses: VecDeque<PoseSample>,
     /// The newest tick with readings, and the echo of the front sonar, metres.
@@ -91,7 +94,8 @@ impl Process for Shell {
     fn open(context: &mut Context) -> Result<Self, StageError> {
         let mission = &context.run.mission;
         let plan = mission.planner.calibration.clone().unwrap_or_default();
-        let (body, target, front) = (mission.body(), mission.target, mission.front_row());
+        let (body, front) = (mission.body(), mission.front_row());
+        let target = TargetSample::first(mission);
         let mut drive = Drive::new(plan);
         if let Some(state) = context.saved_state()? {
             drive = state;
@@ -157,14 +161,14 @@ impl Shell {
         let guidance = GuidanceSample {
             ex: direction.x,
             ey: direction.y,
-            distance_m: self.target.distance(DVec2::new(order.x_m, 0.0)),
+            distance_m: self.target.target.position().distance(DVec2::new(order.x_m, 0.0)),
             speed_limit_m_s: order.speed_limit_m_s,
             status: order.status.into(),
             // The place before the wall: dead reckoning with uncalibrated wheels would be metres off after some loops.
             x_m: order.x_m,
             y_m: 0.0,
             heading_rad,
-            ..GuidanceSample::for_pose(pose, &GridHeader::default())
+            ..GuidanceSample::for_pose(pose, &GridHeader::default(), &self.target)
         };
         self.answered = Some(guidance);
         self.guidance.publish(pose.stamp.tick, pose.stamp.time(), guidance)?;

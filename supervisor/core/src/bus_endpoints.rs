@@ -10,8 +10,8 @@ use common::{
     bus::{Bus, BusError, Reader, SliceWriter, Writer},
     clock::MissionTime,
     samples::{
-        DeathSample, DirectiveSample, PoseSample, RequestSample, RosterEntry, RosterHeader,
-        StallSample, TickLimitSample,
+        DeathSample, DirectiveSample, PoseSample, RequestAnswer, RequestSample, RosterEntry,
+        RosterHeader, StallSample, TargetSample, TickLimitSample,
     },
     topics,
     waiter::Waiter,
@@ -28,14 +28,15 @@ pub(crate) struct BusEndpoints {
     pub observer: Observer,
     /// Wakes for heartbeats, ends of ticks and requests.
     pub waiter: Waiter,
+    target: Writer<TargetSample>,
     directive: Writer<DirectiveSample>,
     tick_limit: Writer<TickLimitSample>,
     roster: SliceWriter<RosterHeader, RosterEntry>,
     deaths: Writer<DeathSample>,
     stalls: Writer<StallSample>,
     requests: Reader<RequestSample>,
-    /// The request that was taken last; 0 for none.
-    last_request: u64,
+    /// The request that was answered last, and the answer; 0 for none.
+    last_request: (u64, RequestAnswer),
     published: Option<Instant>,
     // Dropped last.
     bus: Rc<Bus>,
@@ -43,14 +44,14 @@ pub(crate) struct BusEndpoints {
 
 impl BusEndpoints {
     pub(crate) fn open(lock: &DomainLock) -> Result<Self, SupervisorError> {
-        Self::continued(lock, Record::default(), 0)
+        Self::continued(lock, Record::default(), (0, RequestAnswer::Taken))
     }
 
     /// Open all, and continue the record of an earlier bus.
     fn continued(
         lock: &DomainLock,
         record: Record,
-        last_request: u64,
+        last_request: (u64, RequestAnswer),
     ) -> Result<Self, SupervisorError> {
         let bus = lock.bus();
         let bus = bus.ok_or_else(|| system("open the bus")(io::ErrorKind::NotConnected.into()))?;
@@ -60,6 +61,7 @@ impl BusEndpoints {
         Ok(Self {
             observer,
             waiter,
+            target: bus.writer(&topics::TARGET, 1)?,
             directive: bus.writer(&topics::DIRECTIVE, 1)?,
             tick_limit: bus.writer(&topics::TICK_LIMIT, 1)?,
             roster: bus.slice_writer(&topics::ROSTER, 1, stages::TABLE.len())?,
@@ -90,11 +92,22 @@ impl BusEndpoints {
 
     /// The next request of an operator.
     pub(crate) fn take_request(&mut self) -> Result<Option<RequestSample>, BusError> {
-        let request = self.requests.take()?;
-        if let Some(request) = request {
-            self.last_request = request.id;
-        }
-        Ok(request)
+        self.requests.take()
+    }
+
+    /// The request `id` has this answer, which the roster tells from now on.
+    pub(crate) const fn answered(&mut self, id: u64, answer: RequestAnswer) {
+        self.last_request = (id, answer);
+    }
+
+    /// Publish the target, as of `tick`.
+    pub(crate) fn publish_target(
+        &mut self,
+        tick: u64,
+        time: MissionTime,
+        target: TargetSample,
+    ) -> Result<(), BusError> {
+        self.target.publish(tick, time, target)
     }
 
     /// Whether the state was last published a `period` ago or earlier.
@@ -113,7 +126,8 @@ impl BusEndpoints {
     ) -> Result<(), BusError> {
         self.published = Some(Instant::now());
         self.directive.publish(tick, time, directive)?;
-        let header = RosterHeader { last_request: self.last_request, ..header };
+        let (last_request, answer) = self.last_request;
+        let header = RosterHeader { last_request, answer: answer.into(), ..header };
         self.roster.publish(tick, time, header, entries.into_iter())
     }
 

@@ -90,7 +90,7 @@ pub(crate) fn first(
 
 /// The index in the ground truth of the tick that `pose` was computed from. A robot at rest measures the same for many
 /// ticks; then it is the tick with the nearest number.
-fn truth_of(pose: &PoseSample, truth: &[GroundTruthTick]) -> Option<usize> {
+pub(crate) fn truth_of(pose: &PoseSample, truth: &[GroundTruthTick]) -> Option<usize> {
     let shown = truth.iter().enumerate().filter(|(_, it)| it.is_of(pose));
     shown.min_by_key(|(_, it)| it.heard_tick().abs_diff(pose.stamp.tick)).map(|(index, _)| index)
 }
@@ -111,8 +111,10 @@ mod tests {
 
     use super::*;
 
-    const TIMEOUT: Timeout =
-        Timeout { deadline: Deadline { timeout_s: 20.0, stopped_s: 0.0 }, by_robot: true };
+    const TIMEOUT: Timeout = Timeout {
+        deadline: Deadline { began_s: 0.0, timeout_s: 20.0, stopped_s: 0.0 },
+        by_robot: true,
+    };
 
     fn truth(tick: u64, contacts: u64) -> GroundTruthTick {
         GroundTruthTick {

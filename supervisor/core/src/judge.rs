@@ -80,9 +80,11 @@ pub(crate) fn touched([x, y]: [f64; 2]) -> Ending {
     Ending::failed(Outcome::Collision, reason)
 }
 
-/// The deadline of a mission. Time in which an operator stopped the robot does not count.
+/// The deadline of a target. Time in which an operator stopped the robot does not count.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Deadline {
+    /// Mission time at which the robot was sent there, seconds.
+    pub began_s: f64,
     /// The mission's own limit, seconds.
     pub timeout_s: f64,
     /// Mission time of operators' stops, seconds.
@@ -92,11 +94,11 @@ pub(crate) struct Deadline {
 impl Deadline {
     /// Mission time at which it is given up, seconds.
     pub(crate) const fn at_s(self) -> f64 {
-        self.timeout_s + self.stopped_s
+        self.began_s + self.timeout_s + self.stopped_s
     }
 
     pub(crate) fn timed_out(self) -> Ending {
-        let Self { timeout_s, stopped_s } = self;
+        let Self { timeout_s, stopped_s, .. } = self;
         let mut reason = format!("not there after {timeout_s} s");
         if stopped_s > 0.0 {
             reason += &format!(", {stopped_s:.0} s of an operator's stop not counted");

@@ -35,6 +35,8 @@
 //! | `stall` | whether the robot stalls, and the next recovery step, pure |
 //! | `supervisor`, `stall_recovery` | the loop, which asks these; what it does about stalls |
 //! | `run`, `shutdown` | a run from start to end; the robot to rest and the stages stopped |
+//! | [`target_list`], `requests` | the robot's targets, pure; operators' requests, and the next target |
+//! | [`operator`] | requests of an operator, in any process |
 //! | [`planner_executable`] | the executable that a mission names for the planner, checked |
 //! | [`process`] | a process that is watched, signalled, reaped |
 //! | `descriptors` | the limit of this process's descriptors |
@@ -68,6 +70,7 @@ mod last_resort;
 mod lockstep;
 mod observed_time;
 pub mod observer;
+pub mod operator;
 mod order;
 mod orphans;
 pub mod outcome;
@@ -78,6 +81,7 @@ pub mod process;
 mod progress;
 mod records;
 pub mod recovery;
+mod requests;
 mod run;
 mod run_clock;
 mod service_manager;
@@ -90,6 +94,7 @@ mod stall;
 mod stall_recovery;
 pub mod summary;
 mod supervisor;
+pub mod target_list;
 pub mod totals;
 
 pub use domain_error::DomainError;

@@ -59,7 +59,8 @@ pub struct Record {
     grid_changed: bool,
     /// The newest ticks at which something held the wheels, oldest first.
     contacts: VecDeque<u64>,
-    /// The first command that said arrived.
+    /// The number of the current target, and the first command that said that it is reached.
+    pub(crate) target_number: u64,
     pub arrival: Option<CommandSample>,
     pub link: Option<LinkSample>,
     /// Latencies by generation of the link.
@@ -115,7 +116,9 @@ impl Observer {
             record.commands += 1;
             let tick = command.stamp.tick;
             record.wheels.add(tick, |totals| totals.with(&command));
-            if CommandState::from_byte(command.state) == CommandState::Arrived {
+            if CommandState::from_byte(command.state) == CommandState::Arrived
+                && command.target_number == record.target_number
+            {
                 record.arrival.get_or_insert(command);
             }
         }

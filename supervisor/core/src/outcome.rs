@@ -1,11 +1,17 @@
 //! The ending of a run.
 
 use common::{ground_truth::GroundTruthTick, mission::Mission, samples::PoseSample};
+use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 /// A simulated robot that reports its arrival and by the ground truth stands farther from its target than this is in the wrong
 /// place, metres. Other benchmarks use the same limit. A wider tolerance of the mission takes its place.
 pub const RIGHT_PLACE_M: f64 = 0.5;
+
+/// How far from its target a robot may be that reports its arrival, metres.
+pub(crate) const fn allowed_m(mission: &Mission) -> f64 {
+    RIGHT_PLACE_M.max(mission.arrival_tolerance_m)
+}
 
 /// The outcome of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -73,16 +79,16 @@ impl Ending {
     pub(crate) fn checked(
         self,
         mission: &Mission,
+        target: DVec2,
         ended: Option<&GroundTruthTick>,
         at_rest: Option<&PoseSample>,
     ) -> Self {
         if self.outcome != Outcome::Reached {
             return self;
         }
-        let allowed_m = RIGHT_PLACE_M.max(mission.arrival_tolerance_m);
-        let by_truth_m =
-            ended.map(|ended| (ended.x - mission.target.x).hypot(ended.y - mission.target.y));
-        let at_rest_m = at_rest.map(|pose| mission.target.distance(pose.pose().position));
+        let allowed_m = allowed_m(mission);
+        let by_truth_m = ended.map(|ended| (ended.x - target.x).hypot(ended.y - target.y));
+        let at_rest_m = at_rest.map(|pose| target.distance(pose.pose().position));
         let too_far = |distance_m: &f64| *distance_m > allowed_m;
         let said = &self.reason;
         let (outcome, contradicted) = if let Some(distance_m) = by_truth_m.filter(too_far) {
@@ -144,7 +150,7 @@ mod tests {
             let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
             let ended = ended.map(at);
             let ending = Ending::asked_for(said, "0.08 m from the target");
-            let checked = ending.checked(&mission, ended.as_ref(), None);
+            let checked = ending.checked(&mission, mission.target, ended.as_ref(), None);
             assert_eq!(checked.asked_for, checked.outcome != WrongPlace);
             checked.outcome
         };
@@ -164,7 +170,7 @@ mod tests {
             let covariance = [xx, xy, 0.0, yy, 0.0, 0.0];
             let pose = PoseSample { x_m: 2.9, covariance, ..PoseSample::default() };
             let ending = Ending::asked_for(said, "0.10 m from the target");
-            ending.checked(&mission, ended.map(at).as_ref(), Some(&pose)).outcome
+            ending.checked(&mission, mission.target, ended.map(at).as_ref(), Some(&pose)).outcome
         };
         use Outcome::{Aborted, Reached, ReachedUnsure, WrongPlace};
         for (deviation, want) in [(0.249_f64, Reached), (0.251, ReachedUnsure)] {

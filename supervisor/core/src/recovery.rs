@@ -14,8 +14,10 @@ use dead_reckoning::saved_state;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Room for the encoded [`SupervisorState`], bytes. It takes under 90.
-const CAPACITY: usize = 256;
+use crate::target_list::TargetList;
+
+/// Room for the encoded [`SupervisorState`], bytes: its targets and their results take under 10,000.
+const CAPACITY: usize = 12 << 10;
 /// The kernel's name for the time since the machine was started.
 const BOOT_ID: &str = "/proc/sys/kernel/random/boot_id";
 /// The summary of a run that ended, in its run directory.
@@ -28,10 +30,11 @@ const SIMULATOR: &str = "x80-sim";
 pub struct SupervisorState {
     /// An operator's stop holds.
     pub operator_stop: bool,
-    /// Mission time of all operators' stops, seconds.
+    /// Mission time of operators' stops on the way to the current target, seconds.
     pub operator_stopped_s: f64,
     /// Times the run was resumed.
     pub resumes: u32,
+    pub(crate) targets: Option<TargetList>,
     /// The boot of the machine it ran in.
     boot: String,
     /// The time of the last save, [`boot_ns`]. Its clock includes the time in which the machine is suspended, when the robot may be
@@ -137,5 +140,32 @@ impl RecoveredRun {
             MissionClock::Ticks { .. } => Pace::Max,
             MissionClock::Wall { rate, .. } => Pace::Rate(rate),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use common::{
+        mission::Mission,
+        samples::{CommandSample, MOST_TARGETS, TargetPoint},
+    };
+
+    use super::*;
+
+    #[test]
+    fn the_persisted_targets_of_the_longest_run_fit_into_the_checkpoint() {
+        let mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
+        let mut list = TargetList::of(&mission);
+        let points =
+            [TargetPoint { x_m: 1.5, has_heading: 1, ..TargetPoint::default() }; MOST_TARGETS];
+        for tick in 0..500 {
+            let arrival = CommandSample { distance_m: 0.1, ..CommandSample::default() };
+            list.replace(&points, (tick, tick as f64), Some((&arrival, true)));
+        }
+        assert!(!list.append(&points[..1]), "the list is full");
+        let directory = tempfile::tempdir().unwrap();
+        let mut file = StateFile::open(directory.path()).unwrap();
+        file.state.targets = Some(list);
+        file.save().unwrap();
     }
 }

@@ -15,10 +15,11 @@ use crate::{
     error::{SupervisorError, system},
     last_resort::{self, Turns},
     observer::Record,
-    outcome::{Ending, Wheels},
+    outcome::{Ending, Wheels, allowed_m},
     progress::Progress,
     shutdown,
     supervisor::{Options, Supervisor},
+    target_list::{self, TargetResult},
 };
 
 /// The result of a run.
@@ -44,6 +45,8 @@ pub struct Finished {
     pub replans: u32,
     /// Times the sensed map was reset.
     pub resets: u64,
+    /// All targets, in the order in which the robot was sent to them.
+    pub targets: Vec<TargetResult>,
 }
 
 /// A robot that could not be stopped. Its link goes on telling it to stand, by each method of the protocol in turn.
@@ -105,7 +108,10 @@ pub fn run<'a>(
     let deadline = supervisor.deadline();
     let simulator = supervisor.robot.simulator.as_ref();
     let mut truth = simulator.map_or_else(Vec::new, |simulator| simulator.truth().to_vec());
-    let record = std::mem::take(&mut supervisor.bus.observer.record);
+    let mut record = std::mem::take(&mut supervisor.bus.observer.record);
+    let mut targets = supervisor.targets.clone();
+    targets.compare(&record, &truth, allowed_m(&options.mission));
+    record.arrival.take_if(|_| !targets.is_last());
     let decided = decisive::first(
         ending,
         &record,
@@ -115,7 +121,11 @@ pub fn run<'a>(
     );
     let (replans, resets) = supervisor.stall_watch.recoveries(decided.last_tick);
     truth.truncate(decided.truth_ticks);
-    let ending = decided.ending.checked(&options.mission, truth.last(), record.pose.as_ref());
+    let (ended, at_rest) = (truth.last(), record.pose.as_ref());
+    let place = targets.current().position();
+    let ending = decided.ending.checked(&options.mission, place, ended, at_rest);
+    let targets = targets.results(&ending, decided.last_tick, record.arrival.as_ref(), ended);
+    let ending = target_list::of_all(ending, &targets);
     let finished = Finished {
         duration_s: supervisor.clock.duration_s(decided.last_tick, &record, &truth),
         ending: ending.with(wheels),
@@ -127,6 +137,7 @@ pub fn run<'a>(
         resumes: supervisor.state_file.state.resumes,
         replans,
         resets,
+        targets,
     };
     let still_moving =
         (wheels == Wheels::Turning).then_some(StillMoving { supervisor, signals, _lock: lock });

@@ -121,6 +121,10 @@ pub(crate) struct StallWatch {
     /// Epochs without a reset of their own, and resets because the robot was relocated.
     skipped: u64,
     relocated: u64,
+    /// The resets before the robot was sent to its present target, without those of relocations.
+    resets_before: u64,
+    /// The number of that target.
+    target: Option<u64>,
     /// The relocations of the newest pose that was checked.
     relocations: u64,
     /// The last tick that was checked.
@@ -186,6 +190,8 @@ impl StallWatch {
             skipped: 0,
             relocated: 0,
             relocations: 0,
+            resets_before: 0,
+            target: None,
             tick: None,
             stalls: Vec::new(),
         }
@@ -241,6 +247,13 @@ impl StallWatch {
         }
         // The map may be older than this supervisor.
         self.epoch = self.epoch.max(guidance.epoch);
+        if self
+            .target
+            .replace(guidance.target_number)
+            .is_some_and(|it| it != guidance.target_number)
+        {
+            self.on_new_target(pose.stamp.tick);
+        }
         if held {
             self.hold(pose.stamp.tick);
             return None;
@@ -262,7 +275,7 @@ impl StallWatch {
         let recovery = if self.may_replan(cause, pose.pose().position) {
             self.replans += 1;
             RecoveryStep::Replan
-        } else if relocated || self.resets() - self.relocated < MOST_RESETS {
+        } else if relocated || self.resets() - self.relocated - self.resets_before < MOST_RESETS {
             // In an even epoch the mapper drops what is near the robot, too.
             let skips = u64::from(relocated) * ((self.epoch + 1) % 2);
             self.relocated += u64::from(relocated);
@@ -313,6 +326,14 @@ impl StallWatch {
         let may = *replans < MOST_REPLANS;
         *replans += u32::from(may);
         may
+    }
+
+    /// The robot is sent elsewhere: nothing so far is a stall on the way there.
+    fn on_new_target(&mut self, tick: u64) {
+        self.hold(tick);
+        (self.inside_hazard_since, self.wanders_at, self.held_at) = (None, None, None);
+        self.replans_here = 0;
+        self.resets_before = self.resets() - self.relocated;
     }
 
     /// The robot was not ordered to drive until `tick`, so nothing by then is a stall.

@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use common::samples::{Cause, Order, RecoveryStep, StallSample};
+use common::samples::{Cause, Order, RecoveryStep, StallSample, TickLimitSample};
 
 use crate::{
     error::SupervisorError,
@@ -115,7 +115,8 @@ impl Supervisor<'_> {
 
     /// Publish the limit of the link, if it changed.
     pub(crate) fn publish_tick_limit(&mut self) -> Result<(), SupervisorError> {
-        let limit = self.lockstep.limit();
+        let target_number = self.targets.number();
+        let limit = TickLimitSample { target_number, ..self.lockstep.limit() };
         if self.published_limit.replace(limit) != Some(limit) {
             let (tick, time) = self.published_as_of();
             self.bus.publish_tick_limit(tick, time, limit)?;

@@ -7,7 +7,12 @@ use common::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::{Finished, outcome::Outcome, totals::LookTotals};
+use crate::{
+    Finished,
+    outcome::Outcome,
+    target_list::{TargetOutcome, TargetResult},
+    totals::LookTotals,
+};
 
 /// Quantiles of a duration, microseconds; none if nothing was measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -74,6 +79,9 @@ pub struct Summary {
     pub replans: u32,
     /// Times the sensed part of the map was reset.
     pub resets: u64,
+    /// The targets, in the order in which the robot was sent to them.
+    #[serde(default)]
+    pub targets: Vec<TargetResult>,
     /// Time from the datagram in to the datagram out.
     pub tick_latency_us: Quantiles,
     pub full_solve_us: Quantiles,
@@ -104,7 +112,7 @@ impl Summary {
                 Some(_) if *resumes == 0 => path_length(truth),
                 _ => pose.map_or(0.0, |pose| pose.travelled_m),
             },
-            straight_m: mission.target.length(),
+            straight_m: straight_m(&finished.targets),
             min_clearance_m: clearance
                 .filter(|&clearance| clearance < GroundTruthTick::NOTHING_NEAR),
             collisions,
@@ -114,9 +122,11 @@ impl Summary {
             }),
             pose_error_expected_m: pose.map(PoseSample::position_rms_m),
             pose_within_m: pose.map(PoseSample::position_within_m),
-            true_distance_m: truth
-                .last()
-                .map(|tick| (tick.x - mission.target.x).hypot(tick.y - mission.target.y)),
+            true_distance_m: truth.last().and_then(|tick| {
+                let tried = |it: &&TargetResult| it.outcome != TargetOutcome::NotTried;
+                let last = finished.targets.iter().rfind(tried)?;
+                Some((tick.x - last.x_m).hypot(tick.y - last.y_m))
+            }),
             departed_s: truth
                 .iter()
                 .find(|tick| tick.x.hypot(tick.y) >= DEPARTED_M)
@@ -136,6 +146,7 @@ impl Summary {
             resumes: *resumes,
             replans: finished.replans,
             resets: finished.resets,
+            targets: finished.targets.clone(),
             tick_latency_us: (&record.latency()).into(),
             full_solve_us: (&record.full_solves).into(),
         }
@@ -209,6 +220,17 @@ impl fmt::Display for Summary {
         }
         Ok(())
     }
+}
+
+/// The length of the straight lines from the start to each target in turn, without those that were replaced, metres.
+fn straight_m(targets: &[TargetResult]) -> f64 {
+    let mut here = [0.0, 0.0];
+    let counted = targets.iter().filter(|target| target.outcome != TargetOutcome::Replaced);
+    let legs = counted.map(|target| {
+        let [x, y] = std::mem::replace(&mut here, [target.x_m, target.y_m]);
+        (target.x_m - x).hypot(target.y_m - y)
+    });
+    legs.sum()
 }
 
 fn path_length(truth: &[GroundTruthTick]) -> f64 {

@@ -8,10 +8,7 @@ use common::{
     domain::{Domain, RobotName},
     mission::Mission,
     run::Run,
-    samples::{
-        DirectiveSample, HoldReason, Order, PoseSample, RequestKind, RosterHeader, TickLimitSample,
-        name_str,
-    },
+    samples::{DirectiveSample, HoldReason, Order, PoseSample, RosterHeader, TickLimitSample},
     signals::Signals,
     topics,
 };
@@ -36,6 +33,7 @@ use crate::{
     simulator::Simulator,
     stage_processes::{StageProcesses, Starter},
     stall::StallWatch,
+    target_list::TargetList,
 };
 
 pub struct Options {
@@ -88,8 +86,9 @@ pub(crate) struct Supervisor<'a> {
     /// Whether the robot was ever ordered to drive.
     pub drove: bool,
     pub tick_progress: TickProgress,
+    pub targets: TargetList,
     /// When the arrival was first seen.
-    arrived: Option<Now>,
+    pub arrived: Option<Now>,
     stop_clock: StopClock,
     pub stall_watch: StallWatch,
     pub lockstep: Lockstep,
@@ -128,6 +127,7 @@ impl<'a> Supervisor<'a> {
         };
         run.save(directory)?;
         let lockstep = Lockstep::new(clock.first_tick(None));
+        let targets = state_file.state.targets.take().unwrap_or_else(|| TargetList::of(mission));
         let mut supervisor = Self {
             options,
             stages: StageProcesses::new(directory.clone(), options.starter, mission),
@@ -138,6 +138,7 @@ impl<'a> Supervisor<'a> {
             decision: Decision::STARTING,
             drove: false,
             tick_progress: TickProgress::new(Now::ZERO),
+            targets,
             arrived: None,
             stop_clock: StopClock::default(),
             stall_watch: StallWatch::new(mission),
@@ -147,6 +148,7 @@ impl<'a> Supervisor<'a> {
             turns,
             service: ServiceManager::of_environment(),
         };
+        supervisor.bus.observer.record.target_number = supervisor.targets.number();
         let link = Domain::of(options.robot.clone()).run_directory();
         symlink(directory, &link).map_err(system(format!("make {}", link.display())))?;
         attach();
@@ -197,44 +199,20 @@ impl<'a> Supervisor<'a> {
 
     fn iterate(&mut self) -> Result<Option<Ending>, SupervisorError> {
         let roster_changed = self.bus.observer.take(&mut self.stages)?;
+        let next = self.take_arrival();
         let first_tick = self.first_tick();
         let asked = self.take_requests(first_tick)?;
         let died = self.poll_processes(first_tick)?;
         let driving = self.decision.order() == Order::Drive;
         self.stages.check_outputs(driving, first_tick);
         let simulator_ended = !self.robot.poll()?;
-        if self.decide_order() || roster_changed || died || asked {
+        if self.decide_order() || roster_changed || died || asked || next {
             self.publish_state()?;
         }
         match self.judge(simulator_ended) {
             None => self.watch_for_stalls(),
             ending => Ok(ending),
         }
-    }
-
-    /// Carry out the requests of operators. Returns whether there was one.
-    fn take_requests(&mut self, first_tick: u64) -> Result<bool, SupervisorError> {
-        let mut asked = false;
-        while let Some(request) = self.bus.take_request()? {
-            asked = true;
-            let stage = name_str(&request.stage);
-            match RequestKind::from_byte(request.kind) {
-                RequestKind::Nothing => {}
-                RequestKind::Restart => {
-                    tracing::warn!(stage, "an operator asks for a new generation");
-                    self.stages.replace(stage, first_tick);
-                }
-                RequestKind::Stop => {
-                    tracing::warn!("an operator stops the robot");
-                    self.state_file.state.operator_stop = true;
-                }
-                RequestKind::Resume => {
-                    tracing::warn!("an operator lets the robot go on");
-                    self.state_file.state.operator_stop = false;
-                }
-            }
-        }
-        Ok(asked)
     }
 
     /// Reap and restart stages; log, publish and record each death once. Returns whether there was one.
@@ -283,7 +261,8 @@ impl<'a> Supervisor<'a> {
         let now = self.stages.now();
         let record = &self.bus.observer.record;
         let newest_m = record.pose.as_ref().map(|pose| self.to_target_m(pose));
-        let arrival = record.arrival.map(|command| Arrival {
+        let last = record.arrival.filter(|_| self.targets.is_last());
+        let arrival = last.map(|command| Arrival {
             distance_m: newest_m.unwrap_or(command.distance_m),
             since: *self.arrived.get_or_insert(now),
         });
@@ -317,11 +296,12 @@ impl<'a> Supervisor<'a> {
 
     /// Distance of `pose` from the target, metres.
     pub(crate) fn to_target_m(&self, pose: &PoseSample) -> f64 {
-        self.options.mission.target.distance(pose.pose().position)
+        self.targets.current().position().distance(pose.pose().position)
     }
 
     pub(crate) const fn deadline(&self) -> Deadline {
         Deadline {
+            began_s: self.targets.began_s(),
             timeout_s: self.options.mission.timeout_s,
             stopped_s: self.state_file.state.operator_stopped_s,
         }
@@ -349,11 +329,14 @@ impl<'a> Supervisor<'a> {
     /// Save the state, then publish the order and the roster. The roster confirms an operator's request, so the state is
     /// saved before.
     pub(crate) fn publish_state(&mut self) -> Result<(), SupervisorError> {
+        self.state_file.state.targets = Some(self.targets.clone());
         if let Err(error) = self.state_file.save() {
             // Only a supervisor that resumes this run needs the state, so the mission goes on.
             tracing::error!(%error, "cannot save the state; a supervisor that resumes this run will not know the last requests");
         }
         let (tick, time) = self.published_as_of();
+        // A stage that is told to drive knows where.
+        self.bus.publish_target(tick, time, self.targets.sample())?;
         if self.clock.in_ticks() {
             // The limit is published before the order that starts the first tick.
             self.published_limit = None;
@@ -383,7 +366,7 @@ impl<'a> Supervisor<'a> {
             record: &self.bus.observer.record,
             running: self.stages.running(),
             driving: self.decision.order() == Order::Drive,
-            straight_m: self.options.mission.target.length(),
+            straight_m: self.targets.current().position().length(),
         };
         show(&progress);
         self.service.show(|| progress.to_string());

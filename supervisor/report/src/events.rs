@@ -46,7 +46,7 @@ pub(crate) struct Events {
     stopped: Option<f64>,
     failsafe: Option<(u8, u8)>,
     directive: Option<(u8, u8)>,
-    arrived: bool,
+    arrived: u64,
     safety_events: u64,
     of_failsafe: usize,
     /// Mission time of the newest pose, seconds. A process that has just started knows no mission time.
@@ -175,8 +175,11 @@ impl Events {
     }
 
     pub(crate) fn request(&mut self, request: &RequestSample) {
-        let text =
-            format!("{} {}", words(RequestKind::from_byte(request.kind)), name_str(&request.stage));
+        let targets = request.targets().unwrap_or_default().iter();
+        let targets: String =
+            targets.map(|at| format!(" ({:.2}, {:.2})", at.x_m, at.y_m)).collect();
+        let kind = words(RequestKind::from_byte(request.kind));
+        let text = format!("{kind} {}{targets}", name_str(&request.stage));
         self.add(&request.stamp, OPERATOR, Symbol::Request, text);
     }
 
@@ -199,9 +202,9 @@ impl Events {
 
     pub(crate) fn command(&mut self, command: &CommandSample) {
         let arrived = CommandState::from_byte(command.state) == CommandState::Arrived;
-        if arrived && !self.arrived {
-            self.arrived = true;
-            let text = "the target is reached".to_owned();
+        if arrived && self.arrived != command.target_number {
+            self.arrived = command.target_number;
+            let text = format!("target {} is reached", command.target_number);
             self.add(&command.stamp, "controller", Symbol::Event, text);
         }
     }

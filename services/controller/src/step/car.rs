@@ -43,7 +43,7 @@ mod tests {
         clock::MissionTime,
         kinematics::SteeredWheel,
         mission::Mission,
-        samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus},
+        samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus, TargetPoint},
         step::Step as _,
     };
 
@@ -66,6 +66,8 @@ mod tests {
             ey: angle.sin(),
             speed_limit_m_s,
             status: status.into(),
+            target_number: 1,
+            target: TargetPoint::at(mission.target),
             ..GuidanceSample::default()
         };
         Controller::new(mission).step(&guidance, MissionTime(0))

@@ -1,5 +1,5 @@
 use super::*;
-use common::kinematics::Pose2;
+use common::{kinematics::Pose2, samples::TargetPoint};
 use std::{
     f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, FRAC_PI_3, FRAC_PI_4, PI},
     path::Path,
@@ -42,6 +42,8 @@ fn ahead() -> GuidanceSample {
         ex: 1.0,
         speed_limit_m_s: f64::INFINITY,
         status: GuidanceStatus::Along.into(),
+        target_number: 1,
+        target: TargetPoint::at(DVec2::new(3.0, 0.0)),
         ..GuidanceSample::default()
     }
 }
@@ -208,5 +210,51 @@ fn without_guidance_the_robot_stands() {
         assert_eq!(CommandState::from_byte(command.state), CommandState::Halt);
         close(command.v_m_s, 0.0);
         close(command.left_rad_s, 0.0);
+    }
+}
+
+#[test]
+fn an_arrival_holds_for_its_target_alone() {
+    let mut controller = controller("");
+    let there = Pose2 { position: DVec2::new(2.95, 0.0), heading: 0.0 };
+    let state = |command: &CommandSample| CommandState::from_byte(command.state);
+    let command = controller.at(there, &ahead());
+    assert_eq!((state(&command), command.target_number), (CommandState::Arrived, 1));
+    let next = GuidanceSample {
+        target_number: 2,
+        target: TargetPoint::at(DVec2::new(9.0, 0.0)),
+        ..ahead()
+    };
+    let command = controller.at(there, &next);
+    assert_eq!((state(&command), command.target_number), (CommandState::Driving, 2));
+    close(command.distance_m, 6.05);
+    let none = GuidanceSample { target_number: 0, ..ahead() };
+    assert_eq!(state(&controller.at(there, &none)), CommandState::Halt);
+}
+
+#[test]
+fn a_robot_that_is_to_face_a_heading_turns_on_the_spot_and_then_has_arrived() {
+    for method in ["paper", "evidential"] {
+        let text = format!("target = [3, 0]\nmethod = '{method}'");
+        let mission = Mission::parse(&text, Path::new("test.toml")).unwrap();
+        let mut controller = Controller::new(&mission);
+        let mut guidance = ahead();
+        (guidance.target.heading_rad, guidance.target.has_heading) = (2.0 + 2.0 * PI, 1);
+        let mut pose = Pose2 { position: DVec2::new(2.95, 0.0), heading: 0.0 };
+        let mut turned = 0;
+        let mut command = controller.at(pose, &guidance);
+        while CommandState::from_byte(command.state) == CommandState::Driving {
+            close(command.v_m_s, 0.0);
+            assert!(command.omega_rad_s > 0.0, "{method}: the shorter way");
+            pose.heading += command.omega_rad_s / 7.0;
+            // It slips on the spot, and stays at its target.
+            pose.position.x -= 0.02;
+            command = controller.at(pose, &guidance);
+            turned += 1;
+            assert!(turned < 200, "{method}: it turns for ever");
+        }
+        assert_eq!(CommandState::from_byte(command.state), CommandState::Arrived, "{method}");
+        assert!((pose.heading - 2.0).abs() <= 5_f64.to_radians(), "{method}: {}", pose.heading);
+        assert!(turned > 3, "{method}: {turned}");
     }
 }

@@ -12,7 +12,7 @@ impl Mapper {
     }
 
     fn sense(&mut self, pose: &PoseSample, ranges: Vec<RangeReading>) -> Window {
-        let input = Input::Tick { pose: *pose, ranges, contact: None };
+        let input = Input::Tick { pose: *pose, ranges, contact: None, target: None };
         match self.step(input, pose.stamp.time()) {
             Change::Window(window) => window,
             other => panic!("a tick gave {other:?}"),
@@ -22,7 +22,8 @@ impl Mapper {
     fn touch(&mut self, pose: &PoseSample, bearing_rad: f64) {
         let half_width_rad = 0.8;
         let contact = ContactSample { bearing_rad, half_width_rad, ..ContactSample::default() };
-        let input = Input::Tick { pose: *pose, ranges: Vec::new(), contact: Some(contact) };
+        let contact = Some(contact);
+        let input = Input::Tick { pose: *pose, ranges: Vec::new(), contact, target: None };
         let changed = self.step(input, pose.stamp.time());
         assert!(matches!(changed, Change::Window(window) if window.area() > 0));
     }
@@ -223,4 +224,40 @@ fn a_contact_is_hazard_where_the_body_touches_by_the_papers_method() {
     };
     assert!(state(0.0, 0.3).is_hazard());
     assert!(!state(0.0, -0.3).is_hazard() && !state(0.0, 0.0).is_hazard());
+}
+
+/// Send the robot to (x, y) in `tick`. Returns the window that changed.
+fn send(mapper: &mut Mapper, tick: u64, x: f64, y: f64) -> Window {
+    let (pose, target) = (at(tick, 0.0, 0.0, 0.0), Some(DVec2::new(x, y)));
+    let input = Input::Tick { pose, ranges: Vec::new(), contact: None, target };
+    match mapper.step(input, MissionTime(0)) {
+        Change::Window(window) => window,
+        other => panic!("a tick gave {other:?}"),
+    }
+}
+
+#[test]
+fn the_cell_of_the_target_is_free_as_long_as_the_robot_is_sent_there() {
+    for method in ["paper", "evidential"] {
+        let drum = "known.drum = [{ at = [-1.5, 0], radius_m = 0.2 }]";
+        let text = format!("target = [1.5, 0.0]\nmethod = '{method}'\n{drum}");
+        let mut mapper = Mapper::new(&Mission::parse(&text, Path::new("test.toml")).unwrap());
+        let state = |mapper: &Mapper, x: f64| {
+            let cell = mapper.frame().cell_at(DVec2::new(x, 0.0)).unwrap();
+            CellState::from_byte(mapper.state().cells()[mapper.frame().index(cell)])
+        };
+        // The margin of the drum, as a place that a list names beforehand may be.
+        let margin = -1.25;
+        assert_eq!(state(&mapper, margin), CellState::Known, "{method}");
+        let version = mapper.state().version();
+        assert_eq!(send(&mut mapper, 1, margin, 0.0).area(), 1, "{method}");
+        assert!(!state(&mapper, margin).is_hazard(), "{method}");
+        assert_eq!(mapper.state().version(), version + 1, "{method}");
+        // The target survives the process.
+        let mut restored = mapper.clone();
+        restored.restore(mapper.state().clone()).unwrap();
+        assert_eq!(restored.target(), DVec2::new(margin, 0.0));
+        assert_eq!(send(&mut restored, 2, 1.5, 0.0).area(), 1, "{method}");
+        assert_eq!(state(&restored, margin), CellState::Known, "{method}");
+    }
 }

@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use common::{
     grid::GridFrame,
-    samples::{FaultKind, FieldCell, FieldHeader, GridHeader, GuidanceSample, PoseSample},
+    samples::{
+        FaultKind, FieldCell, FieldHeader, GridHeader, GuidanceSample, PoseSample, TargetSample,
+    },
 };
 use glam::DVec2;
 use harmonic::{Domain, Field, SolveError};
@@ -19,6 +21,8 @@ pub enum Input<'a> {
         /// The cells of its window.
         cells: &'a [u8],
     },
+    /// The robot is sent there from now on.
+    Target(&'a TargetSample),
     /// The pose of the tick: it is answered with guidance.
     Pose(&'a PoseSample),
     /// The tick has its guidance: a background solve may begin.

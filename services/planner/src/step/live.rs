@@ -56,12 +56,15 @@ pub(super) struct Live {
     pub(super) field: Arc<Field>,
     /// The version of the grid that `field` was solved for, unless it is current.
     field_version: u64,
+    /// The field leads to the target before: it is not followed.
+    leads_elsewhere: bool,
     state: State,
 }
 
 impl Live {
     pub(super) fn new(frame: GridFrame, map: Domain, field: Field) -> Self {
-        Self { frame, map, field: Arc::new(field), field_version: 0, state: State::Current }
+        let field = Arc::new(field);
+        Self { frame, map, field, field_version: 0, leads_elsewhere: false, state: State::Current }
     }
 
     pub(super) fn is_solved_at_once(&self) -> bool {
@@ -78,6 +81,13 @@ impl Live {
             State::Stale => {}
             State::Solving { changed, .. } => *changed = true,
         }
+    }
+
+    /// There is another target on the newest map, of version `version`. A job that runs is not awaited any longer.
+    pub(super) fn target_changed(&mut self, version: u64) {
+        self.map_changed(version);
+        self.leads_elsewhere = true;
+        self.state = State::Stale;
     }
 
     /// The job to begin, named `number`, if the field is stale and no job runs; the newest map has version `version`.
@@ -101,6 +111,7 @@ impl Live {
         };
         self.field = field;
         self.field_version = version;
+        self.leads_elsewhere = false;
         self.state = if changed { State::Stale } else { State::Current };
     }
 
@@ -120,6 +131,9 @@ impl Live {
         target: DVec2,
         cells: &[u8],
     ) -> (GuidanceStatus, DVec2) {
+        if self.leads_elsewhere {
+            return (GuidanceStatus::Waiting, DVec2::ZERO);
+        }
         if self.is_beside(target, pose.position) {
             return (GuidanceStatus::AtTarget, pose.axis());
         }
@@ -167,7 +181,8 @@ impl Live {
                 let cell = grid::Cell { col, row };
                 let blocked = is_hazard(cells[self.frame.index(cell)]);
                 let cell = field_cell(cell);
-                if blocked != self.map.is_blocked(cell) {
+                // The target's cell counts as free.
+                if cell != self.map.target() && blocked != self.map.is_blocked(cell) {
                     changes.push(Change { cell, blocked });
                 }
             }

@@ -1,7 +1,7 @@
 use super::*;
 use common::{
     grid::{self, CellState, Part},
-    samples::ClearBeam,
+    samples::{ClearBeam, TargetPoint},
 };
 use std::path::Path;
 
@@ -15,6 +15,14 @@ fn mission_of(cells: u32) -> Mission {
         "target = [1.5, 0]\nmethod = 'paper'\nperimeter = {{ width_m = 4, cells = {cells} }}"
     );
     Mission::parse(&text, Path::new("test.toml")).unwrap()
+}
+
+/// A planner that is told the mission's target.
+fn sent(mission: &Mission) -> Planner {
+    let mut planner = Planner::new(mission);
+    let target = TargetSample::first(mission);
+    assert_eq!(planner.take_target(&target).unwrap(), Work::None);
+    planner
 }
 
 /// A keyframe with the perimeter, and `hazard` where it says so.
@@ -62,14 +70,14 @@ fn a_screening_length_in_metres_is_the_same_on_any_grid() {
 
 #[test]
 fn before_the_first_keyframe_there_is_no_guidance() {
-    let mut planner = Planner::new(&mission());
+    let mut planner = sent(&mission());
     assert_eq!(status(&planner.guide(&at(0.0, 0.0))), GuidanceStatus::Waiting);
     assert!(planner.snapshot().is_none());
 }
 
 #[test]
 fn an_empty_room_is_crossed_straight() {
-    let mut planner = Planner::new(&mission());
+    let mut planner = sent(&mission());
     let (header, cells) = keyframe(1, |_| false);
     assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::Solved);
     let guidance = planner.guide(&at(0.0, 0.0));
@@ -80,7 +88,7 @@ fn an_empty_room_is_crossed_straight() {
 
 #[test]
 fn a_wall_that_appears_turns_the_guidance_aside() {
-    let mut planner = Planner::new(&mission());
+    let mut planner = sent(&mission());
     let (header, cells) = keyframe(1, |_| false);
     planner.take_grid(&header, &cells).unwrap();
     // Open only above y = 1.
@@ -94,7 +102,7 @@ fn a_wall_that_appears_turns_the_guidance_aside() {
 
 #[test]
 fn a_robot_walled_in_hears_that_the_target_is_unreachable() {
-    let mut planner = Planner::new(&mission());
+    let mut planner = sent(&mission());
     let ring = |at: DVec2| (0.5..0.75).contains(&at.length());
     let (header, cells) = keyframe(1, ring);
     planner.take_grid(&header, &cells).unwrap();
@@ -103,7 +111,7 @@ fn a_robot_walled_in_hears_that_the_target_is_unreachable() {
 
 #[test]
 fn a_robot_on_a_hazard_cell_is_shown_the_way_out() {
-    let mut planner = Planner::new(&mission());
+    let mut planner = sent(&mission());
     let block = |at: DVec2| at.x.abs() < 0.25 && at.y.abs() < 0.45;
     let (header, cells) = keyframe(1, block);
     planner.take_grid(&header, &cells).unwrap();
@@ -114,7 +122,7 @@ fn a_robot_on_a_hazard_cell_is_shown_the_way_out() {
 
 #[test]
 fn in_the_targets_cell_the_rest_is_straight() {
-    let mut planner = Planner::new(&mission());
+    let mut planner = sent(&mission());
     let (header, cells) = keyframe(1, |_| false);
     planner.take_grid(&header, &cells).unwrap();
     let guidance = planner.guide(&at(1.48, 0.02));
@@ -141,7 +149,7 @@ fn evidential(scanned: impl Fn(DVec2) -> bool) -> Planner {
             *state = CellState::Scanned as u8;
         }
     }
-    let mut planner = Planner::new(&mission);
+    let mut planner = sent(&mission);
     planner.take_grid(&header, &cells).unwrap();
     planner
 }
@@ -159,7 +167,7 @@ fn an_evidential_robot_looks_where_nobody_looked_before_it_goes_there() {
 #[test]
 fn an_evidential_robot_without_sensing_does_not_look_first() {
     let mission = Mission { method: Method::Evidential, sensing: false, ..mission() };
-    let mut planner = Planner::new(&mission);
+    let mut planner = sent(&mission);
     let (header, cells) = keyframe(1, |_| false);
     planner.take_grid(&header, &cells).unwrap();
     let guidance = planner.guide(&at(0.0, 0.0));
@@ -233,7 +241,7 @@ impl LargeRoom {
             |y: f64| [FAR_GAP, NEAR_GAP].iter().any(|[from, to]| (*from..*to).contains(&y));
         let hazard = |at: DVec2| (at.x - 0.8).abs() < 0.03 && !in_gap(at.y);
         let (header, cells) = keyframe_of(mission.grid_frame(), 1, hazard);
-        let mut planner = Planner::new(&mission);
+        let mut planner = sent(&mission);
         assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::Solved);
         assert!(planner.begin_job().is_none(), "the field is current");
         Self { planner, header, cells }
@@ -339,7 +347,7 @@ fn a_robot_cut_off_on_a_large_map_hears_so_only_from_a_field_of_the_newest_map()
 
 #[test]
 fn a_missing_version_waits_for_a_keyframe() {
-    let mut planner = Planner::new(&mission());
+    let mut planner = sent(&mission());
     let (mut header, _) = keyframe(5, |_| false);
     header.part.keyframe = 0;
     (header.part.width, header.part.height) = (1, 1);
@@ -348,7 +356,7 @@ fn a_missing_version_waits_for_a_keyframe() {
 
 #[test]
 fn the_policy_covers_every_cell_with_unit_vectors_or_nothing() {
-    let mut planner = Planner::new(&mission());
+    let mut planner = sent(&mission());
     let (header, cells) = keyframe(1, |at| at.distance(DVec2::new(0.7, 0.3)) < 0.3);
     planner.take_grid(&header, &cells).unwrap();
     let snapshot = planner.snapshot().unwrap();
@@ -360,4 +368,73 @@ fn the_policy_covers_every_cell_with_unit_vectors_or_nothing() {
         let target = cell.log2_u == 0.0;
         assert_eq!(directed || target, state == 0, "{cell:?} where the grid says {state}");
     }
+}
+
+fn sample(number: u64, x: f64, y: f64) -> TargetSample {
+    let target = TargetPoint::at(DVec2::new(x, y));
+    TargetSample { number, last: number, target, ..TargetSample::default() }
+}
+
+#[test]
+fn a_new_target_is_solved_for_on_the_same_map_within_the_tick() {
+    let mut planner = sent(&mission());
+    let wall = |at: DVec2| (at.x - 0.7).abs() < 0.06 && at.y < 1.0;
+    let (header, cells) = keyframe(1, wall);
+    planner.take_grid(&header, &cells).unwrap();
+    assert_eq!(planner.take_target(&sample(2, -1.5, 0.0)).unwrap(), Work::Solved);
+    let guidance = planner.guide(&at(0.3, 0.0));
+    assert_eq!(status(&guidance), GuidanceStatus::Along);
+    assert!(guidance.ex < -0.9, "{guidance:?}");
+    assert_eq!((guidance.target_number, guidance.distance_m), (2, 1.8));
+    let mut fresh = Planner::new(&mission());
+    fresh.take_target(&sample(2, -1.5, 0.0)).unwrap();
+    fresh.take_grid(&header, &cells).unwrap();
+    let fresh = fresh.guide(&at(0.3, 0.0));
+    let of = |guidance: &GuidanceSample| (guidance.ex, guidance.ey, guidance.target);
+    assert_eq!(of(&guidance), of(&fresh), "as a planner that knew no other target");
+}
+
+#[test]
+fn a_planner_that_knows_no_target_gives_no_direction() {
+    let mut planner = Planner::new(&mission());
+    let (header, cells) = keyframe(1, |_| false);
+    assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::None);
+    let guidance = planner.guide(&at(0.0, 0.0));
+    assert_eq!((status(&guidance), guidance.target_number), (GuidanceStatus::Waiting, 0));
+    assert_eq!(planner.take_target(&sample(1, 1.5, 0.0)).unwrap(), Work::Solved);
+    assert_eq!(status(&planner.guide(&at(0.0, 0.0))), GuidanceStatus::Along);
+}
+
+#[test]
+fn a_target_in_hazard_or_outside_ends_no_planner() {
+    let mut planner = sent(&mission());
+    let (header, cells) = keyframe(1, |at| at.x < -0.5);
+    planner.take_grid(&header, &cells).unwrap();
+    planner.take_target(&sample(2, -1.5, 0.0)).unwrap();
+    assert_eq!(status(&planner.guide(&at(0.0, 0.0))), GuidanceStatus::Unreachable);
+    // The mapper's next map still has hazard there.
+    let (mut header, _) = keyframe(2, |_| true);
+    header.part.version = 2;
+    let (_, cells) = keyframe(2, |at| at.x < -0.4);
+    planner.take_grid(&header, &cells).unwrap();
+    for (x, y) in [(9.0, 0.0), (1.99, 0.0), (f64::NAN, 0.0)] {
+        assert_eq!(planner.take_target(&sample(3, x, y)).unwrap(), Work::None, "{x}");
+        assert_eq!(planner.guide(&at(0.0, 0.0)).target_number, 2, "{x}");
+    }
+}
+
+#[test]
+fn on_a_large_map_the_robot_waits_until_the_field_leads_to_its_new_target() {
+    let mut room = LargeRoom::new();
+    assert_eq!(room.status_at(0.0, 0.0), GuidanceStatus::Along);
+    room.block_post(-1.0, -1.0);
+    let before = room.planner.begin_job().unwrap();
+    assert_eq!(room.planner.take_target(&sample(2, -1.5, 0.0)).unwrap(), Work::Stale);
+    assert_eq!(room.status_at(0.0, 0.0), GuidanceStatus::Waiting);
+    assert_eq!(room.planner.swap_in(solve(&before)).unwrap(), Work::None);
+    assert_eq!(room.status_at(0.0, 0.0), GuidanceStatus::Waiting);
+    room.solve();
+    let guidance = room.planner.guide(&at(0.0, 0.0));
+    assert_eq!(status(&guidance), GuidanceStatus::Along);
+    assert!(guidance.ex < -0.9, "{guidance:?}");
 }

@@ -52,8 +52,8 @@ pub enum Event<'a> {
     Order(Order, HoldReason),
     /// An operator's request at the link.
     Operator(Request),
-    /// The supervisor's limit in lockstep: the last tick that may begin.
-    TickLimit(u64),
+    /// The supervisor's limit in lockstep: the last tick that may begin, and the number of the current target.
+    TickLimit { last_tick: u64, target_number: u64 },
     /// Time passed without input.
     Quiet,
 }

@@ -3,7 +3,9 @@
 use clap::Args;
 use common::domain::RobotName;
 
-use crate::console::{failure::Failure, operator};
+use supervisor::operator;
+
+use crate::console::failure::Failure;
 
 /// Let a stopped robot go on.
 #[derive(Debug, Args)]
@@ -14,5 +16,5 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
-    operator::resume(&arguments.robot)
+    Ok(operator::resume(&arguments.robot)?)
 }

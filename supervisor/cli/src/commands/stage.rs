@@ -6,7 +6,7 @@ mod process;
 use std::ffi::OsString;
 
 use clap::{Args, Subcommand};
-use common::{domain::RobotName, samples::RequestKind};
+use common::domain::RobotName;
 use rustix::process::Signal;
 
 use super::table;
@@ -75,7 +75,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
         Command::Freeze(process) => process.send(Signal::STOP)?,
         Command::Thaw(process) => process.send(Signal::CONT)?,
         Command::Restart { stage, robot } => {
-            operator::ask(robot, RequestKind::Restart, operator::known(stage)?)?;
+            supervisor::operator::restart(robot, operator::known(stage)?)?;
         }
         Command::Fault(arguments) => fault::main(arguments)?,
         Command::Process(words) => process::run(words)?,

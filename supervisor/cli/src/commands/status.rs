@@ -13,7 +13,8 @@ use common::{
     domain::{Domain, RobotName},
     roster::Roster,
     samples::{
-        Action, HoldReason, LinkSample, Order, PowerSample, RosterEntry, StageState, name_str,
+        Action, HoldReason, LinkSample, Order, PowerSample, RosterEntry, StageState, TargetSample,
+        name_str,
     },
     topics,
 };
@@ -50,11 +51,22 @@ struct Status<'a> {
     order: &'static str,
     tick: u64,
     mission_time_s: f64,
+    /// None if it is not published.
+    target: Option<TargetStatus>,
     /// None if no link publishes.
     link: Option<LinkStatus>,
     /// None if the robot does not report it.
     power: Option<PowerStatus>,
     stages: Vec<StageStatus<'a>>,
+}
+
+#[derive(Serialize)]
+struct TargetStatus {
+    number: u64,
+    /// The number of the last target of the list.
+    last: u64,
+    x_m: f64,
+    y_m: f64,
 }
 
 #[derive(Serialize)]
@@ -115,6 +127,7 @@ fn print_one(arguments: &Arguments) -> Result<(), Failure> {
     let mut roster = Roster::open(&bus)?;
     let mut links = bus.reader(&topics::LINK)?;
     let mut powers = bus.reader(&topics::POWER)?;
+    let mut targets = bus.reader(&topics::TARGET)?;
     roster.waiter.on(bus.wakeup(&topics::LINK)?);
     roster.waiter.on(bus.wakeup(&topics::POWER)?);
     let began = Instant::now();
@@ -139,6 +152,8 @@ fn print_one(arguments: &Arguments) -> Result<(), Failure> {
         }
         roster.waiter.wait(LINK_PATIENCE)?;
     };
+    // The supervisor publishes the target before its roster.
+    let target = targets.newest()?;
     let header = entries.header();
     let status = Status {
         robot: &arguments.robot,
@@ -146,6 +161,12 @@ fn print_one(arguments: &Arguments) -> Result<(), Failure> {
         order: order(Order::from_byte(header.order), HoldReason::from_byte(header.reason)),
         tick: header.stamp.tick,
         mission_time_s: header.stamp.time().seconds(),
+        target: target.map(|TargetSample { number, last, target, .. }| TargetStatus {
+            number,
+            last,
+            x_m: target.x_m,
+            y_m: target.y_m,
+        }),
         link: link.as_ref().map(link_status),
         power: power.as_ref().map(power_status),
         stages: entries.iter().map(stage_status).collect(),
@@ -204,6 +225,9 @@ impl fmt::Display for Status<'_> {
             "robot {}: supervisor {}, {}, {:.1} s into the mission",
             self.robot, self.supervisor_pid, self.order, self.mission_time_s
         )?;
+        if let Some(TargetStatus { number, last, x_m, y_m }) = &self.target {
+            writeln!(f, "target {number} of {last}: ({x_m:.2}, {y_m:.2})")?;
+        }
         if let Some(link) = &self.link {
             writeln!(f, "{link}")?;
         }

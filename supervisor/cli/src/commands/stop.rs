@@ -1,10 +1,7 @@
 //! `firsthand stop`.
 
 use clap::Args;
-use common::{
-    domain::{Domain, RobotName},
-    samples::RequestKind,
-};
+use common::domain::{Domain, RobotName};
 
 use crate::console::{failure::Failure, operator};
 
@@ -30,7 +27,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
         return Ok(());
     }
     if arguments.through_supervisor {
-        return operator::ask(&arguments.robot, RequestKind::Stop, "");
+        return Ok(supervisor::operator::request_stop(&arguments.robot)?);
     }
     operator::stand(&arguments.robot)
 }

@@ -11,7 +11,8 @@ use common::{
 };
 use recording::RecordingError;
 use supervisor::{
-    DomainError, SupervisorError, planner_executable::PlannerExecutableError, recovery::ResumeError,
+    DomainError, SupervisorError, operator::OperatorError,
+    planner_executable::PlannerExecutableError, recovery::ResumeError,
 };
 use thiserror::Error;
 
@@ -56,32 +57,15 @@ pub(crate) fn code(error: &(dyn Error + 'static)) -> Option<&'static str> {
     let code = error.downcast_ref().map(|refused: &Refused| refused.code);
     code.or_else(|| error.downcast_ref().and_then(of_supervisor))
         .or_else(|| error.downcast_ref().and_then(of_resumption))
+        .or_else(|| error.downcast_ref().and_then(of_operator))
         .or_else(|| error.downcast_ref().and_then(of_bus))
         .or_else(|| error.downcast_ref().and_then(of_recording))
         .or_else(|| error.downcast_ref().map(of_lookup))
         .or_else(|| error.is::<MissionError>().then_some("mission"))
-        .or_else(|| of_page(error))
         .or_else(|| {
             let planner = error.is::<PlannerExecutableError>();
             planner.then_some("planner-executable")
         })
-}
-
-#[cfg(feature = "page")]
-fn of_page(error: &(dyn Error + 'static)) -> Option<&'static str> {
-    use page::live::PageError;
-    Some(match error.downcast_ref()? {
-        PageError::NotLoopback(_) => "not-loopback",
-        PageError::Listen { .. } => "cannot-listen",
-        PageError::Tls { .. } => "tls",
-        PageError::NoName(_) => "no-name",
-        PageError::System(_) => return None,
-    })
-}
-
-#[cfg(not(feature = "page"))]
-const fn of_page(_: &(dyn Error + 'static)) -> Option<&'static str> {
-    None
 }
 
 fn of_supervisor(error: &SupervisorError) -> Option<&'static str> {
@@ -91,6 +75,14 @@ fn of_supervisor(error: &SupervisorError) -> Option<&'static str> {
         SupervisorError::Checkpoint(error) => of_checkpoint(error),
         SupervisorError::Address(AddressError::Form { .. }) => Some("address"),
         _ => None,
+    }
+}
+
+fn of_operator(error: &OperatorError) -> Option<&'static str> {
+    match error {
+        OperatorError::Refused { code, .. } => Some(code),
+        OperatorError::Bus(error) => of_bus(error),
+        OperatorError::Stage(_) | OperatorError::System(..) => None,
     }
 }
 
@@ -144,7 +136,11 @@ fn of_lookup(error: &LookupError) -> &'static str {
 /// A remark to the message of `error`: a robot that does not run for this user may run for another one, whose bus nobody else
 /// can join.
 pub(crate) fn remark(error: &(dyn Error + 'static)) -> Option<String> {
-    let Some(BusError::NotRunning { robot, .. }) = error.downcast_ref() else {
+    let operator = error.downcast_ref().and_then(|error| match error {
+        OperatorError::Bus(error) => Some(error),
+        _ => None,
+    });
+    let Some(BusError::NotRunning { robot, .. }) = operator.or_else(|| error.downcast_ref()) else {
         return None;
     };
     let user = users(Path::new(SHARED_MEMORY), robot).next()?;

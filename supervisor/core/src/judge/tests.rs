@@ -7,7 +7,7 @@ fn link(action: Action, cause: Cause) -> LinkSample {
 }
 
 const fn deadline(timeout_s: f64, stopped_s: f64) -> Deadline {
-    Deadline { timeout_s, stopped_s }
+    Deadline { began_s: 0.0, timeout_s, stopped_s }
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::fmt::Debug;
 
 use common::{
     mission::{Method, Mission},
-    samples::{GridHeader, GuidanceSample, GuidanceStatus, PoseSample},
+    samples::{GridHeader, GuidanceSample, GuidanceStatus, PoseSample, TargetSample},
 };
 use glam::DVec2;
 use serde::{Serialize, de::DeserializeOwned};
@@ -43,8 +43,8 @@ impl Way {
 /// A planner on a copy of the map.
 #[derive(Debug)]
 pub struct Baseline<P> {
-    /// X_T, metres.
-    target: DVec2,
+    /// Where the robot is sent; none before the supervisor has said so.
+    target: Option<TargetSample>,
     looks_around: bool,
     belief: Belief,
     pub planner: P,
@@ -54,7 +54,7 @@ impl<P: Planner> Baseline<P> {
     /// For the robot of `mission`, without a map.
     pub fn new(mission: &Mission) -> Self {
         Self {
-            target: mission.target,
+            target: None,
             looks_around: mission.method == Method::Evidential,
             belief: Belief::default(),
             planner: P::default(),
@@ -66,12 +66,19 @@ impl<P: Planner> Baseline<P> {
         self.belief.follow(header, cells)
     }
 
+    /// The robot is sent to `target`. On the way to another one the planner begins anew.
+    pub fn send_to(&mut self, target: TargetSample) {
+        if self.target.replace(target).is_some() {
+            self.planner = P::default();
+        }
+    }
+
     /// The guidance for the pose of `sample`.
     pub fn guidance(&mut self, sample: &PoseSample) -> GuidanceSample {
         let here = sample.pose().position;
-        let way = match self.belief.map() {
-            Some(map) => self.planner.way(&map, here, self.target),
-            None => Way::Unknown,
+        let way = match (self.belief.map(), &self.target) {
+            (Some(map), Some(sample)) => self.planner.way(&map, here, sample.target.position()),
+            _ => Way::Unknown,
         };
         self.along(way, sample)
     }
@@ -80,7 +87,6 @@ impl<P: Planner> Baseline<P> {
     fn along(&self, way: Way, sample: &PoseSample) -> GuidanceSample {
         let belief = self.belief.header();
         let pose = sample.pose();
-        let to_target = self.target - pose.position;
         // A robot that stands on the point keeps its heading.
         let toward = |point: DVec2| (point - pose.position).normalize_or(pose.axis());
         let (status, direction, limit) = match way {
@@ -96,11 +102,10 @@ impl<P: Planner> Baseline<P> {
         GuidanceSample {
             ex: direction.x,
             ey: direction.y,
-            distance_m: to_target.length(),
             speed_limit_m_s: limit,
             status: status.into(),
             grid_version: belief.part.version,
-            ..GuidanceSample::for_pose(sample, belief)
+            ..GuidanceSample::for_pose(sample, belief, &self.target.unwrap_or_default())
         }
     }
 }
@@ -109,13 +114,13 @@ impl<P: Planner> Baseline<P> {
 mod tests {
     use super::*;
     use crate::baselines::{
-        testing::{mission, pose},
+        testing::{pose, sent},
         wavefront::Wavefront,
     };
 
     #[test]
     fn a_robot_without_a_way_is_told_so_and_looks_around() {
-        let baseline = Baseline::<Wavefront>::new(&mission([1.0, 0.0]));
+        let baseline = sent::<Wavefront>([1.0, 0.0]);
         let guidance = baseline.along(Way::None, &pose([0.0, 0.0]));
         assert_eq!(guidance.status, u8::from(GuidanceStatus::Unreachable));
         assert_eq!((guidance.ex, guidance.ey), (0.0, 1.0));
@@ -123,7 +128,7 @@ mod tests {
 
     #[test]
     fn without_a_map_the_robot_waits() {
-        let guidance = Baseline::<Wavefront>::new(&mission([0.3, 0.0])).guidance(&pose([0.0, 0.0]));
+        let guidance = sent::<Wavefront>([0.3, 0.0]).guidance(&pose([0.0, 0.0]));
         assert_eq!(guidance.status, u8::from(GuidanceStatus::Waiting));
     }
 }

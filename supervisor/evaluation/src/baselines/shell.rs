@@ -5,7 +5,8 @@ use common::{
     samples::{GridHeader, GuidanceSample, PoseSample},
     saved::Saved,
     shell::{Context, Process, Progress, StageError},
-    topics::{GRID, GUIDANCE, POSE},
+    target::TargetReader,
+    topics::{GRID, GUIDANCE, POSE, TARGET},
     wiring::{Persists, Wiring},
 };
 
@@ -19,6 +20,7 @@ const STATE_BYTES: usize = 256;
 pub struct Shell<P> {
     grid: SliceReader<GridHeader, u8>,
     pose: Reader<PoseSample>,
+    target: TargetReader,
     guidance: Writer<GuidanceSample>,
     saved: Saved,
     baseline: Baseline<P>,
@@ -30,7 +32,7 @@ pub struct Shell<P> {
 
 impl<P: Planner> Process for Shell<P> {
     const WIRING: &'static Wiring = &Wiring {
-        inputs: &[&POSE, &GRID],
+        inputs: &[&POSE, &GRID, &TARGET],
         wakes: &[&GRID],
         outputs: &[&GUIDANCE],
         persists: Persists::State(STATE_BYTES),
@@ -46,6 +48,7 @@ impl<P: Planner> Process for Shell<P> {
         Ok(Self {
             grid: context.slice_reader(&GRID)?,
             pose: context.reader(&POSE)?,
+            target: TargetReader::open(context)?,
             guidance: context.writer(&GUIDANCE)?,
             saved: context.take_saved(),
             baseline,
@@ -80,6 +83,9 @@ impl<P: Planner> Shell<P> {
     fn answer(&mut self) -> Result<(), StageError> {
         self.latest_pose = self.pose.newest()?.or(self.latest_pose);
         let Progress { tick, time } = self.progress;
+        if let Some(target) = self.target.next(tick)? {
+            self.baseline.send_to(target);
+        }
         // A grid for new readers may be of a tick that is over.
         if let Some(pose) = self.latest_pose.filter(|pose| pose.stamp.tick == tick) {
             let guidance = self.baseline.guidance(&pose);

@@ -6,9 +6,11 @@ use std::path::Path;
 use common::{
     grid::{CellState, GridFrame, Part},
     mission::Mission,
-    samples::{GridHeader, PoseSample},
+    samples::{GridHeader, PoseSample, TargetSample},
 };
 use glam::DVec2;
+
+use super::planner::{Baseline, Planner};
 
 /// The header and the cells of a map drawn row by row, the first one with the greatest y: `#` is hazard. Cells of
 /// 0.1 m, the middle one at (0, 0).
@@ -27,6 +29,14 @@ pub(crate) fn drawn(rows: &[&str]) -> (GridHeader, Vec<u8>) {
 pub(crate) fn mission([x, y]: [f64; 2]) -> Mission {
     let text = format!("target = [{x:?}, {y:?}]");
     Mission::parse(&text, Path::new("test.toml")).unwrap()
+}
+
+/// A planner that is sent to (x, y) metres.
+pub(crate) fn sent<P: Planner>(target: [f64; 2]) -> Baseline<P> {
+    let mission = mission(target);
+    let mut baseline = Baseline::new(&mission);
+    baseline.send_to(TargetSample::first(&mission));
+    baseline
 }
 
 /// A robot at (x, y) metres that faces along x.

@@ -5,9 +5,10 @@ use std::process::ExitCode;
 use common::{
     bus::{Reader, SliceReader, Writer},
     grid::{Applied, CellState, Replica},
-    samples::{GridHeader, GuidanceSample, GuidanceStatus, PoseSample},
+    samples::{GridHeader, GuidanceSample, GuidanceStatus, PoseSample, TargetSample},
     shell::{self, Context, Process, Progress, StageError},
-    topics::{GRID, GUIDANCE, POSE},
+    target::TargetReader,
+    topics::{GRID, GUIDANCE, POSE, TARGET},
     wiring::Wiring,
 };
 use glam::DVec2;
@@ -19,7 +20,8 @@ struct Planner {
     grid: SliceReader<GridHeader, u8>,
     pose: Reader<PoseSample>,
     guidance: Writer<GuidanceSample>,
-    target: DVec2,
+    followed: TargetReader,
+    target: TargetSample,
     map: Replica<u8>,
     latest: Option<PoseSample>,
     progress: Progress,
@@ -27,7 +29,7 @@ struct Planner {
 
 impl Process for Planner {
     const WIRING: &'static Wiring = &Wiring {
-        inputs: &[&POSE, &GRID],
+        inputs: &[&POSE, &GRID, &TARGET],
         wakes: &[&GRID],
         outputs: &[&GUIDANCE],
         ..Wiring::of("planner")
@@ -38,7 +40,8 @@ impl Process for Planner {
             grid: context.slice_reader(&GRID)?,
             pose: context.reader(&POSE)?,
             guidance: context.writer(&GUIDANCE)?,
-            target: context.run.mission.target,
+            followed: TargetReader::open(context)?,
+            target: TargetSample::default(),
             map: Replica::default(),
             latest: None,
             progress: Progress::default(),
@@ -55,6 +58,7 @@ impl Process for Planner {
             self.progress = Progress { tick, time };
             // The pose of a tick is published before its grid.
             self.latest = self.pose.newest()?.or(self.latest);
+            self.target = self.followed.next(tick)?.unwrap_or(self.target);
             if let Some(pose) = self.latest.take_if(|pose| pose.stamp.tick == tick) {
                 let guidance = self.guide(&pose, &header);
                 self.guidance.publish(tick, time, guidance)?;
@@ -67,7 +71,7 @@ impl Process for Planner {
 impl Planner {
     fn guide(&self, pose: &PoseSample, header: &GridHeader) -> GuidanceSample {
         let here = pose.pose().position;
-        let to_target = self.target - here;
+        let to_target = self.target.target.position() - here;
         let direction = to_target.normalize_or(DVec2::X);
         let ahead = AHEAD_M.min(to_target.length()) / 10.0;
         let mut points = (1..=10).map(|step| here + direction * ahead * f64::from(step));
@@ -78,17 +82,10 @@ impl Planner {
         GuidanceSample {
             ex: direction.x,
             ey: direction.y,
-            distance_m: to_target.length(),
             speed_limit_m_s: f64::INFINITY,
             status: status.into(),
-            pose_ns: pose.stamp.stamp_ns,
-            x_m: pose.x_m,
-            y_m: pose.y_m,
-            heading_rad: pose.heading_rad,
             grid_version: header.part.version,
-            safety_events: header.safety_events,
-            epoch: header.epoch,
-            ..GuidanceSample::default()
+            ..GuidanceSample::for_pose(pose, header, &self.target)
         }
     }
 

@@ -23,6 +23,11 @@ fn tick_by(link: &mut Link, now_ns: u64, frames: &[u8], command: &CommandSample)
     effects
 }
 
+/// A limit on ticks, on the way to target 1.
+const fn limit(last_tick: u64) -> Event<'static> {
+    Event::TickLimit { last_tick, target_number: 1 }
+}
+
 /// The frames of a robot whose batteries have `volts`.
 fn powered(volts: f64) -> Vec<u8> {
     let ad = |scale: f64| (volts / scale * 4095.0).round() as u16;
@@ -170,23 +175,42 @@ fn the_cause_of_a_hold_is_the_supervisors() {
 }
 
 #[test]
+fn in_lockstep_no_tick_follows_an_arrival_before_there_is_another_target() {
+    let given = |effects: &[Effect]| effects.iter().any(|it| matches!(it, Effect::Tick { .. }));
+    let mut link = in_ticks();
+    link.at(limit(9), 0);
+    let mut link = driving(link);
+    let frames = datagram(255, 0, 0);
+    assert!(given(&link.at(Event::Datagram(&frames), MS)));
+    let state = CommandState::Arrived.into();
+    let arrived = CommandSample { state, target_number: 1, ..command(0, 0, 0.0, 0.0) };
+    link.at(Event::Command(&arrived), 2 * MS);
+    assert!(!given(&link.at(Event::Datagram(&frames), 3 * MS)));
+    assert!(!given(&link.at(limit(12), 4 * MS)), "it is the same target");
+    let next = Event::TickLimit { last_tick: 12, target_number: 2 };
+    let effects = link.at(next, 5 * MS);
+    let ticks = effects.iter().filter(|it| matches!(it, Effect::Tick { tick: 1, .. }));
+    assert_eq!(ticks.count(), 1, "{effects:?}");
+}
+
+#[test]
 fn in_lockstep_none_begins_beyond_the_supervisors_limit_until_it_was_waited_for_too_long() {
     let given = |effects: &[Effect]| effects.iter().any(|it| matches!(it, Effect::Tick { .. }));
     let frames = datagram(255, 0, 0);
     let limited = || {
         let mut link = from_tick(3);
-        link.at(Event::TickLimit(2), 0);
+        link.at(limit(2), 0);
         let mut link = driving(link);
         assert!(!given(&link.at(Event::Datagram(&frames), MS)));
         link
     };
     let mut link = limited();
     assert!(!given(&link.at(Event::Quiet, 200 * MS)));
-    assert!(given(&link.at(Event::TickLimit(3), 201 * MS)));
+    assert!(given(&link.at(limit(3), 201 * MS)));
     let late = LIMIT_WAITED.as_nanos() as u64 + 2 * MS;
     assert!(given(&limited().at(Event::Quiet, late)));
     let mut on_the_wall = on_the_wall();
-    on_the_wall.at(Event::TickLimit(0), 0);
+    on_the_wall.at(limit(0), 0);
     let mut on_the_wall = driving(on_the_wall);
     for tick in 1..3 {
         assert!(given(&on_the_wall.at(Event::Datagram(&frames), tick * PERIOD_NS)));

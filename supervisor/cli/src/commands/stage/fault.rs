@@ -14,9 +14,11 @@ use common::{
     waiter::Waiter,
 };
 
+use supervisor::operator::{PATIENCE, find, new_id};
+
 use crate::console::{
     failure::{Failure, Refused},
-    operator::{PATIENCE, find, known, new_id},
+    operator::known,
 };
 
 /// Break something in a running stage on purpose, to see what the others do.

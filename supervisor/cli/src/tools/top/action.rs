@@ -5,8 +5,9 @@ use std::{
     thread::{self, JoinHandle},
 };
 
-use common::{domain::RobotName, samples::RequestKind};
+use common::domain::RobotName;
 use rustix::process::Signal;
+use supervisor::operator as requests;
 
 use crate::console::operator;
 
@@ -37,9 +38,9 @@ impl Action {
             Self::Kill => operator::send(robot, stage, Signal::KILL),
             Self::Freeze => operator::send(robot, stage, Signal::STOP),
             Self::Thaw => operator::send(robot, stage, Signal::CONT),
-            Self::Restart => operator::ask(robot, RequestKind::Restart, stage),
+            Self::Restart => requests::restart(robot, stage).map_err(Into::into),
             Self::Stop => operator::stand(robot),
-            Self::Resume => operator::resume(robot),
+            Self::Resume => requests::resume(robot).map_err(Into::into),
         };
         done.map_err(|error| error.to_string())
     }

@@ -4,7 +4,6 @@ use std::time::{Duration, Instant};
 
 use common::{
     bus::{AnyReader, Bus, BusError, Reader, SliceReader},
-    process_usage::Processes,
     samples::{
         CommandSample, DeathSample, FieldCell, FieldHeader, GridHeader, GuidanceSample, LinkSample,
         PoseSample, PowerSample, RosterEntry, RosterHeader, StallSample, name_str,
@@ -14,7 +13,7 @@ use common::{
 use glam::DVec2;
 use supervisor::stages;
 
-use super::{view::View, words};
+use super::{usage::Processes, view::View, words};
 use crate::console::rates::TopicRates;
 
 /// Rates are counted over this time.

@@ -1,6 +1,5 @@
 use common::{
     latency::Histogram,
-    process_usage::Usage,
     samples::{Action, HoldReason, LinkSample, Order, StageState, name_str},
 };
 use ratatui::{
@@ -14,6 +13,7 @@ use ratatui::{
 use super::{
     action::KEYS,
     map,
+    usage::Usage,
     view::{Stage, View},
     words as top_words,
 };

@@ -5,7 +5,6 @@ use std::f64::consts::FRAC_PI_2;
 
 use common::{
     grid::{CellState, GridFrame, Part},
-    process_usage::Usage,
     samples::{
         CommandSample, DeathSample, FieldCell, GuidanceSample, GuidanceStatus, LinkSample, Order,
         PoseSample, PowerSample, RosterEntry, RosterHeader, StageState, Stamp, name,
@@ -14,7 +13,7 @@ use common::{
 use glam::DVec2;
 use ratatui::{Terminal, backend::TestBackend};
 
-use super::{action::KEYS, screen, view::View, words};
+use super::{action::KEYS, screen, usage::Usage, view::View, words};
 
 const STAGES: [&str; 5] = ["x80-link", "dead-reckoning", "mapper", "planner", "controller"];
 
@@ -30,6 +29,7 @@ fn view() -> View {
         reason: 1,
         simulated: 1,
         last_request: 0,
+        answer: 0,
     };
     let entries = STAGES.map(|stage| RosterEntry {
         stage: name(stage),

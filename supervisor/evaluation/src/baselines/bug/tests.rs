@@ -1,7 +1,7 @@
 use super::*;
 use crate::baselines::{
     planner::Baseline,
-    testing::{drawn, mission, pose},
+    testing::{drawn, pose, sent},
 };
 use common::samples::{GridHeader, GuidanceSample, GuidanceStatus};
 
@@ -42,8 +42,7 @@ impl Drive {
     fn on(rows: &[String]) -> Self {
         let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
         let (header, cells) = drawn(&rows);
-        let mut drive =
-            Self { bug: Baseline::new(&mission(TARGET)), header, cells, at: START.into() };
+        let mut drive = Self { bug: sent(TARGET), header, cells, at: START.into() };
         drive.see();
         drive
     }

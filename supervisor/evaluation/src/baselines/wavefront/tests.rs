@@ -1,8 +1,7 @@
 use super::*;
 use crate::baselines::{
     belief::Belief,
-    planner::Baseline,
-    testing::{drawn, mission, pose},
+    testing::{drawn, pose, sent},
 };
 use common::samples::{GuidanceSample, GuidanceStatus};
 
@@ -20,7 +19,7 @@ const WALL: [&str; 9] = [
 
 /// The answer of a planner with target (0.3, 0) on the map `rows` to a robot at (x, y).
 fn guidance(rows: &[&str], at: [f64; 2]) -> GuidanceSample {
-    let mut planner = Baseline::<Wavefront>::new(&mission([0.3, 0.0]));
+    let mut planner = sent::<Wavefront>([0.3, 0.0]);
     let (header, cells) = drawn(rows);
     assert!(planner.follow(&header, &cells));
     planner.guidance(&pose(at))

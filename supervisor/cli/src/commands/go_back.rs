@@ -1,0 +1,20 @@
+//! `firsthand return`.
+
+use clap::Args;
+use common::{domain::RobotName, samples::TargetPoint};
+use supervisor::operator;
+
+use crate::console::failure::Failure;
+
+/// Send a robot that drives back to its start.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// Name of the robot.
+    #[arg(long, default_value = "x80")]
+    robot: RobotName,
+}
+
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+    // The start is the origin of the mission frame.
+    Ok(operator::send_to(&arguments.robot, &[TargetPoint::default()], false)?)
+}

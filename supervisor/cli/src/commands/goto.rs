@@ -1,0 +1,41 @@
+//! `firsthand goto`.
+
+use clap::Args;
+use common::{domain::RobotName, samples::TargetPoint};
+use supervisor::operator;
+
+use crate::console::failure::{Failure, Refused};
+
+/// Send a robot that drives to another target, or to several in turn; it goes on without a stop. Fails if the supervisor
+/// refuses: a place in a believed hazard or outside the perimeter, a robot that an operator stopped.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// X and Y of each target, metres in the mission frame, whose origin is the robot's start.
+    #[arg(required = true, value_names = ["X", "Y"], num_args = 2.., allow_negative_numbers = true)]
+    places: Vec<f64>,
+    /// Turn to this heading at the last target, degrees counter-clockwise from x.
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    heading: Option<f64>,
+    /// After the targets that the robot has, instead of them.
+    #[arg(long)]
+    append: bool,
+    /// Name of the robot.
+    #[arg(long, default_value = "x80")]
+    robot: RobotName,
+}
+
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+    let (places, rest) = arguments.places.as_chunks::<2>();
+    if !rest.is_empty() {
+        let message = format!("{} is an X without a Y; give two numbers for each target", rest[0]);
+        return Err(Refused::new("no-target", message).into());
+    }
+    let mut points: Vec<_> = places
+        .iter()
+        .map(|&[x_m, y_m]| TargetPoint { x_m, y_m, ..TargetPoint::default() })
+        .collect();
+    if let (Some(last), Some(heading)) = (points.last_mut(), arguments.heading) {
+        (last.heading_rad, last.has_heading) = (heading.to_radians(), 1);
+    }
+    Ok(operator::send_to(&arguments.robot, &points, arguments.append)?)
+}

@@ -1,0 +1,113 @@
+use std::path::Path;
+
+use common::samples::Stamp;
+use glam::DVec2;
+
+use super::*;
+
+fn mission(extra: &str) -> Mission {
+    let text = format!("target = [3, 0]\nperimeter.width_m = 8\n{extra}");
+    Mission::parse(&text, Path::new("m.toml")).unwrap()
+}
+
+fn at(x: f64, y: f64) -> TargetPoint {
+    TargetPoint::at(DVec2::new(x, y))
+}
+
+/// A command that says arrived, in a tick of as many seconds.
+fn arrival(tick: u64) -> CommandSample {
+    let stamp = Stamp { tick, stamp_ns: tick * 1_000_000_000, ..Stamp::default() };
+    CommandSample { stamp, distance_m: 0.1, ..CommandSample::default() }
+}
+
+fn outcomes(results: &[TargetResult]) -> Vec<(u64, TargetOutcome)> {
+    results.iter().map(|result| (result.number, result.outcome)).collect()
+}
+
+#[test]
+fn a_list_goes_on_from_target_to_target_and_says_what_became_of_each() {
+    use TargetOutcome::{Missed, NotTried, Reached, ReachedUnsure, Replaced};
+    let mut list = TargetList::of(&mission(""));
+    assert!(list.append(&[at(1.0, 1.0), at(2.0, 2.0)]));
+    let TargetSample { number, last, since_tick, target, .. } = list.sample();
+    assert_eq!((number, last, since_tick, target), (1, 3, 0, at(3.0, 0.0)));
+    assert_eq!(list.sample().ahead(), [at(1.0, 1.0), at(2.0, 2.0)]);
+    list.advance(&arrival(7), true, 8);
+    let TargetSample { number, last, since_tick, target, .. } = list.sample();
+    assert_eq!((number, last, since_tick, target), (2, 3, 8, at(1.0, 1.0)));
+    assert_eq!(list.began_s(), 7.0);
+    list.replace(&[at(0.5, 0.0), at(0.0, 0.0)], (12, 11.0), None);
+    let TargetSample { number, last, since_tick, target, .. } = list.sample();
+    assert_eq!((number, last, since_tick, target), (4, 5, 12, at(0.5, 0.0)));
+    list.advance(&arrival(20), false, 21);
+    assert!(list.is_last());
+    let reached = Ending::asked_for(Outcome::Reached, "");
+    let results = list.results(&reached, Some(30), Some(&arrival(30)), None);
+    let want = [(1, Reached), (2, Replaced), (3, Replaced), (4, ReachedUnsure), (5, Reached)];
+    assert_eq!(outcomes(&results), want);
+    assert!((results[4].at_s.unwrap() - 30.0).abs() < 1e-9);
+    assert_eq!(of_all(reached, &results).outcome, Outcome::ReachedUnsure);
+    // The robot touched something in tick 15, which was seen after its arrival in tick 20.
+    let touched = Ending::failed(Outcome::Collision, "");
+    let results = list.results(&touched, Some(14), None, None);
+    assert_eq!(outcomes(&results)[2..], [(3, Replaced), (4, Missed), (5, NotTried)]);
+}
+
+#[test]
+fn an_arrival_that_the_ground_truth_contradicts_makes_the_whole_list_wrong() {
+    let pose = PoseSample { stamp: arrival(7).stamp, left_counts: 7, ..PoseSample::default() };
+    let truth = |x, tick| GroundTruthTick { tick, x, left_counts: 7, ..GroundTruthTick::default() };
+    for (x, outcome) in [(2.6, Outcome::Reached), (2.4, Outcome::WrongPlace)] {
+        let mut list = TargetList::of(&mission(""));
+        assert!(list.append(&[at(0.0, 0.0)]));
+        list.advance(&arrival(7), true, 8);
+        let mut record = Record::default();
+        record.poses.push(pose);
+        list.compare(&record, &[truth(x, 7)], 0.5);
+        let reached = Ending::asked_for(Outcome::Reached, "");
+        let results = list.results(&reached, Some(9), Some(&arrival(9)), None);
+        assert!((results[0].truth_m.unwrap() - (3.0 - x)).abs() < 1e-12, "{results:?}");
+        assert_eq!(of_all(reached, &results).outcome, outcome);
+    }
+}
+
+#[test]
+fn every_reason_against_a_target_has_its_answer() {
+    use RequestAnswer::{
+        FixedTarget, InHazard, Malformed, NoHeading, NotRunning, Outside, Stopped,
+    };
+    let plain = mission("");
+    let frame = plain.grid_frame();
+    let mut cells = vec![common::grid::CellState::Free as u8; frame.area()];
+    let hazard = frame.cell_at(DVec2::new(1.0, 1.0)).unwrap();
+    cells[frame.index(hazard)] = common::grid::CellState::Sensed as u8;
+    let part = common::grid::Part::whole(frame, 1);
+    let mut record = Record::default();
+    record.grid.apply(&part, &cells);
+    let car = mission("robot.model = 'car'");
+    let calibrates = mission("planner.calibration = { procedure = 'wall' }");
+    let faces = TargetPoint { has_heading: 1, ..at(2.0, 0.0) };
+    let nowhere = at(f64::NAN, 0.0);
+    #[rustfmt::skip]
+    let rows = [
+        (&plain, HoldReason::None, Some(at(2.0, 0.0)), None),
+        (&plain, HoldReason::StageHeld, Some(faces), None),
+        (&plain, HoldReason::Starting, Some(at(2.0, 0.0)), Some(NotRunning)),
+        (&plain, HoldReason::Ending, Some(at(2.0, 0.0)), Some(NotRunning)),
+        (&plain, HoldReason::Operator, Some(at(2.0, 0.0)), Some(Stopped)),
+        (&plain, HoldReason::None, None, Some(Malformed)),
+        (&plain, HoldReason::None, Some(nowhere), Some(Malformed)),
+        (&plain, HoldReason::None, Some(at(9.0, 0.0)), Some(Outside)),
+        (&plain, HoldReason::None, Some(at(3.99, 0.0)), Some(Outside)),
+        (&plain, HoldReason::None, Some(at(1.0, 1.0)), Some(InHazard)),
+        (&car, HoldReason::None, Some(faces), Some(NoHeading)),
+        (&calibrates, HoldReason::None, Some(at(2.0, 0.0)), Some(FixedTarget)),
+    ];
+    for (mission, reason, point, want) in rows {
+        let points = point.as_slice();
+        let points = (!points.is_empty()).then_some(points);
+        assert_eq!(refusal(points, reason, mission, &record), want, "{reason:?} {point:?}");
+    }
+    let unmapped = refusal(Some(&[at(2.0, 0.0)]), HoldReason::None, &plain, &Record::default());
+    assert_eq!(unmapped, Some(NotRunning));
+}

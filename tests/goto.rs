@@ -1,0 +1,147 @@
+//! A robot that is sent elsewhere while it drives.
+
+use std::{path::Path, time::Duration};
+
+use common::{
+    bus::{Bus, decode_sample},
+    geometry::wrap_angle,
+    samples::{CommandSample, CommandState, PoseSample},
+    topics,
+    waiter::Waiter,
+};
+use recording::{
+    Recording,
+    replay::{Options, replay},
+};
+use rustix::process::Signal;
+use serde_json::Value;
+
+use crate::support::{self, Run, json_of, operate, output, refused};
+
+/// Mission time runs so many times as fast as the wall's.
+const PACE: [&str; 2] = ["--pace", "2"];
+
+/// The targets of a summary: their outcomes.
+fn outcomes(summary: &Value) -> Vec<&str> {
+    let targets = summary["targets"].as_array().unwrap();
+    targets.iter().map(|target| target["outcome"].as_str().unwrap()).collect()
+}
+
+/// The commands of a robot, for each new one of which `is_enough` is asked.
+fn follow(robot: &str, mut is_enough: impl FnMut(&CommandSample) -> bool) {
+    let bus = Bus::join(&support::domain(robot), "follower").unwrap();
+    let mut commands = bus.reader(&topics::COMMAND).unwrap();
+    let mut waiter = Waiter::default();
+    waiter.on(bus.wakeup(&topics::COMMAND).unwrap());
+    let began = std::time::Instant::now();
+    loop {
+        while let Some(command) = commands.take().unwrap() {
+            if is_enough(&command) {
+                return;
+            }
+        }
+        assert!(began.elapsed() < support::PATIENCE, "no command came that was waited for");
+        waiter.wait(Duration::from_millis(100)).unwrap();
+    }
+}
+
+/// Every generation of a recorded run gives what it gave, to the bit.
+#[track_caller]
+fn assert_replays(run: &Path) {
+    let mut files: Vec<_> =
+        std::fs::read_dir(run).unwrap().map(|file| file.unwrap().path()).collect();
+    files.retain(|file| file.extension().is_some_and(|extension| extension == "mcap"));
+    assert!(!files.is_empty());
+    for file in files {
+        let report = replay(&Recording::open(&file).unwrap(), &Options::default()).unwrap();
+        assert!(report.difference.is_none() && report.equal() > 0, "{report}");
+    }
+}
+
+#[test]
+fn a_robot_that_is_sent_elsewhere_in_flight_goes_on_without_a_stop() {
+    let mut run = Run::start("goto-flight", "open-room", &PACE);
+    run.wait_until_under_way(3.0);
+    operate("goto-flight", &["goto", "1.0", "-1.0"]);
+    let mut number = 0;
+    follow("goto-flight", |command| {
+        number = number.max(command.target_number);
+        let state = CommandState::from_byte(command.state);
+        assert!(number == 0 || state != CommandState::Halt, "{command:?}");
+        number == 2 && command.v_m_s > 0.1
+    });
+    let (summary, directory) = run.arrives_in();
+    assert_eq!(outcomes(&summary), ["replaced", "reached"]);
+    let last = &summary["targets"][1];
+    assert_eq!((&last["x_m"], &last["y_m"]), (&1.0.into(), &(-1.0).into()));
+    assert!(summary["true_distance_m"].as_f64().unwrap() < 0.5, "{summary}");
+    assert_replays(&directory.path().join("run"));
+}
+
+#[test]
+fn a_list_is_driven_to_its_end_although_planner_and_supervisor_are_killed_in_between() {
+    let mut run = Run::start("goto-list", "open-room", &PACE);
+    run.wait_until_under_way(2.0);
+    operate("goto-list", &["goto", "1.0", "-0.8", "1.6", "0.4"]);
+    operate("goto-list", &["goto", "0.8", "0.8", "--heading", "-90", "--append"]);
+    run.kill_and_await_successor("planner", Signal::KILL);
+    run.wait_until("the second target of the list is reached", |status| {
+        status["target"]["number"].as_u64() == Some(4)
+    });
+    run.kill();
+    let directory = run.directory();
+    let resumed = output(&["run", "--resume", directory.to_str().unwrap(), "--json"]);
+    let (code, summary) = json_of(&resumed);
+    let summary = summary.last().unwrap();
+    assert_eq!(code.code(), Some(0), "{summary}");
+    assert_eq!(outcomes(summary), ["replaced", "reached", "reached", "reached"]);
+    assert_eq!(summary["resumes"], 1, "{summary}");
+    let facing = records_of_pose(&directory);
+    assert!((facing + std::f64::consts::FRAC_PI_2).abs() < 0.2, "it faces {facing}");
+    support::assert_nothing_left("goto-list");
+    assert_replays(&directory);
+}
+
+/// The heading of the last recorded pose of a run, radians in (-pi, pi].
+fn records_of_pose(run: &Path) -> f64 {
+    let mut newest = None;
+    for file in std::fs::read_dir(run).unwrap().map(|file| file.unwrap().path()) {
+        if file.extension().is_some_and(|extension| extension == "mcap") {
+            let recording = Recording::open(&file).unwrap();
+            for message in recording.messages(&["pose"]).unwrap() {
+                let pose: PoseSample = decode_sample(&message.unwrap().data).unwrap();
+                newest = newest.filter(|(tick, _)| *tick > pose.stamp.tick);
+                newest = newest.or(Some((pose.stamp.tick, pose.heading_rad)));
+            }
+        }
+    }
+    wrap_angle(newest.unwrap().1)
+}
+
+#[test]
+fn a_target_is_refused_with_the_reason_and_the_robot_keeps_the_one_it_has() {
+    let robot = "goto-refused";
+    let to = |words: &[&'static str], code: &str, names: &[&str]| {
+        refused(&[&["goto", "--robot", robot], words].concat(), code, names);
+    };
+    to(&["1", "1"], "not-running", &[robot]);
+    let drum = "known.drum=[{at=[2.0, 2.0], radius_m=0.3}]";
+    let mut run = Run::start(robot, "open-room", &["--pace", "2", "--set", drum]);
+    run.wait_until_under_way(1.0);
+    to(&["1"], "usage", &[]);
+    to(&["1", "1", "2"], "no-target", &["2"]);
+    to(&["inf", "1"], "no-target", &[robot]);
+    to(&["9", "0"], "target-outside", &["perimeter"]);
+    to(&["1", "1", "2", "2"], "target-in-hazard", &["hazard"]);
+    to(&["0"; 34], "too-many-targets", &["16"]);
+    operate(robot, &["stop"]);
+    to(&["1", "1"], "robot-stopped", &["resume"]);
+    refused(&["return", "--robot", robot], "robot-stopped", &["resume"]);
+    operate(robot, &["resume"]);
+    run.wait_until_driving();
+    operate(robot, &["return"]);
+    let summary = run.arrives();
+    assert_eq!(outcomes(&summary), ["replaced", "reached"]);
+    assert!(summary["true_distance_m"].as_f64().unwrap() < 0.5, "{summary}");
+    assert_eq!(summary["targets"][1]["x_m"], 0.0, "{summary}");
+}
