@@ -96,6 +96,21 @@ fn consumers_that_are_killed_and_frozen_do_not_change_the_outcome_and_leave_noth
 }
 
 #[test]
+fn a_robot_whose_targets_change_while_stages_and_supervisor_are_killed_reaches_each_or_tells() {
+    let arguments = ["bench", "chaos", "open-room", "--kills", "12", "--targets", "--replay"];
+    let robot = ["--robot", "chd-targets", "--include-supervisor", "--json"];
+    let ended = output(&[&arguments[..], &robot, &SLOW].concat());
+    let report: Value =
+        serde_json::from_slice(&ended.stdout).unwrap_or_else(|_| panic!("{ended:?}"));
+    assert_eq!(ended.status.code(), Some(0), "{report}");
+    assert_eq!(report["collisions"], 0, "{report}");
+    let targets = &report["targets"];
+    assert!(number(&targets["taken"]) >= 2 && number(&targets["reached"]) >= 1, "{report}");
+    assert_eq!(targets["wrong"].as_array().map(Vec::len), Some(0), "{report}");
+    assert_nothing_left("chd-targets");
+}
+
+#[test]
 fn chaos_that_is_killed_keeps_its_rows_and_its_consumers_end_with_it() {
     let directory = tempfile::tempdir().unwrap();
     let given = format!("'{}' topic echo pose --robot chd-cut", env!("CARGO_BIN_EXE_firsthand"));

@@ -145,3 +145,29 @@ fn a_target_is_refused_with_the_reason_and_the_robot_keeps_the_one_it_has() {
     assert!(summary["true_distance_m"].as_f64().unwrap() < 0.5, "{summary}");
     assert_eq!(summary["targets"][1]["x_m"], 0.0, "{summary}");
 }
+
+#[test]
+fn a_list_of_the_mission_file_gives_the_same_summary_and_replay_to_the_bit_in_lockstep() {
+    let text = "targets = [[1.5, -1.0], [2.5, 0.5, 180], [0.5, 0.8]]\n\
+                [[world.drum]]\nat = [2.0, 0.0]\nradius_m = 0.2";
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("list.toml");
+    std::fs::write(&file, text).unwrap();
+    let runs = ["goto-bits-1", "goto-bits-2"].map(|robot| {
+        let run = Run::start(robot, file.to_str().unwrap(), &["--seed", "3"]);
+        let (mut summary, directory) = run.arrives_in();
+        assert_eq!(outcomes(&summary), ["reached"; 3]);
+        assert_replays(&directory.path().join("run"));
+        for wall_clock in ["tick_latency_us", "full_solve_us"] {
+            summary.as_object_mut().unwrap().remove(wall_clock);
+        }
+        summary
+    });
+    assert_eq!(runs[0], runs[1]);
+    let targets = runs[0]["targets"].as_array().unwrap();
+    let times = targets.iter().map(|target| target["at_s"].as_f64().unwrap());
+    assert!(times.is_sorted() && targets.iter().all(|it| it["truth_m"].as_f64() < Some(0.5)));
+    let straight_m = runs[0]["straight_m"].as_f64().unwrap();
+    let legs = 1.5_f64.hypot(1.0) + 1.0_f64.hypot(1.5) + 2.0_f64.hypot(0.3);
+    assert!((straight_m - legs).abs() < 1e-9, "{straight_m} m");
+}

@@ -17,7 +17,7 @@ use glam::DVec2;
 use toml::de::{DeTable, DeValue};
 
 use self::objection::{Objection, objection, within};
-use super::{Method, Mission, Sensors, error::MissionError};
+use super::{MOST_TARGETS, Method, Mission, Sensors, Waypoint, error::MissionError};
 use crate::grid::{MAX_CELLS, MIN_CELLS};
 
 /// A mission is a page or two; a file without end is no mission.
@@ -74,6 +74,16 @@ fn parse(text: &str, origin: &Path) -> Result<Mission, MissionError> {
     };
     let tree = DeTable::parse(text).map_err(|error| syntax(&error))?;
     let mut mission: Mission = toml::from_str(text).map_err(|error| syntax(&error))?;
+    let has_target = tree.get_ref().contains_key("target");
+    if !has_target && let Some(first) = mission.targets.first() {
+        mission.target = first.at;
+    } else if !has_target {
+        return Err(MissionError::Syntax {
+            file: origin.to_path_buf(),
+            line: 1,
+            problem: "missing field `target`".to_owned(),
+        });
+    }
     if mission.name.is_empty() {
         mission.name =
             origin.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
@@ -201,16 +211,42 @@ impl Checker {
     }
 
     fn target(&mut self, mission: &Mission) -> Result<(), Objection> {
-        self.point("target", mission.target)?;
+        let key = key_of_target(mission);
         let frame = mission.grid_frame();
-        if frame.cell_at(mission.target).is_none_or(|cell| frame.is_rim(cell)) {
+        for Waypoint { at, heading_deg } in mission.waypoints() {
+            self.point(key, at)?;
+            if frame.cell_at(at).is_none_or(|cell| frame.is_rim(cell)) {
+                return Err(objection(
+                    key,
+                    format!(
+                        "{at} is not inside the perimeter of {} m around {}",
+                        mission.perimeter.width_m, mission.perimeter.centre
+                    ),
+                    "move the target in, or widen perimeter.width_m",
+                ));
+            }
+            within(key, heading_deg.unwrap_or_default(), -360.0..=360.0, "degrees of heading")?;
+            if heading_deg.is_some() && mission.body().steering.is_some() {
+                return Err(objection(
+                    key,
+                    "a car does not turn on the spot, so its targets have no heading",
+                    "give [x, y]",
+                ));
+            }
+        }
+        if mission.targets.len() > MOST_TARGETS {
             return Err(objection(
-                "target",
-                format!(
-                    "{} is not inside the perimeter of {} m around {}",
-                    mission.target, mission.perimeter.width_m, mission.perimeter.centre
-                ),
-                "move the target in, or widen perimeter.width_m",
+                key,
+                format!("a list of {} targets is too long", mission.targets.len()),
+                format!("give 1 to {MOST_TARGETS}"),
+            ));
+        }
+        // A run file has both.
+        if mission.targets.first().is_some_and(|first| first.at != mission.target) {
+            return Err(objection(
+                "targets",
+                "target and targets are both given",
+                "leave one of them out",
             ));
         }
         let half = mission.perimeter.width_m / 2.0;
@@ -224,6 +260,11 @@ impl Checker {
         }
         Err(objection(key, format!("{point} is not a place"), "give two finite numbers, metres"))
     }
+}
+
+/// The key that names the mission's targets.
+const fn key_of_target(mission: &Mission) -> &'static str {
+    if mission.targets.is_empty() { "target" } else { "targets" }
 }
 
 fn stages(mission: &Mission) -> Result<(), Objection> {
@@ -279,8 +320,14 @@ fn start_is_free(mission: &Mission) -> Result<(), Objection> {
                 "move it away from (0, 0)",
             ));
         }
-        if shapes.clearance(mission.target) <= 0.0 {
-            return Err(objection(key, "the target lies inside a shape", "move one of them"));
+        for Waypoint { at, .. } in mission.waypoints() {
+            if shapes.clearance(at) <= 0.0 {
+                let problem = match mission.targets.is_empty() {
+                    true => "the target lies inside a shape".to_owned(),
+                    false => format!("the target {at} lies inside a shape"),
+                };
+                return Err(objection(key, problem, "move one of them"));
+            }
         }
     }
     Ok(())

@@ -60,8 +60,12 @@ pub struct Mission {
     /// One line for `firsthand missions`.
     #[serde(default)]
     pub description: String,
-    /// X_T: where to go, metres.
+    /// X_T: where to go first, metres.
+    #[serde(default = "defaults::no_target")]
     pub target: DVec2,
+    /// Where to go one after the other, instead of [`Mission::target`]; that is the first of them then.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub targets: Vec<Waypoint>,
     /// The method by which the robot is guided.
     #[serde(default)]
     pub method: Method,
@@ -120,6 +124,37 @@ pub struct Mission {
     /// Remarks about a valid file, one line each: keys or values that have a new name now, and requests that the robot cannot fulfil.
     #[serde(skip)]
     pub remarks: Vec<String>,
+}
+
+/// How many targets a list has at most.
+pub const MOST_TARGETS: usize = 16;
+
+/// A place of a list of targets: `[x, y]`, or `[x, y, heading]`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
+pub struct Waypoint {
+    /// Metres.
+    pub at: DVec2,
+    /// The heading to turn to there, degrees counter-clockwise from x; none for any.
+    pub heading_deg: Option<f64>,
+}
+
+impl TryFrom<Vec<f64>> for Waypoint {
+    type Error = &'static str;
+
+    fn try_from(numbers: Vec<f64>) -> Result<Self, Self::Error> {
+        match numbers[..] {
+            [x, y] => Ok(Self { at: DVec2::new(x, y), heading_deg: None }),
+            [x, y, heading] => Ok(Self { at: DVec2::new(x, y), heading_deg: Some(heading) }),
+            _ => Err("a target of a list is [x, y], or [x, y, heading in degrees]"),
+        }
+    }
+}
+
+impl From<Waypoint> for Vec<f64> {
+    fn from(Waypoint { at, heading_deg }: Waypoint) -> Self {
+        [at.x, at.y].into_iter().chain(heading_deg).collect()
+    }
 }
 
 /// The method by which the robot is guided to its target.
@@ -267,6 +302,9 @@ pub struct Controller {
 }
 
 mod defaults {
+    pub(super) const fn no_target() -> glam::DVec2 {
+        glam::DVec2::NAN
+    }
     pub(super) const fn arrival_tolerance_m() -> f64 {
         0.15
     }
@@ -312,6 +350,15 @@ impl Default for Controller {
 }
 
 impl Mission {
+    /// Where to go, one after the other.
+    #[must_use]
+    pub fn waypoints(&self) -> Vec<Waypoint> {
+        match self.targets.is_empty() {
+            true => vec![Waypoint { at: self.target, heading_deg: None }],
+            false => self.targets.clone(),
+        }
+    }
+
     /// Delta = D / N and where the cells lie.
     #[must_use]
     pub fn grid_frame(&self) -> GridFrame {

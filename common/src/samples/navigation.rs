@@ -7,7 +7,7 @@ use crate::{
     bus::{Stamp, ZeroCopySend, layouts},
     grid::Part,
     kinematics::{Pose2, Twist},
-    mission::{INFRARED_RANGERS, Mission},
+    mission::{INFRARED_RANGERS, Mission, Waypoint},
 };
 
 payloads! {
@@ -203,8 +203,17 @@ impl TargetPoint {
     }
 }
 
-/// How many targets a list has at most.
-pub const MOST_TARGETS: usize = 16;
+pub use crate::mission::MOST_TARGETS;
+
+impl From<Waypoint> for TargetPoint {
+    fn from(Waypoint { at, heading_deg }: Waypoint) -> Self {
+        Self {
+            heading_rad: heading_deg.unwrap_or_default().to_radians(),
+            has_heading: heading_deg.is_some().into(),
+            ..Self::at(at)
+        }
+    }
+}
 
 payloads! {
     /// Topic `target`: where the robot is sent.

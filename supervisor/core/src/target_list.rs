@@ -78,12 +78,13 @@ pub struct TargetList {
 impl TargetList {
     /// The targets that `mission` begins with.
     pub(crate) fn of(mission: &Mission) -> Self {
+        let mut points = mission.waypoints().into_iter().map(TargetPoint::from);
         Self {
             number: 1,
-            current: TargetPoint::at(mission.target),
+            current: points.next().unwrap_or_default(),
             since_tick: 0,
             began_s: 0.0,
-            ahead: Vec::new(),
+            ahead: points.collect(),
             results: Vec::new(),
         }
     }

@@ -23,6 +23,7 @@ pub(super) struct Motion<'a> {
     believed: &'a [Pose2],
     covariance: Option<[f64; 3]>,
     truth: &'a [Pose2],
+    targets: &'a [DVec2],
     /// Mission time between two bodies, seconds, and the poses from one to the next.
     every: Option<(f64, f64)>,
 }
@@ -35,6 +36,7 @@ impl<'a> Motion<'a> {
             believed: scene.believed,
             covariance: scene.covariance,
             truth: scene.truth,
+            targets: scene.targets,
             every: None,
         };
         let duration = scene.facts.mission_time_s;
@@ -74,8 +76,13 @@ impl<'a> Motion<'a> {
     pub(super) fn layer(&self, view: &View) -> String {
         let radius = view.px(self.mission.body().radius_m);
         let start = self.mission.start_pose();
+        let ring = view.px(self.mission.arrival_tolerance_m);
+        let mut targets = self.targets.to_vec();
+        if targets.is_empty() {
+            targets.extend(self.mission.waypoints().iter().map(|waypoint| waypoint.at));
+        }
         [
-            target(view.place(self.mission.target), view.px(self.mission.arrival_tolerance_m)),
+            targets.into_iter().map(|at| target(view.place(at), ring)).collect(),
             halo(&trajectory(view, self.truth)),
             halo(&trajectory(view, self.believed)),
             self.bodies(view, radius),

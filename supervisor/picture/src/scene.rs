@@ -1,6 +1,7 @@
 //! The content of a picture of a run.
 
 use common::{grid::GridFrame, kinematics::Pose2, mission::Mission, samples::FieldCell};
+use glam::DVec2;
 
 pub struct Scene<'a> {
     /// The mission: target, world, body, perimeter.
@@ -15,6 +16,8 @@ pub struct Scene<'a> {
     pub covariance: Option<[f64; 3]>,
     /// The true poses at the same times; empty with a real robot.
     pub truth: &'a [Pose2],
+    /// Where the robot was sent, metres; empty for the targets of the mission.
+    pub targets: &'a [DVec2],
     /// The facts about the run.
     pub facts: Facts<'a>,
     /// Lines below the picture; each is cut where the page ends.

@@ -35,6 +35,7 @@ impl Run {
             believed: &self.believed,
             covariance: Some([0.04, 0.03, 0.09]),
             truth: &self.truth,
+            targets: &[],
             facts: Facts {
                 outcome: "reached",
                 reached: true,

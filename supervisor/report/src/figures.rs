@@ -77,6 +77,7 @@ fn scene<'a>(
         believed: poses,
         covariance: None,
         truth: &[],
+        targets: &[],
         facts: Facts {
             outcome: content.outcome().unwrap_or("unknown"),
             reached: content.outcome() == Some("reached"),

@@ -13,6 +13,7 @@
 //! | `attack`, `subscriptions` | the attacker of one mission; its readers on the bus |
 //! | `kind`, `recovery` | how a process is hit; the recovery until its successor works |
 //! | `consumer`, `consumers`, `terminal` | consumers that are hit and restarted; a terminal for one that draws |
+//! | `changes` | targets that change meanwhile |
 //! | `replays` | replays of the missions' recordings |
 //! | `resources`, `leftovers` | resources of a process; files and processes that outlived a mission |
 //! | [`Report`] | the result of all missions |
@@ -22,6 +23,7 @@
 //! | [`StopTimeTable`] | how long each moved after its fault |
 
 mod attack;
+mod changes;
 mod consumer;
 mod consumers;
 mod fault_injector;

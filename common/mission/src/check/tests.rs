@@ -25,6 +25,18 @@ fn a_mission_written_out_reads_back_the_same() {
 }
 
 #[test]
+fn a_list_of_targets_is_written_in_place_of_one_and_reads_back_the_same() {
+    let mission = parse("targets = [[3, 0.5], [1, -1, 90]]", Path::new("m.toml")).unwrap();
+    assert_eq!(mission.target, DVec2::new(3.0, 0.5));
+    let last = Waypoint { at: DVec2::new(1.0, -1.0), heading_deg: Some(90.0) };
+    assert_eq!(mission.waypoints()[1..], [last]);
+    let written = toml::to_string(&mission).unwrap();
+    assert_eq!(parse(&written, Path::new("m.toml")).unwrap(), mission);
+    let seventeen = format!("targets = [{}]", "[1, 1],".repeat(17));
+    assert!(refusal(&seventeen).contains("1 to 16"));
+}
+
+#[test]
 fn every_refusal_names_line_and_key() {
     let cases = [
         ("target = [30, 0]", "m.toml:1: target: "),
@@ -51,6 +63,17 @@ fn every_refusal_names_line_and_key() {
         (
             "target = [3, 0]\n[robot]\nmodel = 'car'\nsteering_limit_deg = 90",
             "m.toml:4: robot.steering_limit_deg: ",
+        ),
+        ("target = [3, 0]\ntargets = [[2, 0]]", "m.toml:2: targets: target and targets"),
+        ("targets = [[2, 0], [30, 0]]", "m.toml:1: targets: "),
+        ("targets = [[2, 0], [nan, 0]]", "m.toml:1: targets: "),
+        ("targets = [[2, 0], [3]]", "m.toml:1: a target of a list is [x, y]"),
+        ("targets = [[2, 0, 400]]", "m.toml:1: targets: "),
+        ("targets = [[2, 0, 90]]\nrobot.model = 'car'", "m.toml:1: targets: a car"),
+        ("targets = []", "m.toml:1: missing field `target`"),
+        (
+            "targets = [[2, 0], [3, 0]]\n[[known.drum]]\nat = [3, 0]\nradius_m = 0.2",
+            "m.toml:2: known: the target [3, 0] lies inside",
         ),
         ("description = 'no target'", "m.toml:1: missing field `target`"),
     ];

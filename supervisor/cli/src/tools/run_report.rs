@@ -5,8 +5,14 @@ use std::{fs, path::PathBuf};
 use common::{
     ground_truth::GroundTruthTick, kinematics::Pose2, mission::Mission, samples::PoseSample,
 };
+use glam::DVec2;
 use picture::{Facts, Scene};
-use supervisor::{Finished, Options, outcome::Outcome, summary::Summary};
+use supervisor::{
+    Finished, Options,
+    outcome::Outcome,
+    summary::Summary,
+    target_list::{TargetOutcome, TargetResult},
+};
 
 /// The name of a result and its file.
 pub(crate) type Written = Result<(&'static str, PathBuf), String>;
@@ -34,6 +40,13 @@ fn svg(mission: &Mission, finished: &Finished, summary: &Summary) -> String {
     if summary.outcome != Outcome::Reached {
         captions.insert(0, summary.reason.clone());
     }
+    let tried = |target: &&TargetResult| target.outcome != TargetOutcome::NotTried;
+    let targets: Vec<_> = finished
+        .targets
+        .iter()
+        .filter(tried)
+        .map(|target| DVec2::new(target.x_m, target.y_m))
+        .collect();
     picture::svg(&Scene {
         mission,
         grid: record.grid.frame().map(|frame| (frame, record.grid.cells())),
@@ -44,6 +57,7 @@ fn svg(mission: &Mission, finished: &Finished, summary: &Summary) -> String {
             [xx, xy, yy]
         }),
         truth: &true_poses(&finished.truth),
+        targets: &targets,
         facts: Facts {
             outcome: summary.outcome.as_str(),
             reached: summary.outcome == Outcome::Reached,
@@ -60,6 +74,6 @@ fn svg(mission: &Mission, finished: &Finished, summary: &Summary) -> String {
 fn true_poses(truth: &[GroundTruthTick]) -> Vec<Pose2> {
     truth
         .iter()
-        .map(|tick| Pose2 { position: glam::DVec2::new(tick.x, tick.y), heading: tick.heading })
+        .map(|tick| Pose2 { position: DVec2::new(tick.x, tick.y), heading: tick.heading })
         .collect()
 }

@@ -12,7 +12,8 @@ use common::{clock::Pace, mission::Mission};
 use serde_json::Value;
 
 use crate::chaos::{
-    attack::Attack, consumers::Consumers, options::Options, report::End, series::Series,
+    attack::Attack, changes::Operator, consumers::Consumers, options::Options, report::End,
+    series::Series,
 };
 use crate::error::{self, BenchError, system};
 use supervisor::{
@@ -101,6 +102,9 @@ pub(crate) fn attack(
     }
     let consumers = files.join("consumers");
     let consumers = Consumers::start(options, consumers, &mut series.report)?;
+    let asked = &options.asked;
+    let operator =
+        asked.targets.then(|| Operator::start(asked.robot.clone(), &options.loaded, seed));
     let mut attack = Attack::new(seed, consumers);
     let began = Instant::now();
     let summary = loop {
@@ -125,16 +129,25 @@ pub(crate) fn attack(
         kills,
         healthy_aborted: attack.healthy_aborted(&deaths(&directory)),
     };
+    let mut all_truth = Vec::new();
     if let Some(mut robot) = robot {
         robot.stop()?;
         let truth = robot.truth();
+        all_truth = truth.to_vec();
         let last = truth.last();
         end.collisions = last.map_or(0, |tick| tick.contacts);
         end.stopping_time_s = last.map_or(0.0, |tick| tick.stopping_time_s);
         let error = attack.pose_error(truth).unwrap_or(f64::INFINITY);
         end.pose_excess_m = error - undisturbed_error_m;
     }
+    if options.asked.targets {
+        // The undisturbed robot took another way.
+        end.pose_allowance_m = f64::INFINITY;
+    }
     let mut right = series.report.add_mission(&end);
+    if let Some(operator) = operator {
+        right &= series.report.targets().add(seed, operator, &summary, &all_truth);
+    }
     if options.asked.only_consumers {
         series.report.tick_latencies().add(undisturbed, &summary);
     }

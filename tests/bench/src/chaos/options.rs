@@ -42,6 +42,9 @@ pub struct Arguments {
     /// Freeze supervisor and stages together too, for 0.3 to 1.5 s, one in two signals, as if the machine stood still.
     #[arg(long)]
     pub freeze_all: bool,
+    /// Send the robot elsewhere every few seconds. Each target must be reached by the ground truth, or told to be replaced.
+    #[arg(long, conflicts_with_all = ["only_consumers", "robot_faults"])]
+    pub targets: bool,
     /// Record the missions, and replay every generation of every stage, which must be equal to the bit.
     #[arg(long)]
     pub replay: bool,

@@ -6,7 +6,8 @@ use common::{latency::Histogram, topics::SUPERVISOR};
 use serde::Serialize;
 
 use crate::chaos::{
-    kind::Kind, replays::Replays, resources::Resources, tick_latencies::TickLatencies,
+    changes::Changes, kind::Kind, replays::Replays, resources::Resources,
+    tick_latencies::TickLatencies,
 };
 use supervisor::{outcome::Outcome, stages::TABLE};
 
@@ -48,6 +49,9 @@ pub struct Report {
     /// Results of replaying the missions' recordings.
     #[serde(skip_serializing_if = "Option::is_none")]
     replays: Option<Replays>,
+    /// Targets that changed meanwhile.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    targets: Option<Changes>,
     /// Ticks with and without consumers, if nothing else is hit.
     #[serde(skip_serializing_if = "Option::is_none")]
     tick_latencies: Option<TickLatencies>,
@@ -170,6 +174,10 @@ impl Report {
         self.replays.get_or_insert_default()
     }
 
+    pub(crate) fn targets(&mut self) -> &mut Changes {
+        self.targets.get_or_insert_default()
+    }
+
     pub(crate) fn tick_latencies(&mut self) -> &mut TickLatencies {
         self.tick_latencies.get_or_insert_default()
     }
@@ -184,7 +192,8 @@ impl Report {
     /// Whether every mission reached the target without a contact and knew its pose. The files of other missions stay.
     pub fn is_right(&self) -> bool {
         let replayed = self.replays.as_ref().is_none_or(Replays::all_equal);
-        self.wrong.is_empty() && replayed
+        let told = self.targets.as_ref().is_none_or(Changes::is_right);
+        self.wrong.is_empty() && replayed && told
     }
 
     /// Count leftovers of the last mission.
@@ -304,6 +313,9 @@ impl fmt::Display for Report {
             to,
             "a supervisor grew by at most {descriptors} descriptors and {memory_kib} KiB"
         )?;
+        if let Some(targets) = &self.targets {
+            writeln!(to, "{targets}")?;
+        }
         if let Some(ticks) = &self.tick_latencies {
             writeln!(to, "{ticks}")?;
         }

@@ -6,11 +6,10 @@ use common::{
     bus::{AnyReader, Bus, BusError, Reader, SliceReader},
     samples::{
         CommandSample, DeathSample, FieldCell, FieldHeader, GridHeader, GuidanceSample, LinkSample,
-        PoseSample, PowerSample, RosterEntry, RosterHeader, StallSample, name_str,
+        PoseSample, PowerSample, RosterEntry, RosterHeader, StallSample, TargetSample, name_str,
     },
     topics,
 };
-use glam::DVec2;
 use supervisor::stages;
 
 use super::{usage::Processes, view::View, words};
@@ -24,6 +23,7 @@ pub(super) struct Feed {
     pose: Reader<PoseSample>,
     grid: SliceReader<GridHeader, u8>,
     field: SliceReader<FieldHeader, FieldCell>,
+    target: Reader<TargetSample>,
     guidance: Reader<GuidanceSample>,
     command: Reader<CommandSample>,
     link: Reader<LinkSample>,
@@ -64,6 +64,7 @@ impl Feed {
             pose: bus.reader(&topics::POSE)?,
             grid: bus.slice_reader(&topics::GRID)?,
             field: bus.slice_reader(&topics::FIELD)?,
+            target: bus.reader(&topics::TARGET)?,
             guidance: bus.reader(&topics::GUIDANCE)?,
             command: bus.reader(&topics::COMMAND)?,
             link: bus.reader(&topics::LINK)?,
@@ -85,9 +86,11 @@ impl Feed {
             view.grid.apply(&grid.header().part, &grid);
         }
         while let Some(field) = self.field.take()? {
-            let header = field.header();
-            view.target = Some(DVec2::new(header.target_x_m, header.target_y_m));
-            view.field.apply(&header.part, &field);
+            view.field.apply(&field.header().part, &field);
+        }
+        if let Some(target) = self.target.newest()? {
+            let points = [target.target].into_iter().chain(target.ahead().to_vec());
+            view.targets = points.map(|point| point.position()).collect();
         }
         view.guidance = self.guidance.newest()?.or(view.guidance);
         view.command = self.command.newest()?.or(view.command);

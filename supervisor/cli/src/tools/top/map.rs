@@ -117,7 +117,7 @@ pub(super) fn lines(view: &View, width: u16, height: u16) -> Option<Vec<Line<'st
     for &point in &view.way {
         put(point, WAY, WAY_STYLE);
     }
-    if let Some(target) = view.target {
+    for &target in &view.targets {
         put(target, TARGET, TARGET_STYLE);
     }
     if let Some(pose) = view.pose {

@@ -66,7 +66,7 @@ fn view() -> View {
     }
     view.grid.apply(&Part::whole(frame, 3), &grid);
     view.field.apply(&Part::whole(frame, 3), &field);
-    view.target = Some(DVec2::new(0.0, 4.0));
+    view.targets = vec![DVec2::new(0.0, 4.0)];
     for y in -40..0 {
         view.on_pose(PoseSample {
             stamp,

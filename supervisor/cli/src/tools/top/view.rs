@@ -39,8 +39,8 @@ pub(super) struct View {
     pub(super) power: Option<PowerSample>,
     pub(super) grid: Replica<u8>,
     pub(super) field: Replica<FieldCell>,
-    /// The target, metres in the mission frame.
-    pub(super) target: Option<DVec2>,
+    /// The target and those after it, metres in the mission frame.
+    pub(super) targets: Vec<DVec2>,
     /// The believed way of the robot, metres in the mission frame.
     pub(super) way: Vec<DVec2>,
     /// Deaths and stalls, the newest first.
@@ -73,7 +73,7 @@ impl View {
             power: None,
             grid: Replica::default(),
             field: Replica::default(),
-            target: None,
+            targets: Vec::new(),
             way: Vec::new(),
             events: VecDeque::new(),
             message: String::new(),
