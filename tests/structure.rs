@@ -200,6 +200,8 @@ fn what_watches_a_robot_contains_no_pictures_no_file_formats_and_no_chance() {
             "picture",
             "evaluation",
             "x80-sim",
+            "page",
+            "tokio",
         ] {
             assert!(!names.contains(tool), "{arguments:?} contains {tool}");
         }

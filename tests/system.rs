@@ -27,6 +27,7 @@ mod machine;
 mod missions;
 mod neighbours;
 mod operators;
+mod page;
 mod planners;
 mod recording;
 mod repeatability;

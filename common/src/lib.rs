@@ -13,6 +13,7 @@
 //! | [`ground_truth`] | what a simulated robot writes about itself |
 //! | [`signals`] | signals as something to wait for |
 //! | [`checkpoint`], [`journal`] | state that outlives a SIGKILL: small, and large with few changes |
+//! | [`process_status`], [`process_usage`] | what the kernel says of a process; its processor and memory |
 //! | [`samples`] | the payloads of the topics |
 //! | [`topics`] | THE table of topics |
 //! | [`faults`] | THE table of what can be broken in a stage on purpose |
@@ -42,6 +43,7 @@ pub mod latency;
 pub mod latency_budget;
 pub mod outputs;
 pub mod process_status;
+pub mod process_usage;
 pub mod replay;
 pub mod roster;
 pub mod run;

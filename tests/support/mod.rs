@@ -12,10 +12,11 @@
     reason = "each of the two test executables uses a part"
 )]
 
+mod browser;
 mod commands;
 mod own_process;
 mod robot;
 mod run;
 pub mod wire;
 
-pub use self::{commands::*, own_process::*, robot::*, run::*};
+pub use self::{browser::*, commands::*, own_process::*, robot::*, run::*};

@@ -7,6 +7,8 @@ pub(crate) mod help;
 pub(crate) mod install;
 pub(crate) mod logs;
 pub(crate) mod missions;
+#[cfg(feature = "page")]
+pub(crate) mod page;
 pub(crate) mod record;
 pub(crate) mod resume;
 pub(crate) mod run;
@@ -34,11 +36,13 @@ use crate::tools::{
 use crate::{console::failure::Failure, renamed};
 
 /// Declares the subcommands by groups: the name of each and the module that has its `Arguments` and its `main`, which takes in
-/// addition what stands in parentheses. `@tools` and `@simulator` are the features without which it does not exist.
+/// addition what stands in parentheses. `@tools`, `@page` and `@simulator` are the features without which it does
+/// not exist.
 macro_rules! commands {
     ($($heading:literal {
         $($name:ident $module:ident $(($whole:ident))?,)*
         $(@tools { $($tool:ident $tool_module:ident $(($tool_whole:ident))?,)* })?
+        $(@page { $page:ident $page_module:ident })?
         $(@simulator { $sim:ident $sim_module:ident })?
     })*) => {
         #[derive(Debug, Subcommand)]
@@ -46,6 +50,7 @@ macro_rules! commands {
             $(
                 $($name($module::Arguments),)*
                 $($(#[cfg(feature = "tools")] $tool($tool_module::Arguments),)*)?
+                $(#[cfg(feature = "page")] $page($page_module::Arguments),)?
                 $(#[cfg(feature = "simulator")] $sim($sim_module::Arguments),)?
             )*
         }
@@ -56,6 +61,7 @@ macro_rules! commands {
             &[
                 $(stringify!($name),)*
                 $($(#[cfg(feature = "tools")] stringify!($tool),)*)?
+                $(#[cfg(feature = "page")] stringify!($page),)?
                 $(#[cfg(feature = "simulator")] stringify!($sim),)?
             ],
         )),*];
@@ -69,6 +75,10 @@ macro_rules! commands {
                             #[cfg(feature = "tools")]
                             Self::$tool(arguments) => $tool_module::main(arguments $(, $tool_whole())?)?.report(),
                         )*)?
+                        $(
+                            #[cfg(feature = "page")]
+                            Self::$page(arguments) => $page_module::main(arguments)?.report(),
+                        )?
                         $(
                             #[cfg(feature = "simulator")]
                             Self::$sim(arguments) => $sim_module::main(arguments)?.report(),
@@ -89,6 +99,7 @@ commands! {
         Stop stop,
         Resume resume,
         @tools { Top top, }
+        @page { Page page }
     }
     "Look at it" {
         Topic topic,

@@ -56,7 +56,7 @@ pub mod downsampled;
 mod error;
 mod file;
 mod foxglove;
-mod log_files;
+pub mod log_files;
 mod losses;
 pub mod reader;
 pub mod recorder;
@@ -66,6 +66,7 @@ pub mod schema;
 
 pub use self::{
     error::RecordingError,
+    foxglove::base64,
     reader::{End, Message, Recording, Sample, SliceSample, parts, places},
     recorder::{Options, record},
 };

@@ -12,7 +12,7 @@ use std::{
 const AT_ONCE: usize = 1 << 16;
 
 #[derive(Debug)]
-pub(crate) struct LogFiles {
+pub struct LogFiles {
     directory: PathBuf,
     /// The position in each log, and its incomplete last line.
     read: HashMap<PathBuf, (u64, Vec<u8>)>,
@@ -20,7 +20,7 @@ pub(crate) struct LogFiles {
 
 impl LogFiles {
     /// Follow logs from their beginning, or only lines from now on.
-    pub(crate) fn follow(directory: &Path, from_the_beginning: bool) -> Self {
+    pub fn follow(directory: &Path, from_the_beginning: bool) -> Self {
         let mut files = Self { directory: directory.to_path_buf(), read: HashMap::new() };
         if !from_the_beginning {
             for file in files.files() {
@@ -38,7 +38,7 @@ impl LogFiles {
     }
 
     /// Call `each` with the process and the text of every new line. A log that cannot be read is tried again later.
-    pub(crate) fn take(&mut self, each: &mut dyn FnMut(&str, &str)) {
+    pub fn take(&mut self, each: &mut dyn FnMut(&str, &str)) {
         for file in self.files() {
             let process = file.file_stem().map(|name| name.to_string_lossy().into_owned());
             let (at, partial) = self.read.entry(file.clone()).or_default();

@@ -62,10 +62,28 @@ pub(crate) fn code(error: &(dyn Error + 'static)) -> Option<&'static str> {
         .or_else(|| error.downcast_ref().and_then(of_recording))
         .or_else(|| error.downcast_ref().map(of_lookup))
         .or_else(|| error.is::<MissionError>().then_some("mission"))
+        .or_else(|| of_page(error))
         .or_else(|| {
             let planner = error.is::<PlannerExecutableError>();
             planner.then_some("planner-executable")
         })
+}
+
+#[cfg(feature = "page")]
+fn of_page(error: &(dyn Error + 'static)) -> Option<&'static str> {
+    use page::live::PageError;
+    Some(match error.downcast_ref()? {
+        PageError::NotLoopback(_) => "not-loopback",
+        PageError::Listen { .. } => "cannot-listen",
+        PageError::Tls { .. } => "tls",
+        PageError::NoName(_) => "no-name",
+        PageError::System(_) => return None,
+    })
+}
+
+#[cfg(not(feature = "page"))]
+const fn of_page(_: &(dyn Error + 'static)) -> Option<&'static str> {
+    None
 }
 
 fn of_supervisor(error: &SupervisorError) -> Option<&'static str> {

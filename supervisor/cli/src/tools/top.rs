@@ -7,7 +7,6 @@
 //! | `screen`, `map` | draw it |
 //! | `action` | what the keys do |
 //! | `words` | guidance, deaths and stalls in words |
-//! | `usage` | processor and memory of a process |
 
 mod action;
 mod feed;
@@ -15,7 +14,6 @@ mod map;
 mod screen;
 #[cfg(test)]
 mod tests;
-mod usage;
 mod view;
 mod words;
 

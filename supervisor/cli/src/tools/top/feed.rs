@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use common::{
     bus::{AnyReader, Bus, BusError, Reader, SliceReader},
+    process_usage::Processes,
     samples::{
         CommandSample, DeathSample, FieldCell, FieldHeader, GridHeader, GuidanceSample, LinkSample,
         PoseSample, PowerSample, RosterEntry, RosterHeader, StallSample, TargetSample, name_str,
@@ -12,7 +13,7 @@ use common::{
 };
 use supervisor::stages;
 
-use super::{usage::Processes, view::View, words};
+use super::{view::View, words};
 use crate::console::rates::TopicRates;
 
 /// Rates are counted over this time.

@@ -1,5 +1,6 @@
 use common::{
     latency::Histogram,
+    process_usage::Usage,
     samples::{Action, HoldReason, LinkSample, Order, StageState, name_str},
 };
 use ratatui::{
@@ -13,7 +14,6 @@ use ratatui::{
 use super::{
     action::KEYS,
     map,
-    usage::Usage,
     view::{Stage, View},
     words as top_words,
 };

@@ -5,6 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use common::{
     grid::{CellState, GridFrame, Part},
+    process_usage::Usage,
     samples::{
         CommandSample, DeathSample, FieldCell, GuidanceSample, GuidanceStatus, LinkSample, Order,
         PoseSample, PowerSample, RosterEntry, RosterHeader, StageState, Stamp, name,
@@ -13,7 +14,7 @@ use common::{
 use glam::DVec2;
 use ratatui::{Terminal, backend::TestBackend};
 
-use super::{action::KEYS, screen, usage::Usage, view::View, words};
+use super::{action::KEYS, screen, view::View, words};
 
 const STAGES: [&str; 5] = ["x80-link", "dead-reckoning", "mapper", "planner", "controller"];
 

@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use common::{
     domain::RobotName,
     grid::Replica,
+    process_usage::Usage,
     samples::{
         CommandSample, FieldCell, GuidanceSample, LinkSample, PoseSample, PowerSample, RosterEntry,
         RosterHeader, name_str,
@@ -12,8 +13,6 @@ use common::{
 };
 use glam::DVec2;
 use recording::downsampled::drop_every_second;
-
-use super::usage::Usage;
 
 /// The longest way, in points. From a longer one every second point is dropped.
 const MOST_POINTS: usize = 4000;

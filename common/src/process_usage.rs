@@ -5,18 +5,18 @@ use std::{
     time::{Duration, Instant},
 };
 
-use common::process_status::{kibibytes, processor_time};
+use crate::process_status::{kibibytes, processor_time};
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Usage {
+pub struct Usage {
     /// Share of one processor since the last look, from 0 to 1; none at the first look.
-    pub(super) cpu: Option<f64>,
+    pub cpu: Option<f64>,
     /// Resident memory with shared memory, bytes; none if the process has ended.
-    pub(super) memory_bytes: Option<u64>,
+    pub memory_bytes: Option<u64>,
 }
 
 #[derive(Debug, Default)]
-pub(super) struct Processes {
+pub struct Processes {
     /// For each process the time of the last look, its processor time then, and the result.
     seen: BTreeMap<u32, (Instant, Duration, Usage)>,
 }
@@ -26,7 +26,7 @@ const LOOK_EVERY: Duration = Duration::from_secs(1);
 
 impl Processes {
     /// The usage of each of `processes` at `now`, in their order. Shares are over a second at least.
-    pub(super) fn look(&mut self, processes: &[u32], now: Instant) -> Vec<Usage> {
+    pub fn look(&mut self, processes: &[u32], now: Instant) -> Vec<Usage> {
         self.seen.retain(|process, _| processes.contains(process));
         processes.iter().map(|&process| self.one(process, now)).collect()
     }

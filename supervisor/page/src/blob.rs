@@ -1,0 +1,156 @@
+//! Maps and fields as the binary messages of the page.
+//!
+//! | bytes | content, little-endian |
+//! |---|---|
+//! | 0 | 1: a map, 2: a field, 3: the field of a target that is only looked at |
+//! | 2..4 | N: N x N cells |
+//! | 4..8 | side of a cell, metres, f32 |
+//! | 8..16 | lower left corner, metres, two f32 |
+//! | 16..24 | mission time, seconds, f64 |
+//! | 24..32 | target of a field, metres, two f32 |
+//! | 32.. | cells, row-major from below, as raw deflate |
+//!
+//! A cell of a map is its [`common::grid::CellState`] byte. A field has first for all cells the direction (254 steps of a turn from
+//! x, counter-clockwise; 255 for none), then -2 log2 u (255 for u = 0).
+
+use std::io::Write as _;
+
+use common::{grid::GridFrame, samples::FieldCell};
+use flate2::{Compression, write::DeflateEncoder};
+use glam::DVec2;
+
+/// Steps of a turn.
+const STEPS: f32 = 254.0;
+const NONE: u8 = 255;
+/// A field has at most so many cells a side; of a larger one every second, third, ... cell is sent.
+const MOST_A_SIDE: usize = 256;
+
+/// What a message shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Shown {
+    Map = 1,
+    Field = 2,
+    #[cfg_attr(not(feature = "live"), allow(dead_code))]
+    Preview = 3,
+}
+
+/// The map of `cells` at mission time `time_s`.
+pub(crate) fn map(frame: GridFrame, cells: &[u8], time_s: f64) -> Vec<u8> {
+    let header = Header {
+        shown: Shown::Map,
+        cells: frame.cells as usize,
+        side_m: frame.resolution_m,
+        frame,
+        time_s,
+        target: DVec2::ZERO,
+    };
+    header.message(cells)
+}
+
+/// The field of `cells` to `target` at mission time `time_s`.
+pub(crate) fn field(
+    shown: Shown,
+    frame: GridFrame,
+    cells: &[FieldCell],
+    target: DVec2,
+    time_s: f64,
+) -> Vec<u8> {
+    let side = frame.cells as usize;
+    let every = side.div_ceil(MOST_A_SIDE).max(1);
+    let sent = side / every;
+    let (mut directions, mut depths) = (Vec::new(), Vec::new());
+    for row in 0..sent {
+        for col in 0..sent {
+            let cell = cells[(row * every + every / 2) * side + col * every + every / 2];
+            directions.push(direction(cell));
+            depths.push(depth(cell));
+        }
+    }
+    directions.append(&mut depths);
+    let side_m = frame.resolution_m * every as f64;
+    Header { shown, cells: sent, side_m, frame, time_s, target }.message(&directions)
+}
+
+fn direction(cell: FieldCell) -> u8 {
+    if cell.ex == 0.0 && cell.ey == 0.0 {
+        return NONE;
+    }
+    let turns = cell.ey.atan2(cell.ex) / std::f32::consts::TAU;
+    (turns.rem_euclid(1.0) * STEPS).round() as u8 % STEPS as u8
+}
+
+fn depth(cell: FieldCell) -> u8 {
+    let depth = -2.0 * cell.log2_u;
+    if depth.is_finite() { depth.round().clamp(0.0, 254.0) as u8 } else { NONE }
+}
+
+struct Header {
+    shown: Shown,
+    cells: usize,
+    side_m: f64,
+    frame: GridFrame,
+    time_s: f64,
+    target: DVec2,
+}
+
+impl Header {
+    fn message(&self, cells: &[u8]) -> Vec<u8> {
+        let first = common::grid::Cell { col: 0, row: 0 };
+        let corner = self.frame.centre_of(first) - DVec2::splat(self.frame.resolution_m / 2.0);
+        let mut message = vec![self.shown as u8, 0];
+        message.extend((self.cells as u16).to_le_bytes());
+        for value in [self.side_m, corner.x, corner.y] {
+            message.extend((value as f32).to_le_bytes());
+        }
+        message.extend(self.time_s.to_le_bytes());
+        for value in [self.target.x, self.target.y] {
+            message.extend((value as f32).to_le_bytes());
+        }
+        let mut deflated = DeflateEncoder::new(message, Compression::fast());
+        // Writing to a Vec cannot fail.
+        let _ = deflated.write_all(cells);
+        deflated.finish().unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Read as _;
+
+    fn frame(cells: u32) -> GridFrame {
+        GridFrame { cells, resolution_m: 0.1, centre: DVec2::new(1.0, 0.0) }
+    }
+
+    fn unpacked(message: &[u8]) -> Vec<u8> {
+        let mut cells = Vec::new();
+        flate2::read::DeflateDecoder::new(&message[32..]).read_to_end(&mut cells).unwrap();
+        cells
+    }
+
+    #[test]
+    fn a_map_is_unpacked_as_it_was_and_lies_where_it_is() {
+        let cells: Vec<u8> = (0..100).map(|at| at % 6).collect();
+        let message = map(frame(10), &cells, 7.5);
+        assert_eq!((message[0], &message[2..4]), (1, &[10, 0][..]));
+        let corner = f32::from_le_bytes(message[8..12].try_into().unwrap());
+        assert!((corner - 0.45).abs() < 1e-6, "{corner}");
+        assert_eq!(message[16..24], 7.5_f64.to_le_bytes());
+        assert_eq!(unpacked(&message), cells);
+    }
+
+    #[test]
+    fn a_field_has_a_direction_and_a_depth_for_each_cell_and_no_more_cells_than_the_limit() {
+        let up = FieldCell { ex: 0.0, ey: 1.0, log2_u: -3.0 };
+        let mut cells = vec![up; 100];
+        cells[0] = FieldCell { log2_u: f32::NEG_INFINITY, ..FieldCell::default() };
+        cells[1] = FieldCell { ex: 1.0, ey: -1e-9, log2_u: -1e9 };
+        let sent = unpacked(&field(Shown::Field, frame(10), &cells, DVec2::X, 0.0));
+        assert_eq!((sent[0], sent[100]), (NONE, NONE));
+        assert_eq!((sent[1], sent[101]), (0, 254));
+        assert_eq!((sent[2], sent[102]), (64, 6));
+        let large = field(Shown::Field, frame(600), &vec![up; 360_000], DVec2::X, 0.0);
+        assert_eq!(large[2..4], [200, 0]);
+        assert_eq!(unpacked(&large).len(), 2 * 200 * 200);
+    }
+}

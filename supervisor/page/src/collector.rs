@@ -1,0 +1,447 @@
+//! Samples of a robot as the page shows them: rows of its charts, states, events, maps and fields. The live page and the recorded one
+//! both come from here.
+
+use std::collections::VecDeque;
+
+use common::{
+    bus::{Layout, decode_sample, decode_slice},
+    grid::{Applied, Replica},
+    ground_truth::GroundTruthTick,
+    mission::Mission,
+    process_usage::Usage,
+    run::Run,
+    samples::{
+        Cause, CommandSample, FieldCell, FieldHeader, GridHeader, GuidanceSample, GuidanceStatus,
+        HoldReason, LinkSample, Order, PoseSample, PowerSample, RangeReading, RangeStatus,
+        RangesHeader, RosterEntry, RosterHeader, StageState, TargetSample, name_str,
+    },
+    topics::{self, AnyTopic},
+};
+use glam::DVec2;
+use serde_json::{Value, json};
+
+use crate::{
+    blob::{self, Shown},
+    events::{Event, Events, words},
+};
+
+/// The columns of a row before those of the sensors.
+const COLUMNS: [&str; 20] = [
+    "t",
+    "x",
+    "y",
+    "heading",
+    "xx",
+    "xy",
+    "yy",
+    "v",
+    "omega",
+    "v_told",
+    "omega_told",
+    "distance",
+    "limit",
+    "latency_ms",
+    "board_v",
+    "motor_v",
+    "status",
+    "true_x",
+    "true_y",
+    "true_heading",
+];
+/// A state in which only ages have changed is given again after this mission time, seconds.
+const STATE_AGAIN_S: f64 = 1.0;
+/// Most ticks of the ground truth that wait for their pose.
+const MOST_TRUTHS: usize = 4096;
+
+/// What the newest samples say.
+#[derive(Debug)]
+pub struct Collector {
+    mission: Mission,
+    pose: Option<PoseSample>,
+    command: CommandSample,
+    guidance: GuidanceSample,
+    power: Option<PowerSample>,
+    ranges: Vec<Option<f64>>,
+    link: LinkSample,
+    roster: RosterHeader,
+    stages: Vec<RosterEntry>,
+    usage: Vec<Usage>,
+    grid: Replica<u8>,
+    grid_header: GridHeader,
+    field: Replica<FieldCell>,
+    field_target: DVec2,
+    target_number: u64,
+    target: DVec2,
+    events: Events,
+    /// The targets after the current one.
+    ahead: Vec<DVec2>,
+    /// The ground truth from the tick of the newest row on, as far as it was read.
+    truths: VecDeque<GroundTruthTick>,
+    /// The tick of the newest row.
+    row_of: Option<u64>,
+    rows: Vec<Value>,
+    /// What decided the newest state, and its time.
+    state_of: Option<(Vec<u64>, f64)>,
+    map_of: Option<u64>,
+    field_of: Option<u64>,
+}
+
+/// What `run` is: the first message of a page.
+pub fn about(run: &Run) -> Value {
+    let mission = &run.mission;
+    let simulated = mission.robot.address.is_none();
+    let sensors: Vec<_> = mission
+        .sensor_table()
+        .into_iter()
+        .map(|sensor| {
+            json!({
+                "name": sensor.name,
+                "cone": sensor.kind == common::mission::SensorKind::Cone,
+                "forward_m": sensor.mount.forward_m,
+                "bearing": sensor.mount.bearing_rad,
+                "half": sensor.field_of_view_deg.to_radians() / 2.0,
+                "reach_m": sensor.reach_m,
+                "used": sensor.used,
+            })
+        })
+        .collect();
+    json!({
+        "robot": run.robot.to_string(),
+        "mission": mission.name,
+        "simulated": simulated,
+        "seed": mission.seed,
+        "target": [mission.target.x, mission.target.y],
+        "tolerance_m": mission.arrival_tolerance_m,
+        "perimeter": {
+            "width_m": mission.perimeter.width_m,
+            "centre": [mission.perimeter.centre.x, mission.perimeter.centre.y],
+        },
+        "radius_m": mission.body().radius_m,
+        "sensors": sensors,
+        "columns": COLUMNS,
+        "known": mission.known,
+        "world": simulated.then_some(&mission.world),
+    })
+}
+
+impl Collector {
+    pub fn new(mission: &Mission) -> Self {
+        Self {
+            mission: mission.clone(),
+            pose: None,
+            command: CommandSample::default(),
+            guidance: GuidanceSample::default(),
+            power: None,
+            ranges: vec![None; mission.sensor_table().len()],
+            link: LinkSample::default(),
+            roster: RosterHeader::default(),
+            stages: Vec::new(),
+            usage: Vec::new(),
+            grid: Replica::default(),
+            grid_header: GridHeader::default(),
+            field: Replica::default(),
+            field_target: mission.target,
+            target_number: 0,
+            target: mission.target,
+            ahead: Vec::new(),
+            events: Events::default(),
+            truths: VecDeque::new(),
+            row_of: None,
+            rows: Vec::new(),
+            state_of: None,
+            map_of: None,
+            field_of: None,
+        }
+    }
+
+    /// Take the message `data` of `topic`. None if it does not match its topic; other topics are ignored.
+    pub fn take(&mut self, topic: &str, data: &[u8]) -> Option<()> {
+        fn sample<P: Layout>(data: &[u8]) -> Option<P> {
+            decode_sample(data)
+        }
+        let is = |known: &dyn AnyTopic| topic == known.spec().name;
+        if is(&topics::POSE) {
+            self.pose(sample(data)?);
+        } else if is(&topics::RANGES) {
+            let (_, readings) = decode_slice::<RangesHeader, RangeReading>(data)?;
+            self.ranges(&readings);
+        } else if is(&topics::COMMAND) {
+            self.command(sample(data)?);
+        } else if is(&topics::GUIDANCE) {
+            self.guidance = sample(data)?;
+        } else if is(&topics::TARGET) {
+            self.target(&sample(data)?);
+        } else if is(&topics::POWER) {
+            self.power = Some(sample(data)?);
+        } else if is(&topics::LINK) {
+            self.link(sample(data)?);
+        } else if is(&topics::GRID) {
+            let (header, cells) = decode_slice::<GridHeader, u8>(data)?;
+            self.grid(&header, &cells);
+        } else if is(&topics::FIELD) {
+            let (header, cells) = decode_slice::<FieldHeader, FieldCell>(data)?;
+            self.field(&header, &cells);
+        } else if is(&topics::ROSTER) {
+            let (header, entries) = decode_slice::<RosterHeader, RosterEntry>(data)?;
+            self.roster(header, &entries);
+        } else if is(&topics::DEATHS) {
+            self.events.death(&sample(data)?);
+        } else if is(&topics::DIRECTIVE) {
+            self.events.directive(&sample(data)?);
+        } else if is(&topics::STALLS) {
+            self.events.stall(&sample(data)?);
+        } else if is(&topics::REQUESTS) {
+            self.events.request(&sample(data)?);
+        } else if is(&topics::FAULTS) {
+            self.events.fault(&sample(data)?);
+        }
+        Some(())
+    }
+
+    fn pose(&mut self, pose: PoseSample) {
+        self.events.now_s = self.events.now_s.max(pose.stamp.time().seconds());
+        self.pose = Some(pose);
+    }
+
+    fn ranges(&mut self, readings: &[RangeReading]) {
+        for reading in readings {
+            let Some(range) = self.ranges.get_mut(usize::from(reading.sensor)) else {
+                continue;
+            };
+            *range = match reading.status() {
+                RangeStatus::Measured | RangeStatus::AtContact => Some(reading.range_m),
+                RangeStatus::Absent | RangeStatus::Nothing | RangeStatus::Invalid => None,
+            };
+        }
+    }
+
+    fn command(&mut self, command: CommandSample) {
+        self.events.command(&command);
+        self.command = command;
+    }
+
+    fn grid(&mut self, header: &GridHeader, cells: &[u8]) {
+        if self.grid.apply(&header.part, cells) != Applied::Missed {
+            self.grid_header = *header;
+        }
+    }
+
+    pub(crate) fn field(&mut self, header: &FieldHeader, cells: &[FieldCell]) {
+        if self.field.apply(&header.part, cells) != Applied::Missed {
+            self.field_target = DVec2::new(header.target_x_m, header.target_y_m);
+        }
+    }
+
+    fn target(&mut self, target: &TargetSample) {
+        if self.target_number != target.number {
+            self.events.target(target);
+        }
+        self.target_number = target.number;
+        self.target = target.target.position();
+        self.ahead = target.ahead().iter().map(|point| point.position()).collect();
+    }
+
+    fn roster(&mut self, header: RosterHeader, entries: &[RosterEntry]) {
+        self.events.roster(entries);
+        self.roster = header;
+        self.stages = entries.to_vec();
+    }
+
+    /// A link's sample ends a tick.
+    fn link(&mut self, link: LinkSample) {
+        self.events.link(&link);
+        self.link = link;
+        let Some(pose) = self.pose else {
+            return;
+        };
+        if self.row_of.replace(pose.stamp.tick) != Some(pose.stamp.tick) {
+            let row = self.row(&pose);
+            self.rows.push(row);
+        }
+    }
+
+    fn row(&mut self, pose: &PoseSample) -> Value {
+        let [xx, xy, _, yy, ..] = pose.covariance;
+        let of_pose = self.truths.iter().position(|truth| truth.is_of(pose));
+        self.truths.drain(..of_pose.unwrap_or_default());
+        let truth = of_pose.and_then(|_| self.truths.front());
+        let truth = truth.map_or([f64::NAN; 3], |truth| [truth.x, truth.y, truth.heading]);
+        let volts = self.power.map_or([f64::NAN; 2], |power| [power.board_v, power.motor_v]);
+        let values = [
+            pose.stamp.time().seconds(),
+            pose.x_m,
+            pose.y_m,
+            pose.heading_rad,
+            xx,
+            xy,
+            yy,
+            pose.v_m_s,
+            pose.omega_rad_s,
+            self.command.v_m_s,
+            self.command.omega_rad_s,
+            self.guidance.distance_m,
+            self.guidance.speed_limit_m_s,
+            self.link.latency_ns as f64 / 1e6,
+            volts[0],
+            volts[1],
+            f64::from(self.guidance.status),
+            truth[0],
+            truth[1],
+            truth[2],
+        ];
+        let ranges = self.ranges.iter().map(|range| range.map_or(Value::Null, rounded));
+        values.into_iter().map(rounded).chain(ranges).collect()
+    }
+
+    /// Take a line of the ground truth, which is written before the tick's pose is published. Returns whether a further one may come
+    /// before the next pose.
+    pub fn truth(&mut self, line: &str) -> bool {
+        if let Ok(truth) = serde_json::from_str(line) {
+            if self.truths.len() == MOST_TRUTHS {
+                self.truths.pop_front();
+            }
+            self.truths.push_back(truth);
+        }
+        self.truths.len() < MOST_TRUTHS
+    }
+
+    /// Take a line of the log of `process`.
+    pub fn log(&mut self, process: &str, line: &str) {
+        self.events.log(process, line);
+    }
+
+    /// The processes of the stages, and the supervisor's.
+    pub fn processes(&self) -> Vec<u32> {
+        let stages = self.stages.iter().map(|entry| entry.pid);
+        stages.chain([self.roster.supervisor_pid]).collect()
+    }
+
+    /// What these processes use, in the order of [`Self::processes`].
+    pub fn used(&mut self, usage: Vec<Usage>) {
+        self.usage = usage;
+    }
+
+    /// The rows since the last time.
+    pub fn take_rows(&mut self) -> Vec<Value> {
+        std::mem::take(&mut self.rows)
+    }
+
+    /// The events since the last time.
+    pub fn take_events(&mut self) -> Vec<Event> {
+        self.events.take()
+    }
+
+    /// The mission time of the newest pose, seconds.
+    pub fn now_s(&self) -> f64 {
+        self.events.now_s
+    }
+
+    /// The map as a message, if it has changed since the last time.
+    pub fn take_map(&mut self) -> Option<Vec<u8>> {
+        let frame = self.grid.frame()?;
+        let version = self.grid.version();
+        let changed = self.map_of.replace(version) != Some(version);
+        changed.then(|| blob::map(frame, self.grid.cells(), self.now_s()))
+    }
+
+    /// The field as a message, if it has changed since the last time.
+    pub fn take_field(&mut self) -> Option<Vec<u8>> {
+        let frame = self.field.frame()?;
+        let version = self.field.version();
+        let changed = self.field_of.replace(version) != Some(version);
+        let cells = self.field.cells();
+        changed.then(|| blob::field(Shown::Field, frame, cells, self.field_target, self.now_s()))
+    }
+
+    /// The map, for a planner; none before the first keyframe.
+    pub fn belief(&self) -> Option<(GridHeader, &[u8])> {
+        let frame = self.grid.frame()?;
+        let part = common::grid::Part::whole(frame, self.grid.version());
+        Some((GridHeader { part, ..self.grid_header }, self.grid.cells()))
+    }
+
+    pub fn mission(&self) -> &Mission {
+        &self.mission
+    }
+
+    /// Whether the link stops the robot for an operator, and what it does.
+    #[cfg(feature = "live")]
+    pub(crate) fn link_says(&self) -> (bool, String) {
+        let (action, cause) = (self.link.action().effect(), self.link.cause());
+        let why = if self.link.stopped() { format!(": {}", cause.name()) } else { String::new() };
+        (cause == Cause::OperatorStop, format!("the link says that the robot {action}{why}"))
+    }
+
+    /// The state of the robot's processes, if it has changed since the last time; one in which only ages differ is given once a second.
+    pub fn take_state(&mut self) -> Option<Value> {
+        if self.stages.is_empty() {
+            return None;
+        }
+        let flags = |entry: &RosterEntry| [u64::from(entry.pid), u64::from(entry.state)];
+        let mut key: Vec<u64> = self.stages.iter().flat_map(flags).collect();
+        let LinkSample { action, cause, connected, at_rest, .. } = self.link;
+        let RosterHeader { order, reason, .. } = self.roster;
+        key.extend([action, cause, at_rest, order, reason, self.guidance.status].map(u64::from));
+        key.extend([u64::from(connected), self.target_number, self.ahead.len() as u64]);
+        let now = self.now_s();
+        if let Some((before, at)) = &self.state_of
+            && *before == key
+            && now < at + STATE_AGAIN_S
+        {
+            return None;
+        }
+        self.state_of = Some((key, now));
+        Some(self.state())
+    }
+
+    fn state(&self) -> Value {
+        let usage = |at: usize| self.usage.get(at).copied().unwrap_or_default();
+        let stages = self.stages.iter().enumerate().map(|(at, entry)| {
+            json!({
+                "name": name_str(&entry.stage),
+                "state": words(StageState::from_byte(entry.state)),
+                "pid": entry.pid,
+                "generation": entry.generation,
+                "restarts": entry.restarts,
+                "age_s": seconds(entry.uptime_ns),
+                "beat_s": seconds(entry.beat_age_ns),
+                "cpu": usage(at).cpu.map_or(Value::Null, rounded),
+                "memory": usage(at).memory_bytes,
+            })
+        });
+        let own = usage(self.stages.len());
+        let targets = [self.target].into_iter().chain(self.ahead.iter().copied());
+        json!({
+            "t": rounded(self.now_s()),
+            "order": words(Order::from_byte(self.roster.order)),
+            "reason": match HoldReason::from_byte(self.roster.reason) {
+                HoldReason::None => String::new(),
+                reason => words(reason),
+            },
+            "connected": self.link.connected == 1,
+            "at_rest": self.link.at_rest == 1,
+            "stopped": self.link.stopped(),
+            "operator_stop": self.link.cause() == Cause::OperatorStop,
+            "action": self.link.action().effect(),
+            "cause": self.link.cause().name(),
+            "guidance": words(GuidanceStatus::from_byte(self.guidance.status)),
+            "targets": targets.map(|at| [at.x, at.y]).collect::<Vec<_>>(),
+            "stages": stages.collect::<Vec<_>>(),
+            "supervisor": {
+                "pid": self.roster.supervisor_pid,
+                "cpu": own.cpu.map_or(Value::Null, rounded),
+                "memory": own.memory_bytes,
+            },
+        })
+    }
+}
+
+/// To a tenth of a millimetre; null where there is no number.
+fn rounded(value: f64) -> Value {
+    Value::from((value * 1e4).round() / 1e4)
+}
+
+/// Null for an age that is not known.
+fn seconds(ns: u64) -> Value {
+    if ns == u64::MAX { Value::Null } else { Value::from((ns / 1_000_000) as f64 / 1e3) }
+}

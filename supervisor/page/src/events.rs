@@ -1,0 +1,205 @@
+//! Deaths, recoveries, orders and log lines as one list.
+
+use std::fmt::Debug;
+
+use common::samples::{
+    Action, Cause, CommandSample, CommandState, DeathSample, DirectiveSample, FaultKind,
+    FaultSample, HoldReason, LinkSample, Order, RequestKind, RequestSample, RosterEntry,
+    StageState, StallSample, TargetSample, name_str,
+};
+use serde::Serialize;
+use supervisor::process::ExitCause;
+
+/// Most letters of a text.
+const LONGEST: usize = 300;
+
+/// A line of the list.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Event {
+    /// Mission time, seconds.
+    pub t: f64,
+    /// The stage, or the part of the system, that it is about.
+    pub of: String,
+    pub kind: Kind,
+    pub text: String,
+}
+
+/// How much an event matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// A death, a stall, a stop.
+    Bad,
+    Good,
+    Note,
+    /// A line of a process's log.
+    Log,
+}
+
+/// Finds the events in samples, in their order.
+#[derive(Debug, Default)]
+pub(crate) struct Events {
+    found: Vec<Event>,
+    failsafe: Option<(u8, u8)>,
+    directive: Option<(u8, u8)>,
+    arrived: bool,
+    /// The generation of each stage that was seen to run.
+    running: Vec<(String, u32)>,
+    /// Mission time of the newest pose, seconds. A process that has just started knows no mission time.
+    pub(crate) now_s: f64,
+}
+
+impl Events {
+    /// Take what was found since the last time.
+    pub(crate) fn take(&mut self) -> Vec<Event> {
+        std::mem::take(&mut self.found)
+    }
+
+    fn add(&mut self, of: &str, kind: Kind, text: impl Into<String>) {
+        let mut text = text.into();
+        if let Some((cut, _)) = text.char_indices().nth(LONGEST) {
+            text.truncate(cut);
+            text.push('…');
+        }
+        self.found.push(Event { t: self.now_s, of: of.to_owned(), kind, text });
+    }
+
+    pub(crate) fn death(&mut self, death: &DeathSample) {
+        let hung = if death.hung == 1 { "hung, " } else { "" };
+        let log_tail = match death.log_tail.text().trim() {
+            "" => String::new(),
+            tail => format!("; its log ends: {tail}"),
+        };
+        let (generation, cause) = (death.generation, ExitCause::from(death));
+        let text = format!("generation {generation} died ({hung}{cause}){log_tail}");
+        self.add(name_str(&death.stage), Kind::Bad, text);
+    }
+
+    pub(crate) fn roster(&mut self, entries: &[RosterEntry]) {
+        for entry in entries {
+            if StageState::from_byte(entry.state) != StageState::Running {
+                continue;
+            }
+            let name = name_str(&entry.stage);
+            let before = self.running.iter_mut().find(|(stage, _)| stage == name);
+            match before {
+                Some((_, generation)) if *generation == entry.generation => continue,
+                Some((_, generation)) => *generation = entry.generation,
+                None => self.running.push((name.to_owned(), entry.generation)),
+            }
+            self.add(name, Kind::Good, format!("generation {} runs", entry.generation));
+        }
+    }
+
+    pub(crate) fn link(&mut self, link: &LinkSample) {
+        let now = (link.action, link.cause);
+        if self.failsafe.replace(now) == Some(now) {
+            return;
+        }
+        let kind = if link.stopped() { Kind::Bad } else { Kind::Good };
+        let text = match (link.action(), link.cause()) {
+            (action, Cause::None) => format!("the robot {}", action.effect()),
+            (Action::Go, cause) => cause.name().to_owned(),
+            (action, cause) => format!("the robot {}: {}", action.effect(), cause.name()),
+        };
+        self.add("failsafe", kind, text);
+    }
+
+    pub(crate) fn directive(&mut self, directive: &DirectiveSample) {
+        let now = (directive.order, directive.reason);
+        if self.directive.replace(now) == Some(now) {
+            return;
+        }
+        let order = words(Order::from_byte(directive.order));
+        let text = match HoldReason::from_byte(directive.reason) {
+            HoldReason::None => format!("order: {order}"),
+            reason => format!("order: {order} ({})", words(reason)),
+        };
+        self.add("supervisor", Kind::Note, text);
+    }
+
+    pub(crate) fn stall(&mut self, stall: &StallSample) {
+        let (cause, recovery) = (words(stall.cause()), words(stall.recovery()));
+        self.add("stalls", Kind::Bad, format!("no progress ({cause}): {recovery}"));
+    }
+
+    pub(crate) fn request(&mut self, request: &RequestSample) {
+        let kind = words(RequestKind::from_byte(request.kind));
+        let text = format!("{kind} {}", name_str(&request.stage));
+        self.add("operator", Kind::Note, text.trim_end());
+    }
+
+    pub(crate) fn fault(&mut self, fault: &FaultSample) {
+        let kind = words(FaultKind::from_byte(fault.kind));
+        self.add("operator", Kind::Note, format!("fault {kind} in {}", name_str(&fault.stage)));
+    }
+
+    pub(crate) fn target(&mut self, target: &TargetSample) {
+        let at = target.target.position();
+        let text = format!("target {}: ({:.2}, {:.2})", target.number, at.x, at.y);
+        self.add("supervisor", Kind::Note, text);
+    }
+
+    pub(crate) fn command(&mut self, command: &CommandSample) {
+        let arrived = CommandState::from_byte(command.state) == CommandState::Arrived;
+        if arrived && !self.arrived {
+            self.add("controller", Kind::Good, "the target is reached");
+        }
+        self.arrived = arrived;
+    }
+
+    pub(crate) fn log(&mut self, process: &str, line: &str) {
+        self.add(process, Kind::Log, line);
+    }
+}
+
+/// `CommandStale` as `command stale`.
+pub(crate) fn words(of: impl Debug) -> String {
+    let mut words = String::new();
+    for letter in format!("{of:?}").chars() {
+        if letter.is_uppercase() && !words.is_empty() {
+            words.push(' ');
+        }
+        words.extend(letter.to_lowercase());
+    }
+    words
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use common::samples::{DeathCause, name};
+
+    #[test]
+    fn a_death_and_the_successor_that_runs_are_told_once_each() {
+        let mut events = Events { now_s: 3.0, ..Events::default() };
+        let mut entry = RosterEntry {
+            stage: name("planner"),
+            generation: 1,
+            state: StageState::Running.into(),
+            ..RosterEntry::default()
+        };
+        events.roster(&[entry]);
+        events.death(&DeathSample {
+            stage: name("planner"),
+            generation: 1,
+            cause: DeathCause::Signalled.into(),
+            code: 9,
+            ..DeathSample::default()
+        });
+        entry.generation = 2;
+        events.roster(&[entry]);
+        events.roster(&[entry]);
+        let told: Vec<_> = events.take().into_iter().map(|event| event.text).collect();
+        let died = "generation 1 died (signal 9)";
+        assert_eq!(told, ["generation 1 runs", died, "generation 2 runs"]);
+        assert!(events.take().is_empty());
+    }
+
+    #[test]
+    fn a_long_line_of_a_log_is_cut_between_letters() {
+        let mut events = Events::default();
+        events.log("mapper", &"ö".repeat(1000));
+        assert_eq!(events.take()[0].text.chars().count(), LONGEST + 1);
+    }
+}

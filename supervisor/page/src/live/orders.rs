@@ -1,0 +1,87 @@
+//! What an operator may ask for in the browser, and who does it.
+
+use serde::Deserialize;
+
+use super::access::Role;
+
+/// Most targets in one order.
+const MOST_TARGETS: usize = 16;
+
+/// Does what is asked, and waits until it is confirmed. Each returns what was confirmed, or why it was not done.
+pub trait Operator: Send + Sync + 'static {
+    /// The robot stands.
+    fn stop(&self) -> Result<String, String>;
+    /// A stopped robot goes on.
+    fn resume(&self) -> Result<String, String>;
+    /// A new generation of a stage.
+    fn restart(&self, stage: &str) -> Result<String, String>;
+    /// Kill the process of a stage.
+    fn kill(&self, stage: &str) -> Result<String, String>;
+    /// Go to these places, one after the other; metres in the mission frame.
+    fn go_to(&self, targets: &[[f64; 2]]) -> Result<String, String>;
+    /// Go back to where the run began.
+    fn go_back(&self) -> Result<String, String>;
+}
+
+/// A message of a browser that has shown its token.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub(crate) struct Asked {
+    /// The answer has it, too.
+    pub(crate) id: u64,
+    #[serde(flatten)]
+    pub(crate) order: Order,
+}
+
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(tag = "order", rename_all = "snake_case")]
+pub(crate) enum Order {
+    Stop,
+    Resume,
+    Restart {
+        stage: String,
+    },
+    Kill {
+        stage: String,
+    },
+    GoTo {
+        targets: Vec<[f64; 2]>,
+    },
+    GoBack,
+    /// Show the field of a target, without going there.
+    Preview {
+        x: f64,
+        y: f64,
+    },
+}
+
+impl Order {
+    /// Why a browser of `role` may not have this done to a robot that is `simulated`.
+    pub(crate) fn refusal(&self, role: Role, simulated: bool) -> Option<&'static str> {
+        match self {
+            Self::Stop => None,
+            _ if role < Role::Drive => {
+                Some("this page may watch and stop; open it with the address for driving")
+            }
+            Self::Restart { .. } | Self::Kill { .. } if !simulated => {
+                Some("stages are killed and restarted here only in simulation")
+            }
+            Self::GoTo { targets } if targets.is_empty() || targets.len() > MOST_TARGETS => {
+                Some("an order has 1 to 16 targets")
+            }
+            _ => None,
+        }
+    }
+
+    /// Have it done by `operator`.
+    pub(crate) fn perform(&self, operator: &dyn Operator) -> Result<String, String> {
+        match self {
+            Self::Stop => operator.stop(),
+            Self::Resume => operator.resume(),
+            Self::Restart { stage } => operator.restart(stage),
+            Self::Kill { stage } => operator.kill(stage),
+            Self::GoTo { targets } => operator.go_to(targets),
+            Self::GoBack => operator.go_back(),
+            Self::Preview { .. } => Ok(String::new()),
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! Connections and requests. Whatever a client does, its connection costs a bounded amount of memory for a bounded time.
+
+use std::{convert::Infallible, io, net::TcpListener, path::Path, sync::Arc, time::Duration};
+
+use axum::{
+    body::Body,
+    extract::{FromRequestParts as _, Request, ws::WebSocketUpgrade},
+    http::{HeaderMap, HeaderValue, Method, StatusCode, header},
+    response::{IntoResponse as _, Response},
+};
+use hyper::{body::Incoming, server::conn::http1, service::service_fn};
+use hyper_util::rt::{TokioIo, TokioTimer};
+use tokio::{
+    io::{AsyncRead, AsyncWrite},
+    sync::Semaphore,
+    time::timeout,
+};
+use tokio_rustls::{
+    TlsAcceptor,
+    rustls::{
+        ServerConfig,
+        crypto::ring,
+        pki_types::{CertificateDer, PrivateKeyDer, pem::PemObject as _},
+    },
+};
+
+use super::{
+    context::Context,
+    options::{Options, PageError},
+    session,
+};
+use crate::assets;
+
+/// Most connections at a time; more are closed at once.
+const MOST_CONNECTIONS: usize = 64;
+/// Most websockets at a time.
+const MOST_SESSIONS: usize = 16;
+/// A connection has so long for its handshake, and so long for its request.
+const REQUEST_WITHIN: Duration = Duration::from_secs(3);
+/// A connection that does not become a websocket ends by then.
+const ANSWERED_WITHIN: Duration = Duration::from_secs(10);
+/// Most bytes of a request and its headers.
+const MOST_HEADER_BYTES: usize = 16 << 10;
+/// Most bytes of a websocket's message.
+const MOST_MESSAGE_BYTES: usize = 4 << 10;
+/// The path of the websocket.
+const LIVE: &str = "/live";
+
+/// The keys of `options`; none where the page is not encrypted.
+pub(super) fn tls(options: &Options) -> Result<Option<TlsAcceptor>, PageError> {
+    let Some((certificates, key)) = &options.tls else {
+        return Ok(None);
+    };
+    let problem = |file: &Path| {
+        let file = file.to_path_buf();
+        move |problem: String| PageError::Tls { file, problem }
+    };
+    let chain = CertificateDer::pem_file_iter(certificates)
+        .and_then(Iterator::collect::<Result<Vec<_>, _>>)
+        .map_err(|error| problem(certificates)(error.to_string()))?;
+    let its_key =
+        PrivateKeyDer::from_pem_file(key).map_err(|error| problem(key)(error.to_string()))?;
+    let config = ServerConfig::builder_with_provider(Arc::new(ring::default_provider()))
+        .with_safe_default_protocol_versions()
+        .and_then(|config| config.with_no_client_auth().with_single_cert(chain, its_key))
+        .map_err(|error| problem(certificates)(error.to_string()))?;
+    Ok(Some(TlsAcceptor::from(Arc::new(config))))
+}
+
+/// Serve connections until the result is dropped.
+pub(super) async fn serve(context: Arc<Context>, listener: TcpListener, tls: Option<TlsAcceptor>) {
+    let Ok(listener) = tokio::net::TcpListener::from_std(listener) else {
+        tracing::error!("the system refuses to watch the socket of the page");
+        return;
+    };
+    let connections = Arc::new(Semaphore::new(MOST_CONNECTIONS));
+    let sessions = Arc::new(Semaphore::new(MOST_SESSIONS));
+    loop {
+        let Ok((stream, _)) = listener.accept().await else {
+            // There are too many open files.
+            tokio::time::sleep(Duration::from_millis(100)).await;
+            continue;
+        };
+        let Ok(permit) = connections.clone().try_acquire_owned() else {
+            continue;
+        };
+        let (context, sessions, tls) = (context.clone(), sessions.clone(), tls.clone());
+        tokio::spawn(async move {
+            // A connection that fails is the client's business.
+            let _ = match tls {
+                None => connection(&context, stream, &sessions).await,
+                Some(tls) => match timeout(REQUEST_WITHIN, tls.accept(stream)).await {
+                    Ok(Ok(stream)) => connection(&context, stream, &sessions).await,
+                    _ => Ok(()),
+                },
+            };
+            drop(permit);
+        });
+    }
+}
+
+/// Answer one request, or begin a session.
+async fn connection(
+    context: &Arc<Context>,
+    stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static,
+    sessions: &Arc<Semaphore>,
+) -> io::Result<()> {
+    let service = service_fn(|request: hyper::Request<Incoming>| {
+        let (context, sessions) = (context.clone(), sessions.clone());
+        async move { Ok::<_, Infallible>(answer(&context, request.map(Body::new), &sessions).await) }
+    });
+    let connection = http1::Builder::new()
+        .timer(TokioTimer::new())
+        .header_read_timeout(REQUEST_WITHIN)
+        .max_buf_size(MOST_HEADER_BYTES)
+        .keep_alive(false)
+        .serve_connection(TokioIo::new(stream), service)
+        .with_upgrades();
+    match timeout(ANSWERED_WITHIN, connection).await {
+        Ok(Ok(())) => Ok(()),
+        Ok(Err(error)) => Err(io::Error::other(error)),
+        Err(late) => Err(io::Error::other(late)),
+    }
+}
+
+async fn answer(context: &Arc<Context>, request: Request, sessions: &Arc<Semaphore>) -> Response {
+    let Some(host) = host(context, &request) else {
+        return StatusCode::MISDIRECTED_REQUEST.into_response();
+    };
+    let path = request.uri().path().to_owned();
+    let is_own = single(request.headers(), &header::ORIGIN)
+        .is_some_and(|origin| context.access.is_own_origin(origin, &host));
+    let has_origin = request.headers().contains_key(header::ORIGIN);
+    if !is_own && (has_origin || path == LIVE || request.method() != Method::GET) {
+        return StatusCode::FORBIDDEN.into_response();
+    }
+    if request.method() != Method::GET {
+        return StatusCode::METHOD_NOT_ALLOWED.into_response();
+    }
+    if path == LIVE {
+        return session(context, request, sessions).await;
+    }
+    let Some((_, kind, text)) = assets::ALL.iter().find(|(at, ..)| *at == path) else {
+        return StatusCode::NOT_FOUND.into_response();
+    };
+    let policy = format!(
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src {}; \
+         base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+        context.access.websocket(&host)
+    );
+    let mut answer = (*text).into_response();
+    let headers = [
+        (header::CONTENT_TYPE, (*kind).to_owned()),
+        (header::CONTENT_SECURITY_POLICY, policy),
+        (header::CACHE_CONTROL, "no-store".to_owned()),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff".to_owned()),
+        (header::REFERRER_POLICY, "no-referrer".to_owned()),
+    ];
+    for (name, value) in headers {
+        if let Ok(value) = HeaderValue::from_str(&value) {
+            answer.headers_mut().insert(name, value);
+        }
+    }
+    answer
+}
+
+/// The host that `request` names, once and everywhere the same, if the page answers to it.
+fn host(context: &Context, request: &Request) -> Option<String> {
+    let host = context.access.host(single(request.headers(), &header::HOST)?)?;
+    let absolute = request.uri().authority();
+    absolute.is_none_or(|absolute| absolute.as_str() == host).then(|| host.to_owned())
+}
+
+async fn session(context: &Arc<Context>, request: Request, sessions: &Arc<Semaphore>) -> Response {
+    let (mut parts, _) = request.into_parts();
+    let upgrade = match WebSocketUpgrade::from_request_parts(&mut parts, &()).await {
+        Ok(upgrade) => upgrade,
+        Err(refused) => return refused.into_response(),
+    };
+    let Ok(permit) = sessions.clone().try_acquire_owned() else {
+        return StatusCode::SERVICE_UNAVAILABLE.into_response();
+    };
+    let context = context.clone();
+    let upgrade = upgrade.max_message_size(MOST_MESSAGE_BYTES).max_frame_size(MOST_MESSAGE_BYTES);
+    upgrade.on_upgrade(async move |socket| {
+        session::run(socket, &context).await;
+        drop(permit);
+    })
+}
+
+/// The value of a header that a request has once.
+fn single<'a>(headers: &'a HeaderMap, name: &header::HeaderName) -> Option<&'a str> {
+    let mut values = headers.get_all(name).iter();
+    let value = values.next()?;
+    values.next().is_none().then(|| value.to_str().ok()).flatten()
+}

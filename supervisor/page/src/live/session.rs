@@ -1,0 +1,192 @@
+//! One browser: it shows its token, then is sent what is new and may ask for orders.
+
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use axum::extract::ws::{CloseFrame, Message, WebSocket};
+use futures_util::{SinkExt as _, StreamExt as _, stream::SplitSink};
+use serde::Deserialize;
+use serde_json::json;
+use tokio::{
+    sync::{Semaphore, mpsc},
+    task::spawn_blocking,
+    time::{MissedTickBehavior, interval, timeout},
+};
+
+use super::{
+    access::Role,
+    context::Context,
+    orders::{Asked, Order},
+    shared::Cursor,
+};
+
+/// A browser has so long to show its token.
+const TOKEN_WITHIN: Duration = Duration::from_secs(3);
+/// What is new is sent so often.
+const SEND_EVERY: Duration = Duration::from_millis(100);
+/// A message says that the server lives after this time without another one.
+const ALIVE_EVERY: Duration = Duration::from_millis(300);
+/// A browser that does not take a message for so long is left.
+const TAKEN_WITHIN: Duration = Duration::from_secs(10);
+/// A robot that may go on goes on within this time.
+const GOES_WITHIN: Duration = Duration::from_secs(3);
+/// Most messages of a browser in a second.
+const MOST_A_SECOND: u32 = 50;
+/// Most orders that are performed at a time, stops not counted, and most stops.
+const MOST_ORDERS: usize = 1;
+const MOST_STOPS: usize = 3;
+static ORDERS: Semaphore = Semaphore::const_new(MOST_ORDERS);
+static STOPS: Semaphore = Semaphore::const_new(MOST_STOPS);
+
+/// Codes of websockets from 4000 are the application's.
+const WRONG_TOKEN: u16 = 4401;
+const TOO_MUCH: u16 = 4429;
+
+/// The first message of a browser.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Hello {
+    token: String,
+}
+
+type Sender = SplitSink<WebSocket, Message>;
+
+pub(super) async fn run(mut socket: WebSocket, context: &Arc<Context>) {
+    let first = timeout(TOKEN_WITHIN, socket.recv()).await;
+    let role = match &first {
+        Ok(Some(Ok(Message::Text(text)))) => {
+            let hello = serde_json::from_str::<Hello>(text).ok();
+            hello.and_then(|hello| context.access.role(&hello.token))
+        }
+        _ => None,
+    };
+    let (sender, mut receiver) = socket.split();
+    let Some(role) = role else {
+        close(sender, WRONG_TOKEN, "token").await;
+        return;
+    };
+    let (answers, told) = mpsc::channel(16);
+    let sending = tokio::spawn(send(sender, Cursor::new(&context.shared), role, told));
+    let (mut counted_since, mut count) = (Instant::now(), 0);
+    let mut code = None;
+    while let Some(Ok(message)) = receiver.next().await {
+        if counted_since.elapsed() >= Duration::from_secs(1) {
+            (counted_since, count) = (Instant::now(), 0);
+        }
+        count += 1;
+        if count > MOST_A_SECOND {
+            code = Some(TOO_MUCH);
+            break;
+        }
+        if let Message::Text(text) = message
+            && let Ok(asked) = serde_json::from_str(&text)
+        {
+            tokio::spawn(perform(asked, role, context.clone(), answers.clone()));
+        }
+    }
+    match code {
+        // The task that sends closes the socket when it ends.
+        Some(code) => {
+            let _ = answers.try_send(Told::Close(code));
+        }
+        None => sending.abort(),
+    }
+}
+
+/// What the task that sends is told.
+enum Told {
+    Answer(String),
+    Close(u16),
+}
+
+async fn send(mut sender: Sender, mut cursor: Cursor, role: Role, mut told: mpsc::Receiver<Told>) {
+    let mut ticks = interval(SEND_EVERY);
+    ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut sent = Instant::now();
+    let hello = json!({"role": if role == Role::Drive { "drive" } else { "watch" }});
+    let mut due = vec![Message::text(hello.to_string())];
+    loop {
+        if !due.is_empty() {
+            sent = Instant::now();
+        }
+        for message in due.drain(..) {
+            match timeout(TAKEN_WITHIN, sender.send(message)).await {
+                Ok(Ok(())) => {}
+                _ => return,
+            }
+        }
+        tokio::select! {
+            answer = told.recv() => match answer {
+                Some(Told::Answer(answer)) => due.push(Message::text(answer)),
+                Some(Told::Close(code)) => return close(sender, code, "too many messages").await,
+                None => return,
+            },
+            _ = ticks.tick() => {
+                let news = cursor.news();
+                if !news.text.is_empty() {
+                    due.push(Message::text(news.text));
+                }
+                due.extend(news.blobs.into_iter().map(Message::Binary));
+                if due.is_empty() && sent.elapsed() >= ALIVE_EVERY {
+                    due.push(Message::text("{}"));
+                }
+            }
+        }
+    }
+}
+
+async fn close(mut sender: Sender, code: u16, reason: &'static str) {
+    let frame = CloseFrame { code, reason: reason.into() };
+    let _ = timeout(TAKEN_WITHIN, sender.send(Message::Close(Some(frame)))).await;
+}
+
+/// Have `asked` done, and tell the browser what was confirmed.
+async fn perform(asked: Asked, role: Role, context: Arc<Context>, answers: mpsc::Sender<Told>) {
+    let Asked { id, order } = asked;
+    let simulated = context.shared.lock().simulated;
+    let done = match order.refusal(role, simulated) {
+        Some(why) => Err(why.to_owned()),
+        None => done(order, &context).await,
+    };
+    let (ok, text) = match done {
+        Ok(text) => (true, text),
+        Err(text) => (false, text),
+    };
+    let answer = json!({"answer": {"id": id, "ok": ok, "text": text}});
+    // A browser that has gone needs no answer.
+    let _ = answers.send(Told::Answer(answer.to_string())).await;
+}
+
+async fn done(order: Order, context: &Arc<Context>) -> Result<String, String> {
+    if let Order::Preview { x, y } = order {
+        context.shared.lock().wanted = Some([x, y]);
+        return Ok(String::new());
+    }
+    let permits = if order == Order::Stop { &STOPS } else { &ORDERS };
+    let Ok(permit) = permits.try_acquire() else {
+        return Err("the order before is still under way".to_owned());
+    };
+    let operator = context.operator.clone();
+    let resumes = order == Order::Resume;
+    let done = spawn_blocking(move || order.perform(&*operator)).await;
+    drop(permit);
+    let told = done.unwrap_or_else(|error| Err(format!("the order failed: {error}")))?;
+    if resumes { resumed(context).await } else { Ok(told) }
+}
+
+/// What the link says after the supervisor has taken a request to resume.
+async fn resumed(context: &Arc<Context>) -> Result<String, String> {
+    let began = Instant::now();
+    loop {
+        let (stopped, says) = context.shared.lock().link.clone();
+        if !stopped {
+            return Ok(says);
+        }
+        if began.elapsed() >= GOES_WITHIN {
+            return Err(says);
+        }
+        tokio::time::sleep(SEND_EVERY).await;
+    }
+}

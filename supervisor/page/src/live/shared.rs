@@ -1,0 +1,264 @@
+//! What browsers are shown, between the thread that reads the bus and those that serve.
+
+use std::{
+    collections::VecDeque,
+    fmt::Write as _,
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicUsize, Ordering},
+    },
+};
+
+use axum::body::Bytes;
+use serde_json::Value;
+
+/// Rows of ten minutes at 10 Hz.
+const MOST_ROWS: usize = 6000;
+const MOST_EVENTS: usize = 1000;
+/// Most of each in one message.
+const AT_ONCE: usize = 500;
+
+/// A value and its number, which grows with each new one.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Newest<T> {
+    number: u64,
+    value: Option<T>,
+}
+
+impl<T: Clone> Newest<T> {
+    pub(crate) fn set(&mut self, value: T) {
+        (self.number, self.value) = (self.number + 1, Some(value));
+    }
+
+    /// The value, unless a browser at `cursor` has it.
+    fn after(&self, cursor: &mut u64) -> Option<T> {
+        let is_new = std::mem::replace(cursor, self.number) != self.number;
+        self.value.clone().filter(|_| is_new)
+    }
+}
+
+/// The newest of a series, each with its number.
+#[derive(Debug, Default)]
+pub(crate) struct Ring {
+    /// The number of the first one.
+    first: u64,
+    items: VecDeque<Arc<str>>,
+}
+
+impl Ring {
+    fn push(&mut self, item: &Value, most: usize) {
+        if self.items.len() == most {
+            self.items.pop_front();
+            self.first += 1;
+        }
+        self.items.push_back(item.to_string().into());
+    }
+
+    /// Those that a browser at `cursor` does not have, at most [`AT_ONCE`].
+    fn after(&self, cursor: &mut u64) -> Vec<Arc<str>> {
+        let from = cursor.saturating_sub(self.first) as usize;
+        let found: Vec<_> = self.items.iter().skip(from).take(AT_ONCE).cloned().collect();
+        *cursor = self.first + from.min(self.items.len()) as u64 + found.len() as u64;
+        found
+    }
+}
+
+/// The robot's run as browsers are shown it.
+#[derive(Debug, Default)]
+pub(crate) struct Shown {
+    /// Counts the runs.
+    run: u64,
+    about: Option<Arc<str>>,
+    pub(crate) connected: bool,
+    pub(crate) simulated: bool,
+    /// Whether the link stops the robot for an operator, and what it does.
+    pub(crate) link: (bool, String),
+    rows: Ring,
+    events: Ring,
+    pub(crate) state: Newest<Arc<str>>,
+    pub(crate) map: Newest<Bytes>,
+    pub(crate) field: Newest<Bytes>,
+    pub(crate) preview: Newest<Bytes>,
+    /// The target whose field is wanted; a new one replaces it.
+    pub(crate) wanted: Option<[f64; 2]>,
+    /// Why the robot cannot be shown; empty where it can.
+    pub(crate) problem: String,
+}
+
+impl Shown {
+    /// A run began: what was of the last one is dropped.
+    pub(crate) fn begin(&mut self, about: &Value, simulated: bool) {
+        *self = Self {
+            run: self.run + 1,
+            about: Some(about.to_string().into()),
+            connected: true,
+            simulated,
+            ..Self::default()
+        };
+    }
+
+    pub(crate) fn row(&mut self, row: &Value) {
+        self.rows.push(row, MOST_ROWS);
+    }
+
+    pub(crate) fn event(&mut self, event: &Value) {
+        self.events.push(event, MOST_EVENTS);
+    }
+}
+
+#[derive(Debug, Default)]
+pub(crate) struct Shared {
+    shown: Mutex<Shown>,
+    watching: AtomicUsize,
+}
+
+impl Shared {
+    pub(crate) fn lock(&self) -> MutexGuard<'_, Shown> {
+        self.shown.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether a browser watches.
+    pub(crate) fn is_watched(&self) -> bool {
+        self.watching.load(Ordering::Relaxed) > 0
+    }
+}
+
+/// What one browser has been sent.
+#[derive(Debug)]
+pub(crate) struct Cursor {
+    shared: Arc<Shared>,
+    run: u64,
+    connected: bool,
+    problem: String,
+    rows: u64,
+    events: u64,
+    state: u64,
+    map: u64,
+    field: u64,
+    preview: u64,
+}
+
+/// What is new for a browser.
+#[derive(Debug, Default)]
+pub(crate) struct News {
+    /// JSON; empty where there is nothing new in it.
+    pub(crate) text: String,
+    pub(crate) blobs: Vec<Bytes>,
+}
+
+impl Cursor {
+    pub(crate) fn new(shared: &Arc<Shared>) -> Self {
+        shared.watching.fetch_add(1, Ordering::Relaxed);
+        Self {
+            shared: shared.clone(),
+            run: u64::MAX,
+            connected: false,
+            problem: String::new(),
+            rows: 0,
+            events: 0,
+            state: 0,
+            map: 0,
+            field: 0,
+            preview: 0,
+        }
+    }
+
+    /// What is new since the last time.
+    pub(crate) fn news(&mut self) -> News {
+        let shared = self.shared.clone();
+        let shown = shared.lock();
+        let mut parts = Vec::new();
+        if self.run != shown.run {
+            self.run = shown.run;
+            self.connected = !shown.connected;
+            (self.rows, self.events, self.state) = (0, 0, 0);
+            (self.map, self.field, self.preview) = (0, 0, 0);
+            parts.push(format!("\"about\":{}", shown.about.as_deref().unwrap_or("null")));
+        }
+        if self.connected != shown.connected || self.problem != shown.problem {
+            self.connected = shown.connected;
+            self.problem.clone_from(&shown.problem);
+            parts.push(format!("\"running\":{}", shown.connected));
+            parts.push(format!("\"problem\":{}", Value::from(shown.problem.as_str())));
+        }
+        let rows = shown.rows.after(&mut self.rows);
+        let events = shown.events.after(&mut self.events);
+        for (name, items) in [("rows", rows), ("events", events)] {
+            if !items.is_empty() {
+                let mut part = format!("\"{name}\":[");
+                for (at, item) in items.iter().enumerate() {
+                    // Writing to a String cannot fail.
+                    let _ = write!(part, "{}{item}", if at > 0 { "," } else { "" });
+                }
+                parts.push(part + "]");
+            }
+        }
+        if let Some(state) = shown.state.after(&mut self.state) {
+            parts.push(format!("\"state\":{state}"));
+        }
+        let blobs = [
+            shown.map.after(&mut self.map),
+            shown.field.after(&mut self.field),
+            shown.preview.after(&mut self.preview),
+        ];
+        let text =
+            if parts.is_empty() { String::new() } else { format!("{{{}}}", parts.join(",")) };
+        News { text, blobs: blobs.into_iter().flatten().collect() }
+    }
+}
+
+impl Drop for Cursor {
+    fn drop(&mut self) {
+        self.shared.watching.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn a_slow_browser_gets_the_newest_map_and_no_more_rows_than_are_held() {
+        let shared = Arc::new(Shared::default());
+        shared.lock().begin(&json!({"robot": "x80"}), true);
+        let mut cursor = Cursor::new(&shared);
+        assert!(cursor.news().text.contains("\"robot\":\"x80\""));
+        for row in 0..MOST_ROWS + 100 {
+            shared.lock().row(&json!([row]));
+            shared.lock().map.set(Bytes::from(row.to_string()));
+        }
+        let (mut rows, mut blobs) = (0, Vec::new());
+        loop {
+            let news = cursor.news();
+            blobs.extend(news.blobs);
+            if news.text.is_empty() {
+                break;
+            }
+            let text: Value = serde_json::from_str(&news.text).unwrap();
+            let some = text["rows"].as_array().unwrap();
+            assert!(some.len() <= AT_ONCE);
+            assert!(rows > 0 || some[0][0] == 100, "the oldest are dropped");
+            rows += some.len();
+        }
+        assert_eq!((rows, blobs), (MOST_ROWS, vec![Bytes::from((MOST_ROWS + 99).to_string())]));
+    }
+
+    #[test]
+    fn a_new_run_begins_the_page_anew_and_a_run_that_has_ended_is_told() {
+        let shared = Arc::new(Shared::default());
+        shared.lock().begin(&json!(1), true);
+        shared.lock().row(&json!([1.0]));
+        let mut cursor = Cursor::new(&shared);
+        assert!(cursor.news().text.contains("rows"));
+        shared.lock().connected = false;
+        assert_eq!(cursor.news().text, r#"{"running":false,"problem":""}"#);
+        shared.lock().begin(&json!(2), true);
+        shared.lock().row(&json!([2.0]));
+        let text = cursor.news().text;
+        assert_eq!(text, r#"{"about":2,"running":true,"problem":"","rows":[[2.0]]}"#);
+        assert!(shared.is_watched());
+        drop(cursor);
+        assert!(!shared.is_watched());
+    }
+}

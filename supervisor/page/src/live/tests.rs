@@ -1,0 +1,398 @@
+//! Attacks on a page that is served, over real sockets, and what an operator may do.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use std::{
+    io::{ErrorKind, Read as _, Write as _},
+    net::TcpStream,
+    sync::{Arc, Mutex},
+    time::Duration,
+};
+
+use serde_json::{Value, json};
+
+use super::{Options, Page, PageError, orders::Operator};
+
+/// An operator that notes what it is asked for.
+#[derive(Default)]
+struct Noted(Mutex<Vec<String>>);
+
+impl Noted {
+    fn note(&self, order: &str) -> Result<String, String> {
+        self.0.lock().unwrap().push(order.to_owned());
+        Ok("confirmed".to_owned())
+    }
+}
+
+impl Operator for Noted {
+    fn stop(&self) -> Result<String, String> {
+        self.note("stop")
+    }
+    fn resume(&self) -> Result<String, String> {
+        self.note("resume")
+    }
+    fn restart(&self, stage: &str) -> Result<String, String> {
+        self.note(&format!("restart {stage}"))
+    }
+    fn kill(&self, stage: &str) -> Result<String, String> {
+        self.note(&format!("kill {stage}"))
+    }
+    fn go_to(&self, targets: &[[f64; 2]]) -> Result<String, String> {
+        self.note(&format!("go to {targets:?}"))
+    }
+    fn go_back(&self) -> Result<String, String> {
+        Err("the robot is supervised by nobody".to_owned())
+    }
+}
+
+fn options(listen: &str) -> Options {
+    Options {
+        robot: "page-test".parse().unwrap(),
+        listen: listen.parse().unwrap(),
+        hosts: Vec::new(),
+        tls: None,
+    }
+}
+
+fn page() -> (Page, Arc<Noted>) {
+    let noted = Arc::new(Noted::default());
+    (Page::open(&options("127.0.0.1:0"), noted.clone()).unwrap(), noted)
+}
+
+/// The longest that a test waits for anything.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+fn connect(page: &Page) -> TcpStream {
+    let stream = TcpStream::connect(page.address).unwrap();
+    stream.set_read_timeout(Some(PATIENCE)).unwrap();
+    stream
+}
+
+/// Whether the other end closes `stream`, without a further byte.
+fn is_closed(stream: &mut TcpStream) -> bool {
+    match stream.read(&mut [0]) {
+        Ok(count) => count == 0,
+        Err(error) => error.kind() == ErrorKind::ConnectionReset,
+    }
+}
+
+/// The answer to a request with these lines.
+fn ask(page: &Page, lines: &[&str]) -> String {
+    let mut stream = connect(page);
+    stream.write_all((lines.join("\r\n") + "\r\n\r\n").as_bytes()).unwrap();
+    let mut answer = String::new();
+    let _ = stream.read_to_string(&mut answer);
+    answer
+}
+
+fn status(answer: &str) -> &str {
+    answer.split(' ').nth(1).unwrap_or_default()
+}
+
+fn host(page: &Page) -> String {
+    format!("Host: {}", page.address)
+}
+
+fn origin(page: &Page) -> String {
+    format!("Origin: http://{}", page.address)
+}
+
+const UPGRADE: [&str; 4] = [
+    "Connection: Upgrade",
+    "Upgrade: websocket",
+    "Sec-WebSocket-Version: 13",
+    "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
+];
+
+/// A websocket's client, no more of it than these tests need.
+struct Browser(TcpStream);
+
+#[derive(Debug, PartialEq)]
+enum Frame {
+    Text(Value),
+    Binary(Vec<u8>),
+    Closed(u16),
+}
+
+impl Browser {
+    fn open(page: &Page) -> Self {
+        let mut stream = connect(page);
+        let (host, origin) = (host(page), origin(page));
+        let lines = [&["GET /live HTTP/1.1", &host, &origin][..], &UPGRADE].concat().join("\r\n");
+        stream.write_all((lines + "\r\n\r\n").as_bytes()).unwrap();
+        let mut head = Vec::new();
+        while !head.ends_with(b"\r\n\r\n") {
+            let mut byte = [0];
+            stream.read_exact(&mut byte).unwrap();
+            head.push(byte[0]);
+        }
+        assert!(head.starts_with(b"HTTP/1.1 101"), "{}", String::from_utf8_lossy(&head));
+        Self(stream)
+    }
+
+    fn with_token(page: &Page, token: &str) -> Self {
+        let mut browser = Self::open(page);
+        browser.say(&json!({"token": token}).to_string());
+        browser
+    }
+
+    fn say(&mut self, text: &str) {
+        let length = text.len();
+        // The mask is four zeros.
+        let mut frame = match length {
+            0..126 => vec![0x81, 0x80 | length as u8],
+            _ => vec![0x81, 0xfe, (length >> 8) as u8, length as u8],
+        };
+        frame.extend([0; 4]);
+        frame.extend(text.as_bytes());
+        let _ = self.0.write_all(&frame);
+    }
+
+    /// The next frame; closed without a code where the connection ends.
+    fn hear(&mut self) -> Frame {
+        let mut head = [0; 2];
+        if self.0.read_exact(&mut head).is_err() {
+            return Frame::Closed(0);
+        }
+        let length = match head[1] {
+            126 => {
+                let mut length = [0; 2];
+                self.0.read_exact(&mut length).unwrap();
+                usize::from(u16::from_be_bytes(length))
+            }
+            127 => {
+                let mut length = [0; 8];
+                self.0.read_exact(&mut length).unwrap();
+                u64::from_be_bytes(length) as usize
+            }
+            length => usize::from(length),
+        };
+        let mut content = vec![0; length];
+        self.0.read_exact(&mut content).unwrap();
+        match head[0] & 0xf {
+            1 => Frame::Text(serde_json::from_slice(&content).unwrap()),
+            2 => Frame::Binary(content),
+            _ => Frame::Closed(content.first_chunk().map_or(0, |code| u16::from_be_bytes(*code))),
+        }
+    }
+
+    /// The first message that has `key`.
+    fn await_key(&mut self, key: &str) -> Value {
+        loop {
+            match self.hear() {
+                Frame::Text(text) if text.get(key).is_some() => return text[key].clone(),
+                Frame::Closed(code) => panic!("closed with {code} before {key}"),
+                _ => {}
+            }
+        }
+    }
+
+    /// The code with which the page closes.
+    fn await_close(&mut self) -> u16 {
+        loop {
+            if let Frame::Closed(code) = self.hear() {
+                return code;
+            }
+        }
+    }
+
+    /// Whether an order is done, and what is said about it.
+    fn order(&mut self, order: &Value) -> (bool, String) {
+        let mut asked = order.clone();
+        asked["id"] = 7.into();
+        self.say(&asked.to_string());
+        let answer = self.await_key("answer");
+        assert_eq!(answer["id"], 7);
+        (answer["ok"] == true, answer["text"].as_str().unwrap().to_owned())
+    }
+}
+
+#[test]
+fn a_request_that_names_another_host_or_none_or_two_is_misdirected() {
+    let (page, _) = page();
+    let own = host(&page);
+    let foreign = format!("Host: evil.example:{}", page.address.port());
+    for lines in [
+        &["GET / HTTP/1.1", &foreign][..],
+        &["GET / HTTP/1.1", "Host: 127.0.0.1"],
+        &["GET / HTTP/1.0"],
+        &["GET / HTTP/1.1", &own, &foreign],
+        &["GET http://evil.example/ HTTP/1.1", &own],
+    ] {
+        let answer = ask(&page, lines);
+        // The HTTP library itself refuses what no server may accept.
+        assert!(["421", "400"].contains(&status(&answer)), "{lines:?}: {answer}");
+    }
+    assert_eq!(status(&ask(&page, &["GET / HTTP/1.1", &own])), "200");
+}
+
+#[test]
+fn a_foreign_origin_and_a_websocket_or_a_change_without_one_are_forbidden() {
+    let (page, _) = page();
+    let (own, origin) = (host(&page), origin(&page));
+    for foreign in ["Origin: null", "Origin: http://evil.example", "Origin: https://127.0.0.1", ""]
+    {
+        let lines = ["GET /live HTTP/1.1", &own, UPGRADE[0], UPGRADE[1], UPGRADE[2], UPGRADE[3]];
+        let mut lines = lines.to_vec();
+        lines.extend((!foreign.is_empty()).then_some(foreign));
+        assert_eq!(status(&ask(&page, &lines)), "403", "{foreign}");
+        if !foreign.is_empty() {
+            assert_eq!(status(&ask(&page, &["GET / HTTP/1.1", &own, foreign])), "403");
+        }
+    }
+    assert_eq!(status(&ask(&page, &["POST / HTTP/1.1", &own])), "403");
+    assert_eq!(status(&ask(&page, &["POST / HTTP/1.1", &own, &origin])), "405");
+}
+
+#[test]
+fn every_file_forbids_scripts_of_others_and_none_has_a_token() {
+    let (page, _) = page();
+    for (path, kind, _) in crate::assets::ALL {
+        let answer = ask(&page, &[&format!("GET {path} HTTP/1.1"), &host(&page)]);
+        assert_eq!(status(&answer), "200", "{path}");
+        let head = answer.to_lowercase();
+        for line in [
+            "content-security-policy: default-src 'none'; script-src 'self';",
+            "x-content-type-options: nosniff",
+            "referrer-policy: no-referrer",
+            "cache-control: no-store",
+            kind,
+        ] {
+            assert!(head.contains(line), "{path}: {line}");
+        }
+        assert!(!head.contains("set-cookie"));
+        for token in [&page.access.watch, &page.access.drive] {
+            assert!(!answer.contains(token.reveal()));
+        }
+    }
+    let secret = format!("GET /?token={} HTTP/1.1", page.access.drive.reveal());
+    assert!(!ask(&page, &[&secret, &host(&page)]).contains(page.access.drive.reveal()));
+    assert_eq!(status(&ask(&page, &["GET /../Cargo.toml HTTP/1.1", &host(&page)])), "404");
+}
+
+#[test]
+fn a_browser_that_shows_a_wrong_token_or_none_in_time_is_left() {
+    let (page, noted) = page();
+    let earlier = self::page().0;
+    for token in [earlier.access.drive.reveal(), "x", &page.access.drive.reveal()[..31]] {
+        assert_eq!(Browser::with_token(&page, token).await_close(), 4401, "{token}");
+    }
+    let mut hasty = Browser::open(&page);
+    hasty.say(&json!({"id": 1, "order": "stop"}).to_string());
+    assert_eq!(hasty.await_close(), 4401, "an order is no token");
+    assert_eq!(Browser::open(&page).await_close(), 4401, "nothing was said");
+    assert!(noted.0.lock().unwrap().is_empty());
+}
+
+#[test]
+fn who_watches_may_stop_the_robot_and_nothing_else() {
+    let (page, noted) = page();
+    page.shared.lock().begin(&json!({}), true);
+    for token in ["", page.access.watch.reveal()] {
+        let mut browser = Browser::with_token(&page, token);
+        assert_eq!(browser.await_key("role"), "watch");
+        for order in [
+            json!({"order": "resume"}),
+            json!({"order": "kill", "stage": "planner"}),
+            json!({"order": "restart", "stage": "planner"}),
+            json!({"order": "go_to", "targets": [[1.0, 2.0]]}),
+            json!({"order": "go_back"}),
+            json!({"order": "preview", "x": 1.0, "y": 0.0}),
+        ] {
+            let (done, why) = browser.order(&order);
+            assert!(!done && why.contains("driving"), "{order}: {why}");
+        }
+        assert_eq!(browser.order(&json!({"order": "stop"})), (true, "confirmed".to_owned()));
+    }
+    assert_eq!(*noted.0.lock().unwrap(), ["stop", "stop"]);
+}
+
+#[test]
+fn who_drives_is_told_what_was_confirmed_or_why_it_was_not_done() {
+    let (page, noted) = page();
+    let mut browser = Browser::with_token(&page, page.access.drive.reveal());
+    assert_eq!(browser.await_key("role"), "drive");
+    let kill = json!({"order": "kill", "stage": "planner"});
+    let (done, why) = browser.order(&kill);
+    assert!(!done && why.contains("simulation"), "a real robot's stage: {why}");
+    page.shared.lock().begin(&json!({}), true);
+    assert!(browser.order(&kill).0);
+    assert!(browser.order(&json!({"order": "go_to", "targets": [[1.0, 2.0]]})).0);
+    assert!(!browser.order(&json!({"order": "go_to", "targets": vec![[0.0, 0.0]; 17]})).0);
+    let (done, why) = browser.order(&json!({"order": "go_back"}));
+    assert_eq!((done, &*why), (false, "the robot is supervised by nobody"));
+    assert!(browser.order(&json!({"order": "preview", "x": 1.5, "y": 0.0})).0);
+    assert_eq!(page.shared.lock().wanted, Some([1.5, 0.0]));
+    assert_eq!(*noted.0.lock().unwrap(), ["kill planner", "go to [[1.0, 2.0]]"]);
+}
+
+#[test]
+fn a_long_message_and_a_flood_end_the_session() {
+    let (page, noted) = page();
+    let mut browser = Browser::with_token(&page, "");
+    browser.say(&format!("{{\"id\":1,\"order\":\"stop\",\"x\":\"{}\"}}", "x".repeat(4096)));
+    browser.await_close();
+    let mut browser = Browser::with_token(&page, "");
+    for _ in 0..200 {
+        browser.say("{}");
+    }
+    let code = browser.await_close();
+    assert!([4429, 0].contains(&code), "{code}");
+    assert!(noted.0.lock().unwrap().is_empty());
+}
+
+#[test]
+fn connections_beyond_the_limit_are_closed_at_once_and_silent_ones_soon() {
+    let (page, _) = page();
+    let mut watching = Browser::with_token(&page, "");
+    watching.await_key("role");
+    let mut silent: Vec<_> = (0..300).map(|_| connect(&page)).collect();
+    // Half a request, so that the header is never whole.
+    for stream in &mut silent {
+        let _ = stream.write_all(b"GET / HTTP/1.1\r\n");
+    }
+    watching.say(&json!({"id": 1, "order": "stop"}).to_string());
+    assert_eq!(watching.await_key("answer")["ok"], true, "who watches is served meanwhile");
+    for stream in &mut silent {
+        let mut answer = Vec::new();
+        // Whatever it says, it ends.
+        if let Err(error) = stream.read_to_end(&mut answer) {
+            assert_eq!(error.kind(), ErrorKind::ConnectionReset);
+        }
+    }
+    assert_eq!(status(&ask(&page, &["GET / HTTP/1.1", &host(&page)])), "200");
+    let mut many: Vec<_> = (0..15).map(|_| Browser::with_token(&page, "")).collect();
+    for browser in &mut many {
+        browser.await_key("role");
+    }
+    let (host, origin) = (host(&page), origin(&page));
+    let lines = [&["GET /live HTTP/1.1", &host, &origin][..], &UPGRADE].concat();
+    assert_eq!(status(&ask(&page, &lines)), "503", "sessions are counted");
+}
+
+#[test]
+fn a_request_without_an_end_is_not_waited_for() {
+    let (page, _) = page();
+    let mut stream = connect(&page);
+    assert!(is_closed(&mut stream), "nothing was said");
+    let mut stream = connect(&page);
+    let _ = stream.write_all(&[b'x'; 1 << 20]);
+    let mut answer = Vec::new();
+    let _ = stream.read_to_end(&mut answer);
+    assert!(!answer.starts_with(b"HTTP/1.1 2"));
+}
+
+#[test]
+fn a_page_that_cannot_be_served_says_why() {
+    let refused = |options: &Options| Page::open(options, Arc::new(Noted::default())).unwrap_err();
+    let far = refused(&options("0.0.0.0:0"));
+    assert!(matches!(far, PageError::NotLoopback(_)), "{far}");
+    let (first, _) = page();
+    let taken = refused(&options(&first.address.to_string()));
+    assert!(matches!(taken, PageError::Listen { .. }), "{taken}");
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("none.pem");
+    let mut encrypted = options("127.0.0.1:0");
+    encrypted.tls = Some((file.clone(), file));
+    let none = refused(&encrypted);
+    assert!(matches!(none, PageError::Tls { .. }), "{none}");
+}

@@ -1,0 +1,149 @@
+//! A recorded run as one file: the page, its styles, its modules and its messages.
+
+use std::io::Write as _;
+
+use flate2::{Compression, write::DeflateEncoder};
+use serde_json::Value;
+
+use crate::assets;
+
+/// A page that refers to something must be blocked from it.
+const POLICY: &str = "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'unsafe-inline'; \
+style-src 'unsafe-inline'; img-src data:\">";
+/// The modules, each before those that import it.
+const MODULES: [&str; 8] = ["store", "field", "map", "charts", "timeline", "orders", "net", "page"];
+const TITLE: &str = "<title>firsthand</title>";
+
+/// The messages of a recorded run, in the order in which a server would have sent them.
+#[derive(Debug)]
+pub struct Recorded {
+    packed: DeflateEncoder<Vec<u8>>,
+}
+
+impl Default for Recorded {
+    fn default() -> Self {
+        Self { packed: DeflateEncoder::new(Vec::new(), Compression::best()) }
+    }
+}
+
+impl Recorded {
+    pub fn text(&mut self, message: &Value) {
+        self.add(0, message.to_string().as_bytes());
+    }
+
+    /// Add a map or a field.
+    pub fn blob(&mut self, message: &[u8]) {
+        self.add(1, message);
+    }
+
+    /// Each message has its length, and a byte that is 0 for text.
+    fn add(&mut self, kind: u8, message: &[u8]) {
+        let length = message.len() as u32;
+        // Writing to a Vec cannot fail.
+        let _ = self.packed.write_all(&length.to_le_bytes());
+        let _ = self.packed.write_all(&[kind]);
+        let _ = self.packed.write_all(message);
+    }
+
+    /// The file. `title` may be any text.
+    pub fn html(self, title: &str) -> String {
+        let data = recording::base64(&self.packed.finish().unwrap_or_default());
+        let title = title.replace('&', "&amp;").replace('<', "&lt;");
+        let style = |file: &str| (link(file), format!("<style>{}</style>", asset(file)));
+        let scripts = format!(
+            "<script id=\"data\" type=\"text/plain\">{data}</script>\n<script type=\"module\">{}</script>",
+            bundle()
+        );
+        let (license, plot) = (asset("uplot-license.txt"), asset("uplot.js"));
+        let parts = [
+            (TITLE.to_owned(), format!("{POLICY}\n<title>{title}</title>")),
+            style("uplot.css"),
+            style("page.css"),
+            (
+                script("", "uplot.js"),
+                format!("<!-- uPlot:\n{license} -->\n<script>{plot}</script>"),
+            ),
+            (script("type=\"module\" ", "page.js"), scripts),
+        ];
+        let mut html = asset("").to_owned();
+        for (reference, part) in parts {
+            html = html.replacen(&reference, &part, 1);
+        }
+        html
+    }
+}
+
+fn link(file: &str) -> String {
+    format!("<link rel=\"stylesheet\" href=\"/{file}\">")
+}
+
+fn script(kind: &str, file: &str) -> String {
+    format!("<script {kind}src=\"/{file}\"></script>")
+}
+
+/// The text of a file of the page.
+fn asset(file: &str) -> &'static str {
+    let found = assets::ALL.iter().find(|(path, ..)| path.strip_prefix('/') == Some(file));
+    found.map_or("", |(_, _, text)| text)
+}
+
+/// The modules as one script, each in a scope of its own, which gives what it exports.
+fn bundle() -> String {
+    let mut bundle = String::new();
+    for module in MODULES {
+        bundle += &format!("const {module}_js = (() => {{\n");
+        let mut exports = Vec::new();
+        for line in asset(&format!("{module}.js")).lines() {
+            if let Some((names, from)) = import(line) {
+                bundle += &format!("const {names} = {from}_js;\n");
+                continue;
+            }
+            let exported = line.strip_prefix("export ");
+            let words = exported.map(|line| line.split([' ', '(', '{']));
+            exports.extend(words.and_then(|mut words| {
+                words.find(|word| !["class", "function", "const"].contains(word))
+            }));
+            bundle += exported.unwrap_or(line);
+            bundle.push('\n');
+        }
+        bundle += &format!("return {{ {} }};\n}})();\n", exports.join(", "));
+    }
+    bundle
+}
+
+/// The names and the module of a line that imports.
+fn import(line: &str) -> Option<(&str, &str)> {
+    let (names, from) = line.strip_prefix("import ")?.split_once(" from \"./")?;
+    Some((names, from.strip_suffix(".js\";")?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recorded_page_refers_to_nothing_and_no_text_of_it_is_markup() {
+        let mut recorded = Recorded::default();
+        recorded.text(&serde_json::json!({"about": null, "problem": "</script><script>alert(1)"}));
+        recorded.blob(&[0; 40]);
+        let html = recorded.html("<script>alert(\"&\")</script>");
+        assert!(html.contains("<title>&lt;script>alert"));
+        assert!(!html.contains("alert(1)"));
+        for reference in ["src=\"/", "href=\"/", "import ", "export ", "://\""] {
+            let mut found = html.match_indices(reference).map(|(at, _)| &html[at..at + 40]);
+            assert_eq!(found.next(), None, "{reference}");
+        }
+        assert_eq!(html.matches("</script>").count(), 3);
+    }
+
+    #[test]
+    fn every_module_is_in_the_recorded_page_after_those_that_it_imports() {
+        for (at, module) in MODULES.iter().enumerate() {
+            let text = asset(&format!("{module}.js"));
+            for line in text.lines().filter(|line| line.starts_with("import ")) {
+                let (_, from) = import(line).unwrap();
+                assert!(MODULES[..at].contains(&from), "{module}: {line}");
+            }
+        }
+    }
+}

@@ -1,0 +1,86 @@
+// The connection to the server: it shows the token, tells what comes, asks for orders, and says when the server is gone.
+
+// The server sends something every 300 ms; without anything for this time it is lost.
+const LOST_AFTER_MS = 900;
+const AGAIN_AFTER_MS = 500;
+const WRONG_TOKEN = 4401;
+
+/// The token of the address's fragment. The tab remembers it, and the address bar does not show it.
+function token() {
+  const shown = location.hash.slice(1);
+  if (shown) history.replaceState({ token: shown }, "", location.pathname);
+  return shown || history.state?.token || "";
+}
+
+export class Net {
+  /// `on` has `message`, `blob`, `role` and `lost`.
+  constructor(on) {
+    this.on = on;
+    this.token = token();
+    this.asked = new Map();
+    this.next = 1;
+    addEventListener("hashchange", () => {
+      this.token = token();
+      this.socket?.close();
+    });
+    this.connect();
+    setInterval(() => this.watch(), 200);
+  }
+
+  connect() {
+    const scheme = location.protocol === "https:" ? "wss" : "ws";
+    const socket = new WebSocket(`${scheme}://${location.host}/live`);
+    socket.binaryType = "arraybuffer";
+    this.socket = socket;
+    this.heard = performance.now();
+    socket.onopen = () => socket.send(JSON.stringify({ token: this.token }));
+    socket.onmessage = ({ data }) => {
+      if (socket !== this.socket) return;
+      this.heard = performance.now();
+      if (typeof data !== "string") return this.on.blob(data);
+      const message = JSON.parse(data);
+      if (message.role) {
+        this.isOpen = true;
+        this.on.role(message.role);
+      }
+      if (message.answer) this.answered(message.answer);
+      this.on.message(message);
+    };
+    socket.onclose = ({ code }) => {
+      if (socket !== this.socket) return;
+      // A token of an earlier page opens nothing; without one the page may still watch on this machine.
+      if (code === WRONG_TOKEN) this.token = "";
+      this.lose(code === WRONG_TOKEN ? "the token opens nothing; use an address that the page printed" : "the page has lost its server; it tries again");
+    };
+  }
+
+  watch() {
+    if (this.isOpen && performance.now() - this.heard > LOST_AFTER_MS) {
+      const socket = this.socket;
+      this.lose("the server does not answer; the page tries again");
+      socket.close();
+    }
+  }
+
+  lose(why) {
+    this.socket = null;
+    this.isOpen = false;
+    for (const answer of this.asked.values()) answer({ ok: false, text: "the server was lost; look at the state" });
+    this.asked.clear();
+    this.on.lost(why);
+    setTimeout(() => this.connect(), AGAIN_AFTER_MS);
+  }
+
+  answered({ id, ok, text }) {
+    this.asked.get(id)?.({ ok, text });
+    this.asked.delete(id);
+  }
+
+  /// Ask for an order. The answer says what was confirmed, or why it was not done.
+  ask(order) {
+    if (!this.isOpen) return Promise.resolve({ ok: false, text: "there is no server to ask" });
+    const id = this.next++;
+    this.socket.send(JSON.stringify({ id, ...order }));
+    return new Promise((answer) => this.asked.set(id, answer));
+  }
+}

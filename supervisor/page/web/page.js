@@ -1,0 +1,153 @@
+// The page: it joins the store, the map, the charts, the time line, and for a live robot the connection and the orders.
+
+import { Store } from "./store.js";
+import { MapView } from "./map.js";
+import { Charts } from "./charts.js";
+import { Timeline } from "./timeline.js";
+import { Orders } from "./orders.js";
+import { Net } from "./net.js";
+
+const byId = (id) => document.getElementById(id);
+
+// A recorded page has its data with it.
+const recording = byId("data");
+const store = new Store(!recording);
+let asked = false;
+
+function changed() {
+  if (asked) return;
+  asked = true;
+  requestAnimationFrame(draw);
+}
+
+const timeline = new Timeline(store, !recording, changed);
+const map = new MapView(byId("map"), store, changed, (places, at, isDone) => orders?.choose(places, at, isDone));
+const charts = new Charts(byId("figures"), store, (t) => timeline.go(t));
+let orders = null;
+let drawnCharts = 0;
+
+function draw(now) {
+  asked = false;
+  timeline.tick(now);
+  map.draw(timeline.t);
+  timeline.draw();
+  // Charts cost most: five times a second is enough while time runs.
+  if (now - drawnCharts > 200 || !timeline.plays) {
+    drawnCharts = now;
+    charts.draw(timeline.t);
+  }
+  drawStatus();
+}
+
+function drawStatus() {
+  const state = store.stateAt(timeline.t);
+  const status = byId("status");
+  let text = "no robot runs; the page waits for it";
+  if (store.problem) text = store.problem;
+  else if (store.about && !store.running && !recording) text = `the run has ended at ${store.end.toFixed(1)} s; the page waits for the next`;
+  else if (state) {
+    const why = state.stopped ? `: ${state.cause}` : "";
+    const rest = state.at_rest ? ", at rest" : "";
+    text = state.connected ? `the robot ${state.action}${why}${rest}; guidance: ${state.guidance}` : "the robot does not answer";
+  } else if (store.about) text = "the robot starts";
+  status.textContent = text;
+  status.classList.toggle("bad", Boolean(store.problem) || Boolean(state?.stopped));
+}
+
+/// A run is shown from its beginning.
+function begin() {
+  const { about } = store;
+  byId("title").textContent = about ? `${about.robot} · ${about.mission}` : "firsthand";
+  document.title = byId("title").textContent;
+  document.body.classList.toggle("simulated", Boolean(about?.simulated));
+  map.fit();
+  map.legend(byId("legend"));
+  charts.make();
+  if (timeline.isLive) timeline.follow();
+}
+
+function lost(why) {
+  document.body.classList.toggle("lost", Boolean(why));
+  byId("notice").hidden = !why;
+  byId("notice").textContent = why;
+}
+
+async function openRecording() {
+  document.body.classList.add("recording");
+  const bytes = Uint8Array.from(atob(recording.textContent.trim()), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
+  const buffer = await new Response(stream).arrayBuffer();
+  const view = new DataView(buffer);
+  // Each message has its length and whether it is text, as the server would have sent it.
+  for (let at = 0; at + 5 <= buffer.byteLength;) {
+    const length = view.getUint32(at, true);
+    const message = buffer.slice(at + 5, at + 5 + length);
+    if (view.getUint8(at + 4) === 0) store.take(JSON.parse(new TextDecoder().decode(message)));
+    else store.takeBlob(message);
+    at += 5 + length;
+  }
+  begin();
+  showMetrics();
+  timeline.go(store.end);
+}
+
+/// The table of metrics of a recorded run, how it ended, and what is missing from its recording.
+function showMetrics() {
+  const { metrics, outcome, remarks = [] } = store.summary ?? {};
+  if (!metrics) return;
+  byId("metrics-part").hidden = false;
+  const paragraphs = [outcome, ...remarks].map((text) => {
+    const paragraph = document.createElement("p");
+    paragraph.textContent = text;
+    return paragraph;
+  });
+  const table = document.createElement("table");
+  for (const texts of metrics) {
+    const row = table.insertRow();
+    for (const text of texts) row.insertCell().textContent = text;
+  }
+  byId("metrics").replaceChildren(...paragraphs, table);
+}
+
+byId("fit").addEventListener("click", () => map.fit());
+byId("field-mode").addEventListener("change", ({ target }) => {
+  map.fieldMode = target.value;
+  changed();
+});
+byId("truth").addEventListener("change", ({ target }) => {
+  map.showsTruth = target.checked;
+  changed();
+});
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+  map.repaint();
+  charts.make();
+  changed();
+});
+addEventListener("keydown", ({ key, target }) => {
+  if (target.tagName === "INPUT" || target.tagName === "SELECT" || target.id === "map") return;
+  if (key === "ArrowLeft") timeline.go(timeline.t - 0.5);
+  if (key === "ArrowRight") timeline.go(timeline.t + 0.5);
+});
+
+if (recording) {
+  openRecording();
+} else {
+  const net = new Net({
+    role: (role) => {
+      lost("");
+      orders.role(role);
+    },
+    message: (message) => {
+      store.take(message);
+      if ("about" in message) begin();
+      changed();
+    },
+    blob: (data) => {
+      store.takeBlob(data);
+      changed();
+    },
+    lost,
+  });
+  orders = new Orders(net, map);
+  orders.choose([]);
+}

@@ -1,0 +1,156 @@
+//! The page, in a headless browser.
+
+use std::{
+    io::{BufRead as _, BufReader},
+    process::{Child, Stdio},
+};
+
+use rustix::process::Signal;
+
+use crate::support::{
+    Browser, Run, assert_nothing_left, firsthand, has_browser, not_run, refused, signal_process,
+};
+
+/// `firsthand page` for a robot.
+struct Page {
+    child: Child,
+    /// The addresses to watch and to drive.
+    watch: String,
+    drive: String,
+}
+
+impl Page {
+    fn start(robot: &str, listen: &str) -> Self {
+        let mut child = firsthand(&["page", "--robot", robot, "--listen", listen])
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut lines = BufReader::new(child.stdout.take().unwrap()).lines().map(Result::unwrap);
+        let mut address = |role: &str| {
+            let line = lines.next().unwrap();
+            line.strip_prefix(role).unwrap().trim_start().to_owned()
+        };
+        let (watch, drive) = (address("watch"), address("drive"));
+        Self { child, watch, drive }
+    }
+
+    /// Where it listens.
+    fn listen(&self) -> &str {
+        self.watch.strip_prefix("http://").unwrap().split('/').next().unwrap()
+    }
+
+    fn signal(&self, signal: Signal) {
+        signal_process(self.child.id(), signal);
+    }
+
+    fn end(mut self, signal: Signal) {
+        self.signal(signal);
+        let _ = self.child.wait();
+    }
+}
+
+impl Drop for Page {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+const IS_LOST: &str = "document.body.classList.contains('lost')";
+const IS_THERE: &str = "!document.body.classList.contains('lost')";
+const GOES: &str = "document.getElementById('status').textContent.startsWith('the robot goes')";
+const RESTS: &str = "document.getElementById('status').textContent.includes('at rest')";
+
+fn says(id: &str, text: &str) -> String {
+    format!("document.getElementById('{id}').textContent.includes('{text}')")
+}
+
+/// Watch a live run in a window of that width, and do what an operator does.
+fn operate(robot: &str, width: u32) {
+    let page = Page::start(robot, "127.0.0.1:0");
+    let browser = Browser::open(width);
+    browser.go(&page.drive);
+    browser.wait_until(&says("status", "no robot runs"));
+    assert_eq!(browser.run("return location.hash"), "", "the token is not shown");
+    let mut run = Run::start(robot, "open-room", &["--pace", "1", "--set", "timeout_s=600"]);
+    run.wait_until_driving();
+    browser.wait_until(GOES);
+    browser.wait_until("document.querySelectorAll('#stages tr').length === 6");
+    browser.wait_until("document.querySelectorAll('#figures canvas').length >= 5");
+    let wide = "document.documentElement.scrollWidth <= innerWidth";
+    assert_eq!(browser.run(&format!("return {wide}")), true, "it fits the window");
+
+    browser.tap("map", 40, -30);
+    browser.wait_until(&says("chosen", ","));
+    browser.wait_until("!document.getElementById('go').disabled");
+    browser.tap("go", 0, 0);
+    browser.wait_until(&says("answer", "target: the supervisor sends the robot there"));
+    let sent = run.wait_until("the robot has another target", |status| {
+        status["target"]["number"].as_u64() > Some(1)
+    });
+    assert_eq!(sent["order"], "driving");
+
+    browser.tap("stop", 0, 0);
+    browser.wait_until(&says("answer", "stop: the robot rests"));
+    browser.wait_until(RESTS);
+    browser.tap("resume", 0, 0);
+    browser.wait_until(GOES);
+    browser.press(" ");
+    browser.wait_until(RESTS);
+    browser.tap("resume", 0, 0);
+    browser.wait_until(GOES);
+
+    // Scrub back, and follow again.
+    browser.run("const time = document.getElementById('time'); time.value = time.min; time.dispatchEvent(new Event('input'))");
+    browser.wait_until("document.getElementById('live').getAttribute('aria-pressed') === 'false'");
+    browser.tap("live", 0, 0);
+    browser.wait_until("document.getElementById('live').getAttribute('aria-pressed') === 'true'");
+
+    page.signal(Signal::STOP);
+    browser.wait_until(IS_LOST);
+    page.signal(Signal::CONT);
+    browser.wait_until(IS_THERE);
+    browser.wait_until("document.body.classList.contains('drive')");
+    let listen = page.listen().to_owned();
+    page.end(Signal::KILL);
+    browser.wait_until(IS_LOST);
+    // The next page has other tokens: who could drive watches now.
+    let page = Page::start(robot, &listen);
+    browser.wait_until(IS_THERE);
+    browser.wait_until("!document.body.classList.contains('drive')");
+    browser.wait_until(GOES);
+    run.stop();
+    browser.wait_until(&says("status", "the run has ended"));
+    page.end(Signal::TERM);
+    assert_nothing_left(robot);
+}
+
+#[test]
+fn a_robot_is_watched_stopped_and_resumed_in_a_browser_that_loses_and_regains_its_server() {
+    if !has_browser() {
+        return not_run("the page in a window of a desk", "chromium and chromedriver are missing");
+    }
+    operate("page-desk", 1280);
+}
+
+#[test]
+fn a_robot_is_watched_stopped_and_resumed_on_a_phone() {
+    if !has_browser() {
+        return not_run("the page on a phone", "chromium and chromedriver are missing");
+    }
+    operate("page-phone", 390);
+}
+
+#[test]
+fn a_page_for_others_than_this_machine_needs_keys() {
+    let listen = ["page", "--robot", "page-far", "--listen"];
+    refused(&[&listen[..], &["0.0.0.0:0"]].concat(), "not-loopback", &["0.0.0.0", "--tls-cert"]);
+    refused(&[&listen[..], &["here"]].concat(), "usage", &["--listen"]);
+}
+
+#[test]
+fn a_page_ends_on_request_without_a_robot() {
+    let mut page = Page::start("page-none", "127.0.0.1:0");
+    page.signal(Signal::TERM);
+    assert!(page.child.wait().unwrap().success());
+}

@@ -1,0 +1,147 @@
+//! A headless Chromium, by the W3C WebDriver protocol.
+
+use std::{
+    io::{BufRead as _, BufReader, Read as _, Write as _},
+    net::TcpStream,
+    process::{Child, Command, Stdio},
+    time::Instant,
+};
+
+use serde_json::{Value, json};
+
+use super::{PATIENCE, commands::with_parent};
+
+/// A session of a browser, whose driver ends with it.
+pub struct Browser {
+    driver: Child,
+    port: u16,
+    session: String,
+}
+
+/// Whether Chromium and its driver are installed.
+pub fn has_browser() -> bool {
+    ["chromium", "chromedriver"].into_iter().all(|name| {
+        let found = Command::new(name).arg("--version").stdout(Stdio::null()).status();
+        found.is_ok_and(|status| status.success())
+    })
+}
+
+impl Browser {
+    /// A window of that width; one of a phone's width is touched rather than clicked.
+    pub fn open(width: u32) -> Self {
+        let mut driver = with_parent(&["chromedriver", "--port=0"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let lines = BufReader::new(driver.stdout.take().unwrap()).lines();
+        // "ChromeDriver was started successfully on port N."
+        let started = lines.map(Result::unwrap).find(|line| line.contains("successfully"));
+        let port = started.unwrap().trim_end_matches('.').rsplit(' ').next().unwrap().parse();
+        let mut browser = Self { driver, port: port.unwrap(), session: String::new() };
+        let size = format!("--window-size={width},900");
+        let mut options =
+            json!({"args": ["--headless=new", "--no-sandbox", "--disable-gpu", size]});
+        if width < 500 {
+            let metrics = json!({"width": width, "height": 844, "pixelRatio": 2, "touch": true});
+            options["mobileEmulation"] = json!({"deviceMetrics": metrics});
+        }
+        let capabilities = json!({"browserName": "chrome", "goog:chromeOptions": options});
+        let wanted = json!({"capabilities": {"alwaysMatch": capabilities}});
+        let session = browser.ask("POST", "/session", &wanted);
+        browser.session = format!("/session/{}", session["sessionId"].as_str().unwrap());
+        browser
+    }
+
+    /// The value that the driver answers with.
+    fn ask(&self, method: &str, path: &str, body: &Value) -> Value {
+        let mut stream = TcpStream::connect(("127.0.0.1", self.port)).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        let body = body.to_string();
+        let length = body.len();
+        let head = format!(
+            "{method} {path} HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\nContent-Length: {length}\r\n\r\n"
+        );
+        stream.write_all((head + &body).as_bytes()).unwrap();
+        let mut answer = BufReader::new(stream);
+        let (mut head, mut length) = (String::new(), 0);
+        while !head.ends_with("\r\n\r\n") {
+            let start = head.len();
+            answer.read_line(&mut head).unwrap();
+            let line = head[start..].to_lowercase();
+            if let Some(value) = line.strip_prefix("content-length:") {
+                length = value.trim().parse().unwrap();
+            }
+        }
+        let mut body = vec![0; length];
+        answer.read_exact(&mut body).unwrap();
+        let value: Value = serde_json::from_slice(&body).unwrap();
+        assert!(head.starts_with("HTTP/1.1 200"), "{path}: {value}");
+        value["value"].clone()
+    }
+
+    pub fn go(&self, url: &str) {
+        self.ask("POST", &format!("{}/url", self.session), &json!({"url": url}));
+    }
+
+    /// The value of a script that returns one.
+    pub fn run(&self, script: &str) -> Value {
+        let asked = json!({"script": script, "args": []});
+        self.ask("POST", &format!("{}/execute/sync", self.session), &asked)
+    }
+
+    /// The text of the element `id`.
+    pub fn text(&self, id: &str) -> String {
+        let text = self.run(&format!("return document.getElementById('{id}').textContent"));
+        text.as_str().unwrap().to_owned()
+    }
+
+    /// Wait until a script returns true.
+    #[track_caller]
+    pub fn wait_until(&self, script: &str) {
+        let began = Instant::now();
+        while self.run(&format!("return Boolean({script})")) != true {
+            let texts = ["status", "answer", "notice"].map(|id| self.text(id));
+            assert!(began.elapsed() < PATIENCE, "waited too long for {script}: {texts:?}");
+        }
+    }
+
+    /// Press and release at a point of the element `id`, from its centre, CSS pixels.
+    pub fn tap(&self, id: &str, x: i32, y: i32) {
+        let found = json!({"using": "css selector", "value": format!("#{id}")});
+        let element = self.ask("POST", &format!("{}/element", self.session), &found);
+        self.run(&format!("document.getElementById('{id}').scrollIntoView({{block: 'center'}})"));
+        let actions = json!({"actions": [{
+            "type": "pointer",
+            "id": "finger",
+            "parameters": {"pointerType": "touch"},
+            "actions": [
+                {"type": "pointerMove", "origin": element, "x": x, "y": y, "duration": 0},
+                {"type": "pointerDown", "button": 0},
+                {"type": "pointerUp", "button": 0},
+            ],
+        }]});
+        self.ask("POST", &format!("{}/actions", self.session), &actions);
+    }
+
+    /// Press and release a key.
+    pub fn press(&self, key: &str) {
+        let actions = json!({"actions": [{
+            "type": "key",
+            "id": "keys",
+            "actions": [{"type": "keyDown", "value": key}, {"type": "keyUp", "value": key}],
+        }]});
+        self.ask("POST", &format!("{}/actions", self.session), &actions);
+    }
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        // The driver ends its browser when its session ends.
+        if !self.session.is_empty() && !std::thread::panicking() {
+            self.ask("DELETE", &self.session, &json!({}));
+        }
+        let _ = self.driver.kill();
+        let _ = self.driver.wait();
+    }
+}
