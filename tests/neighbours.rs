@@ -6,13 +6,14 @@ use std::{
     net::UdpSocket,
     os::unix::fs::{MetadataExt as _, PermissionsExt as _},
     path::Path,
+    process::Stdio,
     sync::atomic::{AtomicBool, Ordering},
     time::{Duration, Instant},
 };
 
 use crate::support::{
     self, PATIENCE, Run, assert_nothing_left, assert_refused, bus_instance, domain, find,
-    in_own_process, pid, signal_process,
+    firsthand, in_own_process, json_of, pid, signal_process,
 };
 use common::{
     address::Address,
@@ -26,9 +27,10 @@ use common::{
     topics,
     wire::{Addressing, Command},
 };
+use recording::Recording;
 use rustix::{
     fs::inotify,
-    process::Signal,
+    process::{Pid, PidfdFlags, Signal, pidfd_open},
     thread::{Uid, set_thread_res_uid},
 };
 use supervisor::domain::DomainLock;
@@ -85,10 +87,19 @@ fn a_second_controller_and_a_second_supervisor_are_ignored_counted_and_told_with
 }
 
 #[test]
-fn samples_that_seem_newer_than_all_others_wedge_no_mission_whatever_their_topic() {
+fn samples_that_seem_newer_than_all_others_wedge_no_mission_and_no_consumer_whatever_their_topic() {
     in_own_process(|| {
         let mut run = Run::start("forged", "open-room", &["--pace", "2"]);
         run.wait_until_under_way(0.3);
+        let echo = |topic| {
+            let mut echo = firsthand(&["topic", "echo", topic, "--robot", "forged", "--json"]);
+            echo.args(["--number", "40"]).stdout(Stdio::piped()).spawn().unwrap()
+        };
+        let mut echoes = [echo("pose"), echo("guidance")];
+        for echo in &mut echoes {
+            let printed = echo.stdout.as_ref().unwrap();
+            assert!(poll::is_readable(printed, PATIENCE).unwrap(), "nothing is shown");
+        }
         let bus = Bus::join(&domain("forged"), "forger").unwrap();
         macro_rules! forge {
             ($($topic:ident),*) => {
@@ -112,8 +123,21 @@ fn samples_that_seem_newer_than_all_others_wedge_no_mission_whatever_their_topic
             let told = || support::logged(&run.directory(), reader, &["WARN", &own]) == 1;
             support::wait_until("the forger is told", told);
         }
+        for echo in echoes {
+            let ended = pidfd_open(Pid::from_child(&echo), PidfdFlags::empty()).unwrap();
+            assert!(poll::is_readable(&ended, PATIENCE).unwrap(), "it shows no more");
+            let (status, shown) = json_of(&echo.wait_with_output().unwrap());
+            let forged = shown.iter().filter(|sample| sample["stamp"]["generation"] != 1);
+            assert_eq!((status.code(), shown.len(), forged.count()), (Some(0), 40, 0));
+        }
         drop((ranges, wheels, pose, grid, guidance, link, bus));
-        let summary = run.arrives();
+        let (summary, directory) = run.arrives_in();
+        let recording = Recording::open(&directory.path().join("run")).unwrap();
+        let poses: Vec<_> = recording.samples(&topics::POSE).unwrap().map(Result::unwrap).collect();
+        assert!(poses.iter().all(|pose| pose.sample.stamp.generation == 1));
+        let in_order =
+            poses.windows(2).all(|pair| pair[0].sample.stamp.tick <= pair[1].sample.stamp.tick);
+        assert!(in_order && poses.len() > 40, "{}", poses.len());
         let restarts = summary["restarts"].as_object().unwrap();
         assert!(restarts.values().all(|times| times == 0), "{summary}");
     });
@@ -187,7 +211,7 @@ fn a_directory_of_another_user_with_the_name_of_this_users_blocks_no_start() {
         command
     };
     let slowly = ["run", "open-room", "--robot", "squatted", "--pace", "1", "--json"];
-    let mut run = start(&slowly).stdout(std::process::Stdio::piped()).spawn().unwrap();
+    let mut run = start(&slowly).stdout(Stdio::piped()).spawn().unwrap();
     // Another process of the user finds the robot, and stops it.
     support::wait_until("it is found", || {
         let status = start(&["status", "--robot", "squatted", "--json"]).output().unwrap();

@@ -6,6 +6,7 @@ use crate::{
     bus::{Bus, BusError},
     bus_instance::BusInstance,
     domain::Domain,
+    roster,
     topics::{self, AnyTopic, Rate},
     waiter::Waiter,
 };
@@ -127,6 +128,16 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
         self.joined.as_mut().map(|joined| &mut joined.topics)
     }
 
+    /// Open the readers again, as a new consumer does: they get whole maps. Returns the earlier ones, from which the last samples can be
+    /// taken; none while the robot is away.
+    pub fn reopen(&mut self) -> Result<Option<Topics>, BusError> {
+        let Some(joined) = &mut self.joined else {
+            return Ok(None);
+        };
+        let opened = (self.open)(&joined.bus)?;
+        Ok(Some(std::mem::replace(&mut joined.topics, opened)))
+    }
+
     /// Join the robot's bus, if there is one. Returns whether it was joined.
     fn look(&mut self) -> Result<bool, BusError> {
         let Ok(instance) = BusInstance::current(&self.domain) else {
@@ -158,7 +169,7 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
     fn join(&mut self) -> Result<Joined<Topics>, BusError> {
         // Readers create files, too. Without a lock there is no bus, and the next line says so.
         let _joining = self.domain.joining();
-        let bus = Bus::join(&self.domain, &self.name)?;
+        let bus = roster::join(&self.domain, &self.name)?;
         let mut waiter = Waiter::default();
         let mut known = Vec::new();
         for topic in self.wake_on.iter().map(|&topic| wakes_for(topic)) {

@@ -3,7 +3,8 @@
 use std::time::{Duration, Instant};
 
 use crate::{
-    bus::{Author, Bus, BusError, SliceReader},
+    bus::{Author, Bus, BusError, Names, SliceReader},
+    domain::Domain,
     samples::{RosterEntry, RosterHeader, name_str},
     topics,
     waiter::Waiter,
@@ -30,6 +31,27 @@ pub fn named(entries: &[RosterEntry]) -> impl Iterator<Item = (String, Author)> 
     })
 }
 
+/// Join a robot's bus as a consumer, whose readers return only samples of the supervisor and of the processes that rosters name.
+pub fn join(domain: &Domain, name: &str) -> Result<Bus, BusError> {
+    let bus = Bus::join_as_consumer(domain, name)?;
+    if let Some(writers) = bus.writers() {
+        writers.read_from(names(bus.slice_reader(&topics::ROSTER)?));
+        writers.wait_for_names(PATIENCE);
+    }
+    Ok(bus)
+}
+
+/// The processes of all rosters since the last call.
+fn names(mut rosters: SliceReader<RosterHeader, RosterEntry>) -> Names {
+    Box::new(move || {
+        let mut all: Option<Vec<_>> = None;
+        while let Some(entries) = rosters.take()? {
+            all.get_or_insert_default().extend(named(&entries));
+        }
+        Ok(all)
+    })
+}
+
 impl Roster {
     /// Read the roster on `bus`.
     pub fn open(bus: &Bus) -> Result<Self, BusError> {
@@ -53,14 +75,7 @@ impl Roster {
             Some(stages) => writers.name(stages),
             None => tracing::warn!("the supervisor does not name this process; is it frozen?"),
         }
-        let mut samples = self.samples;
-        writers.read_from(Box::new(move || {
-            let mut newest = None;
-            while let Some(entries) = samples.take()? {
-                newest = Some(named(&entries).collect());
-            }
-            Ok(newest)
-        }));
+        writers.read_from(names(self.samples));
         Ok(())
     }
 

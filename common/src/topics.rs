@@ -27,6 +27,9 @@ const FIELD_RATE: Rate = Rate::OnChange {
     again_after: Duration::from_secs(1),
 };
 
+/// A recorder that was not scheduled for long still learns of each generation from the rosters that wait for it.
+const ROSTERS: Limits = Limits { buffer: Limits::MAP.recorder_buffer, ..Limits::MAP };
+
 /// At every change at once, and again after `again_after`.
 const fn on_change(again_after: Duration) -> Rate {
     Rate::OnChange { at_most_every: Duration::ZERO, again_after }
@@ -133,7 +136,7 @@ topics! {
     }
     /// The stages' processes, as the supervisor sees them.
     ROSTER: SliceTopic<RosterHeader, RosterEntry> {
-        name: "roster", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::MAP, logged: Yes,
+        name: "roster", writer: SUPERVISOR, rate: on_change(RESTATE), limits: ROSTERS, logged: Yes,
     }
     /// A stage's process ended: cause, ages, the end of its log, what follows.
     DEATHS: Topic<DeathSample> {

@@ -1,7 +1,12 @@
-//! The processes whose samples a reader returns. A stage and a supervisor admit the processes that the supervisor names as writers of
-//! a topic, a consumer the newest generation.
+//! The processes whose samples a reader returns: those that the supervisor names as writers of a topic.
 
-use std::{cell::RefCell, collections::BTreeMap, fmt, rc::Rc};
+use std::{
+    cell::RefCell,
+    collections::{BTreeMap, VecDeque},
+    fmt,
+    rc::Rc,
+    time::{Duration, Instant},
+};
 
 use crate::{
     error::BusError,
@@ -29,6 +34,9 @@ pub struct Ignored {
 /// Reads which processes the stages have; none if there is no newer list since the last call.
 pub type Names = Box<dyn FnMut() -> Result<Option<Vec<(String, Author)>>, BusError>>;
 
+/// So many processes of a stage are remembered. A recorder still takes samples of those that ended.
+const REMEMBERED: usize = 64;
+
 /// The processes that may write, for all readers of a process.
 #[derive(Clone, Default)]
 pub struct Writers(Rc<RefCell<Named>>);
@@ -36,9 +44,27 @@ pub struct Writers(Rc<RefCell<Named>>);
 #[derive(Default)]
 struct Named {
     supervisor: u32,
-    stages: BTreeMap<String, Author>,
+    /// The processes of each stage, the newest last.
+    stages: BTreeMap<String, VecDeque<Author>>,
     source: Option<Names>,
+    /// Until this time, or the first list of `source`, samples of stages wait for their readers.
+    names_come_by: Option<Instant>,
     ignored: Ignored,
+}
+
+impl Named {
+    fn name(&mut self, stages: impl IntoIterator<Item = (String, Author)>) {
+        for (stage, author) in stages {
+            let known = self.stages.entry(stage).or_default();
+            if known.back() != Some(&author) {
+                known.retain(|other| *other != author);
+                known.push_back(author);
+                if known.len() > REMEMBERED {
+                    known.pop_front();
+                }
+            }
+        }
+    }
 }
 
 impl fmt::Debug for Writers {
@@ -55,12 +81,18 @@ impl Writers {
 
     /// Name the processes of stages. A stage that is not listed keeps the process that it had.
     pub fn name(&self, stages: impl IntoIterator<Item = (String, Author)>) {
-        self.0.borrow_mut().stages.extend(stages);
+        self.0.borrow_mut().name(stages);
     }
 
     /// Read the names from `source`, whenever a process writes that is not named.
     pub fn read_from(&self, source: Names) {
         self.0.borrow_mut().source = Some(source);
+    }
+
+    /// Let samples of stages wait until the source has a list. If it has none for `patience`, for example because the supervisor is
+    /// frozen, samples of the newest generation are returned until it has.
+    pub fn wait_for_names(&self, patience: Duration) {
+        self.0.borrow_mut().names_come_by = Some(Instant::now() + patience);
     }
 
     /// The samples that all readers of this process ignored.
@@ -73,15 +105,48 @@ impl Writers {
         self.0.borrow().supervisor
     }
 
+    /// Read the lists of the source.
+    fn read_names(&self) -> Result<(), BusError> {
+        // The source is a reader of this bus, which asks for the supervisor's process.
+        let Some(mut source) = self.0.borrow_mut().source.take() else {
+            return Ok(());
+        };
+        let names = source();
+        let mut named = self.0.borrow_mut();
+        named.source = Some(source);
+        if let Some(names) = names? {
+            named.names_come_by = None;
+            named.name(names);
+        }
+        Ok(())
+    }
+
     /// The process of `stage`, by the newest list.
     fn process_of(&self, stage: &str) -> Result<Option<Author>, BusError> {
-        // The source is a reader of this bus, which asks for the supervisor's process.
-        let mut source = self.0.borrow_mut().source.take();
-        let newest = source.as_mut().map_or(Ok(None), |source| source());
-        let mut named = self.0.borrow_mut();
-        named.source = source;
-        named.stages.extend(newest?.unwrap_or_default());
-        Ok(named.stages.get(stage).copied())
+        self.read_names()?;
+        Ok(self.0.borrow().stages.get(stage).and_then(|known| known.back().copied()))
+    }
+
+    /// Whether `author` is or was the process of `stage`.
+    fn has_named(&self, stage: &str, author: Author) -> Result<bool, BusError> {
+        let named =
+            || self.0.borrow().stages.get(stage).is_some_and(|known| known.contains(&author));
+        if !named() {
+            self.read_names()?;
+        }
+        Ok(named())
+    }
+
+    fn names_are_awaited(&self) -> bool {
+        self.0.borrow().names_come_by.is_some()
+    }
+
+    /// Whether samples of stages wait for the first list.
+    fn hold_samples(&self) -> Result<bool, BusError> {
+        if self.names_are_awaited() {
+            self.read_names()?;
+        }
+        Ok(self.0.borrow().names_come_by.is_some_and(|time| Instant::now() < time))
     }
 
     fn ignore(&self, process: u32) {
@@ -94,9 +159,9 @@ impl Writers {
 /// The authors whose samples a reader returns.
 #[derive(Debug)]
 pub(crate) enum Admitted {
-    /// All authors: several processes write the topic at a time.
+    /// All authors: several processes write the topic at a time, or nobody names them.
     All,
-    /// The newest generation, and the generation that was newest so far.
+    /// The newest generation, and the generation that was newest so far: nobody names authors.
     Newest(u32),
     /// The process that is named.
     Named(OneStage),
@@ -110,12 +175,15 @@ pub(crate) struct OneStage {
     process: Option<Author>,
     /// It is admitted until the first sample of `process` comes.
     before: Option<Author>,
-    /// The newest generation that the supervisor's process published on the topic: it may play a recording.
-    played: u32,
+    /// The newest generation that the supervisor's process published on the topic, because it may play a recording, or that anybody
+    /// published before anybody was named.
+    newest: u32,
+    /// Processes that the supervisor named earlier are admitted, too.
+    all_generations: bool,
 }
 
 impl Admitted {
-    /// The authors of a topic for a process that knows the `writers`, or for a consumer.
+    /// The authors of a topic for a process that knows the `writers`, or for one that does not.
     pub(crate) fn of(spec: &Spec, writers: Option<&Writers>) -> Self {
         match writers {
             _ if !spec.has_one_writer() => Self::All,
@@ -125,8 +193,25 @@ impl Admitted {
                 stage: spec.writer,
                 process: None,
                 before: None,
-                played: 0,
+                newest: 0,
+                all_generations: false,
             }),
+        }
+    }
+
+    /// The same authors, whether they have ended or not.
+    pub(crate) fn of_all_generations(self) -> Self {
+        match self {
+            Self::All | Self::Newest(_) => Self::All,
+            Self::Named(one) => Self::Named(OneStage { all_generations: true, ..one }),
+        }
+    }
+
+    /// Whether the samples wait until their authors are known.
+    pub(crate) fn hold_samples(&self) -> Result<bool, BusError> {
+        match self {
+            Self::Named(one) if one.stage != SUPERVISOR => one.writers.hold_samples(),
+            _ => Ok(false),
         }
     }
 
@@ -148,8 +233,16 @@ fn is_newest(author: Author, newest: &mut u32) -> bool {
 
 impl OneStage {
     fn admits(&mut self, author: Author) -> Result<bool, BusError> {
-        if author.process == self.writers.supervisor() {
-            return Ok(is_newest(author, &mut self.played));
+        let by_supervisor = author.process == self.writers.supervisor();
+        if by_supervisor || self.stage != SUPERVISOR && self.writers.names_are_awaited() {
+            return Ok(is_newest(author, &mut self.newest) || self.all_generations);
+        }
+        if self.all_generations {
+            let named = self.stage != SUPERVISOR && self.writers.has_named(self.stage, author)?;
+            if !named {
+                self.writers.ignore(author.process);
+            }
+            return Ok(named);
         }
         let known = [self.process, self.before].contains(&Some(author));
         if !known && self.stage != SUPERVISOR {
@@ -204,6 +297,37 @@ mod tests {
         assert!(admits(author(8, 2)));
         assert!(!admits(author(7, 1)));
         assert_eq!(writers.ignored(), Ignored { samples: 1, process: 66 });
+    }
+
+    #[test]
+    fn a_recorder_admits_every_process_that_was_named_and_no_other() {
+        let writers = Writers::of(1);
+        writers.name([("stage".to_owned(), author(7, 1))]);
+        writers.name([("stage".to_owned(), author(8, 2))]);
+        let mut admitted = Admitted::of(&SPEC, Some(&writers)).of_all_generations();
+        let authors =
+            [author(8, 2), author(7, 1), author(66, u32::MAX), author(66, 1), author(8, 2)];
+        let admits = authors.map(|author| admitted.admits(author).unwrap());
+        assert_eq!(admits, [true, true, false, false, true]);
+    }
+
+    #[test]
+    fn samples_wait_for_the_first_names_and_a_forged_one_before_them_hides_none_after_them() {
+        let writers = Writers::of(1);
+        let come = Rc::new(RefCell::new(None));
+        let names = Rc::clone(&come);
+        writers.read_from(Box::new(move || Ok(names.borrow_mut().take())));
+        writers.wait_for_names(Duration::from_secs(3600));
+        let mut admitted = Admitted::of(&SPEC, Some(&writers));
+        assert!(admitted.hold_samples().unwrap());
+        writers.wait_for_names(Duration::ZERO);
+        assert!(!admitted.hold_samples().unwrap(), "no names came in time");
+        assert!(admitted.admits(author(66, u32::MAX)).unwrap());
+        assert!(!admitted.admits(author(7, 1)).unwrap());
+        *come.borrow_mut() = Some(vec![("stage".to_owned(), author(7, 1))]);
+        assert!(!admitted.hold_samples().unwrap());
+        assert!(admitted.admits(author(7, 1)).unwrap());
+        assert!(!admitted.admits(author(66, u32::MAX)).unwrap());
     }
 
     #[test]

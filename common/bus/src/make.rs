@@ -34,8 +34,10 @@ use crate::{
 #[derive(Debug)]
 pub struct Bus {
     pub(super) node: BusNode,
-    /// The processes whose samples are read; none for a consumer.
+    /// The processes whose samples are read; none if nobody names them.
     pub(super) writers: Option<Writers>,
+    /// It is a stage's or a supervisor's, which may take the places that consumers leave free.
+    pub(super) is_stage: bool,
     instance: BusInstance,
 }
 
@@ -63,6 +65,7 @@ impl Bus {
         ownership::create_count_of_nodes(&instance).map_err(failed)?;
         let mut bus = Self::join_instance(instance, name)?;
         bus.writers = Some(Writers::of(std::process::id()));
+        bus.is_stage = true;
         let services = table
             .iter()
             .map(|topic| ports::create(&bus.node, topic.spec(), &topic.carried()))
@@ -91,8 +94,8 @@ impl Bus {
         std::fs::write(&file, text).map_err(|error| failed(format!("{}: {error}", file.display())))
     }
 
-    /// Join the bus of a robot under a name that `iox2 node list` shows. It fails if the robot does not run here, if it belongs to
-    /// another user, or if shared memory is full.
+    /// Join the bus of a robot under a name that `iox2 node list` shows, and read the newest generation, whoever wrote it. It fails if
+    /// the robot does not run here, if it belongs to another user, or if shared memory is full.
     pub fn join(domain: &Domain, name: &str) -> Result<Self, BusError> {
         let not_running = |error: io::Error| BusError::NotRunning {
             robot: domain.robot.to_string(),
@@ -103,10 +106,17 @@ impl Bus {
         Self::join_instance(instance, name)
     }
 
+    /// Join with [`Bus::join`] as a consumer. If there is a supervisor, only samples of it and of the processes that it names are read.
+    pub fn join_as_consumer(domain: &Domain, name: &str) -> Result<Self, BusError> {
+        let supervisor = domain.supervisor().ok().flatten();
+        Ok(Self { writers: supervisor.map(Writers::of), ..Self::join(domain, name)? })
+    }
+
     /// Join with [`Bus::join`] as a stage of the supervisor with the process number `supervisor`. Samples of processes that the
     /// supervisor does not name are ignored, and the stage may take the places that consumers leave free.
     pub fn join_as_stage(domain: &Domain, name: &str, supervisor: u32) -> Result<Self, BusError> {
-        Ok(Self { writers: Some(Writers::of(supervisor)), ..Self::join(domain, name)? })
+        let writers = Some(Writers::of(supervisor));
+        Ok(Self { writers, is_stage: true, ..Self::join(domain, name)? })
     }
 
     fn join_instance(instance: BusInstance, name: &str) -> Result<Self, BusError> {
@@ -129,10 +139,10 @@ impl Bus {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
             .map_err(|error| join(format!("{error:?}")))?;
-        Ok(Self { node: node.into(), writers: None, instance })
+        Ok(Self { node: node.into(), writers: None, is_stage: false, instance })
     }
 
-    /// The processes whose samples are read; none for a consumer, which reads the newest generation.
+    /// The processes whose samples are read; none if nobody names them, and the newest generation is read.
     #[must_use]
     pub const fn writers(&self) -> Option<&Writers> {
         self.writers.as_ref()

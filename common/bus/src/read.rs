@@ -68,7 +68,7 @@ impl Bus {
 
     /// Refuse a consumer the last places, which the stages may need.
     fn leave_places(&self, spec: &Spec, places: usize, taken: usize) -> Result<(), BusError> {
-        if self.writers.is_none() && taken + Limits::KEPT_FREE >= places {
+        if !self.is_stage && taken + Limits::KEPT_FREE >= places {
             let topic = spec.name;
             return Err(BusError::NoPlace { topic, places });
         }
@@ -96,6 +96,9 @@ impl<P: Payload + Stamped> Reader<P> {
 
     /// [`Reader::take`] with the author of the sample.
     pub fn take_with_author(&mut self) -> Result<Option<(Author, P)>, BusError> {
+        if self.admitted.hold_samples()? {
+            return Ok(None);
+        }
         while let Some(sample) = self.subscriber.take()? {
             let Some(&payload) = sample.elements().first() else {
                 continue;
@@ -111,7 +114,7 @@ impl<P: Payload + Stamped> Reader<P> {
     /// Return the samples of all generations. Samples of an older generation may arrive after the first of the next one.
     #[must_use]
     pub fn of_all_generations(mut self) -> Self {
-        self.admitted = Admitted::All;
+        self.admitted = self.admitted.of_all_generations();
         self
     }
 
@@ -165,12 +168,15 @@ impl<H: Payload + Stamped, T: Payload> SliceReader<H, T> {
     /// [`Reader::of_all_generations`] for slices.
     #[must_use]
     pub fn of_all_generations(mut self) -> Self {
-        self.admitted = Admitted::All;
+        self.admitted = self.admitted.of_all_generations();
         self
     }
 
     /// [`Reader::take`] for slices.
     pub fn take(&mut self) -> Result<Option<Slice<H, T>>, BusError> {
+        if self.admitted.hold_samples()? {
+            return Ok(None);
+        }
         while let Some(sample) = self.subscriber.take()? {
             let author = author(&sample, sample.header().stamp());
             if self.admitted.admits(author)? {

@@ -110,9 +110,9 @@ impl BusEndpoints {
         self.target.publish(tick, time, target)
     }
 
-    /// Whether the state was last published a `period` ago or earlier.
-    pub(crate) fn is_due(&self, period: Duration) -> bool {
-        self.published.is_none_or(|last| last.elapsed() >= period)
+    /// Whether the state was last published a `period` ago or earlier, or a consumer waits for the first roster.
+    pub(crate) fn is_due(&mut self, period: Duration) -> bool {
+        self.roster.has_new_reader() || self.published.is_none_or(|last| last.elapsed() >= period)
     }
 
     /// Publish the order and the roster, as of `tick`.

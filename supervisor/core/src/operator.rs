@@ -8,11 +8,11 @@ use std::{
 };
 
 use common::{
-    bus::{Bus, BusError},
+    bus::BusError,
     clock::{MissionTime, monotonic_ns},
     domain::{Domain, RobotName},
     poll,
-    roster::Roster,
+    roster::{self, Roster},
     run::Run,
     samples::{
         Action, Cause, LinkSample, MOST_TARGETS, RequestAnswer, RequestKind, RequestSample,
@@ -160,7 +160,7 @@ fn told(mut teller: Child) -> Result<(), OperatorError> {
 
 /// Wait until the link says that it stopped the robot, and the robot's encoders that it rests.
 fn await_rest(robot: &RobotName) -> Result<(), OperatorError> {
-    let bus = Bus::join(&Domain::of(robot.clone()), "operator")?;
+    let bus = roster::join(&Domain::of(robot.clone()), "operator")?;
     let mut links = bus.reader(&topics::LINK)?;
     let mut waiter = Waiter::default();
     waiter.on(bus.wakeup(&topics::LINK)?);
@@ -236,7 +236,7 @@ fn refused(robot: &RobotName, answer: RequestAnswer) -> OperatorError {
 
 /// Send a request to the supervisor, and wait until the roster has its answer.
 fn ask(robot: &RobotName, request: RequestSample) -> Result<(), OperatorError> {
-    let bus = Bus::join(&Domain::of(robot.clone()), "operator")?;
+    let bus = roster::join(&Domain::of(robot.clone()), "operator")?;
     // The roster is opened first, so that the answer is not missed.
     let mut roster = Roster::open(&bus)?;
     let mut requests = bus.writer(&topics::REQUESTS, 1)?;

@@ -9,9 +9,8 @@ use std::{
 
 use clap::Args;
 use common::{
-    bus::Bus,
     domain::{Domain, RobotName},
-    roster::Roster,
+    roster::{self, Roster},
     samples::{
         Action, HoldReason, LinkSample, Order, PowerSample, RosterEntry, StageState, TargetSample,
         name_str,
@@ -123,7 +122,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn print_one(arguments: &Arguments) -> Result<(), Failure> {
-    let bus = Bus::join(&Domain::of(arguments.robot.clone()), "status")?;
+    let bus = roster::join(&Domain::of(arguments.robot.clone()), "status")?;
     let mut roster = Roster::open(&bus)?;
     let mut links = bus.reader(&topics::LINK)?;
     let mut powers = bus.reader(&topics::POWER)?;

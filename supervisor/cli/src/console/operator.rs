@@ -3,10 +3,9 @@
 use std::fs::File;
 
 use common::{
-    bus::Bus,
     domain::{Domain, RobotName},
     lock_holders,
-    roster::Roster,
+    roster::{self, Roster},
     samples::name_str,
 };
 use rustix::process::Signal;
@@ -62,7 +61,7 @@ pub(crate) fn send(robot: &RobotName, stage: &str, signal: Signal) -> Result<(),
 
 /// The process that the roster names for `stage`.
 fn pid_of(domain: &Domain, stage: &str) -> Result<Option<u32>, Failure> {
-    let bus = Bus::join(domain, "operator")?;
+    let bus = roster::join(domain, "operator")?;
     Ok(operator::find(&mut Roster::open(&bus)?, &domain.robot, |_, entries| {
         let mut entries = entries.iter();
         let entry = entries.find(|entry| name_str(&entry.stage) == stage)?;

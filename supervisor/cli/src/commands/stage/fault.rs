@@ -8,7 +8,7 @@ use common::{
     clock::MissionTime,
     domain::{Domain, RobotName},
     faults,
-    roster::Roster,
+    roster::{self, Roster},
     samples::{FaultAnswer, FaultSample, name, name_str},
     topics,
     waiter::Waiter,
@@ -55,7 +55,7 @@ pub(super) fn main(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Refused::new("unknown-fault", message).into());
     };
     let robot = &arguments.robot;
-    let bus = Bus::join(&Domain::of(robot.clone()), "operator")?;
+    let bus = roster::join(&Domain::of(robot.clone()), "operator")?;
     let simulated = find(&mut Roster::open(&bus)?, robot, |header, _| Some(header.simulated == 1))?;
     if !simulated && !arguments.break_a_real_robot {
         return Err(real_robot(robot).into());

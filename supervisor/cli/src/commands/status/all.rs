@@ -3,9 +3,9 @@
 use std::{path::PathBuf, time::Duration};
 
 use common::{
-    bus::{Bus, BusError},
+    bus::BusError,
     domain::Domain,
-    roster::Roster,
+    roster::{self, Roster},
     samples::{HoldReason, Order},
 };
 use serde::Serialize;
@@ -80,7 +80,7 @@ fn listed(robot: Robot) -> Listed {
 type RosterFacts = (&'static str, Option<f64>, Option<bool>);
 
 fn roster(robot: &Robot) -> Result<Option<RosterFacts>, BusError> {
-    let bus = Bus::join(&Domain::of(robot.name.clone()), "list")?;
+    let bus = roster::join(&Domain::of(robot.name.clone()), "list")?;
     Roster::open(&bus)?.find(PATIENCE, |header, _| {
         let order =
             words::order(Order::from_byte(header.order), HoldReason::from_byte(header.reason));
