@@ -16,6 +16,9 @@ const MOVES_M_S: f64 = 0.03;
 /// vary.
 const RESTS_M_S: f64 = 0.01;
 const RESTS_COUNTS: f64 = 4.0;
+/// A command may show in the counts only after so long, because of the delay of the speed loop and of the radio. Wheels that rest
+/// before that may still start by the last command before the stop.
+const SHOWS_AFTER: Duration = Duration::from_millis(150);
 /// The robot is at rest when its wheels have been at rest for so long.
 const AT_REST_AFTER: Duration = Duration::from_millis(200);
 /// The next method is used after so long on a robot that does not stop.
@@ -73,7 +76,6 @@ impl StopMonitor {
     fn commanded(&mut self, counts: [i16; 2], now: MissionTime) {
         if counts == [0, 0] {
             if self.told_to_stand.is_none() {
-                // A wheel that does not turn yet after the last command must not count as at rest.
                 self.resting = Duration::ZERO;
                 self.told_to_stand = Some(now);
             }
@@ -100,7 +102,8 @@ impl StopMonitor {
         let within = |speed: f64| speed * self.counts_per_m * gap.as_secs_f64();
         let rests = farthest <= RESTS_COUNTS.max(within(RESTS_M_S));
         let moves = !rests && farthest >= within(MOVES_M_S);
-        self.resting = if rests { self.resting + gap } else { Duration::ZERO };
+        let shows_stop = self.told_to_stand.is_none_or(|told| then.since(told) >= SHOWS_AFTER);
+        self.resting = if rests && shows_stop { self.resting + gap } else { Duration::ZERO };
         let due = |told: MissionTime| now.since(told).saturating_sub(gap) >= COMES_TO_REST;
         if !moves {
             self.moving = Duration::ZERO;

@@ -65,6 +65,27 @@ fn a_robot_that_did_not_obey_does_when_it_has_been_seen_at_rest() {
 }
 
 #[test]
+fn a_robot_that_is_stopped_before_it_obeys_a_command_to_drive_is_not_at_rest_until_that_would_show()
+{
+    // Frames every quarter of a second, as on a loaded machine.
+    for period in [PERIOD, 0.25] {
+        let mut stop_monitor = stop_monitor();
+        let time = |frame: i32| MissionTime::from_seconds(1.0 + f64::from(frame) * period);
+        for frame in -4..=0 {
+            stop_monitor.heard([0; 2], time(frame));
+        }
+        assert!(stop_monitor.is_at_rest());
+        stop_monitor.commanded([900, 900], MissionTime::from_seconds(1.01));
+        stop_monitor.commanded([0, 0], MissionTime::from_seconds(1.02));
+        let known = (1..6).map(time).find(|now| {
+            stop_monitor.heard([0; 2], *now);
+            stop_monitor.is_at_rest()
+        });
+        assert!(known.unwrap().seconds() - 1.02 >= 0.35, "{period}: {known:?}");
+    }
+}
+
+#[test]
 fn encoders_that_tremble_are_at_rest() {
     let mut stop_monitor = stop_monitor();
     for tick in 0..4 {
