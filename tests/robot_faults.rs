@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::support::{assert_nothing_left, json_of, output, refused};
+use crate::support::{Run, assert_nothing_left, json_of, output, refused};
 
 /// The exit code, and the entry of the stop-time table for a robot with `fault`.
 fn stop_time(robot: &str, fault: &str) -> (Option<i32>, Value) {
@@ -22,6 +22,15 @@ fn a_robot_that_falls_silent_is_at_rest_in_time_and_the_stop_time_table_says_so(
     assert_eq!(entry["reason"], "robot lost", "{entry}");
     assert!(entry["rest_s"].as_f64() < Some(2.0), "{entry}");
     assert!(entry["last_moving_s"].as_f64() < Some(2.0), "{entry}");
+}
+
+#[test]
+fn a_robot_that_rests_has_a_reason_although_a_killed_mission_left_its_bus() {
+    let mut killed = Run::start("rf-bus", "open-room", &["--pace", "1"]);
+    killed.wait_until_under_way(0.1);
+    killed.kill();
+    let (code, entry) = stop_time("rf-bus", "silence");
+    assert_eq!((code, &entry["reason"]), (Some(0), &"robot lost".into()), "{entry}");
 }
 
 #[test]

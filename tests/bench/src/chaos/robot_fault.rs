@@ -25,8 +25,6 @@ pub enum Promise {
     Unharmed,
     /// As [`Promise::Unharmed`], and it rests when its mission ends.
     EndsAtRest,
-    /// Nothing notices it: the table only shows how it ends.
-    Nothing,
 }
 
 /// A fault of a robot's data. [`TABLE`] says what each does.
@@ -108,7 +106,7 @@ impl Promise {
             Self::RestsAtOnce => Some(REST_AT_ONCE_S),
             Self::Rests => Some(REST_WITHIN_S),
             Self::RestsLater => Some(REST_LATER_S),
-            Self::Unharmed | Self::EndsAtRest | Self::Nothing => None,
+            Self::Unharmed | Self::EndsAtRest => None,
         }
     }
 }
@@ -163,7 +161,6 @@ mod tests {
             let promise = match (row.promise.rest_within_s(), row.promise) {
                 (Some(within_s), _) => format!("rests within {within_s} s"),
                 (None, Promise::EndsAtRest) => "ends at rest".to_owned(),
-                (None, Promise::Nothing) => "nothing: unnoticed".to_owned(),
                 (None, _) => "unharmed".to_owned(),
             };
             let what = row.what;

@@ -9,8 +9,9 @@ use std::{
 };
 
 use common::{
-    bus::{Bus, Reader},
+    bus::Reader,
     domain::Domain,
+    follower::{Event, Follower},
     ground_truth::GroundTruthTick,
     mission::Mission,
     samples::LinkSample,
@@ -137,17 +138,18 @@ impl Observed {
         let (least, more) = FAULT_AFTER_S;
         let chance = Pcg64::new(u128::from(seed), 17 + fault as u128).next_u64() >> 11;
         let fault_after_s = least + more * chance as f64 / (1_u64 << 53) as f64;
-        let (mut departed, mut stop, mut link) = (None, None, None);
+        let (mut departed, mut stop) = (None, None);
+        // It leaves the bus of the mission before, which that may have left behind.
+        let robot_domain = Domain::of(options.asked.robot.clone());
+        let mut link =
+            Follower::new(robot_domain, "chaos", &topics::LINK, |bus| bus.reader(&topics::LINK));
         loop {
             self.ended = Some(Instant::now());
             self.last_moving = proxy.last_moving();
             robot.poll()?;
             self.take(robot.truth());
-            if let Some(reader) = link.get_or_insert_with(|| self::link(options)) {
+            if let Ok(Event::Samples(reader)) = link.wait(Duration::ZERO) {
                 self.hear(reader)?;
-            } else {
-                // The bus does not exist yet.
-                link = None;
             }
             self.ended_by_itself =
                 child.try_reap().map_err(system("reap"))?.is_some() && !fault.is_kill();
@@ -272,12 +274,6 @@ impl Observed {
 /// Whether both wheels are at rest.
 fn is_at_rest(tick: &GroundTruthTick, track_m: f64) -> bool {
     tick.v.abs() + tick.omega.abs() * track_m / 2.0 < GroundTruthTick::AT_REST_M_S
-}
-
-/// A reader of the link's samples, once the bus exists.
-fn link(options: &Options) -> Option<Reader<LinkSample>> {
-    let bus = Bus::join(&Domain::of(options.asked.robot.clone()), "chaos").ok()?;
-    bus.reader(&topics::LINK).ok()
 }
 
 /// The directory of a mission's files.

@@ -33,9 +33,6 @@ impl Entry {
     /// Whether the robot did as promised.
     pub fn is_kept(&self) -> bool {
         let promise = self.fault.row().promise;
-        if promise == Promise::Nothing {
-            return self.fault_began;
-        }
         let unharmed = self.fault_began && self.collisions == 0 && self.outcome != "wrong_place";
         let Some(limit_s) = promise.rest_within_s() else {
             let rests =
@@ -92,13 +89,11 @@ impl fmt::Display for StopTimeTable {
         writeln!(
             to,
             "Times are from the fault, the longest of each kind; at most {REST_WITHIN_S} s, {REST_LATER_S} s: {}, or \
-             {REST_AT_ONCE_S} s: {}; except where the robot may go on unharmed: {}, {}, and \
-             where nothing is promised: {}.",
+             {REST_AT_ONCE_S} s: {}; except where the robot may go on unharmed: {}, {}.",
             names(Promise::RestsLater),
             names(Promise::RestsAtOnce),
             names(Promise::Unharmed),
-            names(Promise::EndsAtRest),
-            names(Promise::Nothing)
+            names(Promise::EndsAtRest)
         )
     }
 }
