@@ -38,6 +38,8 @@ enum Fault {
     NoSonar,
     /// The front sonar says that nothing is in range.
     DeafSonar,
+    /// An infrared ranger that looks into the front sonar's cone says 0, which is not valid.
+    DeadRanger,
     /// Velocity 0 does not reach the robot, nor does the time limit of commands.
     IgnoresZero,
 }
@@ -152,6 +154,8 @@ impl Shared {
                 Report::Standard(sensors) if self.fault == Fault::DeafSonar => {
                     sensors.ultrasonic[1] = 255;
                 }
+                // Channels 2 to 7 are infrared-1 to infrared-6.
+                Report::Custom(sensors) if self.fault == Fault::DeadRanger => sensors.ad[2] = 0,
                 _ => {}
             }
             report.encode(Addressing::default(), &mut bytes);
@@ -164,7 +168,11 @@ impl Shared {
         let frames = self.frames;
         let [left, right] = &mut sensors.encoders;
         match self.fault {
-            Fault::None | Fault::NoSonar | Fault::DeafSonar | Fault::IgnoresZero => {}
+            Fault::None
+            | Fault::NoSonar
+            | Fault::DeafSonar
+            | Fault::DeadRanger
+            | Fault::IgnoresZero => {}
             Fault::SameFrame => *sensors = MotorSensors::default(),
             Fault::DeadEncoder => right.position = 0,
             Fault::Reversed => {
@@ -277,6 +285,19 @@ fn without_its_front_sonar_the_robot_stands_and_goes_on_when_it_is_back() {
     faults.set(Fault::None);
     run.wait_until("it goes on", |status| status["link"]["cause"].is_null());
     run.stop();
+}
+
+#[test]
+fn with_one_dead_infrared_ranger_before_a_sonar_the_robot_says_so_and_arrives() {
+    let body = Robot::start("open-room", "udp", "127.0.0.1:0");
+    let faults = FaultInjector::before(&body, Fault::DeadRanger);
+    let address = faults.proxy.as_robot();
+    let quick = ["--set", "controller.speed_m_s=0.6", "--set", &address];
+    let mut run = Run::start("fi-ranger", "open-room", &quick);
+    let status = run.wait_until("it is told", cause_is("infrared ranger silent"));
+    assert_eq!(status["order"], "driving", "{status}");
+    assert!(run.link_logged(&["infrared-1"]));
+    run.arrives();
 }
 
 #[test]

@@ -144,6 +144,8 @@ wire_enum! {
         WheelsHeld = 19 "wheels held",
         /// The reading of a ranging sensor does not change although the robot moves, or the front sonar hears nothing of what others see.
         RangeImplausible = 20 "ranging sensor implausible",
+        /// An infrared ranger that the mission uses gives no readings, and the sensors that are left cover the ground ahead.
+        InfraredSilent = 21 "infrared ranger silent",
     }
 }
 

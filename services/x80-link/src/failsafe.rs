@@ -179,7 +179,7 @@ pub const TABLE: &[Rule] = &[
     },
     Rule {
         cause: Cause::RangeSilent,
-        when: "a sensor that the mission uses has given no valid reading for three times `robot.command_limit_s`; `x80-link.log` names it. Nothing in range is a reading",
+        when: "a sensor that the mission uses has given no valid reading for three times `robot.command_limit_s`, and it is not a single infrared ranger without which the robot goes on; `x80-link.log` names it. Nothing in range is a reading",
         action: Action::Stop,
         clears: Clears::WithCondition,
         monitor: |all| &all.streams,
@@ -211,6 +211,13 @@ pub const TABLE: &[Rule] = &[
         action: Action::Stop,
         clears: Clears::WithCondition,
         monitor: |all| &all.staleness,
+    },
+    Rule {
+        cause: Cause::InfraredSilent,
+        when: "one infrared ranger has given no valid reading for so long, and it looks aside or back, or into the cone of a sonar that the mission uses; `x80-link.log` names it",
+        action: Action::Slow,
+        clears: Clears::WithCondition,
+        monitor: |all| &all.streams,
     },
     Rule {
         cause: Cause::BatteryLow,

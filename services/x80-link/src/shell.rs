@@ -10,7 +10,8 @@ use common::{
     latency::Histogram,
     latency_budget::{Answers, LatencyBudget},
     samples::{
-        Cause, CommandSample, DirectiveSample, HoldReason, LinkSample, Order, TickLimitSample,
+        Action, Cause, CommandSample, DirectiveSample, HoldReason, LinkSample, Order,
+        TickLimitSample,
     },
     shell::{Context, Process, Progress, StageError},
     stage::Runner,
@@ -299,7 +300,8 @@ impl Shell {
                 }
                 Effect::Decided { before, now } => {
                     log_decision(before, now);
-                    if now.action >= before.action
+                    // A robot that goes on slowly has a fault of which nothing was said while a worse one held it.
+                    if (now.action >= before.action || now.action == Action::Slow)
                         && let Some(explanation) =
                             self.runner.stage.link.explain(now.cause, monotonic_ns())
                     {

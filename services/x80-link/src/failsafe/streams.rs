@@ -1,11 +1,14 @@
 //! The monitor of the robot's streams: whether their frames come, and often enough. Silence is measured by the machine's clock, like
 //! that of [`super::presence`], and intervals by mission time.
+//!
+//! The robot goes on at half speed without one infrared ranger that looks where it does not drive, or into the cone of a sonar: what
+//! stands in the cone is still heard, and ground that nobody has scanned is looked at before the robot drives over it.
 
 use std::{collections::VecDeque, time::Duration};
 
 use common::{
     clock::MissionTime,
-    mission::Mission,
+    mission::{Mission, Sensor, SensorKind},
     samples::{Cause, RangeReading, RangeStatus},
 };
 
@@ -36,11 +39,16 @@ pub enum Motor {
     Slow(f64),
 }
 
+/// A sensor within this of the front sonar's bearing looks where the robot drives, degrees.
+const AHEAD_DEG: f64 = 60.0;
+
 /// The newest valid reading of a sensor.
 #[derive(Clone, Debug)]
 struct Newest {
     row: u8,
     name: String,
+    /// The robot may go on without it.
+    is_covered: bool,
     /// When it came by the machine's clock.
     ns: u64,
 }
@@ -87,16 +95,26 @@ impl Streams {
         }
     }
 
-    /// A sensor without a valid reading.
-    fn silent_sensor(&self, now_ns: u64) -> Option<&Newest> {
+    /// The sensors without a valid reading.
+    fn silent_sensors(&self, now_ns: u64) -> Vec<&Newest> {
         // A robot that was just found must send a new reading first. Older readings do not show the obstacles that are ahead now.
-        let is_silent = |sensor: &&Newest| self.silence.is_over(sensor.ns, now_ns);
-        self.sensors.iter().filter(|_| self.sensing).find(is_silent)
+        let is_silent = |sensor: &&Newest| self.sensing && self.silence.is_over(sensor.ns, now_ns);
+        self.sensors.iter().filter(is_silent).collect()
+    }
+
+    /// Why the robot may not drive as usual: sensors without which it stands, or one without which it goes on slowly.
+    fn silent(&self, now_ns: u64) -> Option<Cause> {
+        match self.silent_sensors(now_ns)[..] {
+            [] => None,
+            [one] if one.is_covered => Some(Cause::InfraredSilent),
+            _ => Some(Cause::RangeSilent),
+        }
     }
 
     /// Whether the next request for the streams is due. The pauses between requests grow.
     pub fn wants_request(&mut self, now_ns: u64) -> bool {
-        if self.motor_frames(now_ns) == Motor::Regular && self.silent_sensor(now_ns).is_none() {
+        let ranges_come = self.silent(now_ns) != Some(Cause::RangeSilent);
+        if self.motor_frames(now_ns) == Motor::Regular && ranges_come {
             // A robot that sends frames only when it is asked is not asked more often.
             return false;
         }
@@ -108,14 +126,35 @@ impl Streams {
     }
 }
 
+/// Whether a robot that lacks `sensor` alone may go on: an infrared ranger that looks aside or back, or into the cone of a sonar of
+/// `table` that the mission uses. The front sonar looks at `front_deg`.
+fn is_covered(sensor: &Sensor, table: &[Sensor], front_deg: f64) -> bool {
+    let from = |bearing_deg: f64| {
+        ((sensor.bearing_deg() - bearing_deg + 180.0).rem_euclid(360.0) - 180.0).abs()
+    };
+    let covers = |cone: &Sensor| {
+        let is_cone = cone.used && cone.kind == SensorKind::Cone;
+        is_cone && from(cone.bearing_deg()) <= cone.field_of_view_deg / 2.0
+    };
+    sensor.kind == SensorKind::Ray && (from(front_deg) > AHEAD_DEG || table.iter().any(covers))
+}
+
 impl Monitor for Streams {
     fn new(mission: &Mission) -> Self {
-        let used = (0..).zip(mission.sensor_table()).filter(|(_, sensor)| sensor.used);
+        let table = mission.sensor_table();
+        let front_deg = mission.front_sonar().bearing_deg();
+        let used = (0..).zip(&table).filter(|(_, sensor)| sensor.used);
+        let sensors = used.map(|(row, sensor)| Newest {
+            row,
+            name: sensor.name.clone(),
+            is_covered: is_covered(sensor, &table, front_deg),
+            ns: 0,
+        });
         Self {
             limit: Duration::from_secs_f64(mission.robot.command_limit_s),
             silence: Silence::new(mission),
             sensing: mission.sensing,
-            sensors: used.map(|(row, sensor)| Newest { row, name: sensor.name, ns: 0 }).collect(),
+            sensors: sensors.collect(),
             found_ns: 0,
             motor_ns: 0,
             newest: None,
@@ -151,7 +190,9 @@ impl Monitor for Streams {
 
     fn condition(&self, cause: Cause, now: Moment) -> Condition {
         let holds = match cause {
-            Cause::RangeSilent => self.silent_sensor(now.machine_ns).is_some(),
+            Cause::RangeSilent | Cause::InfraredSilent => {
+                self.silent(now.machine_ns) == Some(cause)
+            }
             Cause::FramesSilent => self.motor_frames(now.machine_ns) == Motor::Silent,
             _ => matches!(self.motor_frames(now.machine_ns), Motor::Slow(_)),
         };
@@ -160,12 +201,18 @@ impl Monitor for Streams {
 
     fn explain(&self, cause: Cause, now: Moment) -> Option<String> {
         match (cause, self.motor_frames(now.machine_ns)) {
-            (Cause::RangeSilent, _) => self.silent_sensor(now.machine_ns).map(|sensor| {
-                format!(
-                    "the sensor {} gives no valid reading: check it, or leave it out of robot.sensor or of sensors",
-                    sensor.name
-                )
-            }),
+            (Cause::RangeSilent | Cause::InfraredSilent, _) => {
+                let silent = self.silent_sensors(now.machine_ns).into_iter();
+                let names: Vec<_> = silent.map(|sensor| &*sensor.name).collect();
+                let goes_on = match cause {
+                    Cause::InfraredSilent => "the robot goes on without it; ",
+                    _ => "",
+                };
+                Some(format!(
+                    "no valid reading from {}: {goes_on}check the sensor, or leave it out of robot.sensor or of sensors",
+                    names.join(", ")
+                ))
+            }
             (Cause::FramesSilent, _) => {
                 Some("the robot answers and sends no motor frames; they are asked for".to_owned())
             }

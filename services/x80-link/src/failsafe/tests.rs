@@ -108,6 +108,18 @@ fn wheels_are_held(failsafe: &mut Failsafe) {
     }
 }
 
+/// The robot has all sensors, and infrared-1, which looks into the cone of the front sonar, gives no reading.
+fn without_an_infrared_ranger(failsafe: &mut Failsafe) {
+    let mission = Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap();
+    let status = RangeStatus::Nothing.into();
+    let valid = |sensor| RangeReading { sensor, status, ..RangeReading::default() };
+    let readings: Vec<_> = (0..10).filter(|sensor| *sensor != 4).map(valid).collect();
+    let mut streams = streams::Streams::new(&mission);
+    streams.observe(&Observation::Found { again: false }, now());
+    streams.observe(&Observation::Readings(&readings), now());
+    failsafe.monitors.streams = streams;
+}
+
 /// For each cause, a change that alone leads to it, and its action.
 const CASES: &[(Break, Action, Cause)] = &[
     (|it| directive(it, Order::Stop, HoldReason::Ending), Action::End, Cause::MissionOver),
@@ -201,6 +213,7 @@ const CASES: &[(Break, Action, Cause)] = &[
         Action::Stop,
         Cause::GuidanceStale,
     ),
+    (without_an_infrared_ranger, Action::Slow, Cause::InfraredSilent),
     (
         |it| it.observe(&Observation::Standard(&standard(6.5)), now()),
         Action::Slow,

@@ -63,30 +63,79 @@ fn a_front_sonar_without_readings_is_missed_by_a_mission_that_senses_only() {
     for (text, missed) in [("", true), ("sensing = false", false)] {
         let mut streams = streams(text);
         range(&mut streams, 100 * MS);
-        assert!(streams.silent_sensor(849 * MS).is_none());
-        assert_eq!(streams.silent_sensor(850 * MS).is_some(), missed);
+        assert_eq!(streams.silent(849 * MS), None);
+        assert_eq!(streams.silent(850 * MS) == Some(Cause::RangeSilent), missed);
         range(&mut streams, 900 * MS);
-        assert!(streams.silent_sensor(1000 * MS).is_none(), "back");
+        assert_eq!(streams.silent(1000 * MS), None, "back");
     }
+}
+
+/// The cause and its explanation when the `silent` of the ten sensors give no valid reading.
+fn without(text: &str, silent: &[u8]) -> (Option<Cause>, String) {
+    let text = format!("target = [3, 0]\n{text}");
+    let mut streams = Streams::new(&Mission::parse(&text, Path::new("test.toml")).unwrap());
+    let readings: Vec<_> = (0..10)
+        .map(|sensor| {
+            let is_silent = silent.contains(&sensor);
+            let status = if is_silent { RangeStatus::Invalid } else { RangeStatus::Nothing };
+            RangeReading { sensor, status: status.into(), ..RangeReading::default() }
+        })
+        .collect();
+    let now = Moment { time: MissionTime(900 * MS), machine_ns: 900 * MS };
+    streams.observe(&Observation::Readings(&readings), now);
+    let causes = [Cause::RangeSilent, Cause::InfraredSilent];
+    let mut holding =
+        causes.into_iter().filter(|&it| streams.condition(it, now) == Condition::Holds);
+    let cause = holding.next();
+    assert_eq!(holding.next(), None);
+    (cause, cause.and_then(|cause| streams.explain(cause, now)).unwrap_or_default())
 }
 
 #[test]
 fn each_sensor_that_the_mission_uses_must_give_valid_readings_and_the_one_that_does_not_is_named() {
     let mission = Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap();
-    for silent in 0..10 {
-        let mut streams = Streams::new(&mission);
-        let readings: Vec<_> = (0..10)
-            .map(|sensor| {
-                let is_silent = sensor == silent;
-                let status = if is_silent { RangeStatus::Invalid } else { RangeStatus::Nothing };
-                RangeReading { sensor, status: status.into(), ..RangeReading::default() }
-            })
-            .collect();
-        let now = Moment { time: MissionTime(900 * MS), machine_ns: 900 * MS };
-        streams.observe(&Observation::Readings(&readings), now);
-        let row = usize::from(silent);
-        let named = streams.silent_sensor(now.machine_ns).map(|sensor| sensor.name.clone());
-        assert_eq!(named, Some(mission.sensor_table().swap_remove(row).name));
-        assert_eq!(streams.condition(Cause::RangeSilent, now), Condition::Holds);
+    assert_eq!(without("", &[]).0, None);
+    for (row, sensor) in (0..).zip(mission.sensor_table()) {
+        let (cause, told) = without("", &[row]);
+        // Each infrared ranger of the X80 looks aside, back, or into the cone of a sonar.
+        let stands = sensor.kind == SensorKind::Cone;
+        let expected = if stands { Cause::RangeSilent } else { Cause::InfraredSilent };
+        assert_eq!(cause, Some(expected), "{}", sensor.name);
+        assert!(told.contains(&sensor.name), "{told}");
     }
+}
+
+#[test]
+fn without_a_second_sensor_or_a_ranger_whose_ground_no_sonar_covers_the_robot_stands() {
+    let (cause, told) = without("", &[4, 7]);
+    assert_eq!(cause, Some(Cause::RangeSilent));
+    assert!(told.contains("infrared-1") && told.contains("infrared-4"), "{told}");
+    // The side sonars are not used: only the front one's cone and the sides are covered.
+    let infrared = "sensors = 'front+infrared'";
+    for (ranger, cause) in [
+        (3, Cause::RangeSilent),
+        (4, Cause::InfraredSilent),
+        (5, Cause::InfraredSilent),
+        (6, Cause::RangeSilent),
+        (7, Cause::InfraredSilent),
+        (8, Cause::InfraredSilent),
+    ] {
+        assert_eq!(without(infrared, &[ranger]).0, Some(cause), "{ranger}");
+    }
+}
+
+#[test]
+fn a_ranger_without_which_the_robot_goes_on_is_not_asked_for() {
+    let mission = Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap();
+    let mut streams = Streams::new(&mission);
+    let valid = |sensor| RangeReading {
+        sensor,
+        status: RangeStatus::Nothing.into(),
+        ..RangeReading::default()
+    };
+    let readings: Vec<_> = (0..10).filter(|sensor| *sensor != 4).map(valid).collect();
+    let now = Moment { time: MissionTime(9000 * MS), machine_ns: 9000 * MS };
+    streams.observe(&Observation::Readings(&readings), now);
+    streams.motor(now.time, now.machine_ns);
+    assert!(!streams.wants_request(now.machine_ns));
 }
