@@ -7,15 +7,15 @@ use std::{
     process::Stdio,
 };
 
-use common::{poll, topics};
+use common::{grid::CellState, poll, samples::name_str, topics};
 use recording::{
     End, Recording,
     replay::{Options, Report, diff::diff, replay},
 };
 
 use crate::support::{
-    PATIENCE, Run, STAGES, assert_nothing_left, assert_refused, firsthand, golden, json_of, output,
-    refused,
+    PATIENCE, Run, STAGES, assert_nothing_left, assert_refused, firsthand, golden, golden_of,
+    json_of, output, refused,
 };
 
 fn open(directory: &Path) -> Recording {
@@ -123,12 +123,52 @@ fn recorders_killed_leave_readable_files_that_say_so_and_the_mission_as_it_was()
     assert_nothing_left("rec-shot");
 }
 
+#[test]
+fn a_disk_budget_ends_files_at_a_quarter_of_it_removes_the_oldest_and_each_can_be_read_alone() {
+    let budget = ["--pace", "4", "--disk-budget", "800kB"];
+    let (code, summary, directory) =
+        Run::start("rec-budget", "obstacle-course", &budget).finish_in();
+    assert_eq!(code, Some(0), "{summary}");
+    let run = directory.path().join("run");
+    let files = recording::parts(&run);
+    let sizes: Vec<_> = files.iter().map(|file| fs::metadata(file).unwrap().len()).collect();
+    assert!(files.len() > 1 && !run.join("recording.mcap").exists(), "{files:?}");
+    // A file has its share by a chunk of a second more.
+    assert!(sizes.iter().sum::<u64>() < 1_200_000, "{sizes:?}");
+    for file in &files {
+        let recording = Recording::open(file).unwrap();
+        assert_eq!(recording.end, End::Complete);
+        let mut grids = recording.slices(&topics::GRID).unwrap().map(Result::unwrap);
+        assert!(grids.any(|grid| grid.header.part.is_keyframe()), "{}", file.display());
+        let report = replayed(&recording);
+        assert_eq!(report.difference, None, "{report}");
+        assert!(report.not_replayed() > 0, "{report}");
+    }
+    assert_nothing_left("rec-budget");
+}
+
 /// `.ci/renew` records the golden recording again after an intended change.
 #[test]
 fn the_golden_recording_replays_to_the_bit() {
     let report = replayed(&golden());
     assert_eq!(assert_all_equal(&report), 5);
     assert!(report.stages["planner"].compared > 20, "{report}");
+}
+
+#[test]
+fn a_golden_recording_of_obstacles_a_killed_stage_and_a_stall_replays_to_the_bit() {
+    let recording = golden_of("stall-and-kill");
+    let stalls = recording.samples(&topics::STALLS).unwrap().count();
+    let deaths = recording.samples(&topics::DEATHS).unwrap().map(|death| death.unwrap().sample);
+    let killed: Vec<_> = deaths.map(|death| name_str(&death.stage).to_owned()).collect();
+    assert_eq!((stalls, &killed[..]), (1, &["mapper".to_owned()][..]));
+    let mut grids = recording.slices(&topics::GRID).unwrap().map(Result::unwrap);
+    let sensed = |cell: &u8| *cell == CellState::Sensed as u8;
+    assert!(grids.any(|grid| grid.elements.iter().any(sensed)), "obstacles");
+    let report = replayed(&recording);
+    assert_eq!(assert_all_equal(&report), 7);
+    let generations = |stage| report.stages[stage].equal;
+    assert_eq!((generations("mapper"), generations("planner")), (2, 2), "{report}");
 }
 
 #[test]

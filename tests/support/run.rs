@@ -228,6 +228,11 @@ pub fn run(robot: &str, mission: &str, arguments: &[&str]) -> (Option<i32>, Valu
 
 /// The committed recording of the first seconds of a mission.
 pub fn golden() -> Recording {
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/golden/open-room.mcap");
-    Recording::open(file.as_ref()).unwrap()
+    golden_of("open-room")
+}
+
+/// The committed recording of that name.
+pub fn golden_of(name: &str) -> Recording {
+    let directory = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/golden");
+    Recording::open(&Path::new(directory).join(name).with_extension("mcap")).unwrap()
 }

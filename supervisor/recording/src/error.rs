@@ -14,7 +14,7 @@ pub enum RecordingError {
     #[error("{0} holds no recording.mcap; give a recorded run or a recording")]
     NoRecording(PathBuf),
     #[error(
-        "{directory} contains several recordings, because the run was resumed; give one of them, up to {last}"
+        "{directory} contains several recordings, because the run was resumed or has a disk budget; give one of them, up to {last}"
     )]
     Several { directory: PathBuf, last: PathBuf },
     #[error("{file} is not a recording of firsthand: {problem}; `firsthand record` makes one")]

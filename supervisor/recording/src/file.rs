@@ -90,6 +90,12 @@ impl RecordingFile {
         Ok(recording)
     }
 
+    /// The same file with the clock of publish times of the file `before`.
+    pub(crate) const fn continuing(mut self, before: &Self) -> Self {
+        self.began_ns = before.began_ns;
+        self
+    }
+
     fn add(
         &mut self,
         topic: &'static str,

@@ -43,6 +43,7 @@
 //! |---|---|
 //! | [`schema`] | the schema of a topic, made from its layout |
 //! | [`downsampled`] | a bounded number of samples |
+//! | `budget` | the disk budget of a recorder's files |
 //! | `file` | writing the file |
 //! | `foxglove` | messages for viewers |
 //! | `log_files` | lines that the processes of a run append to their logs |
@@ -52,6 +53,7 @@
 //! | [`replay`] | recordings replayed to the bit (feature `replay`) |
 //! | `error` | errors |
 
+mod budget;
 pub mod downsampled;
 mod error;
 mod file;
@@ -67,6 +69,6 @@ pub mod schema;
 pub use self::{
     error::RecordingError,
     foxglove::base64,
-    reader::{End, Message, Recording, Sample, SliceSample, parts, places},
+    reader::{End, Message, Recording, Sample, SliceSample, next_place, parts},
     recorder::{Options, record},
 };

@@ -64,6 +64,11 @@ impl Losses {
         std::mem::take(&mut self.changed).then_some(&self.counts)
     }
 
+    /// Losses by topic.
+    pub(crate) const fn counts(&self) -> &BTreeMap<&'static str, u64> {
+        &self.counts
+    }
+
     pub(crate) fn total(&self) -> u64 {
         self.counts.values().sum()
     }

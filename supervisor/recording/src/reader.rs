@@ -83,17 +83,23 @@ pub struct SliceSample<H, T> {
     pub elements: Vec<T>,
 }
 
-const MOST_PARTS: usize = 1000;
+const MOST_PARTS: u32 = 10_000;
 
-/// The files of a run's recordings, in order: a resumed run begins another.
-pub fn places(run: &Path) -> impl Iterator<Item = PathBuf> {
+/// The possible files of a run's recordings, in order: a resumed run begins another, and so does a file that reached its size.
+fn places(run: &Path) -> impl DoubleEndedIterator<Item = PathBuf> + use<> {
     let first = run.join("recording.mcap");
-    (1..).map(move |number| numbered(&first, number))
+    (1..=MOST_PARTS).map(move |number| numbered(&first, number))
 }
 
-/// The recordings in a run's directory, in order.
+/// The file behind the recordings in a run's directory.
+pub fn next_place(run: &Path) -> PathBuf {
+    let free = places(run).rev().take_while(|file| !file.exists()).last();
+    free.unwrap_or_else(|| numbered(&run.join("recording.mcap"), MOST_PARTS + 1))
+}
+
+/// The recordings in a run's directory, in order. A recorder with a disk budget removes the oldest.
 pub fn parts(run: &Path) -> Vec<PathBuf> {
-    places(run).take(MOST_PARTS).take_while(|file| file.is_file()).collect()
+    places(run).filter(|file| file.is_file()).collect()
 }
 
 impl Recording {

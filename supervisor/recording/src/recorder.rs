@@ -19,11 +19,13 @@ use common::{
 };
 
 use crate::{
+    budget::Budget,
     error::RecordingError,
     file::{RecordingFile, now_ns},
     foxglove::{self, Drawn},
     log_files::{self, LogFiles},
     losses::Losses,
+    reader,
 };
 
 /// Longest time between two reads of the bus.
@@ -44,6 +46,8 @@ pub struct Options {
     pub fields: bool,
     /// The directory of the one run that is recorded; none to find it and to follow the robot from run to run.
     pub run: Option<PathBuf>,
+    /// Most bytes of all files; none for no limit. The oldest files are removed.
+    pub budget: Option<u64>,
 }
 
 impl Options {
@@ -91,6 +95,8 @@ pub fn record(
     let mut current: Option<CurrentRun> = None;
     let mut files = 0;
     let mut supervisor = None;
+    let earlier = options.run.as_deref().map(reader::parts).unwrap_or_default();
+    let mut budget = options.budget.map(|bytes| Budget::new(bytes, earlier));
     loop {
         let stopped = stop();
         let news = match follower.wait(if stopped { Duration::ZERO } else { POLL })? {
@@ -111,7 +117,10 @@ pub fn record(
             let run = find_run(options);
             // Samples of a bus that was recreated within the run go into the same file.
             if let Some(ended) = current.take_if(|current| !current.is_of(run.as_deref())) {
-                ended.finish(tell)?;
+                let file = ended.finish(tell)?;
+                if let Some(budget) = &mut budget {
+                    budget.complete(file);
+                }
             }
             match &mut current {
                 Some(current) => current.losses.joined_again(),
@@ -131,6 +140,18 @@ pub fn record(
             }
             run.take_logs(stopped)?;
             run.file.flush_if_due()?;
+            if let Some(budget) = budget.as_mut().filter(|budget| budget.is_spent_by(&run.path)) {
+                // Readers that are new get whole maps, with which the next file begins.
+                if let Ok(Some(mut before)) = follower.reopen() {
+                    run.take(&mut before)?;
+                }
+                files += 1;
+                let next = match &options.run {
+                    Some(directory) => reader::next_place(directory),
+                    None => numbered(&options.out, files),
+                };
+                budget.complete(run.go_on_in(&next, &chosen)?);
+            }
         }
         let run_over = news == Some(false) && !options.domain.is_supervised();
         if (stopped || run_over)
@@ -161,6 +182,7 @@ pub(crate) fn numbered(out: &Path, number: u32) -> PathBuf {
 struct CurrentRun {
     path: PathBuf,
     directory: Option<PathBuf>,
+    about: BTreeMap<String, String>,
     file: RecordingFile,
     drawn: Drawn,
     losses: Losses,
@@ -190,14 +212,15 @@ impl CurrentRun {
             about.insert("seed", run.mission.seed.to_string());
         }
         let about = about.into_iter();
-        let about = about.map(|(key, value)| (key.to_owned(), value)).collect();
-        let file = RecordingFile::create(path, topics, about)?;
+        let about: BTreeMap<_, _> = about.map(|(key, value)| (key.to_owned(), value)).collect();
+        let file = RecordingFile::create(path, topics, about.clone())?;
         let whole = options.run.is_some();
         let logs = directory.as_ref();
         let logs = logs.map(|directory| LogFiles::follow(directory, whole));
         Ok(Self {
             path: path.to_path_buf(),
             directory,
+            about,
             file,
             drawn: Drawn::new(run.map(|run| run.mission)),
             losses: Losses::default(),
@@ -205,6 +228,20 @@ impl CurrentRun {
             logs_taken: Instant::now(),
             message: Vec::new(),
         })
+    }
+
+    /// Go on in another file, which can be read alone. Returns the file that is complete now.
+    fn go_on_in(
+        &mut self,
+        path: &Path,
+        topics: &[&'static dyn EncodedTopic],
+    ) -> Result<PathBuf, RecordingError> {
+        let next = RecordingFile::create(path, topics, self.about.clone())?;
+        let next = next.continuing(&self.file);
+        std::mem::replace(&mut self.file, next).finish()?;
+        let lost = self.losses.counts();
+        self.file.json("recorder", None, &serde_json::json!({"lost": lost}))?;
+        Ok(std::mem::replace(&mut self.path, path.to_path_buf()))
     }
 
     fn is_of(&self, run: Option<&Path>) -> bool {
@@ -256,11 +293,11 @@ impl CurrentRun {
         written
     }
 
-    fn finish(mut self, tell: &mut dyn FnMut(Happened<'_>)) -> Result<(), RecordingError> {
+    fn finish(mut self, tell: &mut dyn FnMut(Happened<'_>)) -> Result<PathBuf, RecordingError> {
         self.take_logs(true)?;
         self.file.finish()?;
         tell(Happened::Complete(&self.path, self.losses.total()));
-        Ok(())
+        Ok(self.path)
     }
 }
 

@@ -1,6 +1,6 @@
 //! `firsthand record`: everything on a robot's bus into a file.
 
-use std::path::PathBuf;
+use std::{path::PathBuf, str::FromStr};
 
 use clap::Args;
 use common::{
@@ -31,12 +31,41 @@ pub(crate) struct Arguments {
     /// Fields, too: they are larger than all else together.
     #[arg(long)]
     fields: bool,
+    /// Most bytes of all files: `500MB`, `2GB`. A file ends at a quarter of it, and the oldest files are removed.
+    #[arg(long, value_name = "SIZE")]
+    disk_budget: Option<DiskBudget>,
     /// The directory of the one run to record.
     #[arg(long, hide = true)]
     run_directory: Option<PathBuf>,
     /// End when this process, the parent, ends.
     #[arg(long, hide = true)]
     supervisor: Option<u32>,
+}
+
+/// The bytes that recordings may take.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DiskBudget(pub(crate) u64);
+
+impl FromStr for DiskBudget {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        /// A file holds the definitions of all messages.
+        const LEAST: u64 = 500_000;
+        let digits = text.trim_end_matches(|letter: char| !letter.is_ascii_digit());
+        let unit: Option<u64> = match &text[digits.len()..] {
+            "" => Some(1),
+            "kB" => Some(1_000),
+            "MB" => Some(1_000_000),
+            "GB" => Some(1_000_000_000),
+            _ => None,
+        };
+        let bytes = unit.and_then(|unit| digits.parse::<u64>().ok()?.checked_mul(unit));
+        let bytes = bytes.filter(|bytes| *bytes >= LEAST);
+        bytes.map(Self).ok_or_else(|| {
+            format!("{text:?} is no size from 500kB on; give one such as 500MB or 2GB")
+        })
+    }
 }
 
 fn topic(name: &str) -> Result<&'static dyn EncodedTopic, String> {
@@ -59,6 +88,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
         topics: chosen.transpose()?,
         fields: arguments.fields,
         run: arguments.run_directory.clone(),
+        budget: arguments.disk_budget.map(|DiskBudget(bytes)| bytes),
     };
     let mut tell = |happened: Happened<'_>| {
         let printed = match happened {

@@ -19,6 +19,7 @@ use self::{recorder::RunRecorder, summary_file::SummaryFile};
 #[cfg(feature = "tools")]
 use crate::tools::run_report;
 use crate::{
+    commands::record::DiskBudget,
     console::{
         failure::{Failure, Refused},
         missions,
@@ -77,6 +78,9 @@ pub(crate) struct Arguments {
     /// Record nothing; by default everything but fields goes into recording.mcap in the run's directory.
     #[arg(long)]
     no_record: bool,
+    /// Most bytes of the run's recordings: `500MB`, `2GB`. A file ends at a quarter of it, and the oldest files are removed.
+    #[arg(long, value_name = "SIZE", default_value = "2GB")]
+    disk_budget: Option<DiskBudget>,
     /// Print one line of JSON at the end, and nothing else on standard output.
     #[arg(long)]
     json: bool,
@@ -197,7 +201,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut recorder = None;
     let mut attach = || {
         if !arguments.no_record {
-            recorder = RunRecorder::start(&options);
+            recorder = RunRecorder::start(&options, arguments.disk_budget);
         }
     };
     let ran = supervisor::run(&options, &mut attach, &mut |progress| {

@@ -8,6 +8,8 @@ use supervisor::{
     process::{Process, firsthand},
 };
 
+use crate::commands::record::DiskBudget;
+
 /// A recorder that is attached later misses the beginning.
 const ATTACHED_WITHIN: Duration = Duration::from_secs(2);
 /// The recorder takes some milliseconds to write its last chunk.
@@ -18,9 +20,9 @@ pub(crate) struct RunRecorder {
 }
 
 impl RunRecorder {
-    /// Start it, and wait until it is attached. None if it cannot be started, which is logged.
-    pub(crate) fn start(options: &Options) -> Option<Self> {
-        match Self::spawn(options) {
+    /// Start it with this budget for its files, and wait until it is attached. None if it cannot be started, which is logged.
+    pub(crate) fn start(options: &Options, budget: Option<DiskBudget>) -> Option<Self> {
+        match Self::spawn(options, budget) {
             Ok(recorder) => Some(recorder),
             Err(error) => {
                 tracing::error!(%error, "nothing is recorded");
@@ -29,13 +31,15 @@ impl RunRecorder {
         }
     }
 
-    fn spawn(options: &Options) -> std::io::Result<Self> {
+    fn spawn(options: &Options, budget: Option<DiskBudget>) -> std::io::Result<Self> {
         let directory = &options.directory;
         let log = File::options().create(true).append(true).open(directory.join("recorder.log"))?;
         let mut command = firsthand(&["record", "--robot", &options.robot.to_string()]);
         // A run that is resumed may have a recording already.
-        let free = recording::places(directory).find(|file| !file.exists());
-        command.arg("--out").args(free);
+        command.arg("--out").arg(recording::next_place(directory));
+        if let Some(DiskBudget(bytes)) = budget {
+            command.args(["--disk-budget", &bytes.to_string()]);
+        }
         command.arg("--run-directory").arg(directory);
         command.args(["--supervisor", &std::process::id().to_string()]);
         command.stdout(Stdio::piped()).stderr(log);

@@ -62,7 +62,7 @@ pub(super) fn carry_out(
     let mut recorder = None;
     let ran = supervisor::run(
         &options,
-        &mut || recorder = RunRecorder::start(&options),
+        &mut || recorder = RunRecorder::start(&options, None),
         &mut |progress| {
             if line.is_due() {
                 if line.begin() {

@@ -1,0 +1,66 @@
+//! The disk budget of a recorder: its files have at most a share of it, and the oldest are removed.
+
+use std::{collections::VecDeque, fs, path::PathBuf};
+
+/// A budget has room for so many files, so that at least three quarters of it are the newest samples.
+const FILES: u64 = 4;
+
+pub(crate) struct Budget {
+    bytes: u64,
+    /// Complete files and their sizes, the oldest first.
+    complete: VecDeque<(PathBuf, u64)>,
+}
+
+fn size(file: &PathBuf) -> u64 {
+    fs::metadata(file).map_or(0, |about| about.len())
+}
+
+impl Budget {
+    /// A budget that counts the `earlier` files, too, the oldest first.
+    pub(crate) fn new(bytes: u64, earlier: impl IntoIterator<Item = PathBuf>) -> Self {
+        let complete = earlier.into_iter().map(|file| (file.clone(), size(&file))).collect();
+        Self { bytes, complete }
+    }
+
+    /// Whether `file` has its share.
+    pub(crate) fn is_spent_by(&self, file: &PathBuf) -> bool {
+        size(file) >= self.bytes / FILES
+    }
+
+    /// Count a complete `file`, and remove the oldest until there is room for the next.
+    pub(crate) fn complete(&mut self, file: PathBuf) {
+        let its = size(&file);
+        self.complete.push_back((file, its));
+        let mut total: u64 = self.complete.iter().map(|(_, size)| size).sum();
+        while total + self.bytes / FILES > self.bytes
+            && let Some((oldest, size)) = self.complete.pop_front()
+        {
+            // Somebody else may have removed it.
+            let _ = fs::remove_file(&oldest);
+            total -= size;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_oldest_files_are_removed_until_the_next_fits_in_the_budget() {
+        let directory = tempfile::tempdir().unwrap();
+        let file = |number: usize| directory.path().join(number.to_string());
+        let write = |number, bytes| fs::write(file(number), vec![0; bytes]).unwrap();
+        write(0, 30);
+        let mut budget = Budget::new(100, [file(0)]);
+        for number in 1..5 {
+            write(number, 24);
+            assert!(!budget.is_spent_by(&file(number)));
+            write(number, 25);
+            assert!(budget.is_spent_by(&file(number)));
+            budget.complete(file(number));
+        }
+        let there = [0, 1, 2, 3, 4].map(|number| file(number).exists());
+        assert_eq!(there, [false, false, true, true, true]);
+    }
+}
