@@ -47,6 +47,7 @@
 //! | `file` | writing the file |
 //! | `foxglove` | messages for viewers |
 //! | `log_files` | lines that the processes of a run append to their logs |
+//! | `places` | the names of recordings |
 //! | `losses` | samples that the recorder missed |
 //! | [`recorder`] | the recorder |
 //! | [`reader`] | reading the file |
@@ -60,6 +61,7 @@ mod file;
 mod foxglove;
 pub mod log_files;
 mod losses;
+mod places;
 pub mod reader;
 pub mod recorder;
 #[cfg(feature = "replay")]
@@ -69,6 +71,7 @@ pub mod schema;
 pub use self::{
     error::RecordingError,
     foxglove::base64,
-    reader::{End, Message, Recording, Sample, SliceSample, next_place, parts},
+    places::{next_place, parts},
+    reader::{End, Message, Recording, Sample, SliceSample},
     recorder::{Options, record},
 };

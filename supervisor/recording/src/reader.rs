@@ -21,7 +21,7 @@ use mcap::{
     sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions},
 };
 
-use crate::{error::RecordingError, file::RUN, recorder::numbered};
+use crate::{error::RecordingError, file::RUN, places::parts};
 
 /// Most bytes of a record or chunk. The recorder's are shorter.
 const LONGEST_RECORD: usize = 1 << 28;
@@ -81,25 +81,6 @@ pub struct SliceSample<H, T> {
     pub log_ns: u64,
     pub header: H,
     pub elements: Vec<T>,
-}
-
-const MOST_PARTS: u32 = 10_000;
-
-/// The possible files of a run's recordings, in order: a resumed run begins another, and so does a file that reached its size.
-fn places(run: &Path) -> impl DoubleEndedIterator<Item = PathBuf> + use<> {
-    let first = run.join("recording.mcap");
-    (1..=MOST_PARTS).map(move |number| numbered(&first, number))
-}
-
-/// The file behind the recordings in a run's directory.
-pub fn next_place(run: &Path) -> PathBuf {
-    let free = places(run).rev().take_while(|file| !file.exists()).last();
-    free.unwrap_or_else(|| numbered(&run.join("recording.mcap"), MOST_PARTS + 1))
-}
-
-/// The recordings in a run's directory, in order. A recorder with a disk budget removes the oldest.
-pub fn parts(run: &Path) -> Vec<PathBuf> {
-    places(run).filter(|file| file.is_file()).collect()
 }
 
 impl Recording {

@@ -25,7 +25,7 @@ use crate::{
     foxglove::{self, Drawn},
     log_files::{self, LogFiles},
     losses::Losses,
-    reader,
+    places::{self, numbered},
 };
 
 /// Longest time between two reads of the bus.
@@ -95,7 +95,7 @@ pub fn record(
     let mut current: Option<CurrentRun> = None;
     let mut files = 0;
     let mut supervisor = None;
-    let earlier = options.run.as_deref().map(reader::parts).unwrap_or_default();
+    let earlier = options.run.as_deref().map(places::parts).unwrap_or_default();
     let mut budget = options.budget.map(|bytes| Budget::new(bytes, earlier));
     loop {
         let stopped = stop();
@@ -147,7 +147,7 @@ pub fn record(
                 }
                 files += 1;
                 let next = match &options.run {
-                    Some(directory) => reader::next_place(directory),
+                    Some(directory) => places::next_place(directory),
                     None => numbered(&options.out, files),
                 };
                 budget.complete(run.go_on_in(&next, &chosen)?);
@@ -168,15 +168,6 @@ pub fn record(
 fn find_run(options: &Options) -> Option<PathBuf> {
     let link = options.domain.run_directory();
     options.run.clone().or_else(|| fs::read_link(link).ok())
-}
-
-/// `F.mcap`, `F-2.mcap`, ...
-pub(crate) fn numbered(out: &Path, number: u32) -> PathBuf {
-    if number <= 1 {
-        return out.to_path_buf();
-    }
-    let stem = out.file_stem().unwrap_or_default().to_string_lossy();
-    out.with_file_name(format!("{stem}-{number}.mcap"))
 }
 
 struct CurrentRun {
@@ -318,16 +309,4 @@ fn machine() -> String {
         system.trim(),
         std::env::consts::ARCH
     )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_file_of_the_next_run_has_the_next_number() {
-        let out = Path::new("/tmp/a.mcap");
-        assert_eq!(numbered(out, 1), Path::new("/tmp/a.mcap"));
-        assert_eq!(numbered(out, 2), Path::new("/tmp/a-2.mcap"));
-    }
 }
