@@ -2,13 +2,14 @@
 
 use std::{
     io::{BufRead as _, BufReader},
-    process::{Child, Stdio},
+    process::{Child, Command, Stdio},
 };
 
 use rustix::process::Signal;
 
 use crate::support::{
-    Browser, Run, assert_nothing_left, firsthand, has_browser, not_run, refused, signal_process,
+    Browser, Run, assert_nothing_left, firsthand, has_browser, not_run, printed, refused,
+    signal_process,
 };
 
 /// `firsthand page` for a robot.
@@ -21,7 +22,12 @@ struct Page {
 
 impl Page {
     fn start(robot: &str, listen: &str) -> Self {
+        Self::start_with(robot, listen, &[])
+    }
+
+    fn start_with(robot: &str, listen: &str, arguments: &[&str]) -> Self {
         let mut child = firsthand(&["page", "--robot", robot, "--listen", listen])
+            .args(arguments)
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
@@ -54,6 +60,11 @@ impl Drop for Page {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
+}
+
+/// Whether a program of that name is installed.
+fn has(program: &str) -> bool {
+    Command::new(program).arg("version").output().is_ok()
 }
 
 const IS_LOST: &str = "document.body.classList.contains('lost')";
@@ -142,10 +153,87 @@ fn a_robot_is_watched_stopped_and_resumed_on_a_phone() {
 }
 
 #[test]
+fn a_recorded_run_is_scrubbed_and_played_in_windows_of_both_widths() {
+    if !has_browser() {
+        return not_run("a recorded page", "chromium and chromedriver are missing");
+    }
+    let golden = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/golden/open-room.mcap");
+    let out = tempfile::tempdir().unwrap();
+    let page = printed(&["report", golden, "--out", out.path().to_str().unwrap()]);
+    let picture = "return document.getElementById('map').toDataURL()";
+    for width in [1280, 390] {
+        let browser = Browser::open(width);
+        browser.go(&format!("file://{}", page.trim_end()));
+        browser.wait_until("document.querySelectorAll('#metrics tr').length > 10");
+        browser.wait_until("document.querySelectorAll('#figures canvas').length >= 5");
+        browser.wait_until(
+            "document.getElementById('time').value === document.getElementById('time').max",
+        );
+        let at_the_end = browser.run(picture);
+        let scrub = "const time = document.getElementById('time'); time.value = 1; time.dispatchEvent(new Event('input'))";
+        browser.run(scrub);
+        browser.wait_until("document.getElementById('now').textContent === '1.0 s'");
+        assert_ne!(browser.run(picture), at_the_end, "the map is that of another time");
+        browser.run("document.getElementById('speed').value = '10'");
+        browser.tap("play", 0, 0);
+        browser.wait_until(
+            "document.getElementById('time').value === document.getElementById('time').max",
+        );
+        browser.wait_until(&says("play", "Play"));
+        let there =
+            browser.run("return getComputedStyle(document.getElementById('urgent')).display");
+        assert_eq!(there, "none", "there is nobody to stop");
+    }
+}
+
+#[test]
 fn a_page_for_others_than_this_machine_needs_keys() {
     let listen = ["page", "--robot", "page-far", "--listen"];
     refused(&[&listen[..], &["0.0.0.0:0"]].concat(), "not-loopback", &["0.0.0.0", "--tls-cert"]);
     refused(&[&listen[..], &["here"]].concat(), "usage", &["--listen"]);
+}
+
+#[test]
+fn an_encrypted_page_is_served_under_the_name_of_its_certificate_alone() {
+    if !has("openssl") || !has("curl") {
+        return not_run("an encrypted page", "openssl and curl are missing");
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let path = |name: &str| directory.path().join(name).to_str().unwrap().to_owned();
+    let (certificate, key) = (path("certificate.pem"), path("key.pem"));
+    let made = Command::new("openssl")
+        .args(["req", "-x509", "-nodes", "-newkey", "ec", "-days", "2", "-subj", "/CN=localhost"])
+        .args([
+            "-pkeyopt",
+            "ec_paramgen_curve:prime256v1",
+            "-addext",
+            "subjectAltName=DNS:localhost",
+        ])
+        .args(["-keyout", &key, "-out", &certificate])
+        .output();
+    assert!(made.unwrap().status.success());
+    let keys = ["--tls-cert", &certificate, "--tls-key", &key];
+    let page = Page::start_with("page-tls", "127.0.0.1:0", &keys);
+    let port = page.watch.strip_prefix("https://127.0.0.1:").unwrap().split('/').next().unwrap();
+    let status = |scheme: &str, host: &str| {
+        let url = format!("{scheme}://localhost:{port}/");
+        let asked = Command::new("curl")
+            .args([
+                "--silent",
+                "--max-time",
+                "10",
+                "--cacert",
+                &certificate,
+                "--output",
+                "/dev/null",
+            ])
+            .args(["--write-out", "%{http_code}", "--header", &format!("Host: {host}"), &url])
+            .output();
+        String::from_utf8(asked.unwrap().stdout).unwrap()
+    };
+    assert_eq!(status("https", &format!("localhost:{port}")), "200");
+    assert_eq!(status("https", "evil.example"), "421");
+    assert_eq!(status("http", &format!("localhost:{port}")), "000", "without encryption");
 }
 
 #[test]

@@ -15,8 +15,9 @@
 mod browser;
 mod commands;
 mod own_process;
+mod recorded_page;
 mod robot;
 mod run;
 pub mod wire;
 
-pub use self::{browser::*, commands::*, own_process::*, robot::*, run::*};
+pub use self::{browser::*, commands::*, own_process::*, recorded_page::*, robot::*, run::*};

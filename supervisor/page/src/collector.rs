@@ -1,7 +1,7 @@
 //! Samples of a robot as the page shows them: rows of its charts, states, events, maps and fields. The live page and the recorded one
 //! both come from here.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 use common::{
     bus::{Layout, decode_sample, decode_slice},
@@ -50,18 +50,32 @@ const COLUMNS: [&str; 20] = [
 ];
 /// A state in which only ages have changed is given again after this mission time, seconds.
 const STATE_AGAIN_S: f64 = 1.0;
+/// Most ticks whose samples come in at a time.
+const MOST_TICKS: usize = 4096;
 /// Most ticks of the ground truth that wait for their pose.
 const MOST_TRUTHS: usize = 4096;
+
+/// The samples of a tick. A recording has them by topics, some ticks at a time.
+#[derive(Clone, Debug, Default)]
+struct Tick {
+    pose: Option<PoseSample>,
+    command: Option<CommandSample>,
+    guidance: Option<GuidanceSample>,
+    ranges: Option<Vec<Option<f64>>>,
+    latency_ns: Option<u64>,
+}
 
 /// What the newest samples say.
 #[derive(Debug)]
 pub struct Collector {
     mission: Mission,
-    pose: Option<PoseSample>,
-    command: CommandSample,
-    guidance: GuidanceSample,
+    /// Ticks whose samples come in, by their numbers.
+    ticks: BTreeMap<u64, Tick>,
+    /// The tick of the newest pose.
+    pose_tick: u64,
+    /// The samples of the newest row.
+    newest: Tick,
     power: Option<PowerSample>,
-    ranges: Vec<Option<f64>>,
     link: LinkSample,
     roster: RosterHeader,
     stages: Vec<RosterEntry>,
@@ -77,9 +91,6 @@ pub struct Collector {
     ahead: Vec<DVec2>,
     /// The ground truth from the tick of the newest row on, as far as it was read.
     truths: VecDeque<GroundTruthTick>,
-    /// The tick of the newest row.
-    row_of: Option<u64>,
-    rows: Vec<Value>,
     /// What decided the newest state, and its time.
     state_of: Option<(Vec<u64>, f64)>,
     map_of: Option<u64>,
@@ -128,11 +139,13 @@ impl Collector {
     pub fn new(mission: &Mission) -> Self {
         Self {
             mission: mission.clone(),
-            pose: None,
-            command: CommandSample::default(),
-            guidance: GuidanceSample::default(),
+            ticks: BTreeMap::new(),
+            pose_tick: 0,
+            newest: Tick {
+                ranges: Some(vec![None; mission.sensor_table().len()]),
+                ..Tick::default()
+            },
             power: None,
-            ranges: vec![None; mission.sensor_table().len()],
             link: LinkSample::default(),
             roster: RosterHeader::default(),
             stages: Vec::new(),
@@ -146,8 +159,6 @@ impl Collector {
             ahead: Vec::new(),
             events: Events::default(),
             truths: VecDeque::new(),
-            row_of: None,
-            rows: Vec::new(),
             state_of: None,
             map_of: None,
             field_of: None,
@@ -163,14 +174,15 @@ impl Collector {
         if is(&topics::POSE) {
             self.pose(sample(data)?);
         } else if is(&topics::RANGES) {
-            let (_, readings) = decode_slice::<RangesHeader, RangeReading>(data)?;
-            self.ranges(&readings);
+            let (header, readings) = decode_slice::<RangesHeader, RangeReading>(data)?;
+            self.ranges(header.stamp.tick, &readings);
         } else if is(&topics::COMMAND) {
             self.command(sample(data)?);
         } else if is(&topics::GUIDANCE) {
-            self.guidance = sample(data)?;
+            let guidance: GuidanceSample = sample(data)?;
+            self.tick(guidance.stamp.tick).guidance = Some(guidance);
         } else if is(&topics::TARGET) {
-            self.target(&sample(data)?);
+            self.sent(&sample(data)?);
         } else if is(&topics::POWER) {
             self.power = Some(sample(data)?);
         } else if is(&topics::LINK) {
@@ -200,12 +212,21 @@ impl Collector {
 
     fn pose(&mut self, pose: PoseSample) {
         self.events.now_s = self.events.now_s.max(pose.stamp.time().seconds());
-        self.pose = Some(pose);
+        self.pose_tick = pose.stamp.tick;
+        self.tick(pose.stamp.tick).pose = Some(pose);
     }
 
-    fn ranges(&mut self, readings: &[RangeReading]) {
+    fn tick(&mut self, number: u64) -> &mut Tick {
+        if self.ticks.len() >= MOST_TICKS {
+            self.ticks.pop_first();
+        }
+        self.ticks.entry(number).or_default()
+    }
+
+    fn ranges(&mut self, tick: u64, readings: &[RangeReading]) {
+        let mut ranges = vec![None; self.newest.ranges.as_ref().map_or(0, Vec::len)];
         for reading in readings {
-            let Some(range) = self.ranges.get_mut(usize::from(reading.sensor)) else {
+            let Some(range) = ranges.get_mut(usize::from(reading.sensor)) else {
                 continue;
             };
             *range = match reading.status() {
@@ -213,11 +234,12 @@ impl Collector {
                 RangeStatus::Absent | RangeStatus::Nothing | RangeStatus::Invalid => None,
             };
         }
+        self.tick(tick).ranges = Some(ranges);
     }
 
     fn command(&mut self, command: CommandSample) {
         self.events.command(&command);
-        self.command = command;
+        self.tick(command.stamp.tick).command = Some(command);
     }
 
     fn grid(&mut self, header: &GridHeader, cells: &[u8]) {
@@ -232,7 +254,7 @@ impl Collector {
         }
     }
 
-    fn target(&mut self, target: &TargetSample) {
+    fn sent(&mut self, target: &TargetSample) {
         if self.target_number != target.number {
             self.events.target(target);
         }
@@ -247,20 +269,25 @@ impl Collector {
         self.stages = entries.to_vec();
     }
 
-    /// A link's sample ends a tick.
     fn link(&mut self, link: LinkSample) {
         self.events.link(&link);
+        self.tick(link.stamp.tick).latency_ns = Some(link.latency_ns);
         self.link = link;
-        let Some(pose) = self.pose else {
-            return;
-        };
-        if self.row_of.replace(pose.stamp.tick) != Some(pose.stamp.tick) {
-            let row = self.row(&pose);
-            self.rows.push(row);
-        }
     }
 
-    fn row(&mut self, pose: &PoseSample) -> Value {
+    /// The row of `tick`. What did not come in it is as before.
+    fn row(&mut self, tick: Tick) -> Option<Value> {
+        let pose = &tick.pose?;
+        let Tick { command, guidance, ranges, latency_ns, .. } = std::mem::take(&mut self.newest);
+        self.newest = Tick {
+            pose: Some(*pose),
+            command: tick.command.or(command),
+            guidance: tick.guidance.or(guidance),
+            ranges: tick.ranges.or(ranges),
+            latency_ns: tick.latency_ns.or(latency_ns),
+        };
+        let command = self.newest.command.unwrap_or_default();
+        let guidance = self.newest.guidance.unwrap_or_default();
         let [xx, xy, _, yy, ..] = pose.covariance;
         let of_pose = self.truths.iter().position(|truth| truth.is_of(pose));
         self.truths.drain(..of_pose.unwrap_or_default());
@@ -277,20 +304,21 @@ impl Collector {
             yy,
             pose.v_m_s,
             pose.omega_rad_s,
-            self.command.v_m_s,
-            self.command.omega_rad_s,
-            self.guidance.distance_m,
-            self.guidance.speed_limit_m_s,
-            self.link.latency_ns as f64 / 1e6,
+            command.v_m_s,
+            command.omega_rad_s,
+            guidance.distance_m,
+            guidance.speed_limit_m_s,
+            self.newest.latency_ns.map_or(f64::NAN, |ns| ns as f64 / 1e6),
             volts[0],
             volts[1],
-            f64::from(self.guidance.status),
+            f64::from(guidance.status),
             truth[0],
             truth[1],
             truth[2],
         ];
-        let ranges = self.ranges.iter().map(|range| range.map_or(Value::Null, rounded));
-        values.into_iter().map(rounded).chain(ranges).collect()
+        let ranges = self.newest.ranges.iter().flatten();
+        let ranges = ranges.map(|range| range.map_or(Value::Null, rounded));
+        Some(values.into_iter().map(rounded).chain(ranges).collect())
     }
 
     /// Take a line of the ground truth, which is written before the tick's pose is published. Returns whether a further one may come
@@ -321,9 +349,15 @@ impl Collector {
         self.usage = usage;
     }
 
-    /// The rows since the last time.
+    /// The rows of the ticks that have ended since the last time: a sample of the link ends a tick.
     pub fn take_rows(&mut self) -> Vec<Value> {
-        std::mem::take(&mut self.rows)
+        let last = self.link.stamp.tick.min(self.pose_tick);
+        let mut rows = Vec::new();
+        while let Some(first) = self.ticks.first_entry().filter(|first| *first.key() <= last) {
+            let tick = first.remove();
+            rows.extend(self.row(tick));
+        }
+        rows
     }
 
     /// The events since the last time.
@@ -360,6 +394,11 @@ impl Collector {
         Some((GridHeader { part, ..self.grid_header }, self.grid.cells()))
     }
 
+    /// Where the robot is sent, metres.
+    pub const fn target(&self) -> DVec2 {
+        self.target
+    }
+
     pub fn mission(&self) -> &Mission {
         &self.mission
     }
@@ -381,7 +420,7 @@ impl Collector {
         let mut key: Vec<u64> = self.stages.iter().flat_map(flags).collect();
         let LinkSample { action, cause, connected, at_rest, .. } = self.link;
         let RosterHeader { order, reason, .. } = self.roster;
-        key.extend([action, cause, at_rest, order, reason, self.guidance.status].map(u64::from));
+        key.extend([action, cause, at_rest, order, reason, self.status()].map(u64::from));
         key.extend([u64::from(connected), self.target_number, self.ahead.len() as u64]);
         let now = self.now_s();
         if let Some((before, at)) = &self.state_of
@@ -392,6 +431,10 @@ impl Collector {
         }
         self.state_of = Some((key, now));
         Some(self.state())
+    }
+
+    fn status(&self) -> u8 {
+        self.newest.guidance.map_or(0, |guidance| guidance.status)
     }
 
     fn state(&self) -> Value {
@@ -424,7 +467,7 @@ impl Collector {
             "operator_stop": self.link.cause() == Cause::OperatorStop,
             "action": self.link.action().effect(),
             "cause": self.link.cause().name(),
-            "guidance": words(GuidanceStatus::from_byte(self.guidance.status)),
+            "guidance": words(GuidanceStatus::from_byte(self.status())),
             "targets": targets.map(|at| [at.x, at.y]).collect::<Vec<_>>(),
             "stages": stages.collect::<Vec<_>>(),
             "supervisor": {

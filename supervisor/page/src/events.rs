@@ -42,7 +42,8 @@ pub(crate) struct Events {
     found: Vec<Event>,
     failsafe: Option<(u8, u8)>,
     directive: Option<(u8, u8)>,
-    arrived: bool,
+    /// The number of the target that was reached last.
+    arrived: u64,
     /// The generation of each stage that was seen to run.
     running: Vec<(String, u32)>,
     /// Mission time of the newest pose, seconds. A process that has just started knows no mission time.
@@ -124,8 +125,11 @@ impl Events {
     }
 
     pub(crate) fn request(&mut self, request: &RequestSample) {
+        let targets = request.targets().unwrap_or_default().iter();
+        let targets: String =
+            targets.map(|at| format!("({:.2}, {:.2}) ", at.x_m, at.y_m)).collect();
         let kind = words(RequestKind::from_byte(request.kind));
-        let text = format!("{kind} {}", name_str(&request.stage));
+        let text = format!("{kind} {}{targets}", name_str(&request.stage));
         self.add("operator", Kind::Note, text.trim_end());
     }
 
@@ -142,10 +146,11 @@ impl Events {
 
     pub(crate) fn command(&mut self, command: &CommandSample) {
         let arrived = CommandState::from_byte(command.state) == CommandState::Arrived;
-        if arrived && !self.arrived {
-            self.add("controller", Kind::Good, "the target is reached");
+        if arrived && self.arrived != command.target_number {
+            self.arrived = command.target_number;
+            let text = format!("target {} is reached", command.target_number);
+            self.add("controller", Kind::Good, text);
         }
-        self.arrived = arrived;
     }
 
     pub(crate) fn log(&mut self, process: &str, line: &str) {

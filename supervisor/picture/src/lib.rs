@@ -13,11 +13,8 @@
 //! | `page`, `lattice` | the page, and the position of cells on it |
 //! | [`Scene`] | the data of a picture |
 //!
-//! [`figure_svg`] draws the picture without title and captions, and with text that can be read on a small page. [`panels_svg`] puts
-//! plots of several moments side by side.
-//!
-//! `map` draws the field of a bare map with the same bands and lines, and `raster` converts it to PNG. `chart` and `timeline` draw
-//! values and events against time; `plot` is their common part.
+//! `map` draws the field of a bare map with the same bands and lines, and `raster` converts it to PNG. `chart` draws values
+//! against each other; `plot` is its frame.
 //!
 //! A picture shows what is known at the end of a run, however it ended: every layer but the frame may be missing, and
 //! every input gives a valid file.
@@ -37,7 +34,6 @@ mod scene;
 mod streamlines;
 #[cfg(test)]
 mod tests;
-mod timeline;
 mod world;
 
 use common::{
@@ -49,10 +45,8 @@ pub use self::{
     chart::{Chart, Mark, Series},
     map::{FieldOnMap, map_svg},
     page::escape,
-    plot::{Axis, Scale},
     raster::png,
     scene::{Facts, Scene},
-    timeline::{Lane, Symbol, Timeline},
 };
 
 use self::{
@@ -93,18 +87,6 @@ pub fn svg(scene: &Scene<'_>) -> String {
         ]
         .concat()
     })
-}
-
-/// `scene` as a figure: no title, no captions, the legend below, and text that is read where the figure is small.
-pub fn figure_svg(scene: &Scene<'_>) -> String {
-    drawn(scene, |view, plot, legend| margin::figure(scene, &plot, view, legend))
-}
-
-/// Plots side by side, two in a row, each below its title. They have no axes and no legend; [`figure_svg`] of the same mission shows
-/// them.
-pub fn panels_svg(title: &str, panels: &[(String, Scene<'_>)]) -> String {
-    let plots = panels.iter().map(|(title, scene)| (&title[..], drawn(scene, |_, plot, _| plot)));
-    margin::panels(title, &plots.collect::<Vec<_>>())
 }
 
 /// The plot of `scene` and what explains it, put together by `sheet`.

@@ -1,9 +1,8 @@
-//! The parts around the plot: title, axes, captions; and the place of a figure's legend.
+//! The parts around the plot: title, axes, captions.
 
 use glam::DVec2;
 
 use super::{
-    legend::{Column, Legend},
     page::{PLOT_LEFT, PLOT_SIDE, PLOT_TOP, Path, Px, View, WIDTH, escape, ink, round_up},
     scene::Scene,
     world,
@@ -78,12 +77,7 @@ fn facts(scene: &Scene<'_>) -> String {
 
 /// The frame of the plot with ticks in metres.
 pub(super) fn axes(view: &View) -> String {
-    axes_in(view, 1.0)
-}
-
-/// The frame with text `size` times as large, and that many times fewer ticks.
-fn axes_in(view: &View, size: f64) -> String {
-    let step = round_up(view.side_m() * size / 12.0);
+    let step = round_up(view.side_m() / 12.0);
     let digits = (-step.log10().floor()).max(0.0) as usize;
     let low = view.low();
     let bottom = PLOT_TOP + PLOT_SIDE;
@@ -101,9 +95,9 @@ fn axes_in(view: &View, size: f64) -> String {
             ticks.move_to(mark);
             ticks.line_to(mark + away);
             let (x, y, anchor) = if axis == 0 {
-                (mark.x, bottom + 8.0 + 12.0 * size, "middle")
+                (mark.x, bottom + 20.0, "middle")
             } else {
-                (PLOT_LEFT - 10.0, mark.y + 4.5 * size, "end")
+                (PLOT_LEFT - 10.0, mark.y + 4.5, "end")
             };
             // Adding 0 turns -0 into 0.
             let value = nth * step + 0.0;
@@ -123,79 +117,11 @@ fn axes_in(view: &View, size: f64) -> String {
          <text transform=\"translate({} {middle}) rotate(-90)\" text-anchor=\"middle\">y, metres</text>\n\
          </g>\n",
         ticks.element(&style),
-        Px(12.5 * size),
+        Px(12.5),
         PLOT_LEFT + PLOT_SIDE / 2.0,
-        Px(bottom + 12.0 + 28.0 * size),
-        Px(34.0 - 14.0 * size - 22.0 * (size - 1.0)),
+        Px(bottom + 40.0),
+        Px(20.0),
         quiet = ink::QUIET
-    )
-}
-
-/// Text of a figure, in that of a picture.
-const LARGER: f64 = 1.75;
-/// Left edge of a figure, and its width.
-const FIGURE_LEFT: f64 = -32.0;
-const FIGURE_WIDTH: f64 = PLOT_LEFT + PLOT_SIDE + 24.0 - FIGURE_LEFT;
-
-/// The file of a figure: the plot, and its legend below it in two columns.
-pub(super) fn figure(scene: &Scene<'_>, plot: &str, view: &View, legend: &Legend<'_>) -> String {
-    let mut left = Column::at(DVec2::new(0.0, 16.0));
-    legend.motion_rows(&mut left);
-    legend.field_rows(&mut left);
-    let mut right = Column::at(DVec2::new(252.0, 16.0));
-    legend.hazard_rows(&mut right);
-    let rows = left.y.max(right.y) * LARGER;
-    let (top, below) = (PLOT_TOP - 16.0, PLOT_TOP + PLOT_SIDE + 78.0);
-    let height = below + rows - top;
-    format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"{FIGURE_LEFT} {top} {FIGURE_WIDTH} {height}\" \
-         width=\"{FIGURE_WIDTH}\" height=\"{height}\" role=\"img\" font-family=\"{FONT}\" font-size=\"12.5\" fill=\"{}\">\n\
-         <title>{}</title>\n<desc>{}</desc>\n{}\
-         <rect x=\"{FIGURE_LEFT}\" y=\"{top}\" width=\"{FIGURE_WIDTH}\" height=\"{height}\" fill=\"#fff\"/>\n\
-         {plot}{}<g transform=\"translate({PLOT_LEFT} {below}) scale({LARGER})\">\n{}{}</g>\n</svg>\n",
-        ink::TEXT,
-        escape(&scene.mission.name, ACROSS),
-        facts(scene),
-        definitions(),
-        axes_in(view, LARGER),
-        left.text,
-        right.text,
-    )
-}
-
-/// Side of a plot among others, and from one to the next.
-const PANEL: f64 = 440.0;
-const PANELS_APART: f64 = 24.0;
-/// Above each plot, for its title.
-const PANEL_TOP: f64 = 34.0;
-
-/// The file of `plots` under their titles.
-pub(super) fn panels(title: &str, plots: &[(&str, String)]) -> String {
-    let rows = plots.len().div_ceil(2) as f64;
-    let width = 2.0 * PANEL + 3.0 * PANELS_APART;
-    let height = rows * (PANEL + PANEL_TOP) + PANELS_APART;
-    let mut drawn = String::new();
-    for (nth, (title, plot)) in plots.iter().enumerate() {
-        let left = PANELS_APART + (nth % 2) as f64 * (PANEL + PANELS_APART);
-        let top = PANEL_TOP + (nth / 2) as f64 * (PANEL + PANEL_TOP);
-        drawn += &format!(
-            "<text x=\"{left}\" y=\"{}\">{}</text>\n\
-             <svg x=\"{left}\" y=\"{top}\" width=\"{PANEL}\" height=\"{PANEL}\" \
-             viewBox=\"{PLOT_LEFT} {PLOT_TOP} {PLOT_SIDE} {PLOT_SIDE}\">\n{plot}</svg>\n\
-             <rect x=\"{left}\" y=\"{top}\" width=\"{PANEL}\" height=\"{PANEL}\" fill=\"none\" stroke=\"{}\" \
-             stroke-width=\"1.2\"/>\n",
-            top - 10.0,
-            escape(title, ACROSS),
-            ink::TEXT
-        );
-    }
-    format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" \
-         role=\"img\" font-family=\"{FONT}\" font-size=\"21\" fill=\"{}\">\n<title>{}</title>\n{}\
-         <rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>\n{drawn}</svg>\n",
-        ink::TEXT,
-        escape(title, ACROSS),
-        definitions(),
     )
 }
 

@@ -5,11 +5,11 @@ use glam::DVec2;
 use super::page::{Path, Px, escape, ink, round_up};
 
 /// Width of the sheet: on a telephone its text is still read, across a column of print it is as large as the text.
-pub(super) const WIDTH: f64 = 620.0;
+const WIDTH: f64 = 620.0;
 /// Left edge of the plot.
-pub(super) const LEFT: f64 = 70.0;
+const LEFT: f64 = 70.0;
 /// Right edge of the plot.
-pub(super) const RIGHT: f64 = WIDTH - 20.0;
+const RIGHT: f64 = WIDTH - 20.0;
 /// Text, px.
 const TEXT: f64 = 14.0;
 /// The approximate width of a character of the text.
@@ -24,40 +24,9 @@ const BELOW: f64 = 52.0;
 /// Characters that surely fit across the sheet.
 const ACROSS: usize = 70;
 
-/// The scale of an axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scale {
-    /// Equal distances are equal differences.
-    Linear,
-    /// Logarithmic; values of 0 and less are not drawn.
-    Logarithmic,
-}
-
-/// An axis of a chart.
-#[derive(Clone, Debug)]
-pub struct Axis {
-    /// Its quantity and unit, such as `time, s`.
-    pub label: String,
-    /// The scale.
-    pub scale: Scale,
-}
-
-impl Axis {
-    /// A linear axis.
-    pub fn linear(label: &str) -> Self {
-        Self { label: label.to_owned(), scale: Scale::Linear }
-    }
-
-    /// A logarithmic axis.
-    pub fn logarithmic(label: &str) -> Self {
-        Self { label: label.to_owned(), scale: Scale::Logarithmic }
-    }
-}
-
-/// The range of an axis; of a logarithmic one the exponents.
+/// The range of an axis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Range {
-    scale: Scale,
     low: f64,
     high: f64,
     step: f64,
@@ -65,41 +34,24 @@ pub(super) struct Range {
 
 impl Range {
     /// Round numbers around `values`; 0 to 1 around none.
-    pub(super) fn around(scale: Scale, values: impl Iterator<Item = f64>) -> Self {
-        let placed = values.map(|value| scaled(scale, value)).filter(|value| value.is_finite());
-        let bounds = placed.fold(None, |bounds: Option<(f64, f64)>, value| {
+    pub(super) fn around(values: impl Iterator<Item = f64>) -> Self {
+        let finite = values.filter(|value| value.is_finite());
+        let bounds = finite.fold(None, |bounds: Option<(f64, f64)>, value| {
             let (low, high) = bounds.unwrap_or((value, value));
             Some((low.min(value), high.max(value)))
         });
         let (low, high) = bounds.unwrap_or((0.0, 1.0));
         let (low, high) = (low.max(-1e12), high.min(1e12));
-        let step = match scale {
-            Scale::Linear => round_up((high - low).max(1e-9 * high.abs().max(1e-3)) / 5.0),
-            Scale::Logarithmic => 1.0,
-        };
+        let step = round_up((high - low).max(1e-9 * high.abs().max(1e-3)) / 5.0);
         let (low, high) = ((low / step).floor() * step, (high / step).ceil() * step);
         let high = if high > low { high } else { low + step };
-        Self { scale, low, high, step }
-    }
-
-    /// An axis from 0 to exactly `high`.
-    pub(super) fn to(high: f64) -> Self {
-        let high = if high.is_finite() && high > 0.0 { high } else { 1.0 };
-        Self { scale: Scale::Linear, low: 0.0, high, step: round_up(high / 6.0) }
+        Self { low, high, step }
     }
 
     /// The place of `value`: 0 at the low end, 1 at the high one; NaN if it has none.
     pub(super) fn part(&self, value: f64) -> f64 {
-        let part = (scaled(self.scale, value) - self.low) / (self.high - self.low);
+        let part = (value - self.low) / (self.high - self.low);
         if part.is_finite() { part.clamp(0.0, 1.0) } else { f64::NAN }
-    }
-
-    /// The least value.
-    pub(super) fn least(&self) -> f64 {
-        match self.scale {
-            Scale::Linear => self.low,
-            Scale::Logarithmic => 10_f64.powf(self.low),
-        }
     }
 
     /// Places and labels of the ticks.
@@ -110,25 +62,10 @@ impl Range {
             .map(|nth| (first + f64::from(nth)) * self.step + 0.0)
             .take_while(|value| *value <= self.high + self.step * 1e-6)
             .map(|value| {
-                let text = match self.scale {
-                    Scale::Linear => format!("{value:.digits$}"),
-                    Scale::Logarithmic => {
-                        let value = 10_f64.powf(value);
-                        let digits = (-value.log10().floor()).clamp(0.0, 9.0) as usize;
-                        format!("{value:.digits$}")
-                    }
-                };
+                let text = format!("{value:.digits$}");
                 ((value - self.low) / (self.high - self.low), text)
             })
             .collect()
-    }
-}
-
-fn scaled(scale: Scale, value: f64) -> f64 {
-    match scale {
-        Scale::Linear => value,
-        Scale::Logarithmic if value > 0.0 => value.log10(),
-        Scale::Logarithmic => f64::NAN,
     }
 }
 
@@ -138,16 +75,14 @@ pub(super) type Entry = (Box<dyn Fn(DVec2) -> String>, String);
 /// The sheet of a chart.
 pub(super) struct Plot {
     title: String,
-    /// Left edge of the plot.
-    left: f64,
     top: f64,
     height: f64,
     legend: String,
 }
 
 impl Plot {
-    /// A sheet with a plot `height` high from `left` on, below `title` and the entries of its legend.
-    pub(super) fn new(title: &str, left: f64, height: f64, entries: &[Entry]) -> Self {
+    /// A sheet with a plot `height` high, below `title` and the entries of its legend.
+    pub(super) fn new(title: &str, height: f64, entries: &[Entry]) -> Self {
         let mut at = DVec2::new(LEFT, 48.0);
         let mut legend = String::new();
         for (symbol, words) in entries {
@@ -162,19 +97,19 @@ impl Plot {
             at.x += wide + APART;
         }
         let below = if entries.is_empty() { 0.0 } else { 12.0 };
-        Self { title: title.to_owned(), left, top: at.y + below, height, legend }
+        Self { title: title.to_owned(), top: at.y + below, height, legend }
     }
 
     /// The point on the sheet at these shares of both ranges.
     pub(super) fn place(&self, x: f64, y: f64) -> DVec2 {
-        DVec2::new(self.left + x * (RIGHT - self.left), self.top + (1.0 - y) * self.height)
+        DVec2::new(LEFT + x * (RIGHT - LEFT), self.top + (1.0 - y) * self.height)
     }
 
-    /// The file with `drawn` between axes. The y axis has no ticks if it has no range.
+    /// The file with `drawn` between axes.
     pub(super) fn svg(
         &self,
         x: (&Range, &str),
-        y: Option<(&Range, &str)>,
+        y: (&Range, &str),
         description: &str,
         drawn: &str,
     ) -> String {
@@ -197,7 +132,7 @@ impl Plot {
                 Px(foot.y + 19.0)
             );
         }
-        for (part, text) in y.iter().flat_map(|(range, _)| range.ticks()) {
+        for (part, text) in y.0.ticks() {
             let mark = self.place(0.0, part);
             rules.move_to(mark);
             rules.line_to(self.place(1.0, part));
@@ -214,13 +149,11 @@ impl Plot {
             Px(foot.y + 42.0),
             escape(x.1, ACROSS)
         );
-        if let Some((_, label)) = y {
-            labels += &format!(
-                "<text transform=\"translate(17 {}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
-                Px(self.place(0.0, 0.5).y),
-                escape(label, ACROSS)
-            );
-        }
+        labels += &format!(
+            "<text transform=\"translate(17 {}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
+            Px(self.place(0.0, 0.5).y),
+            escape(y.1, ACROSS)
+        );
         let corner = self.place(0.0, 1.0);
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height}\" width=\"{WIDTH}\" height=\"{height}\" \
@@ -235,7 +168,7 @@ impl Plot {
             rules.element("stroke=\"#d5dbe1\" stroke-width=\"0.8\" fill=\"none\""),
             Px(corner.x),
             Px(corner.y),
-            Px(RIGHT - self.left),
+            Px(RIGHT - LEFT),
             Px(self.height),
             ink::TEXT,
         )

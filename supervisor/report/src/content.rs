@@ -1,49 +1,58 @@
-//! The data that a report takes from the recordings.
+//! The recordings of a run as a page and as metrics.
+
+use std::{
+    fs::File,
+    io::{BufRead as _, BufReader, Lines, Read as _, Take},
+    path::Path,
+};
 
 use common::{
     bus::{Layout, decode_sample, decode_slice},
-    grid::{Applied, Replica},
     mission::Mission,
-    samples::{
-        CommandSample, GridHeader, PoseSample, RangeReading, RangesHeader, Stamp, WheelSample,
-    },
+    samples::{RangeReading, RangesHeader},
     topics::{self, AnyTopic},
 };
-use recording::{End, Message, Recording, downsampled::Downsampled};
-use serde_json::{Map, Value};
+use page::{Collector, Recorded};
+use recording::{End, Message, Recording};
+use serde_json::{Map, Value, json};
+use supervisor::simulator::GROUND_TRUTH;
 
 use crate::{
     beliefs::Beliefs,
     error::ReportError,
-    events::Events,
     measured::Measured,
     source::{self, Source},
 };
 
-/// Most samples of a topic that are drawn.
-const MOST: usize = 20_000;
+/// The lines of logs, which are no topic.
+const LOG: &str = "log";
+/// Most bytes of the ground truth: an hour at 10 Hz takes 10 MB.
+const LARGEST_TRUTH: u64 = 1 << 28;
+/// Maps follow each other after this mission time at the earliest, seconds.
+const MAP_EVERY_S: f64 = 0.5;
+/// Most rows, states and events of a page. Of a longer run the page shows the beginning; metrics count all.
+const MOST: usize = 60_000;
+/// Most maps of a page.
+const MOST_MAPS: usize = 2400;
 
 pub(crate) struct Content {
     pub(crate) mission: Mission,
-    pub(crate) simulated: bool,
     /// Names and values: robot, build, machine and others.
-    pub(crate) about: Vec<(&'static str, String)>,
+    about: Vec<(&'static str, String)>,
     /// Gaps of the recordings.
     pub(crate) remarks: Vec<String>,
     pub(crate) summary: Map<String, Value>,
-    pub(crate) poses: Downsampled<PoseSample, MOST>,
     /// The row of the front sonar.
     front: usize,
-    /// Readings of the front sonar.
-    pub(crate) ranges: Downsampled<(Stamp, RangeReading), MOST>,
-    pub(crate) commands: Downsampled<CommandSample, MOST>,
-    pub(crate) wheels: Downsampled<WheelSample, MOST>,
-    pub(crate) grid: Replica<u8>,
-    /// The header of the newest grid.
-    pub(crate) grid_header: GridHeader,
-    pub(crate) beliefs: Beliefs,
-    pub(crate) events: Events,
     pub(crate) measured: Measured,
+    collector: Collector,
+    beliefs: Beliefs,
+    page: Recorded,
+    truth: Option<Lines<BufReader<Take<File>>>>,
+    added: usize,
+    maps: usize,
+    map_at_s: f64,
+    has_fields: bool,
 }
 
 impl Content {
@@ -56,32 +65,32 @@ impl Content {
         Ok(content)
     }
 
-    fn of(recording: &Recording) -> Self {
+    pub(crate) fn of(recording: &Recording) -> Self {
         let run = &recording.run;
-        let simulated = run.mission.robot.address.is_none();
         let mut about =
             vec![("mission", run.mission.name.clone()), ("robot", run.robot.to_string())];
-        if simulated {
+        if run.mission.robot.address.is_none() {
             about.push(("seed", run.mission.seed.to_string()));
         }
         about.push(("build", recording.build.to_owned()));
         about.push(("machine", recording.machine.to_owned()));
+        let mut page = Recorded::default();
+        page.text(&json!({"about": page::about(run)}));
         Self {
             mission: run.mission.clone(),
-            simulated,
             about,
             remarks: Vec::new(),
             summary: source::summary(recording).unwrap_or_default(),
-            poses: Downsampled::default(),
             front: run.mission.front_row(),
-            ranges: Downsampled::default(),
-            commands: Downsampled::default(),
-            wheels: Downsampled::default(),
-            grid: Replica::default(),
-            grid_header: GridHeader::default(),
-            beliefs: Beliefs::default(),
-            events: Events::default(),
             measured: Measured::default(),
+            collector: Collector::new(&run.mission),
+            beliefs: Beliefs::default(),
+            page,
+            truth: source::run_directory(recording).and_then(truth),
+            added: 0,
+            maps: 0,
+            map_at_s: f64::NEG_INFINITY,
+            has_fields: false,
         }
     }
 
@@ -98,7 +107,9 @@ impl Content {
         if lost > 0 {
             self.remarks.push(format!("The recorder of {name} lost {lost} samples."));
         }
-        for message in recording.messages(&TOPICS.map(|topic| topic.spec().name))? {
+        let mut wanted = TOPICS.map(|topic| topic.spec().name).to_vec();
+        wanted.push(LOG);
+        for message in recording.messages(&wanted)? {
             let message = message?;
             if self.take(&message).is_none() {
                 return Err(recording::RecordingError::Message {
@@ -117,54 +128,105 @@ impl Content {
             decode_sample(&message.data)
         }
         let is = |topic: &dyn AnyTopic| *message.topic == *topic.spec().name;
+        if *message.topic == *LOG {
+            let line: Value = serde_json::from_slice(&message.data).ok()?;
+            self.collector.log(line["name"].as_str()?, line["message"].as_str()?);
+            return Some(());
+        }
+        // Ground truth that is not of this tick waits in the collector.
         if is(&topics::POSE) {
-            let pose = sample(message)?;
-            self.events.pose(&pose);
-            if self.measured.pose(&pose, &self.mission) {
-                self.poses.push(pose);
+            while let Some(Ok(line)) = self.truth.as_mut().and_then(Iterator::next) {
+                if !self.collector.truth(&line) {
+                    break;
+                }
             }
+        }
+        self.collector.take(&message.topic, &message.data)?;
+        if is(&topics::POSE) {
+            self.measured.pose(&sample(message)?, &self.mission);
         } else if is(&topics::RANGES) {
-            let (header, readings) = decode_slice::<RangesHeader, RangeReading>(&message.data)?;
+            let (_, readings) = decode_slice::<RangesHeader, RangeReading>(&message.data)?;
             let front = |reading: &&RangeReading| usize::from(reading.sensor) == self.front;
             if let Some(reading) = readings.iter().find(front) {
                 self.measured.range(reading, &self.mission);
-                self.ranges.push((header.stamp, *reading));
             }
-        } else if is(&topics::WHEELS) {
-            self.wheels.push(sample(message)?);
         } else if is(&topics::COMMAND) {
-            let command = sample(message)?;
-            self.measured.command(&command);
-            self.events.command(&command);
-            self.commands.push(command);
+            self.measured.command(&sample(message)?);
         } else if is(&topics::GUIDANCE) {
-            let guidance = sample(message)?;
-            self.measured.guidance(&guidance);
-            self.events.guidance(&guidance);
+            self.measured.guidance(&sample(message)?);
         } else if is(&topics::LINK) {
-            let link = sample(message)?;
-            self.measured.link(&link);
-            self.events.link(&link);
+            self.measured.link(&sample(message)?);
+            self.add();
         } else if is(&topics::GRID) {
-            let (header, cells) = decode_slice::<GridHeader, u8>(&message.data)?;
-            if self.grid.apply(&header.part, &cells) != Applied::Missed {
-                self.grid_header = header;
-                self.beliefs.push(&header, &self.grid);
-            }
-        } else if is(&topics::HEALTH) {
-            self.events.health(&sample(message)?);
-        } else if is(&topics::DEATHS) {
-            self.events.death(&sample(message)?);
-        } else if is(&topics::DIRECTIVE) {
-            self.events.directive(&sample(message)?);
-        } else if is(&topics::STALLS) {
-            self.events.stall(&sample(message)?);
-        } else if is(&topics::REQUESTS) {
-            self.events.request(&sample(message)?);
-        } else if is(&topics::FAULTS) {
-            self.events.fault(&sample(message)?);
+            self.add_map();
+        } else if is(&topics::FIELD) {
+            let field = self.collector.take_field();
+            self.has_fields |= field.is_some();
+            field.iter().for_each(|field| self.page.blob(field));
         }
         Some(())
+    }
+
+    /// Add to the page what the collector has since the last time.
+    fn add(&mut self) {
+        let (rows, events) = (self.collector.take_rows(), self.collector.take_events());
+        let state = self.collector.take_state();
+        if self.added >= MOST {
+            return;
+        }
+        self.added += rows.len() + events.len() + usize::from(state.is_some());
+        if rows.is_empty() && events.is_empty() && state.is_none() {
+            return;
+        }
+        self.page.text(&json!({"rows": rows, "events": events, "state": state}));
+    }
+
+    fn add_map(&mut self) {
+        let now_s = self.collector.now_s();
+        if now_s < self.map_at_s + MAP_EVERY_S || self.maps == MOST_MAPS {
+            return;
+        }
+        if let Some(map) = self.collector.take_map() {
+            self.map_at_s = now_s;
+            self.maps += 1;
+            self.page.blob(&map);
+        }
+        if let Some((header, cells)) = self.collector.belief() {
+            self.beliefs.push(now_s, self.collector.target(), &header, cells);
+        }
+    }
+
+    /// The page of the run with these rows of metrics.
+    pub(crate) fn html(mut self, metrics: Vec<Value>) -> String {
+        self.add();
+        if let Some(map) = self.collector.take_map() {
+            self.page.blob(&map);
+        }
+        if !self.has_fields {
+            if let Some((header, cells)) = self.collector.belief() {
+                let target = self.collector.target();
+                self.beliefs.end(self.collector.now_s(), target, &header, cells);
+            }
+            for field in self.beliefs.fields(&self.mission) {
+                self.page.blob(&field);
+            }
+        }
+        let about = self.about.iter().map(|(name, value)| json!([name, value, ""]));
+        self.page.text(&json!({
+            "metrics": metrics.into_iter().chain(about).collect::<Vec<_>>(),
+            "outcome": self.ended(),
+            "remarks": self.remarks,
+        }));
+        self.page.html(&format!("Report: {}", self.mission.name))
+    }
+
+    fn ended(&self) -> String {
+        let reason = self.summary.get("reason").and_then(Value::as_str);
+        match (self.outcome(), reason) {
+            (Some(outcome), Some(reason)) => format!("{outcome}: {reason}"),
+            (Some(outcome), None) => outcome.to_owned(),
+            (None, _) => "No summary of this run lies beside the recording: how it ended is not known here, and metrics are those of the recording.".to_owned(),
+        }
     }
 
     pub(crate) fn summed(&self, field: &str) -> Option<f64> {
@@ -182,15 +244,23 @@ impl Content {
     }
 }
 
-const TOPICS: [&dyn AnyTopic; 13] = [
+/// The ground truth of a simulated robot's run in `directory`.
+fn truth(directory: &Path) -> Option<Lines<BufReader<Take<File>>>> {
+    let file = File::open(directory.join(GROUND_TRUTH)).ok()?;
+    Some(BufReader::new(file.take(LARGEST_TRUTH)).lines())
+}
+
+const TOPICS: [&dyn AnyTopic; 15] = [
     &topics::POSE,
     &topics::RANGES,
-    &topics::WHEELS,
     &topics::COMMAND,
     &topics::GUIDANCE,
+    &topics::TARGET,
+    &topics::POWER,
     &topics::LINK,
     &topics::GRID,
-    &topics::HEALTH,
+    &topics::FIELD,
+    &topics::ROSTER,
     &topics::DEATHS,
     &topics::DIRECTIVE,
     &topics::STALLS,

@@ -1,4 +1,4 @@
-//! The report of a run, from its recording: one page that refers to nothing else, and each figure as an SVG file.
+//! The report of a run: the robot's page with the recording in it, one file that refers to nothing else.
 //!
 //! ```no_run
 //! let report = report::write("runs/obstacle-course-1".as_ref(), None)?;
@@ -6,29 +6,22 @@
 //! # Ok::<(), report::ReportError>(())
 //! ```
 //!
-//! A recording is read once, and memory is bounded: whenever there are too many samples, every second one is dropped; metrics
-//! count all. Text from the file is escaped.
+//! A recording is read once, and the page has a bounded number of rows, maps and fields; metrics count all.
 //!
 //! | module | holds |
 //! |---|---|
 //! | `source` | the recordings of the run, and its summary |
-//! | `content` | the data that a report takes from the recordings |
-//! | `events` | deaths, recoveries and other events |
+//! | `content` | the page and the metrics of the recordings |
 //! | `measured` | metrics of the recording itself |
 //! | `beliefs` | the map at a few moments, and the field of each |
 //! | `metrics` | the table of metrics, under their field names |
-//! | `figures` | the figures |
-//! | `page` | the page |
 //! | `error` | errors |
 
 mod beliefs;
 mod content;
 mod error;
-mod events;
-mod figures;
 mod measured;
 mod metrics;
-mod page;
 mod source;
 #[cfg(test)]
 mod tests;
@@ -54,19 +47,16 @@ pub fn write(run: &Path, out: Option<&Path>) -> Result<PathBuf, ReportError> {
     let out = out.map_or_else(|| source.default_out(), Path::to_path_buf);
     let content = Content::read(&source)?;
     fs::create_dir_all(&out).map_err(FileError::of("make", &out))?;
-    let figures = figures::all(&content);
-    for figure in &figures {
-        save(&out.join(format!("{}.svg", figure.name)), &figure.svg)?;
-    }
     let page = out.join(PAGE);
-    save(&page, &page::html(&content, &figures))?;
+    fs::write(&page, html(content)).map_err(|error| {
+        // A part of a page is of no use.
+        let _ = fs::remove_file(&page);
+        FileError::of("write", &page)(error)
+    })?;
     Ok(page)
 }
 
-/// An incomplete file is removed.
-fn save(file: &Path, text: &str) -> Result<(), FileError> {
-    fs::write(file, text).map_err(|error| {
-        let _ = fs::remove_file(file);
-        FileError::of("write", file)(error)
-    })
+fn html(content: Content) -> String {
+    let metrics = metrics::rows(&content);
+    content.html(metrics)
 }

@@ -31,26 +31,23 @@ pub(crate) struct Measured {
 }
 
 impl Measured {
-    /// Take a pose. Returns whether its speeds are valid: if a late machine receives two ticks together, a speed is a distance divided
-    /// by almost no time.
-    pub(crate) fn pose(&mut self, pose: &PoseSample, mission: &Mission) -> bool {
+    /// Take a pose. If a late machine receives two ticks together, its speed does not count: it is a distance divided by almost no time.
+    pub(crate) fn pose(&mut self, pose: &PoseSample, mission: &Mission) {
         self.ticks += 1;
         self.time_s = self.time_s.max(pose.stamp.time().seconds());
         self.path_m = pose.travelled_m;
         let Some(last) = self.last_pose.replace(*pose) else {
             self.last_speed = Some(pose.v_m_s);
-            return true;
+            return;
         };
         let time = pose.stamp.time().seconds() - last.stamp.time().seconds();
-        let is_told = time * mission.robot.rate_hz > 0.5;
-        if is_told {
+        if time * mission.robot.rate_hz > 0.5 {
             if let Some(before) = self.last_speed.filter(|before| before.is_finite()) {
                 self.speed_change += (pose.v_m_s - before).abs() / time;
                 self.changes += 1;
             }
             self.last_speed = Some(pose.v_m_s);
         }
-        is_told
     }
 
     /// Take a reading of the front sonar.

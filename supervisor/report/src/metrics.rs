@@ -2,16 +2,17 @@
 //! simulated robot; or else from the recording, which knows the robot's estimate.
 
 use evaluation::shortest_path::{ShortestPath, shortest_path};
+use serde_json::{Value, json};
 
 use crate::content::Content;
 
-pub(crate) struct Metric {
+struct Metric {
     /// Its name in the literature.
-    pub(crate) name: &'static str,
+    name: &'static str,
     /// Its field in `summary.json`, or its formula.
-    pub(crate) field: &'static str,
+    field: &'static str,
     /// With its unit; a dash if it is unknown.
-    pub(crate) value: String,
+    value: String,
 }
 
 fn shown(value: Option<f64>, digits: usize, unit: &str) -> String {
@@ -36,7 +37,13 @@ fn spl(content: &Content, path: Option<f64>) -> Option<f64> {
     }
 }
 
-pub(crate) fn table(content: &Content) -> Vec<Metric> {
+/// The rows of the table as the page takes them: name, value, field.
+pub(crate) fn rows(content: &Content) -> Vec<Value> {
+    let rows = table(content).into_iter();
+    rows.map(|metric| json!([metric.name, metric.value, metric.field])).collect()
+}
+
+fn table(content: &Content) -> Vec<Metric> {
     let measured = &content.measured;
     let of = |field: &str, measured: Option<f64>| content.summed(field).or(measured);
     let has_poses = measured.ticks > 0;
@@ -141,7 +148,7 @@ fn restarts(content: &Content) -> String {
     let restarts = content.summary.get("restarts");
     let times = restarts.and_then(|restarts| {
         let times = restarts.as_object()?.values();
-        Some(times.filter_map(serde_json::Value::as_u64).sum::<u64>() as f64)
+        Some(times.filter_map(Value::as_u64).sum::<u64>() as f64)
     });
     shown(times, 0, "")
 }

@@ -47,11 +47,15 @@ impl Source {
 
 /// The summary of the run of `recording`, if it is beside it.
 pub(crate) fn summary(recording: &Recording) -> Option<Map<String, Value>> {
+    let file = run_directory(recording)?.join("summary.json");
+    let is_small = fs::metadata(&file).ok()?.len() <= LARGEST_SUMMARY;
+    let text = is_small.then(|| fs::read_to_string(&file).ok()).flatten()?;
+    serde_json::from_str(&text).ok()
+}
+
+/// The directory of the run of `recording`; none if the recording lies elsewhere.
+pub(crate) fn run_directory(recording: &Recording) -> Option<&Path> {
     let directory = recording.path.parent()?;
     // The directory may be of another run, or of none.
-    let its = Run::load(directory).ok()?;
-    let file = directory.join("summary.json");
-    let is_its = its == recording.run && fs::metadata(&file).ok()?.len() <= LARGEST_SUMMARY;
-    let text = is_its.then(|| fs::read_to_string(&file).ok()).flatten()?;
-    serde_json::from_str(&text).ok()
+    (Run::load(directory).ok()? == recording.run).then_some(directory)
 }

@@ -1,4 +1,4 @@
-//! `firsthand report RUN|F.mcap`: one page and its figures from a recording.
+//! `firsthand report RUN|F.mcap`: the robot's page with a recording in it.
 
 use std::path::PathBuf;
 
@@ -6,8 +6,7 @@ use clap::Args;
 
 use crate::console::{failure::Failure, output::print_text};
 
-/// Write the report of a run from its recording: one page without references to other files, and each figure as SVG. `run` does
-/// this at its end.
+/// Write the robot's page with the recording of a run in it, one file without references to others. `run` does this at its end.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// The directory of a run that was recorded, or a recording.

@@ -10,7 +10,7 @@ use common::{
     file::{FileError, replace},
     mission::{Calibration, Odometry, Provenance},
 };
-use picture::{Axis, Chart, Mark, Series};
+use picture::{Chart, Mark, Series};
 use serde_json::json;
 
 use crate::console::{failure::Failure, output::print_text};
@@ -120,8 +120,8 @@ impl Found {
             title: "Residuals of the calibration".to_owned(),
             description: "How far each loop or square is from what the calibrated wheels say, in standard deviations."
                 .to_owned(),
-            x: Axis::linear("loop or square"),
-            y: Axis::linear("residual, standard deviations"),
+            x: "loop or square".to_owned(),
+            y: "residual, standard deviations".to_owned(),
             series: vec![series("to the left", true), series("to the right", false)],
         }
         .svg()
