@@ -112,6 +112,10 @@ pub struct Mission {
     /// The values of the controller, which turns guidance into wheel speeds.
     #[serde(default)]
     pub controller: Controller,
+    /// A map of the ROS map_server whose occupied cells become boxes of [`Mission::known`] before a run starts. A relative name is taken
+    /// from the current directory.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub map: Option<PathBuf>,
     /// The hazards that the map holds before the robot starts.
     #[serde(default, skip_serializing_if = "Shapes::is_empty")]
     pub known: Shapes,

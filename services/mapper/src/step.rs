@@ -106,6 +106,17 @@ impl Belief {
     }
 }
 
+/// How far around a surface the cells of a mission's map are hazard, metres.
+pub fn hazard_reach_m(mission: &Mission) -> f64 {
+    match mission.method {
+        // A known surface blocks the same cells as a hit on it: its own cell and the margin around.
+        Method::Paper => {
+            (f64::from(mission.margin_cells()) + 0.5) * mission.grid_frame().resolution_m
+        }
+        Method::Evidential => Evidential::new(mission).reach(),
+    }
+}
+
 /// The mapper of (19), or of the evidential method.
 #[derive(Clone, Debug)]
 pub struct Mapper {
@@ -135,15 +146,14 @@ impl Step for Mapper {
         let frame = mission.grid_frame();
         let margin = mission.margin_cells();
         let evidential = Evidential::new(mission);
-        let (sensed, reach) = match mission.method {
-            // A known surface blocks the same cells as a hit on it: its own cell and the margin around.
-            Method::Paper => (Sensed::Hits, (f64::from(margin) + 0.5) * frame.resolution_m),
-            Method::Evidential => (Sensed::Evidence(evidential.empty()), evidential.reach()),
+        let sensed = match mission.method {
+            Method::Paper => Sensed::Hits,
+            Method::Evidential => Sensed::Evidence(evidential.empty()),
         };
         let mut mapper = Self {
             frame,
             target: frame.cell_at(mission.target),
-            known: (mission.known.clone(), reach),
+            known: (mission.known.clone(), hazard_reach_m(mission)),
             margin,
             evidential,
             sensing: mission.sensing,

@@ -31,7 +31,7 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 
 #[cfg(feature = "tools")]
 use crate::tools::{
-    bench, calibrate, completions, evaluate, experiments, field, man, replay, report, top,
+    bench, calibrate, completions, evaluate, experiments, field, man, map, replay, report, top,
 };
 use crate::{console::failure::Failure, renamed};
 
@@ -106,6 +106,7 @@ commands! {
         Logs logs,
         Runs runs,
         Table table,
+        @tools { Map map, }
     }
     "Record it" {
         Record record,

@@ -9,6 +9,7 @@ pub(crate) mod evaluate;
 pub(crate) mod experiments;
 pub(crate) mod field;
 pub(crate) mod man;
+pub(crate) mod map;
 mod mission_progress;
 pub(crate) mod replay;
 pub(crate) mod report;

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `ros` | a ROS map_server YAML and the image it names |
 //! | `image` | a PGM (any Netpbm) or PNG image |
+//! | `prior` | a ROS map as hazards that a mission knows; it also writes one of what a robot believed |
 //! | `moving_ai` | the `.map` grids of the MovingAI benchmarks |
 //!
 //! [`load`] chooses a reader by the file's name; [`load_placed`] reads a ROS map with its place in metres.
@@ -15,12 +16,14 @@ mod file;
 mod image;
 mod map;
 mod moving_ai;
+mod prior;
 mod ros;
 
 use std::path::Path;
 
 pub use error::MapError;
 pub use map::{Map, PlacedMap};
+pub use prior::{save_believed, with_prior_map};
 pub use ros::load_placed;
 
 /// The map in `file`. The ending of its name says its format.

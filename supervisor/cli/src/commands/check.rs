@@ -7,6 +7,7 @@ use common::mission::Mission;
 
 use crate::console::{
     failure::Failure,
+    missions,
     output::{print_text, write_stderr},
 };
 
@@ -18,7 +19,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
-    let mission = Mission::load(&arguments.file)?.with_calibration()?;
+    let mission = missions::complete(Mission::load(&arguments.file)?)?;
     for remark in &mission.remarks {
         write_stderr(&format!("firsthand: {remark}\n"));
     }

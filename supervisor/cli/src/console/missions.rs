@@ -1,6 +1,6 @@
 //! The missions that ship with the program, mission files, and assignments over both.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use common::mission::{Mission, MissionError};
 use thiserror::Error;
@@ -28,6 +28,14 @@ pub(crate) enum LookupError {
     Assigned { name: String, assignments: String, problem: String },
     #[error(transparent)]
     Mission(#[from] MissionError),
+    #[cfg(feature = "tools")]
+    #[error("map: {0}")]
+    Map(#[from] evaluation::maps::MapError),
+    #[error(
+        "map = {:?}: this build for robots reads no maps; start the mission with one that has the feature `tools`",
+        file.display()
+    )]
+    NoMaps { file: PathBuf },
 }
 
 fn names() -> String {
@@ -42,7 +50,18 @@ pub(crate) fn shipped(name: &str) -> Option<&'static str> {
 /// The shipped mission `name`, or the one in the file `name`, with `KEY=VALUE` assignments on top and the values of its calibration
 /// in place.
 pub(crate) fn load(name: &str, assignments: &[String]) -> Result<Mission, LookupError> {
-    Ok(as_assigned(name, assignments)?.with_calibration()?)
+    complete(as_assigned(name, assignments)?)
+}
+
+/// `mission` with what the files that it names say.
+pub(crate) fn complete(mission: Mission) -> Result<Mission, LookupError> {
+    let mission = mission.with_calibration()?;
+    #[cfg(feature = "tools")]
+    let mission = evaluation::maps::with_prior_map(mission)?;
+    match mission.map {
+        Some(file) => Err(LookupError::NoMaps { file }),
+        None => Ok(mission),
+    }
 }
 
 fn as_assigned(name: &str, assignments: &[String]) -> Result<Mission, LookupError> {
@@ -66,7 +85,7 @@ pub(crate) fn parsed(
     origin: &str,
     assignments: &[String],
 ) -> Result<Mission, LookupError> {
-    Ok(as_parsed(text, origin, assignments)?.with_calibration()?)
+    complete(as_parsed(text, origin, assignments)?)
 }
 
 fn as_parsed(text: &str, name: &str, assignments: &[String]) -> Result<Mission, LookupError> {
@@ -106,10 +125,7 @@ pub(crate) fn with(
     let table = toml::Table::try_from(mission).map_err(|error| failed(error.to_string()))?;
     let assigned = assign(table, assignments)?;
     let mission = Mission::parse(&assigned, Path::new(&mission.name));
-    mission
-        .and_then(Mission::with_calibration)
-        .map(Some)
-        .map_err(|error| failed(error.without_place()))
+    complete(mission.map_err(|error| failed(error.without_place()))?).map(Some)
 }
 
 /// The text of `table` with all assignments.

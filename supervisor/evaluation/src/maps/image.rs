@@ -46,13 +46,19 @@ impl Lightness {
 type Cause = Box<dyn Error>;
 
 /// Which pixels are free, row by row.
-struct Free {
-    cols: usize,
-    pixels: Vec<bool>,
+pub(super) struct Free {
+    pub(super) cols: usize,
+    pub(super) pixels: Vec<bool>,
 }
 
 /// The map in an image, a cell a pixel.
 pub(super) fn load(file: &Path, lightness: Lightness) -> Result<Map, MapError> {
+    let Free { cols, pixels } = pixels(file, lightness)?;
+    Ok(Map::new(cols, pixels.len() / cols, pixels.into_iter()))
+}
+
+/// The pixels of an image; it has at least one.
+pub(super) fn pixels(file: &Path, lightness: Lightness) -> Result<Free, MapError> {
     let mut reader = BufReader::new(open(file, LONGEST)?);
     let start =
         reader.fill_buf().map_err(|cause| MapError::Unreadable { file: file.to_owned(), cause })?;
@@ -71,14 +77,13 @@ pub(super) fn load(file: &Path, lightness: Lightness) -> Result<Map, MapError> {
             ));
         }
     };
-    let Free { cols, pixels } = decoded.map_err(|cause| match cause.downcast() {
+    decoded.map_err(|cause| match cause.downcast() {
         Ok(size) => *size,
         Err(cause) => MapError::malformed(
             file,
             format!("a damaged or unusual image ({cause}); save it anew as an 8-bit PGM or PNG"),
         ),
-    })?;
-    Ok(Map::new(cols, pixels.len() / cols, pixels.into_iter()))
+    })
 }
 
 /// A Netpbm image of greys (kinds 2 and 5) or colours (3 and 6), in ASCII (2 and 3) or binary.

@@ -7,12 +7,13 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use common::file;
 use serde::{Deserialize, de::DeserializeOwned};
 
 use crate::maps::{
     error::MapError,
     file::read,
-    image::{self, Lightness},
+    image::{self, Free, Lightness},
     map::{Map, PlacedMap},
 };
 
@@ -62,6 +63,24 @@ pub(super) fn load(file: &Path) -> Result<Map, MapError> {
 
 /// The map that the YAML `file` of the ROS map_server describes, and where it lies.
 pub fn load_placed(file: &Path) -> Result<PlacedMap, MapError> {
+    placed(file, image_of)
+}
+
+/// Likewise, with only those cells blocked that the map says are occupied.
+pub(super) fn load_occupied(file: &Path) -> Result<PlacedMap, MapError> {
+    placed(file, |file, text| {
+        let (image, lightness) = named_image(file, text)?;
+        let free_thresh = f64::INFINITY;
+        let Free { cols, pixels } = image::pixels(&image, Lightness { free_thresh, ..lightness })?;
+        let blocked: Vec<bool> = pixels.into_iter().map(|is_free| !is_free).collect();
+        Ok(Map { cols, rows: blocked.len() / cols, blocked })
+    })
+}
+
+fn placed(
+    file: &Path,
+    map_of: fn(&Path, &str) -> Result<Map, MapError>,
+) -> Result<PlacedMap, MapError> {
     let text = text(file)?;
     let place: Place = parse(file, &text, "resolution: METRES` and `origin: [x, y, 0]")?;
     if !CELL_M.contains(&place.resolution) {
@@ -75,11 +94,7 @@ pub fn load_placed(file: &Path) -> Result<PlacedMap, MapError> {
     }
     match place.origin[..] {
         [x, y, turn] if x.abs() <= FARTHEST_M && y.abs() <= FARTHEST_M && turn == 0.0 => {
-            Ok(PlacedMap {
-                map: image_of(file, &text)?,
-                cell_m: place.resolution,
-                corner_m: [x, y],
-            })
+            Ok(PlacedMap { map: map_of(file, &text)?, cell_m: place.resolution, corner_m: [x, y] })
         }
         _ => Err(MapError::malformed(
             file,
@@ -111,11 +126,44 @@ fn parse<T: DeserializeOwned>(file: &Path, text: &str, needed: &str) -> Result<T
 
 /// The image that the YAML `text` of `file` names.
 fn image_of(file: &Path, text: &str) -> Result<Map, MapError> {
+    let (image, lightness) = named_image(file, text)?;
+    image::load(&image, lightness)
+}
+
+/// The name of that image, and which of its pixels are free.
+fn named_image(file: &Path, text: &str) -> Result<(PathBuf, Lightness), MapError> {
     let parsed: MapFile = parse(file, text, "image: FILE")?;
     let lightness = parsed.lightness(file)?;
     let folder = file.parent().unwrap_or(Path::new(""));
     // `join` leaves an absolute path as it is.
-    image::load(&folder.join(&parsed.image), lightness)
+    Ok((folder.join(&parsed.image), lightness))
+}
+
+/// A map to write: cells, row-major, row 0 at the top.
+pub(super) struct Saved {
+    pub(super) cols: usize,
+    /// 0 for occupied, 254 for free, 205 for unknown, as the map_saver writes them.
+    pub(super) pixels: Vec<u8>,
+    pub(super) cell_m: f64,
+    /// The corner where x and y are least, metres.
+    pub(super) corner_m: [f64; 2],
+}
+
+/// Write `map` to the YAML `file` and to an image of the same name beside it.
+pub(super) fn save(file: &Path, map: &Saved) -> Result<(), MapError> {
+    let unwritable = |cause| MapError::Unwritable { file: file.to_owned(), cause };
+    let image = file.with_extension("pgm");
+    let mut bytes = format!("P5\n{} {}\n255\n", map.cols, map.pixels.len() / map.cols).into_bytes();
+    bytes.extend_from_slice(&map.pixels);
+    file::replace(&image, bytes).map_err(unwritable)?;
+    let (name, [x, y]) = (image.file_name().unwrap_or_default().to_string_lossy(), map.corner_m);
+    // A name in single quotes is taken as it is, but for quotes, which are doubled.
+    let name = name.replace('\'', "''");
+    let yaml = format!(
+        "image: '{name}'\nmode: trinary\nresolution: {:?}\norigin: [{x:?}, {y:?}, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
+        map.cell_m
+    );
+    file::replace(file, yaml).map_err(unwritable)
 }
 
 impl MapFile {
