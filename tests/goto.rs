@@ -171,3 +171,24 @@ fn a_list_of_the_mission_file_gives_the_same_summary_and_replay_to_the_bit_in_lo
     let legs = 1.5_f64.hypot(1.0) + 1.0_f64.hypot(1.5) + 2.0_f64.hypot(0.3);
     assert!((straight_m - legs).abs() < 1e-9, "{straight_m} m");
 }
+
+#[test]
+fn a_mission_starts_from_the_map_that_an_earlier_run_saved_and_a_damaged_map_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (first, second, map) = (path("first"), path("second"), path("course.yaml"));
+    let set = format!("map='{map}'");
+    let drive = |out: &str, more: &[&str]| {
+        let common = ["run", "obstacle-course", "--robot", "prior-map", "--json", "--out", out];
+        let (status, summary) = json_of(&output(&[&common, more].concat()));
+        assert!(status.success(), "{summary:?}");
+        assert_eq!(summary[0]["outcome"], "reached");
+    };
+    drive(&first, &[]);
+    support::printed(&["map", "save", &first, "--out", &map]);
+    drive(&second, &["--set", &set]);
+    let mission = std::fs::read_to_string(path("second/mission.toml")).unwrap();
+    assert!(mission.contains("[[known.box]]") && !mission.contains("course.yaml"), "{mission}");
+    std::fs::write(path("course.pgm"), "P5 9 9 255 ").unwrap();
+    refused(&["run", "obstacle-course", "--set", &set], "mission", &["course.pgm"]);
+}
