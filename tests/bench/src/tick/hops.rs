@@ -6,7 +6,7 @@
 use std::time::{Duration, Instant};
 
 use common::{
-    bus::{Bus, BusError},
+    bus::{Author, Bus, BusError},
     clock::{MissionTime, monotonic_ns},
     domain::{Domain, RobotName},
     latency::Histogram,
@@ -42,8 +42,7 @@ pub fn measure(
     let lock = DomainLock::acquire(Domain::of(robot.clone()), CELLS)?;
     let bus = lock.bus().ok_or(BenchError::Lost)?;
     let mut start = bus.writer(&topics::WHEELS, 1)?;
-    // No roster names a forwarder.
-    let mut end = bus.reader(&topics::COMMAND)?.of_all_generations();
+    let mut end = bus.reader(&topics::COMMAND)?;
     let mut waiter = Waiter::default();
     waiter.on(bus.wakeup(&topics::COMMAND)?);
     let own = std::process::id().to_string();
@@ -52,7 +51,12 @@ pub fn measure(
         let arguments = ["bench", "tick", "--forwarder", place, "--supervisor", &own];
         let mut command = firsthand(&arguments);
         command.args(["--robot", &robot.to_string()]);
-        forwarders.push(Process::spawn(command).map_err(system("start a forwarder"))?);
+        let forwarder = Process::spawn(command).map_err(system("start a forwarder"))?;
+        if let Some(writers) = bus.writers() {
+            let author = Author { process: forwarder.id(), generation: 1 };
+            writers.name([(place.to_owned(), author)]);
+        }
+        forwarders.push(forwarder);
     }
     let mut latencies = Histogram::default();
     for trip in 0..WARM_UP + trips {
