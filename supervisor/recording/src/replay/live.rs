@@ -25,6 +25,7 @@ use common::{
     clock::{MissionClock, MissionTime, Pace},
     domain::{Domain, RobotName},
     mission::Mission,
+    roster,
     run::Run,
     samples::{HealthSample, HealthState, RosterEntry, RosterHeader, name_str},
     topics::{self, AnyTopic, EncodedTopic},
@@ -229,6 +230,9 @@ impl Player {
             RosterEntry { stage, pid, generation: stamp.generation, ..RosterEntry::default() };
         self.named.retain(|named| named.stage != stage);
         self.named.push(entry);
+        if let Some(writers) = self.bus.writers() {
+            writers.name(roster::named(&self.named));
+        }
         let header = RosterHeader { supervisor_pid: std::process::id(), ..RosterHeader::default() };
         self.roster.publish(0, MissionTime::default(), header, self.named.iter().copied())
     }
