@@ -17,9 +17,9 @@ pub(crate) struct Gyro {
     /// The number and the end of the newest increment.
     sequence: u64,
     end: MissionTime,
-    /// The time from which no increment is missing.
-    whole_since: MissionTime,
-    /// From the end of the last tick to the end of the newest increment, radians and rad^2.
+    /// The time at which `turn` begins: the end of a tick, or of the first increment after missing ones.
+    since: MissionTime,
+    /// From `since` to the end of the newest increment, radians and rad^2.
     turn: f64,
     variance: f64,
 }
@@ -41,7 +41,7 @@ impl Gyro {
         let follows =
             |gyro: &Self| sequence.checked_sub(1) == Some(gyro.sequence) && gyro.end < end;
         let Some(before) = gyro.filter(follows) else {
-            *gyro = Some(Self { sequence, end, whole_since: end, turn: 0.0, variance: 0.0 });
+            *gyro = Some(Self { sequence, end, since: end, turn: 0.0, variance: 0.0 });
             return false;
         };
         let seconds = |from: MissionTime, to: MissionTime| to.since(from).as_secs_f64();
@@ -54,12 +54,13 @@ impl Gyro {
             let divided = UNEVEN * share * (1.0 - share) * turn_rad;
             let turn = rest.turn + part * turn_rad;
             let variance = rest.variance + part * variance_rad2 + divided * divided;
-            let begins_s = tick.time.seconds() - tick.seconds;
-            if tick.seconds > 0.0 && begins_s >= before.whole_since.seconds() - 1e-6 {
+            // A turn that began before the tick contains those of ticks that have left the history.
+            if (seconds(rest.since, tick.time) - tick.seconds).abs() < 1e-6 && tick.seconds > 0.0 {
                 tick.gyro = Some(GyroTurn { turn, variance });
                 completed = true;
             }
-            (rest.turn, rest.variance, given) = (0.0, divided * divided, share);
+            (rest.since, rest.turn, rest.variance) = (tick.time, 0.0, divided * divided);
+            given = share;
         }
         rest.turn += (1.0 - given) * turn_rad;
         rest.variance += (1.0 - given) * variance_rad2;

@@ -261,15 +261,34 @@ fn heading_error(bias: f64, mut gyro: impl FnMut(u64, f64) -> Vec<TurnSample>) -
     pose.heading_rad - robot.truth.heading
 }
 
-#[test]
-fn a_gyro_holds_the_heading_and_its_bias_is_learned_at_rest() {
-    let turn = |tick: u64, turn_rad| TurnSample {
+/// The increment that ends at `tick`.
+fn turn(tick: u64, turn_rad: f64) -> TurnSample {
+    TurnSample {
         capture_ns: tick * TICK_NS,
         sequence: tick,
         turn_rad,
         variance_rad2: 1e-8,
         ..TurnSample::default()
-    };
+    }
+}
+
+#[test]
+fn a_gyro_whose_increments_come_after_their_ticks_have_left_the_history_does_no_harm() {
+    let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
+    // A source that stands still for 4 s, again and again, while the robot drives in a circle.
+    let mut waiting = Vec::new();
+    for _ in 0..400 {
+        let wheels = robot.drive(0.04, 0.03);
+        waiting.push(turn(robot.tick, 0.03));
+        let come = robot.tick.is_multiple_of(40).then(|| std::mem::take(&mut waiting));
+        let pose = reckoning.given(&wheels, &[], &come.unwrap_or_default()).pose;
+        let off = (pose.heading_rad - robot.truth.heading).abs();
+        assert!(off < 0.1, "{off} at tick {}", robot.tick);
+    }
+}
+
+#[test]
+fn a_gyro_holds_the_heading_and_its_bias_is_learned_at_rest() {
     let without = heading_error(0.0, |_, _| Vec::new());
     let with = heading_error(0.01, |tick, increment| vec![turn(tick, increment)]);
     assert!(without.abs() > 0.5 && with.abs() < 0.01, "{with} with a gyro, {without} without");
