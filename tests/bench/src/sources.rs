@@ -67,7 +67,7 @@ pub fn publish(arguments: &Arguments) -> Result<Published, BenchError> {
     let mut source = Source::new(arguments);
     loop {
         match robot.wait(Duration::from_secs(1))? {
-            Event::Connected => source.open()?,
+            Event::Connected => source.file = None,
             Event::Samples((poses, writers)) => source.take(poses, writers)?,
             Event::Nothing => {}
             Event::Disconnected => return Ok(source.published),
@@ -115,12 +115,6 @@ impl<'a> Source<'a> {
         }
     }
 
-    fn open(&mut self) -> Result<(), BenchError> {
-        let file = File::open(self.arguments.run.join(GROUND_TRUTH));
-        self.file = Some(BufReader::new(file.map_err(system("open the ground truth of the run"))?));
-        Ok(())
-    }
-
     /// Publish what is measured at the new poses.
     fn take(
         &mut self,
@@ -150,6 +144,9 @@ impl<'a> Source<'a> {
     }
 
     fn read_truth(&mut self) -> io::Result<()> {
+        if self.file.is_none() {
+            self.file = self.open()?.map(BufReader::new);
+        }
         let Some(file) = &mut self.file else { return Ok(()) };
         while file.read_line(&mut self.line)? > 0 && self.line.ends_with('\n') {
             self.truth.extend(serde_json::from_str::<GroundTruthTick>(&self.line).ok());
@@ -157,6 +154,14 @@ impl<'a> Source<'a> {
         }
         self.truth.drain(..self.truth.len().saturating_sub(WAITING));
         Ok(())
+    }
+
+    /// The ground truth of the run; none before the simulated robot has written it.
+    fn open(&self) -> io::Result<Option<File>> {
+        match File::open(self.arguments.run.join(GROUND_TRUTH)) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+            opened => opened.map(Some),
+        }
     }
 
     fn measure(
