@@ -8,6 +8,8 @@ use std::{
 use harmonic::MAX_SIDE;
 use thiserror::Error;
 
+use super::MOST_BOXES;
+
 /// Every message begins with the file.
 #[derive(Debug, Error)]
 pub enum MapError {
@@ -39,5 +41,12 @@ pub enum MapError {
 impl MapError {
     pub(crate) fn malformed(file: &Path, problem: impl Into<String>) -> Self {
         Self::Malformed { file: file.to_owned(), problem: problem.into() }
+    }
+
+    pub(crate) fn too_many_boxes(file: &Path) -> Self {
+        let problem = format!(
+            "its walls are more than {MOST_BOXES} boxes; give a map with larger cells or straighter walls"
+        );
+        Self::malformed(file, problem)
     }
 }

@@ -1,5 +1,8 @@
 //! A map of free and blocked cells.
 
+use common::geometry::Box2;
+use glam::DVec2;
+
 /// A map of cells, row-major, row 0 at the top.
 #[derive(Debug)]
 pub struct Map {
@@ -42,6 +45,43 @@ impl Map {
             let (x, y) = (cell.0.abs_diff(col) as u64, cell.1.abs_diff(row) as u64);
             // Far outside the map a distance may not fit.
             x.saturating_mul(x).saturating_add(y.saturating_mul(y))
+        })
+    }
+}
+
+impl PlacedMap {
+    /// The place `cols` cells from the left edge and `rows` from the top one, metres.
+    pub(crate) fn place(&self, cols: f64, rows: f64) -> DVec2 {
+        let up = self.map.rows as f64 - rows;
+        DVec2::from(self.corner_m) + DVec2::new(cols, up) * self.cell_m
+    }
+
+    /// Boxes that cover the cells `wanted` and none but `solid` ones: each grows to the right as far as cells are solid, and down while
+    /// that covers more. They are made as they are asked for.
+    pub(crate) fn boxes(
+        &self,
+        solid: &[bool],
+        mut wanted: Vec<bool>,
+    ) -> impl Iterator<Item = Box2> {
+        let Map { cols, rows, .. } = self.map;
+        (0..wanted.len()).filter_map(move |first| {
+            if !wanted[first] {
+                return None;
+            }
+            let (col, row) = (first % cols, first / cols);
+            let run = (first..(row + 1) * cols).take_while(|&cell| solid[cell]);
+            let width = run.filter(|&cell| wanted[cell]).last().map_or(1, |last| last - first + 1);
+            let line = |row: usize| row * cols + col..row * cols + col + width;
+            let covers = |row: &usize| {
+                line(*row).all(|cell| solid[cell]) && line(*row).any(|cell| wanted[cell])
+            };
+            let height = (row..rows).take_while(covers).count();
+            for row in row..row + height {
+                wanted[line(row)].fill(false);
+            }
+            let least = self.place(col as f64, (row + height) as f64);
+            let size_m = DVec2::new(width as f64, height as f64) * self.cell_m;
+            Some(Box2 { at: least + size_m / 2.0, size_m, ..Box2::default() })
         })
     }
 }

@@ -9,10 +9,8 @@ use common::{
 };
 use glam::DVec2;
 
-use crate::maps::{MapError, PlacedMap, ros};
+use crate::maps::{MOST_BOXES, MapError, PlacedMap, ros};
 
-/// A mission file with so many boxes has 2 MB.
-const MOST_BOXES: usize = 20_000;
 /// Cells farther outside of the perimeter than this concern no robot inside, metres.
 const BEYOND_M: f64 = 1.0;
 
@@ -34,40 +32,17 @@ pub fn with_prior_map(mut mission: Mission) -> Result<Mission, MapError> {
 
 /// Boxes that cover the occupied cells of `placed` in the perimeter `frame` and no other cell.
 fn known(file: &Path, placed: &PlacedMap, frame: &GridFrame) -> Result<Vec<Box2>, MapError> {
-    let PlacedMap { map, cell_m, corner_m } = placed;
-    let place = |cols: usize, rows: usize| {
-        DVec2::from(*corner_m) + DVec2::new(cols as f64, (map.rows - rows) as f64) * *cell_m
-    };
     let within = f64::from(frame.cells) * frame.resolution_m / 2.0 + BEYOND_M;
-    let mut wanted: Vec<bool> = (0..map.blocked.len())
+    let map = &placed.map;
+    let wanted: Vec<bool> = (0..map.blocked.len())
         .map(|cell| {
-            let middle = place(cell % map.cols, cell / map.cols) + DVec2::new(0.5, -0.5) * *cell_m;
-            map.blocked[cell] && (middle - frame.centre).abs().max_element() <= within
+            let (col, row) = ((cell % map.cols) as f64, (cell / map.cols) as f64);
+            let away = placed.place(col + 0.5, row + 0.5) - frame.centre;
+            map.blocked[cell] && away.abs().max_element() <= within
         })
         .collect();
-    let mut boxes = Vec::new();
-    for first in 0..wanted.len() {
-        if !wanted[first] {
-            continue;
-        }
-        if boxes.len() == MOST_BOXES {
-            let problem = format!(
-                "its occupied cells are more than {MOST_BOXES} boxes; give a map with larger cells or straighter walls"
-            );
-            return Err(MapError::malformed(file, problem));
-        }
-        let (col, row) = (first % map.cols, first / map.cols);
-        let width = (col..map.cols).take_while(|col| wanted[row * map.cols + col]).count();
-        let line = |row: usize| row * map.cols + col..row * map.cols + col + width;
-        let height =
-            (row..map.rows).take_while(|&row| wanted[line(row)].iter().all(|it| *it)).count();
-        for row in row..row + height {
-            wanted[line(row)].fill(false);
-        }
-        let size_m = DVec2::new(width as f64, height as f64) * *cell_m;
-        boxes.push(Box2 { at: place(col, row + height) + size_m / 2.0, size_m, ..Box2::default() });
-    }
-    Ok(boxes)
+    let boxes: Vec<Box2> = placed.boxes(&wanted, wanted.clone()).take(MOST_BOXES + 1).collect();
+    if boxes.len() > MOST_BOXES { Err(MapError::too_many_boxes(file)) } else { Ok(boxes) }
 }
 
 /// Write what was believed in `cells` of `frame`, one [`CellState`] byte each, to the YAML `file` and an image beside it.

@@ -4,7 +4,7 @@
 
 use std::{collections::VecDeque, f64::consts::PI, path::Path};
 
-use crate::maps::{MapError, PlacedMap};
+use crate::maps::{MOST_BOXES, MapError, PlacedMap};
 use common::geometry::{Box2, Shapes};
 use glam::DVec2;
 
@@ -12,7 +12,6 @@ use super::{ends::Ends, error::WorldError, random::Random};
 
 /// Longest side of a map, metres: that of the check of solvability.
 const LARGEST_M: f64 = 95.0;
-const MOST_BOXES: usize = 20_000;
 /// Range of the straight distance to a drawn target, metres.
 const DRAWN_M: [f64; 2] = [3.0, 15.0];
 /// Starts that are drawn before the search for a target is given up.
@@ -42,12 +41,14 @@ impl Floor {
     pub(super) fn shapes(&self, file: &Path, start: DVec2) -> Result<Shapes, WorldError> {
         let free: Vec<bool> = self.map.map.blocked.iter().map(|it| !it).collect();
         let reached = self.connected(&free, self.cell(start));
-        let boxes = self.boxes(&reached);
+        let mut wanted = vec![false; reached.len()];
+        for cell in self.beside(&reached) {
+            wanted[cell] = true;
+        }
+        let boxes: Vec<Box2> =
+            self.map.boxes(&self.map.map.blocked, wanted).take(MOST_BOXES + 1).collect();
         if boxes.len() > MOST_BOXES {
-            let problem = format!(
-                "its walls are more than {MOST_BOXES} boxes; give a map with larger cells or straighter walls"
-            );
-            return Err(MapError::Malformed { file: file.to_path_buf(), problem }.into());
+            return Err(MapError::too_many_boxes(file).into());
         }
         Ok(Shapes { boxes, ..Shapes::default() })
     }
@@ -96,13 +97,7 @@ impl Floor {
     /// The middle of a cell, metres.
     fn centre(&self, cell: usize) -> DVec2 {
         let (col, row) = (cell % self.map.map.cols, cell / self.map.map.cols);
-        self.place(col as f64 + 0.5, row as f64 + 0.5)
-    }
-
-    /// The place `cols` cells from the left edge and `rows` from the top one, metres.
-    fn place(&self, cols: f64, rows: f64) -> DVec2 {
-        let up = self.map.map.rows as f64 - rows;
-        DVec2::from(self.map.corner_m) + DVec2::new(cols, up) * self.map.cell_m
+        self.map.place(col as f64 + 0.5, row as f64 + 0.5)
     }
 
     /// The cells of `open` that are connected to `from`, itself included. The rim of a map is never open.
@@ -152,40 +147,6 @@ impl Floor {
         let blocked = &self.map.map.blocked;
         let solid = (0..blocked.len()).filter(|&cell| blocked[cell]);
         solid.filter(|&cell| touches(cell)).collect()
-    }
-
-    /// Boxes of solid cells that cover every one beside `ground`.
-    fn boxes(&self, ground: &[bool]) -> Vec<Box2> {
-        let (cols, rows) = (self.map.map.cols, self.map.map.rows);
-        let blocked = &self.map.map.blocked;
-        let mut wanted = vec![false; blocked.len()];
-        let beside = self.beside(ground);
-        for &cell in &beside {
-            wanted[cell] = true;
-        }
-        let mut boxes = Vec::new();
-        for first in beside {
-            if !wanted[first] {
-                continue;
-            }
-            let (col, row) = (first % cols, first / cols);
-            // The box grows to the right as far as cells are solid, and down while that covers more.
-            let run = (first..(row + 1) * cols).take_while(|&cell| blocked[cell]);
-            let width = run.filter(|&cell| wanted[cell]).last().map_or(1, |last| last - first + 1);
-            let line = |row: usize| row * cols + col..row * cols + col + width;
-            let height = (row..rows)
-                .take_while(|&row| {
-                    line(row).all(|cell| blocked[cell]) && line(row).any(|cell| wanted[cell])
-                })
-                .count();
-            for row in row..row + height {
-                wanted[line(row)].fill(false);
-            }
-            let least = self.place(col as f64, (row + height) as f64);
-            let size_m = DVec2::new(width as f64, height as f64) * self.map.cell_m;
-            boxes.push(Box2 { at: least + size_m / 2.0, size_m, ..Box2::default() });
-        }
-        boxes
     }
 }
 
