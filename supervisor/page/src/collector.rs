@@ -136,6 +136,25 @@ pub fn about(run: &Run) -> Value {
 }
 
 impl Collector {
+    /// The topics whose messages are shown, besides the field.
+    pub const TOPICS: [&dyn AnyTopic; 14] = [
+        &topics::POSE,
+        &topics::RANGES,
+        &topics::COMMAND,
+        &topics::GUIDANCE,
+        &topics::TARGET,
+        &topics::POWER,
+        &topics::GRID,
+        &topics::ROSTER,
+        &topics::DEATHS,
+        &topics::DIRECTIVE,
+        &topics::STALLS,
+        &topics::REQUESTS,
+        &topics::FAULTS,
+        // It ends a tick, so it is read last.
+        &topics::LINK,
+    ];
+
     pub fn new(mission: &Mission) -> Self {
         Self {
             mission: mission.clone(),

@@ -107,8 +107,8 @@ impl Content {
         if lost > 0 {
             self.remarks.push(format!("The recorder of {name} lost {lost} samples."));
         }
-        let mut wanted = TOPICS.map(|topic| topic.spec().name).to_vec();
-        wanted.push(LOG);
+        let mut wanted = Collector::TOPICS.map(|topic| topic.spec().name).to_vec();
+        wanted.extend([topics::FIELD.spec().name, LOG]);
         for message in recording.messages(&wanted)? {
             let message = message?;
             if self.take(&message).is_none() {
@@ -249,21 +249,3 @@ fn truth(directory: &Path) -> Option<Lines<BufReader<Take<File>>>> {
     let file = File::open(directory.join(GROUND_TRUTH)).ok()?;
     Some(BufReader::new(file.take(LARGEST_TRUTH)).lines())
 }
-
-const TOPICS: [&dyn AnyTopic; 15] = [
-    &topics::POSE,
-    &topics::RANGES,
-    &topics::COMMAND,
-    &topics::GUIDANCE,
-    &topics::TARGET,
-    &topics::POWER,
-    &topics::LINK,
-    &topics::GRID,
-    &topics::FIELD,
-    &topics::ROSTER,
-    &topics::DEATHS,
-    &topics::DIRECTIVE,
-    &topics::STALLS,
-    &topics::REQUESTS,
-    &topics::FAULTS,
-];

@@ -19,11 +19,12 @@ use common::{
     run::Run,
     samples::{FieldCell, FieldHeader, TargetPoint, TargetSample},
     step::Step as _,
-    topics::{self, AnyTopic},
+    topics,
 };
 use glam::DVec2;
 use planner::step::{Input, Planner};
 use recording::log_files::LogFiles;
+use supervisor::simulator::GROUND_TRUTH;
 
 use super::shared::Shared;
 use crate::{
@@ -43,33 +44,16 @@ const TRUTH_AT_ONCE: usize = 1 << 16;
 /// Of a larger map no field is computed for a target that is only looked at.
 const PREVIEW_MOST_CELLS: usize = 512 * 512;
 
-/// The topics that are read as messages. The field is read only while somebody watches.
-const READ: [&dyn AnyTopic; 14] = [
-    &topics::POSE,
-    &topics::RANGES,
-    &topics::COMMAND,
-    &topics::GUIDANCE,
-    &topics::TARGET,
-    &topics::POWER,
-    &topics::GRID,
-    &topics::ROSTER,
-    &topics::DEATHS,
-    &topics::DIRECTIVE,
-    &topics::STALLS,
-    &topics::REQUESTS,
-    &topics::FAULTS,
-    // It ends a tick, so it comes last.
-    &topics::LINK,
-];
-
 struct Readers {
+    /// Of [`Collector::TOPICS`].
     messages: Vec<(&'static str, Box<dyn EncodedReader>)>,
+    /// It is looked at only while somebody watches.
     field: SliceReader<FieldHeader, FieldCell>,
 }
 
 impl Readers {
     fn open(bus: &Bus) -> Result<Self, BusError> {
-        let names = READ.map(|topic| topic.spec().name);
+        let names = Collector::TOPICS.map(|topic| topic.spec().name);
         let found = names.into_iter().filter_map(|name| {
             let mut all = topics::ENCODED.iter();
             all.find(|topic| topic.spec().name == name).map(|topic| (name, topic))
@@ -124,11 +108,7 @@ impl Reading {
             processes: Processes::default(),
             logs: LogFiles::follow(&directory, true),
             logs_read: Instant::now(),
-            truth: Truth {
-                file: directory.join("ground_truth.jsonl"),
-                read: 0,
-                partial: Vec::new(),
-            },
+            truth: Truth { file: directory.join(GROUND_TRUTH), read: 0, partial: Vec::new() },
             packed: None,
         })
     }
