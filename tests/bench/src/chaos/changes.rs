@@ -21,7 +21,7 @@ use supervisor::{
 /// Changes of the targets of one mission.
 const MOST_CHANGES: usize = 6;
 /// Wall-clock time from one change to the next, seconds.
-const PAUSE_S: [f64; 2] = [0.4, 1.5];
+const PAUSE_S: [f64; 2] = [0.8, 3.0];
 /// Targets are no farther from the start, metres.
 const WITHIN_M: f64 = 2.5;
 /// What is left free around a target beside the body, metres.
@@ -84,7 +84,7 @@ fn send(robot: &RobotName, mission: &Mission, seed: u64, stopped: &Receiver<()>)
             (0..1 + usize::from(uniform() < 0.4)).map(|_| place(mission, &mut uniform)).collect();
         let words: Vec<_> = places.iter().flatten().map(f64::to_string).collect();
         let mut command = firsthand(&["goto", "--robot", &robot.to_string()]);
-        if uniform() < 0.3 {
+        if uniform() < 0.5 {
             command.arg("--append");
         }
         let output = command.args(words).stdin(Stdio::null()).output();
