@@ -127,7 +127,7 @@ fn a_logger_follows_its_robot_through_five_runs_one_of_them_killed_and_harms_non
         for run in 0..5 {
             let mut started = Run::start("followed", "open-room", &["--pace", "4"]);
             if run == 1 {
-                let status = started.wait_until_under_way(2.0);
+                let status = started.wait_until_under_way(6.0);
                 let supervisor = status["supervisor_pid"].as_u64().unwrap() as u32;
                 support::signal_process(supervisor, rustix::process::Signal::KILL);
                 started.reap();

@@ -147,6 +147,8 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
             return Ok(false);
         }
         match self.join() {
+            // Its supervisor was killed, and another one has begun.
+            Ok(joined) if joined.bus.is_replaced() => Ok(false),
             Ok(joined) => {
                 self.joined = Some(joined);
                 self.refused = None;

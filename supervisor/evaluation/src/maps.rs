@@ -22,12 +22,10 @@ mod ros;
 use std::path::Path;
 
 pub use error::MapError;
+pub(crate) use map::MOST_BOXES;
 pub use map::{Map, PlacedMap};
 pub use prior::{save_believed, with_prior_map};
 pub use ros::load_placed;
-
-/// Of a map that needs more boxes no mission is made: a mission file with so many has 2 MB.
-pub(crate) const MOST_BOXES: usize = 20_000;
 
 /// The map in `file`. The ending of its name says its format.
 pub fn load(file: &Path) -> Result<Map, MapError> {

@@ -8,7 +8,7 @@ use std::{
 use harmonic::MAX_SIDE;
 use thiserror::Error;
 
-use super::MOST_BOXES;
+use super::map::MOST_BOXES;
 
 /// Every message begins with the file.
 #[derive(Debug, Error)]

@@ -3,6 +3,9 @@
 use common::geometry::Box2;
 use glam::DVec2;
 
+/// Of a map that needs more boxes no mission is made: a mission file with so many has 2 MB.
+pub(crate) const MOST_BOXES: usize = 20_000;
+
 /// A map of cells, row-major, row 0 at the top.
 #[derive(Debug)]
 pub struct Map {
