@@ -237,7 +237,7 @@ impl LinkSample {
         Action::from_byte(self.action)
     }
 
-    /// The cause of the action.
+    /// Why the failsafe acts so.
     pub const fn cause(&self) -> Cause {
         Cause::from_byte(self.cause)
     }

@@ -51,6 +51,16 @@ enum SpeedLaw {
     Car,
 }
 
+/// How far the robot has come to its target.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Arrival {
+    #[default]
+    OnTheWay,
+    /// It is there, and turns to the heading that is asked for.
+    Turning,
+    Arrived,
+}
+
 /// The controller of (15)-(17).
 #[derive(Clone, Debug)]
 pub struct Controller {
@@ -70,14 +80,14 @@ pub struct Controller {
     law: SpeedLaw,
     /// The direction in which an antipodal robot turns: 1 to the left, -1 to the right.
     side: f64,
-    /// The number of the target that it has come to, and whether it has also turned to the heading that is asked for there.
-    reached: Option<(u64, bool)>,
+    /// The number of the newest target, and how far the robot has come to it.
+    arrival: (u64, Arrival),
 }
 
 impl Step for Controller {
     type Input<'a> = &'a GuidanceSample;
     type Output = CommandSample;
-    /// The controller has no state. A robot that arrived is at the target for its next controller too.
+    /// No state survives the process: a robot at its target is there for the next controller too, or drives the last centimetre again.
     type State = ();
 
     fn new(mission: &Mission) -> Self {
@@ -100,7 +110,7 @@ impl Step for Controller {
                 Method::Evidential => SpeedLaw::Evidential,
             },
             side: 1.0,
-            reached: None,
+            arrival: Default::default(),
         }
     }
 
@@ -123,17 +133,19 @@ impl Step for Controller {
             target_number: guidance.target_number,
             ..CommandSample::default()
         };
-        let reached = self.reaches(guidance, distance);
-        if reached == Some(true) {
-            return CommandSample { state: CommandState::Arrived.into(), ..command };
-        }
-        let (status, direction) = match guidance.target.heading().filter(|_| reached.is_some()) {
-            Some(heading) => (GuidanceStatus::Look, DVec2::from_angle(heading)),
-            None => {
-                let direction = DVec2::new(guidance.ex, guidance.ey);
-                (GuidanceStatus::from_byte(guidance.status), direction)
-            }
-        };
+        let (status, direction) =
+            match (self.arrival(guidance, distance), guidance.target.heading()) {
+                (Arrival::Arrived, _) => {
+                    return CommandSample { state: CommandState::Arrived.into(), ..command };
+                }
+                (Arrival::Turning, Some(heading)) => {
+                    (GuidanceStatus::Look, DVec2::from_angle(heading))
+                }
+                _ => {
+                    let direction = DVec2::new(guidance.ex, guidance.ey);
+                    (GuidanceStatus::from_byte(guidance.status), direction)
+                }
+            };
         // Shared memory is outside too: only a direction is followed.
         let unit = (direction.length() - 1.0).abs() < 1e-3;
         let is_sent = guidance.target_number != 0;
@@ -160,23 +172,26 @@ impl Step for Controller {
 }
 
 impl Controller {
-    /// Whether the robot has arrived, or only has to turn to the heading that is asked for there; none if it is on its way.
-    fn reaches(&mut self, guidance: &GuidanceSample, distance: f64) -> Option<bool> {
+    /// How far the robot has come. It never goes back: a robot at rest on the edge of the circle does not start again because of one
+    /// count. A robot beside a target that is not free is there too, if the planner says that it is as near as it can be.
+    fn arrival(&mut self, guidance: &GuidanceSample, distance: f64) -> Arrival {
         let number = guidance.target_number;
-        // The arrival is latched, so that a robot at rest on the edge of the circle does not start again because of one count. A robot
-        // beside a target that is not free has arrived too, if the planner says that it is as near as it can be.
-        self.reached.take_if(|(of, _)| *of != number);
+        if self.arrival.0 != number {
+            self.arrival = (number, Arrival::OnTheWay);
+        }
         let beside = GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::AtTarget;
         let is_there = distance <= self.tolerance || beside && distance <= MOST_OFF_TARGET_M;
-        if self.reached.is_none() && !(is_there && number != 0) {
-            return None;
+        let arrival = &mut self.arrival.1;
+        if *arrival == Arrival::OnTheWay && is_there && number != 0 {
+            *arrival = Arrival::Turning;
         }
         let faces = guidance.target.heading().is_none_or(|heading| {
             wrap_angle(heading - guidance.heading_rad).abs() <= FACES_WITHIN_RAD
         });
-        let (_, faced) = self.reached.get_or_insert((number, false));
-        *faced |= faces;
-        Some(*faced)
+        if *arrival == Arrival::Turning && faces {
+            *arrival = Arrival::Arrived;
+        }
+        *arrival
     }
 
     /// The motion under guidance of that status; none to stand.

@@ -37,7 +37,7 @@ pub enum Input {
     },
     /// The supervisor's reset of the sensed belief.
     Reset {
-        /// The epoch that begins. An epoch that has begun already is ignored.
+        /// The number of the belief that begins. A reset to one that has begun already is ignored.
         epoch: u64,
     },
     /// A fault that an operator injects into the belief; it acts from the next tick on.

@@ -94,7 +94,7 @@ mod tests {
 
     #[test]
     fn equation_3_by_hand_and_back() {
-        // phi = 45 degrees, 4 rad/s: v = 0.4, omega = 0.4 / 0.5 = 0.8.
+        // Wheels of 0.1 m, 0.5 m between the axles: at 45 degrees and 4 rad/s v = 0.4, omega = 0.4 / 0.5 = 0.8.
         let input = SteeredWheel { wheel: 4.0, steering: FRAC_PI_4 };
         let twist = car(1.0).twist(input);
         close(twist.v, 0.4);

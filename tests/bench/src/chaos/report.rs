@@ -25,7 +25,7 @@ pub struct Report {
     collisions: u64,
     /// Missions that did not reach the target, touched something or lost the pose: seeds and reasons.
     wrong: Vec<String>,
-    /// Stages aborted as hung that were not frozen alone.
+    /// Stages that the supervisor aborted as hung although no signal had frozen them, or one had frozen all processes.
     healthy_aborted: u64,
     /// Signals by stage and kind.
     kills: BTreeMap<&'static str, BTreeMap<Kind, u32>>,

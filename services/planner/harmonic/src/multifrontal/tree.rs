@@ -45,7 +45,7 @@ pub(crate) struct Cost {
     pub operations: f64,
     /// Most weights stored for the substitution.
     pub weights: usize,
-    /// Bytes, of all that is allocated.
+    /// Bytes that the factorisation allocates.
     pub bytes: u64,
 }
 
