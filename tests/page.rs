@@ -6,6 +6,7 @@ use std::{
 };
 
 use rustix::process::Signal;
+use serde_json::json;
 
 use crate::support::{
     Browser, Run, assert_nothing_left, firsthand, has_browser, not_run, printed, refused,
@@ -72,6 +73,21 @@ const IS_THERE: &str = "!document.body.classList.contains('lost')";
 const GOES: &str = "document.getElementById('status').textContent.startsWith('the robot goes')";
 const RESTS: &str = "document.getElementById('status').textContent.includes('at rest')";
 
+const GOLDEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/golden/open-room.mcap");
+const TITLES: &str =
+    "return [...document.querySelectorAll('figcaption')].map((it) => it.textContent.split(',')[0])";
+const CHARTS: [&str; 9] = [
+    "Speed",
+    "Turn rate",
+    "Left wheel",
+    "Right wheel",
+    "Sonar",
+    "Infrared",
+    "Battery",
+    "Tick latency",
+    "Ticks by latency",
+];
+
 fn says(id: &str, text: &str) -> String {
     format!("document.getElementById('{id}').textContent.includes('{text}')")
 }
@@ -91,6 +107,7 @@ fn operate(robot: &str, width: u32) {
     let wide = "document.documentElement.scrollWidth <= innerWidth";
     assert_eq!(browser.run(&format!("return {wide}")), true, "it fits the window");
 
+    browser.assert_legible();
     browser.tap("map", 40, -30);
     browser.wait_until(&says("chosen", ","));
     browser.wait_until("!document.getElementById('go').disabled");
@@ -157,9 +174,8 @@ fn a_recorded_run_is_scrubbed_and_played_in_windows_of_both_widths() {
     if !has_browser() {
         return not_run("a recorded page", "chromium and chromedriver are missing");
     }
-    let golden = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/golden/open-room.mcap");
     let out = tempfile::tempdir().unwrap();
-    let page = printed(&["report", golden, "--out", out.path().to_str().unwrap()]);
+    let page = printed(&["report", GOLDEN, "--out", out.path().to_str().unwrap()]);
     let picture = "return document.getElementById('map').toDataURL()";
     for width in [1280, 390] {
         let browser = Browser::open(width);
@@ -169,6 +185,9 @@ fn a_recorded_run_is_scrubbed_and_played_in_windows_of_both_widths() {
         browser.wait_until(
             "document.getElementById('time').value === document.getElementById('time').max",
         );
+        browser.wait_until("document.getElementById('status').className === 'good'");
+        assert_eq!(browser.run(TITLES), json!(CHARTS));
+        browser.assert_legible();
         let at_the_end = browser.run(picture);
         let scrub = "const time = document.getElementById('time'); time.value = 1; time.dispatchEvent(new Event('input'))";
         browser.run(scrub);
@@ -184,6 +203,27 @@ fn a_recorded_run_is_scrubbed_and_played_in_windows_of_both_widths() {
             browser.run("return getComputedStyle(document.getElementById('urgent')).display");
         assert_eq!(there, "none", "there is nobody to stop");
     }
+}
+
+#[test]
+fn a_page_of_dark_colours_is_printed_in_light_ones() {
+    if !has_browser() {
+        return not_run("a printed page", "chromium and chromedriver are missing");
+    }
+    let out = tempfile::tempdir().unwrap();
+    let page = printed(&["report", GOLDEN, "--out", out.path().to_str().unwrap()]);
+    let browser = Browser::open(1280);
+    let features = json!([{"name": "prefers-color-scheme", "value": "dark"}]);
+    browser.command("Emulation.setEmulatedMedia", &json!({"features": features}));
+    browser.go(&format!("file://{}", page.trim_end()));
+    browser.wait_until("document.querySelectorAll('#metrics tr').length > 10");
+    let corner = "document.getElementById('map').getContext('2d').getImageData(2, 2, 1, 1).data[0]";
+    browser.wait_until(&format!("{corner} === 23"));
+    browser.run(&format!("addEventListener('beforeprint', () => (window.paper = {corner}))"));
+    let printed = browser.command("Page.printToPDF", &json!({"preferCSSPageSize": true}));
+    assert!(printed["data"].as_str().unwrap().starts_with("JVBERi"), "a PDF in base64");
+    assert_eq!(browser.run("return window.paper"), 255);
+    browser.wait_until(&format!("{corner} === 23"));
 }
 
 #[test]

@@ -90,6 +90,23 @@ impl Browser {
         self.ask("POST", &format!("{}/execute/sync", self.session), &asked)
     }
 
+    /// A command of Chromium's own protocol.
+    pub fn command(&self, name: &str, parameters: &Value) -> Value {
+        let asked = json!({"cmd": name, "params": parameters});
+        self.ask("POST", &format!("{}/goog/cdp/execute", self.session), &asked)
+    }
+
+    /// Each text of the page can be read, in light and in dark colours.
+    #[track_caller]
+    pub fn assert_legible(&self) {
+        for scheme in ["light", "dark"] {
+            let features = json!([{"name": "prefers-color-scheme", "value": scheme}]);
+            self.command("Emulation.setEmulatedMedia", &json!({"features": features}));
+            assert_eq!(self.run(include_str!("legibility.js")), json!([]), "{scheme}");
+        }
+        self.command("Emulation.setEmulatedMedia", &json!({"features": []}));
+    }
+
     /// The text of the element `id`.
     pub fn text(&self, id: &str) -> String {
         let text = self.run(&format!("return document.getElementById('{id}').textContent"));

@@ -9,11 +9,10 @@ use common::{
     ground_truth::GroundTruthTick,
     mission::Mission,
     process_usage::Usage,
-    run::Run,
     samples::{
-        Cause, CommandSample, FieldCell, FieldHeader, GridHeader, GuidanceSample, GuidanceStatus,
+        CommandSample, FieldCell, FieldHeader, GridHeader, GuidanceSample, GuidanceStatus,
         HoldReason, LinkSample, Order, PoseSample, PowerSample, RangeReading, RangeStatus,
-        RangesHeader, RosterEntry, RosterHeader, StageState, TargetSample, name_str,
+        RangesHeader, RosterEntry, RosterHeader, StageState, TargetSample, WheelSample, name_str,
     },
     topics::{self, AnyTopic},
 };
@@ -26,7 +25,7 @@ use crate::{
 };
 
 /// The columns of a row before those of the sensors.
-const COLUMNS: [&str; 20] = [
+pub(crate) const COLUMNS: [&str; 24] = [
     "t",
     "x",
     "y",
@@ -38,6 +37,10 @@ const COLUMNS: [&str; 20] = [
     "omega",
     "v_told",
     "omega_told",
+    "left",
+    "right",
+    "left_told",
+    "right_told",
     "distance",
     "limit",
     "latency_ms",
@@ -59,6 +62,8 @@ const MOST_TRUTHS: usize = 4096;
 #[derive(Clone, Debug, Default)]
 struct Tick {
     pose: Option<PoseSample>,
+    /// Speeds of the left and the right wheel by their encoders, rad/s.
+    wheels: Option<[f64; 2]>,
     command: Option<CommandSample>,
     guidance: Option<GuidanceSample>,
     ranges: Option<Vec<Option<f64>>>,
@@ -84,7 +89,6 @@ pub struct Collector {
     grid_header: GridHeader,
     field: Replica<FieldCell>,
     field_target: DVec2,
-    target_number: u64,
     target: DVec2,
     events: Events,
     /// The targets after the current one.
@@ -97,49 +101,12 @@ pub struct Collector {
     field_of: Option<u64>,
 }
 
-/// What `run` is: the first message of a page.
-pub fn about(run: &Run) -> Value {
-    let mission = &run.mission;
-    let simulated = mission.robot.address.is_none();
-    let sensors: Vec<_> = mission
-        .sensor_table()
-        .into_iter()
-        .map(|sensor| {
-            json!({
-                "name": sensor.name,
-                "cone": sensor.kind == common::mission::SensorKind::Cone,
-                "forward_m": sensor.mount.forward_m,
-                "bearing": sensor.mount.bearing_rad,
-                "half": sensor.field_of_view_deg.to_radians() / 2.0,
-                "reach_m": sensor.reach_m,
-                "used": sensor.used,
-            })
-        })
-        .collect();
-    json!({
-        "robot": run.robot.to_string(),
-        "mission": mission.name,
-        "simulated": simulated,
-        "seed": mission.seed,
-        "target": [mission.target.x, mission.target.y],
-        "tolerance_m": mission.arrival_tolerance_m,
-        "perimeter": {
-            "width_m": mission.perimeter.width_m,
-            "centre": [mission.perimeter.centre.x, mission.perimeter.centre.y],
-        },
-        "radius_m": mission.body().radius_m,
-        "sensors": sensors,
-        "columns": COLUMNS,
-        "known": mission.known,
-        "world": simulated.then_some(&mission.world),
-    })
-}
-
 impl Collector {
     /// The topics whose messages are shown, besides the field.
-    pub const TOPICS: [&dyn AnyTopic; 14] = [
+    pub const TOPICS: [&dyn AnyTopic; 15] = [
         &topics::POSE,
         &topics::RANGES,
+        &topics::WHEELS,
         &topics::COMMAND,
         &topics::GUIDANCE,
         &topics::TARGET,
@@ -173,7 +140,6 @@ impl Collector {
             grid_header: GridHeader::default(),
             field: Replica::default(),
             field_target: mission.target,
-            target_number: 0,
             target: mission.target,
             ahead: Vec::new(),
             events: Events::default(),
@@ -195,6 +161,8 @@ impl Collector {
         } else if is(&topics::RANGES) {
             let (header, readings) = decode_slice::<RangesHeader, RangeReading>(data)?;
             self.ranges(header.stamp.tick, &readings);
+        } else if is(&topics::WHEELS) {
+            self.wheels(&sample(data)?);
         } else if is(&topics::COMMAND) {
             self.command(sample(data)?);
         } else if is(&topics::GUIDANCE) {
@@ -256,6 +224,13 @@ impl Collector {
         self.tick(tick).ranges = Some(ranges);
     }
 
+    fn wheels(&mut self, wheels: &WheelSample) {
+        let per_count = std::f64::consts::TAU / self.mission.body().counts_per_turn;
+        let speeds = [wheels.left_counts_per_s, wheels.right_counts_per_s];
+        self.tick(wheels.stamp.tick).wheels =
+            Some(speeds.map(|speed| f64::from(speed) * per_count));
+    }
+
     fn command(&mut self, command: CommandSample) {
         self.events.command(&command);
         self.tick(command.stamp.tick).command = Some(command);
@@ -274,10 +249,7 @@ impl Collector {
     }
 
     fn sent(&mut self, target: &TargetSample) {
-        if self.target_number != target.number {
-            self.events.target(target);
-        }
-        self.target_number = target.number;
+        self.events.target(target);
         self.target = target.target.position();
         self.ahead = target.ahead().iter().map(|point| point.position()).collect();
     }
@@ -297,14 +269,17 @@ impl Collector {
     /// The row of `tick`. What did not come in it is as before.
     fn row(&mut self, tick: Tick) -> Option<Value> {
         let pose = &tick.pose?;
-        let Tick { command, guidance, ranges, latency_ns, .. } = std::mem::take(&mut self.newest);
+        let Tick { wheels, command, guidance, ranges, latency_ns, .. } =
+            std::mem::take(&mut self.newest);
         self.newest = Tick {
             pose: Some(*pose),
+            wheels: tick.wheels.or(wheels),
             command: tick.command.or(command),
             guidance: tick.guidance.or(guidance),
             ranges: tick.ranges.or(ranges),
             latency_ns: tick.latency_ns.or(latency_ns),
         };
+        let [left, right] = self.newest.wheels.unwrap_or([f64::NAN; 2]);
         let command = self.newest.command.unwrap_or_default();
         let guidance = self.newest.guidance.unwrap_or_default();
         let [xx, xy, _, yy, ..] = pose.covariance;
@@ -325,6 +300,10 @@ impl Collector {
             pose.omega_rad_s,
             command.v_m_s,
             command.omega_rad_s,
+            left,
+            right,
+            command.left_rad_s,
+            command.right_rad_s,
             guidance.distance_m,
             guidance.speed_limit_m_s,
             self.newest.latency_ns.map_or(f64::NAN, |ns| ns as f64 / 1e6),
@@ -427,7 +406,10 @@ impl Collector {
     pub(crate) fn link_says(&self) -> (bool, String) {
         let (action, cause) = (self.link.action().effect(), self.link.cause());
         let why = if self.link.stopped() { format!(": {}", cause.name()) } else { String::new() };
-        (cause == Cause::OperatorStop, format!("the link says that the robot {action}{why}"))
+        (
+            cause == common::samples::Cause::OperatorStop,
+            format!("the link says that the robot {action}{why}"),
+        )
     }
 
     /// The state of the robot's processes, if it has changed since the last time; one in which only ages differ is given once a second.
@@ -439,8 +421,11 @@ impl Collector {
         let mut key: Vec<u64> = self.stages.iter().flat_map(flags).collect();
         let LinkSample { action, cause, connected, at_rest, .. } = self.link;
         let RosterHeader { order, reason, .. } = self.roster;
-        key.extend([action, cause, at_rest, order, reason, self.status()].map(u64::from));
-        key.extend([u64::from(connected), self.target_number, self.ahead.len() as u64]);
+        let kind = self.events.kind(&self.link);
+        key.extend(
+            [action, cause, at_rest, order, reason, self.status(), kind as u8].map(u64::from),
+        );
+        key.extend([u64::from(connected), self.events.target, self.ahead.len() as u64]);
         let now = self.now_s();
         if let Some((before, at)) = &self.state_of
             && *before == key
@@ -483,7 +468,7 @@ impl Collector {
             "connected": self.link.connected == 1,
             "at_rest": self.link.at_rest == 1,
             "stopped": self.link.stopped(),
-            "operator_stop": self.link.cause() == Cause::OperatorStop,
+            "kind": self.events.kind(&self.link),
             "action": self.link.action().effect(),
             "cause": self.link.cause().name(),
             "guidance": words(GuidanceStatus::from_byte(self.status())),

@@ -42,7 +42,9 @@ pub(crate) struct Events {
     found: Vec<Event>,
     failsafe: Option<(u8, u8)>,
     directive: Option<(u8, u8)>,
-    /// The number of the target that was reached last.
+    /// The number of the current target, of the last of the list, and of the one that was reached.
+    pub(crate) target: u64,
+    last: u64,
     arrived: u64,
     /// The generation of each stage that was seen to run.
     running: Vec<(String, u32)>,
@@ -97,13 +99,23 @@ impl Events {
         if self.failsafe.replace(now) == Some(now) {
             return;
         }
-        let kind = if link.stopped() { Kind::Bad } else { Kind::Good };
+        let kind = self.kind(link);
         let text = match (link.action(), link.cause()) {
             (action, Cause::None) => format!("the robot {}", action.effect()),
             (Action::Go, cause) => cause.name().to_owned(),
             (action, cause) => format!("the robot {}: {}", action.effect(), cause.name()),
         };
         self.add("failsafe", kind, text);
+    }
+
+    /// How the state of `link` is to be judged.
+    pub(crate) fn kind(&self, link: &LinkSample) -> Kind {
+        match link.cause() {
+            Cause::NotOrdered => Kind::Note,
+            Cause::MissionOver if self.last > 0 && self.arrived == self.last => Kind::Good,
+            _ if link.stopped() => Kind::Bad,
+            _ => Kind::Good,
+        }
     }
 
     pub(crate) fn directive(&mut self, directive: &DirectiveSample) {
@@ -139,6 +151,10 @@ impl Events {
     }
 
     pub(crate) fn target(&mut self, target: &TargetSample) {
+        self.last = target.last;
+        if std::mem::replace(&mut self.target, target.number) == target.number {
+            return;
+        }
         let at = target.target.position();
         let text = format!("target {}: ({:.2}, {:.2})", target.number, at.x, at.y);
         self.add("supervisor", Kind::Note, text);

@@ -3,6 +3,7 @@
 //!
 //! | module | holds |
 //! |---|---|
+//! | `about` | the first message of a page |
 //! | `collector` | samples as rows, states, events |
 //! | `events` | deaths, recoveries, orders and log lines as one list |
 //! | `blob` | maps and fields as binary messages |
@@ -10,6 +11,7 @@
 //! | `recorded` | a recorded run as one file |
 //! | [`live`] | the live page (feature `live`) |
 
+mod about;
 mod assets;
 mod blob;
 mod collector;
@@ -21,7 +23,8 @@ mod recorded;
 use common::{grid::GridFrame, samples::FieldCell};
 use glam::DVec2;
 
-pub use collector::{Collector, about};
+pub use about::about;
+pub use collector::Collector;
 pub use events::{Event, Kind};
 pub use recorded::Recorded;
 

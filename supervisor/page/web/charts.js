@@ -1,24 +1,47 @@
-// The charts, all on one axis of time, drawn by uPlot.
+// The charts, drawn by uPlot: all but a histogram are on one axis of time.
+
+import { colour } from "./map.js";
 
 /* global uPlot */
 
 const HEIGHT = 120;
 
-function colour(name) {
-  return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+// Buckets of the histogram an octave, from a microsecond.
+const PER_OCTAVE = 8;
+
+/// How many of `values`, ms, are in each bucket: the lower ends of the buckets, and the counts.
+function histogram(values) {
+  const counts = [];
+  for (const value of values) {
+    if (!value) continue;
+    const bucket = Math.max(0, Math.floor(Math.log2(value * 1000) * PER_OCTAVE));
+    counts[bucket] = (counts[bucket] ?? 0) + 1;
+  }
+  const [ends, heights] = [[], []];
+  for (let bucket = counts.findIndex(Boolean); bucket >= 0 && bucket <= counts.length; bucket++) {
+    ends.push(2 ** (bucket / PER_OCTAVE) / 1000);
+    heights.push(counts[bucket] ?? 0);
+  }
+  return [ends, heights];
 }
 
 /// What the charts show: a title, a unit, and series with a name and their values in the store.
 function charts(store) {
   const column = (name, text) => ({ text, of: () => store.columns[name] });
   const sensors = (cone) => store.about.sensors.map((sensor, at) => ({ sensor, text: sensor.name, of: () => store.ranges[at] })).filter(({ sensor }) => sensor.cone === cone);
+  const { steers } = store.about;
   return [
     { title: "Speed", unit: "m/s", series: [column("v", "driven"), column("v_told", "told"), column("limit", "limit")] },
     { title: "Turn rate", unit: "rad/s", series: [column("omega", "turned"), column("omega_told", "told")] },
+    { title: steers ? "Driven wheel" : "Left wheel", unit: "rad/s", series: [column("left", "measured"), column("left_told", "told")] },
+    steers
+      ? { title: "Steering", unit: "rad", series: [column("right_told", "told")] }
+      : { title: "Right wheel", unit: "rad/s", series: [column("right", "measured"), column("right_told", "told")] },
     { title: "Sonar", unit: "m", series: sensors(true) },
     { title: "Infrared", unit: "m", series: sensors(false) },
     { title: "Battery", unit: "V", series: [column("board_v", "boards"), column("motor_v", "motors")] },
     { title: "Tick latency", unit: "ms", series: [column("latency_ms", "link")] },
+    { title: "Ticks by latency", unit: "count", isHistogram: true, series: [column("latency_ms", "ticks")] },
   ].filter(({ series }) => series.length);
 }
 
@@ -43,7 +66,8 @@ export class Charts {
       this.plots = [];
       return;
     }
-    const sync = uPlot.sync("time");
+    const width = this.width();
+    const font = "11px system-ui";
     const all = charts(this.store);
     this.plots = all.map((chart, row) => {
       const figure = document.createElement("figure");
@@ -51,31 +75,36 @@ export class Charts {
       caption.textContent = `${chart.title}, ${chart.unit}`;
       figure.append(caption);
       this.parent.append(figure);
-      const isLast = row === all.length - 1;
-      const axis = { stroke: colour("soft"), grid: { stroke: colour("line"), width: 0.5 }, ticks: { stroke: colour("line"), width: 0.5 }, font: "11px system-ui" };
+      const { isHistogram } = chart;
+      const label = isHistogram ? "tick latency, ms" : all[row + 1]?.isHistogram ? "mission time, s" : undefined;
+      const axis = { stroke: colour("soft"), grid: { stroke: colour("line"), width: 0.5 }, ticks: { stroke: colour("line"), width: 0.5 }, font, labelFont: font, labelSize: 18 };
       const plot = new uPlot({
-        width: this.width(),
-        height: isLast ? HEIGHT + 30 : HEIGHT,
-        cursor: { sync: { key: sync.key }, drag: { x: false, y: false } },
-        scales: { x: { time: false } },
-        axes: [{ ...axis, size: isLast ? 42 : 24, label: isLast ? "mission time, s" : undefined, labelSize: 18, labelFont: "11px system-ui" }, { ...axis, size: 44 }],
-        series: [{ label: "s", value: (_, t) => (t === null ? "–" : t.toFixed(2)) }, ...chart.series.map(({ text }, at) => ({
+        width,
+        height: label ? HEIGHT + 30 : HEIGHT,
+        cursor: { sync: isHistogram ? {} : { key: "time" }, drag: { x: false, y: false } },
+        scales: { x: { time: false, ...(isHistogram && { distr: 3, range: (_, from, to) => [from, to] }) } },
+        axes: [{ ...axis, size: label ? 42 : 24, label }, { ...axis, size: 44 }],
+        series: [{ label: isHistogram ? "ms" : "s", value: (_, t) => (t === null ? "–" : t.toFixed(2)) }, ...chart.series.map(({ text }, at) => ({
           label: text,
           stroke: colour(`c${at % 7}`),
           width: 1.4,
           points: { show: false },
+          ...(isHistogram && { fill: colour("c0"), paths: uPlot.paths.stepped({ align: 1 }) }),
           value: (_, value) => (value === null || value === undefined ? "–" : value.toFixed(2)),
         }))],
-        hooks: { draw: [(it) => this.mark(it)] },
+        hooks: { draw: isHistogram ? [] : [(it) => this.mark(it)] },
       }, this.data(chart), figure);
       plot.over.addEventListener("click", () => {
-        if (plot.cursor.left >= 0) this.onTime(plot.posToVal(plot.cursor.left, "x"));
+        if (!isHistogram && plot.cursor.left >= 0) this.onTime(plot.posToVal(plot.cursor.left, "x"));
       });
       return { chart, plot };
     });
+    this.shown = this.store.end;
+    this.t = NaN;
   }
 
   data(chart) {
+    if (chart.isHistogram) return histogram(this.store.columns.latency_ms);
     return [this.store.times, ...chart.series.map(({ of }) => of())];
   }
 
@@ -84,8 +113,9 @@ export class Charts {
   }
 
   resize() {
+    const width = this.width();
     for (const { plot } of this.plots) {
-      if (plot.width !== this.width()) plot.setSize({ width: this.width(), height: plot.height });
+      if (plot.width !== width) plot.setSize({ width, height: plot.height });
     }
   }
 
@@ -111,6 +141,7 @@ export class Charts {
     for (const { chart, plot } of this.plots) {
       if (end !== this.shown) plot.setData(this.data(chart));
       else plot.redraw(false, false);
+      if (chart.isHistogram) continue;
       // Without a pointer the legend has the values at the time that is shown.
       if (!(plot.cursor.left >= 0)) plot.setLegend({ idx: Math.max(this.store.rowAt(t), 0) });
     }

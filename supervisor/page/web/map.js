@@ -10,8 +10,12 @@ const GRAB = 26;
 const CELLS = [null, "sensed", "known", "rim", "scanned", "margin"];
 const LEGEND = [["sensed", "believed hazard"], ["margin", "its margin"], ["known", "known before"], ["scanned", "scanned"], ["way", "way"], ["beam", "beams"], ["target", "target"]];
 
-function colour(name) {
-  return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+const colours = new Map();
+
+/// The colour of that name in the style sheet.
+export function colour(name) {
+  if (!colours.has(name)) colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
+  return colours.get(name);
 }
 
 function rgb(name) {
@@ -49,6 +53,7 @@ export class MapView {
 
   /// Colours have changed.
   repaint() {
+    colours.clear();
     this.images = {};
     this.changed();
   }
@@ -234,13 +239,20 @@ export class MapView {
   }
 
   drawLines(unpacked) {
-    if (this.lines?.of !== unpacked) this.lines = { of: unpacked, lines: new Field(unpacked).lines(0.3) };
-    this.context.globalAlpha = 0.7;
-    for (const line of this.lines.lines) {
-      this.path(line);
-      this.stroke("stream", 0.8);
+    if (this.lines?.of !== unpacked) {
+      const path = new Path2D();
+      for (const line of new Field(unpacked).lines(0.3)) line.forEach(([x, y], at) => (at ? path.lineTo(x, y) : path.moveTo(x, y)));
+      this.lines = { of: unpacked, path };
     }
-    this.context.globalAlpha = 1;
+    const { context, scale } = this;
+    const [px, py] = this.pixels(0, 0);
+    context.save();
+    context.transform(scale, 0, 0, -scale, px, py);
+    context.globalAlpha = 0.7;
+    context.strokeStyle = colour("stream");
+    context.lineWidth = 0.8 / scale;
+    context.stroke(this.lines.path);
+    context.restore();
   }
 
   drawPerimeter() {

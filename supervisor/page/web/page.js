@@ -50,8 +50,10 @@ function drawStatus() {
     const rest = state.at_rest ? ", at rest" : "";
     text = state.connected ? `the robot ${state.action}${why}${rest}; guidance: ${state.guidance}` : "the robot does not answer";
   } else if (store.about) text = "the robot starts";
+  let kind = store.problem ? "bad" : (state?.kind ?? "");
+  if (store.summary?.kind && timeline.t >= store.end) ({ outcome: text, kind } = store.summary);
   status.textContent = text;
-  status.classList.toggle("bad", Boolean(store.problem) || Boolean(state?.stopped));
+  status.className = kind;
 }
 
 /// A run is shown from its beginning.
@@ -74,7 +76,9 @@ function lost(why) {
 
 async function openRecording() {
   document.body.classList.add("recording");
-  const bytes = Uint8Array.from(atob(recording.textContent.trim()), (letter) => letter.charCodeAt(0));
+  const text = atob(recording.textContent.trim());
+  const bytes = new Uint8Array(text.length);
+  for (let at = 0; at < bytes.length; at++) bytes[at] = text.charCodeAt(at);
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
   const buffer = await new Response(stream).arrayBuffer();
   const view = new DataView(buffer);
@@ -123,6 +127,15 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   charts.make();
   changed();
 });
+/// Paper has light colours. Canvases that are drawn for it are printed as lines and letters.
+function print(prints) {
+  document.documentElement.classList.toggle("print", prints);
+  map.repaint();
+  charts.make();
+  draw(performance.now());
+}
+addEventListener("beforeprint", () => print(true));
+addEventListener("afterprint", () => print(false));
 addEventListener("keydown", ({ key, target }) => {
   if (target.tagName === "INPUT" || target.tagName === "SELECT" || target.id === "map") return;
   if (key === "ArrowLeft") timeline.go(timeline.t - 0.5);

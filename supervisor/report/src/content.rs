@@ -12,7 +12,7 @@ use common::{
     samples::{RangeReading, RangesHeader},
     topics::{self, AnyTopic},
 };
-use page::{Collector, Recorded};
+use page::{Collector, Kind, Recorded};
 use recording::{End, Message, Recording};
 use serde_json::{Map, Value, json};
 use supervisor::simulator::GROUND_TRUTH;
@@ -215,6 +215,7 @@ impl Content {
         self.page.text(&json!({
             "metrics": metrics.into_iter().chain(about).collect::<Vec<_>>(),
             "outcome": self.ended(),
+            "kind": self.kind(),
             "remarks": self.remarks,
         }));
         self.page.html(&format!("Report: {}", self.mission.name))
@@ -227,6 +228,14 @@ impl Content {
             (Some(outcome), None) => outcome.to_owned(),
             (None, _) => "No summary of this run lies beside the recording: how it ended is not known here, and metrics are those of the recording.".to_owned(),
         }
+    }
+
+    fn kind(&self) -> Option<Kind> {
+        Some(match self.outcome()? {
+            "reached" => Kind::Good,
+            "reached_unsure" => Kind::Note,
+            _ => Kind::Bad,
+        })
     }
 
     pub(crate) fn summed(&self, field: &str) -> Option<f64> {

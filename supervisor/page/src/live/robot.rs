@@ -28,8 +28,9 @@ use supervisor::simulator::GROUND_TRUTH;
 
 use super::shared::Shared;
 use crate::{
+    about::about,
     blob::{self, Shown},
-    collector::{Collector, about},
+    collector::Collector,
 };
 
 /// How often a run that has ended or begun, or the end of this process, is noticed when nothing is published.
