@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::support::{printed, refused};
+use crate::support::{messages, printed, refused};
 
 /// The command that evaluates two rooms in `out`.
 fn two_rooms<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
@@ -43,6 +43,25 @@ fn an_evaluation_that_was_cut_off_goes_on_and_another_is_not_mixed_with_it() {
     refused(&again, "results-there", &["--resume"]);
     let other = two_rooms(name, &["--seed", "6", "--resume"]);
     refused(&other, "other-results", &[name]);
+}
+
+#[test]
+fn a_failure_of_an_evaluation_is_opened_as_the_page_of_its_run() {
+    let out = tempfile::tempdir().unwrap();
+    let name = out.path().join("late");
+    let all = evaluate(name.to_str().unwrap(), &["--set", "timeout_s=3"]);
+    assert_eq!(all["timeout"], 1.0, "{all}");
+    let files = std::fs::read_dir(name.join("failures")).unwrap();
+    let files: Vec<_> = files.map(|file| file.unwrap().path()).collect();
+    let pages: Vec<_> = files.iter().filter(|file| file.extension().unwrap() == "html").collect();
+    assert_eq!((pages.len(), files.len()), (2, 4), "each has its picture: {files:?}");
+    let index = std::fs::read_to_string(name.join("index.html")).unwrap();
+    for page in pages {
+        let (messages, _) = messages(&std::fs::read_to_string(page).unwrap());
+        assert_eq!(messages.last().unwrap()["kind"], "bad");
+        let file = page.file_name().unwrap().to_str().unwrap();
+        assert!(index.contains(&format!("href=\"failures/{file}\"")), "{index}");
+    }
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! The page of an evaluation: totals, paired differences, every failure with its picture.
+//! The page of an evaluation: totals, paired differences, every failure with its picture and its own page.
 
 use std::fmt::{self, Write as _};
 
@@ -7,7 +7,7 @@ use crate::{
     page::{END, escaped, head},
     results::Results,
     row::{Outcome, Row},
-    runner::Plan,
+    runner::{self, Plan},
     totals::{Comparison, Totals},
 };
 
@@ -119,6 +119,11 @@ pub fn html(plan: &Plan, results: &Results, command: &str) -> String {
                 let name = escaped(&name.to_string_lossy());
                 let _ =
                     write!(page, "<img loading=\"lazy\" src=\"failures/{name}\" alt=\"{name}\">");
+            }
+            let own_page = runner::page(&picture);
+            if let (true, Some(name)) = (own_page.exists(), own_page.file_name()) {
+                let name = escaped(&name.to_string_lossy());
+                let _ = write!(page, "<a href=\"failures/{name}\">its page</a>");
             }
             page.push_str("</figure>\n");
         }

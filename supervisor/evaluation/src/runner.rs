@@ -22,8 +22,9 @@ use crate::{
     trial::Trial,
 };
 
-/// Name of a run's picture in its directory.
+/// A run's picture and its page, in its directory.
 const PICTURE: &str = "picture.svg";
+const PAGE: &str = "report/report.html";
 
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -135,6 +136,11 @@ pub fn picture(row: &Row) -> PathBuf {
         .join(name.replace(|c: char| !(c.is_ascii_alphanumeric() || "-_.".contains(c)), "_"))
 }
 
+/// The path of the page of a failure, beside its picture.
+pub fn page(picture: &Path) -> PathBuf {
+    picture.with_extension("html")
+}
+
 /// Run all missions of `plan` whose rows are not in `results` yet. `watch` is called after each.
 pub fn run(
     plan: &Plan,
@@ -219,27 +225,27 @@ fn mission(
             command.args(["--set", assignment]);
         }
     };
-    let mut command = firsthand(&["run", "--json", "--no-record"]);
-    with_keys(&mut command);
-    command.args(["--parent", &own.to_string()]);
-    command.arg("--out").arg(&directory);
     let calibration = plan.directory.join(format!("calibration-{worker}"));
+    let mut calibrated = None;
     if plan.calibrates {
         let file = calibration.join("calibration.toml");
         let mut calibrate = firsthand(&["calibrate", "--json"]);
         with_keys(&mut calibrate);
         calibrate.arg("--runs").arg(&calibration).arg("--out").arg(&file);
-        let calibrated = calibrate.stdout(Stdio::null()).stderr(Stdio::null()).status();
-        if calibrated.map_err(RunnerError::Start)?.success() {
+        let ended = calibrate.stdout(Stdio::null()).stderr(Stdio::null()).status();
+        if ended.map_err(RunnerError::Start)?.success() {
             let file = toml::Value::from(file.to_string_lossy().into_owned());
-            command.args(["--set", &format!("robot.calibration={file}")]);
+            calibrated = Some(format!("robot.calibration={file}"));
         }
     }
-    let output = command
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .output()
-        .map_err(RunnerError::Start)?;
+    let run = |options: &[&str]| {
+        let mut command = firsthand(&["run", "--json"]);
+        with_keys(&mut command);
+        command.args(options).args(["--parent", &own.to_string()]);
+        command.args(calibrated.iter().flat_map(|key| ["--set", key]));
+        command.arg("--out").arg(&directory).output().map_err(RunnerError::Start)
+    };
+    let output = run(&["--no-record"])?;
     let (row, latency) = match serde_json::from_slice::<Summary>(&output.stdout) {
         Ok(summary) => {
             let row = Row::new(trial, *seed, setting, &summary);
@@ -255,6 +261,12 @@ fn mission(
     if plan.keeps_picture(&row) {
         // A mission that could not start has no picture.
         let _ = fs::rename(directory.join(PICTURE), plan.picture(&row));
+    }
+    if !matches!(row.outcome, Outcome::Success | Outcome::Aborted) {
+        // It runs again, to the bit, because recordings of all missions would take too long.
+        let _ = fs::remove_dir_all(&directory);
+        run(&[])?;
+        let _ = fs::rename(directory.join(PAGE), page(&plan.picture(&row)));
     }
     let _ = fs::remove_dir_all(&directory);
     let _ = fs::remove_dir_all(&calibration);

@@ -30,7 +30,7 @@ use crate::console::{
     output::{print_text, write_stderr},
 };
 
-/// Run missions on many worlds and count successes by the ground truth, with 95 % intervals and a picture of every failure.
+/// Run missions on many worlds and count successes by the ground truth, with 95 % intervals, a picture and a page of every failure.
 /// Worlds and noise follow from the seed.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
