@@ -51,11 +51,11 @@ impl DomainLock {
     pub fn acquire(domain: Domain, cells: usize) -> Result<Self, DomainError> {
         descriptors::raise_limit().map_err(|limit| DomainError::Descriptors { limit })?;
         let lock = lock(&domain)?;
-        // No consumer takes the bus of a supervisor that was killed for the one that is made now.
-        remove_file(&domain.middleware_config())?;
-        remove_run(&domain)?;
         let mut acquired =
             Self { domain, bus: None, stages_lock: None, joining_lock: None, cells, _lock: lock };
+        // No consumer takes the bus of a supervisor that was killed for the one that is made now.
+        remove_file(&acquired.domain.middleware_config())?;
+        remove_run(&acquired.domain)?;
         acquired.recreate_bus()?;
         Ok(acquired)
     }

@@ -52,6 +52,7 @@
 //! | `service_manager` | notifications to systemd |
 //! | `progress` | how far a run has come, as shown to its user |
 //! | [`summary`] | the outcome and the numbers of a run |
+//! | `long_record` | records of each tick that stay bounded, pure |
 //! | `lockstep` | in lockstep: how far the link may go, and from which tick a recovery step holds, pure |
 //! | `last_resort` | the end of a run whose supervisor hangs |
 //! | `error`, `domain_error` | why a run could not be carried out |
@@ -68,6 +69,7 @@ pub mod executable;
 mod judge;
 mod last_resort;
 mod lockstep;
+mod long_record;
 mod observed_time;
 pub mod observer;
 pub mod operator;

@@ -17,6 +17,7 @@ use common::{
 
 use crate::{
     lockstep::Published,
+    long_record,
     stage_processes::StageProcesses,
     totals::{LookTotals, Totals, WheelTotals},
 };
@@ -25,8 +26,6 @@ use crate::{
 const MOST_GUIDANCE: usize = 1024;
 /// Contacts recorded: more than come between two checks for stalls.
 const MOST_CONTACTS: usize = 64;
-/// The greatest number of recorded poses, three hours at 7 Hz. Whenever the record is full, every second pose is dropped.
-const MOST_POSES: usize = 80_000;
 
 pub struct Observer {
     health: Reader<HealthSample>,
@@ -45,7 +44,7 @@ pub struct Observer {
 /// The data read so far.
 #[derive(Default)]
 pub struct Record {
-    /// The pose of every tick.
+    /// The pose of every tick; in a long run of fewer of the older ones.
     pub poses: Vec<PoseSample>,
     pub pose: Option<PoseSample>,
     /// The newest guidance samples, oldest first.
@@ -141,14 +140,7 @@ impl Observer {
         while let Some(pose) = self.pose.take()? {
             stages.on_output(topics::POSE.spec().writer, pose.stamp.tick);
             record.pose = Some(pose);
-            if record.poses.len() == MOST_POSES {
-                let mut nth = 0;
-                record.poses.retain(|_| {
-                    nth += 1;
-                    nth % 2 == 1
-                });
-            }
-            record.poses.push(pose);
+            long_record::push(&mut record.poses, pose);
         }
         // Poses are computed from the link's samples, so these are read last.
         while let Some(contact) = self.contact.take()? {

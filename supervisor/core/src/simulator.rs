@@ -19,7 +19,10 @@ use common::{
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use thiserror::Error;
 
-use crate::process::{Process, firsthand};
+use crate::{
+    long_record,
+    process::{Process, firsthand},
+};
 
 /// The file in the run directory with the ground truth, one [`GroundTruthTick`] a line.
 pub const GROUND_TRUTH: &str = "ground_truth.jsonl";
@@ -173,7 +176,7 @@ impl GroundTruth {
                 let header = serde_json::from_slice::<GroundTruthHeader>(line).ok();
                 self.listening = header.and_then(|header| header.listening.parse().ok());
             } else if let Ok(tick) = serde_json::from_slice(line) {
-                self.ticks.push(tick);
+                long_record::push(&mut self.ticks, tick);
             }
         }
         self.unfinished = rest;

@@ -1,0 +1,60 @@
+//! Records of each tick of a run that take no more memory however long it lasts: older ticks are thinned out.
+
+use common::{ground_truth::GroundTruthTick, samples::PoseSample};
+
+/// The greatest length of a record, 39 minutes at 7 Hz.
+const MOST_TICKS: usize = 16_384;
+
+/// A tick of a record.
+pub(crate) trait Recorded: Copy {
+    /// This tick, standing for the `next` one too; none if both are needed.
+    fn with(self, next: Self) -> Option<Self>;
+}
+
+impl Recorded for PoseSample {
+    fn with(self, _: Self) -> Option<Self> {
+        Some(self)
+    }
+}
+
+impl Recorded for GroundTruthTick {
+    fn with(self, next: Self) -> Option<Self> {
+        let clearance_m = self.clearance_m.min(next.clearance_m);
+        (self.contacts == next.contacts).then_some(Self { clearance_m, ..self })
+    }
+}
+
+/// Append `tick` to `record`. When the record is full, pairs of ticks of its older half become one.
+pub(crate) fn push<T: Recorded>(record: &mut Vec<T>, tick: T) {
+    if record.len() >= MOST_TICKS {
+        let newer = record.split_off(MOST_TICKS / 2);
+        let pairs = record.chunks(2).flat_map(|pair| match *pair {
+            [tick, next] => tick.with(next).map_or_else(|| vec![tick, next], |one| vec![one]),
+            ref rest => rest.to_vec(),
+        });
+        *record = pairs.chain(newer).collect();
+    }
+    record.push(tick);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_record_is_bounded_and_has_every_contact_the_least_clearance_and_the_newest_ticks() {
+        let mut record = Vec::new();
+        for tick in 0..100_000u64 {
+            let clearance_m = if tick == 777 { 0.1 } else { 1.0 };
+            let contacts = u64::from(tick >= 5001);
+            let truth = GroundTruthTick { tick, clearance_m, contacts, ..Default::default() };
+            push(&mut record, truth);
+            assert!(record.len() <= MOST_TICKS);
+        }
+        let ticks: Vec<u64> = record.iter().map(|truth| truth.tick).collect();
+        assert!(ticks.is_sorted() && ticks[0] == 0 && ticks.ends_with(&[99_998, 99_999]));
+        assert!(record.windows(2).rev().take(4096).all(|pair| pair[0].tick + 1 == pair[1].tick));
+        assert!(record.iter().any(|truth| truth.clearance_m == 0.1));
+        assert_eq!(record.iter().find(|truth| truth.contacts > 0).unwrap().tick, 5001);
+    }
+}
