@@ -11,6 +11,7 @@ use std::{
 use common::{
     bus::Stamp,
     file::FileError,
+    mission::Mission,
     topics::{EncodedTopic, Spec},
 };
 use mcap::{
@@ -18,7 +19,7 @@ use mcap::{
     records::{MessageHeader, Metadata},
 };
 
-use crate::{error::RecordingError, foxglove, schema};
+use crate::{error::RecordingError, schema, viewers};
 
 /// A chunk is written when it has so many bytes, or after [`CHUNK_EVERY`].
 const CHUNK_BYTES: u64 = 1 << 19;
@@ -26,11 +27,14 @@ const CHUNK_BYTES: u64 = 1 << 19;
 const CHUNK_EVERY: Duration = Duration::from_secs(1);
 /// The name of the metadata record about the run.
 pub(crate) const RUN: &str = "run";
+/// The channel of the recorder's own losses.
+pub(crate) const LOST: &str = "recorder";
+const LOST_SCHEMA: &[u8] = br#"{"title": "firsthand.Recorder", "type": "object", "properties": {"lost": {"type": "object"}}}"#;
 
 pub(crate) struct RecordingFile {
     writer: Writer<BufWriter<File>>,
     path: PathBuf,
-    channels: HashMap<&'static str, u16>,
+    channels: HashMap<String, u16>,
     /// Nanoseconds since 1970.
     began_ns: u64,
     chunk_began: Instant,
@@ -43,11 +47,12 @@ pub(crate) fn now_ns() -> u64 {
 }
 
 impl RecordingFile {
-    /// Make a new file `about` a run, with a channel for each of `topics`. It gets its name when all of that is written, so a
-    /// file of this name can always be read.
+    /// Make a new file `about` a run, with a channel for each of `topics` and for what viewers draw of `mission`. It gets its name when
+    /// all of that is written, so a file of this name can always be read.
     pub(crate) fn create(
         path: &Path,
         topics: &[&'static dyn EncodedTopic],
+        mission: Option<&Mission>,
         about: BTreeMap<String, String>,
     ) -> Result<Self, RecordingError> {
         let named = |error: io::Error| FileError::of("make recording", path)(error);
@@ -79,12 +84,14 @@ impl RecordingFile {
                 ("writer".to_owned(), spec.writer.to_owned()),
                 ("meaning".to_owned(), spec.meaning.trim().to_owned()),
             ]);
-            recording.add(spec.name, &name, "ros2msg", &text, "cdr", &about)?;
+            recording.add(spec.name, &name, "ros2msg", text.as_bytes(), "cdr", &about)?;
         }
-        for &(topic, name) in foxglove::CHANNELS {
-            let schema = foxglove::schema(name);
-            recording.add(topic, name, "jsonschema", &schema, "json", &BTreeMap::new())?;
+        let none = BTreeMap::new();
+        for (topic, schema, encoding) in viewers::channels(mission) {
+            let foxglove::Schema { name, encoding: language, data } = schema;
+            recording.add(&topic, &name, &language, &data, &encoding, &none)?;
         }
+        recording.add(LOST, "firsthand.Recorder", "jsonschema", LOST_SCHEMA, "json", &none)?;
         recording.metadata(about)?;
         fs::rename(&unfinished, path).map_err(named)?;
         Ok(recording)
@@ -98,18 +105,18 @@ impl RecordingFile {
 
     fn add(
         &mut self,
-        topic: &'static str,
+        topic: &str,
         schema: &str,
         language: &str,
-        text: &str,
+        text: &[u8],
         encoding: &str,
         about: &BTreeMap<String, String>,
     ) -> Result<(), RecordingError> {
         let failed = failed(&self.path);
-        let schema = self.writer.add_schema(schema, language, text.as_bytes());
+        let schema = self.writer.add_schema(schema, language, text);
         let added =
             schema.and_then(|schema| self.writer.add_channel(schema, topic, encoding, about));
-        self.channels.insert(topic, added.map_err(failed)?);
+        self.channels.insert(topic.to_owned(), added.map_err(failed)?);
         Ok(())
     }
 
@@ -124,25 +131,20 @@ impl RecordingFile {
         self.write(spec.name, stamp.sequence, published, message)
     }
 
-    /// Add `json`, of mission time `stamp_ns` if it has one.
-    pub(crate) fn json(
-        &mut self,
-        topic: &'static str,
-        stamp_ns: Option<u64>,
-        json: &serde_json::Value,
-    ) -> Result<(), RecordingError> {
-        let published = stamp_ns.map_or_else(now_ns, |stamp| self.began_ns.saturating_add(stamp));
-        self.write(topic, 0, published, json.to_string().as_bytes())
+    /// Add a message that is no sample.
+    pub(crate) fn message(&mut self, topic: &str, message: &[u8]) -> Result<(), RecordingError> {
+        self.write(topic, 0, now_ns(), message)
     }
 
-    /// Time of mission time 0 on the clock of publish times, nanoseconds since 1970.
-    pub(crate) const fn began_ns(&self) -> u64 {
-        self.began_ns
+    /// Add the numbers of samples that were lost so far.
+    pub(crate) fn lost(&mut self, lost: &BTreeMap<&str, u64>) -> Result<(), RecordingError> {
+        let json = serde_json::json!({"lost": lost}).to_string();
+        self.message(LOST, json.as_bytes())
     }
 
     fn write(
         &mut self,
-        topic: &'static str,
+        topic: &str,
         sequence: u32,
         publish_time: u64,
         message: &[u8],

@@ -7,9 +7,10 @@
 //! - A channel for each topic of the table that its column `logged` names, under the topic's name. A message is one
 //!   whole sample in the CDR encoding of ROS 2; its schema is the text of a ROS 2 message (`ros2msg`), made from the
 //!   topic's layout. A message of a topic of slices has a `header` and `elements`.
-//! - Channels for viewers, in Foxglove's schemas as JSON: `foxglove/pose` (`foxglove.PoseInFrame`), `foxglove/grid`
-//!   (`foxglove.Grid`), `foxglove/scene` (`foxglove.SceneUpdate`: the sonar's cone and the trajectory), `log`
-//!   (`foxglove.Log`: the logs of the stages and the supervisor).
+//! - Channels for viewers, in Foxglove's schemas as Protobuf: `foxglove/transforms` (`FrameTransforms`: `map`, `base`, sensors),
+//!   `foxglove/pose` (`PoseInFrame`), `foxglove/odometry` (`Odometry`: with covariance), `foxglove/grid` (`Grid`), `foxglove/scene`
+//!   (`SceneUpdate`: trajectory, targets, body, uncertainty), `foxglove/scan/SENSOR` (`LaserScan`), `log` (`Log`: the logs of the
+//!   stages and the supervisor).
 //! - A channel `recorder` (JSON): numbers of samples by topic that the recorder lost so far, whenever they grow.
 //! - A metadata record `run`: robot, mission, seed, build, machine, and `run_toml`, the run file of the stages.
 //!
@@ -45,20 +46,19 @@
 //! | [`downsampled`] | a bounded number of samples |
 //! | `budget` | the disk budget of a recorder's files |
 //! | `file` | writing the file |
-//! | `foxglove` | messages for viewers |
 //! | `log_files` | lines that the processes of a run append to their logs |
 //! | `places` | the names of recordings |
 //! | `losses` | samples that the recorder missed |
 //! | [`recorder`] | the recorder |
 //! | [`reader`] | reading the file |
 //! | [`replay`] | recordings replayed to the bit (feature `replay`) |
+//! | `viewers` | messages for viewers |
 //! | `error` | errors |
 
 mod budget;
 pub mod downsampled;
 mod error;
 mod file;
-mod foxglove;
 pub mod log_files;
 mod losses;
 mod places;
@@ -67,11 +67,12 @@ pub mod recorder;
 #[cfg(feature = "replay")]
 pub mod replay;
 pub mod schema;
+mod viewers;
 
 pub use self::{
     error::RecordingError,
-    foxglove::base64,
     places::{next_place, parts},
     reader::{End, Message, Recording, Sample, SliceSample},
     recorder::{Options, record},
+    viewers::log_line,
 };

@@ -21,7 +21,11 @@ use mcap::{
     sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions},
 };
 
-use crate::{error::RecordingError, file::RUN, places::parts};
+use crate::{
+    error::RecordingError,
+    file::{LOST, RUN},
+    places::parts,
+};
 
 /// Most bytes of a record or chunk. The recorder's are shorter.
 const LONGEST_RECORD: usize = 1 << 28;
@@ -110,7 +114,7 @@ impl Recording {
                 Ok(Some(Found::Metadata(..))) => {}
                 Ok(Some(Found::Message(header, data))) => {
                     let topic = records.topic(&header)?;
-                    if &*topic == "recorder" {
+                    if &*topic == LOST {
                         lost = losses(&data).unwrap_or(lost);
                     }
                     *counts.entry(topic.to_string()).or_default() += 1;

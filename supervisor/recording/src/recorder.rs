@@ -14,6 +14,7 @@ use common::{
     bus::{Bus, BusError, EncodedReader, Logged},
     domain::Domain,
     follower::{Event, Follower},
+    mission::Mission,
     run::{self, Run},
     topics::{self, EncodedTopic},
 };
@@ -22,10 +23,10 @@ use crate::{
     budget::Budget,
     error::RecordingError,
     file::{RecordingFile, now_ns},
-    foxglove::{self, Drawn},
     log_files::{self, LogFiles},
     losses::Losses,
     places::{self, numbered},
+    viewers::{self, Drawn},
 };
 
 /// Longest time between two reads of the bus.
@@ -173,6 +174,7 @@ fn find_run(options: &Options) -> Option<PathBuf> {
 struct CurrentRun {
     path: PathBuf,
     directory: Option<PathBuf>,
+    mission: Option<Mission>,
     about: BTreeMap<String, String>,
     file: RecordingFile,
     drawn: Drawn,
@@ -204,7 +206,8 @@ impl CurrentRun {
         }
         let about = about.into_iter();
         let about: BTreeMap<_, _> = about.map(|(key, value)| (key.to_owned(), value)).collect();
-        let file = RecordingFile::create(path, topics, about.clone())?;
+        let mission = run.map(|run| run.mission);
+        let file = RecordingFile::create(path, topics, mission.as_ref(), about.clone())?;
         let whole = options.run.is_some();
         let logs = directory.as_ref();
         let logs = logs.map(|directory| LogFiles::follow(directory, whole));
@@ -213,7 +216,8 @@ impl CurrentRun {
             directory,
             about,
             file,
-            drawn: Drawn::new(run.map(|run| run.mission)),
+            drawn: Drawn::new(mission.clone()),
+            mission,
             losses: Losses::default(),
             logs,
             logs_taken: Instant::now(),
@@ -227,11 +231,11 @@ impl CurrentRun {
         path: &Path,
         topics: &[&'static dyn EncodedTopic],
     ) -> Result<PathBuf, RecordingError> {
-        let next = RecordingFile::create(path, topics, self.about.clone())?;
+        let (mission, about) = (self.mission.as_ref(), self.about.clone());
+        let next = RecordingFile::create(path, topics, mission, about)?;
         let next = next.continuing(&self.file);
         std::mem::replace(&mut self.file, next).finish()?;
-        let lost = self.losses.counts();
-        self.file.json("recorder", None, &serde_json::json!({"lost": lost}))?;
+        self.file.lost(self.losses.counts())?;
         Ok(std::mem::replace(&mut self.path, path.to_path_buf()))
     }
 
@@ -252,16 +256,19 @@ impl CurrentRun {
                     continue;
                 }
                 file.sample(spec, &stamp, &self.message)?;
-                let began = file.began_ns();
-                if let Some((channel, stamp_ns, json)) =
-                    self.drawn.take(spec.name, &self.message, began)
-                {
-                    file.json(channel, Some(stamp_ns), &json)?;
-                }
+                let mut written = Ok(());
+                // Of a message that does not match its topic nothing is drawn.
+                let _ =
+                    self.drawn.take(spec.name, &self.message, now_ns(), &mut |topic, message| {
+                        if written.is_ok() {
+                            written = file.message(topic, message);
+                        }
+                    });
+                written?;
             }
         }
         if let Some(lost) = self.losses.grown() {
-            file.json("recorder", None, &serde_json::json!({"lost": lost}))?;
+            file.lost(lost)?;
         }
         Ok(())
     }
@@ -276,10 +283,11 @@ impl CurrentRun {
         };
         let mut written = Ok(());
         logs.take(&mut |process, line| {
-            let json = foxglove::log(process, line, now_ns());
-            if written.is_ok() {
-                written = file.json("log", None, &json);
-            }
+            viewers::log(process, line, now_ns(), &mut |topic, message| {
+                if written.is_ok() {
+                    written = file.message(topic, message);
+                }
+            });
         });
         written
     }

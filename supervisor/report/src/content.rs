@@ -129,8 +129,8 @@ impl Content {
         }
         let is = |topic: &dyn AnyTopic| *message.topic == *topic.spec().name;
         if *message.topic == *LOG {
-            let line: Value = serde_json::from_slice(&message.data).ok()?;
-            self.collector.log(line["name"].as_str()?, line["message"].as_str()?);
+            let (process, line) = recording::log_line(&message.data)?;
+            self.collector.log(&process, &line);
             return Some(());
         }
         // Ground truth that is not of this tick waits in the collector.
