@@ -1,6 +1,8 @@
 //! The one list of subcommands: parser, dispatch and the groups of `--help` follow from it.
 
 pub(crate) mod check;
+#[cfg(feature = "foxglove")]
+pub(crate) mod foxglove;
 pub(crate) mod go_back;
 pub(crate) mod goto;
 pub(crate) mod help;
@@ -36,13 +38,14 @@ use crate::tools::{
 use crate::{console::failure::Failure, renamed};
 
 /// Declares the subcommands by groups: the name of each and the module that has its `Arguments` and its `main`, which takes in
-/// addition what stands in parentheses. `@tools`, `@page` and `@simulator` are the features without which it does
-/// not exist.
+/// addition what stands in parentheses. `@tools`, `@page`, `@foxglove` and `@simulator` are the features without which it
+/// does not exist.
 macro_rules! commands {
     ($($heading:literal {
         $($name:ident $module:ident $(($whole:ident))?,)*
         $(@tools { $($tool:ident $tool_module:ident $(($tool_whole:ident))?,)* })?
         $(@page { $page:ident $page_module:ident })?
+        $(@foxglove { $viewer:ident $viewer_module:ident })?
         $(@simulator { $sim:ident $sim_module:ident })?
     })*) => {
         #[derive(Debug, Subcommand)]
@@ -51,6 +54,7 @@ macro_rules! commands {
                 $($name($module::Arguments),)*
                 $($(#[cfg(feature = "tools")] $tool($tool_module::Arguments),)*)?
                 $(#[cfg(feature = "page")] $page($page_module::Arguments),)?
+                $(#[cfg(feature = "foxglove")] $viewer($viewer_module::Arguments),)?
                 $(#[cfg(feature = "simulator")] $sim($sim_module::Arguments),)?
             )*
         }
@@ -62,6 +66,7 @@ macro_rules! commands {
                 $(stringify!($name),)*
                 $($(#[cfg(feature = "tools")] stringify!($tool),)*)?
                 $(#[cfg(feature = "page")] stringify!($page),)?
+                $(#[cfg(feature = "foxglove")] stringify!($viewer),)?
                 $(#[cfg(feature = "simulator")] stringify!($sim),)?
             ],
         )),*];
@@ -78,6 +83,10 @@ macro_rules! commands {
                         $(
                             #[cfg(feature = "page")]
                             Self::$page(arguments) => $page_module::main(arguments)?.report(),
+                        )?
+                        $(
+                            #[cfg(feature = "foxglove")]
+                            Self::$viewer(arguments) => $viewer_module::main(arguments)?.report(),
                         )?
                         $(
                             #[cfg(feature = "simulator")]
@@ -107,6 +116,7 @@ commands! {
         Runs runs,
         Table table,
         @tools { Map map, }
+        @foxglove { Foxglove foxglove }
     }
     "Record it" {
         Record record,
@@ -184,6 +194,9 @@ impl Command {
             Self::Stage(arguments) if arguments.is_process() => Some("info"),
             #[cfg(feature = "simulator")]
             Self::Sim(_) => Some("info"),
+            // A client could fill the log with its own errors.
+            #[cfg(feature = "foxglove")]
+            Self::Foxglove(_) => Some("error,foxglove=off"),
             _ => Some("error"),
         }
     }

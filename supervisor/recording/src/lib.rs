@@ -46,6 +46,7 @@
 //! | [`downsampled`] | a bounded number of samples |
 //! | `budget` | the disk budget of a recorder's files |
 //! | `file` | writing the file |
+//! | [`live`] | the channels of a recording, live (feature `live`) |
 //! | `log_files` | lines that the processes of a run append to their logs |
 //! | `places` | the names of recordings |
 //! | `losses` | samples that the recorder missed |
@@ -59,6 +60,8 @@ mod budget;
 pub mod downsampled;
 mod error;
 mod file;
+#[cfg(feature = "live")]
+pub mod live;
 pub mod log_files;
 mod losses;
 mod places;

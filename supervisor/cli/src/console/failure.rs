@@ -63,6 +63,7 @@ pub(crate) fn code(error: &(dyn Error + 'static)) -> Option<&'static str> {
         .or_else(|| error.downcast_ref().map(of_lookup))
         .or_else(|| error.is::<MissionError>().then_some("mission"))
         .or_else(|| of_page(error))
+        .or_else(|| of_live(error))
         .or_else(|| {
             let planner = error.is::<PlannerExecutableError>();
             planner.then_some("planner-executable")
@@ -83,6 +84,16 @@ fn of_page(error: &(dyn Error + 'static)) -> Option<&'static str> {
 
 #[cfg(not(feature = "page"))]
 const fn of_page(_: &(dyn Error + 'static)) -> Option<&'static str> {
+    None
+}
+
+#[cfg(feature = "foxglove")]
+fn of_live(error: &(dyn Error + 'static)) -> Option<&'static str> {
+    error.is::<recording::live::LiveError>().then_some("cannot-listen")
+}
+
+#[cfg(not(feature = "foxglove"))]
+const fn of_live(_: &(dyn Error + 'static)) -> Option<&'static str> {
     None
 }
 

@@ -1,0 +1,187 @@
+//! A websocket server for Foxglove and Lichtblick: the channels of a recording, live. It is a consumer, and its clients can only watch.
+//!
+//! Each client has a queue of its own. What does not fit is dropped for this client, so a slow one costs neither the robot nor others.
+
+use std::{
+    collections::HashMap,
+    net::SocketAddr,
+    sync::Arc,
+    thread,
+    time::{Duration, Instant},
+};
+
+use common::{
+    bus::{Bus, BusError, EncodedReader, Logged},
+    domain::{Domain, RobotName},
+    follower::{Event, Follower},
+    mission::Mission,
+    run::Run,
+    topics::{self, EncodedTopic},
+};
+use foxglove::{
+    ChannelBuilder, Context, FoxgloveError, RawChannel, Schema, WebSocketServer,
+    WebSocketServerHandle,
+};
+use thiserror::Error;
+
+use crate::{
+    file::now_ns,
+    log_files::LogFiles,
+    schema,
+    viewers::{self, Drawn},
+};
+
+/// How often a run that has ended or begun, or the end of this process, is noticed when nothing is published.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+const LOGS_EVERY: Duration = Duration::from_millis(500);
+/// A bus that cannot be used is tried again after this time.
+const AGAIN_AFTER: Duration = Duration::from_secs(1);
+/// Messages that wait for a client: those of some ticks.
+const MOST_WAITING: usize = 512;
+
+/// A server that cannot be started.
+#[derive(Debug, Error)]
+#[error("cannot listen on {address}: {source}; choose another port with --listen")]
+pub struct LiveError {
+    address: SocketAddr,
+    source: FoxgloveError,
+}
+
+/// A server for viewers.
+#[derive(Debug)]
+pub struct Live {
+    context: Arc<Context>,
+    server: WebSocketServerHandle,
+}
+
+type Readers = Vec<(&'static str, Box<dyn EncodedReader>)>;
+
+/// Topics that are served: those that are recorded without being asked for.
+fn served() -> impl Iterator<Item = &'static dyn EncodedTopic> {
+    let all = topics::ENCODED.iter().copied();
+    all.filter(|topic| matches!(topic.spec().logged, Logged::Yes))
+}
+
+/// What is served of one run.
+struct Serving {
+    channels: HashMap<String, Arc<RawChannel>>,
+    drawn: Drawn,
+    logs: LogFiles,
+    logs_read: Instant,
+}
+
+impl Live {
+    /// Listen from now on.
+    pub fn open(robot: &RobotName, address: SocketAddr) -> Result<Self, LiveError> {
+        let context = Context::new();
+        let server = WebSocketServer::new()
+            .name(robot.to_string())
+            .bind(address.ip().to_string(), address.port())
+            .context(&context)
+            .message_backlog_size(MOST_WAITING)
+            .start_blocking()
+            .map_err(|source| LiveError { address, source })?;
+        Ok(Self { context, server })
+    }
+
+    /// The port on which it listens.
+    pub fn port(&self) -> u16 {
+        self.server.port()
+    }
+
+    /// Serve the robot of `domain`, from run to run, until `ended` says so.
+    pub fn serve(&self, domain: &Domain, ended: &mut dyn FnMut() -> bool) {
+        let open = |bus: &Bus| -> Result<Readers, BusError> {
+            served().map(|topic| Ok((topic.spec().name, topic.encoded_reader(bus)?))).collect()
+        };
+        let mut follower = Follower::new(domain.clone(), "foxglove", &topics::LINK, open);
+        let mut serving = None;
+        while !ended() {
+            let taken = match follower.wait(LOOK_EVERY) {
+                Ok(Event::Connected) => {
+                    serving = None;
+                    Ok(())
+                }
+                Ok(Event::Samples(readers)) => {
+                    serving = serving.or_else(|| self.begin(domain));
+                    serving.as_mut().map_or(Ok(()), |serving| serving.take(readers))
+                }
+                Ok(Event::Disconnected | Event::Nothing) => Ok(()),
+                Err(error) => Err(error),
+            };
+            if let Some(serving) = &mut serving {
+                serving.take_logs();
+            }
+            if let Err(error) = taken {
+                tracing::error!(%error, "the robot cannot be shown; it is tried again");
+                thread::park_timeout(AGAIN_AFTER);
+            }
+        }
+    }
+
+    /// The run of `domain`; none if its run file cannot be read.
+    fn begin(&self, domain: &Domain) -> Option<Serving> {
+        // The link leads to another directory when the next run begins.
+        let directory = domain.run_directory().canonicalize().ok()?;
+        let mission = Run::load(&directory).ok()?.mission;
+        // Viewers forget the run before.
+        self.server.clear_session(None);
+        Some(Serving {
+            channels: self.channels(&mission),
+            drawn: Drawn::new(Some(mission)),
+            logs: LogFiles::follow(&directory, true),
+            logs_read: Instant::now(),
+        })
+    }
+
+    /// The channels of a recording. A channel that the run before had, too, is the same one.
+    fn channels(&self, mission: &Mission) -> HashMap<String, Arc<RawChannel>> {
+        let topics = served().map(|topic| {
+            let schema::Schema { name, text } = schema::of(topic);
+            let schema = Schema::new(name, "ros2msg", text.into_bytes());
+            (topic.spec().name.to_owned(), schema, "cdr".to_owned())
+        });
+        let all = topics.chain(viewers::channels(Some(mission)));
+        let built = all.filter_map(|(topic, schema, encoding)| {
+            let channel = ChannelBuilder::new(&topic).context(&self.context).schema(schema);
+            Some((topic, channel.message_encoding(encoding).build_raw().ok()?))
+        });
+        built.collect()
+    }
+}
+
+impl Serving {
+    fn take(&mut self, readers: &mut Readers) -> Result<(), BusError> {
+        let Self { channels, drawn, .. } = self;
+        let mut send = |topic: &str, message: &[u8]| {
+            if let Some(channel) = channels.get(topic) {
+                channel.log(message);
+            }
+        };
+        let mut message = Vec::new();
+        for (topic, reader) in readers {
+            loop {
+                message.clear();
+                if reader.take(&mut message)?.is_none() {
+                    break;
+                }
+                send(topic, &message);
+                // Of a message that does not match its topic nothing is drawn.
+                let _ = drawn.take(topic, &message, now_ns(), &mut send);
+            }
+        }
+        Ok(())
+    }
+
+    fn take_logs(&mut self) {
+        if self.logs_read.elapsed() < LOGS_EVERY {
+            return;
+        }
+        self.logs_read = Instant::now();
+        if let Some(channel) = self.channels.get(viewers::LOG) {
+            self.logs.take(&mut |process, line| {
+                viewers::log(process, line, now_ns(), &mut |_, message| channel.log(message));
+            });
+        }
+    }
+}
