@@ -125,7 +125,8 @@ fn recorders_killed_leave_readable_files_that_say_so_and_the_mission_as_it_was()
 
 #[test]
 fn a_disk_budget_ends_files_at_a_quarter_of_it_removes_the_oldest_and_each_can_be_read_alone() {
-    let budget = ["--pace", "4", "--disk-budget", "800kB"];
+    let slow = "controller.speed_m_s=0.3";
+    let budget = ["--pace", "4", "--disk-budget", "500kB", "--set", slow];
     let (code, summary, directory) =
         Run::start("rec-budget", "obstacle-course", &budget).finish_in();
     assert_eq!(code, Some(0), "{summary}");
