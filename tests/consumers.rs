@@ -2,7 +2,10 @@
 
 use std::{
     process::{Child, Stdio},
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicBool, Ordering},
+    },
     time::{Duration, Instant},
 };
 
@@ -91,43 +94,48 @@ fn a_late_consumer_gets_pose_grid_and_field_whole_and_its_leaving_changes_nothin
     });
 }
 
-/// Follow `robot` through so many runs; how many poses came in each.
-fn follow(robot: &str, runs: usize) -> Vec<usize> {
+/// Poses heard in each run.
+type HeardPoses = Mutex<Vec<usize>>;
+
+/// Follow `robot` through so many runs, and count the poses that come in each.
+fn follow(robot: &str, runs: usize, heard: &HeardPoses) {
     let domain = support::domain(robot);
     let mut follower = Follower::new(domain, "logger", &topics::POSE, |bus| {
         Ok((bus.reader(&topics::POSE)?, bus.slice_reader(&topics::GRID)?))
     });
-    let (mut heard, mut here) = (Vec::new(), false);
+    let mut here = false;
     let patience = support::PATIENCE * runs as u32;
     let began = Instant::now();
-    while heard.len() < runs || here {
+    while heard.lock().unwrap().len() < runs || here {
         assert!(began.elapsed() < patience, "{heard:?}");
         match follower.wait(Duration::from_secs(1)).unwrap() {
             Event::Connected => {
                 here = true;
-                heard.push(0);
+                heard.lock().unwrap().push(0);
             }
             Event::Disconnected => here = false,
             Event::Nothing => {}
             Event::Samples((poses, grids)) => {
                 while poses.take().unwrap().is_some() {
-                    *heard.last_mut().unwrap() += 1;
+                    *heard.lock().unwrap().last_mut().unwrap() += 1;
                 }
                 while grids.take().unwrap().is_some() {}
             }
         }
     }
-    heard
 }
 
 #[test]
 fn a_logger_follows_its_robot_through_five_runs_one_of_them_killed_and_harms_none() {
     in_own_process(|| {
-        let logger = std::thread::spawn(|| follow("followed", 5));
+        let heard = Arc::new(HeardPoses::default());
+        let counted = Arc::clone(&heard);
+        let logger = std::thread::spawn(move || follow("followed", 5, &counted));
         for run in 0..5 {
             let mut started = Run::start("followed", "open-room", &["--pace", "4"]);
             if run == 1 {
-                let status = started.wait_until_under_way(6.0);
+                let has_heard = || heard.lock().unwrap().get(1).is_some_and(|&poses| poses > 5);
+                let status = started.wait_until("the logger hears it", |_| has_heard());
                 let supervisor = status["supervisor_pid"].as_u64().unwrap() as u32;
                 support::signal_process(supervisor, rustix::process::Signal::KILL);
                 started.reap();
@@ -142,8 +150,8 @@ fn a_logger_follows_its_robot_through_five_runs_one_of_them_killed_and_harms_non
             // The pause lets the consumer notice the end of the run; a robot is not started twice within a second.
             std::thread::park_timeout(Duration::from_secs(1));
         }
-        let heard = logger.join().unwrap();
-        assert!(heard.iter().all(|&poses| poses > 5), "{heard:?}");
+        logger.join().unwrap();
+        assert!(heard.lock().unwrap().iter().all(|&poses| poses > 5), "{heard:?}");
         assert_nothing_left("followed");
     });
 }
