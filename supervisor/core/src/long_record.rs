@@ -27,12 +27,20 @@ impl Recorded for GroundTruthTick {
 /// Append `tick` to `record`. When the record is full, pairs of ticks of its older half become one.
 pub(crate) fn push<T: Recorded>(record: &mut Vec<T>, tick: T) {
     if record.len() >= MOST_TICKS {
-        let newer = record.split_off(MOST_TICKS / 2);
-        let pairs = record.chunks(2).flat_map(|pair| match *pair {
-            [tick, next] => tick.with(next).map_or_else(|| vec![tick, next], |one| vec![one]),
-            ref rest => rest.to_vec(),
-        });
-        *record = pairs.chain(newer).collect();
+        let (older, newer) = record.split_at(MOST_TICKS / 2);
+        let mut thinned = Vec::with_capacity(MOST_TICKS);
+        for pair in older.chunks(2) {
+            let one = match *pair {
+                [tick, next] => tick.with(next),
+                _ => None,
+            };
+            match one {
+                Some(one) => thinned.push(one),
+                None => thinned.extend_from_slice(pair),
+            }
+        }
+        thinned.extend_from_slice(newer);
+        *record = thinned;
     }
     record.push(tick);
 }
