@@ -49,18 +49,19 @@ impl<H: Payload + Stamped + Layout, T: Payload + Layout> EncodedTopic for SliceT
 
 /// Reads samples of a topic as encoded messages.
 pub trait EncodedReader {
-    /// Append the next sample to `bytes` as a message of its own (see [`super::cdr`]). Returns its stamp; none when all samples
+    /// Take the next sample into `message` (see [`super::cdr`]), in place of what is there. Returns its stamp; none when all samples
     /// were taken.
-    fn take(&mut self, bytes: &mut Vec<u8>) -> Result<Option<Stamp>, BusError>;
+    fn take(&mut self, message: &mut Vec<u8>) -> Result<Option<Stamp>, BusError>;
 }
 
 struct SampleReader<P: Payload>(Reader<P>);
 
 impl<P: Payload + Stamped + Layout> EncodedReader for SampleReader<P> {
-    fn take(&mut self, bytes: &mut Vec<u8>) -> Result<Option<Stamp>, BusError> {
+    fn take(&mut self, message: &mut Vec<u8>) -> Result<Option<Stamp>, BusError> {
+        message.clear();
         let sample = self.0.take()?;
         Ok(sample.map(|sample| {
-            encode_sample(&sample, bytes);
+            encode_sample(&sample, message);
             *sample.stamp()
         }))
     }
@@ -69,10 +70,11 @@ impl<P: Payload + Stamped + Layout> EncodedReader for SampleReader<P> {
 struct SliceSampleReader<H: Payload, T: Payload>(SliceReader<H, T>);
 
 impl<H: Payload + Stamped + Layout, T: Payload + Layout> EncodedReader for SliceSampleReader<H, T> {
-    fn take(&mut self, bytes: &mut Vec<u8>) -> Result<Option<Stamp>, BusError> {
+    fn take(&mut self, message: &mut Vec<u8>) -> Result<Option<Stamp>, BusError> {
+        message.clear();
         let sample = self.0.take()?;
         Ok(sample.map(|sample| {
-            encode_slice(sample.header(), &sample, bytes);
+            encode_slice(sample.header(), &sample, message);
             *sample.header().stamp()
         }))
     }

@@ -161,6 +161,12 @@ impl GridFrame {
         self.centre + offset * self.resolution_m
     }
 
+    /// The corner of `cell` where x and y are least, metres.
+    #[must_use]
+    pub fn corner_of(&self, cell: Cell) -> DVec2 {
+        self.centre_of(cell) - DVec2::splat(self.resolution_m / 2.0)
+    }
+
     /// Position of `cell` in a row-major slice of the whole map.
     #[must_use]
     pub const fn index(&self, cell: Cell) -> usize {

@@ -96,7 +96,7 @@ struct Header {
 impl Header {
     fn message(&self, cells: &[u8]) -> Vec<u8> {
         let first = common::grid::Cell { col: 0, row: 0 };
-        let corner = self.frame.centre_of(first) - DVec2::splat(self.frame.resolution_m / 2.0);
+        let corner = self.frame.corner_of(first);
         let mut message = vec![self.shown as u8, 0];
         message.extend((self.cells as u16).to_le_bytes());
         for value in [self.side_m, corner.x, corner.y] {

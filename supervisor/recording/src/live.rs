@@ -160,11 +160,7 @@ impl Serving {
         };
         let mut message = Vec::new();
         for (topic, reader) in readers {
-            loop {
-                message.clear();
-                if reader.take(&mut message)?.is_none() {
-                    break;
-                }
+            while reader.take(&mut message)?.is_some() {
                 send(topic, &message);
                 // Of a message that does not match its topic nothing is drawn.
                 let _ = drawn.take(topic, &message, now_ns(), &mut send);

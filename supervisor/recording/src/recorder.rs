@@ -247,11 +247,7 @@ impl CurrentRun {
         let file = &mut self.file;
         for (topic, reader) in readers {
             let spec = topic.spec();
-            loop {
-                self.message.clear();
-                let Some(stamp) = reader.take(&mut self.message)? else {
-                    break;
-                };
+            while let Some(stamp) = reader.take(&mut self.message)? {
                 if !self.losses.came(spec, &stamp, &self.message) {
                     continue;
                 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use common::{
     bus::{decode_sample, decode_slice},
-    grid::{CellState, GridFrame, Replica},
+    grid::{Cell, CellState, GridFrame, Replica},
     kinematics::Pose2,
     mission::{Mission, Sensor, SensorKind},
     samples::{GridHeader, PoseSample, RangeReading, RangeStatus, RangesHeader, TargetSample},
@@ -255,7 +255,6 @@ fn grid(frame: GridFrame, cells: &[u8], timestamp: Option<Timestamp>) -> Grid {
         }
     }
     let cell_m = frame.resolution_m * each as f64;
-    let half = f64::from(frame.cells / 2) * frame.resolution_m + frame.resolution_m / 2.0;
     let field = |(offset, name): (u32, &str)| PackedElementField {
         name: name.to_owned(),
         offset,
@@ -264,7 +263,7 @@ fn grid(frame: GridFrame, cells: &[u8], timestamp: Option<Timestamp>) -> Grid {
     Grid {
         timestamp,
         frame_id: MAP.to_owned(),
-        pose: pose(Pose2 { position: frame.centre - half, heading: 0.0 }),
+        pose: pose(Pose2 { position: frame.corner_of(Cell { col: 0, row: 0 }), heading: 0.0 }),
         column_count: drawn as u32,
         cell_size: Some(Vector2 { x: cell_m, y: cell_m }),
         row_stride: (drawn * CELL.len()) as u32,

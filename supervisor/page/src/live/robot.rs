@@ -69,11 +69,7 @@ impl Readers {
     fn take(&mut self, collector: &mut Collector, watched: bool) -> Result<(), BusError> {
         let mut message = Vec::new();
         for (topic, reader) in &mut self.messages {
-            loop {
-                message.clear();
-                if reader.take(&mut message)?.is_none() {
-                    break;
-                }
+            while reader.take(&mut message)?.is_some() {
                 // A message that does not match its topic is not shown.
                 let _ = collector.take(topic, &message);
             }
