@@ -1,5 +1,7 @@
 //! An operator's actions on a robot that runs: stop and resume, kill, hold and release.
 
+use common::clock::monotonic_ns;
+
 use crate::support::{Run, find, operate, refused};
 
 /// Mission time runs so many times as fast as the wall's.
@@ -19,6 +21,17 @@ fn a_robot_told_to_stop_stands_until_it_is_told_to_go_on() {
     });
     assert_eq!(later["link"]["stopped"], true, "{later}");
     operate("halt", &["resume"]);
+    run.arrives();
+}
+
+#[test]
+fn a_stop_of_which_the_supervisor_hears_after_the_resume_does_not_stop_the_robot_again() {
+    let mut run = Run::start("late-stop", "open-room", &PACE);
+    run.wait_until_under_way(2.0);
+    let asked_ns = monotonic_ns().to_string();
+    operate("late-stop", &["stop"]);
+    operate("late-stop", &["resume"]);
+    operate("late-stop", &["stop", "--through-supervisor", &asked_ns]);
     run.arrives();
 }
 

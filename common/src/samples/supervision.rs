@@ -395,6 +395,8 @@ payloads! {
     "firsthand.Request" RequestSample {
         /// Identifies the request: the roster's `last_request` says that it was taken. Never 0.
         id: u64,
+        /// When the operator asked, nanoseconds of the machine's monotonic clock.
+        asked_ns: u64,
         /// The stage it is about; empty for none.
         stage: Name,
         /// A [`RequestKind`].

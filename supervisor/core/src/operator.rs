@@ -82,6 +82,7 @@ const LINK_ANSWERS: Duration = Duration::from_millis(200);
 /// Let the robot stand, and wait until it rests. The link is asked directly, without the middleware. The supervisor is told as
 /// well: mission time stops, and the stop holds for its successors. Where no link answers, the robot itself is told to stand.
 pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
+    let asked_ns = monotonic_ns();
     let domain = Domain::of(robot.clone());
     let link = stop_socket::Operator::connect(&domain)
         .map_err(|error| OperatorError::System("open a socket to the link", error))?
@@ -91,10 +92,10 @@ pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
         });
     let run = Run::load(&domain.run_directory());
     if link.is_none() && run.is_err() {
-        request_stop(robot)?;
+        request_stop(robot, asked_ns)?;
         return await_rest(robot).map(|()| None);
     }
-    let supervisor = tell_supervisor(robot)?;
+    let supervisor = tell_supervisor(robot, asked_ns)?;
     let rests = match (link, run) {
         (Some(link), _) => rests_by(&link),
         // A link that answers nobody sends nothing either.
@@ -122,13 +123,13 @@ fn rests_by(link: &stop_socket::Operator) -> bool {
     }
 }
 
-/// Ask the supervisor for a stop, in a process of its own: the files of a damaged bus can end the process that opens them.
-fn tell_supervisor(robot: &RobotName) -> Result<Child, OperatorError> {
-    let child =
-        process::firsthand(&["stop", "--through-supervisor", "--robot", &robot.to_string()])
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn();
+/// Tell the supervisor of a stop, in a process of its own: the files of a damaged bus can end the process that opens them.
+fn tell_supervisor(robot: &RobotName, asked_ns: u64) -> Result<Child, OperatorError> {
+    let (robot, asked) = (robot.to_string(), asked_ns.to_string());
+    let child = process::firsthand(&["stop", "--robot", &robot, "--through-supervisor", &asked])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn();
     let system = |error| OperatorError::System("start a process that tells the supervisor", error);
     child.map_err(system)
 }
@@ -199,18 +200,17 @@ pub fn resume(robot: &RobotName) -> Result<(), OperatorError> {
     if let Ok(Some(link)) = stop_socket::Operator::connect(&Domain::of(robot.clone())) {
         let _ = link.send(Request::Resume);
     }
-    ask(robot, RequestSample { kind: RequestKind::Resume.into(), ..RequestSample::default() })
+    ask(robot, request(RequestKind::Resume))
 }
 
-/// Tell the supervisor alone to stop the robot.
-pub fn request_stop(robot: &RobotName) -> Result<(), OperatorError> {
-    ask(robot, RequestSample { kind: RequestKind::Stop.into(), ..RequestSample::default() })
+/// Tell the supervisor alone of a stop that was asked at `asked_ns` of the monotonic clock. It is over if the robot was resumed since.
+pub fn request_stop(robot: &RobotName, asked_ns: u64) -> Result<(), OperatorError> {
+    ask(robot, RequestSample { asked_ns, ..request(RequestKind::Stop) })
 }
 
 /// Start a new generation of `stage`.
 pub fn restart(robot: &RobotName, stage: &str) -> Result<(), OperatorError> {
-    let kind = RequestKind::Restart.into();
-    ask(robot, RequestSample { kind, stage: name(stage), ..RequestSample::default() })
+    ask(robot, RequestSample { stage: name(stage), ..request(RequestKind::Restart) })
 }
 
 /// Send the robot to `points` one after the other: now, or if it `appends` after the targets that it has.
@@ -220,13 +220,18 @@ pub fn send_to(
     appends: bool,
 ) -> Result<(), OperatorError> {
     let kind = if appends { RequestKind::Append } else { RequestKind::Goto };
-    let mut request = RequestSample { kind: kind.into(), ..RequestSample::default() };
+    let mut request = request(kind);
     if points.len() > MOST_TARGETS {
         return Err(refused(robot, RequestAnswer::TooMany));
     }
     request.target_count = points.len() as u8;
     request.targets[..points.len()].copy_from_slice(points);
     ask(robot, request)
+}
+
+/// A request that is made now.
+fn request(kind: RequestKind) -> RequestSample {
+    RequestSample { kind: kind.into(), asked_ns: monotonic_ns(), ..RequestSample::default() }
 }
 
 fn refused(robot: &RobotName, answer: RequestAnswer) -> OperatorError {

@@ -1,6 +1,9 @@
 //! The part of the loop that takes operators' requests, and sends the robot to its next target.
 
-use common::samples::{Cause, HoldReason, RequestAnswer, RequestKind, RequestSample, name_str};
+use common::{
+    clock::monotonic_ns,
+    samples::{Cause, HoldReason, RequestAnswer, RequestKind, RequestSample, name_str},
+};
 
 use crate::{
     error::SupervisorError, outcome::allowed_m, simulator::Simulator, supervisor::Supervisor,
@@ -33,6 +36,10 @@ impl Supervisor<'_> {
                 tracing::warn!(stage, "an operator asks for a new generation");
                 self.stages.replace(stage, first_tick);
             }
+            // Its teller was slow: the link obeyed it at once, and an operator has resumed since.
+            RequestKind::Stop if request.asked_ns < self.resumed_ns => {
+                tracing::warn!("an operator's stop is over, because the robot was resumed since");
+            }
             RequestKind::Stop => {
                 tracing::warn!("an operator stops the robot");
                 self.state_file.state.operator_stop = true;
@@ -40,6 +47,8 @@ impl Supervisor<'_> {
             RequestKind::Resume => {
                 tracing::warn!("an operator lets the robot go on");
                 self.state_file.state.operator_stop = false;
+                // A time to come would void the stops until then.
+                self.resumed_ns = request.asked_ns.min(monotonic_ns());
             }
             kind @ (RequestKind::Goto | RequestKind::Append) => {
                 return self.send_robot(request, kind == RequestKind::Append, first_tick);

@@ -83,6 +83,8 @@ pub(crate) struct Supervisor<'a> {
     pub state_file: StateFile,
     pub clock: RunClock,
     pub decision: Decision,
+    /// When an operator last resumed, nanoseconds of the monotonic clock.
+    pub resumed_ns: u64,
     /// Whether the robot was ever ordered to drive.
     pub drove: bool,
     pub tick_progress: TickProgress,
@@ -136,6 +138,7 @@ impl<'a> Supervisor<'a> {
             state_file,
             clock,
             decision: Decision::STARTING,
+            resumed_ns: 0,
             drove: false,
             tick_progress: TickProgress::new(Now::ZERO),
             targets,

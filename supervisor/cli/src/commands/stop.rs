@@ -17,17 +17,17 @@ pub(crate) struct Arguments {
     /// Do nothing where no run was cut off. This is for services of systemd.
     #[arg(long)]
     cut_off: bool,
-    /// Only tell the supervisor, and do not wait for rest.
-    #[arg(long, hide = true)]
-    through_supervisor: bool,
+    /// Only tell the supervisor of a stop that was asked at this time of the monotonic clock, and do not wait for rest.
+    #[arg(long, hide = true, value_name = "NS")]
+    through_supervisor: Option<u64>,
 }
 
 pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.cut_off && !Domain::of(arguments.robot.clone()).run_directory().exists() {
         return Ok(());
     }
-    if arguments.through_supervisor {
-        return Ok(supervisor::operator::request_stop(&arguments.robot)?);
+    if let Some(asked_ns) = arguments.through_supervisor {
+        return Ok(supervisor::operator::request_stop(&arguments.robot, asked_ns)?);
     }
     operator::stand(&arguments.robot)
 }
