@@ -239,6 +239,15 @@ pub fn nearest_on_segment(point: DVec2, from: DVec2, to: DVec2) -> DVec2 {
     from + along * ((point - from).dot(along) / length_squared).clamp(0.0, 1.0)
 }
 
+/// The axes of the covariance `[xx, xy, yy]` of a place: the standard deviations along the longer and the shorter one, and the angle of
+/// the longer one from x, radians.
+#[must_use]
+pub fn principal_axes([xx, xy, yy]: [f64; 3]) -> ([f64; 2], f64) {
+    let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
+    let variances = [mean + half.hypot(xy), mean - half.hypot(xy)];
+    (variances.map(|variance| variance.max(0.0).sqrt()), 0.5 * xy.atan2(half))
+}
+
 /// `angle` brought into (-pi, pi], radians.
 #[must_use]
 pub fn wrap_angle(angle: f64) -> f64 {

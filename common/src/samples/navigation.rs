@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     bus::{Stamp, ZeroCopySend, layouts},
+    geometry::principal_axes,
     grid::Part,
     kinematics::{Pose2, Twist},
     mission::{INFRARED_RANGERS, Mission, Waypoint},
@@ -61,9 +62,14 @@ impl PoseSample {
 
     /// Two standard deviations of the position's error along its worst axis, metres.
     pub fn position_within_m(&self) -> f64 {
+        let ([worst, _], _) = self.position_axes();
+        2.0 * worst
+    }
+
+    /// The [`principal_axes`] of the position's error.
+    pub fn position_axes(&self) -> ([f64; 2], f64) {
         let [xx, xy, _, yy, ..] = self.covariance;
-        let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
-        2.0 * (mean + half.hypot(xy)).max(0.0).sqrt()
+        principal_axes([xx, xy, yy])
     }
 
     /// Whether the position is known well enough for an arrival: within `sure_within_m` of the mission, by two standard deviations.

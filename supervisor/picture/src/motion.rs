@@ -1,6 +1,6 @@
 //! The robot: its true and its estimated trajectory, its body at regular times, start, target, end.
 
-use common::{kinematics::Pose2, mission::Mission};
+use common::{geometry::principal_axes, kinematics::Pose2, mission::Mission};
 use glam::DVec2;
 
 use super::{
@@ -114,13 +114,10 @@ impl<'a> Motion<'a> {
 
     /// The ellipse about the estimated end in which the robot's centre is with 95 %.
     fn region(&self, view: &View) -> String {
-        let (Some([xx, xy, yy]), Some(end)) = (self.covariance, self.believed.last()) else {
+        let (Some(covariance), Some(end)) = (self.covariance, self.believed.last()) else {
             return String::new();
         };
-        // The axes of the ellipse are the eigenvectors of the covariance.
-        let (mean, half) = ((xx + yy) / 2.0, (xx - yy) / 2.0);
-        let root = half.hypot(xy);
-        let [long, short] = [mean + root, mean - root].map(|variance| variance.max(0.0).sqrt());
+        let ([long, short], angle) = principal_axes(covariance);
         let axes = [long, short].map(|sigma| Px(view.px(WITHIN_95 * sigma)));
         let drawn = is_shown(view, end) && long.is_finite() && view.px(long) > 0.5;
         if !drawn {
@@ -128,7 +125,7 @@ impl<'a> Motion<'a> {
         }
         let at = view.place(end.position);
         // The sheet's y axis points downwards.
-        let angle = Px(-xy.atan2(half).to_degrees() / 2.0);
+        let angle = Px(-angle.to_degrees());
         format!(
             "<ellipse rx=\"{}\" ry=\"{}\" transform=\"translate({} {}) rotate({angle})\" {}/>\n",
             axes[0],

@@ -210,13 +210,11 @@ impl Drawn {
         };
         let mut entities =
             vec![SceneEntity { lines: vec![trajectory], ..entity("trajectory", MAP) }];
-        let [xx, xy, _, yy, ..] = self.pose.covariance;
-        let (mean, half) = (0.5 * (xx + yy), (0.5 * (xx - yy)).hypot(xy));
-        let axis = 0.5 * (2.0 * xy).atan2(xx - yy) - self.pose.heading_rad;
-        let width = |variance: f64| 4.0 * variance.max(0.0).sqrt();
+        let (sigmas, axis) = self.pose.position_axes();
+        let heading = axis - self.pose.heading_rad;
         let mut discs = vec![disc(
-            Pose2 { heading: axis, ..Pose2::default() },
-            [width(mean + half), width(mean - half)],
+            Pose2 { heading, ..Pose2::default() },
+            sigmas.map(|sigma| 4.0 * sigma),
             [0.6, 0.2, 0.8, 0.4],
         )];
         if let Some(mission) = &self.mission {

@@ -4,10 +4,9 @@ use std::path::Path;
 
 use common::{
     geometry::Box2,
-    grid::{CellState, GridFrame},
+    grid::{Cell, CellState, GridFrame},
     mission::Mission,
 };
-use glam::DVec2;
 
 use crate::maps::{MOST_BOXES, MapError, PlacedMap, ros};
 
@@ -64,12 +63,13 @@ pub fn save_believed(
         let byte = is_inside.then(|| cells.get((row * side + col) as usize)).flatten();
         byte.map_or(CellState::Perimeter, |byte| CellState::from_byte(*byte))
     };
-    // Half a cell less: a surface may be anywhere in its cell.
+    // A surface fills its cell in the map. Half a cell less: what was believed may lie anywhere in it.
     let reach = mapper::step::hazard_reach_m(mission) / frame.resolution_m - 0.5;
-    let around = reach.ceil() as i64;
+    let around = (reach + 0.5).ceil() as i64;
+    let beyond = |cells: i64| (cells.abs() as f64 - 0.5).max(0.0);
     let disc: Vec<(i64, i64)> = (-around..=around)
         .flat_map(|row| (-around..=around).map(move |col| (col, row)))
-        .filter(|&(col, row)| ((col * col + row * row) as f64).sqrt() <= reach)
+        .filter(|&(col, row)| beyond(col).hypot(beyond(row)) <= reach)
         .collect();
     let pixel = |col: i64, row: i64| match state(col, row) {
         CellState::Scanned => FREE,
@@ -85,12 +85,11 @@ pub fn save_believed(
     };
     // Row 0 of the grid is the lowest, that of an image the highest.
     let pixels = (0..side).rev().flat_map(|row| (0..side).map(move |col| (col, row)));
-    let corner = frame.centre - DVec2::splat(f64::from(frame.cells) * frame.resolution_m / 2.0);
     let map = ros::Saved {
         cols: frame.cells as usize,
         pixels: pixels.map(|(col, row)| pixel(col, row)).collect(),
         cell_m: frame.resolution_m,
-        corner_m: corner.to_array(),
+        corner_m: frame.corner_of(Cell { col: 0, row: 0 }).to_array(),
     };
     ros::save(file, &map)
 }
@@ -99,6 +98,7 @@ pub fn save_believed(
 mod tests {
     use super::*;
     use common::step::Step as _;
+    use glam::DVec2;
 
     fn mission(text: &str) -> Mission {
         let text = format!("target = [2, 0]\nperimeter.width_m = 6\n{text}");
@@ -130,6 +130,23 @@ mod tests {
             (DVec2::new(0.75, 1.25), DVec2::new(0.5, 0.5)),
         ];
         assert_eq!(boxes, expected);
+    }
+
+    #[test]
+    fn a_saved_map_lies_where_its_cells_do() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("believed.yaml");
+        let mission = mission("");
+        for cells in [60, 61] {
+            let frame = GridFrame { cells, ..mission.grid_frame() };
+            let cells = vec![0; frame.area()];
+            save_believed(&file, &mission, &frame, &cells).unwrap();
+            let placed = ros::load_occupied(&file).unwrap();
+            // The image's rows count from the top.
+            let place = placed.place(7.5, f64::from(frame.cells) - 2.5);
+            let apart = place - frame.centre_of(Cell { col: 7, row: 2 });
+            assert!(apart.length() < 1e-6, "{apart} m apart of {} cells", frame.cells);
+        }
     }
 
     #[test]
