@@ -43,8 +43,8 @@ const KILL_AND_FREEZE: &[Signal] = &[Signal::KILL, Signal::STOP];
 
 /// Mission time runs four times as fast as the wall clock: a mission takes ten seconds.
 const FAST: &[&str] = &["--pace", "4"];
-/// With the front sonar alone the robot is under way for long enough.
-const LONG: &[&str] = &["--pace", "4", "--set", "sensors='front'"];
+/// At this speed the robot is under way for longer than the signals take.
+const LONG: &[&str] = &["--pace", "4", "--set", "controller.speed_m_s=0.1"];
 const CAR: &[&str] = &["--pace", "4", "--set", "robot.model=\"car\""];
 /// At this speed a mission in lockstep has tens of thousands of ticks, which take seconds. That is time enough for the signals.
 const LOCKSTEP: &[&str] = &["--set", "controller.speed_m_s=0.002", "--timeout", "80000"];

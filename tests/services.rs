@@ -215,9 +215,13 @@ fn keep_up(robot: &str, stage: &str, log: &Path, over: &AtomicBool) -> Option<i3
 }
 
 impl Drop for Units {
-    /// The stages end with their supervisor; then they are let go.
+    /// The stages end with their supervisor; then they are let go. A test that fails shows what they logged.
     fn drop(&mut self) {
         self.over.store(true, Ordering::Relaxed);
+        for stage in support::STAGES.iter().filter(|_| thread::panicking()) {
+            let log = std::fs::read_to_string(self.directory.path().join(stage));
+            eprintln!("{stage}: {}", log.unwrap_or_default());
+        }
     }
 }
 

@@ -12,8 +12,6 @@ use common::{
     },
 };
 
-use crate::failsafe::stop_monitor::StopMethod;
-
 /// The share of the remaining angle that the steering turns in a tick. It is below 1 so that the delay of the speed loop does not
 /// make the steering oscillate.
 const STEERING_GAIN: f64 = 0.6;
@@ -37,11 +35,6 @@ impl Drive {
             body: mission.body(),
             limit: Duration::from_secs_f64(mission.robot.command_limit_s),
         }
-    }
-
-    /// The time limit of a command.
-    pub const fn limit(&self) -> Duration {
-        self.limit
     }
 
     /// Commands for encoders as feedback, velocity mode, enabled motors and running streams.
@@ -136,30 +129,27 @@ impl Drive {
     }
 
     /// A command that holds the wheels at rest.
-    pub fn stop(&self) -> Vec<u8> {
+    pub fn stand(&self) -> Vec<u8> {
         self.velocity([0, 0], self.limit)
     }
 
-    /// The commands that stop the wheels by `method`.
-    pub fn stop_by(&self, method: StopMethod) -> Vec<u8> {
-        let wheels = [self.robot.left.channel, self.robot.right.channel];
-        let disable = |channel: Option<u8>| encoded(Command::Enable { on: false, channel });
-        match method {
-            StopMethod::Velocity => self.stop(),
-            StopMethod::Disable => wheels.map(|wheel| disable(Some(wheel))).concat(),
-            StopMethod::Pwm => {
-                let mut targets = [None; CHANNELS];
-                for wheel in wheels {
-                    targets[usize::from(wheel.min(1))] = Some(PWM_STANDS);
-                }
-                encoded(Command::Motion(Motion {
-                    quantity: Quantity::Pwm,
-                    targets: Targets::All(targets),
-                    limit_ms: None,
-                }))
-            }
-            StopMethod::Suspend => disable(None),
+    /// Commands that disable the motors of both wheels.
+    pub fn disable(&self) -> Vec<u8> {
+        let channels = [self.robot.left.channel, self.robot.right.channel].map(Some);
+        channels.map(|channel| encoded(Command::Enable { on: false, channel })).concat()
+    }
+
+    /// A command that gives both wheels the pulse width at which they do not turn.
+    pub fn still_pulses(&self) -> Vec<u8> {
+        let mut targets = [None; CHANNELS];
+        for wheel in [self.robot.left.channel, self.robot.right.channel] {
+            targets[usize::from(wheel.min(1))] = Some(PWM_STANDS);
         }
+        encoded(Command::Motion(Motion {
+            quantity: Quantity::Pwm,
+            targets: Targets::All(targets),
+            limit_ms: None,
+        }))
     }
 }
 

@@ -1,26 +1,150 @@
-//! The X80 link: frames in, samples out, commands to the robot, and the one place that stops it.
+//! The link of the X80: a [`Driver`] that speaks its protocol.
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`step`] | the pure step of the link: bytes and commands in, samples and bytes out |
 //! | [`drive`] | the wheels: counts of motor frames in, timed commands out |
-//! | [`failsafe`] | THE table of causes for which the link slows or stops the robot or ends the mission; in `failsafe/` their monitors |
-//! | [`transport`] | datagrams, a connection or a serial line |
 //! | `rangers` | the readings of a tick that go into the map |
 //! | [`telemetry`] | batteries and the other sensors, in the units of the topics |
-//! | [`backoff`] | pauses between attempts |
-//! | [`stage`] | the link as a stage: the entries of a recording, and the samples that it publishes |
-//! | [`shell`] | the process of the link: the wire and the topics that it reads |
-//! | [`stop_guard`] | the process that stops a moving robot when the link's process ended |
 
-pub mod backoff;
 pub mod drive;
-pub mod failsafe;
 mod rangers;
-pub mod shell;
-mod speed_trim;
-pub mod stage;
-pub mod step;
-pub mod stop_guard;
 pub mod telemetry;
-pub mod transport;
+
+use std::{path::Path, time::Duration};
+
+use common::{
+    mission::Mission,
+    run::Run,
+    samples::{CommandSample, RangeReading, WheelSample},
+    start::StageError,
+    stop_socket::Identity,
+    wire::{Command, Decoder, Report, SystemSignal},
+};
+use link::driver::{Driver, Heard, Motion, StopMethod, WireTally};
+
+use self::{
+    drive::{Drive, encoded},
+    rangers::Rangers,
+    telemetry::Telemetry,
+};
+
+/// The process of the X80's link.
+pub type Shell = link::shell::Shell<X80>;
+
+/// The X80's link as a stage.
+pub type LinkStage = link::stage::LinkStage<X80>;
+
+/// Be the [stop guard](link::stop_guard::run) of an X80.
+pub fn guard(directory: &Path, link: &Identity) -> Result<(), StageError> {
+    link::stop_guard::run::<X80>(directory, link)
+}
+
+/// Tell an X80 [to stand](link::stop_guard::stand).
+pub fn stand(run: &Run) -> Result<bool, StageError> {
+    link::stop_guard::stand::<X80>(run, || false)
+}
+
+/// The X80's protocol.
+#[derive(Clone, Debug)]
+pub struct X80 {
+    drive: Drive,
+    decoder: Decoder,
+    rangers: Rangers,
+    telemetry: Telemetry,
+}
+
+impl Driver for X80 {
+    const STAGE: &'static str = "x80-link";
+    const STOPS: &'static [StopMethod<Self>] = &[
+        StopMethod { name: "velocity 0", bytes: |x80| x80.drive.stand() },
+        StopMethod { name: "disable", bytes: |x80| x80.drive.disable() },
+        StopMethod { name: "pulse width 0", bytes: |x80| x80.drive.still_pulses() },
+        StopMethod {
+            name: "suspend",
+            bytes: |_| encoded(Command::Enable { on: false, channel: None }),
+        },
+    ];
+
+    fn new(mission: &Mission) -> Self {
+        Self {
+            drive: Drive::new(mission),
+            decoder: Decoder::default(),
+            rangers: Rangers::new(mission),
+            telemetry: Telemetry::default(),
+        }
+    }
+
+    fn push(&mut self, bytes: &[u8]) {
+        self.decoder.push(bytes);
+    }
+
+    fn reset(&mut self) {
+        self.decoder.reset();
+    }
+
+    fn heard(&mut self) -> Heard {
+        let mut heard = Heard::default();
+        let (mut motor, mut standard, mut custom) = (None, None, None);
+        while let Some(frame) = self.decoder.next_frame() {
+            match Report::parse(&frame) {
+                Ok(Report::Standard(sensors)) => standard = Some(sensors),
+                Ok(Report::Custom(sensors)) => custom = Some(sensors),
+                Ok(Report::Motor(sensors)) => motor = Some(sensors),
+                Ok(Report::System(SystemSignal::Ping)) => heard.pinged = true,
+                Ok(Report::System(SystemSignal::Ack)) => heard.acknowledged += 1,
+                // Any other frame only shows that the robot answers.
+                Err(_) => {}
+            }
+            heard.anything = true;
+        }
+        if let Some(motor) = motor {
+            self.telemetry.take_motor(&motor);
+            let (wheels, currents) = (self.drive.wheels(&motor), self.drive.currents(&motor));
+            heard.motion = Some(Motion { wheels, currents });
+        }
+        if let Some(standard) = standard {
+            self.rangers.take_standard(&standard);
+            heard.power = Some(self.telemetry.power(&standard));
+            heard.surroundings = Some(telemetry::surroundings(&standard));
+        }
+        heard.infrared = custom.and_then(|custom| self.rangers.take_custom(&custom));
+        heard.readings = self.rangers.take_fresh();
+        heard
+    }
+
+    fn tally(&self) -> WireTally {
+        let tally = self.decoder.tally();
+        WireTally { messages: tally.frames, bytes_dropped: tally.noise_bytes + tally.dropped_bytes }
+    }
+
+    fn readings_for_tick(&mut self) -> Vec<RangeReading> {
+        self.rangers.for_tick()
+    }
+
+    fn greeting(&self) -> Vec<u8> {
+        self.drive.greeting()
+    }
+
+    fn ask_for_sensors(&self) -> Vec<u8> {
+        self.drive.streams()
+    }
+
+    fn ping(&self) -> Vec<u8> {
+        encoded(Command::System(SystemSignal::Ping))
+    }
+
+    fn acknowledge(&self) -> Vec<u8> {
+        encoded(Command::System(SystemSignal::Ack))
+    }
+
+    fn counts(&self, command: &CommandSample, share: f64, wheels: &WheelSample) -> [i16; 2] {
+        self.drive.counts(command, share, wheels)
+    }
+
+    fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8> {
+        self.drive.velocity(counts, limit)
+    }
+}
+
+#[cfg(test)]
+mod tests;

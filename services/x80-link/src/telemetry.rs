@@ -20,33 +20,28 @@ impl Telemetry {
         self.currents = motor.currents;
     }
 
-    /// Take a standard frame; `low` says whether the battery of the boards, of the motors, and of the servos is low.
-    pub fn take_standard(
-        &mut self,
-        standard: &StandardSensors,
-        low: [bool; 3],
-    ) -> (PowerSample, SurroundingsSample) {
-        let [board_low, motor_low, servo_low] = low.map(u8::from);
-        let power = PowerSample {
+    /// The batteries of a standard frame, and the newest motor currents.
+    pub fn power(&self, standard: &StandardSensors) -> PowerSample {
+        PowerSample {
             board_v: volts(standard.board_battery, LOGIC_SCALE_V),
             motor_v: volts(standard.motor_battery, MOTOR_SCALE_V),
             servo_v: volts(standard.servo_battery, LOGIC_SCALE_V),
             driver_c: standard.overheat.map(driver_celsius),
             current_ad: self.currents,
-            board_low,
-            motor_low,
-            servo_low,
             ..PowerSample::default()
-        };
-        let [alarm_1, motion_1, alarm_2, motion_2] = standard.human;
-        let surroundings = SurroundingsSample {
-            temperature_c: board_celsius(standard.temperature),
-            human_alarm_ad: [alarm_1, alarm_2],
-            human_motion_ad: [motion_1, motion_2],
-            tilt_ad: standard.tilt,
-            ..SurroundingsSample::default()
-        };
-        (power, surroundings)
+        }
+    }
+}
+
+/// The other sensors of a standard frame.
+pub fn surroundings(standard: &StandardSensors) -> SurroundingsSample {
+    let [alarm_1, motion_1, alarm_2, motion_2] = standard.human;
+    SurroundingsSample {
+        temperature_c: board_celsius(standard.temperature),
+        human_alarm_ad: [alarm_1, alarm_2],
+        human_motion_ad: [motion_1, motion_2],
+        tilt_ad: standard.tilt,
+        ..SurroundingsSample::default()
     }
 }
 
@@ -69,9 +64,7 @@ mod tests {
             motor_battery: 2048,
             ..StandardSensors::default()
         };
-        let low = [false, true, false];
-        let (power, surroundings) = telemetry.take_standard(&standard, low);
-        assert_eq!((power.board_low, power.motor_low, power.servo_low), (0, 1, 0));
+        let (power, surroundings) = (telemetry.power(&standard), surroundings(&standard));
         assert!((power.board_v - 7.2).abs() < 1e-9);
         assert!((power.motor_v - 12.003).abs() < 1e-3);
         assert_eq!(power.driver_c, [60.0, 100.0]);

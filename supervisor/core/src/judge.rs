@@ -8,7 +8,7 @@ use common::{
     domain::RobotName,
     samples::{Action, HoldReason, LinkSample},
 };
-use x80_link::failsafe;
+use link::failsafe;
 
 use crate::{
     outcome::{Ending, Outcome},

@@ -25,7 +25,9 @@ use common::{
 };
 use thiserror::Error;
 
-use crate::{process, stop_guard};
+use x80_link::stand as tell_to_stand;
+
+use crate::process;
 
 /// The roster is published five times a second; a frozen supervisor publishes none.
 pub const PATIENCE: Duration = Duration::from_secs(2);
@@ -99,7 +101,7 @@ pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
     let rests = match (link, run) {
         (Some(link), _) => rests_by(&link),
         // A link that answers nobody sends nothing either.
-        (None, Ok(run)) => stop_guard::stand(&run, || false)?,
+        (None, Ok(run)) => tell_to_stand(&run)?,
         (None, Err(_)) => false,
     };
     let told = told(supervisor);

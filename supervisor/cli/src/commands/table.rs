@@ -10,8 +10,8 @@ use common::{
     topics::{self, AnyTopic, Logged, Rate},
     wiring::{EVERY_STAGE_READS, EVERY_STAGE_WRITES, Persists, Topics},
 };
+use link::failsafe::{self, monitor::Clears};
 use supervisor::stages;
-use x80_link::failsafe::{self, monitor::Clears};
 
 use self::item::item;
 use crate::console::{failure::Failure, output::print_text};

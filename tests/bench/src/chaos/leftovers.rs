@@ -8,7 +8,7 @@ use std::{
 };
 
 use common::domain::{Domain, RobotName, SHARED_MEMORY};
-use supervisor::stop_guard;
+use supervisor::STOP_GUARD;
 
 use crate::{command_line, processes};
 
@@ -28,9 +28,7 @@ pub(crate) fn find(robot: &RobotName, directory: &Path) -> Vec<String> {
     let directory = directory.to_string_lossy();
     // A stop guard ends after its link, when its robot rests or is gone.
     let began = Instant::now();
-    while began.elapsed() < GUARDS_END
-        && lines(&directory).any(|line| line.contains(stop_guard::NAME))
-    {
+    while began.elapsed() < GUARDS_END && lines(&directory).any(|line| line.contains(STOP_GUARD)) {
         thread::park_timeout(LOOK);
     }
     found.extend(lines(&directory));

@@ -15,7 +15,7 @@ use common::{
 use evaluation::baselines::{bug::Bug, shell::Shell, wavefront::Wavefront};
 #[cfg(feature = "baselines")]
 use supervisor::stages::PLANNER;
-use supervisor::{planner_executable, stages::Stage, stop_guard};
+use supervisor::{STOP_GUARD, guard, planner_executable, stages::Stage};
 
 use crate::console::{failure::Failure, operator};
 
@@ -23,12 +23,12 @@ use crate::console::{failure::Failure, operator};
 pub(super) fn run(words: &[OsString]) -> Result<(), Failure> {
     let (name, options) = words.split_first().ok_or("name a stage")?;
     let name = name.to_string_lossy();
-    if name == stop_guard::NAME {
+    if name == STOP_GUARD {
         let [directory, link] = options else {
             return Err("name the directory of a run and the socket of its link".into());
         };
         let link = Identity(link.to_string_lossy().into_owned());
-        return Ok(stop_guard::run(Path::new(directory), &link)?);
+        return Ok(guard(Path::new(directory), &link)?);
     }
     #[cfg(feature = "baselines")]
     if let Some(run) = baseline(&name) {

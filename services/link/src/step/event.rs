@@ -11,7 +11,7 @@ use common::{
 
 use serde::{Deserialize, Serialize};
 
-use crate::failsafe::{Decision, battery::BatteryChange, stop_monitor::StopMethod};
+use crate::failsafe::{Decision, battery::BatteryChange};
 
 /// The state from which a generation starts: the pace of mission time and the number of its first tick. The supervisor gives the
 /// number, because it follows the ticks, so the link writes no checkpoint.
@@ -99,8 +99,8 @@ pub enum Effect {
     Restarted,
     /// The counts jumped farther than wheels turn, and continue from there.
     CountsElsewhere,
-    /// The robot does not stop, and was stopped by this next method.
-    StopBy(StopMethod),
+    /// The robot does not stop, and was stopped by the next method, which has this name.
+    StopBy(&'static str),
     /// The robot was asked for its streams again.
     AskedForStreams,
     /// Publish the infrared rangers.

@@ -5,9 +5,12 @@ use std::time::Duration;
 use common::samples::Cause;
 
 use super::{Effect, Link, STOP_AGAIN, passed};
-use crate::failsafe::{Decision, monitor::Observation, stop_monitor::StopMethod};
+use crate::{
+    driver::Driver,
+    failsafe::{Decision, monitor::Observation},
+};
 
-impl Link {
+impl<D: Driver> Link<D> {
     pub(super) fn decide(&mut self, now_ns: u64) -> Decision {
         self.failsafe.decide(self.in_ticks(), self.moment(now_ns))
     }
@@ -40,12 +43,12 @@ impl Link {
         now_ns: u64,
         effects: &mut Vec<Effect>,
     ) {
-        if self.monitors().stop.method() != StopMethod::Velocity && counts != [0, 0] {
-            // The robot was stopped by another method than velocity, and must be set up again.
-            effects.push(Effect::Send(self.drive.greeting()));
+        if self.stop_method() != 0 && counts != [0, 0] {
+            // The robot was stopped by another method than the first, and must be set up again.
+            effects.push(Effect::Send(self.driver.greeting()));
         }
         self.commanded(counts, now_ns);
-        effects.push(Effect::Send(self.drive.velocity(counts, limit)));
+        effects.push(Effect::Send(self.driver.velocity(counts, limit)));
     }
 
     /// Send the stop several times when it is new, and then at intervals.
@@ -55,14 +58,14 @@ impl Link {
         } else if self.monitors().latency.is_testing() && self.stop_sent_ns.is_some() {
             // The latency monitor waits for late acknowledgements, so nothing may be sent.
             return;
-        } else if let Some(method) = self.next_stop_method() {
-            effects.push(Effect::Send(self.drive.stop_by(method)));
-            effects.push(Effect::StopBy(method));
+        } else if self.takes_next_stop_method() {
+            effects.push(Effect::Send(self.stop()));
+            effects.push(Effect::StopBy(D::STOPS[self.stop_method()].name));
         } else if self.failsafe.applied(Cause::RobotDoesNotStop) {
             // The method that was used last needs time to have an effect.
             return;
         } else if self.connected() && passed(self.stop_sent_ns, now_ns, STOP_AGAIN) {
-            effects.push(Effect::Send(self.drive.stop_by(self.monitors().stop.method())));
+            effects.push(Effect::Send(self.stop()));
         } else {
             return;
         }
@@ -75,9 +78,18 @@ impl Link {
         self.restart.commanded(counts, self.now);
     }
 
-    fn next_stop_method(&mut self) -> Option<StopMethod> {
+    /// The index of the method by which the robot is stopped now. After the last one the first follows.
+    fn stop_method(&self) -> usize {
+        self.monitors().stop.method() % D::STOPS.len()
+    }
+
+    fn stop(&self) -> Vec<u8> {
+        (D::STOPS[self.stop_method()].bytes)(&self.driver)
+    }
+
+    /// Change to the next method, if it is due. Returns whether it was.
+    fn takes_next_stop_method(&mut self) -> bool {
         let does_not_stop = self.failsafe.applied(Cause::RobotDoesNotStop);
-        let stop = &mut self.failsafe.monitors.stop;
-        stop.next_method(does_not_stop, self.now)
+        self.failsafe.monitors.stop.takes_next_method(does_not_stop, self.now)
     }
 }

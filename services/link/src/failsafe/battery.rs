@@ -6,7 +6,6 @@ use common::{
     clock::MissionTime,
     mission::{BatteryLimits, Mission},
     samples::Cause,
-    wire::{LOGIC_SCALE_V, MOTOR_SCALE_V, StandardSensors, volts},
 };
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
@@ -122,12 +121,9 @@ impl Batteries {
         board.charge.max(motor.charge)
     }
 
-    fn read(&mut self, standard: &StandardSensors, now: MissionTime) {
-        let readings = [
-            (volts(standard.board_battery, LOGIC_SCALE_V), self.limits.board),
-            (volts(standard.motor_battery, MOTOR_SCALE_V), self.limits.motor),
-            (volts(standard.servo_battery, LOGIC_SCALE_V), self.limits.servo),
-        ];
+    fn read(&mut self, volts: [f64; 3], now: MissionTime) {
+        let BatteryLimits { board, motor, servo } = self.limits;
+        let readings = volts.into_iter().zip([board, motor, servo]);
         for ((gauge, pack), (volts, limit)) in self.gauges.iter_mut().zip(Pack::ALL).zip(readings) {
             let before = gauge.charge;
             let charge = gauge.read(volts, limit, now);
@@ -148,8 +144,8 @@ impl Monitor for Batteries {
     }
 
     fn observe(&mut self, what: &Observation<'_>, now: Moment) {
-        if let Observation::Standard(standard) = what {
-            self.read(standard, now.time);
+        if let Observation::Batteries(volts) = what {
+            self.read(*volts, now.time);
         }
     }
 

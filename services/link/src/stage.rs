@@ -19,7 +19,10 @@ use common::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::step::{Effect, Event, Input, Link, State};
+use crate::{
+    driver::Driver,
+    step::{Effect, Event, Input, Link, State},
+};
 
 /// A sample of `wire` has at most so many bytes. Longer data are published in several samples.
 pub(crate) const WIRE_PIECE: usize = 2048;
@@ -90,8 +93,8 @@ impl<'a> Taken<'a> {
 
 /// The step, and the samples that are published later, when no stage of the pipeline waits for the link.
 #[derive(Debug)]
-pub struct LinkStage {
-    pub(crate) link: Link,
+pub struct LinkStage<D> {
+    pub(crate) link: Link<D>,
     infrared: Option<InfraredSample>,
     power: Option<PowerSample>,
     surroundings: Option<SurroundingsSample>,
@@ -99,7 +102,7 @@ pub struct LinkStage {
     wire: Vec<(Progress, WireHeader, Vec<u8>)>,
 }
 
-impl LinkStage {
+impl<D: Driver> LinkStage<D> {
     /// Whether telemetry waits to be published.
     pub(crate) const fn has_telemetry(&self) -> bool {
         self.infrared.is_some() || self.power.is_some() || self.surroundings.is_some()
@@ -153,7 +156,7 @@ impl LinkStage {
     }
 }
 
-impl Stage for LinkStage {
+impl<D: Driver> Stage for LinkStage<D> {
     type Start = State;
     type Entry<'a> = Entry<'a>;
     /// The effects that the process has to carry out, in order.

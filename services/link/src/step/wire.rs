@@ -1,20 +1,17 @@
-//! The part of the step that takes the robot's frames and follows its presence.
+//! The part of the step that takes what the robot says and follows its presence.
 
-use common::wire::{
-    COUNT_CYCLE, Command, CustomSensors, MotorSensors, Report, StandardSensors, SystemSignal,
-};
+use common::{samples::PowerSample, wire::COUNT_CYCLE};
 
 use super::{Effect, Link, PING_EVERY, passed};
 use crate::{
-    drive::encoded,
+    driver::{Driver, Heard, Motion},
     failsafe::monitor::{Counts, Monitor as _, Observation},
 };
 
-impl Link {
+impl<D: Driver> Link<D> {
     pub(super) fn take_wire(&mut self, open: bool, now_ns: u64, effects: &mut Vec<Effect>) {
         self.failsafe.monitors.presence.wire(open);
-        // The rest of a frame does not follow in the next connection.
-        self.decoder.reset();
+        self.driver.reset();
         // What was sent while the wire was closed is lost.
         self.stop_sent_ns = None;
         if !open {
@@ -22,27 +19,16 @@ impl Link {
         }
     }
 
-    pub(super) fn take_frames(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        let (mut motor, mut standard, mut custom) = (None, None, None);
-        let (mut heard, mut ping) = (false, false);
-        while let Some(frame) = self.decoder.next_frame() {
-            match Report::parse(&frame) {
-                Ok(Report::Standard(sensors)) => standard = Some(sensors),
-                Ok(Report::Custom(sensors)) => custom = Some(sensors),
-                Ok(Report::Motor(sensors)) => motor = Some(sensors),
-                Ok(Report::System(SystemSignal::Ping)) => ping = true,
-                Ok(Report::System(SystemSignal::Ack)) => {
-                    self.observe(Observation::Acknowledged, now_ns);
-                }
-                // Any other frame only shows that the robot answers.
-                Err(_) => {}
-            }
-            heard = true;
+    pub(super) fn take_heard(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
+        let heard = self.driver.heard();
+        for _ in 0..heard.acknowledged {
+            self.observe(Observation::Acknowledged, now_ns);
         }
-        if ping {
-            effects.push(Effect::Send(encoded(Command::System(SystemSignal::Ack))));
+        if heard.pinged {
+            effects.push(Effect::Send(self.driver.acknowledge()));
         }
-        let counts = motor.map(|sensors| self.judge_counts(&sensors, now_ns));
+        let motion = heard.motion;
+        let counts = motion.map(|motion| self.judge_counts(&motion, now_ns));
         if counts == Some(Counts::Elsewhere) {
             effects.push(Effect::CountsElsewhere);
         }
@@ -50,28 +36,21 @@ impl Link {
             effects.push(Effect::Restarted);
             if self.connected() {
                 // A restarted robot has its default settings.
-                effects.push(Effect::Send(self.drive.greeting()));
+                effects.push(Effect::Send(self.driver.greeting()));
             }
         }
-        if let Some(standard) = &standard {
-            self.observe(Observation::Standard(standard), now_ns);
-        }
-        self.take_telemetry(motor.as_ref(), standard.as_ref(), custom.as_ref(), effects);
-        let readings = self.rangers.take_fresh();
-        if !readings.is_empty() {
-            self.observe(Observation::Readings(&readings), now_ns);
-        }
-        if heard && self.failsafe.monitors.presence.heard(now_ns) {
+        self.take_sensors(&heard, now_ns, effects);
+        if heard.anything && self.failsafe.monitors.presence.heard(now_ns) {
             let again = self.losses() > 0;
             self.observe(Observation::Found { again }, now_ns);
             effects.push(Effect::Connected(true));
-            effects.push(Effect::Send(self.drive.greeting()));
+            effects.push(Effect::Send(self.driver.greeting()));
             // The robot may still drive by a command of an earlier link.
             self.stop_sent_ns = None;
             if self.in_ticks() {
                 // These frames answer the greeting, and their number depends on the time that the robot took to start. Ticks begin with the
                 // frames that answer the order.
-                if motor.is_some() {
+                if motion.is_some() {
                     self.due = self.due.saturating_sub(1);
                 }
                 if self.ordered_to_drive() {
@@ -83,19 +62,19 @@ impl Link {
         if counts == Some(Counts::Implausible) {
             // They start no tick. The robot stands until its motion is known again, so that little of it is lost.
             self.repeat = None;
-            self.tell([0, 0], self.drive.limit(), now_ns, effects);
-        } else if let Some(sensors) = motor {
-            self.begin_tick(&sensors, now_ns, effects);
+            self.tell([0, 0], self.limit, now_ns, effects);
+        } else if let Some(Motion { wheels, .. }) = motion {
+            self.begin_tick(wheels, now_ns, effects);
         }
     }
 
     /// Classify the counts of a frame. In lockstep all counts are plausible, because the robot is a simulated one that does not restart.
     /// Only its contacts are noticed then.
-    pub(super) fn judge_counts(&mut self, sensors: &MotorSensors, now_ns: u64) -> Counts {
-        let wheels = self.drive.wheels(sensors);
+    fn judge_counts(&mut self, motion: &Motion, now_ns: u64) -> Counts {
+        let wheels = motion.wheels;
         let counts = [wheels.left_counts, wheels.right_counts];
         let counts = counts.map(|count| count % COUNT_CYCLE);
-        let currents = Observation::Currents(self.drive.currents(sensors));
+        let currents = Observation::Currents(motion.currents);
         if self.in_ticks() {
             let now = self.moment(now_ns);
             let odometry = &mut self.failsafe.monitors.odometry;
@@ -111,27 +90,20 @@ impl Link {
         are
     }
 
-    /// Take the sensors that do not belong to the tick.
-    pub(super) fn take_telemetry(
-        &mut self,
-        motor: Option<&MotorSensors>,
-        standard: Option<&StandardSensors>,
-        custom: Option<&CustomSensors>,
-        effects: &mut Vec<Effect>,
-    ) {
-        if let Some(motor) = motor {
-            self.telemetry.take_motor(motor);
-        }
-        if let Some(standard) = standard {
-            self.rangers.take_standard(standard);
+    /// Take the sensors that do not begin a tick.
+    fn take_sensors(&mut self, heard: &Heard, now_ns: u64, effects: &mut Vec<Effect>) {
+        if let Some(power) = heard.power {
+            let volts = [power.board_v, power.motor_v, power.servo_v];
+            self.observe(Observation::Batteries(volts), now_ns);
             let battery = &mut self.failsafe.monitors.battery;
-            let (power, surroundings) = self.telemetry.take_standard(standard, battery.low());
-            effects.push(Effect::Power(power));
-            effects.push(Effect::Surroundings(surroundings));
+            let [board_low, motor_low, servo_low] = battery.low().map(u8::from);
+            effects.push(Effect::Power(PowerSample { board_low, motor_low, servo_low, ..power }));
             effects.extend(battery.take_changes().into_iter().map(Effect::Battery));
         }
-        if let Some(infrared) = custom.and_then(|custom| self.rangers.take_custom(custom)) {
-            effects.push(Effect::Infrared(infrared));
+        effects.extend(heard.surroundings.map(Effect::Surroundings));
+        effects.extend(heard.infrared.map(Effect::Infrared));
+        if !heard.readings.is_empty() {
+            self.observe(Observation::Readings(&heard.readings), now_ns);
         }
     }
 
@@ -141,7 +113,7 @@ impl Link {
         if self.ordered_to_drive() {
             self.due += 1;
         }
-        effects.push(Effect::Send(encoded(Command::System(SystemSignal::Ping))));
+        effects.push(Effect::Send(self.driver.ping()));
     }
 
     pub(super) fn keep_connected(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
@@ -156,7 +128,7 @@ impl Link {
             && !self.monitors().latency.is_testing()
             && self.failsafe.monitors.streams.wants_request(now_ns)
         {
-            effects.push(Effect::Send(self.drive.streams()));
+            effects.push(Effect::Send(self.driver.ask_for_sensors()));
             effects.push(Effect::AskedForStreams);
         }
         let owing = self.in_ticks() && owes && silent && self.connected();

@@ -12,15 +12,7 @@ fn batteries(limits: BatteryLimits) -> Batteries {
 impl Batteries {
     /// Take voltages at a time in seconds. Returns which batteries are low, and the changes.
     fn at(&mut self, seconds: f64, volts: [f64; 3]) -> ([bool; 3], Vec<(Pack, Charge)>) {
-        let ad = |volts: f64, scale: f64| (volts / scale * 4095.0).round() as u16;
-        let [board, motor, servo] = volts;
-        let standard = StandardSensors {
-            board_battery: ad(board, LOGIC_SCALE_V),
-            motor_battery: ad(motor, MOTOR_SCALE_V),
-            servo_battery: ad(servo, LOGIC_SCALE_V),
-            ..StandardSensors::default()
-        };
-        self.read(&standard, MissionTime::from_seconds(seconds));
+        self.read(volts, MissionTime::from_seconds(seconds));
         let changes = self.take_changes().into_iter();
         let changes = changes.map(|change| (change.pack, change.charge));
         (self.low(), changes.collect())

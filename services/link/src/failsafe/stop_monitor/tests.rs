@@ -102,18 +102,12 @@ fn every_method_is_tried_in_turn_while_the_robot_does_not_stop() {
         let times = (from_ms..to_ms).step_by(20);
         let tried = times.filter_map(|ms| {
             let now = MissionTime(ms * 1_000_000);
-            let method = stop_monitor.next_method(does_not_stop, now);
-            method.map(|method| (ms, method))
+            let takes = stop_monitor.takes_next_method(does_not_stop, now);
+            takes.then(|| (ms, stop_monitor.method()))
         });
         tried.collect::<Vec<_>>()
     };
-    let methods = [
-        (0, StopMethod::Disable),
-        (300, StopMethod::Pwm),
-        (600, StopMethod::Suspend),
-        (900, StopMethod::Velocity),
-    ];
-    assert_eq!(tried(0, 1000, true), methods);
+    assert_eq!(tried(0, 1000, true), [(0, 1), (300, 2), (600, 3), (900, 4)]);
     assert_eq!(tried(1000, 1100, false), []);
-    assert_eq!(tried(1100, 1120, true), [(1100, StopMethod::Disable)]);
+    assert_eq!(tried(1100, 1120, true), [(1100, 5)]);
 }

@@ -5,7 +5,6 @@ use super::{
 use common::{
     clock::{MissionTime, Pace},
     samples::{CommandSample, HoldReason, Order, RangeReading, RangeStatus, Stamp},
-    wire::StandardSensors,
 };
 use std::path::Path;
 
@@ -39,10 +38,9 @@ fn command(tick_ago: u64, pose_ago: u64, guidance_ago: u64) -> CommandSample {
     }
 }
 
-/// A standard frame with these volts of all batteries.
-fn standard(volts: f64) -> StandardSensors {
-    let board_battery = (volts / 9.0 * 4095.0).round() as u16;
-    StandardSensors { board_battery, ..StandardSensors::default() }
+/// The voltage of the boards' battery, the only one that is fitted.
+const fn boards(volts: f64) -> [f64; 3] {
+    [volts, 0.0, 0.0]
 }
 
 /// A reading of the front sonar.
@@ -62,7 +60,7 @@ fn well() -> Failsafe {
         (Observation::Pace(Pace::Rate(1.0)), now()),
         (Observation::Directive(Order::Drive, HoldReason::None), supervisor_silent),
         (Observation::Found { again: false }, frame),
-        (Observation::Standard(&standard(7.2)), frame),
+        (Observation::Batteries(boards(7.2)), frame),
         (Observation::Readings(&front(RangeStatus::Nothing, 255)), frame),
         (Observation::Command(&command(limit, limit, limit)), now()),
     ] {
@@ -126,7 +124,7 @@ const CASES: &[(Break, Action, Cause)] = &[
     (
         |it| {
             for when in [ago(2000 * MS), now()] {
-                it.observe(&Observation::Standard(&standard(5.9)), when);
+                it.observe(&Observation::Batteries(boards(5.9)), when);
             }
         },
         Action::End,
@@ -214,11 +212,7 @@ const CASES: &[(Break, Action, Cause)] = &[
         Cause::GuidanceStale,
     ),
     (without_an_infrared_ranger, Action::Slow, Cause::InfraredSilent),
-    (
-        |it| it.observe(&Observation::Standard(&standard(6.5)), now()),
-        Action::Slow,
-        Cause::BatteryLow,
-    ),
+    (|it| it.observe(&Observation::Batteries(boards(6.5)), now()), Action::Slow, Cause::BatteryLow),
 ];
 
 fn fresh(newest: Option<CommandSample>) -> staleness::Staleness {

@@ -19,20 +19,17 @@ use common::{
     },
     step::{ForeignState, Step},
     stop_socket::Request,
-    wire::{Decoder, DecoderTally, MotorSensors},
 };
 
 use crate::{
-    drive::Drive,
+    driver::{Driver, WireTally},
     failsafe::{
         Decision, Failsafe, Monitors, SLOW_SHARE,
         monitor::{Moment, Observation},
         presence::Absence,
         restart::RestartWatch,
     },
-    rangers::Rangers,
     speed_trim::SpeedTrim,
-    telemetry::Telemetry,
 };
 
 pub use event::{Effect, Event, Input, State, Tally};
@@ -43,11 +40,11 @@ const PING_EVERY: Duration = Duration::from_millis(200);
 const REPEAT_AFTER: Duration = Duration::from_millis(100);
 /// In lockstep a tick waits at most so long until the supervisor's limit allows it. This is longer than the planner of a stalled
 /// robot may take to restart. If the supervisor is silent, the failsafe stops the robot earlier.
-const LIMIT_WAITED: Duration = Duration::from_secs(5);
+pub const LIMIT_WAITED: Duration = Duration::from_secs(5);
 /// The least time limit of a command. The wire carries whole milliseconds, and for most robots 0 means no limit.
 const LEAST_LEFT: Duration = Duration::from_millis(1);
 /// A new stop is sent so many times, because datagrams may be lost.
-const STOPS: u32 = 3;
+pub const STOPS: u32 = 3;
 /// While the link stops the robot, it repeats the stop after so long. All stops may be lost while the radio fades, and the robot may
 /// ignore the time limit of its last command.
 const STOP_AGAIN: Duration = Duration::from_millis(200);
@@ -73,20 +70,19 @@ struct Repeat {
     due: MissionTime,
 }
 
-/// The link to one robot.
+/// The link to one robot, which speaks the protocol of `D`.
 #[derive(Debug)]
-pub struct Link {
+pub struct Link<D> {
     state: State,
     /// The mission time of the present event.
     now: MissionTime,
-    drive: Drive,
+    driver: D,
+    /// The time limit of a command.
+    limit: Duration,
     half_period_ns: u64,
-    decoder: Decoder,
     failsafe: Failsafe,
     restart: RestartWatch,
     pinged_ns: Option<u64>,
-    telemetry: Telemetry,
-    rangers: Rangers,
     /// None if the mission wants commands sent as they are.
     trim: Option<SpeedTrim>,
     /// The encoders of the newest tick.
@@ -107,7 +103,7 @@ pub struct Link {
     tally: Tally,
 }
 
-impl Step for Link {
+impl<D: Driver> Step for Link<D> {
     type Input<'a> = Input<'a>;
     type Output = Vec<Effect>;
     type State = State;
@@ -117,14 +113,12 @@ impl Step for Link {
         Self {
             state: State::default(),
             now: MissionTime::default(),
-            drive: Drive::new(mission),
+            driver: D::new(mission),
+            limit: Duration::from_secs_f64(mission.robot.command_limit_s),
             half_period_ns: (0.5e9 / mission.robot.rate_hz) as u64,
-            decoder: Decoder::default(),
             failsafe: Failsafe::new(mission),
             restart: RestartWatch::new(mission),
             pinged_ns: None,
-            telemetry: Telemetry::default(),
-            rangers: Rangers::new(mission),
             trim: mission.speed_trim().then(|| {
                 let wheels = if mission.body().steering.is_some() { 1 } else { 2 };
                 SpeedTrim::new(wheels, 1.0 / mission.robot.rate_hz)
@@ -159,8 +153,8 @@ impl Step for Link {
         let mut effects = Vec::new();
         match input.event {
             Event::Datagram(bytes) => {
-                self.decoder.push(bytes);
-                self.take_frames(now_ns, &mut effects);
+                self.driver.push(bytes);
+                self.take_heard(now_ns, &mut effects);
             }
             Event::Wire(open) => self.take_wire(open, now_ns, &mut effects),
             Event::Command(command) => self.take_command(command, now_ns, &mut effects),
@@ -183,7 +177,7 @@ impl Step for Link {
     }
 }
 
-impl Link {
+impl<D: Driver> Link<D> {
     /// Whether the robot answers.
     pub fn connected(&self) -> bool {
         self.monitors().presence.connected()
@@ -194,9 +188,9 @@ impl Link {
         self.decision
     }
 
-    /// The counts of the decoder.
-    pub fn wire_tally(&self) -> DecoderTally {
-        self.decoder.tally()
+    /// The counts of what came from the robot.
+    pub fn wire_tally(&self) -> WireTally {
+        self.driver.tally()
     }
 
     /// The counts of the link.
@@ -251,7 +245,7 @@ impl Link {
 
     /// The stops that are sent when the stage ends.
     pub fn final_stops(&self) -> Vec<Vec<u8>> {
-        (0..STOPS).map(|_| self.drive.stop()).collect()
+        (0..STOPS).map(|_| (D::STOPS[0].bytes)(&self.driver)).collect()
     }
 
     const fn monitors(&self) -> &Monitors {
@@ -287,7 +281,7 @@ impl Link {
         })
     }
 
-    fn begin_tick(&mut self, sensors: &MotorSensors, now_ns: u64, effects: &mut Vec<Effect>) {
+    fn begin_tick(&mut self, wheels: WheelSample, now_ns: u64, effects: &mut Vec<Effect>) {
         if !self.ordered_to_drive() && !self.held_by_operator() {
             return;
         }
@@ -303,14 +297,13 @@ impl Link {
             // The tick uses up its number even if it is never answered.
             self.state.next_tick += 1;
         }
-        let wheels =
-            WheelSample { restarts: self.restart.restarts(), ..self.drive.wheels(sensors) };
+        let wheels = WheelSample { restarts: self.restart.restarts(), ..wheels };
         self.wheels = wheels;
         if let Some(trim) = &mut self.trim {
             trim.rolled(&wheels, self.time.seconds());
         }
         self.open = Some(OpenTick {
-            ranges: self.rangers.for_tick(),
+            ranges: self.driver.readings_for_tick(),
             wheels,
             contact: self.failsafe.monitors.odometry.take_contact(),
             began_ns: now_ns,
@@ -352,14 +345,14 @@ impl Link {
         let counts = match CommandState::from_byte(command.state) {
             CommandState::Driving => {
                 let reached = self.trim.as_ref().map_or(1.0, SpeedTrim::share);
-                self.drive.counts(command, share / reached, &self.wheels)
+                self.driver.counts(command, share / reached, &self.wheels)
             }
             CommandState::Halt | CommandState::Arrived => [0, 0],
         };
         if let Some(trim) = &mut self.trim {
             trim.told(counts);
         }
-        self.tell(counts, self.drive.limit(), now_ns, effects);
+        self.tell(counts, self.limit, now_ns, effects);
         let stamp = command.stamp.time();
         self.repeat = Some(Repeat {
             counts,
@@ -439,7 +432,7 @@ impl Link {
         let Some(repeat) = self.repeat.take_if(|repeat| repeat.due <= now) else {
             return;
         };
-        let left = self.drive.limit().saturating_sub(now.since(repeat.stamp));
+        let left = self.limit.saturating_sub(now.since(repeat.stamp));
         // While a tick is open, the next command will follow soon.
         let superseded = self.open.is_some();
         if superseded || left < LEAST_LEFT || self.decide(now_ns).stops() {
@@ -454,6 +447,3 @@ impl Link {
 fn passed(since_ns: Option<u64>, now_ns: u64, span: Duration) -> bool {
     since_ns.is_none_or(|since| now_ns.saturating_sub(since) >= span.as_nanos() as u64)
 }
-
-#[cfg(test)]
-mod tests;

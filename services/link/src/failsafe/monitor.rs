@@ -6,7 +6,6 @@ use common::{
     clock::{MissionTime, Pace},
     mission::Mission,
     samples::{Cause, CommandSample, HoldReason, Order, RangeReading},
-    wire::StandardSensors,
 };
 
 /// The two clocks at one moment.
@@ -43,8 +42,8 @@ pub enum Observation<'a> {
     Currents([u16; 2]),
     /// A motor frame came, with these counts of the wheels, growing forward.
     Motor([u16; 2], Counts),
-    /// A standard frame came.
-    Standard(&'a StandardSensors),
+    /// The voltages of the batteries of the boards, the motors and the servos came; 0 for one that is not fitted.
+    Batteries([f64; 3]),
     /// Readings of ranging sensors came.
     Readings(&'a [RangeReading]),
     /// The robot answers after it did not, and was asked for its streams.

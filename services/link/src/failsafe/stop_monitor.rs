@@ -24,41 +24,6 @@ const AT_REST_AFTER: Duration = Duration::from_millis(200);
 /// The next method is used after so long on a robot that does not stop.
 const NEXT_METHOD_AFTER: Duration = Duration::from_millis(300);
 
-/// A way to stop the robot. The methods are tried in this order.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum StopMethod {
-    /// The velocity of both wheels is set to 0.
-    #[default]
-    Velocity,
-    /// The motors of both wheels are disabled.
-    Disable,
-    /// Both wheels get the pulse width at which they do not turn.
-    Pwm,
-    /// All motors are suspended.
-    Suspend,
-}
-
-impl StopMethod {
-    const fn next(self) -> Self {
-        match self {
-            Self::Velocity => Self::Disable,
-            Self::Disable => Self::Pwm,
-            Self::Pwm => Self::Suspend,
-            Self::Suspend => Self::Velocity,
-        }
-    }
-
-    /// Its name in logs.
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Velocity => "velocity 0",
-            Self::Disable => "disable",
-            Self::Pwm => "pulse width 0",
-            Self::Suspend => "suspend",
-        }
-    }
-}
-
 /// The stop monitor of one robot.
 #[derive(Clone, Debug)]
 pub struct StopMonitor {
@@ -68,7 +33,7 @@ pub struct StopMonitor {
     frame: Option<([u16; 2], MissionTime)>,
     moving: Duration,
     resting: Duration,
-    method: StopMethod,
+    method: usize,
     tried: Option<MissionTime>,
 }
 
@@ -82,7 +47,7 @@ impl StopMonitor {
         } else {
             self.told_to_stand = None;
             self.moving = Duration::ZERO;
-            self.method = StopMethod::Velocity;
+            self.method = 0;
         }
     }
 
@@ -122,24 +87,24 @@ impl StopMonitor {
         self.resting >= AT_REST_AFTER
     }
 
-    /// The method by which the robot is stopped now.
-    pub const fn method(&self) -> StopMethod {
+    /// The number of the method by which the robot is stopped now; it grows on after the last method, when the first follows.
+    pub const fn method(&self) -> usize {
         self.method
     }
 
-    /// Change to the next method if it is due, and return it; `does_not_stop` says whether the cause applies.
-    pub fn next_method(&mut self, does_not_stop: bool, now: MissionTime) -> Option<StopMethod> {
+    /// Change to the next method if it is due, and return whether it was; `does_not_stop` says whether the cause applies.
+    pub fn takes_next_method(&mut self, does_not_stop: bool, now: MissionTime) -> bool {
         if !does_not_stop {
             self.tried = None;
-            return None;
+            return false;
         }
         let recently = |tried| now.since(tried) < NEXT_METHOD_AFTER;
         if self.tried.is_some_and(recently) {
-            return None;
+            return false;
         }
         self.tried = Some(now);
-        self.method = self.method.next();
-        Some(self.method)
+        self.method += 1;
+        true
     }
 }
 
@@ -152,7 +117,7 @@ impl Monitor for StopMonitor {
             frame: None,
             moving: Duration::ZERO,
             resting: Duration::ZERO,
-            method: StopMethod::Velocity,
+            method: 0,
             tried: None,
         }
     }
@@ -179,7 +144,7 @@ impl Monitor for StopMonitor {
     }
 
     fn explain(&self, _: Cause, _: Moment) -> Option<String> {
-        let text = "it was told to stand and its encoders say that it moves; every method is tried in turn: velocity 0, disable, pulse width 0, suspend";
+        let text = "it was told to stand and its encoders say that it moves; every method of the robot is tried in turn";
         Some(text.to_owned())
     }
 }

@@ -102,7 +102,7 @@ pub const TABLE: &[Rule] = &[
     },
     Rule {
         cause: Cause::RobotDoesNotStop,
-        when: "it was told to stand, and 0.6 s later its encoders say for 0.5 s that it moves; other methods are tried in turn: disable, pulse width 0, suspend",
+        when: "it was told to stand, and 0.6 s later its encoders say for 0.5 s that it moves; its other methods are tried in turn",
         action: Action::Stop,
         clears: Clears::After(Duration::from_millis(500)),
         monitor: |all| &all.stop,

@@ -1,11 +1,16 @@
 use super::*;
 use common::{
-    samples::{RangeReading, RangeStatus, Stamp},
-    wire::{
-        Addressing, Command, CustomSensors, Mode, Parameter, Report, StandardSensors, SystemSignal,
-    },
+    clock::{MissionTime, Pace},
+    samples::{Action, Cause, CommandState, HoldReason, Order, RangeStatus, Stamp},
+    step::Step as _,
+    wire::{Addressing, CustomSensors, Mode, MotorSensors, Parameter, StandardSensors},
 };
-use std::path::Path;
+use link::{
+    failsafe::{Decision, presence::Absence},
+    step::{Effect, Event, Input, STOPS, State},
+};
+
+type Link = link::step::Link<X80>;
 
 const MS: u64 = 1_000_000;
 const PERIOD_NS: u64 = 142_857_142;
@@ -41,8 +46,8 @@ trait At {
 
 impl At for Link {
     fn at(&mut self, event: Event<'_>, machine_ns: u64) -> Vec<Effect> {
-        let now = match self.state.pace {
-            Pace::Max => self.state.next_tick * PERIOD_NS,
+        let now = match self.state().pace {
+            Pace::Max => self.state().next_tick * PERIOD_NS,
             Pace::Rate(_) => machine_ns,
         };
         self.step(Input { event, machine_ns }, MissionTime(now))

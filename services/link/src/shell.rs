@@ -22,6 +22,7 @@ use common::{
 };
 
 use crate::{
+    driver::Driver,
     failsafe::{
         Decision,
         battery::{BatteryChange, Charge},
@@ -39,13 +40,13 @@ const LOOKS_AGAIN: Duration = Duration::from_millis(20);
 const MOST_LISTENING_NS: u64 = 20_000_000;
 
 /// The link process.
-pub struct Shell {
+pub struct Shell<D: Driver> {
     transport: Transport,
     command: Reader<CommandSample>,
     writers: Option<Writers>,
     directive: Reader<DirectiveSample>,
     tick_limit: Reader<TickLimitSample>,
-    runner: Runner<LinkStage>,
+    runner: Runner<LinkStage<D>>,
     /// None where it could not be made, which the log says.
     stop_socket: Option<StopSocket>,
     stop_mark: StopMark,
@@ -62,7 +63,7 @@ pub struct Shell {
     budget: LatencyBudget,
 }
 
-impl Process for Shell {
+impl<D: Driver> Process for Shell<D> {
     const WIRING: &'static Wiring = &Wiring {
         inputs: &[&topics::DIRECTIVE, &topics::TICK_LIMIT],
         feedback: &[&topics::COMMAND],
@@ -77,7 +78,7 @@ impl Process for Shell {
             &topics::SURROUNDINGS,
             &topics::WIRE,
         ],
-        ..Wiring::of("x80-link")
+        ..Wiring::of(D::STAGE)
     };
 
     fn open(context: &mut Context) -> Result<Self, StageError> {
@@ -101,7 +102,7 @@ impl Process for Shell {
         if let Some(socket) = &stop_socket {
             context.waiter.on_readable(socket)?;
         }
-        let runner = Runner::open(context, |_: &LinkStage| WIRE_PIECE)?;
+        let runner = Runner::open(context, |_: &LinkStage<D>| WIRE_PIECE)?;
         let mut shell = Self {
             transport,
             command: context.reader(&topics::COMMAND)?,
@@ -236,7 +237,7 @@ fn log_decision(before: Decision, now: Decision) {
     }
 }
 
-impl Shell {
+impl<D: Driver> Shell<D> {
     fn take_operators_requests(&mut self) -> Result<(), StageError> {
         while let Some(request) = self.stop_socket.as_mut().and_then(StopSocket::take) {
             tracing::warn!(?request, "an operator asks the link itself");
@@ -326,7 +327,7 @@ impl Shell {
                 ),
                 Effect::StopBy(method) => {
                     tracing::warn!(
-                        by = method.as_str(),
+                        by = method,
                         "the robot does not stop; it is stopped by the next method"
                     );
                 }
@@ -364,8 +365,8 @@ impl Shell {
             action: link.decision().action.into(),
             cause: link.decision().cause.into(),
             at_rest: link.is_at_rest().into(),
-            frames_in: wire.frames,
-            bytes_dropped: wire.noise_bytes + wire.dropped_bytes,
+            frames_in: wire.messages,
+            bytes_dropped: wire.bytes_dropped,
             foreign_datagrams: carried.foreign_datagrams,
             unsent: carried.unsent,
             ignored_samples: ignored.samples,

@@ -1,0 +1,103 @@
+//! What a link needs of a robot's protocol.
+
+use std::{fmt, time::Duration};
+
+use common::{
+    mission::Mission,
+    samples::{
+        CommandSample, InfraredSample, PowerSample, RangeReading, SurroundingsSample, WheelSample,
+    },
+};
+
+/// The protocol of one kind of robot, without a wire and without a clock: bytes of the robot in and their meaning out, orders in and
+/// bytes for the robot out.
+pub trait Driver: fmt::Debug + Sized + 'static {
+    /// The name of the stage.
+    const STAGE: &'static str;
+
+    /// The methods that stop the robot, at least one, in the order in which they are tried. The first sets the speeds of the wheels to
+    /// 0; after any other the robot must be greeted before it drives.
+    const STOPS: &'static [StopMethod<Self>];
+
+    /// The driver of `mission`'s robot.
+    fn new(mission: &Mission) -> Self;
+
+    /// Take bytes from the robot.
+    fn push(&mut self, bytes: &[u8]);
+
+    /// Forget the beginning of a message, because its rest does not follow in the next connection.
+    fn reset(&mut self);
+
+    /// The meaning of the bytes that came since the last call.
+    fn heard(&mut self) -> Heard;
+
+    /// Counts of what came.
+    fn tally(&self) -> WireTally;
+
+    /// The newest reading of each sensor of the mission, in the order of its table. The next tick has none until new ones come.
+    fn readings_for_tick(&mut self) -> Vec<RangeReading>;
+
+    /// What the robot is told when it is found: its settings, and that it sends its sensors.
+    fn greeting(&self) -> Vec<u8>;
+
+    /// Ask the robot to send its sensors.
+    fn ask_for_sensors(&self) -> Vec<u8>;
+
+    /// Ask the robot to answer.
+    fn ping(&self) -> Vec<u8>;
+
+    /// Answer a ping of the robot.
+    fn acknowledge(&self) -> Vec<u8>;
+
+    /// The speeds of the two wheels, or of a car's wheel and steering, for `command` at `share` of its speed, counts/s, forward
+    /// positive; `wheels` are the newest encoder counts.
+    fn counts(&self, command: &CommandSample, share: f64, wheels: &WheelSample) -> [i16; 2];
+
+    /// A command for these speeds, counts/s, after `limit` of which the robot stops by itself.
+    fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8>;
+}
+
+/// A method that stops a robot.
+#[derive(Debug)]
+pub struct StopMethod<D> {
+    /// Its name in logs.
+    pub name: &'static str,
+    /// What the robot is sent.
+    pub bytes: fn(&D) -> Vec<u8>,
+}
+
+/// Counts of what came from a robot.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct WireTally {
+    pub messages: u64,
+    /// The bytes that belong to no message, or were dropped unread.
+    pub bytes_dropped: u64,
+}
+
+/// What a robot said. Of each kind of message the newest counts.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Heard {
+    /// Whether it said anything.
+    pub anything: bool,
+    /// Whether it wants an answer.
+    pub pinged: bool,
+    /// How often it acknowledged what it was sent.
+    pub acknowledged: usize,
+    /// What its encoders and motors say; a tick begins with it.
+    pub motion: Option<Motion>,
+    /// The readings of its ranging sensors.
+    pub readings: Vec<RangeReading>,
+    /// Its batteries and motor currents; the link says which batteries are low.
+    pub power: Option<PowerSample>,
+    pub surroundings: Option<SurroundingsSample>,
+    pub infrared: Option<InfraredSample>,
+}
+
+/// What the encoders and motors say.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// The encoder counts, growing forward.
+    pub wheels: WheelSample,
+    /// The motor currents of the left and the right wheel, AD counts.
+    pub currents: [u16; 2],
+}

@@ -1,0 +1,23 @@
+//! The library of links: a robot's words in, samples out, commands to it, and the one place that stops it. A link is this and a
+//! [`driver::Driver`], which speaks the protocol of one kind of robot.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`driver`] | what a link needs of a robot's protocol |
+//! | [`step`] | the pure step of the link: bytes and commands in, samples and bytes out |
+//! | [`failsafe`] | THE table of causes for which the link slows or stops the robot or ends the mission; in `failsafe/` their monitors |
+//! | [`transport`] | datagrams, a connection or a serial line |
+//! | [`backoff`] | pauses between attempts |
+//! | [`stage`] | the link as a stage: the entries of a recording, and the samples that it publishes |
+//! | [`shell`] | the process of the link: the wire and the topics that it reads |
+//! | [`stop_guard`] | the process that stops a moving robot when the link's process ended |
+
+pub mod backoff;
+pub mod driver;
+pub mod failsafe;
+pub mod shell;
+mod speed_trim;
+pub mod stage;
+pub mod step;
+pub mod stop_guard;
+pub mod transport;
