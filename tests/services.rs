@@ -201,14 +201,18 @@ impl Units {
     }
 }
 
-/// Start one process of a stage after another until one ends in order or `over` is set. Returns the exit code of the last one.
+/// Start one process of a stage after another until one ends in order with its run, or `over` is set. Returns the exit code of the
+/// last one.
 fn keep_up(robot: &str, stage: &str, log: &Path, over: &AtomicBool) -> Option<i32> {
     loop {
         let mut append = std::fs::File::options();
         let log = append.create(true).append(true).open(log).unwrap();
         let mut command = firsthand(&["stage", stage, "--robot", robot]);
         let code = command.stderr(log).status().unwrap().code();
-        if code == Some(0) || over.load(Ordering::Relaxed) {
+        // The supervisor of a stalled robot replaces the planner, which ends in order, too.
+        let is_replaced =
+            || support::status_of(robot).is_some_and(|status| status["order"] == "driving");
+        if code == Some(0) && !is_replaced() || over.load(Ordering::Relaxed) {
             return code;
         }
     }

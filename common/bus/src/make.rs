@@ -3,7 +3,7 @@
 use std::{
     any::Any,
     ffi::OsStr,
-    fs::DirBuilder,
+    fs::{DirBuilder, File},
     io,
     os::unix::{ffi::OsStrExt as _, fs::DirBuilderExt as _},
     path::{Path, PathBuf},
@@ -47,6 +47,13 @@ pub struct Services(#[allow(dead_code, reason = "held, not read")] Vec<Box<dyn A
 fn no_join(domain: &Domain) -> impl Fn(String) -> BusError + use<> {
     let robot = domain.robot.to_string();
     move |detail| BusError::Join { robot: robot.clone(), detail }
+}
+
+fn not_running(domain: &Domain) -> impl Fn(io::Error) -> BusError {
+    |error| BusError::NotRunning {
+        robot: domain.robot.to_string(),
+        detail: format!("{}: {error}", domain.middleware_config().display()),
+    }
 }
 
 impl Bus {
@@ -97,12 +104,8 @@ impl Bus {
     /// Join the bus of a robot under a name that `iox2 node list` shows, and read the newest generation, whoever wrote it. It fails if
     /// the robot does not run here, if it belongs to another user, or if shared memory is full.
     pub fn join(domain: &Domain, name: &str) -> Result<Self, BusError> {
-        let not_running = |error: io::Error| BusError::NotRunning {
-            robot: domain.robot.to_string(),
-            detail: format!("{}: {error}", domain.middleware_config().display()),
-        };
-        let _joining = domain.joining().map_err(not_running)?;
-        let instance = BusInstance::current(domain).map_err(not_running)?;
+        let _joining = domain.joining().map_err(not_running(domain))?;
+        let instance = BusInstance::current(domain).map_err(not_running(domain))?;
         Self::join_instance(instance, name)
     }
 
@@ -153,6 +156,20 @@ impl Bus {
     #[must_use]
     pub fn is_replaced(&self) -> bool {
         BusInstance::current(self.instance.domain()).map_or(true, |now| now != self.instance)
+    }
+
+    /// Prevent the removal of the bus while a consumer opens a topic, which would make the bus's directory again and leave it there.
+    /// The stages share another lock as long as they run.
+    pub(super) fn hold(&self) -> Result<Option<File>, BusError> {
+        if self.is_stage {
+            return Ok(None);
+        }
+        let domain = self.instance.domain();
+        let held = domain.joining().map_err(not_running(domain))?;
+        match self.is_replaced() {
+            false => Ok(Some(held)),
+            true => Err(not_running(domain)(io::ErrorKind::NotFound.into())),
+        }
     }
 
     /// The directory of the service files.

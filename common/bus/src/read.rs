@@ -27,6 +27,7 @@ impl Bus {
         topic: &Topic<P>,
         buffer: usize,
     ) -> Result<Reader<P>, BusError> {
+        let _held = self.hold()?;
         let service = Service::of_structs(&self.node, topic.spec)?;
         self.leave_places(topic.spec, topic.spec.limits.readers, service.number_of_readers())?;
         Ok(Reader {
@@ -49,6 +50,7 @@ impl Bus {
         topic: &SliceTopic<H, T>,
         buffer: usize,
     ) -> Result<SliceReader<H, T>, BusError> {
+        let _held = self.hold()?;
         let service = Service::of_slices(&self.node, topic.spec)?;
         self.leave_places(topic.spec, topic.spec.limits.readers, service.number_of_readers())?;
         Ok(SliceReader {
@@ -60,6 +62,7 @@ impl Bus {
     /// A wakeup that is readable once a sample was published on `topic`. It fails if the topic is missing or has no place left.
     pub fn wakeup(&self, topic: &dyn AnyTopic) -> Result<Wakeup, BusError> {
         let spec = topic.spec();
+        let _held = self.hold()?;
         let listener = Listener::open(&self.node, spec, |taken| {
             self.leave_places(spec, Limits::LISTENERS, taken)
         })?;

@@ -20,6 +20,7 @@ impl Bus {
         topic: &Topic<P>,
         generation: u32,
     ) -> Result<Writer<P>, BusError> {
+        let _held = self.hold()?;
         let service = Service::of_structs(&self.node, topic.spec)?;
         Ok(Writer { publisher: service.publisher(1)?, turn: self.turn(topic.spec, generation)? })
     }
@@ -31,6 +32,7 @@ impl Bus {
         generation: u32,
         longest: usize,
     ) -> Result<SliceWriter<H, T>, BusError> {
+        let _held = self.hold()?;
         let service = Service::of_slices(&self.node, topic.spec)?;
         Ok(SliceWriter {
             publisher: service.publisher(longest)?,

@@ -265,6 +265,8 @@ mod tests {
         thread,
     };
 
+    use common::bus::BusError;
+
     use super::*;
 
     /// A robot of this process: a test that was killed leaves nothing for the next.
@@ -326,6 +328,20 @@ mod tests {
         drop(held);
         assert!(!domain.directory().exists());
         drop(joining);
+    }
+
+    #[test]
+    fn a_consumer_that_opens_a_topic_of_a_removed_bus_is_refused_and_leaves_nothing() {
+        let domain = domain("late");
+        let held = DomainLock::acquire(domain.clone(), 1).unwrap();
+        let bus = Bus::join(&domain, "late").unwrap();
+        drop(held);
+        assert!(matches!(bus.reader(&topics::POSE), Err(BusError::NotRunning { .. })));
+        drop(bus);
+        let prefix = domain.shared_memory_prefix();
+        let left = fs::read_dir(SHARED_MEMORY).unwrap().flatten();
+        let mut left = left.filter(|it| it.file_name().to_string_lossy().starts_with(&prefix));
+        assert!(left.next().is_none());
     }
 
     #[test]

@@ -339,6 +339,11 @@ impl StallWatch {
     /// The robot was not ordered to drive until `tick`, so nothing by then is a stall.
     pub(crate) fn hold(&mut self, tick: u64) {
         self.tick = Some(tick);
+        self.forget_motion();
+    }
+
+    /// Something held the robot until now, perhaps without a tick: its time at its place begins anew.
+    pub(crate) const fn forget_motion(&mut self) {
         (self.anchor, self.place) = (None, None);
         (self.cut_off_since, self.waits_since) = (None, None);
     }

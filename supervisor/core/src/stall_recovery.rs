@@ -63,6 +63,9 @@ impl Supervisor<'_> {
             record.link.is_none_or(|link| link.stopped() && link.cause() != Cause::WheelsHeld);
         // In lockstep mission time stands still while something holds the robot.
         let held = !in_ticks && (stopped || !self.stages.all_running());
+        if held {
+            self.stall_watch.forget_motion();
+        }
         // A tick without its command may be incomplete here.
         let newest = record.published().tick.filter(|_| in_ticks);
         // Several ticks may have passed since the last check. Each is checked, so the result does not depend on their number.

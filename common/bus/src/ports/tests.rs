@@ -6,8 +6,12 @@ use iceoryx2::prelude::{ServiceName, ZeroCopySend};
 
 use super::*;
 use crate::{
-    AnyTopic, Bus, Logged, Rate, SliceTopic, Stamp, Stamped, Topic, bus_instance::BusInstance,
-    clock::MissionTime, domain::Domain, layouts, spec::Limits,
+    AnyTopic, Bus, Logged, Rate, SliceTopic, Stamp, Stamped, Topic,
+    bus_instance::BusInstance,
+    clock::MissionTime,
+    domain::{Domain, SHARED_MEMORY},
+    layouts,
+    spec::Limits,
 };
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
@@ -67,6 +71,11 @@ fn with_bus(robot: &str, test: impl FnOnce(&Bus)) {
     test(&bus);
     drop((services, bus));
     fs::remove_dir_all(BusInstance::current(&domain).unwrap().root()).unwrap();
+    for file in fs::read_dir(SHARED_MEMORY).unwrap().flatten() {
+        if file.file_name().to_string_lossy().starts_with(&domain.shared_memory_prefix()) {
+            fs::remove_file(file.path()).unwrap();
+        }
+    }
     fs::remove_dir_all(domain.directory()).unwrap();
 }
 

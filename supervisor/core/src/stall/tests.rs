@@ -63,6 +63,15 @@ fn a_robot_held_by_something_else_is_not_stalled() {
 }
 
 #[test]
+fn a_robot_that_was_held_without_a_tick_is_not_stalled_at_the_next_one() {
+    let mut watch = watch();
+    let along = guidance(GuidanceStatus::Along, 0);
+    assert_eq!(watch.step(&pose(0.0, 0.0), &along, false, false), None);
+    watch.forget_motion();
+    assert_eq!(watch.step(&pose(20.0, 0.0), &along, false, false), None);
+}
+
+#[test]
 fn a_robot_that_waits_for_a_field_is_not_stalled_until_that_takes_too_long() {
     let mut watch = watch();
     let waiting = guidance(GuidanceStatus::Waiting, 0);
