@@ -258,3 +258,34 @@ fn a_robot_that_is_to_face_a_heading_turns_on_the_spot_and_then_has_arrived() {
         assert!(turned > 3, "{method}: {turned}");
     }
 }
+
+#[test]
+fn a_command_names_the_pose_and_the_guidance_that_it_follows() {
+    let mut guidance = GuidanceSample { pose_ns: 7, ..ahead() };
+    guidance.stamp.stamp_ns = 8;
+    let halted = GuidanceSample { ex: f64::NAN, ..guidance };
+    for guidance in [guidance, halted] {
+        let command = controller("").at(facing(0.0), &guidance);
+        assert_eq!((command.pose_ns, command.guidance_ns), (7, 8));
+    }
+}
+
+#[test]
+fn a_robot_has_arrived_beside_a_target_that_is_not_free_if_it_is_within_half_a_metre() {
+    let beside = GuidanceSample { status: GuidanceStatus::AtTarget.into(), ..ahead() };
+    for (x, has_arrived) in [(2.55, true), (2.45, false)] {
+        let there = Pose2 { position: DVec2::new(x, 0.0), heading: 0.0 };
+        let state = CommandState::from_byte(controller("").at(there, &beside).state);
+        assert_eq!(state == CommandState::Arrived, has_arrived, "{x}");
+    }
+}
+
+#[test]
+fn an_evidential_robot_slows_down_towards_its_target() {
+    let mut controller = evidential();
+    controller.slow_radius = 0.5;
+    let short =
+        |short_of_it_m: f64| Pose2 { position: DVec2::new(3.0 - short_of_it_m, 0.0), heading: 0.0 };
+    close(controller.at(short(0.6), &ahead()).v_m_s, 0.4);
+    close(controller.at(short(0.25), &ahead()).v_m_s, 0.2);
+}
