@@ -4,9 +4,7 @@ use std::{fmt, time::Duration};
 
 use common::{
     mission::Mission,
-    samples::{
-        CommandSample, InfraredSample, PowerSample, RangeReading, SurroundingsSample, WheelSample,
-    },
+    samples::{InfraredSample, PowerSample, RangeReading, SurroundingsSample, WheelSample},
 };
 
 /// The protocol of one kind of robot, without a wire and without a clock: bytes of the robot in and their meaning out, orders in and
@@ -49,11 +47,8 @@ pub trait Driver: fmt::Debug + Sized + 'static {
     /// Answer a ping of the robot.
     fn acknowledge(&self) -> Vec<u8>;
 
-    /// The speeds of the two wheels, or of a car's wheel and steering, for `command` at `share` of its speed, counts/s, forward
-    /// positive; `wheels` are the newest encoder counts.
-    fn counts(&self, command: &CommandSample, share: f64, wheels: &WheelSample) -> [i16; 2];
-
-    /// A command for these speeds, counts/s, after `limit` of which the robot stops by itself.
+    /// A command for the speeds of the two wheels, or of a car's wheel and steering, counts/s, forward positive. After `limit` the robot
+    /// stops by itself.
     fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8>;
 }
 

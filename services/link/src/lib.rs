@@ -21,3 +21,4 @@ pub mod stage;
 pub mod step;
 pub mod stop_guard;
 pub mod transport;
+mod wheel_speeds;

@@ -30,6 +30,7 @@ use crate::{
         restart::RestartWatch,
     },
     speed_trim::SpeedTrim,
+    wheel_speeds::WheelSpeeds,
 };
 
 pub use event::{Effect, Event, Input, State, Tally};
@@ -77,6 +78,7 @@ pub struct Link<D> {
     /// The mission time of the present event.
     now: MissionTime,
     driver: D,
+    speeds: WheelSpeeds,
     /// The time limit of a command.
     limit: Duration,
     half_period_ns: u64,
@@ -114,6 +116,7 @@ impl<D: Driver> Step for Link<D> {
             state: State::default(),
             now: MissionTime::default(),
             driver: D::new(mission),
+            speeds: WheelSpeeds::new(mission),
             limit: Duration::from_secs_f64(mission.robot.command_limit_s),
             half_period_ns: (0.5e9 / mission.robot.rate_hz) as u64,
             failsafe: Failsafe::new(mission),
@@ -345,7 +348,7 @@ impl<D: Driver> Link<D> {
         let counts = match CommandState::from_byte(command.state) {
             CommandState::Driving => {
                 let reached = self.trim.as_ref().map_or(1.0, SpeedTrim::share);
-                self.driver.counts(command, share / reached, &self.wheels)
+                self.speeds.of(command, share / reached, &self.wheels)
             }
             CommandState::Halt | CommandState::Arrived => [0, 0],
         };

@@ -15,7 +15,7 @@ use std::{path::Path, time::Duration};
 use common::{
     mission::Mission,
     run::Run,
-    samples::{CommandSample, RangeReading, WheelSample},
+    samples::RangeReading,
     start::StageError,
     stop_socket::Identity,
     wire::{Command, Decoder, Report, SystemSignal},
@@ -135,10 +135,6 @@ impl Driver for X80 {
 
     fn acknowledge(&self) -> Vec<u8> {
         encoded(Command::System(SystemSignal::Ack))
-    }
-
-    fn counts(&self, command: &CommandSample, share: f64, wheels: &WheelSample) -> [i16; 2] {
-        self.drive.counts(command, share, wheels)
     }
 
     fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8> {

@@ -1,7 +1,10 @@
 use super::*;
 use common::{
     clock::{MissionTime, Pace},
-    samples::{Action, Cause, CommandState, HoldReason, Order, RangeStatus, Stamp},
+    samples::{
+        Action, Cause, CommandSample, CommandState, HoldReason, Order, RangeStatus, Stamp,
+        WheelSample,
+    },
     step::Step as _,
     wire::{Addressing, CustomSensors, Mode, MotorSensors, Parameter, StandardSensors},
 };
