@@ -1,7 +1,7 @@
 //! The link with a robot whose frames are implausible or do not come.
 
 use super::*;
-use common::wire::Quantity;
+use common::wire::{COUNT_CYCLE, Quantity};
 
 const STAND: [Option<i16>; 2] = [Some(0), Some(0)];
 /// A turn a second is 1200 counts/s.
@@ -204,4 +204,33 @@ fn a_robot_that_was_lost_and_acknowledges_what_was_sent_long_ago_is_not_driven()
     // The robot is tested again every 2 s.
     assert!(moving.first().is_some_and(|first| *first > 28), "{moving:?}");
     assert_eq!(causes.last(), Some(&Cause::None), "{causes:?}");
+}
+
+#[test]
+fn wheels_that_reach_four_fifths_of_their_command_are_told_more_until_they_turn_as_commanded() {
+    let mut link = driving(on_the_wall());
+    let half = TURN / 2.0;
+    let (mut turned, mut told) = (0.0, 0.0);
+    for number in 0..60 {
+        let now = number * PERIOD_NS;
+        turned += 0.8 * told / 7.0;
+        let counts = |turned: f64| turned.rem_euclid(COUNT_CYCLE.into()) as u16;
+        link.at(Event::Order(Order::Drive, HoldReason::None), now);
+        link.at(Event::Datagram(&datagram(255, counts(-turned), counts(turned))), now);
+        let effects = link.at(Event::Command(&command(number, now, half, half)), now + MS);
+        told = velocities(&effects)[0][1].unwrap().into();
+    }
+    assert!((0.8 * told - 600.0).abs() < 10.0, "{told}");
+}
+
+#[test]
+fn on_the_wall_clock_a_second_command_for_a_tick_reaches_the_robot_too() {
+    let mut link = driving(on_the_wall());
+    link.at(Event::Datagram(&datagram(255, 0, 0)), PERIOD_NS);
+    for speed in [TURN / 4.0, TURN / 2.0] {
+        let answer = command(0, PERIOD_NS, speed, speed);
+        let told = velocities(&link.at(Event::Command(&answer), PERIOD_NS + MS));
+        assert_eq!(told[0][1], Some((speed / TURN * 1200.0) as i16));
+    }
+    assert_eq!(link.tally().commands, 2);
 }
