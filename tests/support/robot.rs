@@ -164,9 +164,9 @@ pub fn assert_nothing_left(robot: &str) {
     assert_eq!(processes_of(robot), Vec::<String>::new());
 }
 
-/// The names of all directories for runs of `robot` in these tests start with this.
+/// The names of all directories for runs of `robot` in this suite start with this.
 fn mark(robot: &str) -> String {
-    format!("firsthand-test-{robot}_")
+    format!("firsthand-{}_{robot}_", suite())
 }
 
 /// The command lines of the processes of `robot`: supervisor, stages, simulator.
