@@ -234,3 +234,13 @@ fn on_the_wall_clock_a_second_command_for_a_tick_reaches_the_robot_too() {
     }
     assert_eq!(link.tally().commands, 2);
 }
+
+#[test]
+fn a_suspicion_outlasts_a_hold_that_is_no_operators() {
+    let mut link = driving(on_the_wall());
+    drive(&mut link, 0..10, |_| datagram(255, 0, 0));
+    assert_eq!(link.decision().cause, Cause::OdometryImplausible);
+    link.at(Event::Order(Order::Hold, HoldReason::StageHeld), 10 * PERIOD_NS);
+    link.at(Event::Order(Order::Drive, HoldReason::None), 11 * PERIOD_NS);
+    assert_eq!(link.decision().cause, Cause::OdometryImplausible);
+}
