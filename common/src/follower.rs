@@ -169,8 +169,6 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
     }
 
     fn join(&mut self) -> Result<Joined<Topics>, BusError> {
-        // Readers create files, too. Without a lock there is no bus, and the next line says so.
-        let _joining = self.domain.joining();
         let bus = roster::join(&self.domain, &self.name)?;
         let mut waiter = Waiter::default();
         let mut known = Vec::new();

@@ -13,9 +13,9 @@ pub trait Driver: fmt::Debug + Sized + 'static {
     /// The name of the stage.
     const STAGE: &'static str;
 
-    /// The methods that stop the robot, at least one, in the order in which they are tried. The first sets the speeds of the wheels to
-    /// 0; after any other the robot must be greeted before it drives.
-    const STOPS: &'static [StopMethod<Self>];
+    /// The methods that stop a robot which does not obey a velocity of 0, in the order in which they are tried. After one of them the
+    /// robot must be greeted before it drives.
+    const OTHER_STOPS: &'static [StopMethod<Self>];
 
     /// The driver of `mission`'s robot.
     fn new(mission: &Mission) -> Self;
@@ -52,7 +52,7 @@ pub trait Driver: fmt::Debug + Sized + 'static {
     fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8>;
 }
 
-/// A method that stops a robot.
+/// A method that stops a robot, besides a velocity of 0.
 #[derive(Debug)]
 pub struct StopMethod<D> {
     /// Its name in logs.

@@ -248,7 +248,7 @@ impl<D: Driver> Link<D> {
 
     /// The stops that are sent when the stage ends.
     pub fn final_stops(&self) -> Vec<Vec<u8>> {
-        (0..STOPS).map(|_| (D::STOPS[0].bytes)(&self.driver)).collect()
+        (0..STOPS).map(|_| self.velocity_0()).collect()
     }
 
     const fn monitors(&self) -> &Monitors {

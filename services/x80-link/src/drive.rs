@@ -22,16 +22,12 @@ const PWM_STANDS: i16 = 16_384;
 #[derive(Clone, Debug)]
 pub struct Drive {
     robot: RobotConfig,
-    limit: Duration,
 }
 
 impl Drive {
     /// The drive of `mission`'s robot.
     pub fn new(mission: &Mission) -> Self {
-        Self {
-            robot: mission.robot.clone(),
-            limit: Duration::from_secs_f64(mission.robot.command_limit_s),
-        }
+        Self { robot: mission.robot.clone() }
     }
 
     /// Commands for encoders as feedback, velocity mode, enabled motors and running streams.
@@ -102,11 +98,6 @@ impl Drive {
         }
         let limit_ms = limit.as_millis().min(u128::from(u16::MAX)) as u16;
         encoded(Command::velocity(channels, limit_ms))
-    }
-
-    /// A command that holds the wheels at rest.
-    pub fn stand(&self) -> Vec<u8> {
-        self.velocity([0, 0], self.limit)
     }
 
     /// Commands that disable the motors of both wheels.

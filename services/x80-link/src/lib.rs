@@ -55,8 +55,7 @@ pub struct X80 {
 
 impl Driver for X80 {
     const STAGE: &'static str = "x80-link";
-    const STOPS: &'static [StopMethod<Self>] = &[
-        StopMethod { name: "velocity 0", bytes: |x80| x80.drive.stand() },
+    const OTHER_STOPS: &'static [StopMethod<Self>] = &[
         StopMethod { name: "disable", bytes: |x80| x80.drive.disable() },
         StopMethod { name: "pulse width 0", bytes: |x80| x80.drive.still_pulses() },
         StopMethod {

@@ -24,7 +24,6 @@ use common::{
     waiter::Waiter,
 };
 use thiserror::Error;
-
 use x80_link::stand as tell_to_stand;
 
 use crate::process;

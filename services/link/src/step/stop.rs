@@ -6,7 +6,7 @@ use common::samples::Cause;
 
 use super::{Effect, Link, STOP_AGAIN, passed};
 use crate::{
-    driver::Driver,
+    driver::{Driver, StopMethod},
     failsafe::{Decision, monitor::Observation},
 };
 
@@ -43,8 +43,8 @@ impl<D: Driver> Link<D> {
         now_ns: u64,
         effects: &mut Vec<Effect>,
     ) {
-        if self.stop_method() != 0 && counts != [0, 0] {
-            // The robot was stopped by another method than the first, and must be set up again.
+        if self.other_stop().is_some() && counts != [0, 0] {
+            // The robot was stopped by another method than velocity, and must be set up again.
             effects.push(Effect::Send(self.driver.greeting()));
         }
         self.commanded(counts, now_ns);
@@ -60,7 +60,8 @@ impl<D: Driver> Link<D> {
             return;
         } else if self.takes_next_stop_method() {
             effects.push(Effect::Send(self.stop()));
-            effects.push(Effect::StopBy(D::STOPS[self.stop_method()].name));
+            effects
+                .push(Effect::StopBy(self.other_stop().map_or("velocity 0", |other| other.name)));
         } else if self.failsafe.applied(Cause::RobotDoesNotStop) {
             // The method that was used last needs time to have an effect.
             return;
@@ -78,13 +79,18 @@ impl<D: Driver> Link<D> {
         self.restart.commanded(counts, self.now);
     }
 
-    /// The index of the method by which the robot is stopped now. After the last one the first follows.
-    fn stop_method(&self) -> usize {
-        self.monitors().stop.method() % D::STOPS.len()
+    /// The method by which the robot is stopped now; none for velocity 0, which is the first and follows the last.
+    fn other_stop(&self) -> Option<&'static StopMethod<D>> {
+        let method = self.monitors().stop.method() % (D::OTHER_STOPS.len() + 1);
+        D::OTHER_STOPS.get(method.checked_sub(1)?)
     }
 
     fn stop(&self) -> Vec<u8> {
-        (D::STOPS[self.stop_method()].bytes)(&self.driver)
+        self.other_stop().map_or_else(|| self.velocity_0(), |other| (other.bytes)(&self.driver))
+    }
+
+    pub(super) fn velocity_0(&self) -> Vec<u8> {
+        self.driver.velocity([0, 0], self.limit)
     }
 
     /// Change to the next method, if it is due. Returns whether it was.
