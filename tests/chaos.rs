@@ -2,9 +2,10 @@
 
 use std::{fs, process::Stdio, time::Instant};
 
+use common::domain::SUITE_VARIABLE;
 use serde_json::Value;
 
-use crate::support::{PATIENCE, assert_nothing_left, firsthand, output, refused, status_of};
+use crate::support::{self, PATIENCE, assert_nothing_left, firsthand, output, refused, status_of};
 
 /// A machine with other work may take its time.
 const SLOW: [&str; 4] = ["--set", "timeout_s=600", "--set", "controller.speed_m_s=0.2"];
@@ -20,12 +21,15 @@ fn sum(of: &Value) -> u64 {
     counts.map(number).sum()
 }
 
-/// Command lines of processes that contain `mark`.
+/// Command lines of this suite's processes that contain `mark`.
 fn processes(mark: &str) -> Vec<String> {
-    let entries = fs::read_dir("/proc").unwrap().flatten();
-    let lines = entries.filter_map(|entry| fs::read(entry.path().join("cmdline")).ok());
-    let lines = lines.map(|line| String::from_utf8_lossy(&line).replace('\0', " "));
-    lines.filter(|line| line.contains(mark)).collect()
+    let own = format!("{SUITE_VARIABLE}={}", support::suite());
+    let is_own = |pid: &u32| {
+        let environment = fs::read(format!("/proc/{pid}/environ")).unwrap_or_default();
+        environment.split(|byte| *byte == 0).any(|variable| variable == own.as_bytes())
+    };
+    let found = support::processes(mark).into_iter().filter(|(pid, _)| is_own(pid));
+    found.map(|(_, line)| line).collect()
 }
 
 #[test]

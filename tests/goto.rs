@@ -192,3 +192,14 @@ fn a_mission_starts_from_the_map_that_an_earlier_run_saved_and_a_damaged_map_is_
     std::fs::write(path("course.pgm"), "P5 9 9 255 ").unwrap();
     refused(&["run", "obstacle-course", "--set", &set], "mission", &["course.pgm"]);
 }
+
+#[test]
+fn each_of_fifty_commands_in_a_row_finds_a_place_on_the_bus() {
+    let robot = "goto-many";
+    let slowly = ["--pace", "1", "--set", "controller.speed_m_s=0.1"];
+    let mut run = Run::start(robot, "open-room", &slowly);
+    run.wait_until_under_way(0.2);
+    for _ in 0..50 {
+        refused(&["goto", "--robot", robot, "9", "0"], "target-outside", &["perimeter"]);
+    }
+}

@@ -163,8 +163,20 @@ pub(crate) enum Admitted {
     All,
     /// The newest generation, and the generation that was newest so far: nobody names authors.
     Newest(u32),
+    /// The supervisor's process. It knows no [`Writers`]: a reader of the roster is their source, and a circle of owners would keep its
+    /// place on the bus for ever.
+    Supervisor(Newest),
     /// The process that is named.
     Named(OneStage),
+}
+
+/// The newest generation that one process published.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Newest {
+    process: u32,
+    newest: u32,
+    /// Older generations are admitted, too.
+    all_generations: bool,
 }
 
 /// The process of one stage.
@@ -188,6 +200,11 @@ impl Admitted {
         match writers {
             _ if !spec.has_one_writer() => Self::All,
             None => Self::Newest(0),
+            Some(writers) if spec.writer == SUPERVISOR => Self::Supervisor(Newest {
+                process: writers.supervisor(),
+                newest: 0,
+                all_generations: false,
+            }),
             Some(writers) => Self::Named(OneStage {
                 writers: writers.clone(),
                 stage: spec.writer,
@@ -203,6 +220,7 @@ impl Admitted {
     pub(crate) fn of_all_generations(self) -> Self {
         match self {
             Self::All | Self::Newest(_) => Self::All,
+            Self::Supervisor(one) => Self::Supervisor(Newest { all_generations: true, ..one }),
             Self::Named(one) => Self::Named(OneStage { all_generations: true, ..one }),
         }
     }
@@ -210,7 +228,7 @@ impl Admitted {
     /// Whether the samples wait until their authors are known.
     pub(crate) fn hold_samples(&self) -> Result<bool, BusError> {
         match self {
-            Self::Named(one) if one.stage != SUPERVISOR => one.writers.hold_samples(),
+            Self::Named(one) => one.writers.hold_samples(),
             _ => Ok(false),
         }
     }
@@ -220,6 +238,8 @@ impl Admitted {
         match self {
             Self::All => Ok(true),
             Self::Newest(newest) => Ok(is_newest(author, newest)),
+            Self::Supervisor(one) => Ok(author.process == one.process
+                && (is_newest(author, &mut one.newest) || one.all_generations)),
             Self::Named(one) => one.admits(author),
         }
     }
@@ -234,18 +254,18 @@ fn is_newest(author: Author, newest: &mut u32) -> bool {
 impl OneStage {
     fn admits(&mut self, author: Author) -> Result<bool, BusError> {
         let by_supervisor = author.process == self.writers.supervisor();
-        if by_supervisor || self.stage != SUPERVISOR && self.writers.names_are_awaited() {
+        if by_supervisor || self.writers.names_are_awaited() {
             return Ok(is_newest(author, &mut self.newest) || self.all_generations);
         }
         if self.all_generations {
-            let named = self.stage != SUPERVISOR && self.writers.has_named(self.stage, author)?;
+            let named = self.writers.has_named(self.stage, author)?;
             if !named {
                 self.writers.ignore(author.process);
             }
             return Ok(named);
         }
         let known = [self.process, self.before].contains(&Some(author));
-        if !known && self.stage != SUPERVISOR {
+        if !known {
             let named = self.writers.process_of(self.stage)?;
             if named.is_some() && named != self.process {
                 self.before = std::mem::replace(&mut self.process, named);
@@ -328,6 +348,23 @@ mod tests {
         assert!(!admitted.hold_samples().unwrap());
         assert!(admitted.admits(author(7, 1)).unwrap());
         assert!(!admitted.admits(author(66, u32::MAX)).unwrap());
+    }
+
+    #[test]
+    fn a_reader_of_the_supervisors_words_may_be_the_source_of_the_names_and_is_dropped_with_them() {
+        let writers = Writers::of(1);
+        let roster = Spec { writer: SUPERVISOR, ..SPEC };
+        let mut admitted = Admitted::of(&roster, Some(&writers));
+        let admits = [author(66, 9), author(1, 0), author(1, 0)];
+        assert_eq!(admits.map(|author| admitted.admits(author).unwrap()), [false, true, true]);
+        let dropped = Rc::new(());
+        let held = (admitted, Rc::clone(&dropped));
+        writers.read_from(Box::new(move || {
+            let _ = &held;
+            Ok(None)
+        }));
+        drop(writers);
+        assert_eq!(Rc::strong_count(&dropped), 1);
     }
 
     #[test]
