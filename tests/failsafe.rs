@@ -133,7 +133,7 @@ fn whatever_is_killed_or_frozen_the_wheels_have_zero_within_250_ms_and_a_period_
         for stage in STAGES {
             let moving = tap.next_that(Heard::valid);
             run.kill_and_await_successor(stage, signal);
-            let longest = tap.longest_uncommanded(moving, stage == "x80-link");
+            let longest = tap.longest_uncommanded(moving, stage == "link");
             println!("{stage} {signal:?}: at most {} ms", longest.as_millis());
             assert!(longest <= LIMIT + PERIOD, "{stage} {signal:?}: {longest:?}");
         }

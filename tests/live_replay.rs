@@ -120,6 +120,6 @@ fn a_live_stage_that_is_killed_ends_the_replay_by_its_name_and_leaves_nothing() 
     wait_for(&mut said, "mapper ended in tick");
     assert_eq!(played.wait().unwrap().code(), Some(1));
     assert_nothing_left("live-killed");
-    let link = ["replay", file, "--live", "--stage", "x80-link"];
-    refused(&link, "never-live", &["x80-link"]);
+    let link = ["replay", file, "--live", "--stage", "link"];
+    refused(&link, "never-live", &["link"]);
 }

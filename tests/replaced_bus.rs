@@ -42,7 +42,7 @@ fn a_consumer_of_a_bus_that_was_replaced_joins_again_and_leaves_the_old_one_with
             half_make(&service.unwrap().path());
         }
         // The link neither reads nor writes poses. A killed process still counts as a user of its topics.
-        signal_process(pid(&status, "x80-link"), Signal::KILL);
+        signal_process(pid(&status, "link"), Signal::KILL);
         let began = Instant::now();
         while !old.is_replaced() {
             assert!(began.elapsed() < PATIENCE, "the bus is never recreated");

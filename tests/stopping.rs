@@ -61,7 +61,7 @@ fn stands_after_kills(transport: &str) {
     let (_directory, mut robot, run) = under_way(&format!("sl-{transport}"), transport);
     let status = run.status().unwrap();
     run.signal(Signal::STOP);
-    signal_process(pid(&status, "x80-link"), Signal::KILL);
+    signal_process(pid(&status, "link"), Signal::KILL);
     robot.wait_until_at_rest();
 
     // With its parent each stage ends, the link too.
@@ -159,7 +159,7 @@ fn a_robot_that_obeys_no_stop_has_an_outcome_of_its_own_and_a_link_that_stays() 
         robot.wait_for_a_tick();
     }
     let status = run.wait_until("the link tells it to stand", |status| {
-        find(status, "x80-link")["state"] == "running"
+        find(status, "link")["state"] == "running"
     });
     assert_eq!(status["link"]["at_rest"], false, "{status}");
     run.signal(Signal::TERM);

@@ -21,6 +21,7 @@ mod fixes;
 mod foreign_payload;
 mod goto;
 mod held_wheels;
+mod json_robot;
 mod kills_and_freezes;
 mod live_replay;
 mod machine;

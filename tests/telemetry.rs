@@ -48,7 +48,7 @@ fn infrared_power_and_surroundings_reach_a_consumer_and_a_low_battery_is_told_on
 
         for pack in ["board", "motor", "servo"] {
             let told = ["WARN", &format!("pack=\"{pack}\"")];
-            let told = support::logged(&run.directory(), "x80-link", &told);
+            let told = support::logged(&run.directory(), "link", &told);
             assert_eq!(told, 1, "{pack}");
         }
         run.stop();

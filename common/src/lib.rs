@@ -1,7 +1,8 @@
 //! The code that firsthand's processes share: only what two of them must agree on.
 //!
-//! Three crates lie below this one, and their modules are found under its name too: [`bus`] (writers, readers and wakeups; it alone
-//! names the middleware), [`mission`] (the mission file, geometry, kinematics) and [`x80_protocol`] (here [`wire`]).
+//! Four crates lie below this one, and their modules are found under its name too: [`bus`] (writers, readers and wakeups; it alone
+//! names the middleware), [`mission`] (the mission file, geometry, kinematics) [`x80_protocol`] (here [`wire`]) and [`json_protocol`]
+//! (here [`json_wire`]).
 //!
 //! Layout, lowest layer first: a module uses modules above it in this table only.
 //!
@@ -26,11 +27,13 @@
 //! | [`stop_socket`] | the operator's stop without middleware |
 //! | [`shell`] | the process shell every stage runs in |
 //! | [`target`] | the target, as a stage follows it |
+//! | [`driver`] | what the link needs of a robot's protocol |
 //! | [`step`] | what a stage computes: the trait of every stage's pure step |
 //! | [`inputs`], [`replay`] | the inputs of every step, published; their replay |
 //! | [`outputs`], [`stage`] | where a stage's outputs go; its runner: process and replay of every stage, once |
 
 pub mod checkpoint;
+pub mod driver;
 pub mod external;
 pub mod faults;
 pub mod file;
@@ -61,6 +64,7 @@ pub mod topics;
 pub mod wiring;
 
 pub use bus::{self, bus_instance, clock, domain, lock_holders, poll, waiter};
+pub use json_protocol as json_wire;
 pub use mission::{self, address, geometry, kinematics, sonar};
 pub use x80_protocol as wire;
 

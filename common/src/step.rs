@@ -19,7 +19,7 @@
 //!
 //! | stage | input | output | state |
 //! |---|---|---|---|
-//! | `x80-link` | datagram, open or closed wire, command, directive, passing time | datagrams, samples, decisions | next tick |
+//! | `link` | datagram, open or closed wire, command, directive, passing time | datagrams, samples, decisions | next tick |
 //! | `dead-reckoning` | wheel counts | pose | pose and the counts it was computed at |
 //! | `mapper` | pose with range, reset, fault | the window of the grid that changed | the whole belief |
 //! | `planner` | grid part, pose, solved job, fault | guidance, job for the background solver | none: the next keyframe has all |

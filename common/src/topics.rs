@@ -68,15 +68,15 @@ topics! {
     }
     /// Readings of the sonars and infrared rangers, one for each row of the mission's sensors.
     RANGES: SliceTopic<RangesHeader, RangeReading> {
-        name: "ranges", writer: "x80-link", rate: Rate::EachTick, limits: Limits::slices(MOST_SENSORS), logged: Yes,
+        name: "ranges", writer: "link", rate: Rate::EachTick, limits: Limits::slices(MOST_SENSORS), logged: Yes,
     }
     /// Encoder counts and wheel speeds.
     WHEELS: Topic<WheelSample> {
-        name: "wheels", writer: "x80-link", rate: Rate::EachTick, limits: Limits::SMALL, logged: Yes,
+        name: "wheels", writer: "link", rate: Rate::EachTick, limits: Limits::SMALL, logged: Yes,
     }
     /// Wheels are held although they were told to turn: where something touches the body.
     CONTACT: Topic<ContactSample> {
-        name: "contact", writer: "x80-link", rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
+        name: "contact", writer: "link", rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
     }
     /// Where a source outside saw the robot: a camera, a satellite receiver. Any consumer may publish it.
     FIX: Topic<FixSample> {
@@ -112,19 +112,19 @@ topics! {
     }
     /// The connection to the robot: its state, counts, tick latency.
     LINK: Topic<LinkSample> {
-        name: "link", writer: "x80-link", rate: on_change(LINK_AGAIN), limits: Limits::SMALL, logged: Yes,
+        name: "link", writer: "link", rate: on_change(LINK_AGAIN), limits: Limits::SMALL, logged: Yes,
     }
     /// The seven infrared rangers, metres.
     INFRARED: Topic<InfraredSample> {
-        name: "infrared", writer: "x80-link", rate: Rate::EachFrame, limits: Limits::SMALL, logged: Yes,
+        name: "infrared", writer: "link", rate: Rate::EachFrame, limits: Limits::SMALL, logged: Yes,
     }
     /// Battery volts and whether they are low, motor currents, temperatures of the drivers.
     POWER: Topic<PowerSample> {
-        name: "power", writer: "x80-link", rate: Rate::EachFrame, limits: Limits::SMALL, logged: Yes,
+        name: "power", writer: "link", rate: Rate::EachFrame, limits: Limits::SMALL, logged: Yes,
     }
     /// Human sensors, tilt, temperature.
     SURROUNDINGS: Topic<SurroundingsSample> {
-        name: "surroundings", writer: "x80-link", rate: Rate::EachFrame, limits: Limits::SMALL, logged: Yes,
+        name: "surroundings", writer: "link", rate: Rate::EachFrame, limits: Limits::SMALL, logged: Yes,
     }
     /// The supervisor's order to all stages.
     DIRECTIVE: Topic<DirectiveSample> {
@@ -156,7 +156,7 @@ topics! {
     }
     /// The bytes that the link received from the robot and sent to it. Wakes nobody: a reader waits for `link`.
     WIRE: SliceTopic<WireHeader, u8> {
-        name: "wire", writer: "x80-link", rate: Rate::WhenItHappens, limits: Limits::DEEP, logged: Yes,
+        name: "wire", writer: "link", rate: Rate::WhenItHappens, limits: Limits::DEEP, logged: Yes,
     }
     /// The inputs of every stage's step, and the checkpoint each generation started from, for a replay.
     /// Wakes nobody: a reader waits for `link`.

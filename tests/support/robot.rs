@@ -19,7 +19,7 @@ use tempfile::TempDir;
 use super::commands::output;
 
 /// Every stage, in the order of the pipeline.
-pub const STAGES: [&str; 5] = ["x80-link", "dead-reckoning", "mapper", "planner", "controller"];
+pub const STAGES: [&str; 5] = ["link", "dead-reckoning", "mapper", "planner", "controller"];
 
 /// A wait that takes so long has failed, because no event that a test waits for takes nearly as long.
 pub const PATIENCE: Duration = Duration::from_secs(60);

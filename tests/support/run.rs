@@ -57,7 +57,7 @@ impl Run {
 
     /// Whether a line of the link's log contains all `parts`, which are a level and fields.
     pub fn link_logged(&self, parts: &[&str]) -> bool {
-        logged(&self.directory(), "x80-link", parts) > 0
+        logged(&self.directory(), "link", parts) > 0
     }
 
     pub fn is_running(&mut self) -> bool {

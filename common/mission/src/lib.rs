@@ -34,7 +34,7 @@ use serde::{Deserialize, Serialize};
 
 pub use error::MissionError;
 pub use odometry::{Calibration, CalibrationPlan, Odometry, Procedure, Provenance};
-pub use robot::{BatteryLimits, Body, Channel, Model, RobotConfig, Steering};
+pub use robot::{BatteryLimits, Body, Channel, Model, Protocol, RobotConfig, Steering};
 pub use sensor::{
     INFRARED_RANGERS, MOST_SENSORS, SONARS, Sensor, SensorKind, SensorModel, SensorRow, Sensors,
     SonarConfig,

@@ -22,6 +22,17 @@ pub enum Model {
     Car,
 }
 
+/// The protocol that a robot speaks: the link has a driver for each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Protocol {
+    /// The frames of the X80.
+    #[default]
+    X80,
+    /// Lines of JSON.
+    Json,
+}
+
 /// A channel of the motor board: a wheel's, or that of a car's steering.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -38,6 +49,8 @@ pub struct Channel {
 pub struct RobotConfig {
     /// Preset that gives what is not said.
     pub model: Model,
+    /// The protocol that it speaks.
+    pub protocol: Protocol,
     /// The address of a real robot, in one of the forms of [`crate::address::Address`]. Without it a simulated robot is started.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub address: Option<String>,
@@ -118,6 +131,7 @@ impl Default for RobotConfig {
     fn default() -> Self {
         Self {
             model: Model::X80,
+            protocol: Protocol::X80,
             address: None,
             rate_hz: 7.0,
             wheel_radius_m: None,

@@ -95,7 +95,7 @@ pub const TABLE: &[Rule] = &[
     },
     Rule {
         cause: Cause::OdometryGivenUp,
-        when: "commands and encoders have disagreed for 10 s; `x80-link.log` says how",
+        when: "commands and encoders have disagreed for 10 s; `link.log` says how",
         action: Action::End,
         clears: Clears::OnNewMission,
         monitor: |all| &all.odometry,
@@ -165,7 +165,7 @@ pub const TABLE: &[Rule] = &[
     },
     Rule {
         cause: Cause::OdometryImplausible,
-        when: "0.55 s of commanded motion with less than a quarter of it in the encoders, until the robot restarts, or 3 jumps within 2 s; `x80-link.log` says which",
+        when: "0.55 s of commanded motion with less than a quarter of it in the encoders, until the robot restarts, or 3 jumps within 2 s; `link.log` says which",
         action: Action::Stop,
         clears: Clears::OnResume { or_after: Some(odometry::CALM) },
         monitor: |all| &all.odometry,
@@ -179,14 +179,14 @@ pub const TABLE: &[Rule] = &[
     },
     Rule {
         cause: Cause::RangeSilent,
-        when: "a sensor that the mission uses has given no valid reading for three times `robot.command_limit_s`, and it is not a single infrared ranger without which the robot goes on; `x80-link.log` names it. Nothing in range is a reading",
+        when: "a sensor that the mission uses has given no valid reading for three times `robot.command_limit_s`, and it is not a single infrared ranger without which the robot goes on; `link.log` names it. Nothing in range is a reading",
         action: Action::Stop,
         clears: Clears::WithCondition,
         monitor: |all| &all.streams,
     },
     Rule {
         cause: Cause::RangeImplausible,
-        when: "the front sonar says the same within 1 cm while the robot drives 0.4 m or turns by 90 degrees, another sensor while it turns by 90 degrees on the spot; or the front sonar hears nothing more than 4 times in a row of a surface nearer than 0.45 m that the two infrared rangers beside it see within 12 degrees of square; `x80-link.log` names the sensor",
+        when: "the front sonar says the same within 1 cm while the robot drives 0.4 m or turns by 90 degrees, another sensor while it turns by 90 degrees on the spot; or the front sonar hears nothing more than 4 times in a row of a surface nearer than 0.45 m that the two infrared rangers beside it see within 12 degrees of square; `link.log` names the sensor",
         action: Action::Stop,
         clears: Clears::OnResume { or_after: Some(range::CHANGES) },
         monitor: |all| &all.range,
@@ -214,7 +214,7 @@ pub const TABLE: &[Rule] = &[
     },
     Rule {
         cause: Cause::InfraredSilent,
-        when: "one infrared ranger has given no valid reading for so long, and it looks aside or back, or into the cone of a sonar that the mission uses; `x80-link.log` names it",
+        when: "one infrared ranger has given no valid reading for so long, and it looks aside or back, or into the cone of a sonar that the mission uses; `link.log` names it",
         action: Action::Slow,
         clears: Clears::WithCondition,
         monitor: |all| &all.streams,

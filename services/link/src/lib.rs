@@ -1,9 +1,9 @@
-//! The library of links: a robot's words in, samples out, commands to it, and the one place that stops it. A link is this and a
-//! [`driver::Driver`], which speaks the protocol of one kind of robot.
+//! The link: a robot's words in, samples out, commands to it, and the one place that stops it. A [`common::driver::Driver`] speaks the
+//! protocol of its kind of robot.
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`driver`] | what a link needs of a robot's protocol |
+//! | [`drivers`] | THE table of drivers |
 //! | [`step`] | the pure step of the link: bytes and commands in, samples and bytes out |
 //! | [`failsafe`] | THE table of causes for which the link slows or stops the robot or ends the mission; in `failsafe/` their monitors |
 //! | [`transport`] | datagrams, a connection or a serial line |
@@ -13,7 +13,7 @@
 //! | [`stop_guard`] | the process that stops a moving robot when the link's process ended |
 
 pub mod backoff;
-pub mod driver;
+pub mod drivers;
 pub mod failsafe;
 pub mod shell;
 mod speed_trim;

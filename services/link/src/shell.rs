@@ -22,7 +22,6 @@ use common::{
 };
 
 use crate::{
-    driver::Driver,
     failsafe::{
         Decision,
         battery::{BatteryChange, Charge},
@@ -40,13 +39,13 @@ const LOOKS_AGAIN: Duration = Duration::from_millis(20);
 const MOST_LISTENING_NS: u64 = 20_000_000;
 
 /// The link process.
-pub struct Shell<D: Driver> {
+pub struct Shell {
     transport: Transport,
     command: Reader<CommandSample>,
     writers: Option<Writers>,
     directive: Reader<DirectiveSample>,
     tick_limit: Reader<TickLimitSample>,
-    runner: Runner<LinkStage<D>>,
+    runner: Runner<LinkStage>,
     /// None where it could not be made, which the log says.
     stop_socket: Option<StopSocket>,
     stop_mark: StopMark,
@@ -63,7 +62,7 @@ pub struct Shell<D: Driver> {
     budget: LatencyBudget,
 }
 
-impl<D: Driver> Process for Shell<D> {
+impl Process for Shell {
     const WIRING: &'static Wiring = &Wiring {
         inputs: &[&topics::DIRECTIVE, &topics::TICK_LIMIT],
         feedback: &[&topics::COMMAND],
@@ -78,7 +77,7 @@ impl<D: Driver> Process for Shell<D> {
             &topics::SURROUNDINGS,
             &topics::WIRE,
         ],
-        ..Wiring::of(D::STAGE)
+        ..Wiring::of("link")
     };
 
     fn open(context: &mut Context) -> Result<Self, StageError> {
@@ -102,7 +101,7 @@ impl<D: Driver> Process for Shell<D> {
         if let Some(socket) = &stop_socket {
             context.waiter.on_readable(socket)?;
         }
-        let runner = Runner::open(context, |_: &LinkStage<D>| WIRE_PIECE)?;
+        let runner = Runner::open(context, |_: &LinkStage| WIRE_PIECE)?;
         let mut shell = Self {
             transport,
             command: context.reader(&topics::COMMAND)?,
@@ -237,7 +236,7 @@ fn log_decision(before: Decision, now: Decision) {
     }
 }
 
-impl<D: Driver> Shell<D> {
+impl Shell {
     fn take_operators_requests(&mut self) -> Result<(), StageError> {
         while let Some(request) = self.stop_socket.as_mut().and_then(StopSocket::take) {
             tracing::warn!(?request, "an operator asks the link itself");
@@ -330,6 +329,9 @@ impl<D: Driver> Shell<D> {
                         by = method,
                         "the robot does not stop; it is stopped by the next method"
                     );
+                }
+                Effect::Refused(why) => {
+                    tracing::warn!("the robot says what is not in its protocol: {why}");
                 }
                 Effect::AskedForStreams => {
                     tracing::info!("the robot is asked for its streams again");

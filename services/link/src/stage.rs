@@ -19,10 +19,7 @@ use common::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    driver::Driver,
-    step::{Effect, Event, Input, Link, State},
-};
+use crate::step::{Effect, Event, Input, Link, State};
 
 /// A sample of `wire` has at most so many bytes. Longer data are published in several samples.
 pub(crate) const WIRE_PIECE: usize = 2048;
@@ -93,8 +90,8 @@ impl<'a> Taken<'a> {
 
 /// The step, and the samples that are published later, when no stage of the pipeline waits for the link.
 #[derive(Debug)]
-pub struct LinkStage<D> {
-    pub(crate) link: Link<D>,
+pub struct LinkStage {
+    pub(crate) link: Link,
     infrared: Option<InfraredSample>,
     power: Option<PowerSample>,
     surroundings: Option<SurroundingsSample>,
@@ -102,7 +99,7 @@ pub struct LinkStage<D> {
     wire: Vec<(Progress, WireHeader, Vec<u8>)>,
 }
 
-impl<D: Driver> LinkStage<D> {
+impl LinkStage {
     /// Whether telemetry waits to be published.
     pub(crate) const fn has_telemetry(&self) -> bool {
         self.infrared.is_some() || self.power.is_some() || self.surroundings.is_some()
@@ -156,7 +153,7 @@ impl<D: Driver> LinkStage<D> {
     }
 }
 
-impl<D: Driver> Stage for LinkStage<D> {
+impl Stage for LinkStage {
     type Start = State;
     type Entry<'a> = Entry<'a>;
     /// The effects that the process has to carry out, in order.

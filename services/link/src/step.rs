@@ -12,6 +12,7 @@ use std::time::Duration;
 
 use common::{
     clock::{MissionTime, Pace},
+    driver::{Driver, WireTally},
     mission::Mission,
     samples::{
         Action, Cause, CommandSample, CommandState, ContactSample, HoldReason, Order, RangeReading,
@@ -22,7 +23,7 @@ use common::{
 };
 
 use crate::{
-    driver::{Driver, WireTally},
+    drivers,
     failsafe::{
         Decision, Failsafe, Monitors, SLOW_SHARE,
         monitor::{Moment, Observation},
@@ -71,13 +72,13 @@ struct Repeat {
     due: MissionTime,
 }
 
-/// The link to one robot, which speaks the protocol of `D`.
+/// The link to one robot, in the protocol of its driver.
 #[derive(Debug)]
-pub struct Link<D> {
+pub struct Link {
     state: State,
     /// The mission time of the present event.
     now: MissionTime,
-    driver: D,
+    driver: Box<dyn Driver>,
     speeds: WheelSpeeds,
     /// The time limit of a command.
     limit: Duration,
@@ -103,9 +104,11 @@ pub struct Link<D> {
     /// In lockstep, the motor frames that the robot still has to send, one for each command and each ping since the order.
     due: u32,
     tally: Tally,
+    /// The newest reason for which a message was refused.
+    refused: Option<String>,
 }
 
-impl<D: Driver> Step for Link<D> {
+impl Step for Link {
     type Input<'a> = Input<'a>;
     type Output = Vec<Effect>;
     type State = State;
@@ -115,7 +118,7 @@ impl<D: Driver> Step for Link<D> {
         Self {
             state: State::default(),
             now: MissionTime::default(),
-            driver: D::new(mission),
+            driver: drivers::of(mission),
             speeds: WheelSpeeds::new(mission),
             limit: Duration::from_secs_f64(mission.robot.command_limit_s),
             half_period_ns: (0.5e9 / mission.robot.rate_hz) as u64,
@@ -137,6 +140,7 @@ impl<D: Driver> Step for Link<D> {
             stop_sent_ns: None,
             due: 0,
             tally: Tally::default(),
+            refused: None,
         }
     }
 
@@ -180,7 +184,7 @@ impl<D: Driver> Step for Link<D> {
     }
 }
 
-impl<D: Driver> Link<D> {
+impl Link {
     /// Whether the robot answers.
     pub fn connected(&self) -> bool {
         self.monitors().presence.connected()
@@ -450,3 +454,6 @@ impl<D: Driver> Link<D> {
 fn passed(since_ns: Option<u64>, now_ns: u64, span: Duration) -> bool {
     since_ns.is_none_or(|since| now_ns.saturating_sub(since) >= span.as_nanos() as u64)
 }
+
+#[cfg(test)]
+mod tests;

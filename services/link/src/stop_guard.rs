@@ -29,7 +29,6 @@ use common::{
 use rustix::process::setsid;
 
 use crate::{
-    driver::Driver,
     step::{Effect, Event, Input, Link, State},
     transport::Transport,
 };
@@ -74,7 +73,7 @@ impl StopGuard {
 }
 
 /// Be the guard of the link with this socket, in the run in `directory`. Standard input ends with the link.
-pub fn run<D: Driver>(directory: &Path, link: &Identity) -> Result<(), StageError> {
+pub fn run(directory: &Path, link: &Identity) -> Result<(), StageError> {
     // The link's session may be that of a terminal, or end with it.
     let _ = setsid();
     let run = Run::load(directory)?;
@@ -84,14 +83,14 @@ pub fn run<D: Driver>(directory: &Path, link: &Identity) -> Result<(), StageErro
         return Ok(());
     }
     tracing::warn!("the link ended, and nobody saw the robot at rest: it is told to stand");
-    let at_rest = stand::<D>(&run, || link.is_succeeded(&domain))?;
+    let at_rest = stand(&run, || link.is_succeeded(&domain))?;
     tracing::warn!(at_rest, "the stop guard leaves");
     Ok(())
 }
 
 /// Tell the robot of `run` to stand, by each method of the protocol in turn, until its encoders say that it rests. Returns
 /// whether they do; not if it is out of reach or told in vain, or `leave` says so.
-pub fn stand<D: Driver>(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bool, StageError> {
+pub fn stand(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bool, StageError> {
     let MissionClock::Wall { rate, .. } = run.clock else {
         // In lockstep a robot waits for commands.
         return Ok(true);
@@ -99,7 +98,7 @@ pub fn stand<D: Driver>(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bo
     // A simulated robot ends with its supervisor.
     let is_gone = || run.mission.robot.address.is_none() && !is_taken(&run.address);
     let mut transport = Transport::open(&run.address)?;
-    let mut link = Link::<D>::new(&run.mission);
+    let mut link = Link::new(&run.mission);
     // A pace is no foreign state.
     let _ = link.restore(State { pace: Pace::Rate(rate), next_tick: 0 });
     let began_ns = monotonic_ns();

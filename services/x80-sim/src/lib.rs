@@ -9,6 +9,7 @@
 //! | [`wheel_errors`] | how far its wheels are from what the mission says |
 //! | [`motor`] | one channel: modes, timed commands, the speed loop |
 //! | [`sonar`], [`infrared`], [`sensors`] | the readings of the sensors, as the frames carry them |
+//! | `json_words` | the words of a robot that speaks lines of JSON |
 //! | [`noise`] | seeded randomness, one stream for each source |
 //! | [`robot`] | all of it as a pure state machine: frames in, time forward, frames out |
 //! | [`radio`] | outages, losses, delays between host and robot |
@@ -41,6 +42,7 @@ mod car;
 mod drivetrain;
 mod error;
 pub mod infrared;
+mod json_words;
 pub mod motor;
 pub mod noise;
 pub mod radio;

@@ -2,8 +2,9 @@
 
 use common::{
     ground_truth::GroundTruthTick,
+    json_wire::Order,
     kinematics::Twist,
-    mission::{Block, BlockedWheels, Mission, Physics},
+    mission::{Block, BlockedWheels, Mission, Physics, Protocol},
     wire::{
         Addressing, Command, CustomSensors, Frame, Motion, MotorSensors, Report, StandardSensors,
         SystemSignal,
@@ -14,6 +15,7 @@ use crate::{
     body::{Body, Wheels},
     car::Car,
     drivetrain::{self, Drivetrain},
+    json_words::JsonWords,
     motor::Motor,
     noise::{Noise, Source},
     saved_state::SavedState,
@@ -76,6 +78,8 @@ pub struct Robot {
     standard: StandardSensors,
     custom: CustomSensors,
     motor: MotorSensors,
+    /// The words of a robot that speaks lines of JSON; none for an X80.
+    json: Option<JsonWords>,
 }
 
 impl Robot {
@@ -124,6 +128,7 @@ impl Robot {
             standard: StandardSensors::default(),
             custom: CustomSensors::default(),
             motor: MotorSensors::default(),
+            json: (mission.robot.protocol == Protocol::Json).then(|| JsonWords::new(mission)),
         };
         robot.least_clearance = robot.body.clearance();
         robot.measure();
@@ -266,6 +271,29 @@ impl Robot {
         }
     }
 
+    /// Take an order of a host that speaks lines of JSON, and append what is answered at once to `replies`.
+    pub fn on_order(&mut self, order: &Order, replies: &mut Vec<u8>) -> Heard {
+        let Some(json) = &mut self.json else {
+            return Heard::Foreign;
+        };
+        let commands = json.commands(order);
+        replies.extend(json.acknowledgement());
+        self.heard_at = self.time;
+        for command in commands {
+            self.take(command);
+        }
+        Self::kind_of(order)
+    }
+
+    /// The meaning of an order, before it is executed.
+    pub const fn kind_of(order: &Order) -> Heard {
+        match order {
+            Order::Drive { .. } => Heard::Motion,
+            Order::Ping {} => Heard::Ping,
+            Order::Hello { .. } | Order::Brake {} => Heard::Other,
+        }
+    }
+
     /// The time at which the ultrasonic rangers listen for the next tick, if that is before the tick and still to come.
     fn listens_at(&self) -> Option<f64> {
         let age = self.physics.sonar.age_s;
@@ -401,6 +429,11 @@ impl Robot {
     }
 
     fn write(&self, due: Due, out: &mut Vec<u8>) {
+        if let Some(json) = &self.json {
+            let sensors = (&self.standard, &self.custom, &self.motor);
+            out.extend(json.report(sensors, &self.motors));
+            return;
+        }
         if due.standard {
             Report::Standard(self.standard).encode(self.addressing, out);
         }

@@ -101,10 +101,9 @@ pub mod totals;
 
 pub use domain_error::DomainError;
 pub use error::SupervisorError;
-pub use link::stop_guard::NAME as STOP_GUARD;
+pub use link::stop_guard::{NAME as STOP_GUARD, run as guard};
 pub use progress::Progress;
 pub use records::DEATHS;
 pub use run::{Finished, StillMoving, run};
 pub use stage_processes::Starter;
 pub use supervisor::Options;
-pub use x80_link::guard;

@@ -23,8 +23,8 @@ use common::{
     topics::{self, AnyTopic as _},
     waiter::Waiter,
 };
+use link::stop_guard;
 use thiserror::Error;
-use x80_link::stand as tell_to_stand;
 
 use crate::process;
 
@@ -100,7 +100,7 @@ pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
     let rests = match (link, run) {
         (Some(link), _) => rests_by(&link),
         // A link that answers nobody sends nothing either.
-        (None, Ok(run)) => tell_to_stand(&run)?,
+        (None, Ok(run)) => stop_guard::stand(&run, || false)?,
         (None, Err(_)) => false,
     };
     let told = told(supervisor);

@@ -140,8 +140,8 @@ mod tests {
 
     #[test]
     fn a_stage_is_blamed_when_its_time_is_over_and_not_before() {
-        for stage in TABLE.iter().filter(|stage| stage.name != "x80-link") {
-            let mut watchdog = published(&[("x80-link", 1), ("dead-reckoning", 1), ("mapper", 1)]);
+        for stage in TABLE.iter().filter(|stage| stage.name != "link") {
+            let mut watchdog = published(&[("link", 1), ("dead-reckoning", 1), ("mapper", 1)]);
             watchdog.on_output("planner", 1);
             watchdog.on_output("controller", 1);
             for reads in OutputWatchdog::new(0).find(stage.name).unwrap().reads.clone() {
@@ -164,7 +164,7 @@ mod tests {
         let mut watchdog = OutputWatchdog::new(0);
         for tick in 1..100 {
             for stage in TABLE {
-                let ahead = u64::from(stage.name == "x80-link");
+                let ahead = u64::from(stage.name == "link");
                 watchdog.on_output(stage.name, tick + ahead);
             }
             let now = Duration::from_millis(900) * tick as u32;
@@ -176,17 +176,17 @@ mod tests {
     fn a_new_generation_need_not_answer_ticks_from_before_it() {
         let mut watchdog =
             published(&TABLE.iter().map(|stage| (stage.name, 6)).collect::<Vec<_>>());
-        watchdog.on_output("x80-link", 7);
+        watchdog.on_output("link", 7);
         watchdog.stale(Duration::ZERO);
         watchdog.on_start("dead-reckoning");
         assert_eq!(blamed(&mut watchdog), None);
-        watchdog.on_output("x80-link", 8);
+        watchdog.on_output("link", 8);
         assert_eq!(blamed(&mut watchdog), Some("dead-reckoning"));
     }
 
     #[test]
     fn time_before_the_robot_drove_is_cleared() {
-        let mut watchdog = published(&[("x80-link", 7)]);
+        let mut watchdog = published(&[("link", 7)]);
         watchdog.stale(Duration::ZERO);
         watchdog.clear_unanswered();
         assert_eq!(watchdog.stale(MINUTE), None);

@@ -109,8 +109,8 @@ const STOPPED: &str = "stopped by the link when the command is stale";
 
 /// Every stage, in the order of the pipeline.
 pub static TABLE: &[Stage] = &[
-    Stage::new::<x80_link::Shell>(
-        replay::<x80_link::LinkStage>,
+    Stage::new::<link::shell::Shell>(
+        replay::<link::stage::LinkStage>,
         "stands when its timed command ends",
     ),
     Stage::answering::<dead_reckoning::DeadReckoning>(STOPPED),

@@ -101,6 +101,8 @@ pub enum Effect {
     CountsElsewhere,
     /// The robot does not stop, and was stopped by the next method, which has this name.
     StopBy(&'static str),
+    /// Messages of the robot are none of the protocol, for this reason, which is new.
+    Refused(String),
     /// The robot was asked for its streams again.
     AskedForStreams,
     /// Publish the infrared rangers.

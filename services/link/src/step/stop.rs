@@ -2,15 +2,12 @@
 
 use std::time::Duration;
 
-use common::samples::Cause;
+use common::{driver::StopMethod, samples::Cause};
 
 use super::{Effect, Link, STOP_AGAIN, passed};
-use crate::{
-    driver::{Driver, StopMethod},
-    failsafe::{Decision, monitor::Observation},
-};
+use crate::failsafe::{Decision, monitor::Observation};
 
-impl<D: Driver> Link<D> {
+impl Link {
     pub(super) fn decide(&mut self, now_ns: u64) -> Decision {
         self.failsafe.decide(self.in_ticks(), self.moment(now_ns))
     }
@@ -80,13 +77,14 @@ impl<D: Driver> Link<D> {
     }
 
     /// The method by which the robot is stopped now; none for velocity 0, which is the first and follows the last.
-    fn other_stop(&self) -> Option<&'static StopMethod<D>> {
-        let method = self.monitors().stop.method() % (D::OTHER_STOPS.len() + 1);
-        D::OTHER_STOPS.get(method.checked_sub(1)?)
+    fn other_stop(&self) -> Option<StopMethod> {
+        let mut others = self.driver.other_stops();
+        let method = self.monitors().stop.method() % (others.len() + 1);
+        method.checked_sub(1).map(|other| others.swap_remove(other))
     }
 
     fn stop(&self) -> Vec<u8> {
-        self.other_stop().map_or_else(|| self.velocity_0(), |other| (other.bytes)(&self.driver))
+        self.other_stop().map_or_else(|| self.velocity_0(), |other| other.bytes)
     }
 
     pub(super) fn velocity_0(&self) -> Vec<u8> {

@@ -1,14 +1,15 @@
 //! The part of the step that takes what the robot says and follows its presence.
 
-use common::{samples::PowerSample, wire::COUNT_CYCLE};
-
-use super::{Effect, Link, PING_EVERY, passed};
-use crate::{
-    driver::{Driver, Heard, Motion},
-    failsafe::monitor::{Counts, Monitor as _, Observation},
+use common::{
+    driver::{Heard, Motion},
+    samples::PowerSample,
+    wire::COUNT_CYCLE,
 };
 
-impl<D: Driver> Link<D> {
+use super::{Effect, Link, PING_EVERY, passed};
+use crate::failsafe::monitor::{Counts, Monitor as _, Observation};
+
+impl Link {
     pub(super) fn take_wire(&mut self, open: bool, now_ns: u64, effects: &mut Vec<Effect>) {
         self.failsafe.monitors.presence.wire(open);
         self.driver.reset();
@@ -20,7 +21,12 @@ impl<D: Driver> Link<D> {
     }
 
     pub(super) fn take_heard(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        let heard = self.driver.heard();
+        let mut heard = self.driver.heard();
+        let refused = heard.refused.take();
+        if refused.is_some() && refused != self.refused {
+            effects.extend(refused.clone().map(Effect::Refused));
+            self.refused = refused;
+        }
         for _ in 0..heard.acknowledged {
             self.observe(Observation::Acknowledged, now_ns);
         }

@@ -10,7 +10,8 @@ use common::{
     checkpoint::Checkpoint,
     clock::Pace,
     ground_truth::GroundTruthHeader,
-    mission::Mission,
+    json_wire::{Lines, Order, parse},
+    mission::{Mission, Protocol},
     wire::{Decoder, Frame},
 };
 use serde::Serialize;
@@ -51,6 +52,7 @@ pub(super) struct Session {
     strangers: u64,
     /// Decoders of the peer and of one other: half a frame of the one must not garble the other's.
     decoders: Vec<SourceDecoder>,
+    protocol: Protocol,
     ground_truth: Option<Box<dyn Write + Send>>,
     /// The file of the robot's state.
     checkpoint: Option<Checkpoint>,
@@ -59,7 +61,45 @@ pub(super) struct Session {
 /// Bytes from one source.
 struct SourceDecoder {
     source: Source,
-    decoder: Decoder,
+    words: Words,
+}
+
+/// Decodes the protocol that the robot speaks.
+enum Words {
+    X80(Decoder),
+    Json(Lines),
+}
+
+impl Words {
+    fn of(protocol: Protocol) -> Self {
+        match protocol {
+            Protocol::X80 => Self::X80(Decoder::default()),
+            Protocol::Json => Self::Json(Lines::default()),
+        }
+    }
+}
+
+/// What a host says.
+#[derive(Clone, Copy, Debug)]
+enum Said<'a> {
+    Frame(&'a Frame<'a>),
+    Order(&'a Order),
+}
+
+impl Said<'_> {
+    fn kind(self) -> Heard {
+        match self {
+            Self::Frame(frame) => Robot::kind(frame),
+            Self::Order(order) => Robot::kind_of(order),
+        }
+    }
+
+    fn told(self, robot: &mut Robot, answer: &mut Vec<u8>) -> Heard {
+        match self {
+            Self::Frame(frame) => robot.on_frame(frame, answer),
+            Self::Order(order) => robot.on_order(order, answer),
+        }
+    }
 }
 
 impl Session {
@@ -83,6 +123,7 @@ impl Session {
             heard: Instant::now(),
             strangers: 0,
             decoders: Vec::new(),
+            protocol: mission.robot.protocol,
             ground_truth,
             checkpoint,
         };
@@ -208,12 +249,24 @@ impl Session {
     fn hear(&mut self, source: Source, bytes: &[u8]) -> Result<(), SimError> {
         let known = self.decoders.iter().position(|heard| heard.source == source);
         let mut heard = known.map_or_else(
-            || SourceDecoder { source, decoder: Decoder::default() },
+            || SourceDecoder { source, words: Words::of(self.protocol) },
             |at| self.decoders.swap_remove(at),
         );
-        heard.decoder.push(bytes);
-        while let Some(frame) = heard.decoder.next_frame() {
-            self.on_frame(source, &frame)?;
+        match &mut heard.words {
+            Words::X80(decoder) => {
+                decoder.push(bytes);
+                while let Some(frame) = decoder.next_frame() {
+                    self.on_said(source, Said::Frame(&frame))?;
+                }
+            }
+            Words::Json(lines) => {
+                for line in lines.push(bytes) {
+                    match parse(&line) {
+                        Ok(order) => self.on_said(source, Said::Order(&order))?,
+                        Err(why) => tracing::debug!("the host says what is no order: {why}"),
+                    }
+                }
+            }
         }
         // At most one source besides the peer is stored.
         if self.peer != Some(source) {
@@ -226,19 +279,19 @@ impl Session {
         Ok(())
     }
 
-    fn on_frame(&mut self, source: Source, frame: &Frame<'_>) -> Result<(), SimError> {
+    fn on_said(&mut self, source: Source, said: Said<'_>) -> Result<(), SimError> {
         if !self.serves(source) {
             return Ok(());
         }
         let mut answer = Vec::with_capacity(16);
         if !self.lock_step {
-            if self.robot.on_frame(frame, &mut answer) != Heard::Foreign {
+            if said.told(&mut self.robot, &mut answer) != Heard::Foreign {
                 self.peer = Some(source);
                 self.send(&answer);
             }
             return Ok(());
         }
-        match Robot::kind(frame) {
+        match said.kind() {
             Heard::Foreign => {}
             // The radio may lose the command or make it late; the period passes all the same.
             Heard::Motion => {
@@ -250,14 +303,14 @@ impl Session {
                         let both_ways = radio.delay() + radio.delay();
                         self.robot.advance_to((now + both_ways).min(self.next_tick_s()));
                     }
-                    self.robot.on_frame(frame, &mut answer);
+                    said.told(&mut self.robot, &mut answer);
                     self.deliver(&answer);
                 }
                 self.tick_until_heard()?;
             }
             Heard::Ping => {
                 self.peer = Some(source);
-                self.robot.on_frame(frame, &mut answer);
+                said.told(&mut self.robot, &mut answer);
                 self.deliver(&answer);
                 let mut frames = Vec::with_capacity(256);
                 self.robot.repeat(&mut frames);
@@ -265,7 +318,7 @@ impl Session {
             }
             Heard::Ack | Heard::Other => {
                 self.peer = Some(source);
-                self.robot.on_frame(frame, &mut answer);
+                said.told(&mut self.robot, &mut answer);
                 self.deliver(&answer);
             }
         }

@@ -40,6 +40,7 @@ static GUIDE: &[Page] = guide! {
     "method",
     "mission-file",
     "simulation",
+    "your-robot",
     "operate",
     "attach",
     "recordings",

@@ -326,16 +326,20 @@ const LINE_EVERY: Duration = Duration::from_secs(5);
 impl Console {
     fn new(options: &Options) -> Self {
         let mission = &options.mission;
+        // A real robot does not wait, whatever the pace.
+        let pace = match &mission.robot.address {
+            Some(address) => format!("at {address}"),
+            None => format!("pace {}", options.pace),
+        };
         Self {
             line: ProgressLine::new(LINE_EVERY),
             silent: logging::to_journal(),
             title: format!(
-                "mission {}{}: {:.1} m to the target, robot {}, pace {}; everything of this run is in {}",
+                "mission {}{}: {:.1} m to the target, robot {}, {pace}; everything of this run is in {}",
                 mission.name,
                 if options.recovered.is_some() { " goes on" } else { "" },
                 mission.target.length(),
                 options.robot,
-                options.pace,
                 options.directory.display()
             ),
         }

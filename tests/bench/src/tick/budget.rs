@@ -177,7 +177,7 @@ mod tests {
             let file = latency_budget::file(directory.path(), stage, number);
             fs::write(file, lines).unwrap();
         };
-        save("x80-link", 1, "5 inputs 1000 9000 1 2 3 4 5\n5 feedback 90000 95000 1 2 3 4 5\n");
+        save("link", 1, "5 inputs 1000 9000 1 2 3 4 5\n5 feedback 90000 95000 1 2 3 4 5\n");
         save("dead-reckoning", 1, "4 inputs 1 2 3 4 5 6 7\n");
         save("dead-reckoning", 2, "5 inputs 19000 29000 1 2 3 4 5\n");
         let mut budget = Budget::default();

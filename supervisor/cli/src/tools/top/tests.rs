@@ -16,7 +16,7 @@ use ratatui::{Terminal, backend::TestBackend};
 
 use super::{action::KEYS, screen, view::View, words};
 
-const STAGES: [&str; 5] = ["x80-link", "dead-reckoning", "mapper", "planner", "controller"];
+const STAGES: [&str; 5] = ["link", "dead-reckoning", "mapper", "planner", "controller"];
 
 /// A robot in the middle of a mission: a wall to the east of it, the field to the north, where the target is.
 fn view() -> View {

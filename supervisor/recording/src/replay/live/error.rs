@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use crate::RecordingError;
 
-pub(super) const NEVER_LIVE: &str = "x80-link";
+pub(super) const NEVER_LIVE: &str = "link";
 #[derive(Debug, Error)]
 pub enum LiveError {
     #[error(transparent)]

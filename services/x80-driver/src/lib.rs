@@ -1,4 +1,4 @@
-//! The link of the X80: a [`Driver`] that speaks its protocol.
+//! The driver of the X80: it speaks the robot's protocol.
 //!
 //! | module | holds |
 //! |---|---|
@@ -10,39 +10,20 @@ pub mod drive;
 mod rangers;
 pub mod telemetry;
 
-use std::{path::Path, time::Duration};
+use std::time::Duration;
 
 use common::{
+    driver::{Driver, Heard, Motion, StopMethod, WireTally},
     mission::Mission,
-    run::Run,
     samples::RangeReading,
-    start::StageError,
-    stop_socket::Identity,
     wire::{Command, Decoder, Report, SystemSignal},
 };
-use link::driver::{Driver, Heard, Motion, StopMethod, WireTally};
 
 use self::{
     drive::{Drive, encoded},
     rangers::Rangers,
     telemetry::Telemetry,
 };
-
-/// The process of the X80's link.
-pub type Shell = link::shell::Shell<X80>;
-
-/// The X80's link as a stage.
-pub type LinkStage = link::stage::LinkStage<X80>;
-
-/// Be the [stop guard](link::stop_guard::run) of an X80.
-pub fn guard(directory: &Path, link: &Identity) -> Result<(), StageError> {
-    link::stop_guard::run::<X80>(directory, link)
-}
-
-/// Tell an X80 [to stand](link::stop_guard::stand).
-pub fn stand(run: &Run) -> Result<bool, StageError> {
-    link::stop_guard::stand::<X80>(run, || false)
-}
 
 /// The X80's protocol.
 #[derive(Clone, Debug)]
@@ -53,18 +34,9 @@ pub struct X80 {
     telemetry: Telemetry,
 }
 
-impl Driver for X80 {
-    const STAGE: &'static str = "x80-link";
-    const OTHER_STOPS: &'static [StopMethod<Self>] = &[
-        StopMethod { name: "disable", bytes: |x80| x80.drive.disable() },
-        StopMethod { name: "pulse width 0", bytes: |x80| x80.drive.still_pulses() },
-        StopMethod {
-            name: "suspend",
-            bytes: |_| encoded(Command::Enable { on: false, channel: None }),
-        },
-    ];
-
-    fn new(mission: &Mission) -> Self {
+impl X80 {
+    /// The driver of `mission`'s robot.
+    pub fn new(mission: &Mission) -> Self {
         Self {
             drive: Drive::new(mission),
             decoder: Decoder::default(),
@@ -72,7 +44,9 @@ impl Driver for X80 {
             telemetry: Telemetry::default(),
         }
     }
+}
 
+impl Driver for X80 {
     fn push(&mut self, bytes: &[u8]) {
         self.decoder.push(bytes);
     }
@@ -107,7 +81,7 @@ impl Driver for X80 {
             heard.surroundings = Some(telemetry::surroundings(&standard));
         }
         heard.infrared = custom.and_then(|custom| self.rangers.take_custom(&custom));
-        heard.readings = self.rangers.take_fresh();
+        heard.readings = self.rangers.readings.take_fresh();
         heard
     }
 
@@ -117,7 +91,7 @@ impl Driver for X80 {
     }
 
     fn readings_for_tick(&mut self) -> Vec<RangeReading> {
-        self.rangers.for_tick()
+        self.rangers.readings.for_tick()
     }
 
     fn greeting(&self) -> Vec<u8> {
@@ -139,7 +113,13 @@ impl Driver for X80 {
     fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8> {
         self.drive.velocity(counts, limit)
     }
-}
 
-#[cfg(test)]
-mod tests;
+    fn other_stops(&self) -> Vec<StopMethod> {
+        let suspend = encoded(Command::Enable { on: false, channel: None });
+        vec![
+            StopMethod { name: "disable", bytes: self.drive.disable() },
+            StopMethod { name: "pulse width 0", bytes: self.drive.still_pulses() },
+            StopMethod { name: "suspend", bytes: suspend },
+        ]
+    }
+}

@@ -1,7 +1,6 @@
 //! The inputs of the failsafe in the step, and the effects of its decisions.
 
 use super::*;
-use link::step::LIMIT_WAITED;
 
 const STAND: [Option<i16>; 2] = [Some(0), Some(0)];
 /// A turn a second is 1200 counts/s.

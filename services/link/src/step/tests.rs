@@ -1,19 +1,17 @@
 use super::*;
+use std::path::Path;
+
 use common::{
     clock::{MissionTime, Pace},
     samples::{
         Action, Cause, CommandSample, CommandState, HoldReason, Order, RangeStatus, Stamp,
         WheelSample,
     },
-    step::Step as _,
-    wire::{Addressing, CustomSensors, Mode, MotorSensors, Parameter, StandardSensors},
+    wire::{
+        Addressing, Command, CustomSensors, Decoder, Mode, MotorSensors, Parameter, Report,
+        StandardSensors, SystemSignal,
+    },
 };
-use link::{
-    failsafe::{Decision, presence::Absence},
-    step::{Effect, Event, Input, STOPS, State},
-};
-
-type Link = link::step::Link<X80>;
 
 const MS: u64 = 1_000_000;
 const PERIOD_NS: u64 = 142_857_142;

@@ -2,24 +2,12 @@
 
 use std::{fmt, time::Duration};
 
-use common::{
-    mission::Mission,
-    samples::{InfraredSample, PowerSample, RangeReading, SurroundingsSample, WheelSample},
-};
+use crate::mission::{Mission, Sensor};
+use crate::samples::{InfraredSample, PowerSample, RangeReading, SurroundingsSample, WheelSample};
 
 /// The protocol of one kind of robot, without a wire and without a clock: bytes of the robot in and their meaning out, orders in and
 /// bytes for the robot out.
-pub trait Driver: fmt::Debug + Sized + 'static {
-    /// The name of the stage.
-    const STAGE: &'static str;
-
-    /// The methods that stop a robot which does not obey a velocity of 0, in the order in which they are tried. After one of them the
-    /// robot must be greeted before it drives.
-    const OTHER_STOPS: &'static [StopMethod<Self>];
-
-    /// The driver of `mission`'s robot.
-    fn new(mission: &Mission) -> Self;
-
+pub trait Driver: fmt::Debug {
     /// Take bytes from the robot.
     fn push(&mut self, bytes: &[u8]);
 
@@ -50,15 +38,19 @@ pub trait Driver: fmt::Debug + Sized + 'static {
     /// A command for the speeds of the two wheels, or of a car's wheel and steering, counts/s, forward positive. After `limit` the robot
     /// stops by itself.
     fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8>;
+
+    /// The methods that stop a robot which does not obey a velocity of 0, in the order in which they are tried. After one of them the
+    /// robot must be greeted before it drives.
+    fn other_stops(&self) -> Vec<StopMethod>;
 }
 
 /// A method that stops a robot, besides a velocity of 0.
-#[derive(Debug)]
-pub struct StopMethod<D> {
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StopMethod {
     /// Its name in logs.
     pub name: &'static str,
     /// What the robot is sent.
-    pub bytes: fn(&D) -> Vec<u8>,
+    pub bytes: Vec<u8>,
 }
 
 /// Counts of what came from a robot.
@@ -86,6 +78,8 @@ pub struct Heard {
     pub power: Option<PowerSample>,
     pub surroundings: Option<SurroundingsSample>,
     pub infrared: Option<InfraredSample>,
+    /// The reason why the newest message that was refused is none of the protocol, if any was.
+    pub refused: Option<String>,
 }
 
 /// What the encoders and motors say.
@@ -95,4 +89,58 @@ pub struct Motion {
     pub wheels: WheelSample,
     /// The motor currents of the left and the right wheel, AD counts.
     pub currents: [u16; 2],
+}
+
+/// The newest reading of each sensor of a mission since the last tick.
+#[derive(Clone, Debug)]
+pub struct Readings {
+    table: Vec<Sensor>,
+    newest: Vec<RangeReading>,
+    /// The readings that came since [`Readings::take_fresh`].
+    fresh: Vec<RangeReading>,
+    ticks: u64,
+}
+
+impl Readings {
+    /// None of the sensors of `mission` has read anything.
+    pub fn new(mission: &Mission) -> Self {
+        let table = mission.sensor_table();
+        Self { newest: absent(&table).collect(), table, fresh: Vec::new(), ticks: 0 }
+    }
+
+    /// The sensors, by rows.
+    pub fn table(&self) -> &[Sensor] {
+        &self.table
+    }
+
+    /// Take a reading of the sensor in `row`; one of a row that is not there is dropped.
+    pub fn take(&mut self, row: usize, reading: RangeReading) {
+        if let Some(newest) = self.newest.get_mut(row) {
+            *newest = RangeReading { sensor: row as u8, ..reading };
+            self.fresh.push(*newest);
+        }
+    }
+
+    /// The readings since the last call.
+    pub fn take_fresh(&mut self) -> Vec<RangeReading> {
+        std::mem::take(&mut self.fresh)
+    }
+
+    /// Take the readings for a tick, one for each row. The next tick has none until new ones come.
+    pub fn for_tick(&mut self) -> Vec<RangeReading> {
+        let tick = self.ticks;
+        self.ticks += 1;
+        let absent = absent(&self.table).collect();
+        let mut readings = std::mem::replace(&mut self.newest, absent);
+        for (reading, sensor) in readings.iter_mut().zip(&self.table) {
+            if !tick.is_multiple_of(sensor.every_ticks) {
+                *reading = RangeReading { sensor: reading.sensor, ..RangeReading::default() };
+            }
+        }
+        readings
+    }
+}
+
+fn absent(table: &[Sensor]) -> impl Iterator<Item = RangeReading> {
+    (0..).zip(table).map(|(sensor, _)| RangeReading { sensor, ..RangeReading::default() })
 }

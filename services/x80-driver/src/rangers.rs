@@ -1,33 +1,23 @@
 //! The readings of the ranging sensors for the next tick, collected from several frames.
 
 use common::{
-    mission::{INFRARED_RANGERS, Mission, Sensor, SensorKind},
+    driver::Readings,
+    mission::{INFRARED_RANGERS, Mission, SensorKind},
     samples::{InfraredSample, RangeReading, RangeStatus},
     wire::{CustomSensors, Echo, INFRARED_LIVE_AD, StandardSensors, infrared_m},
 };
 
-/// The newest reading of each sensor since the last tick.
+/// The readings of an X80's sonars and infrared rangers.
 #[derive(Clone, Debug)]
 pub(crate) struct Rangers {
-    table: Vec<Sensor>,
-    newest: Vec<RangeReading>,
-    /// The readings that came since [`Rangers::take_fresh`].
-    fresh: Vec<RangeReading>,
+    pub(crate) readings: Readings,
     /// The first infrared ranger comes in the standard frame, the other six in the custom one.
     first_infrared: Option<u16>,
-    ticks: u64,
 }
 
 impl Rangers {
     pub(crate) fn new(mission: &Mission) -> Self {
-        let table = mission.sensor_table();
-        Self {
-            newest: absent(&table).collect(),
-            table,
-            fresh: Vec::new(),
-            first_infrared: None,
-            ticks: 0,
-        }
+        Self { readings: Readings::new(mission), first_infrared: None }
     }
 
     pub(crate) fn take_standard(&mut self, standard: &StandardSensors) {
@@ -46,38 +36,20 @@ impl Rangers {
     }
 
     fn take(&mut self, kind: SensorKind, read: impl Fn(usize) -> Option<RangeReading>) {
-        for (row, sensor) in self.table.iter().enumerate() {
-            if sensor.kind == kind
-                && let Some(reading) = read(sensor.channel.into())
-            {
-                self.newest[row] = RangeReading { sensor: row as u8, ..reading };
-                self.fresh.push(self.newest[row]);
+        let channels: Vec<_> = self
+            .readings
+            .table()
+            .iter()
+            .enumerate()
+            .filter(|(_, sensor)| sensor.kind == kind)
+            .map(|(row, sensor)| (row, usize::from(sensor.channel)))
+            .collect();
+        for (row, channel) in channels {
+            if let Some(reading) = read(channel) {
+                self.readings.take(row, reading);
             }
         }
     }
-
-    /// The readings of the frames since the last call.
-    pub(crate) fn take_fresh(&mut self) -> Vec<RangeReading> {
-        std::mem::take(&mut self.fresh)
-    }
-
-    /// Take the readings for a tick, one for each row. The next tick has none until new ones come.
-    pub(crate) fn for_tick(&mut self) -> Vec<RangeReading> {
-        let tick = self.ticks;
-        self.ticks += 1;
-        let absent = absent(&self.table).collect();
-        let mut readings = std::mem::replace(&mut self.newest, absent);
-        for (reading, sensor) in readings.iter_mut().zip(&self.table) {
-            if !tick.is_multiple_of(sensor.every_ticks) {
-                *reading = RangeReading { sensor: reading.sensor, ..RangeReading::default() };
-            }
-        }
-        readings
-    }
-}
-
-fn absent(table: &[Sensor]) -> impl Iterator<Item = RangeReading> {
-    (0..).zip(table).map(|(sensor, _)| RangeReading { sensor, ..RangeReading::default() })
 }
 
 /// The reading of a sonar byte.
@@ -128,7 +100,7 @@ mod tests {
         assert_eq!(infrared.raw_ad, [1000, 1000, 0, 4095, 0, 0, 300]);
         assert_eq!(infrared.range_m[2..4], [0.81, 0.09]);
         assert!((infrared.range_m[0] - 0.375_79).abs() < 1e-5);
-        let readings = rangers.for_tick();
+        let readings = rangers.readings.for_tick();
         assert!(is(&readings[3], RangeStatus::Measured, 0.375_79, 1000));
         assert!(is(&readings[9], RangeStatus::Nothing, 0.0, 300));
     }
@@ -155,15 +127,15 @@ mod tests {
         let mut rangers = rangers("");
         let ultrasonic = [45, 80, 135, 0, 0, 0];
         rangers.take_standard(&StandardSensors { ultrasonic, ..StandardSensors::default() });
-        assert_eq!(rangers.take_fresh().len(), 3);
-        let readings = rangers.for_tick();
+        assert_eq!(rangers.readings.take_fresh().len(), 3);
+        let readings = rangers.readings.for_tick();
         assert_eq!(readings.len(), 10);
         for (row, cm) in [(0, 80), (1, 45), (2, 135)] {
             let measured = is(&readings[row], RangeStatus::Measured, f64::from(cm) / 100.0, cm);
             assert!(measured && usize::from(readings[row].sensor) == row, "{readings:?}");
         }
         let is_absent = |reading: &RangeReading| reading.status() == RangeStatus::Absent;
-        assert!(rangers.for_tick().iter().all(is_absent));
+        assert!(rangers.readings.for_tick().iter().all(is_absent));
     }
 
     #[test]
@@ -175,7 +147,7 @@ mod tests {
                 let ultrasonic = [0, 80, 0, 0, 0, 0];
                 let standard = StandardSensors { ultrasonic, ..StandardSensors::default() };
                 rangers.take_standard(&standard);
-                rangers.for_tick()[0].status() == RangeStatus::Measured
+                rangers.readings.for_tick()[0].status() == RangeStatus::Measured
             })
             .collect();
         assert_eq!(measured, [0, 3]);

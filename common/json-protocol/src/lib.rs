@@ -1,0 +1,175 @@
+//! The protocol of robots that speak lines of JSON, over datagrams, a connection or a serial line.
+//!
+//! Every message is one JSON object in one line, at most [`LONGEST_LINE`] bytes with its line feed. A datagram may carry several lines.
+//! Angles are in radians, distances in metres, times in seconds; left is positive. The robot speaks [`Report`]s and hears [`Order`]s.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+/// The greatest length of a line, bytes: a scan of 1,080 beams has 8 kB.
+pub const LONGEST_LINE: usize = 32_768;
+
+/// What the robot says: any of these.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Report {
+    /// The number of orders that the robot has taken since it started. Each order is answered by a report that counts it, at once.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub heard: Option<u64>,
+    /// The angles by which the left and the right wheel have turned since the robot started. A tick begins with them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wheels: Option<[f64; 2]>,
+    /// The speeds of the wheels, rad/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub speeds: Option<[f64; 2]>,
+    /// Instead of `wheels`: x, y and heading by the robot's own odometry.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub odometry: Option<[f64; 3]>,
+    /// Whether something holds the left and the right wheel: their motors draw the current of a stall.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held: Option<[bool; 2]>,
+    /// The readings of ranging sensors by the names of the mission's rows; null for nothing in reach.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub ranges: BTreeMap<String, Option<f64>>,
+    /// The voltage of the battery.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub battery_v: Option<f64>,
+}
+
+/// What the robot is told.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "lowercase")]
+pub enum Order {
+    /// The link has found the robot, or it has braked: it releases its brake and sends its reports so often, for as long as it hears
+    /// orders.
+    Hello {
+        /// Reports a second.
+        rate_hz: f64,
+    },
+    /// Drive for so long, then stand, unless another order came.
+    Drive {
+        /// The speeds of the left and the right wheel, rad/s.
+        wheels: [f64; 2],
+        /// The same as the speed ahead, m/s, and the turn, rad/s.
+        twist: [f64; 2],
+        /// The time after which the robot stands.
+        for_s: f64,
+    },
+    /// Stand by every means until the next hello.
+    Brake {},
+    /// Report at once.
+    Ping {},
+}
+
+impl Order {
+    /// The line that says it.
+    #[must_use]
+    pub fn line(&self) -> Vec<u8> {
+        line(self)
+    }
+}
+
+impl Report {
+    /// The line that says it.
+    #[must_use]
+    pub fn line(&self) -> Vec<u8> {
+        line(self)
+    }
+}
+
+fn line(message: &impl Serialize) -> Vec<u8> {
+    // A struct of numbers and names always serialises.
+    let mut line = serde_json::to_vec(message).unwrap_or_default();
+    line.push(b'\n');
+    line
+}
+
+/// The message of a line, or why it is none.
+pub fn parse<'a, M: Deserialize<'a>>(line: &'a [u8]) -> Result<M, String> {
+    serde_json::from_slice(line).map_err(|error| error.to_string())
+}
+
+/// Bytes to lines. A line that is too long is dropped, and so is an empty one.
+#[derive(Clone, Debug, Default)]
+pub struct Lines {
+    held: Vec<u8>,
+    /// Whether the rest of a line that is too long is still to come.
+    drops: bool,
+    dropped: u64,
+}
+
+impl Lines {
+    /// Take bytes. Returns the lines that they complete, without their line feeds.
+    pub fn push(&mut self, bytes: &[u8]) -> Vec<Vec<u8>> {
+        let mut complete = Vec::new();
+        let mut pieces = bytes.split(|byte| *byte == b'\n').peekable();
+        while let Some(piece) = pieces.next() {
+            let ends = pieces.peek().is_some();
+            if self.drops || self.held.len() + piece.len() >= LONGEST_LINE {
+                self.dropped += (self.held.len() + piece.len()) as u64;
+                self.held.clear();
+                self.drops = !ends;
+                continue;
+            }
+            self.held.extend_from_slice(piece);
+            if ends {
+                let line = std::mem::take(&mut self.held);
+                complete.extend(Some(line).filter(|line| !line.trim_ascii().is_empty()));
+            }
+        }
+        complete
+    }
+
+    /// Forget the beginning of a line, because its rest does not follow.
+    pub fn reset(&mut self) {
+        self.dropped += self.held.len() as u64;
+        self.held.clear();
+        self.drops = false;
+    }
+
+    /// The bytes of lines that were dropped.
+    #[must_use]
+    pub const fn dropped(&self) -> u64 {
+        self.dropped
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_order_is_a_line_that_says_itself() {
+        let drive = Order::Drive { wheels: [1.0, 2.0], twist: [0.1, 0.2], for_s: 0.25 };
+        let said = r#"{"drive":{"wheels":[1.0,2.0],"twist":[0.1,0.2],"for_s":0.25}}"#;
+        assert_eq!(drive.line(), format!("{said}\n").as_bytes());
+        assert_eq!(Order::Brake {}.line(), b"{\"brake\":{}}\n");
+        assert_eq!(parse::<Order>(said.as_bytes()), Ok(drive));
+    }
+
+    #[test]
+    fn a_report_may_say_any_part_and_no_word_that_is_not_in_the_protocol() {
+        let report: Report =
+            parse(br#"{"wheels":[1,-2],"ranges":{"front":1.5,"left":null}}"#).unwrap();
+        assert_eq!(report.wheels, Some([1.0, -2.0]));
+        assert_eq!(report.ranges["left"], None);
+        for foreign in ["{\"wheel\":[1,2]}", "{\"wheels\":[1]}", "{\"wheels\":[1e999,0]}", "7"] {
+            parse::<Report>(foreign.as_bytes()).unwrap_err();
+        }
+    }
+
+    #[test]
+    fn lines_come_out_of_any_pieces_and_one_that_is_too_long_is_dropped() {
+        let mut lines = Lines::default();
+        assert!(lines.push(b"ab").is_empty());
+        assert_eq!(lines.push(b"c\n\nd\ne"), [b"abc".to_vec(), b"d".to_vec()]);
+        lines.reset();
+        assert_eq!(lines.dropped(), 1);
+        for _ in 0..5 {
+            assert!(lines.push(&[b'x'; 10_000]).is_empty());
+        }
+        assert_eq!(lines.push(b"y\nz\n"), [b"z".to_vec()]);
+        assert_eq!(lines.dropped(), 1 + 50_001);
+    }
+}

@@ -1,0 +1,297 @@
+//! The driver of robots that speak lines of JSON: [`common::json_wire`] has the words.
+
+use std::{collections::BTreeMap, f64::consts::TAU, time::Duration};
+
+use common::{
+    driver::{Driver, Heard, Motion, Readings, StopMethod, WireTally},
+    geometry::wrap_angle,
+    json_wire::{Lines, Order, Report, parse},
+    kinematics::Pose2,
+    mission::{Body, Mission},
+    samples::{PowerSample, RangeReading, RangeStatus, WheelSample},
+    wire::COUNT_CYCLE,
+};
+use glam::DVec2;
+
+/// More orders than these are not counted as answered by one report.
+const MOST_ANSWERED: u64 = 64;
+
+/// A robot that speaks lines of JSON.
+#[derive(Clone, Debug)]
+pub struct Json {
+    body: Body,
+    rate_hz: f64,
+    lines: Lines,
+    waiting: Vec<Vec<u8>>,
+    readings: Readings,
+    /// The number of orders that the robot has taken.
+    answered: Option<u64>,
+    odometry: Odometry,
+    tally: WireTally,
+}
+
+impl Json {
+    /// The driver of `mission`'s robot.
+    pub fn new(mission: &Mission) -> Self {
+        Self {
+            body: mission.body(),
+            rate_hz: mission.robot.rate_hz,
+            lines: Lines::default(),
+            waiting: Vec::new(),
+            readings: Readings::new(mission),
+            answered: None,
+            odometry: Odometry::default(),
+            tally: WireTally::default(),
+        }
+    }
+
+    fn take(&mut self, report: &Report, heard: &mut Heard) -> Result<(), String> {
+        self.take_ranges(&report.ranges)?;
+        if let Some(count) = report.heard {
+            // A robot that has restarted counts from 0.
+            let before = self.answered.replace(count).filter(|before| *before <= count);
+            let answered = before.map_or(0, |before| count - before);
+            heard.acknowledged += answered.min(MOST_ANSWERED) as usize;
+        }
+        heard.power = report.battery_v.map(|volts| PowerSample {
+            board_v: volts,
+            motor_v: volts,
+            servo_v: volts,
+            ..PowerSample::default()
+        });
+        let turned = match (report.wheels, report.odometry) {
+            (Some(_), Some(_)) => return Err("wheels and odometry: say one of them".to_owned()),
+            (Some(turned), None) => turned,
+            (None, Some(odometry)) => self.odometry.turned(odometry, &self.body),
+            (None, None) => return Ok(()),
+        };
+        let Some(speeds) = report.speeds else {
+            return Err("wheels or odometry without speeds: say both".to_owned());
+        };
+        heard.motion = Some(self.motion(turned, speeds, report.held.unwrap_or_default()));
+        Ok(())
+    }
+
+    fn take_ranges(&mut self, ranges: &BTreeMap<String, Option<f64>>) -> Result<(), String> {
+        for (name, range) in ranges {
+            let table = self.readings.table();
+            let Some(row) = table.iter().position(|sensor| sensor.name == *name) else {
+                let names: Vec<_> = table.iter().map(|sensor| sensor.name.as_str()).collect();
+                return Err(format!("no sensor is called {name:?}; {} are", names.join(", ")));
+            };
+            let reach_m = table[row].reach_m;
+            let (status, range_m) = match *range {
+                Some(range) if range < 0.0 => (RangeStatus::Invalid, 0.0),
+                Some(range) if range <= reach_m => (RangeStatus::Measured, range),
+                _ => (RangeStatus::Nothing, 0.0),
+            };
+            let raw = (range_m * 100.0).round() as u16;
+            let status = status.into();
+            self.readings.take(row, RangeReading { range_m, raw, status, ..Default::default() });
+        }
+        Ok(())
+    }
+
+    fn motion(&self, turned: [f64; 2], speeds: [f64; 2], held: [bool; 2]) -> Motion {
+        let counts = |angle: f64| angle * self.body.counts_per_turn / TAU;
+        let [left_counts, right_counts] =
+            turned.map(|angle| counts(angle).round().rem_euclid(f64::from(COUNT_CYCLE)) as u16);
+        let [left_counts_per_s, right_counts_per_s] =
+            speeds.map(|speed| counts(speed).round() as i32);
+        Motion {
+            wheels: WheelSample {
+                left_counts,
+                right_counts,
+                left_counts_per_s,
+                right_counts_per_s,
+                ..WheelSample::default()
+            },
+            // A wheel that is held draws all that its motor can.
+            currents: held.map(|held| if held { u16::MAX } else { 0 }),
+        }
+    }
+
+    fn order(order: &Order) -> Vec<u8> {
+        order.line()
+    }
+}
+
+impl Driver for Json {
+    fn push(&mut self, bytes: &[u8]) {
+        self.waiting.extend(self.lines.push(bytes));
+    }
+
+    fn reset(&mut self) {
+        self.lines.reset();
+    }
+
+    fn heard(&mut self) -> Heard {
+        let mut heard = Heard::default();
+        for line in std::mem::take(&mut self.waiting) {
+            match parse(&line).and_then(|report| self.take(&report, &mut heard)) {
+                Ok(()) => {
+                    heard.anything = true;
+                    self.tally.messages += 1;
+                }
+                Err(why) => {
+                    self.tally.bytes_dropped += line.len() as u64;
+                    heard.refused = Some(why);
+                }
+            }
+        }
+        heard.readings = self.readings.take_fresh();
+        heard
+    }
+
+    fn tally(&self) -> WireTally {
+        let WireTally { messages, bytes_dropped } = self.tally;
+        WireTally { messages, bytes_dropped: bytes_dropped + self.lines.dropped() }
+    }
+
+    fn readings_for_tick(&mut self) -> Vec<RangeReading> {
+        self.readings.for_tick()
+    }
+
+    fn greeting(&self) -> Vec<u8> {
+        Self::order(&Order::Hello { rate_hz: self.rate_hz })
+    }
+
+    fn ask_for_sensors(&self) -> Vec<u8> {
+        self.greeting()
+    }
+
+    fn ping(&self) -> Vec<u8> {
+        Self::order(&Order::Ping {})
+    }
+
+    fn acknowledge(&self) -> Vec<u8> {
+        self.ping()
+    }
+
+    fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8> {
+        let wheels = counts.map(|counts| f64::from(counts) * TAU / self.body.counts_per_turn);
+        let [left, right] = wheels.map(|speed| speed * self.body.wheel_radius_m);
+        let twist = [(left + right) / 2.0, (right - left) / self.body.track_m];
+        Self::order(&Order::Drive { wheels, twist, for_s: limit.as_secs_f64() })
+    }
+
+    fn other_stops(&self) -> Vec<StopMethod> {
+        vec![StopMethod { name: "brake", bytes: Self::order(&Order::Brake {}) }]
+    }
+}
+
+/// The angles by which wheels would have turned on the way of a robot that says its pose.
+#[derive(Clone, Copy, Debug, Default)]
+struct Odometry {
+    last: Option<Pose2>,
+    turned: [f64; 2],
+}
+
+impl Odometry {
+    /// The robot is at `x`, `y` with this heading by its odometry. What it slipped aside is left out, as wheels leave it out.
+    fn turned(&mut self, [x, y, heading]: [f64; 3], body: &Body) -> [f64; 2] {
+        let now = Pose2 { position: DVec2::new(x, y), heading };
+        let Some(last) = self.last.replace(now) else {
+            return self.turned;
+        };
+        let turn = wrap_angle(now.heading - last.heading);
+        let middle = DVec2::from_angle(last.heading + turn / 2.0);
+        let chord = (now.position - last.position).dot(middle);
+        // The chord of an arc is shorter than the arc by this.
+        let half = turn / 2.0;
+        let arc = if half.abs() < 1e-9 { chord } else { chord * half / half.sin() };
+        for (turned, side) in self.turned.iter_mut().zip([-1.0, 1.0]) {
+            *turned += (arc + side * turn * body.track_m / 2.0) / body.wheel_radius_m;
+        }
+        self.turned
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    fn driver() -> Json {
+        let text = "target = [3, 0]\nrobot.protocol = 'json'\nrobot.counts_per_turn = 3600";
+        Json::new(&Mission::parse(text, Path::new("m.toml")).unwrap())
+    }
+
+    fn heard(driver: &mut Json, line: &str) -> Heard {
+        driver.push(format!("{line}\n").as_bytes());
+        driver.heard()
+    }
+
+    #[test]
+    fn the_angles_of_wheels_are_counts_and_backward_ones_count_down() {
+        let said = r#"{"wheels":[6.283185307,-3.141592654],"speeds":[1,-1],"held":[false,true]}"#;
+        let motion = heard(&mut driver(), said).motion.unwrap();
+        assert_eq!((motion.wheels.left_counts, motion.wheels.right_counts), (3600, 32_768 - 1800));
+        assert_eq!(motion.wheels.right_counts_per_s, -573);
+        assert_eq!(motion.currents, [0, u16::MAX]);
+    }
+
+    #[test]
+    fn odometry_is_the_way_of_wheels_on_an_arc_too() {
+        let mut driver = driver();
+        let at = |driver: &mut Json, pose: &str| {
+            let said = format!("{{\"odometry\":{pose},\"speeds\":[0,0]}}");
+            let wheels = heard(driver, &said).motion.unwrap().wheels;
+            [wheels.left_counts, wheels.right_counts]
+        };
+        assert_eq!(at(&mut driver, "[5,5,0]"), [0, 0]);
+        // A quarter circle of 1 m to the left: the right wheel goes (1 + W / 2) pi / 2, of r = 0.085 m and W = 0.26 m.
+        let counts = |radius: f64| (radius * 0.25 * TAU / 0.085 * 3600.0 / TAU).round() as u16;
+        assert_eq!(at(&mut driver, "[6,6,1.5707963267948966]"), [counts(0.87), counts(1.13)]);
+    }
+
+    #[test]
+    fn a_range_of_no_sensor_and_a_motion_without_speeds_are_refused_with_the_remedy() {
+        for (said, why) in [
+            (r#"{"ranges":{"nose":1}}"#, "no sensor is called \"nose\"; front,"),
+            (r#"{"wheels":[0,0]}"#, "without speeds"),
+            (r#"{"wheels":[0,0],"odometry":[0,0,0],"speeds":[0,0]}"#, "say one of them"),
+            (r#"{"wheel":[0,0]}"#, "unknown field `wheel`"),
+        ] {
+            let heard = heard(&mut driver(), said);
+            assert!(!heard.anything && heard.motion.is_none(), "{said}");
+            assert!(heard.refused.is_some_and(|refused| refused.contains(why)), "{said}");
+        }
+    }
+
+    #[test]
+    fn null_and_what_is_beyond_reach_are_nothing_and_less_than_0_is_no_reading() {
+        for (said, status) in [
+            ("null", RangeStatus::Nothing),
+            ("99", RangeStatus::Nothing),
+            ("-1", RangeStatus::Invalid),
+            ("0.5", RangeStatus::Measured),
+        ] {
+            let heard = heard(&mut driver(), &format!("{{\"ranges\":{{\"front\":{said}}}}}"));
+            assert_eq!(heard.readings[0].status(), status, "{said}");
+        }
+    }
+
+    #[test]
+    fn a_robot_that_counts_its_orders_acknowledges_them_and_a_restarted_one_begins_again() {
+        let mut driver = driver();
+        let counts = [(5, 0), (8, 3), (8, 0), (2, 0), (1_000_000, 64)];
+        for (count, answered) in counts {
+            let heard = heard(&mut driver, &format!("{{\"heard\":{count}}}"));
+            assert_eq!(heard.acknowledged, answered, "{count}");
+        }
+    }
+
+    #[test]
+    fn a_command_is_said_as_wheel_speeds_and_as_a_twist() {
+        let said = driver().velocity([-573, 573], Duration::from_millis(250));
+        let Ok(Order::Drive { wheels, twist, for_s }) = parse(&said) else {
+            panic!("{said:?}");
+        };
+        assert!((wheels[1] - 1.0).abs() < 1e-3 && (wheels[0] + 1.0).abs() < 1e-3);
+        // 2 * 0.085 m/s over 0.26 m.
+        assert!(twist[0].abs() < 1e-9 && (twist[1] - 0.6538).abs() < 1e-3);
+        assert!((for_s - 0.25).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,138 @@
+//! The words of a simulated robot that speaks lines of JSON: its boards are those of an X80, and this stands before them.
+
+use std::f64::consts::TAU;
+
+use common::{
+    json_wire::{Order, Report},
+    mission::{Mission, RobotConfig, Sensor, SensorKind},
+    wire::{
+        Command, CustomSensors, Echo, Feedback, INFRARED_LIVE_AD, MOTOR_SCALE_V, Mode,
+        MotorSensors, Parameter, StandardSensors, infrared_m, volts,
+    },
+};
+
+use crate::motor::Motor;
+
+/// Converts between the words and the boards.
+#[derive(Clone, Debug)]
+pub(crate) struct JsonWords {
+    robot: RobotConfig,
+    counts_per_radian: f64,
+    table: Vec<Sensor>,
+    /// The orders that were taken.
+    heard: u64,
+}
+
+impl JsonWords {
+    pub(crate) fn new(mission: &Mission) -> Self {
+        Self {
+            robot: mission.robot.clone(),
+            counts_per_radian: mission.body().counts_per_turn / TAU,
+            table: mission.sensor_table(),
+            heard: 0,
+        }
+    }
+
+    /// What the boards are to do. The order counts as taken.
+    pub(crate) fn commands(&mut self, order: &Order) -> Vec<Command> {
+        self.heard += 1;
+        let wheels = [self.robot.left, self.robot.right];
+        let enabled =
+            |on| wheels.map(|wheel| Command::Enable { on, channel: Some(wheel.channel) }).to_vec();
+        match *order {
+            Order::Hello { .. } => {
+                let parameters = wheels.iter().flat_map(|wheel| {
+                    [Parameter::Feedback(Feedback::Encoder), Parameter::Mode(Mode::Velocity)]
+                        .map(|parameter| Command::Parameter { channel: wheel.channel, parameter })
+                });
+                parameters.chain(enabled(true)).collect()
+            }
+            Order::Drive { wheels: speeds, for_s, .. } => {
+                let mut channels = [None; 2];
+                for (wheel, speed) in wheels.into_iter().zip(speeds) {
+                    let counts = (speed * self.counts_per_radian).round() as i16;
+                    let signed = if wheel.reversed { counts.saturating_neg() } else { counts };
+                    // -32768 and -32767 mean that a channel is not changed.
+                    let counts = signed.clamp(-32_766, 32_766);
+                    channels[usize::from(wheel.channel.min(1))] = Some(counts);
+                }
+                // No time would be a command without an end.
+                let limit_ms = (for_s * 1000.0).round().clamp(1.0, f64::from(u16::MAX));
+                vec![Command::velocity(channels, limit_ms as u16)]
+            }
+            Order::Brake {} => enabled(false),
+            Order::Ping {} => Vec::new(),
+        }
+    }
+
+    /// The answer to an order.
+    pub(crate) fn acknowledgement(&self) -> Vec<u8> {
+        Report { heard: Some(self.heard), ..Report::default() }.line()
+    }
+
+    /// The report of a tick.
+    pub(crate) fn report(
+        &self,
+        (standard, custom, motor): (&StandardSensors, &CustomSensors, &MotorSensors),
+        motors: &[Motor; 6],
+    ) -> Vec<u8> {
+        let wheels = [self.robot.left, self.robot.right];
+        let forward = |reversed: bool| if reversed { -1.0 } else { 1.0 };
+        let of = |value: &dyn Fn(usize) -> f64| {
+            wheels.map(|wheel| {
+                let counts = value(usize::from(wheel.channel.min(1)));
+                forward(wheel.reversed) * counts / self.counts_per_radian
+            })
+        };
+        let held = wheels.map(|wheel| {
+            motor.currents[usize::from(wheel.channel.min(1))] >= self.robot.held_current_ad
+        });
+        let ranges = self.table.iter().map(|sensor| {
+            let channel = usize::from(sensor.channel);
+            let range = match sensor.kind {
+                SensorKind::Cone => standard.ultrasonic.get(channel).and_then(|byte| heard(*byte)),
+                SensorKind::Ray => infrared(standard, custom, channel),
+            };
+            (sensor.name.clone(), range)
+        });
+        let report = Report {
+            heard: Some(self.heard),
+            wheels: Some(of(&|channel| turned(motor, motors, channel))),
+            speeds: Some(of(&|channel| f64::from(motor.encoders[channel].velocity()))),
+            held: Some(held),
+            ranges: ranges.collect(),
+            battery_v: Some(volts(standard.motor_battery, MOTOR_SCALE_V)),
+            odometry: None,
+        };
+        report.line()
+    }
+}
+
+/// What a channel has turned by its encoder, which counts in a circle, and by the motor, which does not.
+fn turned(sensors: &MotorSensors, motors: &[Motor; 6], channel: usize) -> f64 {
+    let cycle = f64::from(common::wire::COUNT_CYCLE);
+    let (read, true_counts) =
+        (f64::from(sensors.encoders[channel].position), motors[channel].turned());
+    read + ((true_counts - read) / cycle).round() * cycle
+}
+
+/// The range of a sonar byte, metres; negative for no reading, none for nothing.
+fn heard(byte: u8) -> Option<f64> {
+    match Echo::from_byte(byte) {
+        None => Some(-1.0),
+        Some(Echo::Nothing) => None,
+        Some(echo) => echo.metres().or(Some(0.0)),
+    }
+}
+
+/// The range of an infrared ranger, metres.
+fn infrared(standard: &StandardSensors, custom: &CustomSensors, channel: usize) -> Option<f64> {
+    let ad = match channel {
+        0 => standard.infrared,
+        further => custom.ad.get(further + 1).copied().unwrap_or_default(),
+    };
+    if !INFRARED_LIVE_AD.contains(&ad) {
+        return Some(-1.0);
+    }
+    Some(infrared_m(ad)).filter(|range| *range < infrared_m(0))
+}

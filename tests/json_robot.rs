@@ -1,0 +1,94 @@
+//! Robots that speak lines of JSON: the example of the guide in Python, which shares no code with this project, and the simulated one.
+
+use std::{
+    io::{BufRead as _, BufReader},
+    process::{Child, Command, Stdio},
+    thread::{self, JoinHandle},
+};
+
+use recording::{
+    Recording,
+    replay::{Options, replay},
+};
+use rustix::process::Signal;
+use serde_json::Value;
+
+use crate::support::{Run, STAGES, assert_reached};
+
+const EXAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../guide/example-robot");
+
+/// The guide's robot, as a process.
+struct PythonRobot {
+    process: Child,
+    /// Reads what it says about itself, so that it never waits, and gives the last.
+    last: JoinHandle<String>,
+    port: u64,
+}
+
+impl PythonRobot {
+    fn start() -> Self {
+        let mut process = Command::new("setpriv")
+            .args(["--pdeathsig", "KILL", "--", "python3"])
+            .args([&format!("{EXAMPLE}/robot.py"), "0"])
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut says = BufReader::new(process.stdout.take().unwrap());
+        let mut first = String::new();
+        says.read_line(&mut first).unwrap();
+        let first: Value = serde_json::from_str(&first).unwrap();
+        let last = thread::spawn(|| says.lines().map_while(Result::ok).last().unwrap());
+        Self { process, last, port: first["port"].as_u64().unwrap() }
+    }
+
+    fn run(&self, robot: &str) -> Run {
+        let address = format!("robot.address='udp://127.0.0.1:{}'", self.port);
+        Run::start(robot, &format!("{EXAMPLE}/robot.toml"), &["--set", &address])
+    }
+
+    /// What it says about itself last, once it has been ended.
+    fn end(mut self) -> Value {
+        self.process.kill().unwrap();
+        self.process.wait().unwrap();
+        serde_json::from_str(&self.last.join().unwrap()).unwrap()
+    }
+}
+
+#[track_caller]
+fn assert_at_its_target_untouched(truth: &Value) {
+    let [x, y] = ["x", "y"].map(|axis| truth[axis].as_f64().unwrap());
+    assert!((x - 4.5).hypot(y) < 0.5, "{truth}");
+    assert_eq!(truth["touches"], 0, "{truth}");
+    assert_eq!(truth["told"], serde_json::json!([0.0, 0.0]), "{truth}");
+}
+
+#[test]
+fn a_robot_in_python_is_driven_past_drums_to_its_target() {
+    let robot = PythonRobot::start();
+    let (code, summary) = robot.run("json-py").finish();
+    assert_reached(code, &summary);
+    assert_at_its_target_untouched(&robot.end());
+}
+
+#[test]
+fn a_robot_in_python_arrives_untouched_though_each_stage_is_killed() {
+    let robot = PythonRobot::start();
+    let mut run = robot.run("json-kills");
+    run.wait_until_under_way(0.3);
+    for stage in STAGES {
+        run.kill_and_await_successor(stage, Signal::KILL);
+    }
+    let (code, summary) = run.finish();
+    assert_reached(code, &summary);
+    assert_at_its_target_untouched(&robot.end());
+}
+
+#[test]
+fn a_simulated_robot_that_speaks_json_arrives_and_replays_to_the_bit() {
+    let protocol = ["--set", "robot.protocol='json'"];
+    let (_, directory) = Run::start("json-sim", "obstacle-course", &protocol).arrives_in();
+    let recording = Recording::open(&directory.path().join("run/recording.mcap")).unwrap();
+    let report = replay(&recording, &Options::default()).unwrap();
+    assert_eq!(report.difference, None, "{report}");
+    assert_eq!((report.equal(), report.not_replayed()), (5, 0), "{report}");
+}
