@@ -43,7 +43,9 @@ impl PythonRobot {
 
     fn run(&self, robot: &str) -> Run {
         let address = format!("robot.address='udp://127.0.0.1:{}'", self.port);
-        Run::start(robot, &format!("{EXAMPLE}/robot.toml"), &["--set", &address])
+        let fast = "controller.speed_m_s=0.5";
+        let set = ["--set", &address, "--set", fast];
+        Run::start(robot, &format!("{EXAMPLE}/robot.toml"), &set)
     }
 
     /// What it says about itself last, once it has been ended.
@@ -85,7 +87,7 @@ fn a_robot_in_python_arrives_untouched_though_each_stage_is_killed() {
 
 #[test]
 fn a_simulated_robot_that_speaks_json_arrives_and_replays_to_the_bit() {
-    let protocol = ["--set", "robot.protocol='json'"];
+    let protocol = ["--pace", "4", "--set", "robot.protocol='json'"];
     let (_, directory) = Run::start("json-sim", "obstacle-course", &protocol).arrives_in();
     let recording = Recording::open(&directory.path().join("run/recording.mcap")).unwrap();
     let report = replay(&recording, &Options::default()).unwrap();

@@ -23,6 +23,7 @@ mod goto;
 mod held_wheels;
 mod json_robot;
 mod kills_and_freezes;
+mod laser;
 mod live_replay;
 mod machine;
 mod missions;

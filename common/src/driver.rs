@@ -23,6 +23,11 @@ pub trait Driver: fmt::Debug {
     /// The newest reading of each sensor of the mission, in the order of its table. The next tick has none until new ones come.
     fn readings_for_tick(&mut self) -> Vec<RangeReading>;
 
+    /// The newest beams of the mission's laser, as the topic `scan` has them, if some came since the last tick.
+    fn scan_for_tick(&mut self) -> Vec<f32> {
+        Vec::new()
+    }
+
     /// What the robot is told when it is found: its settings, and that it sends its sensors.
     fn greeting(&self) -> Vec<u8>;
 

@@ -29,9 +29,9 @@ const HEADER: usize = 16;
 /// The end mark, after the last entry. No header is all zeros, for the checksum of zeros is not 0.
 const END: [u8; HEADER] = [0; HEADER];
 /// No entry is longer, bytes.
-const LONGEST: usize = 4096;
-/// Room that is reserved for each entry until the next snapshot, bytes: an entry of the mapper takes 250 at most.
-const ENTRY_ROOM: u64 = 512;
+const LONGEST: usize = 8192;
+/// Room that is reserved for each entry until the next snapshot, bytes: an entry of the mapper takes 250, and 4,500 with a scan of a laser.
+const ENTRY_ROOM: u64 = 4_608;
 /// Bytes of a snapshot besides the state.
 const NUMBER: usize = 10;
 

@@ -6,7 +6,10 @@
 
 use std::time::Duration;
 
-use crate::{mission::MOST_SENSORS, samples::*};
+use crate::{
+    mission::{MOST_BEAMS, MOST_SENSORS},
+    samples::*,
+};
 
 pub use crate::bus::{
     AnyTopic, EVERY_STAGE, EncodedTopic, Limits, Logged, OPERATOR, OpenTopic, Rate, ReadableTopic,
@@ -70,6 +73,10 @@ topics! {
     RANGES: SliceTopic<RangesHeader, RangeReading> {
         name: "ranges", writer: "link", rate: Rate::EachTick, limits: Limits::slices(MOST_SENSORS), logged: Yes,
     }
+    /// The beams of the laser.
+    SCAN: SliceTopic<ScanHeader, f32> {
+        name: "scan", writer: "link", rate: Rate::WhenItHappens, limits: Limits::slices(MOST_BEAMS), logged: Yes,
+    }
     /// Encoder counts and wheel speeds.
     WHEELS: Topic<WheelSample> {
         name: "wheels", writer: "link", rate: Rate::EachTick, limits: Limits::SMALL, logged: Yes,
@@ -81,6 +88,10 @@ topics! {
     /// Where a source outside saw the robot: a camera, a satellite receiver. Any consumer may publish it.
     FIX: Topic<FixSample> {
         name: "fix", writer: OPERATOR, rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
+    }
+    /// Where the robot is by the scans of its laser.
+    SCAN_FIX: Topic<FixSample> {
+        name: "scan_fix", writer: "mapper", rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
     }
     /// How far a gyro turned. Any consumer may publish it, one at a time.
     TURN: Topic<TurnSample> {

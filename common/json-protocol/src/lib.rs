@@ -32,6 +32,9 @@ pub struct Report {
     /// The readings of ranging sensors by the names of the mission's rows; null for nothing in reach.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub ranges: BTreeMap<String, Option<f64>>,
+    /// The beams of the laser, counter-clockwise; null for nothing in reach, less than 0 for no reading.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scan: Option<Vec<Option<f32>>>,
     /// The voltage of the battery.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub battery_v: Option<f64>,

@@ -36,8 +36,8 @@ pub use error::MissionError;
 pub use odometry::{Calibration, CalibrationPlan, Odometry, Procedure, Provenance};
 pub use robot::{BatteryLimits, Body, Channel, Model, Protocol, RobotConfig, Steering};
 pub use sensor::{
-    INFRARED_RANGERS, MOST_SENSORS, SONARS, Sensor, SensorKind, SensorModel, SensorRow, Sensors,
-    SonarConfig,
+    INFRARED_RANGERS, MOST_BEAMS, MOST_SENSORS, SONARS, Sensor, SensorKind, SensorModel, SensorRow,
+    Sensors, SonarConfig,
 };
 pub use simulation::{
     BatteryPhysics, Block, BlockedWheels, Heights, InfraredPhysics, Move, Physics, Radio, Ranger,
@@ -394,12 +394,13 @@ impl Mission {
             && self.body().ackermann().is_none()
     }
 
-    /// vd, m/s: `controller.speed_m_s`, or by default for a robot that looks first 0.5, with infrared rangers 0.7; else the
-    /// paper's 0.25.
+    /// vd, m/s: `controller.speed_m_s`, or by default for a robot that looks first 0.5, with infrared rangers 0.7, with a laser what its
+    /// body can; else the paper's 0.25.
     #[must_use]
     pub fn speed_m_s(&self) -> f64 {
         self.controller.speed_m_s.unwrap_or_else(|| match self.looks_first() {
             false => 0.25,
+            true if self.used(SensorKind::Scan) > 0 => self.body().top_speed_m_s,
             true if self.used(SensorKind::Ray) > 0 => 0.7,
             true => 0.5,
         })
@@ -425,9 +426,15 @@ impl Mission {
     #[must_use]
     pub fn sensor_table(&self) -> Vec<Sensor> {
         let RobotConfig { sensors, rate_hz, .. } = &self.robot;
-        let rows = match sensors.is_empty() {
-            true => sensor::x80(self.body().radius_m, &self.sonar),
-            false => sensors.clone(),
+        let rows = match self.robot.model {
+            _ if !sensors.is_empty() => sensors.clone(),
+            Model::X80 | Model::X80sv | Model::Car => {
+                sensor::x80(self.body().radius_m, &self.sonar)
+            }
+            Model::Jackal => sensor::laser(SensorModel::Ust10lx, 0.12),
+            Model::TurtleBot3Burger => sensor::laser(SensorModel::Lds02, -0.032),
+            Model::TurtleBot3Waffle => sensor::laser(SensorModel::Lds02, -0.064),
+            Model::Kobuki => sensor::laser(SensorModel::RplidarA1, 0.0),
         };
         sensor::table(&rows, *rate_hz, &self.sonar, self.sensor_set())
     }
@@ -449,7 +456,8 @@ impl Mission {
     /// 2.0 rad/s three times as many robots touched something, most of them the ends of loose walls.
     #[must_use]
     pub fn hurry(&self) -> Hurry {
-        let sees = self.looks_first() && self.used(SensorKind::Ray) > 0;
+        let uses = |kind| self.looks_first() && self.used(kind) > 0;
+        let sees = uses(SensorKind::Ray) || uses(SensorKind::Scan);
         let [full, turns, look, stops] =
             if sees { [26.0, 73.0, 2.0, 0.4] } else { [1.0, 45.0, 1.2, 0.6] };
         let Controller { full_speed_within_deg, turns_beyond_deg, look_rad_s, .. } =

@@ -18,6 +18,17 @@ pub enum Model {
     X80,
     /// The X80SV and X80Pro: 756 counts a wheel turn.
     X80sv,
+    /// Clearpath's Jackal, four wheels, of which those of a side turn together; a disc around its corners. Source: its data sheet, and the
+    /// `jackal_control` package.
+    Jackal,
+    /// ROBOTIS' TurtleBot 3 Burger. Source: its e-Manual, and the radius of its Nav2 parameters.
+    #[serde(rename = "turtlebot3-burger")]
+    TurtleBot3Burger,
+    /// ROBOTIS' TurtleBot 3 Waffle. Source: its e-Manual, and the radius of its Nav2 parameters.
+    #[serde(rename = "turtlebot3-waffle")]
+    TurtleBot3Waffle,
+    /// Yujin's Kobuki. Source: its user guide.
+    Kobuki,
     /// A small car on the X80's boards. Nominal, no product: the size of a model car of about 1:14.
     Car,
 }
@@ -49,8 +60,9 @@ pub struct Channel {
 pub struct RobotConfig {
     /// Preset that gives what is not said.
     pub model: Model,
-    /// The protocol that it speaks.
-    pub protocol: Protocol,
+    /// The protocol that it speaks; by default that of its model: [`RobotConfig::protocol`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub protocol: Option<Protocol>,
     /// The address of a real robot, in one of the forms of [`crate::address::Address`]. Without it a simulated robot is started.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub address: Option<String>,
@@ -131,7 +143,7 @@ impl Default for RobotConfig {
     fn default() -> Self {
         Self {
             model: Model::X80,
-            protocol: Protocol::X80,
+            protocol: None,
             address: None,
             rate_hz: 7.0,
             wheel_radius_m: None,
@@ -236,7 +248,24 @@ impl Body {
     }
 }
 
+/// A body that tells its wheels' angles, of which a count is a step of 0.1 degrees.
+const fn differential(
+    wheel_radius_m: f64,
+    track_m: f64,
+    radius_m: f64,
+    top_speed_m_s: f64,
+) -> Body {
+    let counts_per_turn = 3600.0;
+    Body { wheel_radius_m, track_m, counts_per_turn, radius_m, top_speed_m_s, steering: None }
+}
+
 impl Model {
+    /// Whether it is an X80, or has its boards.
+    #[must_use]
+    pub const fn is_x80(self) -> bool {
+        matches!(self, Self::X80 | Self::X80sv | Self::Car)
+    }
+
     /// Published and measured dimensions of the X80s, nominal ones of the car.
     #[must_use]
     pub const fn body(self) -> Body {
@@ -257,6 +286,11 @@ impl Model {
                 top_speed_m_s: 0.76,
                 steering: None,
             },
+            // 508 mm by 430 mm; its encoders count so many a turn, and no word of ours depends on it.
+            Self::Jackal => differential(0.098, 0.375_59, 0.333, 2.0),
+            Self::TurtleBot3Burger => differential(0.033, 0.16, 0.105, 0.22),
+            Self::TurtleBot3Waffle => differential(0.033, 0.287, 0.22, 0.26),
+            Self::Kobuki => differential(0.0352, 0.23, 0.1758, 0.7),
             // Nominal. The pose is the middle of the rear axle: the disc around it covers a body that reaches 0.22 m ahead of
             // it and 0.09 m to either side. It turns in 0.31 m.
             Self::Car => Body {
@@ -277,6 +311,15 @@ impl Model {
 }
 
 impl RobotConfig {
+    /// The protocol that it speaks.
+    #[must_use]
+    pub fn protocol(&self) -> Protocol {
+        self.protocol.unwrap_or(match self.model.is_x80() {
+            true => Protocol::X80,
+            false => Protocol::Json,
+        })
+    }
+
     /// The model's body with the overrides in place.
     #[must_use]
     pub fn body(&self) -> Body {

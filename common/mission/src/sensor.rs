@@ -10,6 +10,8 @@ use crate::sonar::Mount;
 
 /// The greatest number of rows, and of the readings in a sample of `ranges`.
 pub const MOST_SENSORS: usize = 16;
+/// The greatest number of beams of a laser.
+pub const MOST_BEAMS: usize = 1081;
 /// Infrared rangers of the X80.
 pub const INFRARED_RANGERS: usize = 7;
 /// Sonars of the standard frame.
@@ -42,6 +44,8 @@ pub enum SensorKind {
     Cone,
     /// An infrared ranger: the ray is free up to where it ends.
     Ray,
+    /// A laser: a fan of beams, each of which is free up to where it ends.
+    Scan,
 }
 
 /// The product whose readings the mapper's model describes.
@@ -53,6 +57,14 @@ pub enum SensorModel {
     /// The infrared ranger of the X80, 10 to 80 cm, a ray. Source: the formula in the X80's user manual, 2006; `infrared_model` of the
     /// mapper has its numbers.
     X80Infrared,
+    /// Hokuyo's UST-10LX, a laser: 270 degrees in 1,081 beams, 0.06 to 10 m, 40 Hz. Source: its specification, C-42-04077, 2014.
+    #[serde(rename = "ust-10lx")]
+    Ust10lx,
+    /// Slamtec's RPLIDAR A1, a laser: 360 degrees, 0.15 to 12 m, 5.5 Hz, 8,000 readings a second. Source: its data sheet, 2020.
+    RplidarA1,
+    /// The LDS-02 of a TurtleBot 3, a laser: 360 degrees in steps of 1, 0.16 to 8 m, 5 Hz. Source: ROBOTIS e-Manual.
+    #[serde(rename = "lds-02")]
+    Lds02,
 }
 
 impl SensorModel {
@@ -62,6 +74,7 @@ impl SensorModel {
         match self {
             Self::Dur5200 => SensorKind::Cone,
             Self::X80Infrared => SensorKind::Ray,
+            Self::Ust10lx | Self::RplidarA1 | Self::Lds02 => SensorKind::Scan,
         }
     }
 
@@ -70,6 +83,7 @@ impl SensorModel {
         match kind {
             SensorKind::Cone => Self::Dur5200,
             SensorKind::Ray => Self::X80Infrared,
+            SensorKind::Scan => Self::Ust10lx,
         }
     }
 
@@ -79,6 +93,8 @@ impl SensorModel {
         match self {
             Self::Dur5200 => 30.0,
             Self::X80Infrared => 0.0,
+            Self::Ust10lx => 270.0,
+            Self::RplidarA1 | Self::Lds02 => 360.0,
         }
     }
 
@@ -88,6 +104,42 @@ impl SensorModel {
         match self {
             Self::Dur5200 => 2.55,
             Self::X80Infrared => 0.81,
+            Self::Ust10lx => 10.0,
+            Self::RplidarA1 => 12.0,
+            Self::Lds02 => 8.0,
+        }
+    }
+
+    /// The least range that it gives, metres.
+    #[must_use]
+    pub const fn least_m(self) -> f64 {
+        match self {
+            Self::Dur5200 | Self::X80Infrared => 0.0,
+            Self::Ust10lx => 0.06,
+            Self::RplidarA1 => 0.15,
+            Self::Lds02 => 0.16,
+        }
+    }
+
+    /// The number of its beams; 1 of a sensor that is no laser.
+    #[must_use]
+    pub const fn beams(self) -> usize {
+        match self {
+            Self::Dur5200 | Self::X80Infrared => 1,
+            Self::Ust10lx => 1081,
+            Self::RplidarA1 | Self::Lds02 => 360,
+        }
+    }
+
+    /// The standard deviation of a beam's range: metres, and a share of the range. Of the LDS-02 the manual gives 15 mm up to half a
+    /// metre and 5 % beyond, of the A1 less than 1 %, of the UST-10LX 40 mm at most: these are taken as two deviations.
+    #[must_use]
+    pub const fn beam_noise(self) -> (f64, f64) {
+        match self {
+            Self::Dur5200 | Self::X80Infrared => (0.0, 0.0),
+            Self::Ust10lx => (0.02, 0.0),
+            Self::RplidarA1 => (0.005, 0.005),
+            Self::Lds02 => (0.0075, 0.025),
         }
     }
 }
@@ -107,12 +159,15 @@ pub struct SensorRow {
     pub forward_m: f64,
     /// delta of (19): its bearing from the robot's axis, degrees counter-clockwise.
     pub bearing_deg: f64,
-    /// The angle in which it detects, degrees; of a cone only. By default that of its model.
+    /// The angle in which it detects, degrees; of a cone or a laser. By default that of its model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field_of_view_deg: Option<f64>,
     /// The greatest range that is used, metres. By default that of its model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reach_m: Option<f64>,
+    /// The number of beams of a laser, evenly over its field of view; by default that of its model.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub beams: Option<u16>,
     /// Readings a second, where it measures less often than the frames come. Readings between are not used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
@@ -154,6 +209,8 @@ pub struct Sensor {
     pub field_of_view_deg: f64,
     /// The greatest range that is used, metres.
     pub reach_m: f64,
+    /// The number of its beams; 1 of a sensor that is no laser.
+    pub beams: usize,
     /// It measures once in so many ticks.
     pub every_ticks: u64,
     /// Its product.
@@ -173,9 +230,19 @@ impl Sensor {
             field_of_view_deg: row.field_of_view_deg.unwrap_or(model.field_of_view_deg()),
             reach_m: row.reach_m.unwrap_or(model.reach_m()),
             every_ticks: row.rate_hz.map_or(1.0, |hz| (rate_hz / hz).round().max(1.0)) as u64,
+            beams: row.beams.map_or(model.beams(), usize::from),
             model,
             used: false,
         }
+    }
+
+    /// The bearing of a laser's first beam from the sensor's own, and the angle from beam to beam, radians counter-clockwise.
+    #[must_use]
+    pub fn fan(&self) -> (f64, f64) {
+        let wide = self.field_of_view_deg.to_radians();
+        // The first and the last beam of a whole turn would be the same.
+        let steps = if wide >= std::f64::consts::TAU - 1e-9 { self.beams } else { self.beams - 1 };
+        (-wide / 2.0, wide / steps.max(1) as f64)
     }
 
     /// Its bearing from the robot's axis, degrees.
@@ -197,6 +264,9 @@ pub enum Sensors {
     /// The front sonar and the cones within 60 degrees of it.
     #[serde(rename = "three-front")]
     ThreeFront,
+    /// The lasers alone.
+    #[serde(rename = "laser")]
+    Laser,
     /// All that the robot has.
     #[serde(rename = "all")]
     All,
@@ -217,10 +287,12 @@ pub(crate) fn table(
     for (index, sensor) in table.iter_mut().enumerate() {
         let beside = (sensor.bearing_deg() - front_deg).abs() <= BESIDE_FRONT_DEG;
         let is_cone = sensor.kind == SensorKind::Cone;
-        sensor.used = index == front
+        let is_scan = sensor.kind == SensorKind::Scan;
+        sensor.used = index == front && set != Sensors::Laser
             || match set {
                 Sensors::Front => false,
-                Sensors::FrontInfrared => !is_cone,
+                Sensors::FrontInfrared => sensor.kind == SensorKind::Ray,
+                Sensors::Laser => is_scan,
                 Sensors::ThreeFront => is_cone && beside,
                 Sensors::All => true,
             };
@@ -228,11 +300,30 @@ pub(crate) fn table(
     table
 }
 
-/// The row of the front sonar. Without rows of the mission it is the first, wherever `[sonar]` says that it looks.
+/// The row of the front sonar. Without rows of the mission it is the first, wherever `[sonar]` says that it looks. Of a robot without
+/// sonars it is the sensor whose bearing is the least.
 pub(crate) fn front(table: &[Sensor], sonar: &SonarConfig) -> Option<usize> {
     let ahead = |sensor: &Sensor| (sensor.bearing_deg() - sonar.bearing_deg).abs();
-    let cones = table.iter().enumerate().filter(|(_, sensor)| sensor.kind == SensorKind::Cone);
-    cones.min_by(|(_, a), (_, b)| ahead(a).total_cmp(&ahead(b))).map(|(index, _)| index)
+    let any_cone = table.iter().any(|sensor| sensor.kind == SensorKind::Cone);
+    let candidates = table.iter().enumerate();
+    let candidates = candidates.filter(|(_, sensor)| !any_cone || sensor.kind == SensorKind::Cone);
+    candidates.min_by(|(_, a), (_, b)| ahead(a).total_cmp(&ahead(b))).map(|(index, _)| index)
+}
+
+/// The one row of a robot with a laser in its middle.
+pub(crate) fn laser(model: SensorModel, forward_m: f64) -> Vec<SensorRow> {
+    vec![SensorRow {
+        name: "laser".to_owned(),
+        kind: SensorKind::Scan,
+        channel: 0,
+        forward_m,
+        bearing_deg: 0.0,
+        field_of_view_deg: None,
+        reach_m: None,
+        beams: None,
+        rate_hz: None,
+        model: Some(model),
+    }]
 }
 
 /// The rows of an X80 with a body of `radius_m` metres. The car has its boards and sensors.
@@ -245,6 +336,7 @@ pub(crate) fn x80(radius_m: f64, sonar: &SonarConfig) -> Vec<SensorRow> {
         bearing_deg,
         field_of_view_deg: None,
         reach_m: None,
+        beams: None,
         rate_hz: None,
         model: None,
     };

@@ -1,11 +1,12 @@
 //! The payloads of the link: the robot's sensors, and the state of the link itself.
 
+use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
     bus::{Stamp, ZeroCopySend, layouts},
     latency,
-    mission::INFRARED_RANGERS,
+    mission::{INFRARED_RANGERS, Sensor},
 };
 
 wire_enum! {
@@ -48,6 +49,41 @@ impl RangeReading {
     /// What the reading is.
     pub const fn status(&self) -> RangeStatus {
         RangeStatus::from_byte(self.status)
+    }
+}
+
+payloads! {
+    /// Topic `scan`, header; the slice has the ranges of the laser's beams counter-clockwise, metres: infinite for nothing in reach, not a
+    /// number for no reading.
+    "firsthand.ScanHeader" ScanHeader {
+        /// The row of [`crate::mission::Mission::sensor_table`].
+        sensor: u64,
+        /// Position of the laser on the robot, metres ahead of and to the left of its centre.
+        x_m: f64,
+        y_m: f64,
+        /// Bearing of the first beam from the robot's axis, radians.
+        first_rad: f64,
+        /// Angle from beam to beam, radians.
+        step_rad: f64,
+        /// The range up to which the laser sees, metres.
+        reach_m: f64,
+    }
+}
+
+impl ScanHeader {
+    /// The header of a laser's scans: `sensor` stands in `row` of the mission's table.
+    pub fn of(row: usize, sensor: &Sensor) -> Self {
+        let at = sensor.mount.forward_m * DVec2::from_angle(sensor.mount.bearing_rad);
+        let (first, step_rad) = sensor.fan();
+        Self {
+            sensor: row as u64,
+            x_m: at.x,
+            y_m: at.y,
+            first_rad: sensor.mount.bearing_rad + first,
+            step_rad,
+            reach_m: sensor.reach_m,
+            ..Self::default()
+        }
     }
 }
 

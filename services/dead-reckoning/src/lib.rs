@@ -35,7 +35,7 @@ use common::{
     stage::{Answer, Answering, Further},
     start::StageError,
     step::Step as _,
-    topics::{FIX, POSE, TURN, WHEELS},
+    topics::{FIX, POSE, SCAN_FIX, TURN, WHEELS},
     wiring::{Persists, Topics},
 };
 use serde::{Deserialize, Serialize};
@@ -58,15 +58,18 @@ pub struct Sources {
 }
 
 impl Further for Sources {
-    const TOPICS: Topics = &[&FIX, &TURN];
-    type Readers = (Reader<FixSample>, Reader<TurnSample>);
+    const TOPICS: Topics = &[&FIX, &SCAN_FIX, &TURN];
+    type Readers = ([Reader<FixSample>; 2], Reader<TurnSample>);
 
     fn open(context: &mut Context) -> Result<Self::Readers, StageError> {
-        Ok((context.reader(&FIX)?, context.reader(&TURN)?))
+        Ok(([context.reader(&FIX)?, context.reader(&SCAN_FIX)?], context.reader(&TURN)?))
     }
 
     fn take((fixes, turns): &mut Self::Readers) -> Result<Self, StageError> {
-        Ok(Self { fixes: some(fixes, MOST_FIXES)?, turns: some(turns, MOST_TURNS)? })
+        let [outside, scans] = fixes;
+        let mut fixes = some(outside, MOST_FIXES)?;
+        fixes.extend(some(scans, MOST_FIXES)?);
+        Ok(Self { fixes, turns: some(turns, MOST_TURNS)? })
     }
 }
 

@@ -7,7 +7,7 @@ use common::{
     geometry::wrap_angle,
     json_wire::{Lines, Order, Report, parse},
     kinematics::Pose2,
-    mission::{Body, Mission},
+    mission::{Body, Mission, Sensor, SensorKind},
     samples::{PowerSample, RangeReading, RangeStatus, WheelSample},
     wire::COUNT_CYCLE,
 };
@@ -24,6 +24,10 @@ pub struct Json {
     lines: Lines,
     waiting: Vec<Vec<u8>>,
     readings: Readings,
+    /// The row of the laser; none without one.
+    laser: Option<usize>,
+    /// The beams since the last tick.
+    scan: Vec<f32>,
     /// The number of orders that the robot has taken.
     answered: Option<u64>,
     odometry: Odometry,
@@ -33,12 +37,16 @@ pub struct Json {
 impl Json {
     /// The driver of `mission`'s robot.
     pub fn new(mission: &Mission) -> Self {
+        let readings = Readings::new(mission);
+        let is_laser = |sensor: &Sensor| sensor.kind == SensorKind::Scan;
         Self {
+            laser: readings.table().iter().position(is_laser),
+            scan: Vec::new(),
             body: mission.body(),
             rate_hz: mission.robot.rate_hz,
             lines: Lines::default(),
             waiting: Vec::new(),
-            readings: Readings::new(mission),
+            readings,
             answered: None,
             odometry: Odometry::default(),
             tally: WireTally::default(),
@@ -47,6 +55,7 @@ impl Json {
 
     fn take(&mut self, report: &Report, heard: &mut Heard) -> Result<(), String> {
         self.take_ranges(&report.ranges)?;
+        report.scan.as_deref().map_or(Ok(()), |scan| self.take_scan(scan))?;
         if let Some(count) = report.heard {
             // A robot that has restarted counts from 0.
             let before = self.answered.replace(count).filter(|before| *before <= count);
@@ -89,6 +98,34 @@ impl Json {
             let status = status.into();
             self.readings.take(row, RangeReading { range_m, raw, status, ..Default::default() });
         }
+        Ok(())
+    }
+
+    /// Take the beams of a laser. As a reading of its row the nearest of them counts.
+    fn take_scan(&mut self, beams: &[Option<f32>]) -> Result<(), String> {
+        let Some(row) = self.laser else {
+            return Err("a scan, and the mission has no laser: add a row of kind scan".to_owned());
+        };
+        let sensor = &self.readings.table()[row];
+        if beams.len() != sensor.beams {
+            let (came, want) = (beams.len(), sensor.beams);
+            return Err(format!("a scan of {came} beams, and the mission's laser has {want}"));
+        }
+        let (least_m, reach_m) = (sensor.model.least_m() as f32, sensor.reach_m as f32);
+        let range = |beam: &Option<f32>| match *beam {
+            Some(range) if range < least_m => f32::NAN,
+            Some(range) if range <= reach_m => range,
+            _ => f32::INFINITY,
+        };
+        self.scan = beams.iter().map(range).collect();
+        let nearest = self.scan.iter().copied().fold(f32::NAN, f32::min);
+        let (status, range_m) = match nearest {
+            nearest if nearest.is_nan() => (RangeStatus::Invalid, 0.0),
+            nearest if nearest.is_infinite() => (RangeStatus::Nothing, 0.0),
+            nearest => (RangeStatus::Measured, nearest.into()),
+        };
+        let status = status.into();
+        self.readings.take(row, RangeReading { range_m, status, ..RangeReading::default() });
         Ok(())
     }
 
@@ -150,6 +187,10 @@ impl Driver for Json {
 
     fn readings_for_tick(&mut self) -> Vec<RangeReading> {
         self.readings.for_tick()
+    }
+
+    fn scan_for_tick(&mut self) -> Vec<f32> {
+        std::mem::take(&mut self.scan)
     }
 
     fn greeting(&self) -> Vec<u8> {

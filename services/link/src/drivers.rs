@@ -9,7 +9,7 @@ use x80_driver::X80;
 
 /// The driver of `mission`'s robot.
 pub fn of(mission: &Mission) -> Box<dyn Driver> {
-    match mission.robot.protocol {
+    match mission.robot.protocol() {
         Protocol::X80 => Box::new(X80::new(mission)),
         Protocol::Json => Box::new(Json::new(mission)),
     }

@@ -69,6 +69,7 @@ impl Process for Shell {
         wakes: &[&topics::COMMAND, &topics::DIRECTIVE, &topics::TICK_LIMIT],
         outputs: &[
             &topics::CONTACT,
+            &topics::SCAN,
             &topics::RANGES,
             &topics::WHEELS,
             &topics::LINK,

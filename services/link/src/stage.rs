@@ -4,18 +4,18 @@
 use common::{
     clock::{MissionClock, MissionTime, Pace},
     inputs,
-    mission::Mission,
+    mission::{Mission, SensorKind},
     outputs::Outputs,
     samples::{
         CommandSample, Direction, HoldReason, InfraredSample, Order, PowerSample, RangesHeader,
-        SurroundingsSample, WireHeader,
+        ScanHeader, SurroundingsSample, WireHeader,
     },
     shell::{Context, Progress},
     stage::Stage,
     start::StageError,
     step::{ForeignState, Step as _},
     stop_socket::Request,
-    topics::{CONTACT, INFRARED, POWER, RANGES, SURROUNDINGS, WHEELS, WIRE},
+    topics::{CONTACT, INFRARED, POWER, RANGES, SCAN, SURROUNDINGS, WHEELS, WIRE},
 };
 use serde::{Deserialize, Serialize};
 
@@ -92,11 +92,20 @@ impl<'a> Taken<'a> {
 #[derive(Debug)]
 pub struct LinkStage {
     pub(crate) link: Link,
+    /// None if the robot has no laser.
+    laser: Option<ScanHeader>,
     infrared: Option<InfraredSample>,
     power: Option<PowerSample>,
     surroundings: Option<SurroundingsSample>,
     /// The bytes received and sent that are not published yet, oldest first.
     wire: Vec<(Progress, WireHeader, Vec<u8>)>,
+}
+
+fn laser(mission: &Mission) -> Option<ScanHeader> {
+    let table = mission.sensor_table();
+    let mut rows = table.iter().enumerate();
+    let (row, sensor) = rows.find(|(_, sensor)| sensor.kind == SensorKind::Scan)?;
+    Some(ScanHeader::of(row, sensor))
 }
 
 impl LinkStage {
@@ -119,10 +128,13 @@ impl LinkStage {
         out: &mut Outputs,
     ) -> Result<Option<Effect>, StageError> {
         match effect {
-            Effect::Tick { tick, time, ranges, wheels, contact } => {
+            Effect::Tick { tick, time, ranges, scan, wheels, contact } => {
                 out.at = Progress { tick, time };
                 if let Some(contact) = contact {
                     out.publish(&CONTACT, contact)?;
+                }
+                if let Some(header) = self.laser.filter(|_| !scan.is_empty()) {
+                    out.publish_slice(&SCAN, header, &scan)?;
                 }
                 out.publish_slice(&RANGES, RangesHeader::default(), &ranges)?;
                 out.publish(&WHEELS, wheels)?;
@@ -162,6 +174,7 @@ impl Stage for LinkStage {
     fn new(mission: &Mission) -> Self {
         Self {
             link: Link::new(mission),
+            laser: laser(mission),
             infrared: None,
             power: None,
             surroundings: None,

@@ -55,6 +55,7 @@ const STOP_AGAIN: Duration = Duration::from_millis(200);
 #[derive(Clone, Debug)]
 struct OpenTick {
     ranges: Vec<RangeReading>,
+    scan: Vec<f32>,
     wheels: WheelSample,
     contact: Option<ContactSample>,
     began_ns: u64,
@@ -311,6 +312,7 @@ impl Link {
         }
         self.open = Some(OpenTick {
             ranges: self.driver.readings_for_tick(),
+            scan: self.driver.scan_for_tick(),
             wheels,
             contact: self.failsafe.monitors.odometry.take_contact(),
             began_ns: now_ns,
@@ -320,8 +322,8 @@ impl Link {
     }
 
     fn tick_effect(&self, tick: u64, open: OpenTick) -> Effect {
-        let OpenTick { ranges, wheels, contact, .. } = open;
-        Effect::Tick { tick, time: self.time, ranges, wheels, contact }
+        let OpenTick { ranges, scan, wheels, contact, .. } = open;
+        Effect::Tick { tick, time: self.time, ranges, scan, wheels, contact }
     }
 
     /// The number of the open tick.

@@ -232,7 +232,19 @@ impl EvidenceGrid {
             self.set(sonar, lattice, cell, weight, flips);
             window = window.including(cell);
         }
-        // No obstacle stands where the robot is, and no sonar can scan the ground that touches the robot.
+        window.union(self.stand(sonar, lattice, (robot, radius), flips))
+    }
+
+    /// Note that a robot with a body of `radius` metres stands at `robot`. No obstacle stands there, and no sensor can scan the ground that
+    /// touches the robot.
+    pub(crate) fn stand(
+        &mut self,
+        sonar: &SonarModel,
+        lattice: &GridFrame,
+        (robot, radius): (DVec2, f64),
+        flips: &mut Vec<Flip>,
+    ) -> Window {
+        let mut window = Window::default();
         let touches = radius + lattice.resolution_m;
         for cell in around(lattice, robot, touches) {
             let index = lattice.index(cell);
@@ -297,6 +309,30 @@ impl EvidenceGrid {
             window = window.including(cell);
         }
         window
+    }
+
+    /// Change the weight of a cell that a laser saw by `change`; positive means that an obstacle stands in it. Ground that is seen free is
+    /// scanned. Returns the window that changed.
+    pub(crate) fn weigh_seen(
+        &mut self,
+        sonar: &SonarModel,
+        lattice: &GridFrame,
+        cell: Cell,
+        change: i8,
+        flips: &mut Vec<Flip>,
+    ) -> Window {
+        let index = lattice.index(cell);
+        let (weight, was_occupied) = (self.weight_of(index), self.is_occupied(index));
+        let was_scanned = self.is_scanned(sonar, index);
+        self.looks[index] = SCANNED;
+        if change > 0 {
+            self.occupied[index] |= SEEN;
+            self.set(sonar, lattice, cell, weight.max(-sonar.pass).saturating_add(change), flips);
+        } else if self.occupied[index] & TOUCHED == 0 {
+            self.set(sonar, lattice, cell, weight.saturating_add(change), flips);
+        }
+        let same = was_scanned && was_occupied == self.is_occupied(index);
+        if same { Window::default() } else { Window::default().including(cell) }
     }
 
     /// Note that something touches a body of `radius` metres: an obstacle stands in every cell at its rim in the arc of `touch`.

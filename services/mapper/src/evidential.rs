@@ -12,7 +12,7 @@ use crate::{
     clear_beams::ClearBeams,
     evidence_grid::{EvidenceGrid, Flip, lattice, step_m},
     inflation::{Geometry, Inflation},
-    reading::{Ray, Reading, Rows, Touch},
+    reading::{Fan, Ray, Reading, Rows, Touch},
     sonar_model::SonarModel,
 };
 
@@ -126,6 +126,19 @@ impl Evidential {
             let heard = map.evidence.take(&reading.sonar, lattice, beam, body, &mut flips);
             touched = touched.union(heard);
         }
+        let mut window = self.on_grid(touched);
+        for flip in &flips {
+            window = window.union(map.inflation.follow(&self.geometry, *flip));
+        }
+        Observed { window, safety_event: flips.iter().any(|flip| flip.occupied) }
+    }
+
+    /// Take a scan of a laser on a robot at `robot`.
+    pub(crate) fn take_scan(&self, map: &mut EvidenceMap, robot: DVec2, fan: &Fan<'_>) -> Observed {
+        let mut flips = Vec::new();
+        let lattice = &self.geometry.lattice;
+        let body = (robot, self.radius);
+        let touched = map.evidence.take_scan(&self.sonar, lattice, fan, body, &mut flips);
         let mut window = self.on_grid(touched);
         for flip in &flips {
             window = window.union(map.inflation.follow(&self.geometry, *flip));

@@ -22,6 +22,8 @@ const CONTACT_M: f64 = 0.04;
 #[derive(Clone, Debug)]
 pub(crate) struct Rows {
     rows: Vec<Option<Row>>,
+    /// The bearing of the laser's first beam from its own and the angle from beam to beam, and its row; none if it is not used.
+    laser: Option<((f64, f64), Row)>,
     front: u8,
 }
 
@@ -29,7 +31,8 @@ pub(crate) struct Rows {
 struct Row {
     mount: Mount,
     reach_m: f64,
-    /// The model of a cone; none for a ray.
+    kind: SensorKind,
+    /// The model of a cone; none for others.
     cone: Option<SonarModel>,
 }
 
@@ -39,11 +42,17 @@ impl Rows {
             sensor.used.then(|| Row {
                 mount: sensor.mount,
                 reach_m: sensor.reach_m,
+                kind: sensor.kind,
                 cone: (sensor.kind == SensorKind::Cone).then(|| SonarModel::of(&sensor)),
             })
         };
+        let table = mission.sensor_table();
         Self {
-            rows: mission.sensor_table().into_iter().map(row).collect(),
+            laser: table
+                .iter()
+                .find(|sensor| sensor.used && sensor.kind == SensorKind::Scan)
+                .and_then(|sensor| Some((sensor.fan(), row(sensor.clone())?))),
+            rows: table.into_iter().map(row).collect(),
             front: mission.front_row() as u8,
         }
     }
@@ -56,6 +65,18 @@ impl Rows {
     /// The row of a reading; none if the mission does not use it. The sample comes from shared memory and may hold anything.
     fn of(&self, reading: &RangeReading) -> Option<Row> {
         *self.rows.get(usize::from(reading.sensor))?
+    }
+
+    pub(crate) fn uses_row(&self, row: u64) -> bool {
+        usize::try_from(row).is_ok_and(|row| self.rows.get(row).is_some_and(Option::is_some))
+    }
+
+    /// The beams of the laser on a robot at `robot`; none if there are none.
+    pub(crate) fn scan<'a>(&self, robot: Pose2, beams: &'a [f32]) -> Option<Fan<'a>> {
+        let ((first, step_rad), row) = self.laser.filter(|_| !beams.is_empty())?;
+        let mount = row.mount.on(robot);
+        let first_rad = mount.heading + first;
+        Some(Fan { origin: mount.position, first_rad, step_rad, reach_m: row.reach_m, beams })
     }
 
     pub(crate) fn uses(&self, reading: &RangeReading) -> bool {
@@ -98,7 +119,7 @@ impl Rows {
         readings: &[RangeReading],
     ) -> impl Iterator<Item = Ray> {
         readings.iter().filter_map(move |reading| {
-            let row = self.of(reading).filter(|row| row.cone.is_none())?;
+            let row = self.of(reading).filter(|row| row.kind == SensorKind::Ray)?;
             let seen = infrared_model::seen(reading, row.reach_m)?;
             let ranger = row.mount.on(robot);
             Some(Ray { origin: ranger.position, axis: ranger.axis(), seen })
@@ -136,6 +157,20 @@ pub(crate) struct Ray {
     /// Direction of the ray, a unit vector.
     pub(crate) axis: DVec2,
     pub(crate) seen: Seen,
+}
+
+/// A scan of a laser in the mission's frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Fan<'a> {
+    /// Position of the laser, metres.
+    pub(crate) origin: DVec2,
+    /// Bearing of the first beam, and the angle from beam to beam, radians.
+    pub(crate) first_rad: f64,
+    pub(crate) step_rad: f64,
+    /// The range up to which it sees, metres.
+    pub(crate) reach_m: f64,
+    /// The ranges, metres: infinite for nothing in reach, not a number for no reading.
+    pub(crate) beams: &'a [f32],
 }
 
 /// Something that touches the body, in the mission's frame.

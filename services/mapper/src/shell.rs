@@ -6,14 +6,17 @@ use std::time::Duration;
 use common::{
     bus::{Reader, SliceReader},
     clock::MissionTime,
-    mission::MOST_SENSORS,
-    samples::{ContactSample, DirectiveSample, FaultKind, PoseSample, RangeReading, RangesHeader},
+    mission::{MOST_BEAMS, MOST_SENSORS},
+    samples::{
+        ContactSample, DirectiveSample, FaultKind, PoseSample, RangeReading, RangesHeader,
+        ScanHeader,
+    },
     shell::{Context, Process, Progress},
     stage::Runner,
     start::StageError,
     step::Step as _,
     target::TargetReader,
-    topics::{CONTACT, DIRECTIVE, GRID, HEALTH, POSE, RANGES, TARGET},
+    topics::{CONTACT, DIRECTIVE, GRID, HEALTH, POSE, RANGES, SCAN, SCAN_FIX, TARGET},
     wiring::{Persists, Wiring},
 };
 
@@ -33,6 +36,9 @@ pub struct Shell {
     directive: Reader<DirectiveSample>,
     target: TargetReader,
     runner: Runner<Mapper>,
+    scan: SliceReader<ScanHeader, f32>,
+    /// The newest scan, and its tick.
+    latest_scan: Option<(u64, Vec<f32>)>,
     /// The newest readings that are used, and their tick.
     latest_ranges: Option<(u64, Vec<RangeReading>)>,
     latest_contact: Option<ContactSample>,
@@ -41,10 +47,10 @@ pub struct Shell {
 
 impl Process for Shell {
     const WIRING: &'static Wiring = &Wiring {
-        inputs: &[&RANGES, &CONTACT, &POSE, &DIRECTIVE, &TARGET],
+        inputs: &[&RANGES, &SCAN, &CONTACT, &POSE, &DIRECTIVE, &TARGET],
         // A planner that becomes ready is a new reader of the grid.
         wakes: &[&POSE, &DIRECTIVE, &HEALTH],
-        outputs: &[&GRID],
+        outputs: &[&SCAN_FIX, &GRID],
         persists: Persists::Journal,
         ..Wiring::of("mapper")
     };
@@ -58,6 +64,8 @@ impl Process for Shell {
         Ok(Self {
             pose: context.reader(&POSE)?,
             ranges: context.slice_reader(&RANGES)?,
+            scan: context.slice_reader(&SCAN)?,
+            latest_scan: None,
             contact: context.reader(&CONTACT)?,
             directive: context.reader(&DIRECTIVE)?,
             target: TargetReader::open(context)?,
@@ -72,10 +80,11 @@ impl Process for Shell {
         while let Some(pose) = self.pose.take()? {
             let ranges = self.ranges_of(pose.stamp.tick)?;
             self.runner.out.at = Progress::of(&pose.stamp);
+            let scan = self.scan_of(pose.stamp.tick)?;
             let contact = self.contact_of(pose.stamp.tick)?;
             let target = self.target.next(pose.stamp.tick)?.map(|sample| sample.target.position());
             let target = target.filter(|target| *target != self.runner.stage.target());
-            self.step(Input::Tick { pose, ranges, contact, target })?;
+            self.step(Input::Tick { pose, ranges, scan, contact, target })?;
         }
         if let Some(DirectiveSample { epoch, .. }) = self.directive.newest()?
             && self.step(Input::Reset { epoch })?
@@ -136,6 +145,21 @@ impl Shell {
         }
         let latest = self.latest_ranges.as_ref().filter(|(latest, _)| *latest == tick);
         Ok(latest.map(|(_, readings)| readings.clone()).unwrap_or_default())
+    }
+
+    /// The scan of `tick`; none if the laser gave none, or the mission uses none.
+    fn scan_of(&mut self, tick: u64) -> Result<Vec<f32>, StageError> {
+        while self.latest_scan.as_ref().is_none_or(|(latest, _)| *latest < tick) {
+            let Some(slice) = self.scan.take()? else {
+                break;
+            };
+            let used = self.runner.stage.uses_row(slice.header().sensor);
+            let beams =
+                if used { slice.iter().take(MOST_BEAMS).copied().collect() } else { Vec::new() };
+            self.latest_scan = Some((slice.header().stamp.tick, beams));
+        }
+        let latest = self.latest_scan.as_mut().filter(|(latest, _)| *latest == tick);
+        Ok(latest.map(|(_, beams)| std::mem::take(beams)).unwrap_or_default())
     }
 
     /// The contact of `tick`; most ticks have none.

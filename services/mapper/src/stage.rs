@@ -8,7 +8,7 @@ use common::{
     stage::Stage,
     start::StageError,
     step::{ForeignState, Step as _},
-    topics::GRID,
+    topics::{GRID, SCAN_FIX},
 };
 use serde::{Deserialize, Serialize};
 
@@ -72,6 +72,9 @@ impl Stage for Mapper {
                 Change::Whole
             }
         };
+        if let Some(fix) = self.take_fix() {
+            out.publish(&SCAN_FIX, fix)?;
+        }
         let (frame, version) = (self.frame(), self.state().version());
         let part = match change {
             Change::None => return Ok(None),

@@ -8,8 +8,8 @@ use common::{
     geometry::Shapes,
     grid::{Cell, CellState, GridFrame, Part, Window},
     kinematics::Pose2,
-    mission::{Method, Mission},
-    samples::{ContactSample, FaultKind, GridHeader, PoseSample, RangeReading},
+    mission::{MOST_BEAMS, Method, Mission},
+    samples::{ContactSample, FaultKind, FixSample, GridHeader, PoseSample, RangeReading, name},
     step::{ForeignState, Step},
 };
 use glam::DVec2;
@@ -19,6 +19,7 @@ use crate::{
     evidential::{EvidenceMap, Evidential},
     fault,
     reading::{Rows, Touch},
+    scan_match::{Reference, ScanMatcher},
 };
 
 /// An input of the step. The belief follows from its inputs alone, so the journal holds the inputs.
@@ -30,6 +31,8 @@ pub enum Input {
         pose: PoseSample,
         /// The readings of this tick; none if none came.
         ranges: Vec<RangeReading>,
+        /// The beams of the laser, metres, as the topic `scan` has them; none if none came.
+        scan: Vec<f32>,
         /// Where something holds the wheels at this tick.
         contact: Option<ContactSample>,
         /// The target that holds from this tick on, metres; none if it is the one before.
@@ -89,6 +92,8 @@ pub struct Belief {
     fault: FaultKind,
     /// The target, metres.
     target: DVec2,
+    /// The scan with which others are matched; none before the first.
+    reference: Option<Reference>,
 }
 
 impl Belief {
@@ -133,6 +138,9 @@ pub struct Mapper {
     map_within: f64,
     footprint: f64,
     half_track: f64,
+    matcher: ScanMatcher,
+    /// The fix by the newest scan.
+    fix: Option<FixSample>,
     belief: Belief,
 }
 
@@ -161,6 +169,8 @@ impl Step for Mapper {
             map_within: mission.map_within_m(),
             footprint: mission.body().radius_m,
             half_track: mission.body().track_m / 2.0,
+            matcher: ScanMatcher::new(mission),
+            fix: None,
             belief: Belief {
                 cells: vec![CellState::Free as u8; frame.area()],
                 version: 1,
@@ -173,6 +183,7 @@ impl Step for Mapper {
                 sensed,
                 fault: FaultKind::Nothing,
                 target: mission.target,
+                reference: None,
             },
         };
         mapper.mark_known();
@@ -197,11 +208,17 @@ impl Step for Mapper {
         Ok(())
     }
 
-    fn step(&mut self, input: Input, _: MissionTime) -> Change {
+    fn step(&mut self, input: Input, now: MissionTime) -> Change {
+        self.fix = None;
         match input {
-            Input::Tick { pose, ranges, contact, target } => {
+            Input::Tick { pose, ranges, scan, contact, target } => {
                 let moved = target.map_or(Window::default(), |target| self.move_target(target));
-                Change::Window(self.map(&pose, &ranges, contact.as_ref(), moved))
+                if self.belief.tick != Some(pose.stamp.tick) {
+                    let fix = self.matcher.step(&mut self.belief.reference, pose.pose(), &scan);
+                    let source = name("scan");
+                    self.fix = fix.map(|fix| FixSample { capture_ns: now.0, source, ..fix });
+                }
+                Change::Window(self.map(&pose, (&ranges, &scan), contact.as_ref(), moved))
             }
             Input::Reset { epoch } if self.reset_belief(epoch) => Change::Whole,
             Input::Reset { .. } => Change::None,
@@ -214,9 +231,19 @@ impl Step for Mapper {
 }
 
 impl Mapper {
+    /// Whether the mission uses the sensor of this row.
+    pub fn uses_row(&self, row: u64) -> bool {
+        self.rows.uses_row(row)
+    }
+
     /// Whether the mission uses the sensor of a reading.
     pub fn uses(&self, reading: &RangeReading) -> bool {
         self.rows.uses(reading)
+    }
+
+    /// Where the robot is by the newest scan, and the scans before it; none if that says nothing.
+    pub const fn take_fix(&mut self) -> Option<FixSample> {
+        self.fix.take()
     }
 
     pub const fn frame(&self) -> GridFrame {
@@ -234,7 +261,7 @@ impl Mapper {
             Sensed::Hits => 0,
             Sensed::Evidence(_) => self.evidential.saved_bytes(),
         };
-        self.frame.area() + evidence + 160
+        self.frame.area() + evidence + 5 * MOST_BEAMS + 240
     }
 
     /// The header of a `grid` sample with `part` of this belief.
@@ -316,7 +343,7 @@ impl Mapper {
     fn map(
         &mut self,
         pose: &PoseSample,
-        ranges: &[RangeReading],
+        (ranges, scan): (&[RangeReading], &[f32]),
         contact: Option<&ContactSample>,
         changed: Window,
     ) -> Window {
@@ -330,10 +357,10 @@ impl Mapper {
         self.belief.rolled += last.distance(now.position)
             + self.half_track * (now.heading - self.belief.heading).abs();
         (self.belief.robot, self.belief.heading) = (now.position, now.heading);
-        let ranges = if self.sensing { ranges } else { &[] };
+        let (ranges, scan) = if self.sensing { (ranges, scan) } else { (&[][..], &[][..]) };
         let seen = match &self.belief.sensed {
             Sensed::Hits => self.mark_hit(now, ranges),
-            Sensed::Evidence(_) => self.weigh(now, ranges, rolled),
+            Sensed::Evidence(_) => self.weigh(now, (ranges, scan), rolled),
         };
         let contact = contact.and_then(|contact| Touch::of(now, contact));
         let felt = contact.map_or_else(Window::default, |touch| self.mark_touch(&touch));
@@ -356,15 +383,23 @@ impl Mapper {
     }
 
     /// Method `evidential`: take the readings as evidence for and against hazard, and note which ground was scanned.
-    fn weigh(&mut self, robot: Pose2, ranges: &[RangeReading], rolled: f64) -> Window {
+    fn weigh(
+        &mut self,
+        robot: Pose2,
+        (ranges, scan): (&[RangeReading], &[f32]),
+        rolled: f64,
+    ) -> Window {
         let Sensed::Evidence(map) = &mut self.belief.sensed else {
             return Window::default();
         };
         let stale = self.evidential.roll(map, rolled, self.belief.rolled);
         let (beams, rays) = (self.rows.beams(robot, ranges), self.rows.rays(robot, ranges));
         let news = self.evidential.take(map, robot.position, beams, rays, self.belief.rolled);
-        let changed = self.redraw(stale.union(news.window));
-        self.belief.safety_events += u64::from(news.safety_event);
+        let fan = self.rows.scan(robot, scan);
+        let seen = fan.map(|fan| self.evidential.take_scan(map, robot.position, &fan));
+        let seen = seen.unwrap_or_default();
+        let changed = self.redraw(stale.union(news.window).union(seen.window));
+        self.belief.safety_events += u64::from(news.safety_event || seen.safety_event);
         changed
     }
 

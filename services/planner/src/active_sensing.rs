@@ -24,7 +24,7 @@ use crate::{
 
 /// The ground under so much of the way ahead must have been scanned, and no surface could be touched there undetected, metres.
 const SCANNED_AHEAD_M: f64 = 0.25;
-/// How far ahead the way is followed, metres.
+/// How far ahead the way is followed, metres, and at least the arc.
 const AHEAD_M: f64 = 0.6;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,8 +51,12 @@ pub(crate) struct ActiveSensing {
     stops_within_s: f64,
     /// Unit vector from the robot's axis to the front sonar's, which is turned for a look.
     bearing: DVec2,
+    /// How far ahead the arc is followed on which the robot drives: at its greatest speed it can stop there, metres.
+    ahead_m: f64,
     /// The number of sonars that the mission uses.
     sonars: usize,
+    /// Whether the mission uses a laser, whose beams end at a surface of any angle: what its scans leave free is free.
+    has_laser: bool,
     /// The side to which the present scan turns; none while there is no scan.
     scan_side: Option<Side>,
 }
@@ -65,7 +69,9 @@ impl ActiveSensing {
             turn: mission.turn_rad_s(),
             stops_within_s: mission.hurry().stops_within_s,
             bearing: DVec2::from_angle(mission.front_sonar().mount.bearing_rad),
+            ahead_m: AHEAD_M.max(mission.speed_m_s() * mission.hurry().stops_within_s + STEP_M),
             sonars: mission.used(SensorKind::Cone),
+            has_laser: mission.used(SensorKind::Scan) > 0,
             scan_side: None,
         }
     }
@@ -91,6 +97,7 @@ impl ActiveSensing {
             let along = (to - from).normalize_or(direction);
             undetected.normals(to, along)
         });
+        let surfaces = surfaces.filter(|_| !self.has_laser);
         let unseen = ground.chain(surfaces);
         match scan(self.bearing.rotate(pose.axis()), unseen, &mut self.scan_side) {
             // The robot turns until its sonar faces there.
@@ -121,14 +128,14 @@ impl ActiveSensing {
         direction: DVec2,
     ) -> f64 {
         let curvature = self.turn * pose.axis().perp_dot(direction) / self.speed;
-        let steps = (AHEAD_M / STEP_M) as usize;
+        let steps = (self.ahead_m / STEP_M) as usize;
         let open = |step: &usize| {
             let way = *step as f64 * STEP_M;
             let ahead = pose.along_arc(way, way * curvature);
             let at = ahead.position;
             !view.is_hazard(at)
                 && view.unscanned(at, self.radius).next().is_none()
-                && undetected.normals(at, ahead.axis()).next().is_none()
+                && (self.has_laser || undetected.normals(at, ahead.axis()).next().is_none())
         };
         let free = (1..=steps).find(|step| !open(step)).unwrap_or(steps + 1) - 1;
         let on_arc = free as f64 * STEP_M / self.stops_within_s;

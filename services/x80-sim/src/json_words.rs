@@ -74,6 +74,7 @@ impl JsonWords {
     pub(crate) fn report(
         &self,
         (standard, custom, motor): (&StandardSensors, &CustomSensors, &MotorSensors),
+        scan: &[Option<f32>],
         motors: &[Motor; 6],
     ) -> Vec<u8> {
         let wheels = [self.robot.left, self.robot.right];
@@ -87,13 +88,14 @@ impl JsonWords {
         let held = wheels.map(|wheel| {
             motor.currents[usize::from(wheel.channel.min(1))] >= self.robot.held_current_ad
         });
-        let ranges = self.table.iter().map(|sensor| {
+        let ranges = self.table.iter().filter_map(|sensor| {
             let channel = usize::from(sensor.channel);
             let range = match sensor.kind {
+                SensorKind::Scan => return None,
                 SensorKind::Cone => standard.ultrasonic.get(channel).and_then(|byte| heard(*byte)),
                 SensorKind::Ray => infrared(standard, custom, channel),
             };
-            (sensor.name.clone(), range)
+            Some((sensor.name.clone(), range))
         });
         let report = Report {
             heard: Some(self.heard),
@@ -103,6 +105,7 @@ impl JsonWords {
             ranges: ranges.collect(),
             battery_v: Some(volts(standard.motor_battery, MOTOR_SCALE_V)),
             odometry: None,
+            scan: (!scan.is_empty()).then(|| scan.to_vec()),
         };
         report.line()
     }

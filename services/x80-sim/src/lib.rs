@@ -8,7 +8,7 @@
 //! | [`body`] | a disc on two wheels or on a car's, and what it touches |
 //! | [`wheel_errors`] | how far its wheels are from what the mission says |
 //! | [`motor`] | one channel: modes, timed commands, the speed loop |
-//! | [`sonar`], [`infrared`], [`sensors`] | the readings of the sensors, as the frames carry them |
+//! | [`sonar`], [`infrared`], `laser`, [`sensors`] | the readings of the sensors, as the frames carry them |
 //! | `json_words` | the words of a robot that speaks lines of JSON |
 //! | [`noise`] | seeded randomness, one stream for each source |
 //! | [`robot`] | all of it as a pure state machine: frames in, time forward, frames out |
@@ -43,6 +43,7 @@ mod drivetrain;
 mod error;
 pub mod infrared;
 mod json_words;
+mod laser;
 pub mod motor;
 pub mod noise;
 pub mod radio;

@@ -20,6 +20,8 @@ pub enum Source {
     WheelErrors = 6,
     /// Runs of silence of the ultrasonic rangers.
     Silence = 7,
+    /// The laser.
+    Laser = 8,
 }
 
 /// A seeded stream of random numbers.

@@ -16,6 +16,7 @@ use crate::{
     car::Car,
     drivetrain::{self, Drivetrain},
     json_words::JsonWords,
+    laser::Laser,
     motor::Motor,
     noise::{Noise, Source},
     saved_state::SavedState,
@@ -80,6 +81,9 @@ pub struct Robot {
     motor: MotorSensors,
     /// The words of a robot that speaks lines of JSON; none for an X80.
     json: Option<JsonWords>,
+    laser: Option<Laser>,
+    /// The beams of this tick.
+    scan: Vec<Option<f32>>,
 }
 
 impl Robot {
@@ -128,7 +132,9 @@ impl Robot {
             standard: StandardSensors::default(),
             custom: CustomSensors::default(),
             motor: MotorSensors::default(),
-            json: (mission.robot.protocol == Protocol::Json).then(|| JsonWords::new(mission)),
+            json: (mission.robot.protocol() == Protocol::Json).then(|| JsonWords::new(mission)),
+            laser: Laser::new(mission, seed),
+            scan: Vec::new(),
         };
         robot.least_clearance = robot.body.clearance();
         robot.measure();
@@ -414,6 +420,13 @@ impl Robot {
         self.motor.pots = [sensors::MIDDLE; 6];
         (self.standard, self.custom) =
             self.ranging.measure(&self.world, &self.body, self.time, &self.physics);
+        if let Some(laser) = &mut self.laser
+            && self.tick.is_multiple_of(laser.every_ticks())
+        {
+            self.scan = laser.scan(&self.world, self.body.pose());
+        } else {
+            self.scan.clear();
+        }
     }
 
     /// Append the frames of this tick to `out`, one of every stream that runs, the motor frame last. They
@@ -431,7 +444,7 @@ impl Robot {
     fn write(&self, due: Due, out: &mut Vec<u8>) {
         if let Some(json) = &self.json {
             let sensors = (&self.standard, &self.custom, &self.motor);
-            out.extend(json.report(sensors, &self.motors));
+            out.extend(json.report(sensors, &self.scan, &self.motors));
             return;
         }
         if due.standard {

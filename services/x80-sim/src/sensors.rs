@@ -47,6 +47,7 @@ impl Ranging {
             let mounts = match sensor.kind {
                 SensorKind::Cone => &mut mounts[..],
                 SensorKind::Ray => &mut infrared[..],
+                SensorKind::Scan => continue,
             };
             if let Some(mount) = mounts.get_mut(usize::from(sensor.channel)) {
                 *mount = Some(sensor.mount);

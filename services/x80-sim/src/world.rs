@@ -185,6 +185,15 @@ impl World {
 }
 
 impl World {
+    /// The surfaces at `height_m` that stand no farther than `reach_m` from `point`.
+    pub fn near(&self, point: DVec2, reach_m: f64, height_m: f64) -> Vec<Surface> {
+        self.solids()
+            .filter(|solid| solid.profile.height_gap(height_m) == 0.0)
+            .map(|solid| solid.surface)
+            .filter(|surface| surface.distance(point) <= reach_m)
+            .collect()
+    }
+
     /// Whether a surface at `height_m` stands between two points, or within [`TOUCHES_M`] of the second: what a body
     /// touches may do so between a sensor at its edge and its centre.
     pub fn is_between(&self, from: DVec2, to: DVec2, height_m: f64) -> bool {

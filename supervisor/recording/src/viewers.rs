@@ -8,7 +8,9 @@ use common::{
     grid::{Cell, CellState, GridFrame, Replica},
     kinematics::Pose2,
     mission::{Mission, Sensor, SensorKind},
-    samples::{GridHeader, PoseSample, RangeReading, RangeStatus, RangesHeader, TargetSample},
+    samples::{
+        GridHeader, PoseSample, RangeReading, RangeStatus, RangesHeader, ScanHeader, TargetSample,
+    },
     topics::{self, AnyTopic as _},
 };
 use foxglove::{
@@ -117,6 +119,11 @@ impl Drawn {
         } else if topic == topics::RANGES.spec().name {
             let (header, readings) = decode_slice(message)?;
             self.ranges(&header, &readings, now_ns, sink);
+        } else if topic == topics::SCAN.spec().name {
+            let (header, beams) = decode_slice::<ScanHeader, f32>(message)?;
+            if let Some(sensor) = self.sensors.get(usize::try_from(header.sensor).ok()?) {
+                send(sink, &scan_topic(sensor), &beams_of(sensor, &header, &beams, time(now_ns)));
+            }
         } else if topic == topics::GRID.spec().name {
             let (header, cells) = decode_slice(message)?;
             self.grid(&header, &cells, now_ns, sink);
@@ -183,7 +190,9 @@ impl Drawn {
         }
         for reading in readings {
             let sensor = self.sensors.get(usize::from(reading.sensor));
+            // The beams of a laser are a topic of their own.
             if let Some(sensor) = sensor.filter(|sensor| sensor.used)
+                && sensor.kind != SensorKind::Scan
                 && reading.status() != RangeStatus::Absent
             {
                 send(sink, &scan_topic(sensor), &scan(sensor, reading, timestamp));
@@ -299,6 +308,25 @@ fn scan(sensor: &Sensor, reading: &RangeReading, timestamp: Option<Timestamp>) -
         start_angle: -half,
         end_angle: half,
         ranges: vec![reading.range_m; points],
+        intensities: Vec::new(),
+    }
+}
+
+/// The beams of a laser; those without an end have the range infinity, as viewers expect it.
+fn beams_of(
+    sensor: &Sensor,
+    header: &ScanHeader,
+    beams: &[f32],
+    timestamp: Option<Timestamp>,
+) -> LaserScan {
+    let start_angle = header.first_rad - sensor.mount.bearing_rad;
+    LaserScan {
+        timestamp,
+        frame_id: sensor.name.clone(),
+        pose: pose(Pose2::default()),
+        start_angle,
+        end_angle: start_angle + header.step_rad * beams.len().saturating_sub(1) as f64,
+        ranges: beams.iter().copied().map(f64::from).collect(),
         intensities: Vec::new(),
     }
 }

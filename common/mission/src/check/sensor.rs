@@ -2,7 +2,8 @@
 
 use super::objection::{Objection, objection, within};
 use crate::{
-    INFRARED_RANGERS, MOST_SENSORS, Mission, SONARS, SensorKind, SensorRow, Sensors, SonarConfig,
+    INFRARED_RANGERS, MOST_BEAMS, MOST_SENSORS, Method, Mission, Protocol, SONARS, SensorKind,
+    SensorRow, Sensors, SonarConfig,
 };
 
 const KEY: &str = "robot.sensor";
@@ -31,8 +32,17 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
         }
     }
     let is_cone = |row: &SensorRow| row.kind == SensorKind::Cone;
-    if !rows.is_empty() && !rows.iter().any(is_cone) {
-        return Err(objection(KEY, "no row is a cone", "add the front sonar"));
+    let is_scan = |row: &SensorRow| row.kind == SensorKind::Scan;
+    if rows.iter().filter(|row| is_scan(row)).count() > 1 {
+        return Err(objection(KEY, "two rows are lasers", "keep one"));
+    }
+    let speaks_x80 = mission.robot.protocol() == Protocol::X80;
+    if speaks_x80 && rows.iter().any(is_scan) {
+        let problem = "the boards of an X80 have no laser";
+        return Err(objection(KEY, problem, "remove it, or give robot.protocol = \"json\""));
+    }
+    if !rows.is_empty() && !rows.iter().any(|row| is_cone(row) || is_scan(row)) {
+        return Err(objection(KEY, "no row is a cone or a laser", "add the front sonar"));
     }
     if !rows.is_empty() && *sonar != SonarConfig::default() {
         let remedy = "remove it: the rows of robot.sensor say where the front sonar is";
@@ -41,6 +51,8 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     let table = mission.sensor_table();
     let used = |kind| table.iter().filter(|sensor| sensor.used && sensor.kind == kind).count();
     let lacks = match mission.sensors {
+        Some(Sensors::Laser) if used(SensorKind::Scan) == 0 => "a laser",
+        None if mission.method == Method::Paper && used(SensorKind::Cone) == 0 => "a sonar",
         Some(Sensors::FrontInfrared) if used(SensorKind::Ray) == 0 => "a ray",
         Some(Sensors::ThreeFront) if used(SensorKind::Cone) < 2 => "a cone beside the front one",
         _ => return Ok(()),
@@ -66,14 +78,22 @@ fn row(row: &SensorRow, rate_hz: f64) -> Result<(), Objection> {
     let reach = match row.kind {
         SensorKind::Cone => 0.3..=2.55,
         SensorKind::Ray => 0.2..=0.81,
+        SensorKind::Scan => 0.5..=30.0,
     };
     within(KEY, row.reach_m.unwrap_or(*reach.end()), reach, "m of reach_m")?;
+    if let Some(beams) = row.beams {
+        let most = if row.kind == SensorKind::Scan { MOST_BEAMS } else { 1 };
+        within(KEY, f64::from(beams), 1.0..=most as f64, "beams")?;
+    }
     match (row.kind, row.field_of_view_deg) {
         (SensorKind::Ray, Some(_)) => {
             return Err(objection(KEY, "a ray has no field of view", "remove field_of_view_deg"));
         }
         (SensorKind::Cone, Some(deg)) => {
             within(KEY, deg, 5.0..=60.0, "degrees of field_of_view_deg")?;
+        }
+        (SensorKind::Scan, Some(deg)) => {
+            within(KEY, deg, 10.0..=360.0, "degrees of field_of_view_deg")?;
         }
         (_, None) => {}
     }
@@ -84,6 +104,7 @@ fn channel(key: &'static str, kind: SensorKind, channel: u8) -> Result<(), Objec
     let (channels, remedy) = match kind {
         SensorKind::Cone => (SONARS, "give 0 to 5 for a sonar; 1 is the front one of an X80"),
         SensorKind::Ray => (INFRARED_RANGERS, "give 0 to 6 for an infrared ranger"),
+        SensorKind::Scan => (1, "give 0 for a laser"),
     };
     if usize::from(channel) < channels {
         return Ok(());

@@ -72,6 +72,8 @@ impl Row {
             judged_m: match sensor.kind {
                 SensorKind::Cone => JUDGED_SONAR_M,
                 SensorKind::Ray => JUDGED_INFRARED_M,
+                // The nearest of many beams may stay the same for long.
+                SensorKind::Scan => 0.0..=0.0,
             },
             equal: Equal::default(),
             implausible: None,

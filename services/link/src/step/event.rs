@@ -71,6 +71,8 @@ pub enum Effect {
         time: MissionTime,
         /// The newest reading of each sensor.
         ranges: Vec<RangeReading>,
+        /// The beams of the laser; none if none came.
+        scan: Vec<f32>,
         /// The encoders.
         wheels: WheelSample,
         /// The contact that these encoders show.

@@ -12,7 +12,8 @@ impl Mapper {
     }
 
     fn sense(&mut self, pose: &PoseSample, ranges: Vec<RangeReading>) -> Window {
-        let input = Input::Tick { pose: *pose, ranges, contact: None, target: None };
+        let input =
+            Input::Tick { pose: *pose, ranges, scan: Vec::new(), contact: None, target: None };
         match self.step(input, pose.stamp.time()) {
             Change::Window(window) => window,
             other => panic!("a tick gave {other:?}"),
@@ -23,7 +24,13 @@ impl Mapper {
         let half_width_rad = 0.8;
         let contact = ContactSample { bearing_rad, half_width_rad, ..ContactSample::default() };
         let contact = Some(contact);
-        let input = Input::Tick { pose: *pose, ranges: Vec::new(), contact, target: None };
+        let input = Input::Tick {
+            pose: *pose,
+            ranges: Vec::new(),
+            scan: Vec::new(),
+            contact,
+            target: None,
+        };
         let changed = self.step(input, pose.stamp.time());
         assert!(matches!(changed, Change::Window(window) if window.area() > 0));
     }
@@ -229,7 +236,7 @@ fn a_contact_is_hazard_where_the_body_touches_by_the_papers_method() {
 /// Send the robot to (x, y) in `tick`. Returns the window that changed.
 fn send(mapper: &mut Mapper, tick: u64, x: f64, y: f64) -> Window {
     let (pose, target) = (at(tick, 0.0, 0.0, 0.0), Some(DVec2::new(x, y)));
-    let input = Input::Tick { pose, ranges: Vec::new(), contact: None, target };
+    let input = Input::Tick { pose, ranges: Vec::new(), scan: Vec::new(), contact: None, target };
     match mapper.step(input, MissionTime(0)) {
         Change::Window(window) => window,
         other => panic!("a tick gave {other:?}"),

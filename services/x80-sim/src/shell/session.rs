@@ -123,7 +123,7 @@ impl Session {
             heard: Instant::now(),
             strangers: 0,
             decoders: Vec::new(),
-            protocol: mission.robot.protocol,
+            protocol: mission.robot.protocol(),
             ground_truth,
             checkpoint,
         };

@@ -60,7 +60,7 @@ pub(crate) struct Arguments {
     /// commas, are compared on the same worlds.
     #[arg(long, value_delimiter = ',', default_value = HARMONIC)]
     planner: Vec<String>,
-    /// front (the front sonar alone), front+infrared, three-front (the front sonar and the two beside it) or all, the default: what the
+    /// front (the front sonar alone), front+infrared, three-front (the front sonar and the two beside it), laser or all, the default: what the
     /// evidential method senses; the paper's has the front sonar alone. Several, with commas, are compared on the same worlds.
     #[arg(long, value_delimiter = ',')]
     sensors: Vec<String>,
@@ -106,7 +106,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
         arguments.count,
         arguments.seed,
         arguments.ends(),
-        &body(&arguments.robot)?,
+        &body(&arguments.robot, &arguments.set)?,
     )?;
     let plan = Plan {
         trials: found.trials,
@@ -255,9 +255,11 @@ fn executable(planner: &str) -> Result<Option<String>, Failure> {
     Ok(Some(format!("planner.executable={value}")))
 }
 
-/// The body that every world must let through.
-fn body(robot: &str) -> Result<BodySize, Failure> {
-    let text = format!("target = [1, 0]\nrobot.model = '{robot}'");
+/// The body that every world must let through, by the robot's model and what `set` changes of it.
+fn body(robot: &str, set: &[String]) -> Result<BodySize, Failure> {
+    let radius = set.iter().rfind(|assignment| assignment.starts_with("robot.radius_m"));
+    let radius = radius.map_or("", String::as_str);
+    let text = format!("target = [1, 0]\nrobot.model = '{robot}'\n{radius}");
     let mission = Mission::parse(&text, Path::new("--robot"))?;
     let _: Model = mission.robot.model;
     Ok(BodySize { radius_m: mission.body().radius_m, margin_m: MARGIN_M })

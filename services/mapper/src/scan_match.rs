@@ -1,0 +1,323 @@
+//! The scan matcher: where the robot is, by its laser.
+//!
+//! A scan is laid over a reference scan, so that its points come to lie on the lines through the reference's points (point-to-line
+//! matching, Censi 2008). The reference is an earlier scan at the pose that was matched then; it is replaced when the robot has gone
+//! on so far that it sees other things. The pose of dead reckoning is where the search begins, and holds the robot in directions in
+//! which nothing does, as along a corridor.
+//!
+//! The result is a fix for dead reckoning, whose filter knows the errors of the wheels and takes the errors of fixes for independent.
+//! All matches with one reference share its error, so those of [`SHARED_S`] are given the weight of one.
+
+use common::{kinematics::Pose2, mission::Mission, samples::FixSample};
+use glam::{DMat3, DVec2, DVec3};
+use serde::{Deserialize, Serialize};
+
+use crate::reading::{Fan, Rows};
+
+/// The deviation of a point from its line, metres: the noise of a laser, and of the line.
+const POINT_M: f64 = 0.02;
+/// The deviation of the pose at which the search begins: metres and radians.
+const PRIOR: [f64; 2] = [0.10, 0.05];
+/// A point belongs to a line no farther away than this, metres: at the first round, and at the last ones.
+const GATES_M: [f64; 2] = [0.30, 0.08];
+const ROUNDS: usize = 8;
+/// Points that are matched of each scan, about.
+const POINTS: usize = 240;
+/// Half the length over which a line is laid through points, metres.
+const LINE_M: f64 = 0.06;
+/// Points farther than this from their neighbours are the edge of a thing, metres.
+const EDGE_M: f64 = 0.20;
+/// Points of a line are no farther from it than this, root mean square, metres.
+const STRAIGHT_M: f64 = 0.03;
+/// Lines that a point is compared with, to either side of the bearing at which it is seen, radians.
+const BESIDE_RAD: f64 = 0.08;
+/// With fewer points on lines there is no match.
+const LEAST_POINTS: usize = 10;
+/// The reference is replaced when the robot has gone so far, metres, or turned by so much, radians, or a smaller share of the points
+/// finds a line.
+const REPLACED_AFTER: (f64, f64) = (1.0, std::f64::consts::FRAC_PI_3);
+const LEAST_SHARE: f64 = 0.6;
+/// What a new reference adds to the deviation of all after it: metres and radians.
+const OF_REFERENCE: [f64; 2] = [0.015, 0.005];
+/// The errors of matches are alike for so long, seconds.
+const SHARED_S: f64 = 5.0;
+/// No match is better than this: metres and radians.
+const LEAST: [f64; 2] = [0.005, 0.002];
+
+/// A scan at a pose that is held to be known.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Reference {
+    pose: Pose2,
+    beams: Vec<f32>,
+    /// The variance of its position, m^2, and of its heading, rad^2.
+    variance: [f64; 2],
+    /// The lines through its points, by beams; not saved, because they are laid again.
+    #[serde(skip)]
+    lines: Vec<Option<Line>>,
+}
+
+/// A line through points of a scan, in the mission's frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Line {
+    point: DVec2,
+    /// A unit vector.
+    normal: DVec2,
+}
+
+/// Matches the scans of one mission's laser.
+#[derive(Clone, Debug)]
+pub(crate) struct ScanMatcher {
+    rows: Rows,
+    rate_hz: f64,
+}
+
+impl ScanMatcher {
+    pub(crate) fn new(mission: &Mission) -> Self {
+        Self { rows: Rows::new(mission), rate_hz: mission.robot.rate_hz }
+    }
+
+    /// Match `beams`, taken by a robot whose pose is `robot` by dead reckoning, with the reference, which is replaced if need be. Gives
+    /// the robot's pose by the match with its covariance; none if too little of the reference is seen.
+    pub(crate) fn step(
+        &self,
+        reference: &mut Option<Reference>,
+        robot: Pose2,
+        beams: &[f32],
+    ) -> Option<FixSample> {
+        let fan = self.rows.scan(robot, beams)?;
+        let Some(held) = reference else {
+            *reference = Some(Reference::new(&fan, robot, [0.0; 2]));
+            return None;
+        };
+        if held.lines.is_empty() {
+            // It was saved without them.
+            let saved = std::mem::take(&mut held.beams);
+            let fan = self.rows.scan(held.pose, &saved)?;
+            *held = Reference::new(&fan, held.pose, held.variance);
+        }
+        let seen_from = self.rows.scan(held.pose, beams)?;
+        let found = held.matched(&fan, &seen_from, robot);
+        let (pose, matched, share) = match found {
+            Some(found) => found,
+            None => (robot, DMat3::IDENTITY, 1.0),
+        };
+        let variance = held.variance;
+        let fix = found.map(|_| {
+            let own = [LEAST[0] * LEAST[0], LEAST[1] * LEAST[1]];
+            let more = DVec3::new(variance[0] + own[0], variance[0] + own[0], variance[1] + own[1]);
+            let all = (matched + DMat3::from_diagonal(more)) * (SHARED_S * self.rate_hz).max(1.0);
+            FixSample {
+                x_m: pose.position.x,
+                y_m: pose.position.y,
+                heading_rad: pose.heading,
+                covariance: [
+                    all.x_axis.x,
+                    all.x_axis.y,
+                    all.x_axis.z,
+                    all.y_axis.y,
+                    all.y_axis.z,
+                    all.z_axis.z,
+                ],
+                ..FixSample::default()
+            }
+        });
+        let went = pose.position.distance(held.pose.position);
+        let turned = (pose.heading - held.pose.heading).abs();
+        if went > REPLACED_AFTER.0 || turned > REPLACED_AFTER.1 || share < LEAST_SHARE {
+            // Where nothing was matched, the wheels have carried the robot on.
+            let unsure = if found.is_some() { OF_REFERENCE } else { PRIOR };
+            let fan = self.rows.scan(pose, beams)?;
+            let variance = [0, 1].map(|part| variance[part] + unsure[part] * unsure[part]);
+            *reference = Some(Reference::new(&fan, pose, variance));
+        }
+        fix
+    }
+}
+
+impl Reference {
+    fn new(fan: &Fan<'_>, pose: Pose2, variance: [f64; 2]) -> Self {
+        let points = points_of(fan);
+        let lines = (0..points.len()).map(|beam| Line::through(&points, fan, beam)).collect();
+        Self { pose, beams: fan.beams.to_vec(), variance, lines }
+    }
+
+    /// The pose at which the points of `fan` lie best on the lines, with its covariance and the share of the points that found a line.
+    /// `fan` is the scan at the pose `start`, and `seen_from` the same at the reference's pose.
+    fn matched(
+        &self,
+        fan: &Fan<'_>,
+        seen_from: &Fan<'_>,
+        start: Pose2,
+    ) -> Option<(Pose2, DMat3, f64)> {
+        let seen: Vec<_> = points_of(fan).into_iter().flatten().collect();
+        let every = seen.len().div_ceil(POINTS).max(1);
+        // Points in the robot's frame.
+        let back = DVec2::from_angle(-start.heading);
+        let points = seen.iter().step_by(every).map(|point| back.rotate(point - start.position));
+        let points: Vec<_> = points.collect();
+        let prior = DVec3::new(PRIOR[0], PRIOR[0], PRIOR[1]).map(|deviation| deviation.powi(-2));
+        let (mut pose, mut information, mut found) = (start, DMat3::ZERO, 0);
+        for round in 0..ROUNDS {
+            let gate = if round < 2 { GATES_M[0] } else { GATES_M[1] };
+            let turned = DVec2::from_angle(pose.heading);
+            (information, found) = (DMat3::ZERO, 0);
+            let gone = pose.position - start.position;
+            let mut pull = -prior * DVec3::new(gone.x, gone.y, pose.heading - start.heading);
+            for point in &points {
+                let arm = turned.rotate(*point);
+                let at = pose.position + arm;
+                let Some(line) = self.line_near(seen_from, at, gate) else {
+                    continue;
+                };
+                let off = line.normal.dot(at - line.point);
+                let by = DVec3::new(line.normal.x, line.normal.y, line.normal.dot(arm.perp()));
+                let weight = (POINT_M * POINT_M).recip();
+                information += weight * DMat3::from_cols(by * by.x, by * by.y, by * by.z);
+                pull -= weight * off * by;
+                found += 1;
+            }
+            if found < LEAST_POINTS {
+                return None;
+            }
+            let change = (information + DMat3::from_diagonal(prior)).inverse() * pull;
+            pose.position += change.truncate();
+            pose.heading += change.z;
+        }
+        // Where the scan says nothing, the covariance is that of a guess.
+        let guess = DVec3::new(1.0, 1.0, 1.0);
+        let covariance = (information + DMat3::from_diagonal(guess)).inverse();
+        let usable =
+            pose.position.is_finite() && pose.heading.is_finite() && covariance.is_finite();
+        usable.then(|| (pose, covariance, found as f64 / points.len().max(1) as f64))
+    }
+
+    /// The line nearest to `at` within `gate` metres, of those that stand near its bearing from the reference.
+    fn line_near(&self, seen_from: &Fan<'_>, at: DVec2, gate: f64) -> Option<Line> {
+        let way = at - seen_from.origin;
+        let turn = std::f64::consts::TAU;
+        let bearing = (way.to_angle() - seen_from.first_rad).rem_euclid(turn);
+        let beam = (bearing / seen_from.step_rad).round();
+        let beside = (BESIDE_RAD.max(gate / way.length().max(gate)) / seen_from.step_rad).ceil();
+        // A scan of 1,081 beams needs not each of them.
+        let stride = (beside as usize / 12).max(1);
+        let first = (beam - beside).max(0.0) as usize;
+        let last = ((beam + beside) as usize).min(self.lines.len().saturating_sub(1));
+        let near = |line: &Line| line.point.distance_squared(at);
+        (first..=last)
+            .step_by(stride)
+            .filter_map(|beam| self.lines[beam])
+            .min_by(|a, b| near(a).total_cmp(&near(b)))
+            .filter(|line| near(line) <= gate * gate)
+    }
+}
+
+impl Line {
+    /// The line through the points around `beam`; none where they are too few, an edge, or not on a line.
+    fn through(points: &[Option<DVec2>], fan: &Fan<'_>, beam: usize) -> Option<Self> {
+        let point = points[beam]?;
+        let spacing = point.distance(fan.origin) * fan.step_rad;
+        let beside = ((LINE_M / spacing.max(1e-6)).ceil() as usize).clamp(1, 40);
+        let around = points.get(beam.checked_sub(beside)?..=beam + beside)?;
+        let near = |other: &&Option<DVec2>| other.is_some_and(|at| at.distance(point) <= EDGE_M);
+        if around.iter().filter(near).count() < around.len() {
+            return None;
+        }
+        let share = 1.0 / around.len() as f64;
+        let mean = around.iter().flatten().sum::<DVec2>() * share;
+        let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+        for at in around.iter().flatten() {
+            let off = *at - mean;
+            xx += share * off.x * off.x;
+            xy += share * off.x * off.y;
+            yy += share * off.y * off.y;
+        }
+        let along = DVec2::from_angle(0.5 * (2.0 * xy).atan2(xx - yy));
+        let normal = along.perp();
+        let aside =
+            xx * normal.x * normal.x + 2.0 * xy * normal.x * normal.y + yy * normal.y * normal.y;
+        (aside <= STRAIGHT_M * STRAIGHT_M).then_some(Self { point: mean, normal })
+    }
+}
+
+/// Where the beams of `fan` end; none for those without an end.
+fn points_of(fan: &Fan<'_>) -> Vec<Option<DVec2>> {
+    let ends = |(beam, range): (usize, &f32)| {
+        let range = f64::from(*range);
+        let along = DVec2::from_angle(fan.first_rad + fan.step_rad * beam as f64);
+        (range >= 0.0 && range <= fan.reach_m).then(|| fan.origin + range * along)
+    };
+    fan.beams.iter().enumerate().map(ends).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    fn matcher() -> (Mission, ScanMatcher) {
+        let text = "target = [3, 0]\nrobot.model = 'turtlebot3-waffle'\nrobot.rate_hz = 10";
+        let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
+        let matcher = ScanMatcher::new(&mission);
+        (mission, matcher)
+    }
+
+    /// The scan of a robot at `pose` in a room of 6 by 4 metres; of a corridor along x without its ends.
+    fn scan(mission: &Mission, pose: Pose2, corridor: bool) -> Vec<f32> {
+        let mount = mission.sensor_table()[0].mount.on(pose);
+        (0..360)
+            .map(|beam| {
+                let angle = mount.heading - std::f64::consts::PI + f64::from(beam).to_radians();
+                let along = DVec2::from_angle(angle);
+                let to = |at: f64, way: f64, wall: f64| (wall * way.signum() - at) / way;
+                let across = to(mount.position.y, along.y, 2.0);
+                let range = match corridor {
+                    true => across,
+                    false => across.min(to(mount.position.x, along.x, 3.0)),
+                };
+                if range <= 8.0 { range as f32 } else { f32::INFINITY }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_scan_says_where_the_robot_is_though_its_wheels_say_otherwise() {
+        let (mission, matcher) = matcher();
+        let mut reference = None;
+        let start = Pose2::default();
+        assert_eq!(matcher.step(&mut reference, start, &scan(&mission, start, false)), None);
+        let truth = Pose2 { position: DVec2::new(0.3, 0.1), heading: 0.2 };
+        let wheels = Pose2 { position: DVec2::new(0.36, 0.05), heading: 0.17 };
+        let fix = matcher.step(&mut reference, wheels, &scan(&mission, truth, false)).unwrap();
+        let off = DVec2::new(fix.x_m, fix.y_m).distance(truth.position);
+        assert!(off < 0.01 && (fix.heading_rad - 0.2).abs() < 0.005, "{fix:?}");
+        assert!(fix.covariance[0] < 10.0 * 1e-3, "{fix:?}");
+    }
+
+    #[test]
+    fn along_a_corridor_the_wheels_are_believed() {
+        let (mission, matcher) = matcher();
+        let mut reference = None;
+        let start = Pose2::default();
+        matcher.step(&mut reference, start, &scan(&mission, start, true));
+        let wheels = Pose2 { position: DVec2::new(0.3, 0.05), heading: 0.02 };
+        let fix = matcher.step(&mut reference, wheels, &scan(&mission, start, true)).unwrap();
+        assert!((fix.x_m - 0.3).abs() < 0.01 && fix.y_m.abs() < 0.01, "{fix:?}");
+        assert!(fix.covariance[0] > 100.0 * fix.covariance[3], "{fix:?}");
+    }
+
+    #[test]
+    fn a_reference_without_its_lines_matches_as_with_them() {
+        let (mission, matcher) = matcher();
+        let (start, there) =
+            (Pose2::default(), Pose2 { position: DVec2::new(0.1, 0.0), heading: 0.1 });
+        let mut reference = None;
+        matcher.step(&mut reference, start, &scan(&mission, start, false));
+        let mut restored = reference.clone();
+        restored.as_mut().unwrap().lines.clear();
+        let beams = scan(&mission, there, false);
+        let fixes = [&mut reference, &mut restored].map(|held| matcher.step(held, start, &beams));
+        assert_eq!(fixes[0], fixes[1]);
+        assert_eq!(reference, restored);
+    }
+}

@@ -1,0 +1,37 @@
+//! Robots with a laser, which is simulated, through real processes.
+
+use recording::{
+    Recording,
+    replay::{Options, replay},
+};
+use rustix::process::Signal;
+
+use crate::support::{Run, STAGES, run};
+
+#[test]
+fn a_robot_with_a_laser_arrives_though_each_stage_is_killed_and_replays_to_the_bit() {
+    let robot = ["--pace", "2", "--set", "robot.model='kobuki'", "--set", "robot.rate_hz=20"];
+    let mut run = Run::start("laser-kills", "obstacle-course", &robot);
+    run.wait_until_under_way(0.3);
+    for stage in STAGES {
+        run.kill_and_await_successor(stage, Signal::KILL);
+    }
+    let (_, directory) = run.arrives_in();
+    let recording = Recording::open(&directory.path().join("run/recording.mcap")).unwrap();
+    assert!(recording.counts["scan"] > 100, "{:?}", recording.counts);
+    assert!(recording.counts["foxglove/scan/laser"] > 100, "{:?}", recording.counts);
+    let report = replay(&recording, &Options::default()).unwrap();
+    assert_eq!(report.difference, None, "{report}");
+    assert!(report.equal() >= 2 * STAGES.len() as u64, "{report}");
+}
+
+#[test]
+fn by_its_laser_a_robot_whose_wheels_are_not_what_they_should_be_knows_where_it_is() {
+    for seed in ["1", "2", "3"] {
+        let robot = ["--set", "robot.model='kobuki'", "--set", "robot.rate_hz=10", "--seed", seed];
+        let harsh = ["--set", "simulation.realism='harsh'", "--set", "controller.speed_m_s=0.5"];
+        let (code, summary) = run("laser-harsh", "obstacle-course", &[&robot[..], &harsh].concat());
+        assert_eq!(code, Some(0), "{summary}");
+        assert!(summary["pose_error_m"].as_f64().unwrap() < 0.12, "seed {seed}: {summary}");
+    }
+}
