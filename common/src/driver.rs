@@ -37,8 +37,10 @@ pub trait Driver: fmt::Debug {
     /// Ask the robot to answer.
     fn ping(&self) -> Vec<u8>;
 
-    /// Answer a ping of the robot.
-    fn acknowledge(&self) -> Vec<u8>;
+    /// Answer a ping of the robot. A robot that sends no pings is answered nothing.
+    fn acknowledge(&self) -> Vec<u8> {
+        Vec::new()
+    }
 
     /// A command for the speeds of the two wheels, or of a car's wheel and steering, counts/s, forward positive. After `limit` the robot
     /// stops by itself.

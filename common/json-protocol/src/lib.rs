@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// The greatest length of a line, bytes: a scan of 1,080 beams has 8 kB.
 pub const LONGEST_LINE: usize = 32_768;
 
-/// What the robot says: any of these.
+/// A report of the robot. Each field is optional.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Report {
@@ -40,12 +40,11 @@ pub struct Report {
     pub battery_v: Option<f64>,
 }
 
-/// What the robot is told.
+/// An order to the robot.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "lowercase")]
 pub enum Order {
-    /// The link has found the robot, or it has braked: it releases its brake and sends its reports so often, for as long as it hears
-    /// orders.
+    /// The link has found the robot, or it has braked: it releases its brake and reports so often from now on.
     Hello {
         /// Reports a second.
         rate_hz: f64,
@@ -54,7 +53,7 @@ pub enum Order {
     Drive {
         /// The speeds of the left and the right wheel, rad/s.
         wheels: [f64; 2],
-        /// The same as the speed ahead, m/s, and the turn, rad/s.
+        /// The speed ahead, m/s, and the turn rate, rad/s, that `wheels` give.
         twist: [f64; 2],
         /// The time after which the robot stands.
         for_s: f64,
@@ -65,23 +64,9 @@ pub enum Order {
     Ping {},
 }
 
-impl Order {
-    /// The line that says it.
-    #[must_use]
-    pub fn line(&self) -> Vec<u8> {
-        line(self)
-    }
-}
-
-impl Report {
-    /// The line that says it.
-    #[must_use]
-    pub fn line(&self) -> Vec<u8> {
-        line(self)
-    }
-}
-
-fn line(message: &impl Serialize) -> Vec<u8> {
+/// Encode a message as one line.
+#[must_use]
+pub fn line(message: &impl Serialize) -> Vec<u8> {
     // A struct of numbers and names always serialises.
     let mut line = serde_json::to_vec(message).unwrap_or_default();
     line.push(b'\n');
@@ -146,8 +131,8 @@ mod tests {
     fn an_order_is_a_line_that_says_itself() {
         let drive = Order::Drive { wheels: [1.0, 2.0], twist: [0.1, 0.2], for_s: 0.25 };
         let said = r#"{"drive":{"wheels":[1.0,2.0],"twist":[0.1,0.2],"for_s":0.25}}"#;
-        assert_eq!(drive.line(), format!("{said}\n").as_bytes());
-        assert_eq!(Order::Brake {}.line(), b"{\"brake\":{}}\n");
+        assert_eq!(line(&drive), format!("{said}\n").as_bytes());
+        assert_eq!(line(&Order::Brake {}), b"{\"brake\":{}}\n");
         assert_eq!(parse::<Order>(said.as_bytes()), Ok(drive));
     }
 

@@ -439,6 +439,13 @@ impl Mission {
         sensor::table(&rows, *rate_hz, &self.sonar, self.sensor_set())
     }
 
+    /// The row of the laser in [`Mission::sensor_table`], and the laser; none of a robot without one.
+    #[must_use]
+    pub fn laser(&self) -> Option<(usize, Sensor)> {
+        let mut rows = self.sensor_table().into_iter().enumerate();
+        rows.find(|(_, sensor)| sensor.kind == SensorKind::Scan)
+    }
+
     /// The row of the front sonar in [`Mission::sensor_table`].
     #[must_use]
     pub fn front_row(&self) -> usize {

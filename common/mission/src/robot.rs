@@ -248,7 +248,7 @@ impl Body {
     }
 }
 
-/// A body that tells its wheels' angles, of which a count is a step of 0.1 degrees.
+/// The body of a robot that reports the angles of its wheels; one count is 0.1 degrees.
 const fn differential(
     wheel_radius_m: f64,
     track_m: f64,
@@ -286,7 +286,7 @@ impl Model {
                 top_speed_m_s: 0.76,
                 steering: None,
             },
-            // 508 mm by 430 mm; its encoders count so many a turn, and no word of ours depends on it.
+            // 508 mm by 430 mm.
             Self::Jackal => differential(0.098, 0.375_59, 0.333, 2.0),
             Self::TurtleBot3Burger => differential(0.033, 0.16, 0.105, 0.22),
             Self::TurtleBot3Waffle => differential(0.033, 0.287, 0.22, 0.26),

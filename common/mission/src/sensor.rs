@@ -264,7 +264,7 @@ pub enum Sensors {
     /// The front sonar and the cones within 60 degrees of it.
     #[serde(rename = "three-front")]
     ThreeFront,
-    /// The lasers alone.
+    /// The laser alone.
     #[serde(rename = "laser")]
     Laser,
     /// All that the robot has.
@@ -301,7 +301,7 @@ pub(crate) fn table(
 }
 
 /// The row of the front sonar. Without rows of the mission it is the first, wherever `[sonar]` says that it looks. Of a robot without
-/// sonars it is the sensor whose bearing is the least.
+/// sonars it is the sensor that looks most nearly there.
 pub(crate) fn front(table: &[Sensor], sonar: &SonarConfig) -> Option<usize> {
     let ahead = |sensor: &Sensor| (sensor.bearing_deg() - sonar.bearing_deg).abs();
     let any_cone = table.iter().any(|sensor| sensor.kind == SensorKind::Cone);
@@ -310,7 +310,7 @@ pub(crate) fn front(table: &[Sensor], sonar: &SonarConfig) -> Option<usize> {
     candidates.min_by(|(_, a), (_, b)| ahead(a).total_cmp(&ahead(b))).map(|(index, _)| index)
 }
 
-/// The one row of a robot with a laser in its middle.
+/// The one row of a robot with a laser alone.
 pub(crate) fn laser(model: SensorModel, forward_m: f64) -> Vec<SensorRow> {
     vec![SensorRow {
         name: "laser".to_owned(),

@@ -5,16 +5,22 @@ use std::{collections::BTreeMap, f64::consts::TAU, time::Duration};
 use common::{
     driver::{Driver, Heard, Motion, Readings, StopMethod, WireTally},
     geometry::wrap_angle,
-    json_wire::{Lines, Order, Report, parse},
+    json_wire::{Lines, Order, Report, line, parse},
     kinematics::Pose2,
-    mission::{Body, Mission, Sensor, SensorKind},
+    mission::{Body, Mission, Sensor},
     samples::{PowerSample, RangeReading, RangeStatus, WheelSample},
     wire::COUNT_CYCLE,
 };
 use glam::DVec2;
 
+/// No odometry says that a robot is farther away, metres, or has turned farther, radians.
+const FARTHEST: f64 = 1e6;
 /// More orders than these are not counted as answered by one report.
-const MOST_ANSWERED: u64 = 64;
+const MOST_ANSWERED: usize = 64;
+/// A laser whose scans are the same to the bit while a wheel turns so far is stuck, radians.
+const STUCK_RAD: f64 = 1.0;
+/// The current of a wheel that is held: all that the converter of an X80 can say, AD counts.
+const HELD_AD: u16 = 4095;
 
 /// A robot that speaks lines of JSON.
 #[derive(Clone, Debug)]
@@ -24,8 +30,12 @@ pub struct Json {
     lines: Lines,
     waiting: Vec<Vec<u8>>,
     readings: Readings,
-    /// The row of the laser; none without one.
-    laser: Option<usize>,
+    /// The laser and its row; none without one.
+    laser: Option<(usize, Sensor)>,
+    /// The newest scan that differs from the one before, and the angles of the wheels then.
+    newest_scan: (Vec<f32>, [f64; 2]),
+    /// The angles of the wheels.
+    turned: [f64; 2],
     /// The beams since the last tick.
     scan: Vec<f32>,
     /// The number of orders that the robot has taken.
@@ -37,76 +47,93 @@ pub struct Json {
 impl Json {
     /// The driver of `mission`'s robot.
     pub fn new(mission: &Mission) -> Self {
-        let readings = Readings::new(mission);
-        let is_laser = |sensor: &Sensor| sensor.kind == SensorKind::Scan;
         Self {
-            laser: readings.table().iter().position(is_laser),
+            laser: mission.laser(),
+            newest_scan: (Vec::new(), [0.0; 2]),
+            turned: [0.0; 2],
             scan: Vec::new(),
             body: mission.body(),
             rate_hz: mission.robot.rate_hz,
             lines: Lines::default(),
             waiting: Vec::new(),
-            readings,
+            readings: Readings::new(mission),
             answered: None,
             odometry: Odometry::default(),
             tally: WireTally::default(),
         }
     }
 
+    /// Take a report, or say why it is refused; then nothing of it is taken.
     fn take(&mut self, report: &Report, heard: &mut Heard) -> Result<(), String> {
-        self.take_ranges(&report.ranges)?;
-        report.scan.as_deref().map_or(Ok(()), |scan| self.take_scan(scan))?;
+        let rows = self.rows_of(&report.ranges)?;
+        let scan = report.scan.as_deref().map(|scan| self.beams_of(scan)).transpose()?;
+        let turned = match (report.wheels, report.odometry) {
+            (Some(_), Some(_)) => return Err("wheels and odometry: say one of them".to_owned()),
+            (Some(turned), None) => Some(turned),
+            (None, Some(odometry)) => {
+                let turned = self.odometry.turned(odometry, &self.body);
+                Some(turned.ok_or("odometry that no robot can have: say metres and radians")?)
+            }
+            (None, None) => None,
+        };
+        if turned.is_some() && report.speeds.is_none() {
+            return Err("wheels or odometry without speeds: say both".to_owned());
+        }
+        for (row, range) in rows {
+            self.take_range(row, range);
+        }
+        if let (Some(turned), Some(speeds)) = (turned, report.speeds) {
+            self.turned = turned;
+            heard.motion = Some(self.motion(turned, speeds, report.held.unwrap_or_default()));
+        }
+        if let Some((row, beams)) = scan {
+            self.take_scan(row, beams);
+        }
         if let Some(count) = report.heard {
             // A robot that has restarted counts from 0.
             let before = self.answered.replace(count).filter(|before| *before <= count);
             let answered = before.map_or(0, |before| count - before);
-            heard.acknowledged += answered.min(MOST_ANSWERED) as usize;
+            heard.acknowledged = MOST_ANSWERED.min(heard.acknowledged + answered as usize);
         }
-        heard.power = report.battery_v.map(|volts| PowerSample {
-            board_v: volts,
-            motor_v: volts,
-            servo_v: volts,
-            ..PowerSample::default()
-        });
-        let turned = match (report.wheels, report.odometry) {
-            (Some(_), Some(_)) => return Err("wheels and odometry: say one of them".to_owned()),
-            (Some(turned), None) => turned,
-            (None, Some(odometry)) => self.odometry.turned(odometry, &self.body),
-            (None, None) => return Ok(()),
-        };
-        let Some(speeds) = report.speeds else {
-            return Err("wheels or odometry without speeds: say both".to_owned());
-        };
-        heard.motion = Some(self.motion(turned, speeds, report.held.unwrap_or_default()));
+        if let Some(volts) = report.battery_v {
+            let (board_v, motor_v, servo_v) = (volts, volts, volts);
+            heard.power = Some(PowerSample { board_v, motor_v, servo_v, ..PowerSample::default() });
+        }
         Ok(())
     }
 
-    fn take_ranges(&mut self, ranges: &BTreeMap<String, Option<f64>>) -> Result<(), String> {
-        for (name, range) in ranges {
-            let table = self.readings.table();
-            let Some(row) = table.iter().position(|sensor| sensor.name == *name) else {
+    /// The rows of the mission's sensors with these names.
+    fn rows_of(
+        &self,
+        ranges: &BTreeMap<String, Option<f64>>,
+    ) -> Result<Vec<(usize, Option<f64>)>, String> {
+        let table = self.readings.table();
+        let row = |(name, range): (&String, &Option<f64>)| {
+            let row = table.iter().position(|sensor| sensor.name == *name);
+            row.map(|row| (row, *range)).ok_or_else(|| {
                 let names: Vec<_> = table.iter().map(|sensor| sensor.name.as_str()).collect();
-                return Err(format!("no sensor is called {name:?}; {} are", names.join(", ")));
-            };
-            let reach_m = table[row].reach_m;
-            let (status, range_m) = match *range {
-                Some(range) if range < 0.0 => (RangeStatus::Invalid, 0.0),
-                Some(range) if range <= reach_m => (RangeStatus::Measured, range),
-                _ => (RangeStatus::Nothing, 0.0),
-            };
-            let raw = (range_m * 100.0).round() as u16;
-            let status = status.into();
-            self.readings.take(row, RangeReading { range_m, raw, status, ..Default::default() });
-        }
-        Ok(())
+                format!("no sensor is called {name:?}; {} are", names.join(", "))
+            })
+        };
+        ranges.iter().map(row).collect()
     }
 
-    /// Take the beams of a laser. As a reading of its row the nearest of them counts.
-    fn take_scan(&mut self, beams: &[Option<f32>]) -> Result<(), String> {
-        let Some(row) = self.laser else {
+    fn take_range(&mut self, row: usize, range: Option<f64>) {
+        let reach_m = self.readings.table()[row].reach_m;
+        let (status, range_m) = match range {
+            Some(range) if range < 0.0 => (RangeStatus::Invalid, 0.0),
+            Some(range) if range <= reach_m => (RangeStatus::Measured, range),
+            _ => (RangeStatus::Nothing, 0.0),
+        };
+        let (raw, status) = ((range_m * 100.0).round() as u16, status.into());
+        self.readings.take(row, RangeReading { range_m, raw, status, ..RangeReading::default() });
+    }
+
+    /// The row of the laser, and its beams as the topic `scan` has them.
+    fn beams_of(&self, beams: &[Option<f32>]) -> Result<(usize, Vec<f32>), String> {
+        let Some((row, sensor)) = &self.laser else {
             return Err("a scan, and the mission has no laser: add a row of kind scan".to_owned());
         };
-        let sensor = &self.readings.table()[row];
         if beams.len() != sensor.beams {
             let (came, want) = (beams.len(), sensor.beams);
             return Err(format!("a scan of {came} beams, and the mission's laser has {want}"));
@@ -117,8 +144,22 @@ impl Json {
             Some(range) if range <= reach_m => range,
             _ => f32::INFINITY,
         };
-        self.scan = beams.iter().map(range).collect();
-        let nearest = self.scan.iter().copied().fold(f32::NAN, f32::min);
+        Ok((*row, beams.iter().map(range).collect()))
+    }
+
+    /// Take the beams of the laser in `row`. As a reading of its row the nearest of them counts; none does of a laser that says the same
+    /// although the wheels have turned.
+    fn take_scan(&mut self, row: usize, beams: Vec<f32>) {
+        let bits = |beams: &[f32]| beams.iter().map(|beam| beam.to_bits()).collect::<Vec<_>>();
+        let (newest, turned_then) = &self.newest_scan;
+        if bits(newest) != bits(&beams) || !beams.iter().any(|beam| beam.is_finite()) {
+            self.newest_scan = (beams.clone(), self.turned);
+        } else if (0..2).any(|wheel| (self.turned[wheel] - turned_then[wheel]).abs() > STUCK_RAD) {
+            let status = RangeStatus::Invalid.into();
+            self.readings.take(row, RangeReading { status, ..RangeReading::default() });
+            return;
+        }
+        let nearest = beams.iter().copied().fold(f32::NAN, f32::min);
         let (status, range_m) = match nearest {
             nearest if nearest.is_nan() => (RangeStatus::Invalid, 0.0),
             nearest if nearest.is_infinite() => (RangeStatus::Nothing, 0.0),
@@ -126,7 +167,7 @@ impl Json {
         };
         let status = status.into();
         self.readings.take(row, RangeReading { range_m, status, ..RangeReading::default() });
-        Ok(())
+        self.scan = beams;
     }
 
     fn motion(&self, turned: [f64; 2], speeds: [f64; 2], held: [bool; 2]) -> Motion {
@@ -144,12 +185,8 @@ impl Json {
                 ..WheelSample::default()
             },
             // A wheel that is held draws all that its motor can.
-            currents: held.map(|held| if held { u16::MAX } else { 0 }),
+            currents: held.map(|held| if held { HELD_AD } else { 0 }),
         }
-    }
-
-    fn order(order: &Order) -> Vec<u8> {
-        order.line()
     }
 }
 
@@ -194,7 +231,7 @@ impl Driver for Json {
     }
 
     fn greeting(&self) -> Vec<u8> {
-        Self::order(&Order::Hello { rate_hz: self.rate_hz })
+        line(&Order::Hello { rate_hz: self.rate_hz })
     }
 
     fn ask_for_sensors(&self) -> Vec<u8> {
@@ -202,22 +239,18 @@ impl Driver for Json {
     }
 
     fn ping(&self) -> Vec<u8> {
-        Self::order(&Order::Ping {})
-    }
-
-    fn acknowledge(&self) -> Vec<u8> {
-        self.ping()
+        line(&Order::Ping {})
     }
 
     fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8> {
         let wheels = counts.map(|counts| f64::from(counts) * TAU / self.body.counts_per_turn);
         let [left, right] = wheels.map(|speed| speed * self.body.wheel_radius_m);
         let twist = [(left + right) / 2.0, (right - left) / self.body.track_m];
-        Self::order(&Order::Drive { wheels, twist, for_s: limit.as_secs_f64() })
+        line(&Order::Drive { wheels, twist, for_s: limit.as_secs_f64() })
     }
 
     fn other_stops(&self) -> Vec<StopMethod> {
-        vec![StopMethod { name: "brake", bytes: Self::order(&Order::Brake {}) }]
+        vec![StopMethod { name: "brake", bytes: line(&Order::Brake {}) }]
     }
 }
 
@@ -230,10 +263,14 @@ struct Odometry {
 
 impl Odometry {
     /// The robot is at `x`, `y` with this heading by its odometry. What it slipped aside is left out, as wheels leave it out.
-    fn turned(&mut self, [x, y, heading]: [f64; 3], body: &Body) -> [f64; 2] {
+    /// None if the numbers are too great to be a way.
+    fn turned(&mut self, [x, y, heading]: [f64; 3], body: &Body) -> Option<[f64; 2]> {
         let now = Pose2 { position: DVec2::new(x, y), heading };
+        if now.position.length() > FARTHEST || heading.abs() > FARTHEST {
+            return None;
+        }
         let Some(last) = self.last.replace(now) else {
-            return self.turned;
+            return Some(self.turned);
         };
         let turn = wrap_angle(now.heading - last.heading);
         let middle = DVec2::from_angle(last.heading + turn / 2.0);
@@ -244,7 +281,7 @@ impl Odometry {
         for (turned, side) in self.turned.iter_mut().zip([-1.0, 1.0]) {
             *turned += (arc + side * turn * body.track_m / 2.0) / body.wheel_radius_m;
         }
-        self.turned
+        Some(self.turned)
     }
 }
 
@@ -270,7 +307,7 @@ mod tests {
         let motion = heard(&mut driver(), said).motion.unwrap();
         assert_eq!((motion.wheels.left_counts, motion.wheels.right_counts), (3600, 32_768 - 1800));
         assert_eq!(motion.wheels.right_counts_per_s, -573);
-        assert_eq!(motion.currents, [0, u16::MAX]);
+        assert_eq!(motion.currents, [0, 4095]);
     }
 
     #[test]
@@ -293,12 +330,39 @@ mod tests {
             (r#"{"ranges":{"nose":1}}"#, "no sensor is called \"nose\"; front,"),
             (r#"{"wheels":[0,0]}"#, "without speeds"),
             (r#"{"wheels":[0,0],"odometry":[0,0,0],"speeds":[0,0]}"#, "say one of them"),
+            (r#"{"odometry":[1e300,0,0],"speeds":[0,0]}"#, "no robot can have"),
             (r#"{"wheel":[0,0]}"#, "unknown field `wheel`"),
         ] {
             let heard = heard(&mut driver(), said);
             assert!(!heard.anything && heard.motion.is_none(), "{said}");
             assert!(heard.refused.is_some_and(|refused| refused.contains(why)), "{said}");
         }
+    }
+
+    #[test]
+    fn a_refused_line_is_taken_in_no_part_and_another_keeps_the_battery_of_the_one_before() {
+        let mut driver = driver();
+        let half = r#"{"heard":9,"battery_v":12,"ranges":{"front":1,"nose":1}}"#;
+        let refused = heard(&mut driver, half);
+        assert!(refused.readings.is_empty() && refused.power.is_none(), "{refused:?}");
+        let both = heard(&mut driver, "{\"battery_v\":12}\n{\"heard\":1}");
+        assert!(both.power.is_some_and(|power| power.motor_v == 12.0));
+    }
+
+    #[test]
+    fn a_laser_that_says_the_same_while_the_wheels_turn_gives_no_reading_until_it_changes() {
+        let text = "target = [3, 0]\nrobot.model = 'kobuki'";
+        let mut driver = Json::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
+        let mut scan = |range: f64, turned: f64| {
+            let beams = vec![range.to_string(); 360].join(",");
+            let wheels = format!("\"wheels\":[{turned},{turned}],\"speeds\":[1,1]");
+            let heard = heard(&mut driver, &format!("{{{wheels},\"scan\":[{beams}]}}"));
+            (heard.readings[0].status(), driver.scan_for_tick().len())
+        };
+        let measured = (RangeStatus::Measured, 360);
+        assert_eq!([scan(1.0, 0.0), scan(1.0, 0.1), scan(1.0, 0.9)], [measured; 3]);
+        assert_eq!(scan(1.0, 1.1), (RangeStatus::Invalid, 0));
+        assert_eq!(scan(1.5, 1.2), measured);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 use common::{
     clock::{MissionClock, MissionTime, Pace},
     inputs,
-    mission::{Mission, SensorKind},
+    mission::Mission,
     outputs::Outputs,
     samples::{
         CommandSample, Direction, HoldReason, InfraredSample, Order, PowerSample, RangesHeader,
@@ -101,13 +101,6 @@ pub struct LinkStage {
     wire: Vec<(Progress, WireHeader, Vec<u8>)>,
 }
 
-fn laser(mission: &Mission) -> Option<ScanHeader> {
-    let table = mission.sensor_table();
-    let mut rows = table.iter().enumerate();
-    let (row, sensor) = rows.find(|(_, sensor)| sensor.kind == SensorKind::Scan)?;
-    Some(ScanHeader::of(row, sensor))
-}
-
 impl LinkStage {
     /// Whether telemetry waits to be published.
     pub(crate) const fn has_telemetry(&self) -> bool {
@@ -174,7 +167,7 @@ impl Stage for LinkStage {
     fn new(mission: &Mission) -> Self {
         Self {
             link: Link::new(mission),
-            laser: laser(mission),
+            laser: mission.laser().map(|(row, laser)| ScanHeader::of(row, &laser)),
             infrared: None,
             power: None,
             surroundings: None,

@@ -105,8 +105,8 @@ pub struct Link {
     /// In lockstep, the motor frames that the robot still has to send, one for each command and each ping since the order.
     due: u32,
     tally: Tally,
-    /// The newest reason for which a message was refused.
-    refused: Option<String>,
+    /// The time at which a refused message was last logged.
+    refused_ns: Option<u64>,
 }
 
 impl Step for Link {
@@ -141,7 +141,7 @@ impl Step for Link {
             stop_sent_ns: None,
             due: 0,
             tally: Tally::default(),
-            refused: None,
+            refused_ns: None,
         }
     }
 

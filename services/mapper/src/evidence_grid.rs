@@ -311,8 +311,7 @@ impl EvidenceGrid {
         window
     }
 
-    /// Change the weight of a cell that a laser saw by `change`; positive means that an obstacle stands in it. Ground that is seen free is
-    /// scanned. Returns the window that changed.
+    /// Change the weight of a cell that a laser saw by `change`; positive means that an obstacle stands in it. What is seen is scanned. Returns the window that changed.
     pub(crate) fn weigh_seen(
         &mut self,
         sonar: &SonarModel,
@@ -328,7 +327,7 @@ impl EvidenceGrid {
         if change > 0 {
             self.occupied[index] |= SEEN;
             self.set(sonar, lattice, cell, weight.max(-sonar.pass).saturating_add(change), flips);
-        } else if self.occupied[index] & TOUCHED == 0 {
+        } else if change < 0 && self.occupied[index] & TOUCHED == 0 {
             self.set(sonar, lattice, cell, weight.saturating_add(change), flips);
         }
         let same = was_scanned && was_occupied == self.is_occupied(index);

@@ -22,6 +22,12 @@ const HIT: i8 = 6;
 /// Weight taken off a cell that beams passed and in which none ended. Two scans free a cell that many others filled.
 const PASS: i8 = 6;
 
+/// A beam that passes a cell and ends no farther behind it is no evidence against a thing in it: along a wall at a slant most beams pass
+/// a part of it before they end in the next one, metres.
+const NEAR_END_M: f64 = 0.25;
+/// No robot is farther from its map, cells.
+const FARTHEST: f64 = 1e6;
+
 /// A cell is occupied if of so many beams that pass at least one ends.
 const PASS_FOR_ONE_THAT_ENDS: u16 = 4;
 
@@ -30,18 +36,27 @@ const PASS_FOR_ONE_THAT_ENDS: u16 = 4;
 struct Beams {
     passed: u16,
     ended: u16,
+    /// Whether one of those that passed ends far behind.
+    passed_far: bool,
 }
 
 impl Beams {
-    const PASSED: Self = Self { passed: 1, ended: 0 };
-    const ENDED: Self = Self { passed: 0, ended: 1 };
+    const ENDED: Self = Self { passed: 0, ended: 1, passed_far: false };
+
+    const fn passed(far: bool) -> Self {
+        Self { passed: 1, ended: 0, passed_far: far }
+    }
 
     const fn and(self, other: Self) -> Self {
-        Self { passed: self.passed + other.passed, ended: self.ended + other.ended }
+        Self {
+            passed: self.passed.saturating_add(other.passed),
+            ended: self.ended.saturating_add(other.ended),
+            passed_far: self.passed_far || other.passed_far,
+        }
     }
 
     const fn are_of_a_thing(self) -> bool {
-        self.ended > 0 && self.ended * PASS_FOR_ONE_THAT_ENDS >= self.passed
+        self.ended > 0 && self.ended.saturating_mul(PASS_FOR_ONE_THAT_ENDS) >= self.passed
     }
 }
 
@@ -102,6 +117,11 @@ impl EvidenceGrid {
         let mut touched = Vec::new();
         let side = i32::try_from(lattice.cells).unwrap_or(i32::MAX);
         let origin = lattice.to_cells(fan.origin);
+        let near_end = NEAR_END_M / lattice.resolution_m;
+        // The pose comes from shared memory.
+        if !(origin.is_finite() && origin.abs().max_element() < FARTHEST) {
+            return Window::default();
+        }
         let mut note = |cell: IVec2, result: Beams| {
             let inside = cell.cmpge(IVec2::ZERO).all() && cell.cmplt(IVec2::splat(side)).all();
             if inside {
@@ -124,7 +144,9 @@ impl EvidenceGrid {
             let mut way = Along::new(origin, along);
             let mut inside = true;
             while way.ends() < range && inside {
-                inside = note(way.cell, Beams::PASSED) || !left_behind(way.cell, way.step, side);
+                let far = way.ends() + near_end < range;
+                inside =
+                    note(way.cell, Beams::passed(far)) || !left_behind(way.cell, way.step, side);
                 way.advance();
             }
             if inside && range_m <= fan.reach_m {
@@ -134,11 +156,16 @@ impl EvidenceGrid {
         let mut window = self.stand(sonar, lattice, (robot, radius), flips);
         for cell in touched {
             let index = lattice.index(cell);
-            let ended = results[index].are_of_a_thing();
-            if ended && lattice.centre_of(cell).distance(robot) <= radius {
+            let beams = results[index];
+            let is_thing = beams.are_of_a_thing();
+            if is_thing && lattice.centre_of(cell).distance(robot) <= radius {
                 continue;
             }
-            let change = if ended { HIT } else { -PASS };
+            let change = match beams {
+                _ if is_thing => HIT,
+                Beams { ended: 0, passed_far: true, .. } => -PASS,
+                _ => 0,
+            };
             window = window.union(self.weigh_seen(sonar, lattice, cell, change, flips));
         }
         window

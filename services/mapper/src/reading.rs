@@ -46,13 +46,9 @@ impl Rows {
                 cone: (sensor.kind == SensorKind::Cone).then(|| SonarModel::of(&sensor)),
             })
         };
-        let table = mission.sensor_table();
         Self {
-            laser: table
-                .iter()
-                .find(|sensor| sensor.used && sensor.kind == SensorKind::Scan)
-                .and_then(|sensor| Some((sensor.fan(), row(sensor.clone())?))),
-            rows: table.into_iter().map(row).collect(),
+            laser: mission.laser().and_then(|(_, laser)| Some((laser.fan(), row(laser)?))),
+            rows: mission.sensor_table().into_iter().map(row).collect(),
             front: mission.front_row() as u8,
         }
     }

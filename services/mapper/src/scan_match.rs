@@ -39,6 +39,8 @@ const REPLACED_AFTER: (f64, f64) = (1.0, std::f64::consts::FRAC_PI_3);
 const LEAST_SHARE: f64 = 0.6;
 /// What a new reference adds to the deviation of all after it: metres and radians.
 const OF_REFERENCE: [f64; 2] = [0.015, 0.005];
+/// More fixes a second would leave no room for those of others.
+const MOST_FIXES_HZ: f64 = 20.0;
 /// The errors of matches are alike for so long, seconds.
 const SHARED_S: f64 = 5.0;
 /// No match is better than this: metres and radians.
@@ -68,12 +70,24 @@ struct Line {
 #[derive(Clone, Debug)]
 pub(crate) struct ScanMatcher {
     rows: Rows,
-    rate_hz: f64,
+    /// A match in so many ticks is published.
+    every_ticks: u64,
+    /// The matches that share their errors.
+    shared: f64,
 }
 
 impl ScanMatcher {
     pub(crate) fn new(mission: &Mission) -> Self {
-        Self { rows: Rows::new(mission), rate_hz: mission.robot.rate_hz }
+        let rate_hz = mission.robot.rate_hz;
+        let every_ticks = (rate_hz / MOST_FIXES_HZ).ceil().max(1.0) as u64;
+        let scans = mission.laser().map_or(1, |(_, laser)| laser.every_ticks.max(1));
+        let fixes_hz = rate_hz / every_ticks.max(scans) as f64;
+        Self { rows: Rows::new(mission), every_ticks, shared: (SHARED_S * fixes_hz).max(1.0) }
+    }
+
+    /// Whether the match of `tick` is published.
+    pub(crate) const fn publishes(&self, tick: u64) -> bool {
+        tick.is_multiple_of(self.every_ticks)
     }
 
     /// Match `beams`, taken by a robot whose pose is `robot` by dead reckoning, with the reference, which is replaced if need be. Gives
@@ -105,7 +119,7 @@ impl ScanMatcher {
         let fix = found.map(|_| {
             let own = [LEAST[0] * LEAST[0], LEAST[1] * LEAST[1]];
             let more = DVec3::new(variance[0] + own[0], variance[0] + own[0], variance[1] + own[1]);
-            let all = (matched + DMat3::from_diagonal(more)) * (SHARED_S * self.rate_hz).max(1.0);
+            let all = (matched + DMat3::from_diagonal(more)) * self.shared;
             FixSample {
                 x_m: pose.position.x,
                 y_m: pose.position.y,
@@ -194,18 +208,18 @@ impl Reference {
     /// The line nearest to `at` within `gate` metres, of those that stand near its bearing from the reference.
     fn line_near(&self, seen_from: &Fan<'_>, at: DVec2, gate: f64) -> Option<Line> {
         let way = at - seen_from.origin;
-        let turn = std::f64::consts::TAU;
-        let bearing = (way.to_angle() - seen_from.first_rad).rem_euclid(turn);
-        let beam = (bearing / seen_from.step_rad).round();
+        let bearing = (way.to_angle() - seen_from.first_rad).rem_euclid(std::f64::consts::TAU);
+        let beam = (bearing / seen_from.step_rad).round() as i32;
         let beside = (BESIDE_RAD.max(gate / way.length().max(gate)) / seen_from.step_rad).ceil();
+        let beside = beside as i32;
         // A scan of 1,081 beams needs not each of them.
-        let stride = (beside as usize / 12).max(1);
-        let first = (beam - beside).max(0.0) as usize;
-        let last = ((beam + beside) as usize).min(self.lines.len().saturating_sub(1));
+        let stride = (beside / 12).max(1) as usize;
+        let whole_turn = (std::f64::consts::TAU / seen_from.step_rad).round() as i32;
         let near = |line: &Line| line.point.distance_squared(at);
-        (first..=last)
+        (-beside..=beside)
             .step_by(stride)
-            .filter_map(|beam| self.lines[beam])
+            .map(|beside| (beam + beside).rem_euclid(whole_turn.max(1)) as usize)
+            .filter_map(|beam| *self.lines.get(beam)?)
             .min_by(|a, b| near(a).total_cmp(&near(b)))
             .filter(|line| near(line) <= gate * gate)
     }

@@ -50,7 +50,7 @@ impl Process for Shell {
         inputs: &[&RANGES, &SCAN, &CONTACT, &POSE, &DIRECTIVE, &TARGET],
         // A planner that becomes ready is a new reader of the grid.
         wakes: &[&POSE, &DIRECTIVE, &HEALTH],
-        outputs: &[&SCAN_FIX, &GRID],
+        outputs: &[&GRID, &SCAN_FIX],
         persists: Persists::Journal,
         ..Wiring::of("mapper")
     };

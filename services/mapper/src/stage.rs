@@ -53,6 +53,8 @@ impl Stage for Mapper {
         for input in start.inputs {
             self.step(input, Progress::default().time);
         }
+        // What the last of them gave was published then.
+        self.take_fix();
         restored
     }
 

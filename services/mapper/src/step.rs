@@ -215,6 +215,7 @@ impl Step for Mapper {
                 let moved = target.map_or(Window::default(), |target| self.move_target(target));
                 if self.belief.tick != Some(pose.stamp.tick) {
                     let fix = self.matcher.step(&mut self.belief.reference, pose.pose(), &scan);
+                    let fix = fix.filter(|_| self.matcher.publishes(pose.stamp.tick));
                     let source = name("scan");
                     self.fix = fix.map(|fix| FixSample { capture_ns: now.0, source, ..fix });
                 }
@@ -488,6 +489,7 @@ impl Mapper {
             }
         }
         self.belief.fault = fault::after_reset(self.belief.fault);
+        self.belief.reference = None;
         self.falsify();
         self.belief.epoch = epoch;
         self.belief.version += 1;

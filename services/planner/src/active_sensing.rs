@@ -24,7 +24,7 @@ use crate::{
 
 /// The ground under so much of the way ahead must have been scanned, and no surface could be touched there undetected, metres.
 const SCANNED_AHEAD_M: f64 = 0.25;
-/// How far ahead the way is followed, metres, and at least the arc.
+/// The planned way is followed so far ahead, metres; the arc at least so far.
 const AHEAD_M: f64 = 0.6;
 
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,9 +1,10 @@
-//! The words of a simulated robot that speaks lines of JSON: its boards are those of an X80, and this stands before them.
+//! The words of a simulated robot that speaks lines of JSON: orders become commands of the boards of a simulated X80, and their
+//! readings become reports.
 
 use std::f64::consts::TAU;
 
 use common::{
-    json_wire::{Order, Report},
+    json_wire::{Order, Report, line},
     mission::{Mission, RobotConfig, Sensor, SensorKind},
     wire::{
         Command, CustomSensors, Echo, Feedback, INFRARED_LIVE_AD, MOTOR_SCALE_V, Mode,
@@ -67,7 +68,7 @@ impl JsonWords {
 
     /// The answer to an order.
     pub(crate) fn acknowledgement(&self) -> Vec<u8> {
-        Report { heard: Some(self.heard), ..Report::default() }.line()
+        line(&Report { heard: Some(self.heard), ..Report::default() })
     }
 
     /// The report of a tick.
@@ -107,7 +108,7 @@ impl JsonWords {
             odometry: None,
             scan: (!scan.is_empty()).then(|| scan.to_vec()),
         };
-        report.line()
+        line(&report)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use common::{
     kinematics::Pose2,
-    mission::{Mission, Sensor, SensorKind},
+    mission::{Mission, Sensor},
 };
 use glam::DVec2;
 
@@ -24,8 +24,7 @@ pub(crate) struct Laser {
 impl Laser {
     /// The laser of `mission`'s robot, whose noise follows from `seed`; none without one.
     pub(crate) fn new(mission: &Mission, seed: u64) -> Option<Self> {
-        let mut table = mission.sensor_table().into_iter();
-        let sensor = table.find(|sensor| sensor.kind == SensorKind::Scan)?;
+        let (_, sensor) = mission.laser()?;
         Some(Self { sensor, noise: Noise::new(seed, Source::Laser) })
     }
 

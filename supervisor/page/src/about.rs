@@ -16,6 +16,7 @@ pub fn about(run: &Run) -> Value {
             json!({
                 "name": sensor.name,
                 "cone": sensor.kind == SensorKind::Cone,
+                "scan": sensor.kind == SensorKind::Scan,
                 "forward_m": sensor.mount.forward_m,
                 "bearing": sensor.mount.bearing_rad,
                 "half": sensor.field_of_view_deg.to_radians() / 2.0,

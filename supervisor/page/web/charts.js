@@ -28,7 +28,7 @@ function histogram(values) {
 /// What the charts show: a title, a unit, and series with a name and their values in the store.
 function charts(store) {
   const column = (name, text) => ({ text, of: () => store.columns[name] });
-  const sensors = (cone) => store.about.sensors.map((sensor, at) => ({ sensor, text: sensor.name, of: () => store.ranges[at] })).filter(({ sensor }) => sensor.cone === cone);
+  const sensors = (cone) => store.about.sensors.map((sensor, at) => ({ sensor, text: sensor.name, of: () => store.ranges[at] })).filter(({ sensor }) => sensor.cone === cone && !sensor.scan);
   const { steers } = store.about;
   return [
     { title: "Speed", unit: "m/s", series: [column("v", "driven"), column("v_told", "told"), column("limit", "limit")] },

@@ -312,7 +312,8 @@ export class MapView {
     const [x, y, heading] = robot;
     this.store.about.sensors.forEach((sensor, row) => {
       const range = this.store.ranges[row]?.[at];
-      if (range === null || range === undefined) return;
+      // Of a laser the readings have the nearest beam only.
+      if (range === null || range === undefined || sensor.scan) return;
       const bearing = heading + sensor.bearing;
       const from = [x + sensor.forward_m * Math.cos(bearing), y + sensor.forward_m * Math.sin(bearing)];
       const [px, py] = this.pixels(...from);

@@ -8,7 +8,7 @@ use std::{
 
 use common::{
     bus::{Layout, decode_sample, decode_slice},
-    mission::Mission,
+    mission::{Mission, SensorKind},
     samples::{RangeReading, RangesHeader},
     topics::{self, AnyTopic},
 };
@@ -43,7 +43,8 @@ pub(crate) struct Content {
     pub(crate) remarks: Vec<String>,
     pub(crate) summary: Map<String, Value>,
     /// The row of the front sonar.
-    front: usize,
+    /// The row of the front sonar; none of a robot without sonars.
+    front: Option<usize>,
     pub(crate) measured: Measured,
     collector: Collector,
     beliefs: Beliefs,
@@ -81,7 +82,8 @@ impl Content {
             about,
             remarks: Vec::new(),
             summary: source::summary(recording).unwrap_or_default(),
-            front: run.mission.front_row(),
+            front: Some(run.mission.front_row())
+                .filter(|_| run.mission.front_sonar().kind == SensorKind::Cone),
             measured: Measured::default(),
             collector: Collector::new(&run.mission),
             beliefs: Beliefs::default(),
@@ -146,7 +148,7 @@ impl Content {
             self.measured.pose(&sample(message)?, &self.mission);
         } else if is(&topics::RANGES) {
             let (_, readings) = decode_slice::<RangesHeader, RangeReading>(&message.data)?;
-            let front = |reading: &&RangeReading| usize::from(reading.sensor) == self.front;
+            let front = |reading: &&RangeReading| Some(usize::from(reading.sensor)) == self.front;
             if let Some(reading) = readings.iter().find(front) {
                 self.measured.range(reading, &self.mission);
             }

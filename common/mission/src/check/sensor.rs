@@ -37,7 +37,7 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
         return Err(objection(KEY, "two rows are lasers", "keep one"));
     }
     let speaks_x80 = mission.robot.protocol() == Protocol::X80;
-    if speaks_x80 && rows.iter().any(is_scan) {
+    if speaks_x80 && mission.laser().is_some() {
         let problem = "the boards of an X80 have no laser";
         return Err(objection(KEY, problem, "remove it, or give robot.protocol = \"json\""));
     }
@@ -51,8 +51,8 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     let table = mission.sensor_table();
     let used = |kind| table.iter().filter(|sensor| sensor.used && sensor.kind == kind).count();
     let lacks = match mission.sensors {
+        _ if mission.method == Method::Paper && used(SensorKind::Cone) == 0 => "a sonar",
         Some(Sensors::Laser) if used(SensorKind::Scan) == 0 => "a laser",
-        None if mission.method == Method::Paper && used(SensorKind::Cone) == 0 => "a sonar",
         Some(Sensors::FrontInfrared) if used(SensorKind::Ray) == 0 => "a ray",
         Some(Sensors::ThreeFront) if used(SensorKind::Cone) < 2 => "a cone beside the front one",
         _ => return Ok(()),

@@ -103,7 +103,7 @@ pub enum Effect {
     CountsElsewhere,
     /// The robot does not stop, and was stopped by the next method, which has this name.
     StopBy(&'static str),
-    /// Messages of the robot are none of the protocol, for this reason, which is new.
+    /// A message of the robot is none of the protocol, for this reason.
     Refused(String),
     /// The robot was asked for its streams again.
     AskedForStreams,

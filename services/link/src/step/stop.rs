@@ -77,7 +77,7 @@ impl Link {
     }
 
     /// The method by which the robot is stopped now; none for velocity 0, which is the first and follows the last.
-    fn other_stop(&self) -> Option<StopMethod> {
+    pub(super) fn other_stop(&self) -> Option<StopMethod> {
         let mut others = self.driver.other_stops();
         let method = self.monitors().stop.method() % (others.len() + 1);
         method.checked_sub(1).map(|other| others.swap_remove(other))

@@ -1,5 +1,7 @@
 //! The part of the step that takes what the robot says and follows its presence.
 
+use std::time::Duration;
+
 use common::{
     driver::{Heard, Motion},
     samples::PowerSample,
@@ -7,6 +9,11 @@ use common::{
 };
 
 use super::{Effect, Link, PING_EVERY, passed};
+
+/// Of messages that are refused one a second is logged, and so many letters of the reason.
+const REFUSED_AGAIN: Duration = Duration::from_secs(1);
+const LONGEST_REFUSAL: usize = 200;
+
 use crate::failsafe::monitor::{Counts, Monitor as _, Observation};
 
 impl Link {
@@ -22,10 +29,13 @@ impl Link {
 
     pub(super) fn take_heard(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         let mut heard = self.driver.heard();
-        let refused = heard.refused.take();
-        if refused.is_some() && refused != self.refused {
-            effects.extend(refused.clone().map(Effect::Refused));
-            self.refused = refused;
+        if let Some(why) = heard.refused.take()
+            && passed(self.refused_ns, now_ns, REFUSED_AGAIN)
+        {
+            self.refused_ns = Some(now_ns);
+            // The robot chose its words.
+            let why = why.escape_debug().take(LONGEST_REFUSAL).collect();
+            effects.push(Effect::Refused(why));
         }
         for _ in 0..heard.acknowledged {
             self.observe(Observation::Acknowledged, now_ns);
@@ -132,6 +142,7 @@ impl Link {
         if !self.in_ticks()
             && self.connected()
             && !self.monitors().latency.is_testing()
+            && self.other_stop().is_none()
             && self.failsafe.monitors.streams.wants_request(now_ns)
         {
             effects.push(Effect::Send(self.driver.ask_for_sensors()));

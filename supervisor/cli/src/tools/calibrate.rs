@@ -11,7 +11,7 @@ use clap::Args;
 use common::{
     clock::Pace,
     domain::RobotName,
-    mission::{CalibrationPlan, Mission, Procedure, Sensors},
+    mission::{CalibrationPlan, Mission, Procedure, SensorKind, Sensors},
     signals::{SIGHUP, SIGINT, SIGTERM, Signals},
 };
 
@@ -124,6 +124,9 @@ impl Arguments {
             return Err(
                 "a car has no two driven wheels to calibrate; name a mission of an X80".into()
             );
+        }
+        if plan.procedure == Procedure::Wall && named.front_sonar().kind != SensorKind::Cone {
+            return Err("the wall is measured by a front sonar, and this robot has none: calibrate along squares".into());
         }
         let mut mission = missions::parsed(SIMULATED, "calibration", &[])?;
         mission.robot = named.robot;

@@ -297,7 +297,7 @@ fn kill(fault: RobotFault, supervisor: &Process, directory: &Path) {
     }
     for (pid, line) in others {
         let is_hit = match fault {
-            RobotFault::LinkKilled => line.contains("link"),
+            RobotFault::LinkKilled => line.split(['\0', ' ']).any(|word| word == "link"),
             fault => fault == RobotFault::AllKilled,
         };
         if let Some(pid) = Pid::from_raw(pid as i32).filter(|_| is_hit) {

@@ -159,10 +159,14 @@ fn every_command_line_in_readme_and_guide_is_understood() {
                 Err(error) if is_incomplete(&error) && command.len() <= 2 => continue,
                 parsed => parsed.unwrap_or_else(|error| panic!("{at}: firsthand {line}: {error}")),
             };
+            let evaluates = command.first().is_some_and(|word| word == "evaluate");
             let set: Vec<String> = command
                 .windows(2)
-                .filter(|pair| pair[0] == "--set")
-                .map(|pair| pair[1].clone())
+                .filter_map(|pair| match pair[0].as_str() {
+                    "--set" => Some(pair[1].clone()),
+                    "--robot" if evaluates => Some(format!("robot.model='{}'", pair[1])),
+                    _ => None,
+                })
                 .collect();
             missions::load("obstacle-course", &set)
                 .unwrap_or_else(|error| panic!("{at}: firsthand {line}: {error}"));
