@@ -6,13 +6,16 @@ use recording::{
 };
 use rustix::process::Signal;
 
-use crate::support::{Run, STAGES, run};
+use crate::support::{Run, STAGES, printed, run};
 
 #[test]
 fn a_robot_with_a_laser_arrives_though_each_stage_is_killed_and_replays_to_the_bit() {
     let robot = ["--pace", "2", "--set", "robot.model='kobuki'", "--set", "robot.rate_hz=20"];
     let mut run = Run::start("laser-kills", "obstacle-course", &robot);
     run.wait_until_under_way(0.3);
+    for topic in ["scan", "scan_fix"] {
+        printed(&["topic", "echo", topic, "--robot", "laser-kills", "-n", "1"]);
+    }
     for stage in STAGES {
         run.kill_and_await_successor(stage, Signal::KILL);
     }

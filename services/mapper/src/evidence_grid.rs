@@ -324,6 +324,10 @@ impl EvidenceGrid {
         let (weight, was_occupied) = (self.weight_of(index), self.is_occupied(index));
         let was_scanned = self.is_scanned(sonar, index);
         self.looks[index] = SCANNED;
+        if was_scanned && change <= 0 && (change == 0 || weight == sonar.least) {
+            // This is so of most cells.
+            return Window::default();
+        }
         if change > 0 {
             self.occupied[index] |= SEEN;
             self.set(sonar, lattice, cell, weight.max(-sonar.pass).saturating_add(change), flips);

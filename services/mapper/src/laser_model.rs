@@ -29,13 +29,13 @@ const NEAR_END_M: f64 = 0.25;
 const FARTHEST: f64 = 1e6;
 
 /// A cell is occupied if of so many beams that pass at least one ends.
-const PASS_FOR_ONE_THAT_ENDS: u16 = 4;
+const PASS_FOR_ONE_THAT_ENDS: u8 = 4;
 
 /// The beams of a scan in a cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Beams {
-    passed: u16,
-    ended: u16,
+    passed: u8,
+    ended: u8,
     /// Whether one of those that passed ends far behind.
     passed_far: bool,
 }
@@ -115,7 +115,7 @@ impl EvidenceGrid {
     ) -> Window {
         let mut results = vec![Beams::default(); lattice.area()];
         let mut touched = Vec::new();
-        let side = i32::try_from(lattice.cells).unwrap_or(i32::MAX);
+        let side = lattice.cells as i32;
         let origin = lattice.to_cells(fan.origin);
         let near_end = NEAR_END_M / lattice.resolution_m;
         // The pose comes from shared memory.
@@ -123,14 +123,15 @@ impl EvidenceGrid {
             return Window::default();
         }
         let mut note = |cell: IVec2, result: Beams| {
-            let inside = cell.cmpge(IVec2::ZERO).all() && cell.cmplt(IVec2::splat(side)).all();
+            // A negative one is a great one without its sign.
+            let (col, row) = (cell.x as u32, cell.y as u32);
+            let inside = col < lattice.cells && row < lattice.cells;
             if inside {
-                let cell = Cell { col: cell.x as u32, row: cell.y as u32 };
-                let index = lattice.index(cell);
-                if results[index] == Beams::default() {
-                    touched.push(cell);
+                let held = &mut results[(row * lattice.cells + col) as usize];
+                if *held == Beams::default() {
+                    touched.push(Cell { col, row });
                 }
-                results[index] = results[index].and(result);
+                *held = held.and(result);
             }
             inside
         };

@@ -20,7 +20,7 @@ const POINT_M: f64 = 0.02;
 const PRIOR: [f64; 2] = [0.10, 0.05];
 /// A point belongs to a line no farther away than this, metres: at the first round, and at the last ones.
 const GATES_M: [f64; 2] = [0.30, 0.08];
-const ROUNDS: usize = 8;
+const ROUNDS: usize = 6;
 /// Points that are matched of each scan, about.
 const POINTS: usize = 240;
 /// Half the length over which a line is laid through points, metres.
@@ -213,12 +213,13 @@ impl Reference {
         let beside = (BESIDE_RAD.max(gate / way.length().max(gate)) / seen_from.step_rad).ceil();
         let beside = beside as i32;
         // A scan of 1,081 beams needs not each of them.
-        let stride = (beside / 12).max(1) as usize;
-        let whole_turn = (std::f64::consts::TAU / seen_from.step_rad).round() as i32;
+        let stride = (beside / 6).max(1);
+        let whole_turn = (std::f64::consts::TAU / seen_from.step_rad).round().max(1.0) as i32;
         let near = |line: &Line| line.point.distance_squared(at);
-        (-beside..=beside)
-            .step_by(stride)
-            .map(|beside| (beam + beside).rem_euclid(whole_turn.max(1)) as usize)
+        let first = (beam - beside).rem_euclid(whole_turn);
+        (0..=2 * beside / stride)
+            .map(|step| first + step * stride)
+            .map(|beam| if beam < whole_turn { beam } else { beam - whole_turn } as usize)
             .filter_map(|beam| *self.lines.get(beam)?)
             .min_by(|a, b| near(a).total_cmp(&near(b)))
             .filter(|line| near(line) <= gate * gate)
