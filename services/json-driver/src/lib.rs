@@ -6,7 +6,7 @@ use common::{
     driver::{Driver, Heard, Motion, Readings, StopMethod, WireTally},
     geometry::wrap_angle,
     json_wire::{Lines, Order, Report, line, parse},
-    kinematics::Pose2,
+    kinematics::{DifferentialDrive, Pose2, Twist, WheelSpeeds},
     mission::{Body, Mission, Sensor},
     samples::{PowerSample, RangeReading, RangeStatus, WheelSample},
     wire::COUNT_CYCLE,
@@ -93,7 +93,8 @@ impl Json {
             // A robot that has restarted counts from 0.
             let before = self.answered.replace(count).filter(|before| *before <= count);
             let answered = before.map_or(0, |before| count - before);
-            heard.acknowledged = MOST_ANSWERED.min(heard.acknowledged + answered as usize);
+            let answered = heard.acknowledged.saturating_add(answered as usize);
+            heard.acknowledged = answered.min(MOST_ANSWERED);
         }
         if let Some(volts) = report.battery_v {
             let (board_v, motor_v, servo_v) = (volts, volts, volts);
@@ -150,24 +151,26 @@ impl Json {
     /// Take the beams of the laser in `row`. As a reading of its row the nearest of them counts; none does of a laser that says the same
     /// although the wheels have turned.
     fn take_scan(&mut self, row: usize, beams: Vec<f32>) {
-        let bits = |beams: &[f32]| beams.iter().map(|beam| beam.to_bits()).collect::<Vec<_>>();
         let (newest, turned_then) = &self.newest_scan;
-        if bits(newest) != bits(&beams) || !beams.iter().any(|beam| beam.is_finite()) {
+        let [bits_then, bits_now] =
+            [newest, &beams].map(|beams| beams.iter().map(|beam| beam.to_bits()));
+        let is_same = beams.iter().any(|beam| beam.is_finite()) && bits_then.eq(bits_now);
+        let went = |wheel: usize| (self.turned[wheel] - turned_then[wheel]).abs();
+        let is_stuck = is_same && went(0).max(went(1)) > STUCK_RAD;
+        if !is_same {
             self.newest_scan = (beams.clone(), self.turned);
-        } else if (0..2).any(|wheel| (self.turned[wheel] - turned_then[wheel]).abs() > STUCK_RAD) {
-            let status = RangeStatus::Invalid.into();
-            self.readings.take(row, RangeReading { status, ..RangeReading::default() });
-            return;
         }
         let nearest = beams.iter().copied().fold(f32::NAN, f32::min);
         let (status, range_m) = match nearest {
-            nearest if nearest.is_nan() => (RangeStatus::Invalid, 0.0),
+            nearest if is_stuck || nearest.is_nan() => (RangeStatus::Invalid, 0.0),
             nearest if nearest.is_infinite() => (RangeStatus::Nothing, 0.0),
             nearest => (RangeStatus::Measured, nearest.into()),
         };
         let status = status.into();
         self.readings.take(row, RangeReading { range_m, status, ..RangeReading::default() });
-        self.scan = beams;
+        if !is_stuck {
+            self.scan = beams;
+        }
     }
 
     fn motion(&self, turned: [f64; 2], speeds: [f64; 2], held: [bool; 2]) -> Motion {
@@ -244,14 +247,19 @@ impl Driver for Json {
 
     fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8> {
         let wheels = counts.map(|counts| f64::from(counts) * TAU / self.body.counts_per_turn);
-        let [left, right] = wheels.map(|speed| speed * self.body.wheel_radius_m);
-        let twist = [(left + right) / 2.0, (right - left) / self.body.track_m];
-        line(&Order::Drive { wheels, twist, for_s: limit.as_secs_f64() })
+        let [left, right] = wheels;
+        let Twist { v, omega } = drive(&self.body).twist(WheelSpeeds { right, left });
+        line(&Order::Drive { wheels, twist: [v, omega], for_s: limit.as_secs_f64() })
     }
 
     fn other_stops(&self) -> Vec<StopMethod> {
         vec![StopMethod { name: "brake", bytes: line(&Order::Brake {}) }]
     }
+}
+
+/// The drive of a body whose wheels have no limit.
+fn drive(body: &Body) -> DifferentialDrive {
+    DifferentialDrive::new(body.wheel_radius_m, body.track_m, f64::INFINITY)
 }
 
 /// The angles by which wheels would have turned on the way of a robot that says its pose.
@@ -278,9 +286,9 @@ impl Odometry {
         // The chord of an arc is shorter than the arc by this.
         let half = turn / 2.0;
         let arc = if half.abs() < 1e-9 { chord } else { chord * half / half.sin() };
-        for (turned, side) in self.turned.iter_mut().zip([-1.0, 1.0]) {
-            *turned += (arc + side * turn * body.track_m / 2.0) / body.wheel_radius_m;
-        }
+        // (17) is linear: an arc and a turn give the angles of the wheels.
+        let WheelSpeeds { right, left } = drive(body).wheels(Twist { v: arc, omega: turn });
+        self.turned = [self.turned[0] + left, self.turned[1] + right];
         Some(self.turned)
     }
 }
@@ -381,11 +389,14 @@ mod tests {
     #[test]
     fn a_robot_that_counts_its_orders_acknowledges_them_and_a_restarted_one_begins_again() {
         let mut driver = driver();
-        let counts = [(5, 0), (8, 3), (8, 0), (2, 0), (1_000_000, 64)];
+        let counts = [(5, 0), (8, 3), (8, 0), (2, 0), (1_000_000, 64), (u64::MAX, 64)];
         for (count, answered) in counts {
             let heard = heard(&mut driver, &format!("{{\"heard\":{count}}}"));
             assert_eq!(heard.acknowledged, answered, "{count}");
         }
+        let most = format!("{{\"heard\":0}}\n{{\"heard\":1}}\n{{\"heard\":{}}}", u64::MAX);
+        let many = format!("{most}\n{most}");
+        assert_eq!(heard(&mut driver, &many).acknowledged, 64);
     }
 
     #[test]

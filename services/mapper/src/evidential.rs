@@ -126,10 +126,7 @@ impl Evidential {
             let heard = map.evidence.take(&reading.sonar, lattice, beam, body, &mut flips);
             touched = touched.union(heard);
         }
-        let mut window = self.on_grid(touched);
-        for flip in &flips {
-            window = window.union(map.inflation.follow(&self.geometry, *flip));
-        }
+        let window = self.follow(map, touched, &flips);
         Observed { window, safety_event: flips.iter().any(|flip| flip.occupied) }
     }
 
@@ -139,10 +136,7 @@ impl Evidential {
         let lattice = &self.geometry.lattice;
         let body = (robot, self.radius);
         let touched = map.evidence.take_scan(&self.sonar, lattice, fan, body, &mut flips);
-        let mut window = self.on_grid(touched);
-        for flip in &flips {
-            window = window.union(map.inflation.follow(&self.geometry, *flip));
-        }
+        let window = self.follow(map, touched, &flips);
         Observed { window, safety_event: flips.iter().any(|flip| flip.occupied) }
     }
 
@@ -151,8 +145,13 @@ impl Evidential {
         let mut flips = Vec::new();
         let lattice = &self.geometry.lattice;
         let touched = map.evidence.touch(&self.sonar, lattice, touch, self.radius, &mut flips);
+        self.follow(map, touched, &flips)
+    }
+
+    /// Inflate the cells that flipped. Returns the window of the grid that may look different now, with what was `touched` of the lattice.
+    fn follow(&self, map: &mut EvidenceMap, touched: Window, flips: &[Flip]) -> Window {
         let mut window = self.on_grid(touched);
-        for flip in &flips {
+        for flip in flips {
             window = window.union(map.inflation.follow(&self.geometry, *flip));
         }
         window

@@ -140,9 +140,8 @@ impl EvidenceGrid {
                 continue;
             }
             let range_m = f64::from(range_m);
-            let along = DVec2::from_angle(fan.first_rad + fan.step_rad * beam as f64);
             let range = range_m.min(fan.reach_m) / lattice.resolution_m;
-            let mut way = Along::new(origin, along);
+            let mut way = Along::new(origin, fan.along(beam));
             let mut inside = true;
             while way.ends() < range && inside {
                 let far = way.ends() + near_end < range;

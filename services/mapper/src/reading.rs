@@ -76,7 +76,7 @@ impl Rows {
     }
 
     pub(crate) fn uses(&self, reading: &RangeReading) -> bool {
-        self.of(reading).is_some()
+        self.uses_row(reading.sensor.into())
     }
 
     /// The hit of (19), metres, with its distance S: where the front sonar of a robot at `robot` hears something.
@@ -167,6 +167,13 @@ pub(crate) struct Fan<'a> {
     pub(crate) reach_m: f64,
     /// The ranges, metres: infinite for nothing in reach, not a number for no reading.
     pub(crate) beams: &'a [f32],
+}
+
+impl Fan<'_> {
+    /// Direction of a beam, a unit vector.
+    pub(crate) fn along(&self, beam: usize) -> DVec2 {
+        DVec2::from_angle(self.first_rad + self.step_rad * beam as f64)
+    }
 }
 
 /// Something that touches the body, in the mission's frame.

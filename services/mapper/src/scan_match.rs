@@ -8,7 +8,7 @@
 //! The result is a fix for dead reckoning, whose filter knows the errors of the wheels and takes the errors of fixes for independent.
 //! All matches with one reference share its error, so those of [`SHARED_S`] are given the weight of one.
 
-use common::{kinematics::Pose2, mission::Mission, samples::FixSample};
+use common::{geometry::principal_axes, kinematics::Pose2, mission::Mission, samples::FixSample};
 use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -69,7 +69,6 @@ struct Line {
 /// Matches the scans of one mission's laser.
 #[derive(Clone, Debug)]
 pub(crate) struct ScanMatcher {
-    rows: Rows,
     /// A match in so many ticks is published.
     every_ticks: u64,
     /// The matches that share their errors.
@@ -82,7 +81,7 @@ impl ScanMatcher {
         let every_ticks = (rate_hz / MOST_FIXES_HZ).ceil().max(1.0) as u64;
         let scans = mission.laser().map_or(1, |(_, laser)| laser.every_ticks.max(1));
         let fixes_hz = rate_hz / every_ticks.max(scans) as f64;
-        Self { rows: Rows::new(mission), every_ticks, shared: (SHARED_S * fixes_hz).max(1.0) }
+        Self { every_ticks, shared: (SHARED_S * fixes_hz).max(1.0) }
     }
 
     /// Whether the match of `tick` is published.
@@ -94,11 +93,12 @@ impl ScanMatcher {
     /// the robot's pose by the match with its covariance; none if too little of the reference is seen.
     pub(crate) fn step(
         &self,
+        rows: &Rows,
         reference: &mut Option<Reference>,
         robot: Pose2,
         beams: &[f32],
     ) -> Option<FixSample> {
-        let fan = self.rows.scan(robot, beams)?;
+        let fan = rows.scan(robot, beams)?;
         let Some(held) = reference else {
             *reference = Some(Reference::new(&fan, robot, [0.0; 2]));
             return None;
@@ -106,10 +106,10 @@ impl ScanMatcher {
         if held.lines.is_empty() {
             // It was saved without them.
             let saved = std::mem::take(&mut held.beams);
-            let fan = self.rows.scan(held.pose, &saved)?;
+            let fan = rows.scan(held.pose, &saved)?;
             *held = Reference::new(&fan, held.pose, held.variance);
         }
-        let seen_from = self.rows.scan(held.pose, beams)?;
+        let seen_from = rows.scan(held.pose, beams)?;
         let found = held.matched(&fan, &seen_from, robot);
         let (pose, matched, share) = match found {
             Some(found) => found,
@@ -140,7 +140,7 @@ impl ScanMatcher {
         if went > REPLACED_AFTER.0 || turned > REPLACED_AFTER.1 || share < LEAST_SHARE {
             // Where nothing was matched, the wheels have carried the robot on.
             let unsure = if found.is_some() { OF_REFERENCE } else { PRIOR };
-            let fan = self.rows.scan(pose, beams)?;
+            let fan = rows.scan(pose, beams)?;
             let variance = [0, 1].map(|part| variance[part] + unsure[part] * unsure[part]);
             *reference = Some(Reference::new(&fan, pose, variance));
         }
@@ -246,11 +246,9 @@ impl Line {
             xy += share * off.x * off.y;
             yy += share * off.y * off.y;
         }
-        let along = DVec2::from_angle(0.5 * (2.0 * xy).atan2(xx - yy));
-        let normal = along.perp();
-        let aside =
-            xx * normal.x * normal.x + 2.0 * xy * normal.x * normal.y + yy * normal.y * normal.y;
-        (aside <= STRAIGHT_M * STRAIGHT_M).then_some(Self { point: mean, normal })
+        let ([_, aside], along) = principal_axes([xx, xy, yy]);
+        let normal = DVec2::from_angle(along).perp();
+        (aside <= STRAIGHT_M).then_some(Self { point: mean, normal })
     }
 }
 
@@ -258,8 +256,7 @@ impl Line {
 fn points_of(fan: &Fan<'_>) -> Vec<Option<DVec2>> {
     let ends = |(beam, range): (usize, &f32)| {
         let range = f64::from(*range);
-        let along = DVec2::from_angle(fan.first_rad + fan.step_rad * beam as f64);
-        (range >= 0.0 && range <= fan.reach_m).then(|| fan.origin + range * along)
+        (range >= 0.0 && range <= fan.reach_m).then(|| fan.origin + range * fan.along(beam))
     };
     fan.beams.iter().enumerate().map(ends).collect()
 }
@@ -270,10 +267,24 @@ mod tests {
 
     use super::*;
 
-    fn matcher() -> (Mission, ScanMatcher) {
+    /// The matcher of a mission's robot, with what it needs of it.
+    struct Matcher(ScanMatcher, Rows);
+
+    impl Matcher {
+        fn step(
+            &self,
+            reference: &mut Option<Reference>,
+            robot: Pose2,
+            beams: &[f32],
+        ) -> Option<FixSample> {
+            self.0.step(&self.1, reference, robot, beams)
+        }
+    }
+
+    fn matcher() -> (Mission, Matcher) {
         let text = "target = [3, 0]\nrobot.model = 'turtlebot3-waffle'\nrobot.rate_hz = 10";
         let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
-        let matcher = ScanMatcher::new(&mission);
+        let matcher = Matcher(ScanMatcher::new(&mission), Rows::new(&mission));
         (mission, matcher)
     }
 

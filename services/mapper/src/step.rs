@@ -214,7 +214,12 @@ impl Step for Mapper {
             Input::Tick { pose, ranges, scan, contact, target } => {
                 let moved = target.map_or(Window::default(), |target| self.move_target(target));
                 if self.belief.tick != Some(pose.stamp.tick) {
-                    let fix = self.matcher.step(&mut self.belief.reference, pose.pose(), &scan);
+                    let fix = self.matcher.step(
+                        &self.rows,
+                        &mut self.belief.reference,
+                        pose.pose(),
+                        &scan,
+                    );
                     let fix = fix.filter(|_| self.matcher.publishes(pose.stamp.tick));
                     let source = name("scan");
                     self.fix = fix.map(|fix| FixSample { capture_ns: now.0, source, ..fix });

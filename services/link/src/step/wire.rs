@@ -9,12 +9,11 @@ use common::{
 };
 
 use super::{Effect, Link, PING_EVERY, passed};
+use crate::failsafe::monitor::{Counts, Monitor as _, Observation};
 
 /// Of messages that are refused one a second is logged, and so many letters of the reason.
 const REFUSED_AGAIN: Duration = Duration::from_secs(1);
 const LONGEST_REFUSAL: usize = 200;
-
-use crate::failsafe::monitor::{Counts, Monitor as _, Observation};
 
 impl Link {
     pub(super) fn take_wire(&mut self, open: bool, now_ns: u64, effects: &mut Vec<Effect>) {
