@@ -22,6 +22,9 @@ payloads! {
         /// Covariance of the error of (x, y, theta): xx, xy, x theta, yy, y theta, theta theta; m^2, m rad, rad^2. The entries of
         /// theta are not read without a heading.
         covariance: [f64; 6],
+        /// Variances of the error that all fixes of this source have in common, of x as of y and of theta, m^2 and rad^2, such as that
+        /// of a map that the source made itself. They are in the covariance too. No number of fixes makes the pose surer.
+        shared: [f64; 2],
     }
 
     /// Topic `turn`: how far a gyro turned since its last sample.

@@ -64,16 +64,18 @@ pub(crate) struct Fix {
     pub(crate) position: DVec2,
     pub(crate) heading: Option<f64>,
     pub(crate) covariance: [f64; 6],
+    /// Variances of the error that it shares with the other fixes of its source: of x as of y, and of the heading.
+    pub(crate) shared: [f64; 2],
 }
 
 impl TryFrom<&FixSample> for Fix {
     type Error = FixRefusal;
 
     fn try_from(sample: &FixSample) -> Result<Self, FixRefusal> {
-        let FixSample { capture_ns, x_m, y_m, heading_rad, covariance, .. } = *sample;
+        let FixSample { capture_ns, x_m, y_m, heading_rad, covariance, shared, .. } = *sample;
         let heading = (!heading_rad.is_nan()).then_some(heading_rad);
         let [xx, xy, xt, yy, yt, tt] = covariance;
-        let numbers = [x_m, y_m, xx, xy, yy].into_iter();
+        let numbers = [x_m, y_m, xx, xy, yy].into_iter().chain(shared);
         if !numbers.chain(heading.into_iter().flat_map(|it| [it, xt, yt, tt])).all(f64::is_finite) {
             return Err(FixRefusal::NotFinite);
         }
@@ -82,6 +84,7 @@ impl TryFrom<&FixSample> for Fix {
             position: DVec2::new(x_m, y_m),
             heading,
             covariance: if heading.is_some() { covariance } else { [xx, xy, 0.0, yy, 0.0, 0.0] },
+            shared: if heading.is_some() { shared } else { [shared[0], 0.0] },
         };
         // A matrix is positive where less than its least eigenvalue can be taken from its diagonal.
         let least = SVector::from([LEAST_VARIANCE, LEAST_VARIANCE, LEAST_HEADING_VARIANCE]);
@@ -189,8 +192,13 @@ impl Filter {
                 update(covariance, &seen, SVector::from([x, y]), noise, GATES[0])
             }
         };
-        if let Some((error, covariance)) = taken {
+        if let Some((error, mut covariance)) = taken {
             self.correct(&error);
+            let [place, heading] = fix.shared;
+            for (part, least) in [place, place, heading].into_iter().enumerate() {
+                // A greater diagonal keeps the matrix positive.
+                covariance[(part, part)] = covariance[(part, part)].max(least);
+            }
             self.covariance = Covariance(covariance);
         }
         taken.is_some()

@@ -12,6 +12,10 @@
 //! The ray of an infrared ranger is as thin as a cell and ends at a surface of any angle. The cells that it passed are free,
 //! the cell where it ends is occupied, and the absence of an echo is no evidence against that.
 //!
+//! Beside a laser there are two grids, its own and one of the other rangers, and a cell of either is hazard: a laser that looks over or
+//! through a thing is no evidence against it. Where the laser sees a thing, an echo from there is that thing's, and has its place. A pane
+//! of glass that the laser sees only squarely stays so by its echo.
+//!
 //! Where the body touched something, no ranger is evidence against it: all of them may look over it.
 
 use std::f64::consts::TAU;
@@ -38,6 +42,11 @@ const OCCUPIED: u8 = 1;
 const SEEN: u8 = 2;
 /// Flag of a cell: the body touched the obstacle, which no ranger may see.
 const TOUCHED: u8 = 4;
+
+/// An echo is that of a thing which a laser sees if their ranges differ by no more than this, metres: the noise of both, and a cell.
+const SAME_RANGE_M: f64 = 0.10;
+/// The lobe of a sonar hears what is near as far off its axis as this, radians.
+const LOBE_RAD: f64 = 28.0 * TAU / 360.0;
 
 /// Distance that the wheels roll until scanned ground is one step less certain, metres.
 pub(crate) fn step_m(sonar: &SonarModel) -> f64 {
@@ -142,13 +151,14 @@ impl EvidenceGrid {
         window
     }
 
-    /// Take one reading, which counts as evidence up to `reach` metres, of a robot at `robot` with a body of `radius` metres.
-    /// Appends the cells that flipped to `flips` and returns the window of all cells that changed.
+    /// Take one reading, which counts as evidence up to `reach` metres, of a robot at `robot` with a body of `radius` metres. Where a laser
+    /// has `seen` what gave the echo, it stands in one of the cells that are occupied there. Appends the cells that flipped to `flips` and returns the window of all cells that changed.
     pub(crate) fn take(
         &mut self,
         sonar: &SonarModel,
         lattice: &GridFrame,
         (beam, reach): (&Reading, f64),
+        seen: Option<&Self>,
         (robot, radius): (DVec2, f64),
         flips: &mut Vec<Flip>,
     ) -> Window {
@@ -222,7 +232,8 @@ impl EvidenceGrid {
         for (cell, off) in arc {
             let index = lattice.index(cell);
             let under_the_robot = lattice.centre_of(cell).distance(robot) <= radius;
-            if under_the_robot || explained && !self.is_occupied(index) {
+            let elsewhere = seen.is_some_and(|seen| !seen.is_occupied(index));
+            if under_the_robot || elsewhere || explained && !self.is_occupied(index) {
                 continue;
             }
             let more = sonar.hit + (sonar.hit_at_edge - sonar.hit) * off.min(1.0);
@@ -233,6 +244,20 @@ impl EvidenceGrid {
             window = window.including(cell);
         }
         window.union(self.stand(sonar, lattice, (robot, radius), flips))
+    }
+
+    /// Whether a thing in an occupied cell may have given the echo of `beam`.
+    pub(crate) fn explains(&self, lattice: &GridFrame, beam: &Reading) -> bool {
+        let Some(echo) = beam.echo else {
+            return false;
+        };
+        around(lattice, beam.origin, echo + SAME_RANGE_M).any(|cell| {
+            let offset = lattice.centre_of(cell) - beam.origin;
+            let off = || beam.axis.perp_dot(offset).atan2(beam.axis.dot(offset)).abs();
+            self.is_occupied(lattice.index(cell))
+                && (offset.length() - echo).abs() <= SAME_RANGE_M
+                && off() <= LOBE_RAD
+        })
     }
 
     /// Note that a robot with a body of `radius` metres stands at `robot`. No obstacle stands there, and no sensor can scan the ground that
@@ -311,7 +336,8 @@ impl EvidenceGrid {
         window
     }
 
-    /// Change the weight of a cell that a laser saw by `change`; positive means that an obstacle stands in it. What is seen is scanned. Returns the window that changed.
+    /// Change the weight of a cell that a laser saw by `change`; positive means that an obstacle stands in it. What is seen is scanned.
+    /// Returns whether it looks different now.
     pub(crate) fn weigh_seen(
         &mut self,
         sonar: &SonarModel,
@@ -319,14 +345,14 @@ impl EvidenceGrid {
         cell: Cell,
         change: i8,
         flips: &mut Vec<Flip>,
-    ) -> Window {
+    ) -> bool {
         let index = lattice.index(cell);
         let (weight, was_occupied) = (self.weight_of(index), self.is_occupied(index));
         let was_scanned = self.is_scanned(sonar, index);
         self.looks[index] = SCANNED;
         if was_scanned && change <= 0 && (change == 0 || weight == sonar.least) {
             // This is so of most cells.
-            return Window::default();
+            return false;
         }
         if change > 0 {
             self.occupied[index] |= SEEN;
@@ -334,8 +360,7 @@ impl EvidenceGrid {
         } else if change < 0 && self.occupied[index] & TOUCHED == 0 {
             self.set(sonar, lattice, cell, weight.saturating_add(change), flips);
         }
-        let same = was_scanned && was_occupied == self.is_occupied(index);
-        if same { Window::default() } else { Window::default().including(cell) }
+        !was_scanned || was_occupied != self.is_occupied(index)
     }
 
     /// Note that something touches a body of `radius` metres: an obstacle stands in every cell at its rim in the arc of `touch`.

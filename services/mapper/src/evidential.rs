@@ -20,6 +20,8 @@ use crate::{
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct EvidenceMap {
     evidence: EvidenceGrid,
+    /// What sonars hear and infrared rangers see of things that a laser beside them looks over or through; none without both.
+    unseen: Option<Box<EvidenceGrid>>,
     pub(crate) beams: ClearBeams,
     /// The inflation is not saved, because it is recomputed from the evidence.
     #[serde(skip)]
@@ -44,6 +46,8 @@ pub(crate) struct Evidential {
     map_within: f64,
     /// Number of sonars that are used.
     sonars: usize,
+    /// Whether sonars or infrared rangers are used beside a laser.
+    beside_laser: bool,
 }
 
 impl Evidential {
@@ -53,12 +57,14 @@ impl Evidential {
         let radius = mission.body().radius_m;
         // A position is up to half a cell off the centre that stands for it.
         let reach = radius + mission.mapper.clearance_m + grid.resolution_m / 2.0;
+        let rows = Rows::new(mission);
         Self {
             sonar,
             geometry: Geometry { lattice: lattice(&sonar, mission, reach), grid, reach },
             radius,
             map_within: mission.map_within_m(),
-            sonars: Rows::new(mission).cones(),
+            sonars: rows.cones(),
+            beside_laser: rows.are_beside_laser(),
         }
     }
 
@@ -69,8 +75,10 @@ impl Evidential {
 
     /// A map without evidence, with which a mission starts.
     pub(crate) fn empty(&self) -> EvidenceMap {
+        let evidence = EvidenceGrid::none(&self.geometry.lattice);
         EvidenceMap {
-            evidence: EvidenceGrid::none(&self.geometry.lattice),
+            unseen: self.beside_laser.then(|| Box::new(evidence.clone())),
+            evidence,
             beams: ClearBeams::default(),
             inflation: Inflation::new(&self.geometry),
         }
@@ -78,22 +86,28 @@ impl Evidential {
 
     /// Size of a saved map, bytes.
     pub(crate) const fn saved_bytes(&self) -> usize {
-        4 * self.geometry.lattice.area() + ClearBeams::SAVED_BYTES + 64
+        let grids = if self.beside_laser { 2 } else { 1 };
+        4 * grids * self.geometry.lattice.area() + ClearBeams::SAVED_BYTES + 128
     }
 
     /// Complete a saved map. A map of another mission is refused.
     pub(crate) fn complete(&self, map: &mut EvidenceMap) -> Result<(), ForeignState> {
         let lattice = self.geometry.lattice;
-        if !map.evidence.fits(&lattice) {
+        if map.unseen.is_some() != self.beside_laser {
             return Err(ForeignState);
         }
         map.inflation = Inflation::new(&self.geometry);
-        for row in 0..lattice.cells {
-            for col in 0..lattice.cells {
-                let cell = Cell { col, row };
-                if map.evidence.is_occupied(lattice.index(cell)) {
-                    let occupied = true;
-                    map.inflation.follow(&self.geometry, Flip { cell, occupied });
+        for grid in std::iter::once(&map.evidence).chain(map.unseen.as_deref()) {
+            if !grid.fits(&lattice) {
+                return Err(ForeignState);
+            }
+            for row in 0..lattice.cells {
+                for col in 0..lattice.cells {
+                    let cell = Cell { col, row };
+                    if grid.is_occupied(lattice.index(cell)) {
+                        let occupied = true;
+                        map.inflation.follow(&self.geometry, Flip { cell, occupied });
+                    }
                 }
             }
         }
@@ -114,16 +128,21 @@ impl Evidential {
         let lattice = &self.geometry.lattice;
         let body = (robot, self.radius);
         let mut touched = Window::default();
+        let (grid, by_laser) = match &mut map.unseen {
+            Some(unseen) => (unseen.as_mut(), Some(&map.evidence)),
+            None => (&mut map.evidence, None),
+        };
         // Rays come first, because what they show explains echoes.
         for ray in rays {
             map.beams.take_ray(&self.sonar, &ray, rolled_m);
-            let seen = map.evidence.take_ray(&self.sonar, lattice, &ray, body, &mut flips);
+            let seen = grid.take_ray(&self.sonar, lattice, &ray, body, &mut flips);
             touched = touched.union(seen);
         }
         for reading in beams {
             map.beams.take(self.sonars, &reading, rolled_m);
+            let seen = by_laser.filter(|seen| seen.explains(lattice, &reading));
             let beam = (&reading, self.map_within);
-            let heard = map.evidence.take(&reading.sonar, lattice, beam, body, &mut flips);
+            let heard = grid.take(&reading.sonar, lattice, beam, seen, body, &mut flips);
             touched = touched.union(heard);
         }
         let window = self.follow(map, touched, &flips);
@@ -175,7 +194,9 @@ impl Evidential {
         let mut flips = Vec::new();
         map.beams.clear();
         let lattice = &self.geometry.lattice;
-        map.evidence.reset(&self.sonar, lattice, (robot, keep), &mut flips);
+        for grid in std::iter::once(&mut map.evidence).chain(map.unseen.as_deref_mut()) {
+            grid.reset(&self.sonar, lattice, (robot, keep), &mut flips);
+        }
         for flip in &flips {
             map.inflation.follow(&self.geometry, *flip);
         }

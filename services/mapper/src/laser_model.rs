@@ -1,12 +1,16 @@
 //! The laser model: the meaning of a scan for the cells along its beams.
 //!
 //! A beam is thinner than a cell and ends at a surface of any angle, so the cells that it passed are free and the cell in which it ends
-//! is occupied. Glass and black surfaces may give no reading: the cells before them stay what they were, and what a sonar heard there
-//! is believed until a beam passes through it.
+//! is occupied. A beam without a reading says nothing of the cells along it.
 //!
 //! Many beams cross one cell near the laser, so a scan counts once for each cell. Where a fifth of them end and the others pass, the cell
 //! is occupied: a post, or the edge of a thing, fills a part of its cell. Fewer that end there are noise of a surface behind it, which
 //! must not close a gap.
+//!
+//! Where beams are no farther apart than a cell is wide, they are not followed one by one: the cells that they passed are those in the
+//! polygon of their ends, which is filled row by row. Farther away each beam is followed, and so is a beam beside one without a reading.
+
+use std::ops::Range;
 
 use common::grid::{Cell, GridFrame, Window};
 use glam::{DVec2, IVec2};
@@ -29,34 +33,195 @@ const NEAR_END_M: f64 = 0.25;
 const FARTHEST: f64 = 1e6;
 
 /// A cell is occupied if of so many beams that pass at least one ends.
-const PASS_FOR_ONE_THAT_ENDS: u8 = 4;
+const PASS_FOR_ONE_THAT_ENDS: u32 = 4;
 
-/// The beams of a scan in a cell.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Beams {
-    passed: u8,
-    ended: u8,
-    /// Whether one of those that passed ends far behind.
-    passed_far: bool,
+/// Marks of a cell in a scan: a beam ended in it, a beam passed it, a beam passed it and ended far behind.
+const ENDED: u8 = 1;
+const PASSED: u8 = 2;
+const PASSED_FAR: u8 = 4;
+
+/// A beam of a scan on the lattice.
+#[derive(Clone, Copy, Debug)]
+struct Beam {
+    /// A unit vector.
+    along: DVec2,
+    /// How far it went, cells; 0 without a reading.
+    range: f64,
+    /// Whether it ended there.
+    ends: bool,
 }
 
-impl Beams {
-    const ENDED: Self = Self { passed: 0, ended: 1, passed_far: false };
+/// A scan of a laser on the lattice, whose cells have sides of 1.
+struct Scan<'a> {
+    fan: &'a Fan<'a>,
+    lattice: &'a GridFrame,
+    origin: DVec2,
+    beams: Vec<Beam>,
+    /// The marks of the lattice's cells, row-major.
+    marks: Vec<u8>,
+}
 
-    const fn passed(far: bool) -> Self {
-        Self { passed: 1, ended: 0, passed_far: far }
+impl EvidenceGrid {
+    /// Take a scan of a laser on a robot at `robot` with a body of `radius` metres. Appends the cells that flipped to `flips` and returns
+    /// the window of all cells that changed.
+    pub(crate) fn take_scan(
+        &mut self,
+        sonar: &SonarModel,
+        lattice: &GridFrame,
+        fan: &Fan<'_>,
+        (robot, radius): (DVec2, f64),
+        flips: &mut Vec<Flip>,
+    ) -> Window {
+        let Some(mut scan) = Scan::new(lattice, fan) else {
+            return Window::default();
+        };
+        let near = NEAR_END_M / lattice.resolution_m;
+        scan.pass(0.0, PASSED);
+        scan.pass(near, PASSED_FAR);
+        scan.end();
+        let mut window = self.stand(sonar, lattice, (robot, radius), flips);
+        let side = lattice.cells as usize;
+        for (row, marks) in (0..).zip(scan.marks.chunks_exact(side)) {
+            for (col, &mark) in (0..).zip(marks) {
+                let cell = Cell { col, row };
+                let change = match mark {
+                    0 => continue,
+                    mark if mark & ENDED != 0 => match scan.is_thing(cell) {
+                        true if lattice.centre_of(cell).distance(robot) <= radius => continue,
+                        true => HIT,
+                        false => 0,
+                    },
+                    mark if mark & PASSED_FAR != 0 => -PASS,
+                    _ => 0,
+                };
+                if self.weigh_seen(sonar, lattice, cell, change, flips) {
+                    window = window.including(cell);
+                }
+            }
+        }
+        window
+    }
+}
+
+impl<'a> Scan<'a> {
+    /// None if the laser is nowhere: its pose comes from shared memory.
+    fn new(lattice: &'a GridFrame, fan: &'a Fan<'a>) -> Option<Self> {
+        let origin = lattice.to_cells(fan.origin);
+        let beam = |(along, range_m): (DVec2, f64)| {
+            // A comparison with what is no number is false.
+            let reads = range_m >= 0.0;
+            let range = if reads { range_m.min(fan.reach_m) / lattice.resolution_m } else { 0.0 };
+            Beam { along, range, ends: reads && range_m <= fan.reach_m }
+        };
+        (origin.is_finite() && origin.abs().max_element() < FARTHEST).then(|| Self {
+            fan,
+            lattice,
+            origin,
+            beams: fan.iter().map(beam).collect(),
+            marks: vec![0; lattice.area()],
+        })
     }
 
-    const fn and(self, other: Self) -> Self {
-        Self {
-            passed: self.passed.saturating_add(other.passed),
-            ended: self.ended.saturating_add(other.ended),
-            passed_far: self.passed_far || other.passed_far,
+    /// Mark the cells that beams passed and left at least `near` cells before their ends.
+    fn pass(&mut self, near: f64, mark: u8) {
+        // Beyond this range there may be a cell between two beams.
+        let close = self.fan.step_rad.recip();
+        let corner = |beam: &Beam| self.origin + (beam.range - near).clamp(0.0, close) * beam.along;
+        let mut corners: Vec<_> = self.beams.iter().map(corner).collect();
+        corners.push(self.origin);
+        let side = self.lattice.cells;
+        fill(side, &corners, |row, columns| {
+            let row = (row * side) as usize;
+            let cells = row + columns.start as usize..row + columns.end as usize;
+            self.marks[cells].iter_mut().for_each(|held| *held |= mark);
+        });
+        let reads = |number: usize| self.beams.get(number).is_some_and(|beam| beam.range > 0.0);
+        for (number, beam) in self.beams.iter().enumerate() {
+            let in_polygon = reads(number.wrapping_sub(1)) && reads(number + 1);
+            let from = if in_polygon { close } else { 0.0 };
+            if beam.range - near <= from {
+                continue;
+            }
+            let mut way = Along::new(self.origin + from * beam.along, beam.along);
+            let side = side as i32;
+            while from + way.ends() + near < beam.range && !left_behind(way.cell, way.step, side) {
+                if let Some(index) = self.index(way.cell) {
+                    self.marks[index] |= mark;
+                }
+                way.advance();
+            }
         }
     }
 
-    const fn are_of_a_thing(self) -> bool {
-        self.ended > 0 && self.ended.saturating_mul(PASS_FOR_ONE_THAT_ENDS) >= self.passed
+    /// Mark the cells in which beams ended.
+    fn end(&mut self) {
+        for beam in self.beams.iter().filter(|beam| beam.ends) {
+            let end = self.origin + beam.range * beam.along;
+            if let Some(index) = self.index((end + 0.5).floor().as_ivec2()) {
+                self.marks[index] |= ENDED;
+            }
+        }
+    }
+
+    /// Whether enough of the beams that reach a cell end in it.
+    fn is_thing(&self, cell: Cell) -> bool {
+        let offset = DVec2::new(cell.col.into(), cell.row.into()) - self.origin;
+        let away = offset.length();
+        // No part of the cell is farther off its middle than this angle.
+        let half = away.max(1.0).recip() / self.fan.step_rad;
+        let turn = std::f64::consts::TAU / self.fan.step_rad;
+        let middle = (offset.to_angle() - self.fan.first_rad) / self.fan.step_rad;
+        let first = (middle - half).rem_euclid(turn);
+        let (mut ended, mut passed) = (0_u32, 0_u32);
+        for step in 0..=(2.0 * half).ceil() as usize {
+            let beam = (first + step as f64).rem_euclid(turn) as usize;
+            let Some(Beam { along, range, ends }) = self.beams.get(beam).copied() else {
+                continue;
+            };
+            let aside = 0.5 * (along.x.abs() + along.y.abs());
+            if along.perp_dot(offset).abs() > aside {
+                continue;
+            }
+            // The cell's far sides, as the beam meets them.
+            let leaves = ((offset + 0.5 * along.signum()) / along).min_element();
+            let is_here = || (range * along - offset).abs().max_element() <= 0.5;
+            ended += u32::from(ends && is_here());
+            passed += u32::from(leaves < range);
+        }
+        ended > 0 && ended * PASS_FOR_ONE_THAT_ENDS >= passed
+    }
+
+    fn index(&self, cell: IVec2) -> Option<usize> {
+        // A negative one is a great one without its sign.
+        let (col, row, side) = (cell.x as u32, cell.y as u32, self.lattice.cells);
+        (col < side && row < side).then(|| (row * side + col) as usize)
+    }
+}
+
+/// The cells of a lattice of `side` times `side` whose centres lie in the polygon of these corners: gives rows with their columns.
+fn fill(side: u32, corners: &[DVec2], mut span: impl FnMut(u32, Range<u32>)) {
+    let last = f64::from(side) - 1.0;
+    let mut crossings = vec![Vec::new(); side as usize];
+    let before = corners.iter().skip(corners.len().saturating_sub(1)).chain(corners);
+    for (from, to) in before.zip(corners) {
+        let (least, greatest) = (from.y.min(to.y), from.y.max(to.y));
+        let slope = (to.x - from.x) / (to.y - from.y);
+        // Of two edges that meet on the centre of a row one crosses it.
+        let (first, end) = ((least.floor() + 1.0).max(0.0), greatest.floor().min(last) + 1.0);
+        for (row, crossings) in
+            crossings.iter_mut().enumerate().take(end as usize).skip(first as usize)
+        {
+            crossings.push(from.x + (row as f64 - from.y) * slope);
+        }
+    }
+    for (row, crossings) in (0..).zip(&mut crossings) {
+        crossings.sort_unstable_by(f64::total_cmp);
+        for pair in crossings.chunks_exact(2) {
+            let (from, to) = (pair[0].ceil().max(0.0), pair[1].floor().min(last));
+            if from <= to {
+                span(row, from as u32..to as u32 + 1);
+            }
+        }
     }
 }
 
@@ -99,76 +264,6 @@ impl Along {
             self.cell.y += self.step.y;
             self.next.y += self.each.y;
         }
-    }
-}
-
-impl EvidenceGrid {
-    /// Take a scan of a laser on a robot at `robot` with a body of `radius` metres. Appends the cells that flipped to `flips` and returns
-    /// the window of all cells that changed.
-    pub(crate) fn take_scan(
-        &mut self,
-        sonar: &SonarModel,
-        lattice: &GridFrame,
-        fan: &Fan<'_>,
-        (robot, radius): (DVec2, f64),
-        flips: &mut Vec<Flip>,
-    ) -> Window {
-        let mut results = vec![Beams::default(); lattice.area()];
-        let mut touched = Vec::new();
-        let side = lattice.cells as i32;
-        let origin = lattice.to_cells(fan.origin);
-        let near_end = NEAR_END_M / lattice.resolution_m;
-        // The pose comes from shared memory.
-        if !(origin.is_finite() && origin.abs().max_element() < FARTHEST) {
-            return Window::default();
-        }
-        let mut note = |cell: IVec2, result: Beams| {
-            // A negative one is a great one without its sign.
-            let (col, row) = (cell.x as u32, cell.y as u32);
-            let inside = col < lattice.cells && row < lattice.cells;
-            if inside {
-                let held = &mut results[(row * lattice.cells + col) as usize];
-                if *held == Beams::default() {
-                    touched.push(Cell { col, row });
-                }
-                *held = held.and(result);
-            }
-            inside
-        };
-        for (beam, &range_m) in fan.beams.iter().enumerate() {
-            if range_m.is_nan() || range_m < 0.0 {
-                continue;
-            }
-            let range_m = f64::from(range_m);
-            let range = range_m.min(fan.reach_m) / lattice.resolution_m;
-            let mut way = Along::new(origin, fan.along(beam));
-            let mut inside = true;
-            while way.ends() < range && inside {
-                let far = way.ends() + near_end < range;
-                inside =
-                    note(way.cell, Beams::passed(far)) || !left_behind(way.cell, way.step, side);
-                way.advance();
-            }
-            if inside && range_m <= fan.reach_m {
-                note(way.cell, Beams::ENDED);
-            }
-        }
-        let mut window = self.stand(sonar, lattice, (robot, radius), flips);
-        for cell in touched {
-            let index = lattice.index(cell);
-            let beams = results[index];
-            let is_thing = beams.are_of_a_thing();
-            if is_thing && lattice.centre_of(cell).distance(robot) <= radius {
-                continue;
-            }
-            let change = match beams {
-                _ if is_thing => HIT,
-                Beams { ended: 0, passed_far: true, .. } => -PASS,
-                _ => 0,
-            };
-            window = window.union(self.weigh_seen(sonar, lattice, cell, change, flips));
-        }
-        window
     }
 }
 
@@ -234,5 +329,34 @@ mod tests {
         let many = (0..12).map(|beam| if beam == 0 { 0.3 } else { 1.5 }).collect();
         let (grid, _) = after(&[many]);
         assert!(!grid.is_occupied(index(0.3, 0.0)), "one of seven");
+    }
+
+    #[test]
+    fn beams_that_are_close_free_the_cells_that_each_of_them_passes() {
+        // A room of 4 m times 4 m with a post.
+        let beam = |number: usize| {
+            let (sin, cos) = (number as f64 * 0.25).to_radians().sin_cos();
+            let wall = 2.0 / cos.abs().max(sin.abs());
+            let post = sin.atan2(cos).abs() < 0.05;
+            if post { 1.0 } else { wall as f32 }
+        };
+        let beams: Vec<f32> = (0..1440).map(beam).collect();
+        let origin = DVec2::new(0.013, -0.021);
+        let (first_rad, step_rad) = (0.0, 0.25_f64.to_radians());
+        let fan = Fan { origin, first_rad, step_rad, reach_m: 8.0, beams: &beams };
+        let mut scan = Scan::new(&LATTICE, &fan).unwrap();
+        scan.pass(5.0, PASSED);
+        let mut passed = vec![false; LATTICE.area()];
+        for beam in &scan.beams {
+            for step in 0..((beam.range - 5.0) * 100.0) as u32 {
+                let at = scan.origin + f64::from(step) / 100.0 * beam.along;
+                passed[scan.index((at + 0.5).floor().as_ivec2()).unwrap()] = true;
+            }
+        }
+        let marked = |index: &usize| scan.marks[*index] != 0;
+        let marked: Vec<usize> = (0..passed.len()).filter(marked).collect();
+        assert!(marked.iter().all(|index| passed[*index]), "what no beam passed is not free");
+        let all = passed.iter().filter(|passed| **passed).count();
+        assert!(marked.len() > all * 9 / 10, "{} of {all}", marked.len());
     }
 }

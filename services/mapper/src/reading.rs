@@ -58,6 +58,12 @@ impl Rows {
         self.rows.iter().flatten().filter(|row| row.cone.is_some()).count()
     }
 
+    /// Whether the mission uses a laser and a sensor of another kind.
+    pub(crate) fn are_beside_laser(&self) -> bool {
+        let is_other = |row: &Row| row.kind != SensorKind::Scan;
+        self.laser.is_some() && self.rows.iter().flatten().any(is_other)
+    }
+
     /// The row of a reading; none if the mission does not use it. The sample comes from shared memory and may hold anything.
     fn of(&self, reading: &RangeReading) -> Option<Row> {
         *self.rows.get(usize::from(reading.sensor))?
@@ -170,9 +176,12 @@ pub(crate) struct Fan<'a> {
 }
 
 impl Fan<'_> {
-    /// Direction of a beam, a unit vector.
-    pub(crate) fn along(&self, beam: usize) -> DVec2 {
-        DVec2::from_angle(self.first_rad + self.step_rad * beam as f64)
+    /// The beams: the direction of each, a unit vector, and its range.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (DVec2, f64)> + '_ {
+        let step = DVec2::from_angle(self.step_rad);
+        let first = DVec2::from_angle(self.first_rad);
+        let along = std::iter::successors(Some(first), move |along| Some(step.rotate(*along)));
+        along.zip(self.beams.iter().map(|range| f64::from(*range)))
     }
 }
 

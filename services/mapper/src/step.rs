@@ -214,12 +214,8 @@ impl Step for Mapper {
             Input::Tick { pose, ranges, scan, contact, target } => {
                 let moved = target.map_or(Window::default(), |target| self.move_target(target));
                 if self.belief.tick != Some(pose.stamp.tick) {
-                    let fix = self.matcher.step(
-                        &self.rows,
-                        &mut self.belief.reference,
-                        pose.pose(),
-                        &scan,
-                    );
+                    let fix =
+                        self.matcher.step(&self.rows, &mut self.belief.reference, &pose, &scan);
                     let fix = fix.filter(|_| self.matcher.publishes(pose.stamp.tick));
                     let source = name("scan");
                     self.fix = fix.map(|fix| FixSample { capture_ns: now.0, source, ..fix });
@@ -399,11 +395,12 @@ impl Mapper {
             return Window::default();
         };
         let stale = self.evidential.roll(map, rolled, self.belief.rolled);
-        let (beams, rays) = (self.rows.beams(robot, ranges), self.rows.rays(robot, ranges));
-        let news = self.evidential.take(map, robot.position, beams, rays, self.belief.rolled);
+        // The scan comes first, because what it shows explains echoes.
         let fan = self.rows.scan(robot, scan);
         let seen = fan.map(|fan| self.evidential.take_scan(map, robot.position, &fan));
         let seen = seen.unwrap_or_default();
+        let (beams, rays) = (self.rows.beams(robot, ranges), self.rows.rays(robot, ranges));
+        let news = self.evidential.take(map, robot.position, beams, rays, self.belief.rolled);
         let changed = self.redraw(stale.union(news.window).union(seen.window));
         self.belief.safety_events += u64::from(news.safety_event || seen.safety_event);
         changed

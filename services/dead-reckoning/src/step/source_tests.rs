@@ -115,6 +115,17 @@ fn fixes_hold_the_pose_of_a_robot_with_unequal_wheels_and_teach_their_ratio() {
 }
 
 #[test]
+fn no_number_of_fixes_makes_the_pose_surer_than_the_error_that_they_share() {
+    let (mut robot, mut reckoning) = (Robot::new(0.005), x80());
+    let deviation = |reckoning: &DeadReckoning| reckoning.sample().covariance[0].sqrt();
+    let shared = |robot: &mut Robot| vec![FixSample { shared: [0.04, 0.0], ..robot.fix() }];
+    rms(&mut robot, &mut reckoning, 200, shared);
+    assert!((deviation(&reckoning) - 0.2).abs() < 0.01, "{}", deviation(&reckoning));
+    rms(&mut robot, &mut reckoning, 200, |robot| vec![robot.fix()]);
+    assert!(deviation(&reckoning) < 0.05, "fixes of another source do");
+}
+
+#[test]
 fn a_fix_that_comes_late_counts_as_if_it_had_come_at_once() {
     let (mut robot, mut prompt, mut late) = (Robot::new(0.005), x80(), x80());
     let mut waiting = Vec::new();

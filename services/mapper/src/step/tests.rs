@@ -1,5 +1,6 @@
 mod evidential;
 mod fault;
+mod laser;
 
 use super::*;
 use common::samples::{RangeStatus, Stamp};
