@@ -19,15 +19,15 @@ pub enum Model {
     /// The X80SV and X80Pro: 756 counts a wheel turn.
     X80sv,
     /// Clearpath's Jackal, four wheels, of which those of a side turn together; a disc around its corners. Source: its data sheet, and the
-    /// `jackal_control` package.
+    /// `jackal_control` package, also of its accelerations.
     Jackal,
-    /// ROBOTIS' TurtleBot 3 Burger. Source: its e-Manual, and the radius of its Nav2 parameters.
+    /// ROBOTIS' TurtleBot 3 Burger. Source: its e-Manual; its radius and accelerations are those of its Nav2 parameters.
     #[serde(rename = "turtlebot3-burger")]
     TurtleBot3Burger,
-    /// ROBOTIS' TurtleBot 3 Waffle. Source: its e-Manual, and the radius of its Nav2 parameters.
+    /// ROBOTIS' TurtleBot 3 Waffle. Source: its e-Manual; its radius and accelerations are those of its Nav2 parameters.
     #[serde(rename = "turtlebot3-waffle")]
     TurtleBot3Waffle,
-    /// Yujin's Kobuki. Source: its user guide.
+    /// Yujin's Kobuki. Source: its user guide; its accelerations are those of its ROS velocity smoother.
     Kobuki,
     /// A small car on the X80's boards. Nominal, no product: the size of a model car of about 1:14.
     Car,
@@ -95,6 +95,12 @@ pub struct RobotConfig {
     /// The most either wheel's rim can do, m/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub top_speed_m_s: Option<f64>,
+    /// The most that its speed may grow, m/s^2; a car's and an X80's may grow at once.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub acceleration_m_s2: Option<f64>,
+    /// The most that its turn rate may grow, rad/s^2; likewise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub turn_acceleration_rad_s2: Option<f64>,
     /// The left wheel's channel; that of a car's driven axle.
     pub left: Channel,
     /// The right wheel's channel; that of a car's steering, positive to the left.
@@ -155,6 +161,8 @@ impl Default for RobotConfig {
             counts_per_turn: None,
             radius_m: None,
             top_speed_m_s: None,
+            acceleration_m_s2: None,
+            turn_acceleration_rad_s2: None,
             left: Channel { channel: 0, reversed: true },
             right: Channel { channel: 1, reversed: false },
             speed_trim: None,
@@ -181,6 +189,8 @@ pub struct Body {
     pub radius_m: f64,
     /// The most either wheel's rim can do, m/s.
     pub top_speed_m_s: f64,
+    /// The most that speed and turn rate may grow, m/s^2 and rad/s^2; infinite if at once. They fall at once on every robot.
+    pub acceleration: [f64; 2],
     /// The steering of a car; none for a robot with two driven wheels.
     pub steering: Option<Steering>,
 }
@@ -254,10 +264,21 @@ const fn differential(
     track_m: f64,
     radius_m: f64,
     top_speed_m_s: f64,
+    acceleration: [f64; 2],
 ) -> Body {
-    let counts_per_turn = 3600.0;
-    Body { wheel_radius_m, track_m, counts_per_turn, radius_m, top_speed_m_s, steering: None }
+    Body {
+        wheel_radius_m,
+        track_m,
+        counts_per_turn: 3600.0,
+        radius_m,
+        top_speed_m_s,
+        acceleration,
+        steering: None,
+    }
 }
+
+/// The accelerations of the X80 and the car. No source has any.
+const AT_ONCE: [f64; 2] = [f64::INFINITY; 2];
 
 impl Model {
     /// Whether it is an X80, or has its boards.
@@ -276,6 +297,7 @@ impl Model {
                 counts_per_turn: 1200.0,
                 radius_m: 0.19,
                 top_speed_m_s: 1.0,
+                acceleration: AT_ONCE,
                 steering: None,
             },
             Self::X80sv => Body {
@@ -284,13 +306,14 @@ impl Model {
                 counts_per_turn: 756.0,
                 radius_m: 0.19,
                 top_speed_m_s: 0.76,
+                acceleration: AT_ONCE,
                 steering: None,
             },
             // 508 mm by 430 mm.
-            Self::Jackal => differential(0.098, 0.375_59, 0.333, 2.0),
-            Self::TurtleBot3Burger => differential(0.033, 0.16, 0.105, 0.22),
-            Self::TurtleBot3Waffle => differential(0.033, 0.287, 0.22, 0.26),
-            Self::Kobuki => differential(0.0352, 0.23, 0.1758, 0.7),
+            Self::Jackal => differential(0.098, 0.375_59, 0.333, 2.0, [20.0, 25.0]),
+            Self::TurtleBot3Burger => differential(0.033, 0.16, 0.105, 0.22, [2.5, 3.2]),
+            Self::TurtleBot3Waffle => differential(0.033, 0.287, 0.22, 0.26, [2.5, 3.2]),
+            Self::Kobuki => differential(0.0352, 0.23, 0.1758, 0.7, [1.0, 2.0]),
             // Nominal. The pose is the middle of the rear axle: the disc around it covers a body that reaches 0.22 m ahead of
             // it and 0.09 m to either side. It turns in 0.31 m.
             Self::Car => Body {
@@ -299,6 +322,7 @@ impl Model {
                 counts_per_turn: 600.0,
                 radius_m: 0.24,
                 top_speed_m_s: 1.0,
+                acceleration: AT_ONCE,
                 steering: Some(Steering {
                     wheelbase_m: 0.18,
                     limit_rad: std::f64::consts::FRAC_PI_6,
@@ -330,6 +354,10 @@ impl RobotConfig {
             counts_per_turn: self.counts_per_turn.unwrap_or(preset.counts_per_turn),
             radius_m: self.radius_m.unwrap_or(preset.radius_m),
             top_speed_m_s: self.top_speed_m_s.unwrap_or(preset.top_speed_m_s),
+            acceleration: [
+                self.acceleration_m_s2.unwrap_or(preset.acceleration[0]),
+                self.turn_acceleration_rad_s2.unwrap_or(preset.acceleration[1]),
+            ],
             steering: preset.steering.map(|steering| Steering {
                 wheelbase_m: self.wheelbase_m.unwrap_or(steering.wheelbase_m),
                 limit_rad: self.steering_limit_deg.map_or(steering.limit_rad, f64::to_radians),

@@ -1,6 +1,8 @@
-//! The speeds of a command in counts of the encoders.
+//! The speeds of a command in counts of the encoders, which grow no faster than the body's accelerations allow. They fall at once: the
+//! robot stops as well as it can.
 
 use common::{
+    kinematics::{DifferentialDrive, Twist, WheelSpeeds as Wheels},
     mission::{Body, Mission},
     samples::{CommandSample, WheelSample},
     wire::counts_between,
@@ -15,21 +17,29 @@ const STEERING_GAIN: f64 = 0.6;
 pub(crate) struct WheelSpeeds {
     body: Body,
     rate_hz: f64,
+    /// The newest speeds that the robot was told, counts/s.
+    told: [i16; 2],
 }
 
 impl WheelSpeeds {
     pub(crate) fn new(mission: &Mission) -> Self {
-        Self { body: mission.body(), rate_hz: mission.robot.rate_hz }
+        Self { body: mission.body(), rate_hz: mission.robot.rate_hz, told: [0; 2] }
+    }
+
+    /// The robot was told these speeds, counts/s.
+    pub(crate) const fn told(&mut self, counts: [i16; 2]) {
+        self.told = counts;
     }
 
     /// The speeds of the two wheels, or of a car's wheel and steering, for `command` at `share` of its speed, counts/s; `wheels` are the
     /// newest encoder counts. A car's steering has a speed loop like a wheel's and is driven towards its angle, so its motion ends with
     /// a timed command too.
     pub(crate) fn of(&self, command: &CommandSample, share: f64, wheels: &WheelSample) -> [i16; 2] {
-        let driven = self.counts_per_second(share * command.left_rad_s);
         let Some(steering) = self.body.steering else {
-            return [driven, self.counts_per_second(share * command.right_rad_s)];
+            let wanted = [command.left_rad_s, command.right_rad_s].map(|speed| share * speed);
+            return self.reachable(wanted).map(|speed| self.counts_per_second(speed));
         };
+        let driven = self.counts_per_second(share * command.left_rad_s);
         let angle = command.right_rad_s.clamp(-steering.limit_rad, steering.limit_rad);
         let left = steering.counts(angle) - f64::from(counts_between(0, wheels.right_counts));
         let top = steering.counts(steering.rate_rad_s);
@@ -37,11 +47,36 @@ impl WheelSpeeds {
         [driven, whole(rate)]
     }
 
+    /// The speeds of the wheels, rad/s, that the robot reaches in a tick of those that are `wanted`.
+    fn reachable(&self, wanted: [f64; 2]) -> [f64; 2] {
+        let Body { wheel_radius_m, track_m, acceleration, .. } = self.body;
+        if acceleration == [f64::INFINITY; 2] {
+            return wanted;
+        }
+        let drive = DifferentialDrive::new(wheel_radius_m, track_m, f64::INFINITY);
+        let twist = |[left, right]: [f64; 2]| drive.twist(Wheels { right, left });
+        let per_radian = self.counts_per_radian();
+        let (now, then) = (twist(wanted), twist(self.told.map(|it| f64::from(it) / per_radian)));
+        let grown = |now: f64, then: f64, acceleration: f64| {
+            let most = (then * now.signum()).max(0.0) + acceleration / self.rate_hz;
+            now.clamp(-most, most)
+        };
+        let omega = grown(now.omega, then.omega, acceleration[1]);
+        // The robot slows down so that it keeps its curve, which is clear.
+        let turned = if omega == now.omega { 1.0 } else { (omega / now.omega).abs() };
+        let v = grown(now.v * turned, then.v, acceleration[0]);
+        let Wheels { right, left } = drive.wheels(Twist { v, omega });
+        [left, right]
+    }
+
+    fn counts_per_radian(&self) -> f64 {
+        self.body.counts_per_turn / std::f64::consts::TAU
+    }
+
     /// Convert rad/s to counts/s, limited to the wheel's top speed; NaN gives 0.
     fn counts_per_second(&self, speed: f64) -> i16 {
-        let per_radian = self.body.counts_per_turn / std::f64::consts::TAU;
         let top = self.body.top_speed_m_s / self.body.metres_per_count();
-        whole((speed * per_radian).clamp(-top, top))
+        whole((speed * self.counts_per_radian()).clamp(-top, top))
     }
 }
 
@@ -90,5 +125,36 @@ mod tests {
         let tau = std::f64::consts::TAU;
         assert_eq!(counts(tau, five, 1.0, 0), [600, 210]);
         assert_eq!(counts(tau, five, 0.5, 0), [300, 210]);
+    }
+
+    #[test]
+    fn a_kobuki_gains_no_more_speed_in_a_tick_than_it_can_on_the_curve_that_is_wanted_and_loses_it_at_once()
+     {
+        let text = "target = [3, 0]\nrobot.model = 'kobuki'\nrobot.rate_hz = 10";
+        let mut speeds = WheelSpeeds::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
+        let drive = speeds.body.drive();
+        let mut tell = |v: f64, omega: f64| {
+            let [left_rad_s, right_rad_s] = drive.inputs(Twist { v, omega });
+            let command = CommandSample { left_rad_s, right_rad_s, ..CommandSample::default() };
+            let counts = speeds.of(&command, 1.0, &WheelSample::default());
+            speeds.told(counts);
+            let [left, right] = counts.map(|count| f64::from(count) / speeds.counts_per_radian());
+            let (r, w) = (speeds.body.wheel_radius_m, speeds.body.track_m);
+            [(right + left) * r / 2.0, (right - left) * r / w]
+        };
+        let mut is = |said: [f64; 2], done: [f64; 2]| {
+            let [v, omega] = tell(said[0], said[1]);
+            assert!((v - done[0]).abs() < 1e-3 && (omega - done[1]).abs() < 5e-3, "{v} {omega}");
+        };
+        // 1 m/s^2 and 2 rad/s^2 are 0.1 m/s and 0.2 rad/s in a tick.
+        is([0.5, 0.0], [0.1, 0.0]);
+        is([0.5, 0.1], [0.2, 0.1]);
+        // The curve of 0.5 m/s and 1 rad/s at the turn rate that it reaches.
+        is([0.5, 1.0], [0.15, 0.3]);
+        is([0.5, -1.0], [0.1, -0.2]);
+        is([0.1, 0.0], [0.1, 0.0]);
+        is([0.0, 1.0], [0.0, 0.2]);
+        is([0.0, 0.0], [0.0, 0.0]);
+        is([f64::NAN, 0.0], [0.0, 0.0]);
     }
 }

@@ -32,6 +32,12 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     }
     within("robot.radius_m", body.radius_m, 0.01..=5.0, "m")?;
     within("robot.top_speed_m_s", body.top_speed_m_s, 0.01..=10.0, "m/s")?;
+    if let Some(acceleration) = robot.acceleration_m_s2 {
+        within("robot.acceleration_m_s2", acceleration, 0.01..=1000.0, "m/s^2")?;
+    }
+    if let Some(acceleration) = robot.turn_acceleration_rad_s2 {
+        within("robot.turn_acceleration_rad_s2", acceleration, 0.01..=1000.0, "rad/s^2")?;
+    }
     within("robot.command_limit_s", robot.command_limit_s, 0.02..=5.0, "s")?;
     let limits = robot.low_battery_v;
     for limit in [limits.board, limits.motor, limits.servo] {

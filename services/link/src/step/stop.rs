@@ -72,6 +72,7 @@ impl Link {
     }
 
     fn commanded(&mut self, counts: [i16; 2], now_ns: u64) {
+        self.speeds.told(counts);
         self.observe(Observation::Commanded(counts), now_ns);
         self.restart.commanded(counts, self.now);
     }
