@@ -19,6 +19,9 @@ const FARTHEST: f64 = 1e6;
 const MOST_ANSWERED: usize = 64;
 /// A laser whose scans are the same to the bit while a wheel turns so far is stuck, radians.
 const STUCK_RAD: f64 = 1.0;
+/// A laser whose beams all see nothing is blind if, in the scan before, more than one in so many ended within half its reach. Nothing
+/// that fills so much of its view is out of reach a moment later.
+const BLIND_ONE_IN: usize = 20;
 /// The current of a wheel that is held: all that the converter of an X80 can say, AD counts.
 const HELD_AD: u16 = 4095;
 
@@ -34,6 +37,10 @@ pub struct Json {
     laser: Option<(usize, Sensor)>,
     /// The newest scan that differs from the one before, and the angles of the wheels then.
     newest_scan: (Vec<f32>, [f64; 2]),
+    /// The beams that ended near in the newest scan that saw anything, and the angles of the wheels then.
+    near: (usize, [f64; 2]),
+    /// Whether the laser is blind, until it sees anything.
+    is_blind: bool,
     /// The angles of the wheels.
     turned: [f64; 2],
     /// The beams since the last tick.
@@ -50,6 +57,8 @@ impl Json {
         Self {
             laser: mission.laser(),
             newest_scan: (Vec::new(), [0.0; 2]),
+            near: (0, [0.0; 2]),
+            is_blind: false,
             turned: [0.0; 2],
             scan: Vec::new(),
             body: mission.body(),
@@ -148,8 +157,28 @@ impl Json {
         Ok((*row, beams.iter().map(range).collect()))
     }
 
+    /// Note whether a laser with these beams is blind.
+    fn look_for_blindness(&mut self, beams: &[f32]) {
+        let Some((_, sensor)) = &self.laser else {
+            return;
+        };
+        if beams.iter().any(|beam| beam.is_finite()) {
+            let near_m = sensor.reach_m as f32 / 2.0;
+            let near = beams.iter().filter(|beam| **beam < near_m).count();
+            (self.near, self.is_blind) = ((near, self.turned), false);
+        } else if beams.iter().any(|beam| beam.is_infinite()) {
+            let (near, turned_then) = self.near;
+            let [left, right] = [0, 1].map(|wheel| self.turned[wheel] - turned_then[wheel]);
+            let turn = drive(&self.body).twist(WheelSpeeds { right, left }).omega;
+            // A turn takes things out of a view that is no whole circle.
+            let is_circle = sensor.field_of_view_deg >= 360.0;
+            let lost = if is_circle { 0.0 } else { turn.abs() / sensor.fan().1 };
+            self.is_blind |= near > beams.len() / BLIND_ONE_IN + lost.ceil() as usize;
+        }
+    }
+
     /// Take the beams of the laser in `row`. As a reading of its row the nearest of them counts; none does of a laser that says the same
-    /// although the wheels have turned.
+    /// although the wheels have turned, or that is blind.
     fn take_scan(&mut self, row: usize, beams: Vec<f32>) {
         let (newest, turned_then) = &self.newest_scan;
         let [bits_then, bits_now] =
@@ -157,18 +186,20 @@ impl Json {
         let is_same = beams.iter().any(|beam| beam.is_finite()) && bits_then.eq(bits_now);
         let went = |wheel: usize| (self.turned[wheel] - turned_then[wheel]).abs();
         let is_stuck = is_same && went(0).max(went(1)) > STUCK_RAD;
+        self.look_for_blindness(&beams);
+        let is_refused = is_stuck || self.is_blind;
         if !is_same {
             self.newest_scan = (beams.clone(), self.turned);
         }
         let nearest = beams.iter().copied().fold(f32::NAN, f32::min);
         let (status, range_m) = match nearest {
-            nearest if is_stuck || nearest.is_nan() => (RangeStatus::Invalid, 0.0),
+            nearest if is_refused || nearest.is_nan() => (RangeStatus::Invalid, 0.0),
             nearest if nearest.is_infinite() => (RangeStatus::Nothing, 0.0),
             nearest => (RangeStatus::Measured, nearest.into()),
         };
         let status = status.into();
         self.readings.take(row, RangeReading { range_m, status, ..RangeReading::default() });
-        if !is_stuck {
+        if !is_refused {
             self.scan = beams;
         }
     }
@@ -371,6 +402,45 @@ mod tests {
         assert_eq!([scan(1.0, 0.0), scan(1.0, 0.1), scan(1.0, 0.9)], [measured; 3]);
         assert_eq!(scan(1.0, 1.1), (RangeStatus::Invalid, 0));
         assert_eq!(scan(1.5, 1.2), measured);
+    }
+
+    /// The status of the laser of `model` after scans of so many beams that end at a range, the others at nothing, each after the wheels
+    /// have turned on the spot by an angle more.
+    fn scanned(model: &str, scans: &[(usize, f64, f64)]) -> Vec<RangeStatus> {
+        let text = format!("target = [3, 0]\nrobot.model = '{model}'");
+        let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+        let (_, laser) = mission.laser().unwrap();
+        let mut driver = Json::new(&mission);
+        let mut turned = 0.0;
+        let status = |&(ending, range, turn): &(usize, f64, f64)| {
+            turned += turn;
+            let mut beams = vec![range.to_string(); ending];
+            beams.resize(laser.beams, "null".to_owned());
+            let wheels = format!("\"wheels\":[{},{turned}],\"speeds\":[1,1]", -turned);
+            let line = format!("{{{wheels},\"scan\":[{}]}}", beams.join(","));
+            let status = heard(&mut driver, &line).readings[0].status();
+            assert_eq!(driver.scan_for_tick().is_empty(), status == RangeStatus::Invalid);
+            status
+        };
+        scans.iter().map(status).collect()
+    }
+
+    #[test]
+    fn a_laser_that_sees_nothing_where_much_was_near_gives_no_reading_until_it_sees_anything() {
+        use RangeStatus::{Invalid, Measured, Nothing};
+        let blind = [(30, 1.0, 0.0), (0, 0.0, 0.1), (0, 0.0, 9.0), (1, 3.0, 0.0), (0, 0.0, 0.0)];
+        assert_eq!(scanned("kobuki", &blind), [Measured, Invalid, Invalid, Measured, Nothing]);
+    }
+
+    #[test]
+    fn a_laser_sees_nothing_where_what_it_saw_was_small_far_or_is_out_of_view_by_the_turn() {
+        use RangeStatus::{Invalid, Measured, Nothing};
+        for small_or_far in [(18, 1.0, 0.0), (360, 7.0, 0.0)] {
+            assert_eq!(scanned("kobuki", &[small_or_far, (0, 0.0, 0.0)]), [Measured, Nothing]);
+        }
+        // 100 beams of a Jackal's laser are 25 degrees; a wheel that turns by 1 rad turns it by 30.
+        assert_eq!(scanned("jackal", &[(100, 1.0, 0.0), (0, 0.0, 1.0)]), [Measured, Nothing]);
+        assert_eq!(scanned("jackal", &[(100, 1.0, 0.0), (0, 0.0, 0.1)]), [Measured, Invalid]);
     }
 
     #[test]
