@@ -9,18 +9,18 @@
 //! | pinned | it drives or turns, and stays at its place | replan |
 //! | inside hazard | it stands in a hazard, and has driven far without leaving it | reset |
 //! | held | something holds its wheels: its motors push and its encoders stand | replan |
-//! | wandering | it has driven several times as far as its target was away | reset |
+//! | wandering | it has driven several times as far as its target was away; with a laser, on ground where it had been | reset |
 //! | relocated | fixes say that it is elsewhere, so the map is of another place; no limit | reset |
 //! | cut off | no way leads from its place to the target, and it has looked around | reset |
 
-use std::{f64::consts::TAU, time::Duration};
+use std::{collections::HashSet, f64::consts::TAU, time::Duration};
 
 use common::{
     clock::MissionTime,
-    mission::{Body, Method, Mission},
+    mission::{Body, Method, Mission, SensorKind},
     samples::{GuidanceSample, GuidanceStatus, PoseSample, RecoveryStep, StallCause, StallSample},
 };
-use glam::DVec2;
+use glam::{DVec2, IVec2};
 
 /// Mission time without motion that is a stall. The slowest turn on the spot begins earlier.
 const STALLED_AFTER: Duration = Duration::from_secs(3);
@@ -52,6 +52,11 @@ const HELD_WITHIN_M: f64 = 0.5;
 const WANDERS: f64 = 3.0;
 /// See [`WANDERS`], metres.
 const WANDERS_LEAST_M: f64 = 12.0;
+/// The side of a square in which a robot was, metres. The map of a laser is to be trusted, and the way through a large building may be
+/// many times as long as the straight one: each square in which such a robot has not been lets it drive [`WANDERS`] times that farther.
+const SQUARE_M: f64 = 1.0;
+/// The most squares that are remembered.
+const MOST_SQUARES: usize = 10_000;
 /// Replans before the map is reset.
 const MOST_REPLANS: u32 = 2;
 /// Resets of the map before the target is unreachable.
@@ -112,6 +117,8 @@ pub(crate) struct StallWatch {
     forgets: bool,
     /// The distance travelled at which the robot wanders, metres; none before the first tick, and after a reset.
     wanders_at: Option<f64>,
+    /// The squares in which a robot with a laser was on the way to its target; none of another robot.
+    been: Option<HashSet<IVec2>>,
     /// Replans at this place, since the last reset.
     replans_here: u32,
     replans: u32,
@@ -183,6 +190,7 @@ impl StallWatch {
             // A calibration drives to and fro.
             forgets: mission.method == Method::Evidential && mission.planner.calibration.is_none(),
             wanders_at: None,
+            been: (mission.used(SensorKind::Scan) > 0).then(HashSet::new),
             replans_here: 0,
             replans: 0,
             held_at: None,
@@ -333,6 +341,7 @@ impl StallWatch {
         self.hold(tick);
         (self.inside_hazard_since, self.wanders_at, self.held_at) = (None, None, None);
         self.replans_here = 0;
+        self.been.iter_mut().for_each(HashSet::clear);
         self.resets_before = self.resets() - self.relocated;
     }
 
@@ -383,8 +392,13 @@ impl StallWatch {
     /// Whether the robot has driven for so long, since the start or the last reset, that its map must be wrong.
     fn without_end(&mut self, pose: &PoseSample, guidance: &GuidanceSample) -> Option<StallCause> {
         let most_m = (WANDERS * guidance.distance_m).max(WANDERS_LEAST_M);
-        let wanders_at = *self.wanders_at.get_or_insert(pose.travelled_m + most_m);
-        (self.forgets && pose.travelled_m >= wanders_at).then_some(StallCause::Wandering)
+        let wanders_at = self.wanders_at.get_or_insert(pose.travelled_m + most_m);
+        let square = (pose.pose().position / SQUARE_M).floor().as_ivec2();
+        let is_new = |been: &mut HashSet<_>| been.len() < MOST_SQUARES && been.insert(square);
+        if self.been.as_mut().is_some_and(is_new) {
+            *wanders_at += WANDERS * SQUARE_M;
+        }
+        (self.forgets && pose.travelled_m >= *wanders_at).then_some(StallCause::Wandering)
     }
 
     /// Whether the robot has not moved or turned for a while; or moves or turns for longer and stays at its place.

@@ -333,6 +333,24 @@ fn a_robot_that_drives_three_times_as_far_as_its_target_was_away_forgets_and_in_
 }
 
 #[test]
+fn a_robot_with_a_laser_wanders_where_it_has_been_and_not_where_it_has_not() {
+    let text = "target = [3, 0]\nrobot.model = 'kobuki'";
+    let mission = Mission::parse(text, std::path::Path::new("test.toml")).unwrap();
+    let first = |x_m: fn(f64) -> f64| {
+        let mut watch = StallWatch::new(&mission);
+        (0..200).find(|&metre| {
+            let metre = f64::from(metre);
+            let pose = PoseSample { x_m: x_m(metre), ..pose(2.0 * metre, metre) };
+            let guidance = GuidanceSample { distance_m: 3.0, ..guidance(GuidanceStatus::Along, 0) };
+            watch.step(&pose, &guidance, false, false).is_some()
+        })
+    };
+    assert_eq!(first(|metre| metre), None);
+    // 12 m, and 3 m for each of four squares.
+    assert_eq!(first(|metre| metre % 4.0), Some(24));
+}
+
+#[test]
 fn a_relocated_robot_forgets_all_of_its_map_each_time_and_gives_up_for_it_never() {
     let mut watch = watch();
     let along = guidance(GuidanceStatus::Along, 0);
