@@ -5,7 +5,20 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-/// The heights between which a shape extends, and the share of sound that it reflects.
+/// What the surface of a shape does to the beam of a laser.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Light {
+    /// It scatters the beam: a laser detects it from any side.
+    #[default]
+    Matt,
+    /// The beam passes, except near the normal, where the pane reflects it back into the laser.
+    Glass,
+    /// It scatters a tenth of the light: a laser detects it from near.
+    Black,
+}
+
+/// The heights between which a shape extends, the share of sound that it reflects, and what it does to light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Profile {
     /// Its lowest height above the floor, metres.
@@ -14,6 +27,8 @@ pub struct Profile {
     pub top_m: f64,
     /// Amplitude of its echo over that of a hard thing of its form; 1 is hard.
     pub echo: f64,
+    /// What it does to the beam of a laser.
+    pub light: Light,
 }
 
 impl Profile {
@@ -50,16 +65,20 @@ macro_rules! shape {
             /// Amplitude of its echo over that of a hard thing; without it, it is hard.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub echo: Option<f64>,
+            /// What it does to the beam of a laser; without it, it is matt.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub light: Option<Light>,
         }
 
         impl $name {
-            /// Its heights and its echo.
+            /// Its heights, its echo and what it does to light.
             #[must_use]
             pub fn profile(&self) -> Profile {
                 Profile {
                     bottom_m: self.bottom_m.unwrap_or(0.0),
                     top_m: self.top_m.unwrap_or(f64::INFINITY),
                     echo: self.echo.unwrap_or(1.0),
+                    light: self.light.unwrap_or_default(),
                 }
             }
         }
@@ -304,6 +323,16 @@ mod tests {
         let profile = met[1].profile();
         assert!((profile.height_gap(0.18) - 0.08).abs() < 1e-12, "{profile:?}");
         assert_eq!(profile.height_gap(0.05), 0.0);
+    }
+
+    #[test]
+    fn what_a_shape_does_to_light_survives_a_file() {
+        let text = "wall = [{ points = [[0, 0], [1, 0]], light = 'glass' }, { points = [[0, 1], [1, 1]] }]";
+        let shapes: Shapes = toml::from_str(text).unwrap();
+        let lights = shapes.walls.iter().map(|wall| wall.profile().light);
+        assert_eq!(lights.collect::<Vec<_>>(), [Light::Glass, Light::Matt]);
+        let written = toml::to_string(&shapes).unwrap();
+        assert_eq!(toml::from_str::<Shapes>(&written).unwrap(), shapes);
     }
 
     #[test]

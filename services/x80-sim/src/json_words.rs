@@ -12,7 +12,7 @@ use common::{
     },
 };
 
-use crate::motor::Motor;
+use crate::{motor::Motor, sensors::STALL_CURRENT};
 
 /// Converts between the words and the boards.
 #[derive(Clone, Debug)]
@@ -86,8 +86,10 @@ impl JsonWords {
                 forward(wheel.reversed) * counts / self.counts_per_radian
             })
         };
+        // The current of a rolling motor is left out: it is of an X80's counts, and other robots have more of them in a turn.
         let held = wheels.map(|wheel| {
-            motor.currents[usize::from(wheel.channel.min(1))] >= self.robot.held_current_ad
+            let motor = &motors[usize::from(wheel.channel.min(1))];
+            motor.enabled() && STALL_CURRENT * motor.load() >= self.robot.held_current_ad.into()
         });
         let ranges = self.table.iter().filter_map(|sensor| {
             let channel = usize::from(sensor.channel);

@@ -1,6 +1,11 @@
-//! A laser: each beam ends at the first thing that stands at its height.
+//! A laser: each beam ends at the first thing that stands at its height and is no pane of glass at a slant.
+//!
+//! A beam that ends at a black surface too far away brings nothing back. The sensor cannot tell that from an empty room, so the reading
+//! is "nothing in reach", as drivers publish it: infinity by ROS's REP 117 ("no return") and in Slamtec's `rplidar_ros`. So is a beam
+//! through glass with nothing behind.
 
 use common::{
+    geometry::Light,
     kinematics::Pose2,
     mission::{Mission, Sensor},
 };
@@ -8,11 +13,16 @@ use glam::DVec2;
 
 use crate::{
     noise::{Noise, Source},
-    world::World,
+    world::{Solid, World},
 };
 
 /// Beams that give no reading, of a thousand: the edges of things, and the sun. Nominal.
 const LOST_OF_1000: f64 = 2.0;
+
+/// Greatest angle to its normal at which a pane of glass gives a reading, degrees. Nominal: L. Tibebu et al., "LiDAR-based glass
+/// detection for improved occupancy grid mapping", Sensors 21(7), 2021, find the peak of a reflection only where beams are
+/// perpendicular to the glass, and it falls fast beside that.
+const GLASS_LIMIT_DEG: f64 = 5.0;
 
 /// The laser of a robot.
 #[derive(Clone, Debug)]
@@ -39,17 +49,19 @@ impl Laser {
         let height_m = world.heights().infrared_m;
         let (first, step) = self.sensor.fan();
         let (noise_m, noise_share) = self.sensor.model.beam_noise();
+        let black_reach_m = self.sensor.model.black_reach_m();
         let near = world.near(mount.position, self.sensor.reach_m, height_m);
         (0..self.sensor.beams)
             .map(|beam| {
                 let along = DVec2::from_angle(mount.heading + first + step * beam as f64);
                 let hit = near
                     .iter()
-                    .filter_map(|surface| surface.hit(mount.position, along))
-                    .min_by(f64::total_cmp);
+                    .filter_map(|solid| end(solid, mount.position, along))
+                    .min_by(|(a, _), (b, _)| a.total_cmp(b))
+                    .filter(|&(range, light)| light != Light::Black || range <= black_reach_m);
                 let lost = self.noise.chance(LOST_OF_1000 / 1000.0);
                 let noise = self.noise.normal(1.0);
-                let range = hit.map(|range| range + noise * (noise_m + noise_share * range));
+                let range = hit.map(|(range, _)| range + noise * (noise_m + noise_share * range));
                 match range {
                     Some(range) if lost || range < self.sensor.model.least_m() => Some(-1.0),
                     Some(range) if range <= self.sensor.reach_m => Some(range as f32),
@@ -58,6 +70,17 @@ impl Laser {
             })
             .collect()
     }
+}
+
+/// The range at which a beam from `origin` in the unit direction `along` ends at `solid`, metres, and what that does to light; none if
+/// the beam passes.
+fn end(solid: &Solid, origin: DVec2, along: DVec2) -> Option<(f64, Light)> {
+    let (range, light) = (solid.surface.hit(origin, along)?, solid.profile.light);
+    let is_slanted = || {
+        let cos = solid.surface.incidence_cos(origin + along * range, along);
+        cos < GLASS_LIMIT_DEG.to_radians().cos()
+    };
+    (light != Light::Glass || !is_slanted()).then_some((range, light))
 }
 
 #[cfg(test)]
@@ -80,5 +103,54 @@ mod tests {
         assert!((at(0).unwrap() - 2.064).abs() < 0.25, "{:?}", at(0));
         assert!((at(90).unwrap() - 1.5).abs() < 0.2, "{:?}", at(90));
         assert_eq!(at(180), None);
+    }
+
+    /// What a UST-10LX on a Jackal at the origin reads in a world, by the angle of the beam, degrees from straight ahead.
+    fn reading(shapes: &str) -> impl Fn(f64) -> Option<f32> + use<> {
+        let text = format!("target = [0, -5]\nrobot.model = 'jackal'\n{shapes}");
+        let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+        let mut laser = Laser::new(&mission, 1).unwrap();
+        let forward_m = laser.sensor.mount.forward_m;
+        let scan = laser.scan(
+            &World::new(&mission),
+            Pose2 { position: DVec2::new(-forward_m, 0.0), heading: 0.0 },
+        );
+        move |degrees| scan[540 + (degrees * 4.0) as usize]
+    }
+
+    #[track_caller]
+    fn is_near(range: Option<f32>, want: f32) {
+        assert!((range.unwrap() - want).abs() < 0.1, "{range:?} instead of {want} m");
+    }
+
+    #[test]
+    fn a_pane_of_glass_is_measured_square_on_and_at_a_slant_what_stands_behind_it() {
+        let pane = "points = [[2, -3], [2, 3]], light = 'glass'";
+        let seen =
+            reading(&format!("world.wall = [{{ {pane} }}, {{ points = [[4, -9], [4, 9]] }}]"));
+        is_near(seen(0.0), 2.0);
+        is_near(seen(4.0), 2.0);
+        is_near(seen(6.0), 4.02);
+        is_near(seen(30.0), 4.62);
+        let alone = reading(&format!("world.wall = [{{ {pane} }}]"));
+        assert_eq!(alone(30.0), None, "nothing stands behind");
+    }
+
+    #[test]
+    fn a_column_of_glass_is_measured_in_its_middle() {
+        let seen = reading("world.drum = [{ at = [2, 0], radius_m = 0.5, light = 'glass' }]");
+        is_near(seen(0.0), 1.5);
+        assert_eq!(seen(8.0), None);
+    }
+
+    #[test]
+    fn a_black_wall_is_measured_from_near_and_hides_what_stands_behind_it_from_far() {
+        let seen = |x: f64| {
+            let wall = |x: f64, light: &str| format!("{{ points = [[{x}, -9], [{x}, 9]]{light} }}");
+            let [black, white] = [wall(x, ", light = 'black'"), wall(x + 1.0, "")];
+            reading(&format!("world.wall = [{black}, {white}]"))
+        };
+        is_near(seen(3.8)(0.0), 3.8);
+        assert_eq!(seen(4.2)(0.0), None);
     }
 }

@@ -23,7 +23,7 @@ const REFERENCE: u16 = 2048;
 /// Motor current of a standing motor, and for each count per second, AD counts; nominal.
 const CURRENT: (f64, f64) = (20.0, 0.2);
 /// Motor current that a stalled motor draws besides, AD counts; nominal. A stalled motor draws several times what it draws as it rolls.
-const STALL_CURRENT: f64 = 1500.0;
+pub(crate) const STALL_CURRENT: f64 = 1500.0;
 
 /// The ultrasonic and infrared rangers and the rest of the multimedia board.
 #[derive(Clone, Debug)]
@@ -58,7 +58,10 @@ impl Ranging {
             let (forward_m, bearing_rad) = (ranger.forward_m, ranger.bearing_deg.to_radians());
             mounts[usize::from(ranger.index) % SONARS] = Some(Mount { forward_m, bearing_rad });
         }
-        mounts[front_channel] = Some(front.mount);
+        // Of a robot without sonars it is another sensor.
+        if front.kind == SensorKind::Cone {
+            mounts[front_channel] = Some(front.mount);
+        }
         Self {
             front: front_channel,
             mounts,

@@ -73,6 +73,15 @@ impl Surface {
         }
     }
 
+    /// Cosine of the angle between the unit direction `along` and the normal of this surface at `point`, which is on it.
+    pub fn incidence_cos(&self, point: DVec2, along: DVec2) -> f64 {
+        let normal = match *self {
+            Self::Drum { at, .. } => point - at,
+            Self::Face { from, to } => (to - from).perp(),
+        };
+        normal.normalize_or_zero().dot(along).abs()
+    }
+
     fn moved(self, by: DVec2) -> Self {
         match self {
             Self::Drum { at, radius } => Self::Drum { at: at + by, radius },
@@ -81,12 +90,12 @@ impl Surface {
     }
 }
 
-/// A surface with its heights and its echo.
+/// A surface with its heights, its echo and what it does to light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solid {
     /// Its outline from above.
     pub surface: Surface,
-    /// Its heights.
+    /// Its heights, its echo and what it does to light.
     pub profile: Profile,
 }
 
@@ -185,12 +194,11 @@ impl World {
 }
 
 impl World {
-    /// The surfaces at `height_m` that stand no farther than `reach_m` from `point`.
-    pub fn near(&self, point: DVec2, reach_m: f64, height_m: f64) -> Vec<Surface> {
+    /// What stands at `height_m` no farther than `reach_m` from `point`.
+    pub fn near(&self, point: DVec2, reach_m: f64, height_m: f64) -> Vec<Solid> {
         self.solids()
             .filter(|solid| solid.profile.height_gap(height_m) == 0.0)
-            .map(|solid| solid.surface)
-            .filter(|surface| surface.distance(point) <= reach_m)
+            .filter(|solid| solid.surface.distance(point) <= reach_m)
             .collect()
     }
 

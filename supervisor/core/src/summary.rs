@@ -45,6 +45,12 @@ pub struct Summary {
     pub path_length_m: f64,
     pub straight_m: f64,
     pub min_clearance_m: Option<f64>,
+    /// Share of the time in which the body's surface was within [`SAFE_M`] of something: p_o of MRPB (J. Wen et al., ICRA 2021), (2).
+    pub p_o: Option<f64>,
+    /// Sum of the squared changes of the way from tick to tick: f_ps of MRPB, (5). It depends on the rate of the ticks.
+    pub f_ps_m2: Option<f64>,
+    /// Mean |dv/dt|: f_vs of MRPB, (6).
+    pub f_vs_m_s2: Option<f64>,
     pub collisions: Option<u64>,
     pub pose_error_m: Option<f64>,
     /// The root mean square of the pose error by the covariance of the last pose.
@@ -89,6 +95,8 @@ pub struct Summary {
 
 /// A robot has departed after this distance, metres.
 const DEPARTED_M: f64 = 0.1;
+/// d_safe of MRPB, metres. The value is nominal, because MRPB leaves it to its user.
+pub const SAFE_M: f64 = 0.3;
 
 impl Summary {
     /// The summary of a finished run. Samples after the end was decided do not count.
@@ -115,6 +123,9 @@ impl Summary {
             straight_m: straight_m(&finished.targets),
             min_clearance_m: clearance
                 .filter(|&clearance| clearance < GroundTruthTick::NOTHING_NEAR),
+            p_o: near_share(truth),
+            f_ps_m2: path_smoothness(truth),
+            f_vs_m_s2: velocity_smoothness(truth),
             collisions,
             pose_error_m: pose.and_then(|pose| {
                 let its = truth.iter().rev().find(|tick| tick.is_of(pose));
@@ -237,6 +248,29 @@ fn path_length(truth: &[GroundTruthTick]) -> f64 {
     truth.windows(2).map(|pair| (pair[1].x - pair[0].x).hypot(pair[1].y - pair[0].y)).sum()
 }
 
+fn near_share(truth: &[GroundTruthTick]) -> Option<f64> {
+    let [first, .., last] = truth else { return None };
+    let near = truth.windows(2).filter(|pair| pair[1].clearance_m <= SAFE_M);
+    let near_s: f64 = near.map(|pair| pair[1].time_s - pair[0].time_s).sum();
+    Some(near_s / (last.time_s - first.time_s))
+}
+
+fn path_smoothness(truth: &[GroundTruthTick]) -> Option<f64> {
+    let squared = |three: &[GroundTruthTick]| {
+        let change =
+            |of: fn(&GroundTruthTick) -> f64| of(&three[2]) - 2.0 * of(&three[1]) + of(&three[0]);
+        change(|tick| tick.x).powi(2) + change(|tick| tick.y).powi(2)
+    };
+    (truth.len() > 2).then(|| truth.windows(3).map(squared).sum())
+}
+
+fn velocity_smoothness(truth: &[GroundTruthTick]) -> Option<f64> {
+    let changes = truth
+        .windows(2)
+        .map(|pair| (pair[1].v - pair[0].v).abs() / (pair[1].time_s - pair[0].time_s));
+    (truth.len() > 1).then(|| changes.sum::<f64>() / (truth.len() - 1) as f64)
+}
+
 /// Share of the ticks whose front sonar byte is no distance: 255, nothing in range, or 0, not valid.
 fn sonar_unavailable_share(truth: &[GroundTruthTick]) -> Option<f64> {
     let unavailable = truth.iter().filter(|tick| matches!(tick.sonar_cm, 0 | 255));
@@ -253,5 +287,31 @@ mod tests {
         assert_eq!(sonar_unavailable_share(&[]), None);
         let truth = [255, 0, 255, 254, 4].map(tick);
         assert_eq!(sonar_unavailable_share(&truth), Some(0.6));
+    }
+
+    #[test]
+    fn the_metrics_of_mrpb_are_those_of_its_definitions() {
+        // One metre ahead, then two, then one to the left; times 0, 1, 2 and 4 s.
+        let tick = |time_s, x, y, v, clearance_m| GroundTruthTick {
+            time_s,
+            x,
+            y,
+            v,
+            clearance_m,
+            ..GroundTruthTick::default()
+        };
+        let truth = [
+            tick(0.0, 0.0, 0.0, 0.0, 9.0),
+            tick(1.0, 1.0, 0.0, 1.0, 0.2),
+            tick(2.0, 3.0, 0.0, 3.0, 0.4),
+            tick(4.0, 3.0, 1.0, 1.0, 0.3),
+        ];
+        assert_eq!(near_share(&truth), Some(0.75));
+        assert_eq!(path_smoothness(&truth), Some(1.0 + 5.0));
+        assert_eq!(velocity_smoothness(&truth), Some((1.0 + 2.0 + 1.0) / 3.0));
+        assert_eq!(
+            (near_share(&[]), path_smoothness(&[]), velocity_smoothness(&[])),
+            (None, None, None)
+        );
     }
 }

@@ -60,6 +60,9 @@ impl Totals {
             ("SPL", self.spl, 3),
             ("BARN score", self.barn_score, 3),
             ("median least clearance, m", self.median_clearance_m, 3),
+            ("median p_o", self.median_p_o, 3),
+            ("median f_ps, m2", self.median_f_ps_m2, 4),
+            ("median f_vs, m/s2", self.median_f_vs_m_s2, 3),
             ("median share of looking", self.median_look_share, 3),
         ];
         let known = |(name, value, digits): (_, Option<f64>, _)| Some((name, value?, digits));

@@ -75,6 +75,10 @@ pub struct Row {
     pub barn_score: Option<f64>,
     /// Least true clearance.
     pub min_clearance_m: Option<f64>,
+    /// Of MRPB, see [`Summary`]: share of the time near something, path smoothness, velocity smoothness.
+    pub p_o: Option<f64>,
+    pub f_ps_m2: Option<f64>,
+    pub f_vs_m_s2: Option<f64>,
     /// Distance from the estimated to the true position at the end.
     pub pose_error_m: Option<f64>,
     /// Its expected root mean square, by the covariance of the last pose.
@@ -135,6 +139,9 @@ impl Row {
             spl: if success { spl } else { 0.0 },
             barn_score,
             min_clearance_m: summary.min_clearance_m,
+            p_o: summary.p_o,
+            f_ps_m2: summary.f_ps_m2,
+            f_vs_m_s2: summary.f_vs_m_s2,
             pose_error_m: summary.pose_error_m,
             pose_error_expected_m: summary.pose_error_expected_m,
             true_distance_m: summary.true_distance_m,
@@ -183,9 +190,9 @@ fn outcome(summary: &Summary, success_within_m: f64) -> Outcome {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{shortest_path::ShortestPath, trial::Rules};
+    use crate::{shortest_path::ShortestPath, table::Table, trial::Rules};
     use common::mission::Mission;
-    use std::path::Path;
+    use std::{fs, path::Path};
 
     fn setting() -> Setting {
         Setting { name: "a".to_owned(), planner: "harmonic".to_owned(), set: Vec::new() }
@@ -245,6 +252,19 @@ mod tests {
         assert_eq!((row.k, row.spl, row.barn_score), (1.25, 0.8, None));
         let lost = Row::new(&trial(None), 1, &setting(), &summary(Reported::Timeout, 3.0));
         assert_eq!(lost.spl, 0.0);
+    }
+
+    #[test]
+    fn rows_from_before_a_column_was_added_are_read() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let row = Row::new(&trial(None), 1, &setting(), &summary(Reported::Reached, 0.1));
+        Table::open(file.path()).unwrap().add(row.clone()).unwrap();
+        let written = fs::read_to_string(file.path()).unwrap();
+        // The three columns and their neighbours are empty.
+        let former = written.replacen(",p_o,f_ps_m2,f_vs_m_s2", "", 1).replacen(",,,", "", 1);
+        assert_eq!(written.len() - former.len(), ",p_o,f_ps_m2,f_vs_m_s2,,,".len());
+        fs::write(file.path(), former).unwrap();
+        assert_eq!(Table::<Row>::open(file.path()).unwrap().rows(), [row]);
     }
 
     #[test]

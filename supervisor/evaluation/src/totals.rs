@@ -31,6 +31,10 @@ pub struct Totals {
     pub barn_score: Option<f64>,
     /// Median of the least clearance of the successes, metres.
     pub median_clearance_m: Option<f64>,
+    /// Medians of MRPB's metrics, likewise.
+    pub median_p_o: Option<f64>,
+    pub median_f_ps_m2: Option<f64>,
+    pub median_f_vs_m_s2: Option<f64>,
     /// Median share of the time spent looking.
     pub median_look_share: Option<f64>,
     #[serde(skip)]
@@ -64,6 +68,9 @@ impl Totals {
             spl: mean(rows.iter().map(|row| row.spl)),
             barn_score: mean(rows.iter().filter_map(|row| row.barn_score)),
             median_clearance_m: median(successes().filter_map(|row| row.min_clearance_m)),
+            median_p_o: median(successes().filter_map(|row| row.p_o)),
+            median_f_ps_m2: median(successes().filter_map(|row| row.f_ps_m2)),
+            median_f_vs_m_s2: median(successes().filter_map(|row| row.f_vs_m_s2)),
             median_look_share: median(successes().map(|row| row.look_s / row.time_s.max(1e-9))),
             shares,
         }

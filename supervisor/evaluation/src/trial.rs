@@ -2,7 +2,7 @@
 
 use common::{
     geometry::Shapes,
-    mission::{Heights, Mission, MissionError, Realism},
+    mission::{Heights, Mission, MissionError, Realism, Thing},
 };
 use glam::DVec2;
 use std::path::Path;
@@ -14,6 +14,8 @@ use crate::shortest_path::{ShortestPath, shortest_path};
 const WIDTH_STEP_M: f64 = 0.1;
 /// Free ground between the things of a world and the perimeter, metres.
 const RIM_M: f64 = 0.6;
+/// Mission seconds allowed beside those of [`Rules::most_s`], to turn before the clock starts.
+const BEFORE_CLOCK_S: f64 = 20.0;
 
 /// The rules by which the ground truth judges a mission.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,8 +47,10 @@ impl Default for Rules {
 /// A world with a start and a target, in the frame of the world it comes from.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// The things in it, metres.
+    /// What stands in it, metres.
     pub shapes: Shapes,
+    /// What moves in it; the shortest path does not heed it.
+    pub things: Vec<Thing>,
     pub start: DVec2,
     /// Heading at the start, radians counter-clockwise from x.
     pub heading: f64,
@@ -78,7 +82,8 @@ impl Trial {
         else {
             return Ok(None);
         };
-        let mission = mission(&world, scene, shortest_m)?;
+        let mut mission = mission(&world, scene)?;
+        mission.timeout_s = rules.most_s.map_or(timeout_s(shortest_m), |it| it + BEFORE_CLOCK_S);
         Ok(Some(Self { world, mission, shortest_m, rules }))
     }
 }
@@ -118,7 +123,7 @@ fn timeout_s(metres: f64) -> f64 {
 }
 
 /// The mission of `scene`: origin at the start, x along the x of the scene's own frame.
-fn mission(world: &str, scene: &Scene, shortest_m: f64) -> Result<Mission, MissionError> {
+fn mission(world: &str, scene: &Scene) -> Result<Mission, MissionError> {
     let target = scene.target - scene.start;
     let shapes = moved(&scene.shapes, -scene.start);
     let (least, greatest) = bounds(&shapes, target);
@@ -133,7 +138,9 @@ fn mission(world: &str, scene: &Scene, shortest_m: f64) -> Result<Mission, Missi
     mission.name = world.to_owned();
     mission.start.heading_deg = scene.heading.to_degrees();
     mission.world = shapes;
-    mission.timeout_s = timeout_s(shortest_m);
+    let placed = scene.things.iter().cloned();
+    mission.simulation.things =
+        placed.map(|it| Thing { shape: moved(&it.shape, -scene.start), ..it }).collect();
     Ok(mission)
 }
 

@@ -8,6 +8,7 @@ mod files;
 mod floor;
 mod found;
 mod furnished;
+mod moving;
 mod random;
 mod rooms;
 mod traps;
@@ -35,13 +36,14 @@ pub struct Kind {
     stream: u64,
     name: &'static str,
     draw: fn(&mut Random, usize) -> Scene,
+    rules: fn() -> Rules,
 }
 
 const fn kind(stream: u64, name: &'static str, draw: fn(&mut Random, usize) -> Scene) -> Kind {
-    Kind { stream, name, draw }
+    Kind { stream, name, draw, rules: Rules::default }
 }
 
-static KINDS: [Kind; 8] = [
+static KINDS: [Kind; 10] = [
     kind(1, "rooms", |random, number| rooms::draw(random, number, Doors::Some)),
     kind(2, "doors", |random, number| rooms::draw(random, number, Doors::All)),
     kind(3, "traps", traps::draw),
@@ -51,6 +53,8 @@ static KINDS: [Kind; 8] = [
     // Stream 7 draws starts and targets on maps.
     kind(8, "rotated-rooms", |random, number| rooms::rotated(random, number, Doors::Some)),
     kind(9, "rotated-doors", |random, number| rooms::rotated(random, number, Doors::All)),
+    kind(10, "glazed", rooms::glazed),
+    Kind { rules: moving::rules, ..kind(11, "moving-cylinders", moving::draw) },
 ];
 
 impl FromStr for Worlds {
@@ -95,7 +99,7 @@ pub fn find(
 
 /// Draw worlds until `count` of them are solvable.
 fn draw_until(count: usize, seed: u64, kind: &Kind, body: &BodySize) -> Result<Found, WorldError> {
-    let Kind { stream, name, draw } = kind;
+    let Kind { stream, name, draw, rules } = kind;
     let mut found = Found::default();
     let mut drawn = 0;
     while found.trials.len() < count && drawn < MOST_FAILURES + count as u64 {
@@ -103,7 +107,7 @@ fn draw_until(count: usize, seed: u64, kind: &Kind, body: &BodySize) -> Result<F
         let scene = draw(&mut Random::new(seed, *stream, drawn), number);
         drawn += 1;
         let world = format!("{name}-{seed}-{number:04}");
-        found.add(world, &scene, Rules::default(), body)?;
+        found.add(world, &scene, rules(), body)?;
     }
     Ok(found)
 }

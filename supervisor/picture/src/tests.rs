@@ -336,7 +336,7 @@ fn the_same_scene_gives_the_same_bytes() {
 }
 
 #[test]
-fn what_is_low_is_dashed_what_is_soft_dotted_and_the_legend_says_so() {
+fn what_is_low_is_dashed_what_is_of_glass_dash_dotted_what_is_soft_dotted_and_the_legend_says_so() {
     let drawn = |profile: &str| {
         let mut run = three_drums();
         let text =
@@ -344,13 +344,14 @@ fn what_is_low_is_dashed_what_is_soft_dotted_and_the_legend_says_so() {
         run.mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
         let picture = svg(&Scene { grid: None, field: None, ..run.scene() });
         assert_well_formed(&picture);
-        ["drum, box, wall", "low or overhanging", "absorbs sound"]
+        ["drum, box, wall", "low or overhanging", ">glass<", "absorbs sound"]
             .map(|words| picture.contains(words))
     };
-    assert_eq!(drawn(""), [true, false, false]);
-    assert_eq!(drawn(", top_m = 0.1"), [false, true, false]);
-    assert_eq!(drawn(", bottom_m = 0.2"), [false, true, false]);
-    assert_eq!(drawn(", echo = 0.2"), [false, false, true]);
+    assert_eq!(drawn(""), [true, false, false, false]);
+    assert_eq!(drawn(", top_m = 0.1"), [false, true, false, false]);
+    assert_eq!(drawn(", bottom_m = 0.2"), [false, true, false, false]);
+    assert_eq!(drawn(", echo = 0.2"), [false, false, false, true]);
+    assert_eq!(drawn(", light = 'glass'"), [false, false, true, false]);
 }
 
 #[test]

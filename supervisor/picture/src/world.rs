@@ -1,8 +1,9 @@
 //! The real shapes over the robot's map: dark outlines and a hatch, so that both are visible.
 //!
-//! Shapes that do not reach from the floor to above the robot have dashed outlines, those that absorb sound dotted ones.
+//! Shapes that do not reach from the floor to above the robot have dashed outlines, those of glass dash-dotted ones,
+//! those that absorb sound dotted ones.
 
-use common::geometry::{Profile, Shapes};
+use common::geometry::{Light, Profile, Shapes};
 
 use super::page::{Path, View, ink};
 
@@ -18,17 +19,21 @@ pub(super) enum Outline {
     Full,
     /// Lower than that, or above the floor.
     Partial,
+    /// As high as the robot, of glass.
+    Glass,
     /// The obstacle is as high as the robot, but absorbs sound.
     Soft,
 }
 
 impl Outline {
     /// All, in the order in which they are drawn.
-    pub(super) const ALL: [Self; 3] = [Self::Full, Self::Partial, Self::Soft];
+    pub(super) const ALL: [Self; 4] = [Self::Full, Self::Partial, Self::Glass, Self::Soft];
 
     fn of(profile: Profile) -> Self {
         if profile.bottom_m > 0.0 || profile.top_m.is_finite() {
             Self::Partial
+        } else if profile.light == Light::Glass {
+            Self::Glass
         } else if profile.echo < 1.0 {
             Self::Soft
         } else {
@@ -49,6 +54,7 @@ impl Outline {
         match self {
             Self::Full => "drum, box, wall",
             Self::Partial => "low or overhanging",
+            Self::Glass => "glass",
             Self::Soft => "absorbs sound",
         }
     }
@@ -57,6 +63,7 @@ impl Outline {
         match self {
             Self::Full => "",
             Self::Partial => " stroke-dasharray=\"7 4\"",
+            Self::Glass => " stroke-dasharray=\"9 3 2 3\"",
             Self::Soft => " stroke-dasharray=\"1.6 3.2\"",
         }
     }

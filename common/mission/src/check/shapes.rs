@@ -45,7 +45,7 @@ impl Checker {
 }
 
 fn profile(key: &'static str, profile: Profile) -> Result<(), Objection> {
-    let Profile { bottom_m, top_m, echo } = profile;
+    let Profile { bottom_m, top_m, echo, light: _ } = profile;
     within(key, bottom_m, 0.0..=HIGHEST_M, "m of bottom_m")?;
     if top_m <= bottom_m || top_m.is_nan() {
         return Err(objection(

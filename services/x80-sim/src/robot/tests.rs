@@ -416,3 +416,24 @@ fn a_robot_left_driving_comes_to_rest_and_its_next_process_goes_on_there_with_it
     let rolled = counts_between(driving.left_counts, later.left_counts);
     assert!((50..600).contains(&rolled), "{rolled} counts");
 }
+
+#[test]
+fn a_robot_that_speaks_lines_of_json_says_that_its_wheels_are_held_before_a_wall_and_not_as_they_roll()
+ {
+    use common::json_wire::{Report, parse};
+    let wall = "robot.model = 'kobuki'\nworld.wall = [{ points = [[1, -2], [1, 2]] }]";
+    let mut robot = robot(wall);
+    robot.on_order(&Order::Hello { rate_hz: 7.0 }, &mut Vec::new());
+    let mut held = Vec::new();
+    for _ in 0..20 {
+        // 0.56 m/s.
+        let drive = Order::Drive { wheels: [16.0; 2], twist: [0.56, 0.0], for_s: 0.25 };
+        robot.on_order(&drive, &mut Vec::new());
+        robot.advance_to_next_tick();
+        let mut line = Vec::new();
+        robot.stream(&mut line);
+        held.push(parse::<Report>(&line).unwrap().held);
+    }
+    assert_eq!(held[1..8], [Some([false; 2]); 7], "it rolls");
+    assert_eq!(held[19], Some([true; 2]), "it stands before the wall");
+}

@@ -34,7 +34,7 @@ use crate::console::{
 /// Worlds and noise follow from the seed.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// rooms, doors, rotated-rooms, rotated-doors, traps, corridors, straight-corridors, furnished; a mission file, a ROS map (.yaml), a BARN .world or
+    /// rooms, doors, rotated-rooms, rotated-doors, traps, corridors, straight-corridors, furnished, glazed, moving-cylinders; a mission file, a ROS map (.yaml), a BARN .world or
     /// cylinders.csv; a folder of such files.
     #[arg(long, default_value = "rooms")]
     worlds: Worlds,

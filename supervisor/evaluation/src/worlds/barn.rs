@@ -32,8 +32,6 @@ const SIDES_END_M: f64 = 9.6;
 const LONGEST: u64 = 64 << 20;
 /// Seconds allowed from the clock's start.
 const MOST_S: f64 = 100.0;
-/// Mission seconds allowed: those, and time to turn before the clock starts.
-pub(super) const TIMEOUT_S: f64 = 120.0;
 
 /// One row of the table of cylinders.
 #[derive(Deserialize)]
@@ -132,13 +130,14 @@ fn scene(drums: Vec<Drum>) -> Scene {
             walls: vec![Wall { points: corners.to_vec(), ..Wall::default() }],
             ..Shapes::default()
         },
+        things: Vec::new(),
         start: START,
         heading: FRAC_PI_2,
         target: GOAL,
     }
 }
 
-fn rules(optimal_time_s: Option<f64>) -> Rules {
+pub(super) fn rules(optimal_time_s: Option<f64>) -> Rules {
     Rules {
         success_within_m: SUCCESS_WITHIN_M,
         clock_after_departure: true,

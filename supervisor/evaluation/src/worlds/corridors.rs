@@ -39,6 +39,7 @@ pub(super) fn draw(random: &mut Random, bends: Bends) -> Scene {
     };
     Scene {
         shapes: Shapes { walls: vec![Wall { points, ..Wall::default() }], ..Shapes::default() },
+        things: Vec::new(),
         start: axis[0] + ahead * 0.6,
         heading,
         target: axis[last] + back * 0.7,

@@ -113,9 +113,7 @@ fn add_barn(
     body: &BodySize,
 ) -> Result<(), WorldError> {
     for (world, scene, rules) in worlds {
-        if let Some(trial) = found.add(world, &scene, rules, body)? {
-            trial.mission.timeout_s = barn::TIMEOUT_S;
-        }
+        found.add(world, &scene, rules, body)?;
     }
     Ok(())
 }
@@ -142,6 +140,7 @@ fn add_map(
     for (number, ends) in (1..).zip(ends) {
         let scene = Scene {
             shapes: floor.shapes(file, ends.start)?,
+            things: Vec::new(),
             start: ends.start,
             heading: ends.heading,
             target: ends.target,

@@ -13,28 +13,25 @@ pub struct Found {
 }
 
 impl Found {
-    /// Add the trial `world` in `scene` and return it; if the body cannot cross the world, count it as left out.
+    /// Add the trial `world` in `scene`; if the body cannot cross the world, count it as left out.
     pub(super) fn add(
         &mut self,
         world: String,
         scene: &Scene,
         rules: Rules,
         body: &BodySize,
-    ) -> Result<Option<&mut Trial>, MissionError> {
+    ) -> Result<(), MissionError> {
         let trial = Trial::new(world, scene, rules, body)?;
-        Ok(self.add_solvable(trial))
+        self.add_solvable(trial);
+        Ok(())
     }
 
     /// Add `trial`, or count one that was left out.
-    pub(super) fn add_solvable(&mut self, trial: Option<Trial>) -> Option<&mut Trial> {
+    pub(super) fn add_solvable(&mut self, trial: Option<Trial>) {
         match trial {
             Some(trial) => self.trials.push(trial),
-            None => {
-                self.unsolvable += 1;
-                return None;
-            }
+            None => self.unsolvable += 1,
         }
-        self.trials.last_mut()
     }
 
     /// Reduce the trials to `count`, evenly spread.

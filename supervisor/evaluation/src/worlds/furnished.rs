@@ -47,6 +47,7 @@ pub(super) fn draw(random: &mut Random, number: usize) -> Scene {
     }
     Scene {
         shapes,
+        things: Vec::new(),
         start: DVec2::ZERO,
         heading: match random.below(3) {
             0 => random.within(-PI, PI),

@@ -1,9 +1,10 @@
 //! Rooms: four walls, drums, boxes and loose walls at any angle, at three densities; in one of three a partition with
 //! a door of 0.8 to 1.2 m. Rotated rooms lie at any angle to the grid, and their partitions at an angle to the walls.
+//! Glazed rooms have partitions and cabinets of glass, and black things.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use common::geometry::{Box2, Drum, Shapes, Wall};
+use common::geometry::{Box2, Drum, Light, Shapes, Wall};
 use glam::DVec2;
 
 use super::random::Random;
@@ -49,6 +50,19 @@ pub(super) fn rotated(random: &mut Random, number: usize, doors: Doors) -> Scene
     scene
 }
 
+/// Room `number` with a partition. It and the loose walls are of glass; of three boxes one is of glass, a display cabinet, and one black; of
+/// three drums one is black.
+pub(super) fn glazed(random: &mut Random, number: usize) -> Scene {
+    let mut scene = room(random, number, Doors::All, false);
+    let Shapes { drums, boxes, walls } = &mut scene.shapes;
+    // The first wall encloses the room.
+    walls.iter_mut().skip(1).for_each(|wall| wall.light = Some(Light::Glass));
+    let (glass, black) = (Some(Light::Glass), Some(Light::Black));
+    boxes.iter_mut().for_each(|block| block.light = [None, glass, black][random.below(3)]);
+    drums.iter_mut().for_each(|drum| drum.light = [None, None, black][random.below(3)]);
+    scene
+}
+
 fn room(random: &mut Random, number: usize, doors: Doors, oblique: bool) -> Scene {
     let distance = random.within(4.0, 8.0);
     let half_width = random.within(1.6, 3.0);
@@ -79,7 +93,7 @@ fn room(random: &mut Random, number: usize, doors: Doors, oblique: bool) -> Scen
         2 => PI,
         _ => random.within(-PI, PI),
     };
-    Scene { shapes, start: DVec2::ZERO, heading, target }
+    Scene { shapes, things: Vec::new(), start: DVec2::ZERO, heading, target }
 }
 
 /// A closed rectangle of walls.
@@ -126,5 +140,26 @@ fn add_thing(shapes: &mut Shapes, random: &mut Random, at: DVec2, target: DVec2)
                 shapes.walls.push(Wall { points: vec![at - along, at + along], ..Wall::default() });
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn glazed_rooms_have_glass_inside_their_walls_and_some_black_things() {
+        let (mut cabinets, mut black) = (0, 0);
+        for number in 0..20 {
+            let Shapes { drums, boxes, walls } = glazed(&mut Random::new(1, 10, number), 1).shapes;
+            assert_eq!(walls[0].light, None);
+            assert!(
+                walls.len() > 2 && walls[1..].iter().all(|wall| wall.light == Some(Light::Glass))
+            );
+            cabinets += boxes.iter().filter(|block| block.light == Some(Light::Glass)).count();
+            let lights = drums.iter().map(|it| it.light).chain(boxes.iter().map(|it| it.light));
+            black += lights.filter(|light| *light == Some(Light::Black)).count();
+        }
+        assert!(cabinets >= 5 && black >= 10, "{cabinets} cabinets, {black} black things");
     }
 }

@@ -47,6 +47,7 @@ pub(super) fn draw(random: &mut Random, number: usize) -> Scene {
     }
     Scene {
         shapes,
+        things: Vec::new(),
         start: DVec2::ZERO,
         heading: f64::to_radians(heading_deg),
         target: DVec2::new(4.5, 0.0),

@@ -2,30 +2,22 @@
 
 use std::{collections::VecDeque, time::Duration};
 
-use common::wire::{
-    Addressing, COUNT_CYCLE, Command, Decoder, Frame, Motion, MotorSensors, Quantity, Report, did,
-};
+use common::{mission::Protocol, wire::COUNT_CYCLE};
 use rand_pcg::{Pcg64, rand_core::Rng};
 
+use self::words::{Effect, Readings, Said, Wheels, Words};
 use crate::chaos::robot_fault::RobotFault;
+
+mod words;
 
 const LATE: Duration = Duration::from_secs(2);
 const LATE_FROM_BOOT: Duration = Duration::from_millis(500);
-/// Age of an old frame that comes again.
+/// Age of an old message that comes again.
 const OLD: Duration = Duration::from_secs(3);
 const AGAIN_EVERY: Duration = Duration::from_secs(2);
-/// Period of slow frames: three a second.
+/// Period of slow messages: three a second.
 const SLOW: Duration = Duration::from_millis(333);
-/// The stuck echo, centimetres.
-const STUCK_CM: u8 = 8;
-/// The frozen echo of a ranger that has heard nothing yet, centimetres.
-const FROZEN_CM: u8 = 150;
-const NOTHING: u8 = 255;
-/// The current of a held motor, as that of the simulated robot, AD counts.
-const HELD_AD: u16 = 1520;
-/// Ultrasonic bytes at the front of a standard frame's data.
-const ULTRASONIC: usize = 6;
-/// Motor frames that are stored: as many as come in [`OLD`] at ten times the usual rate.
+/// Messages with wheels that are stored: as many as come in [`OLD`] at ten times the usual rate.
 const MOST_KEPT: usize = 1024;
 
 /// Bytes for the host, and their time.
@@ -44,20 +36,17 @@ pub(crate) struct FaultInjector {
     chance: Pcg64,
     /// The encoder of a fault of one encoder.
     channel: usize,
-    from_robot: Decoder,
-    from_host: Decoder,
-    /// The newest motor frame, and the last one before the fault.
-    last: MotorSensors,
-    base: MotorSensors,
-    base_data: Vec<u8>,
-    /// The newest ultrasonic bytes before the fault that are distances.
-    heard: [u8; ULTRASONIC],
-    /// Motor frames of the last seconds, oldest first.
+    words: Words,
+    /// The newest message with wheels before the fault.
+    base: Option<Said>,
+    /// The newest readings before the fault.
+    readings: Readings,
+    /// Messages with wheels of the last seconds, oldest first.
     kept: VecDeque<Late>,
     next_again: Duration,
     next_slow: [Duration; 256],
     /// The last command that moved the wheels.
-    moving: Option<Motion>,
+    moving: Option<Vec<u8>>,
     /// The newest command of a speed moves the wheels.
     pushes: bool,
     /// The link stopped the robot by other means than speed 0.
@@ -65,7 +54,7 @@ pub(crate) struct FaultInjector {
 }
 
 impl FaultInjector {
-    pub(crate) fn new(fault: RobotFault, seed: u64) -> Self {
+    pub(crate) fn new(fault: RobotFault, protocol: Protocol, seed: u64) -> Self {
         let mut chance = Pcg64::new(u128::from(seed), 13);
         let channel = (chance.next_u64() % 2) as usize;
         Self {
@@ -73,12 +62,9 @@ impl FaultInjector {
             faulty: false,
             chance,
             channel,
-            from_robot: Decoder::default(),
-            from_host: Decoder::default(),
-            last: MotorSensors::default(),
-            base: MotorSensors::default(),
-            base_data: Vec::new(),
-            heard: [FROZEN_CM; ULTRASONIC],
+            words: Words::of(protocol),
+            base: None,
+            readings: Readings::default(),
             kept: VecDeque::new(),
             next_again: Duration::ZERO,
             next_slow: [Duration::ZERO; 256],
@@ -88,40 +74,29 @@ impl FaultInjector {
         }
     }
 
-    pub(crate) fn begin(&mut self) {
-        if !self.faulty {
-            self.faulty = true;
-            self.base = self.last;
-        }
+    pub(crate) const fn begin(&mut self) {
+        self.faulty = true;
     }
 
     /// Convert bytes that the robot sent at `now` into those for the host.
     pub(crate) fn report(&mut self, bytes: &[u8], now: Duration) -> Vec<Late> {
-        let mut decoder = std::mem::take(&mut self.from_robot);
-        decoder.push(bytes);
         let (mut out, mut more) = (Vec::new(), Vec::new());
-        while let Some(frame) = decoder.next_frame() {
-            if let Ok(Report::Motor(sensors)) = Report::parse(&frame) {
-                self.last = sensors;
+        for said in self.words.said(bytes) {
+            if said.wheels(&said).is_some() {
                 if !self.faulty {
-                    self.base_data = frame.data.to_vec();
+                    self.base = Some(said.clone());
                 }
-                self.keep(&frame, now);
-            }
-            if frame.did == did::STANDARD && !self.faulty {
-                for (heard, &byte) in self.heard.iter_mut().zip(frame.data) {
-                    if !matches!(byte, 0 | NOTHING) {
-                        *heard = byte;
-                    }
-                }
+                self.keep(&said, now);
             }
             if self.faulty {
-                self.pass(&frame, now, &mut out);
+                out.extend(self.changed(said, now));
             } else {
-                frame.encode(&mut out);
+                self.readings.take(&said);
             }
         }
-        self.from_robot = decoder;
+        if !self.faulty {
+            out = bytes.to_vec();
+        }
         if self.faulty && self.fault == RobotFault::OldFrames && now >= self.next_again {
             self.next_again = now + AGAIN_EVERY;
             let old = self.kept.iter().rfind(|kept| kept.at + OLD <= now);
@@ -138,38 +113,31 @@ impl FaultInjector {
 
     /// Convert bytes of the host into those for the robot. `moves` is called for each command that moves the wheels.
     pub(crate) fn order(&mut self, bytes: &[u8], moves: &mut dyn FnMut()) -> Vec<u8> {
-        let mut decoder = std::mem::take(&mut self.from_host);
-        decoder.push(bytes);
         let mut out = Vec::new();
-        while let Some(frame) = decoder.next_frame() {
-            let command = Command::parse(&frame);
-            match command {
-                Ok(Command::Motion(motion)) if is_moving(&motion) => {
-                    (self.moving, self.disabled, self.pushes) = (Some(motion), false, true);
+        for ordered in self.words.ordered(bytes) {
+            let mut bytes = ordered.bytes;
+            match ordered.effect {
+                Effect::Moves { stand } => {
+                    (self.disabled, self.pushes) = (false, true);
+                    self.moving = Some(bytes.clone());
                     moves();
                     if self.holds_wheels() {
-                        let addressing = Addressing::of_robot(frame.rid).unwrap_or_default();
-                        let stand = Command::velocity([Some(0); 2], motion.limit_ms);
-                        stand.encode(addressing, &mut out);
-                        continue;
+                        bytes = stand;
                     }
                 }
-                Ok(Command::Motion(motion)) if motion.quantity == Quantity::Velocity => {
+                Effect::Stands => {
                     self.pushes = false;
                     if let (true, false, Some(moving)) =
-                        (self.keeps_speed(), self.disabled, self.moving)
+                        (self.keeps_speed(), self.disabled, &self.moving)
                     {
-                        let addressing = Addressing::of_robot(frame.rid).unwrap_or_default();
-                        Command::Motion(moving).encode(addressing, &mut out);
-                        continue;
+                        bytes.clone_from(moving);
                     }
                 }
-                Ok(Command::Motion(_) | Command::Enable { on: false, .. }) => self.disabled = true,
-                _ => {}
+                Effect::Disables => self.disabled = true,
+                Effect::Other => {}
             }
-            frame.encode(&mut out);
+            out.extend(bytes);
         }
-        self.from_host = decoder;
         out
     }
 
@@ -181,11 +149,9 @@ impl FaultInjector {
         self.faulty && matches!(self.fault, RobotFault::DoesNotStop | RobotFault::IgnoresZero)
     }
 
-    fn keep(&mut self, frame: &Frame<'_>, now: Duration) {
-        let mut bytes = Vec::new();
-        frame.encode(&mut bytes);
-        self.kept.push_back(Late { at: now, bytes });
-        // One frame that is older than [`OLD`] stays.
+    fn keep(&mut self, said: &Said, now: Duration) {
+        self.kept.push_back(Late { at: now, bytes: said.bytes() });
+        // One message that is older than [`OLD`] stays.
         while self.kept.len() > MOST_KEPT
             || self.kept.get(1).is_some_and(|next| next.at + OLD <= now)
         {
@@ -193,102 +159,80 @@ impl FaultInjector {
         }
     }
 
-    /// Append the changed `frame` of the robot.
-    fn pass(&mut self, frame: &Frame<'_>, now: Duration, out: &mut Vec<u8>) {
-        let is_sensor = matches!(frame.did, did::MOTOR | did::CUSTOM | did::STANDARD);
-        let with_data = |data: &[u8], out: &mut Vec<u8>| Frame { data, ..*frame }.encode(out);
-        match (self.fault, frame.did) {
-            (RobotFault::Silence, _) | (RobotFault::SonarMissing, did::STANDARD) => {}
-            (RobotFault::StreamsStop, _) if is_sensor => {}
-            (RobotFault::FramesSlow, _) if is_sensor => {
-                let next = &mut self.next_slow[usize::from(frame.did)];
-                if now >= *next {
+    /// The bytes of the message that the fault makes of `said`.
+    fn changed(&mut self, said: Said, now: Duration) -> Vec<u8> {
+        use RobotFault as F;
+        match self.fault {
+            F::Silence => Vec::new(),
+            F::StreamsStop if said.stream().is_some() => Vec::new(),
+            F::FramesSlow => {
+                if let Some(stream) = said.stream() {
+                    let next = &mut self.next_slow[usize::from(stream)];
+                    if now < *next {
+                        return Vec::new();
+                    }
                     *next = now + SLOW;
-                    frame.encode(out);
                 }
+                said.bytes()
             }
-            (RobotFault::MotorOnes, did::MOTOR) => with_data(&vec![0xff; frame.data.len()], out),
-            (RobotFault::MotorZeros, did::MOTOR) => with_data(&vec![0; frame.data.len()], out),
-            (RobotFault::MotorRepeated, did::MOTOR) => with_data(&self.base_data, out),
-            (
-                RobotFault::SonarZero
-                | RobotFault::SonarStuck
-                | RobotFault::SonarSilent
-                | RobotFault::SonarFrozen,
-                did::STANDARD,
-            ) => {
-                let told = match self.fault {
-                    RobotFault::SonarStuck => [STUCK_CM; ULTRASONIC],
-                    RobotFault::SonarSilent => [NOTHING; ULTRASONIC],
-                    RobotFault::SonarFrozen => self.heard,
-                    _ => [0; ULTRASONIC],
+            F::Garbage => {
+                let mut bytes = said.bytes();
+                bytes.truncate(bytes.len() / 2);
+                bytes.push(b'\n');
+                bytes
+            }
+            F::MotorOnes => said.with_data(0xff),
+            F::MotorZeros => said.with_data(0),
+            F::RangeInvalid | F::RangeMissing | F::RangeStuck | F::RangeSilent | F::RangeFrozen => {
+                said.with_readings(self.fault, &self.readings)
+            }
+            fault => {
+                let base = self.base.get_or_insert_with(|| said.clone());
+                let (Some(wheels), Some(before)) = (said.wheels(base), base.wheels(base)) else {
+                    return said.bytes();
                 };
-                let mut data = frame.data.to_vec();
-                for (byte, told) in data.iter_mut().zip(told) {
-                    *byte = told;
+                if fault == F::MotorRepeated {
+                    return base.bytes();
                 }
-                with_data(&data, out);
+                let told = self.counted(fault, wheels, before);
+                said.with_wheels(&told, self.holds_wheels() && self.pushes)
             }
-            (fault, did::MOTOR) => {
-                let sensors = self.counted(fault, self.last);
-                let addressing = Addressing::of_host(frame.rid).unwrap_or_default();
-                Report::Motor(sensors).encode(addressing, out);
-            }
-            _ => frame.encode(out),
         }
     }
 
-    /// The counts that the fault makes of `true_ones`.
-    fn counted(&mut self, fault: RobotFault, true_ones: MotorSensors) -> MotorSensors {
+    /// The wheels that the fault makes of `true_ones`, which were at `base` when it began.
+    fn counted(&mut self, fault: RobotFault, true_ones: Wheels, base: Wheels) -> Wheels {
         let mut told = true_ones;
-        let base = self.base.encoders;
         let channel = self.channel;
+        let turned = [0, 1].map(|wheel| true_ones.counts[wheel] - base.counts[wheel]);
         match fault {
             RobotFault::EncoderDead => {
-                told.encoders[channel] = base[channel];
-                told.encoders[channel].speed = 0;
+                told.counts[channel] = base.counts[channel];
+                told.speeds[channel] = 0.0;
             }
             RobotFault::EncodersSwapped => {
                 for channel in [0, 1] {
-                    let other = true_ones.encoders[1 - channel];
-                    let turned = other.counts_since(&base[1 - channel]);
-                    told.encoders[channel] = other;
-                    told.encoders[channel].position = wrapped(base[channel].position, turned);
+                    told.counts[channel] = base.counts[channel] + turned[1 - channel];
+                    told.speeds[channel] = true_ones.speeds[1 - channel];
                 }
             }
             RobotFault::EncoderReversed => {
-                let turned = true_ones.encoders[channel].counts_since(&base[channel]);
-                told.encoders[channel].position = wrapped(base[channel].position, -turned);
-                told.encoders[channel].positive = !true_ones.encoders[channel].positive;
+                told.counts[channel] = base.counts[channel] - turned[channel];
+                told.speeds[channel] = -true_ones.speeds[channel];
             }
             RobotFault::CountsRandom => {
-                for encoder in &mut told.encoders {
+                for wheel in [0, 1] {
                     let chance = self.chance.next_u64();
-                    encoder.position = chance as u16 % COUNT_CYCLE;
-                    encoder.speed = (chance >> 16) as u16 % 1000;
-                    encoder.positive = chance >> 32 & 1 == 1;
+                    let speed = f64::from((chance >> 16) as u16 % 1000);
+                    told.counts[wheel] = f64::from(chance as u16 % COUNT_CYCLE);
+                    told.speeds[wheel] = if chance >> 32 & 1 == 1 { speed } else { -speed };
                 }
             }
-            RobotFault::CountsReset => {
-                for (encoder, base) in told.encoders.iter_mut().zip(&base) {
-                    encoder.position = wrapped(0, encoder.counts_since(base));
-                }
-            }
-            RobotFault::HeldWheels if self.pushes => told.currents[..2].fill(HELD_AD),
+            RobotFault::CountsReset => told.counts = turned,
             _ => {}
         }
         told
     }
-}
-
-fn is_moving(motion: &Motion) -> bool {
-    let target = |channel| motion.targets.of(channel).unwrap_or_default();
-    motion.quantity == Quantity::Velocity && [0, 1].into_iter().any(|channel| target(channel) != 0)
-}
-
-/// `position` advanced by `turned` counts.
-fn wrapped(position: u16, turned: i32) -> u16 {
-    (i32::from(position) + turned).rem_euclid(i32::from(COUNT_CYCLE)) as u16
 }
 
 #[cfg(test)]

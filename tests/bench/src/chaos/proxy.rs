@@ -12,7 +12,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use common::poll;
+use common::{mission::Protocol, poll};
 
 use crate::chaos::{
     fault_injector::{FaultInjector, Late},
@@ -45,6 +45,7 @@ impl Proxy {
     pub(crate) fn start(
         robot: SocketAddr,
         fault: RobotFault,
+        protocol: Protocol,
         seed: u64,
     ) -> Result<Self, BenchError> {
         let (front, back) = sockets(robot).map_err(system("open the proxy's sockets"))?;
@@ -54,7 +55,7 @@ impl Proxy {
             front,
             back,
             host: None,
-            injector: FaultInjector::new(fault, seed),
+            injector: FaultInjector::new(fault, protocol, seed),
             held: Vec::new(),
             began: Instant::now(),
             shared: Arc::clone(&shared),

@@ -1,5 +1,6 @@
 //! THE table of robot faults: wrong data that a robot sends to its link, and the promise under each.
 
+use common::mission::Protocol;
 use serde::{Serialize, Serializer};
 
 /// Longest time from the fault to the last moving command and to wheels at rest, seconds: 1.5 s of motion until command and
@@ -39,9 +40,9 @@ pub enum RobotFault {
     EncoderReversed,
     CountsRandom,
     CountsReset,
-    SonarZero,
-    SonarMissing,
-    SonarStuck,
+    RangeInvalid,
+    RangeMissing,
+    RangeStuck,
     FramesLate,
     OldFrames,
     StreamsStop,
@@ -51,10 +52,11 @@ pub enum RobotFault {
     LinkKilled,
     SupervisorKilled,
     AllKilled,
-    SonarSilent,
-    SonarFrozen,
+    RangeSilent,
+    RangeFrozen,
     LateFromBoot,
     HeldWheels,
+    Garbage,
 }
 
 #[derive(Debug)]
@@ -62,41 +64,56 @@ pub struct Row {
     pub fault: RobotFault,
     /// Name on the command line and in reports.
     pub name: &'static str,
-    pub what: &'static str,
+    /// What it does to an X80; [`NOTHING`] if it has no meaning there.
+    pub x80: &'static str,
+    /// What it does to a robot that speaks lines of JSON; [`LIKEWISE`] if that is the same.
+    pub json: &'static str,
     pub promise: Promise,
 }
 
-const fn row(fault: RobotFault, name: &'static str, promise: Promise, what: &'static str) -> Row {
-    Row { fault, name, what, promise }
+/// The fault has no meaning for this protocol.
+const NOTHING: &str = "-";
+/// The fault does the same to both.
+const LIKEWISE: &str = "likewise";
+
+const fn row(
+    fault: RobotFault,
+    name: &'static str,
+    promise: Promise,
+    x80: &'static str,
+    json: &'static str,
+) -> Row {
+    Row { fault, name, x80, json, promise }
 }
 
 #[rustfmt::skip]
 pub static TABLE: &[Row] = &[
-    row(RobotFault::Silence, "silence", Promise::Rests, "nothing comes from the robot any more"),
-    row(RobotFault::MotorOnes, "motor-ones", Promise::Rests, "the data of every motor frame are 0xFF"),
-    row(RobotFault::MotorZeros, "motor-zeros", Promise::RestsLater, "the data of every motor frame are 0"),
-    row(RobotFault::MotorRepeated, "motor-repeated", Promise::Rests, "the same motor frame for ever"),
-    row(RobotFault::EncoderDead, "encoder-dead", Promise::Rests, "one encoder does not count"),
-    row(RobotFault::EncodersSwapped, "encoders-swapped", Promise::RestsLater, "the encoders of left and right are swapped"),
-    row(RobotFault::EncoderReversed, "encoder-reversed", Promise::Rests, "one encoder counts backwards"),
-    row(RobotFault::CountsRandom, "counts-random", Promise::Rests, "random counts in each frame"),
-    row(RobotFault::CountsReset, "counts-reset", Promise::Unharmed, "counts begin again from 0 without silence"),
-    row(RobotFault::SonarZero, "sonar-zero", Promise::Rests, "every ultrasonic byte is 0, which is not valid"),
-    row(RobotFault::SonarMissing, "sonar-missing", Promise::Rests, "no standard frame comes"),
-    row(RobotFault::SonarStuck, "sonar-stuck", Promise::RestsLater, "every ultrasonic byte is 8 cm"),
-    row(RobotFault::FramesLate, "frames-late", Promise::Rests, "all frames come 2 s late"),
-    row(RobotFault::OldFrames, "old-frames", Promise::Unharmed, "every 2 s a motor frame of 3 s ago comes again"),
-    row(RobotFault::StreamsStop, "streams-stop", Promise::Rests, "no sensor frame comes, acknowledgements do"),
-    row(RobotFault::DoesNotStop, "does-not-stop", Promise::Rests, "after `firsthand stop`: given speed 0 the robot keeps its speed"),
-    row(RobotFault::FramesSlow, "frames-slow", Promise::RestsLater, "sensor frames come three times a second"),
-    row(RobotFault::IgnoresZero, "ignores-zero", Promise::EndsAtRest, "given speed 0 the robot keeps its speed, to the end of its mission"),
-    row(RobotFault::LinkKilled, "link-killed", Promise::RestsAtOnce, "time limits are ignored; SIGKILL of the link under a frozen supervisor"),
-    row(RobotFault::SupervisorKilled, "supervisor-killed", Promise::RestsAtOnce, "time limits are ignored; SIGKILL of the supervisor"),
-    row(RobotFault::AllKilled, "all-killed", Promise::RestsAtOnce, "time limits are ignored; SIGKILL of all processes, then `firsthand stop`"),
-    row(RobotFault::SonarSilent, "sonar-silent", Promise::Unharmed, "every ultrasonic byte is 255, nothing in range"),
-    row(RobotFault::SonarFrozen, "sonar-frozen", Promise::RestsLater, "the last ultrasonic bytes that are distances repeat for ever"),
-    row(RobotFault::LateFromBoot, "late-from-boot", Promise::Unharmed, "from its start on, all frames come 0.5 s late"),
-    row(RobotFault::HeldWheels, "held-wheels", Promise::EndsAtRest, "the wheels stand, and their motors draw the current of held ones"),
+    row(RobotFault::Silence, "silence", Promise::Rests, "nothing comes from the robot any more", LIKEWISE),
+    row(RobotFault::MotorOnes, "motor-ones", Promise::Rests, "the data of every motor frame are 0xFF", NOTHING),
+    row(RobotFault::MotorZeros, "motor-zeros", Promise::RestsLater, "the data of every motor frame are 0", "all angles and speeds of wheels are 0"),
+    row(RobotFault::MotorRepeated, "motor-repeated", Promise::Rests, "the same motor frame for ever", "the same line for ever"),
+    row(RobotFault::EncoderDead, "encoder-dead", Promise::Rests, "one encoder does not count", LIKEWISE),
+    row(RobotFault::EncodersSwapped, "encoders-swapped", Promise::RestsLater, "the encoders of left and right are swapped", LIKEWISE),
+    row(RobotFault::EncoderReversed, "encoder-reversed", Promise::Rests, "one encoder counts backwards", LIKEWISE),
+    row(RobotFault::CountsRandom, "counts-random", Promise::Rests, "random counts in each frame", "random angles and speeds in each line"),
+    row(RobotFault::CountsReset, "counts-reset", Promise::Unharmed, "counts begin again from 0 without silence", LIKEWISE),
+    row(RobotFault::RangeInvalid, "range-invalid", Promise::Rests, "every ultrasonic byte is 0, which is not valid", "every range and beam is -1, no reading"),
+    row(RobotFault::RangeMissing, "range-missing", Promise::Rests, "no standard frame comes", "no ranges and no scan come"),
+    row(RobotFault::RangeStuck, "range-stuck", Promise::RestsLater, "every ultrasonic byte is 8 cm", "every range and beam is 0.3 m"),
+    row(RobotFault::FramesLate, "frames-late", Promise::Rests, "all frames come 2 s late", "all lines come 2 s late"),
+    row(RobotFault::OldFrames, "old-frames", Promise::Unharmed, "every 2 s a motor frame of 3 s ago comes again", "every 2 s a line of 3 s ago comes again"),
+    row(RobotFault::StreamsStop, "streams-stop", Promise::Rests, "no sensor frame comes, acknowledgements do", "only answers come"),
+    row(RobotFault::DoesNotStop, "does-not-stop", Promise::Rests, "after `firsthand stop`: given speed 0 the robot keeps its speed", LIKEWISE),
+    row(RobotFault::FramesSlow, "frames-slow", Promise::RestsLater, "sensor frames come three times a second", "lines with wheels come three times a second"),
+    row(RobotFault::IgnoresZero, "ignores-zero", Promise::EndsAtRest, "given speed 0 the robot keeps its speed, to the end of its mission", LIKEWISE),
+    row(RobotFault::LinkKilled, "link-killed", Promise::RestsAtOnce, "time limits are ignored; SIGKILL of the link under a frozen supervisor", LIKEWISE),
+    row(RobotFault::SupervisorKilled, "supervisor-killed", Promise::RestsAtOnce, "time limits are ignored; SIGKILL of the supervisor", LIKEWISE),
+    row(RobotFault::AllKilled, "all-killed", Promise::RestsAtOnce, "time limits are ignored; SIGKILL of all processes, then `firsthand stop`", LIKEWISE),
+    row(RobotFault::RangeSilent, "range-silent", Promise::Unharmed, "every ultrasonic byte is 255, nothing in range", "every range and beam is null, nothing in reach"),
+    row(RobotFault::RangeFrozen, "range-frozen", Promise::RestsLater, "the last ultrasonic bytes that are distances repeat for ever", "the last ranges and scan repeat for ever"),
+    row(RobotFault::LateFromBoot, "late-from-boot", Promise::Unharmed, "from its start on, all frames come 0.5 s late", "all lines come 0.5 s late"),
+    row(RobotFault::HeldWheels, "held-wheels", Promise::EndsAtRest, "the wheels stand, and their motors draw the current of held ones", "the wheels stand and are said to be held"),
+    row(RobotFault::Garbage, "garbage", Promise::Rests, NOTHING, "half of each line is missing, so none is JSON"),
 ];
 
 impl Promise {
@@ -120,6 +137,16 @@ impl RobotFault {
     pub fn row(self) -> &'static Row {
         // A test ensures that every fault has a row.
         TABLE.iter().find(|row| row.fault == self).unwrap_or(&TABLE[0])
+    }
+
+    /// Whether a robot that speaks `protocol` can have it.
+    pub fn has_meaning(self, protocol: Protocol) -> bool {
+        let row = self.row();
+        let does = match protocol {
+            Protocol::X80 => row.x80,
+            Protocol::Json => row.json,
+        };
+        does != NOTHING
     }
 
     /// Whether the robot has it from its start on.
@@ -150,7 +177,7 @@ mod tests {
             assert_eq!(RobotFault::named(row.name), Some(row.fault));
             assert_eq!(row.fault.row().name, row.name);
         }
-        assert_eq!(RobotFault::HeldWheels as usize + 1, TABLE.len());
+        assert_eq!(RobotFault::Garbage as usize + 1, TABLE.len());
         assert_eq!(RobotFault::named("none"), None);
     }
 
@@ -163,8 +190,7 @@ mod tests {
                 (None, Promise::EndsAtRest) => "ends at rest".to_owned(),
                 (None, _) => "unharmed".to_owned(),
             };
-            let what = row.what;
-            let line = format!("| `{}` | {what} | {promise} |\n", row.name);
+            let line = format!("| `{}` | {} | {} | {promise} |\n", row.name, row.x80, row.json);
             assert!(guide.contains(&line), "missing in break-it.md: {line}");
         }
     }

@@ -82,7 +82,8 @@ pub fn run_robot_faults(
 
 fn one(options: &Options, fault: RobotFault, seed: u64, files: &Path) -> Result<Entry, BenchError> {
     let mut robot = mission::robot(options, seed, &files.join("robot"), fault.is_kill())?;
-    let proxy = Proxy::start(robot.address(), fault, seed)?;
+    let protocol = options.loaded.robot.protocol();
+    let proxy = Proxy::start(robot.address(), fault, protocol, seed)?;
     let mut child = start(options, seed, proxy.address(), &files.join("run"))?;
     let summary = mission::read_stdout(&mut child);
     let mut observed = Observed::default();

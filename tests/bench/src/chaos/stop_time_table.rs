@@ -142,7 +142,7 @@ mod tests {
 
     #[test]
     fn a_promise_is_broken_by_motion_a_touch_a_wrong_place_or_silence_about_the_reason() {
-        use RobotFault::{CountsReset, Silence, SonarSilent};
+        use RobotFault::{CountsReset, RangeSilent, Silence};
         #[rustfmt::skip]
         let rows = [
             (entry(Silence), true),
@@ -154,8 +154,8 @@ mod tests {
             (Entry { rest_s: Some(9.9), ..entry(CountsReset) }, true),
             (Entry { collisions: 1, ..entry(CountsReset) }, false),
             (Entry { outcome: "wrong_place".to_owned(), ..entry(CountsReset) }, false),
-            (Entry { collisions: 1, ..entry(SonarSilent) }, false),
-            (Entry { fault_began: false, ..entry(SonarSilent) }, false),
+            (Entry { collisions: 1, ..entry(RangeSilent) }, false),
+            (Entry { fault_began: false, ..entry(RangeSilent) }, false),
         ];
         for (entry, kept) in rows {
             assert_eq!(entry.is_kept(), kept, "{entry:?}");

@@ -97,6 +97,17 @@ fn robot_faults(
     faults: Vec<RobotFault>,
 ) -> Result<ExitCode, Failure> {
     chaos::check(&loaded)?;
+    let protocol = loaded.robot.protocol();
+    let (faults, left_out): (Vec<_>, Vec<_>) =
+        faults.into_iter().partition(|fault| fault.has_meaning(protocol));
+    if !left_out.is_empty() {
+        let names: Vec<_> = left_out.iter().map(|fault| fault.row().name).collect();
+        let left_out = format!("no faults of this robot's protocol: {}", names.join(", "));
+        if faults.is_empty() {
+            return Err(left_out.into());
+        }
+        write_stderr(&format!("left out, {left_out}\n"));
+    }
     let options = FaultOptions { base: options(arguments, loaded, set, Pace::Rate(1.0))?, faults };
     let directory = options.base.directory.clone();
     let of = options.faults.len() as u64 * u64::from(arguments.missions);

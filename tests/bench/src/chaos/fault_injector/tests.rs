@@ -1,6 +1,10 @@
-use common::wire::{DecoderTally, Encoder, StandardSensors, SystemSignal};
+use common::json_wire;
+use common::wire::{
+    Addressing, Command, Decoder, DecoderTally, Encoder, MotorSensors, Report, StandardSensors,
+    SystemSignal,
+};
 
-use super::*;
+use super::{words::STUCK_CM, *};
 use crate::chaos::robot_fault::TABLE;
 
 const fn encoder(position: u16) -> Encoder {
@@ -43,7 +47,7 @@ fn reports(passed: &[Late]) -> Vec<Report> {
 
 /// The bytes for the host of a tick with `counts`, from a robot that stood at (100, 200) when its fault began.
 fn faulted(fault: RobotFault, counts: [u16; 2]) -> (FaultInjector, Vec<Late>) {
-    let mut injector = FaultInjector::new(fault, 1);
+    let mut injector = FaultInjector::new(fault, Protocol::X80, 1);
     injector.report(&tick([100, 200]), at(1.0));
     injector.begin();
     let passed = injector.report(&tick(counts), at(1.1));
@@ -67,8 +71,8 @@ fn sonar(passed: &[Late]) -> Option<u8> {
 
 #[test]
 fn bytes_pass_unchanged_until_the_fault_begins_and_every_frame_of_a_fault_is_valid() {
-    for row in TABLE {
-        let mut injector = FaultInjector::new(row.fault, 1);
+    for row in TABLE.iter().filter(|row| row.fault.has_meaning(Protocol::X80)) {
+        let mut injector = FaultInjector::new(row.fault, Protocol::X80, 1);
         let passed = injector.report(&tick([100, 200]), at(1.0));
         assert_eq!(passed.len(), 1, "{}", row.name);
         assert_eq!((passed[0].at, &passed[0].bytes), (at(1.0), &tick([100, 200])));
@@ -93,7 +97,7 @@ fn the_encoders_lie_as_the_table_says() {
     assert_eq!(told(F::MotorRepeated), Some([100, 200]));
     assert_eq!(told(F::EncodersSwapped), Some([90, 250]));
     assert_eq!(told(F::CountsReset), Some([50, 32_758]));
-    assert_eq!(told(F::SonarStuck), Some([150, 190]));
+    assert_eq!(told(F::RangeStuck), Some([150, 190]));
     assert_eq!([told(F::StreamsStop), told(F::Silence)], [None, None]);
     let dead = told(F::EncoderDead);
     assert!(dead == Some([100, 190]) || dead == Some([150, 200]), "{dead:?}");
@@ -107,13 +111,13 @@ fn the_encoders_lie_as_the_table_says() {
 #[test]
 fn the_sonar_is_wrong_as_the_table_says() {
     let told = |fault| sonar(&faulted(fault, [150, 190]).1);
-    assert_eq!(told(RobotFault::SonarZero), Some(0));
-    assert_eq!(told(RobotFault::SonarMissing), None);
-    assert_eq!(told(RobotFault::SonarStuck), Some(STUCK_CM));
+    assert_eq!(told(RobotFault::RangeInvalid), Some(0));
+    assert_eq!(told(RobotFault::RangeMissing), None);
+    assert_eq!(told(RobotFault::RangeStuck), Some(STUCK_CM));
     assert_eq!(told(RobotFault::EncoderDead), Some(90));
-    assert_eq!(told(RobotFault::SonarSilent), Some(255));
+    assert_eq!(told(RobotFault::RangeSilent), Some(255));
     // What the robot hears after the fault began changes nothing.
-    let mut injector = FaultInjector::new(RobotFault::SonarFrozen, 1);
+    let mut injector = FaultInjector::new(RobotFault::RangeFrozen, Protocol::X80, 1);
     injector.report(&tick([100, 200]), at(1.0));
     injector.begin();
     let mut later = Vec::new();
@@ -129,7 +133,7 @@ fn frames_are_late_old_or_rare_as_the_table_says() {
     let (_, late) = faulted(RobotFault::LateFromBoot, [150, 190]);
     assert_eq!(late[0].at, at(1.6));
 
-    let mut injector = FaultInjector::new(RobotFault::OldFrames, 1);
+    let mut injector = FaultInjector::new(RobotFault::OldFrames, Protocol::X80, 1);
     for number in 0..40 {
         injector.report(&tick([number, 200]), at(0.1 * f64::from(number)));
     }
@@ -141,7 +145,7 @@ fn frames_are_late_old_or_rare_as_the_table_says() {
     let next = injector.report(&tick([41, 200]), at(4.1));
     assert_eq!(next.len(), 1, "the next in 2 s");
 
-    let mut injector = FaultInjector::new(RobotFault::FramesSlow, 1);
+    let mut injector = FaultInjector::new(RobotFault::FramesSlow, Protocol::X80, 1);
     injector.begin();
     let came = (0..30).filter(|&number| {
         let passed = injector.report(&tick([number, 200]), at(0.1 * f64::from(number)));
@@ -161,7 +165,7 @@ fn a_robot_that_does_not_stop_keeps_its_speed_until_it_is_disabled() {
     let stop = bytes(Command::velocity([Some(0), Some(0)], 250));
     let suspend = bytes(Command::Enable { on: false, channel: None });
     let mut moved = 0;
-    let mut injector = FaultInjector::new(RobotFault::DoesNotStop, 1);
+    let mut injector = FaultInjector::new(RobotFault::DoesNotStop, Protocol::X80, 1);
     let mut heard =
         |injector: &mut FaultInjector, bytes: &[u8]| injector.order(bytes, &mut || moved += 1);
     assert_eq!(heard(&mut injector, &go), go);
@@ -171,4 +175,89 @@ fn a_robot_that_does_not_stop_keeps_its_speed_until_it_is_disabled() {
     assert_eq!(heard(&mut injector, &suspend), suspend);
     assert_eq!(heard(&mut injector, &stop), stop);
     assert_eq!(moved, 1, "what the host ordered, not what the robot was told");
+}
+
+/// A line of a robot that has turned its wheels so far and sees `beam`, and an answer.
+fn said(wheels: [f64; 2], beam: f32) -> Vec<u8> {
+    let report = json_wire::Report {
+        wheels: Some(wheels),
+        speeds: Some([1.0, 2.0]),
+        ranges: [("front".to_owned(), Some(f64::from(beam)))].into(),
+        scan: Some(vec![Some(beam), None]),
+        ..json_wire::Report::default()
+    };
+    let answer = json_wire::Report { heard: Some(1), ..json_wire::Report::default() };
+    [json_wire::line(&report), json_wire::line(&answer)].concat()
+}
+
+/// The lines for the host from a robot that had turned its wheels by 1 and 2 rad when its fault began, and by 4 and 3 now.
+fn lines(fault: RobotFault) -> Vec<json_wire::Report> {
+    let mut injector = FaultInjector::new(fault, Protocol::Json, 1);
+    let before = said([1.0, 2.0], 0.5);
+    assert_eq!(injector.report(&before, at(1.0))[0].bytes, before);
+    injector.begin();
+    let passed = injector.report(&said([4.0, 3.0], 0.75), at(1.1));
+    let bytes: Vec<u8> = passed.into_iter().flat_map(|late| late.bytes).collect();
+    let lines = bytes.split(|byte| *byte == b'\n').filter(|line| !line.is_empty());
+    lines.filter_map(|line| json_wire::parse(line).ok()).collect()
+}
+
+#[test]
+fn a_robot_that_speaks_lines_of_json_lies_as_the_table_says() {
+    use RobotFault as F;
+    let wheels = |fault| lines(fault)[0].wheels.unwrap().map(|angle| (angle * 1e6).round() / 1e6);
+    assert_eq!(wheels(F::MotorZeros), [0.0, 0.0]);
+    assert_eq!(wheels(F::EncodersSwapped), [2.0, 5.0]);
+    assert_eq!(wheels(F::CountsReset), [3.0, 1.0]);
+    let dead = wheels(F::EncoderDead);
+    assert!(dead == [1.0, 3.0] || dead == [4.0, 2.0], "{dead:?}");
+    let reversed = wheels(F::EncoderReversed);
+    assert!(reversed == [-2.0, 3.0] || reversed == [4.0, 1.0], "{reversed:?}");
+    let repeated: json_wire::Report =
+        json_wire::parse(said([1.0, 2.0], 0.5).split(|byte| *byte == b'\n').next().unwrap())
+            .unwrap();
+    assert_eq!(lines(F::MotorRepeated)[0], repeated);
+    for (fault, beam, rest) in [
+        (F::RangeInvalid, Some(-1.0), Some(-1.0)),
+        (F::RangeStuck, Some(0.3), Some(0.3)),
+        (F::RangeSilent, None, None),
+        (F::RangeFrozen, Some(0.5), None),
+    ] {
+        let line = &lines(fault)[0];
+        assert_eq!(line.scan, Some(vec![beam, rest]), "{fault:?}");
+        assert_eq!(line.ranges["front"].map(|range| range as f32), beam, "{fault:?}");
+        assert_eq!(line.wheels, Some([4.0, 3.0]));
+    }
+    let missing = &lines(F::RangeMissing)[0];
+    assert!(missing.scan.is_none() && missing.ranges.is_empty() && missing.wheels.is_some());
+    assert!(lines(F::StreamsStop).iter().all(|line| line.heard == Some(1)));
+    assert_eq!(
+        [lines(F::StreamsStop).len(), lines(F::Silence).len(), lines(F::Garbage).len()],
+        [1, 0, 0]
+    );
+}
+
+#[test]
+fn a_robot_that_speaks_lines_of_json_keeps_its_speed_until_it_brakes_or_stands_where_it_is_held() {
+    use json_wire::{Order, line};
+    let drive =
+        |speed| line(&Order::Drive { wheels: [speed; 2], twist: [speed, 0.0], for_s: 0.25 });
+    let (go, stand, brake) = (drive(2.0), drive(0.0), line(&Order::Brake {}));
+    let mut keeps = FaultInjector::new(RobotFault::IgnoresZero, Protocol::Json, 1);
+    assert_eq!(
+        keeps.order(&[go.clone(), stand.clone()].concat(), &mut || ()),
+        [go.clone(), stand.clone()].concat()
+    );
+    keeps.begin();
+    assert_eq!(keeps.order(&stand, &mut || ()), go);
+    assert_eq!(
+        keeps.order(&[brake.clone(), stand.clone()].concat(), &mut || ()),
+        [brake, stand.clone()].concat()
+    );
+    let mut held = FaultInjector::new(RobotFault::HeldWheels, Protocol::Json, 1);
+    held.begin();
+    assert_eq!(held.order(&go, &mut || ()), stand);
+    let passed = held.report(&said([1.0, 2.0], 0.5), at(1.0));
+    let held = passed[0].bytes.windows(18).any(|word| word == b"\"held\":[true,true]");
+    assert!(held);
 }
