@@ -1,6 +1,7 @@
 // Reads what firsthand gives viewers by the packages with which Foxglove and Lichtblick read it, and checks that they can draw it:
-//   node foxglove.mjs recording FILE
+//   node foxglove.mjs recording FILE [SENSOR POINTS]
 //   node foxglove.mjs live ws://ADDRESS:PORT
+// SENSOR is the sensor whose scans are looked at, and POINTS the number of points in each that has any.
 import assert from "node:assert/strict";
 import { open } from "node:fs/promises";
 import internal from "@foxglove/schemas/internal.js";
@@ -14,6 +15,8 @@ import { WebSocket } from "ws";
 
 /** Longest time that a live robot may take to show everything. */
 const PATIENCE_MS = 120_000;
+
+const [kind, place, sensor = "front", points = "9"] = process.argv.slice(2);
 
 /** The decoder of a channel, from the schema that came with it, as viewers make it. */
 function decoder({ encoding, schemaName, schemaEncoding, schema }) {
@@ -70,8 +73,11 @@ class Seen {
       case "foxglove.LaserScan":
         // Viewers divide by the number of angles between points.
         assert.notEqual(message.ranges.length, 1, topic);
-        if (message.ranges.length > 1) {
-          this.range = message.ranges[0];
+        if (topic === `foxglove/scan/${sensor}` && message.ranges.length > 1) {
+          assert.equal(message.ranges.length, Number(points), topic);
+          assert.ok(message.end_angle > message.start_angle, topic);
+          // A beam without a reading is no number.
+          this.range = Math.min(this.range ?? Infinity, ...message.ranges.filter(Number.isFinite));
         }
         break;
       case "foxglove.SceneUpdate":
@@ -103,7 +109,7 @@ class Seen {
     const rooted = (frame) => frame === "map" || (this.parents.has(frame) && rooted(this.parents.get(frame)));
     const apart = (axis) => Math.max(...this.poses.map(axis)) - Math.min(...this.poses.map(axis));
     const wanted = {
-      "the transforms map -> base -> front": this.parents.get("base") === "map" && this.parents.get("front") === "base",
+      "the transforms map -> base -> sensor": this.parents.get("base") === "map" && this.parents.get(sensor) === "base",
       "a transform for each frame": [...this.frames].every(rooted),
       "a pose that moves": this.poses.length > 1 && Math.hypot(apart((p) => p.x), apart((p) => p.y)) > 0.1,
       "a covariance": this.variance > 0,
@@ -193,5 +199,4 @@ async function live(url) {
   seen.assertComplete();
 }
 
-const [kind, place] = process.argv.slice(2);
 await { recording, live }[kind](place);
