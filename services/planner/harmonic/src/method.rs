@@ -8,6 +8,8 @@ pub enum Method {
     Multifrontal,
     /// Multigrid in single precision.
     MultigridSingle,
+    /// Multigrid in single precision, and multifrontal factorisation of the passages in which u is below its range.
+    MultigridAndMultifrontal,
     /// Multigrid in double precision.
     MultigridDouble,
     /// Multigrid in double precision, one band of u after the other, each with an exponent of its own.
@@ -20,6 +22,7 @@ impl Method {
         match self {
             Self::Multifrontal => "multifrontal",
             Self::MultigridSingle => "multigrid f32",
+            Self::MultigridAndMultifrontal => "multigrid f32, multifrontal",
             Self::MultigridDouble => "multigrid f64",
             Self::MultigridBands => "multigrid bands",
         }

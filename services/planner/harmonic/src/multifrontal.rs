@@ -28,24 +28,26 @@ use crate::domain::Domain;
 use crate::error::SolveError;
 use crate::screening::Coefficients;
 use crate::store::Store;
+use back_substitution::substitute;
 pub(crate) use breadth_first::BreadthFirst;
 pub(crate) use budget::Budget;
 pub(crate) use gauss_seidel::relax;
 pub(crate) use tree::Tree;
 pub(crate) use workspace::Workspace;
 
-/// The solution of the five-point equations on `domain`, exact but for rounding.
+/// The solution of the five-point equations on `domain`, exact but for rounding; with `known`, in the cells that `pass` visits, from
+/// the values in those from which it begins.
 pub(crate) fn solve(
     domain: &Domain,
-    pass: &BreadthFirst,
-    tree: &Tree,
+    (pass, tree): (&BreadthFirst, &Tree),
+    known: Option<&Store>,
     budget: &Budget,
     workspace: &mut Workspace,
     cancellation: &Cancellation,
 ) -> Result<Store, SolveError> {
     budget.ask(tree.cost.bytes)?;
     let solved = factor(domain, pass, tree, workspace, cancellation)
-        .and_then(|()| back_substitution::substitute(domain, pass, tree, workspace, cancellation));
+        .and_then(|()| substitute(domain, (pass, tree), known, workspace, cancellation));
     workspace.trim();
     solved
 }

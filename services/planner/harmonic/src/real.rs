@@ -24,6 +24,10 @@ pub(crate) trait Real:
     /// Below this, numbers are taken for zero.
     const TINY: Self;
 
+    /// u above this is right once its residuals are small, the target's being 2^TOP: u below it is held down to so much less that what
+    /// lies beyond does not count.
+    const KNOWN: f64;
+
     fn of(value: f64) -> Self;
     fn wide(self) -> f64;
     fn size(self) -> Self;
@@ -52,6 +56,7 @@ impl Real for f32 {
     const ONE: Self = 1.0;
     const TOP: i32 = 100;
     const TINY: Self = 1e-34;
+    const KNOWN: f64 = 1e-28;
 
     #[inline(always)]
     fn of(value: f64) -> Self {
@@ -73,6 +78,7 @@ impl Real for f64 {
     const ONE: Self = 1.0;
     const TOP: i32 = 900;
     const TINY: Self = 1e-300;
+    const KNOWN: f64 = 1e-294;
 
     #[inline(always)]
     fn of(value: f64) -> Self {

@@ -18,7 +18,7 @@ use crate::real::Real;
 use crate::screening::Coefficients;
 use crate::store::{BLOCKED, Store};
 use crate::verification::{self, Check};
-use plan::plan;
+use plan::{beyond_single, plan};
 
 /// A cell whose direction a coarse correction turns by more than this, radians, has not settled. The correction is applied, and
 /// the next would be smaller by a factor of three or more, which leaves directions well within a degree.
@@ -35,9 +35,6 @@ const FIRST_CHECK_NEAR: usize = 2;
 /// Most cycles from the field of a similar map; then it is solved from scratch. Maps that need more are mostly those in which cells
 /// were cut off: their u falls by an order of magnitude a cycle, and is zero at once in a solve from scratch.
 const NEAR_CYCLES: usize = 20;
-
-/// Cycles after which a cell still at zero is one whose u is below what the precision holds.
-const REACHED: usize = 6;
 
 /// A cycle divides residuals by at least this.
 const PER_CYCLE: f64 = 3.0;
@@ -174,16 +171,17 @@ impl Solver {
         if let Some(near) = near.filter(|near| near.fits(domain)) {
             let method = near.verification().method;
             let solved = match method {
-                Method::MultigridSingle => {
-                    Some(self.single.solve(task, Some(near), NEAR_CYCLES, observe)?)
+                Method::MultigridSingle | Method::MultigridAndMultifrontal => {
+                    Some(self.single(task, Some(near), NEAR_CYCLES, &budget, observe)?)
                 }
                 Method::MultigridDouble => {
-                    Some(self.double.solve(task, Some(near), NEAR_CYCLES, observe)?)
+                    let solved = self.double.solve(task, Some(near), NEAR_CYCLES, observe)?;
+                    Some((solved, method))
                 }
                 // The cost of these follows from the shape of the map alone.
                 Method::MultigridBands | Method::Multifrontal => None,
             };
-            if let Some((store, check)) = solved
+            if let Some(((store, check), method)) = solved
                 && check.holds()
             {
                 return Ok(Field::new(domain, store, &check, method));
@@ -192,15 +190,19 @@ impl Solver {
         let mut plan = plan(domain, &budget, cancellation)?;
         let mut failed = Check::default();
         for method in plan.methods {
-            let (store, check) = match method {
-                Method::MultigridSingle => self.single.solve(task, None, SINGLE_CYCLES, observe)?,
-                Method::MultigridDouble => self.double.solve(task, None, DOUBLE_CYCLES, observe)?,
+            let ((store, check), method) = match method {
+                Method::MultigridSingle | Method::MultigridAndMultifrontal => {
+                    self.single(task, None, SINGLE_CYCLES, &budget, observe)?
+                }
+                Method::MultigridDouble => {
+                    (self.double.solve(task, None, DOUBLE_CYCLES, observe)?, method)
+                }
                 Method::MultigridBands => {
                     let store = multigrid_bands::solve(domain, cancellation)?;
                     observe(Phase::Solved);
                     let check = verification::check(domain, &store, threads);
                     observe(Phase::Verified);
-                    (store, check)
+                    ((store, check), method)
                 }
                 Method::Multifrontal => {
                     let (pass, tree) = if let Some(planned) = plan.multifrontal.take() {
@@ -213,8 +215,8 @@ impl Solver {
                     observe(Phase::SetUp);
                     let mut store = multifrontal::solve(
                         domain,
-                        &pass,
-                        &tree,
+                        (&pass, &tree),
+                        None,
                         &budget,
                         &mut self.multifrontal,
                         cancellation,
@@ -228,7 +230,7 @@ impl Solver {
                         check = verification::check(domain, &store, threads);
                         observe(Phase::Verified);
                     }
-                    (store, check)
+                    ((store, check), method)
                 }
             };
             if check.holds() {
@@ -240,6 +242,35 @@ impl Solver {
             worst_residual: failed.worst_residual,
             local_maxima: failed.local_maxima + failed.unreached,
         })
+    }
+}
+
+impl Solver {
+    /// What single precision holds of a field. Where u falls below that in narrow passages only, they are solved beyond it.
+    fn single(
+        &mut self,
+        task: Task<'_>,
+        near: Option<&Field>,
+        most_cycles: usize,
+        budget: &Budget,
+        observe: &mut dyn FnMut(Phase),
+    ) -> Result<((Store, Check), Method), SolveError> {
+        let Task { threads, domain, cancellation } = task;
+        let (store, check) = self.single.solve(task, near, most_cycles, observe)?;
+        if check.holds() {
+            return Ok(((store, check), Method::MultigridSingle));
+        }
+        let Some((pass, tree)) = beyond_single(domain, &store, budget, cancellation)? else {
+            return Ok(((store, check), Method::MultigridSingle));
+        };
+        let places = (&pass, &tree);
+        let workspace = &mut self.multifrontal;
+        let store =
+            multifrontal::solve(domain, places, Some(&store), budget, workspace, cancellation)?;
+        observe(Phase::Solved);
+        let check = verification::check(domain, &store, threads);
+        observe(Phase::Verified);
+        Ok(((store, check), Method::MultigridAndMultifrontal))
     }
 }
 
@@ -287,11 +318,15 @@ where
             observe(Phase::Solved);
             let check = verification::check(domain, &store, threads);
             observe(Phase::Verified);
-            // All settled and some unreached: u goes below what this precision holds.
-            if check.holds() || (check.unreached > 0 && cycle >= REACHED) || last {
+            let mut excess = check.excess();
+            if check.unreached > 0 {
+                // u falls below what this precision holds: what it holds is right, or needs more cycles.
+                excess = verification::check_above(domain, &store, threads, R::KNOWN).excess();
+            }
+            if check.holds() || (check.unreached > 0 && excess <= 1.0) || last {
                 return Ok((store, check));
             }
-            let cycles = check.excess().ln() / PER_CYCLE.ln();
+            let cycles = excess.ln() / PER_CYCLE.ln();
             next_check = cycle + cycles.clamp(1.0, BETWEEN_CHECKS) as usize;
         }
         Err(SolveError::Cancelled)

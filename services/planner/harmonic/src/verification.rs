@@ -47,12 +47,22 @@ const CELLS_PER_THREAD: usize = 1 << 18;
 
 /// Checks every cell of a field, on up to `threads` threads; the result does not depend on how many.
 pub(crate) fn check(domain: &Domain, store: &Store, threads: NonZeroUsize) -> Check {
+    check_above(domain, store, threads, 0.0)
+}
+
+/// Checks the cells of a field in which what is stored is above `floor`.
+pub(crate) fn check_above(
+    domain: &Domain,
+    store: &Store,
+    threads: NonZeroUsize,
+    floor: f64,
+) -> Check {
     let mut found = match store {
         Store::Single { values, .. } => {
-            in_strips(domain, threads, |rows| check_plain(domain, values, rows))
+            in_strips(domain, threads, |rows| check_plain(domain, values, rows, floor))
         }
         Store::Double { values, .. } => {
-            in_strips(domain, threads, |rows| check_plain(domain, values, rows))
+            in_strips(domain, threads, |rows| check_plain(domain, values, rows, floor))
         }
         Store::Extended { mantissas, exponents } => {
             in_strips(domain, threads, |rows| check_extended(domain, mantissas, exponents, rows))
@@ -89,10 +99,10 @@ fn in_strips(
 }
 
 /// Checks rows of a field with one common exponent.
-fn check_plain<R: Real>(domain: &Domain, values: &[R], strip: Range<usize>) -> Check {
+fn check_plain<R: Real>(domain: &Domain, values: &[R], strip: Range<usize>, floor: f64) -> Check {
     let width = domain.width();
     let row_of = |row: usize| values.get(row * width..(row + 1) * width);
-    check_strip(domain, values, Rows::new(width), row_of, strip)
+    check_strip(domain, values, Cells::above(width, floor), Rows::new(width), row_of, strip)
 }
 
 /// Checks rows of a field with an exponent a cell.
@@ -107,13 +117,14 @@ fn check_extended(
         let cells = row * width..(row + 1) * width;
         mantissas.get(cells.clone()).zip(exponents.get(cells))
     };
-    check_strip(domain, mantissas, ScaledRows::new(width), row_of, strip)
+    check_strip(domain, mantissas, Cells::above(width, 0.0), ScaledRows::new(width), row_of, strip)
 }
 
 /// Checks a strip of rows with wide vectors: `raw` is what is stored, `row_of` gives rows by number, none beyond the map.
 fn check_strip<'f, R: Real, W: Window<R>>(
     domain: &Domain,
     raw: &[R],
+    mut cells: Cells<R>,
     mut rows: W,
     row_of: impl Fn(usize) -> Option<W::Row<'f>>,
     strip: Range<usize>,
@@ -123,7 +134,6 @@ fn check_strip<'f, R: Real, W: Window<R>>(
         || {
             let width = domain.width();
             let mut found = Check::default();
-            let mut cells = Cells::new(width);
             let mut tiles = Tiles::new(width);
             rows.take(strip.start.checked_sub(1).and_then(&row_of));
             rows.take(row_of(strip.start));

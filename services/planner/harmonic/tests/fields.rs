@@ -178,6 +178,27 @@ fn a_wide_map_with_strong_screening_is_right_beyond_the_range_of_f64() {
 }
 
 #[test]
+fn a_hall_with_a_long_passage_one_cell_wide_is_not_factorised_and_right_in_the_passage_too() {
+    let mut map = Map::generate(Kind::Empty, 260, 250, 0);
+    // A passage along the rim, but for a door.
+    for (columns, rows) in [(2..258, 2..6), (2..258, 244..248), (2..6, 2..248), (254..258, 2..248)]
+    {
+        map.fill(columns, rows, true);
+    }
+    map.fill(1..8, 120..140, false);
+    let domain = map.domain().expect("a valid map");
+    let domain = domain.with_screening(&Screening::cells(7.0)).expect("a valid screening");
+    let field = solve(&domain);
+    assert!(field.log10_u_min() < -200.0, "only down to 1e{}", field.log10_u_min());
+    assert_eq!(field.verification().method, Method::MultigridAndMultifrontal);
+    assert_eq!(follow(&field), 1.0);
+    let (off, worst) = Reference::solve(&domain).compare(&field);
+    assert!(off <= 1e-3 && worst <= 1.0, "{off} off, worst {worst} degrees");
+    let again = Solver::default().solve_near(&domain, &field, &Cancellation::new()).unwrap();
+    assert_eq!(again.verification().method, Method::MultigridAndMultifrontal);
+}
+
+#[test]
 fn a_narrow_passage_beside_a_wide_one_is_right_where_its_far_end_takes_over() {
     // The narrow way loses 0.57 orders of magnitude a cell, the wide one 0.07: beyond a certain cell the way back to the
     // far end and around is the better one, by weights of 1e-400.

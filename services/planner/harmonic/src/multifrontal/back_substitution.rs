@@ -1,4 +1,4 @@
-//! Back substitution: from the factors to u, outwards from u(target) = 1, in extended range.
+//! Back substitution: from the factors to u, outwards from the cells whose u is known, in extended range.
 
 use super::breadth_first::BreadthFirst;
 use super::tree::Tree;
@@ -21,14 +21,14 @@ const TOP: i32 = 1020;
 /// Exponent of the smallest: so low that it keeps all of its digits.
 const BOTTOM: i32 = -960;
 
-/// u of every cell of `domain`.
+/// u of every cell of `domain`; that of the cells from which `pass` begins is `known`, or 1 at the target.
 ///
 /// # Errors
 /// [`SolveError::Cancelled`].
 pub(super) fn substitute(
     domain: &Domain,
-    pass: &BreadthFirst,
-    tree: &Tree,
+    (pass, tree): (&BreadthFirst, &Tree),
+    known: Option<&Store>,
     workspace: &mut Workspace,
     cancellation: &Cancellation,
 ) -> Result<Store, SolveError> {
@@ -36,7 +36,9 @@ pub(super) fn substitute(
     // The cells are in order of their place, where the cells of a front lie close together.
     u.clear();
     u.resize(pass.len(), Scaled::ZERO);
-    u[0] = Scaled::ONE;
+    for place in 0..pass.unknown().start {
+        u[place as usize] = known.map_or(Scaled::ONE, |known| known.u(pass.cell(place)));
+    }
     let mut plain = Vec::new();
     let (mut rows, mut lengths) = (&factors.rows[..], &factors.lengths[..]);
     for front in tree.fronts.iter().rev() {
@@ -53,14 +55,17 @@ pub(super) fn substitute(
             in_extended_range(u, cells, here);
         }
     }
-    Ok(store(domain, pass, u))
+    Ok(store(domain, pass, u, known))
 }
 
-/// The store of `u`, given by place.
-fn store(domain: &Domain, pass: &BreadthFirst, u: &[Scaled]) -> Store {
+/// The store of `u`, given by place, and of what is `known` of the other cells.
+fn store(domain: &Domain, pass: &BreadthFirst, u: &[Scaled], known: Option<&Store>) -> Store {
     let (width, height) = (domain.width(), domain.height());
     let blocked = |row: usize| domain.blocked()[row * width..(row + 1) * width].iter();
-    let at = |place: u32| u.get(place as usize).copied().unwrap_or(Scaled::ZERO);
+    let at = |index: usize, place: u32| {
+        let known = || known.map_or(Scaled::ZERO, |known| known.u(index));
+        u.get(place as usize).copied().unwrap_or_else(known)
+    };
     let raw = |u: Scaled, blocked: bool, value: f64| match (blocked, u.is_zero()) {
         (true, _) => BLOCKED,
         (false, true) => 0.0,
@@ -70,8 +75,9 @@ fn store(domain: &Domain, pass: &BreadthFirst, u: &[Scaled]) -> Store {
     if least.is_some_and(|least| least >= BOTTOM - TOP) {
         let mut values = Vec::with_capacity(width * height);
         for row in 0..height {
-            values.extend(pass.row(row).iter().zip(blocked(row)).map(|(&place, &blocked)| {
-                let u = at(place);
+            let cells = (row * width..).zip(pass.row(row)).zip(blocked(row));
+            values.extend(cells.map(|((index, &place), &blocked)| {
+                let u = at(index, place);
                 raw(u, blocked, u.relative_to(-TOP))
             }));
         }
@@ -80,8 +86,8 @@ fn store(domain: &Domain, pass: &BreadthFirst, u: &[Scaled]) -> Store {
     let mut mantissas = Vec::with_capacity(width * height);
     let mut exponents = Vec::with_capacity(width * height);
     for row in 0..height {
-        for (&place, &blocked) in pass.row(row).iter().zip(blocked(row)) {
-            let u = at(place);
+        for ((index, &place), &blocked) in (row * width..).zip(pass.row(row)).zip(blocked(row)) {
+            let u = at(index, place);
             mantissas.push(raw(u, blocked, u.mantissa));
             exponents.push(u.exponent);
         }

@@ -1,4 +1,4 @@
-//! A breadth-first pass from the target over the free cells.
+//! A breadth-first pass over the free cells, from the target or from all cells whose u is known.
 
 use super::budget::Budget;
 use crate::cancellation::Cancellation;
@@ -11,9 +11,9 @@ pub(crate) const ABSENT: u32 = u32::MAX;
 /// Distances between two checks of the cancellation: at most some hundred microseconds on the largest maps.
 const CHECKED_EVERY: usize = 64;
 
-/// The reachable cells in order of their distance from the target.
+/// The cells whose u is known and that have others beside them, and those others that can be reached, in order of their distance.
 pub(crate) struct BreadthFirst {
-    /// Indices into the padded map of the reachable cells, the target first, by distance.
+    /// Indices into the padded map of these cells by distance, at first those whose u is known, such as the target.
     order: Vec<u32>,
     /// Place in `order` of each cell of the padded map, or [`ABSENT`].
     place: Vec<u32>,
@@ -32,28 +32,57 @@ impl BreadthFirst {
         budget: &Budget,
         cancellation: &Cancellation,
     ) -> Result<Self, SolveError> {
+        let target = domain.index(domain.target());
+        Self::from_known(domain, |index| index == target, budget, cancellation)
+    }
+
+    /// Visits the cells of `domain` whose u is not known from those whose u `is_known`, by row-major index.
+    ///
+    /// # Errors
+    /// [`SolveError::Cancelled`] and [`SolveError::TooCostly`].
+    pub(crate) fn from_known(
+        domain: &Domain,
+        is_known: impl Fn(usize) -> bool,
+        budget: &Budget,
+        cancellation: &Cancellation,
+    ) -> Result<Self, SolveError> {
         let (width, height) = (domain.width(), domain.height());
         // The place of each cell and the order of the free ones.
         let entries = (width + 2) * (height + 2) + width * height;
         budget.ask((entries * size_of::<u32>()) as u64)?;
         // A border of absent cells makes it unnecessary to check whether a neighbour exists.
         const UNSEEN: u32 = u32::MAX - 1;
+        const KNOWN: u32 = u32::MAX - 2;
         let stride = width + 2;
         let mut place = vec![ABSENT; stride * (height + 2)];
+        let mut known = Vec::new();
         let mut free = 0;
         for (row, cells) in domain.blocked().chunks_exact(width).enumerate() {
             let start = (row + 1) * stride + 1;
-            for (slot, &blocked) in place[start..start + width].iter_mut().zip(cells) {
-                *slot = if blocked { ABSENT } else { UNSEEN };
-                free += usize::from(!blocked);
+            for (col, &blocked) in cells.iter().enumerate() {
+                if !blocked && is_known(row * width + col) {
+                    place[start + col] = KNOWN;
+                    known.push((start + col) as u32);
+                } else if !blocked {
+                    place[start + col] = UNSEEN;
+                    free += 1;
+                }
             }
         }
 
-        let target = (domain.target().row + 1) * stride + domain.target().col + 1;
-        let mut order = Vec::with_capacity(free);
-        order.push(target as u32);
-        place[target] = 0;
-        let mut levels = vec![0, 1];
+        let around = |cell: usize| [cell - stride, cell - 1, cell + 1, cell + stride];
+        let is_alone = known.len() == 1;
+        let mut order = Vec::with_capacity(free + 1);
+        for cell in known {
+            let borders = around(cell as usize).iter().any(|&it| place[it] == UNSEEN);
+            let at = if is_alone || borders { order.len() as u32 } else { ABSENT };
+            place[cell as usize] = at;
+            if at != ABSENT {
+                order.push(cell);
+            }
+        }
+        let known = order.len();
+        let mut levels = vec![0, known as u32];
         let mut next = 0;
         while next < order.len() {
             if levels.len() % CHECKED_EVERY == 0 {
@@ -63,7 +92,7 @@ impl BreadthFirst {
             while next < end {
                 let cell = order[next] as usize;
                 next += 1;
-                for neighbour in [cell - stride, cell - 1, cell + 1, cell + stride] {
+                for neighbour in around(cell) {
                     if place[neighbour] == UNSEEN {
                         place[neighbour] = order.len() as u32;
                         order.push(neighbour as u32);
@@ -74,7 +103,7 @@ impl BreadthFirst {
                 levels.push(order.len() as u32);
             }
         }
-        if order.len() < free {
+        if order.len() < known + free {
             for slot in &mut place {
                 if *slot == UNSEEN {
                     *slot = ABSENT;
@@ -82,6 +111,11 @@ impl BreadthFirst {
             }
         }
         Ok(Self { order, place, levels, width })
+    }
+
+    /// The places of the cells whose u is not known.
+    pub(crate) fn unknown(&self) -> std::ops::Range<u32> {
+        self.levels[1]..self.len() as u32
     }
 
     /// Cells with a place.

@@ -20,7 +20,7 @@ const CONVERGED: f64 = 1e-7;
 pub(crate) fn relax(domain: &Domain, pass: &BreadthFirst, store: &mut Store) {
     for _ in 0..SWEEPS {
         let mut change = 0.0_f64;
-        let places = 1..pass.len() as u32;
+        let places = pass.unknown();
         for place in places.clone().rev().chain(places) {
             let mut largest = i32::MIN;
             let around = pass.neighbours(place).map(|place| {

@@ -10,6 +10,8 @@ use crate::domain::Domain;
 use crate::error::SolveError;
 use crate::method::Method;
 use crate::multifrontal::{BreadthFirst, Budget, Tree};
+use crate::real::Real as _;
+use crate::store::Store;
 
 /// Free space of this mean width, cells, is left to multigrid without a further look.
 const WIDE: f64 = 32.0;
@@ -68,12 +70,10 @@ pub(super) fn plan(
 ) -> Result<Plan, SolveError> {
     use Method::{MultigridBands, MultigridDouble, MultigridSingle};
     let width = mean_width(domain);
-    // Screening makes u fall by this much a cell on its own: cosh(1 / L) = 1 + 2 k.
-    let screened = (1.0 + 2.0 * domain.screening().least()).acosh() / std::f64::consts::LN_10;
     if width >= WIDE {
         // Ways in wide space are not much longer than the map's diagonal.
         let length = (domain.width() as f64).hypot(domain.height() as f64);
-        let first = match screened * length {
+        let first = match screened(domain) * length {
             ..SINGLE_DECADES => MultigridSingle,
             ..DOUBLE_DECADES => MultigridDouble,
             _ => MultigridBands,
@@ -86,10 +86,9 @@ pub(super) fn plan(
         pass => pass?,
     };
     let cells = pass.len() as f64;
-    // Along a passage of width w, u falls like exp(-pi x / w). The runs along a passage count into the mean width too; on
-    // mazes that makes it about 1.7 times too large.
-    let confined = 1.7 * std::f64::consts::PI / (width + 1.0) / std::f64::consts::LN_10;
-    let decades = pass.levels.len() as f64 * confined.hypot(screened);
+    // The runs along a passage count into the mean width too; on mazes that makes it about 1.7 times too large.
+    let passage = (width + 1.0) / 1.7 - 1.0;
+    let decades = pass.levels.len() as f64 * decades_per_cell(domain, passage);
     let (method, per_cycle) = match decades {
         ..SINGLE_DECADES => (MultigridSingle, SINGLE_CYCLE_PER_CELL),
         // The estimate is rather too large than too small, so doubles get a chance beyond their range.
@@ -109,6 +108,51 @@ pub(super) fn plan(
     let exact = MULTIFRONTAL_PER_CELL * cells + MULTIFRONTAL_PER_OPERATION * tree.cost.operations;
     let methods = if exact <= cost { vec![Method::Multifrontal] } else { multigrid.methods };
     Ok(Plan { methods, multifrontal: Some((pass, tree)) })
+}
+
+/// The orders of magnitude of u that are right in single precision.
+const KNOWN_DECADES: f64 = 58.0;
+
+/// The cells in which u is smaller than `store` says, which has what single precision can hold, and the tree of their fronts; none if
+/// double precision costs less.
+///
+/// # Errors
+/// [`SolveError::Cancelled`].
+pub(super) fn beyond_single(
+    domain: &Domain,
+    store: &Store,
+    budget: &Budget,
+    cancellation: &Cancellation,
+) -> Result<Option<(BreadthFirst, Tree)>, SolveError> {
+    let is_known = |index: usize| store.raw(index).0 > f32::KNOWN;
+    let pass = match BreadthFirst::from_known(domain, is_known, budget, cancellation) {
+        Err(SolveError::TooCostly { .. }) => return Ok(None),
+        pass => pass?,
+    };
+    let cells = pass.unknown().len() as f64;
+    let decades = pass.levels.len() as f64 * decades_per_cell(domain, pass.width());
+    let cycles = cycles(KNOWN_DECADES + decades);
+    let double = domain.blocked().len() as f64 * (SET_UP_PER_CELL + DOUBLE_CYCLE_PER_CELL * cycles);
+    if cells == 0.0 || MULTIFRONTAL_PER_CELL * cells > double {
+        return Ok(None);
+    }
+    let tree = match Tree::of(&pass, budget, cancellation) {
+        Err(SolveError::TooCostly { .. }) => return Ok(None),
+        tree => tree?,
+    };
+    let exact = MULTIFRONTAL_PER_CELL * cells + MULTIFRONTAL_PER_OPERATION * tree.cost.operations;
+    Ok((exact <= double).then_some((pass, tree)))
+}
+
+/// The orders of magnitude by which u falls a cell along a passage of this width: like exp(-pi x / width), and by screening.
+fn decades_per_cell(domain: &Domain, width: f64) -> f64 {
+    let confined = std::f64::consts::PI / (width + 1.0) / std::f64::consts::LN_10;
+    confined.hypot(screened(domain))
+}
+
+/// The orders of magnitude by which screening makes u fall a cell on its own: cosh(1 / L) = 1 + 2 k.
+fn screened(domain: &Domain) -> f64 {
+    (1.0 + 2.0 * domain.screening().least()).acosh() / std::f64::consts::LN_10
 }
 
 /// The mean length of the runs of free cells along rows or along columns, whichever is the shorter.

@@ -23,7 +23,7 @@ pub fn exact(domain: &Domain) -> Result<Field, SolveError> {
     let tree = Tree::of(&pass, &budget, &cancellation)?;
     let mut workspace = Workspace::default();
     let mut store =
-        multifrontal::solve(domain, &pass, &tree, &budget, &mut workspace, &cancellation)?;
+        multifrontal::solve(domain, (&pass, &tree), None, &budget, &mut workspace, &cancellation)?;
     multifrontal::relax(domain, &pass, &mut store);
     let check = verification::check(domain, &store, NonZeroUsize::MIN);
     Ok(Field::new(domain, store, &check, Method::Multifrontal))

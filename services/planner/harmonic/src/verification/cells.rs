@@ -72,12 +72,21 @@ pub(super) struct Cells<R> {
     pub residuals: Vec<R>,
     /// (|grad u| / u)^2 of the same.
     pub slopes: Vec<R>,
+    /// Cells in which u is no larger are not checked.
+    floor: R,
 }
 
 impl<R: Real> Cells<R> {
-    pub(super) fn new(width: usize) -> Self {
+    /// Rows of so many cells, of which those with a larger u than `floor` are checked.
+    pub(super) fn above(width: usize, floor: f64) -> Self {
         let row = vec![R::default(); width];
-        Self { weights: row.clone(), weights_set: false, residuals: row.clone(), slopes: row }
+        Self {
+            weights: row.clone(),
+            weights_set: false,
+            residuals: row.clone(),
+            slopes: row,
+            floor: R::of(floor),
+        }
     }
 
     /// Checks row `row` of the map but the target.
@@ -131,7 +140,7 @@ impl<R: Real> Cells<R> {
         found: &mut Check,
     ) {
         let (start, n) = (columns.start, columns.len());
-        let zero = R::default();
+        let (zero, floor) = (R::default(), self.floor);
         let raw = &raw[start..][..n];
         let (here, west, east) =
             (&u.here[start..][..n], &u.west[start..][..n], &u.east[start..][..n]);
@@ -145,7 +154,7 @@ impl<R: Real> Cells<R> {
         for x in 0..n {
             let sum = (west[x] + east[x]) + (north[x] + south[x]);
             let best = larger(larger(west[x], east[x]), larger(north[x], south[x]));
-            let positive = here[x] > zero;
+            let positive = here[x] > floor;
             reachable += u32::from(positive);
             // A value that is no number is neither blocked nor positive: unreached.
             let blocked = raw[x] < zero;
