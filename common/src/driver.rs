@@ -1,9 +1,19 @@
 //! What a link needs of a robot's protocol.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`odometry`] | the way of a robot as angles of its wheels |
+//! | [`laser`] | the newest beams of a laser, and whether it is stuck or blind |
+
+pub mod laser;
+pub mod odometry;
 
 use std::{fmt, time::Duration};
 
 use crate::mission::{Mission, Sensor};
-use crate::samples::{InfraredSample, PowerSample, RangeReading, SurroundingsSample, WheelSample};
+use crate::samples::{
+    InfraredSample, PowerSample, RangeReading, RangeStatus, SurroundingsSample, WheelSample,
+};
 
 /// The protocol of one kind of robot, without a wire and without a clock: bytes of the robot in and their meaning out, orders in and
 /// bytes for the robot out.
@@ -131,6 +141,18 @@ impl Readings {
     /// The readings since the last call.
     pub fn take_fresh(&mut self) -> Vec<RangeReading> {
         std::mem::take(&mut self.fresh)
+    }
+
+    /// Take the range of the sensor in `row`, metres: infinite or beyond its reach for nothing, less than 0 or no number for no reading.
+    pub fn take_range(&mut self, row: usize, range: f64) {
+        let reach_m = self.table.get(row).map_or(0.0, |sensor| sensor.reach_m);
+        let (status, range_m) = match range {
+            range if range < 0.0 || range.is_nan() => (RangeStatus::Invalid, 0.0),
+            range if range <= reach_m => (RangeStatus::Measured, range),
+            _ => (RangeStatus::Nothing, 0.0),
+        };
+        let (raw, status) = ((range_m * 100.0).round() as u16, status.into());
+        self.take(row, RangeReading { range_m, raw, status, ..RangeReading::default() });
     }
 
     /// Take the readings for a tick, one for each row. The next tick has none until new ones come.

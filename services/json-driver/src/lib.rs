@@ -1,29 +1,21 @@
 //! The driver of robots that speak lines of JSON: [`common::json_wire`] has the words.
 
-use std::{collections::BTreeMap, f64::consts::TAU, time::Duration};
+use std::{collections::BTreeMap, time::Duration};
 
 use common::{
-    driver::{Driver, Heard, Motion, Readings, StopMethod, WireTally},
-    geometry::wrap_angle,
+    driver::{
+        Driver, Heard, Readings, StopMethod, WireTally,
+        laser::Laser,
+        odometry::{Odometry, motion, twist, wheel_speeds},
+    },
     json_wire::{Lines, Order, Report, line, parse},
-    kinematics::{DifferentialDrive, Pose2, Twist, WheelSpeeds},
-    mission::{Body, Mission, Sensor},
-    samples::{PowerSample, RangeReading, RangeStatus, WheelSample},
-    wire::COUNT_CYCLE,
+    kinematics::Twist,
+    mission::{Body, Mission},
+    samples::{PowerSample, RangeReading},
 };
-use glam::DVec2;
 
-/// No odometry says that a robot is farther away, metres, or has turned farther, radians.
-const FARTHEST: f64 = 1e6;
 /// More orders than these are not counted as answered by one report.
 const MOST_ANSWERED: usize = 64;
-/// A laser whose scans are the same to the bit while a wheel turns so far is stuck, radians.
-const STUCK_RAD: f64 = 1.0;
-/// A laser whose beams all see nothing is blind if, in the scan before, more than one in so many ended within half its reach. Nothing
-/// that fills so much of its view is out of reach a moment later.
-const BLIND_ONE_IN: usize = 20;
-/// The current of a wheel that is held: all that the converter of an X80 can say, AD counts.
-const HELD_AD: u16 = 4095;
 
 /// A robot that speaks lines of JSON.
 #[derive(Clone, Debug)]
@@ -33,18 +25,8 @@ pub struct Json {
     lines: Lines,
     waiting: Vec<Vec<u8>>,
     readings: Readings,
-    /// The laser and its row; none without one.
-    laser: Option<(usize, Sensor)>,
-    /// The newest scan that differs from the one before, and the angles of the wheels then.
-    newest_scan: (Vec<f32>, [f64; 2]),
-    /// The beams that ended near in the newest scan that saw anything, and the angles of the wheels then.
-    near: (usize, [f64; 2]),
-    /// Whether the laser is blind, until it sees anything.
-    is_blind: bool,
-    /// The angles of the wheels.
-    turned: [f64; 2],
-    /// The beams since the last tick.
-    scan: Vec<f32>,
+    /// None without a laser.
+    laser: Option<Laser>,
     /// The number of orders that the robot has taken.
     answered: Option<u64>,
     odometry: Odometry,
@@ -55,12 +37,7 @@ impl Json {
     /// The driver of `mission`'s robot.
     pub fn new(mission: &Mission) -> Self {
         Self {
-            laser: mission.laser(),
-            newest_scan: (Vec::new(), [0.0; 2]),
-            near: (0, [0.0; 2]),
-            is_blind: false,
-            turned: [0.0; 2],
-            scan: Vec::new(),
+            laser: Laser::new(mission),
             body: mission.body(),
             rate_hz: mission.robot.rate_hz,
             lines: Lines::default(),
@@ -89,14 +66,17 @@ impl Json {
             return Err("wheels or odometry without speeds: say both".to_owned());
         }
         for (row, range) in rows {
-            self.take_range(row, range);
+            self.readings.take_range(row, range.unwrap_or(f64::INFINITY));
         }
         if let (Some(turned), Some(speeds)) = (turned, report.speeds) {
-            self.turned = turned;
-            heard.motion = Some(self.motion(turned, speeds, report.held.unwrap_or_default()));
+            if let Some(laser) = &mut self.laser {
+                laser.turned(turned);
+            }
+            let held = report.held.unwrap_or_default();
+            heard.motion = Some(motion(&self.body, turned, speeds, held));
         }
-        if let Some((row, beams)) = scan {
-            self.take_scan(row, beams);
+        if let (Some(laser), Some(beams)) = (&mut self.laser, scan) {
+            laser.take(beams, &mut self.readings);
         }
         if let Some(count) = report.heard {
             // A robot that has restarted counts from 0.
@@ -128,99 +108,16 @@ impl Json {
         ranges.iter().map(row).collect()
     }
 
-    fn take_range(&mut self, row: usize, range: Option<f64>) {
-        let reach_m = self.readings.table()[row].reach_m;
-        let (status, range_m) = match range {
-            Some(range) if range < 0.0 => (RangeStatus::Invalid, 0.0),
-            Some(range) if range <= reach_m => (RangeStatus::Measured, range),
-            _ => (RangeStatus::Nothing, 0.0),
-        };
-        let (raw, status) = ((range_m * 100.0).round() as u16, status.into());
-        self.readings.take(row, RangeReading { range_m, raw, status, ..RangeReading::default() });
-    }
-
-    /// The row of the laser, and its beams as the topic `scan` has them.
-    fn beams_of(&self, beams: &[Option<f32>]) -> Result<(usize, Vec<f32>), String> {
-        let Some((row, sensor)) = &self.laser else {
+    /// The beams of the laser as the topic `scan` has them.
+    fn beams_of(&self, beams: &[Option<f32>]) -> Result<Vec<f32>, String> {
+        let Some(laser) = &self.laser else {
             return Err("a scan, and the mission has no laser: add a row of kind scan".to_owned());
         };
-        if beams.len() != sensor.beams {
-            let (came, want) = (beams.len(), sensor.beams);
+        if beams.len() != laser.sensor().beams {
+            let (came, want) = (beams.len(), laser.sensor().beams);
             return Err(format!("a scan of {came} beams, and the mission's laser has {want}"));
         }
-        let (least_m, reach_m) = (sensor.model.least_m() as f32, sensor.reach_m as f32);
-        let range = |beam: &Option<f32>| match *beam {
-            Some(range) if range < least_m => f32::NAN,
-            Some(range) if range <= reach_m => range,
-            _ => f32::INFINITY,
-        };
-        Ok((*row, beams.iter().map(range).collect()))
-    }
-
-    /// Note whether a laser with these beams is blind.
-    fn look_for_blindness(&mut self, beams: &[f32]) {
-        let Some((_, sensor)) = &self.laser else {
-            return;
-        };
-        if beams.iter().any(|beam| beam.is_finite()) {
-            let near_m = sensor.reach_m as f32 / 2.0;
-            let near = beams.iter().filter(|beam| **beam < near_m).count();
-            (self.near, self.is_blind) = ((near, self.turned), false);
-        } else if beams.iter().any(|beam| beam.is_infinite()) {
-            let (near, turned_then) = self.near;
-            let [left, right] = [0, 1].map(|wheel| self.turned[wheel] - turned_then[wheel]);
-            let turn = drive(&self.body).twist(WheelSpeeds { right, left }).omega;
-            // A turn takes things out of a view that is no whole circle.
-            let is_circle = sensor.field_of_view_deg >= 360.0;
-            let lost = if is_circle { 0.0 } else { turn.abs() / sensor.fan().1 };
-            self.is_blind |= near > beams.len() / BLIND_ONE_IN + lost.ceil() as usize;
-        }
-    }
-
-    /// Take the beams of the laser in `row`. As a reading of its row the nearest of them counts; none does of a laser that says the same
-    /// although the wheels have turned, or that is blind.
-    fn take_scan(&mut self, row: usize, beams: Vec<f32>) {
-        let (newest, turned_then) = &self.newest_scan;
-        let [bits_then, bits_now] =
-            [newest, &beams].map(|beams| beams.iter().map(|beam| beam.to_bits()));
-        let is_same = beams.iter().any(|beam| beam.is_finite()) && bits_then.eq(bits_now);
-        let went = |wheel: usize| (self.turned[wheel] - turned_then[wheel]).abs();
-        let is_stuck = is_same && went(0).max(went(1)) > STUCK_RAD;
-        self.look_for_blindness(&beams);
-        let is_refused = is_stuck || self.is_blind;
-        if !is_same {
-            self.newest_scan = (beams.clone(), self.turned);
-        }
-        let nearest = beams.iter().copied().fold(f32::NAN, f32::min);
-        let (status, range_m) = match nearest {
-            nearest if is_refused || nearest.is_nan() => (RangeStatus::Invalid, 0.0),
-            nearest if nearest.is_infinite() => (RangeStatus::Nothing, 0.0),
-            nearest => (RangeStatus::Measured, nearest.into()),
-        };
-        let status = status.into();
-        self.readings.take(row, RangeReading { range_m, status, ..RangeReading::default() });
-        if !is_refused {
-            self.scan = beams;
-        }
-    }
-
-    fn motion(&self, turned: [f64; 2], speeds: [f64; 2], held: [bool; 2]) -> Motion {
-        let counts = |angle: f64| angle * self.body.counts_per_turn / TAU;
-        let [left_counts, right_counts] =
-            turned.map(|angle| counts(angle).round().rem_euclid(f64::from(COUNT_CYCLE)) as u16);
-        let [left_counts_per_s, right_counts_per_s] =
-            speeds.map(|speed| counts(speed).round() as i32);
-        Motion {
-            wheels: WheelSample {
-                left_counts,
-                right_counts,
-                left_counts_per_s,
-                right_counts_per_s,
-                ..WheelSample::default()
-            },
-            // A wheel that is held draws all that its motor can.
-            currents: held.map(|held| if held { HELD_AD } else { 0 }),
-        }
+        Ok(beams.iter().map(|beam| laser.beam(*beam)).collect())
     }
 }
 
@@ -261,7 +158,7 @@ impl Driver for Json {
     }
 
     fn scan_for_tick(&mut self) -> Vec<f32> {
-        std::mem::take(&mut self.scan)
+        self.laser.as_mut().map(Laser::for_tick).unwrap_or_default()
     }
 
     fn greeting(&self) -> Vec<u8> {
@@ -277,9 +174,8 @@ impl Driver for Json {
     }
 
     fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8> {
-        let wheels = counts.map(|counts| f64::from(counts) * TAU / self.body.counts_per_turn);
-        let [left, right] = wheels;
-        let Twist { v, omega } = drive(&self.body).twist(WheelSpeeds { right, left });
+        let wheels = wheel_speeds(&self.body, counts);
+        let Twist { v, omega } = twist(&self.body, counts);
         line(&Order::Drive { wheels, twist: [v, omega], for_s: limit.as_secs_f64() })
     }
 
@@ -288,45 +184,11 @@ impl Driver for Json {
     }
 }
 
-/// The drive of a body whose wheels have no limit.
-fn drive(body: &Body) -> DifferentialDrive {
-    DifferentialDrive::new(body.wheel_radius_m, body.track_m, f64::INFINITY)
-}
-
-/// The angles by which wheels would have turned on the way of a robot that says its pose.
-#[derive(Clone, Copy, Debug, Default)]
-struct Odometry {
-    last: Option<Pose2>,
-    turned: [f64; 2],
-}
-
-impl Odometry {
-    /// The robot is at `x`, `y` with this heading by its odometry. What it slipped aside is left out, as wheels leave it out.
-    /// None if the numbers are too great to be a way.
-    fn turned(&mut self, [x, y, heading]: [f64; 3], body: &Body) -> Option<[f64; 2]> {
-        let now = Pose2 { position: DVec2::new(x, y), heading };
-        if now.position.length() > FARTHEST || heading.abs() > FARTHEST {
-            return None;
-        }
-        let Some(last) = self.last.replace(now) else {
-            return Some(self.turned);
-        };
-        let turn = wrap_angle(now.heading - last.heading);
-        let middle = DVec2::from_angle(last.heading + turn / 2.0);
-        let chord = (now.position - last.position).dot(middle);
-        // The chord of an arc is shorter than the arc by this.
-        let half = turn / 2.0;
-        let arc = if half.abs() < 1e-9 { chord } else { chord * half / half.sin() };
-        // (17) is linear: an arc and a turn give the angles of the wheels.
-        let WheelSpeeds { right, left } = drive(body).wheels(Twist { v: arc, omega: turn });
-        self.turned = [self.turned[0] + left, self.turned[1] + right];
-        Some(self.turned)
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
+    use std::{f64::consts::TAU, path::Path};
+
+    use common::samples::RangeStatus;
 
     use super::*;
 
