@@ -11,8 +11,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use thiserror::Error;
 
 /// The valid forms of an address, for the remedy in errors.
-pub const FORMS: &str =
-    "give \"host:port\", \"udp://host:port\", \"tcp://host:port\" or \"serial:///dev/ttyUSB0\"";
+pub const FORMS: &str = "give \"host:port\", \"udp://host:port\", \"tcp://host:port\", \"serial:///dev/ttyUSB0\" or \"ros2:DOMAIN\"";
 
 /// The address and the transport of a robot. `Host` is text in a mission and a number once it is resolved.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -23,6 +22,16 @@ pub enum Address<Host = SocketAddr> {
     Tcp(Host),
     /// A serial line, 115200 8N1: `serial:///dev/ttyUSB0`.
     Serial(PathBuf),
+    /// A domain of ROS 2: `ros2:0`, or `ros2` for the one that the environment variable `ROS_DOMAIN_ID` names, which is 0 without it.
+    Ros2(Option<u16>),
+}
+
+/// The greatest domain: the ports of a greater one do not exist.
+const LAST_DOMAIN: u16 = 232;
+
+/// The domain that `text` is.
+fn domain(text: &str) -> Option<u16> {
+    text.parse().ok().filter(|domain| *domain <= LAST_DOMAIN)
 }
 
 /// The text is not an address, or its host cannot be found.
@@ -54,6 +63,8 @@ impl<Host: fmt::Display> fmt::Display for Address<Host> {
             Self::Udp(host) => write!(f, "udp://{host}"),
             Self::Tcp(host) => write!(f, "tcp://{host}"),
             Self::Serial(path) => write!(f, "serial://{}", path.display()),
+            Self::Ros2(Some(domain)) => write!(f, "ros2:{domain}"),
+            Self::Ros2(None) => f.write_str("ros2"),
         }
     }
 }
@@ -63,6 +74,14 @@ impl FromStr for Address<String> {
 
     fn from_str(address: &str) -> Result<Self, AddressError> {
         let refused = |problem| AddressError::Form { address: address.to_owned(), problem };
+        if address == "ros2" {
+            return Ok(Self::Ros2(None));
+        }
+        if let Some(text) = address.strip_prefix("ros2:") {
+            let domain = domain(text.strip_prefix("//").unwrap_or(text));
+            let domain = domain.ok_or_else(|| refused("has no domain of ROS from 0 to 232"))?;
+            return Ok(Self::Ros2(Some(domain)));
+        }
         let (over, rest) = address.split_once("://").unwrap_or(("udp", address));
         if over == "serial" {
             return if rest.starts_with('/') {
@@ -103,8 +122,21 @@ impl Address<String> {
             Self::Udp(host) => Address::Udp(number(host)?),
             Self::Tcp(host) => Address::Tcp(number(host)?),
             Self::Serial(path) => Address::Serial(path.clone()),
+            Self::Ros2(Some(domain)) => Address::Ros2(Some(*domain)),
+            Self::Ros2(None) => Address::Ros2(Some(domain_of_environment()?)),
         })
     }
+}
+
+/// The domain that `ROS_DOMAIN_ID` names.
+fn domain_of_environment() -> Result<u16, AddressError> {
+    let Some(text) = std::env::var_os("ROS_DOMAIN_ID").filter(|text| !text.is_empty()) else {
+        return Ok(0);
+    };
+    text.to_str().and_then(domain).ok_or_else(|| AddressError::Form {
+        address: format!("ROS_DOMAIN_ID={}", text.display()),
+        problem: "has no domain of ROS from 0 to 232",
+    })
 }
 
 impl Serialize for Address {
@@ -121,6 +153,7 @@ impl<'de> Deserialize<'de> for Address {
             Address::Udp(host) => number(host).map(Self::Udp),
             Address::Tcp(host) => number(host).map(Self::Tcp),
             Address::Serial(path) => Ok(Self::Serial(path)),
+            Address::Ros2(domain) => Ok(Self::Ros2(domain)),
         }
     }
 }
@@ -138,6 +171,10 @@ mod tests {
         assert_eq!(read("tcp://192.168.0.201:10001"), Address::Tcp(host()));
         assert_eq!(read("tcp://[::1]:7"), Address::Tcp("[::1]:7".to_owned()));
         assert_eq!(read("x80.local:7"), Address::Udp("x80.local:7".to_owned()));
+        assert_eq!(read("ros2"), Address::Ros2(None));
+        assert_eq!(read("ros2:7"), Address::Ros2(Some(7)));
+        assert_eq!(read("ros2://7"), Address::Ros2(Some(7)));
+        assert_eq!(read("ros2.local:7"), Address::Udp("ros2.local:7".to_owned()));
         assert_eq!(read("serial:///dev/ttyUSB0"), Address::Serial("/dev/ttyUSB0".into()));
     }
 
@@ -157,6 +194,9 @@ mod tests {
             "tcp://host:1/path",
             "serial://ttyUSB0",
             "serial://",
+            "ros2:",
+            "ros2:233",
+            "ros2:-1",
         ] {
             let error = bad.parse::<Address<String>>().unwrap_err().to_string();
             let named = error.contains(&format!("{bad:?}")) && error.contains(FORMS);
@@ -170,7 +210,7 @@ mod tests {
         struct File {
             address: Address,
         }
-        for text in ["udp://127.0.0.1:1", "tcp://[::1]:2", "serial:///dev/pts/3"] {
+        for text in ["udp://127.0.0.1:1", "tcp://[::1]:2", "serial:///dev/pts/3", "ros2:42"] {
             let address = text.parse::<Address<String>>().unwrap().resolve().unwrap();
             let file = File { address };
             let written = toml::to_string(&file).unwrap();

@@ -3,6 +3,7 @@
 mod calibration;
 mod objection;
 mod robot;
+mod ros2;
 mod sensor;
 mod shapes;
 mod simulation;
@@ -180,6 +181,7 @@ impl Checker {
         within("start.heading_deg", mission.start.heading_deg, -360.0..=360.0, "degrees")?;
         robot::check(mission)?;
         sensor::check(mission)?;
+        ros2::check(mission)?;
         stages(mission)?;
         self.shapes("known", &mission.known)?;
         self.shapes("world", &mission.world)?;

@@ -23,6 +23,7 @@ pub mod grid;
 pub mod kinematics;
 mod odometry;
 mod robot;
+mod ros2;
 mod sensor;
 mod simulation;
 pub mod sonar;
@@ -35,6 +36,7 @@ use serde::{Deserialize, Serialize};
 pub use error::MissionError;
 pub use odometry::{Calibration, CalibrationPlan, Odometry, Procedure, Provenance};
 pub use robot::{BatteryLimits, Body, Channel, Model, Protocol, RobotConfig, Steering};
+pub use ros2::Ros2Topics;
 pub use sensor::{
     INFRARED_RANGERS, MOST_BEAMS, MOST_SENSORS, SONARS, Sensor, SensorKind, SensorModel, SensorRow,
     Sensors, SonarConfig,

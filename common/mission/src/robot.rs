@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use crate::{
     kinematics::{Ackermann, DifferentialDrive, Drive},
     odometry::Odometry,
+    ros2::Ros2Topics,
     sensor::SensorRow,
 };
 use serde::{Deserialize, Serialize};
@@ -42,6 +43,8 @@ pub enum Protocol {
     X80,
     /// Lines of JSON.
     Json,
+    /// Topics of ROS 2.
+    Ros2,
 }
 
 /// A channel of the motor board: a wheel's, or that of a car's steering.
@@ -120,6 +123,9 @@ pub struct RobotConfig {
     pub calibration: Option<PathBuf>,
     /// How its wheels differ from the nominal ones.
     pub odometry: Odometry,
+    /// The topics of a robot that speaks ROS 2.
+    #[serde(skip_serializing_if = "Ros2Topics::is_default")]
+    pub ros2: Ros2Topics,
     /// The ranging sensors that it has, at most [`crate::MOST_SENSORS`]. Without rows they are those of the X80.
     #[serde(rename = "sensor", skip_serializing_if = "Vec::is_empty")]
     pub sensors: Vec<SensorRow>,
@@ -171,6 +177,7 @@ impl Default for RobotConfig {
             held_current_ad: 1000,
             calibration: None,
             odometry: Odometry::default(),
+            ros2: Ros2Topics::default(),
             sensors: Vec::new(),
         }
     }

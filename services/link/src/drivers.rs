@@ -5,6 +5,7 @@ use common::{
     mission::{Mission, Protocol},
 };
 use json_driver::Json;
+use ros2_driver::Ros2;
 use x80_driver::X80;
 
 /// The driver of `mission`'s robot.
@@ -12,5 +13,6 @@ pub fn of(mission: &Mission) -> Box<dyn Driver> {
     match mission.robot.protocol() {
         Protocol::X80 => Box::new(X80::new(mission)),
         Protocol::Json => Box::new(Json::new(mission)),
+        Protocol::Ros2 => Box::new(Ros2::new(mission)),
     }
 }

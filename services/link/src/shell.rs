@@ -97,7 +97,7 @@ impl Process for Shell {
             })
             .flatten();
         let stop_mark = StopMark::of(directory);
-        let transport = Transport::open(&context.run.address)?;
+        let transport = Transport::open(&context.run.address, &context.run.mission)?;
         context.waiter.on_readable(&transport)?;
         if let Some(socket) = &stop_socket {
             context.waiter.on_readable(socket)?;

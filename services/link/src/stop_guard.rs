@@ -97,7 +97,7 @@ pub fn stand(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bool, StageEr
     };
     // A simulated robot ends with its supervisor.
     let is_gone = || run.mission.robot.address.is_none() && !is_taken(&run.address);
-    let mut transport = Transport::open(&run.address)?;
+    let mut transport = Transport::open(&run.address, &run.mission)?;
     let mut link = Link::new(&run.mission);
     // A pace is no foreign state.
     let _ = link.restore(State { pace: Pace::Rate(rate), next_tick: 0 });
@@ -143,6 +143,6 @@ pub fn stand(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bool, StageEr
 fn is_taken(address: &Address) -> bool {
     match address {
         Address::Udp(address) => UdpSocket::bind(address).is_err(),
-        Address::Tcp(_) | Address::Serial(_) => true,
+        Address::Tcp(_) | Address::Serial(_) | Address::Ros2(_) => true,
     }
 }

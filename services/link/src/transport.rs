@@ -7,9 +7,12 @@
 //! | `stream` | the common part of a connection and a serial line: it is reopened after each loss and sends no partial frame |
 //! | `tcp` | a connection |
 //! | `serial` | a serial line |
+//! | `dds` | topics of ROS 2, with the feature `ros2` |
 //! | `counts` | the counts of a transport |
 
 mod counts;
+#[cfg(feature = "ros2")]
+mod dds;
 mod serial;
 mod stream;
 mod tcp;
@@ -20,10 +23,12 @@ use std::{
     os::fd::{AsFd, BorrowedFd},
 };
 
-use common::{address::Address, start::StageError};
+use common::{address::Address, mission::Mission, start::StageError};
 use thiserror::Error;
 
 pub use self::counts::{Attempts, Tally};
+#[cfg(feature = "ros2")]
+use self::dds::Dds;
 use self::{serial::Serial, stream::Stream, tcp::Tcp, udp::Udp};
 
 /// The wire cannot be opened or used, and the cause is this machine rather than the robot.
@@ -59,15 +64,18 @@ enum Wire {
     Udp(Udp),
     Tcp(Stream<Tcp>),
     Serial(Stream<Serial>),
+    #[cfg(feature = "ros2")]
+    Dds(Dds),
 }
 
 impl Transport {
-    /// A wire to the robot at `address`. [`Transport::maintain`] opens a connection or a serial line.
-    pub fn open(address: &Address) -> Result<Self, TransportError> {
+    /// A wire to the robot of `mission` at `address`. [`Transport::maintain`] opens a connection or a serial line.
+    pub fn open(address: &Address, mission: &Mission) -> Result<Self, TransportError> {
         let wire = match address {
             Address::Udp(robot) => Udp::open(*robot).map(Wire::Udp),
             Address::Tcp(robot) => Stream::new(Tcp::to(*robot)).map(Wire::Tcp),
             Address::Serial(path) => Stream::new(Serial::on(path)).map(Wire::Serial),
+            Address::Ros2(domain) => ros2(domain.unwrap_or_default(), mission),
         };
         Ok(Self {
             wire: wire.map_err(|source| TransportError { address: address.clone(), source })?,
@@ -87,6 +95,11 @@ impl Transport {
                 Wire::Udp(_) => Ok(()),
                 Wire::Tcp(stream) => stream.maintain(now_ns),
                 Wire::Serial(stream) => stream.maintain(now_ns),
+                #[cfg(feature = "ros2")]
+                Wire::Dds(dds) => {
+                    dds.look_for_other_writers(now_ns);
+                    Ok(())
+                }
             };
             maintained.map_err(|source| self.broken(source))?;
         }
@@ -104,6 +117,8 @@ impl Transport {
             Wire::Udp(_) => true,
             Wire::Tcp(stream) => stream.is_open(),
             Wire::Serial(stream) => stream.is_open(),
+            #[cfg(feature = "ros2")]
+            Wire::Dds(dds) => dds.is_open(),
         }
     }
 
@@ -113,6 +128,8 @@ impl Transport {
             Wire::Udp(udp) => udp.receive(&mut self.buffer),
             Wire::Tcp(stream) => Ok(stream.receive(&mut self.buffer, now_ns)),
             Wire::Serial(stream) => Ok(stream.receive(&mut self.buffer, now_ns)),
+            #[cfg(feature = "ros2")]
+            Wire::Dds(dds) => Ok(dds.receive(&mut self.buffer)),
         };
         match received {
             Ok(length) => Ok(length.and_then(|length| self.buffer.get(..length))),
@@ -126,6 +143,11 @@ impl Transport {
             Wire::Udp(udp) => udp.send(bytes),
             Wire::Tcp(stream) => stream.send(bytes),
             Wire::Serial(stream) => stream.send(bytes),
+            #[cfg(feature = "ros2")]
+            Wire::Dds(dds) => {
+                dds.send(bytes);
+                Ok(())
+            }
         };
         sent.map_err(|source| self.broken(source))
     }
@@ -136,6 +158,8 @@ impl Transport {
             Wire::Udp(udp) => udp.tally(),
             Wire::Tcp(stream) => stream.tally(),
             Wire::Serial(stream) => stream.tally(),
+            #[cfg(feature = "ros2")]
+            Wire::Dds(dds) => dds.tally(),
         }
     }
 
@@ -145,12 +169,27 @@ impl Transport {
             Wire::Udp(_) => None,
             Wire::Tcp(stream) => stream.attempts(now_ns),
             Wire::Serial(stream) => stream.attempts(now_ns),
+            #[cfg(feature = "ros2")]
+            Wire::Dds(_) => None,
         }
     }
 
     fn broken(&self, source: io::Error) -> TransportError {
         TransportError { address: self.address.clone(), source }
     }
+}
+
+/// Whether this executable speaks ROS 2.
+pub const SPEAKS_ROS2: bool = cfg!(feature = "ros2");
+
+#[cfg(feature = "ros2")]
+fn ros2(domain: u16, mission: &Mission) -> io::Result<Wire> {
+    Dds::open(domain, &ros2_driver::topics::Topics::of(mission)).map(Wire::Dds)
+}
+
+#[cfg(not(feature = "ros2"))]
+fn ros2(_: u16, _: &Mission) -> io::Result<Wire> {
+    Err(io::Error::other("this executable speaks no ROS 2: build it with `--features ros2`"))
 }
 
 /// The descriptor is readable when the wire needs attention. It stays the same when the wire is reopened.
@@ -160,6 +199,8 @@ impl AsFd for Transport {
             Wire::Udp(udp) => udp.as_fd(),
             Wire::Tcp(stream) => stream.as_fd(),
             Wire::Serial(stream) => stream.as_fd(),
+            #[cfg(feature = "ros2")]
+            Wire::Dds(dds) => dds.as_fd(),
         }
     }
 }

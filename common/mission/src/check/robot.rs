@@ -22,8 +22,8 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     within("robot.wheel_radius_m", body.wheel_radius_m, 0.005..=2.0, "m")?;
     within("robot.track_m", body.track_m, 0.01..=5.0, "m")?;
     within("robot.counts_per_turn", body.counts_per_turn, 1.0..=100_000.0, "counts")?;
-    if robot.protocol() == Protocol::Json && body.steering.is_some() {
-        let problem = "a car's steering has no word in lines of JSON";
+    if robot.protocol() != Protocol::X80 && body.steering.is_some() {
+        let problem = "a car's steering has no word in lines of JSON or topics of ROS";
         return Err(objection("robot.protocol", problem, "give \"x80\", or another robot.model"));
     }
     steering(mission)?;

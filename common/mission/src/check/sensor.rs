@@ -39,7 +39,11 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     let speaks_x80 = mission.robot.protocol() == Protocol::X80;
     if speaks_x80 && mission.laser().is_some() {
         let problem = "the boards of an X80 have no laser";
-        return Err(objection(KEY, problem, "remove it, or give robot.protocol = \"json\""));
+        return Err(objection(
+            KEY,
+            problem,
+            "remove it, or give robot.protocol = \"json\" or \"ros2\"",
+        ));
     }
     if !rows.is_empty() && !rows.iter().any(|row| is_cone(row) || is_scan(row)) {
         return Err(objection(KEY, "no row is a cone or a laser", "add the front sonar"));

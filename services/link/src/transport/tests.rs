@@ -20,6 +20,11 @@ use tempfile::TempDir;
 
 use super::*;
 
+fn open_at(address: &Address) -> Result<Transport, TransportError> {
+    let mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
+    Transport::open(address, &mission)
+}
+
 const MS: u64 = 1_000_000;
 
 /// Wait until the descriptor is readable.
@@ -60,7 +65,7 @@ fn expect_closing(transport: &mut Transport, now_ns: u64) {
 fn a_foreign_datagram_is_dropped_and_counted_and_the_port_of_the_robots_host_is_kept() {
     let robot = UdpSocket::bind("127.0.0.1:0").unwrap();
     let other = UdpSocket::bind("127.0.0.1:0").unwrap();
-    let mut transport = Transport::open(&Address::Udp(robot.local_addr().unwrap())).unwrap();
+    let mut transport = open_at(&Address::Udp(robot.local_addr().unwrap())).unwrap();
     transport.send(b"where?").unwrap();
     let (_, link) = robot.recv_from(&mut [0; 16]).unwrap();
     other.send_to(b"go left", link).unwrap();
@@ -89,7 +94,7 @@ fn connected(listener: &TcpListener, transport: &mut Transport, now_ns: u64) -> 
 #[test]
 fn a_connection_carries_bytes_both_ways() {
     let (listener, address) = listener();
-    let mut transport = Transport::open(&Address::Tcp(address)).unwrap();
+    let mut transport = open_at(&Address::Tcp(address)).unwrap();
     let mut robot = connected(&listener, &mut transport, 0);
     transport.send(b"ping").unwrap();
     let mut heard = [0; 4];
@@ -103,7 +108,7 @@ fn a_connection_carries_bytes_both_ways() {
 #[test]
 fn a_connection_that_ends_is_told_and_made_anew() {
     let (listener, address) = listener();
-    let mut transport = Transport::open(&Address::Tcp(address)).unwrap();
+    let mut transport = open_at(&Address::Tcp(address)).unwrap();
     let mut robot = connected(&listener, &mut transport, 0);
     robot.write_all(b"here").unwrap();
     expect(&mut transport, b"here", 0);
@@ -118,7 +123,7 @@ fn a_connection_that_ends_is_told_and_made_anew() {
 fn a_robot_that_is_off_is_called_ever_less_often_and_for_ever() {
     let (listener, address) = listener();
     drop(listener);
-    let mut transport = Transport::open(&Address::Tcp(address)).unwrap();
+    let mut transport = open_at(&Address::Tcp(address)).unwrap();
     assert_eq!(transport.maintain(0).unwrap(), Some(false));
     let (mut now, mut pauses) = (0, Vec::new());
     for _ in 0..7 {
@@ -139,7 +144,7 @@ fn a_robot_that_is_off_is_called_ever_less_often_and_for_ever() {
 #[test]
 fn a_connection_without_a_word_is_taken_for_dead() {
     let (listener, address) = listener();
-    let mut transport = Transport::open(&Address::Tcp(address)).unwrap();
+    let mut transport = open_at(&Address::Tcp(address)).unwrap();
     let _robot = connected(&listener, &mut transport, 0);
     assert_eq!(transport.maintain(4999 * MS).unwrap(), None);
     assert_eq!(transport.maintain(5000 * MS).unwrap(), Some(false));
@@ -179,7 +184,7 @@ fn overfill(transport: &mut Transport, mut robot_reads: impl FnMut(&mut [u8]) ->
 #[test]
 fn a_connection_that_takes_no_more_loses_whole_frames_only() {
     let (listener, address) = listener();
-    let mut transport = Transport::open(&Address::Tcp(address)).unwrap();
+    let mut transport = open_at(&Address::Tcp(address)).unwrap();
     let mut robot = connected(&listener, &mut transport, 0);
     robot.set_read_timeout(Some(Duration::from_millis(200))).unwrap();
     overfill(&mut transport, |buffer| robot.read(buffer).ok());
@@ -226,7 +231,7 @@ fn read_from(robot: &OwnedFd, length: usize) -> Vec<u8> {
 #[test]
 fn a_serial_line_carries_every_byte_as_it_is() {
     let line = line();
-    let mut transport = Transport::open(&Address::Serial(line.name.clone())).unwrap();
+    let mut transport = open_at(&Address::Serial(line.name.clone())).unwrap();
     maintain_until(&mut transport, true, 0);
     let bytes: Vec<u8> = (0..=255).collect();
     transport.send(&bytes).unwrap();
@@ -238,7 +243,7 @@ fn a_serial_line_carries_every_byte_as_it_is() {
 #[test]
 fn a_serial_line_is_set_to_115200_8n1() {
     let line = line();
-    let mut transport = Transport::open(&Address::Serial(line.name.clone())).unwrap();
+    let mut transport = open_at(&Address::Serial(line.name.clone())).unwrap();
     maintain_until(&mut transport, true, 0);
     let settings = tcgetattr(&line.robot).unwrap();
     assert_eq!(settings.output_speed(), 115_200);
@@ -251,7 +256,7 @@ fn a_serial_line_is_set_to_115200_8n1() {
 #[test]
 fn a_serial_line_that_is_pulled_out_is_opened_again_when_it_is_back() {
     let mut line = line();
-    let mut transport = Transport::open(&Address::Serial(line.name.clone())).unwrap();
+    let mut transport = open_at(&Address::Serial(line.name.clone())).unwrap();
     maintain_until(&mut transport, true, 0);
     write(&line.robot, b"here").unwrap();
     expect(&mut transport, b"here", 0);
@@ -273,9 +278,9 @@ fn a_serial_line_that_is_pulled_out_is_opened_again_when_it_is_back() {
 #[test]
 fn a_serial_line_is_for_one_link_and_free_again_when_that_is_killed() {
     let line = line();
-    let mut first = Transport::open(&Address::Serial(line.name.clone())).unwrap();
+    let mut first = open_at(&Address::Serial(line.name.clone())).unwrap();
     maintain_until(&mut first, true, 0);
-    let mut second = Transport::open(&Address::Serial(line.name.clone())).unwrap();
+    let mut second = open_at(&Address::Serial(line.name.clone())).unwrap();
     assert_eq!(second.maintain(0).unwrap(), Some(false));
     // Another process has the line open all the time, as a simulated robot does.
     let _holder = open(&line.name, OFlags::RDWR | OFlags::NOCTTY, Mode::empty()).unwrap();
@@ -286,7 +291,7 @@ fn a_serial_line_is_for_one_link_and_free_again_when_that_is_killed() {
 #[test]
 fn a_line_that_takes_no_more_loses_whole_frames_only() {
     let line = line();
-    let mut transport = Transport::open(&Address::Serial(line.name.clone())).unwrap();
+    let mut transport = open_at(&Address::Serial(line.name.clone())).unwrap();
     maintain_until(&mut transport, true, 0);
     overfill(&mut transport, |buffer| {
         let came = poll::is_readable(&line.robot, Duration::from_millis(200)).unwrap();
@@ -296,7 +301,7 @@ fn a_line_that_takes_no_more_loses_whole_frames_only() {
 
 #[test]
 fn a_file_that_is_no_serial_line_is_never_written_to() {
-    let mut transport = Transport::open(&Address::Serial("/dev/null".into())).unwrap();
+    let mut transport = open_at(&Address::Serial("/dev/null".into())).unwrap();
     assert_eq!(transport.maintain(0).unwrap(), Some(false));
     transport.send(b"ping").unwrap();
     assert_eq!(transport.tally().unsent, 1);

@@ -74,7 +74,8 @@ impl Words {
     fn of(protocol: Protocol) -> Self {
         match protocol {
             Protocol::X80 => Self::X80(Decoder::default()),
-            Protocol::Json => Self::Json(Lines::default()),
+            // A robot that speaks ROS 2 is not simulated: its mission has an address.
+            Protocol::Json | Protocol::Ros2 => Self::Json(Lines::default()),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use common::mission::{Mission, MissionError};
+use common::mission::{Mission, MissionError, Protocol};
 use thiserror::Error;
 
 macro_rules! shipped {
@@ -32,6 +32,10 @@ pub(crate) enum LookupError {
     #[error("map: {0}")]
     Map(#[from] evaluation::maps::MapError),
     #[error(
+        "robot.protocol: this executable speaks no ROS 2; build it with `cargo build -p firsthand --features ros2`"
+    )]
+    NoRos2,
+    #[error(
         "map = {:?}: this build for robots reads no maps; start the mission with one that has the feature `tools`",
         file.display()
     )]
@@ -55,6 +59,9 @@ pub(crate) fn load(name: &str, assignments: &[String]) -> Result<Mission, Lookup
 
 /// `mission` with what the files that it names say.
 pub(crate) fn complete(mission: Mission) -> Result<Mission, LookupError> {
+    if mission.robot.protocol() == Protocol::Ros2 && !link::transport::SPEAKS_ROS2 {
+        return Err(LookupError::NoRos2);
+    }
     let mission = mission.with_calibration()?;
     #[cfg(feature = "tools")]
     let mission = evaluation::maps::with_prior_map(mission)?;

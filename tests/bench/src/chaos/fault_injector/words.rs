@@ -39,7 +39,10 @@ impl Words {
     pub(super) fn of(protocol: Protocol) -> Self {
         match protocol {
             Protocol::X80 => Self::X80 { robot: Decoder::default(), host: Decoder::default() },
-            Protocol::Json => Self::Json { robot: Lines::default(), host: Lines::default() },
+            // A robot that speaks ROS 2 has no fault that is injected on a wire.
+            Protocol::Json | Protocol::Ros2 => {
+                Self::Json { robot: Lines::default(), host: Lines::default() }
+            }
         }
     }
 

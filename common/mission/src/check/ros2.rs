@@ -1,0 +1,102 @@
+//! The ROS 2 part of a mission.
+
+use super::objection::{Objection, objection};
+use crate::{Mission, Protocol, SensorKind, address::Address};
+
+/// The longest name of a topic, bytes.
+const LONGEST_TOPIC: usize = 200;
+
+pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
+    let robot = &mission.robot;
+    let speaks = robot.protocol() == Protocol::Ros2;
+    let address = robot.address.as_deref().map(str::parse);
+    let is_domain = matches!(address, Some(Ok(Address::Ros2(_))));
+    if !speaks {
+        return if is_domain {
+            let remedy = "give robot.protocol = \"ros2\" too, or another address";
+            Err(objection("robot.address", "a ROS domain, and the robot speaks no ROS 2", remedy))
+        } else if !robot.ros2.is_default() {
+            let remedy = "give robot.protocol = \"ros2\" too, or remove it";
+            Err(objection("robot.ros2", "the robot speaks no ROS 2", remedy))
+        } else {
+            Ok(())
+        };
+    }
+    if !is_domain {
+        let remedy = "give \"ros2\" for the domain that ROS_DOMAIN_ID names, or \"ros2:0\"";
+        return Err(objection("robot.address", "a robot that speaks ROS 2 has a domain", remedy));
+    }
+    let topics = &robot.ros2;
+    let named = [&topics.odom, &topics.scan, &topics.cmd_vel, &topics.battery];
+    for name in named.into_iter().chain(topics.ranges.values()) {
+        if !is_topic(name) {
+            let remedy = "use letters, digits and '_' between slashes, as in \"/robot/odom\"";
+            return Err(objection("robot.ros2", format!("{name:?} is no topic of ROS"), remedy));
+        }
+    }
+    let table = mission.sensor_table();
+    let mut rangers = table.iter().filter(|sensor| sensor.kind != SensorKind::Scan);
+    if let Some(silent) = rangers.find(|sensor| !topics.ranges.contains_key(&sensor.name)) {
+        let problem = format!("no topic is that of the sensor {:?}", silent.name);
+        let remedy = "name it in robot.ros2.ranges, or give other rows of robot.sensor";
+        return Err(objection("robot.ros2", problem, remedy));
+    }
+    let is_ranger =
+        |name: &str| table.iter().any(|row| row.name == name && row.kind != SensorKind::Scan);
+    if let Some(other) = topics.ranges.keys().find(|name| !is_ranger(name)) {
+        let problem =
+            format!("robot.ros2.ranges names {other:?}, and no sonar or ray is called so");
+        return Err(objection("robot.ros2", problem, "give the name of a row of robot.sensor"));
+    }
+    Ok(())
+}
+
+/// Whether ROS takes `name` for the name of a topic.
+fn is_topic(name: &str) -> bool {
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    let token = |token: &str| {
+        !token.is_empty()
+            && !token.starts_with(|c: char| c.is_ascii_digit())
+            && token.chars().all(plain)
+    };
+    name.len() <= LONGEST_TOPIC && name.strip_prefix('/').unwrap_or(name).split('/').all(token)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    const ROBOT: &str =
+        "target = [3, 0]\nrobot.model = 'turtlebot3-burger'\nrobot.protocol = 'ros2'\n";
+
+    fn refusal(text: &str) -> String {
+        match Mission::parse(text, Path::new("m.toml")) {
+            Ok(_) => panic!("accepted: {text}"),
+            Err(error) => error.to_string(),
+        }
+    }
+
+    #[test]
+    fn a_robot_of_ros_needs_a_domain_and_other_robots_have_none() {
+        Mission::parse(&format!("{ROBOT}robot.address = 'ros2'"), Path::new("m.toml")).unwrap();
+        assert!(refusal(ROBOT).contains("ros2:0"));
+        assert!(refusal(&format!("{ROBOT}robot.address = '1.2.3.4:5'")).contains("ROS_DOMAIN_ID"));
+        assert!(refusal("target = [3, 0]\nrobot.address = 'ros2'").contains("robot.protocol"));
+        assert!(refusal("target = [3, 0]\nrobot.ros2.odom = '/o'").contains("robot.protocol"));
+    }
+
+    #[test]
+    fn topics_that_ros_does_not_have_and_sensors_without_a_topic_are_refused() {
+        let at = format!("{ROBOT}robot.address = 'ros2:3'\n");
+        for bad in ["", "/", "/a//b", "/odom/", "/7", "/a b", &"x".repeat(201)] {
+            let refusal = refusal(&format!("{at}robot.ros2.odom = '{bad}'"));
+            assert!(refusal.contains("no topic of ROS"), "{refusal}");
+        }
+        let named = refusal(&format!("{at}robot.ros2.ranges = {{ nose = '/nose' }}"));
+        assert!(named.contains("\"nose\""), "{named}");
+        let x80 = at.replace("turtlebot3-burger", "x80");
+        assert!(refusal(&x80).contains("no topic is that of the sensor \"front\""));
+    }
+}

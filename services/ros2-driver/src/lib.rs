@@ -1,0 +1,283 @@
+//! The driver of robots that speak ROS 2: messages of topics in, their meaning out; `cmd_vel` for the robot.
+//!
+//! It knows no middleware. A piece of the wire is one message: a byte, the row of its topic in [`Topics`], and its payload as DDS
+//! delivered it. What the robot is sent is a payload for the topic of commands.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`topics`] | THE table of topics |
+//! | [`messages`] | the messages, as far as the driver needs them |
+//! | [`cdr`] | their encoding |
+
+pub mod cdr;
+pub mod messages;
+pub mod topics;
+
+use std::{f64::consts::TAU, time::Duration};
+
+use common::{
+    driver::{
+        Driver, Heard, Readings, StopMethod, WireTally,
+        laser::Laser,
+        odometry::{self, drive, motion, twist},
+    },
+    kinematics::{Twist, WheelSpeeds},
+    mission::{Body, Mission, Sensor},
+    samples::{PowerSample, RangeReading},
+};
+
+use self::{
+    messages::{Odometry, Scan, read_range, read_voltage, write_twist},
+    topics::{Content, Topics},
+};
+
+/// So many messages wait to be heard; more are dropped.
+const MOST_WAITING: usize = 64;
+/// A stamp that lies before the last by more is that of a clock that was set anew, nanoseconds.
+const SET_ANEW_NS: i64 = 1_000_000_000;
+/// The beams of a laser's row and of its scans lie at the same bearings if they differ by no more, as a share of the angle between beams.
+const SAME_BEARING: f64 = 0.5;
+/// The angle from beam to beam may differ by this share.
+const SAME_STEP: f64 = 0.01;
+
+/// A robot that speaks ROS 2.
+#[derive(Clone, Debug)]
+pub struct Ros2 {
+    body: Body,
+    period_ns: i64,
+    stamped: bool,
+    topics: Topics,
+    waiting: Vec<Vec<u8>>,
+    readings: Readings,
+    /// None without a laser.
+    laser: Option<Laser>,
+    odometry: odometry::Odometry,
+    /// The stamp of the newest odometry, and of that with which the newest tick began, nanoseconds.
+    stamps_ns: Option<[i64; 2]>,
+    tally: WireTally,
+}
+
+impl Ros2 {
+    /// The driver of `mission`'s robot.
+    pub fn new(mission: &Mission) -> Self {
+        Self {
+            body: mission.body(),
+            period_ns: (1e9 / mission.robot.rate_hz) as i64,
+            stamped: mission.robot.ros2.stamped,
+            topics: Topics::of(mission),
+            waiting: Vec::new(),
+            readings: Readings::new(mission),
+            laser: Laser::new(mission),
+            odometry: odometry::Odometry::default(),
+            stamps_ns: None,
+            tally: WireTally::default(),
+        }
+    }
+
+    /// Take a message, or say why it is refused; then nothing of it is taken.
+    fn take(&mut self, piece: &[u8], heard: &mut Heard) -> Result<(), String> {
+        let row_of =
+            |(row, payload): (&u8, _)| Some((self.topics.heard.get(usize::from(*row))?, payload));
+        let Some(((content, topic), payload)) = piece.split_first().and_then(row_of) else {
+            return Err("a message of no topic that is subscribed to".to_owned());
+        };
+        let (content, name) = (*content, topic.name.clone());
+        self.take_payload(content, payload, heard).map_err(|why| format!("{name}: {why}"))
+    }
+
+    fn take_payload(
+        &mut self,
+        content: Content,
+        payload: &[u8],
+        heard: &mut Heard,
+    ) -> Result<(), String> {
+        match content {
+            Content::Odometry => self.take_odometry(&Odometry::read(payload)?, heard),
+            Content::Scan => {
+                let scan = Scan::read(payload).map_err(|error| error.to_string())?;
+                self.take_scan(&scan)
+            }
+            Content::Range(row) => {
+                let range = read_range(payload).map_err(|error| error.to_string())?;
+                self.readings.take_range(row, range);
+                Ok(())
+            }
+            Content::Battery => {
+                let volts = read_voltage(payload).map_err(|error| error.to_string())?;
+                if volts.is_finite() && volts >= 0.0 {
+                    let volts = f64::from(volts);
+                    let (board_v, motor_v, servo_v) = (volts, volts, volts);
+                    let power = PowerSample { board_v, motor_v, servo_v, ..PowerSample::default() };
+                    heard.power = Some(power);
+                }
+                Ok(())
+            }
+        }
+    }
+
+    fn take_odometry(&mut self, odometry: &Odometry, heard: &mut Heard) -> Result<(), String> {
+        let stamp_ns = odometry.stamp_ns;
+        let [newest_ns, tick_ns] = match self.stamps_ns {
+            Some([newest_ns, _]) if (newest_ns - SET_ANEW_NS..=newest_ns).contains(&stamp_ns) => {
+                let why =
+                    "a stamp that does not grow; let one node alone publish it, and stamp each";
+                return Err(why.to_owned());
+            }
+            Some(stamps_ns) if stamp_ns > stamps_ns[0] => stamps_ns,
+            _ => [stamp_ns - self.period_ns; 2],
+        };
+        let turned = self.odometry.turned(odometry.pose, &self.body);
+        let turned = turned.ok_or("a pose that no robot can have; say metres")?;
+        if let Some(laser) = &mut self.laser {
+            laser.turned(turned);
+        }
+        // Of odometry that comes faster than ticks, that begins one which is nearest to its time.
+        let slack_ns = (stamp_ns - newest_ns) / 2;
+        let is_tick = stamp_ns - tick_ns >= self.period_ns - slack_ns;
+        self.stamps_ns = Some([stamp_ns, if is_tick { stamp_ns } else { tick_ns }]);
+        if is_tick {
+            let [v, omega] = odometry.twist;
+            let WheelSpeeds { right, left } = drive(&self.body).wheels(Twist { v, omega });
+            heard.motion = Some(motion(&self.body, turned, [left, right], [false; 2]));
+        }
+        Ok(())
+    }
+
+    fn take_scan(&mut self, scan: &Scan) -> Result<(), String> {
+        let Some(laser) = &mut self.laser else {
+            return Err("a scan, and the mission has no laser; add a row of kind scan".to_owned());
+        };
+        let range = |range: &f32| match *range {
+            range if range < scan.least_m => f32::NAN,
+            range if range > scan.most_m => f32::INFINITY,
+            range => range,
+        };
+        let came = scan.ranges.iter().map(|beam| laser.beam(Some(range(beam))));
+        let beams = if is_same_fan(scan, laser.sensor()) {
+            came.collect()
+        } else if is_circle(scan.ranges.len(), scan.fan.1) && is_whole(laser.sensor(), scan) {
+            turned_to(laser.sensor(), scan.fan, came)
+        } else {
+            return Err(other_fan(scan, laser.sensor()));
+        };
+        laser.take(beams, &mut self.readings);
+        Ok(())
+    }
+}
+
+/// Whether each beam of `scan` is that of the laser's row.
+fn is_same_fan(scan: &Scan, sensor: &Sensor) -> bool {
+    let ((first, step), (its_first, its_step)) = (scan.fan, sensor.fan());
+    scan.ranges.len() == sensor.beams
+        && (first - its_first).abs() <= SAME_BEARING * its_step
+        && (step - its_step).abs() <= SAME_STEP * its_step
+}
+
+/// Whether so many beams are a whole circle; the last one may be the first again.
+fn is_circle(beams: usize, step: f64) -> bool {
+    (beams as f64 * step.abs() - TAU).abs() <= 1.5 * step.abs()
+}
+
+/// Whether the laser's row is a whole circle with at most twice the beams of `scan`.
+fn is_whole(sensor: &Sensor, scan: &Scan) -> bool {
+    sensor.field_of_view_deg >= 360.0 && scan.ranges.len() * 2 >= sensor.beams
+}
+
+/// The beams of a whole circle as those of the laser's row: each goes to the nearest of the row, the shortest of several counts, and a
+/// beam of the row that gets none has no reading.
+fn turned_to(sensor: &Sensor, fan: (f64, f64), came: impl Iterator<Item = f32>) -> Vec<f32> {
+    let ((first, step), (its_first, its_step)) = (fan, sensor.fan());
+    let mut beams = vec![f32::NAN; sensor.beams];
+    for (number, range) in came.enumerate() {
+        let from_first = (first + number as f64 * step - its_first) / its_step;
+        let nearest = from_first.round().rem_euclid(sensor.beams as f64) as usize;
+        if let Some(beam) = beams.get_mut(nearest) {
+            *beam = beam.min(range);
+        }
+    }
+    beams
+}
+
+/// That the beams of `scan` are not those of the laser's row.
+fn other_fan(scan: &Scan, sensor: &Sensor) -> String {
+    let fan = |(first, step): (f64, f64), beams| {
+        let (first, step) = (first.to_degrees(), step.to_degrees());
+        format!("{beams} beams from {first:.1} degrees in steps of {step:.3}")
+    };
+    format!(
+        "{}, and the mission's laser has {}; set beams and field_of_view_deg of its row",
+        fan(scan.fan, scan.ranges.len()),
+        fan(sensor.fan(), sensor.beams)
+    )
+}
+
+impl Driver for Ros2 {
+    fn push(&mut self, bytes: &[u8]) {
+        if self.waiting.len() < MOST_WAITING {
+            self.waiting.push(bytes.to_vec());
+        } else {
+            self.tally.bytes_dropped += bytes.len() as u64;
+        }
+    }
+
+    fn reset(&mut self) {
+        // A message comes whole or not at all.
+    }
+
+    fn heard(&mut self) -> Heard {
+        let mut heard = Heard::default();
+        for piece in std::mem::take(&mut self.waiting) {
+            match self.take(&piece, &mut heard) {
+                Ok(()) => {
+                    heard.anything = true;
+                    self.tally.messages += 1;
+                }
+                Err(why) => {
+                    self.tally.bytes_dropped += piece.len() as u64;
+                    heard.refused = Some(why);
+                }
+            }
+        }
+        heard.readings = self.readings.take_fresh();
+        heard
+    }
+
+    fn tally(&self) -> WireTally {
+        self.tally
+    }
+
+    fn readings_for_tick(&mut self) -> Vec<RangeReading> {
+        self.readings.for_tick()
+    }
+
+    fn scan_for_tick(&mut self) -> Vec<f32> {
+        self.laser.as_mut().map(Laser::for_tick).unwrap_or_default()
+    }
+
+    /// Topics need no greeting.
+    fn greeting(&self) -> Vec<u8> {
+        Vec::new()
+    }
+
+    fn ask_for_sensors(&self) -> Vec<u8> {
+        Vec::new()
+    }
+
+    /// A robot publishes without being asked.
+    fn ping(&self) -> Vec<u8> {
+        Vec::new()
+    }
+
+    /// `Twist` has no word for the limit.
+    fn velocity(&self, counts: [i16; 2], _limit: Duration) -> Vec<u8> {
+        let Twist { v, omega } = twist(&self.body, counts);
+        write_twist(v, omega, self.stamped)
+    }
+
+    fn other_stops(&self) -> Vec<StopMethod> {
+        Vec::new()
+    }
+}
+
+#[cfg(test)]
+mod tests;

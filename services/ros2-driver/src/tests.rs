@@ -1,0 +1,242 @@
+//! The messages below were serialised by rclpy of ROS 2 Kilted with Fast DDS. Zeros stand for lists of zeros.
+
+use std::path::Path;
+
+use common::samples::RangeStatus;
+
+use super::*;
+use crate::cdr::Malformed;
+
+const ROBOT: &str = "target = [3, 0]\nrobot.model = 'turtlebot3-burger'\nrobot.protocol = 'ros2'\nrobot.address = 'ros2'\n";
+/// Stamp 12.5 s, at (1.5, -0.25) with heading 0.5, 0.2 m/s and -0.1 rad/s.
+const ODOMETRY: [&str; 3] = [
+    "000100000c0000000065cd1d050000006f646f6d004764b30a000000626173655f6c696e6b0064af64468401000000000000f83f000000000000d0bf000000000000000000000000000000000000000000000000\
+     7715f3d4eeaacf3fa1ee7d9f5401ef3f",
+    "9a9999999999c93f00000000000000000000000000000000000000000000000000000000000000009a9999999999b9bf",
+    "",
+];
+/// 4 beams from 0 in steps of 1.5: 1 m, infinite, no number and 0; from 0.16 m to 8 m.
+const SCAN: &str = "0001000000000000000000000a000000626173655f7363616e00b11e000000000000c0400000c03f00000000000000000ad7233e00000041040000000000803f0000807f0000c07f00000000\
+     020000000000803f0000803f";
+/// 1.25 m of 0.02 to 4 m.
+const RANGE: &str =
+    "000100000000000000000000050000006e6f7365000070650000003f0ad7a33c000080400000a03f00000000";
+/// 12.1 V.
+const BATTERY: &str = "0001000000000000000000000200000062009b199a994141000000000000000000000000000000000000000000000000000000000000000000000001";
+/// 0.2 m/s and -0.5 rad/s.
+const TWIST: &str = "000100009a9999999999c93f0000000000000000000000000000000000000000000000000000000000000000000000000000e0bf";
+const TWIST_STAMPED: &str = "0001000000000000000000000100000000d197199a9999999999c93f0000000000000000000000000000000000000000000000000000000000000000000000000000e0bf";
+
+fn bytes(hex: &str) -> Vec<u8> {
+    let digits = hex.as_bytes().chunks_exact(2);
+    digits.map(|pair| u8::from_str_radix(str::from_utf8(pair).unwrap(), 16).unwrap()).collect()
+}
+
+fn odometry() -> Vec<u8> {
+    let covariance = vec![0; 36 * 8];
+    [bytes(ODOMETRY[0]), covariance.clone(), bytes(ODOMETRY[1]), covariance].concat()
+}
+
+/// The odometry with this stamp and x.
+fn odometry_at(stamp_ms: u32, x: f64) -> Vec<u8> {
+    let mut payload = odometry();
+    payload[4..8].copy_from_slice(&(stamp_ms / 1000).to_le_bytes());
+    payload[8..12].copy_from_slice(&(stamp_ms % 1000 * 1_000_000).to_le_bytes());
+    payload[44..52].copy_from_slice(&x.to_le_bytes());
+    payload
+}
+
+/// A scan of beams that end at `ranges`, from `first` in steps of `step`.
+fn scan_of(first: f32, step: f32, ranges: &[f32]) -> Vec<u8> {
+    let mut payload = bytes(SCAN)[..56].to_vec();
+    payload[28..32].copy_from_slice(&first.to_le_bytes());
+    payload[36..40].copy_from_slice(&step.to_le_bytes());
+    payload.extend((ranges.len() as u32).to_le_bytes());
+    payload.extend(ranges.iter().flat_map(|range| range.to_le_bytes()));
+    payload
+}
+
+fn driver(extra: &str) -> Ros2 {
+    Ros2::new(&Mission::parse(&format!("{ROBOT}{extra}"), Path::new("m.toml")).unwrap())
+}
+
+fn said(driver: &mut Ros2, row: u8, payload: &[u8]) -> Heard {
+    driver.push(&[&[row], payload].concat());
+    driver.heard()
+}
+
+const ODOM: u8 = 0;
+const LASER: u8 = 1;
+const POWER: u8 = 2;
+const NOSE: u8 = 3;
+const SONAR: &str = "robot.ros2.ranges = { nose = 'nose' }\n[[robot.sensor]]\nname = 'nose'\nkind = 'cone'\nchannel = 0\nforward_m = 0.1\nbearing_deg = 0\n\
+    [[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nchannel = 0\nforward_m = 0\nbearing_deg = 0\nmodel = 'lds-02'\n";
+
+#[test]
+fn what_rclpy_serialises_is_read_as_what_was_said() {
+    let read = Odometry::read(&odometry()).unwrap();
+    assert_eq!((read.stamp_ns, read.twist), (12_500_000_000, [0.2, -0.1]));
+    let [x, y, heading] = read.pose;
+    assert!((x, y) == (1.5, -0.25) && (heading - 0.5).abs() < 1e-12, "{read:?}");
+    let scan = Scan::read(&bytes(SCAN)).unwrap();
+    assert_eq!((scan.fan, scan.least_m, scan.most_m), ((0.0, 1.5), 0.16, 8.0));
+    assert_eq!((scan.ranges[0], scan.ranges[1], scan.ranges[3]), (1.0, f32::INFINITY, 0.0));
+    assert!(scan.ranges[2].is_nan());
+    assert_eq!(read_range(&bytes(RANGE)), Ok(1.25));
+    assert_eq!(read_voltage(&bytes(BATTERY)), Ok(12.1));
+}
+
+#[test]
+fn a_message_of_the_other_byte_order_is_the_same() {
+    let mut big = bytes(RANGE);
+    big[1] = 0;
+    // After stamp and length come the name of the frame with its padding and the kind, which are bytes.
+    for start in [4, 8, 12, 24, 28, 32, 36] {
+        big[start..start + 4].reverse();
+    }
+    assert_eq!(read_range(&big), Ok(1.25));
+}
+
+#[test]
+fn a_message_that_ends_anywhere_is_refused_and_none_makes_the_driver_panic_or_allocate() {
+    let mut driver = driver(SONAR);
+    let needed = [(ODOM, odometry(), 436), (LASER, bytes(SCAN), 76), (NOSE, bytes(RANGE), 40)];
+    for (row, payload, needed) in needed {
+        for length in 0..payload.len() {
+            let heard = said(&mut driver, row, &payload[..length]);
+            assert!(
+                length >= needed || heard.refused.is_some_and(|why| why.contains("ends early"))
+            );
+        }
+        for at in 0..payload.len().min(80) {
+            for value in [0, 1, 0x7f, 0x80, 0xff] {
+                let mut broken = payload.clone();
+                broken[at] = value;
+                said(&mut driver, row, &broken);
+            }
+        }
+    }
+    let mut endless = bytes(SCAN);
+    endless[56..60].copy_from_slice(&u32::MAX.to_le_bytes());
+    assert_eq!(Scan::read(&endless), Err(Malformed::Long(u32::MAX, 1081)));
+    assert!(driver.tally().bytes_dropped > 0);
+    driver.push(&[]);
+    assert!(driver.heard().refused.is_some());
+}
+
+#[test]
+fn a_refusal_names_the_topic_what_was_wrong_and_the_remedy() {
+    let mut driver = driver("");
+    let mut xcdr2 = odometry();
+    xcdr2[1] = 7;
+    let mut lying = odometry();
+    lying[68..100].fill(0);
+    let mut nowhere = odometry();
+    nowhere[44..52].copy_from_slice(&f64::NAN.to_le_bytes());
+    for (row, payload, words) in [
+        (ODOM, xcdr2, "/odom: encoding 0x0007 instead of plain CDR; set"),
+        (ODOM, lying, "/odom: an orientation that is no rotation; fill"),
+        (ODOM, nowhere, "/odom: a pose that no robot can have; say metres"),
+        (
+            LASER,
+            bytes(SCAN),
+            "/scan: 4 beams from 0.0 degrees in steps of 85.944, and the mission's laser has 360 beams from -180.0 degrees in steps of 1.000; set",
+        ),
+        (9, odometry(), "no topic that is subscribed to"),
+    ] {
+        let heard = said(&mut driver, row, &payload);
+        assert!(!heard.anything && heard.motion.is_none() && heard.readings.is_empty());
+        let why = heard.refused.unwrap();
+        assert!(why.contains(words), "{why}");
+    }
+}
+
+#[test]
+fn odometry_is_the_way_of_wheels_and_begins_a_tick_at_the_missions_rate() {
+    let mut driver = driver("robot.rate_hz = 10");
+    let mut ticks = Vec::new();
+    for step in 0..9_u32 {
+        let payload = odometry_at(1000 + 50 * step, 1.0);
+        ticks.push(said(&mut driver, ODOM, &payload).motion.is_some());
+    }
+    assert_eq!(ticks, [true, false, true, false, true, false, true, false, true]);
+    // 0.1 m along the heading of 0.5 rad is 0.1 cos(0.5) along x.
+    let motion = said(&mut driver, ODOM, &odometry_at(1500, 1.1)).motion.unwrap();
+    let counts = (0.1 * 0.5_f64.cos() / 0.033 * 3600.0 / TAU).round() as u16;
+    assert_eq!([motion.wheels.left_counts, motion.wheels.right_counts], [counts; 2]);
+    // 0.2 m/s and -0.1 rad/s of a track of 0.16 m.
+    let left = ((0.2 + 0.008) / 0.033 * 3600.0 / TAU).round() as i32;
+    assert_eq!(motion.wheels.left_counts_per_s, left);
+}
+
+#[test]
+fn odometry_that_is_repeated_or_old_is_refused_until_it_goes_on() {
+    let mut driver = driver("robot.rate_hz = 10");
+    let mut refused = |stamp_ms| said(&mut driver, ODOM, &odometry_at(stamp_ms, 1.0)).refused;
+    assert_eq!(refused(5000), None);
+    assert!(refused(5000).is_some_and(|why| why.contains("does not grow")));
+    assert!(refused(4900).is_some());
+    assert_eq!(refused(5100), None);
+    // A clock that was set anew.
+    assert_eq!([refused(100), refused(200)], [None, None]);
+}
+
+#[test]
+fn a_circle_of_beams_is_turned_to_the_missions_and_lacking_ones_have_no_reading() {
+    let mut driver = driver("");
+    // As the driver of a TurtleBot 3 does, the first looks ahead: it is the mission's 180th.
+    let mut ranges = vec![f32::INFINITY; 360];
+    ranges[0] = 1.0;
+    ranges[90] = 0.1;
+    let heard = said(&mut driver, LASER, &scan_of(0.0, 1_f32.to_radians(), &ranges));
+    assert_eq!(heard.readings[0].status(), RangeStatus::Measured);
+    let beams = driver.scan_for_tick();
+    assert_eq!((beams[180], beams[181]), (1.0, f32::INFINITY));
+    assert!(beams[270].is_nan(), "less than the least range");
+    let few = scan_of(0.0, 1.5_f32.to_radians(), &[2.0; 240]);
+    assert_eq!(said(&mut driver, LASER, &few).refused, None);
+    let beams = driver.scan_for_tick();
+    assert_eq!(beams.iter().filter(|beam| beam.is_nan()).count(), 120);
+}
+
+#[test]
+fn ranges_and_the_battery_are_those_of_their_topics() {
+    let mut driver = driver(SONAR);
+    let nose = said(&mut driver, NOSE, &bytes(RANGE)).readings[0];
+    assert_eq!((nose.status(), nose.range_m), (RangeStatus::Measured, 1.25));
+    for (range, status) in [
+        (f32::INFINITY, RangeStatus::Nothing),
+        (5.0, RangeStatus::Nothing),
+        (f32::NAN, RangeStatus::Invalid),
+        (0.01, RangeStatus::Invalid),
+    ] {
+        let mut payload = bytes(RANGE);
+        payload[36..40].copy_from_slice(&range.to_le_bytes());
+        assert_eq!(said(&mut driver, NOSE, &payload).readings[0].status(), status, "{range}");
+    }
+    let power = said(&mut driver, POWER, &bytes(BATTERY)).power.unwrap();
+    assert!((power.motor_v - 12.1).abs() < 1e-6);
+}
+
+#[test]
+fn a_command_is_the_bytes_of_rclpy_and_one_of_nothing_is_a_stop() {
+    assert_eq!(write_twist(0.2, -0.5, false), bytes(TWIST));
+    let mut stamped = bytes(TWIST_STAMPED);
+    // Fast DDS leaves padding as it was.
+    stamped[17..20].fill(0);
+    assert_eq!(write_twist(0.2, -0.5, true), stamped);
+    let stop = driver("").velocity([0, 0], Duration::from_millis(250));
+    assert_eq!(stop, write_twist(0.0, 0.0, false));
+    // Half a turn of each wheel a second is pi r.
+    let told = driver("").velocity([1800, 1800], Duration::from_millis(250));
+    assert_eq!(told, write_twist(twist(&driver("").body, [1800; 2]).v, 0.0, false));
+}
+
+#[test]
+fn the_missions_names_are_those_of_its_topics() {
+    let mission = format!("{ROBOT}robot.ros2.odom = 'a/odom'\nrobot.ros2.stamped = true\n{SONAR}");
+    let topics = Topics::of(&Mission::parse(&mission, Path::new("m.toml")).unwrap());
+    let names: Vec<_> = topics.heard.iter().map(|(_, topic)| topic.dds_name()).collect();
+    assert_eq!(names, ["rt/a/odom", "rt/scan", "rt/battery_state", "rt/nose"]);
+    assert_eq!(topics.command.type_name, "geometry_msgs::msg::dds_::TwistStamped_");
+}

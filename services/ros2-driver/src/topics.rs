@@ -1,0 +1,68 @@
+//! THE table of a robot's topics: what the link subscribes to, and where it writes.
+
+use common::mission::Mission;
+
+/// The meaning of a topic that is heard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Content {
+    Odometry,
+    Scan,
+    Battery,
+    /// The range of the sensor in this row of the mission.
+    Range(usize),
+}
+
+/// A topic as DDS knows it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Topic {
+    /// Its name in ROS, from the root.
+    pub name: String,
+    /// The name of its type in DDS.
+    pub type_name: &'static str,
+}
+
+impl Topic {
+    fn new(name: &str, type_name: &'static str) -> Self {
+        Self { name: format!("/{}", name.strip_prefix('/').unwrap_or(name)), type_name }
+    }
+
+    /// Its name in DDS.
+    pub fn dds_name(&self) -> String {
+        format!("rt{}", self.name)
+    }
+}
+
+/// The topics of a robot.
+#[derive(Clone, Debug)]
+pub struct Topics {
+    /// What the robot is told.
+    pub command: Topic,
+    /// What it says. A piece of the wire begins with the row of its topic here.
+    pub heard: Vec<(Content, Topic)>,
+}
+
+impl Topics {
+    /// The topics of the robot of `mission`.
+    pub fn of(mission: &Mission) -> Self {
+        let topics = &mission.robot.ros2;
+        let command = match topics.stamped {
+            true => "geometry_msgs::msg::dds_::TwistStamped_",
+            false => "geometry_msgs::msg::dds_::Twist_",
+        };
+        let odometry = Topic::new(&topics.odom, "nav_msgs::msg::dds_::Odometry_");
+        let mut heard = vec![(Content::Odometry, odometry)];
+        if mission.laser().is_some() {
+            let scan = Topic::new(&topics.scan, "sensor_msgs::msg::dds_::LaserScan_");
+            heard.push((Content::Scan, scan));
+        }
+        let battery = Topic::new(&topics.battery, "sensor_msgs::msg::dds_::BatteryState_");
+        heard.push((Content::Battery, battery));
+        for (row, sensor) in mission.sensor_table().iter().enumerate() {
+            if let Some(name) = topics.ranges.get(&sensor.name) {
+                let range = Topic::new(name, "sensor_msgs::msg::dds_::Range_");
+                heard.push((Content::Range(row), range));
+            }
+        }
+        Self { command: Topic::new(&topics.cmd_vel, command), heard }
+    }
+}

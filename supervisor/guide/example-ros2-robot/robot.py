@@ -1,0 +1,101 @@
+"""A robot for firsthand that speaks ROS 2, with rclpy and no code of firsthand.
+
+    python3 robot.py &                  # what it really does goes to standard output
+    firsthand run robot.toml
+
+It is like a TurtleBot 3: it publishes /odom at 20 Hz, /scan at 10 Hz with 360 beams and /battery_state, obeys /cmd_vel, and
+stands after a quarter of a second without it. Its world is a few drums. `--stamped` takes TwistStamped.
+"""
+
+import json
+import math
+import random
+import sys
+import time
+
+import rclpy
+from geometry_msgs.msg import Twist, TwistStamped
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import BatteryState, LaserScan
+
+RADIUS, LEAST, REACH, BEAMS = 0.105, 0.16, 8.0, 360
+DRUMS = [(1.0, 0.1, 0.2), (2.0, -0.6, 0.25), (1.9, 0.7, 0.2), (-1.5, 1.0, 0.3)]  # x, y, radius, metres
+TIMEOUT, STEP = 0.25, 0.01
+
+
+class Robot(Node):
+    def __init__(self, stamped):
+        super().__init__("drums_robot")
+        self.x = self.y = self.heading = self.way = 0.0
+        self.told, self.told_at, self.touches, self.orders = (0.0, 0.0), 0.0, 0, 0
+        self.before = time.monotonic()
+        if stamped:
+            self.create_subscription(TwistStamped, "cmd_vel", lambda message: self.obey(message.twist), 10)
+        else:
+            self.create_subscription(Twist, "cmd_vel", self.obey, 10)
+        self.odom = self.create_publisher(Odometry, "odom", 10)
+        self.scan = self.create_publisher(LaserScan, "scan", qos_profile_sensor_data)
+        self.battery = self.create_publisher(BatteryState, "battery_state", 10)
+        self.create_timer(STEP, self.move)
+        self.create_timer(0.05, self.publish_odom)
+        self.create_timer(0.1, self.publish_scan)
+        self.create_timer(1.0, lambda: self.battery.publish(BatteryState(voltage=12.1)))
+
+    def obey(self, twist):
+        self.told, self.told_at = (twist.linear.x, twist.angular.z), time.monotonic()
+        self.orders += 1
+
+    def move(self):
+        now = time.monotonic()
+        if now - self.told_at > TIMEOUT:
+            self.told = (0.0, 0.0)
+        while self.before + STEP <= now:
+            self.before += STEP
+            ahead, turn = self.told[0] * STEP, self.told[1] * STEP
+            heading = self.heading + turn / 2
+            x, y = self.x + ahead * math.cos(heading), self.y + ahead * math.sin(heading)
+            self.heading += turn
+            if any(math.hypot(x - a, y - b) < r + RADIUS for a, b, r in DRUMS):
+                self.touches += 1
+            else:
+                self.x, self.y, self.way = x, y, self.way + abs(ahead)
+
+    def publish_odom(self):
+        message = Odometry()
+        message.header.stamp = self.get_clock().now().to_msg()
+        message.header.frame_id, message.child_frame_id = "odom", "base_footprint"
+        pose, twist = message.pose.pose, message.twist.twist
+        pose.position.x, pose.position.y = self.x, self.y
+        pose.orientation.z, pose.orientation.w = math.sin(self.heading / 2), math.cos(self.heading / 2)
+        twist.linear.x, twist.angular.z = self.told
+        self.odom.publish(message)
+        truth = {"x": self.x, "y": self.y, "way": self.way, "told": self.told}
+        print(json.dumps({**truth, "touches": self.touches, "orders": self.orders}), flush=True)
+
+    def range_at(self, angle):
+        """The nearest drum along a beam, metres; infinite for none."""
+        dx, dy = math.cos(self.heading + angle), math.sin(self.heading + angle)
+        nearest = math.inf
+        for a, b, r in DRUMS:
+            along = (a - self.x) * dx + (b - self.y) * dy
+            aside = (a - self.x) * dy - (b - self.y) * dx
+            if along > 0 and abs(aside) < r:
+                nearest = min(nearest, along - math.sqrt(r * r - aside * aside))
+        return random.gauss(nearest, 0.005) if nearest < REACH else math.inf
+
+    def publish_scan(self):
+        message = LaserScan(range_min=LEAST, range_max=REACH, scan_time=0.1)
+        message.header.stamp = self.get_clock().now().to_msg()
+        message.header.frame_id = "base_scan"
+        # As the driver of the LDS does, the first beam looks ahead.
+        message.angle_max, message.angle_increment = 2 * math.pi, 2 * math.pi / BEAMS
+        message.ranges = [self.range_at(beam * message.angle_increment) for beam in range(BEAMS)]
+        message.intensities = [0.0] * BEAMS
+        self.scan.publish(message)
+
+
+if __name__ == "__main__":
+    rclpy.init()
+    rclpy.spin(Robot("--stamped" in sys.argv))
