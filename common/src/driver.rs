@@ -56,10 +56,22 @@ pub trait Driver: fmt::Debug {
     /// stops by itself.
     fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8>;
 
+    /// What the driver of the next link must know so that the counts of the wheels go on; none if the robot itself counts.
+    fn memory(&self) -> Option<Memory> {
+        None
+    }
+
+    /// Go on from what the driver of an earlier link knew.
+    fn remember(&mut self, _memory: &Memory) {}
+
     /// The methods that stop a robot which does not obey a velocity of 0, in the order in which they are tried. After one of them the
     /// robot must be greeted before it drives.
     fn other_stops(&self) -> Vec<StopMethod>;
 }
+
+/// What makes the counts of a robot that says its pose go on: x, y and heading by its odometry, and the angles that its wheels are taken
+/// to have turned by there.
+pub type Memory = [f64; 5];
 
 /// A method that stops a robot, besides a velocity of 0.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec2;
 
-use super::Motion;
+use super::{Memory, Motion};
 use crate::{
     geometry::wrap_angle,
     kinematics::{DifferentialDrive, Pose2, Twist, WheelSpeeds},
@@ -26,6 +26,19 @@ pub struct Odometry {
 }
 
 impl Odometry {
+    /// The newest pose and the angles of the wheels there; none before the first.
+    pub fn memory(&self) -> Option<Memory> {
+        let Pose2 { position, heading } = self.last?;
+        let [left, right] = self.turned;
+        Some([position.x, position.y, heading, left, right])
+    }
+
+    /// Go on from there.
+    pub const fn remember(&mut self, [x, y, heading, left, right]: Memory) {
+        self.last = Some(Pose2 { position: DVec2::new(x, y), heading });
+        self.turned = [left, right];
+    }
+
     /// The angles of the left and the right wheel of a robot that is at `x`, `y` with this heading by its odometry. What it slipped aside is
     /// left out, as wheels leave it out. None if the numbers are too great to be a way.
     pub fn turned(&mut self, [x, y, heading]: [f64; 3], body: &Body) -> Option<[f64; 2]> {

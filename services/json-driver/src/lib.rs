@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, time::Duration};
 
 use common::{
     driver::{
-        Driver, Heard, Readings, StopMethod, WireTally,
+        Driver, Heard, Memory, Readings, StopMethod, WireTally,
         laser::Laser,
         odometry::{Odometry, motion, twist, wheel_speeds},
     },
@@ -177,6 +177,14 @@ impl Driver for Json {
         let wheels = wheel_speeds(&self.body, counts);
         let Twist { v, omega } = twist(&self.body, counts);
         line(&Order::Drive { wheels, twist: [v, omega], for_s: limit.as_secs_f64() })
+    }
+
+    fn memory(&self) -> Option<Memory> {
+        self.odometry.memory()
+    }
+
+    fn remember(&mut self, memory: &Memory) {
+        self.odometry.remember(*memory);
     }
 
     fn other_stops(&self) -> Vec<StopMethod> {

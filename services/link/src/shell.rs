@@ -7,18 +7,20 @@ use common::{
     bus::{Reader, Writers},
     clock::{MissionClock, monotonic_ns},
     domain::Domain,
+    driver::Memory,
     latency::Histogram,
     latency_budget::{Answers, LatencyBudget},
     samples::{
         Action, Cause, CommandSample, DirectiveSample, HoldReason, LinkSample, Order,
         TickLimitSample,
     },
+    saved::Saved,
     shell::{Context, Process, Progress, StageError},
     stage::Runner,
     step::Step as _,
     stop_socket::{Identity, Request, StopMark, StopSocket},
     topics::{self, AnyTopic as _},
-    wiring::Wiring,
+    wiring::{Persists, Wiring},
 };
 
 use crate::{
@@ -38,6 +40,9 @@ const LOOKS_AGAIN: Duration = Duration::from_millis(20);
 /// A robot that floods the link delays its heartbeat by no more than this, and a datagram. The rest is taken in the next turn.
 const MOST_LISTENING_NS: u64 = 20_000_000;
 
+/// The bytes of a [`Memory`].
+const MEMORY_BYTES: usize = 64;
+
 /// The link process.
 pub struct Shell {
     transport: Transport,
@@ -46,6 +51,8 @@ pub struct Shell {
     directive: Reader<DirectiveSample>,
     tick_limit: Reader<TickLimitSample>,
     runner: Runner<LinkStage>,
+    /// What the next link's driver must know.
+    saved: Saved,
     /// None where it could not be made, which the log says.
     stop_socket: Option<StopSocket>,
     stop_mark: StopMark,
@@ -78,6 +85,7 @@ impl Process for Shell {
             &topics::SURROUNDINGS,
             &topics::WIRE,
         ],
+        persists: Persists::State(MEMORY_BYTES),
         ..Wiring::of("link")
     };
 
@@ -102,7 +110,12 @@ impl Process for Shell {
         if let Some(socket) = &stop_socket {
             context.waiter.on_readable(socket)?;
         }
-        let runner = Runner::open(context, |_: &LinkStage| WIRE_PIECE)?;
+        let memory: Option<Memory> = context.saved_state()?;
+        let saved = context.take_saved();
+        let mut runner = Runner::open(context, |_: &LinkStage| WIRE_PIECE)?;
+        if let Some(memory) = memory {
+            runner.take(Entry::Remember(memory))?;
+        }
         let mut shell = Self {
             transport,
             command: context.reader(&topics::COMMAND)?,
@@ -110,6 +123,7 @@ impl Process for Shell {
             directive: context.reader(&topics::DIRECTIVE)?,
             tick_limit: context.reader(&topics::TICK_LIMIT)?,
             runner,
+            saved,
             stop_socket,
             marked: stop_mark.is_set(),
             stop_mark,
@@ -287,6 +301,9 @@ impl Shell {
             match effect {
                 Effect::Send(bytes) => self.transport.send(&bytes)?,
                 Effect::Answered { began_ns } => {
+                    if let Some(memory) = self.runner.stage.link.driver_memory() {
+                        self.saved.save(&memory)?;
+                    }
                     let tick = self.runner.out.at.tick;
                     self.budget.published(tick, Answers::Feedback);
                     self.latency_ns = monotonic_ns().saturating_sub(began_ns);

@@ -3,6 +3,7 @@
 
 use common::{
     clock::{MissionClock, MissionTime, Pace},
+    driver::Memory,
     inputs,
     mission::Mission,
     outputs::Outputs,
@@ -33,6 +34,8 @@ pub enum Entry<'a> {
     Telemetry,
     /// The stage stops at this reading of the monotonic clock, nanoseconds.
     Stop(u64),
+    /// The stage goes on from what the driver of the link before it knew.
+    Remember(Memory),
 }
 
 /// An [`Event`] as a recording stores it.
@@ -200,6 +203,10 @@ impl Stage for LinkStage {
             }
             Entry::Telemetry => {
                 self.publish_telemetry(out)?;
+                return Ok(Vec::new());
+            }
+            Entry::Remember(memory) => {
+                self.link.remember(&memory);
                 return Ok(Vec::new());
             }
             Entry::Stop(machine_ns) => {

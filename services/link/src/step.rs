@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use common::{
     clock::{MissionTime, Pace},
-    driver::{Driver, WireTally},
+    driver::{Driver, Memory, WireTally},
     mission::Mission,
     samples::{
         Action, Cause, CommandSample, CommandState, ContactSample, HoldReason, Order, RangeReading,
@@ -244,6 +244,16 @@ impl Link {
     pub fn distrusts_encoders(&self) -> bool {
         let causes = [Cause::OdometryImplausible, Cause::OdometryGivenUp];
         causes.into_iter().any(|cause| self.failsafe.applied(cause))
+    }
+
+    /// What the next link's driver must know; none if the robot itself counts.
+    pub(crate) fn driver_memory(&self) -> Option<Memory> {
+        self.driver.memory()
+    }
+
+    /// Go on from what the driver of an earlier link knew.
+    pub(crate) fn remember(&mut self, memory: &Memory) {
+        self.driver.remember(memory);
     }
 
     /// Whether an operator stopped the robot at its link.

@@ -17,7 +17,7 @@ use std::{f64::consts::TAU, time::Duration};
 
 use common::{
     driver::{
-        Driver, Heard, Readings, StopMethod, WireTally,
+        Driver, Heard, Memory, Readings, StopMethod, WireTally,
         laser::Laser,
         odometry::{self, drive, motion, twist},
     },
@@ -272,6 +272,14 @@ impl Driver for Ros2 {
     fn velocity(&self, counts: [i16; 2], _limit: Duration) -> Vec<u8> {
         let Twist { v, omega } = twist(&self.body, counts);
         write_twist(v, omega, self.stamped)
+    }
+
+    fn memory(&self) -> Option<Memory> {
+        self.odometry.memory()
+    }
+
+    fn remember(&mut self, memory: &Memory) {
+        self.odometry.remember(*memory);
     }
 
     fn other_stops(&self) -> Vec<StopMethod> {

@@ -240,3 +240,19 @@ fn the_missions_names_are_those_of_its_topics() {
     assert_eq!(names, ["rt/a/odom", "rt/scan", "rt/battery_state", "rt/nose"]);
     assert_eq!(topics.command.type_name, "geometry_msgs::msg::dds_::TwistStamped_");
 }
+
+#[test]
+fn the_counts_of_a_link_that_is_started_again_go_on_where_they_were_and_take_what_was_driven_meanwhile()
+ {
+    let mut first = driver("");
+    said(&mut first, ODOM, &odometry_at(1000, 1.0));
+    said(&mut first, ODOM, &odometry_at(1200, 1.1));
+    let mut second = driver("");
+    second.remember(&first.memory().unwrap());
+    let counts = |driver: &mut Ros2| {
+        let motion = said(driver, ODOM, &odometry_at(2000, 1.3)).motion.unwrap();
+        [motion.wheels.left_counts, motion.wheels.right_counts]
+    };
+    let (alone, after) = (counts(&mut first), counts(&mut second));
+    assert!(alone == after && alone[0] > 3000, "{alone:?} {after:?}");
+}

@@ -67,7 +67,9 @@ fn stderr_layer() -> AnyLayer {
 
 fn start(layers: Vec<AnyLayer>, default: &str) {
     let filter =
-        EnvFilter::try_from_env("FIRSTHAND_LOG").unwrap_or_else(|_| EnvFilter::new(default));
+        // The library of ROS 2 remarks on each of its sockets and on each message that it sends to itself.
+        EnvFilter::try_from_env("FIRSTHAND_LOG")
+            .unwrap_or_else(|_| EnvFilter::new(format!("{default},rustdds=error")));
     tracing_subscriber::registry().with(layers).with(filter).init();
 }
 

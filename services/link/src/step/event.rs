@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::failsafe::{Decision, battery::BatteryChange};
 
 /// The state from which a generation starts: the pace of mission time and the number of its first tick. The supervisor gives the
-/// number, because it follows the ticks, so the link writes no checkpoint.
+/// number, because it follows the ticks. The link's checkpoint has only what its driver knows of the robot's odometry.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State {
     /// The pace of mission time. [`Pace::Max`] is lockstep, in which the robot waits for each command. At any other pace mission time is
