@@ -65,7 +65,7 @@ enum Wire {
     Tcp(Stream<Tcp>),
     Serial(Stream<Serial>),
     #[cfg(feature = "ros2")]
-    Dds(Dds),
+    Dds(Box<Dds>),
 }
 
 impl Transport {
@@ -184,7 +184,7 @@ pub const SPEAKS_ROS2: bool = cfg!(feature = "ros2");
 
 #[cfg(feature = "ros2")]
 fn ros2(domain: u16, mission: &Mission) -> io::Result<Wire> {
-    Dds::open(domain, &ros2_driver::topics::Topics::of(mission)).map(Wire::Dds)
+    Dds::open(domain, &ros2_driver::topics::Topics::of(mission)).map(|dds| Wire::Dds(Box::new(dds)))
 }
 
 #[cfg(not(feature = "ros2"))]

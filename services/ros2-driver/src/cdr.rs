@@ -109,7 +109,7 @@ pub struct Writer(Vec<u8>);
 
 impl Writer {
     /// A message of nothing yet, after its encapsulation.
-    pub fn new() -> Self {
+    pub fn begin() -> Self {
         Self(vec![0, 1, 0, 0])
     }
 

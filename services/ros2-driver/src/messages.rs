@@ -26,7 +26,7 @@ impl Odometry {
         let (stamp_ns, [x, y, _], [i, j, k, w], twist) =
             Self::parts(payload).map_err(|error| error.to_string())?;
         let length = [i, j, k, w].iter().map(|part| part * part).sum::<f64>().sqrt();
-        if !((length - 1.0).abs() <= UNIT_WITHIN) {
+        if length.is_nan() || (length - 1.0).abs() > UNIT_WITHIN {
             return Err("an orientation that is no rotation; fill pose.pose.orientation".to_owned());
         }
         let heading = (2.0 * (w * k + i * j)).atan2(1.0 - 2.0 * (j * j + k * k));
@@ -105,7 +105,7 @@ fn header(reader: &mut Reader<'_>) -> Result<i64, Malformed> {
 /// A `geometry_msgs/Twist` or, if `stamped`, a `TwistStamped`. Its stamp is 0, which receivers take for their own time: the driver has
 /// no clock, and a stop must never be too old.
 pub fn write_twist(ahead: f64, turn: f64, stamped: bool) -> Vec<u8> {
-    let writer = Writer::new();
+    let writer = Writer::begin();
     let writer = if stamped { writer.u32(0).u32(0).empty_text() } else { writer };
     let numbers = [ahead, 0.0, 0.0, 0.0, 0.0, turn].into_iter();
     numbers.fold(writer, Writer::f64).bytes()
