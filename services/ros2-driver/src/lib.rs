@@ -7,9 +7,7 @@
 //! |---|---|
 //! | [`topics`] | THE table of topics |
 //! | [`messages`] | the messages, as far as the driver needs them |
-//! | [`cdr`] | their encoding |
 
-pub mod cdr;
 pub mod messages;
 pub mod topics;
 

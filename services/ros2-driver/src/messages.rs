@@ -2,7 +2,7 @@
 
 use common::mission::MOST_BEAMS;
 
-use crate::cdr::{Malformed, Reader, Writer};
+use ros2::cdr::{Malformed, Reader, Writer};
 
 /// The covariance of a pose or a twist has so many numbers.
 const COVARIANCE: usize = 36;
@@ -41,7 +41,7 @@ impl Odometry {
     fn parts(payload: &[u8]) -> Result<(i64, [f64; 3], [f64; 4], [f64; 6]), Malformed> {
         let mut reader = Reader::new(payload)?;
         let stamp_ns = header(&mut reader)?;
-        reader.skip_text()?;
+        reader.text()?;
         let (position, orientation) = (reader.f64s()?, reader.f64s()?);
         reader.f64s::<COVARIANCE>()?;
         Ok((stamp_ns, position, orientation, reader.f64s()?))
@@ -98,15 +98,16 @@ pub fn read_voltage(payload: &[u8]) -> Result<f32, Malformed> {
 /// The stamp of a header, nanoseconds.
 fn header(reader: &mut Reader<'_>) -> Result<i64, Malformed> {
     let (seconds, nanoseconds) = (reader.i32()?, reader.u32()?);
-    reader.skip_text()?;
+    reader.text()?;
     Ok(i64::from(seconds) * 1_000_000_000 + i64::from(nanoseconds))
 }
 
 /// A `geometry_msgs/Twist` or, if `stamped`, a `TwistStamped`. Its stamp is 0, which receivers take for their own time: the driver has
 /// no clock, and a stop must never be too old.
 pub fn write_twist(ahead: f64, turn: f64, stamped: bool) -> Vec<u8> {
-    let writer = Writer::begin();
-    let writer = if stamped { writer.u32(0).u32(0).empty_text() } else { writer };
-    let numbers = [ahead, 0.0, 0.0, 0.0, 0.0, turn].into_iter();
-    numbers.fold(writer, Writer::f64).bytes()
+    let mut writer = Writer::default();
+    if stamped {
+        writer.u32(0).u32(0).text("");
+    }
+    writer.f64s(&[ahead, 0.0, 0.0, 0.0, 0.0, turn]).take()
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use common::samples::RangeStatus;
 
 use super::*;
-use crate::cdr::Malformed;
+use ros2::cdr::Malformed;
 
 const ROBOT: &str = "target = [3, 0]\nrobot.model = 'turtlebot3-burger'\nrobot.protocol = 'ros2'\nrobot.address = 'ros2'\n";
 /// Stamp 12.5 s, at (1.5, -0.25) with heading 0.5, 0.2 m/s and -0.1 rad/s.

@@ -1,6 +1,7 @@
 //! THE table of a robot's topics: what the link subscribes to, and where it writes.
 
 use common::mission::Mission;
+use ros2::topic::Topic;
 
 /// The meaning of a topic that is heard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,26 +11,6 @@ pub enum Content {
     Battery,
     /// The range of the sensor in this row of the mission.
     Range(usize),
-}
-
-/// A topic as DDS knows it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Topic {
-    /// Its name in ROS, from the root.
-    pub name: String,
-    /// The name of its type in DDS.
-    pub type_name: &'static str,
-}
-
-impl Topic {
-    fn new(name: &str, type_name: &'static str) -> Self {
-        Self { name: format!("/{}", name.strip_prefix('/').unwrap_or(name)), type_name }
-    }
-
-    /// Its name in DDS.
-    pub fn dds_name(&self) -> String {
-        format!("rt{}", self.name)
-    }
 }
 
 /// The topics of a robot.

@@ -87,11 +87,19 @@ impl<'a> Reader<'a> {
         (0..length).map(|_| self.f32()).collect()
     }
 
-    /// Pass over a text.
-    pub fn skip_text(&mut self) -> Result<(), Malformed> {
+    /// The next `count` bytes as they are.
+    pub fn raw(&mut self, count: usize) -> Result<&'a [u8], Malformed> {
+        let bytes = self.bytes.get(self.at..).and_then(|rest| rest.get(..count));
+        let bytes = bytes.ok_or(Malformed::Short)?;
+        self.at += count;
+        Ok(bytes)
+    }
+
+    /// A text without the zero byte that ends it; what is not UTF-8 is left out.
+    pub fn text(&mut self) -> Result<&'a str, Malformed> {
         let length = self.length(LONGEST_TEXT)?;
-        self.at += length;
-        if self.at <= self.bytes.len() { Ok(()) } else { Err(Malformed::Short) }
+        let text = self.raw(length)?.split(|byte| *byte == 0).next().unwrap_or_default();
+        Ok(str::from_utf8(text).unwrap_or_default())
     }
 
     fn length(&mut self, most: usize) -> Result<usize, Malformed> {
@@ -107,33 +115,81 @@ impl<'a> Reader<'a> {
 #[derive(Clone, Debug)]
 pub struct Writer(Vec<u8>);
 
-impl Writer {
+impl Default for Writer {
     /// A message of nothing yet, after its encapsulation.
-    pub fn begin() -> Self {
+    fn default() -> Self {
         Self(vec![0, 1, 0, 0])
     }
+}
 
-    fn primitive<const N: usize>(mut self, bytes: [u8; N]) -> Self {
+impl Writer {
+    fn primitive<const N: usize>(&mut self, bytes: [u8; N]) -> &mut Self {
         let end = (self.0.len() - ENCAPSULATION).next_multiple_of(N) + ENCAPSULATION;
         self.0.resize(end, 0);
         self.0.extend(bytes);
         self
     }
 
-    pub fn u32(self, number: u32) -> Self {
+    pub fn u8(&mut self, number: u8) -> &mut Self {
+        self.primitive([number])
+    }
+
+    pub fn u16(&mut self, number: u16) -> &mut Self {
         self.primitive(number.to_le_bytes())
     }
 
-    pub fn f64(self, number: f64) -> Self {
+    pub fn u32(&mut self, number: u32) -> &mut Self {
         self.primitive(number.to_le_bytes())
     }
 
-    /// An empty text: a zero byte ends each.
-    pub fn empty_text(self) -> Self {
-        self.u32(1).primitive([0])
+    pub fn i32(&mut self, number: i32) -> &mut Self {
+        self.primitive(number.to_le_bytes())
     }
 
-    pub fn bytes(self) -> Vec<u8> {
-        self.0
+    pub fn f32(&mut self, number: f32) -> &mut Self {
+        self.primitive(number.to_le_bytes())
+    }
+
+    pub fn f64(&mut self, number: f64) -> &mut Self {
+        self.primitive(number.to_le_bytes())
+    }
+
+    pub fn f64s(&mut self, numbers: &[f64]) -> &mut Self {
+        numbers.iter().fold(self, |writer, number| writer.f64(*number))
+    }
+
+    /// Bytes of which the receiver knows how many there are.
+    pub fn raw(&mut self, bytes: &[u8]) -> &mut Self {
+        self.0.extend(bytes);
+        self
+    }
+
+    /// A text; a zero byte ends it.
+    pub fn text(&mut self, text: &str) -> &mut Self {
+        self.length(text.len() + 1).raw(text.as_bytes()).u8(0)
+    }
+
+    /// The length of a list, which its elements follow.
+    pub fn length(&mut self, elements: usize) -> &mut Self {
+        self.u32(u32::try_from(elements).unwrap_or(u32::MAX))
+    }
+
+    /// A list, of which `write` writes each element.
+    pub fn list<T>(
+        &mut self,
+        elements: impl IntoIterator<Item = T, IntoIter: ExactSizeIterator>,
+        mut write: impl FnMut(&mut Self, T),
+    ) -> &mut Self {
+        let elements = elements.into_iter();
+        self.length(elements.len());
+        for element in elements {
+            write(self, element);
+        }
+        self
+    }
+
+    /// The message with its encapsulation. Nothing more can be written to it.
+    pub fn take(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.0)
     }
 }

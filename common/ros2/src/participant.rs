@@ -1,0 +1,311 @@
+//! A participant of a DDS domain. Messages are payloads with their encapsulation, not decoded.
+//!
+//! The library's threads ring the participant's descriptor; no call here waits.
+
+use std::{
+    convert::Infallible,
+    env, fmt, io,
+    net::Ipv4Addr,
+    os::fd::{AsFd, BorrowedFd, OwnedFd},
+    sync::Arc,
+    task::{Wake, Waker},
+};
+
+use rustdds::{
+    DomainParticipant, DomainParticipantBuilder, Duration, QosPolicies, QosPolicyBuilder,
+    RTPSEntity as _, RepresentationIdentifier, StatusEvented as _, TopicKind, WriteOptionsBuilder,
+    bytes::Bytes,
+    dds::statusevents::DomainParticipantStatusEvent,
+    no_key::{
+        DataWriter, Decode, DefaultDecoder, DeserializerAdapter, SerializerAdapter,
+        SimpleDataReader,
+    },
+    policy::{Durability, History, Reliability},
+    rpc::SampleIdentity,
+};
+use rustix::{
+    event::{EventfdFlags, eventfd},
+    io::{read, write},
+};
+
+use crate::topic::Topic;
+
+/// The longest message that is received, bytes. A longer one is cut, and who decodes it refuses it.
+const LONGEST: usize = 65_535;
+/// So many messages that cannot be decoded are passed over at a time.
+const MOST_BROKEN: usize = 16;
+
+/// A message as DDS delivers it.
+type Payload = Vec<u8>;
+/// The number that DDS knows a participant, a reader or a writer by.
+pub type Gid = [u8; 16];
+
+/// What a reader demands, and what a writer offers.
+#[derive(Clone, Copy, Debug)]
+pub struct Quality {
+    /// What was lost is sent again.
+    pub is_reliable: bool,
+    /// Who comes later gets the newest messages.
+    pub is_latched: bool,
+    /// So many messages are kept at most.
+    pub depth: u16,
+}
+
+impl Quality {
+    fn policies(self) -> QosPolicies {
+        let reliability = match self.is_reliable {
+            true => Reliability::Reliable { max_blocking_time: Duration::ZERO },
+            false => Reliability::BestEffort,
+        };
+        let durability = match self.is_latched {
+            true => Durability::TransientLocal,
+            false => Durability::Volatile,
+        };
+        QosPolicyBuilder::new()
+            .reliability(reliability)
+            .durability(durability)
+            .history(History::KeepLast { depth: self.depth.into() })
+            .build()
+    }
+}
+
+/// Takes payloads as they are.
+#[derive(Clone, Copy)]
+struct Raw;
+
+impl DeserializerAdapter<Payload> for Raw {
+    type Error = Infallible;
+    type Decoded = Payload;
+
+    fn supported_encodings() -> &'static [RepresentationIdentifier] {
+        use RepresentationIdentifier as Encoding;
+        // Who decodes them refuses the others, with the reason.
+        const { &[Encoding::CDR_LE, Encoding::CDR_BE, Encoding::CDR2_LE, Encoding::CDR2_BE] }
+    }
+
+    fn transform_decoded(payload: Payload) -> Payload {
+        payload
+    }
+}
+
+impl DefaultDecoder<Payload> for Raw {
+    type Decoder = Self;
+    const DECODER: Self = Self;
+}
+
+impl Decode<'_, Payload> for Raw {
+    type Error = Infallible;
+
+    fn decode_bytes(
+        self,
+        bytes: &[u8],
+        as_: RepresentationIdentifier,
+    ) -> Result<Payload, Infallible> {
+        let bytes = bytes.get(..LONGEST).unwrap_or(bytes);
+        Ok([&as_.to_bytes()[..], &[0, 0], bytes].concat())
+    }
+}
+
+impl SerializerAdapter<Payload> for Raw {
+    type Error = Infallible;
+
+    fn output_encoding() -> RepresentationIdentifier {
+        RepresentationIdentifier::CDR_LE
+    }
+
+    fn to_bytes(payload: &Payload) -> Result<Bytes, Infallible> {
+        // The library writes the encapsulation itself.
+        Ok(Bytes::copy_from_slice(payload.get(4..).unwrap_or_default()))
+    }
+}
+
+/// Makes a descriptor readable.
+struct Bell(OwnedFd);
+
+impl Wake for Bell {
+    fn wake(self: Arc<Self>) {
+        // It fails when the descriptor has been rung very often, and is readable then.
+        let _ = write(&self.0, &1_u64.to_ne_bytes());
+    }
+}
+
+/// A participant of a domain.
+pub struct Participant {
+    inner: DomainParticipant,
+    rung: OwnedFd,
+    bell: Waker,
+}
+
+impl Participant {
+    /// Join `domain`, on this machine only if the environment says so as it does for ROS.
+    pub fn join(domain: u16) -> io::Result<Self> {
+        let mut builder = DomainParticipantBuilder::new(domain);
+        if is_local() {
+            builder = builder.with_only_networks([Ipv4Addr::LOCALHOST]);
+        }
+        let inner = builder.build().map_err(io::Error::other)?;
+        let rung = eventfd(0, EventfdFlags::NONBLOCK | EventfdFlags::CLOEXEC)?;
+        let bell = Waker::from(Arc::new(Bell(rung.try_clone()?)));
+        Ok(Self { inner, rung, bell })
+    }
+
+    /// A reader of `topic`.
+    pub fn reader(&self, topic: &Topic, quality: Quality) -> io::Result<Reader> {
+        let policies = quality.policies();
+        let subscriber = self.inner.create_subscriber(&policies).map_err(io::Error::other)?;
+        let topic = self.topic(topic, &policies)?;
+        let reader = subscriber
+            .create_simple_datareader_no_key(&topic, Some(policies))
+            .map_err(io::Error::other)?;
+        reader.set_waker(Some(self.bell.clone()));
+        Ok(Reader { inner: reader, bell: self.bell.clone() })
+    }
+
+    /// A writer of `topic`.
+    pub fn writer(&self, topic: &Topic, quality: Quality) -> io::Result<Writer> {
+        let policies = quality.policies();
+        let publisher = self.inner.create_publisher(&policies).map_err(io::Error::other)?;
+        let topic = self.topic(topic, &policies)?;
+        let writer = publisher.create_datawriter_no_key(&topic, Some(policies));
+        writer.map(Writer).map_err(io::Error::other)
+    }
+
+    fn topic(&self, topic: &Topic, policies: &QosPolicies) -> io::Result<rustdds::Topic> {
+        let (name, type_name) = (topic.dds_name(), topic.type_name.to_owned());
+        let topic = self.inner.create_topic(name, type_name, policies, TopicKind::NoKey);
+        topic.map_err(io::Error::other)
+    }
+
+    /// Let the descriptor be readable no more until something comes. Readers are asked after this, so that it is readable again for
+    /// what comes after they said that they have nothing.
+    pub fn unring(&self) {
+        let _ = read(&self.rung, &mut [0_u8; 8]);
+    }
+
+    /// The number of this participant.
+    pub fn gid(&self) -> Gid {
+        self.inner.guid().to_bytes()
+    }
+
+    /// What has changed since it was last asked: writers of other participants.
+    pub fn changes(&self) -> impl Iterator<Item = Change> {
+        let (own, events) = (self.inner.guid().prefix, self.inner.status_listener());
+        std::iter::from_fn(move || events.try_recv_status()).filter_map(move |event| match event {
+            DomainParticipantStatusEvent::WriterDetected { writer }
+                if writer.guid.prefix != own =>
+            {
+                Some(Change::Writer { gid: writer.guid.to_bytes(), dds_topic: writer.topic_name })
+            }
+            DomainParticipantStatusEvent::WriterLost { guid, .. } => {
+                Some(Change::Gone { gid: guid.to_bytes() })
+            }
+            _ => None,
+        })
+    }
+}
+
+/// A writer of another participant came or went.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Change {
+    /// It writes to the topic of this name in DDS.
+    Writer {
+        gid: Gid,
+        dds_topic: String,
+    },
+    Gone {
+        gid: Gid,
+    },
+}
+
+/// Whom a request came from; its reply names it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Request(SampleIdentity);
+
+/// A message and its sender.
+#[derive(Clone, Debug)]
+pub struct Message {
+    pub payload: Payload,
+    /// The number of the writer.
+    pub from: Gid,
+    pub request: Request,
+}
+
+/// Reads a topic.
+pub struct Reader {
+    inner: SimpleDataReader<Payload, Raw>,
+    bell: Waker,
+}
+
+impl Reader {
+    /// The next message, if one has come.
+    pub fn take(&self) -> Option<Message> {
+        self.inner.set_waker(Some(self.bell.clone()));
+        self.inner.drain_read_notifications();
+        // A message in an encoding that is unknown here is an error, and the next may be another.
+        let message = (0..MOST_BROKEN).find_map(|_| self.inner.try_take_one().ok())??;
+        // A client of Fast DDS names the reader that waits for the reply; the number is that of the request itself.
+        let asked = message
+            .related_sample_identity()
+            .map_or(message.writer_guid, |asked| asked.writer_guid);
+        let request = Request(SampleIdentity {
+            writer_guid: asked,
+            sequence_number: message.sequence_number,
+        });
+        let from = message.writer_guid.to_bytes();
+        Some(Message { payload: message.sample, from, request })
+    }
+
+    pub fn gid(&self) -> Gid {
+        self.inner.guid().to_bytes()
+    }
+}
+
+/// Writes to a topic.
+pub struct Writer(DataWriter<Payload, Raw>);
+
+impl Writer {
+    /// Send a payload. Returns whether the library took it; it takes none while it is busy.
+    pub fn write(&self, payload: Payload) -> bool {
+        self.0.write(payload, None).is_ok()
+    }
+
+    /// Reply to a request.
+    pub fn reply(&self, to: Request, payload: Payload) -> bool {
+        let options = WriteOptionsBuilder::new().related_sample_identity(to.0).build();
+        self.0.write_with_options(payload, options).is_ok()
+    }
+
+    pub fn gid(&self) -> Gid {
+        self.0.guid().to_bytes()
+    }
+}
+
+/// Whether the environment keeps ROS on this machine.
+fn is_local() -> bool {
+    let is = |name: &str, value: &str| env::var(name).is_ok_and(|set| set == value);
+    is("ROS_LOCALHOST_ONLY", "1") || is("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+}
+
+impl AsFd for Participant {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.rung.as_fd()
+    }
+}
+
+impl fmt::Debug for Participant {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Participant").field("guid", &self.inner.guid()).finish_non_exhaustive()
+    }
+}
+
+impl fmt::Debug for Reader {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Reader").field("guid", &self.inner.guid()).finish_non_exhaustive()
+    }
+}
+
+impl fmt::Debug for Writer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Writer").field("guid", &self.0.guid()).finish_non_exhaustive()
+    }
+}

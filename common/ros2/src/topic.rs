@@ -1,0 +1,36 @@
+//! A topic as DDS knows it.
+
+/// A topic of messages, or one that carries the requests or the replies of a service.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Topic {
+    /// Its name in ROS, from the root.
+    pub name: String,
+    /// The name of its type in DDS.
+    pub type_name: &'static str,
+    /// What its name in DDS begins and ends with.
+    ends: [&'static str; 2],
+}
+
+impl Topic {
+    /// A topic of messages of this type, such as `nav_msgs::msg::dds_::Odometry_`.
+    pub fn new(name: &str, type_name: &'static str) -> Self {
+        Self { name: absolute(name), type_name, ends: ["rt", ""] }
+    }
+
+    /// The topics of a service: what clients ask, and what they are answered.
+    pub fn service(name: &str, [request, reply]: [&'static str; 2]) -> [Self; 2] {
+        [
+            Self { name: absolute(name), type_name: request, ends: ["rq", "Request"] },
+            Self { name: absolute(name), type_name: reply, ends: ["rr", "Reply"] },
+        ]
+    }
+
+    /// Its name in DDS.
+    pub fn dds_name(&self) -> String {
+        format!("{}{}{}", self.ends[0], self.name, self.ends[1])
+    }
+}
+
+fn absolute(name: &str) -> String {
+    format!("/{}", name.trim_start_matches('/'))
+}
