@@ -128,8 +128,8 @@ impl Address<String> {
     }
 }
 
-/// The domain that `ROS_DOMAIN_ID` names.
-fn domain_of_environment() -> Result<u16, AddressError> {
+/// The domain that `ROS_DOMAIN_ID` names; 0 without it.
+pub fn domain_of_environment() -> Result<u16, AddressError> {
     let Some(text) = std::env::var_os("ROS_DOMAIN_ID").filter(|text| !text.is_empty()) else {
         return Ok(0);
     };

@@ -6,7 +6,7 @@ use thiserror::Error;
 /// The longest text of a message, bytes; ROS uses them for the names of frames.
 const LONGEST_TEXT: usize = 256;
 /// The bytes before the message that name its encoding.
-const ENCAPSULATION: usize = 4;
+pub(crate) const ENCAPSULATION: usize = 4;
 
 /// The bytes are not the message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]

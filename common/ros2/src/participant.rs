@@ -28,7 +28,7 @@ use rustix::{
     io::{read, write},
 };
 
-use crate::topic::Topic;
+use crate::{cdr::ENCAPSULATION, topic::Topic};
 
 /// The longest message that is received, bytes. A longer one is cut, and who decodes it refuses it.
 const LONGEST: usize = 65_535;
@@ -115,7 +115,7 @@ impl SerializerAdapter<Payload> for Raw {
 
     fn to_bytes(payload: &Payload) -> Result<Bytes, Infallible> {
         // The library writes the encapsulation itself.
-        Ok(Bytes::copy_from_slice(payload.get(4..).unwrap_or_default()))
+        Ok(Bytes::copy_from_slice(payload.get(ENCAPSULATION..).unwrap_or_default()))
     }
 }
 
@@ -137,11 +137,12 @@ pub struct Participant {
 }
 
 impl Participant {
-    /// Join `domain`, on this machine only if the environment says so as it does for ROS.
-    pub fn join(domain: u16) -> io::Result<Self> {
+    /// Join `domain` by the network interface with the address `only`, or else by all of them; by none but this machine's own if the
+    /// environment says so as it does for ROS.
+    pub fn join(domain: u16, only: Option<Ipv4Addr>) -> io::Result<Self> {
         let mut builder = DomainParticipantBuilder::new(domain);
-        if is_local() {
-            builder = builder.with_only_networks([Ipv4Addr::LOCALHOST]);
+        if let Some(only) = only.or_else(|| is_local().then_some(Ipv4Addr::LOCALHOST)) {
+            builder = builder.with_only_networks([only]);
         }
         let inner = builder.build().map_err(io::Error::other)?;
         let rung = eventfd(0, EventfdFlags::NONBLOCK | EventfdFlags::CLOEXEC)?;
@@ -217,9 +218,24 @@ pub enum Change {
     },
 }
 
-/// Whom a request came from; its reply names it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Request(SampleIdentity);
+/// The header that Cyclone DDS puts before a request: the client's number and that of the request, 8 bytes each. The reply repeats it.
+const CYCLONE_HEADER: usize = 16;
+
+/// Whom a request came from. Fast DDS says so beside the message, as the standard has it, and Cyclone DDS in it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Request {
+    identity: SampleIdentity,
+    /// What stands before the request, and before its reply; nothing of Fast DDS.
+    header: Vec<u8>,
+}
+
+impl Request {
+    /// The payload of a request without what stands before it.
+    pub fn without_header(&self, payload: &[u8]) -> Payload {
+        let (encapsulation, rest) = payload.split_at(payload.len().min(ENCAPSULATION));
+        [encapsulation, rest.get(self.header.len()..).unwrap_or_default()].concat()
+    }
+}
 
 /// A message and its sender.
 #[derive(Clone, Debug)]
@@ -243,16 +259,23 @@ impl Reader {
         self.inner.drain_read_notifications();
         // A message in an encoding that is unknown here is an error, and the next may be another.
         let message = (0..MOST_BROKEN).find_map(|_| self.inner.try_take_one().ok())??;
+        let asked = message.related_sample_identity();
         // A client of Fast DDS names the reader that waits for the reply; the number is that of the request itself.
-        let asked = message
-            .related_sample_identity()
-            .map_or(message.writer_guid, |asked| asked.writer_guid);
-        let request = Request(SampleIdentity {
-            writer_guid: asked,
-            sequence_number: message.sequence_number,
-        });
+        let writer_guid = asked.map_or(message.writer_guid, |asked| asked.writer_guid);
+        let after_encapsulation = message.sample.get(ENCAPSULATION..).unwrap_or_default();
+        let header = match asked {
+            Some(_) => &[],
+            None => after_encapsulation.get(..CYCLONE_HEADER).unwrap_or_default(),
+        };
+        let identity = SampleIdentity { writer_guid, sequence_number: message.sequence_number };
+        let request = Request { identity, header: header.to_vec() };
         let from = message.writer_guid.to_bytes();
         Some(Message { payload: message.sample, from, request })
+    }
+
+    /// The messages that have come. Who floods the topic makes them endless.
+    pub fn messages(&self) -> impl Iterator<Item = Message> {
+        std::iter::from_fn(|| self.take())
     }
 
     pub fn gid(&self) -> Gid {
@@ -270,8 +293,10 @@ impl Writer {
     }
 
     /// Reply to a request.
-    pub fn reply(&self, to: Request, payload: Payload) -> bool {
-        let options = WriteOptionsBuilder::new().related_sample_identity(to.0).build();
+    pub fn reply(&self, to: &Request, payload: &[u8]) -> bool {
+        let options = WriteOptionsBuilder::new().related_sample_identity(to.identity).build();
+        let (encapsulation, rest) = payload.split_at(payload.len().min(ENCAPSULATION));
+        let payload = [encapsulation, &to.header, rest].concat();
         self.0.write_with_options(payload, options).is_ok()
     }
 

@@ -17,6 +17,11 @@ impl Topic {
         Self { name: absolute(name), type_name, ends: ["rt", ""] }
     }
 
+    /// A topic outside of the names of ROS, by its name in DDS.
+    pub fn plain(name: &str, type_name: &'static str) -> Self {
+        Self { name: name.to_owned(), type_name, ends: ["", ""] }
+    }
+
     /// The topics of a service: what clients ask, and what they are answered.
     pub fn service(name: &str, [request, reply]: [&'static str; 2]) -> [Self; 2] {
         [

@@ -54,6 +54,19 @@ impl PoseSample {
         Pose2 { position: DVec2::new(self.x_m, self.y_m), heading: self.heading_rad }
     }
 
+    /// The covariance as messages of ROS have it, by rows: of x, y, z and the rotations about them, of which only x, y and the last
+    /// are estimated.
+    pub fn covariance_6x6(&self) -> [f64; 36] {
+        let [xx, xy, xt, yy, yt, tt] = self.covariance;
+        let mut whole = [0.0; 36];
+        for (row, values) in [(0, [xx, xy, xt]), (1, [xy, yy, yt]), (5, [xt, yt, tt])] {
+            for (col, value) in [0, 1, 5].into_iter().zip(values) {
+                whole[row * 6 + col] = value;
+            }
+        }
+        whole
+    }
+
     /// Root of the mean square of the position's error, as the covariance has it, metres.
     pub fn position_rms_m(&self) -> f64 {
         let [xx, _, _, yy, ..] = self.covariance;

@@ -33,7 +33,8 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 
 #[cfg(feature = "tools")]
 use crate::tools::{
-    bench, calibrate, completions, evaluate, experiments, field, man, map, replay, report, top,
+    bench, calibrate, completions, evaluate, experiments, field, man, map, replay, report, ros2,
+    top,
 };
 use crate::{console::failure::Failure, renamed};
 
@@ -115,7 +116,7 @@ commands! {
         Logs logs,
         Runs runs,
         Table table,
-        @tools { Map map, }
+        @tools { Map map, Ros2 ros2, }
         @foxglove { Foxglove foxglove }
     }
     "Record it" {
@@ -197,6 +198,9 @@ impl Command {
             // A client could fill the log with its own errors.
             #[cfg(feature = "foxglove")]
             Self::Foxglove(_) => Some("error,foxglove=off"),
+            // What is refused of what others ask is said.
+            #[cfg(feature = "tools")]
+            Self::Ros2(_) => Some("warn,rustdds=off"),
             _ => Some("error"),
         }
     }

@@ -13,5 +13,6 @@ pub(crate) mod map;
 mod mission_progress;
 pub(crate) mod replay;
 pub(crate) mod report;
+pub(crate) mod ros2;
 pub(crate) mod run_report;
 pub(crate) mod top;

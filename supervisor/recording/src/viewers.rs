@@ -138,14 +138,6 @@ impl Drawn {
         self.trajectory.push(point(sample.x_m, sample.y_m));
         let timestamp = time(now_ns);
         let pose = pose(sample.pose());
-        let [xx, xy, xt, yy, yt, tt] = sample.covariance;
-        let mut covariance = vec![0.0; 36];
-        // Of x, y, z and the rotations about them only x, y and the last are estimated.
-        for (row, values) in [(0, [xx, xy, xt]), (1, [xy, yy, yt]), (5, [xt, yt, tt])] {
-            for (col, value) in [0, 1, 5].into_iter().zip(values) {
-                covariance[row * 6 + col] = value;
-            }
-        }
         let odometry = Odometry {
             timestamp,
             frame_id: MAP.to_owned(),
@@ -153,7 +145,7 @@ impl Drawn {
             pose,
             linear_velocity: Some(Vector3 { x: sample.v_m_s, y: 0.0, z: 0.0 }),
             angular_velocity: Some(Vector3 { x: 0.0, y: 0.0, z: sample.omega_rad_s }),
-            pose_covariance: covariance,
+            pose_covariance: sample.covariance_6x6().to_vec(),
             velocity_covariance: vec![0.0; 36],
             ..Odometry::default()
         };

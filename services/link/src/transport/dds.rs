@@ -48,7 +48,7 @@ pub(super) struct Dds {
 impl Dds {
     /// A participant of `domain` for the robot with these topics.
     pub(super) fn open(domain: u16, topics: &Topics) -> io::Result<Self> {
-        let participant = Participant::join(domain)?;
+        let participant = Participant::join(domain, None)?;
         let heard = Quality { is_reliable: false, is_latched: false, depth: DEPTH };
         let readers = topics.heard.iter().map(|(_, topic)| participant.reader(topic, heard));
         let told = Quality { is_reliable: true, is_latched: false, depth: 1 };

@@ -29,6 +29,9 @@ enum Table {
     Failsafe,
     /// Print the faults that can be put into stages (`firsthand stage fault`).
     Faults,
+    /// Print the topics of the bridge to ROS 2 (`firsthand ros2`).
+    #[cfg(feature = "tools")]
+    Ros2,
     /// Print what was measured.
     #[cfg(feature = "tools")]
     Results,
@@ -41,6 +44,8 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     Ok(print_text(&match arguments.table {
         Table::Failsafe => failsafe(),
         Table::Faults => faults(),
+        #[cfg(feature = "tools")]
+        Table::Ros2 => ros2(),
         #[cfg(feature = "tools")]
         Table::Results => stored::results(),
         #[cfg(feature = "tools")]
@@ -56,6 +61,7 @@ pub(crate) fn shown(name: &str, section: Option<&str>) -> Option<String> {
         "stages" => Some(stages()),
         "failsafe" => Some(failsafe()),
         "faults" => Some(faults()),
+        "ros2" => Some(ros2()),
         stored => stored::markdown(stored, section),
     }
 }
@@ -145,6 +151,19 @@ fn faults() -> String {
         item(&format!("`{}` ({stage}): {}; until: {}", fault.name, fault.meaning, fault.ends))
     };
     faults::TABLE.iter().map(row).collect()
+}
+
+#[cfg(feature = "tools")]
+fn ros2() -> String {
+    let row = |spec: &ros2_bridge::topics::Spec| {
+        let [package, message] = spec.message;
+        let way = match spec.accepted_by {
+            None => String::new(),
+            Some(by) => format!("taken with `--accept {}`; ", format!("{by:?}").to_lowercase()),
+        };
+        item(&format!("`{}` (`{package}/{message}`): {way}{}", spec.name, spec.meaning))
+    };
+    ros2_bridge::topics::TABLE.iter().map(row).collect()
 }
 
 #[cfg(test)]

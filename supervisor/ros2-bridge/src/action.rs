@@ -1,0 +1,246 @@
+//! The server of the action `navigate_to_pose`: goals, their states, and the messages of its services and topics. Pure.
+//!
+//! It has one goal at a time: a newer one takes its place, as in Nav2. A goal is reached when the controller says so of the target
+//! that the supervisor made of it.
+
+use std::collections::VecDeque;
+
+use common::samples::{CommandSample, CommandState, PoseSample, TargetPoint, TargetSample};
+use ros2::cdr::{Reader, Writer};
+
+use crate::{
+    asked::{goal_of, malformed},
+    messages::{Header, pose_stamped},
+    shown::MAP,
+};
+
+/// The id that a client gave its goal.
+pub type Uuid = [u8; 16];
+
+/// The services and topics of the action, and their types in DDS.
+pub const SEND_GOAL: (&str, [&str; 2]) = (
+    "navigate_to_pose/_action/send_goal",
+    [
+        "nav2_msgs::action::dds_::NavigateToPose_SendGoal_Request_",
+        "nav2_msgs::action::dds_::NavigateToPose_SendGoal_Response_",
+    ],
+);
+pub const CANCEL_GOAL: (&str, [&str; 2]) = (
+    "navigate_to_pose/_action/cancel_goal",
+    ["action_msgs::srv::dds_::CancelGoal_Request_", "action_msgs::srv::dds_::CancelGoal_Response_"],
+);
+pub const GET_RESULT: (&str, [&str; 2]) = (
+    "navigate_to_pose/_action/get_result",
+    [
+        "nav2_msgs::action::dds_::NavigateToPose_GetResult_Request_",
+        "nav2_msgs::action::dds_::NavigateToPose_GetResult_Response_",
+    ],
+);
+pub const FEEDBACK: (&str, &str) = (
+    "navigate_to_pose/_action/feedback",
+    "nav2_msgs::action::dds_::NavigateToPose_FeedbackMessage_",
+);
+pub const STATUS: (&str, &str) =
+    ("navigate_to_pose/_action/status", "action_msgs::msg::dds_::GoalStatusArray_");
+
+/// So many goals are remembered, the newest.
+const MOST_GOALS: usize = 16;
+
+/// A `action_msgs/GoalStatus`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    Executing = 2,
+    Canceling = 3,
+    Succeeded = 4,
+    Canceled = 5,
+    Aborted = 6,
+}
+
+impl Status {
+    /// Whether it stays as it is.
+    pub const fn is_final(self) -> bool {
+        matches!(self, Self::Succeeded | Self::Canceled | Self::Aborted)
+    }
+}
+
+/// The answer to a request to cancel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Cancel {
+    Taken = 0,
+    Unknown = 2,
+    Over = 3,
+}
+
+/// A goal that was accepted.
+#[derive(Clone, Debug)]
+struct Goal {
+    id: Uuid,
+    /// When it was accepted, nanoseconds since 1970.
+    at_ns: u64,
+    point: TargetPoint,
+    /// The number of its target, once the supervisor has published it.
+    number: Option<u64>,
+    /// Targets up to this one are older.
+    after: u64,
+    status: Status,
+}
+
+/// The server's goals.
+#[derive(Debug, Default)]
+pub struct Server {
+    goals: VecDeque<Goal>,
+    /// The number of the newest target.
+    newest_target: u64,
+    /// Whether the states have changed since they were last published.
+    is_changed: bool,
+}
+
+/// A goal that a client sends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sent {
+    pub id: Uuid,
+    pub point: TargetPoint,
+}
+
+impl Server {
+    /// What a client sends. Who does not understand it refuses it.
+    pub fn read_goal(payload: &[u8]) -> Result<Sent, String> {
+        let mut reader = Reader::new(payload).map_err(malformed)?;
+        let id = uuid(&mut reader)?;
+        Ok(Sent { id, point: goal_of(&mut reader)? })
+    }
+
+    /// The reply to a goal, at `now_ns` since 1970.
+    pub fn goal_reply(is_accepted: bool, now_ns: u64) -> Vec<u8> {
+        Writer::default().u8(is_accepted.into()).time(now_ns).take()
+    }
+
+    /// The number of the newest target, which the target of a goal that is sent now follows.
+    pub const fn newest_target(&self) -> u64 {
+        self.newest_target
+    }
+
+    /// Take a goal that the supervisor accepted; its target comes after the one with the number `after`.
+    pub fn accept(&mut self, sent: Sent, after: u64, now_ns: u64) {
+        self.end(Status::Aborted);
+        if self.goals.len() == MOST_GOALS {
+            self.goals.pop_front();
+        }
+        let Sent { id, point } = sent;
+        let status = Status::Executing;
+        self.goals.push_back(Goal { id, at_ns: now_ns, point, number: None, after, status });
+        self.is_changed = true;
+    }
+
+    /// Let the goal that is not over end so.
+    pub fn end(&mut self, status: Status) {
+        for goal in self.goals.iter_mut().filter(|goal| !goal.status.is_final()) {
+            goal.status = status;
+            self.is_changed = true;
+        }
+    }
+
+    /// Another run begins, which counts its targets from 1.
+    pub fn forget_targets(&mut self) {
+        self.newest_target = 0;
+    }
+
+    pub fn target(&mut self, target: &TargetSample) {
+        self.newest_target = target.number;
+        let Some(goal) = self.goals.back_mut().filter(|goal| !goal.status.is_final()) else {
+            return;
+        };
+        match goal.number {
+            None if target.number > goal.after
+                && target.target.position() == goal.point.position() =>
+            {
+                goal.number = Some(target.number);
+            }
+            Some(number) if target.number > number => self.end(Status::Aborted),
+            _ => {}
+        }
+    }
+
+    pub fn command(&mut self, command: &CommandSample) {
+        let has_arrived = CommandState::from_byte(command.state) == CommandState::Arrived;
+        let goal = self.goals.back().filter(|goal| goal.number == Some(command.target_number));
+        if has_arrived && goal.is_some_and(|goal| goal.status == Status::Executing) {
+            self.end(Status::Succeeded);
+        }
+    }
+
+    /// Take a request to cancel. Returns the reply, and whether the robot is to stand for it.
+    pub fn cancel(&mut self, payload: &[u8]) -> Result<(Vec<u8>, bool), String> {
+        let mut reader = Reader::new(payload).map_err(malformed)?;
+        let (id, until_ns) = (uuid(&mut reader)?, reader.time().map_err(malformed)?);
+        let is_any = id == Uuid::default();
+        let until_ns = u64::try_from(until_ns).unwrap_or_default();
+        let is_asked = |goal: &Goal| {
+            goal.id == id || (is_any && until_ns == 0) || (until_ns > 0 && goal.at_ns <= until_ns)
+        };
+        let mut canceled = Vec::new();
+        for goal in self.goals.iter_mut().filter(|goal| is_asked(goal)) {
+            if goal.status == Status::Executing {
+                goal.status = Status::Canceling;
+                self.is_changed = true;
+                canceled.push((goal.id, goal.at_ns));
+            }
+        }
+        let answer = match self.goals.iter().any(|goal| goal.id == id) {
+            _ if is_any || !canceled.is_empty() => Cancel::Taken,
+            true => Cancel::Over,
+            false => Cancel::Unknown,
+        };
+        let reply = Writer::default()
+            .u8(answer as u8)
+            .list(&canceled, |writer, (id, at_ns)| {
+                writer.raw(id).time(*at_ns);
+            })
+            .take();
+        Ok((reply, !canceled.is_empty()))
+    }
+
+    /// The goal of which a client asks for the result.
+    pub fn read_result(payload: &[u8]) -> Result<Uuid, String> {
+        uuid(&mut Reader::new(payload).map_err(malformed)?)
+    }
+
+    /// The result of a goal; none while it is not over. Of an unknown one the state is 0.
+    pub fn result(&self, id: Uuid) -> Option<Vec<u8>> {
+        let goal = self.goals.iter().find(|goal| goal.id == id);
+        if goal.is_some_and(|goal| !goal.status.is_final()) {
+            return None;
+        }
+        let status = goal.map_or(0, |goal| goal.status as u8);
+        // No error code, and no text of one.
+        Some(Writer::default().u8(status).u16(0).text("").take())
+    }
+
+    /// The states of all goals, if they have changed.
+    pub fn take_status(&mut self) -> Option<Vec<u8>> {
+        let status = |writer: &mut Writer, goal: &Goal| {
+            writer.raw(&goal.id).time(goal.at_ns).u8(goal.status as u8);
+        };
+        let is_changed = std::mem::take(&mut self.is_changed);
+        is_changed.then(|| Writer::default().list(&self.goals, status).take())
+    }
+
+    /// How far the robot is with its goal; none without one.
+    pub fn feedback(&self, pose: &PoseSample, recoveries: u64, now_ns: u64) -> Option<Vec<u8>> {
+        let goal = self.goals.back().filter(|goal| !goal.status.is_final())?;
+        let at = pose.pose();
+        let left_m = at.position.distance(goal.point.position());
+        let mut writer = Writer::default();
+        writer.raw(&goal.id);
+        pose_stamped(&mut writer, Header(now_ns, MAP), [at.position.x, at.position.y, at.heading]);
+        // The time that remains is not estimated.
+        writer.time(now_ns.saturating_sub(goal.at_ns)).time(0);
+        writer.u16(u16::try_from(recoveries).unwrap_or(u16::MAX)).f32(left_m as f32);
+        Some(writer.take())
+    }
+}
+
+fn uuid(reader: &mut Reader<'_>) -> Result<Uuid, String> {
+    let bytes = reader.raw(16).map_err(malformed)?;
+    bytes.try_into().map_err(|_| "an id of other than 16 bytes".to_owned())
+}

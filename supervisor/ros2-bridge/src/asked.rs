@@ -1,0 +1,59 @@
+//! What nodes ask for by topics: messages in, their meaning out. Each is refused whole, with a reason, or taken.
+
+use common::{kinematics::Pose2, samples::TargetPoint};
+use glam::DVec2;
+use ros2::cdr::{Malformed, Reader};
+
+use crate::shown::MAP;
+
+/// Where a node says that the robot is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    pub pose: Pose2,
+    /// Of x, y and heading: xx, xy, x theta, yy, y theta, theta theta.
+    pub covariance: [f64; 6],
+}
+
+/// The target of a `geometry_msgs/PoseStamped`.
+pub fn goal(payload: &[u8]) -> Result<TargetPoint, String> {
+    goal_of(&mut Reader::new(payload).map_err(malformed)?)
+}
+
+/// The target of a `geometry_msgs/PoseStamped` that is a part of a message.
+pub(crate) fn goal_of(reader: &mut Reader<'_>) -> Result<TargetPoint, String> {
+    let Pose2 { position, heading } = pose_in_map(reader)?;
+    Ok(TargetPoint { x_m: position.x, y_m: position.y, heading_rad: heading, has_heading: 1 })
+}
+
+/// The place of a `geometry_msgs/PoseWithCovarianceStamped`.
+pub fn place(payload: &[u8]) -> Result<Place, String> {
+    let mut reader = Reader::new(payload).map_err(malformed)?;
+    let pose = pose_in_map(&mut reader)?;
+    let all: [f64; 36] = reader.f64s().map_err(malformed)?;
+    Ok(Place { pose, covariance: [0, 1, 5, 7, 11, 35].map(|at| all[at]) })
+}
+
+/// The value of a `std_msgs/Bool`.
+pub fn flag(payload: &[u8]) -> Result<bool, String> {
+    let value = Reader::new(payload).and_then(|mut reader| reader.u8());
+    value.map(|value| value != 0).map_err(malformed)
+}
+
+/// A header and a pose in the mission's frame.
+fn pose_in_map(reader: &mut Reader<'_>) -> Result<Pose2, String> {
+    reader.time().map_err(malformed)?;
+    let frame = reader.text().map_err(malformed)?;
+    if !(frame.is_empty() || frame.trim_start_matches('/') == MAP) {
+        return Err(format!("a pose in the frame {frame:?}; give it in {MAP:?}"));
+    }
+    let ([x, y], heading) = reader.pose().map_err(malformed)?;
+    let heading = heading.ok_or("an orientation that is no rotation; fill orientation.w")?;
+    if !(x.is_finite() && y.is_finite()) {
+        return Err("a position that is no number; give metres".to_owned());
+    }
+    Ok(Pose2 { position: DVec2::new(x, y), heading })
+}
+
+pub(crate) fn malformed(error: Malformed) -> String {
+    error.to_string()
+}

@@ -1,0 +1,436 @@
+//! The bridge: it follows one robot from run to run, publishes what it reads, and has done what nodes may ask for.
+
+use std::{
+    io,
+    net::Ipv4Addr,
+    time::{Duration, Instant, SystemTime, UNIX_EPOCH},
+};
+
+use common::{
+    bus::{Bus, BusError, Reader, SliceReader, Writer},
+    domain::{Domain, RobotName},
+    follower::{Event, Follower},
+    kinematics::Pose2,
+    run::Run,
+    samples::{
+        CommandSample, DeathSample, FieldCell, FieldHeader, FixSample, GridHeader, LinkSample,
+        PoseSample, PowerSample, RangeReading, RangesHeader, RequestKind, RequestSample,
+        RosterEntry, RosterHeader, ScanHeader, StallSample, TargetPoint, TargetSample, name,
+    },
+    topics,
+};
+use glam::DVec2;
+use ros2::participant::{Message, Request};
+use thiserror::Error;
+
+use crate::{
+    action::{Server, Status, Uuid},
+    asked::{self, Place},
+    endpoints::{Call, Endpoints},
+    orders::{Done, Order, Orders, Why},
+    shown::Shown,
+    topics::{Accept, Id},
+};
+
+/// How often what nodes ask, a run that has ended or begun, or the end of this process is noticed when nothing is published.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
+/// Feedback of a goal is published so often.
+const FEEDBACK_EVERY: Duration = Duration::from_millis(100);
+/// A bus that cannot be used is tried again after this time.
+const AGAIN_AFTER: Duration = Duration::from_secs(1);
+/// A place that a node names is given for so long, so often: dead reckoning believes fixes that contradict it when ten of them agree
+/// over three seconds.
+const PLACED_FOR: Duration = Duration::from_secs(4);
+const PLACED_EVERY: Duration = Duration::from_millis(350);
+/// A place is not known better than this, metres and radians, whatever its covariance says.
+const PLACE_SIGMAS: [f64; 2] = [0.05, 0.05];
+/// So many clients wait for results at most.
+const MOST_RESULTS: usize = 32;
+/// What is refused is told so often at most.
+const TELL_EVERY: Duration = Duration::from_secs(1);
+
+/// How the bridge is set up.
+#[derive(Clone, Debug)]
+pub struct Options {
+    pub robot: RobotName,
+    /// The domain of DDS.
+    pub domain: u16,
+    /// The address of the network interface; all of them without it.
+    pub interface: Option<Ipv4Addr>,
+    /// Below which topics stand.
+    pub namespace: String,
+    /// What others may ask for.
+    pub accepted: Vec<Accept>,
+}
+
+/// The bridge cannot be opened.
+#[derive(Debug, Error)]
+pub enum BridgeError {
+    #[error(
+        "cannot join domain {domain} of ROS 2: {source}; is the address of --interface one of this machine?"
+    )]
+    Join { domain: u16, source: io::Error },
+    #[error("cannot start a thread: {0}")]
+    Thread(io::Error),
+}
+
+/// The readers of a robot's bus.
+struct Readers {
+    pose: Reader<PoseSample>,
+    ranges: SliceReader<RangesHeader, RangeReading>,
+    scan: SliceReader<ScanHeader, f32>,
+    target: Reader<TargetSample>,
+    grid: SliceReader<GridHeader, u8>,
+    field: SliceReader<FieldHeader, FieldCell>,
+    command: Reader<CommandSample>,
+    power: Reader<PowerSample>,
+    roster: SliceReader<RosterHeader, RosterEntry>,
+    deaths: Reader<DeathSample>,
+    stalls: Reader<StallSample>,
+    requests: Reader<RequestSample>,
+    link: Reader<LinkSample>,
+    fixes: Writer<FixSample>,
+}
+
+impl Readers {
+    fn open(bus: &Bus) -> Result<Self, BusError> {
+        Ok(Self {
+            pose: bus.reader(&topics::POSE)?,
+            ranges: bus.slice_reader(&topics::RANGES)?,
+            scan: bus.slice_reader(&topics::SCAN)?,
+            target: bus.reader(&topics::TARGET)?,
+            grid: bus.slice_reader(&topics::GRID)?,
+            field: bus.slice_reader(&topics::FIELD)?,
+            command: bus.reader(&topics::COMMAND)?,
+            power: bus.reader(&topics::POWER)?,
+            roster: bus.slice_reader(&topics::ROSTER)?,
+            deaths: bus.reader(&topics::DEATHS)?,
+            stalls: bus.reader(&topics::STALLS)?,
+            requests: bus.reader(&topics::REQUESTS)?,
+            link: bus.reader(&topics::LINK)?,
+            fixes: bus.writer(&topics::FIX, 1)?,
+        })
+    }
+}
+
+/// A place that a node named.
+struct Placed {
+    place: Place,
+    /// The pose when it was named.
+    then: Pose2,
+    since: Instant,
+    newest: Option<Instant>,
+}
+
+/// What is bridged.
+struct Bridge {
+    robot: RobotName,
+    endpoints: Endpoints,
+    orders: Orders,
+    shown: Option<Shown>,
+    goals: Server,
+    /// Clients that wait for the result of a goal.
+    results: Vec<(Request, Uuid)>,
+    recoveries: u64,
+    feedback_at: Instant,
+    placed: Option<Placed>,
+    /// The robot stands for a goal that was canceled, and nobody else has asked for a stop since. Those that were asked since.
+    stands_for_cancel: Option<u32>,
+    told_at: Option<Instant>,
+}
+
+/// Bridge a robot, from run to run, until `ended` says so.
+pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), BridgeError> {
+    let Options { robot, domain, interface, namespace, accepted } = options;
+    let endpoints = Endpoints::open(*domain, *interface, namespace, accepted)
+        .map_err(|source| BridgeError::Join { domain: *domain, source })?;
+    let mut bridge = Bridge {
+        robot: robot.clone(),
+        endpoints,
+        orders: Orders::new(robot).map_err(BridgeError::Thread)?,
+        shown: None,
+        goals: Server::default(),
+        results: Vec::new(),
+        recoveries: 0,
+        feedback_at: Instant::now(),
+        placed: None,
+        stands_for_cancel: None,
+        told_at: None,
+    };
+    let domain = Domain::of(robot.clone());
+    let mut follower = Follower::new(domain.clone(), "ros2", &topics::LINK, Readers::open);
+    while !ended() {
+        let taken = match follower.wait(LOOK_EVERY) {
+            Ok(Event::Connected) => {
+                bridge.begin(&domain);
+                Ok(())
+            }
+            Ok(Event::Samples(readers)) => bridge.take(readers),
+            Ok(Event::Disconnected) => {
+                bridge.end();
+                Ok(())
+            }
+            Ok(Event::Nothing) => Ok(()),
+            Err(error) => Err(error),
+        };
+        bridge.hear();
+        while let Some(done) = bridge.orders.done() {
+            bridge.done(done);
+        }
+        bridge.publish();
+        if let Err(error) = taken {
+            tracing::error!(%error, "the robot cannot be shown; it is tried again");
+            std::thread::park_timeout(AGAIN_AFTER);
+        }
+    }
+    Ok(())
+}
+
+/// Nanoseconds since 1970.
+fn now_ns() -> u64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
+}
+
+impl Bridge {
+    /// A run has begun.
+    fn begin(&mut self, domain: &Domain) {
+        self.end();
+        // The link leads to another directory when the next run begins.
+        let directory = domain.run_directory().canonicalize();
+        let Some(run) = directory.ok().and_then(|directory| Run::load(&directory).ok()) else {
+            self.tell("the run's file cannot be read, so nothing of it is shown");
+            return;
+        };
+        let shown = Shown::new(self.robot.to_string(), run.mission);
+        if let Err(error) = self.endpoints.open_sensors(shown.sensor_topics()) {
+            self.tell(&format!("the topics of the sensors cannot be opened: {error}"));
+        }
+        shown.mounting(now_ns(), &mut |id, payload| self.endpoints.publish(id, payload));
+        self.shown = Some(shown);
+    }
+
+    /// The run has ended: no goal is reached any more.
+    fn end(&mut self) {
+        self.goals.end(Status::Aborted);
+        self.goals.forget_targets();
+        (self.shown, self.placed, self.stands_for_cancel) = (None, None, None);
+        self.recoveries = 0;
+    }
+
+    /// Take all that was published on the robot's bus.
+    fn take(&mut self, readers: &mut Readers) -> Result<(), BusError> {
+        let Self { endpoints, shown, goals, .. } = self;
+        let Some(shown) = shown else {
+            return Ok(());
+        };
+        let now_ns = now_ns();
+        let sink = &mut |id: Id, payload: Vec<u8>| endpoints.publish(id, payload);
+        while let Some(pose) = readers.pose.take()? {
+            shown.pose(&pose, now_ns, sink);
+        }
+        while let Some(ranges) = readers.ranges.take()? {
+            shown.ranges(&ranges, now_ns, sink);
+        }
+        while let Some(scan) = readers.scan.take()? {
+            shown.scan(scan.header(), &scan, now_ns, sink);
+        }
+        while let Some(target) = readers.target.take()? {
+            shown.target(&target);
+            goals.target(&target);
+        }
+        while let Some(command) = readers.command.take()? {
+            goals.command(&command);
+        }
+        while let Some(grid) = readers.grid.take()? {
+            shown.grid(grid.header(), &grid, now_ns, sink);
+        }
+        while let Some(field) = readers.field.take()? {
+            shown.field(field.header(), &field, now_ns, sink);
+        }
+        while let Some(power) = readers.power.take()? {
+            shown.power(&power, now_ns, sink);
+        }
+        while let Some(roster) = readers.roster.take()? {
+            shown.roster(&roster);
+        }
+        while let Some(death) = readers.deaths.take()? {
+            shown.death(&death);
+        }
+        while readers.stalls.take()?.is_some() {
+            self.recoveries += 1;
+        }
+        while let Some(request) = readers.requests.take()? {
+            if RequestKind::from_byte(request.kind) == RequestKind::Stop
+                && let Some(stops) = &mut self.stands_for_cancel
+            {
+                *stops += 1;
+            }
+        }
+        while let Some(link) = readers.link.take()? {
+            shown.link(&link);
+        }
+        self.place(&mut readers.fixes)
+    }
+
+    /// Give the place that a node named, carried on by how far the robot has moved since.
+    fn place(&mut self, fixes: &mut Writer<FixSample>) -> Result<(), BusError> {
+        let (Some(placed), Some(shown)) = (&mut self.placed, &self.shown) else {
+            return Ok(());
+        };
+        if placed.newest.is_some_and(|newest| newest.elapsed() < PLACED_EVERY) {
+            return Ok(());
+        }
+        placed.newest = Some(Instant::now());
+        let now = shown.newest_pose();
+        let Place { pose, covariance } = placed.place;
+        let turned = pose.heading - placed.then.heading;
+        let way = DVec2::from_angle(turned).rotate(now.pose().position - placed.then.position);
+        let mut covariance = covariance;
+        for (variance, sigma) in [(0, PLACE_SIGMAS[0]), (3, PLACE_SIGMAS[0]), (5, PLACE_SIGMAS[1])]
+        {
+            covariance[variance] = covariance[variance].max(sigma * sigma);
+        }
+        let fix = FixSample {
+            capture_ns: now.stamp.stamp_ns,
+            source: name("initialpose"),
+            x_m: pose.position.x + way.x,
+            y_m: pose.position.y + way.y,
+            heading_rad: now.heading_rad + turned,
+            covariance,
+            ..FixSample::default()
+        };
+        if placed.since.elapsed() > PLACED_FOR {
+            self.placed = None;
+        }
+        fixes.publish(now.stamp.tick, now.stamp.time(), fix)
+    }
+
+    /// Take what nodes have sent.
+    fn hear(&mut self) {
+        for (id, message) in self.endpoints.heard() {
+            if let Err(why) = self.hear_topic(id, &message) {
+                self.tell(&format!("a message is refused: {why}"));
+            }
+        }
+        for (call, message) in self.endpoints.called() {
+            if let Err(why) = self.hear_call(call, &message) {
+                self.tell(&format!("a call of the action is refused: {why}"));
+            }
+        }
+    }
+
+    fn hear_topic(&mut self, id: Id, message: &Message) -> Result<(), String> {
+        match id {
+            Id::GoalPose => self.go(asked::goal(&message.payload)?, Why::Topic),
+            Id::InitialPose => {
+                let place = asked::place(&message.payload)?;
+                let shown = self.shown.as_ref().ok_or("a place, and no robot runs")?;
+                let then = shown.newest_pose().pose();
+                self.placed = Some(Placed { place, then, since: Instant::now(), newest: None });
+            }
+            Id::Stop if asked::flag(&message.payload)? => {
+                self.orders.give(Order::Stand { is_cancel: false });
+            }
+            Id::Stop => self.orders.give(Order::Resume),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn go(&self, to: TargetPoint, why: Why) {
+        // Only a stop that was nobody's but the cancelled goal's ends with the next goal.
+        let resumes = self.stands_for_cancel.is_some_and(|stops| stops <= 1);
+        self.orders.give(Order::Go { to, resumes, why });
+    }
+
+    fn hear_call(&mut self, call: Call, message: &Message) -> Result<(), String> {
+        let request = &message.request;
+        let payload = request.without_header(&message.payload);
+        match call {
+            Call::SendGoal => {
+                let sent = Server::read_goal(&payload).inspect_err(|_| {
+                    self.endpoints.reply(call, request, &Server::goal_reply(false, now_ns()));
+                })?;
+                let after = self.goals.newest_target();
+                self.go(sent.point, Why::Action { request: request.clone(), sent, after });
+            }
+            Call::CancelGoal => {
+                let (reply, stands) = self.goals.cancel(&payload)?;
+                self.endpoints.reply(call, request, &reply);
+                if stands {
+                    self.stands_for_cancel = Some(0);
+                    self.orders.give(Order::Stand { is_cancel: true });
+                }
+            }
+            Call::GetResult => {
+                let id = Server::read_result(&payload)?;
+                if self.results.len() == MOST_RESULTS {
+                    self.results.remove(0);
+                }
+                self.results.push((request.clone(), id));
+            }
+        }
+        Ok(())
+    }
+
+    /// An order was done, or was not.
+    fn done(&mut self, (order, result): Done) {
+        if let Err(why) = &result {
+            self.tell(&format!("what was asked is not done: {why}"));
+        }
+        match order {
+            Order::Go { why, resumes, .. } => {
+                if resumes && result.is_ok() {
+                    self.stands_for_cancel = None;
+                }
+                if let Why::Action { request, sent, after } = why {
+                    let reply = Server::goal_reply(result.is_ok(), now_ns());
+                    self.endpoints.reply(Call::SendGoal, &request, &reply);
+                    if result.is_ok() {
+                        self.goals.accept(sent, after, now_ns());
+                    }
+                }
+            }
+            Order::Stand { is_cancel: true } if result.is_ok() => self.goals.end(Status::Canceled),
+            // A robot that did not obey is not said to stand.
+            Order::Stand { is_cancel: true } => self.goals.end(Status::Aborted),
+            Order::Stand { is_cancel: false } | Order::Resume => {}
+        }
+    }
+
+    /// Publish what is due.
+    fn publish(&mut self) {
+        let now_ns = now_ns();
+        if let Some(status) = self.goals.take_status() {
+            self.endpoints.status(status);
+        }
+        let (goals, endpoints) = (&self.goals, &self.endpoints);
+        self.results.retain(|(request, id)| match goals.result(*id) {
+            Some(result) => {
+                endpoints.reply(Call::GetResult, request, &result);
+                false
+            }
+            None => true,
+        });
+        let Some(shown) = &mut self.shown else {
+            return;
+        };
+        shown.tick(now_ns, &mut |id, payload| endpoints.publish(id, payload));
+        if self.feedback_at.elapsed() >= FEEDBACK_EVERY {
+            self.feedback_at = Instant::now();
+            let feedback = self.goals.feedback(shown.newest_pose(), self.recoveries, now_ns);
+            if let Some(feedback) = feedback {
+                self.endpoints.feedback(feedback);
+            }
+        }
+    }
+
+    /// Say why something is not done, at most once a second: other nodes must not fill the log.
+    fn tell(&mut self, why: &str) {
+        if self.told_at.is_none_or(|told| told.elapsed() >= TELL_EVERY) {
+            self.told_at = Some(Instant::now());
+            tracing::warn!("{why}");
+        }
+    }
+}

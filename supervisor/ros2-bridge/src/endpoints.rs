@@ -1,0 +1,226 @@
+//! The bridge's readers and writers in DDS, made from the table of topics, and the node that `ros2 node list` shows.
+
+use std::{collections::BTreeMap, io, net::Ipv4Addr};
+
+use ros2::{
+    cdr,
+    participant::{Gid, Message, Participant, Quality, Reader, Request, Writer},
+    topic::Topic,
+};
+
+use crate::{
+    action::{CANCEL_GOAL, FEEDBACK, GET_RESULT, SEND_GOAL, STATUS},
+    topics::{Accept, Id, Spec, TABLE, spec},
+};
+
+/// The name of the node.
+const NODE: &str = "firsthand";
+/// Messages of a topic that wait for a slow reader, or for the bridge.
+const DEPTH: u16 = 10;
+/// So many messages of a topic are taken at a time.
+const AT_A_TIME: usize = 16;
+
+/// Sends again what was lost; for messages that count each.
+const SURE: Quality = Quality { is_reliable: true, is_latched: false, depth: DEPTH };
+/// Keeps the newest message for who comes later.
+const LATCHED: Quality = Quality { is_reliable: true, is_latched: true, depth: 1 };
+
+/// A service.
+#[derive(Debug)]
+struct Service {
+    requests: Reader,
+    replies: Writer,
+}
+
+/// The services of the action.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Call {
+    SendGoal,
+    CancelGoal,
+    GetResult,
+}
+
+/// The action's readers and writers.
+#[derive(Debug)]
+struct Action {
+    services: [(Call, Service); 3],
+    feedback: Writer,
+    status: Writer,
+}
+
+/// Readers and writers.
+#[derive(Debug)]
+pub(crate) struct Endpoints {
+    namespace: String,
+    writers: BTreeMap<Id, Writer>,
+    readers: Vec<(Id, Reader)>,
+    /// None where goals are not accepted.
+    action: Option<Action>,
+    /// What the participant has, for other nodes.
+    entities: Writer,
+    participant: Participant,
+}
+
+impl Endpoints {
+    /// Join `domain` by the interface `only`, with topics below `namespace`.
+    pub(crate) fn open(
+        domain: u16,
+        only: Option<Ipv4Addr>,
+        namespace: &str,
+        accepted: &[Accept],
+    ) -> io::Result<Self> {
+        let participant = Participant::join(domain, only)?;
+        let namespace = namespace.trim_matches('/');
+        let namespace = if namespace.is_empty() { String::new() } else { format!("/{namespace}") };
+        let entities = Topic::plain(
+            "ros_discovery_info",
+            "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_",
+        );
+        let mut endpoints = Self {
+            writers: BTreeMap::new(),
+            readers: Vec::new(),
+            action: None,
+            entities: participant.writer(&entities, LATCHED)?,
+            namespace,
+            participant,
+        };
+        for row in TABLE {
+            match row.accepted_by {
+                // Those of sensors are opened for each robot.
+                None if matches!(row.id, Id::Range(_) | Id::Scan) => {}
+                None => endpoints.write_to(row.id, row, "")?,
+                Some(by) if accepted.contains(&by) => {
+                    let topic = endpoints.topic(row, "");
+                    let reader = endpoints.participant.reader(&topic, SURE)?;
+                    endpoints.readers.push((row.id, reader));
+                }
+                Some(_) => {}
+            }
+        }
+        if accepted.contains(&Accept::Goals) {
+            endpoints.action = Some(endpoints.open_action()?);
+        }
+        endpoints.announce();
+        Ok(endpoints)
+    }
+
+    /// Open the topics of a robot's sensors.
+    pub(crate) fn open_sensors<'a>(
+        &mut self,
+        sensors: impl Iterator<Item = (Id, &'a str)>,
+    ) -> io::Result<()> {
+        // Those of the robot before are closed.
+        self.writers.retain(|id, _| !matches!(id, Id::Range(_) | Id::Scan));
+        for (id, sensor) in sensors {
+            if let Some(row) = spec(id) {
+                self.write_to(id, row, sensor)?;
+            }
+        }
+        self.announce();
+        Ok(())
+    }
+
+    fn topic(&self, row: &Spec, sensor: &str) -> Topic {
+        let name = row.name.replace("SENSOR", &ros_name(sensor));
+        Topic::new(&format!("{}/{name}", self.namespace), row.type_name)
+    }
+
+    fn write_to(&mut self, id: Id, row: &Spec, sensor: &str) -> io::Result<()> {
+        let quality = if row.is_latched { LATCHED } else { SURE };
+        let writer = self.participant.writer(&self.topic(row, sensor), quality)?;
+        self.writers.insert(id, writer);
+        Ok(())
+    }
+
+    fn open_action(&self) -> io::Result<Action> {
+        let name = |name| format!("{}/{name}", self.namespace);
+        let service = |call, (of, types)| {
+            let [requests, replies] = Topic::service(&name(of), types);
+            let requests = self.participant.reader(&requests, SURE)?;
+            let replies = self.participant.writer(&replies, SURE)?;
+            Ok::<_, io::Error>((call, Service { requests, replies }))
+        };
+        let topic = |(of, type_name)| Topic::new(&name(of), type_name);
+        Ok(Action {
+            services: [
+                service(Call::SendGoal, SEND_GOAL)?,
+                service(Call::CancelGoal, CANCEL_GOAL)?,
+                service(Call::GetResult, GET_RESULT)?,
+            ],
+            feedback: self.participant.writer(&topic(FEEDBACK), SURE)?,
+            status: self.participant.writer(&topic(STATUS), LATCHED)?,
+        })
+    }
+
+    /// Tell other nodes which readers and writers are the node's.
+    fn announce(&self) {
+        let services = || self.action.iter().flat_map(|action| &action.services);
+        let readers = self.readers.iter().map(|(_, reader)| reader.gid());
+        let readers = readers.chain(services().map(|(_, service)| service.requests.gid()));
+        let own =
+            self.action.iter().flat_map(|action| [action.feedback.gid(), action.status.gid()]);
+        let writers = self.writers.values().map(Writer::gid).chain(own);
+        let writers = writers.chain(services().map(|(_, service)| service.replies.gid()));
+        let gid = |writer: &mut cdr::Writer, gid: Gid| {
+            writer.raw(&gid);
+        };
+        let namespace = if self.namespace.is_empty() { "/" } else { &self.namespace };
+        let mut entities = cdr::Writer::default();
+        entities.raw(&self.participant.gid()).length(1).text(namespace).text(NODE);
+        entities.list(readers.collect::<Vec<_>>(), gid).list(writers.collect::<Vec<_>>(), gid);
+        self.entities.write(entities.take());
+    }
+
+    /// Send a message. It is lost if the library does not accept it now, as a newer one follows.
+    pub(crate) fn publish(&self, id: Id, payload: Vec<u8>) {
+        if let Some(writer) = self.writers.get(&id) {
+            writer.write(payload);
+        }
+    }
+
+    /// What has come on the topics.
+    pub(crate) fn heard(&self) -> Vec<(Id, Message)> {
+        self.participant.unring();
+        let heard = self.readers.iter().flat_map(|(id, reader)| {
+            reader.messages().take(AT_A_TIME).map(|message| (*id, message))
+        });
+        heard.collect()
+    }
+
+    /// What clients of the action have called.
+    pub(crate) fn called(&self) -> Vec<(Call, Message)> {
+        let services = self.action.iter().flat_map(|action| &action.services);
+        let taken = services.flat_map(|(call, service)| {
+            service.requests.messages().take(AT_A_TIME).map(|message| (*call, message))
+        });
+        taken.collect()
+    }
+
+    /// Answer a call.
+    pub(crate) fn reply(&self, call: Call, to: &Request, payload: &[u8]) {
+        let mut services = self.action.iter().flat_map(|action| &action.services);
+        if let Some((_, service)) = services.find(|(of, _)| *of == call) {
+            service.replies.reply(to, payload);
+        }
+    }
+
+    /// Publish how far the robot is with its goal.
+    pub(crate) fn feedback(&self, payload: Vec<u8>) {
+        if let Some(action) = &self.action {
+            action.feedback.write(payload);
+        }
+    }
+
+    /// Publish the states of all goals.
+    pub(crate) fn status(&self, payload: Vec<u8>) {
+        if let Some(action) = &self.action {
+            action.status.write(payload);
+        }
+    }
+}
+
+/// `name` as a part of the name of a topic, which has letters, digits and `_`.
+fn ros_name(name: &str) -> String {
+    let letter = |letter: char| if letter.is_ascii_alphanumeric() { letter } else { '_' };
+    name.chars().map(letter).collect()
+}

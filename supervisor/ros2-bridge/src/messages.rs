@@ -1,0 +1,220 @@
+//! The messages that the bridge writes. Their definitions are those of ROS 2 Kilted; of what later releases appended to a message,
+//! earlier ones read the beginning. Lengths are metres, angles radians.
+
+use std::f64::consts::TAU;
+
+use ros2::{cdr::Writer, parts::Pose};
+
+/// The covariance of a pose or a twist has so many numbers.
+const COVARIANCE: usize = 36;
+
+/// The time of a message, nanoseconds since 1970, and the frame that it is in.
+#[derive(Clone, Copy, Debug)]
+pub struct Header<'a>(pub u64, pub &'a str);
+
+/// A message with this header, so far.
+fn begin(Header(ns, frame): Header<'_>) -> Writer {
+    let mut writer = Writer::default();
+    writer.header(ns, frame);
+    writer
+}
+
+/// A `tf2_msgs/TFMessage` of frames and what is in them.
+pub fn transforms(ns: u64, transforms: &[(&str, &str, Pose)]) -> Vec<u8> {
+    let mut writer = Writer::default();
+    let transform = |writer: &mut Writer, &(parent, child, pose): &(&str, &str, Pose)| {
+        writer.header(ns, parent).text(child).pose(pose);
+    };
+    writer.list(transforms, transform).take()
+}
+
+/// A `geometry_msgs/PoseWithCovarianceStamped`.
+pub fn pose(header: Header<'_>, pose: Pose, covariance: &[f64; COVARIANCE]) -> Vec<u8> {
+    begin(header).pose(pose).f64s(covariance).take()
+}
+
+/// A `nav_msgs/Odometry` that states no covariance.
+pub fn odometry(header: Header<'_>, child: &str, pose: Pose, [v, omega]: [f64; 2]) -> Vec<u8> {
+    let unknown = [0.0; COVARIANCE];
+    let twist = [v, 0.0, 0.0, 0.0, 0.0, omega];
+    begin(header).text(child).pose(pose).f64s(&unknown).f64s(&twist).f64s(&unknown).take()
+}
+
+/// A `nav_msgs/OccupancyGrid` of square cells; `corner` is that of the first one, and its rows go along x.
+pub fn map(
+    header: Header<'_>,
+    resolution: f64,
+    [width, height]: [u32; 2],
+    corner: [f64; 2],
+    cells: &[u8],
+) -> Vec<u8> {
+    let Header(ns, _) = header;
+    let mut writer = begin(header);
+    writer.time(ns).f32(resolution as f32).u32(width).u32(height).pose([corner[0], corner[1], 0.0]);
+    writer.length(cells.len()).raw(cells).take()
+}
+
+/// A `map_msgs/OccupancyGridUpdate` of a window whose first cell is this one.
+pub fn map_update(
+    header: Header<'_>,
+    [col, row]: [u32; 2],
+    [width, height]: [u32; 2],
+    cells: &[u8],
+) -> Vec<u8> {
+    let mut writer = begin(header);
+    writer.u32(col).u32(row).u32(width).u32(height).length(cells.len()).raw(cells).take()
+}
+
+/// A `nav_msgs/Path`.
+pub fn path(header: Header<'_>, poses: &[Pose]) -> Vec<u8> {
+    let Header(ns, frame) = header;
+    let stamped = |writer: &mut Writer, pose: &Pose| {
+        writer.header(ns, frame).pose(*pose);
+    };
+    begin(header).list(poses, stamped).take()
+}
+
+/// A `geometry_msgs/PoseStamped`, as a part of a message.
+pub fn pose_stamped(writer: &mut Writer, Header(ns, frame): Header<'_>, pose: Pose) {
+    writer.header(ns, frame).pose(pose);
+}
+
+/// The shapes of markers that are used.
+#[derive(Clone, Copy, Debug)]
+pub enum Shape {
+    Cylinder = 3,
+    /// Each two points are the ends of a line.
+    Lines = 5,
+}
+
+/// A `visualization_msgs/Marker`.
+#[derive(Clone, Debug)]
+pub struct Marker {
+    pub namespace: &'static str,
+    pub id: i32,
+    pub shape: Shape,
+    pub pose: Pose,
+    /// Its size along x, y and z; of lines the first is their width.
+    pub scale: [f64; 3],
+    /// Red, green, blue, alpha.
+    pub color: [f32; 4],
+    pub points: Vec<[f64; 2]>,
+}
+
+/// Removes all markers that were sent before.
+const DELETE_ALL: i32 = 3;
+
+/// A `visualization_msgs/MarkerArray` that replaces the one before.
+pub fn markers(header: Header<'_>, markers: &[Marker]) -> Vec<u8> {
+    let nothing = Marker {
+        namespace: "",
+        id: 0,
+        shape: Shape::Cylinder,
+        pose: [0.0; 3],
+        scale: [0.0; 3],
+        color: [0.0; 4],
+        points: Vec::new(),
+    };
+    let mut writer = Writer::default();
+    writer.length(markers.len() + 1);
+    marker(&mut writer, header, &nothing, DELETE_ALL);
+    for each in markers {
+        marker(&mut writer, header, each, 0);
+    }
+    writer.take()
+}
+
+fn marker(writer: &mut Writer, Header(ns, frame): Header<'_>, marker: &Marker, action: i32) {
+    writer.header(ns, frame).text(marker.namespace).i32(marker.id).i32(marker.shape as i32);
+    writer.i32(action).pose(marker.pose).f64s(&marker.scale);
+    for part in marker.color {
+        writer.f32(part);
+    }
+    // It has no end, and stays where it is if its frame moves.
+    writer.i32(0).u32(0).u8(0);
+    writer.list(&marker.points, |writer, &[x, y]| {
+        writer.f64s(&[x, y, 0.0]);
+    });
+    // No colours of points; no texture with its header, format, bytes and coordinates.
+    writer.length(0).text("").header(0, "").text("").length(0).length(0);
+    // No text, no mesh.
+    writer.text("").text("").text("").length(0).u8(0);
+}
+
+/// A `sensor_msgs/LaserScan`.
+pub fn scan(
+    header: Header<'_>,
+    [first, step]: [f64; 2],
+    [least, most]: [f64; 2],
+    period_s: f64,
+    ranges: &[f32],
+) -> Vec<u8> {
+    let last = first + step * ranges.len().saturating_sub(1) as f64;
+    let mut writer = begin(header);
+    for number in [first, last, step, 0.0, period_s, least, most] {
+        writer.f32(number as f32);
+    }
+    let range = |writer: &mut Writer, range: &f32| {
+        writer.f32(*range);
+    };
+    // No intensities.
+    writer.list(ranges, range).length(0).take()
+}
+
+/// A `sensor_msgs/Range` of a sonar, or of an infrared ranger.
+pub fn range(
+    header: Header<'_>,
+    is_sonar: bool,
+    field_of_view: f64,
+    [least, most]: [f64; 2],
+    range: f64,
+) -> Vec<u8> {
+    let mut writer = begin(header);
+    writer.u8(u8::from(!is_sonar));
+    // The variance is not known.
+    for number in [field_of_view.min(TAU), least, most, range, 0.0] {
+        writer.f32(number as f32);
+    }
+    writer.take()
+}
+
+/// A `sensor_msgs/BatteryState` that states the voltage only.
+pub fn battery(header: Header<'_>, volts: f64) -> Vec<u8> {
+    let mut writer = begin(header);
+    writer.f32(volts as f32);
+    for _temperature_current_charge_capacity_design_percentage in 0..6 {
+        writer.f32(f32::NAN);
+    }
+    // Status, health and technology are unknown; it is there; no cells, place or number.
+    writer.u8(0).u8(0).u8(0).u8(1).length(0).length(0).text("").text("").take()
+}
+
+/// How a `diagnostic_msgs/DiagnosticStatus` is to be judged.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Level {
+    #[default]
+    Ok = 0,
+    Warn = 1,
+    Error = 2,
+    Stale = 3,
+}
+
+/// A `diagnostic_msgs/DiagnosticStatus`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Status {
+    pub level: Level,
+    pub name: String,
+    pub message: String,
+    pub values: Vec<(&'static str, String)>,
+}
+
+/// A `diagnostic_msgs/DiagnosticArray` of this robot.
+pub fn diagnostics(header: Header<'_>, robot: &str, statuses: &[Status]) -> Vec<u8> {
+    let status = |writer: &mut Writer, status: &Status| {
+        writer.u8(status.level as u8).text(&status.name).text(&status.message).text(robot);
+        writer.list(&status.values, |writer, (key, value)| {
+            writer.text(key).text(value);
+        });
+    };
+    begin(header).list(statuses, status).take()
+}

@@ -1,0 +1,114 @@
+//! What nodes asked for is done by threads of its own, so that it does not hold up what is published: an order waits for the supervisor,
+//! and a stop until the robot rests. Targets do not wait behind stops, nor stops behind targets.
+
+use std::{
+    io,
+    sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel},
+    thread,
+};
+
+use common::{domain::RobotName, samples::TargetPoint};
+use ros2::participant::Request;
+use supervisor::operator::{self, OperatorError};
+
+use crate::action::Sent;
+
+/// So many orders wait at most.
+const MOST_WAITING: usize = 16;
+
+/// What the robot is to do.
+#[derive(Clone, Debug)]
+pub(crate) enum Order {
+    /// Go there; if `resumes`, it stands for a goal that was canceled, and goes on first.
+    Go {
+        to: TargetPoint,
+        resumes: bool,
+        why: Why,
+    },
+    /// Stand, for an operator or for a goal that is canceled.
+    Stand {
+        is_cancel: bool,
+    },
+    Resume,
+}
+
+/// Who sends the robot to a target.
+#[derive(Clone, Debug)]
+pub(crate) enum Why {
+    Topic,
+    /// A client of the action. The goal's target comes after the one with the number `after`.
+    Action {
+        request: Request,
+        sent: Sent,
+        after: u64,
+    },
+}
+
+/// An order, and why it was not done.
+pub(crate) type Done = (Order, Result<(), String>);
+
+/// Threads that do orders, in turn.
+pub(crate) struct Orders {
+    targets: SyncSender<Order>,
+    stops: SyncSender<Order>,
+    done: Receiver<Done>,
+    refused: Sender<Done>,
+}
+
+impl Orders {
+    /// Orders for `robot`.
+    pub(crate) fn new(robot: &RobotName) -> io::Result<Self> {
+        let (refused, done) = channel();
+        let worker = |name: &str| {
+            let (orders, waiting) = sync_channel::<Order>(MOST_WAITING);
+            let (robot, done) = (robot.clone(), refused.clone());
+            thread::Builder::new().name(name.to_owned()).spawn(move || {
+                for order in waiting {
+                    let result = perform(&robot, &order).map_err(|error| error.to_string());
+                    if done.send((order, result)).is_err() {
+                        break;
+                    }
+                }
+            })?;
+            Ok::<_, io::Error>(orders)
+        };
+        Ok(Self { targets: worker("targets")?, stops: worker("stops")?, done, refused })
+    }
+
+    /// Have `order` done.
+    pub(crate) fn give(&self, order: Order) {
+        let worker = match order {
+            Order::Go { .. } => &self.targets,
+            Order::Stand { .. } | Order::Resume => &self.stops,
+        };
+        if let Err(full) = worker.try_send(order) {
+            let (std::sync::mpsc::TrySendError::Full(order)
+            | std::sync::mpsc::TrySendError::Disconnected(order)) = full;
+            let _ = self.refused.send((order, Err("too many orders wait already".to_owned())));
+        }
+    }
+
+    /// An order that was done, or was not.
+    pub(crate) fn done(&self) -> Option<Done> {
+        self.done.try_recv().ok()
+    }
+}
+
+fn perform(robot: &RobotName, order: &Order) -> Result<(), OperatorError> {
+    match order {
+        Order::Go { to, resumes, .. } => {
+            if *resumes {
+                operator::resume(robot)?;
+            }
+            match operator::send_to(robot, &[*to], false) {
+                // A car goes there at the heading that it then has.
+                Err(OperatorError::Refused { code: "no-heading", .. }) => {
+                    operator::send_to(robot, &[TargetPoint { has_heading: 0, ..*to }], false)
+                }
+                result => result,
+            }
+        }
+        Order::Stand { .. } => operator::stand(robot).map(|_| ()),
+        Order::Resume => operator::resume(robot),
+    }
+}

@@ -1,0 +1,379 @@
+//! What is published of a robot: samples of its bus in, messages out. Pure.
+
+use std::collections::BTreeMap;
+
+use common::{
+    grid::{Applied, Cell, CellState, GridFrame, Replica},
+    kinematics::Pose2,
+    mission::{Mission, Sensor, SensorKind},
+    samples::{
+        Action, Cause, DeathSample, FieldCell, FieldHeader, GridHeader, LinkSample, PoseSample,
+        PowerSample, RangeReading, RangeStatus, RosterEntry, ScanHeader, StageState, TargetSample,
+        name_str,
+    },
+};
+use glam::DVec2;
+use ros2::parts::Pose;
+use supervisor::process::ExitCause;
+
+use crate::{
+    messages::{self, Header, Level, Marker, Shape, Status},
+    topics::Id,
+};
+
+/// The mission's frame, that of odometry, and the robot's, whose x is ahead.
+pub(crate) const MAP: &str = "map";
+const ODOM: &str = "odom";
+const BASE: &str = "base_link";
+
+/// Wall-clock time between whole maps, and between diagnostics that have not changed, nanoseconds.
+const EVERY_NS: u64 = 1_000_000_000;
+/// So many directions of the field are drawn along a side at most.
+const ARROWS: usize = 48;
+/// A path has at most so many steps for each cell of a side.
+const STEPS_A_CELL: usize = 8;
+/// A path has a pose for each of so many steps of half a cell.
+const POSE_EVERY: usize = 4;
+
+/// Takes a message: its topic and its payload.
+pub type Sink<'a> = &'a mut dyn FnMut(Id, Vec<u8>);
+
+/// A robot as ROS sees it.
+#[derive(Debug)]
+pub struct Shown {
+    robot: String,
+    mission: Mission,
+    sensors: Vec<Sensor>,
+    pose: PoseSample,
+    target: TargetSample,
+    grid: Replica<u8>,
+    /// The version of the whole map that was published, and when.
+    map: Option<(u64, u64)>,
+    field: Replica<FieldCell>,
+    link: LinkSample,
+    power: Option<PowerSample>,
+    stages: Vec<RosterEntry>,
+    deaths: BTreeMap<String, String>,
+    diagnosed: Option<(Vec<Status>, u64)>,
+}
+
+impl Shown {
+    /// A robot of which nothing has been read yet.
+    pub fn new(robot: String, mission: Mission) -> Self {
+        Self {
+            robot,
+            sensors: mission.sensor_table(),
+            target: TargetSample::first(&mission),
+            mission,
+            pose: PoseSample::default(),
+            grid: Replica::default(),
+            map: None,
+            field: Replica::default(),
+            link: LinkSample::default(),
+            power: None,
+            stages: Vec::new(),
+            deaths: BTreeMap::new(),
+            diagnosed: None,
+        }
+    }
+
+    /// The topics of the sensors that the mission uses.
+    pub fn sensor_topics(&self) -> impl Iterator<Item = (Id, &str)> {
+        let used = self.sensors.iter().enumerate().filter(|(_, sensor)| sensor.used);
+        used.map(|(row, sensor)| match sensor.kind {
+            SensorKind::Scan => (Id::Scan, ""),
+            _ => (Id::Range(row), sensor.name.as_str()),
+        })
+    }
+
+    /// The mounting of the sensors.
+    pub fn mounting(&self, now_ns: u64, sink: Sink<'_>) {
+        let used = self.sensors.iter().filter(|sensor| sensor.used);
+        let mounts = used
+            .map(|sensor| (BASE, sensor.name.as_str(), plane(sensor.mount.on(Pose2::default()))));
+        sink(Id::TfStatic, messages::transforms(now_ns, &mounts.collect::<Vec<_>>()));
+    }
+
+    /// The newest pose.
+    pub const fn newest_pose(&self) -> &PoseSample {
+        &self.pose
+    }
+
+    pub fn pose(&mut self, sample: &PoseSample, now_ns: u64, sink: Sink<'_>) {
+        self.pose = *sample;
+        let pose = plane(sample.pose());
+        let origin = sample.map_from_odom;
+        let odom = seen_from(origin, pose);
+        let frames = [(MAP, ODOM, origin), (ODOM, BASE, odom)];
+        sink(Id::Tf, messages::transforms(now_ns, &frames));
+        sink(Id::Pose, messages::pose(Header(now_ns, MAP), pose, &sample.covariance_6x6()));
+        let speeds = [sample.v_m_s, sample.omega_rad_s];
+        sink(Id::Odom, messages::odometry(Header(now_ns, ODOM), BASE, odom, speeds));
+    }
+
+    pub fn ranges(&self, readings: &[RangeReading], now_ns: u64, sink: Sink<'_>) {
+        for reading in readings {
+            let row = usize::from(reading.sensor);
+            let Some(sensor) = self.sensors.get(row).filter(|sensor| sensor.used) else {
+                continue;
+            };
+            let range = match reading.status() {
+                RangeStatus::Measured | RangeStatus::AtContact => reading.range_m,
+                RangeStatus::Nothing => f64::INFINITY,
+                RangeStatus::Absent | RangeStatus::Invalid => continue,
+            };
+            if sensor.kind != SensorKind::Scan {
+                let is_sonar = sensor.kind == SensorKind::Cone;
+                let view = sensor.field_of_view_deg.to_radians();
+                let limits = [sensor.model.least_m(), sensor.reach_m];
+                let header = Header(now_ns, &sensor.name);
+                sink(Id::Range(row), messages::range(header, is_sonar, view, limits, range));
+            }
+        }
+    }
+
+    pub fn scan(&self, header: &ScanHeader, beams: &[f32], now_ns: u64, sink: Sink<'_>) {
+        let row = usize::try_from(header.sensor).unwrap_or(usize::MAX);
+        if let Some(sensor) = self.sensors.get(row) {
+            let period_s = sensor.every_ticks as f64 / self.mission.robot.rate_hz;
+            let fan = [header.first_rad - sensor.mount.bearing_rad, header.step_rad];
+            let limits = [sensor.model.least_m(), header.reach_m];
+            let header = Header(now_ns, &sensor.name);
+            sink(Id::Scan, messages::scan(header, fan, limits, period_s, beams));
+        }
+    }
+
+    pub fn target(&mut self, target: &TargetSample) {
+        self.target = *target;
+    }
+
+    pub fn grid(&mut self, header: &GridHeader, cells: &[u8], now_ns: u64, sink: Sink<'_>) {
+        let window = header.part.window();
+        let applied = self.grid.apply(&header.part, cells);
+        if applied == Applied::Missed || window.area() == 0 {
+            return;
+        }
+        let header = Header(now_ns, MAP);
+        let is_whole = self.grid.frame().is_some_and(|frame| frame.whole() == window);
+        if self.map.is_some() && !is_whole {
+            let occupied: Vec<u8> = cells.iter().copied().map(occupancy).collect();
+            let (first, size) = ([window.col, window.row], [window.width, window.height]);
+            sink(Id::MapUpdates, messages::map_update(header, first, size, &occupied));
+        }
+    }
+
+    /// The whole map if it has changed and is due.
+    fn map(&mut self, now_ns: u64, sink: Sink<'_>) {
+        let version = self.grid.version();
+        let is_due = self.map.is_none_or(|(published, at_ns)| {
+            published != version && now_ns.saturating_sub(at_ns) >= EVERY_NS
+        });
+        if let Some(GridFrame { cells, resolution_m, .. }) = self.grid.frame()
+            && let Some(frame) = self.grid.frame()
+            && is_due
+        {
+            self.map = Some((version, now_ns));
+            let corner = frame.corner_of(Cell { col: 0, row: 0 }).to_array();
+            let occupied: Vec<u8> = self.grid.cells().iter().copied().map(occupancy).collect();
+            let header = Header(now_ns, MAP);
+            sink(Id::Map, messages::map(header, resolution_m, [cells; 2], corner, &occupied));
+        }
+    }
+
+    pub fn field(
+        &mut self,
+        header: &FieldHeader,
+        cells: &[FieldCell],
+        now_ns: u64,
+        sink: Sink<'_>,
+    ) {
+        if self.field.apply(&header.part, cells) == Applied::Missed {
+            return;
+        }
+        let Some(frame) = self.field.frame() else {
+            return;
+        };
+        let to = DVec2::new(header.target_x_m, header.target_y_m);
+        let header = Header(now_ns, MAP);
+        let way = way(frame, self.field.cells(), self.pose.pose().position, to);
+        sink(Id::Path, messages::path(header, &way));
+        let drawn = [vec![directions(frame, self.field.cells())], self.targets()].concat();
+        sink(Id::Field, messages::markers(header, &drawn));
+    }
+
+    fn targets(&self) -> Vec<Marker> {
+        let across = 2.0 * self.mission.arrival_tolerance_m;
+        let targets = [&self.target.target].into_iter().chain(self.target.ahead());
+        let target = |(id, target): (i32, &common::samples::TargetPoint)| Marker {
+            namespace: "targets",
+            id,
+            shape: Shape::Cylinder,
+            pose: [target.x_m, target.y_m, target.heading_rad],
+            scale: [across, across, 0.01],
+            color: [0.1, 0.7, 0.2, 0.6],
+            points: Vec::new(),
+        };
+        (0..).zip(targets).map(target).collect()
+    }
+
+    pub fn link(&mut self, link: &LinkSample) {
+        self.link = *link;
+    }
+
+    pub fn power(&mut self, power: &PowerSample, now_ns: u64, sink: Sink<'_>) {
+        self.power = Some(*power);
+        sink(Id::Battery, messages::battery(Header(now_ns, BASE), power.motor_v));
+    }
+
+    pub fn roster(&mut self, stages: &[RosterEntry]) {
+        self.stages = stages.to_vec();
+    }
+
+    pub fn death(&mut self, death: &DeathSample) {
+        let how = format!("generation {}: {}", death.generation, ExitCause::from(death));
+        self.deaths.insert(name_str(&death.stage).to_owned(), how);
+    }
+
+    /// What is published by time: the map, and diagnostics if they have changed or are due.
+    pub fn tick(&mut self, now_ns: u64, sink: Sink<'_>) {
+        self.map(now_ns, sink);
+        let statuses = self.statuses();
+        let is_due = self.diagnosed.as_ref().is_none_or(|(before, at_ns)| {
+            let age_ns = now_ns.saturating_sub(*at_ns);
+            age_ns >= EVERY_NS || judged(before).ne(judged(&statuses))
+        });
+        if is_due {
+            sink(
+                Id::Diagnostics,
+                messages::diagnostics(Header(now_ns, ""), &self.robot, &statuses),
+            );
+            self.diagnosed = Some((statuses, now_ns));
+        }
+    }
+
+    fn statuses(&self) -> Vec<Status> {
+        let link = &self.link;
+        let level = match (link.action(), link.cause()) {
+            (_, Cause::None | Cause::NotOrdered | Cause::MissionOver | Cause::OperatorStop) => {
+                Level::Ok
+            }
+            (Action::Go | Action::Slow, _) => Level::Warn,
+            (Action::Stop | Action::End, _) => Level::Error,
+        };
+        let message = format!("the robot {}: {}", link.action().effect(), link.cause().name());
+        let values = vec![
+            ("connected", (link.connected == 1).to_string()),
+            ("at rest", (link.at_rest == 1).to_string()),
+            ("tick latency, us", (link.latency_ns / 1000).to_string()),
+            ("robot lost, times", link.losses.to_string()),
+        ];
+        let mut statuses =
+            vec![Status { level, name: "firsthand: failsafe".to_owned(), message, values }];
+        statuses.extend(self.stages.iter().map(|entry| self.stage(entry)));
+        if let Some(power) = &self.power {
+            let level = if power.is_low() { Level::Warn } else { Level::Ok };
+            let message = if power.is_low() { "low" } else { "not low" }.to_owned();
+            let volts = |volts: f64| format!("{volts:.2}");
+            let values =
+                vec![("board, V", volts(power.board_v)), ("motors, V", volts(power.motor_v))];
+            statuses.push(Status { level, name: "firsthand: battery".to_owned(), message, values });
+        }
+        statuses
+    }
+
+    fn stage(&self, entry: &RosterEntry) -> Status {
+        let name = name_str(&entry.stage);
+        let (level, state) = match StageState::from_byte(entry.state) {
+            StageState::Running => (Level::Ok, "runs"),
+            StageState::Starting => (Level::Warn, "starts"),
+            StageState::Stopping => (Level::Warn, "stops"),
+            StageState::BackingOff => {
+                (Level::Error, "died often, waits before it is started again")
+            }
+            StageState::Down => (Level::Error, "is down"),
+            StageState::Held => (Level::Error, "died far too often, is held"),
+        };
+        let values = vec![
+            ("generation", entry.generation.to_string()),
+            ("restarts", entry.restarts.to_string()),
+            ("pid", entry.pid.to_string()),
+            ("last death", self.deaths.get(name).cloned().unwrap_or_default()),
+        ];
+        Status { level, name: format!("firsthand: {name}"), message: state.to_owned(), values }
+    }
+}
+
+/// What decides whether diagnostics are published at once.
+fn judged(statuses: &[Status]) -> impl Iterator<Item = (Level, &str)> {
+    statuses.iter().map(|status| (status.level, status.message.as_str()))
+}
+
+/// A cell's occupancy, as a byte: -1 is not known, and what the robot's centre must not enter is 99, as in a costmap of Nav2.
+fn occupancy(cell: u8) -> u8 {
+    match CellState::from_byte(cell) {
+        CellState::Free => -1_i8 as u8,
+        CellState::Scanned => 0,
+        CellState::Margin => 99,
+        CellState::Sensed | CellState::Known | CellState::Perimeter => 100,
+    }
+}
+
+const fn plane(Pose2 { position, heading }: Pose2) -> Pose {
+    [position.x, position.y, heading]
+}
+
+/// `pose` in the frame whose pose is `origin`.
+fn seen_from([x, y, turned]: Pose, [at_x, at_y, heading]: Pose) -> Pose {
+    let way = DVec2::from_angle(-turned).rotate(DVec2::new(at_x - x, at_y - y));
+    [way.x, way.y, heading - turned]
+}
+
+/// The way along the directions of `cells` from `from` to `to`, in steps of half a cell. It ends where there is no direction.
+fn way(frame: GridFrame, cells: &[FieldCell], from: DVec2, to: DVec2) -> Vec<Pose> {
+    let step_m = frame.resolution_m / 2.0;
+    let (mut at, mut way) = (from, Vec::new());
+    for step in 0..frame.cells as usize * STEPS_A_CELL {
+        let cell = frame.cell_at(at).and_then(|cell| cells.get(frame.index(cell)));
+        let ahead = cell.map_or(DVec2::ZERO, |cell| DVec2::new(cell.ex.into(), cell.ey.into()));
+        if at.distance(to) <= frame.resolution_m || !ahead.is_finite() || ahead == DVec2::ZERO {
+            break;
+        }
+        if step % POSE_EVERY == 0 {
+            way.push([at.x, at.y, ahead.to_angle()]);
+        }
+        at += step_m * ahead;
+    }
+    let heading = way.last().map_or(0.0, |last| last[2]);
+    way.push([at.x, at.y, heading]);
+    way
+}
+
+/// A line along the direction of each cell, or of one among several.
+fn directions(frame: GridFrame, cells: &[FieldCell]) -> Marker {
+    let side = frame.cells as usize;
+    let each = side.div_ceil(ARROWS);
+    let length = 0.7 * each as f64 * frame.resolution_m;
+    let mut points = Vec::new();
+    for row in (each / 2..side).step_by(each) {
+        for col in (each / 2..side).step_by(each) {
+            let cell = Cell { col: col as u32, row: row as u32 };
+            let Some(direction) = cells.get(frame.index(cell)) else {
+                continue;
+            };
+            let ahead = DVec2::new(direction.ex.into(), direction.ey.into());
+            if ahead != DVec2::ZERO {
+                let at = frame.centre_of(cell);
+                points.extend([at.to_array(), (at + length * ahead).to_array()]);
+            }
+        }
+    }
+    Marker {
+        namespace: "field",
+        id: 0,
+        shape: Shape::Lines,
+        pose: [0.0; 3],
+        scale: [0.02, 0.0, 0.0],
+        color: [0.2, 0.4, 0.9, 0.8],
+        points,
+    }
+}

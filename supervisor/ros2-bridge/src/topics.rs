@@ -1,0 +1,104 @@
+//! THE table of what the bridge publishes and takes. Writers and readers are made from it, and the guide's list is printed from it.
+
+/// What a topic carries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Id {
+    Tf,
+    TfStatic,
+    Pose,
+    Odom,
+    Map,
+    MapUpdates,
+    Path,
+    Field,
+    Scan,
+    /// The sensor in this row of the mission; in the table, any.
+    Range(usize),
+    Battery,
+    Diagnostics,
+    GoalPose,
+    InitialPose,
+    Stop,
+}
+
+/// What others may do, if whoever starts the bridge lets them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Accept {
+    /// Send the robot elsewhere: `goal_pose` and the action `navigate_to_pose`.
+    Goals,
+    /// Say where the robot is.
+    Pose,
+    /// Let the robot stand, and go on.
+    Stop,
+}
+
+/// A row of the table.
+#[derive(Clone, Copy, Debug)]
+pub struct Spec {
+    pub id: Id,
+    /// Relative to the bridge's namespace.
+    pub name: &'static str,
+    /// The package and the name of its type.
+    pub message: [&'static str; 2],
+    /// The name of its type in DDS.
+    pub type_name: &'static str,
+    /// Who subscribes later gets the newest message.
+    pub is_latched: bool,
+    /// What lets it in; none of a topic that the bridge publishes.
+    pub accepted_by: Option<Accept>,
+    pub meaning: &'static str,
+}
+
+macro_rules! table {
+    ($($id:expr => $name:literal, $package:ident / $message:ident, $latched:literal, $accept:expr, $meaning:literal;)*) => {
+        /// Every topic.
+        pub const TABLE: &[Spec] = &[$(Spec {
+            id: $id,
+            name: $name,
+            message: [stringify!($package), stringify!($message)],
+            type_name: concat!(stringify!($package), "::msg::dds_::", stringify!($message), "_"),
+            is_latched: $latched,
+            accepted_by: $accept,
+            meaning: $meaning,
+        }),*];
+    };
+}
+
+table! {
+    Id::Tf => "tf", tf2_msgs / TFMessage, false, None,
+        "`map` to `odom` to `base_link`, as REP 105 has them";
+    Id::TfStatic => "tf_static", tf2_msgs / TFMessage, true, None,
+        "`base_link` to a frame of each sensor's name";
+    Id::Pose => "pose", geometry_msgs / PoseWithCovarianceStamped, false, None,
+        "where the robot believes it is";
+    Id::Odom => "odom", nav_msgs / Odometry, false, None,
+        "the pose without what fixes corrected, and the speeds; it states no covariance";
+    Id::Map => "map", nav_msgs / OccupancyGrid, true, None,
+        "the safety map, at most once a second: 100 a hazard, 99 its margin, 0 seen free, -1 not looked at";
+    Id::MapUpdates => "map_updates", map_msgs / OccupancyGridUpdate, false, None,
+        "windows of it as they change";
+    Id::Path => "path", nav_msgs / Path, false, None,
+        "the way along the field from the robot to its target";
+    Id::Field => "field", visualization_msgs / MarkerArray, false, None,
+        "the field's directions, one for several cells, and the targets";
+    Id::Scan => "scan", sensor_msgs / LaserScan, false, None,
+        "the beams of the laser";
+    Id::Range(0) => "range/SENSOR", sensor_msgs / Range, false, None,
+        "each sonar and infrared ranger that the mission uses; infinite for nothing";
+    Id::Battery => "battery_state", sensor_msgs / BatteryState, false, None,
+        "the voltage of the battery that the motors drive on";
+    Id::Diagnostics => "diagnostics", diagnostic_msgs / DiagnosticArray, false, None,
+        "the failsafe, each stage with its generation and its last death, the battery";
+    Id::GoalPose => "goal_pose", geometry_msgs / PoseStamped, false, Some(Accept::Goals),
+        "where to go, as RViz's button sends it; the action `navigate_to_pose` (`nav2_msgs/NavigateToPose`) is taken too";
+    Id::InitialPose => "initialpose", geometry_msgs / PoseWithCovarianceStamped, false, Some(Accept::Pose),
+        "where the robot is, as RViz's button sends it: for 4 s it is a source of fixes";
+    Id::Stop => "stop", std_msgs / Bool, false, Some(Accept::Stop),
+        "true: the robot stands; false: it goes on";
+}
+
+/// The row of `id`.
+pub fn spec(id: Id) -> Option<&'static Spec> {
+    let id = if let Id::Range(_) = id { Id::Range(0) } else { id };
+    TABLE.iter().find(|spec| spec.id == id)
+}
