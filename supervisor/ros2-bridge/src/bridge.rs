@@ -161,12 +161,11 @@ pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), B
     let mut follower = Follower::new(domain.clone(), "ros2", &topics::LINK, Readers::open);
     while !ended() {
         let taken = match follower.wait(LOOK_EVERY) {
-            Ok(Event::Connected) => {
+            Ok(Event::Samples(readers)) => {
                 bridge.begin(&domain);
-                Ok(())
+                bridge.take(readers)
             }
-            Ok(Event::Samples(readers)) => bridge.take(readers),
-            Ok(Event::Disconnected) => {
+            Ok(Event::Connected | Event::Disconnected) => {
                 bridge.end();
                 Ok(())
             }
@@ -193,13 +192,14 @@ fn now_ns() -> u64 {
 }
 
 impl Bridge {
-    /// A run has begun.
+    /// Show the run of `domain`, if it is not shown yet. Its file may not be there when its first samples are.
     fn begin(&mut self, domain: &Domain) {
-        self.end();
+        if self.shown.is_some() {
+            return;
+        }
         // The link leads to another directory when the next run begins.
         let directory = domain.run_directory().canonicalize();
         let Some(run) = directory.ok().and_then(|directory| Run::load(&directory).ok()) else {
-            self.tell("the run's file cannot be read, so nothing of it is shown");
             return;
         };
         let shown = Shown::new(self.robot.to_string(), run.mission);

@@ -23,3 +23,6 @@ pub mod bridge;
 mod endpoints;
 #[cfg(feature = "dds")]
 mod orders;
+
+#[cfg(test)]
+mod tests;

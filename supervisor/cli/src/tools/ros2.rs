@@ -82,6 +82,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
 
 #[cfg(not(feature = "ros2"))]
 pub(crate) fn main(_: &Arguments) -> Result<(), Failure> {
-    let message = "this executable speaks no ROS 2; build it with `cargo build -p firsthand --features ros2`";
+    let message =
+        "this executable speaks no ROS 2; build it with `cargo build -p firsthand --features ros2`";
     Err(crate::console::failure::Refused::new("no-ros2", message).into())
 }

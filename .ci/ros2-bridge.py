@@ -1,0 +1,371 @@
+"""What `firsthand ros2` publishes, heard and decoded by rclpy with Fast DDS and by Cyclone DDS, and what it lets others do.
+
+    python3 .ci/ros2-bridge.py EXECUTABLE
+
+The types of tf2, map and nav2 are not packed for pip, so they are declared here for Cyclone DDS, whose service header stands in the
+payload. A client of Fast DDS cancels a goal.
+"""
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass, field
+
+# All of it stays on this machine.
+os.environ.setdefault("ROS_DOMAIN_ID", str(100 + os.getpid() % 100))
+os.environ.update(ROS_LOCALHOST_ONLY="1", RMW_IMPLEMENTATION="rmw_fastrtps_cpp")
+LOOPBACK = '<Interfaces><NetworkInterface address="127.0.0.1" multicast="true"/></Interfaces>'
+os.environ["CYCLONEDDS_URI"] = f"<CycloneDDS><Domain><General>{LOOPBACK}</General></Domain></CycloneDDS>"
+
+import rclpy
+from action_msgs.msg import GoalStatusArray
+from action_msgs.srv import CancelGoal
+from cyclonedds.core import Policy, Qos
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.idl import IdlStruct
+from cyclonedds.idl.types import array, float32, float64, int8, int16, int32, int64, sequence, uint8, uint16, uint32, uint64
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
+from nav_msgs.msg import OccupancyGrid, Odometry, Path
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import BatteryState, LaserScan, Range
+from std_msgs.msg import Bool
+from visualization_msgs.msg import MarkerArray
+
+ROBOT = f"ci-bridge-{os.getpid()}"
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+@dataclass
+class Time(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
+    sec: int32 = 0
+    nanosec: uint32 = 0
+
+
+@dataclass
+class Header(IdlStruct, typename="std_msgs::msg::dds_::Header_"):
+    stamp: Time = field(default_factory=Time)
+    frame_id: str = "map"
+
+
+@dataclass
+class Plane(IdlStruct, typename="geometry_msgs::msg::dds_::Transform_"):
+    """A pose or a transform: x, y, z and a quaternion."""
+
+    x: float64 = 0.0
+    y: float64 = 0.0
+    z: float64 = 0.0
+    i: float64 = 0.0
+    j: float64 = 0.0
+    k: float64 = 0.0
+    w: float64 = 1.0
+
+
+@dataclass
+class TransformStamped(IdlStruct, typename="geometry_msgs::msg::dds_::TransformStamped_"):
+    header: Header
+    child_frame_id: str
+    transform: Plane
+
+
+@dataclass
+class TFMessage(IdlStruct, typename="tf2_msgs::msg::dds_::TFMessage_"):
+    transforms: sequence[TransformStamped]
+
+
+@dataclass
+class OccupancyGridUpdate(IdlStruct, typename="map_msgs::msg::dds_::OccupancyGridUpdate_"):
+    header: Header
+    x: int32
+    y: int32
+    width: uint32
+    height: uint32
+    data: sequence[int8]
+
+
+@dataclass
+class SendGoal(IdlStruct, typename="nav2_msgs::action::dds_::NavigateToPose_SendGoal_Request_"):
+    client: uint64
+    number: int64
+    goal_id: array[uint8, 16]
+    header: Header
+    pose: Plane
+    behavior_tree: str = ""
+
+
+@dataclass
+class SendGoalReply(IdlStruct, typename="nav2_msgs::action::dds_::NavigateToPose_SendGoal_Response_"):
+    client: uint64
+    number: int64
+    accepted: bool
+    stamp: Time
+
+
+@dataclass
+class GetResult(IdlStruct, typename="nav2_msgs::action::dds_::NavigateToPose_GetResult_Request_"):
+    client: uint64
+    number: int64
+    goal_id: array[uint8, 16]
+
+
+@dataclass
+class GetResultReply(IdlStruct, typename="nav2_msgs::action::dds_::NavigateToPose_GetResult_Response_"):
+    client: uint64
+    number: int64
+    status: int8
+    error_code: uint16
+    error_msg: str
+
+
+@dataclass
+class Feedback(IdlStruct, typename="nav2_msgs::action::dds_::NavigateToPose_FeedbackMessage_"):
+    goal_id: array[uint8, 16]
+    header: Header
+    pose: Plane
+    navigation_time: Time
+    remaining: Time
+    recoveries: int16
+    distance_remaining: float32
+
+
+def cyclone_qos(latched=False):
+    durability = Policy.Durability.TransientLocal if latched else Policy.Durability.Volatile
+    return Qos(Policy.Reliability.Reliable(1_000_000_000), durability, Policy.History.KeepLast(100))
+
+
+class Heard:
+    """All that is published, by rclpy and by Cyclone DDS."""
+
+    def __init__(self):
+        self.node = rclpy.create_node("hears")
+        self.messages = {}
+        for name, kind, quality in [
+            ("pose", PoseWithCovarianceStamped, 10),
+            ("odom", Odometry, 10),
+            ("map", OccupancyGrid, LATCHED),
+            ("path", Path, 10),
+            ("field", MarkerArray, 10),
+            ("scan", LaserScan, 10),
+            ("range/front", Range, 10),
+            ("battery_state", BatteryState, 10),
+            ("diagnostics", DiagnosticArray, 10),
+            ("navigate_to_pose/_action/status", GoalStatusArray, LATCHED),
+        ]:
+            keep = lambda message, name=name: self.messages.setdefault(name, []).append(message)
+            self.node.create_subscription(kind, name, keep, quality)
+        self.participant = DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]))
+        self.readers = {
+            "tf": self.reader("rt/tf", TFMessage),
+            "tf_static": self.reader("rt/tf_static", TFMessage, True),
+            "map_updates": self.reader("rt/map_updates", OccupancyGridUpdate),
+            "feedback": self.reader("rt/navigate_to_pose/_action/feedback", Feedback),
+            "sent": self.reader("rr/navigate_to_pose/_action/send_goalReply", SendGoalReply),
+            "result": self.reader("rr/navigate_to_pose/_action/get_resultReply", GetResultReply),
+        }
+        request = lambda name, kind: DataWriter(
+            self.participant, Topic(self.participant, f"rq/navigate_to_pose/_action/{name}Request", kind), cyclone_qos()
+        )
+        self.send_goal, self.get_result = request("send_goal", SendGoal), request("get_result", GetResult)
+
+    def reader(self, name, kind, latched=False):
+        return DataReader(self.participant, Topic(self.participant, name, kind), cyclone_qos(latched))
+
+    def turn(self):
+        rclpy.spin_once(self.node, timeout_sec=0.005)
+        for name, reader in self.readers.items():
+            self.messages.setdefault(name, []).extend(reader.take(N=100))
+
+    def until(self, what, condition, seconds=60):
+        end = time.monotonic() + seconds
+        while not (found := condition()):
+            assert time.monotonic() < end, f"in vain was waited for: {what}"
+            self.turn()
+        return found
+
+    def newest(self, name):
+        return self.messages.get(name, [None])[-1] if self.messages.get(name) else None
+
+
+def status(firsthand):
+    answer = subprocess.run([firsthand, "status", "--robot", ROBOT, "--json"], capture_output=True, text=True)
+    return json.loads(answer.stdout) if answer.returncode == 0 else None
+
+
+def turned(transform):
+    return 2 * math.atan2(transform.k, transform.w)
+
+
+def is_pose(heard):
+    """Whether map to odom to base_link is a pose that was heard."""
+    frames = {(t.header.frame_id, t.child_frame_id): t.transform for t in heard.newest("tf").transforms}
+    origin, odom = frames["map", "odom"], frames["odom", "base_link"]
+    angle = turned(origin)
+    x = origin.x + math.cos(angle) * odom.x - math.sin(angle) * odom.y
+    y = origin.y + math.sin(angle) * odom.x + math.cos(angle) * odom.y
+    near = [pose.pose.pose.position for pose in heard.messages["pose"][-20:]]
+    return min(math.hypot(at.x - x, at.y - y) for at in near) < 1e-9
+
+
+def check_map(heard):
+    """A map and its updates are the map that comes next."""
+    first = heard.messages["map"][0]
+    assert (first.header.frame_id, first.info.width * first.info.height) == ("map", len(first.data))
+    assert set(first.data) <= {-1, 0, 99, 100}
+    update = heard.newest("map_updates")
+    assert len(update.data) == update.width * update.height and update.x + update.width <= first.info.width
+
+
+def main(firsthand):
+    rclpy.init()
+    work = tempfile.mkdtemp()
+    processes = []
+
+    def start(*words, says=None):
+        processes.append(subprocess.Popen([firsthand, *words], stdout=subprocess.PIPE, stderr=says))
+        return processes[-1]
+
+    def bridge(*words):
+        return start("ros2", "--robot", ROBOT, *words)
+
+    def mission(name, *words):
+        slow = ["--pace", "1", "--json", "--robot", ROBOT, "--out", f"{work}/{name}", "--set", "controller.speed_m_s=0.3"]
+        return start("run", "open-room", *slow, *words, says=subprocess.DEVNULL)
+
+    def is_at(heard, x, y):
+        path = heard.newest("path")
+        return path and math.hypot(path.poses[-1].pose.position.x - x, path.poses[-1].pose.position.y - y) < 0.2
+
+    try:
+        heard = Heard()
+        node = heard.node
+        processes += [subprocess.Popen([sys.executable, __file__, role]) for role in ["--echo", "--latency"]]
+
+        # Nothing is let in unless it is asked for, and everything is published.
+        deaf = bridge()
+        run = mission("shown", "--set", "robot.model='kobuki'", "--set", "robot.rate_hz=10")
+        for name in ["pose", "odom", "map", "path", "field", "scan", "diagnostics", "tf", "tf_static", "map_updates"]:
+            heard.until(name, lambda: heard.messages.get(name))
+        heard.until("frames that are the pose", lambda: is_pose(heard))
+        assert {t.child_frame_id for t in heard.newest("tf_static").transforms} >= {"laser"}
+        heard.until("three maps", lambda: len(heard.messages["map"]) >= 3)
+        check_map(heard)
+        names = {status.name for status in heard.newest("diagnostics").status}
+        assert names >= {"firsthand: failsafe", "firsthand: planner"}, names
+        scan = heard.newest("scan")
+        assert len(scan.ranges) > 100 and scan.header.frame_id == "laser"
+        goals = node.create_publisher(PoseStamped, "goal_pose", 10)
+        goal = PoseStamped()
+        goal.header.frame_id, goal.pose.position.x, goal.pose.position.y = "map", 1.0, 1.0
+        goal.pose.orientation.w = 1.0
+        for _ in range(20):
+            goals.publish(goal)
+            heard.turn()
+        assert not is_at(heard, 1.0, 1.0)
+        # Who kills it harms nothing.
+        deaf.send_signal(signal.SIGKILL)
+        heard.until("the end of the mission", lambda: run.poll() is not None, 120)
+        assert json.loads(run.stdout.read())["outcome"] == "reached"
+        heard.messages.clear()
+
+        # A goal, a place, a stop.
+        bridge("--accept", "goals,pose,stop")
+        run = mission("asked", "--timeout", "600")
+        heard.until("range, battery", lambda: heard.messages.get("range/front") and heard.messages.get("battery_state"))
+        heard.until("movement", lambda: heard.newest("odom").twist.twist.linear.x > 0.1)
+        goal.pose.position.x, goal.pose.position.y = 2.5, 0.8
+
+        heard.until("a reader of goals", lambda: goals.get_subscription_count() > 0)
+        goals.publish(goal)
+        heard.until("the goal", lambda: is_at(heard, 2.5, 0.8))
+        stops = node.create_publisher(Bool, "stop", 10)
+        heard.until("a reader of stop", lambda: stops.get_subscription_count() > 0)
+        stops.publish(Bool(data=True))
+        heard.until("rest", lambda: status(firsthand)["link"]["cause"] == "stopped by an operator")
+        stops.publish(Bool(data=False))
+        heard.until("movement again", lambda: not status(firsthand)["link"]["stopped"])
+
+        # The action: a goal is sent, canceled, sent again, and reached.
+        client, number = 0x1234, 0
+
+        def call(writer, reply, request):
+            nonlocal number
+            number += 1
+            heard.messages[reply] = []
+            writer.write(request(client, number))
+            of_this = lambda: [r for r in heard.messages[reply] if (r.client, r.number) == (client, number)]
+            return heard.until(reply, of_this)[0]
+
+        def send(goal_id, x, y):
+            ask = lambda client, number: SendGoal(client, number, [goal_id] * 16, Header(), Plane(x=x, y=y))
+            return call(heard.send_goal, "sent", ask)
+
+        heard.until("the action's server", lambda: heard.send_goal.get_matched_subscriptions())
+        assert send(1, 3.0, -0.8).accepted
+        heard.until("its path", lambda: is_at(heard, 3.0, -0.8))
+        feedback = heard.until("feedback", lambda: heard.newest("feedback"))
+        assert list(feedback.goal_id) == [1] * 16 and feedback.distance_remaining > 0
+        cancel = node.create_client(CancelGoal, "navigate_to_pose/_action/cancel_goal")
+        heard.until("the service", cancel.service_is_ready)
+        answer = cancel.call_async(CancelGoal.Request())
+        heard.until("the answer of the service", answer.done)
+        assert [list(goal.goal_id.uuid) for goal in answer.result().goals_canceling] == [[1] * 16], answer.result()
+        heard.until("rest", lambda: status(firsthand)["link"]["cause"] == "stopped by an operator")
+        ask = lambda goal_id: lambda client, number: GetResult(client, number, [goal_id] * 16)
+        assert call(heard.get_result, "result", ask(1)).status == 5
+        assert not send(2, 90.0, 0.0).accepted
+        assert send(3, 3.0, 0.5).accepted
+        assert call(heard.get_result, "result", ask(3)).status == 4
+        of = lambda message: {int(goal.goal_info.goal_id.uuid[0]): goal.status for goal in message.status_list}
+        heard.until("its states", lambda: of(heard.newest("navigate_to_pose/_action/status")) == {1: 5, 3: 4})
+        heard.until("the end of the mission", lambda: run.poll() is not None, 120)
+        assert json.loads(run.stdout.read())["outcome"] == "reached"
+        print("every topic of the bridge was decoded, and what it lets in was done")
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+
+
+def echo():
+    """Publishes poses of its own, for a latency to compare with."""
+    rclpy.init()
+    node = rclpy.create_node("echo")
+    poses = node.create_publisher(PoseWithCovarianceStamped, "echo", 10)
+
+    def publish():
+        message = PoseWithCovarianceStamped()
+        message.header.stamp = node.get_clock().now().to_msg()
+        poses.publish(message)
+
+    node.create_timer(0.1, publish)
+    rclpy.spin(node)
+
+
+def latency(count=100):
+    """Hears poses of the bridge and of `echo`, and says how old they are."""
+    rclpy.init()
+    node, late = rclpy.create_node("latency"), {"pose": [], "echo": []}
+
+    def came(name, message):
+        stamp = message.header.stamp
+        late[name].append(1e3 * (time.time() - stamp.sec - stamp.nanosec * 1e-9))
+
+    for name in late:
+        node.create_subscription(PoseWithCovarianceStamped, name, lambda message, name=name: came(name, message), 10)
+    while min(map(len, late.values())) < count:
+        rclpy.spin_once(node)
+    for name, writer in [("pose", "the bridge"), ("echo", "rclpy")]:
+        ms = sorted(late[name])
+        print(f"a pose of {writer} is {ms[len(ms) // 2]:.2f} ms old in rclpy, at 99 % {ms[len(ms) * 99 // 100]:.2f} ms, of {len(ms)}", flush=True)
+
+
+if __name__ == "__main__":
+    {"--echo": echo, "--latency": latency}.get(sys.argv[1], lambda: main(sys.argv[1]))()
