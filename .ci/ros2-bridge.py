@@ -327,6 +327,20 @@ def main(firsthand):
         heard.until("its states", lambda: of(heard.newest("navigate_to_pose/_action/status")) == {1: 5, 3: 4})
         heard.until("the end of the mission", lambda: run.poll() is not None, 120)
         assert json.loads(run.stdout.read())["outcome"] == "reached"
+
+        # A robot that is said to be elsewhere believes it.
+        run = mission("placed")
+        heard.messages.clear()
+        heard.until("movement", lambda: heard.messages.get("odom") and heard.newest("odom").twist.twist.linear.x > 0.1)
+        places = node.create_publisher(PoseWithCovarianceStamped, "initialpose", 10)
+        heard.until("a reader of places", lambda: places.get_subscription_count() > 0)
+        place = PoseWithCovarianceStamped()
+        place.header.frame_id, place.pose.pose.position.y, place.pose.pose.orientation.w = "map", -2.0, 1.0
+        # As RViz sends it.
+        place.pose.covariance[0] = place.pose.covariance[7] = 0.25
+        place.pose.covariance[35] = 0.0685
+        places.publish(place)
+        heard.until("the place", lambda: heard.newest("pose").pose.pose.position.y < -1.5)
         print("every topic of the bridge was decoded, and what it lets in was done")
     finally:
         for process in processes:
