@@ -7,7 +7,8 @@
 //! - `accuracy` measures angles instead of times.
 //! - `split` measures the phases of a solve; with `quick` on small maps.
 //! - `growth` measures time and memory by the size of the map.
-//! - `--maps DIR` adds the PGM maps of a directory.
+//! - `sweep` measures a sweep over widths of corridors and doors, densities and depths of u, the worst first; `sweep angles` its angles.
+//! - `--maps DIR` adds the PGM and MovingAI maps of a directory.
 #![allow(
     clippy::expect_used,
     clippy::print_stdout,
@@ -20,6 +21,7 @@ mod machine;
 mod others;
 mod real;
 mod split;
+mod sweep;
 mod updates;
 mod wavefront;
 
@@ -58,6 +60,10 @@ fn main() {
     }
     if asked("growth") {
         return split::growth_table();
+    }
+    if asked("sweep") {
+        let real = maps_directory().map(|it| real::load_all(Path::new(&it)));
+        return if asked("angles") { sweep::angle_table() } else { sweep::table(real) };
     }
     if asked("accuracy") {
         accuracy::angle_table();

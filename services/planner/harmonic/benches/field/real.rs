@@ -7,11 +7,13 @@ use harmonic::{Cell, Domain};
 /// The ROS map_server's threshold: a darker cell is not free.
 const FREE_FROM: u8 = 206;
 
-/// The maps in the PGMs of a directory, by name.
+/// The maps in the PGMs and in the MovingAI files of a directory, by name.
 pub(crate) fn load_all(directory: &Path) -> Vec<(String, Domain)> {
     let entries = std::fs::read_dir(directory).expect("a directory of maps");
     let mut files: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
-    files.retain(|file| file.extension().is_some_and(|extension| extension == "pgm"));
+    files.retain(|file| {
+        file.extension().is_some_and(|extension| extension == "pgm" || extension == "map")
+    });
     files.sort();
     let named = |file: &PathBuf| {
         let name = file.file_stem().unwrap_or_default().to_string_lossy();
@@ -20,10 +22,11 @@ pub(crate) fn load_all(directory: &Path) -> Vec<(String, Domain)> {
     files.iter().map(named).collect()
 }
 
-/// The map in a PGM, its target the free cell nearest to the middle.
+/// The map in a file, its target the free cell nearest to the middle.
 fn load(file: &Path) -> Domain {
-    let (width, height, grey) = pgm(&std::fs::read(file).expect("a map"));
-    let mut blocked: Vec<bool> = grey.iter().map(|&grey| grey < FREE_FROM).collect();
+    let bytes = std::fs::read(file).expect("a map");
+    let (width, height, mut blocked) =
+        if bytes.starts_with(b"type ") { moving_ai(&bytes) } else { pgm(&bytes) };
     for (at, blocked) in blocked.iter_mut().enumerate() {
         let (col, row) = (at % width, at / width);
         *blocked |= col == 0 || row == 0 || col == width - 1 || row == height - 1;
@@ -38,8 +41,21 @@ fn load(file: &Path) -> Domain {
     Domain::new(width, height, blocked, target).expect("a valid map")
 }
 
-/// Columns, rows and pixels of a binary PGM of 8 bits, whose comments are lines of their own.
-fn pgm(bytes: &[u8]) -> (usize, usize, Vec<u8>) {
+/// Columns, rows and blocked cells of a MovingAI map.
+fn moving_ai(bytes: &[u8]) -> (usize, usize, Vec<bool>) {
+    let text = std::str::from_utf8(bytes).expect("a map in ASCII");
+    let (header, rows) = text.split_once("\nmap").expect("a map after its header");
+    let number = |name: &str| {
+        let mut words = header.split_whitespace().skip_while(|word| *word != name);
+        words.nth(1).and_then(|word| word.parse::<usize>().ok()).expect("a size")
+    };
+    let cells = rows.bytes().filter(|byte| !byte.is_ascii_whitespace());
+    let blocked = cells.map(|cell| !matches!(cell, b'.' | b'G' | b'S')).collect();
+    (number("width"), number("height"), blocked)
+}
+
+/// Columns, rows and blocked cells of a binary PGM of 8 bits, whose comments are lines of their own.
+fn pgm(bytes: &[u8]) -> (usize, usize, Vec<bool>) {
     let mut numbers = Vec::new();
     let mut rest = bytes.strip_prefix(b"P5\n").expect("a binary PGM");
     while numbers.len() < 3 {
@@ -53,5 +69,6 @@ fn pgm(bytes: &[u8]) -> (usize, usize, Vec<u8>) {
         }
     }
     assert_eq!(numbers[2], 255, "8 bits");
-    (numbers[0], numbers[1], rest.to_vec())
+    let pixels = &rest[..numbers[0] * numbers[1]];
+    (numbers[0], numbers[1], pixels.iter().map(|&grey| grey < FREE_FROM).collect())
 }

@@ -6,24 +6,24 @@ use std::time::Instant;
 use harmonic::testing::{Kind, Map};
 use harmonic::{Cancellation, Domain, Phase, Solver};
 
-use crate::{others_than, runs, wavefront};
+use crate::{others_than, runs, sweep, wavefront};
 
 /// The times of a solve's phases, milliseconds.
 #[derive(Clone, Copy, Default)]
-struct Split {
-    total: f64,
+pub(crate) struct Split {
+    pub total: f64,
     /// The choice of a method included.
     set_up: f64,
-    cycles: usize,
+    pub cycles: usize,
     cycling: f64,
     /// The end of the cycles until the field can be checked; all of a solve without cycles.
     rest: f64,
-    checks: usize,
+    pub checks: usize,
     checking: f64,
 }
 
 /// A solve of `domain` by phases, and its method.
-fn split(solver: &mut Solver, domain: &Domain) -> (Split, &'static str) {
+pub(crate) fn split(solver: &mut Solver, domain: &Domain) -> (Split, &'static str) {
     let mut split = Split::default();
     let start = Instant::now();
     let mut last = start;
@@ -126,7 +126,7 @@ pub(crate) fn growth_table() {
     for kind in [Kind::Drums, Kind::Office] {
         for n in [128, 256, 512, 1024, 2048, 4096] {
             let domain = Map::generate(kind, n, n, 1).domain().expect("a valid map");
-            let bytes = bytes_of_a_process(kind, n);
+            let bytes = bytes_of_a_process(&format!("{kind:?}:{n}"));
             let (split, method) = least(&domain);
             let (wavefront, _) = wavefront::time(&domain, runs(n * n).min(12));
             println!(
@@ -145,9 +145,8 @@ pub(crate) fn growth_table() {
 pub(crate) const BYTES: &str = "bytes";
 
 /// [`most_bytes`] in a process of its own, in which no memory was used and freed before.
-fn bytes_of_a_process(kind: Kind, n: usize) -> Option<f64> {
-    let map = format!("{kind:?}:{n}");
-    let output = Command::new(std::env::current_exe().ok()?).args([BYTES, &map]).output().ok()?;
+pub(crate) fn bytes_of_a_process(map: &str) -> Option<f64> {
+    let output = Command::new(std::env::current_exe().ok()?).args([BYTES, map]).output().ok()?;
     String::from_utf8(output.stdout).ok()?.trim().parse().ok()
 }
 
@@ -158,6 +157,7 @@ pub(crate) fn print_bytes() {
         let n = map.strip_prefix(&format!("{kind:?}:"))?.parse().ok()?;
         Map::generate(kind, n, n, 1).domain().ok()
     });
+    let domain = domain.or_else(|| sweep::named(&map));
     if let Some(bytes) = domain.and_then(|domain| most_bytes(&domain)) {
         println!("{bytes}");
     }

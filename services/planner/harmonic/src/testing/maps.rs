@@ -18,6 +18,10 @@ pub enum Kind {
     Maze { corridor: usize },
     /// A corridor of this width, folded over the whole map.
     Serpentine { corridor: usize },
+    /// A corridor of this width, wound up from the rim to the middle.
+    Spiral { corridor: usize },
+    /// Rooms of so many cells a side, joined by doors of this width.
+    Rooms { side: usize, door: usize },
     /// A U-shaped wall that opens away from the target.
     Trap,
     /// Every cell blocked with this chance: islands, pockets, diagonal leaks.
@@ -43,9 +47,10 @@ impl Map {
         let wanted = match kind {
             Kind::Empty | Kind::Noise { .. } => (width / 3, height / 4),
             Kind::Drums | Kind::Office => (width / 6, height / 5),
-            Kind::Maze { corridor } | Kind::Serpentine { corridor } => {
-                (1 + corridor / 2, 1 + corridor / 2)
-            }
+            Kind::Maze { corridor: side }
+            | Kind::Serpentine { corridor: side }
+            | Kind::Spiral { corridor: side }
+            | Kind::Rooms { side, .. } => (1 + side / 2, 1 + side / 2),
             Kind::Trap => (width * 9 / 10, height / 2),
         };
         match kind {
@@ -54,6 +59,8 @@ impl Map {
             Kind::Office => map.office(&mut random),
             Kind::Maze { corridor } => map.maze(corridor.max(1), &mut random),
             Kind::Serpentine { corridor } => map.serpentine(corridor.max(1)),
+            Kind::Spiral { corridor } => map.spiral(corridor.max(1)),
+            Kind::Rooms { side, door } => map.rooms(side.max(1), door, &mut random),
             Kind::Trap => map.trap(),
             Kind::Noise { density } => {
                 for cell in &mut map.blocked {
@@ -152,15 +159,59 @@ impl Map {
         }
     }
 
-    fn maze(&mut self, corridor: usize, random: &mut Random) {
-        let pitch = corridor + 1;
-        let (wide, high) =
-            (self.width.saturating_sub(1) / pitch, self.height.saturating_sub(1) / pitch);
+    /// Columns and rows of squares of this side, with walls of one cell between them, that the map has room for.
+    fn squares(&self, side: usize) -> (usize, usize) {
+        let count = |cells: usize| cells.saturating_sub(1) / (side + 1);
+        (count(self.width), count(self.height))
+    }
+
+    /// Frees nothing but the squares of this side in `pairs`, each joined to the other by an opening of the same width.
+    fn carve(&mut self, side: usize, pairs: impl IntoIterator<Item = Pair>) {
+        let pitch = side + 1;
         self.fill(0..self.width, 0..self.height, true);
-        for (a, b) in spanning_tree(wide, high, 0.05, random) {
+        for (a, b) in pairs {
             let (left, right) = (a.0.min(b.0) * pitch + 1, a.0.max(b.0) * pitch + 1);
             let (top, bottom) = (a.1.min(b.1) * pitch + 1, a.1.max(b.1) * pitch + 1);
-            self.fill(left..right + corridor, top..bottom + corridor, false);
+            self.fill(left..right + side, top..bottom + side, false);
+        }
+    }
+
+    fn maze(&mut self, corridor: usize, random: &mut Random) {
+        let (wide, high) = self.squares(corridor);
+        self.carve(corridor, spanning_tree(wide, high, 0.05, random));
+    }
+
+    fn spiral(&mut self, corridor: usize) {
+        let (wide, high) = self.squares(corridor);
+        let (mut at, mut step, mut turns) = ((0_usize, 0_usize), (1_isize, 0_isize), 0);
+        let mut seen = vec![false; wide * high];
+        let mut pairs = Vec::new();
+        while turns < 2 {
+            seen[at.1 * wide + at.0] = true;
+            let next = (at.0.wrapping_add_signed(step.0), at.1.wrapping_add_signed(step.1));
+            if next.0 < wide && next.1 < high && !seen[next.1 * wide + next.0] {
+                pairs.push((at, next));
+                (at, turns) = (next, 0);
+            } else {
+                (step, turns) = ((-step.1, step.0), turns + 1);
+            }
+        }
+        self.carve(corridor, pairs);
+    }
+
+    fn rooms(&mut self, side: usize, door: usize, random: &mut Random) {
+        let ((wide, high), pitch) = (self.squares(side), side + 1);
+        let rooms =
+            (0..wide * high).map(|room| ((room % wide, room / wide), (room % wide, room / wide)));
+        self.carve(side, rooms);
+        for (a, b) in spanning_tree(wide, high, 0.5, random) {
+            let at = 1 + random.below(side - door.min(side) + 1);
+            let (col, row) = (a.0.max(b.0) * pitch, a.1.max(b.1) * pitch);
+            if a.0 == b.0 {
+                self.fill(col + at..col + at + door.min(side), row..row + 1, false);
+            } else {
+                self.fill(col..col + 1, row + at..row + at + door.min(side), false);
+            }
         }
     }
 
@@ -191,13 +242,11 @@ impl Map {
     }
 }
 
+/// Two neighbouring rooms, or one room twice, by column and row.
+type Pair = ((usize, usize), (usize, usize));
+
 /// Pairs of neighbouring rooms that a door joins: a random spanning tree, and each other pair with chance `more`.
-fn spanning_tree(
-    wide: usize,
-    high: usize,
-    more: f64,
-    random: &mut Random,
-) -> Vec<((usize, usize), (usize, usize))> {
+fn spanning_tree(wide: usize, high: usize, more: f64, random: &mut Random) -> Vec<Pair> {
     let mut seen = vec![false; wide * high];
     let mut doors = Vec::new();
     let mut path = Vec::new();

@@ -1,0 +1,150 @@
+//! A sweep over the shapes of maps that decide what a solve costs: the width of corridors and of doors, the density of obstacles and
+//! the depth of u.
+
+use harmonic::testing::{Angles, Kind, Map, exact, follow};
+use harmonic::{Cancellation, Domain, Screening, Solver};
+
+use crate::split::{bytes_of_a_process, split};
+use crate::{others_than, wavefront};
+
+/// Side of the maps whose time is measured, cells.
+const SIDE: usize = 512;
+
+/// Side of the maps whose directions are compared: a factorisation of larger halls takes gigabytes.
+const SIDE_OF_EXACT: usize = 256;
+
+/// Runs of each solve; the fastest counts.
+const RUNS: usize = 3;
+
+/// The maps of the sweep by name, without making them: their kinds and screening lengths.
+fn kinds() -> Vec<(String, Kind, f64)> {
+    const NONE: f64 = f64::INFINITY;
+    let mut kinds = vec![(Kind::Empty, NONE), (Kind::Drums, NONE), (Kind::Office, NONE)];
+    for corridor in [1, 2, 3, 4, 6, 8, 12, 16, 20, 24, 32, 48, 64] {
+        kinds.push((Kind::Serpentine { corridor }, NONE));
+        kinds.push((Kind::Spiral { corridor }, NONE));
+        kinds.push((Kind::Maze { corridor }, NONE));
+    }
+    for side in [7, 15, 31, 63] {
+        for door in [1, 2, 4, 8, 16].into_iter().filter(|&door| door <= side) {
+            kinds.push((Kind::Rooms { side, door }, NONE));
+        }
+    }
+    for density in [0.01, 0.03, 0.1, 0.2, 0.25, 0.3, 0.35, 0.38, 0.4, 0.45] {
+        kinds.push((Kind::Noise { density }, NONE));
+    }
+    // Screening of this length lowers u across a hall by 1e-3 to 1e-2000.
+    for length in [70.0, 20.0, 7.0, 3.0, 1.0, 0.5, 0.1] {
+        kinds.extend([Kind::Empty, Kind::Drums, Kind::Office].map(|kind| (kind, length)));
+    }
+    let named = |(kind, length): (Kind, f64)| {
+        let mut name = format!("{kind:?}").replace(" { ", " ").replace(" }", "");
+        if length < NONE {
+            name += &format!(" L {length}");
+        }
+        (name, kind, length)
+    };
+    kinds.into_iter().map(named).collect()
+}
+
+fn domain(kind: Kind, length: f64, side: usize) -> Domain {
+    let domain = Map::generate(kind, side, side, 1).domain();
+    let domain = domain.and_then(|it| it.with_screening(&Screening::cells(length)));
+    domain.expect("a valid map")
+}
+
+/// The map of the sweep with this name.
+pub(crate) fn named(name: &str) -> Option<Domain> {
+    let (_, kind, length) = kinds().into_iter().find(|it| it.0 == name)?;
+    Some(domain(kind, length, SIDE))
+}
+
+/// Whether the words after `only` on the command line, if any, choose the map `name`.
+fn chosen(name: &str) -> bool {
+    let mut only = std::env::args().skip_while(|word| word != "only").skip(1).peekable();
+    only.peek().is_none() || only.any(|word| name.contains(&word))
+}
+
+/// Print the time of a solve from scratch of every map and of the wavefront that was run in turn with it, the worst ratio first.
+pub(crate) fn table(real: Option<Vec<(String, Domain)>>) {
+    let generated = kinds().into_iter().filter(|it| chosen(&it.0));
+    let mut rows: Vec<_> = generated
+        .map(|(name, kind, length)| {
+            row(&name, &domain(kind, length, SIDE), bytes_of_a_process(&name))
+        })
+        .collect();
+    rows.extend(real.into_iter().flatten().map(|(name, domain)| row(&name, &domain, None)));
+    rows.sort_by(|a, b| b.0.total_cmp(&a.0));
+    println!(
+        "\nSolves from scratch, {SIDE} x {SIDE} cells, as multiples of a wavefront's time, the worst first"
+    );
+    println!(
+        "{:<28} {:>6} {:>9} {:>7} {:<28} {:>6} {:>6} {:>9} {:>9}",
+        "map", "x", "ms", "ms/1e6", "method", "cycles", "checks", "log10 u", "bytes"
+    );
+    for (_, line) in rows {
+        println!("{line}");
+    }
+}
+
+/// The multiple of a wavefront's time that a map takes, and the line to print.
+fn row(name: &str, domain: &Domain, bytes: Option<f64>) -> (f64, String) {
+    let cells = domain.blocked().len() as f64;
+    let others = others_than(domain);
+    let mut solver = Solver::default();
+    let (mut best, mut waves) = (None, f64::INFINITY);
+    for _ in 0..RUNS {
+        for other in &others {
+            solver.solve(other, &Cancellation::new()).expect("a field");
+        }
+        let (split, method) = split(&mut solver, domain);
+        if best.is_none_or(|(least, _): (crate::split::Split, _)| split.total < least.total) {
+            best = Some((split, method));
+        }
+        waves = waves.min(wavefront::time(domain, 2).0);
+    }
+    let (split, method) = best.expect("at least one run");
+    let field = solver.solve(domain, &Cancellation::new()).expect("a field");
+    let ratio = split.total / waves;
+    let line = format!(
+        "{name:<28} {ratio:>6.2} {:>9.2} {:>7.1} {method:<28} {:>6} {:>6} {:>9.1} {:>9}",
+        split.total,
+        split.total * 1e6 / cells,
+        split.cycles,
+        split.checks,
+        field.log10_u_min(),
+        bytes.map_or("-".to_owned(), |it| format!("{:.0}", it / cells)),
+    );
+    (ratio, line)
+}
+
+/// Print the angles between the directions of the sweep's maps and exact ones, the worst first.
+pub(crate) fn angle_table() {
+    let mut rows = Vec::new();
+    for (name, kind, length) in kinds().into_iter().filter(|it| chosen(&it.0)) {
+        let domain = domain(kind, length, SIDE_OF_EXACT);
+        let field = Solver::default().solve(&domain, &Cancellation::new()).expect("a field");
+        let angles = Angles::between(&field, &exact(&domain).expect("a field"), |_| true);
+        let line = format!(
+            "{name:<28} {:>8.4} {:>8.4} {:>8.3} {:>8.2} {:>7} {}",
+            angles.p50,
+            angles.p99,
+            angles.clear_max,
+            angles.max,
+            follow(&field),
+            field.verification().method.name(),
+        );
+        rows.push((angles.clear_max, line));
+    }
+    rows.sort_by(|a, b| b.0.total_cmp(&a.0));
+    println!(
+        "\nDirections beside exact ones, {SIDE_OF_EXACT} x {SIDE_OF_EXACT} cells, degrees, the worst first"
+    );
+    println!(
+        "{:<28} {:>8} {:>8} {:>8} {:>8} {:>7} method",
+        "map", "p50", "p99", "clear", "max", "follow"
+    );
+    for (_, line) in rows {
+        println!("{line}");
+    }
+}
