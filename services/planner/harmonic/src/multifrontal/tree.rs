@@ -106,6 +106,8 @@ impl Tree {
         let mut stages = 0_usize;
         let distances = pass.levels.len() - 1;
         let slab = shape.slab.unwrap_or(distances);
+        // Two cells at one distance from a single cell are never neighbours: their parities are equal.
+        let several = pass.levels[1] > 1;
         let at = |distance: usize| pass.levels[distance.min(distances)];
         // Distance 0, the target, stands in for the innermost separator.
         for inner in (0..distances).step_by(slab).rev() {
@@ -120,10 +122,11 @@ impl Tree {
                 stages += 1;
                 let start = end.saturating_sub(shape.thickness).max(inner + 1);
                 let next = if start > inner + 1 { Next::Stage } else { Next::Separator };
-                builder.add_stage(&(at(start)..at(end)), &outer, end - start > 1, next);
+                let joins = several || end - start > 1;
+                builder.add_stage(&(at(start)..at(end)), &outer, joins, next);
                 end = start;
             }
-            builder.add_separator(&outer);
+            builder.add_separator(&outer, several);
         }
         let mut tree = builder.tree;
         tree.cost.bytes = tree.bytes(pass);
@@ -238,17 +241,8 @@ impl<'a> Builder<'a> {
     }
 
     /// Adds the fronts of a stage inside the slab whose outer separator takes the places `outer`.
-    fn add_stage(&mut self, stage: &Range<u32>, outer: &Range<u32>, thick: bool, next: Next) {
-        self.pieces.reset(stage.len());
-        if thick {
-            for place in stage.clone() {
-                for neighbour in self.pass.neighbours(place) {
-                    if neighbour > place && neighbour < stage.end {
-                        self.pieces.join(place - stage.start, neighbour - stage.start);
-                    }
-                }
-            }
-        }
+    fn add_stage(&mut self, stage: &Range<u32>, outer: &Range<u32>, joins: bool, next: Next) {
+        self.begin_pieces(stage, joins);
         let mut waiting = std::mem::take(&mut self.for_stage);
         self.adopt(stage, &waiting);
         waiting.clear();
@@ -264,8 +258,8 @@ impl<'a> Builder<'a> {
     }
 
     /// Adds the fronts of a separator, the slabs on both sides of which are eliminated.
-    fn add_separator(&mut self, separator: &Range<u32>) {
-        self.pieces.reset(separator.len());
+    fn add_separator(&mut self, separator: &Range<u32>, joins: bool) {
+        self.begin_pieces(separator, joins);
         let mut waiting = std::mem::take(&mut self.for_outer);
         self.adopt(separator, &waiting);
         waiting.clear();
@@ -273,6 +267,18 @@ impl<'a> Builder<'a> {
         for piece in 0..self.pieces.count() {
             let (index, _) = self.add_front(piece, separator, None);
             self.for_inner.push(index);
+        }
+    }
+
+    /// Makes every cell of a stage a piece; if `joins`, neighbours are joined.
+    fn begin_pieces(&mut self, stage: &Range<u32>, joins: bool) {
+        self.pieces.reset(stage.len());
+        for place in stage.clone().filter(|_| joins) {
+            for neighbour in self.pass.neighbours(place) {
+                if neighbour > place && neighbour < stage.end {
+                    self.pieces.join(place - stage.start, neighbour - stage.start);
+                }
+            }
         }
     }
 
@@ -441,6 +447,28 @@ mod tests {
     use super::*;
     use crate::cell::Cell;
     use crate::domain::Domain;
+    use crate::multifrontal::{Workspace, solve};
+    use crate::store::Store;
+
+    #[test]
+    fn neighbours_at_one_distance_from_several_known_cells_keep_their_coupling() {
+        let domain = Domain::new(60, 40, vec![false; 2400], Cell::new(7, 8)).unwrap();
+        let (none, budget) = (Cancellation::new(), Budget::of(&domain, u64::MAX));
+        let field = |pass: BreadthFirst, known: Option<&Store>| {
+            let tree = Tree::of(&pass, &budget, &none).unwrap();
+            let mut workspace = Workspace::default();
+            solve(&domain, (&pass, &tree), known, &budget, &mut workspace, &none).unwrap()
+        };
+        let right = field(BreadthFirst::from_target(&domain, &budget, &none).unwrap(), None);
+        // Cells in the middle between both ends are as far from one as from the other.
+        let is_known = |index: usize| !(10..50).contains(&(index % 60));
+        let pass = BreadthFirst::from_known(&domain, is_known, &budget, &none).unwrap();
+        let found = field(pass, Some(&right));
+        for index in 0..2400 {
+            let (found, right) = (found.u(index), right.u(index));
+            assert!((found.relative_to(right.exponent) / right.mantissa - 1.0).abs() < 1e-9);
+        }
+    }
 
     #[test]
     fn a_factorisation_without_the_memory_it_needs_is_refused_before_it_is_allocated() {
