@@ -30,9 +30,8 @@
 //! # The solvers
 //! [`Solver`] estimates the cost of each [`Method`] from the shape of the free space and falls back to the next one where a
 //! field fails verification:
-//! - Multigrid with interpolation by the equations (after Dendy's BoxMG), in `f32` or `f64`: a few dozen sweeps' worth of
-//!   work, where passages are wide.
-//! - Multigrid in bands of u, where wide maps are screened so strongly that u leaves the range of `f64`.
+//! - Multigrid with interpolation by the equations (after Dendy's BoxMG): a few dozen sweeps' worth of work, where passages
+//!   are wide. It is in `f32`, and in bands of u where u leaves that range; in `f64` where `f32` has too few digits.
 //! - Multifrontal factorisation in order of distance from the target, in extended range: where passages are narrow; its cost
 //!   does not depend on the range of u but grows with the square of the passages' width.
 //!

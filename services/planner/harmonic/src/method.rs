@@ -12,7 +12,7 @@ pub enum Method {
     MultigridAndMultifrontal,
     /// Multigrid in double precision.
     MultigridDouble,
-    /// Multigrid in double precision, one band of u after the other, each with an exponent of its own.
+    /// Multigrid in single precision, one band of u after the other, each with an exponent of its own.
     MultigridBands,
 }
 

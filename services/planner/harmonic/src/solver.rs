@@ -12,21 +12,13 @@ use crate::error::SolveError;
 use crate::field::Field;
 use crate::method::Method;
 use crate::multifrontal::{self, BreadthFirst, Budget, Tree, Workspace};
-use crate::multigrid::Multigrid;
+use crate::multigrid::{DOUBLE_CYCLES, FIRST_CHECK, Multigrid, SINGLE_CYCLES};
 use crate::multigrid_bands;
 use crate::real::Real;
 use crate::screening::Coefficients;
 use crate::store::{BLOCKED, Store};
 use crate::verification::{self, Check};
 use plan::{beyond_single, plan};
-
-/// A cell whose direction a coarse correction turns by more than this, radians, has not settled. The correction is applied, and
-/// the next would be smaller by a factor of three or more, which leaves directions well within a degree.
-const TOLERANCE: f64 = 0.02;
-
-/// Cycles before the first check: the first ones have not reached every cell, and a cell that is still zero does not count
-/// as unsettled.
-const FIRST_CHECK: usize = 3;
 
 /// Cycles before the first check of a solve that starts from the field of a similar map: the first cycle has no correction to
 /// judge by.
@@ -35,15 +27,6 @@ const FIRST_CHECK_NEAR: usize = 2;
 /// Most cycles from the field of a similar map; then it is solved from scratch. Maps that need more are mostly those in which cells
 /// were cut off: their u falls by an order of magnitude a cycle, and is zero at once in a solve from scratch.
 const NEAR_CYCLES: usize = 20;
-
-/// A cycle divides residuals by at least this.
-const PER_CYCLE: f64 = 3.0;
-/// Most cycles between a check that failed and the next.
-const BETWEEN_CHECKS: f64 = 4.0;
-
-/// Most cycles in a precision: its range of u at 1.4 orders of magnitude a cycle, with a reserve.
-const SINGLE_CYCLES: usize = 60;
-const DOUBLE_CYCLES: usize = 450;
 
 /// The resources of a solver. The results of full solves do not depend on them.
 #[derive(Clone, Debug)]
@@ -171,15 +154,17 @@ impl Solver {
         if let Some(near) = near.filter(|near| near.fits(domain)) {
             let method = near.verification().method;
             let solved = match method {
-                Method::MultigridSingle | Method::MultigridAndMultifrontal => {
+                Method::MultigridSingle
+                | Method::MultigridAndMultifrontal
+                | Method::MultigridBands => {
                     Some(self.single(task, Some(near), NEAR_CYCLES, &budget, observe)?)
                 }
                 Method::MultigridDouble => {
                     let solved = self.double.solve(task, Some(near), NEAR_CYCLES, observe)?;
                     Some((solved, method))
                 }
-                // The cost of these follows from the shape of the map alone.
-                Method::MultigridBands | Method::Multifrontal => None,
+                // The cost of this follows from the shape of the map alone.
+                Method::Multifrontal => None,
             };
             if let Some(((store, check), method)) = solved
                 && check.holds()
@@ -191,18 +176,13 @@ impl Solver {
         let mut failed = Check::default();
         for method in plan.methods {
             let ((store, check), method) = match method {
-                Method::MultigridSingle | Method::MultigridAndMultifrontal => {
+                Method::MultigridSingle
+                | Method::MultigridAndMultifrontal
+                | Method::MultigridBands => {
                     self.single(task, None, SINGLE_CYCLES, &budget, observe)?
                 }
                 Method::MultigridDouble => {
                     (self.double.solve(task, None, DOUBLE_CYCLES, observe)?, method)
-                }
-                Method::MultigridBands => {
-                    let store = multigrid_bands::solve(domain, cancellation)?;
-                    observe(Phase::Solved);
-                    let check = verification::check(domain, &store, threads);
-                    observe(Phase::Verified);
-                    ((store, check), method)
                 }
                 Method::Multifrontal => {
                     let (pass, tree) = if let Some(planned) = plan.multifrontal.take() {
@@ -246,7 +226,8 @@ impl Solver {
 }
 
 impl Solver {
-    /// What single precision holds of a field. Where u falls below that in narrow passages only, they are solved beyond it.
+    /// The field by multigrid in single precision, and where u falls below its range by what costs less there: multifrontal
+    /// factorisation of the passages or multigrid in bands.
     fn single(
         &mut self,
         task: Task<'_>,
@@ -257,20 +238,25 @@ impl Solver {
     ) -> Result<((Store, Check), Method), SolveError> {
         let Task { threads, domain, cancellation } = task;
         let (store, check) = self.single.solve(task, near, most_cycles, observe)?;
-        if check.holds() {
+        if check.holds() || check.unreached == 0 {
             return Ok(((store, check), Method::MultigridSingle));
         }
-        let Some((pass, tree)) = beyond_single(domain, &store, budget, cancellation)? else {
-            return Ok(((store, check), Method::MultigridSingle));
+        let beyond = beyond_single(domain, &store, budget, cancellation)?;
+        let (store, method) = if let Some((pass, tree)) = beyond {
+            let (places, workspace) = ((&pass, &tree), &mut self.multifrontal);
+            let known = Some(&store);
+            let store =
+                multifrontal::solve(domain, places, known, budget, workspace, cancellation)?;
+            (store, Method::MultigridAndMultifrontal)
+        } else {
+            let cycled = &mut || observe(Phase::Cycled);
+            let store = multigrid_bands::solve(domain, store, cancellation, cycled)?;
+            (store, Method::MultigridBands)
         };
-        let places = (&pass, &tree);
-        let workspace = &mut self.multifrontal;
-        let store =
-            multifrontal::solve(domain, places, Some(&store), budget, workspace, cancellation)?;
         observe(Phase::Solved);
         let check = verification::check(domain, &store, threads);
         observe(Phase::Verified);
-        Ok(((store, check), Method::MultigridAndMultifrontal))
+        Ok(((store, check), method))
     }
 }
 
@@ -290,7 +276,7 @@ where
         let Task { threads, domain, cancellation } = task;
         let levels = self.prepare(domain);
         observe(Phase::SetUp);
-        let mut next_check = FIRST_CHECK;
+        let mut first_check = FIRST_CHECK;
         match near {
             Some(near) => {
                 let width = domain.width();
@@ -298,18 +284,15 @@ where
                     let cells = row * width..(row + 1) * width;
                     near.store().read_row_as(cells, -R::TOP, guess);
                 });
-                next_check = FIRST_CHECK_NEAR;
+                first_check = FIRST_CHECK_NEAR;
             }
             None => levels.start(domain.target()),
         }
-        for cycle in 1.. {
-            cancellation.check()?;
-            let last = cycle == most_cycles;
-            let judged = (cycle >= next_check).then_some(TOLERANCE);
-            let settled = levels.cycle(judged).unsettled == 0 && judged.is_some();
+        let mut found = (Store::from(Vec::new()), Check::default());
+        levels.converge((first_check, most_cycles), cancellation, |levels, checked| {
             observe(Phase::Cycled);
-            if !(last || settled) {
-                continue;
+            if !checked {
+                return None;
             }
             levels.finish();
             let mut values = Vec::new();
@@ -323,13 +306,10 @@ where
                 // u falls below what this precision holds: what it holds is right, or needs more cycles.
                 excess = verification::check_above(domain, &store, threads, R::KNOWN).excess();
             }
-            if check.holds() || (check.unreached > 0 && excess <= 1.0) || last {
-                return Ok((store, check));
-            }
-            let cycles = excess.ln() / PER_CYCLE.ln();
-            next_check = cycle + cycles.clamp(1.0, BETWEEN_CHECKS) as usize;
-        }
-        Err(SolveError::Cancelled)
+            found = (store, check);
+            (!check.holds() && (check.unreached == 0 || excess > 1.0)).then_some(excess)
+        })?;
+        Ok(found)
     }
 
     /// The levels for `domain`: new, patched where it changed, or as they are.

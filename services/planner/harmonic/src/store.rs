@@ -8,6 +8,12 @@ use crate::scaled::{Scaled, pow2};
 /// u of a blocked cell in the stores: any negative number would do, the accessors hide it.
 pub(crate) const BLOCKED: f64 = -1.0;
 
+/// Exponent of the largest u in a store of many bands or fronts with a common exponent: so high that four of it can be added.
+const TOP: i32 = 1020;
+
+/// Exponent of the smallest: so low that it keeps all of its digits.
+const BOTTOM: i32 = -960;
+
 /// u as stored: positive where reachable, 0 where free but cut off, [`BLOCKED`] where blocked.
 #[derive(Clone, Debug)]
 pub(crate) enum Store {
@@ -96,6 +102,18 @@ impl Store {
             // The multiplication is done in two steps, because the factor may be out of range where the product is not.
             *to = R::of(value.max(0.0) * pow2(shift / 2) * pow2(shift - shift / 2));
         }
+    }
+
+    /// The store of mantissas, 0 and [`BLOCKED`] among them, and exponents: with a common exponent if an `f64` holds them all.
+    pub(crate) fn narrowest(mut mantissas: Vec<f64>, exponents: Vec<i32>) -> Self {
+        let positive = mantissas.iter().zip(&exponents).filter(|(mantissa, _)| **mantissa > 0.0);
+        if positive.map(|(_, &exponent)| exponent).min().is_none_or(|it| it < BOTTOM - TOP) {
+            return Self::Extended { mantissas, exponents };
+        }
+        for (value, exponent) in mantissas.iter_mut().zip(exponents) {
+            *value *= if *value > 0.0 { pow2(exponent + TOP) } else { 1.0 };
+        }
+        Self::Double { values: mantissas, exponent: -TOP }
     }
 
     fn extend(&mut self) {

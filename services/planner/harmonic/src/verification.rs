@@ -23,6 +23,7 @@ use crate::method::Method;
 use crate::real::Real;
 use crate::simd::Simd;
 use crate::store::Store;
+use cells::Around;
 use cells::Cells;
 pub(crate) use cells::Check;
 use rows::{Rows, ScaledRows, Window};
@@ -120,19 +121,65 @@ fn check_extended(
     check_strip(domain, mantissas, Cells::above(width, 0.0), ScaledRows::new(width), row_of, strip)
 }
 
-/// Checks a strip of rows with wide vectors: `raw` is what is stored, `row_of` gives rows by number, none beyond the map.
+/// Checks those cells of part of a map that have a `weight`, 0.25 / (1 + k), and in which u is above `floor`.
+pub(crate) fn check_above_with<R: Real>(
+    width: usize,
+    values: &[R],
+    weights: &[R],
+    floor: f64,
+) -> Check {
+    let cells = Cells::above(width, floor);
+    let row_of = |row: usize| values.get(row * width..(row + 1) * width);
+    let strip = 0..values.len() / width;
+    check_rows(
+        values,
+        cells,
+        Rows::new(width),
+        row_of,
+        strip,
+        #[inline(always)]
+        |cells, row, raw, u, found| {
+            cells.weights.copy_from_slice(&weights[row * width..(row + 1) * width]);
+            cells.check(raw, u, 0..width, found);
+        },
+    )
+}
+
+/// Checks a strip of rows of `domain`.
 fn check_strip<'f, R: Real, W: Window<R>>(
     domain: &Domain,
+    raw: &[R],
+    cells: Cells<R>,
+    rows: W,
+    row_of: impl Fn(usize) -> Option<W::Row<'f>>,
+    strip: Range<usize>,
+) -> Check {
+    check_rows(
+        raw,
+        cells,
+        rows,
+        row_of,
+        strip,
+        #[inline(always)]
+        |cells, row, raw, u, found| {
+            cells.check_row(domain, row, raw, u, found);
+        },
+    )
+}
+
+/// Checks a strip of rows with wide vectors: `raw` is what is stored, `row_of` gives rows by number, none beyond the map.
+fn check_rows<'f, R: Real, W: Window<R>>(
     raw: &[R],
     mut cells: Cells<R>,
     mut rows: W,
     row_of: impl Fn(usize) -> Option<W::Row<'f>>,
     strip: Range<usize>,
+    check_row: impl Fn(&mut Cells<R>, usize, &[R], Around<'_, R>, &mut Check),
 ) -> Check {
     Simd::default().run(
         #[inline(always)]
         || {
-            let width = domain.width();
+            let width = cells.weights.len();
             let mut found = Check::default();
             let mut tiles = Tiles::new(width);
             rows.take(strip.start.checked_sub(1).and_then(&row_of));
@@ -140,7 +187,7 @@ fn check_strip<'f, R: Real, W: Window<R>>(
             for row in strip.clone() {
                 rows.take(row_of(row + 1));
                 let raw = &raw[row * width..(row + 1) * width];
-                cells.check_row(domain, row, raw, rows.around(), &mut found);
+                check_row(&mut cells, row, raw, rows.around(), &mut found);
                 tiles.add_row(row, &cells.residuals, &cells.slopes);
             }
             found.worst_tile = tiles.finish();

@@ -15,12 +15,6 @@ const PLAIN_SPAN: i32 = 300;
 /// Below this, sums in plain `f64` may have unreached terms to underflow.
 const PLAIN_LEAST: f64 = 1e-180;
 
-/// Exponent of the largest u in a plain store: so high that four of it can be added.
-const TOP: i32 = 1020;
-
-/// Exponent of the smallest: so low that it keeps all of its digits.
-const BOTTOM: i32 = -960;
-
 /// u of every cell of `domain`; that of the cells from which `pass` begins is `known`, or 1 at the target.
 ///
 /// # Errors
@@ -66,33 +60,16 @@ fn store(domain: &Domain, pass: &BreadthFirst, u: &[Scaled], known: Option<&Stor
         let known = || known.map_or(Scaled::ZERO, |known| known.u(index));
         u.get(place as usize).copied().unwrap_or_else(known)
     };
-    let raw = |u: Scaled, blocked: bool, value: f64| match (blocked, u.is_zero()) {
-        (true, _) => BLOCKED,
-        (false, true) => 0.0,
-        (false, false) => value,
-    };
-    let least = u.iter().filter(|u| !u.is_zero()).map(|u| u.exponent).min();
-    if least.is_some_and(|least| least >= BOTTOM - TOP) {
-        let mut values = Vec::with_capacity(width * height);
-        for row in 0..height {
-            let cells = (row * width..).zip(pass.row(row)).zip(blocked(row));
-            values.extend(cells.map(|((index, &place), &blocked)| {
-                let u = at(index, place);
-                raw(u, blocked, u.relative_to(-TOP))
-            }));
-        }
-        return Store::Double { values, exponent: -TOP };
-    }
     let mut mantissas = Vec::with_capacity(width * height);
     let mut exponents = Vec::with_capacity(width * height);
     for row in 0..height {
         for ((index, &place), &blocked) in (row * width..).zip(pass.row(row)).zip(blocked(row)) {
             let u = at(index, place);
-            mantissas.push(raw(u, blocked, u.mantissa));
+            mantissas.push(if blocked { BLOCKED } else { u.mantissa });
             exponents.push(u.exponent);
         }
     }
-    Store::Extended { mantissas, exponents }
+    Store::narrowest(mantissas, exponents)
 }
 
 /// The weights of a front.

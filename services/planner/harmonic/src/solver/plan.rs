@@ -19,16 +19,17 @@ const WIDE: f64 = 32.0;
 /// Orders of magnitude of u that fit single precision between the largest and the smallest normal number, less some.
 const SINGLE_DECADES: f64 = 62.0;
 
-/// Orders of magnitude of u that fit double precision.
-const DOUBLE_DECADES: f64 = 570.0;
-const TWICE_DOUBLE_DECADES: f64 = 2.0 * DOUBLE_DECADES;
-
 /// Measured on one machine; only their ratios matter. Nanoseconds.
 const SET_UP_PER_CELL: f64 = 3.0;
 const SINGLE_CYCLE_PER_CELL: f64 = 1.1;
-const DOUBLE_CYCLE_PER_CELL: f64 = 2.5;
 const MULTIFRONTAL_PER_CELL: f64 = 65.0;
 const MULTIFRONTAL_PER_OPERATION: f64 = 0.15;
+
+/// Nanoseconds a cell of the map that multigrid in single precision takes for a range of u, in as many bands as that needs.
+fn multigrid_per_cell(decades: f64) -> f64 {
+    let bands = (decades / SINGLE_DECADES).max(1.0);
+    bands * (SET_UP_PER_CELL + SINGLE_CYCLE_PER_CELL * cycles(decades / bands))
+}
 
 /// Cycles multigrid takes for a range of u: in narrow passages one converges three to four orders of magnitude.
 fn cycles(decades: f64) -> f64 {
@@ -43,19 +44,11 @@ pub(super) struct Plan {
     pub multifrontal: Option<(BreadthFirst, Tree)>,
 }
 
-/// The methods by growing range of u.
-const METHODS: [Method; 4] = [
-    Method::MultigridSingle,
-    Method::MultigridDouble,
-    Method::MultigridBands,
-    Method::Multifrontal,
-];
-
 impl Plan {
-    /// Try the multigrid method `first`, then those after it.
-    fn multigrid(first: Method) -> Self {
-        let methods = METHODS.into_iter().skip_while(|&method| method != first);
-        Self { methods: methods.collect(), multifrontal: None }
+    /// Multigrid in single precision and beyond its range, then in double precision.
+    fn multigrid() -> Self {
+        use Method::{Multifrontal, MultigridDouble, MultigridSingle};
+        Self { methods: vec![MultigridSingle, MultigridDouble, Multifrontal], multifrontal: None }
     }
 }
 
@@ -68,35 +61,20 @@ pub(super) fn plan(
     budget: &Budget,
     cancellation: &Cancellation,
 ) -> Result<Plan, SolveError> {
-    use Method::{MultigridBands, MultigridDouble, MultigridSingle};
     let width = mean_width(domain);
     if width >= WIDE {
-        // Ways in wide space are not much longer than the map's diagonal.
-        let length = (domain.width() as f64).hypot(domain.height() as f64);
-        let first = match screened(domain) * length {
-            ..SINGLE_DECADES => MultigridSingle,
-            ..DOUBLE_DECADES => MultigridDouble,
-            _ => MultigridBands,
-        };
-        return Ok(Plan::multigrid(first));
+        return Ok(Plan::multigrid());
     }
     let pass = match BreadthFirst::from_target(domain, budget, cancellation) {
-        // The length of the ways is then not known: from single precision up, whatever holds.
-        Err(SolveError::TooCostly { .. }) => return Ok(Plan::multigrid(MultigridSingle)),
+        Err(SolveError::TooCostly { .. }) => return Ok(Plan::multigrid()),
         pass => pass?,
     };
     let cells = pass.len() as f64;
     // The runs along a passage count into the mean width too; on mazes that makes it about 1.7 times too large.
     let passage = (width + 1.0) / 1.7 - 1.0;
     let decades = pass.levels.len() as f64 * decades_per_cell(domain, passage);
-    let (method, per_cycle) = match decades {
-        ..SINGLE_DECADES => (MultigridSingle, SINGLE_CYCLE_PER_CELL),
-        // The estimate is rather too large than too small, so doubles get a chance beyond their range.
-        ..TWICE_DOUBLE_DECADES => (MultigridDouble, DOUBLE_CYCLE_PER_CELL),
-        _ => (MultigridBands, DOUBLE_CYCLE_PER_CELL),
-    };
-    let multigrid = Plan::multigrid(method);
-    let cost = domain.blocked().len() as f64 * (SET_UP_PER_CELL + per_cycle * cycles(decades));
+    let multigrid = Plan::multigrid();
+    let cost = domain.blocked().len() as f64 * multigrid_per_cell(decades);
     // The factorisation costs more than this on any map: no need to build its tree.
     if cost < 0.5 * MULTIFRONTAL_PER_CELL * cells {
         return Ok(multigrid);
@@ -110,11 +88,8 @@ pub(super) fn plan(
     Ok(Plan { methods, multifrontal: Some((pass, tree)) })
 }
 
-/// The orders of magnitude of u that are right in single precision.
-const KNOWN_DECADES: f64 = 58.0;
-
 /// The cells in which u is smaller than `store` says, which has what single precision can hold, and the tree of their fronts; none if
-/// double precision costs less.
+/// multigrid in bands costs less.
 ///
 /// # Errors
 /// [`SolveError::Cancelled`].
@@ -131,9 +106,8 @@ pub(super) fn beyond_single(
     };
     let cells = pass.unknown().len() as f64;
     let decades = pass.levels.len() as f64 * decades_per_cell(domain, pass.width());
-    let cycles = cycles(KNOWN_DECADES + decades);
-    let double = domain.blocked().len() as f64 * (SET_UP_PER_CELL + DOUBLE_CYCLE_PER_CELL * cycles);
-    if cells == 0.0 || MULTIFRONTAL_PER_CELL * cells > double {
+    let bands = domain.blocked().len() as f64 * multigrid_per_cell(decades);
+    if cells == 0.0 || MULTIFRONTAL_PER_CELL * cells > bands {
         return Ok(None);
     }
     let tree = match Tree::of(&pass, budget, cancellation) {
@@ -141,7 +115,7 @@ pub(super) fn beyond_single(
         tree => tree?,
     };
     let exact = MULTIFRONTAL_PER_CELL * cells + MULTIFRONTAL_PER_OPERATION * tree.cost.operations;
-    Ok((exact <= double).then_some((pass, tree)))
+    Ok((exact <= bands).then_some((pass, tree)))
 }
 
 /// The orders of magnitude by which u falls a cell along a passage of this width: like exp(-pi x / width), and by screening.

@@ -46,8 +46,12 @@ impl Check {
 
     /// Whether the field may be handed out.
     pub(crate) fn holds(&self) -> bool {
+        self.unreached == 0 && self.holds_where_reached()
+    }
+
+    /// Whether the cells of u > 0 are right.
+    pub(crate) fn holds_where_reached(&self) -> bool {
         self.local_maxima == 0
-            && self.unreached == 0
             && self.worst_residual <= RESIDUAL_LIMIT
             && self.worst_tile <= TILE_LIMIT
     }
