@@ -96,25 +96,33 @@ pub(crate) struct Multigrid<R> {
 impl<R: Real> Multigrid<R> {
     /// Levels for maps of this size, with no equations yet.
     pub(crate) fn new(width: usize, height: usize) -> Self {
-        let mut grid = Grid::new(width, height);
-        let finest = Finest::new(grid);
-        let mut coarse = Vec::new();
-        let mut products = Vec::new();
-        loop {
-            products.push(Products::new(&grid));
-            grid = Grid::new(grid.columns, grid.rows);
-            coarse.push(Coarse::new(grid));
-            if grid.width.max(grid.height) <= COARSEST_SIDE {
-                break;
-            }
-        }
-        Self {
-            finest,
-            coarse,
+        let mut levels = Self {
+            finest: Finest::default(),
+            coarse: Vec::new(),
             coarsest: Coarsest::default(),
-            products,
+            products: Vec::new(),
             corrects: false,
             simd: Simd::default(),
+        };
+        levels.reshape(width, height);
+        levels
+    }
+
+    /// Makes these levels for maps of another size, with no equations yet, in the memory they have: fresh pages from the system
+    /// cost as much as several cycles.
+    pub(crate) fn reshape(&mut self, width: usize, height: usize) {
+        let mut grid = Grid::new(width, height);
+        self.finest.reshape(grid);
+        self.products.clear();
+        loop {
+            self.products.push(Products::new(&grid));
+            grid = Grid::new(grid.columns, grid.rows);
+            let level = self.products.len();
+            self.coarse.resize_with(self.coarse.len().max(level), Coarse::default);
+            self.coarse[level - 1].reshape(grid);
+            if grid.width.max(grid.height) <= COARSEST_SIDE {
+                return self.coarse.truncate(level);
+            }
         }
     }
 

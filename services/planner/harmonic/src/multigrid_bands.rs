@@ -34,8 +34,11 @@ const LARGEST: f32 = 1e35;
 /// Steps of a band as a multiple of those in which u fell out of range in the band before.
 const RESERVE: f64 = 1.25;
 
-/// The sides of rectangles are multiples of this, so that the levels of one serve for the next.
-const SIDES: usize = 32;
+/// The sides of rectangles are multiples of this, for whole vectors.
+const SIDES: usize = 16;
+
+/// Column and row of a cell.
+type Place = [u16; 2];
 
 /// u of the cells resolved so far, and the cells from which the next band begins.
 struct Bands<'a> {
@@ -45,16 +48,16 @@ struct Bands<'a> {
     /// In cells that are not resolved the number of the last band they were in.
     exponents: Vec<i32>,
     /// Resolved cells beside others that are not.
-    edge: Vec<usize>,
+    edge: Vec<Place>,
 }
 
 /// The unknowns of a band.
 #[derive(Default)]
 struct Unknowns {
     /// In order of their distance in steps from the inflow.
-    cells: Vec<usize>,
-    /// The end of each distance in `cells`.
-    ends: Vec<usize>,
+    places: Vec<Place>,
+    /// The start of each distance in `places`.
+    starts: Vec<usize>,
 }
 
 /// The part of the map that holds a band's unknowns and their neighbours.
@@ -66,31 +69,28 @@ struct Rectangle {
     height: usize,
 }
 
-/// u of every cell of `domain` that can be reached, from that of the cells in which `known` is above [`KNOWN`](Real::KNOWN).
+/// u of every cell of `domain` that can be reached, from that of the cells in which `known` is above [`KNOWN`](Real::KNOWN). The
+/// memory of `levels` is used.
 pub(crate) fn solve(
     domain: &Domain,
     known: Store,
+    levels: &mut Multigrid<f32>,
     cancellation: &Cancellation,
     cycled: &mut dyn FnMut(),
 ) -> Result<Store, SolveError> {
     let mut bands = Bands::new(domain, &known);
     drop(known);
-    let mut levels = None;
-    let mut shape = Rectangle::default();
     let (mut inverse, mut values) = (Vec::new(), Vec::new());
-    let mut steps = usize::MAX;
+    // The first band is about as deep as the known cells are.
+    let resolved = bands.mantissas.iter().filter(|&&mantissa| mantissa > 0.0).count();
+    let mut steps = 8 + 3 * resolved / bands.edge.len().max(1);
     let mut number = 0;
-    while let Some(top) = bands.edge.iter().map(|&cell| bands.exponents[cell]).max() {
+    while let Some(top) = bands.edge.iter().map(|&at| bands.exponents[bands.index(at)]).max() {
         cancellation.check()?;
         number += 1;
         let unknowns = bands.unknowns(top, number, steps);
         let here = bands.rectangle(&unknowns);
-        if levels.is_none() || (here.width, here.height) != (shape.width, shape.height) {
-            // The memory of the other levels is freed first.
-            drop(levels.take());
-        }
-        shape = here;
-        let levels = levels.get_or_insert_with(|| Multigrid::new(here.width, here.height));
+        levels.reshape(here.width, here.height);
         bands.load(here, top, number, (&mut inverse, &mut values), levels);
         levels.converge((FIRST_CHECK, SINGLE_CYCLES), cancellation, |levels, checked| {
             cycled();
@@ -103,17 +103,15 @@ pub(crate) fn solve(
             let excess = MARGIN * check.excess();
             (excess > 1.0 || !check.holds_where_reached()).then_some(excess)
         })?;
-        let value = |cell: usize| f64::from(values[here.index(domain, cell)]);
-        let within =
-            |&distance: &usize| unknowns.at(distance).iter().any(|&cell| value(cell) > CUT);
-        let last = unknowns.ends.len() - 1;
-        if unknowns.ends.len() == steps && within(&last) {
-            steps = steps.saturating_mul(2);
+        let value = |at: Place| f64::from(values[here.index(at)]);
+        let farthest = unknowns.places.iter().rposition(|&at| value(at) > CUT).unwrap_or(0);
+        let reached = unknowns.starts.partition_point(|&start| start <= farthest);
+        if reached >= steps {
+            steps *= 2;
             continue;
         }
-        let reached = (0..=last).rev().find(within).unwrap_or(0);
-        steps = (RESERVE * (reached + 2) as f64) as usize + 4;
-        if !bands.resolve(&unknowns.cells, value, top) {
+        steps = 8 + (RESERVE * reached as f64) as usize;
+        if !bands.resolve(&unknowns.places, value, top) {
             break;
         }
     }
@@ -124,57 +122,75 @@ impl<'a> Bands<'a> {
     fn new(domain: &'a Domain, known: &Store) -> Self {
         let cells = 0..domain.blocked().len();
         let (mantissas, exponents) = cells
-            .clone()
             .map(|cell| {
                 let (value, _) = known.raw(cell);
                 let u = if value > f32::KNOWN { known.u(cell) } else { Scaled::ZERO };
                 (if value < 0.0 { BLOCKED } else { u.mantissa }, u.exponent)
             })
             .unzip();
-        let mut bands = Self { domain, mantissas, exponents, edge: cells.collect() };
-        bands.keep_edge();
+        let mut bands = Self { domain, mantissas, exponents, edge: Vec::new() };
+        let rows = 0..domain.height() as u16;
+        bands.edge = rows
+            .flat_map(|row| (0..domain.width() as u16).map(move |col| [col, row]))
+            .filter(|&at| bands.is_edge(at))
+            .collect();
         bands
     }
 
-    /// The neighbours of a cell that are not resolved.
-    fn open(&self, cell: usize) -> impl Iterator<Item = usize> {
-        let around = self.domain.neighbours(cell).into_iter().flatten();
-        around.filter(|&cell| self.mantissas[cell] == 0.0)
+    /// Row-major index of a cell of the map.
+    fn index(&self, [col, row]: Place) -> usize {
+        usize::from(row) * self.domain.width() + usize::from(col)
     }
 
-    /// Leaves those cells in the edge that belong there.
-    fn keep_edge(&mut self) {
-        let mut edge = std::mem::take(&mut self.edge);
-        edge.retain(|&cell| self.mantissas[cell] > 0.0 && self.open(cell).next().is_some());
-        self.edge = edge;
+    fn u(&self, at: Place) -> Scaled {
+        let cell = self.index(at);
+        Scaled { mantissa: self.mantissas[cell], exponent: self.exponents[cell] }
+    }
+
+    /// The neighbours of a cell that are not resolved.
+    fn open(&self, [col, row]: Place) -> impl Iterator<Item = Place> {
+        let (width, height) = (self.domain.width(), self.domain.height());
+        let around = [
+            (col > 0).then(|| [col - 1, row]),
+            (usize::from(col) + 1 < width).then(|| [col + 1, row]),
+            (row > 0).then(|| [col, row - 1]),
+            (usize::from(row) + 1 < height).then(|| [col, row + 1]),
+        ];
+        around.into_iter().flatten().filter(|&at| self.mantissas[self.index(at)] == 0.0)
+    }
+
+    fn is_edge(&self, at: Place) -> bool {
+        self.mantissas[self.index(at)] > 0.0 && self.open(at).next().is_some()
     }
 
     /// The cells of the edge from which there is inflow into a band.
-    fn inflow(&self, top: i32) -> impl Iterator<Item = usize> {
-        let counts = move |&cell: &usize| self.exponents[cell] > top.saturating_sub(NO_INFLOW);
-        self.edge.iter().copied().filter(counts)
+    fn inflow(&self, top: i32) -> impl Iterator<Item = Place> {
+        let least = top.saturating_sub(NO_INFLOW);
+        self.edge.iter().copied().filter(move |&at| self.u(at).exponent > least)
     }
 
     /// The cells within so many `steps` from the inflow, marked by the `number` of the band.
     fn unknowns(&mut self, top: i32, number: i32, steps: usize) -> Unknowns {
         let mut unknowns = Unknowns::default();
-        let mut before: Vec<usize> = self.inflow(top).collect();
-        while !before.is_empty() && unknowns.ends.len() < steps {
-            let start = unknowns.cells.len();
-            for &cell in &before {
-                let around = self.domain.neighbours(cell).into_iter().flatten();
-                for next in around {
-                    if self.mantissas[next] == 0.0 && self.exponents[next] != number {
-                        self.exponents[next] = number;
-                        unknowns.cells.push(next);
+        let mut before: Vec<Place> = self.inflow(top).collect();
+        while !before.is_empty() && unknowns.starts.len() < steps {
+            let start = unknowns.places.len();
+            for &from in &before {
+                let open: [Option<Place>; 4] = {
+                    let mut open = self.open(from);
+                    std::array::from_fn(|_| open.next())
+                };
+                for at in open.into_iter().flatten() {
+                    let cell = self.index(at);
+                    if self.exponents[cell] != number {
+                        self.exponents[cell] = number;
+                        unknowns.places.push(at);
                     }
                 }
             }
             before.clear();
-            before.extend_from_slice(&unknowns.cells[start..]);
-            if !before.is_empty() {
-                unknowns.ends.push(unknowns.cells.len());
-            }
+            before.extend_from_slice(&unknowns.places[start..]);
+            unknowns.starts.push(start);
         }
         unknowns
     }
@@ -183,8 +199,8 @@ impl<'a> Bands<'a> {
     fn rectangle(&self, unknowns: &Unknowns) -> Rectangle {
         let (width, height) = (self.domain.width(), self.domain.height());
         let (mut cols, mut rows) = ((width, 0), (height, 0));
-        for &cell in &unknowns.cells {
-            let (col, row) = (cell % width, cell / width);
+        for at in &unknowns.places {
+            let [col, row] = at.map(usize::from);
             cols = (cols.0.min(col), cols.1.max(col + 1));
             rows = (rows.0.min(row), rows.1.max(row + 1));
         }
@@ -221,10 +237,9 @@ impl<'a> Bands<'a> {
             }
         }
         let inflow = self.inflow(top).flat_map(|from| {
-            let u = Scaled { mantissa: self.mantissas[from], exponent: self.exponents[from] };
-            let value = u.relative_to(reference) as f32;
-            let marked = self.open(from).filter(|&to| self.exponents[to] == number);
-            marked.map(move |to| (here.cell(self.domain, to), value))
+            let value = self.u(from).relative_to(reference) as f32;
+            let marked = self.open(from).filter(|&to| self.u(to).exponent == number);
+            marked.map(move |to| (here.cell(to), value))
         });
         let width = here.width;
         levels.load(|row| &inverse[row * width..(row + 1) * width], inflow);
@@ -243,41 +258,35 @@ impl<'a> Bands<'a> {
         });
     }
 
-    /// Resolves the `cells` whose `value` is well inside the range; false if there is none.
-    fn resolve(&mut self, cells: &[usize], value: impl Fn(usize) -> f64, top: i32) -> bool {
+    /// Resolves the unknowns whose `value` is well inside the range; false if there is none.
+    fn resolve(&mut self, unknowns: &[Place], value: impl Fn(Place) -> f64, top: i32) -> bool {
         let before = self.edge.len();
-        for &cell in cells {
-            let value = value(cell);
+        for &at in unknowns {
+            let value = value(at);
             if value > f32::KNOWN {
-                let u = Scaled::new(value, top - f32::TOP);
+                let (u, cell) = (Scaled::new(value, top - f32::TOP), self.index(at));
                 (self.mantissas[cell], self.exponents[cell]) = (u.mantissa, u.exponent);
-                self.edge.push(cell);
+                self.edge.push(at);
             }
         }
         let resolved = self.edge.len() > before;
-        self.keep_edge();
+        let mut edge = std::mem::take(&mut self.edge);
+        edge.retain(|&at| self.is_edge(at));
+        self.edge = edge;
         resolved
-    }
-}
-
-impl Unknowns {
-    /// The cells at a distance.
-    fn at(&self, distance: usize) -> &[usize] {
-        let start = if distance == 0 { 0 } else { self.ends[distance - 1] };
-        &self.cells[start..self.ends[distance]]
     }
 }
 
 impl Rectangle {
     /// The place in the rectangle of a cell of the map.
-    fn cell(self, domain: &Domain, cell: usize) -> Cell {
-        let width = domain.width();
-        Cell::new(cell % width - self.col, cell / width - self.row)
+    fn cell(self, at: Place) -> Cell {
+        let [col, row] = at.map(usize::from);
+        Cell::new(col - self.col, row - self.row)
     }
 
-    /// Its index in the rectangle.
-    fn index(self, domain: &Domain, cell: usize) -> usize {
-        let Cell { col, row } = self.cell(domain, cell);
+    /// Its row-major index in the rectangle.
+    fn index(self, at: Place) -> usize {
+        let Cell { col, row } = self.cell(at);
         row * self.width + col
     }
 }

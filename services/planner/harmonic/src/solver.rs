@@ -250,7 +250,10 @@ impl Solver {
             (store, Method::MultigridAndMultifrontal)
         } else {
             let cycled = &mut || observe(Phase::Cycled);
-            let store = multigrid_bands::solve(domain, store, cancellation, cycled)?;
+            // The next solve sets the levels up again.
+            self.single.width = 0;
+            let levels = self.single.levels.get_or_insert_with(|| Multigrid::new(1, 1));
+            let store = multigrid_bands::solve(domain, store, levels, cancellation, cycled)?;
             (store, Method::MultigridBands)
         };
         observe(Phase::Solved);
@@ -322,14 +325,14 @@ where
         } else {
             Some(0..domain.height())
         };
+        let (width, height) = (domain.width(), domain.height());
+        let levels = self.levels.get_or_insert_with(|| Multigrid::new(1, 1));
         if !same_size {
-            self.levels = None;
+            levels.reshape(width, height);
         }
-        let levels =
-            self.levels.get_or_insert_with(|| Multigrid::new(domain.width(), domain.height()));
         if let Some(rows) = changed {
             levels.set_up_rows(domain, rows);
-            self.width = domain.width();
+            self.width = width;
             self.blocked.clear();
             self.blocked.extend_from_slice(domain.blocked());
             self.screening.clone_from(domain.screening());

@@ -31,7 +31,7 @@ const SE: (isize, isize) = (1, 1);
 const ALL: [(isize, isize); 8] = [W, E, N, S, NW, NE, SW, SE];
 
 /// Cells of one coarse level.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Coarse<R> {
     pub grid: Grid,
     pub u: Planes<R>,
@@ -53,21 +53,14 @@ pub(super) struct Coarse<R> {
 }
 
 impl<R: Real> Coarse<R> {
-    pub(super) fn new(grid: Grid) -> Self {
-        Self {
-            grid,
-            u: grid.planes(),
-            first_visit: grid.planes(),
-            f: grid.planes(),
-            inverse: grid.planes(),
-            coupling: std::array::from_fn(|_| grid.planes()),
-            west: grid.plane(),
-            east: grid.plane(),
-            north: grid.plane(),
-            south: grid.plane(),
-            scratch: Scratch::default(),
-            whole: Whole::new(&grid),
-        }
+    /// Makes this a level of `grid` without cells.
+    pub(super) fn reshape(&mut self, grid: Grid) {
+        self.grid = grid;
+        let weights = [&mut self.west, &mut self.east, &mut self.north, &mut self.south];
+        let values = self.u.iter_mut().chain(&mut self.first_visit).chain(&mut self.f);
+        let equations = self.inverse.iter_mut().chain(self.coupling.iter_mut().flatten());
+        grid.reset(values.chain(equations).chain(weights));
+        self.whole.reset(&grid);
     }
 
     /// Relaxes from a zero guess and restricts the residual to `next`.

@@ -31,7 +31,7 @@ const LARGEST_CHANGE: f64 = 0.05;
 const FLAT: f64 = 0.5;
 
 /// The cells of the map and their interpolation from the next level.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Finest<R> {
     pub grid: Grid,
     pub u: Planes<R>,
@@ -71,19 +71,13 @@ pub(crate) struct Progress {
 }
 
 impl<R: Real> Finest<R> {
-    pub(super) fn new(grid: Grid) -> Self {
-        Self {
-            grid,
-            u: grid.planes(),
-            inverse: grid.planes(),
-            west: grid.plane(),
-            east: grid.plane(),
-            north: grid.plane(),
-            south: grid.plane(),
-            sources: Vec::new(),
-            scratch: Scratch::default(),
-            whole: Whole::new(&grid),
-        }
+    /// Makes this a level of `grid` without cells.
+    pub(super) fn reshape(&mut self, grid: Grid) {
+        self.grid = grid;
+        let weights = [&mut self.west, &mut self.east, &mut self.north, &mut self.south];
+        grid.reset(self.u.iter_mut().chain(&mut self.inverse).chain(weights));
+        self.sources.clear();
+        self.whole.reset(&grid);
     }
 
     /// Sets one row of cells; `inverse` gives 1 / diagonal of a free cell by its column.

@@ -25,7 +25,7 @@ const SMALL: usize = 1 << 15;
 pub(super) type Planes<R> = [Vec<R>; 4];
 
 /// The shape of a level.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 pub(super) struct Grid {
     /// Columns of the level.
     pub width: usize,
@@ -78,14 +78,17 @@ impl Grid {
             .then(|| self.rows.saturating_sub(1) * self.stride + self.columns)
     }
 
-    /// Four planes of zeros.
-    pub(super) fn planes<R: Real>(&self) -> Planes<R> {
-        std::array::from_fn(|_| self.plane())
-    }
-
-    /// A plane of zeros.
-    pub(super) fn plane<R: Real>(&self) -> Vec<R> {
-        vec![R::default(); self.len()]
+    /// Makes `planes` those of this level, of zeros.
+    pub(super) fn reset<'a, R: Real>(&self, planes: impl IntoIterator<Item = &'a mut Vec<R>>) {
+        for plane in planes {
+            if plane.capacity() < self.len() {
+                // Fresh pages are zero already.
+                *plane = vec![R::default(); self.len()];
+                continue;
+            }
+            plane.clear();
+            plane.resize(self.len(), R::default());
+        }
     }
 
     /// A row of values with the margins of a plane's row, and zeros in it.
@@ -124,19 +127,14 @@ pub(super) struct Whole<R> {
 }
 
 impl<R: Real> Whole<R> {
-    /// Planes of zeros.
-    pub(super) fn new(grid: &Grid) -> Self {
-        let plane = || {
-            if grid.span().is_some() { grid.plane() } else { Vec::new() }
-        };
-        Self {
-            transfer: plane(),
-            change_ee: plane(),
-            change_oo: plane(),
-            residual_oe: plane(),
-            residual_eo: plane(),
-            residual_ee: plane(),
+    /// Makes these planes of zeros; none on a large level.
+    pub(super) fn reset(&mut self, grid: &Grid) {
+        let Self { transfer, change_ee, change_oo, residual_oe, residual_eo, residual_ee } = self;
+        let planes = [transfer, change_ee, change_oo, residual_oe, residual_eo, residual_ee];
+        if grid.span().is_some() {
+            return grid.reset(planes);
         }
+        planes.into_iter().for_each(|plane| *plane = Vec::new());
     }
 }
 
