@@ -1,12 +1,13 @@
-//! The memory a factorisation may take, asked about before it is allocated.
+//! The memory and the operations that a factorisation may take, asked about before they are spent.
 
 use crate::domain::Domain;
 use crate::error::SolveError;
 
-/// Bytes allowed for the factorisation of one map.
+/// Bytes and multiplications allowed for the factorisation of one map.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Budget {
     allowed: u64,
+    operations: f64,
     width: usize,
     height: usize,
 }
@@ -14,13 +15,25 @@ pub(crate) struct Budget {
 impl Budget {
     /// `allowed` bytes for the factorisation of `domain`.
     pub(crate) fn of(domain: &Domain, allowed: u64) -> Self {
-        Self { allowed, width: domain.width(), height: domain.height() }
+        let (width, height) = (domain.width(), domain.height());
+        Self { allowed, operations: f64::INFINITY, width, height }
+    }
+
+    /// The same bytes, and at most so many `operations`.
+    pub(crate) fn with_operations(self, operations: f64) -> Self {
+        Self { operations, ..self }
+    }
+
+    /// # Errors
+    /// [`SolveError::TooCostly`] if these are more `operations` than are allowed.
+    pub(super) fn ask_operations(&self, operations: f64) -> Result<(), SolveError> {
+        if operations <= self.operations { Ok(()) } else { self.ask(u64::MAX) }
     }
 
     /// # Errors
     /// [`SolveError::TooCostly`] if `needed` bytes are more than are allowed.
     pub(super) fn ask(&self, needed: u64) -> Result<(), SolveError> {
-        let Self { allowed, width, height } = *self;
+        let Self { allowed, width, height, .. } = *self;
         if needed <= allowed {
             return Ok(());
         }

@@ -94,7 +94,7 @@ impl Tree {
     ///
     /// # Errors
     /// [`SolveError::Cancelled`], and [`SolveError::TooCostly`] as soon as it is known that the factorisation takes more
-    /// memory than `budget` has.
+    /// memory or operations than `budget` has.
     pub(crate) fn of(
         pass: &BreadthFirst,
         budget: &Budget,
@@ -118,6 +118,7 @@ impl Tree {
                 if stages.is_multiple_of(CHECKED_EVERY) {
                     cancellation.check()?;
                     budget.ask(builder.tree.growing_bytes())?;
+                    budget.ask_operations(builder.tree.cost.operations)?;
                 }
                 stages += 1;
                 let start = end.saturating_sub(shape.thickness).max(inner + 1);
@@ -131,6 +132,7 @@ impl Tree {
         let mut tree = builder.tree;
         tree.cost.bytes = tree.bytes(pass);
         budget.ask(tree.cost.bytes)?;
+        budget.ask_operations(tree.cost.operations)?;
         Ok(tree)
     }
 

@@ -25,10 +25,18 @@ const SINGLE_CYCLE_PER_CELL: f64 = 1.1;
 const MULTIFRONTAL_PER_CELL: f64 = 65.0;
 const MULTIFRONTAL_PER_OPERATION: f64 = 0.15;
 
-/// Nanoseconds a cell of the map that multigrid in single precision takes for a range of u, in as many bands as that needs.
-fn multigrid_per_cell(decades: f64) -> f64 {
-    let bands = (decades / SINGLE_DECADES).max(1.0);
-    bands * (SET_UP_PER_CELL + SINGLE_CYCLE_PER_CELL * cycles(decades / bands))
+/// A further band has a set-up of its own and more cycles, but no more than the cells that it is deep take: a cycle takes u some
+/// cells further where u falls steeply.
+const BAND_PER_CELL: f64 = 15.0;
+const BAND_CYCLE_PER_CELL: f64 = 2.2;
+const BAND_CYCLES: f64 = 20.0;
+const CELLS_PER_CYCLE: f64 = 6.0;
+
+/// Nanoseconds a cell of the map for a range of u beyond single precision that takes so many `bands`.
+fn further_bands(bands: f64, decades_per_cell: f64) -> f64 {
+    let depth = SINGLE_DECADES / decades_per_cell;
+    let cycles = (depth / CELLS_PER_CYCLE).min(BAND_CYCLES);
+    bands.max(0.0) * (BAND_PER_CELL + BAND_CYCLE_PER_CELL * cycles)
 }
 
 /// Cycles multigrid takes for a range of u: in narrow passages one converges three to four orders of magnitude.
@@ -72,20 +80,37 @@ pub(super) fn plan(
     let cells = pass.len() as f64;
     // The runs along a passage count into the mean width too; on mazes that makes it about 1.7 times too large.
     let passage = (width + 1.0) / 1.7 - 1.0;
-    let decades = pass.levels.len() as f64 * decades_per_cell(domain, passage);
+    let per_cell = decades_per_cell(domain, passage);
+    let decades = pass.levels.len() as f64 * per_cell;
     let multigrid = Plan::multigrid();
-    let cost = domain.blocked().len() as f64 * multigrid_per_cell(decades);
+    let first = SET_UP_PER_CELL + SINGLE_CYCLE_PER_CELL * cycles(decades.min(SINGLE_DECADES));
+    let further = further_bands(decades / SINGLE_DECADES - 1.0, per_cell);
+    let cost = domain.blocked().len() as f64 * (first + further);
     // The factorisation costs more than this on any map: no need to build its tree.
     if cost < 0.5 * MULTIFRONTAL_PER_CELL * cells {
         return Ok(multigrid);
     }
-    let tree = match Tree::of(&pass, budget, cancellation) {
-        Err(SolveError::TooCostly { .. }) => return Ok(multigrid),
-        tree => tree?,
-    };
-    let exact = MULTIFRONTAL_PER_CELL * cells + MULTIFRONTAL_PER_OPERATION * tree.cost.operations;
-    let methods = if exact <= cost { vec![Method::Multifrontal] } else { multigrid.methods };
-    Ok(Plan { methods, multifrontal: Some((pass, tree)) })
+    Ok(match cheaper_tree(&pass, cost, budget, cancellation)? {
+        Some(tree) => {
+            Plan { methods: vec![Method::Multifrontal], multifrontal: Some((pass, tree)) }
+        }
+        None => multigrid,
+    })
+}
+
+/// The tree of fronts of the cells that `pass` visits, if their factorisation takes at most so many nanoseconds.
+fn cheaper_tree(
+    pass: &BreadthFirst,
+    nanoseconds: f64,
+    budget: &Budget,
+    cancellation: &Cancellation,
+) -> Result<Option<Tree>, SolveError> {
+    let cells = pass.unknown().len() as f64;
+    let operations = (nanoseconds - MULTIFRONTAL_PER_CELL * cells) / MULTIFRONTAL_PER_OPERATION;
+    match Tree::of(pass, &budget.with_operations(operations), cancellation) {
+        Err(SolveError::TooCostly { .. }) => Ok(None),
+        tree => tree.map(Some),
+    }
 }
 
 /// The cells in which u is smaller than `store` says, which has what single precision can hold, and the tree of their fronts; none if
@@ -104,18 +129,13 @@ pub(super) fn beyond_single(
         Err(SolveError::TooCostly { .. }) => return Ok(None),
         pass => pass?,
     };
-    let cells = pass.unknown().len() as f64;
-    let decades = pass.levels.len() as f64 * decades_per_cell(domain, pass.width());
-    let bands = domain.blocked().len() as f64 * multigrid_per_cell(decades);
-    if cells == 0.0 || MULTIFRONTAL_PER_CELL * cells > bands {
+    if pass.unknown().is_empty() {
         return Ok(None);
     }
-    let tree = match Tree::of(&pass, budget, cancellation) {
-        Err(SolveError::TooCostly { .. }) => return Ok(None),
-        tree => tree?,
-    };
-    let exact = MULTIFRONTAL_PER_CELL * cells + MULTIFRONTAL_PER_OPERATION * tree.cost.operations;
-    Ok((exact <= bands).then_some((pass, tree)))
+    let per_cell = decades_per_cell(domain, pass.width());
+    let bands = (pass.levels.len() as f64 * per_cell / SINGLE_DECADES).max(1.0);
+    let bands = domain.blocked().len() as f64 * further_bands(bands, per_cell);
+    Ok(cheaper_tree(&pass, bands, budget, cancellation)?.map(|tree| (pass, tree)))
 }
 
 /// The orders of magnitude by which u falls a cell along a passage of this width: like exp(-pi x / width), and by screening.
