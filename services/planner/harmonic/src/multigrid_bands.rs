@@ -26,7 +26,7 @@ const CUT: f64 = 1e-3 * f32::KNOWN;
 const CHECKED: f64 = 0.1 * f32::KNOWN;
 
 /// Residuals in a band are smaller by this factor than they must be, as those at its end change with the next band.
-const MARGIN: f64 = 4.0;
+const MARGIN: f64 = 16.0;
 
 /// u of resolved cells is at most this in a band's units; larger ones are not beside an unknown.
 const LARGEST: f32 = 1e35;
