@@ -13,6 +13,9 @@ const SIDE: usize = 512;
 /// Side of the maps whose directions are compared: a factorisation of larger halls takes gigabytes.
 const SIDE_OF_EXACT: usize = 256;
 
+/// Maps of each kind whose directions are compared; the worst counts.
+const SEEDS: u64 = 3;
+
 /// Runs of each solve; the fastest counts.
 const RUNS: usize = 3;
 
@@ -47,8 +50,8 @@ fn kinds() -> Vec<(String, Kind, f64)> {
     kinds.into_iter().map(named).collect()
 }
 
-fn domain(kind: Kind, length: f64, side: usize) -> Domain {
-    let domain = Map::generate(kind, side, side, 1).domain();
+fn domain(kind: Kind, length: f64, side: usize, seed: u64) -> Domain {
+    let domain = Map::generate(kind, side, side, seed).domain();
     let domain = domain.and_then(|it| it.with_screening(&Screening::cells(length)));
     domain.expect("a valid map")
 }
@@ -56,7 +59,7 @@ fn domain(kind: Kind, length: f64, side: usize) -> Domain {
 /// The map of the sweep with this name.
 pub(crate) fn named(name: &str) -> Option<Domain> {
     let (_, kind, length) = kinds().into_iter().find(|it| it.0 == name)?;
-    Some(domain(kind, length, SIDE))
+    Some(domain(kind, length, SIDE, 1))
 }
 
 /// Whether the words after `only` on the command line, if any, choose the map `name`.
@@ -70,7 +73,7 @@ pub(crate) fn table(real: Option<Vec<(String, Domain)>>) {
     let generated = kinds().into_iter().filter(|it| chosen(&it.0));
     let mut rows: Vec<_> = generated
         .map(|(name, kind, length)| {
-            row(&name, &domain(kind, length, SIDE), bytes_of_a_process(&name))
+            row(&name, &domain(kind, length, SIDE, 1), bytes_of_a_process(&name))
         })
         .collect();
     rows.extend(real.into_iter().flatten().map(|(name, domain)| row(&name, &domain, None)));
@@ -122,17 +125,21 @@ fn row(name: &str, domain: &Domain, bytes: Option<f64>) -> (f64, String) {
 pub(crate) fn angle_table() {
     let mut rows = Vec::new();
     for (name, kind, length) in kinds().into_iter().filter(|it| chosen(&it.0)) {
-        let domain = domain(kind, length, SIDE_OF_EXACT);
-        let field = Solver::default().solve(&domain, &Cancellation::new()).expect("a field");
-        let angles = Angles::between(&field, &exact(&domain).expect("a field"), |_| true);
+        let mut worst = (Angles::default(), 1.0, "");
+        for seed in 1..=SEEDS {
+            let domain = domain(kind, length, SIDE_OF_EXACT, seed);
+            let field = Solver::default().solve(&domain, &Cancellation::new()).expect("a field");
+            let angles = Angles::between(&field, &exact(&domain).expect("a field"), |_| true);
+            let follow = follow(&field).min(worst.1);
+            if angles.clear_max >= worst.0.clear_max {
+                worst = (angles, follow, field.verification().method.name());
+            }
+            worst.1 = follow;
+        }
+        let (angles, follow, method) = worst;
         let line = format!(
-            "{name:<28} {:>8.4} {:>8.4} {:>8.3} {:>8.2} {:>7} {}",
-            angles.p50,
-            angles.p99,
-            angles.clear_max,
-            angles.max,
-            follow(&field),
-            field.verification().method.name(),
+            "{name:<28} {:>8.4} {:>8.4} {:>8.3} {:>8.2} {follow:>7} {method}",
+            angles.p50, angles.p99, angles.clear_max, angles.max,
         );
         rows.push((angles.clear_max, line));
     }
