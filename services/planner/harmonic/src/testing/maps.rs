@@ -186,7 +186,7 @@ impl Map {
         let (mut at, mut step, mut turns) = ((0_usize, 0_usize), (1_isize, 0_isize), 0);
         let mut seen = vec![false; wide * high];
         let mut pairs = Vec::new();
-        while turns < 2 {
+        while turns < 2 && !seen.is_empty() {
             seen[at.1 * wide + at.0] = true;
             let next = (at.0.wrapping_add_signed(step.0), at.1.wrapping_add_signed(step.1));
             if next.0 < wide && next.1 < high && !seen[next.1 * wide + next.0] {
