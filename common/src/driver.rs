@@ -107,8 +107,19 @@ pub struct Heard {
     pub power: Option<PowerSample>,
     pub surroundings: Option<SurroundingsSample>,
     pub infrared: Option<InfraredSample>,
+    /// Another than the link that commands the robot.
+    pub commander: Option<Commander>,
     /// The reason why the newest message that was refused is none of the protocol, if any was.
     pub refused: Option<String>,
+}
+
+/// Another than the link that told the robot something.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Commander {
+    /// The number that the network knows it by.
+    pub number: [u8; 16],
+    /// Whether it told the robot to move.
+    pub moves: bool,
 }
 
 /// What the encoders and motors say.

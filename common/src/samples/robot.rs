@@ -182,6 +182,8 @@ wire_enum! {
         RangeImplausible = 20 "ranging sensor implausible",
         /// An infrared ranger that the mission uses gives no readings, and the sensors that are left cover the ground ahead.
         InfraredSilent = 21 "infrared ranger silent",
+        /// Another node publishes what the robot is told.
+        AnotherCommander = 22 "another commander",
     }
 }
 

@@ -4,6 +4,7 @@
 //! A new cause needs a variant of [`Cause`], a row, and a monitor, which is a file in `failsafe/` and a line in `monitors!`.
 
 pub mod battery;
+pub mod commander;
 mod contact;
 pub mod latency_monitor;
 pub mod monitor;
@@ -52,6 +53,7 @@ macro_rules! monitors {
 
 monitors! {
     battery: battery::Batteries,
+    commander: commander::OtherCommander,
     latency: latency_monitor::LatencyMonitor,
     odometry: odometry::Odometry,
     orders: orders::Orders,
@@ -99,6 +101,13 @@ pub const TABLE: &[Rule] = &[
         action: Action::End,
         clears: Clears::OnNewMission,
         monitor: |all| &all.odometry,
+    },
+    Rule {
+        cause: Cause::AnotherCommander,
+        when: "another node has published on `robot.ros2.cmd_vel` within 1 s: that the robot moves, or for 2 s that it stands; `link.log` says which. It is told to stand after each command of the other",
+        action: Action::Stop,
+        clears: Clears::WithCondition,
+        monitor: |all| &all.commander,
     },
     Rule {
         cause: Cause::RobotDoesNotStop,

@@ -96,10 +96,7 @@ impl Transport {
                 Wire::Tcp(stream) => stream.maintain(now_ns),
                 Wire::Serial(stream) => stream.maintain(now_ns),
                 #[cfg(feature = "ros2")]
-                Wire::Dds(dds) => {
-                    dds.look_for_other_writers(now_ns);
-                    Ok(())
-                }
+                Wire::Dds(_) => Ok(()),
             };
             maintained.map_err(|source| self.broken(source))?;
         }

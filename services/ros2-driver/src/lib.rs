@@ -1,7 +1,7 @@
 //! The driver of robots that speak ROS 2: messages of topics in, their meaning out; `cmd_vel` for the robot.
 //!
 //! It knows no middleware. A piece of the wire is one message: a byte, the row of its topic in [`Topics`], and its payload as DDS
-//! delivered it. What the robot is sent is a payload for the topic of commands.
+//! delivered it; before the payload of another's command stands the number of its writer. What the robot is sent is a payload for the topic of commands.
 //!
 //! | module | holds |
 //! |---|---|
@@ -15,7 +15,7 @@ use std::{f64::consts::TAU, time::Duration};
 
 use common::{
     driver::{
-        Driver, Heard, Memory, Readings, StopMethod, WireTally,
+        Commander, Driver, Heard, Memory, Readings, StopMethod, WireTally,
         laser::Laser,
         odometry::{self, drive, motion, twist},
     },
@@ -25,7 +25,7 @@ use common::{
 };
 
 use self::{
-    messages::{Odometry, Scan, read_range, read_voltage, write_twist},
+    messages::{Odometry, Scan, read_moves, read_range, read_voltage, write_twist},
     topics::{Content, Topics},
 };
 
@@ -80,7 +80,10 @@ impl Ros2 {
             return Err("a message of no topic that is subscribed to".to_owned());
         };
         let (content, name) = (*content, topic.name.clone());
-        self.take_payload(content, payload, heard).map_err(|why| format!("{name}: {why}"))
+        self.take_payload(content, payload, heard).map_err(|why| format!("{name}: {why}"))?;
+        // What others tell the robot does not show that it is there.
+        heard.anything |= content != Content::Command;
+        Ok(())
     }
 
     fn take_payload(
@@ -108,6 +111,14 @@ impl Ros2 {
                     let power = PowerSample { board_v, motor_v, servo_v, ..PowerSample::default() };
                     heard.power = Some(power);
                 }
+                Ok(())
+            }
+            Content::Command => {
+                let (&number, payload) =
+                    payload.split_first_chunk().ok_or("a command without its writer")?;
+                let moves = read_moves(payload, self.stamped).map_err(|error| error.to_string())?;
+                let moved = heard.commander.is_some_and(|commander| commander.moves);
+                heard.commander = Some(Commander { number, moves: moves || moved });
                 Ok(())
             }
         }
@@ -226,10 +237,7 @@ impl Driver for Ros2 {
         let mut heard = Heard::default();
         for piece in std::mem::take(&mut self.waiting) {
             match self.take(&piece, &mut heard) {
-                Ok(()) => {
-                    heard.anything = true;
-                    self.tally.messages += 1;
-                }
+                Ok(()) => self.tally.messages += 1,
                 Err(why) => {
                     self.tally.bytes_dropped += piece.len() as u64;
                     heard.refused = Some(why);

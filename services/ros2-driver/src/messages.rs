@@ -95,6 +95,15 @@ pub fn read_voltage(payload: &[u8]) -> Result<f32, Malformed> {
     reader.f32()
 }
 
+/// Whether a `geometry_msgs/Twist` or, if `stamped`, a `TwistStamped` is to move a robot. A speed that is no number is none of standing.
+pub fn read_moves(payload: &[u8], stamped: bool) -> Result<bool, Malformed> {
+    let mut reader = Reader::new(payload)?;
+    if stamped {
+        header(&mut reader)?;
+    }
+    Ok(reader.f64s::<6>()? != [0.0; 6])
+}
+
 /// The stamp of a header, nanoseconds.
 fn header(reader: &mut Reader<'_>) -> Result<i64, Malformed> {
     let (seconds, nanoseconds) = (reader.i32()?, reader.u32()?);

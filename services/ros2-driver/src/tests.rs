@@ -69,6 +69,7 @@ const ODOM: u8 = 0;
 const LASER: u8 = 1;
 const POWER: u8 = 2;
 const NOSE: u8 = 3;
+const COMMAND: u8 = 4;
 const SONAR: &str = "robot.ros2.ranges = { nose = 'nose' }\n[[robot.sensor]]\nname = 'nose'\nkind = 'cone'\nchannel = 0\nforward_m = 0.1\nbearing_deg = 0\n\
     [[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nchannel = 0\nforward_m = 0\nbearing_deg = 0\nmodel = 'lds-02'\n";
 
@@ -237,7 +238,7 @@ fn the_missions_names_are_those_of_its_topics() {
     let mission = format!("{ROBOT}robot.ros2.odom = 'a/odom'\nrobot.ros2.stamped = true\n{SONAR}");
     let topics = Topics::of(&Mission::parse(&mission, Path::new("m.toml")).unwrap());
     let names: Vec<_> = topics.heard.iter().map(|(_, topic)| topic.dds_name()).collect();
-    assert_eq!(names, ["rt/a/odom", "rt/scan", "rt/battery_state", "rt/nose"]);
+    assert_eq!(names, ["rt/a/odom", "rt/scan", "rt/battery_state", "rt/nose", "rt/cmd_vel"]);
     assert_eq!(topics.command.type_name, "geometry_msgs::msg::dds_::TwistStamped_");
 }
 
@@ -255,4 +256,31 @@ fn the_counts_of_a_link_that_is_started_again_go_on_where_they_were_and_take_wha
     };
     let (alone, after) = (counts(&mut first), counts(&mut second));
     assert!(alone == after && alone[0] > 3000, "{alone:?} {after:?}");
+}
+
+#[test]
+fn what_others_tell_the_robot_is_theirs_and_no_sign_of_the_robot() {
+    let command =
+        |driver: &mut Ros2, payload: &[u8]| said(driver, COMMAND, &[&[7; 16], payload].concat());
+    let other = |moves| Some(Commander { number: [7; 16], moves });
+    let mut plain = driver(SONAR);
+    let heard = command(&mut plain, &bytes(TWIST));
+    assert_eq!((heard.commander, heard.anything, heard.refused), (other(true), false, None));
+    let stand = stand_of(&plain);
+    assert_eq!(command(&mut plain, &stand).commander, other(false));
+    let mut stamped = driver(&format!("robot.ros2.stamped = true\n{SONAR}"));
+    assert_eq!(command(&mut stamped, &bytes(TWIST_STAMPED)).commander, other(true));
+    let stand = stand_of(&stamped);
+    assert_eq!(command(&mut stamped, &stand).commander, other(false));
+    let cut = command(&mut stamped, &stand[..40]);
+    assert!(cut.commander.is_none() && cut.refused.unwrap().contains("/cmd_vel: "));
+    // Of what came at once, that which moves counts.
+    for payload in [bytes(TWIST), stand_of(&plain)] {
+        plain.push(&[&[COMMAND], &[7; 16][..], &payload].concat());
+    }
+    assert_eq!(plain.heard().commander, other(true));
+}
+
+fn stand_of(driver: &Ros2) -> Vec<u8> {
+    driver.velocity([0, 0], Duration::from_millis(250))
 }

@@ -11,6 +11,8 @@ pub enum Content {
     Battery,
     /// The range of the sensor in this row of the mission.
     Range(usize),
+    /// What others than the link tell the robot. The number of the writer stands before the payload.
+    Command,
 }
 
 /// The topics of a robot.
@@ -18,7 +20,7 @@ pub enum Content {
 pub struct Topics {
     /// What the robot is told.
     pub command: Topic,
-    /// What it says. A piece of the wire begins with the row of its topic here.
+    /// What it says, and what others tell it. A piece of the wire begins with the row of its topic here.
     pub heard: Vec<(Content, Topic)>,
 }
 
@@ -44,6 +46,8 @@ impl Topics {
                 heard.push((Content::Range(row), range));
             }
         }
-        Self { command: Topic::new(&topics.cmd_vel, command), heard }
+        let command = Topic::new(&topics.cmd_vel, command);
+        heard.push((Content::Command, command.clone()));
+        Self { command, heard }
     }
 }

@@ -4,6 +4,7 @@ use std::{fmt, time::Duration};
 
 use common::{
     clock::{MissionTime, Pace},
+    driver::Commander,
     mission::Mission,
     samples::{Cause, CommandSample, HoldReason, Order, RangeReading},
 };
@@ -46,6 +47,8 @@ pub enum Observation<'a> {
     Batteries([f64; 3]),
     /// Readings of ranging sensors came.
     Readings(&'a [RangeReading]),
+    /// Another than the link told the robot something.
+    Commander(Commander),
     /// The robot answers after it did not, and was asked for its streams.
     Found {
         /// Whether it had answered before.

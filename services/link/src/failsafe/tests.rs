@@ -4,6 +4,7 @@ use super::{
 };
 use common::{
     clock::{MissionTime, Pace},
+    driver::Commander,
     samples::{CommandSample, HoldReason, Order, RangeReading, RangeStatus, Stamp},
 };
 use std::path::Path;
@@ -106,6 +107,10 @@ fn wheels_are_held(failsafe: &mut Failsafe) {
     }
 }
 
+const fn commander(moves: bool) -> Commander {
+    Commander { number: [0xab; 16], moves }
+}
+
 /// The robot has all sensors, and infrared-1, which looks into the cone of the front sonar, gives no reading.
 fn without_an_infrared_ranger(failsafe: &mut Failsafe) {
     let mission = Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap();
@@ -131,6 +136,11 @@ const CASES: &[(Break, Action, Cause)] = &[
         Cause::BatteryEmpty,
     ),
     (|it| jumps(it, ago(10_000 * MS)), Action::End, Cause::OdometryGivenUp),
+    (
+        |it| it.observe(&Observation::Commander(commander(true)), now()),
+        Action::Stop,
+        Cause::AnotherCommander,
+    ),
     (does_not_stop, Action::Stop, Cause::RobotDoesNotStop),
     (|it| directive(it, Order::Hold, HoldReason::Operator), Action::Stop, Cause::OperatorStop),
     (|it| directive(it, Order::Hold, HoldReason::StageHeld), Action::Stop, Cause::StageHeld),
@@ -360,4 +370,35 @@ fn the_words_of_the_table_say_the_numbers_that_hold() {
     says(Cause::WheelsHeld, &seconds(contact::HELD_AFTER));
     says(Cause::WheelsHeld, &format!("stands for {}", seconds(contact::STANDS_FOR)));
     assert!((SLOW_SHARE - 0.5).abs() < 1e-9 && Action::Slow.effect().contains("half"));
+}
+
+#[test]
+fn who_tells_the_robot_to_move_is_a_commander_at_once_and_until_a_second_without_a_word() {
+    let mut failsafe = well();
+    let silent = commander::GONE_AFTER.as_nanos() as u64;
+    failsafe.observe(&Observation::Commander(commander(true)), ago(silent - MOMENT_NS));
+    assert_eq!(failsafe.decide(false, now()).cause, Cause::AnotherCommander);
+    let why = failsafe.explain(Cause::AnotherCommander, now()).unwrap();
+    assert!(why.contains("cmd_vel") && why.contains(" ab.ab."), "{why}");
+    let mut failsafe = well();
+    failsafe.observe(&Observation::Commander(commander(true)), ago(silent));
+    assert_eq!(failsafe.decide(false, now()), Decision::GO);
+    // What it says after a pause does not follow on what it said before.
+    failsafe.observe(&Observation::Commander(commander(false)), now());
+    assert_eq!(failsafe.decide(false, now()), Decision::GO);
+}
+
+#[test]
+fn who_tells_the_robot_only_to_stand_as_a_stop_guard_does_is_a_commander_after_2_s() {
+    let stand = Observation::Commander(commander(false));
+    let mut failsafe = well();
+    for ms in [1999, 1200, 600, 0] {
+        failsafe.observe(&stand, ago(ms * MS));
+    }
+    assert_eq!(failsafe.decide(false, now()), Decision::GO);
+    let mut failsafe = well();
+    for ms in [2000, 1200, 600, 0] {
+        failsafe.observe(&stand, ago(ms * MS));
+    }
+    assert_eq!(failsafe.decide(false, now()).cause, Cause::AnotherCommander);
 }

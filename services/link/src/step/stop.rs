@@ -84,7 +84,7 @@ impl Link {
         method.checked_sub(1).map(|other| others.swap_remove(other))
     }
 
-    fn stop(&self) -> Vec<u8> {
+    pub(super) fn stop(&self) -> Vec<u8> {
         self.other_stop().map_or_else(|| self.velocity_0(), |other| other.bytes)
     }
 

@@ -425,3 +425,4 @@ fn an_abandoned_tick_does_not_keep_the_next_from_starting() {
 mod held;
 mod lockstep;
 mod robot_health;
+mod ros2;

@@ -36,6 +36,13 @@ impl Link {
             let why = why.escape_debug().take(LONGEST_REFUSAL).collect();
             effects.push(Effect::Refused(why));
         }
+        if let Some(commander) = heard.commander {
+            self.observe(Observation::Commander(commander), now_ns);
+            // The robot obeys whoever was last. At the first command of another the failsafe stops it, below.
+            if commander.moves && self.decision.stops() && !self.in_ticks() {
+                effects.push(Effect::Send(self.stop()));
+            }
+        }
         for _ in 0..heard.acknowledged {
             self.observe(Observation::Acknowledged, now_ns);
         }

@@ -1,0 +1,81 @@
+//! The monitor of other commanders: nodes that publish what the robot is told, beside the link.
+//!
+//! The robot obeys whoever told it something last, so two commanders at once drive it where neither wants it. A node that may publish
+//! and says nothing does no harm and is no commander.
+
+use std::{fmt::Write as _, time::Duration};
+
+use common::{driver::Commander, mission::Mission, samples::Cause};
+
+use super::monitor::{Condition, Moment, Monitor, Observation};
+
+/// A commander that has said nothing for so long has gone.
+pub(crate) const GONE_AFTER: Duration = Duration::from_secs(1);
+/// Who tells the robot only to stand is a commander after so long. The stop guard of an earlier link does, and leaves sooner.
+pub(crate) const STAYS: Duration = Duration::from_secs(2);
+
+/// What others have told the robot without a pause.
+#[derive(Clone, Copy, Debug)]
+struct Told {
+    newest: Commander,
+    /// Whether any of it was to move the robot.
+    moves: bool,
+    began_ns: u64,
+    newest_ns: u64,
+}
+
+/// What is known of other commanders of one robot.
+#[derive(Clone, Debug)]
+pub struct OtherCommander {
+    topic: String,
+    told: Option<Told>,
+}
+
+impl Monitor for OtherCommander {
+    fn new(mission: &Mission) -> Self {
+        Self { topic: mission.robot.ros2.cmd_vel.clone(), told: None }
+    }
+
+    fn observe(&mut self, what: &Observation<'_>, now: Moment) {
+        let Observation::Commander(newest) = *what else {
+            return;
+        };
+        let now_ns = now.machine_ns;
+        let goes_on = |told: &Told| !has_passed(told.newest_ns, now_ns, GONE_AFTER);
+        let before = self.told.filter(goes_on);
+        self.told = Some(Told {
+            newest,
+            moves: newest.moves || before.is_some_and(|told| told.moves),
+            began_ns: before.map_or(now_ns, |told| told.began_ns),
+            newest_ns: now_ns,
+        });
+    }
+
+    fn condition(&self, _: Cause, now: Moment) -> Condition {
+        let commands = |told: Told| {
+            (told.moves || has_passed(told.began_ns, told.newest_ns, STAYS))
+                && !has_passed(told.newest_ns, now.machine_ns, GONE_AFTER)
+        };
+        self.told.is_some_and(commands).into()
+    }
+
+    fn explain(&self, _: Cause, _: Moment) -> Option<String> {
+        let topic = &self.topic;
+        let mut number = String::new();
+        for (place, byte) in self.told?.newest.number.into_iter().enumerate() {
+            let dot = if place == 0 { "" } else { "." };
+            write!(number, "{dot}{byte:02x}").ok()?;
+        }
+        Some(format!(
+            "another node publishes {topic}, its GID is {number}: `ros2 topic info --verbose {topic}` names it; end it"
+        ))
+    }
+
+    fn judges_frames(&self) -> bool {
+        false
+    }
+}
+
+fn has_passed(then_ns: u64, now_ns: u64, span: Duration) -> bool {
+    now_ns.saturating_sub(then_ns) >= span.as_nanos() as u64
+}

@@ -1,0 +1,211 @@
+//! What the failsafe makes of a robot that speaks ROS 2.
+
+use ::ros2::cdr::Writer;
+use ros2_driver::{
+    messages::write_twist,
+    topics::{Content, Topics},
+};
+
+use super::*;
+
+const FRAME_MS: u64 = 50;
+
+fn mission() -> Mission {
+    let text = "target = [3, 0]\nrobot.model = 'turtlebot3-burger'\nrobot.protocol = 'ros2'\nrobot.address = 'ros2'\nrobot.rate_hz = 10\n";
+    Mission::parse(text, Path::new("test.toml")).unwrap()
+}
+
+/// A robot, its link and their time. It moves as it was told last.
+struct Scene {
+    link: Link,
+    topics: Topics,
+    ms: u64,
+    /// Its odometry: x, y and heading.
+    pose: [f64; 3],
+    told: [f64; 2],
+    tick: u64,
+    odometry: bool,
+    /// Whether its odometry follows its motion.
+    counts: bool,
+    scans: bool,
+    /// Whether its beams change.
+    sees: bool,
+    decided: Vec<(u64, Cause)>,
+    sent: Vec<(u64, [f64; 2])>,
+}
+
+impl Scene {
+    /// A robot that drives straight ahead at 0.15 m/s.
+    fn driving() -> Self {
+        let mut link = Link::new(&mission());
+        link.restore(State { pace: Pace::Rate(1.0), next_tick: 0 }).unwrap();
+        let mut scene = Self {
+            link,
+            topics: Topics::of(&mission()),
+            ms: 0,
+            pose: [0.0; 3],
+            told: [0.0; 2],
+            tick: 0,
+            odometry: true,
+            counts: true,
+            scans: true,
+            sees: true,
+            decided: Vec::new(),
+            sent: Vec::new(),
+        };
+        scene.run(2000);
+        assert_eq!(scene.link.decision(), Decision::GO);
+        assert!(scene.told[0] > 0.1 && scene.pose[0] > 0.1);
+        (scene.decided, scene.sent) = (Vec::new(), Vec::new());
+        scene
+    }
+
+    fn say(&mut self, content: Content, payload: &[u8]) {
+        let row = self.topics.heard.iter().position(|(has, _)| *has == content).unwrap();
+        self.event(Event::Datagram(&[&[row as u8], payload].concat()));
+    }
+
+    fn event(&mut self, event: Event<'_>) {
+        let machine_ns = self.ms * MS;
+        let input = Input { event, machine_ns };
+        let effects = self.link.step(input, MissionTime(machine_ns));
+        for effect in effects {
+            match effect {
+                Effect::Send(bytes) if !bytes.is_empty() => {
+                    let number =
+                        |at: usize| f64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
+                    self.told = [number(4), number(44)];
+                    self.sent.push((self.ms, self.told));
+                }
+                Effect::Decided { now, .. } => self.decided.push((self.ms, now.cause)),
+                Effect::Tick { tick, .. } => self.tick = tick,
+                _ => {}
+            }
+        }
+    }
+
+    fn odometry(&self) -> Vec<u8> {
+        let [x, y, heading] = self.pose;
+        let mut writer = Writer::default();
+        writer.u32((self.ms / 1000) as u32).u32((self.ms % 1000 * MS) as u32);
+        writer.text("odom").text("base_footprint").f64s(&[x, y, 0.0, 0.0, 0.0]);
+        writer.f64s(&[(heading / 2.0).sin(), (heading / 2.0).cos()]).f64s(&[0.0; 36]);
+        writer.f64s(&[self.told[0], 0.0, 0.0, 0.0, 0.0, self.told[1]]).f64s(&[0.0; 36]).take()
+    }
+
+    fn scan(&self) -> Vec<u8> {
+        let step = std::f32::consts::TAU / 360.0;
+        let mut writer = Writer::default();
+        writer.u32(0).u32(0).text("scan").f32(0.0).f32(std::f32::consts::TAU).f32(step);
+        writer.f32(0.0).f32(0.1).f32(0.12).f32(3.5).length(360);
+        let noise = if self.sees { self.ms as f32 * 1e-6 } else { 0.0 };
+        (0..360).for_each(|_| {
+            writer.f32(2.0 + noise);
+        });
+        writer.length(0).take()
+    }
+
+    /// Let time pass: the robot says its odometry at 20 Hz and its scan at 10 Hz, and each tick is answered.
+    fn run(&mut self, for_ms: u64) {
+        for _ in 0..for_ms / FRAME_MS {
+            self.ms += FRAME_MS;
+            if self.ms.is_multiple_of(200) {
+                self.event(Event::Order(Order::Drive, HoldReason::None));
+            }
+            let [ahead, turn] = self.told.map(|speed| speed * FRAME_MS as f64 / 1000.0);
+            if self.counts {
+                self.pose[0] += ahead * self.pose[2].cos();
+                self.pose[1] += ahead * self.pose[2].sin();
+                self.pose[2] += turn;
+            }
+            if self.scans && self.ms.is_multiple_of(100) {
+                self.say(Content::Scan, &self.scan());
+            }
+            if self.odometry {
+                self.say(Content::Odometry, &self.odometry());
+            }
+            let speed = 0.15 / 0.033;
+            let command = command(self.tick, self.ms * MS, speed, speed);
+            self.event(Event::Command(&command));
+            self.event(Event::Quiet);
+        }
+    }
+
+    fn commanded(&mut self, ahead: f64) {
+        self.say(Content::Command, &[&[9; 16][..], &write_twist(ahead, 0.0, false)].concat());
+    }
+
+    fn holds(&self, cause: Cause) {
+        let decision = self.link.decision();
+        assert_eq!((decision.action, decision.cause), (Action::Stop, cause), "{:?}", self.decided);
+        assert_eq!(self.told, [0.0; 2]);
+    }
+}
+
+#[test]
+fn beside_another_commander_the_robot_is_told_to_stand_after_each_of_its_commands_and_drives_on_when_it_has_gone()
+ {
+    let mut scene = Scene::driving();
+    for _ in 0..20 {
+        scene.commanded(0.1);
+        // The robot obeys the other for no longer than a stop is on its way.
+        assert_eq!(scene.sent.last(), Some(&(scene.ms, [0.0; 2])));
+        scene.holds(Cause::AnotherCommander);
+        scene.told = [0.0; 2];
+        scene.run(100);
+    }
+    scene.run(1000);
+    assert_eq!(scene.link.decision(), Decision::GO);
+    scene.run(100);
+    assert!(scene.told[0] > 0.1);
+}
+
+#[test]
+fn a_robot_that_is_silent_is_lost_whatever_others_tell_it() {
+    let mut scene = Scene::driving();
+    (scene.odometry, scene.scans) = (false, false);
+    for _ in 0..10 {
+        scene.commanded(0.0);
+        scene.run(100);
+    }
+    scene.holds(Cause::RobotLost);
+}
+
+#[test]
+fn a_robot_that_freezes_is_lost_and_drives_on_when_it_is_back() {
+    let mut scene = Scene::driving();
+    (scene.odometry, scene.scans) = (false, false);
+    scene.run(800);
+    scene.holds(Cause::RobotLost);
+    (scene.odometry, scene.scans) = (true, true);
+    scene.run(2000);
+    assert_eq!(scene.link.decision(), Decision::GO);
+}
+
+#[test]
+fn odometry_that_ends_while_scans_go_on_is_missed() {
+    let mut scene = Scene::driving();
+    scene.odometry = false;
+    scene.run(800);
+    scene.holds(Cause::FramesSilent);
+}
+
+#[test]
+fn odometry_that_says_the_same_pose_while_the_robot_is_told_to_drive_is_implausible() {
+    let mut scene = Scene::driving();
+    scene.counts = false;
+    scene.run(1500);
+    scene.holds(Cause::OdometryImplausible);
+}
+
+#[test]
+fn scans_that_end_or_stay_the_same_to_the_bit_while_the_robot_drives_are_missed() {
+    let mut ends = Scene::driving();
+    ends.scans = false;
+    ends.run(900);
+    ends.holds(Cause::RangeSilent);
+    let mut stays = Scene::driving();
+    stays.sees = false;
+    stays.run(1500);
+    stays.holds(Cause::RangeSilent);
+}
