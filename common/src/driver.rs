@@ -107,6 +107,8 @@ pub struct Heard {
     pub power: Option<PowerSample>,
     pub surroundings: Option<SurroundingsSample>,
     pub infrared: Option<InfraredSample>,
+    /// Whether its odometry jumped farther than it moves. The counts of its wheels leave the jump out.
+    pub jumped: bool,
     /// Another than the link that commands the robot.
     pub commander: Option<Commander>,
     /// The reason why the newest message that was refused is none of the protocol, if any was.

@@ -15,6 +15,16 @@ use crate::{
 
 /// No odometry says that a robot is farther away, metres, or has turned farther, radians.
 const FARTHEST: f64 = 1e6;
+/// No wheel rolls farther than so many times what it rolls at its top speed.
+const IMPLAUSIBLE: f64 = 1.5;
+/// A pose and its stamp are of the same moment but for so long, seconds.
+const JITTER_S: f64 = 0.1;
+/// A pose is exact but for this, metres.
+const SLACK_M: f64 = 0.01;
+/// A robot that has said nothing for so long may have started again, seconds. Odometry begins at 0, 0 with heading 0, and says so within
+/// this, metres and radians.
+const STARTS_IN_S: f64 = 1.0;
+const NEAR_START: f64 = 0.05;
 /// The current of a wheel that is held: all that the converter of an X80 can say, AD counts.
 const HELD_AD: u16 = 4095;
 
@@ -41,26 +51,61 @@ impl Odometry {
 
     /// The angles of the left and the right wheel of a robot that is at `x`, `y` with this heading by its odometry. What it slipped aside is
     /// left out, as wheels leave it out. None if the numbers are too great to be a way.
-    pub fn turned(&mut self, [x, y, heading]: [f64; 3], body: &Body) -> Option<[f64; 2]> {
-        let now = Pose2 { position: DVec2::new(x, y), heading };
-        let is_near = now.position.length() <= FARTHEST && heading.abs() <= FARTHEST;
-        if !is_near {
-            return None;
-        }
-        let Some(last) = self.last.replace(now) else {
-            return Some(self.turned);
-        };
-        let turn = wrap_angle(now.heading - last.heading);
-        let middle = DVec2::from_angle(last.heading + turn / 2.0);
-        let chord = (now.position - last.position).dot(middle);
-        // The chord of an arc is shorter than the arc by this.
-        let half = turn / 2.0;
-        let arc = if half.abs() < 1e-9 { chord } else { chord * half / half.sin() };
+    pub fn turned(&mut self, pose: [f64; 3], body: &Body) -> Option<[f64; 2]> {
+        let now = pose_at(pose)?;
+        let [arc, turn, _] = self.way(now);
+        self.last = Some(now);
         // (17) is linear: an arc and a turn give the angles of the wheels.
         let WheelSpeeds { right, left } = drive(body).wheels(Twist { v: arc, omega: turn });
         self.turned = [self.turned[0] + left, self.turned[1] + right];
         Some(self.turned)
     }
+
+    /// Whether no robot with this body gets from its newest pose to this one in `gap_s` seconds, or by wheels, or its odometry started
+    /// again. Then go on from the pose: the way to it counts as no motion.
+    pub fn takes_jump(&mut self, pose: [f64; 3], gap_s: f64, body: &Body) -> bool {
+        let Some(now) = pose_at(pose) else {
+            return false;
+        };
+        let [arc, turn, aside] = self.way(now);
+        let farthest_m = arc.abs() + turn.abs() * body.track_m / 2.0;
+        let reach_m = IMPLAUSIBLE * body.top_speed_m_s * (gap_s + JITTER_S) + SLACK_M;
+        let starts_again =
+            gap_s >= STARTS_IN_S && is_start(now) && self.last.is_some_and(|last| !is_start(last));
+        let jumps = farthest_m > reach_m || aside.abs() > reach_m / 2.0 || starts_again;
+        if jumps {
+            self.last = Some(now);
+        }
+        jumps
+    }
+
+    /// The way from the newest pose to `now`: the arc, metres, the turn, radians, and what the robot slipped aside, metres; none before the
+    /// first.
+    fn way(&self, now: Pose2) -> [f64; 3] {
+        let Some(last) = self.last else {
+            return [0.0; 3];
+        };
+        let turn = wrap_angle(now.heading - last.heading);
+        let middle = DVec2::from_angle(last.heading + turn / 2.0);
+        let went = now.position - last.position;
+        let chord = went.dot(middle);
+        // The chord of an arc is shorter than the arc by this.
+        let half = turn / 2.0;
+        let arc = if half.abs() < 1e-9 { chord } else { chord * half / half.sin() };
+        [arc, turn, went.perp_dot(middle)]
+    }
+}
+
+/// The pose of these numbers; none if they are too great to be one.
+fn pose_at([x, y, heading]: [f64; 3]) -> Option<Pose2> {
+    let position = DVec2::new(x, y);
+    let is_near = position.length() <= FARTHEST && heading.abs() <= FARTHEST;
+    is_near.then_some(Pose2 { position, heading })
+}
+
+/// Whether a robot that has just started may say this pose.
+fn is_start(pose: Pose2) -> bool {
+    pose.position.length() <= NEAR_START && wrap_angle(pose.heading).abs() <= NEAR_START
 }
 
 /// The drive of a body whose wheels have no limit.

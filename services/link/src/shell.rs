@@ -340,7 +340,7 @@ impl Shell {
                     tracing::warn!(restarts, "the robot restarted its encoder counts");
                 }
                 Effect::CountsElsewhere => tracing::warn!(
-                    "the encoder counts jumped farther than wheels turn and continue from there; the pose stays"
+                    "the encoder counts or the odometry jumped farther than wheels turn and continue from there; the pose stays"
                 ),
                 Effect::StopBy(method) => {
                     tracing::warn!(

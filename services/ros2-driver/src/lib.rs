@@ -33,6 +33,8 @@ use self::{
 const MOST_WAITING: usize = 64;
 /// A stamp that lies before the last by more is that of a clock that was set anew, nanoseconds.
 const SET_ANEW_NS: i64 = 1_000_000_000;
+/// A link is started again within so long, seconds. Nobody knows how far the robot drove meanwhile.
+const UNSEEN_S: f64 = 5.0;
 /// The beams of a laser's row and of its scans lie at the same bearings if they differ by no more, as a share of the angle between beams.
 const SAME_BEARING: f64 = 0.5;
 /// The angle from beam to beam may differ by this share.
@@ -135,6 +137,15 @@ impl Ros2 {
             Some(stamps_ns) if stamp_ns > stamps_ns[0] => stamps_ns,
             _ => [stamp_ns - self.period_ns; 2],
         };
+        let gap_s = self.stamps_ns.map_or(UNSEEN_S, |_| (stamp_ns - newest_ns) as f64 / 1e9);
+        if self.odometry.takes_jump(odometry.pose, gap_s, &self.body) {
+            heard.jumped = true;
+            let [x, y, heading] = odometry.pose;
+            heard.refused = Some(format!(
+                "odometry that jumps to ({x:.2}, {y:.2}) m and {:.0} degrees, which counts as no motion",
+                heading.to_degrees()
+            ));
+        }
         let turned = self.odometry.turned(odometry.pose, &self.body);
         let turned = turned.ok_or("a pose that no robot can have; say metres")?;
         if let Some(laser) = &mut self.laser {

@@ -161,9 +161,9 @@ fn odometry_is_the_way_of_wheels_and_begins_a_tick_at_the_missions_rate() {
         ticks.push(said(&mut driver, ODOM, &payload).motion.is_some());
     }
     assert_eq!(ticks, [true, false, true, false, true, false, true, false, true]);
-    // 0.1 m along the heading of 0.5 rad is 0.1 cos(0.5) along x.
-    let motion = said(&mut driver, ODOM, &odometry_at(1500, 1.1)).motion.unwrap();
-    let counts = (0.1 * 0.5_f64.cos() / 0.033 * 3600.0 / TAU).round() as u16;
+    // 0.02 m along x are 0.02 cos(0.5) along the heading of 0.5 rad.
+    let motion = said(&mut driver, ODOM, &odometry_at(1500, 1.02)).motion.unwrap();
+    let counts = (0.02 * 0.5_f64.cos() / 0.033 * 3600.0 / TAU).round() as u16;
     assert_eq!([motion.wheels.left_counts, motion.wheels.right_counts], [counts; 2]);
     // 0.2 m/s and -0.1 rad/s of a track of 0.16 m.
     let left = ((0.2 + 0.008) / 0.033 * 3600.0 / TAU).round() as i32;
@@ -283,4 +283,76 @@ fn what_others_tell_the_robot_is_theirs_and_no_sign_of_the_robot() {
 
 fn stand_of(driver: &Ros2) -> Vec<u8> {
     driver.velocity([0, 0], Duration::from_millis(250))
+}
+
+/// Odometry with this stamp and pose.
+fn odometry_of(stamp_ms: u32, [x, y, heading]: [f64; 3]) -> Vec<u8> {
+    let mut payload = odometry_at(stamp_ms, x);
+    payload[52..60].copy_from_slice(&y.to_le_bytes());
+    payload[84..92].copy_from_slice(&(heading / 2.0).sin().to_le_bytes());
+    payload[92..100].copy_from_slice(&(heading / 2.0).cos().to_le_bytes());
+    payload
+}
+
+/// The jump of odometry from (1, 0.5) with heading 0.3 to `pose` after so long, if it is one, and the counts that it adds.
+fn jump(after_ms: u32, pose: [f64; 3]) -> (bool, [i32; 2]) {
+    let mut driver = driver("");
+    let counts = |heard: &Heard| {
+        let wheels = heard.motion.unwrap().wheels;
+        [wheels.left_counts, wheels.right_counts].map(i32::from)
+    };
+    let before = counts(&said(&mut driver, ODOM, &odometry_of(1000, [1.0, 0.5, 0.3])));
+    let heard = said(&mut driver, ODOM, &odometry_of(1000 + after_ms, pose));
+    let refused = heard.refused.clone().is_some_and(|why| why.contains("odometry that jumps to"));
+    assert_eq!((heard.anything, refused), (true, heard.jumped), "{heard:?}");
+    let after = counts(&heard);
+    // The next pose follows on this one.
+    let [x, y, heading] = pose;
+    let next = [x + 0.01 * heading.cos(), y + 0.01 * heading.sin(), heading];
+    let next = said(&mut driver, ODOM, &odometry_of(1100 + after_ms, next));
+    assert!(!next.jumped && counts(&next) != after, "{next:?}");
+    (heard.jumped, [after[0] - before[0], after[1] - before[1]])
+}
+
+#[test]
+fn odometry_that_jumps_aside_or_farther_than_the_robot_moves_or_starts_again_counts_as_no_motion() {
+    let ahead = |way: f64| [1.0 + way * 0.3_f64.cos(), 0.5 + way * 0.3_f64.sin(), 0.3];
+    let aside = |way: f64| [1.0 - way * 0.3_f64.sin(), 0.5 + way * 0.3_f64.cos(), 0.3];
+    for (after_ms, pose) in [
+        (100, ahead(0.1)),
+        (100, ahead(-0.1)),
+        // A whole cycle of the counts.
+        (100, ahead(1.887)),
+        (100, aside(0.05)),
+        (100, aside(-2.0)),
+        (100, [1.0, 0.5, 1.3]),
+        (100, [0.0; 3]),
+        (10_000, [0.0; 3]),
+        (10_000, [0.02, -0.01, 0.03]),
+    ] {
+        assert_eq!(jump(after_ms, pose), (true, [0, 0]), "{after_ms} {pose:?}");
+    }
+    for (after_ms, pose) in [
+        (100, ahead(0.022)),
+        (100, ahead(-0.022)),
+        (1000, ahead(0.22)),
+        (10_000, ahead(2.0)),
+        (100, [1.0, 0.5, 0.575]),
+        (10_000, [0.2, 0.1, 0.3]),
+    ] {
+        let (jumped, counts) = jump(after_ms, pose);
+        assert!(!jumped && counts != [0, 0], "{after_ms} {pose:?} {counts:?}");
+    }
+}
+
+#[test]
+fn odometry_that_started_again_while_no_link_listened_is_no_motion() {
+    let mut first = driver("");
+    said(&mut first, ODOM, &odometry_of(1000, [1.0, 0.5, 0.3]));
+    let memory = first.memory().unwrap();
+    for (pose, jumped) in [([0.0; 3], true), ([9.0, 0.5, 0.3], true), ([0.8, 0.4, 0.4], false)] {
+        let mut second = driver("");
+        second.remember(&memory);
+        assert_eq!(said(&mut second, ODOM, &odometry_of(2000, pose)).jumped, jumped, "{pose:?}");
+    }
 }

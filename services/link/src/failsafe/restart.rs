@@ -36,6 +36,8 @@ pub struct RestartWatch {
     /// The newest implausible counts, their time, and the number of frames in which each can follow the one before.
     suspected: Option<([u16; 2], MissionTime, u32)>,
     away: bool,
+    /// Whether the driver left a jump of the robot's odometry out of the counts.
+    jumped: bool,
     restarts: u32,
     /// The counts of a wheel in a second at its top speed.
     top_counts: f64,
@@ -56,6 +58,7 @@ impl RestartWatch {
             driven: None,
             suspected: None,
             away: false,
+            jumped: false,
             restarts: 0,
             top_counts: body.top_speed_m_s / body.metres_per_count(),
             jitter_s: 1.0 / mission.robot.rate_hz,
@@ -76,6 +79,11 @@ impl RestartWatch {
         self.away = true;
     }
 
+    /// Note that the robot's odometry jumped, which the next counts leave out.
+    pub const fn jumped(&mut self) {
+        self.jumped = true;
+    }
+
     /// Classify the counts of the wheels; `speeds` are those that the robot reports with them, counts/s. `was_away` says whether the robot did not answer until this frame. After an absence,
     /// counts near the value at which robots start mean a restart. Otherwise they must also be farther off than wheels turn.
     pub fn step(
@@ -87,6 +95,10 @@ impl RestartWatch {
     ) -> Counts {
         let speeds = speeds.map(f64::from);
         let away = std::mem::take(&mut self.away);
+        if std::mem::take(&mut self.jumped) {
+            self.begin_at(counts, now);
+            return Counts::Elsewhere;
+        }
         let Some((before, then)) = self.last else {
             self.last = Some((counts, now));
             return Counts::Follow;

@@ -49,6 +49,9 @@ impl Link {
         if heard.pinged {
             effects.push(Effect::Send(self.driver.acknowledge()));
         }
+        if heard.jumped {
+            self.restart.jumped();
+        }
         let motion = heard.motion;
         let counts = motion.map(|motion| self.judge_counts(&motion, now_ns));
         if counts == Some(Counts::Elsewhere) {

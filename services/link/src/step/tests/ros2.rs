@@ -32,6 +32,8 @@ struct Scene {
     sees: bool,
     decided: Vec<(u64, Cause)>,
     sent: Vec<(u64, [f64; 2])>,
+    wheels: WheelSample,
+    refused: Vec<String>,
 }
 
 impl Scene {
@@ -52,6 +54,8 @@ impl Scene {
             sees: true,
             decided: Vec::new(),
             sent: Vec::new(),
+            wheels: WheelSample::default(),
+            refused: Vec::new(),
         };
         scene.run(2000);
         assert_eq!(scene.link.decision(), Decision::GO);
@@ -78,7 +82,8 @@ impl Scene {
                     self.sent.push((self.ms, self.told));
                 }
                 Effect::Decided { now, .. } => self.decided.push((self.ms, now.cause)),
-                Effect::Tick { tick, .. } => self.tick = tick,
+                Effect::Tick { tick, wheels, .. } => (self.tick, self.wheels) = (tick, wheels),
+                Effect::Refused(why) => self.refused.push(why),
                 _ => {}
             }
         }
@@ -208,4 +213,37 @@ fn scans_that_end_or_stay_the_same_to_the_bit_while_the_robot_drives_are_missed(
     stays.sees = false;
     stays.run(1500);
     stays.holds(Cause::RangeSilent);
+}
+
+#[test]
+fn odometry_that_jumps_once_is_no_motion_and_a_restart_of_the_counts() {
+    let counts = |scene: &Scene| [scene.wheels.left_counts, scene.wheels.right_counts];
+    for jump in [[-1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [1.887, 0.0, 0.0], [0.0, 0.0, 2.0]] {
+        let mut scene = Scene::driving();
+        scene.run(100);
+        let before = counts(&scene);
+        let (after, restarts) = (before.map(|counts| counts + 1000), scene.wheels.restarts);
+        scene.pose = [0, 1, 2].map(|part| scene.pose[part] + jump[part]);
+        scene.run(100);
+        assert!(counts(&scene) >= before && counts(&scene) < after, "{jump:?}");
+        assert_eq!(scene.wheels.restarts, restarts + 1, "{jump:?}");
+        assert!(scene.refused[0].contains("odometry that jumps"), "{:?}", scene.refused);
+        scene.run(1000);
+        assert_eq!((scene.link.decision(), &scene.decided[..]), (Decision::GO, &[][..]));
+        assert_eq!(scene.wheels.restarts, restarts + 1);
+    }
+}
+
+#[test]
+fn while_odometry_jumps_again_and_again_the_robot_stands() {
+    let mut scene = Scene::driving();
+    for jump in 1..20 {
+        scene.pose[1] = f64::from(jump % 2);
+        scene.run(100);
+        assert!(jump < 4 || scene.told == [0.0; 2], "{jump}");
+    }
+    scene.holds(Cause::OdometryImplausible);
+    assert!(scene.wheels.restarts >= 19);
+    scene.run(4000);
+    assert_eq!(scene.link.decision(), Decision::GO);
 }
