@@ -132,6 +132,7 @@ impl Wake for Bell {
 /// A participant of a domain.
 pub struct Participant {
     inner: DomainParticipant,
+    only: Option<Ipv4Addr>,
     rung: OwnedFd,
     bell: Waker,
 }
@@ -140,14 +141,17 @@ impl Participant {
     /// Join `domain` by the network interface with the address `only`, or else by all of them; by none but this machine's own if the
     /// environment says so as it does for ROS.
     pub fn join(domain: u16, only: Option<Ipv4Addr>) -> io::Result<Self> {
-        let mut builder = DomainParticipantBuilder::new(domain);
-        if let Some(only) = only.or_else(|| is_local().then_some(Ipv4Addr::LOCALHOST)) {
-            builder = builder.with_only_networks([only]);
-        }
-        let inner = builder.build().map_err(io::Error::other)?;
+        let inner = joined(domain, only)?;
         let rung = eventfd(0, EventfdFlags::NONBLOCK | EventfdFlags::CLOEXEC)?;
         let bell = Waker::from(Arc::new(Bell(rung.try_clone()?)));
-        Ok(Self { inner, rung, bell })
+        Ok(Self { inner, only, rung, bell })
+    }
+
+    /// Join the domain anew with the same descriptor. The readers and writers made before are of no use any more. The library's threads end
+    /// when a call of theirs is interrupted, as it is when the process is stopped and continued, and nothing says so.
+    pub fn rejoin(&mut self) -> io::Result<()> {
+        self.inner = joined(self.inner.domain_id(), self.only)?;
+        Ok(())
     }
 
     /// A reader of `topic`.
@@ -303,6 +307,15 @@ impl Writer {
     pub fn gid(&self) -> Gid {
         self.0.guid().to_bytes()
     }
+}
+
+/// A participant of `domain`, by the interface with the address `only` if there is one.
+fn joined(domain: u16, only: Option<Ipv4Addr>) -> io::Result<DomainParticipant> {
+    let mut builder = DomainParticipantBuilder::new(domain);
+    if let Some(only) = only.or_else(|| is_local().then_some(Ipv4Addr::LOCALHOST)) {
+        builder = builder.with_only_networks([only]);
+    }
+    builder.build().map_err(io::Error::other)
 }
 
 /// Whether the environment keeps ROS on this machine.

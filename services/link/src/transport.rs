@@ -96,7 +96,7 @@ impl Transport {
                 Wire::Tcp(stream) => stream.maintain(now_ns),
                 Wire::Serial(stream) => stream.maintain(now_ns),
                 #[cfg(feature = "ros2")]
-                Wire::Dds(_) => Ok(()),
+                Wire::Dds(dds) => dds.maintain(now_ns),
             };
             maintained.map_err(|source| self.broken(source))?;
         }
@@ -126,7 +126,7 @@ impl Transport {
             Wire::Tcp(stream) => Ok(stream.receive(&mut self.buffer, now_ns)),
             Wire::Serial(stream) => Ok(stream.receive(&mut self.buffer, now_ns)),
             #[cfg(feature = "ros2")]
-            Wire::Dds(dds) => Ok(dds.receive(&mut self.buffer)),
+            Wire::Dds(dds) => Ok(dds.receive(&mut self.buffer, now_ns)),
         };
         match received {
             Ok(length) => Ok(length.and_then(|length| self.buffer.get(..length))),
@@ -181,7 +181,7 @@ pub const SPEAKS_ROS2: bool = cfg!(feature = "ros2");
 
 #[cfg(feature = "ros2")]
 fn ros2(domain: u16, mission: &Mission) -> io::Result<Wire> {
-    Dds::open(domain, &ros2_driver::topics::Topics::of(mission)).map(|dds| Wire::Dds(Box::new(dds)))
+    Dds::open(domain, ros2_driver::topics::Topics::of(mission)).map(|dds| Wire::Dds(Box::new(dds)))
 }
 
 #[cfg(not(feature = "ros2"))]

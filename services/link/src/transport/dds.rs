@@ -18,35 +18,59 @@ use super::counts::Tally;
 /// So many messages of a topic wait at most.
 const DEPTH: u16 = 16;
 
+/// A participant that has heard nothing for so long joins the domain anew, because it cannot know whether it is deaf.
+const DEAF_NS: u64 = 2_000_000_000;
+/// A participant that has not heard anything yet does so after this time, in which others discover it also over a slow network.
+const UNDISCOVERED_NS: u64 = 10_000_000_000;
+
 /// A participant for one robot.
 #[derive(Debug)]
 pub(super) struct Dds {
     /// The readers, in the order of the topics' rows.
     readers: Vec<Reader>,
     writer: Writer,
+    topics: Topics,
     /// The row of the topic of commands.
     commands: Option<usize>,
     /// The row of the reader that is asked next, so that a flood on one topic does not hold back the others.
     next: usize,
+    /// When the newest message came since the domain was joined.
+    heard_ns: Option<u64>,
+    joined_ns: Option<u64>,
     tally: Tally,
     participant: Participant,
 }
 
 impl Dds {
     /// A participant of `domain` for the robot with these topics.
-    pub(super) fn open(domain: u16, topics: &Topics) -> io::Result<Self> {
+    pub(super) fn open(domain: u16, topics: Topics) -> io::Result<Self> {
         let participant = Participant::join(domain, None)?;
-        let heard = Quality { is_reliable: false, is_latched: false, depth: DEPTH };
-        let readers = topics.heard.iter().map(|(_, topic)| participant.reader(topic, heard));
-        let told = Quality { is_reliable: true, is_latched: false, depth: 1 };
+        let (readers, writer) = endpoints(&participant, &topics)?;
         Ok(Self {
-            readers: readers.collect::<io::Result<_>>()?,
-            writer: participant.writer(&topics.command, told)?,
+            readers,
+            writer,
             commands: topics.heard.iter().position(|(content, _)| *content == Content::Command),
+            topics,
             next: 0,
+            heard_ns: None,
+            joined_ns: None,
             tally: Tally::default(),
             participant,
         })
+    }
+
+    /// Join the domain anew if nothing is heard there.
+    pub(super) fn maintain(&mut self, now_ns: u64) -> io::Result<()> {
+        let joined_ns = *self.joined_ns.get_or_insert(now_ns);
+        let (since_ns, most_ns) =
+            self.heard_ns.map_or((joined_ns, UNDISCOVERED_NS), |heard_ns| (heard_ns, DEAF_NS));
+        if now_ns.saturating_sub(since_ns) >= most_ns {
+            tracing::info!("nothing is heard in the domain; it is joined anew");
+            self.participant.rejoin()?;
+            (self.readers, self.writer) = endpoints(&self.participant, &self.topics)?;
+            (self.joined_ns, self.heard_ns) = (Some(now_ns), None);
+        }
+        Ok(())
     }
 
     pub(super) const fn is_open(&self) -> bool {
@@ -54,7 +78,7 @@ impl Dds {
     }
 
     /// Copy the next message into `buffer`, after the row of its topic. Returns its length, or none if all were taken.
-    pub(super) fn receive(&mut self, buffer: &mut [u8]) -> Option<usize> {
+    pub(super) fn receive(&mut self, buffer: &mut [u8], now_ns: u64) -> Option<usize> {
         self.participant.unring();
         let count = self.readers.len();
         for row in (0..count).map(|turn| (self.next + turn) % count) {
@@ -62,6 +86,7 @@ impl Dds {
                 continue;
             };
             self.next = (row + 1) % count;
+            self.heard_ns = Some(now_ns);
             let writer = if self.commands == Some(row) { &from[..] } else { &[] };
             let piece = [&[row as u8], writer, &payload].concat();
             let length = piece.len().min(buffer.len());
@@ -88,6 +113,14 @@ impl Dds {
     pub(super) const fn tally(&self) -> Tally {
         self.tally
     }
+}
+
+/// A reader of each topic that is heard, in their order, and the writer of commands.
+fn endpoints(participant: &Participant, topics: &Topics) -> io::Result<(Vec<Reader>, Writer)> {
+    let heard = Quality { is_reliable: false, is_latched: false, depth: DEPTH };
+    let readers = topics.heard.iter().map(|(_, topic)| participant.reader(topic, heard));
+    let told = Quality { is_reliable: true, is_latched: false, depth: 1 };
+    Ok((readers.collect::<io::Result<_>>()?, participant.writer(&topics.command, told)?))
 }
 
 impl AsFd for Dds {
