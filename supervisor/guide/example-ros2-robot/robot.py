@@ -4,12 +4,14 @@
     firsthand run robot.toml
 
 It is like a TurtleBot 3: it publishes /odom at 20 Hz, /scan at 10 Hz with 360 beams and /battery_state, obeys /cmd_vel, and
-stands after a quarter of a second without it. Its world is a few drums. `--stamped` takes TwistStamped.
+stands after a quarter of a second without it. Its world is a few drums, other ones with `--seed N`. `--stamped` takes
+TwistStamped. After SIGUSR1 its odometry begins anew.
 """
 
 import json
 import math
 import random
+import signal
 import sys
 import time
 
@@ -25,10 +27,21 @@ DRUMS = [(1.0, 0.1, 0.2), (2.0, -0.6, 0.25), (1.9, 0.7, 0.2), (-1.5, 1.0, 0.3)] 
 TIMEOUT, STEP = 0.25, 0.01
 
 
+def drums(seed):
+    """Random drums; between any two, and around the start and the target, the robot has room."""
+    chance, placed = random.Random(seed), [(0.0, 0.0, 0.0), (3.0, 0.0, 0.0)]
+    for _ in range(100):
+        x, y, r = chance.uniform(0.5, 2.6), chance.uniform(-1.3, 1.3), chance.uniform(0.1, 0.3)
+        if all(math.hypot(x - a, y - b) - r - s > 0.6 for a, b, s in placed):
+            placed.append((x, y, r))
+    return placed[2:]
+
+
 class Robot(Node):
     def __init__(self, stamped):
         super().__init__("drums_robot")
         self.x = self.y = self.heading = self.way = 0.0
+        self.origin = (0.0, 0.0, 0.0)
         self.told, self.told_at, self.touches, self.orders = (0.0, 0.0), 0.0, 0, 0
         self.before = time.monotonic()
         if stamped:
@@ -62,13 +75,19 @@ class Robot(Node):
             else:
                 self.x, self.y, self.way = x, y, self.way + abs(ahead)
 
+    def restart_odom(self, *_):
+        self.origin = (self.x, self.y, self.heading)
+
     def publish_odom(self):
-        message = Odometry()
+        self.move()  # The stamp is that of the pose.
+        (a, b, turned), message = self.origin, Odometry()
+        ahead, aside = math.cos(turned), math.sin(turned)
+        dx, dy, half = self.x - a, self.y - b, (self.heading - turned) / 2
         message.header.stamp = self.get_clock().now().to_msg()
         message.header.frame_id, message.child_frame_id = "odom", "base_footprint"
         pose, twist = message.pose.pose, message.twist.twist
-        pose.position.x, pose.position.y = self.x, self.y
-        pose.orientation.z, pose.orientation.w = math.sin(self.heading / 2), math.cos(self.heading / 2)
+        pose.position.x, pose.position.y = dx * ahead + dy * aside, dy * ahead - dx * aside
+        pose.orientation.z, pose.orientation.w = math.sin(half), math.cos(half)
         twist.linear.x, twist.angular.z = self.told
         self.odom.publish(message)
         truth = {"x": self.x, "y": self.y, "way": self.way, "told": self.told}
@@ -97,5 +116,9 @@ class Robot(Node):
 
 
 if __name__ == "__main__":
+    if "--seed" in sys.argv:
+        DRUMS = drums(int(sys.argv[sys.argv.index("--seed") + 1]))
     rclpy.init()
-    rclpy.spin(Robot("--stamped" in sys.argv))
+    robot = Robot("--stamped" in sys.argv)
+    signal.signal(signal.SIGUSR1, robot.restart_odom)
+    rclpy.spin(robot)
