@@ -276,7 +276,7 @@ def main(firsthand):
         heard.messages.clear()
 
         # A goal, a place, a stop.
-        bridge("--accept", "goals,pose,stop")
+        bridged = bridge("--accept", "goals,pose,stop")
         run = mission("asked", "--timeout", "600")
         heard.until("range, battery", lambda: heard.messages.get("range/front") and heard.messages.get("battery_state"))
         heard.until("movement", lambda: heard.newest("odom").twist.twist.linear.x > 0.1)
@@ -286,6 +286,11 @@ def main(firsthand):
         goals.publish(goal)
         heard.until("the goal", lambda: is_at(heard, 2.5, 0.8))
         stops = node.create_publisher(Bool, "stop", 10)
+        # As Ctrl-Z and `fg` do.
+        bridged.send_signal(signal.SIGSTOP)
+        bridged.send_signal(signal.SIGCONT)
+        heard.messages.clear()
+        heard.until("poses and a map again", lambda: heard.messages.get("pose") and heard.messages.get("map"))
         heard.until("a reader of stop", lambda: stops.get_subscription_count() > 0)
         stops.publish(Bool(data=True))
         heard.until("rest", lambda: status(firsthand)["link"]["cause"] == "stopped by an operator")

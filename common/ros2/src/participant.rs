@@ -13,9 +13,8 @@ use std::{
 
 use rustdds::{
     DomainParticipant, DomainParticipantBuilder, Duration, QosPolicies, QosPolicyBuilder,
-    RTPSEntity as _, RepresentationIdentifier, StatusEvented as _, TopicKind, WriteOptionsBuilder,
+    RTPSEntity as _, RepresentationIdentifier, TopicKind, WriteOptionsBuilder,
     bytes::Bytes,
-    dds::statusevents::DomainParticipantStatusEvent,
     no_key::{
         DataWriter, Decode, DefaultDecoder, DeserializerAdapter, SerializerAdapter,
         SimpleDataReader,
@@ -191,35 +190,6 @@ impl Participant {
     pub fn gid(&self) -> Gid {
         self.inner.guid().to_bytes()
     }
-
-    /// What has changed since it was last asked: writers of other participants.
-    pub fn changes(&self) -> impl Iterator<Item = Change> {
-        let (own, events) = (self.inner.guid().prefix, self.inner.status_listener());
-        std::iter::from_fn(move || events.try_recv_status()).filter_map(move |event| match event {
-            DomainParticipantStatusEvent::WriterDetected { writer }
-                if writer.guid.prefix != own =>
-            {
-                Some(Change::Writer { gid: writer.guid.to_bytes(), dds_topic: writer.topic_name })
-            }
-            DomainParticipantStatusEvent::WriterLost { guid, .. } => {
-                Some(Change::Gone { gid: guid.to_bytes() })
-            }
-            _ => None,
-        })
-    }
-}
-
-/// A writer of another participant came or went.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Change {
-    /// It writes to the topic of this name in DDS.
-    Writer {
-        gid: Gid,
-        dds_topic: String,
-    },
-    Gone {
-        gid: Gid,
-    },
 }
 
 /// The header that Cyclone DDS puts before a request: the client's number and that of the request, 8 bytes each. The reply repeats it.

@@ -17,6 +17,7 @@ use common::{
         PoseSample, PowerSample, RangeReading, RangesHeader, RequestKind, RequestSample,
         RosterEntry, RosterHeader, ScanHeader, StallSample, TargetPoint, TargetSample, name,
     },
+    signals::{SIGCONT, Signals},
     topics,
 };
 use glam::DVec2;
@@ -70,8 +71,8 @@ pub enum BridgeError {
         "cannot join domain {domain} of ROS 2: {source}; is the address of --interface one of this machine?"
     )]
     Join { domain: u16, source: io::Error },
-    #[error("cannot start a thread: {0}")]
-    Thread(io::Error),
+    #[error("cannot start a thread or catch a signal: {0}")]
+    System(io::Error),
 }
 
 /// The readers of a robot's bus.
@@ -142,12 +143,15 @@ struct Bridge {
 /// Bridge a robot, from run to run, until `ended` says so.
 pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), BridgeError> {
     let Options { robot, domain, interface, namespace, accepted } = options;
-    let endpoints = Endpoints::open(*domain, *interface, namespace, accepted)
-        .map_err(|source| BridgeError::Join { domain: *domain, source })?;
+    let join = || {
+        Endpoints::open(*domain, *interface, namespace, accepted)
+            .map_err(|source| BridgeError::Join { domain: *domain, source })
+    };
+    let mut continued = Signals::catch(&[SIGCONT]).map_err(BridgeError::System)?;
     let mut bridge = Bridge {
         robot: robot.clone(),
-        endpoints,
-        orders: Orders::new(robot).map_err(BridgeError::Thread)?,
+        endpoints: join()?,
+        orders: Orders::new(robot).map_err(BridgeError::System)?,
         shown: None,
         goals: Server::default(),
         results: Vec::new(),
@@ -157,19 +161,26 @@ pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), B
         stands_for_cancel: None,
         told_at: None,
     };
-    let domain = Domain::of(robot.clone());
-    let mut follower = Follower::new(domain.clone(), "ros2", &topics::LINK, Readers::open);
+    let robot_domain = Domain::of(robot.clone());
+    let follow = || Follower::new(robot_domain.clone(), "ros2", &topics::LINK, Readers::open);
+    let mut follower = follow();
     while !ended() {
+        if continued.came() {
+            // The library's threads end when a call of theirs is interrupted, as it is when the process is stopped and continued. New
+            // readers of the bus get whole maps for the new writers.
+            (bridge.endpoints, bridge.shown) = (join()?, None);
+            follower = follow();
+        }
         let taken = match follower.wait(LOOK_EVERY) {
             Ok(Event::Samples(readers)) => {
-                bridge.begin(&domain);
+                bridge.begin(&robot_domain);
                 bridge.take(readers)
             }
-            Ok(Event::Connected | Event::Disconnected) => {
+            Ok(Event::Disconnected) => {
                 bridge.end();
                 Ok(())
             }
-            Ok(Event::Nothing) => Ok(()),
+            Ok(Event::Connected | Event::Nothing) => Ok(()),
             Err(error) => Err(error),
         };
         bridge.hear();
