@@ -34,7 +34,7 @@ use crate::{
 };
 
 /// How often what nodes ask, a run that has ended or begun, or the end of this process is noticed when nothing is published.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
+const LOOK_EVERY: Duration = Duration::from_millis(50);
 /// Feedback of a goal is published so often.
 const FEEDBACK_EVERY: Duration = Duration::from_millis(100);
 /// A bus that cannot be used is tried again after this time.
