@@ -49,8 +49,11 @@ fn a_full_disk_ends_no_mission_and_loses_no_result() {
     on_small_disk(8, |disk| {
         let robot = "mach-full";
         let out = disk.path().join("run");
+        // It is slow enough not to arrive between two looks at its stages.
+        let slow = ["--pace", "2", "--set", "controller.speed_m_s=0.25"];
         let run = firsthand(&["run", "obstacle-course", "--robot", robot, "--json"])
-            .args(["--pace", "4", "--set", "sure_within_m=9", "--out"])
+            .args(slow)
+            .args(["--set", "sure_within_m=9", "--out"])
             .arg(&out)
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
