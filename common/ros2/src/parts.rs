@@ -15,10 +15,15 @@ pub fn heading([i, j, k, w]: [f64; 4]) -> Option<f64> {
     is_rotation.then(|| (2.0 * (w * k + i * j)).atan2(1.0 - 2.0 * (j * j + k * k)))
 }
 
-impl Reader<'_> {
+impl<'a> Reader<'a> {
     /// A time, nanoseconds.
     pub fn time(&mut self) -> Result<i64, Malformed> {
         Ok(i64::from(self.i32()?) * 1_000_000_000 + i64::from(self.u32()?))
+    }
+
+    /// A `std_msgs/Header`: its stamp, nanoseconds, and its frame.
+    pub fn header(&mut self) -> Result<(i64, &'a str), Malformed> {
+        Ok((self.time()?, self.text()?))
     }
 
     /// A `geometry_msgs/Pose`: x and y, and the heading if it has a rotation.

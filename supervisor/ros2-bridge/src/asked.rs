@@ -41,8 +41,7 @@ pub fn flag(payload: &[u8]) -> Result<bool, String> {
 
 /// A header and a pose in the mission's frame.
 fn pose_in_map(reader: &mut Reader<'_>) -> Result<Pose2, String> {
-    reader.time().map_err(malformed)?;
-    let frame = reader.text().map_err(malformed)?;
+    let (_stamp_ns, frame) = reader.header().map_err(malformed)?;
     if !(frame.is_empty() || frame.trim_start_matches('/') == MAP) {
         return Err(format!("a pose in the frame {frame:?}; give it in {MAP:?}"));
     }

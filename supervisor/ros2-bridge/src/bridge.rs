@@ -135,7 +135,8 @@ struct Bridge {
     recoveries: u64,
     feedback_at: Instant,
     placed: Option<Placed>,
-    /// The robot stands for a goal that was canceled, and nobody else has asked for a stop since. Those that were asked since.
+    /// The number of stops that were asked for since the robot was told to stand for a canceled goal; one of them is that itself. None if
+    /// it does not stand for one.
     stands_for_cancel: Option<u32>,
     told_at: Option<Instant>,
 }

@@ -180,7 +180,6 @@ impl Endpoints {
 
     /// What has come on the topics.
     pub(crate) fn heard(&self) -> Vec<(Id, Message)> {
-        self.participant.unring();
         let heard = self.readers.iter().flat_map(|(id, reader)| {
             reader.messages().take(AT_A_TIME).map(|message| (*id, message))
         });

@@ -67,10 +67,7 @@ pub fn map_update(
 
 /// A `nav_msgs/Path`.
 pub fn path(header: Header<'_>, poses: &[Pose]) -> Vec<u8> {
-    let Header(ns, frame) = header;
-    let stamped = |writer: &mut Writer, pose: &Pose| {
-        writer.header(ns, frame).pose(*pose);
-    };
+    let stamped = |writer: &mut Writer, pose: &Pose| pose_stamped(writer, header, *pose);
     begin(header).list(poses, stamped).take()
 }
 

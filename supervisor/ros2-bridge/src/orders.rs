@@ -3,7 +3,7 @@
 
 use std::{
     io,
-    sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel},
+    sync::mpsc::{Receiver, Sender, SyncSender, TrySendError, channel, sync_channel},
     thread,
 };
 
@@ -81,9 +81,9 @@ impl Orders {
             Order::Go { .. } => &self.targets,
             Order::Stand { .. } | Order::Resume => &self.stops,
         };
-        if let Err(full) = worker.try_send(order) {
-            let (std::sync::mpsc::TrySendError::Full(order)
-            | std::sync::mpsc::TrySendError::Disconnected(order)) = full;
+        if let Err(TrySendError::Full(order) | TrySendError::Disconnected(order)) =
+            worker.try_send(order)
+        {
             let _ = self.refused.send((order, Err("too many orders wait already".to_owned())));
         }
     }

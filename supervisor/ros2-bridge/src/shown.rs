@@ -168,15 +168,17 @@ impl Shown {
         let is_due = self.map.is_none_or(|(published, at_ns)| {
             published != version && now_ns.saturating_sub(at_ns) >= EVERY_NS
         });
-        if let Some(GridFrame { cells, resolution_m, .. }) = self.grid.frame()
-            && let Some(frame) = self.grid.frame()
+        if let Some(frame) = self.grid.frame()
             && is_due
         {
             self.map = Some((version, now_ns));
             let corner = frame.corner_of(Cell { col: 0, row: 0 }).to_array();
             let occupied: Vec<u8> = self.grid.cells().iter().copied().map(occupancy).collect();
             let header = Header(now_ns, MAP);
-            sink(Id::Map, messages::map(header, resolution_m, [cells; 2], corner, &occupied));
+            sink(
+                Id::Map,
+                messages::map(header, frame.resolution_m, [frame.cells; 2], corner, &occupied),
+            );
         }
     }
 
