@@ -43,6 +43,9 @@ const SEEN: u8 = 2;
 /// Flag of a cell: the body touched the obstacle, which no ranger may see.
 const TOUCHED: u8 = 4;
 
+/// A cell that the axis of a beam crosses is not that of the beam at a greater angle, radians: it is beside the sensor.
+const WIDEST_SLACK_RAD: f64 = 1.0;
+
 /// An echo is that of a thing which a laser sees if their ranges differ by no more than this, metres: the noise of both, and a cell.
 const SAME_RANGE_M: f64 = 0.10;
 /// The lobe of a sonar hears what is near as far off its axis as this, radians.
@@ -184,25 +187,37 @@ impl EvidenceGrid {
         let corners = [DVec2::splat(near), DVec2::splat(-near), end + aside, end - aside];
         let least = corners.into_iter().fold(DVec2::ZERO, DVec2::min);
         let greatest = corners.into_iter().fold(DVec2::ZERO, DVec2::max);
+        // The tangents of the model's angles stand for the angles, because an arc tangent for each cell would take most of a tick.
+        let [scanned, pointed, against, at_edge, twice, arc_edge, explains, widest_slack] = [
+            sonar.scanned,
+            sonar.pointed,
+            sonar.against,
+            sonar.against_at_edge,
+            sonar.against * 2.0,
+            sonar.arc,
+            sonar.arc * 1.1,
+            WIDEST_SLACK_RAD,
+        ]
+        .map(f64::tan);
         for cell in between(lattice, beam.origin + least, beam.origin + greatest) {
             let offset = lattice.centre_of(cell) - beam.origin;
             let range = offset.length();
-            let (across, along) = (beam.axis.perp_dot(offset), beam.axis.dot(offset));
-            // Many of the remaining cells are excluded here without computing an angle.
-            if range > far || range > near && across.abs() > along * outside {
+            let (across, along) = (beam.axis.perp_dot(offset).abs(), beam.axis.dot(offset));
+            // Most of the cells are excluded here.
+            if range > far || range > near && across > along * outside {
                 continue;
             }
-            let off = across.atan2(along).abs();
-            // The angle of half a cell's diagonal from the sensor: near the sensor the cone is narrower than a cell.
-            let slack = (half_diagonal / range.max(half_diagonal)).asin().min(1.0);
+            let is_within = |tangent: f64| across <= along * tangent;
+            // Near the sensor the cone is narrower than a cell, so a cell that the axis crosses is within every angle.
+            let is_crossed = across <= half_diagonal && is_within(widest_slack);
             let index = lattice.index(cell);
-            if range <= known_to && off <= sonar.scanned.max(slack) {
+            if range <= known_to && (is_crossed || is_within(scanned)) {
                 let was = std::mem::replace(&mut self.looks[index], SCANNED);
                 if was < sonar.pointed_enough {
                     window = window.including(cell);
                 }
             } else if range <= sonar.pointed_m
-                && off <= sonar.pointed.max(slack)
+                && (is_crossed || is_within(pointed))
                 && self.looks[index] < sonar.pointed_enough
             {
                 self.looks[index] += 1;
@@ -211,10 +226,9 @@ impl EvidenceGrid {
                     window = window.including(cell);
                 }
             }
-            if range <= clear_to && off <= sonar.against_at_edge.max(slack.min(sonar.against * 2.0))
-            {
-                let pass =
-                    if off <= sonar.against.max(slack) { sonar.pass } else { sonar.pass_at_edge };
+            if range <= clear_to && (is_within(at_edge) || is_crossed && is_within(twice)) {
+                let in_middle = is_crossed || is_within(against);
+                let pass = if in_middle { sonar.pass } else { sonar.pass_at_edge };
                 let weight = self.weight_of(index);
                 let same = apart(self.side[index], came_from) <= sonar.same_side;
                 if weight <= 0 || same && self.occupied[index] & (SEEN | TOUCHED) == 0 {
@@ -223,10 +237,10 @@ impl EvidenceGrid {
                 }
             } else if let Some(echo) = echo
                 && (range - echo).abs() <= band
-                && off <= sonar.arc.max(slack)
+                && (is_crossed || is_within(arc_edge))
             {
-                arc.push((cell, off / sonar.arc));
-                explained |= self.weight_of(index) >= sonar.explains && off <= sonar.arc * 1.1;
+                arc.push((cell, across.atan2(along) / sonar.arc));
+                explained |= self.weight_of(index) >= sonar.explains && is_within(explains);
             }
         }
         for (cell, off) in arc {

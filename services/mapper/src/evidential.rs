@@ -38,10 +38,12 @@ pub(crate) struct Observed {
 }
 
 /// Converts evidence to states of the grid's cells, for one mission.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Evidential {
     sonar: SonarModel,
     geometry: Geometry,
+    /// The column of the lattice under the middle of each column of the grid; of rows the same, as both are square and have one centre.
+    under: Vec<Option<u32>>,
     radius: f64,
     map_within: f64,
     /// Number of sonars that are used.
@@ -58,9 +60,12 @@ impl Evidential {
         // A position is up to half a cell off the centre that stands for it.
         let reach = radius + mission.mapper.clearance_m + grid.resolution_m / 2.0;
         let rows = Rows::new(mission);
+        let lattice = lattice(&sonar, mission, reach);
+        let under = |along| lattice.cell_at(grid.centre_of(Cell { col: along, row: along }));
         Self {
             sonar,
-            geometry: Geometry { lattice: lattice(&sonar, mission, reach), grid, reach },
+            under: (0..grid.cells).map(|along| under(along).map(|cell| cell.col)).collect(),
+            geometry: Geometry { lattice, grid, reach },
             radius,
             map_within: mission.map_within_m(),
             sonars: rows.cones(),
@@ -206,7 +211,8 @@ impl Evidential {
     pub(crate) fn state(&self, map: &EvidenceMap, cell: Cell, is_target: bool) -> CellState {
         let Geometry { lattice, grid, .. } = self.geometry;
         let hazard = map.inflation.is_hazard(grid.index(cell)) && !is_target;
-        let under = lattice.cell_at(grid.centre_of(cell));
+        let under = |along: u32| self.under[along as usize];
+        let under = under(cell.col).zip(under(cell.row)).map(|(col, row)| Cell { col, row });
         let is_scanned = |under| map.evidence.is_scanned(&self.sonar, lattice.index(under));
         match (hazard, under.is_some_and(is_scanned)) {
             (true, true) => CellState::Margin,
