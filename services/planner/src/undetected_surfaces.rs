@@ -6,6 +6,8 @@
 //! each point of the way and each normal, a surface tangent to the body is supposed there, and the readings are searched for
 //! one that would have detected it. An infrared ranger detects a surface at any angle, but only where its ray meets it.
 
+use std::f64::consts::TAU;
+
 use common::samples::{ClearBeam, GridHeader};
 use glam::DVec2;
 
@@ -22,7 +24,8 @@ const NEAR_M: f64 = 1.2;
 /// How far a supposed surface extends from the point where the body would touch it, metres. A shorter one could be detected
 /// only from nearer; its end is an edge, which answers a beam ahead.
 const EXTENDS_M: f64 = 1.0;
-/// Least cosine of the angle between a ray and the normal of a surface that it detects: 70 degrees.
+/// Greatest angle between a ray and the normal of a surface that it detects, and its cosine.
+const MOST_SLANT_DEG: f64 = 70.2;
 const LEAST_SLANT: f64 = 0.34;
 /// How far from the point where the body would touch it a ray must meet a supposed surface to exclude it, metres.
 const MET_WITHIN_M: f64 = 0.35;
@@ -36,14 +39,21 @@ const ECHOES_FOR_A_SILENCE: usize = 2;
 /// The number of normals: to either side of the way, and along it.
 const NORMALS: usize = 2 * (WIDEST_DEG / STEP_DEG) as usize + 1;
 
+/// Readings are grouped by bearing into so many sectors, because a normal concerns few of them.
+const SECTORS: usize = 32;
+const SECTOR_DEG: f64 = 360.0 / SECTORS as f64;
+/// Beams that answer a surface lie no farther from the sector of its normal than so many sectors, and rays that detect one.
+const BEAM_SECTORS: usize = (NEAR_ANSWERS_WITHIN_DEG / SECTOR_DEG) as usize + 1;
+const RAY_SECTORS: usize = (MOST_SLANT_DEG / SECTOR_DEG) as usize + 1;
+
 /// The readings, and the body that could touch a surface.
 #[derive(Clone, Debug)]
 pub(crate) struct UndetectedSurfaces {
-    beams: Vec<Beam>,
-    rays: Vec<Beam>,
+    beams: Readings,
+    rays: Readings,
     reach: f64,
-    /// The normals that are checked for a way along x.
-    normals: [DVec2; NORMALS],
+    /// The normals that are checked for a way along x, and their angles.
+    normals: [(DVec2, f64); NORMALS],
     /// Least cosine of the angle between a beam and the normal of a surface that answers it: of a far one, and of a near one.
     answers: [f64; 2],
 }
@@ -55,21 +65,55 @@ struct Beam {
     clear: f64,
 }
 
-impl UndetectedSurfaces {
-    /// From the readings in `belief`, for a body of `radius` metres.
-    pub(crate) fn new(belief: &GridHeader, radius: f64) -> Self {
-        let beam = |beam: &ClearBeam| Beam {
+/// Readings by their sectors.
+#[derive(Clone, Debug)]
+struct Readings {
+    beams: Vec<Beam>,
+    /// The first reading of each sector, and the end of the last.
+    starts: [usize; SECTORS + 1],
+}
+
+impl Readings {
+    fn new(readings: &[ClearBeam]) -> Self {
+        let sector = |beam: &&ClearBeam| sector_of(beam.bearing_rad.into());
+        let mut sorted: Vec<_> = readings.iter().collect();
+        sorted.sort_by_key(sector);
+        let beam = |beam: &&ClearBeam| Beam {
             origin: DVec2::new(beam.x_m.into(), beam.y_m.into()),
             axis: DVec2::from_angle(beam.bearing_rad.into()),
             clear: beam.clear_m.into(),
         };
         Self {
-            beams: belief.clear_beams().iter().map(beam).collect(),
-            rays: belief.clear_rays().iter().map(beam).collect(),
+            beams: sorted.iter().map(beam).collect(),
+            starts: std::array::from_fn(|start| sorted.partition_point(|it| sector(it) < start)),
+        }
+    }
+
+    /// The readings of `sector` and of so many on either side of it.
+    fn around(&self, sector: usize, either_side: usize) -> impl Iterator<Item = &Beam> {
+        let first = sector + SECTORS - either_side;
+        (first..=first + 2 * either_side).flat_map(|sector| {
+            let sector = sector % SECTORS;
+            &self.beams[self.starts[sector]..self.starts[sector + 1]]
+        })
+    }
+}
+
+fn sector_of(angle: f64) -> usize {
+    ((angle / TAU * SECTORS as f64).floor() as i64).rem_euclid(SECTORS as i64) as usize
+}
+
+impl UndetectedSurfaces {
+    /// From the readings in `belief`, for a body of `radius` metres.
+    pub(crate) fn new(belief: &GridHeader, radius: f64) -> Self {
+        Self {
+            beams: Readings::new(belief.clear_beams()),
+            rays: Readings::new(belief.clear_rays()),
             reach: radius + MARGIN_M,
             normals: std::array::from_fn(|index| {
                 let step = index as i32 - (NORMALS / 2) as i32;
-                DVec2::from_angle((f64::from(step) * STEP_DEG).to_radians())
+                let angle = (f64::from(step) * STEP_DEG).to_radians();
+                (DVec2::from_angle(angle), angle)
             }),
             answers: [ANSWERS_WITHIN_DEG, NEAR_ANSWERS_WITHIN_DEG]
                 .map(|deg| deg.to_radians().cos()),
@@ -79,19 +123,20 @@ impl UndetectedSurfaces {
     /// Unit vectors towards the surfaces that a body at `at` could touch on its way along the unit vector `along`, and that no
     /// reading excludes.
     pub(crate) fn normals(&self, at: DVec2, along: DVec2) -> impl Iterator<Item = DVec2> {
-        let normals = self.normals.iter();
-        normals
-            .map(move |normal| normal.rotate(along))
-            .filter(move |&normal| !self.is_excluded(at, normal))
+        let heading = along.to_angle();
+        self.normals.iter().filter_map(move |(normal, angle)| {
+            let normal = normal.rotate(along);
+            (!self.is_excluded(at, normal, sector_of(heading + angle))).then_some(normal)
+        })
     }
 
-    /// Whether the readings exclude a surface that touches a body at `at` on the side of `normal`.
-    fn is_excluded(&self, at: DVec2, normal: DVec2) -> bool {
+    /// Whether the readings exclude a surface that touches a body at `at` on the side of `normal`, which lies in `sector`.
+    fn is_excluded(&self, at: DVec2, normal: DVec2, sector: usize) -> bool {
         let [far, near] = self.answers;
         let (mut silences, mut echoes) = (0, 0);
-        for beam in &self.beams {
+        for beam in self.beams.around(sector, BEAM_SECTORS) {
             let square = beam.axis.dot(normal);
-            // This holds for most beams: however near the surface is, it does not answer them.
+            // However near the surface is, it does not answer such a beam.
             if square < near {
                 continue;
             }
@@ -107,12 +152,15 @@ impl UndetectedSurfaces {
                 echoes += 1;
             }
         }
-        for ray in &self.rays {
-            let offset = at - ray.origin;
+        for ray in self.rays.around(sector, RAY_SECTORS) {
             let slant = ray.axis.dot(normal);
+            if slant < LEAST_SLANT {
+                continue;
+            }
+            let offset = at - ray.origin;
             let meets = (offset.dot(normal) + self.reach) / slant;
             let along_surface = (meets * ray.axis - offset).perp_dot(normal).abs();
-            if slant < LEAST_SLANT || meets < 0.0 || along_surface > MET_WITHIN_M {
+            if meets < 0.0 || along_surface > MET_WITHIN_M {
                 continue;
             }
             if meets <= ray.clear {
