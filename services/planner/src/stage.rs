@@ -45,7 +45,7 @@ pub(crate) enum Taken<'a> {
         /// Wall-clock time of the last full solve, nanoseconds, which is added to the guidance.
         full_solve_ns: u64,
     },
-    /// The step is asked for a job.
+    /// The tick is over.
     Idle,
     /// The step takes the result of the job with this number.
     Solved(u64),

@@ -31,6 +31,11 @@ pub use input::{Input, Job, Outcome, Snapshot, Solved, Work};
 /// How fast the evidential method leaves a hazard the robot stands in, m/s: something is near.
 const WAY_OUT_M_S: f64 = 0.08;
 
+/// A field is solved again within about so long for each cell of its map, nanoseconds.
+const SOLVE_NS_PER_CELL: f64 = 20.0;
+/// Within a tick a map is solved that needs no more than this share of the time to the next.
+const SHARE_OF_PERIOD: f64 = 0.05;
+
 /// How a direction of the field is checked before it is given.
 #[derive(Clone, Copy, Debug)]
 enum Advisor {
@@ -51,6 +56,8 @@ pub struct Planner {
     screening: Screening,
     robot: Robot,
     advisor: Advisor,
+    /// Whether a map that changes is solved before the tick is answered, whatever changed.
+    solves_first: bool,
     solver: Solver,
     grid: Replica<u8>,
     belief: GridHeader,
@@ -82,6 +89,7 @@ impl Step for Planner {
                 }
                 (Method::Paper | Method::Evidential, _) => Advisor::Follow,
             },
+            solves_first: solves_first(mission),
             solver: Solver::new(Settings::default()),
             grid: Replica::default(),
             belief: GridHeader::default(),
@@ -106,7 +114,8 @@ impl Step for Planner {
         Ok(match input {
             Input::Grid { header, cells } => self.take_grid(header, cells)?.into(),
             Input::Target(target) => self.take_target(target)?.into(),
-            Input::Pose(pose) => Outcome { guidance: Some(self.guide(pose)), ..Outcome::default() },
+            Input::Pose(pose) => self.answer(pose)?,
+            Input::Idle if self.is_solved_here() => self.solve_newest()?.into(),
             Input::Idle => Outcome { job: self.begin_job(), ..Outcome::default() },
             Input::Solved(solved) => self.swap_in(solved)?.into(),
             Input::Fault { fault, robot } => self.corrupt(fault, robot).into(),
@@ -146,16 +155,9 @@ impl Planner {
             return self.solve_first();
         };
         live.map = self.map(&frame, self.aim(&frame))?;
-        let work = if live.is_solved_at_once() {
-            live.field = Arc::new(self.solver.solve(&live.map, &Cancellation::default())?);
-            self.full_solves += 1;
-            Work::Solved
-        } else {
-            live.target_changed(self.grid.version());
-            Work::Stale
-        };
+        live.target_changed(self.grid.version());
         self.live = Some(live);
-        Ok(work)
+        self.solve_if_first()
     }
 
     /// Solve a map without an earlier field.
@@ -188,20 +190,32 @@ impl Planner {
         } else {
             live.map = self.map(&live.frame, aim)?;
         }
-        let work = if !changed {
-            Work::None
-        } else if live.is_solved_at_once() {
-            let before = &live.field;
-            let field = self.solver.solve_near(&live.map, before, &Cancellation::default())?;
-            live.field = Arc::new(field);
-            self.full_solves += 1;
-            Work::Solved
-        } else {
+        if changed {
             live.map_changed(before);
-            Work::Stale
-        };
+        }
         self.live = Some(live);
-        Ok(work)
+        if changed { self.solve_if_first() } else { Ok(Work::None) }
+    }
+
+    /// Solve the map, which has changed, if that comes first.
+    fn solve_if_first(&mut self) -> Result<Work, SolveError> {
+        if self.solves_first { self.solve_newest() } else { Ok(Work::Stale) }
+    }
+
+    /// Whether the field is of an older map than the newest, and the newest is solved by the step itself.
+    fn is_solved_here(&self) -> bool {
+        self.live.as_ref().is_some_and(|live| live.is_small() && !live.is_current())
+    }
+
+    /// Solve the newest map, from the field of the one before.
+    fn solve_newest(&mut self) -> Result<Work, SolveError> {
+        let Some(live) = &mut self.live else {
+            return Ok(Work::None);
+        };
+        let field = self.solver.solve_near(&live.map, &live.field, &Cancellation::default())?;
+        live.solve(field);
+        self.full_solves += 1;
+        Ok(Work::Solved)
     }
 
     /// The map of the newest cells, with the target `aim`. Its cell counts as free: the mapper may not know of a new target yet.
@@ -268,14 +282,33 @@ impl Planner {
         }
     }
 
-    /// The guidance for a robot at that pose.
-    fn guide(&mut self, sample: &PoseSample) -> GuidanceSample {
+    /// The guidance for a robot at that pose. A small map is solved first if its field must not be followed there.
+    fn answer(&mut self, sample: &PoseSample) -> Result<Outcome, SolveError> {
         let pose = sample.pose();
-        let cells = self.grid.cells();
-        let (status, direction) = match (&self.live, self.place()) {
-            (Some(live), Some(target)) => live.guide(&self.robot, &pose, target, cells),
-            _ => (GuidanceStatus::Waiting, DVec2::ZERO),
-        };
+        let mut work = Work::None;
+        let mut followed = self.follow_field(&pose);
+        if followed.is_none() && self.is_solved_here() {
+            work = self.solve_newest()?;
+            followed = self.follow_field(&pose);
+        }
+        let guidance = Some(self.guide(sample, followed));
+        Ok(Outcome { work, guidance, job: None })
+    }
+
+    /// Status and direction of the field at `pose`; none where it must not be followed.
+    fn follow_field(&self, pose: &Pose2) -> Option<(GuidanceStatus, DVec2)> {
+        let (live, target) = (self.live.as_ref()?, self.place()?);
+        live.guide(&self.robot, pose, target, self.grid.cells())
+    }
+
+    /// The guidance for a robot that `followed` the field.
+    fn guide(
+        &mut self,
+        sample: &PoseSample,
+        followed: Option<(GuidanceStatus, DVec2)>,
+    ) -> GuidanceSample {
+        let pose = sample.pose();
+        let (status, direction) = followed.unwrap_or((GuidanceStatus::Waiting, DVec2::ZERO));
         let (status, direction, limit) = if self.on_a_saddle {
             (GuidanceStatus::Along, DVec2::ZERO, 0.0)
         } else {
@@ -341,6 +374,12 @@ impl Planner {
         };
         Some(Snapshot { header, frame: live.frame, field: Arc::clone(&live.field) })
     }
+}
+
+/// Whether the maps of `mission` are solved first when they change.
+fn solves_first(mission: &Mission) -> bool {
+    let solve_s = mission.grid_frame().area() as f64 * SOLVE_NS_PER_CELL / 1e9;
+    solve_s * mission.robot.rate_hz <= SHARE_OF_PERIOD
 }
 
 /// The mission's screening length, in the unit of its grid.

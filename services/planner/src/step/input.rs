@@ -25,7 +25,7 @@ pub enum Input<'a> {
     Target(&'a TargetSample),
     /// The pose of the tick: it is answered with guidance.
     Pose(&'a PoseSample),
-    /// The tick has its guidance: a background solve may begin.
+    /// The tick has its guidance: the newest map may be solved, or a background solve begin.
     Idle,
     /// The result of a job.
     Solved(Solved),
@@ -62,7 +62,7 @@ pub enum Work {
     None,
     /// It was solved.
     Solved,
-    /// It is of an older map now; the newest is solved in the background.
+    /// It is of an older map now.
     Stale,
     /// The result of a background solve took its place.
     SwappedIn,

@@ -2,13 +2,14 @@
 //!
 //! | event | [`Current`](State::Current) | [`Stale`](State::Stale) | [`Solving`](State::Solving) |
 //! |---|---|---|---|
-//! | the map changes, and is small | solved at once: `Current` | - | - |
-//! | the map changes, and is large | `Stale` | `Stale` | `Solving`, `changed` |
-//! | a job may begin | `Current` | `Solving` | `Solving` |
+//! | the map changes, and is solved first | solved: `Current` | - | - |
+//! | another map changes | `Stale` | `Stale` | `Solving`, `changed` |
+//! | the tick is over, and the map is small | `Current` | solved: `Current` | - |
+//! | the tick is over, and the map is large | `Current` | a job begins: `Solving` | `Solving` |
 //! | the job's result comes | ignored | ignored | `Current`, or `Stale` if the map `changed` meanwhile |
 //!
 //! While the field is not that of the newest map, a robot follows it only where nothing changed on its way ahead. Elsewhere
-//! it waits. Each tick looks at the way again, with the newest map.
+//! a small map is solved within the tick, and on a large one the robot waits. Each tick looks at the way again, with the newest map.
 
 use std::sync::Arc;
 
@@ -24,9 +25,9 @@ use harmonic::{Cell, Change, Domain, Field, Guidance};
 use super::input::Job;
 use crate::view::{View, field_cell};
 
-/// Maps of at most this many cells (512 a side) are solved within the tick that changes them: a period of 143 ms has room
-/// for such a solve many times over. Larger maps are solved in the background.
-const SOLVED_AT_ONCE_CELLS: usize = 1 << 18;
+/// Maps of at most this many cells (512 a side) are solved by the step: before a tick is answered, or after it if it can do without.
+/// Larger maps are solved in the background.
+const SMALL_CELLS: usize = 1 << 18;
 
 /// How far ahead of the robot nothing may have changed, as the time it takes to drive there, seconds: until the next tick
 /// looks at the way again, and then to stop.
@@ -67,8 +68,13 @@ impl Live {
         Self { frame, map, field, field_version: 0, leads_elsewhere: false, state: State::Current }
     }
 
-    pub(super) fn is_solved_at_once(&self) -> bool {
-        self.frame.area() <= SOLVED_AT_ONCE_CELLS
+    pub(super) fn is_small(&self) -> bool {
+        self.frame.area() <= SMALL_CELLS
+    }
+
+    /// Whether the field is that of the newest map.
+    pub(super) fn is_current(&self) -> bool {
+        self.state == State::Current
     }
 
     /// The map changed; before, it had version `before`.
@@ -115,6 +121,13 @@ impl Live {
         self.state = if changed { State::Stale } else { State::Current };
     }
 
+    /// Take the field of the newest map.
+    pub(super) fn solve(&mut self, field: Field) {
+        self.field = Arc::new(field);
+        self.leads_elsewhere = false;
+        self.state = State::Current;
+    }
+
     /// The version of the grid that the field is of, where the newest is `newest`.
     pub(super) fn field_version(&self, newest: u64) -> u64 {
         match self.state {
@@ -123,19 +136,20 @@ impl Live {
         }
     }
 
-    /// Status and direction for a robot at `pose` that is to go to `target`; `cells` are the cells of the newest map.
+    /// Status and direction for a robot at `pose` that is to go to `target`; `cells` are the cells of the newest map. None where the
+    /// field must not be followed.
     pub(super) fn guide(
         &self,
         robot: &Robot,
         pose: &Pose2,
         target: DVec2,
         cells: &[u8],
-    ) -> (GuidanceStatus, DVec2) {
+    ) -> Option<(GuidanceStatus, DVec2)> {
         if self.leads_elsewhere {
-            return (GuidanceStatus::Waiting, DVec2::ZERO);
+            return None;
         }
         if self.is_beside(target, pose.position) {
-            return (GuidanceStatus::AtTarget, pose.axis());
+            return Some((GuidanceStatus::AtTarget, pose.axis()));
         }
         let view = self.view(cells);
         let (status, direction) = match view.guidance(pose.position) {
@@ -158,7 +172,7 @@ impl Live {
                 !points.any(|at| view.has_changed(at, robot.radius_m))
             }
         };
-        if follow { (status, direction) } else { (GuidanceStatus::Waiting, DVec2::ZERO) }
+        follow.then_some((status, direction))
     }
 
     pub(super) fn view<'a>(&'a self, cells: &'a [u8]) -> View<'a> {

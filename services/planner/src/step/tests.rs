@@ -17,6 +17,12 @@ fn mission_of(cells: u32) -> Mission {
     Mission::parse(&text, Path::new("test.toml")).unwrap()
 }
 
+impl Planner {
+    fn ask(&mut self, pose: &PoseSample) -> GuidanceSample {
+        self.answer(pose).unwrap().guidance.unwrap()
+    }
+}
+
 /// A planner that is told the mission's target.
 fn sent(mission: &Mission) -> Planner {
     let mut planner = Planner::new(mission);
@@ -71,7 +77,7 @@ fn a_screening_length_in_metres_is_the_same_on_any_grid() {
 #[test]
 fn before_the_first_keyframe_there_is_no_guidance() {
     let mut planner = sent(&mission());
-    assert_eq!(status(&planner.guide(&at(0.0, 0.0))), GuidanceStatus::Waiting);
+    assert_eq!(status(&planner.ask(&at(0.0, 0.0))), GuidanceStatus::Waiting);
     assert!(planner.snapshot().is_none());
 }
 
@@ -80,7 +86,7 @@ fn an_empty_room_is_crossed_straight() {
     let mut planner = sent(&mission());
     let (header, cells) = keyframe(1, |_| false);
     assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::Solved);
-    let guidance = planner.guide(&at(0.0, 0.0));
+    let guidance = planner.ask(&at(0.0, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Along);
     assert!(guidance.ex > 0.999 && guidance.ey.abs() < 0.03, "{guidance:?}");
     assert_eq!(guidance.distance_m, 1.5);
@@ -95,9 +101,48 @@ fn a_wall_that_appears_turns_the_guidance_aside() {
     let wall = |at: DVec2| (at.x - 0.7).abs() < 0.06 && at.y < 1.0;
     let (header, cells) = keyframe(2, wall);
     assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::Solved);
-    let guidance = planner.guide(&at(0.3, 0.0));
+    let guidance = planner.ask(&at(0.3, 0.0));
     assert!(guidance.ey > 0.7, "{guidance:?}");
     assert_eq!(guidance.full_solves, 2);
+}
+
+/// A planner whose ticks are too short to solve its map in each, and the keyframe of a wall.
+fn hurried() -> (Planner, impl Fn(u64) -> (GridHeader, Vec<u8>)) {
+    let mut mission = mission_of(200);
+    mission.robot.rate_hz = 100.0;
+    let frame = mission.grid_frame();
+    let mut planner = sent(&mission);
+    let (header, cells) = keyframe_of(frame, 1, |_| false);
+    planner.take_grid(&header, &cells).unwrap();
+    let wall = |at: DVec2| (at.x - 0.7).abs() < 0.06 && at.y < 1.0;
+    (planner, move |version| keyframe_of(frame, version, wall))
+}
+
+#[test]
+fn with_short_ticks_a_wall_that_appears_elsewhere_is_solved_for_after_the_tick() {
+    let (mut planner, wall) = hurried();
+    let before = planner.ask(&at(-1.5, 0.0));
+    let (header, cells) = wall(2);
+    assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::Stale);
+    let after = planner.ask(&at(-1.5, 0.0));
+    assert_eq!((after.ex, after.ey, after.full_solves), (before.ex, before.ey, 1));
+    let over =
+        |planner: &mut Planner| planner.step(Input::Idle, MissionTime::default()).unwrap().work;
+    assert_eq!(over(&mut planner), Work::Solved);
+    assert_eq!(over(&mut planner), Work::None, "once");
+    let guidance = planner.ask(&at(-1.5, 0.0));
+    assert!(guidance.ey > before.ey + 0.1, "{guidance:?}");
+    assert_eq!(planner.snapshot().unwrap().header.grid_version, 2);
+}
+
+#[test]
+fn with_short_ticks_a_wall_that_appears_on_the_way_ahead_is_solved_for_in_the_tick() {
+    let (mut planner, wall) = hurried();
+    let (header, cells) = wall(2);
+    planner.take_grid(&header, &cells).unwrap();
+    let guidance = planner.ask(&at(0.45, 0.0));
+    assert_eq!((status(&guidance), guidance.full_solves), (GuidanceStatus::Along, 2));
+    assert!(guidance.ex < 0.0 && guidance.ey > 0.3, "{guidance:?}");
 }
 
 #[test]
@@ -106,7 +151,7 @@ fn a_robot_walled_in_hears_that_the_target_is_unreachable() {
     let ring = |at: DVec2| (0.5..0.75).contains(&at.length());
     let (header, cells) = keyframe(1, ring);
     planner.take_grid(&header, &cells).unwrap();
-    assert_eq!(status(&planner.guide(&at(0.0, 0.0))), GuidanceStatus::Unreachable);
+    assert_eq!(status(&planner.ask(&at(0.0, 0.0))), GuidanceStatus::Unreachable);
 }
 
 #[test]
@@ -115,7 +160,7 @@ fn a_robot_on_a_hazard_cell_is_shown_the_way_out() {
     let block = |at: DVec2| at.x.abs() < 0.25 && at.y.abs() < 0.45;
     let (header, cells) = keyframe(1, block);
     planner.take_grid(&header, &cells).unwrap();
-    let guidance = planner.guide(&at(-0.15, 0.0));
+    let guidance = planner.ask(&at(-0.15, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::WayOut);
     assert!(guidance.ex < -0.9, "the nearest free cell lies to the left: {guidance:?}");
 }
@@ -125,7 +170,7 @@ fn in_the_targets_cell_the_rest_is_straight() {
     let mut planner = sent(&mission());
     let (header, cells) = keyframe(1, |_| false);
     planner.take_grid(&header, &cells).unwrap();
-    let guidance = planner.guide(&at(1.48, 0.02));
+    let guidance = planner.ask(&at(1.48, 0.02));
     assert!((guidance.ex - 0.5_f64.sqrt()).abs() < 1e-9, "{guidance:?}");
 }
 
@@ -158,7 +203,7 @@ fn evidential(scanned: impl Fn(DVec2) -> bool) -> Planner {
 fn an_evidential_robot_looks_where_nobody_looked_before_it_goes_there() {
     // All is scanned but the ground to the left of the way ahead.
     let mut planner = evidential(|at| at.x < 0.2 || at.y < 0.1);
-    let guidance = planner.guide(&at(0.0, 0.0));
+    let guidance = planner.ask(&at(0.0, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Look);
     assert!(guidance.ex > 0.3 && guidance.ey > 0.1, "{guidance:?}");
     assert_eq!(guidance.speed_limit_m_s, 0.0);
@@ -170,7 +215,7 @@ fn an_evidential_robot_without_sensing_does_not_look_first() {
     let mut planner = sent(&mission);
     let (header, cells) = keyframe(1, |_| false);
     planner.take_grid(&header, &cells).unwrap();
-    let guidance = planner.guide(&at(0.0, 0.0));
+    let guidance = planner.ask(&at(0.0, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Along);
     assert_eq!(guidance.speed_limit_m_s, f64::INFINITY);
 }
@@ -180,7 +225,7 @@ fn an_evidential_robot_looks_square_to_the_surfaces_it_could_touch_undetected() 
     // All ground is scanned, by a sonar that looked ahead only.
     let mut planner = evidential(|_| true);
     planner.belief.clear_beam_count = 1;
-    let guidance = planner.guide(&at(0.0, 0.0));
+    let guidance = planner.ask(&at(0.0, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Look);
     let to_the_side = guidance.ey.atan2(guidance.ex).to_degrees().abs();
     assert!((45.0..=90.0).contains(&to_the_side), "{to_the_side}");
@@ -188,7 +233,7 @@ fn an_evidential_robot_looks_square_to_the_surfaces_it_could_touch_undetected() 
 
 #[test]
 fn over_scanned_ground_an_evidential_robot_goes_at_full_speed() {
-    let guidance = evidential(|_| true).guide(&at(0.0, 0.0));
+    let guidance = evidential(|_| true).ask(&at(0.0, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Along);
     assert!(guidance.speed_limit_m_s > 0.25, "{guidance:?}");
 }
@@ -203,7 +248,7 @@ fn an_evidential_robot_does_not_creep_towards_what_it_hears_right_before_it() {
             (beam.x_m, beam.clear_m) = (0.19, clear_m);
             beam.bearing_rad = 0.0;
         }
-        let guidance = planner.guide(&at(0.0, 0.0));
+        let guidance = planner.ask(&at(0.0, 0.0));
         let limit = guidance.speed_limit_m_s;
         assert_eq!(limit > 0.0, may_go, "{clear_m} m: {guidance:?}");
         let ahead = planner.advise(&Pose2::default(), GuidanceStatus::WayOut, DVec2::X);
@@ -217,7 +262,7 @@ fn a_scan_goes_on_in_a_planner_that_was_restarted() {
     let (mut one, mut other) = (evidential(scanned), evidential(scanned));
     for heading in [0.0, 0.2, 0.4] {
         let pose = PoseSample { heading_rad: heading, ..at(0.0, 0.0) };
-        assert_eq!(one.guide(&pose), other.guide(&pose));
+        assert_eq!(one.ask(&pose), other.ask(&pose));
     }
 }
 
@@ -276,7 +321,7 @@ impl LargeRoom {
     }
 
     fn status_at(&mut self, x: f64, y: f64) -> GuidanceStatus {
-        status(&self.planner.guide(&at(x, y)))
+        status(&self.planner.ask(&at(x, y)))
     }
 }
 
@@ -294,13 +339,13 @@ fn on_a_large_map_a_change_on_the_way_ahead_makes_the_robot_wait_until_the_field
 #[test]
 fn on_a_large_map_a_robot_goes_on_where_nothing_changed_on_its_way_ahead() {
     let mut room = LargeRoom::new();
-    let before = room.planner.guide(&at(0.0, 0.0));
+    let before = room.planner.ask(&at(0.0, 0.0));
     room.close_near_gap();
-    let after = room.planner.guide(&at(0.0, 0.0));
+    let after = room.planner.ask(&at(0.0, 0.0));
     assert_eq!((after.ex, after.ey), (before.ex, before.ey), "far from the gap");
     assert_eq!(room.status_at(0.5, 0.0), GuidanceStatus::Waiting, "at the gap");
     room.solve();
-    let guidance = room.planner.guide(&at(0.5, 0.0));
+    let guidance = room.planner.ask(&at(0.5, 0.0));
     assert!(guidance.ey > 0.4, "to the other gap: {guidance:?}");
 }
 
@@ -382,14 +427,14 @@ fn a_new_target_is_solved_for_on_the_same_map_within_the_tick() {
     let (header, cells) = keyframe(1, wall);
     planner.take_grid(&header, &cells).unwrap();
     assert_eq!(planner.take_target(&sample(2, -1.5, 0.0)).unwrap(), Work::Solved);
-    let guidance = planner.guide(&at(0.3, 0.0));
+    let guidance = planner.ask(&at(0.3, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Along);
     assert!(guidance.ex < -0.9, "{guidance:?}");
     assert_eq!((guidance.target_number, guidance.distance_m), (2, 1.8));
     let mut fresh = Planner::new(&mission());
     fresh.take_target(&sample(2, -1.5, 0.0)).unwrap();
     fresh.take_grid(&header, &cells).unwrap();
-    let fresh = fresh.guide(&at(0.3, 0.0));
+    let fresh = fresh.ask(&at(0.3, 0.0));
     let of = |guidance: &GuidanceSample| (guidance.ex, guidance.ey, guidance.target);
     assert_eq!(of(&guidance), of(&fresh), "as a planner that knew no other target");
 }
@@ -399,10 +444,10 @@ fn a_planner_that_knows_no_target_gives_no_direction() {
     let mut planner = Planner::new(&mission());
     let (header, cells) = keyframe(1, |_| false);
     assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::None);
-    let guidance = planner.guide(&at(0.0, 0.0));
+    let guidance = planner.ask(&at(0.0, 0.0));
     assert_eq!((status(&guidance), guidance.target_number), (GuidanceStatus::Waiting, 0));
     assert_eq!(planner.take_target(&sample(1, 1.5, 0.0)).unwrap(), Work::Solved);
-    assert_eq!(status(&planner.guide(&at(0.0, 0.0))), GuidanceStatus::Along);
+    assert_eq!(status(&planner.ask(&at(0.0, 0.0))), GuidanceStatus::Along);
 }
 
 #[test]
@@ -411,7 +456,7 @@ fn a_target_in_hazard_or_outside_ends_no_planner() {
     let (header, cells) = keyframe(1, |at| at.x < -0.5);
     planner.take_grid(&header, &cells).unwrap();
     planner.take_target(&sample(2, -1.5, 0.0)).unwrap();
-    assert_eq!(status(&planner.guide(&at(0.0, 0.0))), GuidanceStatus::Unreachable);
+    assert_eq!(status(&planner.ask(&at(0.0, 0.0))), GuidanceStatus::Unreachable);
     // The mapper's next map still has hazard there.
     let (mut header, _) = keyframe(2, |_| true);
     header.part.version = 2;
@@ -419,7 +464,7 @@ fn a_target_in_hazard_or_outside_ends_no_planner() {
     planner.take_grid(&header, &cells).unwrap();
     for (x, y) in [(9.0, 0.0), (1.99, 0.0), (f64::NAN, 0.0)] {
         assert_eq!(planner.take_target(&sample(3, x, y)).unwrap(), Work::None, "{x}");
-        assert_eq!(planner.guide(&at(0.0, 0.0)).target_number, 2, "{x}");
+        assert_eq!(planner.ask(&at(0.0, 0.0)).target_number, 2, "{x}");
     }
 }
 
@@ -434,7 +479,7 @@ fn on_a_large_map_the_robot_waits_until_the_field_leads_to_its_new_target() {
     assert_eq!(room.planner.swap_in(solve(&before)).unwrap(), Work::None);
     assert_eq!(room.status_at(0.0, 0.0), GuidanceStatus::Waiting);
     room.solve();
-    let guidance = room.planner.guide(&at(0.0, 0.0));
+    let guidance = room.planner.ask(&at(0.0, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Along);
     assert!(guidance.ex < -0.9, "{guidance:?}");
 }
