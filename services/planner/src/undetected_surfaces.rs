@@ -24,11 +24,12 @@ const NEAR_M: f64 = 1.2;
 /// How far a supposed surface extends from the point where the body would touch it, metres. A shorter one could be detected
 /// only from nearer; its end is an edge, which answers a beam ahead.
 const EXTENDS_M: f64 = 1.0;
-/// Greatest angle between a ray and the normal of a surface that it detects, and its cosine.
-const MOST_SLANT_DEG: f64 = 70.2;
+/// Least cosine of the angle between a ray and the normal of a surface that it detects: 70 degrees.
 const LEAST_SLANT: f64 = 0.34;
 /// How far from the point where the body would touch it a ray must meet a supposed surface to exclude it, metres.
 const MET_WITHIN_M: f64 = 0.35;
+/// More than the rounding of such distances, metres.
+const ROUNDING_M: f64 = 1e-6;
 /// Free ground that is asked for between body and surface, metres.
 const MARGIN_M: f64 = 0.02;
 /// An echo from no farther than this before the supposed surface may be the surface's own, metres.
@@ -39,18 +40,16 @@ const ECHOES_FOR_A_SILENCE: usize = 2;
 /// The number of normals: to either side of the way, and along it.
 const NORMALS: usize = 2 * (WIDEST_DEG / STEP_DEG) as usize + 1;
 
-/// Readings are grouped by bearing into so many sectors, because a normal concerns few of them.
+/// The sonars' readings are grouped by bearing into so many sectors, because a normal concerns few of them.
 const SECTORS: usize = 32;
-const SECTOR_DEG: f64 = 360.0 / SECTORS as f64;
-/// Beams that answer a surface lie no farther from the sector of its normal than so many sectors, and rays that detect one.
-const BEAM_SECTORS: usize = (NEAR_ANSWERS_WITHIN_DEG / SECTOR_DEG) as usize + 1;
-const RAY_SECTORS: usize = (MOST_SLANT_DEG / SECTOR_DEG) as usize + 1;
+/// Beams that answer a surface lie no farther from the sector of its normal than so many sectors.
+const EITHER_SIDE: usize = (NEAR_ANSWERS_WITHIN_DEG * SECTORS as f64 / 360.0) as usize + 1;
 
 /// The readings, and the body that could touch a surface.
 #[derive(Clone, Debug)]
 pub(crate) struct UndetectedSurfaces {
-    beams: Readings,
-    rays: Readings,
+    beams: BySector,
+    rays: Vec<Beam>,
     reach: f64,
     /// The normals that are checked for a way along x, and their angles.
     normals: [(DVec2, f64); NORMALS],
@@ -65,37 +64,41 @@ struct Beam {
     clear: f64,
 }
 
-/// Readings by their sectors.
+impl From<&ClearBeam> for Beam {
+    fn from(beam: &ClearBeam) -> Self {
+        Self {
+            origin: DVec2::new(beam.x_m.into(), beam.y_m.into()),
+            axis: DVec2::from_angle(beam.bearing_rad.into()),
+            clear: beam.clear_m.into(),
+        }
+    }
+}
+
+/// Beams by their sectors.
 #[derive(Clone, Debug)]
-struct Readings {
+struct BySector {
     beams: Vec<Beam>,
-    /// The first reading of each sector, and the end of the last.
+    /// The first beam of each sector, and the end of the last.
     starts: [usize; SECTORS + 1],
 }
 
-impl Readings {
+impl BySector {
     fn new(readings: &[ClearBeam]) -> Self {
         let sector = |beam: &&ClearBeam| sector_of(beam.bearing_rad.into());
         let mut sorted: Vec<_> = readings.iter().collect();
         sorted.sort_by_key(sector);
-        let beam = |beam: &&ClearBeam| Beam {
-            origin: DVec2::new(beam.x_m.into(), beam.y_m.into()),
-            axis: DVec2::from_angle(beam.bearing_rad.into()),
-            clear: beam.clear_m.into(),
-        };
         Self {
-            beams: sorted.iter().map(beam).collect(),
+            beams: sorted.iter().copied().map(Beam::from).collect(),
             starts: std::array::from_fn(|start| sorted.partition_point(|it| sector(it) < start)),
         }
     }
 
-    /// The readings of `sector` and of so many on either side of it.
-    fn around(&self, sector: usize, either_side: usize) -> impl Iterator<Item = &Beam> {
-        let first = sector + SECTORS - either_side;
-        (first..=first + 2 * either_side).flat_map(|sector| {
-            let sector = sector % SECTORS;
-            &self.beams[self.starts[sector]..self.starts[sector + 1]]
-        })
+    /// The beams that may answer a surface whose normal lies in `sector`.
+    fn around(&self, sector: usize) -> [&[Beam]; 2] {
+        let first = (sector + SECTORS - EITHER_SIDE) % SECTORS;
+        let end = first + 2 * EITHER_SIDE + 1;
+        let of = |from: usize, to: usize| &self.beams[self.starts[from]..self.starts[to]];
+        [of(first, end.min(SECTORS)), of(0, end.saturating_sub(SECTORS))]
     }
 }
 
@@ -107,8 +110,8 @@ impl UndetectedSurfaces {
     /// From the readings in `belief`, for a body of `radius` metres.
     pub(crate) fn new(belief: &GridHeader, radius: f64) -> Self {
         Self {
-            beams: Readings::new(belief.clear_beams()),
-            rays: Readings::new(belief.clear_rays()),
+            beams: BySector::new(belief.clear_beams()),
+            rays: belief.clear_rays().iter().map(Beam::from).collect(),
             reach: radius + MARGIN_M,
             normals: std::array::from_fn(|index| {
                 let step = index as i32 - (NORMALS / 2) as i32;
@@ -124,17 +127,31 @@ impl UndetectedSurfaces {
     /// reading excludes.
     pub(crate) fn normals(&self, at: DVec2, along: DVec2) -> impl Iterator<Item = DVec2> {
         let heading = along.to_angle();
+        let rays: Vec<_> = self.rays.iter().filter(|ray| self.may_meet(ray, at)).copied().collect();
         self.normals.iter().filter_map(move |(normal, angle)| {
             let normal = normal.rotate(along);
-            (!self.is_excluded(at, normal, sector_of(heading + angle))).then_some(normal)
+            let beams = self.beams.around(sector_of(heading + angle));
+            (!self.is_excluded(at, normal, beams, &rays)).then_some(normal)
         })
     }
 
-    /// Whether the readings exclude a surface that touches a body at `at` on the side of `normal`, which lies in `sector`.
-    fn is_excluded(&self, at: DVec2, normal: DVec2, sector: usize) -> bool {
+    /// Whether `ray` may meet a surface that touches a body at `at`, near enough to the body and not too far behind its end.
+    fn may_meet(&self, ray: &Beam, at: DVec2) -> bool {
+        let offset = at - ray.origin;
+        let near = self.reach + MET_WITHIN_M + ROUNDING_M;
+        let along = ray.axis.dot(offset);
+        ray.axis.perp_dot(offset).abs() <= near
+            && (-near..=ray.clear + NEAR_ECHO_M + near).contains(&along)
+    }
+
+    /// Whether the `beams` and `rays` exclude a surface that touches a body at `at` on the side of `normal`.
+    fn is_excluded(&self, at: DVec2, normal: DVec2, beams: [&[Beam]; 2], rays: &[Beam]) -> bool {
         let [far, near] = self.answers;
         let (mut silences, mut echoes) = (0, 0);
-        for beam in self.beams.around(sector, BEAM_SECTORS) {
+        // The readings that are still to be asked. Once they cannot outweigh the silences, the others need not be.
+        let mut left = beams[0].len() + beams[1].len() + rays.len();
+        for beam in beams.into_iter().flatten() {
+            left -= 1;
             let square = beam.axis.dot(normal);
             // However near the surface is, it does not answer such a beam.
             if square < near {
@@ -148,11 +165,15 @@ impl UndetectedSurfaces {
             }
             if distance <= beam.clear {
                 silences += 1;
+                if silences * ECHOES_FOR_A_SILENCE > echoes + left {
+                    return true;
+                }
             } else if distance <= beam.clear + NEAR_ECHO_M {
                 echoes += 1;
             }
         }
-        for ray in self.rays.around(sector, RAY_SECTORS) {
+        for ray in rays {
+            left -= 1;
             let slant = ray.axis.dot(normal);
             if slant < LEAST_SLANT {
                 continue;
@@ -165,6 +186,9 @@ impl UndetectedSurfaces {
             }
             if meets <= ray.clear {
                 silences += 1;
+                if silences * ECHOES_FOR_A_SILENCE > echoes + left {
+                    return true;
+                }
             } else if meets <= ray.clear + NEAR_ECHO_M {
                 echoes += 1;
             }
