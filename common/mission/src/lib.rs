@@ -433,10 +433,11 @@ impl Mission {
             Model::X80 | Model::X80sv | Model::Car => {
                 sensor::x80(self.body().radius_m, &self.sonar)
             }
-            Model::Jackal => sensor::laser(SensorModel::Ust10lx, 0.12),
-            Model::TurtleBot3Burger => sensor::laser(SensorModel::Lds02, -0.032),
-            Model::TurtleBot3Waffle => sensor::laser(SensorModel::Lds02, -0.064),
-            Model::Kobuki => sensor::laser(SensorModel::RplidarA1, 0.0),
+            Model::Jackal => sensor::laser(SensorModel::Ust10lx, 0.12, 0.0),
+            Model::TurtleBot3Burger => sensor::laser(SensorModel::Lds02, -0.032, 0.0),
+            Model::TurtleBot3Waffle => sensor::laser(SensorModel::Lds02, -0.064, 0.0),
+            Model::TurtleBot4 => sensor::laser(SensorModel::RplidarA1, -0.04, 90.0),
+            Model::Kobuki | Model::Create3 => sensor::laser(SensorModel::RplidarA1, 0.0, 0.0),
         };
         sensor::table(&rows, *rate_hz, &self.sonar, self.sensor_set())
     }

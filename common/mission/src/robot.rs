@@ -28,6 +28,13 @@ pub enum Model {
     /// ROBOTIS' TurtleBot 3 Waffle. Source: its e-Manual; its radius and accelerations are those of its Nav2 parameters.
     #[serde(rename = "turtlebot3-waffle")]
     TurtleBot3Waffle,
+    /// Clearpath's TurtleBot 4, a Create 3 with a laser that is turned to its left. Source of the laser's place: `turtlebot4_description`.
+    #[serde(rename = "turtlebot4")]
+    TurtleBot4,
+    /// iRobot's Create 3. Source: `create3_sim`, its control parameters, also of its accelerations, and its documentation of
+    /// `safety_override`: by default it drives no faster than 0.306 m/s and hardly backwards. It has no laser of its own; without rows of
+    /// sensors one is taken to stand in its middle.
+    Create3,
     /// Yujin's Kobuki. Source: its user guide; its accelerations are those of its ROS velocity smoother.
     Kobuki,
     /// A small car on the X80's boards. Nominal, no product: the size of a model car of about 1:14.
@@ -320,6 +327,9 @@ impl Model {
             Self::Jackal => differential(0.098, 0.375_59, 0.333, 2.0, [20.0, 25.0]),
             Self::TurtleBot3Burger => differential(0.033, 0.16, 0.105, 0.22, [2.5, 3.2]),
             Self::TurtleBot3Waffle => differential(0.033, 0.287, 0.22, 0.26, [2.5, 3.2]),
+            Self::TurtleBot4 | Self::Create3 => {
+                differential(0.035_75, 0.233, 0.175, 0.306, [0.9, 7.725])
+            }
             Self::Kobuki => differential(0.0352, 0.23, 0.1758, 0.7, [1.0, 2.0]),
             // Nominal. The pose is the middle of the rear axle: the disc around it covers a body that reaches 0.22 m ahead of
             // it and 0.09 m to either side. It turns in 0.31 m.

@@ -167,6 +167,9 @@ pub struct SensorRow {
     pub forward_m: f64,
     /// delta of (19): its bearing from the robot's axis, degrees counter-clockwise.
     pub bearing_deg: f64,
+    /// The angle from the bearing to the middle beam of a laser, degrees counter-clockwise. By default it looks outward.
+    #[serde(default, skip_serializing_if = "is_outward")]
+    pub turned_deg: f64,
     /// The angle in which it detects, degrees; of a cone or a laser. By default that of its model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field_of_view_deg: Option<f64>,
@@ -182,6 +185,10 @@ pub struct SensorRow {
     /// The product. By default that of the X80.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<SensorModel>,
+}
+
+fn is_outward(turned_deg: &f64) -> bool {
+    *turned_deg == 0.0
 }
 
 /// The front ultrasonic sensor of a robot without `[[robot.sensor]]`: which one it is and how it is mounted.
@@ -234,7 +241,11 @@ impl Sensor {
             name: row.name.clone(),
             kind: row.kind,
             channel: row.channel,
-            mount: Mount { forward_m: row.forward_m, bearing_rad: row.bearing_deg.to_radians() },
+            mount: Mount {
+                forward_m: row.forward_m,
+                bearing_rad: row.bearing_deg.to_radians(),
+                turned_rad: row.turned_deg.to_radians(),
+            },
             field_of_view_deg: row.field_of_view_deg.unwrap_or(model.field_of_view_deg()),
             reach_m: row.reach_m.unwrap_or(model.reach_m()),
             every_ticks: row.rate_hz.map_or(1.0, |hz| (rate_hz / hz).round().max(1.0)) as u64,
@@ -251,6 +262,16 @@ impl Sensor {
         // The first and the last beam of a whole turn would be the same.
         let steps = if wide >= std::f64::consts::TAU - 1e-9 { self.beams } else { self.beams - 1 };
         (-wide / 2.0, wide / steps.max(1) as f64)
+    }
+
+    /// The angle from the robot's axis to what is turned to a place for a look, radians. A laser that sees all around is never turned, so
+    /// of that it is its bearing.
+    #[must_use]
+    pub fn faces_rad(&self) -> f64 {
+        match self.field_of_view_deg >= 360.0 {
+            true => self.mount.bearing_rad,
+            false => self.mount.looks_rad(),
+        }
     }
 
     /// Its bearing from the robot's axis, degrees.
@@ -318,14 +339,15 @@ pub(crate) fn front(table: &[Sensor], sonar: &SonarConfig) -> Option<usize> {
     candidates.min_by(|(_, a), (_, b)| ahead(a).total_cmp(&ahead(b))).map(|(index, _)| index)
 }
 
-/// The one row of a robot with a laser alone.
-pub(crate) fn laser(model: SensorModel, forward_m: f64) -> Vec<SensorRow> {
+/// The one row of a robot with a laser alone, which is turned by so many degrees.
+pub(crate) fn laser(model: SensorModel, forward_m: f64, turned_deg: f64) -> Vec<SensorRow> {
     vec![SensorRow {
         name: "laser".to_owned(),
         kind: SensorKind::Scan,
         channel: 0,
         forward_m,
         bearing_deg: 0.0,
+        turned_deg,
         field_of_view_deg: None,
         reach_m: None,
         beams: None,
@@ -342,6 +364,7 @@ pub(crate) fn x80(radius_m: f64, sonar: &SonarConfig) -> Vec<SensorRow> {
         channel,
         forward_m,
         bearing_deg,
+        turned_deg: 0.0,
         field_of_view_deg: None,
         reach_m: None,
         beams: None,

@@ -1,27 +1,36 @@
-//! THE mounting of an ultrasonic ranger, (19): its position and direction on the robot, for simulator and mapper.
+//! THE mounting of a ranging sensor, (19): its position and direction on the robot, for simulator and mapper.
 //!
 //! (19) puts a hit at distance S + W/2 from the robot's centre along theta + delta. So the ranger is on that line: at
-//! bearing delta from the robot's axis, W/2 from the centre, looking outward.
+//! bearing delta from the robot's axis, W/2 from the centre, looking outward. A laser may be turned from that line.
 
 use glam::DVec2;
 
 use crate::kinematics::Pose2;
 
-/// The mounting of a ranger that looks outward.
+/// The mounting of a ranger that looks outward, or of a laser that is turned from there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mount {
     /// Distance from the robot's centre along the bearing, metres; the paper writes W/2.
     pub forward_m: f64,
     /// delta: bearing from the robot's axis, radians counter-clockwise.
     pub bearing_rad: f64,
+    /// The angle from the bearing to where it looks, radians counter-clockwise; 0 of one that looks outward.
+    pub turned_rad: f64,
 }
 
 impl Mount {
-    /// The pose of the ranger of a robot at `robot`. The heading is the direction of the beam.
+    /// The pose of the ranger of a robot at `robot`. The heading is the direction of the beam, or of the middle one.
     #[must_use]
     pub fn on(&self, robot: Pose2) -> Pose2 {
-        let heading = robot.heading + self.bearing_rad;
-        Pose2 { position: robot.position + self.forward_m * DVec2::from_angle(heading), heading }
+        let outward = robot.heading + self.bearing_rad;
+        let position = robot.position + self.forward_m * DVec2::from_angle(outward);
+        Pose2 { position, heading: outward + self.turned_rad }
+    }
+
+    /// The angle from the robot's axis to where it looks, radians counter-clockwise.
+    #[must_use]
+    pub fn looks_rad(&self) -> f64 {
+        self.bearing_rad + self.turned_rad
     }
 
     /// The hit of (19), metres: what a ranger on a robot at `robot` hears `range_m` away on its axis.
@@ -46,11 +55,22 @@ mod tests {
             (45.0, DVec2::new(1.0 + half, 2.0 + half)),
             (-90.0, DVec2::new(1.0, 1.0)),
         ] {
-            let mount = Mount { forward_m: 0.2, bearing_rad: f64::to_radians(bearing_deg) };
+            let bearing_rad = f64::to_radians(bearing_deg);
+            let mount = Mount { forward_m: 0.2, bearing_rad, turned_rad: 0.0 };
             let got = mount.hit(robot, 0.8);
             assert!(got.distance(hit) < 1e-12, "{bearing_deg} degrees: {got}");
             let ranger = mount.on(robot);
             assert!((ranger.position - robot.position).length() - 0.2 < 1e-12);
         }
+    }
+    #[test]
+    fn a_ranger_that_is_turned_stays_where_it_is_and_looks_elsewhere() {
+        let robot = Pose2 { position: DVec2::new(1.0, 2.0), heading: std::f64::consts::FRAC_PI_2 };
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let mount = Mount { forward_m: -0.04, bearing_rad: 0.0, turned_rad: quarter };
+        // 4 cm behind the centre of a robot that faces y; it looks to the robot's left.
+        assert!(mount.on(robot).position.distance(DVec2::new(1.0, 1.96)) < 1e-12);
+        assert!(mount.hit(robot, 0.5).distance(DVec2::new(0.5, 1.96)) < 1e-12);
+        assert_eq!(mount.looks_rad(), quarter);
     }
 }

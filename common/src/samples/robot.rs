@@ -79,7 +79,7 @@ impl ScanHeader {
             sensor: row as u64,
             x_m: at.x,
             y_m: at.y,
-            first_rad: sensor.mount.bearing_rad + first,
+            first_rad: sensor.mount.looks_rad() + first,
             step_rad,
             reach_m: sensor.reach_m,
             ..Self::default()

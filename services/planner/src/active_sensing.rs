@@ -68,7 +68,7 @@ impl ActiveSensing {
             speed: mission.speed_m_s(),
             turn: mission.turn_rad_s(),
             stops_within_s: mission.hurry().stops_within_s,
-            bearing: DVec2::from_angle(mission.front_sonar().mount.bearing_rad),
+            bearing: DVec2::from_angle(mission.front_sonar().faces_rad()),
             ahead_m: AHEAD_M.max(mission.speed_m_s() * mission.hurry().stops_within_s + STEP_M),
             sonars: mission.used(SensorKind::Cone),
             has_laser: mission.used(SensorKind::Scan) > 0,

@@ -105,6 +105,20 @@ mod tests {
         assert_eq!(at(180), None);
     }
 
+    #[test]
+    fn a_laser_that_is_turned_and_off_the_centre_measures_from_where_it_is_and_its_middle_beam_looks_where_it_is_turned()
+     {
+        let text = "target = [0, -5]\nrobot.model = 'turtlebot4'\nworld.wall = [{ points = [[-2, 1], [2, 1]] }, { points = [[2, -2], [2, 2]] }]\n";
+        let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
+        let mut laser = Laser::new(&mission, 1).unwrap();
+        let scan = laser.scan(&World::new(&mission), Pose2::default());
+        // The middle beam looks to the left. The laser is 40 mm behind the centre; its deviation is 1.5 cm at 2 m.
+        let at = |degrees: usize| f64::from(scan[(degrees + 180 + 270) % 360].unwrap());
+        assert!((at(90) - 1.0).abs() < 0.05, "{}", at(90));
+        assert!((at(0) - 2.04).abs() < 0.08, "{}", at(0));
+        assert!((at(135) - 1.0 / 0.5_f64.sqrt()).abs() < 0.07, "{}", at(135));
+    }
+
     /// What a UST-10LX on a Jackal at the origin reads in a world, by the angle of the beam, degrees from straight ahead.
     fn reading(shapes: &str) -> impl Fn(f64) -> Option<f32> + use<> {
         let text = format!("target = [0, -5]\nrobot.model = 'jackal'\n{shapes}");

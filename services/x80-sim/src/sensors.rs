@@ -56,7 +56,8 @@ impl Ranging {
         let front_channel = usize::from(front.channel) % SONARS;
         for ranger in &mission.simulation.ring {
             let (forward_m, bearing_rad) = (ranger.forward_m, ranger.bearing_deg.to_radians());
-            mounts[usize::from(ranger.index) % SONARS] = Some(Mount { forward_m, bearing_rad });
+            mounts[usize::from(ranger.index) % SONARS] =
+                Some(Mount { forward_m, bearing_rad, turned_rad: 0.0 });
         }
         // Of a robot without sonars it is another sensor.
         if front.kind == SensorKind::Cone {

@@ -311,7 +311,7 @@ fn beams_of(
     beams: &[f32],
     timestamp: Option<Timestamp>,
 ) -> LaserScan {
-    let start_angle = header.first_rad - sensor.mount.bearing_rad;
+    let start_angle = header.first_rad - sensor.mount.looks_rad();
     LaserScan {
         timestamp,
         frame_id: sensor.name.clone(),

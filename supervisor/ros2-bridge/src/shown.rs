@@ -136,7 +136,7 @@ impl Shown {
         let row = usize::try_from(header.sensor).unwrap_or(usize::MAX);
         if let Some(sensor) = self.sensors.get(row) {
             let period_s = sensor.every_ticks as f64 / self.mission.robot.rate_hz;
-            let fan = [header.first_rad - sensor.mount.bearing_rad, header.step_rad];
+            let fan = [header.first_rad - sensor.mount.looks_rad(), header.step_rad];
             let limits = [sensor.model.least_m(), header.reach_m];
             let header = Header(now_ns, &sensor.name);
             sink(Id::Scan, messages::scan(header, fan, limits, period_s, beams));

@@ -1,13 +1,16 @@
 //! The messages below were serialised by rclpy of ROS 2 Kilted with Fast DDS. The bytes that pad them are zeros here.
 
-use std::path::Path;
+use std::{
+    f64::consts::{FRAC_PI_2, PI},
+    path::Path,
+};
 
 use common::{
     grid::{Cell, CellState, GridFrame, Part},
     mission::Mission,
     samples::{
-        CommandSample, CommandState, FieldCell, FieldHeader, GridHeader, PoseSample, TargetPoint,
-        TargetSample,
+        CommandSample, CommandState, FieldCell, FieldHeader, GridHeader, PoseSample, ScanHeader,
+        TargetPoint, TargetSample,
     },
 };
 use glam::DVec2;
@@ -185,6 +188,28 @@ fn odometry_and_its_origin_make_up_the_pose() {
     let back = DVec2::from_angle(0.25).rotate(DVec2::new(x, y)) + DVec2::new(0.5, -0.5);
     assert!(back.distance(DVec2::new(1.0, 2.0)) < 1e-12);
     assert!((heading.unwrap() - 0.5).abs() < 1e-12);
+}
+
+#[test]
+fn the_frame_of_a_laser_is_where_it_is_mounted_and_its_beams_are_told_in_that_frame() {
+    let text = "target = [4, 0]\nrobot.model = 'turtlebot4'";
+    let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
+    let (row, laser) = mission.laser().unwrap();
+    let shown = Shown::new("tb4".to_owned(), mission);
+    let sent = published(|sink| shown.mounting(0, sink));
+    let mut reader = Reader::new(&sent[0].1).unwrap();
+    assert_eq!(reader.u32().unwrap(), 1);
+    reader.time().unwrap();
+    assert_eq!((reader.text().unwrap(), reader.text().unwrap()), ("base_link", "laser"));
+    let ([x, y], heading) = reader.pose().unwrap();
+    assert!((x, y) == (-0.04, 0.0) && (heading.unwrap() - FRAC_PI_2).abs() < 1e-12);
+    // The first of 360 beams looks to the right of the robot, which is behind the laser.
+    let header = ScanHeader::of(row, &laser);
+    assert!((header.first_rad + FRAC_PI_2).abs() < 1e-12);
+    let sent = published(|sink| shown.scan(&header, &[1.0; 360], 0, sink));
+    let mut reader = Reader::new(&sent[0].1).unwrap();
+    reader.header().unwrap();
+    assert!((reader.f32().unwrap() + PI as f32).abs() < 1e-6);
 }
 
 #[test]

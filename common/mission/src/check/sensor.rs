@@ -73,6 +73,11 @@ fn row(row: &SensorRow, rate_hz: f64) -> Result<(), Objection> {
     channel(KEY, row.kind, row.channel)?;
     within(KEY, row.forward_m, -5.0..=5.0, "m of forward_m")?;
     within(KEY, row.bearing_deg, -180.0..=180.0, "degrees of bearing_deg")?;
+    within(KEY, row.turned_deg, -180.0..=180.0, "degrees of turned_deg")?;
+    if row.turned_deg != 0.0 && row.kind != SensorKind::Scan {
+        let problem = "only a laser may look elsewhere than outward";
+        return Err(objection(KEY, problem, "remove turned_deg"));
+    }
     if let Some(model) = row.model
         && model.kind() != row.kind
     {
@@ -147,6 +152,8 @@ mod tests {
             (format!("{FRONT}reach_m = 3"), "reach_m"),
             (format!("{FRONT}field_of_view_deg = 90"), "field_of_view_deg"),
             (format!("{FRONT}rate_hz = 100"), "rate_hz"),
+            (format!("{FRONT}turned_deg = 90"), "only a laser"),
+            (format!("{FRONT}turned_deg = 200"), "turned_deg"),
             (format!("{FRONT}model = 'x80-infrared'"), "X80Infrared"),
             (second("").replace("'second'", "'front'"), "two are called"),
             (second(""), "channel of another"),
