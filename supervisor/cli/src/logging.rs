@@ -67,9 +67,9 @@ fn stderr_layer() -> AnyLayer {
 
 fn start(layers: Vec<AnyLayer>, default: &str) {
     let filter =
-        // The library of ROS 2 remarks on each of its sockets and on each message that it sends to itself.
+        // The library of ROS 2 remarks on each of its sockets and on each message that it sends to itself. Of two levels the later counts.
         EnvFilter::try_from_env("FIRSTHAND_LOG")
-            .unwrap_or_else(|_| EnvFilter::new(format!("{default},rustdds=error")));
+            .unwrap_or_else(|_| EnvFilter::new(format!("rustdds=error,{default}")));
     tracing_subscriber::registry().with(layers).with(filter).init();
 }
 

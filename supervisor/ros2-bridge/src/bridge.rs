@@ -90,11 +90,13 @@ struct Readers {
     stalls: Reader<StallSample>,
     requests: Reader<RequestSample>,
     link: Reader<LinkSample>,
-    fixes: Writer<FixSample>,
+    /// None where nobody may say where the robot is.
+    fixes: Option<Writer<FixSample>>,
 }
 
 impl Readers {
-    fn open(bus: &Bus) -> Result<Self, BusError> {
+    fn open(bus: &Bus, accepted: &[Accept]) -> Result<Self, BusError> {
+        let is_placed = accepted.contains(&Accept::Pose);
         Ok(Self {
             pose: bus.reader(&topics::POSE)?,
             ranges: bus.slice_reader(&topics::RANGES)?,
@@ -109,7 +111,7 @@ impl Readers {
             stalls: bus.reader(&topics::STALLS)?,
             requests: bus.reader(&topics::REQUESTS)?,
             link: bus.reader(&topics::LINK)?,
-            fixes: bus.writer(&topics::FIX, 1)?,
+            fixes: is_placed.then(|| bus.writer(&topics::FIX, 1)).transpose()?,
         })
     }
 }
@@ -163,7 +165,8 @@ pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), B
         told_at: None,
     };
     let robot_domain = Domain::of(robot.clone());
-    let follow = || Follower::new(robot_domain.clone(), "ros2", &topics::LINK, Readers::open);
+    let open = |bus: &Bus| Readers::open(bus, accepted);
+    let follow = || Follower::new(robot_domain.clone(), "ros2", &topics::LINK, open);
     let mut follower = follow();
     while !ended() {
         if continued.came() {
@@ -282,7 +285,7 @@ impl Bridge {
         while let Some(link) = readers.link.take()? {
             shown.link(&link);
         }
-        self.place(&mut readers.fixes)
+        readers.fixes.as_mut().map_or(Ok(()), |fixes| self.place(fixes))
     }
 
     /// Give the place that a node named, carried on by how far the robot has moved since.
