@@ -91,6 +91,7 @@ fn echo_prints_every_topic_with_the_fields_of_its_layout() {
             "scan_fix",
             "fix",
             "turn",
+            "imu_turn",
             "deaths",
             "stalls",
             "requests",

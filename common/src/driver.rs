@@ -38,6 +38,11 @@ pub trait Driver: fmt::Debug {
         Vec::new()
     }
 
+    /// How far the robot turned since the tick before by its own gyro, for a tick that begins now.
+    fn turn_for_tick(&mut self) -> Option<Turn> {
+        None
+    }
+
     /// What the robot is told when it is found: its settings, and that it sends its sensors.
     fn greeting(&self) -> Vec<u8>;
 
@@ -122,6 +127,17 @@ pub struct Commander {
     pub number: [u8; 16],
     /// Whether it told the robot to move.
     pub moves: bool,
+}
+
+/// How far a robot turned by its own gyro.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Turn {
+    /// One more than that of the turn before, where this one begins; another one if something between is missing.
+    pub sequence: u64,
+    /// Radians counter-clockwise.
+    pub turn_rad: f64,
+    /// The variance of its error, rad^2.
+    pub variance_rad2: f64,
 }
 
 /// What the encoders and motors say.

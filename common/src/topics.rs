@@ -97,6 +97,10 @@ topics! {
     TURN: Topic<TurnSample> {
         name: "turn", writer: OPERATOR, rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
     }
+    /// How far the robot turned by its own gyro, in each tick.
+    IMU_TURN: Topic<TurnSample> {
+        name: "imu_turn", writer: "link", rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
+    }
     /// Where the robot believes it is.
     POSE: Topic<PoseSample> {
         name: "pose", writer: "dead-reckoning", rate: Rate::EachTick, limits: Limits::SMALL, logged: Yes,

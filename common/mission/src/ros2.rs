@@ -18,6 +18,9 @@ pub struct Ros2Topics {
     pub stamped: bool,
     /// Its battery, `sensor_msgs/BatteryState`.
     pub battery: String,
+    /// Its gyro, `sensor_msgs/Imu`; none by default.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub imu: Option<String>,
     /// The topics of its sonars and infrared rangers, `sensor_msgs/Range`, by the names of their rows.
     pub ranges: BTreeMap<String, String>,
 }
@@ -30,6 +33,7 @@ impl Default for Ros2Topics {
             cmd_vel: "/cmd_vel".to_owned(),
             stamped: false,
             battery: "/battery_state".to_owned(),
+            imu: None,
             ranges: BTreeMap::new(),
         }
     }

@@ -35,7 +35,7 @@ use common::{
     stage::{Answer, Answering, Further},
     start::StageError,
     step::Step as _,
-    topics::{FIX, POSE, SCAN_FIX, TURN, WHEELS},
+    topics::{FIX, IMU_TURN, POSE, SCAN_FIX, TURN, WHEELS},
     wiring::{Persists, Topics},
 };
 use serde::{Deserialize, Serialize};
@@ -58,18 +58,22 @@ pub struct Sources {
 }
 
 impl Further for Sources {
-    const TOPICS: Topics = &[&FIX, &SCAN_FIX, &TURN];
-    type Readers = ([Reader<FixSample>; 2], Reader<TurnSample>);
+    const TOPICS: Topics = &[&FIX, &SCAN_FIX, &TURN, &IMU_TURN];
+    type Readers = ([Reader<FixSample>; 2], [Reader<TurnSample>; 2]);
 
     fn open(context: &mut Context) -> Result<Self::Readers, StageError> {
-        Ok(([context.reader(&FIX)?, context.reader(&SCAN_FIX)?], context.reader(&TURN)?))
+        let fixes = [context.reader(&FIX)?, context.reader(&SCAN_FIX)?];
+        Ok((fixes, [context.reader(&TURN)?, context.reader(&IMU_TURN)?]))
     }
 
     fn take((fixes, turns): &mut Self::Readers) -> Result<Self, StageError> {
         let [outside, scans] = fixes;
         let mut fixes = some(outside, MOST_FIXES)?;
         fixes.extend(some(scans, MOST_FIXES)?);
-        Ok(Self { fixes, turns: some(turns, MOST_TURNS)? })
+        let [outside, own] = turns;
+        let (outside, own) = (some(outside, MOST_TURNS)?, some(own, MOST_TURNS)?);
+        // The turns of two gyros do not follow on each other.
+        Ok(Self { fixes, turns: if own.is_empty() { outside } else { own } })
     }
 }
 

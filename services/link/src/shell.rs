@@ -77,6 +77,7 @@ impl Process for Shell {
         outputs: &[
             &topics::CONTACT,
             &topics::SCAN,
+            &topics::IMU_TURN,
             &topics::RANGES,
             &topics::WHEELS,
             &topics::LINK,

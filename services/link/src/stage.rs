@@ -16,7 +16,7 @@ use common::{
     start::StageError,
     step::{ForeignState, Step as _},
     stop_socket::Request,
-    topics::{CONTACT, INFRARED, POWER, RANGES, SCAN, SURROUNDINGS, WHEELS, WIRE},
+    topics::{CONTACT, IMU_TURN, INFRARED, POWER, RANGES, SCAN, SURROUNDINGS, WHEELS, WIRE},
 };
 use serde::{Deserialize, Serialize};
 
@@ -124,13 +124,16 @@ impl LinkStage {
         out: &mut Outputs,
     ) -> Result<Option<Effect>, StageError> {
         match effect {
-            Effect::Tick { tick, time, ranges, scan, wheels, contact } => {
+            Effect::Tick { tick, time, ranges, scan, turn, wheels, contact } => {
                 out.at = Progress { tick, time };
                 if let Some(contact) = contact {
                     out.publish(&CONTACT, contact)?;
                 }
                 if let Some(header) = self.laser.filter(|_| !scan.is_empty()) {
                     out.publish_slice(&SCAN, header, &scan)?;
+                }
+                if let Some(turn) = turn {
+                    out.publish(&IMU_TURN, turn)?;
                 }
                 out.publish_slice(&RANGES, RangesHeader::default(), &ranges)?;
                 out.publish(&WHEELS, wheels)?;

@@ -12,11 +12,11 @@ use std::time::Duration;
 
 use common::{
     clock::{MissionTime, Pace},
-    driver::{Driver, Memory, WireTally},
+    driver::{Driver, Memory, Turn, WireTally},
     mission::Mission,
     samples::{
         Action, Cause, CommandSample, CommandState, ContactSample, HoldReason, Order, RangeReading,
-        WheelSample,
+        TurnSample, WheelSample,
     },
     step::{ForeignState, Step},
     stop_socket::Request,
@@ -56,6 +56,7 @@ const STOP_AGAIN: Duration = Duration::from_millis(200);
 struct OpenTick {
     ranges: Vec<RangeReading>,
     scan: Vec<f32>,
+    turn: Option<Turn>,
     wheels: WheelSample,
     contact: Option<ContactSample>,
     began_ns: u64,
@@ -323,6 +324,7 @@ impl Link {
         self.open = Some(OpenTick {
             ranges: self.driver.readings_for_tick(),
             scan: self.driver.scan_for_tick(),
+            turn: self.driver.turn_for_tick(),
             wheels,
             contact: self.failsafe.monitors.odometry.take_contact(),
             began_ns: now_ns,
@@ -332,8 +334,14 @@ impl Link {
     }
 
     fn tick_effect(&self, tick: u64, open: OpenTick) -> Effect {
-        let OpenTick { ranges, scan, wheels, contact, .. } = open;
-        Effect::Tick { tick, time: self.time, ranges, scan, wheels, contact }
+        let OpenTick { ranges, scan, turn, wheels, contact, .. } = open;
+        let time = self.time;
+        let turn = turn.map(|Turn { sequence, turn_rad, variance_rad2 }| {
+            // It ends with the motion that the tick's wheels show.
+            let capture_ns = time.0;
+            TurnSample { capture_ns, sequence, turn_rad, variance_rad2, ..TurnSample::default() }
+        });
+        Effect::Tick { tick, time, ranges, scan, turn, wheels, contact }
     }
 
     /// The number of the open tick.

@@ -7,7 +7,9 @@
 //! |---|---|
 //! | [`topics`] | THE table of topics |
 //! | [`messages`] | the messages, as far as the driver needs them |
+//! | `gyro` | the turn of each tick by the robot's IMU |
 
+mod gyro;
 pub mod messages;
 pub mod topics;
 
@@ -15,24 +17,27 @@ use std::{f64::consts::TAU, time::Duration};
 
 use common::{
     driver::{
-        Commander, Driver, Heard, Memory, Readings, StopMethod, WireTally,
+        Commander, Driver, Heard, Memory, Readings, StopMethod, Turn, WireTally,
         laser::Laser,
         odometry::{self, drive, motion, twist},
     },
+    geometry::wrap_angle,
     kinematics::{Twist, WheelSpeeds},
     mission::{Body, Mission, Sensor},
     samples::{PowerSample, RangeReading},
 };
 
 use self::{
-    messages::{Odometry, Scan, read_moves, read_range, read_voltage, write_twist},
+    gyro::Gyro,
+    messages::{
+        Imu, NO_GROWTH, Odometry, Scan, is_repeated, read_moves, read_range, read_voltage,
+        write_twist,
+    },
     topics::{Content, Topics},
 };
 
 /// So many messages wait to be heard; more are dropped.
 const MOST_WAITING: usize = 64;
-/// A stamp that lies before the last by more is that of a clock that was set anew, nanoseconds.
-const SET_ANEW_NS: i64 = 1_000_000_000;
 /// A link is started again within so long, seconds. Nobody knows how far the robot drove meanwhile.
 const UNSEEN_S: f64 = 5.0;
 /// The beams of a laser's row and of its scans lie at the same bearings if they differ by no more, as a share of the angle between beams.
@@ -52,6 +57,9 @@ pub struct Ros2 {
     /// None without a laser.
     laser: Option<Laser>,
     odometry: odometry::Odometry,
+    gyro: Gyro,
+    /// The heading by the odometry of the newest tick, radians.
+    heading: Option<f64>,
     /// The stamp of the newest odometry, and of that with which the newest tick began, nanoseconds.
     stamps_ns: Option<[i64; 2]>,
     tally: WireTally,
@@ -69,6 +77,8 @@ impl Ros2 {
             readings: Readings::new(mission),
             laser: Laser::new(mission),
             odometry: odometry::Odometry::default(),
+            gyro: Gyro::default(),
+            heading: None,
             stamps_ns: None,
             tally: WireTally::default(),
         }
@@ -115,6 +125,7 @@ impl Ros2 {
                 }
                 Ok(())
             }
+            Content::Imu => self.gyro.take(Imu::read(payload)?),
             Content::Command => {
                 let (&number, payload) =
                     payload.split_first_chunk().ok_or("a command without its writer")?;
@@ -129,10 +140,8 @@ impl Ros2 {
     fn take_odometry(&mut self, odometry: &Odometry, heard: &mut Heard) -> Result<(), String> {
         let stamp_ns = odometry.stamp_ns;
         let [newest_ns, tick_ns] = match self.stamps_ns {
-            Some([newest_ns, _]) if (newest_ns - SET_ANEW_NS..=newest_ns).contains(&stamp_ns) => {
-                let why =
-                    "a stamp that does not grow; let one node alone publish it, and stamp each";
-                return Err(why.to_owned());
+            Some([newest_ns, _]) if is_repeated(newest_ns, stamp_ns) => {
+                return Err(NO_GROWTH.to_owned());
             }
             Some(stamps_ns) if stamp_ns > stamps_ns[0] => stamps_ns,
             _ => [stamp_ns - self.period_ns; 2],
@@ -140,6 +149,7 @@ impl Ros2 {
         let gap_s = self.stamps_ns.map_or(UNSEEN_S, |_| (stamp_ns - newest_ns) as f64 / 1e9);
         if self.odometry.takes_jump(odometry.pose, gap_s, &self.body) {
             heard.jumped = true;
+            self.heading = None;
             let [x, y, heading] = odometry.pose;
             heard.refused = Some(format!(
                 "odometry that jumps to ({x:.2}, {y:.2}) m and {:.0} degrees, which counts as no motion",
@@ -156,6 +166,11 @@ impl Ros2 {
         let is_tick = stamp_ns - tick_ns >= self.period_ns - slack_ns;
         self.stamps_ns = Some([stamp_ns, if is_tick { stamp_ns } else { tick_ns }]);
         if is_tick {
+            let [_, _, heading] = odometry.pose;
+            let before = self.heading.replace(heading).unwrap_or(heading);
+            if let Some(why) = self.gyro.odometry(stamp_ns, wrap_angle(heading - before)) {
+                heard.refused = Some(format!("the IMU: {why}"));
+            }
             let [v, omega] = odometry.twist;
             let WheelSpeeds { right, left } = drive(&self.body).wheels(Twist { v, omega });
             heard.motion = Some(motion(&self.body, turned, [left, right], [false; 2]));
@@ -269,6 +284,10 @@ impl Driver for Ros2 {
 
     fn scan_for_tick(&mut self) -> Vec<f32> {
         self.laser.as_mut().map(Laser::for_tick).unwrap_or_default()
+    }
+
+    fn turn_for_tick(&mut self) -> Option<Turn> {
+        self.gyro.for_tick()
     }
 
     /// Topics need no greeting.

@@ -1,10 +1,30 @@
 //! The messages, as far as the driver needs them. What a newer release of ROS appends to one is passed over.
 
 use common::mission::MOST_BEAMS;
-use ros2::cdr::{Malformed, Reader, Writer};
+use ros2::{
+    cdr::{Malformed, Reader, Writer},
+    parts::heading,
+};
 
 /// The covariance of a pose or a twist has so many numbers.
 const COVARIANCE: usize = 36;
+
+/// That of a rotation or a turn rate has so many; the first is this where the quantity is not stated.
+const COVARIANCE_3: usize = 9;
+const NOT_STATED: f64 = -1.0;
+/// No robot turns faster, rad/s.
+const FASTEST_TURN: f64 = 50.0;
+
+/// A stamp that lies before the last by more is that of a clock that was set anew, nanoseconds.
+const SET_ANEW_NS: i64 = 1_000_000_000;
+/// The reason why a message with a repeated stamp is refused.
+pub const NO_GROWTH: &str =
+    "a stamp that does not grow; let one node alone publish it, and stamp each";
+
+/// Whether a message with this stamp came before, by the newest one: it is no newer, and no clock was set anew.
+pub fn is_repeated(newest_ns: i64, stamp_ns: i64) -> bool {
+    (newest_ns - SET_ANEW_NS..=newest_ns).contains(&stamp_ns)
+}
 
 /// `nav_msgs/Odometry`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,6 +60,62 @@ impl Odometry {
         let [ahead, _, _, _, _, turn] = reader.f64s()?;
         let pose = [x, y, heading.unwrap_or(f64::NAN)];
         Ok(Self { stamp_ns, pose, twist: [ahead, turn] })
+    }
+}
+
+/// `sensor_msgs/Imu`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Imu {
+    /// Its stamp by the robot's clock, nanoseconds.
+    pub stamp_ns: i64,
+    pub turn: ImuTurn,
+}
+
+/// What an IMU says of a robot's turns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ImuTurn {
+    /// The turn rate, rad/s, and the variance of its error, rad^2/s^2, if that is stated.
+    Rate(f64, Option<f64>),
+    /// The heading, radians.
+    Heading(f64),
+}
+
+impl Imu {
+    /// The turn of `payload`, or why it has none. The turn rate counts where it is stated, else the orientation.
+    pub fn read(payload: &[u8]) -> Result<Self, String> {
+        let (stamp_ns, heading, rate) = Self::decode(payload).map_err(|error| error.to_string())?;
+        let turn = match (rate, heading) {
+            (Some((rate, variance)), _) if rate.abs() <= FASTEST_TURN => {
+                // A greater variance than that of any rate is one that nobody knows.
+                let most = FASTEST_TURN * FASTEST_TURN;
+                ImuTurn::Rate(rate, Some(variance.min(most)).filter(|_| variance > 0.0))
+            }
+            (Some((rate, _)), _) => {
+                return Err(format!("a turn rate of {rate}; fill angular_velocity in rad/s"));
+            }
+            (None, Some(heading)) if heading.is_nan() => {
+                return Err("an orientation that is no rotation; fill orientation".to_owned());
+            }
+            (None, Some(heading)) => ImuTurn::Heading(heading),
+            (None, None) => {
+                let why = "neither a turn rate nor an orientation is stated; publish one, or remove robot.ros2.imu";
+                return Err(why.to_owned());
+            }
+        };
+        Ok(Self { stamp_ns, turn })
+    }
+
+    /// Stamp, heading, and turn rate with its variance, as far as they are stated. A heading that is no rotation is no number.
+    #[expect(clippy::type_complexity, reason = "it is taken apart at once")]
+    fn decode(payload: &[u8]) -> Result<(i64, Option<f64>, Option<(f64, f64)>), Malformed> {
+        let mut reader = Reader::new(payload)?;
+        let (stamp_ns, _frame) = reader.header()?;
+        let rotation = heading(reader.f64s()?).unwrap_or(f64::NAN);
+        let [first, ..] = reader.f64s::<COVARIANCE_3>()?;
+        let [_, _, rate] = reader.f64s()?;
+        let [rate_first, .., variance] = reader.f64s::<COVARIANCE_3>()?;
+        let heading = (first != NOT_STATED).then_some(rotation);
+        Ok((stamp_ns, heading, (rate_first != NOT_STATED).then_some((rate, variance))))
     }
 }
 

@@ -1,5 +1,7 @@
 //! The messages below were serialised by rclpy of ROS 2 Kilted with Fast DDS. Zeros stand for lists of zeros.
 
+mod imu;
+
 use std::path::Path;
 
 use common::samples::RangeStatus;

@@ -11,6 +11,7 @@ pub enum Content {
     Battery,
     /// The range of the sensor in this row of the mission.
     Range(usize),
+    Imu,
     /// What others than the link tell the robot. The number of the writer stands before the payload.
     Command,
 }
@@ -45,6 +46,9 @@ impl Topics {
                 let range = Topic::new(name, "sensor_msgs::msg::dds_::Range_");
                 heard.push((Content::Range(row), range));
             }
+        }
+        if let Some(imu) = &topics.imu {
+            heard.push((Content::Imu, Topic::new(imu, "sensor_msgs::msg::dds_::Imu_")));
         }
         let command = Topic::new(&topics.cmd_vel, command);
         heard.push((Content::Command, command.clone()));

@@ -28,7 +28,7 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     }
     let topics = &robot.ros2;
     let named = [&topics.odom, &topics.scan, &topics.cmd_vel, &topics.battery];
-    for name in named.into_iter().chain(topics.ranges.values()) {
+    for name in named.into_iter().chain(&topics.imu).chain(topics.ranges.values()) {
         if !is_topic(name) {
             let remedy = "use letters, digits and '_' between slashes, as in \"/robot/odom\"";
             return Err(objection("robot.ros2", format!("{name:?} is no topic of ROS"), remedy));
@@ -92,6 +92,8 @@ mod tests {
         let at = format!("{ROBOT}robot.address = 'ros2:3'\n");
         for bad in ["", "/", "/a//b", "/odom/", "/7", "/a b", &"x".repeat(201)] {
             let refusal = refusal(&format!("{at}robot.ros2.odom = '{bad}'"));
+            assert!(refusal.contains("no topic of ROS"), "{refusal}");
+            let refusal = self::refusal(&format!("{at}robot.ros2.imu = '{bad}'"));
             assert!(refusal.contains("no topic of ROS"), "{refusal}");
         }
         let named = refusal(&format!("{at}robot.ros2.ranges = {{ nose = '/nose' }}"));

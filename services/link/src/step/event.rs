@@ -4,7 +4,7 @@ use common::{
     clock::{MissionTime, Pace},
     samples::{
         CommandSample, ContactSample, HoldReason, InfraredSample, Order, PowerSample, RangeReading,
-        SurroundingsSample, WheelSample,
+        SurroundingsSample, TurnSample, WheelSample,
     },
     stop_socket::Request,
 };
@@ -73,6 +73,8 @@ pub enum Effect {
         ranges: Vec<RangeReading>,
         /// The beams of the laser; none if none came.
         scan: Vec<f32>,
+        /// How far the robot turned since the tick before, by its own gyro.
+        turn: Option<TurnSample>,
         /// The encoders.
         wheels: WheelSample,
         /// The contact that these encoders show.

@@ -11,7 +11,7 @@ use super::*;
 const FRAME_MS: u64 = 50;
 
 fn mission() -> Mission {
-    let text = "target = [3, 0]\nrobot.model = 'turtlebot3-burger'\nrobot.protocol = 'ros2'\nrobot.address = 'ros2'\nrobot.rate_hz = 10\n";
+    let text = "target = [3, 0]\nrobot.model = 'turtlebot3-burger'\nrobot.protocol = 'ros2'\nrobot.address = 'ros2'\nrobot.rate_hz = 10\nrobot.ros2.imu = '/imu'\n";
     Mission::parse(text, Path::new("test.toml")).unwrap()
 }
 
@@ -30,6 +30,9 @@ struct Scene {
     scans: bool,
     /// Whether its beams change.
     sees: bool,
+    /// The shares of the speed that its left and its right wheel are commanded.
+    shares: [f64; 2],
+    turns: Vec<TurnSample>,
     decided: Vec<(u64, Cause)>,
     sent: Vec<(u64, [f64; 2])>,
     wheels: WheelSample,
@@ -52,6 +55,8 @@ impl Scene {
             counts: true,
             scans: true,
             sees: true,
+            shares: [1.0; 2],
+            turns: Vec::new(),
             decided: Vec::new(),
             sent: Vec::new(),
             wheels: WheelSample::default(),
@@ -82,7 +87,11 @@ impl Scene {
                     self.sent.push((self.ms, self.told));
                 }
                 Effect::Decided { now, .. } => self.decided.push((self.ms, now.cause)),
-                Effect::Tick { tick, wheels, .. } => (self.tick, self.wheels) = (tick, wheels),
+                Effect::Tick { tick, time, wheels, turn, .. } => {
+                    (self.tick, self.wheels) = (tick, wheels);
+                    assert!(turn.is_none_or(|turn| turn.capture_ns == time.0));
+                    self.turns.extend(turn);
+                }
                 Effect::Refused(why) => self.refused.push(why),
                 _ => {}
             }
@@ -110,7 +119,14 @@ impl Scene {
         writer.length(0).take()
     }
 
-    /// Let time pass: the robot says its odometry at 20 Hz and its scan at 10 Hz, and each tick is answered.
+    fn imu(&self) -> Vec<u8> {
+        let mut writer = Writer::default();
+        writer.u32((self.ms / 1000) as u32).u32((self.ms % 1000 * MS) as u32).text("imu");
+        writer.f64s(&[0.0, 0.0, 0.0, 1.0]).f64s(&[0.0; 9]);
+        writer.f64s(&[0.0, 0.0, self.told[1]]).f64s(&[0.0; 9]).f64s(&[0.0; 12]).take()
+    }
+
+    /// Let time pass: the robot says its odometry and its turn rate at 20 Hz and its scan at 10 Hz, and each tick is answered.
     fn run(&mut self, for_ms: u64) {
         for _ in 0..for_ms / FRAME_MS {
             self.ms += FRAME_MS;
@@ -127,10 +143,12 @@ impl Scene {
                 self.say(Content::Scan, &self.scan());
             }
             if self.odometry {
+                self.say(Content::Imu, &self.imu());
                 self.say(Content::Odometry, &self.odometry());
             }
             let speed = 0.15 / 0.033;
-            let command = command(self.tick, self.ms * MS, speed, speed);
+            let [left, right] = self.shares.map(|share| share * speed);
+            let command = command(self.tick, self.ms * MS, left, right);
             self.event(Event::Command(&command));
             self.event(Event::Quiet);
         }
@@ -246,4 +264,19 @@ fn while_odometry_jumps_again_and_again_the_robot_stands() {
     assert!(scene.wheels.restarts >= 19);
     scene.run(4000);
     assert_eq!(scene.link.decision(), Decision::GO);
+}
+
+#[test]
+fn a_tick_has_the_turn_of_the_robots_gyro_which_ends_with_it() {
+    let mut scene = Scene::driving();
+    assert_eq!(scene.turns, [], "gyro and odometry were not compared in a turn");
+    scene.shares = [0.7, 1.0];
+    scene.run(2000);
+    scene.turns.clear();
+    let from = scene.pose[2];
+    scene.run(1000);
+    assert_eq!((scene.turns.len(), scene.link.decision()), (10, Decision::GO));
+    let turned: f64 = scene.turns.iter().map(|turn| turn.turn_rad).sum();
+    assert!((turned - (scene.pose[2] - from)).abs() < 0.01 && turned > 0.2, "{turned}");
+    assert!(scene.turns.windows(2).all(|pair| pair[1].sequence == pair[0].sequence + 1));
 }

@@ -1,0 +1,165 @@
+//! A robot's gyro: from messages of its IMU to the turn of each tick.
+//!
+//! Turn rates are integrated by the stamps of their messages. A tick begins with odometry, whose stamp lies between two messages of the
+//! IMU, so the turn goes on at the newest rate until there. What that errs is made good with the next message, because each turn is the
+//! difference of two angles.
+
+use common::{driver::Turn, geometry::wrap_angle};
+
+use crate::messages::{Imu, ImuTurn, NO_GROWTH, is_repeated};
+
+/// Messages that are farther apart, and odometry that is farther from the newest, leave a turn unknown, nanoseconds.
+const LONGEST_GAP_NS: i64 = 100_000_000;
+/// The noise of a turn whose message states less or none, rad per square root of a second. Nominal: several times that of the gyros in
+/// robots, such as the BMI160's 0.007 degrees.
+const NOISE: f64 = 5e-4;
+/// The turn rate may change by so much between the newest message and the tick, rad/s^2. Nominal.
+const CHANGES_BY: f64 = 5.0;
+/// Gyro and odometry are compared after so much of a turn, radians, over at most so long, in which no bias adds up to that, and agree
+/// within this factor: wheels slip in turns, but not more.
+const COMPARED_RAD: f64 = 0.2;
+const COMPARED_NS: i64 = 10_000_000_000;
+const AGREES_WITHIN: f64 = 2.0;
+
+/// The gyro of a robot.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Gyro {
+    newest: Option<Newest>,
+    /// The turn up to the newest message, radians, and its variance.
+    turned: Turned,
+    /// The turn up to the odometry of the newest tick, if the gyro has said it.
+    now: Option<Turned>,
+    /// The turn up to the tick of which it was told, from which the next one goes on; none if something is missing since.
+    told: Option<Turned>,
+    sequence: u64,
+    /// Whether no message is near the newest odometry, which has been said.
+    is_missed: bool,
+    compared: Compared,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Newest {
+    imu: Imu,
+    /// Radians a second.
+    rate: f64,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Turned {
+    angle: f64,
+    variance: f64,
+    /// The variance of the part after the newest message.
+    ahead: f64,
+}
+
+/// The comparison with odometry.
+#[derive(Clone, Copy, Debug, Default)]
+struct Compared {
+    since_ns: i64,
+    /// By odometry and by the gyro since then, radians.
+    turned: [f64; 2],
+    /// Whether they agreed the last time.
+    agrees: bool,
+}
+
+impl Gyro {
+    /// Take a message, or say why it is refused.
+    pub(crate) fn take(&mut self, imu: Imu) -> Result<(), String> {
+        if self.newest.is_some_and(|newest| is_repeated(newest.imu.stamp_ns, imu.stamp_ns)) {
+            return Err(NO_GROWTH.to_owned());
+        }
+        let turn = self.newest.and_then(|newest| turn(&newest.imu, &imu));
+        let rate = match (imu.turn, turn) {
+            (ImuTurn::Rate(rate, _), _) => rate,
+            (ImuTurn::Heading(_), Some((_, rate, _))) => rate,
+            (ImuTurn::Heading(_), None) => 0.0,
+        };
+        match turn {
+            Some((angle, _, variance)) => {
+                self.turned.angle += angle;
+                self.turned.variance += variance;
+            }
+            // How far the robot turned since the message before is not known.
+            None => (self.told, self.now) = (None, None),
+        }
+        self.newest = Some(Newest { imu, rate });
+        Ok(())
+    }
+
+    /// Odometry with this stamp begins a tick, and says that the robot turned by `by_odometry` since the tick before. Returns what is wrong with the gyro, if that
+    /// is new.
+    pub(crate) fn odometry(&mut self, stamp_ns: i64, by_odometry: f64) -> Option<String> {
+        let newest = self.newest?;
+        let since_ns = stamp_ns - newest.imu.stamp_ns;
+        let before = self.now.take();
+        if since_ns.abs() > LONGEST_GAP_NS {
+            self.told = None;
+            let is_new = !std::mem::replace(&mut self.is_missed, true);
+            let apart_s = since_ns as f64 / 1e9;
+            return is_new.then(|| {
+                format!("the newest message is {apart_s:.2} s older than odometry; publish it at 20 Hz or more, stamped by the same clock")
+            });
+        }
+        self.is_missed = false;
+        let since_s = since_ns as f64 / 1e9;
+        let unknown = 0.5 * CHANGES_BY * since_s * since_s;
+        let now = Turned {
+            angle: self.turned.angle + newest.rate * since_s,
+            ahead: unknown * unknown,
+            ..self.turned
+        };
+        self.now = Some(now);
+        self.compared.take(stamp_ns, [by_odometry, now.angle - before?.angle])
+    }
+
+    /// The turn for the tick. That after something is missing only says where the next one begins.
+    pub(crate) fn for_tick(&mut self) -> Option<Turn> {
+        let now = self.now.filter(|_| self.compared.agrees);
+        let before = std::mem::replace(&mut self.told, now);
+        let now = now?;
+        self.sequence += if before.is_some() { 1 } else { 2 };
+        let before = before.unwrap_or(now);
+        let variance_rad2 = now.variance - before.variance + now.ahead + before.ahead;
+        Some(Turn { sequence: self.sequence, turn_rad: now.angle - before.angle, variance_rad2 })
+    }
+}
+
+/// The turn from one message to the next, radians, its rate and its variance; none if they are too far apart, or say it in different ways.
+fn turn(before: &Imu, now: &Imu) -> Option<(f64, f64, f64)> {
+    let gap_ns = now.stamp_ns - before.stamp_ns;
+    if !(1..=LONGEST_GAP_NS).contains(&gap_ns) {
+        return None;
+    }
+    let gap_s = gap_ns as f64 / 1e9;
+    let nominal = NOISE * NOISE * gap_s;
+    match (before.turn, now.turn) {
+        (ImuTurn::Rate(before, _), ImuTurn::Rate(rate, variance)) => {
+            let stated = variance.unwrap_or_default() * gap_s * gap_s;
+            Some((f64::midpoint(before, rate) * gap_s, rate, stated.max(nominal)))
+        }
+        (ImuTurn::Heading(before), ImuTurn::Heading(heading)) => {
+            let turn = wrap_angle(heading - before);
+            Some((turn, turn / gap_s, nominal))
+        }
+        _ => None,
+    }
+}
+
+impl Compared {
+    /// Take turns by odometry and by the gyro up to `now_ns`. Returns how they differ, if they agreed or were not compared before.
+    fn take(&mut self, now_ns: i64, turns: [f64; 2]) -> Option<String> {
+        if !(0..COMPARED_NS).contains(&(now_ns - self.since_ns)) {
+            (self.since_ns, self.turned) = (now_ns, [0.0; 2]);
+        }
+        self.turned = [0, 1].map(|of| self.turned[of] + turns[of]);
+        let [odometry, gyro] = self.turned;
+        if odometry.abs() < COMPARED_RAD {
+            return None;
+        }
+        (self.since_ns, self.turned) = (now_ns, [0.0; 2]);
+        self.agrees = (1.0 / AGREES_WITHIN..=AGREES_WITHIN).contains(&(gyro / odometry));
+        (!self.agrees).then(|| {
+            format!("a turn of {gyro:.2} rad where odometry has {odometry:.2}, so it is not used; publish rad/s about an axis that points up")
+        })
+    }
+}
