@@ -114,6 +114,8 @@ pub struct Heard {
     pub infrared: Option<InfraredSample>,
     /// Whether its odometry jumped farther than it moves. The counts of its wheels leave the jump out.
     pub jumped: bool,
+    /// The time of its newest odometry by its own clock, nanoseconds, if it says that.
+    pub stamp_ns: Option<i64>,
     /// Another than the link that commands the robot.
     pub commander: Option<Commander>,
     /// The reason why the newest message that was refused is none of the protocol, if any was.

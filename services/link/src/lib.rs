@@ -13,6 +13,7 @@
 //! | [`stop_guard`] | the process that stops a moving robot when the link's process ended |
 
 pub mod backoff;
+mod clock_rate;
 pub mod drivers;
 pub mod failsafe;
 pub mod shell;

@@ -352,6 +352,15 @@ impl Shell {
                 Effect::Refused(why) => {
                     tracing::warn!("the robot says what is not in its protocol: {why}");
                 }
+                Effect::ClockRate(rate) => {
+                    let pace = match self.clock {
+                        MissionClock::Wall { rate: pace, .. } => pace * rate,
+                        MissionClock::Ticks { .. } => rate,
+                    };
+                    tracing::warn!(
+                        "the robot's clock goes {rate:.2} times as fast as mission time: let its simulator run in real time, or give `run --pace {pace:.2}`"
+                    );
+                }
                 Effect::AskedForStreams => {
                     tracing::info!("the robot is asked for its streams again");
                 }

@@ -23,6 +23,7 @@ use common::{
 };
 
 use crate::{
+    clock_rate::ClockRate,
     drivers,
     failsafe::{
         Decision, Failsafe, Monitors, SLOW_SHARE,
@@ -82,6 +83,7 @@ pub struct Link {
     now: MissionTime,
     driver: Box<dyn Driver>,
     speeds: WheelSpeeds,
+    clock_rate: ClockRate,
     /// The time limit of a command.
     limit: Duration,
     half_period_ns: u64,
@@ -122,6 +124,7 @@ impl Step for Link {
             now: MissionTime::default(),
             driver: drivers::of(mission),
             speeds: WheelSpeeds::new(mission),
+            clock_rate: ClockRate::default(),
             limit: Duration::from_secs_f64(mission.robot.command_limit_s),
             half_period_ns: (0.5e9 / mission.robot.rate_hz) as u64,
             failsafe: Failsafe::new(mission),

@@ -164,6 +164,7 @@ impl Ros2 {
         // Of odometry that comes faster than ticks, that begins one which is nearest to its time.
         let slack_ns = (stamp_ns - newest_ns) / 2;
         let is_tick = stamp_ns - tick_ns >= self.period_ns - slack_ns;
+        heard.stamp_ns = Some(stamp_ns);
         self.stamps_ns = Some([stamp_ns, if is_tick { stamp_ns } else { tick_ns }]);
         if is_tick {
             let [_, _, heading] = odometry.pose;

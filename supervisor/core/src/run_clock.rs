@@ -3,6 +3,7 @@
 use common::{
     clock::{MissionClock, MissionTime, Pace, monotonic_ns},
     ground_truth::GroundTruthTick,
+    mission::{Protocol, RobotConfig},
     samples::PoseSample,
 };
 
@@ -24,14 +25,18 @@ impl RunClock {
         Self { clock: run.clock(), first_tick: run.first_tick, start: run.time }
     }
 
-    /// The clock of a new run. Only a `simulated` robot can have another pace than the wall clock's.
-    pub(crate) fn begin(pace: Pace, rate_hz: f64, simulated: bool) -> Self {
+    /// The clock of a new run. Only a `simulated` robot can have another pace than the wall clock's, and one that speaks ROS 2, which may be
+    /// simulated elsewhere.
+    pub(crate) fn begin(pace: Pace, robot: &RobotConfig, simulated: bool) -> Self {
+        let has_pace = simulated || robot.protocol() == Protocol::Ros2;
         let clock = match pace {
-            Pace::Max if simulated => MissionClock::Ticks { period_ns: (1e9 / rate_hz) as u64 },
+            Pace::Max if simulated => {
+                MissionClock::Ticks { period_ns: (1e9 / robot.rate_hz) as u64 }
+            }
             _ => MissionClock::Wall {
                 epoch_ns: monotonic_ns(),
                 rate: match pace {
-                    Pace::Rate(rate) if simulated => rate,
+                    Pace::Rate(rate) if has_pace => rate,
                     _ => 1.0,
                 },
             },
@@ -88,5 +93,25 @@ impl RunClock {
             // It passes also without a robot or a pose.
             MissionClock::Wall { .. } => self.clock.at(0, monotonic_ns()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_robot_that_may_be_simulated_elsewhere_has_the_pace_that_is_given_and_others_that_of_the_wall()
+     {
+        let rate = |protocol, pace| {
+            let robot = RobotConfig { protocol: Some(protocol), ..RobotConfig::default() };
+            match RunClock::begin(pace, &robot, false).clock {
+                MissionClock::Wall { rate, .. } => rate,
+                MissionClock::Ticks { .. } => panic!("lockstep with a real robot"),
+            }
+        };
+        assert_eq!(rate(Protocol::Ros2, Pace::Rate(0.5)), 0.5);
+        assert_eq!(rate(Protocol::Ros2, Pace::Max), 1.0);
+        assert_eq!(rate(Protocol::Json, Pace::Rate(0.5)), 1.0);
     }
 }

@@ -39,7 +39,7 @@ use crate::{
 pub struct Options {
     pub mission: Mission,
     pub robot: RobotName,
-    /// Speed of mission time. A real robot's is always wall-clock time.
+    /// Speed of mission time. A real robot's is always wall-clock time, unless it speaks ROS 2.
     pub pace: Pace,
     /// Directory of logs, checkpoints and results; it must exist.
     pub directory: PathBuf,
@@ -119,7 +119,7 @@ impl<'a> Supervisor<'a> {
                 tracing::warn!(tick, seconds, "the run is resumed");
                 RunClock::recovered(run)
             }
-            None => RunClock::begin(options.pace, mission.robot.rate_hz, robot.simulator.is_some()),
+            None => RunClock::begin(options.pace, &mission.robot, robot.simulator.is_some()),
         };
         let run = Run {
             robot: options.robot.clone(),

@@ -107,6 +107,8 @@ pub enum Effect {
     StopBy(&'static str),
     /// A message of the robot is none of the protocol, for this reason.
     Refused(String),
+    /// The robot's clock goes so many times as fast as mission time.
+    ClockRate(f64),
     /// The robot was asked for its streams again.
     AskedForStreams,
     /// Publish the infrared rangers.

@@ -36,6 +36,8 @@ impl Link {
             let why = why.escape_debug().take(LONGEST_REFUSAL).collect();
             effects.push(Effect::Refused(why));
         }
+        let rate = heard.stamp_ns.and_then(|stamp_ns| self.clock_rate.take(stamp_ns, self.now));
+        effects.extend(rate.map(Effect::ClockRate));
         if let Some(commander) = heard.commander {
             self.observe(Observation::Commander(commander), now_ns);
             // The robot obeys whoever was last. At the first command of another the failsafe stops it, below.

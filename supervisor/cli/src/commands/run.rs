@@ -40,7 +40,7 @@ pub(crate) struct Arguments {
     /// Name of the robot, which also names its shared memory.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
-    /// Mission time of a simulated robot: `max`, or R times wall-clock.
+    /// Mission time of a simulated robot: `max`, or R times wall-clock; of one that speaks ROS 2: R times.
     #[arg(long, default_value = "max")]
     pace: Pace,
     /// Seed of everything random in the simulation, instead of the mission's.
@@ -326,7 +326,7 @@ const LINE_EVERY: Duration = Duration::from_secs(5);
 impl Console {
     fn new(options: &Options) -> Self {
         let mission = &options.mission;
-        // A real robot does not wait, whatever the pace.
+        // A real robot does not wait.
         let pace = match &mission.robot.address {
             Some(address) => format!("at {address}"),
             None => format!("pace {}", options.pace),

@@ -33,6 +33,9 @@ struct Scene {
     /// The shares of the speed that its left and its right wheel are commanded.
     shares: [f64; 2],
     turns: Vec<TurnSample>,
+    /// How fast the robot's clock goes, and how fast the link says that it does.
+    clock: f64,
+    rates: Vec<f64>,
     decided: Vec<(u64, Cause)>,
     sent: Vec<(u64, [f64; 2])>,
     wheels: WheelSample,
@@ -57,6 +60,8 @@ impl Scene {
             sees: true,
             shares: [1.0; 2],
             turns: Vec::new(),
+            clock: 1.0,
+            rates: Vec::new(),
             decided: Vec::new(),
             sent: Vec::new(),
             wheels: WheelSample::default(),
@@ -92,6 +97,7 @@ impl Scene {
                     assert!(turn.is_none_or(|turn| turn.capture_ns == time.0));
                     self.turns.extend(turn);
                 }
+                Effect::ClockRate(rate) => self.rates.push(rate),
                 Effect::Refused(why) => self.refused.push(why),
                 _ => {}
             }
@@ -101,7 +107,8 @@ impl Scene {
     fn odometry(&self) -> Vec<u8> {
         let [x, y, heading] = self.pose;
         let mut writer = Writer::default();
-        writer.u32((self.ms / 1000) as u32).u32((self.ms % 1000 * MS) as u32);
+        let ms = (self.ms as f64 * self.clock) as u64;
+        writer.u32((ms / 1000) as u32).u32((ms % 1000 * MS) as u32);
         writer.text("odom").text("base_footprint").f64s(&[x, y, 0.0, 0.0, 0.0]);
         writer.f64s(&[(heading / 2.0).sin(), (heading / 2.0).cos()]).f64s(&[0.0; 36]);
         writer.f64s(&[self.told[0], 0.0, 0.0, 0.0, 0.0, self.told[1]]).f64s(&[0.0; 36]).take()
@@ -279,4 +286,14 @@ fn a_tick_has_the_turn_of_the_robots_gyro_which_ends_with_it() {
     let turned: f64 = scene.turns.iter().map(|turn| turn.turn_rad).sum();
     assert!((turned - (scene.pose[2] - from)).abs() < 0.01 && turned > 0.2, "{turned}");
     assert!(scene.turns.windows(2).all(|pair| pair[1].sequence == pair[0].sequence + 1));
+}
+
+#[test]
+fn a_simulator_whose_clock_goes_slower_than_mission_time_is_told_with_its_rate() {
+    let mut scene = Scene::driving();
+    scene.run(15_000);
+    assert!(scene.rates.is_empty(), "{:?}", scene.rates);
+    scene.clock = 0.5;
+    scene.run(17_000);
+    assert!(scene.rates.len() == 1 && (scene.rates[0] - 0.5).abs() < 0.01, "{:?}", scene.rates);
 }

@@ -1,0 +1,91 @@
+//! Whether the clock of a robot goes as fast as mission time. That of a simulator goes slower where the machine is too slow for it, and
+//! faster where it is not held back. The robot would seem to drive slower or faster than it does.
+
+use common::clock::MissionTime;
+
+/// The clocks are compared over so long, nanoseconds. One such time may be wrong, because a process was frozen in it, so two count.
+const OVER_NS: u64 = 5_000_000_000;
+/// They go equally fast within this share.
+const SHARE: f64 = 0.1;
+/// A stamp that is later than the one before by more is that of a clock that was set anew, nanoseconds.
+const SET_ANEW_NS: i64 = 1_000_000_000;
+
+/// The comparison of a robot's clock with mission time.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct ClockRate {
+    newest_ns: i64,
+    /// The stamp and mission time from which they are compared.
+    since: Option<(i64, MissionTime)>,
+    /// Seconds of the robot in a second of mission time, of the times before; none before the first.
+    before: Option<f64>,
+    told: Option<f64>,
+}
+
+impl ClockRate {
+    /// Take a stamp of the robot that came at `now`. Returns the seconds of the robot in a second of mission time if they are not as many
+    /// and it was not told so before.
+    pub(crate) fn take(&mut self, stamp_ns: i64, now: MissionTime) -> Option<f64> {
+        let passed_ns = stamp_ns.saturating_sub(std::mem::replace(&mut self.newest_ns, stamp_ns));
+        let is_set_anew = !(0..=SET_ANEW_NS).contains(&passed_ns);
+        let Some((from_ns, from)) = self.since.filter(|_| !is_set_anew) else {
+            self.since = Some((stamp_ns, now));
+            return None;
+        };
+        let mission_ns = now.0.saturating_sub(from.0);
+        if mission_ns < OVER_NS {
+            return None;
+        }
+        self.since = Some((stamp_ns, now));
+        let rate = stamp_ns.saturating_sub(from_ns) as f64 / mission_ns as f64;
+        let before = self.before.replace(rate)?;
+        let off = |rate: f64| if (rate - 1.0).abs() > SHARE { (rate - 1.0).signum() } else { 0.0 };
+        let is_off = off(rate) != 0.0 && off(rate) == off(before);
+        let is_told = self.told.is_some_and(|told| (rate - told).abs() <= SHARE * told);
+        (is_off && !is_told).then(|| *self.told.insert(rate))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STEP_NS: u64 = 50_000_000;
+
+    /// What is told of a clock that goes at `rates`, for 20 s each.
+    fn told(rates: &[f64]) -> Vec<f64> {
+        let (mut clock, mut stamp_ns, mut now_ns) = (ClockRate::default(), 7e18, 0);
+        let mut told = Vec::new();
+        for rate in rates {
+            for _ in 0..400 {
+                (stamp_ns, now_ns) = (stamp_ns + rate * STEP_NS as f64, now_ns + STEP_NS);
+                told.extend(clock.take(stamp_ns as i64, MissionTime(now_ns)));
+            }
+        }
+        told
+    }
+
+    #[test]
+    fn a_clock_that_goes_slower_or_faster_is_told_once_until_it_goes_otherwise() {
+        assert!(told(&[1.0, 1.05, 0.95]).is_empty());
+        for rate in [0.3, 0.8, 1.3, 4.0] {
+            let told = told(&[rate, rate]);
+            assert!(told.len() == 1 && (told[0] - rate).abs() < 0.01, "{rate}: {told:?}");
+        }
+        assert_eq!(told(&[0.5, 0.25]).len(), 2);
+    }
+
+    #[test]
+    fn a_link_that_was_frozen_and_a_clock_that_is_set_anew_say_nothing_of_a_rate() {
+        let mut clock = ClockRate::default();
+        for step in 0..400_u64 {
+            // For a second in 20 nothing is heard but what waits at the end, and the clock is set back and forth.
+            let ms = step * 50;
+            let heard_ms = if ms % 20_000 > 7000 && ms % 20_000 < 8000 { 8000 } else { ms };
+            let set_s = if step > 200 { -5000 } else { 9_000_000 };
+            let stamp_ns = i64::try_from(ms).unwrap() * 1_000_000 + set_s * 1_000_000_000;
+            assert_eq!(clock.take(stamp_ns, MissionTime(heard_ms * 1_000_000)), None, "{ms}");
+        }
+        assert_eq!(clock.take(i64::MIN, MissionTime(0)), None);
+        assert_eq!(clock.take(i64::MAX, MissionTime(u64::MAX)), None);
+    }
+}
