@@ -6,6 +6,7 @@
 
 mod support;
 
+mod arduino_robot;
 mod bad_input;
 mod blocked_starts;
 mod calibration;

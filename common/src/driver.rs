@@ -52,6 +52,17 @@ pub trait Driver: fmt::Debug {
     /// Ask the robot to answer.
     fn ping(&self) -> Vec<u8>;
 
+    /// Whether the robot says nothing unasked, so that it is polled.
+    fn is_polled(&self) -> bool {
+        false
+    }
+
+    /// What a robot that is polled is asked now. The link calls it once a period of `robot.rate_hz`, by which the driver may measure time;
+    /// in lockstep after each command and each ping.
+    fn poll(&mut self) -> Vec<u8> {
+        Vec::new()
+    }
+
     /// Answer a ping of the robot. A robot that sends no pings is answered nothing.
     fn acknowledge(&self) -> Vec<u8> {
         Vec::new()

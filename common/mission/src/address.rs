@@ -20,7 +20,7 @@ pub enum Address<Host = SocketAddr> {
     Udp(Host),
     /// A connection: `tcp://host:port`.
     Tcp(Host),
-    /// A serial line, 115200 8N1: `serial:///dev/ttyUSB0`.
+    /// A serial line, 8N1, with 115200 baud or the mission's `robot.arduino.baud`: `serial:///dev/ttyUSB0`.
     Serial(PathBuf),
     /// A domain of ROS 2: `ros2:0`, or `ros2` for the one that the environment variable `ROS_DOMAIN_ID` names, which is 0 without it.
     Ros2(Option<u16>),

@@ -1,5 +1,6 @@
 //! Reading a mission file: syntax, unknown keys, and every number's range, each error with line and key.
 
+mod arduino;
 mod calibration;
 mod objection;
 mod robot;
@@ -182,6 +183,7 @@ impl Checker {
         robot::check(mission)?;
         sensor::check(mission)?;
         ros2::check(mission)?;
+        arduino::check(mission)?;
         stages(mission)?;
         self.shapes("known", &mission.known)?;
         self.shapes("world", &mission.world)?;

@@ -14,8 +14,10 @@
 //! | `odometry` | how the wheels differ from nominal ones, and the calibration file |
 //! | `sensor`, [`sonar`] | the table of the ranging sensors, and how one is mounted, (19) |
 //! | [`address`] | where a robot answers, and over which transport |
+//! | `arduino`, `ros2` | the board of a robot with an Arduino; the topics of one that speaks ROS 2 |
 
 pub mod address;
+mod arduino;
 mod check;
 mod error;
 pub mod geometry;
@@ -33,6 +35,7 @@ use std::path::PathBuf;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
+pub use arduino::{ArduinoBoard, LEAST_BAUD};
 pub use error::MissionError;
 pub use odometry::{Calibration, CalibrationPlan, Odometry, Procedure, Provenance};
 pub use robot::{BatteryLimits, Body, Channel, Model, Protocol, RobotConfig, Steering};

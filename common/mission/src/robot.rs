@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::{
+    arduino::ArduinoBoard,
     kinematics::{Ackermann, DifferentialDrive, Drive},
     odometry::Odometry,
     ros2::Ros2Topics,
@@ -52,6 +53,8 @@ pub enum Protocol {
     Json,
     /// Topics of ROS 2.
     Ros2,
+    /// The requests and answers of ROSArduinoBridge.
+    Arduino,
 }
 
 /// A channel of the motor board: a wheel's, or that of a car's steering.
@@ -130,6 +133,9 @@ pub struct RobotConfig {
     pub calibration: Option<PathBuf>,
     /// How its wheels differ from the nominal ones.
     pub odometry: Odometry,
+    /// The board of a robot that speaks as ROSArduinoBridge does.
+    #[serde(skip_serializing_if = "ArduinoBoard::is_default")]
+    pub arduino: ArduinoBoard,
     /// The topics of a robot that speaks ROS 2.
     #[serde(skip_serializing_if = "Ros2Topics::is_default")]
     pub ros2: Ros2Topics,
@@ -184,6 +190,7 @@ impl Default for RobotConfig {
             held_current_ad: 1000,
             calibration: None,
             odometry: Odometry::default(),
+            arduino: ArduinoBoard::default(),
             ros2: Ros2Topics::default(),
             sensors: Vec::new(),
         }

@@ -193,9 +193,17 @@ impl Process for Shell {
         self.has_telemetry && self.runner.stage.has_telemetry()
     }
 
-    /// The link is called without input to repeat commands and to run the failsafe.
+    /// The link is called without input to repeat commands, to run the failsafe and to poll the robot.
     fn looks_again_after(&self) -> Option<Duration> {
-        Some(LOOKS_AGAIN)
+        let link = &self.runner.stage.link;
+        let until_poll = match self.clock {
+            MissionClock::Wall { rate, .. } if rate > 0.0 => {
+                let now = self.clock.at(link.state().next_tick, monotonic_ns());
+                link.until_poll(now).map(|span| span.div_f64(rate))
+            }
+            _ => None,
+        };
+        Some(until_poll.map_or(LOOKS_AGAIN, |until| until.min(LOOKS_AGAIN)))
     }
 
     fn idle(&mut self) -> Result<(), StageError> {

@@ -5,6 +5,7 @@
 //! ended. On the wall clock the robot does not wait, so an unanswered tick is dropped when the next one starts.
 
 mod event;
+mod poll;
 mod stop;
 mod wire;
 
@@ -34,6 +35,8 @@ use crate::{
     speed_trim::SpeedTrim,
     wheel_speeds::WheelSpeeds,
 };
+
+use self::poll::Polls;
 
 pub use event::{Effect, Event, Input, State, Tally};
 
@@ -82,6 +85,7 @@ pub struct Link {
     /// The mission time of the present event.
     now: MissionTime,
     driver: Box<dyn Driver>,
+    polls: Polls,
     speeds: WheelSpeeds,
     clock_rate: ClockRate,
     /// The time limit of a command.
@@ -123,6 +127,7 @@ impl Step for Link {
             state: State::default(),
             now: MissionTime::default(),
             driver: drivers::of(mission),
+            polls: Polls::new(mission),
             speeds: WheelSpeeds::new(mission),
             clock_rate: ClockRate::default(),
             limit: Duration::from_secs_f64(mission.robot.command_limit_s),
@@ -179,6 +184,7 @@ impl Step for Link {
             Event::Quiet => {}
         }
         self.keep_connected(now_ns, &mut effects);
+        self.keep_polling(&mut effects);
         self.give_tick(now_ns, &mut effects);
         self.repeat_command(now_ns, &mut effects);
         self.guard(now_ns, &mut effects);
@@ -391,6 +397,7 @@ impl Link {
         });
         self.tally.commands += 1;
         self.due += 1;
+        self.poll_in_ticks(effects);
         if answers && let Some(open) = self.open.take() {
             effects.push(Effect::Answered { began_ns: open.began_ns });
             if self.in_ticks() {

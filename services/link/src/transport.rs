@@ -74,7 +74,7 @@ impl Transport {
         let wire = match address {
             Address::Udp(robot) => Udp::open(*robot).map(Wire::Udp),
             Address::Tcp(robot) => Stream::new(Tcp::to(*robot)).map(Wire::Tcp),
-            Address::Serial(path) => Stream::new(Serial::on(path)).map(Wire::Serial),
+            Address::Serial(path) => Stream::new(Serial::of(path, mission)).map(Wire::Serial),
             Address::Ros2(domain) => ros2(domain.unwrap_or_default(), mission),
         };
         Ok(Self {
@@ -134,8 +134,11 @@ impl Transport {
         }
     }
 
-    /// Send a message, which has one frame or more.
+    /// Send a message, which has one frame or more; one without bytes is not sent.
     pub fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
+        if bytes.is_empty() {
+            return Ok(());
+        }
         let sent = match &mut self.wire {
             Wire::Udp(udp) => udp.send(bytes),
             Wire::Tcp(stream) => stream.send(bytes),

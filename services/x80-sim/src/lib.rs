@@ -10,6 +10,7 @@
 //! | [`motor`] | one channel: modes, timed commands, the speed loop |
 //! | [`sonar`], [`infrared`], `laser`, [`sensors`] | the readings of the sensors, as the frames carry them |
 //! | `json_words` | the words of a robot that speaks lines of JSON |
+//! | [`arduino_words`] | the words of a robot with an Arduino |
 //! | [`noise`] | seeded randomness, one stream for each source |
 //! | [`robot`] | all of it as a pure state machine: frames in, time forward, frames out |
 //! | [`radio`] | outages, losses, delays between host and robot |
@@ -37,6 +38,7 @@
 //! assert!(robot.ground_truth().x > 0.0);
 //! ```
 
+pub mod arduino_words;
 pub mod body;
 mod car;
 mod drivetrain;

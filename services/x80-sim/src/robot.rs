@@ -12,6 +12,7 @@ use common::{
 };
 
 use crate::{
+    arduino_words::{ArduinoWords, Request},
     body::{Body, Wheels},
     car::Car,
     drivetrain::{self, Drivetrain},
@@ -81,6 +82,8 @@ pub struct Robot {
     motor: MotorSensors,
     /// The words of a robot that speaks lines of JSON; none for an X80.
     json: Option<JsonWords>,
+    /// The words of a robot with an Arduino.
+    arduino: Option<ArduinoWords>,
     laser: Option<Laser>,
     /// The beams of this tick.
     scan: Vec<Option<f32>>,
@@ -133,6 +136,8 @@ impl Robot {
             custom: CustomSensors::default(),
             motor: MotorSensors::default(),
             json: (mission.robot.protocol() == Protocol::Json).then(|| JsonWords::new(mission)),
+            arduino: (mission.robot.protocol() == Protocol::Arduino)
+                .then(|| ArduinoWords::new(mission)),
             laser: Laser::new(mission, seed),
             scan: Vec::new(),
         };
@@ -300,6 +305,36 @@ impl Robot {
         }
     }
 
+    /// Take a request of a host that speaks to an Arduino, and append the answer to `replies`.
+    pub fn on_request(&mut self, request: Request, replies: &mut Vec<u8>) -> Heard {
+        let Some(arduino) = &mut self.arduino else {
+            return Heard::Foreign;
+        };
+        if arduino.hears(self.time) {
+            let (answer, command) = arduino.answer(request, &self.standard, &self.motors);
+            replies.extend(answer.into_bytes());
+            self.heard_at = self.time;
+            command.into_iter().for_each(|command| self.take(command));
+        }
+        Self::kind_of_request(request)
+    }
+
+    /// The meaning of a request, before it is carried out.
+    pub const fn kind_of_request(request: Request) -> Heard {
+        match request {
+            Request::Speeds(_) => Heard::Motion,
+            _ => Heard::Other,
+        }
+    }
+
+    /// A host opened the line, on which an Arduino boots.
+    pub fn on_opened(&mut self) {
+        if let Some(arduino) = &mut self.arduino {
+            self.motors.iter_mut().for_each(Motor::halt);
+            arduino.boot(self.time, &self.motors);
+        }
+    }
+
     /// The time at which the ultrasonic rangers listen for the next tick, if that is before the tick and still to come.
     fn listens_at(&self) -> Option<f64> {
         let age = self.physics.sonar.age_s;
@@ -445,6 +480,10 @@ impl Robot {
         if let Some(json) = &self.json {
             let sensors = (&self.standard, &self.custom, &self.motor);
             out.extend(json.report(sensors, &self.scan, &self.motors));
+            return;
+        }
+        if self.arduino.is_some() {
+            // It says nothing unasked.
             return;
         }
         if due.standard {

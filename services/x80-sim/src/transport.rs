@@ -74,6 +74,16 @@ impl Way {
         }
     }
 
+    /// Whether a host opened the line or the connection on which the newest bytes came, and they are the first. A line that a host closed
+    /// so that DTR stays high is not opened anew.
+    pub(crate) fn take_opened(&mut self) -> bool {
+        match self {
+            Self::Udp(_) => false,
+            Self::Tcp(tcp) => tcp.take_opened(),
+            Self::Pty(pty) => pty.take_opened(),
+        }
+    }
+
     /// The next bytes, if any have come.
     pub(crate) fn receive<'b>(
         &mut self,

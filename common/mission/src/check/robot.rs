@@ -23,7 +23,7 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     within("robot.track_m", body.track_m, 0.01..=5.0, "m")?;
     within("robot.counts_per_turn", body.counts_per_turn, 1.0..=100_000.0, "counts")?;
     if robot.protocol() != Protocol::X80 && body.steering.is_some() {
-        let problem = "a car's steering has no word in lines of JSON or topics of ROS";
+        let problem = "a car's steering has no word in lines of JSON, topics of ROS or requests to an Arduino";
         return Err(objection("robot.protocol", problem, "give \"x80\", or another robot.model"));
     }
     steering(mission)?;

@@ -422,6 +422,7 @@ fn an_abandoned_tick_does_not_keep_the_next_from_starting() {
     assert_eq!((ticks(&first)[0].0, ticks(&second)[0].0), (0, 1));
 }
 
+mod arduino;
 mod held;
 mod lockstep;
 mod robot_health;

@@ -141,6 +141,7 @@ impl Link {
             self.due += 1;
         }
         effects.push(Effect::Send(self.driver.ping()));
+        self.poll_in_ticks(effects);
     }
 
     pub(super) fn keep_connected(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {

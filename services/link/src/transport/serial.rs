@@ -1,4 +1,4 @@
-//! A serial line with 115200 baud, 8 data bits, no parity and 1 stop bit; bytes are not translated.
+//! A serial line with 115200 baud, or that of the mission's Arduino, 8 data bits, no parity and 1 stop bit; bytes are not translated.
 //!
 //! It is opened by rustix instead of the `serialport` crate, whose ports give no `BorrowedFd`. The waiter needs one, and creating it
 //! from the raw number would be `unsafe`.
@@ -10,6 +10,7 @@ use std::{
     time::Duration,
 };
 
+use common::mission::{Mission, Protocol};
 use rustix::{
     fs::{FlockOperation, Mode, OFlags, flock, open},
     io::Errno,
@@ -21,18 +22,24 @@ use rustix::{
 
 use super::stream::Dial;
 
-/// Speed of the line, bits a second.
+/// Speed of a line to a robot without an Arduino, bits a second.
 const BAUD: u32 = 115_200;
 
-/// The path of the line.
+/// The path of the line and its speed, bits a second.
 #[derive(Debug)]
 pub(super) struct Serial {
     path: PathBuf,
+    baud: u32,
 }
 
 impl Serial {
-    pub(super) fn on(path: &Path) -> Self {
-        Self { path: path.to_owned() }
+    /// The line at `path` to the robot of `mission`.
+    pub(super) fn of(path: &Path, mission: &Mission) -> Self {
+        let baud = match mission.robot.protocol() {
+            Protocol::Arduino => mission.robot.arduino.baud,
+            Protocol::X80 | Protocol::Json | Protocol::Ros2 => BAUD,
+        };
+        Self { path: path.to_owned(), baud }
     }
 }
 
@@ -57,12 +64,15 @@ impl Dial for Serial {
         flock(&line, FlockOperation::NonBlockingLockExclusive)?;
         let mut settings = tcgetattr(&line)?;
         settings.make_raw();
-        settings.set_speed(BAUD)?;
+        settings.set_speed(self.baud)?;
         let flow = ControlModes::CSIZE
             | ControlModes::PARENB
             | ControlModes::CSTOPB
             | ControlModes::CRTSCTS;
         settings.control_modes.remove(flow);
+        // An Arduino restarts when DTR rises. Without HUPCL it stays high when this process ends, so the stop guard and the next link find
+        // the board as it is.
+        settings.control_modes.remove(ControlModes::HUPCL);
         // CLOCAL ignores modem control lines, so three wires are enough.
         let eight = ControlModes::CS8 | ControlModes::CLOCAL | ControlModes::CREAD;
         settings.control_modes.insert(eight);

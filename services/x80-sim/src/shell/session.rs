@@ -17,6 +17,7 @@ use common::{
 use serde::Serialize;
 
 use crate::{
+    arduino_words::{Request, Requests},
     error::SimError,
     radio::Radio,
     robot::{Heard, Robot},
@@ -68,12 +69,14 @@ struct SourceDecoder {
 enum Words {
     X80(Decoder),
     Json(Lines),
+    Arduino(Requests),
 }
 
 impl Words {
     fn of(protocol: Protocol) -> Self {
         match protocol {
             Protocol::X80 => Self::X80(Decoder::default()),
+            Protocol::Arduino => Self::Arduino(Requests::default()),
             // A robot that speaks ROS 2 is not simulated: its mission has an address.
             Protocol::Json | Protocol::Ros2 => Self::Json(Lines::default()),
         }
@@ -85,6 +88,7 @@ impl Words {
 enum Said<'a> {
     Frame(&'a Frame<'a>),
     Order(&'a Order),
+    Request(Request),
 }
 
 impl Said<'_> {
@@ -92,6 +96,7 @@ impl Said<'_> {
         match self {
             Self::Frame(frame) => Robot::kind(frame),
             Self::Order(order) => Robot::kind_of(order),
+            Self::Request(request) => Robot::kind_of_request(request),
         }
     }
 
@@ -99,6 +104,7 @@ impl Said<'_> {
         match self {
             Self::Frame(frame) => robot.on_frame(frame, answer),
             Self::Order(order) => robot.on_order(order, answer),
+            Self::Request(request) => robot.on_request(request, answer),
         }
     }
 }
@@ -175,8 +181,12 @@ impl Session {
             let Some((source, bytes)) = self.way.receive(buffer)? else {
                 return Ok(());
             };
+            let opened = self.way.take_opened();
             if let Some(now) = now() {
                 self.pass(now)?;
+                if opened {
+                    self.robot.on_opened();
+                }
                 let now = self.robot.time_s();
                 if let Some(radio) = &mut self.radio {
                     radio.send(now, Leg::ToRobot(source), bytes);
@@ -266,6 +276,11 @@ impl Session {
                         Ok(order) => self.on_said(source, Said::Order(&order))?,
                         Err(why) => tracing::debug!("the host says what is no order: {why}"),
                     }
+                }
+            }
+            Words::Arduino(requests) => {
+                for request in requests.push(bytes) {
+                    self.on_said(source, Said::Request(request))?;
                 }
             }
         }

@@ -9,16 +9,22 @@ use rustix::{
     fs::{Mode, OFlags, fcntl_getfl, fcntl_setfl, open},
     io::{Errno, read, write},
     pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt},
-    termios::{OptionalActions, tcgetattr, tcsetattr},
+    termios::{ControlModes, OptionalActions, Termios, tcgetattr, tcsetattr},
 };
 
 use super::source::Source;
+
+/// The speed to which the robot sets the line. A host that opens it sets the speed that it needs, by which the robot sees it.
+const NOBODYS_BAUD: u32 = 50;
 
 #[derive(Debug)]
 pub(crate) struct Pty {
     robot: OwnedFd,
     /// The host's end is held open: while nobody holds it, reading the robot's end is an error.
-    _host: OwnedFd,
+    host: OwnedFd,
+    /// Whether DTR falls when the host closes the line, as it says itself (HUPCL), so that it rises when the next opens it.
+    hangs_up: bool,
+    opened: bool,
     path: String,
 }
 
@@ -33,9 +39,11 @@ impl Pty {
         // Bytes pass as they are: no echo, no line editing, no signals.
         let mut settings = tcgetattr(&host)?;
         settings.make_raw();
+        settings.set_speed(NOBODYS_BAUD)?;
         tcsetattr(&host, OptionalActions::Now, &settings)?;
         fcntl_setfl(&robot, fcntl_getfl(&robot)? | OFlags::NONBLOCK)?;
-        Ok(Self { robot, _host: host, path: path.to_string_lossy().into_owned() })
+        let path = path.to_string_lossy().into_owned();
+        Ok(Self { robot, host, hangs_up: true, opened: false, path })
     }
 
     pub(super) fn path(&self) -> &str {
@@ -46,12 +54,30 @@ impl Pty {
         self.robot.as_fd()
     }
 
-    pub(super) fn receive(&self, buffer: &mut [u8]) -> io::Result<Option<(Source, usize)>> {
+    pub(super) fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<(Source, usize)>> {
         match read(&self.robot, buffer) {
             Ok(0) | Err(Errno::AGAIN | Errno::INTR) => Ok(None),
-            Ok(length) => Ok(Some((Source::Line, length))),
+            Ok(length) => {
+                self.notice_host()?;
+                Ok(Some((Source::Line, length)))
+            }
             Err(error) => Err(error.into()),
         }
+    }
+
+    fn notice_host(&mut self) -> io::Result<()> {
+        let mut settings: Termios = tcgetattr(&self.host)?;
+        if settings.output_speed() != NOBODYS_BAUD {
+            self.opened = self.hangs_up;
+            self.hangs_up = settings.control_modes.contains(ControlModes::HUPCL);
+            settings.set_speed(NOBODYS_BAUD)?;
+            tcsetattr(&self.host, OptionalActions::Now, &settings)?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn take_opened(&mut self) -> bool {
+        std::mem::take(&mut self.opened)
     }
 
     /// Bytes that a host does not read in time are lost; its decoder finds the next frame.

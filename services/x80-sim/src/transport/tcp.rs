@@ -15,13 +15,21 @@ pub(crate) struct Tcp {
     connection: Option<TcpStream>,
     /// Connections accepted so far: the number of the one that is open.
     accepted: u64,
+    /// Whether the newest connection was not asked for yet by [`Tcp::take_opened`].
+    opened: bool,
 }
 
 impl Tcp {
     pub(super) fn bind(address: SocketAddr) -> io::Result<Self> {
         let listener = TcpListener::bind(address)?;
         listener.set_nonblocking(true)?;
-        Ok(Self { address: listener.local_addr()?, listener, connection: None, accepted: 0 })
+        Ok(Self {
+            address: listener.local_addr()?,
+            listener,
+            connection: None,
+            accepted: 0,
+            opened: false,
+        })
     }
 
     pub(super) fn address(&self) -> SocketAddr {
@@ -54,6 +62,10 @@ impl Tcp {
         }
     }
 
+    pub(super) fn take_opened(&mut self) -> bool {
+        std::mem::take(&mut self.opened)
+    }
+
     /// The newest connection, while it is open.
     pub(super) fn connected(&mut self) -> io::Result<Option<Source>> {
         self.accept()?;
@@ -67,6 +79,7 @@ impl Tcp {
                 connection.set_nonblocking(true)?;
                 connection.set_nodelay(true)?;
                 self.accepted += 1;
+                self.opened = true;
                 self.connection = Some(connection);
                 Ok(())
             }

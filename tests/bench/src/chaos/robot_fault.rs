@@ -145,7 +145,7 @@ impl RobotFault {
         let does = match protocol {
             Protocol::X80 => row.x80,
             Protocol::Json => row.json,
-            Protocol::Ros2 => NOTHING,
+            Protocol::Arduino | Protocol::Ros2 => NOTHING,
         };
         does != NOTHING
     }

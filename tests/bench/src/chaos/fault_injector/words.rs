@@ -39,8 +39,8 @@ impl Words {
     pub(super) fn of(protocol: Protocol) -> Self {
         match protocol {
             Protocol::X80 => Self::X80 { robot: Decoder::default(), host: Decoder::default() },
-            // A robot that speaks ROS 2 has no fault that is injected on a wire.
-            Protocol::Json | Protocol::Ros2 => {
+            // The others have no fault that is injected on a wire.
+            Protocol::Json | Protocol::Arduino | Protocol::Ros2 => {
                 Self::Json { robot: Lines::default(), host: Lines::default() }
             }
         }

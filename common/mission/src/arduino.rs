@@ -1,0 +1,34 @@
+//! The board of a robot that speaks the protocol of ROSArduinoBridge.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+/// The least baud rate. The driver knows the number that says the rate by its size: a board waits for an echo for a second at most, and
+/// says 17,241 cm then.
+pub const LEAST_BAUD: u32 = 19_200;
+
+/// What the firmware of the board was built with.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ArduinoBoard {
+    /// The speed of its serial line, bits a second.
+    pub baud: u32,
+    /// How often its speed loop runs. Speeds are said in encoder counts from one run to the next.
+    pub pid_rate_hz: f64,
+    /// The pins of its sonars by the names of their rows.
+    pub sonars: BTreeMap<String, u8>,
+}
+
+impl Default for ArduinoBoard {
+    fn default() -> Self {
+        Self { baud: 57_600, pid_rate_hz: 30.0, sonars: BTreeMap::new() }
+    }
+}
+
+impl ArduinoBoard {
+    /// Whether the mission says nothing of it.
+    pub(crate) fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}

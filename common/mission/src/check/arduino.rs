@@ -1,0 +1,115 @@
+//! The part of a mission that is for a robot with an Arduino.
+
+use super::objection::{Objection, objection, within};
+use crate::{LEAST_BAUD, Mission, Protocol, SensorKind};
+
+/// The greatest speed of a rim that is one count from one run of the speed loop to the next, m/s. A robot that cannot be told to turn
+/// its wheels slower than that turns past its target.
+const GREATEST_STEP_M_S: f64 = 0.1;
+
+pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
+    let robot = &mission.robot;
+    let board = &robot.arduino;
+    if robot.protocol() != Protocol::Arduino {
+        if board.is_default() {
+            return Ok(());
+        }
+        let remedy = "give robot.protocol = \"arduino\" too, or remove it";
+        return Err(objection("robot.arduino", "the robot has no Arduino by its protocol", remedy));
+    }
+    let baud = f64::from(LEAST_BAUD)..=2_000_000.0;
+    within("robot.arduino.baud", f64::from(board.baud), baud, "bits a second")?;
+    within("robot.arduino.pid_rate_hz", board.pid_rate_hz, 1.0..=1000.0, "Hz")?;
+    if robot.counts_per_turn.is_none() {
+        let problem =
+            "nobody says how many counts a turn of a wheel has, and the board says counts";
+        let remedy =
+            "give robot.counts_per_turn: turn a wheel once by hand and ask the board for `e`";
+        return Err(objection("robot.counts_per_turn", problem, remedy));
+    }
+    let step_m_s = board.pid_rate_hz * mission.body().metres_per_count();
+    if step_m_s > GREATEST_STEP_M_S {
+        let problem = format!(
+            "one count in each run of the speed loop is {step_m_s:.2} m/s, and the board takes whole counts"
+        );
+        let remedy = "give the wheels encoders of more counts, or lower the rate of the firmware's loop and robot.arduino.pid_rate_hz";
+        return Err(objection("robot.counts_per_turn", problem, remedy));
+    }
+    let table = mission.sensor_table();
+    if let Some(other) = table.iter().find(|sensor| sensor.kind != SensorKind::Cone) {
+        let problem = format!("{:?} is no sonar, and the board has no other sensor", other.name);
+        let remedy = "give rows of robot.sensor that are of kind cone";
+        return Err(objection("robot.sensor", problem, remedy));
+    }
+    if let Some(silent) = table.iter().find(|sensor| !board.sonars.contains_key(&sensor.name)) {
+        let problem = format!("no pin is that of the sonar {:?}", silent.name);
+        let remedy = format!("add it: robot.arduino.sonars = {{ {} = 4 }}", silent.name);
+        return Err(objection("robot.arduino.sonars", problem, remedy));
+    }
+    for (name, pin) in &board.sonars {
+        if !table.iter().any(|sensor| sensor.name == *name) {
+            let problem = format!("it names {name:?}, and no sonar is called so");
+            let remedy = "give the name of a row of robot.sensor";
+            return Err(objection("robot.arduino.sonars", problem, remedy));
+        }
+        if board.sonars.iter().any(|(other, its_pin)| other != name && its_pin == pin) {
+            let problem = format!("pin {pin} is that of two sonars");
+            return Err(objection("robot.arduino.sonars", problem, "give each a pin of its own"));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    const ROBOT: &str = "target = [3, 0]\nrobot.protocol = 'arduino'\nrobot.counts_per_turn = 1320\nrobot.arduino.sonars = { front = 4 }\n";
+    const FRONT: &str = "[[robot.sensor]]\nname = 'front'\nkind = 'cone'\nchannel = 1\nforward_m = 0.1\nbearing_deg = 0\n";
+
+    fn refusal(text: &str) -> String {
+        match Mission::parse(text, Path::new("m.toml")) {
+            Ok(_) => panic!("accepted: {text}"),
+            Err(error) => error.to_string(),
+        }
+    }
+
+    #[test]
+    fn a_board_with_counts_and_a_pin_for_each_sonar_is_accepted_and_reads_back_the_same() {
+        let mission = Mission::parse(&format!("{ROBOT}{FRONT}"), Path::new("m.toml")).unwrap();
+        assert_eq!((mission.robot.arduino.baud, mission.robot.arduino.pid_rate_hz), (57_600, 30.0));
+        let written = toml::to_string(&mission).unwrap();
+        assert_eq!(Mission::parse(&written, Path::new("m.toml")).unwrap(), mission);
+    }
+
+    #[test]
+    fn what_the_board_cannot_have_is_refused_with_the_remedy() {
+        let with = |set: &str| format!("{ROBOT}{set}\n{FRONT}");
+        let without = |line: &str| with("").replace(line, "");
+        let second = FRONT.replace("'front'", "'left'").replace("= 1\n", "= 2\n");
+        let scan = "[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nchannel = 0\nforward_m = 0\nbearing_deg = 0\n";
+        for (text, problem) in [
+            (ROBOT.to_owned(), "\"infrared-0\" is no sonar"),
+            (with("") + scan, "\"laser\" is no sonar"),
+            (with("robot.model = 'car'"), "a car's steering"),
+            (without("robot.counts_per_turn = 1320\n"), "ask the board for `e`"),
+            (with("").replace("1320", "20"), "one count in each run"),
+            (without("robot.arduino.sonars = { front = 4 }\n"), "sonars = { front = 4 }"),
+            (with("").replace("front = 4", "front = 4, nose = 5"), "\"nose\""),
+            (
+                with("").replace("front = 4", "front = 4, left = 4") + &second,
+                "pin 4 is that of two",
+            ),
+            (with("").replace("front = 4", "front = 256"), "256"),
+            (with("robot.arduino.baud = 9600"), "19200"),
+            (with("robot.arduino.pid_rate_hz = nan"), "pid_rate_hz"),
+            (with("robot.address = 'ros2'"), "robot.address"),
+            (with("").replace("'arduino'", "'json'"), "robot.protocol = \"arduino\""),
+        ] {
+            let refusal = refusal(&text);
+            assert!(refusal.contains(problem), "{text}: {refusal}");
+        }
+    }
+}

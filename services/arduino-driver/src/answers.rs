@@ -1,0 +1,73 @@
+//! The lines by which the board answers, each by its form alone.
+
+use common::mission::LEAST_BAUD;
+
+/// An answer of the board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Answer {
+    /// `OK`: a command was carried out.
+    Done,
+    /// `Invalid Command`: a command was none, or arrived garbled.
+    Invalid,
+    /// Two numbers: the encoder counts of the left and the right wheel. No other request is answered so.
+    Counts([i32; 2]),
+    /// A number that is a baud rate, because it is greater than any range.
+    Baud,
+    /// A smaller number, which is a range if a sonar was asked: centimetres.
+    Centimetres(u16),
+}
+
+impl Answer {
+    /// The answer that `line` is, without its line feed; or why it is none.
+    pub(crate) fn parse(line: &[u8]) -> Result<Self, String> {
+        let none = || format!("{:?} is no answer of the board", String::from_utf8_lossy(line));
+        let line = line.strip_suffix(b"\r").unwrap_or(line);
+        // A carriage return in the line is left of a line feed that was lost. What stands before it is the end of another answer.
+        let text = std::str::from_utf8(line).map_err(|_| none())?.trim_matches(' ');
+        match text {
+            "OK" => return Ok(Self::Done),
+            "Invalid Command" => return Ok(Self::Invalid),
+            _ => {}
+        }
+        let whole = |word: &str| word.parse::<i32>().map_err(|_| none());
+        if let Some((left, right)) = text.split_once(' ') {
+            return Ok(Self::Counts([whole(left)?, whole(right)?]));
+        }
+        match u32::try_from(whole(text)?) {
+            Ok(rate) if rate >= LEAST_BAUD => Ok(Self::Baud),
+            Ok(range) => u16::try_from(range).map(Self::Centimetres).map_err(|_| none()),
+            Err(_) => Err(none()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_answer_is_known_by_its_form() {
+        for (line, answer) in [
+            ("OK\r", Answer::Done),
+            ("Invalid Command\r", Answer::Invalid),
+            ("-12 2147483647\r", Answer::Counts([-12, i32::MAX])),
+            (" 57600\r", Answer::Baud),
+            ("19200", Answer::Baud),
+            ("17241\r", Answer::Centimetres(17_241)),
+            ("0", Answer::Centimetres(0)),
+        ] {
+            assert_eq!(Answer::parse(line.as_bytes()), Ok(answer), "{line:?}");
+        }
+    }
+
+    #[test]
+    fn a_line_that_lost_or_gained_bytes_is_refused() {
+        // Of two ranges that lost the line feed between them the carriage return stays: they are no counts.
+        for line in
+            ["12\r34\r", "12 34 56\r", "2147483648 0", "-1", "1.5", "O", "1  2", "12OK", "", "\r\r"]
+        {
+            assert!(Answer::parse(line.as_bytes()).unwrap_err().contains("no answer"), "{line:?}");
+        }
+        assert!(Answer::parse(b"\xff\xfe 1").is_err());
+    }
+}

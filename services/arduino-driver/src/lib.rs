@@ -1,0 +1,285 @@
+//! The driver of robots whose Arduino speaks the protocol of ROSArduinoBridge: requests of one letter, each ended by a carriage return,
+//! and answers in lines, in the order of the requests.
+//!
+//! The board says nothing unasked. At each poll the driver asks it for a round: the range of each sonar, `p PIN`, and then the encoder
+//! counts, `e`, with which a tick begins. Answers carry no name and bytes may be lost, so these rules keep an answer from being taken
+//! for that of another request:
+//!
+//! 1. A round is asked for when nothing before it is unanswered. Its ranges count only when as many came as were asked for, and then
+//!    its counts: the form of counts is no other answer's.
+//! 2. A line that does not fit, and a round that is not complete within `robot.command_limit_s`, drops the round. The driver then asks
+//!    for the baud rate alone, `b`, and drops all that is said until a number comes that is greater than any range.
+//! 3. That number is the answer to the only `b` that is unanswered: another is asked for after [`LATEST_S`] only. Answers come in the
+//!    order of requests, so what was asked before it is answered or lost, and rule 1 holds again.
+//!
+//! The rules suppose that answers come in order, and within [`LATEST_S`] or not at all. Rule 2 bounds how old counts are. A digit that
+//! arrives as another digit is not noticed, because the protocol has no check sum: counts then jump, which the link judges, and a range
+//! is wrong once. Velocity commands are answered by `OK`, which is dropped wherever it comes: counts that come in time show that the
+//! commands before them came in time.
+
+mod answers;
+
+use std::time::Duration;
+
+use common::{
+    driver::{Driver, Heard, Motion, Readings, StopMethod, WireTally},
+    json_wire::Lines,
+    mission::Mission,
+    samples::{RangeReading, WheelSample},
+    wire::COUNT_CYCLE,
+};
+
+use self::answers::Answer;
+
+/// So many lines wait to be heard; more are dropped. A round has at most seven.
+const MOST_WAITING: usize = 64;
+/// The board answers within so long, seconds: it waits for an echo for one second at most.
+const LATEST_S: f64 = 2.0;
+/// No wheel turns faster than so many times its top speed.
+const IMPLAUSIBLE: f64 = 1.5;
+
+/// What the driver waits for.
+#[derive(Clone, Debug)]
+enum Waits {
+    /// For nothing: all is answered.
+    No,
+    /// For the rest of the round that was asked for at this poll, of which these ranges came, centimetres.
+    Round { since: u64, ranges: Vec<u16> },
+    /// For the baud rate, which was asked for at this poll; not yet if none.
+    Baud { since: Option<u64> },
+}
+
+/// A robot whose Arduino speaks the protocol of ROSArduinoBridge.
+#[derive(Clone, Debug)]
+pub struct Arduino {
+    pid_rate_hz: f64,
+    rate_hz: f64,
+    /// The most counts of a wheel in a second.
+    most_counts_s: f64,
+    /// A round is complete after fewer polls, and whatever was asked is answered or lost after so many.
+    overdue: u64,
+    lost: u64,
+    /// The pin and the row of each sonar, in the order in which they are asked.
+    sonars: Vec<(u8, usize)>,
+    lines: Lines,
+    waiting: Vec<Vec<u8>>,
+    readings: Readings,
+    waits: Waits,
+    polls: u64,
+    /// The newest counts, the poll at which they were asked for, and the speeds from the counts before to them, counts/s.
+    counts: Option<([i32; 2], u64, [i32; 2])>,
+    /// Why the newest round was dropped, until the link hears it.
+    dropped: Option<String>,
+    tally: WireTally,
+}
+
+impl Arduino {
+    /// The driver of `mission`'s robot.
+    pub fn new(mission: &Mission) -> Self {
+        let (robot, body) = (&mission.robot, mission.body());
+        let readings = Readings::new(mission);
+        let pin = |(row, name): (usize, &String)| Some((*robot.arduino.sonars.get(name)?, row));
+        let names = readings.table().iter().map(|sensor| &sensor.name).enumerate();
+        Self {
+            pid_rate_hz: robot.arduino.pid_rate_hz,
+            rate_hz: robot.rate_hz,
+            most_counts_s: IMPLAUSIBLE * body.top_speed_m_s / body.metres_per_count(),
+            overdue: (robot.command_limit_s * robot.rate_hz).ceil() as u64,
+            lost: (LATEST_S * robot.rate_hz).ceil() as u64,
+            sonars: names.filter_map(pin).collect(),
+            lines: Lines::default(),
+            waiting: Vec::new(),
+            readings,
+            waits: Waits::Baud { since: None },
+            polls: 0,
+            counts: None,
+            dropped: None,
+            tally: WireTally::default(),
+        }
+    }
+
+    /// Take an answer, or say why it does not fit.
+    fn take(&mut self, line: &[u8], heard: &mut Heard) -> Result<(), String> {
+        let answer = Answer::parse(line)?;
+        // While the driver waits for the baud rate, only that shows that the board understands it.
+        heard.anything |= answer == Answer::Baud || !matches!(self.waits, Waits::Baud { .. });
+        match (answer, &mut self.waits) {
+            (Answer::Done, _) => {}
+            (Answer::Baud, waits @ Waits::Baud { since: Some(_) }) => *waits = Waits::No,
+            (_, Waits::Baud { .. }) => {}
+            (Answer::Centimetres(range), Waits::Round { ranges, .. })
+                if ranges.len() < self.sonars.len() =>
+            {
+                ranges.push(range);
+            }
+            (Answer::Counts(counts), Waits::Round { since, ranges })
+                if ranges.len() == self.sonars.len() =>
+            {
+                let (since, ranges) = (*since, std::mem::take(ranges));
+                self.waits = Waits::No;
+                for (&(_, row), centimetres) in self.sonars.iter().zip(ranges) {
+                    // The board says 0 for no echo.
+                    let range = f64::from(centimetres) / 100.0;
+                    self.readings.take_range(row, if range > 0.0 { range } else { f64::INFINITY });
+                }
+                heard.motion = Some(self.motion(counts, since));
+            }
+            (Answer::Invalid, _) => {
+                return Err("the board says that a request was none: it arrived garbled".to_owned());
+            }
+            (_, _) => return Err(format!("{:?} answers no request", text(line))),
+        }
+        Ok(())
+    }
+
+    /// The motion at these counts, which were asked for at this poll.
+    ///
+    /// The driver knows the time between two rounds by the rate of its polls. The speeds are those of the interval before: the link
+    /// judges counts by the speeds that come with them, and counts that jumped must not vouch for themselves.
+    fn motion(&mut self, counts: [i32; 2], since: u64) -> Motion {
+        let (speeds, newest) = self.counts.map_or(([0; 2], [0; 2]), |(then, at, speeds)| {
+            let gap_s = since.saturating_sub(at).max(1) as f64 / self.rate_hz;
+            // 32 bits wrap.
+            let turned = [0, 1].map(|wheel| f64::from(counts[wheel].wrapping_sub(then[wheel])));
+            let is_plausible = turned.iter().all(|way| way.abs() <= self.most_counts_s * gap_s);
+            let newest = if is_plausible { turned.map(|way| (way / gap_s) as i32) } else { [0; 2] };
+            (speeds, newest)
+        });
+        self.counts = Some((counts, since, newest));
+        // The cycle of the samples divides that of 32 bits, so counts that wrap go on.
+        let [left_counts, right_counts] =
+            counts.map(|count| count.rem_euclid(i32::from(COUNT_CYCLE)) as u16);
+        let [left_counts_per_s, right_counts_per_s] = speeds;
+        let wheels = WheelSample {
+            left_counts,
+            right_counts,
+            left_counts_per_s,
+            right_counts_per_s,
+            ..WheelSample::default()
+        };
+        // The board measures no currents.
+        Motion { wheels, currents: [0; 2] }
+    }
+
+    /// Drop the round, and begin anew with a request whose answer is unmistakable.
+    fn begin_anew(&mut self) {
+        if !matches!(self.waits, Waits::Baud { .. }) {
+            self.waits = Waits::Baud { since: None };
+        }
+    }
+}
+
+fn text(line: &[u8]) -> String {
+    String::from_utf8_lossy(line).trim().to_owned()
+}
+
+impl Driver for Arduino {
+    fn push(&mut self, bytes: &[u8]) {
+        let lines = self.lines.push(bytes);
+        let room = MOST_WAITING.saturating_sub(self.waiting.len());
+        if lines.len() > room {
+            let dropped = lines.iter().skip(room).map(Vec::len).sum::<usize>();
+            self.tally.bytes_dropped += dropped as u64;
+            self.dropped = Some("more lines than were asked for".to_owned());
+            self.begin_anew();
+        }
+        self.waiting.extend(lines.into_iter().take(room));
+    }
+
+    fn reset(&mut self) {
+        self.lines.reset();
+        self.waiting.clear();
+        self.waits = Waits::Baud { since: None };
+    }
+
+    fn heard(&mut self) -> Heard {
+        let mut heard = Heard { refused: self.dropped.take(), ..Heard::default() };
+        for line in std::mem::take(&mut self.waiting) {
+            match self.take(&line, &mut heard) {
+                Ok(()) => self.tally.messages += 1,
+                Err(why) => {
+                    self.tally.bytes_dropped += line.len() as u64;
+                    self.begin_anew();
+                    heard.refused = Some(why);
+                }
+            }
+        }
+        heard.readings = self.readings.take_fresh();
+        heard
+    }
+
+    fn tally(&self) -> WireTally {
+        let WireTally { messages, bytes_dropped } = self.tally;
+        WireTally { messages, bytes_dropped: bytes_dropped + self.lines.dropped() }
+    }
+
+    fn readings_for_tick(&mut self) -> Vec<RangeReading> {
+        self.readings.for_tick()
+    }
+
+    /// The board has no settings that the link needs.
+    fn greeting(&self) -> Vec<u8> {
+        Vec::new()
+    }
+
+    /// The polls ask for them.
+    fn ask_for_sensors(&self) -> Vec<u8> {
+        Vec::new()
+    }
+
+    /// The polls ask for an answer.
+    fn ping(&self) -> Vec<u8> {
+        Vec::new()
+    }
+
+    fn is_polled(&self) -> bool {
+        true
+    }
+
+    fn poll(&mut self) -> Vec<u8> {
+        self.polls += 1;
+        let (now, overdue) = (self.polls, self.overdue);
+        match &self.waits {
+            Waits::Round { since, ranges } if now - since >= overdue => {
+                let asked = self.sonars.get(ranges.len());
+                let asked = asked.map_or_else(|| "e".to_owned(), |(pin, _)| format!("p {pin}"));
+                self.dropped = Some(format!(
+                    "the answer to `{asked}` is overdue by robot.command_limit_s: is that sonar connected, are all bytes carried?"
+                ));
+                self.begin_anew();
+            }
+            _ => {}
+        }
+        match &self.waits {
+            Waits::No => {
+                self.waits = Waits::Round { since: now, ranges: Vec::new() };
+                let pins = self.sonars.iter().map(|(pin, _)| format!("p {pin}\r"));
+                pins.chain(["e\r".to_owned()]).collect::<String>().into_bytes()
+            }
+            Waits::Baud { since } if since.is_none_or(|since| now - since >= self.lost) => {
+                self.waits = Waits::Baud { since: Some(now) };
+                // The first carriage return ends a request whose end was lost.
+                b"\rb\r".to_vec()
+            }
+            Waits::Baud { .. } | Waits::Round { .. } => Vec::new(),
+        }
+    }
+
+    /// The board takes whole counts in a run of its speed loop, and stands by itself after the time that its firmware has. A command that
+    /// both wheels would round to 0 is enlarged until the faster wheel turns by one count.
+    fn velocity(&self, counts: [i16; 2], _limit: Duration) -> Vec<u8> {
+        let exact = counts.map(|counts| f64::from(counts) / self.pid_rate_hz);
+        let greatest = exact[0].abs().max(exact[1].abs());
+        let enlarged = if greatest > 0.0 && greatest < 0.5 { 1.0 / greatest } else { 1.0 };
+        let [left, right] = exact.map(|speed| (speed * enlarged).round() as i32);
+        format!("m {left} {right}\r").into_bytes()
+    }
+
+    /// The protocol has no other.
+    fn other_stops(&self) -> Vec<StopMethod> {
+        Vec::new()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,243 @@
+use std::path::Path;
+
+use common::samples::RangeStatus;
+
+use super::*;
+
+/// A robot with two sonars, at 10 Hz. A round is complete within three polls, and what is lost is so after 20.
+fn mission(set: &str) -> Mission {
+    let row = |name: &str, channel: u8, bearing: i32| {
+        format!(
+            "[[robot.sensor]]\nname = '{name}'\nkind = 'cone'\nchannel = {channel}\nforward_m = 0.1\nbearing_deg = {bearing}\n"
+        )
+    };
+    let text = format!(
+        "target = [3, 0]\nrobot.protocol = 'arduino'\nrobot.counts_per_turn = 1200\nrobot.rate_hz = 10\nrobot.arduino.sonars = {{ front = 4, left = 5 }}\n{set}\n{}{}",
+        row("front", 1, 0),
+        row("left", 0, 40)
+    );
+    Mission::parse(&text, Path::new("m.toml")).unwrap()
+}
+
+/// A driver whose board has said its baud rate.
+fn driver() -> Arduino {
+    let mut driver = Arduino::new(&mission(""));
+    assert_eq!(polled(&mut driver), "\rb\r");
+    assert!(heard(&mut driver, " 57600\r\n").anything);
+    driver
+}
+
+fn polled(driver: &mut Arduino) -> String {
+    String::from_utf8(driver.poll()).unwrap()
+}
+
+fn heard(driver: &mut Arduino, bytes: &str) -> Heard {
+    driver.push(bytes.as_bytes());
+    driver.heard()
+}
+
+const ROUND: &str = "p 4\rp 5\re\r";
+
+/// What the driver hears of a round that the board answers so.
+fn round(driver: &mut Arduino, answers: &str) -> Heard {
+    assert_eq!(polled(driver), ROUND);
+    heard(driver, answers)
+}
+
+fn counts(heard: &Heard) -> Option<[u16; 2]> {
+    heard.motion.map(|motion| [motion.wheels.left_counts, motion.wheels.right_counts])
+}
+
+fn ranges(heard: &Heard) -> Vec<(u8, RangeStatus, f64)> {
+    let of = |reading: &RangeReading| (reading.sensor, reading.status(), reading.range_m);
+    heard.readings.iter().map(of).collect()
+}
+
+#[test]
+fn a_round_gives_the_range_of_each_sonar_and_the_counts_that_begin_a_tick() {
+    let mut driver = driver();
+    let said = round(&mut driver, "123\r\n0\r\n-5 70\r\n");
+    assert_eq!(counts(&said), Some([32_763, 70]));
+    let want = [(0, RangeStatus::Measured, 1.23), (1, RangeStatus::Nothing, 0.0)];
+    assert_eq!((ranges(&said), said.refused), (want.to_vec(), None));
+    // Beyond the sonar's reach is nothing.
+    let said = round(&mut driver, "300\r\n17241\r\n0 0\r\n");
+    assert!(ranges(&said).iter().all(|range| range.1 == RangeStatus::Nothing));
+}
+
+#[test]
+fn answers_come_in_any_pieces_and_commands_are_answered_between_them() {
+    let mut driver = driver();
+    assert_eq!(polled(&mut driver), ROUND);
+    for piece in ["OK\r\n12", "3\r", "\nOK\r\n7\r\nOK\r\n1", " 2\r"] {
+        assert_eq!(counts(&heard(&mut driver, piece)), None, "{piece:?}");
+    }
+    let said = heard(&mut driver, "\nOK\r\n");
+    assert_eq!((counts(&said), said.readings.len()), (Some([1, 2]), 2));
+}
+
+#[test]
+fn nothing_is_asked_while_a_round_is_unanswered() {
+    let mut driver = driver();
+    assert_eq!(polled(&mut driver), ROUND);
+    assert_eq!([polled(&mut driver), polled(&mut driver)], ["", ""]);
+    assert!(heard(&mut driver, "1\r\n1\r\n1 1\r\n").motion.is_some());
+    assert_eq!(polled(&mut driver), ROUND);
+}
+
+#[test]
+fn after_a_line_that_does_not_fit_only_a_baud_rate_is_taken() {
+    for (bad, why) in [
+        // An answer was lost, so the one of pin 5 stands where that of pin 4 should.
+        ("34\r\n1 2\r\n", "\"1 2\" answers no request"),
+        ("12\r\n34\r\n56\r\n1 2\r\n", "\"56\" answers no request"),
+        ("Invalid Command\r\n", "garbled"),
+        ("1#\r\n34\r\n1 2\r\n", "\"1#\\r\" is no answer"),
+        ("12\r34\r\n1 2\r\n", "is no answer"),
+        ("57600\r\n", "answers no request"),
+    ] {
+        let mut driver = driver();
+        let said = round(&mut driver, bad);
+        assert!(said.motion.is_none() && said.readings.is_empty(), "{bad:?}: {said:?}");
+        assert!(said.refused.as_ref().is_some_and(|refused| refused.contains(why)), "{said:?}");
+        // What was asked for before is late, and a baud rate came unasked.
+        let late = heard(&mut driver, "57600\r\n77\r\n88\r\n9 9\r\n");
+        assert!(late.motion.is_none() && late.readings.is_empty(), "{late:?}");
+        assert_eq!(polled(&mut driver), "\rb\r");
+        let late = heard(&mut driver, "77\r\n88\r\n9 9\r\nInvalid Command\r\n");
+        assert!(late.motion.is_none() && late.readings.is_empty() && !late.anything, "{late:?}");
+        assert!(heard(&mut driver, "57600\r\n").anything);
+        let said = round(&mut driver, "10\r\n20\r\n3 4\r\n");
+        let taken: Vec<_> = ranges(&said).iter().map(|range| (range.0, range.2)).collect();
+        assert_eq!((counts(&said), taken), (Some([3, 4]), vec![(0, 0.1), (1, 0.2)]));
+    }
+}
+
+#[test]
+fn a_line_that_nobody_asked_for_is_refused_too() {
+    let mut driver = driver();
+    assert!(heard(&mut driver, "12\r\n").refused.is_some());
+    assert_eq!(polled(&mut driver), "\rb\r");
+}
+
+#[test]
+fn a_round_that_is_overdue_is_dropped_and_its_late_answers_are_no_answers_of_the_next() {
+    let mut driver = driver();
+    assert_eq!(polled(&mut driver), ROUND);
+    assert!(heard(&mut driver, "11\r\n").readings.is_empty());
+    assert_eq!([polled(&mut driver), polled(&mut driver)], ["", ""]);
+    assert_eq!(polled(&mut driver), "\rb\r");
+    let late = heard(&mut driver, "22\r\n1 2\r\n");
+    assert!(late.motion.is_none() && late.readings.is_empty(), "{late:?}");
+    assert!(late.refused.is_some_and(|why| why.contains("`p 5` is overdue")));
+    assert!(heard(&mut driver, "57600\r\n").anything);
+    assert!(round(&mut driver, "1\r\n1\r\n1 2\r\n").motion.is_some());
+}
+
+#[test]
+fn a_baud_rate_is_asked_for_again_only_when_its_answer_is_lost() {
+    let mut driver = Arduino::new(&mission(""));
+    assert_eq!(polled(&mut driver), "\rb\r");
+    // The board boots, and says what is no answer: that makes no second question.
+    assert!(heard(&mut driver, "booting\r\n").refused.is_some());
+    for _ in 1..20 {
+        assert_eq!(polled(&mut driver), "");
+    }
+    assert_eq!(polled(&mut driver), "\rb\r");
+}
+
+#[test]
+fn a_wire_that_opens_again_begins_anew() {
+    let mut driver = driver();
+    assert_eq!(polled(&mut driver), ROUND);
+    driver.push(b"1\r\n2");
+    driver.reset();
+    assert_eq!(polled(&mut driver), "\rb\r");
+    let said = heard(&mut driver, "57600\r\n");
+    assert!(said.refused.is_none() && said.anything, "{said:?}");
+}
+
+#[test]
+fn counts_that_wrap_at_32_bits_go_on_and_their_speeds_are_those_of_the_interval_before() {
+    let mut driver = driver();
+    // A wheel makes 10 counts a tick of 0.1 s.
+    let before_wrap = i32::MAX - 4;
+    let mut sampled = Vec::new();
+    for tick in 0..4 {
+        let turned = before_wrap.wrapping_add(10 * tick);
+        let said = round(&mut driver, &format!("1\r\n1\r\n{turned} {}\r\n", -10 * tick));
+        let wheels = said.motion.unwrap().wheels;
+        sampled.push((wheels.left_counts, wheels.left_counts_per_s, wheels.right_counts_per_s));
+    }
+    assert_eq!(sampled[..2], [(32_763, 0, 0), (5, 0, 0)]);
+    assert_eq!(sampled[2..], [(15, 100, -100), (25, 100, -100)]);
+}
+
+#[test]
+fn the_speed_across_polls_without_a_round_is_by_the_time_between() {
+    let mut driver = driver();
+    round(&mut driver, "1\r\n1\r\n0 0\r\n");
+    assert_eq!(polled(&mut driver), ROUND);
+    assert_eq!(polled(&mut driver), "");
+    heard(&mut driver, "1\r\n1\r\n10 10\r\n");
+    // The poll without a request stands between this round and the one before.
+    round(&mut driver, "1\r\n1\r\n30 30\r\n");
+    let said = round(&mut driver, "1\r\n1\r\n30 30\r\n");
+    assert_eq!(said.motion.unwrap().wheels.left_counts_per_s, 100);
+}
+
+#[test]
+fn counts_that_begin_anew_are_said_as_they_are_and_their_jump_is_no_speed() {
+    let mut driver = driver();
+    for turned in [20_000, 20_010, 0, 5] {
+        let said = round(&mut driver, &format!("1\r\n1\r\n{turned} {turned}\r\n"));
+        let wheels = said.motion.unwrap().wheels;
+        assert_eq!(i32::from(wheels.left_counts), turned);
+        assert!(wheels.left_counts_per_s.abs() <= 100, "{wheels:?}");
+    }
+}
+
+#[test]
+fn a_flood_of_lines_or_of_bytes_without_an_end_is_bounded_and_begins_anew() {
+    let mut driver = driver();
+    assert_eq!(polled(&mut driver), ROUND);
+    driver.push("1\r\n".repeat(100_000).as_bytes());
+    assert!(driver.waiting.len() <= MOST_WAITING);
+    let said = driver.heard();
+    assert!(said.readings.is_empty() && said.refused.is_some());
+    assert_eq!(polled(&mut driver), "\rb\r");
+    for _ in 0..100 {
+        driver.push(&[b'1'; 10_000]);
+    }
+    assert!(driver.tally().bytes_dropped > 900_000);
+    heard(&mut driver, "\r\n57600\r\n");
+    assert!(round(&mut driver, "1\r\n1\r\n1 1\r\n").motion.is_some());
+}
+
+#[test]
+fn a_command_is_said_in_counts_of_the_speed_loop_and_the_slowest_turns_a_wheel() {
+    let driver = driver();
+    let limit = Duration::from_millis(250);
+    for (counts, said) in [
+        ([0, 0], "m 0 0\r"),
+        ([600, -600], "m 20 -20\r"),
+        ([44, 46], "m 1 2\r"),
+        // A wheel that hardly turns beside one that does may stand.
+        ([10, 300], "m 0 10\r"),
+        ([1, 0], "m 1 0\r"),
+        ([-2, 2], "m -1 1\r"),
+        ([14, 3], "m 1 0\r"),
+        ([i16::MIN, i16::MAX], "m -1092 1092\r"),
+    ] {
+        assert_eq!(driver.velocity(counts, limit), said.as_bytes(), "{counts:?}");
+    }
+    let slow = Arduino::new(&mission("robot.arduino.pid_rate_hz = 10"));
+    assert_eq!(slow.velocity([600, 30], limit), b"m 60 3\r");
+}
+
+#[test]
+fn all_that_a_poll_and_a_stop_send_fits_into_the_boards_buffer() {
+    // An Arduino holds 63 bytes that it has not read; at most six sonars have a row.
+    let (round, stops) = ("p 255\r".len() * 6 + "e\r".len(), "m 0 0\r".len() * 3);
+    assert!(round + stops < 63);
+}

@@ -1,0 +1,215 @@
+//! A robot that says nothing unasked: when it is polled, and what becomes of answers that are late or missing.
+
+use super::*;
+
+const POLL_MS: u64 = 100;
+const ROUND: &str = "p 4\re\r";
+
+fn mission() -> Mission {
+    let front = "[[robot.sensor]]\nname = 'front'\nkind = 'cone'\nchannel = 1\nforward_m = 0.1\nbearing_deg = 0\n";
+    let text = format!(
+        "target = [3, 0]\nrobot.protocol = 'arduino'\nrobot.counts_per_turn = 1200\nrobot.rate_hz = 10\nrobot.arduino.sonars = {{ front = 4 }}\n{front}"
+    );
+    Mission::parse(&text, Path::new("test.toml")).unwrap()
+}
+
+/// A board that answers each request after a delay, its link, and their time.
+struct Scene {
+    link: Link,
+    rate: f64,
+    ms: u64,
+    /// The delay of the board, none if it says nothing.
+    delay_ms: Option<u64>,
+    /// What it will say, and when.
+    answers: Vec<(u64, String)>,
+    sent: Vec<(u64, String)>,
+    ticks: Vec<u64>,
+    turned: i32,
+    speed: i32,
+}
+
+impl Scene {
+    fn at(pace: Pace) -> Self {
+        let mut link = Link::new(&mission());
+        link.restore(State { pace, next_tick: 0 }).unwrap();
+        let rate = if let Pace::Rate(rate) = pace { rate } else { 1.0 };
+        Self {
+            link,
+            rate,
+            ms: 0,
+            delay_ms: Some(5),
+            answers: Vec::new(),
+            sent: Vec::new(),
+            ticks: Vec::new(),
+            turned: 0,
+            speed: 0,
+        }
+    }
+
+    /// A robot that drives.
+    fn driving() -> Self {
+        let mut scene = Self::at(Pace::Rate(1.0));
+        scene.run(2000);
+        assert_eq!(scene.link.decision(), Decision::GO);
+        assert!(scene.speed > 0);
+        scene
+    }
+
+    fn event(&mut self, event: Event<'_>) {
+        let machine_ns = self.ms * MS;
+        let now = match self.link.state().pace {
+            Pace::Max => self.link.state().next_tick * POLL_MS * MS,
+            Pace::Rate(_) => (machine_ns as f64 * self.rate) as u64,
+        };
+        for effect in self.link.step(Input { event, machine_ns }, MissionTime(now)) {
+            match effect {
+                Effect::Send(bytes) if !bytes.is_empty() => {
+                    let said = String::from_utf8(bytes).unwrap();
+                    self.answer(&said);
+                    self.sent.push((self.ms, said));
+                }
+                Effect::Tick { tick, .. } => self.ticks.push(tick),
+                _ => {}
+            }
+        }
+    }
+
+    fn answer(&mut self, said: &str) {
+        for request in said.split_terminator('\r') {
+            let words: Vec<_> = request.split(' ').collect();
+            let answer = match words[..] {
+                ["e"] => format!("{0} {0}\r\n", self.turned),
+                // The range changes as the robot drives.
+                ["p", "4"] => format!("{}\r\n", 200 - self.turned / 100),
+                ["b"] => "57600\r\n".to_owned(),
+                ["m", left, _] => {
+                    self.speed = left.parse().unwrap();
+                    "OK\r\n".to_owned()
+                }
+                _ => "Invalid Command\r\n".to_owned(),
+            };
+            self.answers.extend(self.delay_ms.map(|delay| (self.ms + delay, answer)));
+        }
+    }
+
+    /// Let time pass in steps of 5 ms of the machine's clock. Each tick is answered at once.
+    fn run(&mut self, for_ms: u64) {
+        for _ in 0..for_ms / 5 {
+            self.ms += 5;
+            self.turned += self.speed * 30 * 5 / 1000;
+            if self.ms.is_multiple_of(200) {
+                self.event(Event::Order(Order::Drive, HoldReason::None));
+            }
+            let ms = self.ms;
+            let due: Vec<_> = self.answers.extract_if(.., |answer| answer.0 <= ms).collect();
+            for (_, answer) in due {
+                let ticks = self.ticks.len();
+                self.event(Event::Datagram(answer.as_bytes()));
+                if let Some(&tick) = self.ticks.get(ticks) {
+                    let now_ns = (self.ms as f64 * self.rate) as u64 * MS;
+                    self.event(Event::Command(&command(tick, now_ns, 2.0, 2.0)));
+                }
+            }
+            self.event(Event::Quiet);
+        }
+    }
+
+    /// When the board was asked for a round.
+    fn rounds(&self) -> Vec<u64> {
+        let rounds = self.sent.iter().filter(|(_, said)| said == ROUND);
+        rounds.map(|(at, _)| *at).collect()
+    }
+}
+
+#[test]
+fn a_robot_is_polled_at_its_rate_of_mission_time_and_each_answer_begins_a_tick() {
+    for (rate, period) in [(1.0, POLL_MS), (4.0, POLL_MS / 4)] {
+        let mut scene = Scene::at(Pace::Rate(rate));
+        scene.run(200);
+        (scene.sent, scene.ticks) = (Vec::new(), Vec::new());
+        scene.run(period * 20);
+        let rounds = scene.rounds();
+        assert!((19..=20).contains(&rounds.len()), "{rate}: {rounds:?}");
+        // 5 ms are the steps of this test.
+        assert!(rounds.windows(2).all(|two| (two[1] - two[0]).abs_diff(period) <= 5), "{rounds:?}");
+        assert!(scene.ticks.len().abs_diff(rounds.len()) <= 1, "{rate}: {:?}", scene.ticks);
+    }
+}
+
+#[test]
+fn a_poll_that_is_late_does_not_delay_the_next_and_none_is_made_up_for() {
+    let mut scene = Scene::at(Pace::Rate(1.0));
+    scene.run(310);
+    scene.sent = Vec::new();
+    // The link's process is not scheduled for a while. Polls are due each 100 ms.
+    scene.ms = 455;
+    scene.run(255);
+    assert_eq!(scene.rounds(), [460, 500, 600, 700]);
+    scene.ms = 1155;
+    scene.run(205);
+    assert_eq!(scene.rounds()[4..], [1160, 1260, 1360]);
+}
+
+#[test]
+fn a_closed_wire_is_not_polled_and_an_open_one_is_asked_for_its_baud_rate_first() {
+    let mut scene = Scene::driving();
+    scene.event(Event::Wire(false));
+    scene.sent = Vec::new();
+    scene.run(500);
+    assert_eq!(scene.rounds(), [0_u64; 0]);
+    scene.event(Event::Wire(true));
+    scene.run(200);
+    let asked: Vec<_> = scene.sent.iter().filter(|(_, said)| !said.starts_with('m')).collect();
+    assert_eq!((&*asked[0].1, &*asked[1].1), ("\rb\r", ROUND), "{asked:?}");
+}
+
+#[test]
+fn a_board_that_falls_silent_is_lost_and_told_to_stand_and_drives_on_when_it_answers() {
+    let mut scene = Scene::driving();
+    scene.delay_ms = None;
+    scene.run(900);
+    let decision = scene.link.decision();
+    assert_eq!((decision.action, decision.cause), (Action::Stop, Cause::RobotLost));
+    assert_eq!(scene.speed, 0);
+    scene.delay_ms = Some(5);
+    scene.run(5000);
+    assert_eq!(scene.link.decision(), Decision::GO);
+    assert!(scene.speed > 0);
+}
+
+#[test]
+fn answers_later_than_a_command_lasts_begin_no_tick_and_the_robot_stands() {
+    let mut scene = Scene::driving();
+    scene.delay_ms = Some(400);
+    scene.run(1000);
+    scene.ticks = Vec::new();
+    scene.run(2000);
+    assert_eq!((&scene.ticks[..], scene.speed), (&[][..], 0));
+    assert!(scene.link.decision().stops());
+}
+
+#[test]
+fn one_garbled_line_costs_three_ticks_and_no_more() {
+    let mut scene = Scene::driving();
+    let before = scene.ticks.len();
+    scene.run(1000);
+    let usual = scene.ticks.len() - before;
+    scene.event(Event::Datagram(b"1#\r\n"));
+    let before = scene.ticks.len();
+    scene.run(1000);
+    assert!(usual - (scene.ticks.len() - before) <= 3, "{usual}");
+    assert_eq!(scene.link.decision(), Decision::GO);
+}
+
+#[test]
+fn in_lockstep_each_command_and_ping_is_followed_by_one_poll_and_one_tick() {
+    let mut scene = Scene::at(Pace::Max);
+    // The order comes before the robot is found.
+    scene.event(Event::Order(Order::Drive, HoldReason::None));
+    scene.run(300);
+    let commands = scene.sent.iter().filter(|(_, said)| said.starts_with('m')).count();
+    assert!(commands >= 20, "{:?}", scene.sent);
+    assert_eq!(scene.ticks, (0..scene.ticks.len() as u64).collect::<Vec<_>>());
+    assert!(scene.rounds().len().abs_diff(scene.ticks.len()) <= 1, "{:?}", scene.sent);
+    assert!(scene.link.tally().repeated_ticks == 0);
+}

@@ -1,0 +1,167 @@
+//! The words of a simulated robot with an Arduino that speaks the protocol of ROSArduinoBridge: its requests become commands of the
+//! boards of a simulated X80, and their readings become answers. A sonar says what it heard at the newest tick.
+
+use common::{
+    mission::{Mission, RobotConfig},
+    wire::{Command, Echo, StandardSensors},
+};
+
+use crate::motor::Motor;
+
+/// A board that restarts hears nothing for so long, seconds: its boot loader waits for a program.
+const BOOTS_S: f64 = 1.5;
+/// The motors stop by themselves so long after the last command, milliseconds.
+const STOPS_AFTER_MS: u16 = 2000;
+/// The longest request, bytes.
+const LONGEST: usize = 64;
+
+/// A request of the host.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Request {
+    /// `e`: the encoder counts.
+    Counts,
+    /// `r`: count from 0.
+    Reset,
+    /// `m`: the speeds of the left and the right wheel, counts in a run of the speed loop.
+    Speeds([i32; 2]),
+    /// `p`: the range of the sonar on this pin.
+    Range(i32),
+    /// `b`: the baud rate.
+    Baud,
+    /// None of them.
+    Unknown,
+}
+
+impl Request {
+    /// The request of `line`, without its carriage return. A number that is missing or none is 0, as in the firmware.
+    fn parse(line: &[u8]) -> Self {
+        let text = String::from_utf8_lossy(line);
+        let mut words = text.split(' ');
+        let name = words.next().unwrap_or_default();
+        let mut number =
+            || words.next().and_then(|word| word.parse::<i16>().ok()).map_or(0, i32::from);
+        match name {
+            "e" => Self::Counts,
+            "r" => Self::Reset,
+            "m" => Self::Speeds([number(), number()]),
+            "p" => Self::Range(number()),
+            "b" => Self::Baud,
+            _ => Self::Unknown,
+        }
+    }
+}
+
+/// Bytes to requests.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Requests {
+    held: Vec<u8>,
+}
+
+impl Requests {
+    /// Take bytes. Returns the requests that they complete.
+    pub(crate) fn push(&mut self, bytes: &[u8]) -> Vec<Request> {
+        let mut complete = Vec::new();
+        for byte in bytes {
+            if *byte == b'\r' {
+                complete.push(Request::parse(&std::mem::take(&mut self.held)));
+            } else if self.held.len() < LONGEST {
+                self.held.push(*byte);
+            }
+        }
+        complete
+    }
+}
+
+/// Converts between the words and the boards.
+#[derive(Clone, Debug)]
+pub(crate) struct ArduinoWords {
+    robot: RobotConfig,
+    /// The pins of the sonars and their channels.
+    sonars: Vec<(i32, usize)>,
+    /// The counts at which the board counts 0.
+    zero: [f64; 2],
+    /// The mission time until which it boots, seconds.
+    boots_until: f64,
+}
+
+impl ArduinoWords {
+    pub(crate) fn new(mission: &Mission) -> Self {
+        let pins = &mission.robot.arduino.sonars;
+        let table = mission.sensor_table().into_iter();
+        let pin = |name: &String| pins.get(name).copied().map(i32::from);
+        let sonars = table.filter_map(|row| Some((pin(&row.name)?, usize::from(row.channel))));
+        Self {
+            robot: mission.robot.clone(),
+            sonars: sonars.collect(),
+            zero: [0.0; 2],
+            boots_until: 0.0,
+        }
+    }
+
+    /// Boot at mission time `now`: count from 0, and hear nothing for a while.
+    pub(crate) fn boot(&mut self, now: f64, motors: &[Motor; 6]) {
+        self.zero = self.turned(motors);
+        self.boots_until = now + BOOTS_S;
+    }
+
+    /// Whether it hears at mission time `now`.
+    pub(crate) fn hears(&self, now: f64) -> bool {
+        now >= self.boots_until
+    }
+
+    /// The answer to a request, and the command of the boards that it is.
+    pub(crate) fn answer(
+        &mut self,
+        request: Request,
+        sensors: &StandardSensors,
+        motors: &[Motor; 6],
+    ) -> (String, Option<Command>) {
+        let mut command = None;
+        let text = match request {
+            Request::Counts => {
+                let turned = self.turned(motors);
+                let [left, right] =
+                    [0, 1].map(|wheel| (turned[wheel] - self.zero[wheel]).round() as i64 as i32);
+                format!("{left} {right}")
+            }
+            Request::Reset => {
+                self.zero = self.turned(motors);
+                "OK".to_owned()
+            }
+            Request::Speeds(speeds) => {
+                command = Some(self.velocity(speeds));
+                "OK".to_owned()
+            }
+            Request::Range(pin) => {
+                let channel = self.sonars.iter().find(|sonar| sonar.0 == pin);
+                let byte = channel.and_then(|(_, channel)| sensors.ultrasonic.get(*channel));
+                let metres = byte.and_then(|byte| Echo::from_byte(*byte)?.metres());
+                format!("{}", (metres.unwrap_or_default() * 100.0).round() as i32)
+            }
+            Request::Baud => format!(" {}", self.robot.arduino.baud),
+            Request::Unknown => "Invalid Command".to_owned(),
+        };
+        (text + "\r\n", command)
+    }
+
+    /// The command that turns the wheels at these speeds, counts in a run of the speed loop.
+    fn velocity(&self, speeds: [i32; 2]) -> Command {
+        let mut channels = [None; 2];
+        for (wheel, speed) in [self.robot.left, self.robot.right].into_iter().zip(speeds) {
+            let counts = f64::from(speed) * self.robot.arduino.pid_rate_hz;
+            let signed = if wheel.reversed { -counts } else { counts };
+            // -32768 and -32767 mean that a channel is not changed.
+            let counts = signed.round().clamp(-32_766.0, 32_766.0) as i16;
+            channels[usize::from(wheel.channel.min(1))] = Some(counts);
+        }
+        Command::velocity(channels, STOPS_AFTER_MS)
+    }
+
+    /// The counts of the wheels, forward positive.
+    fn turned(&self, motors: &[Motor; 6]) -> [f64; 2] {
+        [self.robot.left, self.robot.right].map(|wheel| {
+            let counts = motors[usize::from(wheel.channel.min(1))].turned();
+            if wheel.reversed { -counts } else { counts }
+        })
+    }
+}

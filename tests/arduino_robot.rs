@@ -1,0 +1,102 @@
+//! Robots whose Arduino speaks the protocol of ROSArduinoBridge, simulated: the mission of the guide over each wire.
+
+use std::{
+    path::Path,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+};
+
+use recording::{
+    Recording,
+    replay::{Options, replay},
+};
+use rustix::process::Signal;
+
+use crate::support::{
+    Run, assert_nothing_left, assert_reached,
+    wire::{Proxy, Robot},
+};
+
+const MISSION: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../guide/example-arduino/robot.toml");
+const TARGET_M: f64 = 4.0;
+
+#[track_caller]
+fn assert_replays(directory: &Path) {
+    let recording = Recording::open(&directory.join("run/recording.mcap")).unwrap();
+    let report = replay(&recording, &Options::default()).unwrap();
+    assert_eq!(report.difference, None, "{report}");
+    assert_eq!(report.not_replayed(), 0, "{report}");
+}
+
+/// Assert that `run` arrives with its robot, and that its recording replays to the bit.
+#[track_caller]
+fn assert_arrives(run: Run, robot: Robot) {
+    let name = run.robot.clone();
+    let (code, summary, directory) = run.finish_in();
+    assert_reached(code, &summary);
+    let went = robot.kill();
+    assert!((went - TARGET_M).abs() < 0.5, "{went} m");
+    assert_replays(directory.path());
+    assert_nothing_left(&name);
+}
+
+/// A run of the robot that listens by `transport`.
+fn over(transport: &str, name: &str) -> (Robot, Run) {
+    let robot = Robot::start(MISSION, transport, "127.0.0.1:0");
+    let scheme = if transport == "pty" { "serial" } else { transport };
+    let address = format!("robot.address='{scheme}://{}'", robot.listening);
+    let run = Run::start(name, MISSION, &["--set", &address]);
+    (robot, run)
+}
+
+#[test]
+fn a_robot_with_an_arduino_arrives_in_lockstep_and_replays_to_the_bit() {
+    let (_, directory) = Run::start("arduino-max", MISSION, &["--pace", "max"]).arrives_in();
+    assert_replays(directory.path());
+}
+
+#[test]
+fn a_robot_with_an_arduino_whose_link_is_killed_arrives_over_a_serial_line_without_a_restart() {
+    let (mut robot, mut run) = over("pty", "arduino-pty");
+    robot.wait_until_driven(1.0);
+    let later = run.kill_and_await_successor("link", Signal::KILL);
+    assert_eq!(later["order"], "driving", "{later}");
+    let status = run.wait_until("the robot drives on", |status| {
+        status["link"]["connected"] == true && status["link"]["stopped"] == false
+    });
+    // The board would be silent for longer if opening the line had restarted it.
+    assert_eq!((&status["link"]["losses"], &status["link"]["reboots"]), (&0.into(), &0.into()));
+    assert_arrives(run, robot);
+}
+
+#[test]
+fn a_robot_with_an_arduino_that_restarts_with_each_connection_arrives_though_its_link_is_killed() {
+    let (mut robot, mut run) = over("tcp", "arduino-tcp");
+    robot.wait_until_driven(1.0);
+    run.kill_and_await_successor("link", Signal::KILL);
+    assert_arrives(run, robot);
+}
+
+#[test]
+fn a_robot_with_an_arduino_that_falls_silent_stands_and_drives_on_when_it_answers_again() {
+    let mut robot = Robot::start(MISSION, "udp", "127.0.0.1:0");
+    let silent = Arc::new(AtomicBool::new(false));
+    let is_silent = Arc::clone(&silent);
+    let to_link = move |bytes: &[u8]| match is_silent.load(Ordering::Relaxed) {
+        true => Vec::new(),
+        false => bytes.to_vec(),
+    };
+    let proxy = Proxy::before(&robot, Box::new(<[u8]>::to_vec), Box::new(to_link));
+    let mut run = Run::start("arduino-mute", MISSION, &["--set", &proxy.as_robot()]);
+    robot.wait_until_driven(1.0);
+    silent.store(true, Ordering::Relaxed);
+    run.wait_until("the silent robot is lost", |status| {
+        status["link"]["connected"] == false && status["link"]["stopped"] == true
+    });
+    robot.wait_until_at_rest();
+    silent.store(false, Ordering::Relaxed);
+    run.wait_until("the robot is found", |status| status["link"]["connected"] == true);
+    assert_arrives(run, robot);
+}
