@@ -52,8 +52,18 @@ fn over(transport: &str, name: &str) -> (Robot, Run) {
 }
 
 #[test]
-fn a_robot_with_an_arduino_arrives_in_lockstep_and_replays_to_the_bit() {
-    let (_, directory) = Run::start("arduino-max", MISSION, &["--pace", "max"]).arrives_in();
+fn a_robot_with_an_arduino_arrives_in_lockstep_on_the_same_way_each_time() {
+    let [first, second] = ["arduino-max", "arduino-again"].map(|name| {
+        let summary = Run::start(name, MISSION, &["--pace", "max"]).arrives();
+        let keys = ["ticks", "mission_time_s", "path_length_m", "pose_error_m"];
+        keys.map(|key| summary[key].to_string())
+    });
+    assert_eq!(first, second);
+}
+
+#[test]
+fn a_simulated_robot_with_an_arduino_arrives_and_replays_to_the_bit() {
+    let (_, directory) = Run::start("arduino-sim", MISSION, &["--pace", "4"]).arrives_in();
     assert_replays(directory.path());
 }
 

@@ -80,8 +80,8 @@ pub(crate) struct ArduinoWords {
     sonars: Vec<(i32, usize)>,
     /// The counts at which the board counts 0.
     zero: [f64; 2],
-    /// The mission time until which it boots, seconds.
-    boots_until: f64,
+    /// The mission time until which it boots, seconds; none when it has booted.
+    boots_until: Option<f64>,
 }
 
 impl ArduinoWords {
@@ -94,19 +94,24 @@ impl ArduinoWords {
             robot: mission.robot.clone(),
             sonars: sonars.collect(),
             zero: [0.0; 2],
-            boots_until: 0.0,
+            boots_until: None,
         }
     }
 
-    /// Boot at mission time `now`: count from 0, and hear nothing for a while.
-    pub(crate) fn boot(&mut self, now: f64, motors: &[Motor; 6]) {
-        self.zero = self.turned(motors);
-        self.boots_until = now + BOOTS_S;
+    /// Boot at mission time `now`.
+    pub(crate) fn boot(&mut self, now: f64) {
+        self.boots_until = Some(now + BOOTS_S);
     }
 
-    /// Whether it hears at mission time `now`.
-    pub(crate) fn hears(&self, now: f64) -> bool {
-        now >= self.boots_until
+    /// Whether it hears at mission time `now`. When it has booted, it counts from 0.
+    pub(crate) fn hears(&mut self, now: f64, motors: &[Motor; 6]) -> bool {
+        if self.boots_until.is_some_and(|until| now < until) {
+            return false;
+        }
+        if self.boots_until.take().is_some() {
+            self.zero = self.turned(motors);
+        }
+        true
     }
 
     /// The answer to a request, and the command of the boards that it is.

@@ -310,7 +310,7 @@ impl Robot {
         let Some(arduino) = &mut self.arduino else {
             return Heard::Foreign;
         };
-        if arduino.hears(self.time) {
+        if arduino.hears(self.time, &self.motors) {
             let (answer, command) = arduino.answer(request, &self.standard, &self.motors);
             replies.extend(answer.into_bytes());
             self.heard_at = self.time;
@@ -331,7 +331,7 @@ impl Robot {
     pub fn on_opened(&mut self) {
         if let Some(arduino) = &mut self.arduino {
             self.motors.iter_mut().for_each(Motor::halt);
-            arduino.boot(self.time, &self.motors);
+            arduino.boot(self.time);
         }
     }
 

@@ -31,10 +31,9 @@ impl Link {
         let is_open = self.monitors().presence.is_wire_open();
         if is_open && self.until_poll(self.now) == Some(Duration::ZERO) {
             let Polls { period_ns, next } = self.polls;
-            let following = [next, self.now].map(|from| from.0.saturating_add(period_ns));
-            let [following, after_now] = following;
-            self.polls.next =
-                MissionTime(if following > self.now.0 { following } else { after_now });
+            let [after_next, after_now] =
+                [next, self.now].map(|from| MissionTime(from.0.saturating_add(period_ns)));
+            self.polls.next = if after_next > self.now { after_next } else { after_now };
             self.poll(effects);
         }
     }
