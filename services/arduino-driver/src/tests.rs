@@ -101,7 +101,7 @@ fn after_a_line_that_does_not_fit_only_a_baud_rate_is_taken() {
         assert!(said.motion.is_none() && said.readings.is_empty(), "{bad:?}: {said:?}");
         assert!(said.refused.as_ref().is_some_and(|refused| refused.contains(why)), "{said:?}");
         // What was asked for before is late, and a baud rate came unasked.
-        let late = heard(&mut driver, "57600\r\n77\r\n88\r\n9 9\r\n");
+        let late = heard(&mut driver, "77\r\n88\r\n9 9\r\n57600\r\n");
         assert!(late.motion.is_none() && late.readings.is_empty(), "{late:?}");
         assert_eq!(polled(&mut driver), "\rb\r");
         let late = heard(&mut driver, "77\r\n88\r\n9 9\r\nInvalid Command\r\n");

@@ -16,6 +16,7 @@ pub mod backoff;
 mod clock_rate;
 pub mod drivers;
 pub mod failsafe;
+mod polls;
 pub mod shell;
 mod speed_trim;
 pub mod stage;

@@ -32,11 +32,10 @@ use crate::{
         presence::Absence,
         restart::RestartWatch,
     },
+    polls::Polls,
     speed_trim::SpeedTrim,
     wheel_speeds::WheelSpeeds,
 };
-
-use self::poll::Polls;
 
 pub use event::{Effect, Event, Input, State, Tally};
 

@@ -2,38 +2,21 @@
 
 use std::time::Duration;
 
-use common::{clock::MissionTime, mission::Mission};
+use common::clock::MissionTime;
 
 use super::{Effect, Link};
-
-/// The times at which a robot is polled.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Polls {
-    period_ns: u64,
-    next: MissionTime,
-}
-
-impl Polls {
-    pub(super) fn new(mission: &Mission) -> Self {
-        Self { period_ns: (1e9 / mission.robot.rate_hz) as u64, next: MissionTime::default() }
-    }
-}
 
 impl Link {
     /// The mission time until the robot is polled next; none if that does not depend on time.
     pub(crate) fn until_poll(&self, now: MissionTime) -> Option<Duration> {
         let by_time = self.driver.is_polled() && !self.in_ticks();
-        by_time.then(|| self.polls.next.since(now))
+        by_time.then(|| self.polls.until_next(now))
     }
 
-    /// Poll a robot when a period has passed. A poll that is late does not delay the next, unless that is due by then.
+    /// Poll a robot when that is due.
     pub(super) fn keep_polling(&mut self, effects: &mut Vec<Effect>) {
-        let is_open = self.monitors().presence.is_wire_open();
-        if is_open && self.until_poll(self.now) == Some(Duration::ZERO) {
-            let Polls { period_ns, next } = self.polls;
-            let [after_next, after_now] =
-                [next, self.now].map(|from| MissionTime(from.0.saturating_add(period_ns)));
-            self.polls.next = if after_next > self.now { after_next } else { after_now };
+        let by_time = self.driver.is_polled() && !self.in_ticks();
+        if by_time && self.monitors().presence.is_wire_open() && self.polls.take_due(self.now) {
             self.poll(effects);
         }
     }

@@ -1,0 +1,35 @@
+//! The times at which a robot is polled that says nothing unasked.
+
+use std::time::Duration;
+
+use common::{clock::MissionTime, mission::Mission};
+
+/// The next poll, and the period.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Polls {
+    period_ns: u64,
+    next: MissionTime,
+}
+
+impl Polls {
+    /// The polls of `mission`'s robot; the first is due at once.
+    pub(crate) fn new(mission: &Mission) -> Self {
+        Self { period_ns: (1e9 / mission.robot.rate_hz) as u64, next: MissionTime::default() }
+    }
+
+    /// The mission time from `now` until the next poll.
+    pub(crate) fn until_next(&self, now: MissionTime) -> Duration {
+        self.next.since(now)
+    }
+
+    /// Whether a poll is due at `now`, which is taken then. One that is late does not delay the next, and none is made up for.
+    pub(crate) fn take_due(&mut self, now: MissionTime) -> bool {
+        let is_due = self.until_next(now).is_zero();
+        if is_due {
+            let [after_next, after_now] =
+                [self.next, now].map(|from| MissionTime(from.0.saturating_add(self.period_ns)));
+            self.next = if after_next > now { after_next } else { after_now };
+        }
+        is_due
+    }
+}
