@@ -14,7 +14,7 @@ use rustix::{
     fs::{Mode, OFlags, fcntl_getfl, fcntl_setfl, open},
     io::{Errno, read, write},
     pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt},
-    termios::{ControlModes, LocalModes, tcgetattr},
+    termios::{ControlModes, LocalModes, OptionalActions, tcgetattr, tcsetattr},
 };
 use tempfile::TempDir;
 
@@ -251,6 +251,22 @@ fn a_serial_line_is_set_to_115200_8n1() {
         & (ControlModes::CSIZE | ControlModes::PARENB | ControlModes::CSTOPB);
     assert_eq!(character, ControlModes::CS8);
     assert!(!settings.local_modes.contains(LocalModes::ECHO));
+}
+
+#[test]
+fn a_line_to_an_arduino_has_the_boards_speed_and_is_closed_without_a_hangup_that_would_restart_it()
+{
+    let line = line();
+    let mut settings = tcgetattr(&line.robot).unwrap();
+    settings.control_modes.insert(ControlModes::HUPCL);
+    tcsetattr(&line.robot, OptionalActions::Now, &settings).unwrap();
+    let text = "target = [3, 0]\nrobot.protocol = 'arduino'\nrobot.counts_per_turn = 1320\nrobot.arduino.sonars = { front = 4 }\n[[robot.sensor]]\nname = 'front'\nkind = 'cone'\nchannel = 1\nforward_m = 0.1\nbearing_deg = 0\n";
+    let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
+    let mut transport = Transport::open(&Address::Serial(line.name.clone()), &mission).unwrap();
+    maintain_until(&mut transport, true, 0);
+    let settings = tcgetattr(&line.robot).unwrap();
+    assert_eq!(settings.output_speed(), 57_600);
+    assert!(!settings.control_modes.contains(ControlModes::HUPCL));
 }
 
 #[test]
