@@ -91,14 +91,20 @@ pub(crate) fn solve(
         let unknowns = bands.unknowns(top, number, steps);
         let here = bands.rectangle(&unknowns);
         levels.reshape(here.width, here.height);
-        bands.load(here, top, number, (&mut inverse, &mut values), levels);
+        bands.load(here, top, &unknowns.places, (&mut inverse, &mut values), levels);
         levels.converge((FIRST_CHECK, SINGLE_CYCLES), cancellation, |levels, checked| {
             cycled();
             if !checked {
                 return None;
             }
             levels.finish();
-            bands.read(here, number, levels, &mut values);
+            levels.unload(|row, found| {
+                let cells = row * here.width..(row + 1) * here.width;
+                let values = values[cells.clone()].iter_mut().zip(&inverse[cells]);
+                for ((value, _), found) in values.zip(found).filter(|it| *it.0.1 > 0.0) {
+                    *value = found.max(0.0);
+                }
+            });
             let check = verification::check_above_with(here.width, &values, &inverse, CHECKED);
             let excess = MARGIN * check.excess();
             (excess > 1.0 || !check.holds_where_reached()).then_some(excess)
@@ -212,50 +218,32 @@ impl<'a> Bands<'a> {
         Rectangle { col, row, width, height }
     }
 
-    /// Loads the equations of a band; `inverse` takes 1 / diagonal of its unknowns, `values` u of resolved cells.
+    /// Loads the equations of a band; `inverse` takes 1 / diagonal of its unknowns, `values` u of the resolved cells beside them.
     fn load(
         &self,
         here: Rectangle,
         top: i32,
-        number: i32,
+        unknowns: &[Place],
         (inverse, values): (&mut Vec<f32>, &mut Vec<f32>),
         levels: &mut Multigrid<f32>,
     ) {
-        let reference = top - f32::TOP;
         inverse.clear();
+        inverse.resize(here.width * here.height, 0.0);
         values.clear();
-        for row in here.row..here.row + here.height {
-            let start = row * self.domain.width() + here.col;
-            for cell in start..start + here.width {
-                let unknown = self.mantissas[cell] == 0.0 && self.exponents[cell] == number;
-                let k = self.domain.screening_coefficient(cell);
-                inverse.push(if unknown { (0.25 / (1.0 + k)) as f32 } else { 0.0 });
-                let u = Scaled { mantissa: self.mantissas[cell], exponent: self.exponents[cell] };
-                let value =
-                    if u.mantissa > 0.0 { u.relative_to(reference) as f32 } else { BLOCKED as f32 };
-                values.push(value.min(LARGEST));
-            }
+        values.resize(here.width * here.height, BLOCKED as f32);
+        for &at in unknowns {
+            let k = self.domain.screening_coefficient(self.index(at));
+            inverse[here.index(at)] = (0.25 / (1.0 + k)) as f32;
         }
-        let inflow = self.inflow(top).flat_map(|from| {
-            let value = self.u(from).relative_to(reference) as f32;
-            let marked = self.open(from).filter(|&to| self.u(to).exponent == number);
-            marked.map(move |to| (here.cell(to), value))
-        });
+        let inflow = |from| self.u(from).relative_to(top - f32::TOP) as f32;
+        for &at in self.edge.iter().filter(|&&at| here.contains(at)) {
+            values[here.index(at)] = inflow(at).min(LARGEST);
+        }
+        let inflow = self
+            .inflow(top)
+            .flat_map(|from| self.open(from).map(move |to| (here.cell(to), inflow(from))));
         let width = here.width;
         levels.load(|row| &inverse[row * width..(row + 1) * width], inflow);
-    }
-
-    /// Reads u of the unknowns of a band.
-    fn read(&self, here: Rectangle, number: i32, levels: &Multigrid<f32>, values: &mut [f32]) {
-        levels.unload(|row, found| {
-            let start = (here.row + row) * self.domain.width() + here.col;
-            let values = &mut values[row * here.width..][..here.width];
-            for ((value, &found), cell) in values.iter_mut().zip(found).zip(start..) {
-                if self.mantissas[cell] == 0.0 && self.exponents[cell] == number {
-                    *value = found.max(0.0);
-                }
-            }
-        });
     }
 
     /// Resolves the unknowns whose `value` is well inside the range; false if there is none.
@@ -278,6 +266,12 @@ impl<'a> Bands<'a> {
 }
 
 impl Rectangle {
+    fn contains(self, at: Place) -> bool {
+        let [col, row] = at.map(usize::from);
+        (self.col..self.col + self.width).contains(&col)
+            && (self.row..self.row + self.height).contains(&row)
+    }
+
     /// The place in the rectangle of a cell of the map.
     fn cell(self, at: Place) -> Cell {
         let [col, row] = at.map(usize::from);
