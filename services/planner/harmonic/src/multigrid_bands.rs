@@ -31,8 +31,10 @@ const MARGIN: f64 = 16.0;
 /// u of resolved cells is at most this in a band's units; larger ones are not beside an unknown.
 const LARGEST: f32 = 1e35;
 
-/// Steps of a band as a multiple of those in which u fell out of range in the band before.
-const RESERVE: f64 = 1.25;
+/// Steps of a band beyond those in which u fell out of range in the band before, and as a multiple of them. A band that is cut too
+/// short is computed again.
+const MORE: usize = 4;
+const RESERVE: f64 = 1.1;
 
 /// The sides of rectangles are multiples of this, for whole vectors.
 const SIDES: usize = 16;
@@ -116,7 +118,7 @@ pub(crate) fn solve(
             steps *= 2;
             continue;
         }
-        steps = 8 + (RESERVE * reached as f64) as usize;
+        steps = MORE + (RESERVE * reached as f64) as usize;
         if !bands.resolve(&unknowns.places, value, top) {
             break;
         }
