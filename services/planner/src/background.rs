@@ -24,6 +24,8 @@ pub(crate) struct Background<Job, Done> {
     done: UnixStream,
     /// Jobs whose end has not been read from `done` yet.
     unread: u64,
+    /// Ends that were read and whose results were not taken; less than 0 where a result was waited for and its end is still to be read.
+    ended: i64,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -49,7 +51,7 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
             }
         };
         let thread = std::thread::Builder::new().name(name.to_owned()).spawn(all)?;
-        Ok(Self { jobs: Some(jobs), results, done, unread: 0, thread: Some(thread) })
+        Ok(Self { jobs: Some(jobs), results, done, unread: 0, ended: 0, thread: Some(thread) })
     }
 
     /// Have `job` done, after those before it.
@@ -61,14 +63,18 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
         }
     }
 
+    /// The next result, if its end was signalled: a signal that came after its result was taken would wake the process for ever.
     pub(crate) fn take(&mut self) -> Option<Done> {
         self.drain();
-        self.results.try_recv().ok()
+        let result = (self.ended > 0).then(|| self.results.try_recv().ok()).flatten();
+        self.ended -= i64::from(result.is_some());
+        result
     }
 
     /// The next result; waits for it. None when the thread has ended.
     pub(crate) fn wait(&mut self) -> Option<Done> {
         let result = self.results.recv().ok();
+        self.ended -= i64::from(result.is_some());
         self.drain();
         result
     }
@@ -78,7 +84,10 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
         // Without a job the system call is saved.
         while self.unread > 0 {
             match self.done.read(&mut wakeups) {
-                Ok(read @ 1..) => self.unread = self.unread.saturating_sub(read as u64),
+                Ok(read @ 1..) => {
+                    self.unread = self.unread.saturating_sub(read as u64);
+                    self.ended += read as i64;
+                }
                 _ => return,
             }
         }
@@ -122,6 +131,21 @@ fn behind_stages() {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn after_its_result_was_taken_a_job_wakes_nobody() {
+        for job in 0..200 {
+            let mut thread = Background::start("test", |job: u32| job).unwrap();
+            thread.begin(job);
+            let result = std::iter::repeat_with(|| thread.take()).flatten().next();
+            assert_eq!(result, Some(job));
+            thread.jobs = None;
+            thread.thread.take().unwrap().join().unwrap();
+            let error = thread.done.read(&mut [0]).map_err(|error| error.kind());
+            // The end of the thread is readable, too, and has no byte.
+            assert!(matches!(error, Ok(0) | Err(io::ErrorKind::WouldBlock)), "{error:?}");
+        }
+    }
 
     #[test]
     fn niceness_10_is_10() {
