@@ -43,14 +43,20 @@ pub trait Driver: fmt::Debug {
         None
     }
 
-    /// What the robot is told when it is found: its settings, and that it sends its sensors.
-    fn greeting(&self) -> Vec<u8>;
+    /// What the robot is told when it is found: its settings, and that it sends its sensors. Not each protocol has such words.
+    fn greeting(&self) -> Vec<u8> {
+        Vec::new()
+    }
 
-    /// Ask the robot to send its sensors.
-    fn ask_for_sensors(&self) -> Vec<u8>;
+    /// Ask the robot to send its sensors. One that publishes them, or is polled for them, is not asked.
+    fn ask_for_sensors(&self) -> Vec<u8> {
+        Vec::new()
+    }
 
-    /// Ask the robot to answer.
-    fn ping(&self) -> Vec<u8>;
+    /// Ask the robot to answer. One that publishes, or is polled, is not asked.
+    fn ping(&self) -> Vec<u8> {
+        Vec::new()
+    }
 
     /// Whether the robot says nothing unasked, so that it is polled.
     fn is_polled(&self) -> bool {
@@ -81,8 +87,10 @@ pub trait Driver: fmt::Debug {
     fn remember(&mut self, _memory: &Memory) {}
 
     /// The methods that stop a robot which does not obey a velocity of 0, in the order in which they are tried. After one of them the
-    /// robot must be greeted before it drives.
-    fn other_stops(&self) -> Vec<StopMethod>;
+    /// robot must be greeted before it drives. Not each protocol has such methods.
+    fn other_stops(&self) -> Vec<StopMethod> {
+        Vec::new()
+    }
 }
 
 /// What makes the counts of a robot that says its pose go on: x, y and heading by its odometry, and the angles that its wheels are taken
@@ -104,6 +112,27 @@ pub struct WireTally {
     pub messages: u64,
     /// The bytes that belong to no message, or were dropped unread.
     pub bytes_dropped: u64,
+}
+
+impl WireTally {
+    /// Count `piece`, a message or what should be one, and note in `heard` why it was refused. Returns whether it was `taken`.
+    pub fn count(&mut self, piece: &[u8], taken: Result<(), String>, heard: &mut Heard) -> bool {
+        let is_taken = taken.is_ok();
+        match taken {
+            Ok(()) => self.messages += 1,
+            Err(why) => {
+                self.bytes_dropped += piece.len() as u64;
+                heard.refused = Some(why);
+            }
+        }
+        is_taken
+    }
+
+    /// These counts and the bytes that were dropped before they could be a message.
+    #[must_use]
+    pub const fn with_dropped(self, bytes: u64) -> Self {
+        Self { bytes_dropped: self.bytes_dropped + bytes, ..self }
+    }
 }
 
 /// What a robot said. Of each kind of message the newest counts.

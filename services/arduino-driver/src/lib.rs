@@ -22,7 +22,7 @@ mod answers;
 use std::time::Duration;
 
 use common::{
-    driver::{Driver, Heard, Motion, Readings, StopMethod, WireTally},
+    driver::{Driver, Heard, Motion, Readings, WireTally},
     json_wire::Lines,
     mission::Mission,
     samples::{RangeReading, WheelSample},
@@ -195,13 +195,9 @@ impl Driver for Arduino {
     fn heard(&mut self) -> Heard {
         let mut heard = Heard { refused: self.dropped.take(), ..Heard::default() };
         for line in std::mem::take(&mut self.waiting) {
-            match self.take(&line, &mut heard) {
-                Ok(()) => self.tally.messages += 1,
-                Err(why) => {
-                    self.tally.bytes_dropped += line.len() as u64;
-                    self.begin_anew();
-                    heard.refused = Some(why);
-                }
+            let taken = self.take(&line, &mut heard);
+            if !self.tally.count(&line, taken, &mut heard) {
+                self.begin_anew();
             }
         }
         heard.readings = self.readings.take_fresh();
@@ -209,27 +205,11 @@ impl Driver for Arduino {
     }
 
     fn tally(&self) -> WireTally {
-        let WireTally { messages, bytes_dropped } = self.tally;
-        WireTally { messages, bytes_dropped: bytes_dropped + self.lines.dropped() }
+        self.tally.with_dropped(self.lines.dropped())
     }
 
     fn readings_for_tick(&mut self) -> Vec<RangeReading> {
         self.readings.for_tick()
-    }
-
-    /// The board has no settings that the link needs.
-    fn greeting(&self) -> Vec<u8> {
-        Vec::new()
-    }
-
-    /// The polls ask for them.
-    fn ask_for_sensors(&self) -> Vec<u8> {
-        Vec::new()
-    }
-
-    /// The polls ask for an answer.
-    fn ping(&self) -> Vec<u8> {
-        Vec::new()
     }
 
     fn is_polled(&self) -> bool {
@@ -239,16 +219,15 @@ impl Driver for Arduino {
     fn poll(&mut self) -> Vec<u8> {
         self.polls += 1;
         let (now, overdue) = (self.polls, self.overdue);
-        match &self.waits {
-            Waits::Round { since, ranges } if now - since >= overdue => {
-                let asked = self.sonars.get(ranges.len());
-                let asked = asked.map_or_else(|| "e".to_owned(), |(pin, _)| format!("p {pin}"));
-                self.dropped = Some(format!(
-                    "the answer to `{asked}` is overdue by robot.command_limit_s: is that sonar connected, are all bytes carried?"
-                ));
-                self.begin_anew();
-            }
-            _ => {}
+        if let Waits::Round { since, ranges } = &self.waits
+            && now - since >= overdue
+        {
+            let asked = self.sonars.get(ranges.len());
+            let asked = asked.map_or_else(|| "e".to_owned(), |(pin, _)| format!("p {pin}"));
+            self.dropped = Some(format!(
+                "the answer to `{asked}` is overdue by robot.command_limit_s: is that sonar connected, are all bytes carried?"
+            ));
+            self.begin_anew();
         }
         match &self.waits {
             Waits::No => {
@@ -273,11 +252,6 @@ impl Driver for Arduino {
         let enlarged = if greatest > 0.0 && greatest < 0.5 { 1.0 / greatest } else { 1.0 };
         let [left, right] = exact.map(|speed| (speed * enlarged).round() as i32);
         format!("m {left} {right}\r").into_bytes()
-    }
-
-    /// The protocol has no other.
-    fn other_stops(&self) -> Vec<StopMethod> {
-        Vec::new()
     }
 }
 

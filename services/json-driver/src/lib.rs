@@ -133,24 +133,15 @@ impl Driver for Json {
     fn heard(&mut self) -> Heard {
         let mut heard = Heard::default();
         for line in std::mem::take(&mut self.waiting) {
-            match parse(&line).and_then(|report| self.take(&report, &mut heard)) {
-                Ok(()) => {
-                    heard.anything = true;
-                    self.tally.messages += 1;
-                }
-                Err(why) => {
-                    self.tally.bytes_dropped += line.len() as u64;
-                    heard.refused = Some(why);
-                }
-            }
+            let taken = parse(&line).and_then(|report| self.take(&report, &mut heard));
+            heard.anything |= self.tally.count(&line, taken, &mut heard);
         }
         heard.readings = self.readings.take_fresh();
         heard
     }
 
     fn tally(&self) -> WireTally {
-        let WireTally { messages, bytes_dropped } = self.tally;
-        WireTally { messages, bytes_dropped: bytes_dropped + self.lines.dropped() }
+        self.tally.with_dropped(self.lines.dropped())
     }
 
     fn readings_for_tick(&mut self) -> Vec<RangeReading> {

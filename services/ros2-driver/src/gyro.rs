@@ -86,8 +86,8 @@ impl Gyro {
         Ok(())
     }
 
-    /// Odometry with this stamp begins a tick, and says that the robot turned by `by_odometry` since the tick before. Returns what is wrong with the gyro, if that
-    /// is new.
+    /// Odometry with this stamp begins a tick, and says that the robot turned by `by_odometry` since the tick before. Returns what is wrong
+    /// with the gyro, if that is new.
     pub(crate) fn odometry(&mut self, stamp_ns: i64, by_odometry: f64) -> Option<String> {
         let newest = self.newest?;
         let since_ns = stamp_ns - newest.imu.stamp_ns;

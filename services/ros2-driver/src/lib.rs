@@ -17,7 +17,7 @@ use std::{f64::consts::TAU, time::Duration};
 
 use common::{
     driver::{
-        Commander, Driver, Heard, Memory, Readings, StopMethod, Turn, WireTally,
+        Commander, Driver, Heard, Memory, Readings, Turn, WireTally,
         laser::Laser,
         odometry::{self, drive, motion, twist},
     },
@@ -263,13 +263,8 @@ impl Driver for Ros2 {
     fn heard(&mut self) -> Heard {
         let mut heard = Heard::default();
         for piece in std::mem::take(&mut self.waiting) {
-            match self.take(&piece, &mut heard) {
-                Ok(()) => self.tally.messages += 1,
-                Err(why) => {
-                    self.tally.bytes_dropped += piece.len() as u64;
-                    heard.refused = Some(why);
-                }
-            }
+            let taken = self.take(&piece, &mut heard);
+            self.tally.count(&piece, taken, &mut heard);
         }
         heard.readings = self.readings.take_fresh();
         heard
@@ -291,20 +286,6 @@ impl Driver for Ros2 {
         self.gyro.for_tick()
     }
 
-    /// Topics need no greeting.
-    fn greeting(&self) -> Vec<u8> {
-        Vec::new()
-    }
-
-    fn ask_for_sensors(&self) -> Vec<u8> {
-        Vec::new()
-    }
-
-    /// A robot publishes without being asked.
-    fn ping(&self) -> Vec<u8> {
-        Vec::new()
-    }
-
     /// `Twist` has no word for the limit.
     fn velocity(&self, counts: [i16; 2], _limit: Duration) -> Vec<u8> {
         let Twist { v, omega } = twist(&self.body, counts);
@@ -317,10 +298,6 @@ impl Driver for Ros2 {
 
     fn remember(&mut self, memory: &Memory) {
         self.odometry.remember(*memory);
-    }
-
-    fn other_stops(&self) -> Vec<StopMethod> {
-        Vec::new()
     }
 }
 
