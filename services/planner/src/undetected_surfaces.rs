@@ -146,54 +146,52 @@ impl UndetectedSurfaces {
 
     /// Whether the `beams` and `rays` exclude a surface that touches a body at `at` on the side of `normal`.
     fn is_excluded(&self, at: DVec2, normal: DVec2, beams: [&[Beam]; 2], rays: &[Beam]) -> bool {
-        let [far, near] = self.answers;
         let (mut silences, mut echoes) = (0, 0);
         // The readings that are still to be asked. Once they cannot outweigh the silences, the others need not be.
         let mut left = beams[0].len() + beams[1].len() + rays.len();
-        for beam in beams.into_iter().flatten() {
+        let beams = beams.into_iter().flatten();
+        let beams = beams.map(|beam| (beam, self.answers_from(beam, at, normal)));
+        let rays = rays.iter().map(|ray| (ray, self.met_after(ray, at, normal)));
+        for (reading, distance) in beams.chain(rays) {
             left -= 1;
-            let square = beam.axis.dot(normal);
-            // However near the surface is, it does not answer such a beam.
-            if square < near {
-                continue;
-            }
-            let offset = at - beam.origin;
-            let distance = offset.dot(normal) + self.reach;
-            let answers = if distance <= NEAR_M { near } else { far };
-            if square < answers || offset.perp_dot(normal).abs() > EXTENDS_M {
-                continue;
-            }
-            if distance <= beam.clear {
-                silences += 1;
-                if silences * ECHOES_FOR_A_SILENCE > echoes + left {
-                    return true;
+            match distance {
+                Some(distance) if distance <= reading.clear => {
+                    silences += 1;
+                    if silences * ECHOES_FOR_A_SILENCE > echoes + left {
+                        return true;
+                    }
                 }
-            } else if distance <= beam.clear + NEAR_ECHO_M {
-                echoes += 1;
-            }
-        }
-        for ray in rays {
-            left -= 1;
-            let slant = ray.axis.dot(normal);
-            if slant < LEAST_SLANT {
-                continue;
-            }
-            let offset = at - ray.origin;
-            let meets = (offset.dot(normal) + self.reach) / slant;
-            let along_surface = (meets * ray.axis - offset).perp_dot(normal).abs();
-            if meets < 0.0 || along_surface > MET_WITHIN_M {
-                continue;
-            }
-            if meets <= ray.clear {
-                silences += 1;
-                if silences * ECHOES_FOR_A_SILENCE > echoes + left {
-                    return true;
-                }
-            } else if meets <= ray.clear + NEAR_ECHO_M {
-                echoes += 1;
+                Some(distance) if distance <= reading.clear + NEAR_ECHO_M => echoes += 1,
+                _ => {}
             }
         }
         silences * ECHOES_FOR_A_SILENCE > echoes
+    }
+
+    /// The distance from which such a surface answers `beam`, metres; none if it does not.
+    fn answers_from(&self, beam: &Beam, at: DVec2, normal: DVec2) -> Option<f64> {
+        let [far, near] = self.answers;
+        let square = beam.axis.dot(normal);
+        // However near the surface is, it does not answer such a beam.
+        if square < near {
+            return None;
+        }
+        let offset = at - beam.origin;
+        let distance = offset.dot(normal) + self.reach;
+        let answers = if distance <= NEAR_M { near } else { far };
+        (square >= answers && offset.perp_dot(normal).abs() <= EXTENDS_M).then_some(distance)
+    }
+
+    /// The distance after which `ray` meets such a surface near the body, metres; none if it does not.
+    fn met_after(&self, ray: &Beam, at: DVec2, normal: DVec2) -> Option<f64> {
+        let slant = ray.axis.dot(normal);
+        if slant < LEAST_SLANT {
+            return None;
+        }
+        let offset = at - ray.origin;
+        let meets = (offset.dot(normal) + self.reach) / slant;
+        let along_surface = (meets * ray.axis - offset).perp_dot(normal).abs();
+        (meets >= 0.0 && along_surface <= MET_WITHIN_M).then_some(meets)
     }
 }
 

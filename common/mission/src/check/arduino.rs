@@ -65,16 +65,10 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+    use crate::check::tests::refusal;
 
     const ROBOT: &str = "target = [3, 0]\nrobot.protocol = 'arduino'\nrobot.counts_per_turn = 1320\nrobot.arduino.sonars = { front = 4 }\n";
     const FRONT: &str = "[[robot.sensor]]\nname = 'front'\nkind = 'cone'\nchannel = 1\nforward_m = 0.1\nbearing_deg = 0\n";
-
-    fn refusal(text: &str) -> String {
-        match Mission::parse(text, Path::new("m.toml")) {
-            Ok(_) => panic!("accepted: {text}"),
-            Err(error) => error.to_string(),
-        }
-    }
 
     #[test]
     fn a_board_with_counts_and_a_pin_for_each_sonar_is_accepted_and_reads_back_the_same() {

@@ -67,16 +67,10 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+    use crate::check::tests::refusal;
 
     const ROBOT: &str =
         "target = [3, 0]\nrobot.model = 'turtlebot3-burger'\nrobot.protocol = 'ros2'\n";
-
-    fn refusal(text: &str) -> String {
-        match Mission::parse(text, Path::new("m.toml")) {
-            Ok(_) => panic!("accepted: {text}"),
-            Err(error) => error.to_string(),
-        }
-    }
 
     #[test]
     fn a_robot_of_ros_needs_a_domain_and_other_robots_have_none() {

@@ -123,18 +123,10 @@ fn channel(key: &'static str, kind: SensorKind, channel: u8) -> Result<(), Objec
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
-    use super::*;
-
     const FRONT: &str = "[[robot.sensor]]\nname = 'front'\nkind = 'cone'\nchannel = 1\nforward_m = 0.19\nbearing_deg = 0\n";
 
     fn refusal(text: &str) -> String {
-        let text = format!("target = [3, 0]\n{text}");
-        match Mission::parse(&text, Path::new("m.toml")) {
-            Ok(_) => panic!("accepted: {text}"),
-            Err(error) => error.to_string(),
-        }
+        crate::check::tests::refusal(&format!("target = [3, 0]\n{text}"))
     }
 
     #[test]

@@ -1,7 +1,9 @@
 use super::*;
 use crate::Method;
 
-fn refusal(text: &str) -> String {
+/// The error with which a mission file of this text is refused.
+#[track_caller]
+pub(super) fn refusal(text: &str) -> String {
     match parse(text, Path::new("m.toml")) {
         Ok(_) => panic!("accepted: {text}"),
         Err(error) => error.to_string(),
