@@ -90,6 +90,8 @@ pub(crate) struct Multigrid<R> {
     products: Vec<Products<R>>,
     /// Whether the first coarse level holds a correction of u, and not a first guess or nothing.
     corrects: bool,
+    /// Whether u falls so steeply that second visits save no cycle.
+    is_steep: bool,
     simd: Simd,
 }
 
@@ -102,6 +104,7 @@ impl<R: Real> Multigrid<R> {
             coarsest: Coarsest::default(),
             products: Vec::new(),
             corrects: false,
+            is_steep: false,
             simd: Simd::default(),
         };
         levels.reshape(width, height);
@@ -128,6 +131,7 @@ impl<R: Real> Multigrid<R> {
 
     /// Sets the equations that depend on `rows` of the map, and no others, on all levels.
     pub(crate) fn set_up_rows(&mut self, domain: &Domain, rows: Range<usize>) {
+        self.is_steep = false;
         let finest = &mut self.finest;
         let width = domain.width();
         self.simd.run(
@@ -249,12 +253,14 @@ impl<R: Real> Multigrid<R> {
     }
 
     /// Loads equations other than a map's: for each row 1 / diagonal (0 for a cell that stays zero), and the inflow by cell.
-    /// Every pair of neighbours is coupled by one. Starts from the coarsest level's solution.
+    /// Every pair of neighbours is coupled by one. `is_steep` says that u falls within a few cells. Starts from the coarsest level's solution.
     pub(crate) fn load<'a>(
         &mut self,
         rows: impl Fn(usize) -> &'a [R],
         inflow: impl Iterator<Item = (Cell, R)>,
+        is_steep: bool,
     ) {
+        self.is_steep = is_steep;
         let finest = &mut self.finest;
         let (grid, width, height) = (finest.grid, finest.grid.width, finest.grid.height);
         let mut buffer = vec![R::default(); 2 * grid.columns];
@@ -330,7 +336,7 @@ impl<R: Real> Multigrid<R> {
     fn solve_level(&mut self, level: usize) {
         self.visit(level);
         // The coarsest level of a large map is none of these.
-        if self.is_large() && VISITED_TWICE.contains(&level) {
+        if self.is_large() && !self.is_steep && VISITED_TWICE.contains(&level) {
             self.second_visit(level);
         }
     }

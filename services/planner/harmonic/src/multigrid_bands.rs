@@ -36,6 +36,9 @@ const LARGEST: f32 = 1e35;
 const MORE: usize = 4;
 const RESERVE: f64 = 1.1;
 
+/// In a band of at most so many steps the second visits of coarse levels save no cycle, and take up to a third of the time.
+const STEEP: usize = 96;
+
 /// The sides of rectangles are multiples of this, for whole vectors.
 const SIDES: usize = 16;
 
@@ -93,7 +96,7 @@ pub(crate) fn solve(
         let unknowns = bands.unknowns(top, number, steps);
         let here = bands.rectangle(&unknowns);
         levels.reshape(here.width, here.height);
-        bands.load(here, top, &unknowns.places, (&mut inverse, &mut values), levels);
+        bands.load(here, top, &unknowns, (&mut inverse, &mut values), levels);
         levels.converge((FIRST_CHECK, SINGLE_CYCLES), cancellation, |levels, checked| {
             cycled();
             if !checked {
@@ -225,7 +228,7 @@ impl<'a> Bands<'a> {
         &self,
         here: Rectangle,
         top: i32,
-        unknowns: &[Place],
+        unknowns: &Unknowns,
         (inverse, values): (&mut Vec<f32>, &mut Vec<f32>),
         levels: &mut Multigrid<f32>,
     ) {
@@ -233,7 +236,7 @@ impl<'a> Bands<'a> {
         inverse.resize(here.width * here.height, 0.0);
         values.clear();
         values.resize(here.width * here.height, BLOCKED as f32);
-        for &at in unknowns {
+        for &at in &unknowns.places {
             let k = self.domain.screening_coefficient(self.index(at));
             inverse[here.index(at)] = (0.25 / (1.0 + k)) as f32;
         }
@@ -245,7 +248,8 @@ impl<'a> Bands<'a> {
             .inflow(top)
             .flat_map(|from| self.open(from).map(move |to| (here.cell(to), inflow(from))));
         let width = here.width;
-        levels.load(|row| &inverse[row * width..(row + 1) * width], inflow);
+        let is_steep = unknowns.starts.len() <= STEEP;
+        levels.load(|row| &inverse[row * width..(row + 1) * width], inflow, is_steep);
     }
 
     /// Resolves the unknowns whose `value` is well inside the range; false if there is none.

@@ -4,7 +4,7 @@
 //! Every time is the least of several runs. Arguments after `--` select the measurements:
 //! - `quick` leaves out the large maps.
 //! - `updates` measures only the updates.
-//! - `accuracy` measures angles instead of times.
+//! - `accuracy` measures angles instead of times, also along a thousand changes of a map.
 //! - `split` measures the phases of a solve; with `quick` on small maps.
 //! - `growth` measures time and memory by the size of the map.
 //! - `sweep` measures a sweep over widths of corridors and doors, densities and depths of u, the worst first; `sweep angles` its angles.
@@ -80,15 +80,16 @@ fn main() {
     updates::table(quick);
 }
 
-/// A map without walls, one with, and the largest of those in a directory, where one is given.
+/// A map without walls, one with, of two sizes, and the largest of those in a directory, where one is given.
 fn sequence_maps() -> Vec<(String, Domain)> {
-    let generated = [Kind::Empty, Kind::Office].map(|kind| {
-        let domain = Map::generate(kind, 512, 512, 1).domain();
-        (format!("{kind:?} 512"), domain.expect("a valid map"))
+    let kinds = [512, 1024].map(|side| [Kind::Empty, Kind::Office].map(|kind| (kind, side)));
+    let generated = kinds.into_iter().flatten().map(|(kind, side)| {
+        let domain = Map::generate(kind, side, side, 1).domain();
+        (format!("{kind:?} {side}"), domain.expect("a valid map"))
     });
     let real = maps_directory().map(|it| real::load_all(Path::new(&it)));
     let largest = real.into_iter().flatten().max_by_key(|(_, domain)| domain.blocked().len());
-    generated.into_iter().chain(largest).collect()
+    generated.chain(largest).collect()
 }
 
 /// The directory that `--maps` names.
