@@ -38,6 +38,11 @@ impl Histogram {
         self.max_ns
     }
 
+    /// The number of latencies that were counted.
+    pub fn total(&self) -> u64 {
+        self.counts.iter().map(|&count| u64::from(count)).sum()
+    }
+
     /// Add the counts of another histogram, for example of another generation of its writer.
     pub fn add(&mut self, counts: &[u32; BUCKETS], max_ns: u64) {
         for (own, other) in self.counts.iter_mut().zip(counts) {
@@ -49,7 +54,7 @@ impl Histogram {
     /// The upper end of the bucket that holds the `share` quantile, microseconds, never above the longest; none if nothing was
     /// counted.
     pub fn quantile_us(&self, share: f64) -> Option<f64> {
-        let total: u64 = self.counts.iter().map(|&count| u64::from(count)).sum();
+        let total = self.total();
         if total == 0 {
             return None;
         }

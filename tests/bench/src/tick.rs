@@ -4,22 +4,27 @@
 //! |---|---|
 //! | [`Arguments`], [`measure`] | missions and bare hops, in turn |
 //! | [`hops`] | five bare hops between processes |
+//! | [`plain_hops`] | the same by eventfds and by datagrams, without the bus |
+//! | [`busy`], [`consumers`] | other processes meanwhile |
 //! | `mission` | a mission whose ticks are measured |
-//! | [`Regime`] | how ticks follow each other |
+//! | `regime` | how ticks follow each other |
 //! | `budget` | the microseconds of each stage and item |
 //! | `process_set` | resources of a process and its descendants |
 //! | [`Report`] | the result, as it is printed |
 
 mod budget;
+pub mod busy;
 pub mod consumers;
 pub mod hops;
 mod mission;
 mod options;
+pub mod plain_hops;
 mod process_set;
 mod regime;
 mod report;
 
 use common::{domain::RobotName, latency::Histogram};
+use plain_hops::Carrier;
 
 pub use options::Arguments;
 pub use report::Report;
@@ -33,27 +38,43 @@ const TRIPS: u64 = 2000;
 /// Trips of a round with the pause of a tick between them.
 const PACED_TRIPS: u64 = 50;
 
-/// Measure missions of `robot` and bare hops, in turn. The mission has `rate_hz` ticks in a mission second.
+/// Measure missions of `robot` and hops, in turn, in each regime that is asked for. The mission has `rate_hz` ticks in a mission second.
 pub fn measure(
     arguments: &Arguments,
     robot: &RobotName,
     rate_hz: f64,
+) -> Result<Vec<Report>, BenchError> {
+    let _busy = busy::start(arguments.busy)?;
+    let regimes = Regime::all(arguments.rate, arguments.pace, rate_hz);
+    regimes.into_iter().map(|regime| measure_in(regime, arguments, robot, rate_hz)).collect()
+}
+
+fn measure_in(
+    regime: Regime,
+    arguments: &Arguments,
+    robot: &RobotName,
+    rate_hz: f64,
 ) -> Result<Report, BenchError> {
-    let regime = Regime::new(arguments.rate, arguments.pace, rate_hz);
     let trips = match regime {
         Regime::BackToBack => TRIPS,
         Regime::Rate { .. } => PACED_TRIPS,
     };
+    let period = regime.period();
     let mut budget = arguments.budget.then(Budget::default);
-    let mut hops = Histogram::default();
+    let mut hops = [Histogram::default(), Histogram::default(), Histogram::default()];
     let mut rounds = Vec::new();
     for _ in 0..arguments.rounds {
-        let round = hops::measure(robot, trips, regime.period())?;
-        hops.add(round.counts(), round.max_ns());
+        let round = [
+            plain_hops::measure(Carrier::Eventfd, trips, period)?,
+            plain_hops::measure(Carrier::UnixDatagram, trips, period)?,
+            hops::measure(robot, trips, period)?,
+        ];
+        for (all, round) in hops.iter_mut().zip(round) {
+            all.add(round.counts(), round.max_ns());
+        }
         rounds.push(mission::measure(arguments, robot, regime.pace(rate_hz), budget.as_mut())?);
     }
-    let trips = u64::from(arguments.rounds) * trips;
-    let mut report = Report::new(regime, &hops, trips, &rounds).ok_or(BenchError::Nothing)?;
+    let mut report = Report::new(regime, &hops, &rounds).ok_or(BenchError::Nothing)?;
     report.budget = budget.map(Budget::rows);
     Ok(report)
 }

@@ -26,11 +26,11 @@ use crate::error::{BenchError, LOST, system};
 /// Cells of the smallest map. No forwarder reads it.
 const CELLS: usize = 64;
 /// The forwarders, by the stage that each stands for.
-const PLACES: [&str; 4] = ["dead-reckoning", "mapper", "planner", "controller"];
+pub(super) const PLACES: [&str; 4] = ["dead-reckoning", "mapper", "planner", "controller"];
 /// Pause between samples to forwarders that may not have started yet.
 const SEND_AGAIN: Duration = Duration::from_millis(20);
 /// Trips before the measurement, which map all memory.
-const WARM_UP: u64 = 200;
+pub(super) const WARM_UP: u64 = 200;
 
 /// Send `trips` samples around the forwarders, one every `period`, or back to back; those that warm up are always back to
 /// back.

@@ -44,7 +44,7 @@ pub(super) fn measure(
     command
         .args(["--pace", &pace.to_string(), "--robot", &robot.to_string(), "--out"])
         .arg(directory.path());
-    if !arguments.record {
+    if arguments.no_record {
         command.arg("--no-record");
     }
     for setting in &arguments.set {

@@ -15,12 +15,14 @@ pub(crate) enum Regime {
 }
 
 impl Regime {
-    /// The regime of a mission with `rate_hz` ticks in a mission second at `pace`; or with `asked_hz` ticks a second.
-    pub(crate) fn new(asked_hz: Option<f64>, pace: Pace, rate_hz: f64) -> Self {
+    /// The regimes to measure a mission in that has `rate_hz` ticks in a mission second: the one that is asked for, or back to back
+    /// and at the robot's rate.
+    pub(crate) fn all(asked_hz: Option<f64>, pace: Option<Pace>, rate_hz: f64) -> Vec<Self> {
         match (asked_hz, pace) {
-            (Some(hz), _) => Self::Rate { hz },
-            (None, Pace::Max) => Self::BackToBack,
-            (None, Pace::Rate(rate)) => Self::Rate { hz: rate * rate_hz },
+            (Some(hz), _) => vec![Self::Rate { hz }],
+            (None, Some(Pace::Max)) => vec![Self::BackToBack],
+            (None, Some(Pace::Rate(rate))) => vec![Self::Rate { hz: rate * rate_hz }],
+            (None, None) => vec![Self::BackToBack, Self::Rate { hz: rate_hz }],
         }
     }
 
@@ -68,12 +70,17 @@ mod tests {
 
     #[test]
     fn a_rate_asked_for_is_a_pace_of_the_mission_and_a_period_of_the_hops() {
-        let regime = Regime::new(Some(7.0), Pace::Max, 3.5);
+        let regimes = Regime::all(Some(7.0), None, 3.5);
+        let [regime] = regimes[..] else {
+            panic!("{regimes:?}");
+        };
         assert_eq!(regime.pace(3.5), Pace::Rate(2.0));
         assert_eq!(regime.period(), Some(Duration::from_secs_f64(1.0 / 7.0)));
         assert_eq!(regime.to_string(), "at 7 Hz");
-        assert_eq!(Regime::new(None, Pace::Rate(2.0), 3.5), regime);
-        let at_once = Regime::new(None, Pace::Max, 7.0);
+        assert_eq!(Regime::all(None, Some(Pace::Rate(2.0)), 3.5), [regime]);
+        let at_once = Regime::BackToBack;
+        assert_eq!(Regime::all(None, Some(Pace::Max), 7.0), [at_once]);
+        assert_eq!(Regime::all(None, None, 7.0), [at_once, regime]);
         assert_eq!((at_once.pace(7.0), at_once.period()), (Pace::Max, None));
         assert_eq!(at_once.to_string(), "back to back");
     }
