@@ -66,6 +66,21 @@ fn a_run_is_recorded_from_its_first_sample_and_every_stage_replays_to_the_bit() 
     assert_nothing_left("rec-whole");
 }
 
+#[test]
+fn on_a_wall_clock_a_tick_is_answered_again_when_its_map_is_solved() {
+    let run = Run::start("rec-again", "obstacle-course", &["--pace", "1", "--set", "timeout_s=4"]);
+    let (_, summary, directory) = run.finish_in();
+    let recording = open(directory.path());
+    let guidance = recording.samples(&topics::GUIDANCE).unwrap();
+    let guidance: Vec<_> = guidance.map(|guidance| guidance.unwrap().sample).collect();
+    let mut pairs = guidance.windows(2);
+    let again = pairs.any(|pair| {
+        pair[0].stamp.tick == pair[1].stamp.tick && pair[0].full_solves < pair[1].full_solves
+    });
+    assert!(again, "{summary} {guidance:?}");
+    assert_all_equal(&replayed(&recording));
+}
+
 /// Kill a recorder of `robot` that has written for so many answers of `status`; its file.
 fn killed_recorder(run: &mut Run, file: PathBuf, answers: usize) -> PathBuf {
     let mut recorder = firsthand(&["record", "--robot", &run.robot, "--out"])

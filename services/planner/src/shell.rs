@@ -82,6 +82,10 @@ impl Process for Shell {
         }
         let asked = self.follow_grid()?;
         let swapped = self.take_solved()?;
+        if asked && self.lockstep {
+            // A robot that waits for its command takes no second one for the same tick.
+            self.take(Taken::Idle)?;
+        }
         if asked || swapped && !self.lockstep {
             self.answer()?;
         }
@@ -106,7 +110,10 @@ impl Process for Shell {
     }
 
     fn idle(&mut self) -> Result<(), StageError> {
-        self.take(Taken::Idle)?;
+        let work = self.take(Taken::Idle)?;
+        if work == Work::Solved && !self.lockstep {
+            self.answer()?;
+        }
         while let Some(job) = self.runner.stage.jobs.pop_front() {
             tracing::debug!(number = job.number, "background solve begins");
             self.job = Some((job.number, self.runner.out.at.tick));

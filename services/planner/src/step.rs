@@ -31,11 +31,6 @@ pub use input::{Input, Job, Outcome, Snapshot, Solved, Work};
 /// How fast the evidential method leaves a hazard the robot stands in, m/s: something is near.
 const WAY_OUT_M_S: f64 = 0.08;
 
-/// A field is solved again within about so long for each cell of its map, nanoseconds.
-const SOLVE_NS_PER_CELL: f64 = 20.0;
-/// Within a tick a map is solved that needs no more than this share of the time to the next.
-const SHARE_OF_PERIOD: f64 = 0.05;
-
 /// How a direction of the field is checked before it is given.
 #[derive(Clone, Copy, Debug)]
 enum Advisor {
@@ -56,8 +51,6 @@ pub struct Planner {
     screening: Screening,
     robot: Robot,
     advisor: Advisor,
-    /// Whether a map that changes is solved before the tick is answered, whatever changed.
-    solves_first: bool,
     solver: Solver,
     grid: Replica<u8>,
     belief: GridHeader,
@@ -89,7 +82,6 @@ impl Step for Planner {
                 }
                 (Method::Paper | Method::Evidential, _) => Advisor::Follow,
             },
-            solves_first: solves_first(mission),
             solver: Solver::new(Settings::default()),
             grid: Replica::default(),
             belief: GridHeader::default(),
@@ -157,7 +149,7 @@ impl Planner {
         live.map = self.map(&frame, self.aim(&frame))?;
         live.target_changed(self.grid.version());
         self.live = Some(live);
-        self.solve_if_first()
+        Ok(Work::Stale)
     }
 
     /// Solve a map without an earlier field.
@@ -194,12 +186,7 @@ impl Planner {
             live.map_changed(before);
         }
         self.live = Some(live);
-        if changed { self.solve_if_first() } else { Ok(Work::None) }
-    }
-
-    /// Solve the map, which has changed, if that comes first.
-    fn solve_if_first(&mut self) -> Result<Work, SolveError> {
-        if self.solves_first { self.solve_newest() } else { Ok(Work::Stale) }
+        Ok(if changed { Work::Stale } else { Work::None })
     }
 
     /// Whether the field is of an older map than the newest, and the newest is solved by the step itself.
@@ -374,12 +361,6 @@ impl Planner {
         };
         Some(Snapshot { header, frame: live.frame, field: Arc::clone(&live.field) })
     }
-}
-
-/// Whether the maps of `mission` are solved first when they change.
-fn solves_first(mission: &Mission) -> bool {
-    let solve_s = mission.grid_frame().area() as f64 * SOLVE_NS_PER_CELL / 1e9;
-    solve_s * mission.robot.rate_hz <= SHARE_OF_PERIOD
 }
 
 /// The mission's screening length, in the unit of its grid.

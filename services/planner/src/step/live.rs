@@ -2,14 +2,14 @@
 //!
 //! | event | [`Current`](State::Current) | [`Stale`](State::Stale) | [`Solving`](State::Solving) |
 //! |---|---|---|---|
-//! | the map changes, and is solved first | solved: `Current` | - | - |
-//! | another map changes | `Stale` | `Stale` | `Solving`, `changed` |
+//! | the map changes | `Stale` | `Stale` | `Solving`, `changed` |
 //! | the tick is over, and the map is small | `Current` | solved: `Current` | - |
 //! | the tick is over, and the map is large | `Current` | a job begins: `Solving` | `Solving` |
 //! | the job's result comes | ignored | ignored | `Current`, or `Stale` if the map `changed` meanwhile |
 //!
 //! While the field is not that of the newest map, a robot follows it only where nothing changed on its way ahead. Elsewhere
-//! a small map is solved within the tick, and on a large one the robot waits. Each tick looks at the way again, with the newest map.
+//! a small map is solved within the tick, and on a large one the robot waits. Each tick looks at the way again, with the newest map,
+//! and on a wall clock a tick is answered once more when its map is solved.
 
 use std::sync::Arc;
 
