@@ -1,4 +1,4 @@
-//! What a link needs of a robot's protocol.
+//! The interface between the link and a robot's protocol.
 //!
 //! | module | holds |
 //! |---|---|
@@ -43,17 +43,17 @@ pub trait Driver: fmt::Debug {
         None
     }
 
-    /// What the robot is told when it is found: its settings, and that it sends its sensors. Not each protocol has such words.
+    /// The bytes that a found robot is sent: its settings, and the order to send its sensors. Some protocols have none.
     fn greeting(&self) -> Vec<u8> {
         Vec::new()
     }
 
-    /// Ask the robot to send its sensors. One that publishes them, or is polled for them, is not asked.
+    /// Ask the robot to send its sensors. A robot that publishes them, or is polled for them, is not asked.
     fn ask_for_sensors(&self) -> Vec<u8> {
         Vec::new()
     }
 
-    /// Ask the robot to answer. One that publishes, or is polled, is not asked.
+    /// Ask the robot to answer. A robot that publishes, or is polled, is not asked.
     fn ping(&self) -> Vec<u8> {
         Vec::new()
     }
@@ -63,8 +63,8 @@ pub trait Driver: fmt::Debug {
         false
     }
 
-    /// What a robot that is polled is asked now. The link calls it once a period of `robot.rate_hz`, by which the driver may measure time;
-    /// in lockstep after each command and each ping.
+    /// The bytes that poll the robot now. The link calls this once a period of `robot.rate_hz`, by which the driver may measure time; in
+    /// lockstep after each command and each ping.
     fn poll(&mut self) -> Vec<u8> {
         Vec::new()
     }
@@ -78,12 +78,12 @@ pub trait Driver: fmt::Debug {
     /// stops by itself.
     fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8>;
 
-    /// What the driver of the next link must know so that the counts of the wheels go on; none if the robot itself counts.
+    /// The state with which the next link's driver continues the counts of the wheels; none if the robot itself counts.
     fn memory(&self) -> Option<Memory> {
         None
     }
 
-    /// Go on from what the driver of an earlier link knew.
+    /// Go on from the state of an earlier link's driver.
     fn remember(&mut self, _memory: &Memory) {}
 
     /// The methods that stop a robot which does not obey a velocity of 0, in the order in which they are tried. After one of them the
@@ -93,16 +93,16 @@ pub trait Driver: fmt::Debug {
     }
 }
 
-/// What makes the counts of a robot that says its pose go on: x, y and heading by its odometry, and the angles that its wheels are taken
-/// to have turned by there.
+/// The state that continues the counts of a robot that says its pose: x, y and heading by its odometry, and the angles by which its wheels
+/// count as turned at that pose.
 pub type Memory = [f64; 5];
 
 /// A method that stops a robot, besides a velocity of 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StopMethod {
-    /// Its name in logs.
+    /// The name in logs.
     pub name: &'static str,
-    /// What the robot is sent.
+    /// The bytes that the robot is sent.
     pub bytes: Vec<u8>,
 }
 
@@ -115,7 +115,7 @@ pub struct WireTally {
 }
 
 impl WireTally {
-    /// Count `piece`, a message or what should be one, and note in `heard` why it was refused. Returns whether it was `taken`.
+    /// Count `piece`, a whole or broken message, and note in `heard` why it was refused. Returns whether it was `taken`.
     pub fn count(&mut self, piece: &[u8], taken: Result<(), String>, heard: &mut Heard) -> bool {
         let is_taken = taken.is_ok();
         match taken {
@@ -135,20 +135,20 @@ impl WireTally {
     }
 }
 
-/// What a robot said. Of each kind of message the newest counts.
+/// The messages of a robot, the newest of each kind.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Heard {
-    /// Whether it said anything.
+    /// Whether the robot said anything.
     pub anything: bool,
-    /// Whether it wants an answer.
+    /// Whether the robot wants an answer.
     pub pinged: bool,
-    /// How often it acknowledged what it was sent.
+    /// The number of the robot's acknowledgements.
     pub acknowledged: usize,
-    /// What its encoders and motors say; a tick begins with it.
+    /// The state of its encoders and motors; a tick begins with it.
     pub motion: Option<Motion>,
     /// The readings of its ranging sensors.
     pub readings: Vec<RangeReading>,
-    /// Its batteries and motor currents; the link says which batteries are low.
+    /// The batteries and motor currents; the link says which batteries are low.
     pub power: Option<PowerSample>,
     pub surroundings: Option<SurroundingsSample>,
     pub infrared: Option<InfraredSample>,
@@ -156,25 +156,25 @@ pub struct Heard {
     pub jumped: bool,
     /// The time of its newest odometry by its own clock, nanoseconds, if it says that.
     pub stamp_ns: Option<i64>,
-    /// Another than the link that commands the robot.
+    /// A sender other than the link that commands the robot.
     pub commander: Option<Commander>,
-    /// The reason why the newest message that was refused is none of the protocol, if any was.
+    /// Why the newest refused message is none of the protocol, if any was refused.
     pub refused: Option<String>,
 }
 
-/// Another than the link that told the robot something.
+/// A sender other than the link that told the robot something.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Commander {
     /// The number that the network knows it by.
     pub number: [u8; 16],
-    /// Whether it told the robot to move.
+    /// Whether the sender told the robot to move.
     pub moves: bool,
 }
 
-/// How far a robot turned by its own gyro.
+/// The turn of a robot by its own gyro.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turn {
-    /// One more than that of the turn before, where this one begins; another one if something between is missing.
+    /// One more than the number of the turn at whose end this one begins; any other number if a turn between is missing.
     pub sequence: u64,
     /// Radians counter-clockwise.
     pub turn_rad: f64,
@@ -182,7 +182,7 @@ pub struct Turn {
     pub variance_rad2: f64,
 }
 
-/// What the encoders and motors say.
+/// The state of the encoders and motors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     /// The encoder counts, growing forward.
@@ -202,7 +202,7 @@ pub struct Readings {
 }
 
 impl Readings {
-    /// None of the sensors of `mission` has read anything.
+    /// The readings before any sensor of `mission` has read anything.
     pub fn new(mission: &Mission) -> Self {
         let table = mission.sensor_table();
         Self { newest: absent(&table).collect(), table, fresh: Vec::new(), ticks: 0 }
@@ -213,7 +213,7 @@ impl Readings {
         &self.table
     }
 
-    /// Take a reading of the sensor in `row`; one of a row that is not there is dropped.
+    /// Take a reading of the sensor in `row`; a reading of a row that does not exist is dropped.
     pub fn take(&mut self, row: usize, reading: RangeReading) {
         if let Some(newest) = self.newest.get_mut(row) {
             *newest = RangeReading { sensor: row as u8, ..reading };

@@ -32,7 +32,7 @@ pub fn mission(robot: &RobotName) -> Result<Mission, StageError> {
     Ok(Run::load(&directory)?.mission)
 }
 
-/// Count as a process of `domain` until the file is dropped; the directory of its run.
+/// Count as a process of `domain` until the returned file is dropped. Returns the directory of the run, too.
 fn enter_run(domain: &Domain) -> Result<(PathBuf, File), StageError> {
     let robot = &domain.robot;
     if !domain.directory().exists() {
@@ -41,7 +41,7 @@ fn enter_run(domain: &Domain) -> Result<(PathBuf, File), StageError> {
             robot.to_string()
         )));
     }
-    // Waits while the supervisor makes the bus.
+    // This waits while the supervisor makes the bus.
     let stage_lock = enter(domain)?;
     let directory = fs::read_link(domain.run_link()).map_err(|_| {
         StageError::Other(format!(

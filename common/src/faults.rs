@@ -13,13 +13,13 @@ use crate::{
 #[derive(Debug)]
 pub struct Fault {
     pub kind: FaultKind,
-    /// Its name on the command line.
+    /// The name on the command line.
     pub name: &'static str,
     /// The stage that has it; none for every stage.
     pub stage: Option<&'static str>,
-    /// Its effect.
+    /// The effect.
     pub meaning: &'static str,
-    /// How it ends.
+    /// The way in which the fault ends.
     pub ends: &'static str,
 }
 

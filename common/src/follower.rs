@@ -13,7 +13,7 @@ use crate::{
 
 /// How often a robot that is away is looked for.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
-/// It is an error if an existing bus cannot be used for so long: a bus that is being removed is gone by then.
+/// The time after which an existing bus that cannot be used is an error: a bus that is being removed is gone by then.
 const REFUSED_FOR: Duration = Duration::from_secs(2);
 
 /// Follows one robot. `Topics` holds the readers: `open` opens them on each bus, and they are dropped with it.
@@ -22,7 +22,7 @@ pub struct Follower<Topics, Open> {
     name: String,
     wake_on: Vec<&'static dyn AnyTopic>,
     open: Open,
-    /// The robot is disconnected, and the samples published last are given first.
+    /// Whether the robot is disconnected, so that the last samples are given first.
     ending: bool,
     joined: Option<Joined<Topics>>,
     /// The bus that cannot be used, and since when.
@@ -147,7 +147,7 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
             return Ok(false);
         }
         match self.join() {
-            // Its supervisor was killed, and another one has begun.
+            // The supervisor of that bus was killed, and another one has begun.
             Ok(joined) if joined.bus.is_replaced() => Ok(false),
             Ok(joined) => {
                 self.joined = Some(joined);

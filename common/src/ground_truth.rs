@@ -37,12 +37,12 @@ pub struct GroundTruthTick {
     pub contacts: u64,
     /// Left wheel counts as this tick's frame shows them, growing forward, modulo 32768.
     pub left_counts: u16,
-    /// Right wheel counts, likewise.
+    /// Right wheel counts, like `left_counts`.
     pub right_counts: u16,
     /// The front ultrasonic byte of this tick's frame, centimetres; 255 is nothing.
     pub sonar_cm: u8,
-    /// The longest so far that a wheel turned after the last motion command the robot received, seconds. Slower than
-    /// [`GroundTruthTick::AT_REST_M_S`] is at rest.
+    /// The longest time so far that a wheel turned after the last motion command the robot received, seconds. A wheel slower
+    /// than [`GroundTruthTick::AT_REST_M_S`] is at rest.
     #[serde(default)]
     pub stopping_time_s: f64,
     /// The losses of the radio so far; missing where it is perfect.
@@ -53,11 +53,11 @@ pub struct GroundTruthTick {
 /// The losses of the radio so far, both ways together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GroundTruthRadio {
-    /// Whether it is out now.
+    /// Whether the radio is out now.
     pub out: bool,
-    /// Datagrams sent over it.
+    /// Datagrams sent.
     pub sent: u64,
-    /// Datagrams lost on it.
+    /// Datagrams lost.
     pub lost: u64,
     /// The longest outage, seconds.
     pub longest_outage_s: f64,
@@ -81,7 +81,7 @@ impl GroundTruthTick {
         }
     }
 
-    /// Whether it is of the tick of `pose`, by the wheel counts, which both have.
+    /// Whether this tick is that of `pose`, by the wheel counts of both.
     pub const fn is_of(&self, pose: &PoseSample) -> bool {
         self.left_counts == pose.left_counts && self.right_counts == pose.right_counts
     }

@@ -3,8 +3,8 @@
 //! The state is the fold of its entries. An entry is appended when it happens, which takes the time of a
 //! small write however large the state is; a new process restores the snapshot and folds the later entries into it.
 //!
-//! An entry is `number | length | crc32 | body`, little-endian. A kill in the middle of an append leaves a torn tail, which is cut off; a kill between a snapshot and the emptying of the journal
-//! leaves entries that the snapshot holds already, which their numbers show.
+//! An entry is `number | length | crc32 | body`, little-endian. A kill in the middle of an append leaves a torn tail, which is cut off. A
+//! kill between a snapshot and the emptying of the journal leaves entries that the snapshot holds already, as their numbers show.
 //!
 //! Room is reserved at opening, for a disk that is full later. The journal is emptied by an end mark at its beginning, not by
 //! shortening it, which would give the room away.
@@ -21,14 +21,14 @@ use crate::checkpoint::{Checkpoint, CheckpointError, failed, reserve};
 
 /// Entries after which a snapshot is due at the soonest and at the latest.
 const SNAPSHOT_AFTER: (u64, u64) = (8, 128);
-/// In between, one more entry for each so many bytes of the state: to write them takes about as long as to fold an
-/// entry, which a new process does with each before it is ready.
+/// Bytes of the state for each further entry before a snapshot. Writing so many bytes takes about as long as folding an entry, and a new
+/// process folds all entries before it is ready.
 const BYTES_FOR_AN_ENTRY: u64 = 20_480;
 /// number u64, length u32, crc32 u32.
 const HEADER: usize = 16;
 /// The end mark, after the last entry. No header is all zeros, for the checksum of zeros is not 0.
 const END: [u8; HEADER] = [0; HEADER];
-/// No entry is longer, bytes.
+/// The greatest length of an entry, bytes.
 const LONGEST: usize = 8192;
 /// Room that is reserved for each entry until the next snapshot, bytes: an entry of the mapper takes 250, and 4,500 with a scan of a laser.
 const ENTRY_ROOM: u64 = 4_608;
@@ -121,7 +121,7 @@ impl Journal {
         Ok(entries)
     }
 
-    /// End the journal here.
+    /// Write the end mark after the last entry.
     fn cut(&self) -> Result<(), CheckpointError> {
         let cut = self.file.write_all_at(&END, self.end);
         cut.map_err(failed("write", &self.path))
@@ -276,7 +276,7 @@ mod tests {
         }
         let full = std::fs::read(&file).unwrap();
         journal.snapshot(&10_u64).unwrap();
-        // Killed before the journal was emptied.
+        // The process was killed before the journal was emptied.
         std::fs::write(&file, &full).unwrap();
         assert_eq!(folded(&path), 10);
         open(&path).0.append(&5_u64).unwrap();

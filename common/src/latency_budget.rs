@@ -12,7 +12,7 @@ use std::{
 
 use crate::clock::monotonic_ns;
 
-/// The environment variable that asks for it; its value does not matter.
+/// The environment variable that asks for measurements; its value does not matter.
 pub const ASKED_FOR: &str = "FIRSTHAND_LATENCY_BUDGET";
 
 /// The times of at most so many ticks are stored, 72 bytes each.
@@ -21,7 +21,7 @@ const MOST_TICKS: usize = 1 << 16;
 /// An item of a tick, in the order of the columns of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Item {
-    /// Taking what came from the bus or the socket.
+    /// Taking samples from the bus, or bytes from the socket.
     Read,
     /// The pure step.
     Step,
@@ -29,12 +29,11 @@ pub enum Item {
     Persist,
     /// The output, until its readers are about to be woken.
     Publish,
-    /// Everything after that until the process waits again: it wakes the readers, and does what nobody waits for.
+    /// Everything from then until the process waits again: it wakes the readers, and does what nobody waits for.
     After,
 }
 
 impl Item {
-    /// Every item.
     pub const ALL: [Self; 5] = [Self::Read, Self::Step, Self::Persist, Self::Publish, Self::After];
 
     /// The heading of its column.
@@ -54,7 +53,7 @@ impl Item {
 pub enum Answers {
     /// An input of the stage.
     Inputs,
-    /// Its feedback, with which the tick ends.
+    /// The feedback of the stage, with which the tick ends.
     Feedback,
 }
 
@@ -119,7 +118,7 @@ impl LatencyBudget {
     }
 
     fn measure(&self, what: impl FnOnce(&mut Stopwatch, u64)) {
-        // It is never borrowed already: no caller measures inside a measurement.
+        // The stopwatch is never borrowed already: no caller measures inside a measurement.
         if let Some(stopwatch) = &self.0
             && let Ok(mut stopwatch) = stopwatch.try_borrow_mut()
         {

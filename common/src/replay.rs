@@ -11,7 +11,7 @@ use crate::{
     topics::AnyTopic as _,
 };
 
-/// A sample that a generation published, or must have.
+/// A sample that a generation published, or must have published.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Output {
     pub topic: &'static str,
@@ -63,10 +63,10 @@ const fn stamp(tick: u64, time: MissionTime) -> Stamp {
 /// An entry of a generation's inputs cannot be taken.
 #[derive(Debug, Error)]
 pub enum ReplayError {
-    /// It cannot be decoded.
+    /// The entry cannot be decoded.
     #[error("not an entry of this version of the stage ({0}); replay with the version that ran")]
     Foreign(#[from] postcard::Error),
-    /// The stage could not take it.
+    /// The stage could not take the entry.
     #[error("the stage cannot take an entry: {0}")]
     Stage(String),
 }

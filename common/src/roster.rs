@@ -18,7 +18,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 pub struct Roster {
     /// The rosters, as they are published.
     pub samples: SliceReader<RosterHeader, RosterEntry>,
-    /// Wakes for them.
+    /// Wakes for the rosters.
     pub waiter: Waiter,
 }
 

@@ -24,7 +24,7 @@ pub struct Run {
     pub robot: RobotName,
     /// Where the robot answers, and over which transport.
     pub address: Address,
-    /// How samples are stamped.
+    /// The clock that stamps samples.
     pub clock: MissionClock,
     pub mission: Mission,
 }

@@ -35,7 +35,7 @@ impl Signals {
         Ok(Self { pipe })
     }
 
-    /// Whether one came since the last call.
+    /// Whether a signal came since the last call.
     pub fn came(&mut self) -> bool {
         matches!(self.pipe.read(&mut [0; 16]), Ok(read) if read > 0)
     }

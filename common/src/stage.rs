@@ -144,7 +144,7 @@ pub trait Answering: Step<State: Clone + Debug> + 'static {
     const INPUT: &'static Topic<Self::In>;
     const OUTPUT: &'static Topic<Self::Out>;
     const PERSISTS: Persists = Persists::Nothing;
-    /// Whether it skips samples that are not the newest.
+    /// Whether the stage skips samples that are not the newest.
     const NEWEST_ONLY: bool = false;
 
     /// Take one sample.
@@ -214,7 +214,7 @@ impl<A: Answering> Stage for A {
     fn start(&self, context: &mut Context) -> Result<Self::Start, StageError> {
         let saved: Self::Start = context.saved_state()?;
         if let Some(state) = &saved {
-            tracing::info!(?state, "state restored");
+            tracing::info!(?state, "the state is restored");
         }
         Ok(saved)
     }

@@ -75,7 +75,7 @@ pub enum StageError {
 pub const REFUSED: u8 = 8;
 
 impl StageError {
-    /// The exit code of a stage's process that ends with this.
+    /// The exit code of a stage's process that ends with this error.
     pub const fn exit_code(&self) -> u8 {
         match self {
             Self::Bus(_) => REFUSED,
@@ -114,7 +114,7 @@ pub fn become_child(process_name: &str, supervisor: u32) -> Result<(), StageErro
     name_process(process_name)?;
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::TERM))
         .map_err(|errno| system("tie the process to its supervisor")(errno.into()))?;
-    // It may have ended before that took effect.
+    // The supervisor may have ended before that took effect.
     let parent = rustix::process::getppid().map_or(0, |pid| pid.as_raw_nonzero().get() as u32);
     if parent == supervisor {
         Ok(())

@@ -42,10 +42,10 @@ const RESUME: u8 = b'r';
 const HEARD: u8 = b'h';
 const AT_REST: u8 = b'a';
 
-/// The link answers so many operators at once; of more it obeys the requests.
+/// The most operators that the link answers at once; it obeys the requests of further ones, too.
 const MOST_ASKING: usize = 16;
 
-/// The link's end.
+/// The link's end of the socket.
 #[derive(Debug)]
 pub struct StopSocket {
     socket: UnixDatagram,
@@ -100,7 +100,7 @@ impl AsFd for StopSocket {
     }
 }
 
-/// The operator's end.
+/// The operator's end of the socket.
 #[derive(Debug)]
 pub struct Operator {
     socket: UnixDatagram,
@@ -182,13 +182,13 @@ impl StopMark {
         Self { path: directory.join("operator-stop") }
     }
 
-    /// Whether it is there.
+    /// Whether the mark is there.
     #[must_use]
     pub fn is_set(&self) -> bool {
         self.path.exists()
     }
 
-    /// Set or remove it.
+    /// Set or remove the mark.
     pub fn set(&self, stopped: bool) -> io::Result<()> {
         if stopped {
             return fs::File::create(&self.path).map(drop);

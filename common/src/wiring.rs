@@ -105,10 +105,10 @@ pub(crate) struct Opened {
 /// A process opens something else than its wiring lists.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum WiringError {
-    /// It opens a topic that is not listed.
+    /// The process opens a topic that is not listed.
     #[error("topic {1} is opened for {0} and not in the wiring of the stage; list it there")]
     NotListed(Access, &'static str),
-    /// It has not opened a topic that is listed.
+    /// The process has not opened a topic that is listed.
     #[error("topic {1} is in the wiring of the stage for {0} and not opened; remove it there")]
     NotOpened(Access, &'static str),
 }

@@ -16,7 +16,7 @@ use crate::{
 /// A process that writes a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Author {
-    /// Its process number.
+    /// The process number.
     pub process: u32,
     /// The generation in its stamps.
     pub generation: u32,
@@ -34,7 +34,7 @@ pub struct Ignored {
 /// Reads which processes the stages have; none if there is no newer list since the last call.
 pub type Names = Box<dyn FnMut() -> Result<Option<Vec<(String, Author)>>, BusError>>;
 
-/// So many processes of a stage are remembered. A recorder still takes samples of those that ended.
+/// The number of processes of a stage that are remembered. A recorder still takes samples of those that ended.
 const REMEMBERED: usize = 64;
 
 /// The processes that may write, for all readers of a process.
@@ -185,7 +185,7 @@ pub(crate) struct OneStage {
     writers: Writers,
     stage: &'static str,
     process: Option<Author>,
-    /// It is admitted until the first sample of `process` comes.
+    /// The earlier process, admitted until the first sample of `process` comes.
     before: Option<Author>,
     /// The newest generation that the supervisor's process published on the topic, because it may play a recording, or that anybody
     /// published before anybody was named.
@@ -216,7 +216,7 @@ impl Admitted {
         }
     }
 
-    /// The same authors, whether they have ended or not.
+    /// The same authors, ended ones included.
     pub(crate) fn of_all_generations(self) -> Self {
         match self {
             Self::All | Self::Newest(_) => Self::All,

@@ -68,7 +68,6 @@ pub const SHARED_MEMORY: &str = "/dev/shm";
 /// The names of one robot's files on this machine, for one user.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Domain {
-    /// The robot.
     pub robot: RobotName,
     /// The user's number, or the letters of a suite of tests.
     owner: String,
@@ -217,8 +216,8 @@ fn places(user: &str) -> Vec<PathBuf> {
     .collect()
 }
 
-/// The one of `places` that has `robot`, or else the first that this user has or may make. A robot that runs is found this way,
-/// whatever places were made or taken since its start. If no place is left, it is the first, and an error names that.
+/// The place of `robot` among `places`, or else the first place that this user has or may make. So a running robot is found, whatever
+/// places were made or taken since its start. If no place is left, the first is returned, and an error names it.
 fn place(places: &[PathBuf], user: u32, robot: &str) -> PathBuf {
     let is_own = |path: &Path| {
         fs::symlink_metadata(path).is_ok_and(|found| found.is_dir() && found.uid() == user)
@@ -265,7 +264,7 @@ mod tests {
         let user = rustix::process::geteuid().as_raw();
         let found = || place(&places, user, "x80");
         assert_eq!(found(), places[0]);
-        // Whatever is no directory of this user stands for a directory of another.
+        // A link, which is no directory of this user, stands for a directory of another user.
         std::os::unix::fs::symlink(directory.path(), &places[0]).unwrap();
         assert_eq!(found(), places[1]);
         fs::create_dir_all(places[2].join("x80")).unwrap();

@@ -19,7 +19,6 @@ pub enum BusError {
         "robot {robot:?} is not running here ({detail}); start it with `firsthand run`, or name another with --robot"
     )]
     NotRunning {
-        /// The robot.
         robot: String,
         /// The file that is missing, and the system's error.
         detail: String,
@@ -28,16 +27,12 @@ pub enum BusError {
     #[error(
         "topic {topic:?} carries another payload than this program was built for; build it against the firsthand that runs (`firsthand --version`)"
     )]
-    Incompatible {
-        /// The topic.
-        topic: &'static str,
-    },
+    Incompatible { topic: &'static str },
     /// Consumers already take all the places for readers that they may take.
     #[error(
         "topic {topic:?} has places for {places} readers, and those for consumers are taken; end one that reads it, or read it once and share it"
     )]
     NoPlace {
-        /// The topic.
         topic: &'static str,
         /// The number of places, the reserved ones of the stages included.
         places: usize,
@@ -47,7 +42,6 @@ pub enum BusError {
         "this reader holds {most} samples of topic {topic:?}, as many as one may; drop one before the next is taken (nobody waits for it: the oldest that is not taken is lost)"
     )]
     HoldsTooMany {
-        /// The topic.
         topic: &'static str,
         /// The number of samples that a reader may hold.
         most: usize,
@@ -57,7 +51,6 @@ pub enum BusError {
     Refused {
         /// The operation.
         action: &'static str,
-        /// The topic.
         topic: &'static str,
         /// The middleware's error.
         detail: String,
@@ -65,7 +58,6 @@ pub enum BusError {
     /// The process could not join the domain.
     #[error("cannot join the bus of robot {robot:?}: {detail}; if it runs, is it this user's, and is {shm} writable and not full?", shm = SHARED_MEMORY)]
     Join {
-        /// The robot.
         robot: String,
         /// The middleware's error.
         detail: String,

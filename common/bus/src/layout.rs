@@ -8,10 +8,10 @@ use super::{
 
 /// A payload or a field whose layout is known.
 pub trait Layout: Copy {
-    /// Its type.
+    /// The type.
     fn kind() -> Kind;
 
-    /// Its value.
+    /// The value.
     fn value(&self) -> Value;
 
     /// The value of an array.
@@ -73,13 +73,13 @@ pub fn encode_slice<H: Layout, T: Layout>(header: &H, slice: &[T], bytes: &mut V
     T::encode_all(slice, &mut to);
 }
 
-/// The sample of a message; none if it holds another.
+/// The sample in a message; none if the message holds another.
 #[must_use]
 pub fn decode_sample<P: Layout>(message: &[u8]) -> Option<P> {
     P::decode(&mut Decoder::new(message)?)
 }
 
-/// The header and slice of a message; none if it holds others.
+/// The header and slice in a message; none if the message holds others.
 #[must_use]
 pub fn decode_slice<H: Layout, T: Layout + Default>(message: &[u8]) -> Option<(H, Vec<T>)> {
     let mut from = Decoder::new(message)?;
@@ -106,11 +106,11 @@ pub enum Kind {
 /// A `repr(C)` struct.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Structure {
-    /// Its name in all languages, for example `firsthand.Pose`.
+    /// The name in all languages, for example `firsthand.Pose`.
     pub name: &'static str,
-    /// Its size, bytes.
+    /// The size, bytes.
     pub size: usize,
-    /// Its fields, in their order.
+    /// The fields, in their order.
     pub fields: Vec<Field>,
 }
 

@@ -9,8 +9,8 @@ use std::{
 
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 
-/// The list of locks is read so often. A list longer than a page is read in parts and may change between them: with 180 locks
-/// that came and went, one reading in 200 missed a lock that was held all the time.
+/// The number of times that the list of locks is read. A list longer than a page is read in parts and may change between them:
+/// with 180 locks that came and went, one reading in 200 missed a lock that was held all the time.
 const READINGS: usize = 5;
 
 /// The processes that hold a lock on `file`.

@@ -36,12 +36,12 @@ pub struct Bus {
     pub(super) node: BusNode,
     /// The processes whose samples are read; none if nobody names them.
     pub(super) writers: Option<Writers>,
-    /// It is a stage's or a supervisor's, which may take the places that consumers leave free.
+    /// Whether the process is a stage or a supervisor, which may take the places that consumers leave free.
     pub(super) is_stage: bool,
     instance: BusInstance,
 }
 
-/// The services of all topics. They exist as long as this is held.
+/// The services of all topics, which exist as long as this value is held.
 pub struct Services(#[allow(dead_code, reason = "held, not read")] Vec<Box<dyn Any>>);
 
 fn no_join(domain: &Domain) -> impl Fn(String) -> BusError + use<> {

@@ -12,7 +12,7 @@ use iceoryx2_bb_elementary::package_version::PackageVersion;
 
 use crate::{bus_instance::BusInstance, domain::SHARED_MEMORY};
 
-/// The name of the middleware's count of nodes ends with this.
+/// The end of the name of the middleware's count of nodes.
 const COUNT_OF_NODES: &str = ".global_mgmt";
 /// The middleware's name of the count's type: the SHA-1 of `iceoryx2::node::global_management_segment::State`.
 const TYPE_OF_COUNT: &str = "9204dd183d1c4d8e1ff592a30766ffa6765aa8b5";

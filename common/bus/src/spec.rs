@@ -39,13 +39,13 @@ pub struct Spec {
     pub name: &'static str,
     /// The writer: a stage, [`SUPERVISOR`], [`OPERATOR`] or [`EVERY_STAGE`].
     pub writer: &'static str,
-    /// How often it is published.
+    /// How often the topic is published.
     pub rate: Rate,
     /// Whether a recording contains it.
     pub logged: Logged,
     /// The sizes of its buffers, and the number of readers.
     pub limits: Limits,
-    /// Its meaning, for the documentation.
+    /// The meaning, for the documentation.
     pub meaning: &'static str,
 }
 

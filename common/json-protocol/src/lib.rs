@@ -23,7 +23,7 @@ pub struct Report {
     /// The speeds of the wheels, rad/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speeds: Option<[f64; 2]>,
-    /// Instead of `wheels`: x, y and heading by the robot's own odometry.
+    /// The pose by the robot's own odometry, sent instead of `wheels`: x, y and heading.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub odometry: Option<[f64; 3]>,
     /// Whether something holds the left and the right wheel: their motors draw the current of a stall.
@@ -44,12 +44,12 @@ pub struct Report {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "lowercase")]
 pub enum Order {
-    /// The link has found the robot, or it has braked: it releases its brake and reports so often from now on.
+    /// The link has found the robot, or the robot has braked. The robot releases its brake and reports at this rate.
     Hello {
         /// Reports a second.
         rate_hz: f64,
     },
-    /// Drive for so long, then stand, unless another order came.
+    /// Drive for a time, then stand, unless another order came.
     Drive {
         /// The speeds of the left and the right wheel, rad/s.
         wheels: [f64; 2],
@@ -73,12 +73,12 @@ pub fn line(message: &impl Serialize) -> Vec<u8> {
     line
 }
 
-/// The message of a line, or why it is none.
+/// The message of a line, or why the line is no message.
 pub fn parse<'a, M: Deserialize<'a>>(line: &'a [u8]) -> Result<M, String> {
     serde_json::from_slice(line).map_err(|error| error.to_string())
 }
 
-/// Bytes to lines. A line that is too long is dropped, and so is an empty one.
+/// Splits bytes into lines. Empty lines and lines that are too long are dropped.
 #[derive(Clone, Debug, Default)]
 pub struct Lines {
     held: Vec<u8>,

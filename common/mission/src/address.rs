@@ -37,15 +37,14 @@ fn domain(text: &str) -> Option<u16> {
 /// The text is not an address, or its host cannot be found.
 #[derive(Debug, Error)]
 pub enum AddressError {
-    /// It is not written as an address.
+    /// The text is not written as an address.
     #[error("{address:?} {problem}; {FORMS}")]
     Form {
         /// The address in the mission.
         address: String,
-        /// The problem.
         problem: &'static str,
     },
-    /// Its host is not known here.
+    /// The host is not known on this machine.
     #[error(
         "the host of {address:?} cannot be found: {source}; give its number, or a name that resolves on this machine"
     )]

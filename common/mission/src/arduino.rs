@@ -8,13 +8,13 @@ use serde::{Deserialize, Serialize};
 /// says 17,241 cm then.
 pub const LEAST_BAUD: u32 = 19_200;
 
-/// What the firmware of the board was built with.
+/// The settings that the board's firmware was built with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ArduinoBoard {
     /// The speed of its serial line, bits a second.
     pub baud: u32,
-    /// How often its speed loop runs. Speeds are said in encoder counts from one run to the next.
+    /// The rate of the speed loop. Speeds are said in encoder counts from one run of the loop to the next.
     pub pid_rate_hz: f64,
     /// The pins of its sonars by the names of their rows.
     pub sonars: BTreeMap<String, u8>,
@@ -27,7 +27,7 @@ impl Default for ArduinoBoard {
 }
 
 impl ArduinoBoard {
-    /// Whether the mission says nothing of it.
+    /// Whether the mission says nothing of the board.
     pub(crate) fn is_default(&self) -> bool {
         *self == Self::default()
     }

@@ -53,7 +53,7 @@ impl Mission {
     /// [`Mission::parse`] on a file.
     ///
     /// # Errors
-    /// Also when the file cannot be read.
+    /// As [`Mission::parse`], and when the file cannot be read.
     pub fn load(path: &Path) -> Result<Self, MissionError> {
         Self::parse(&Self::read(path)?, path)
     }
@@ -245,7 +245,7 @@ impl Checker {
                 format!("give 1 to {MOST_TARGETS}"),
             ));
         }
-        // A run file has both.
+        // A run file has both keys.
         if mission.targets.first().is_some_and(|first| first.at != mission.target) {
             return Err(objection(
                 "targets",
@@ -303,7 +303,7 @@ fn stages(mission: &Mission) -> Result<(), Objection> {
         within("planner.calibration.drive_m", plan.drive_m, 0.6..=10.0, "m")?;
     }
     if let Some(screening) = mission.planner.screening_m {
-        // Shorter than that it would not be resolved by the grid.
+        // The grid does not resolve a shorter length.
         let least = mission.grid_frame().resolution_m / 2.0;
         within("planner.screening_m", screening, least..=1e6, "m")?;
     }

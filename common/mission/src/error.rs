@@ -12,43 +12,37 @@ pub enum MissionError {
         "cannot read mission {file}: {source}; give a shipped name (`firsthand missions`) or a readable TOML file"
     )]
     Unreadable {
-        /// The file.
         file: PathBuf,
-        /// The system's word.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// It is not the TOML a mission is written in: syntax, an unknown key, a wrong type.
+    /// The text is not the TOML that a mission is written in: syntax, an unknown key, a wrong type.
     #[error("{file}:{line}: {problem}")]
     Syntax {
-        /// The file.
         file: PathBuf,
         /// 1-based line.
         line: usize,
-        /// The parser's word.
+        /// The parser's error.
         problem: String,
     },
-    /// The calibration that it names cannot be used.
+    /// The calibration that the mission names cannot be used.
     #[error(
         "robot.calibration: {file}: {problem}; give a file that `firsthand calibrate` wrote, or leave the key out"
     )]
     Calibration {
         /// The file of the calibration.
         file: PathBuf,
-        /// The problem.
         problem: String,
     },
-    /// A value cannot be.
+    /// A value is invalid.
     #[error("{file}:{line}: {key}: {problem}; {remedy}")]
     Value {
-        /// The file.
         file: PathBuf,
         /// 1-based line of the key, or of the table that should hold it.
         line: usize,
         /// The key, dotted.
         key: String,
-        /// The problem.
         problem: String,
-        /// The remedy.
         remedy: String,
     },
 }

@@ -5,34 +5,34 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-/// What the surface of a shape does to the beam of a laser.
+/// The effect of a shape's surface on the beam of a laser.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Light {
-    /// It scatters the beam: a laser detects it from any side.
+    /// The surface scatters the beam: a laser detects it from any side.
     #[default]
     Matt,
     /// The beam passes, except near the normal, where the pane reflects it back into the laser.
     Glass,
-    /// It scatters a tenth of the light: a laser detects it from near.
+    /// The surface scatters a tenth of the light: a laser detects it from near.
     Black,
 }
 
-/// The heights between which a shape extends, the share of sound that it reflects, and what it does to light.
+/// The heights between which a shape extends, the share of sound that it reflects, and its effect on light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Profile {
-    /// Its lowest height above the floor, metres.
+    /// The lowest height above the floor, metres.
     pub bottom_m: f64,
-    /// Its highest, metres; infinite for what is higher than any robot.
+    /// The highest height, metres; infinite for a shape that is higher than any robot.
     pub top_m: f64,
-    /// Amplitude of its echo over that of a hard thing of its form; 1 is hard.
+    /// Amplitude of the echo over that of a hard thing of the same form; 1 is hard.
     pub echo: f64,
-    /// What it does to the beam of a laser.
+    /// The effect on the beam of a laser.
     pub light: Light,
 }
 
 impl Profile {
-    /// Vertical distance from `height_m` to its nearest part, metres; 0 where it is as high as that.
+    /// Vertical distance from `height_m` to the shape's nearest part, metres; 0 if the shape extends to that height.
     #[must_use]
     pub fn height_gap(&self, height_m: f64) -> f64 {
         (self.bottom_m - height_m).max(height_m - self.top_m).max(0.0)
@@ -56,22 +56,22 @@ macro_rules! shape {
         #[serde(deny_unknown_fields)]
         pub struct $name {
             $($(#[$doc])* pub $field: $type,)*
-            /// Its lowest height above the floor, metres; without it, it stands on the floor.
+            /// The lowest height above the floor, metres; by default the shape stands on the floor.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub bottom_m: Option<f64>,
-            /// Its highest, metres; without it, it is higher than the robot.
+            /// The highest height, metres; by default the shape is higher than the robot.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub top_m: Option<f64>,
-            /// Amplitude of its echo over that of a hard thing; without it, it is hard.
+            /// Amplitude of the echo over that of a hard thing; by default the shape is hard.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub echo: Option<f64>,
-            /// What it does to the beam of a laser; without it, it is matt.
+            /// The effect on the beam of a laser; by default the shape is matt.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub light: Option<Light>,
         }
 
         impl $name {
-            /// Its heights, its echo and what it does to light.
+            /// The heights, the echo and the effect on light.
             #[must_use]
             pub fn profile(&self) -> Profile {
                 Profile {
@@ -117,7 +117,7 @@ shape! {
 }
 
 impl Wall {
-    /// Its straight edges, as (from, to).
+    /// The straight edges, as (from, to).
     pub fn edges(&self) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
         self.points.windows(2).map(|pair| (pair[0], pair[1]))
     }

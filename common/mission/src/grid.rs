@@ -146,7 +146,7 @@ impl GridFrame {
     pub fn cell_at(&self, point: DVec2) -> Option<Cell> {
         let index = self.to_cells(point).round();
         let last = f64::from(self.cells) - 1.0;
-        // Written so that NaN falls out too.
+        // This form excludes NaN, too.
         if !(index.cmpge(DVec2::ZERO).all() && index.cmple(DVec2::splat(last)).all()) {
             return None;
         }
@@ -199,14 +199,14 @@ impl GridFrame {
         Cow::Owned(cells)
     }
 
-    /// The smallest window outside of which two whole maps are the same; empty if they are.
+    /// The smallest window outside of which two whole maps are equal; empty if the maps are.
     #[must_use]
     pub fn changed_window<T: PartialEq>(&self, old: &[T], new: &[T]) -> Window {
         let side = self.cells as usize;
         let mut window = Window::default();
         let rows = old.chunks_exact(side).zip(new.chunks_exact(side));
         for (row, (old, new)) in rows.enumerate() {
-            // Most rows are the same: to compare them whole is several times as fast.
+            // Most rows are equal, and comparing a whole row at once is several times as fast.
             if old == new {
                 continue;
             }

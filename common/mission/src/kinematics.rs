@@ -11,10 +11,10 @@ pub use differential::{DifferentialDrive, WheelSpeeds};
 pub use drive::Drive;
 pub use pose::{Pose2, Twist};
 
-/// Slower than this a wheel may stick in the dead band of its loop (20 counts/s after a gain of 0.78, 11 mm/s), m/s: no robot is
-/// ordered to go slower, and a speed limit below it means stand.
+/// Below this speed, m/s, a wheel may stick in the dead band of its loop (20 counts/s after a gain of 0.78, 11 mm/s). So no
+/// robot is ordered to go slower, and a lower speed limit means stand.
 pub const LEAST_SPEED_M_S: f64 = 0.04;
 
-/// Cosine from which on a robot faces its way, 11 degrees: it has no reason to turn on the spot, and where it may not go on it
-/// stands.
+/// Cosine of the greatest angle, 11 degrees, at which a robot faces its way: it does not turn on the spot, and where it may not
+/// go on it stands.
 pub const FACES_COSINE: f64 = 0.98;

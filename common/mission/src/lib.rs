@@ -68,7 +68,7 @@ pub struct Mission {
     /// X_T: where to go first, metres.
     #[serde(default = "defaults::no_target")]
     pub target: DVec2,
-    /// Where to go one after the other, instead of [`Mission::target`]; that is the first of them then.
+    /// The places to visit one after the other, in place of [`Mission::target`], which is then the first of them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub targets: Vec<Waypoint>,
     /// The method by which the robot is guided.
@@ -77,7 +77,7 @@ pub struct Mission {
     /// Whether readings of the sonar go into the map. Without them the robot knows only [`Mission::known`].
     #[serde(default = "defaults::sensing")]
     pub sensing: bool,
-    /// The sensors whose readings go into the map; without it what [`Mission::sensor_set`] says.
+    /// The sensors whose readings go into the map; by default [`Mission::sensor_set`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensors: Option<Sensors>,
     /// The distance within which the target counts as reached, metres.
@@ -135,7 +135,7 @@ pub struct Mission {
     pub remarks: Vec<String>,
 }
 
-/// How many targets a list has at most.
+/// The greatest number of targets in a list.
 pub const MOST_TARGETS: usize = 16;
 
 /// A place of a list of targets: `[x, y]`, or `[x, y, heading]`.
@@ -203,12 +203,12 @@ pub struct Perimeter {
 }
 
 impl Perimeter {
-    /// A grid has no more cells a side than this unless the mission says so: what the planner follows at the robot's rate
-    /// with time to spare.
+    /// The most cells a side of a grid unless the mission says otherwise: the planner follows such a grid at the robot's rate with time to
+    /// spare.
     const DEFAULT_MOST_CELLS: f64 = 512.0;
 }
 
-/// The values of dead reckoning. Those of the wheels are in [`Odometry`].
+/// The values of dead reckoning, except those of the wheels, which are in [`Odometry`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DeadReckoning {
@@ -234,9 +234,9 @@ pub struct Mapper {
     /// The paper's method: how far around a hit cells are marked with it, metres:
     /// [`Mission::margin_cells`] is Im of (19).
     pub margin_m: f64,
-    /// The evidential method: what is left free between the body and a hit, metres.
+    /// The evidential method: the distance left free between the body and a hit, metres.
     pub clearance_m: f64,
-    /// Hits farther than this are no safety event yet, metres; without it what [`Mission::map_within_m`] says.
+    /// Hits farther than this are no safety event yet, metres; by default [`Mission::map_within_m`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub map_within_m: Option<f64>,
 }
@@ -246,7 +246,7 @@ pub struct Mapper {
 #[serde(deny_unknown_fields, default)]
 pub struct Planner {
     /// The evidential method: the time in which the robot must be able to stop before it meets what it believes in or has not scanned,
-    /// seconds; without it what [`Mission::hurry`] says. The sonar's period, the radio's delay and the wheels' lag add up to 0.36 s.
+    /// seconds; by default that of [`Mission::hurry`]. The sonar's period, the radio's delay and the wheels' lag add up to 0.36 s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stops_within_s: Option<f64>,
     /// Screening length, metres: lambda of laplacian u = u / lambda^2. Without
@@ -285,21 +285,21 @@ pub struct Hurry {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Controller {
-    /// vd: the most tangential speed asked for, m/s; without it what [`Mission::speed_m_s`] says.
+    /// vd: the greatest tangential speed asked for, m/s; by default [`Mission::speed_m_s`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speed_m_s: Option<f64>,
-    /// wd: the most turn rate asked for, rad/s; without it what [`Mission::turn_rad_s`] says.
+    /// wd: the greatest turn rate asked for, rad/s; by default [`Mission::turn_rad_s`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub turn_rad_s: Option<f64>,
-    /// The evidential method drives at full speed while it faces its way within this angle, degrees; without it what [`Mission::hurry`]
-    /// says.
+    /// The evidential method drives at full speed while the robot faces its way within this angle, degrees; by default that of
+    /// [`Mission::hurry`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub full_speed_within_deg: Option<f64>,
-    /// The evidential method turns on the spot while its way lies farther than this to a side, degrees. In between the speed falls with
-    /// the cosine. Without it what [`Mission::hurry`] says.
+    /// The evidential method turns on the spot while the way lies farther than this to a side, degrees. At smaller angles the speed falls
+    /// with the cosine. By default that of [`Mission::hurry`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub turns_beyond_deg: Option<f64>,
-    /// The greatest turn rate on the spot of the evidential method, rad/s; without it what [`Mission::hurry`] says.
+    /// The greatest turn rate on the spot of the evidential method, rad/s; by default that of [`Mission::hurry`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub look_rad_s: Option<f64>,
     /// Rc: where slowing down before the target begins, metres.
@@ -359,7 +359,7 @@ impl Default for Controller {
 }
 
 impl Mission {
-    /// Where to go, one after the other.
+    /// The places to visit, one after the other.
     #[must_use]
     pub fn waypoints(&self) -> Vec<Waypoint> {
         match self.targets.is_empty() {
@@ -384,7 +384,7 @@ impl Mission {
     /// grid is.
     #[must_use]
     pub fn margin_cells(&self) -> u32 {
-        // The hit's own cell covers half a cell; what rounding adds is no further cell.
+        // The hit's own cell covers half a cell; a rounding error adds no cell.
         let cells = self.mapper.margin_m / self.grid_frame().resolution_m - 0.5;
         (cells - 1e-6).ceil().max(0.0) as u32
     }
@@ -399,8 +399,8 @@ impl Mission {
             && self.body().ackermann().is_none()
     }
 
-    /// vd, m/s: `controller.speed_m_s`, or by default for a robot that looks first 0.5, with infrared rangers 0.7, with a laser what its
-    /// body can; else the paper's 0.25.
+    /// vd, m/s: `controller.speed_m_s`, or by default 0.5 for a robot that looks first, 0.7 with infrared rangers, the body's top speed
+    /// with a laser; else the paper's 0.25.
     #[must_use]
     pub fn speed_m_s(&self) -> f64 {
         self.controller.speed_m_s.unwrap_or_else(|| match self.looks_first() {
@@ -464,7 +464,7 @@ impl Mission {
         self.sensor_table().swap_remove(self.front_row())
     }
 
-    /// How fast the evidential method may be, by its keys. A robot whose infrared rangers end at surfaces of any angle may hurry. One that
+    /// The speeds of the evidential method, by its keys. A robot whose infrared rangers end at surfaces of any angle may hurry. One that
     /// has sonars alone turns at 1.2 rad/s, so that a cone of 15 degrees to either side covers each direction three times at 7 Hz: with
     /// 2.0 rad/s three times as many robots touched something, most of them the ends of loose walls.
     #[must_use]
@@ -504,12 +504,12 @@ impl Mission {
         self.mapper.map_within_m.unwrap_or(default)
     }
 
-    /// The screening length of the field, metres: `planner.screening_m`, or what the method takes where the mission
-    /// does not say; none for no screening, which is exactly (11).
+    /// The screening length of the field, metres: `planner.screening_m`, or by default that of the method; none for no screening, which is
+    /// exactly (11).
     #[must_use]
     pub fn screening_length_m(&self) -> Option<f64> {
         let default = match self.method {
-            // No shorter than the grid resolves.
+            // The length is at least what the grid resolves.
             Method::Evidential => {
                 let resolution = self.grid_frame().resolution_m;
                 Some(Planner::EVIDENTIAL_SCREENING_M.max(resolution / 2.0))

@@ -71,9 +71,9 @@ pub struct Channel {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RobotConfig {
-    /// Preset that gives what is not said.
+    /// The preset of all values that are not written.
     pub model: Model,
-    /// The protocol that it speaks; by default that of its model: [`RobotConfig::protocol`].
+    /// The robot's protocol; by default that of its model: [`RobotConfig::protocol`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub protocol: Option<Protocol>,
     /// The address of a real robot, in one of the forms of [`crate::address::Address`]. Without it a simulated robot is started.
@@ -111,7 +111,7 @@ pub struct RobotConfig {
     /// The most that its speed may grow, m/s^2; a car's and an X80's may grow at once.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub acceleration_m_s2: Option<f64>,
-    /// The most that its turn rate may grow, rad/s^2; likewise.
+    /// The most that its turn rate may grow, rad/s^2; a car's and an X80's may grow at once.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub turn_acceleration_rad_s2: Option<f64>,
     /// The left wheel's channel; that of a car's driven axle.
@@ -123,15 +123,15 @@ pub struct RobotConfig {
     pub speed_trim: Option<bool>,
     /// Age at which a command no longer moves the robot, seconds.
     pub command_limit_s: f64,
-    /// Below what a battery is low.
+    /// The voltages below which a battery is low.
     pub low_battery_v: BatteryLimits,
-    /// The motor current of a wheel that something holds, AD counts: a wheel that does not turn as told and draws less is taken for a
-    /// wheel whose encoder is dead; 0 takes each for that. The default is that of the simulated robot, because no X80 was measured.
+    /// The least motor current of a wheel that something holds, AD counts. A wheel that does not turn as told and draws less counts as one
+    /// with a dead encoder, and so does every such wheel if this is 0. The default is the simulated robot's, because no X80 was measured.
     pub held_current_ad: u16,
     /// The file of a calibration, whose values replace `odometry` before a run starts: see [`crate::Mission::with_calibration`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration: Option<PathBuf>,
-    /// How its wheels differ from the nominal ones.
+    /// The differences between its wheels and the nominal ones.
     pub odometry: Odometry,
     /// The board of a robot that speaks as ROSArduinoBridge does.
     #[serde(skip_serializing_if = "ArduinoBoard::is_default")]
@@ -298,11 +298,11 @@ const fn differential(
     }
 }
 
-/// The accelerations of the X80 and the car. No source has any.
+/// The accelerations of the X80 and the car, because no source gives any.
 const AT_ONCE: [f64; 2] = [f64::INFINITY; 2];
 
 impl Model {
-    /// Whether it is an X80, or has its boards.
+    /// Whether the robot is an X80, or has an X80's boards.
     #[must_use]
     pub const fn is_x80(self) -> bool {
         matches!(self, Self::X80 | Self::X80sv | Self::Car)
@@ -359,7 +359,7 @@ impl Model {
 }
 
 impl RobotConfig {
-    /// The protocol that it speaks.
+    /// The robot's protocol.
     #[must_use]
     pub fn protocol(&self) -> Protocol {
         self.protocol.unwrap_or(match self.model.is_x80() {

@@ -12,13 +12,13 @@ pub struct Ros2Topics {
     pub odom: String,
     /// The beams of its laser, `sensor_msgs/LaserScan`.
     pub scan: String,
-    /// What it is told, `geometry_msgs/Twist`.
+    /// The robot's velocity commands, `geometry_msgs/Twist`.
     pub cmd_vel: String,
-    /// Whether it is told `geometry_msgs/TwistStamped` instead.
+    /// Whether velocity commands are `geometry_msgs/TwistStamped` instead.
     pub stamped: bool,
-    /// Its battery, `sensor_msgs/BatteryState`.
+    /// The battery, `sensor_msgs/BatteryState`.
     pub battery: String,
-    /// Its gyro, `sensor_msgs/Imu`; none by default.
+    /// The gyro, `sensor_msgs/Imu`; none by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub imu: Option<String>,
     /// The topics of its sonars and infrared rangers, `sensor_msgs/Range`, by the names of their rows.
@@ -40,7 +40,7 @@ impl Default for Ros2Topics {
 }
 
 impl Ros2Topics {
-    /// Whether the mission names none.
+    /// Whether the mission names no topics.
     pub(crate) fn is_default(&self) -> bool {
         *self == Self::default()
     }

@@ -36,7 +36,7 @@ const RING: [(f64, f64); INFRARED_RANGERS] = [
     (90.0, 0.121 / 0.19),
 ];
 
-/// What a reading says about the ground before the sensor.
+/// The meaning of a reading for the ground before the sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SensorKind {
@@ -110,9 +110,9 @@ impl SensorModel {
         }
     }
 
-    /// The greatest range at which a laser detects a black surface, one that reflects a tenth of the light, metres. Of the UST-10LX its
-    /// specification gives 4 m, and 10 m for white; of the others the same share of the reach is nominal. Slamtec gives it for its
-    /// RPLIDAR A3: black 10 m, white 25 m.
+    /// The greatest range at which a laser detects a black surface, which reflects a tenth of the light, metres. The specification of the
+    /// UST-10LX gives 4 m, and 10 m for white. The others are given the same share of their reach, which is nominal: Slamtec gives it for
+    /// its RPLIDAR A3 (black 10 m, white 25 m).
     #[must_use]
     pub const fn black_reach_m(self) -> f64 {
         0.4 * self.reach_m()
@@ -139,8 +139,8 @@ impl SensorModel {
         }
     }
 
-    /// The standard deviation of a beam's range: metres, and a share of the range. Of the LDS-02 the manual gives 15 mm up to half a
-    /// metre and 5 % beyond, of the A1 less than 1 %, of the UST-10LX 40 mm at most: these are taken as two deviations.
+    /// The standard deviation of a beam's range: metres, and a share of the range. The manuals give 15 mm up to half a metre and 5 %
+    /// beyond for the LDS-02, less than 1 % for the A1, 40 mm at most for the UST-10LX: these are taken as two deviations.
     #[must_use]
     pub const fn beam_noise(self) -> (f64, f64) {
         match self {
@@ -156,14 +156,14 @@ impl SensorModel {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorRow {
-    /// Its name in logs and reasons.
+    /// The name in logs and reasons.
     pub name: String,
     /// The kind of its readings.
     pub kind: SensorKind,
     /// The channel of the robot that gives it: of a cone the sonar's index in the standard frame, 0 to 5; of a ray the infrared ranger, 0
     /// to 6.
     pub channel: u8,
-    /// Its distance from the robot's centre along its bearing, metres.
+    /// The distance from the robot's centre along its bearing, metres.
     pub forward_m: f64,
     /// delta of (19): its bearing from the robot's axis, degrees counter-clockwise.
     pub bearing_deg: f64,
@@ -195,9 +195,9 @@ fn is_outward(turned_deg: &f64) -> bool {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SonarConfig {
-    /// Its index among the six of the standard frame.
+    /// The index among the six of the standard frame.
     pub index: u8,
-    /// Its distance from the robot's centre along its bearing, metres (the paper writes W/2).
+    /// The distance from the robot's centre along its bearing, metres (the paper writes W/2).
     pub forward_m: f64,
     /// delta of (19): its bearing from the robot's axis, degrees.
     pub bearing_deg: f64,
@@ -212,13 +212,13 @@ impl Default for SonarConfig {
 /// A sensor, every value known.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sensor {
-    /// Its name in logs and reasons.
+    /// The name in logs and reasons.
     pub name: String,
     /// The kind of its readings.
     pub kind: SensorKind,
     /// The channel of the robot that gives it.
     pub channel: u8,
-    /// Its mounting.
+    /// The mounting.
     pub mount: Mount,
     /// The angle in which it detects, degrees; 0 of a ray.
     pub field_of_view_deg: f64,
@@ -226,9 +226,9 @@ pub struct Sensor {
     pub reach_m: f64,
     /// The number of its beams; 1 of a sensor that is no laser.
     pub beams: usize,
-    /// It measures once in so many ticks.
+    /// The number of ticks from one measurement to the next.
     pub every_ticks: u64,
-    /// Its product.
+    /// The product.
     pub model: SensorModel,
     /// Whether the mission uses its readings.
     pub used: bool,
@@ -264,8 +264,8 @@ impl Sensor {
         (-wide / 2.0, wide / steps.max(1) as f64)
     }
 
-    /// The angle from the robot's axis to what is turned to a place for a look, radians. A laser that sees all around is never turned, so
-    /// of that it is its bearing.
+    /// The angle from the robot's axis to the direction that the robot turns to a place when it looks there, radians. For a laser that
+    /// sees all around it is the bearing, because such a laser is never turned.
     #[must_use]
     pub fn faces_rad(&self) -> f64 {
         match self.field_of_view_deg >= 360.0 {
@@ -274,7 +274,7 @@ impl Sensor {
         }
     }
 
-    /// Its bearing from the robot's axis, degrees.
+    /// The bearing from the robot's axis, degrees.
     #[must_use]
     pub fn bearing_deg(&self) -> f64 {
         self.mount.bearing_rad.to_degrees()
@@ -329,8 +329,8 @@ pub(crate) fn table(
     table
 }
 
-/// The row of the front sonar. Without rows of the mission it is the first, wherever `[sonar]` says that it looks. Of a robot without
-/// sonars it is the sensor that looks most nearly there.
+/// The row of the front sonar. Without rows of the mission it is the first, wherever `[sonar]` says that it looks. A robot without sonars
+/// has instead the sensor that looks most nearly there.
 pub(crate) fn front(table: &[Sensor], sonar: &SonarConfig) -> Option<usize> {
     let ahead = |sensor: &Sensor| (sensor.bearing_deg() - sonar.bearing_deg).abs();
     let any_cone = table.iter().any(|sensor| sensor.kind == SensorKind::Cone);
@@ -339,7 +339,7 @@ pub(crate) fn front(table: &[Sensor], sonar: &SonarConfig) -> Option<usize> {
     candidates.min_by(|(_, a), (_, b)| ahead(a).total_cmp(&ahead(b))).map(|(index, _)| index)
 }
 
-/// The one row of a robot with a laser alone, which is turned by so many degrees.
+/// The one row of a robot whose only sensor is a laser, turned by `turned_deg` degrees.
 pub(crate) fn laser(model: SensorModel, forward_m: f64, turned_deg: f64) -> Vec<SensorRow> {
     vec![SensorRow {
         name: "laser".to_owned(),

@@ -1,8 +1,8 @@
 //! The behaviour of the simulated robot: its sensors, wheels and radio, and the obstacles that move around it.
 //!
-//! Every number has three presets. `realism = "laboratory"`, the default, is ideal: rough surfaces, a prompt speed loop, a perfect
-//! radio. `realism = "measured"` has the values of real robots, `"harsh"` wheels that slip five times as much. A key in a mission
-//! overrides its preset. The guide's page of the simulated robot has the source of each value.
+//! Every number has three presets. `realism = "laboratory"` is ideal: rough surfaces, a prompt speed loop, a perfect radio. `"measured"`,
+//! the default, has the values of real robots, `"harsh"` wheels that slip five times as much. A key in a mission overrides its preset. The
+//! guide's page of the simulated robot has the source of each value.
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -15,7 +15,7 @@ use crate::geometry::Shapes;
 pub struct Simulation {
     /// The preset of every key that is not written.
     pub realism: Realism,
-    /// Whether timed commands last as if they had no time, as one real robot's are said to.
+    /// Whether the robot ignores the time limit of commands, as one real robot is said to.
     pub ignores_time: bool,
     /// The silence of the host after which the motors stop, seconds. By default they never do.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -74,11 +74,11 @@ impl Realism {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ranger {
-    /// Its index among the six of the standard frame.
+    /// The index among the six of the standard frame.
     pub index: u8,
-    /// Its distance from the robot's centre, metres.
+    /// The distance from the robot's centre, metres.
     pub forward_m: f64,
-    /// Its bearing from the robot's axis, degrees counter-clockwise.
+    /// The bearing from the robot's axis, degrees counter-clockwise.
     pub bearing_deg: f64,
 }
 
@@ -86,7 +86,7 @@ pub struct Ranger {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Thing {
-    /// Its shape, at its position before any move.
+    /// The shape, at its position before any move.
     pub shape: Shapes,
     /// The time when it appears, seconds. It appears later if the robot is in its place.
     #[serde(default)]
@@ -94,12 +94,12 @@ pub struct Thing {
     /// The time when it disappears, seconds; by default never.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub until_s: Option<f64>,
-    /// Its positions in order of time. It moves in a straight line between them.
+    /// The positions in order of time. The thing moves in a straight line between them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub moves: Vec<Move>,
 }
 
-/// Something that lets wheels not turn for a while, for example a cable around an axle.
+/// Something that keeps wheels from turning for a while, for example a cable around an axle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Block {
@@ -135,7 +135,7 @@ pub struct Move {
     pub by: DVec2,
 }
 
-/// A written number that cannot be.
+/// A written number outside its range.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct OutOfRange {
     pub(super) key: &'static str,
@@ -220,7 +220,7 @@ section! {
         noise_per_m in 0.0..=1.0 => 0.005, 0.005, 0.005;
         /// Greatest angle between beam and normal at which a wall answers, degrees; 90 is a rough wall.
         wall_limit_deg in 0.0..=90.0 => 90.0, 22.5, 22.5;
-        /// The angle for drums, which reflect over a wider angle.
+        /// Greatest angle between beam and normal at which a drum answers, degrees.
         drum_limit_deg in 0.0..=90.0 => 90.0, 50.0, 50.0;
         /// Share of pings that an edge answers when its wall does not.
         edge_share in 0.0..=1.0 => 0.0, 0.5, 0.5;
@@ -280,7 +280,7 @@ section! {
         noise_counts in 0.0..=1000.0 => 0.0, 12.0, 12.0;
         /// Share of the rolled way that slips away; below 0 it is won.
         slip_share in -0.1..=0.5 => 0.0, 0.0, 0.005;
-        /// Greatest amount by which that share is off, evenly drawn from the seed.
+        /// Greatest error of `slip_share`, evenly drawn from the seed.
         slip_share_spread in 0.0..=0.1 => 0.0, 0.005, 0.0;
         /// Standard deviation of the way lost or won by slip, metres per square root of a metre. Measured: the upper end of the
         /// intervals of public logs of a Khepera III; see the guide.
@@ -289,14 +289,14 @@ section! {
         count_noise in 0.0..=100.0 => 0.0, 0.5, 0.5;
         /// Diameter of the right wheel over that of the left one; their mean is the nominal one.
         diameter_ratio in 0.8..=1.25 => 1.0, 1.0, 1.0;
-        /// Greatest share by which that ratio is off as well, evenly drawn from the seed: each seed has a robot of its
-        /// own. Unequal diameters and an uncertain track are the two systematic errors that dominate dead reckoning
-        /// (J. Borenstein, L. Feng, "Measurement and correction of systematic odometry errors in mobile robots", IEEE
+        /// Greatest error of `diameter_ratio`, as a share of it, evenly drawn from the seed: each seed has a robot of its own. Unequal
+        /// diameters and an uncertain track are the two systematic errors that dominate dead reckoning (J. Borenstein, L. Feng,
+        /// "Measurement and correction of systematic odometry errors in mobile robots", IEEE
         /// Trans. Robotics and Automation 12(6), 1996: UMBmark). Measured: the root mean square of a Khepera III's.
         diameter_spread in 0.0..=0.1 => 0.0, 0.008, 0.005;
         /// Track on the ground over the nominal one.
         track_scale in 0.8..=1.25 => 1.0, 1.0, 1.0;
-        /// Greatest share by which that is off as well, evenly drawn from the seed; the same source.
+        /// Greatest error of `track_scale`, as a share of it, evenly drawn from the seed; the source of `diameter_spread`.
         track_spread in 0.0..=0.1 => 0.0, 0.025, 0.005;
         /// Share of the way asked of a wheel that it turns on, slipping, while something holds the body; 0 is a wheel
         /// that stalls. The vendor gives each motor of an X80 22 kg cm: 26 N at the rim, 52 N together. Tyres hold at most
@@ -333,17 +333,17 @@ section! {
 section! {
     /// The radio: a channel that is good or out, both ways alike, and what it does to datagrams.
     Radio, written as RadioKeys in "simulation.radio" {
-        /// Share of the time it is out.
+        /// Share of the time for which the radio is out.
         outage_share in 0.0..=0.95 => 0.0, 0.0, 0.0;
         /// Mean duration of an outage, seconds.
         outage_mean_s in 0.001..=60.0 => 0.5, 0.5, 0.5;
         /// No outage is longer, seconds.
         outage_max_s in 0.001..=600.0 => 2.0, 2.0, 2.0;
-        /// Share of datagrams lost while it is good.
+        /// Share of datagrams lost while the radio is good.
         loss_share in 0.0..=0.95 => 0.0, 0.0, 0.0;
         /// Time a datagram takes each way, seconds.
         delay_s in 0.0..=5.0 => 0.0, 0.0, 0.0;
-        /// Mean of the further time it takes, exponentially distributed, seconds.
+        /// Mean of the further time a datagram takes, exponentially distributed, seconds.
         jitter_s in 0.0..=5.0 => 0.0, 0.0, 0.0;
         /// Share of datagrams that arrive twice.
         duplicate_share in 0.0..=1.0 => 0.0, 0.0, 0.0;
@@ -367,17 +367,17 @@ impl Heights {
 /// The simulated X80, every value known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Physics {
-    /// The ultrasonic rangers'.
+    /// The physics of the ultrasonic rangers.
     pub sonar: SonarPhysics,
-    /// The infrared rangers'.
+    /// The physics of the infrared rangers.
     pub infrared: InfraredPhysics,
-    /// The wheels'.
+    /// The physics of the wheels.
     pub wheels: WheelPhysics,
     /// The heights of the body and its sensors.
     pub heights: Heights,
-    /// The batteries'.
+    /// The physics of the batteries.
     pub battery: BatteryPhysics,
-    /// The radio's.
+    /// The physics of the radio.
     pub radio: Radio,
 }
 

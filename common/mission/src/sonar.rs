@@ -33,7 +33,7 @@ impl Mount {
         self.bearing_rad + self.turned_rad
     }
 
-    /// The hit of (19), metres: what a ranger on a robot at `robot` hears `range_m` away on its axis.
+    /// The hit of (19), metres: the point that a ranger on a robot at `robot` hears `range_m` away on its axis.
     #[must_use]
     pub fn hit(&self, robot: Pose2, range_m: f64) -> DVec2 {
         let ranger = self.on(robot);

@@ -11,10 +11,10 @@ pub(crate) const ENCAPSULATION: usize = 4;
 /// The bytes are not the message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum Malformed {
-    /// They are encoded in another way.
+    /// The bytes have another encoding.
     #[error("encoding {0:#06x} instead of plain CDR; set the robot's middleware to XCDR1")]
     Encoding(u16),
-    /// They end early.
+    /// The bytes end early.
     #[error("it ends early; is the topic of this type?")]
     Short,
     /// A text or a list is too long.
@@ -116,7 +116,7 @@ impl<'a> Reader<'a> {
 pub struct Writer(Vec<u8>);
 
 impl Default for Writer {
-    /// A message of nothing yet, after its encapsulation.
+    /// An empty message, after its encapsulation.
     fn default() -> Self {
         Self(vec![0, 1, 0, 0])
     }
@@ -158,7 +158,7 @@ impl Writer {
         numbers.iter().fold(self, |writer, number| writer.f64(*number))
     }
 
-    /// Bytes of which the receiver knows how many there are.
+    /// Bytes whose number the receiver knows.
     pub fn raw(&mut self, bytes: &[u8]) -> &mut Self {
         self.0.extend(bytes);
         self

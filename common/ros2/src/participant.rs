@@ -29,9 +29,9 @@ use rustix::{
 
 use crate::{cdr::ENCAPSULATION, topic::Topic};
 
-/// The longest message that is received, bytes. A longer one is cut, and who decodes it refuses it.
+/// The longest message that is received, bytes. A longer one is cut, and its decoder refuses it.
 const LONGEST: usize = 65_535;
-/// So many messages that cannot be decoded are passed over at a time.
+/// The most messages that are skipped at a time because they cannot be decoded.
 const MOST_BROKEN: usize = 16;
 
 /// A message as DDS delivers it.
@@ -39,14 +39,14 @@ type Payload = Vec<u8>;
 /// The number that DDS knows a participant, a reader or a writer by.
 pub type Gid = [u8; 16];
 
-/// What a reader demands, and what a writer offers.
+/// The quality of service that a reader demands, or a writer offers.
 #[derive(Clone, Copy, Debug)]
 pub struct Quality {
-    /// What was lost is sent again.
+    /// Whether lost messages are sent again.
     pub is_reliable: bool,
-    /// Who comes later gets the newest messages.
+    /// Whether a reader that joins later gets the newest messages.
     pub is_latched: bool,
-    /// So many messages are kept at most.
+    /// The most messages that are kept.
     pub depth: u16,
 }
 
@@ -78,7 +78,7 @@ impl DeserializerAdapter<Payload> for Raw {
 
     fn supported_encodings() -> &'static [RepresentationIdentifier] {
         use RepresentationIdentifier as Encoding;
-        // Who decodes them refuses the others, with the reason.
+        // The decoder of the messages refuses other encodings, with the reason.
         const { &[Encoding::CDR_LE, Encoding::CDR_BE, Encoding::CDR2_LE, Encoding::CDR2_BE] }
     }
 
@@ -123,7 +123,7 @@ struct Bell(OwnedFd);
 
 impl Wake for Bell {
     fn wake(self: Arc<Self>) {
-        // It fails when the descriptor has been rung very often, and is readable then.
+        // The write fails if the descriptor was rung very often, and the descriptor is readable then.
         let _ = write(&self.0, &1_u64.to_ne_bytes());
     }
 }
@@ -137,7 +137,7 @@ pub struct Participant {
 }
 
 impl Participant {
-    /// Join `domain` by the network interface with the address `only`, or else by all of them; by none but this machine's own if the
+    /// Join `domain` by the network interface with the address `only`, or else by all interfaces; by this machine's own alone if the
     /// environment says so as it does for ROS.
     pub fn join(domain: u16, only: Option<Ipv4Addr>) -> io::Result<Self> {
         let inner = joined(domain, only)?;
@@ -180,8 +180,8 @@ impl Participant {
         topic.map_err(io::Error::other)
     }
 
-    /// Let the descriptor be readable no more until something comes. Readers are asked after this, so that it is readable again for
-    /// what comes after they said that they have nothing.
+    /// Make the descriptor unreadable until something comes. Ask the readers after this call: the descriptor becomes readable again for
+    /// messages that come after a reader had none.
     pub fn unring(&self) {
         let _ = read(&self.rung, &mut [0_u8; 8]);
     }
@@ -195,16 +195,16 @@ impl Participant {
 /// The header that Cyclone DDS puts before a request: the client's number and that of the request, 8 bytes each. The reply repeats it.
 const CYCLONE_HEADER: usize = 16;
 
-/// Whom a request came from. Fast DDS says so beside the message, as the standard has it, and Cyclone DDS in it.
+/// The sender of a request. Fast DDS names it beside the message, as the standard has it, Cyclone DDS in the message.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Request {
     identity: SampleIdentity,
-    /// What stands before the request, and before its reply; nothing of Fast DDS.
+    /// The header of the request and of its reply; empty for Fast DDS.
     header: Vec<u8>,
 }
 
 impl Request {
-    /// The payload of a request without what stands before it.
+    /// The payload of a request without the header.
     pub fn without_header(&self, payload: &[u8]) -> Payload {
         let (encapsulation, rest) = payload.split_at(payload.len().min(ENCAPSULATION));
         [encapsulation, rest.get(self.header.len()..).unwrap_or_default()].concat()
@@ -247,7 +247,7 @@ impl Reader {
         Some(Message { payload: message.sample, from, request })
     }
 
-    /// The messages that have come. Who floods the topic makes them endless.
+    /// The messages that have come. A writer that floods the topic makes them endless.
     pub fn messages(&self) -> impl Iterator<Item = Message> {
         std::iter::from_fn(|| self.take())
     }

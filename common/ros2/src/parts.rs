@@ -1,14 +1,14 @@
-//! What many messages are made of. Poses are in the plane.
+//! The parts that many messages are made of. Poses are in the plane.
 
 use crate::cdr::{Malformed, Reader, Writer};
 
-/// A rotation whose quaternion is shorter or longer by so much is none.
+/// A quaternion whose length differs from 1 by more than this is no rotation.
 const UNIT_WITHIN: f64 = 0.1;
 
 /// x, y and heading, metres and radians.
 pub type Pose = [f64; 3];
 
-/// The heading of a quaternion (x, y, z, w), radians; none of one that is no rotation.
+/// The heading of a quaternion (x, y, z, w), radians; none if the quaternion is no rotation.
 pub fn heading([i, j, k, w]: [f64; 4]) -> Option<f64> {
     let length = [i, j, k, w].iter().map(|part| part * part).sum::<f64>().sqrt();
     let is_rotation = (length - 1.0).abs() <= UNIT_WITHIN;

@@ -3,11 +3,11 @@
 /// A topic of messages, or one that carries the requests or the replies of a service.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Topic {
-    /// Its name in ROS, from the root.
+    /// The name in ROS, from the root.
     pub name: String,
     /// The name of its type in DDS.
     pub type_name: &'static str,
-    /// What its name in DDS begins and ends with.
+    /// The beginning and the end of its name in DDS.
     ends: [&'static str; 2],
 }
 
@@ -22,7 +22,7 @@ impl Topic {
         Self { name: name.to_owned(), type_name, ends: ["", ""] }
     }
 
-    /// The topics of a service: what clients ask, and what they are answered.
+    /// The topics of a service: the requests of clients, and the replies.
     pub fn service(name: &str, [request, reply]: [&'static str; 2]) -> [Self; 2] {
         [
             Self { name: absolute(name), type_name: request, ends: ["rq", "Request"] },
@@ -30,7 +30,7 @@ impl Topic {
         ]
     }
 
-    /// Its name in DDS.
+    /// The name in DDS.
     pub fn dds_name(&self) -> String {
         format!("{}{}{}", self.ends[0], self.name, self.ends[1])
     }

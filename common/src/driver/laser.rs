@@ -9,8 +9,8 @@ use crate::{
 
 /// A laser whose scans are the same to the bit while a wheel turns so far is stuck, radians.
 const STUCK_RAD: f64 = 1.0;
-/// A laser whose beams all see nothing is blind if, in the scan before, more than one in so many ended within half its reach. Nothing
-/// that fills so much of its view is out of reach a moment later.
+/// A laser whose beams all see nothing is blind if, in the scan before, more than one beam in so many ended within half its reach.
+/// Nothing that fills so much of its view is out of reach a moment later.
 const BLIND_ONE_IN: usize = 20;
 
 /// The laser of a mission.
@@ -47,7 +47,7 @@ impl Laser {
         })
     }
 
-    /// Its row of the mission.
+    /// The laser's row of the mission.
     pub const fn sensor(&self) -> &Sensor {
         &self.sensor
     }
@@ -57,7 +57,7 @@ impl Laser {
         self.turned = turned;
     }
 
-    /// A beam as the topic `scan` has it: infinite for none or one beyond reach, no number for one that is too short to be a range.
+    /// A beam as the topic `scan` has it: infinite for none or one beyond reach, no number for one too short to be a range.
     pub fn beam(&self, range: Option<f32>) -> f32 {
         let (least_m, reach_m) = (self.sensor.model.least_m() as f32, self.sensor.reach_m as f32);
         match range {
@@ -72,8 +72,8 @@ impl Laser {
         std::mem::take(&mut self.scan)
     }
 
-    /// Take the beams as [`Laser::beam`] gives them. As a reading of its row the nearest of them counts; none does of a laser that says
-    /// the same although the wheels have turned, or that is blind.
+    /// Take the beams as [`Laser::beam`] gives them. The nearest beam counts as the reading of the laser's row. None does if the laser
+    /// is blind, or if its scan stays the same although the wheels have turned.
     pub fn take(&mut self, beams: Vec<f32>, readings: &mut Readings) {
         let (newest, turned_then) = &self.newest_scan;
         let [bits_then, bits_now] =

@@ -13,19 +13,19 @@ use crate::{
     wire::COUNT_CYCLE,
 };
 
-/// No odometry says that a robot is farther away, metres, or has turned farther, radians.
+/// The farthest that odometry can say a robot is away, metres, or has turned, radians.
 const FARTHEST: f64 = 1e6;
-/// No wheel rolls farther than so many times what it rolls at its top speed.
+/// The farthest that a wheel can roll, as a multiple of its way at top speed.
 const IMPLAUSIBLE: f64 = 1.5;
-/// A pose and its stamp are of the same moment but for so long, seconds.
+/// The greatest time between a pose and its stamp, seconds.
 const JITTER_S: f64 = 0.1;
-/// A pose is exact but for this, metres.
+/// The greatest error of a pose from one to the next, metres.
 const SLACK_M: f64 = 0.01;
-/// A robot that has said nothing for so long may have started again, seconds. Odometry begins at 0, 0 with heading 0, and says so within
-/// this, metres and radians.
+/// The silence after which a robot may have started again, seconds. Its odometry then says a pose within `NEAR_START` of 0, metres and
+/// radians.
 const STARTS_IN_S: f64 = 1.0;
 const NEAR_START: f64 = 0.05;
-/// The current of a wheel that is held: all that the converter of an X80 can say, AD counts.
+/// The current of a wheel that is held, AD counts: the greatest value of an X80's converter.
 const HELD_AD: u16 = 4095;
 
 /// The angles by which wheels would have turned on the way of a robot that says its pose.
@@ -43,14 +43,14 @@ impl Odometry {
         Some([position.x, position.y, heading, left, right])
     }
 
-    /// Go on from there.
+    /// Go on from the pose and the angles in `memory`.
     pub const fn remember(&mut self, [x, y, heading, left, right]: Memory) {
         self.last = Some(Pose2 { position: DVec2::new(x, y), heading });
         self.turned = [left, right];
     }
 
-    /// The angles of the left and the right wheel of a robot that is at `x`, `y` with this heading by its odometry. What it slipped aside is
-    /// left out, as wheels leave it out. None if the numbers are too great to be a way.
+    /// The angles of the left and the right wheel of a robot that is at `x`, `y` with this heading by its odometry. Sideways slip is left
+    /// out, because wheels do not show it. None if the numbers are too great to be a way.
     pub fn turned(&mut self, pose: [f64; 3], body: &Body) -> Option<[f64; 2]> {
         let now = pose_at(pose)?;
         let [arc, turn, _] = self.way(now);
@@ -61,8 +61,8 @@ impl Odometry {
         Some(self.turned)
     }
 
-    /// Whether no robot with this body gets from its newest pose to this one in `gap_s` seconds, or by wheels, or its odometry started
-    /// again. Then go on from the pose: the way to it counts as no motion.
+    /// Whether the way from the newest pose to this one is a jump: longer than this body can go in `gap_s` seconds, sideways, or a new
+    /// start of the odometry. Then go on from the pose: the way to it counts as no motion.
     pub fn takes_jump(&mut self, pose: [f64; 3], gap_s: f64, body: &Body) -> bool {
         let Some(now) = pose_at(pose) else {
             return false;
@@ -79,8 +79,7 @@ impl Odometry {
         jumps
     }
 
-    /// The way from the newest pose to `now`: the arc, metres, the turn, radians, and what the robot slipped aside, metres; none before the
-    /// first.
+    /// The way from the newest pose to `now`: the arc, metres, the turn, radians, and the sideways slip, metres; all 0 before the first.
     fn way(&self, now: Pose2) -> [f64; 3] {
         let Some(last) = self.last else {
             return [0.0; 3];

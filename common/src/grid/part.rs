@@ -10,7 +10,7 @@ use glam::DVec2;
 use bus::{ZeroCopySend, layouts};
 use mission::grid::{GridFrame, Window};
 
-/// How a map lies and which part of which version came along, as it lies in the headers of `grid` and `field`.
+/// The frame of a map and the part of a version that a sample carries, in the headers of `grid` and `field`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.Part")]
 #[repr(C)]
@@ -32,9 +32,9 @@ pub struct Part {
     pub keyframe: u32,
     /// Delta: side of a cell, metres.
     pub resolution_m: f64,
-    /// Where cell (N/2, N/2) lies, metres.
+    /// X of cell (N/2, N/2), metres.
     pub centre_x_m: f64,
-    /// Where cell (N/2, N/2) lies, metres.
+    /// Y of cell (N/2, N/2), metres.
     pub centre_y_m: f64,
 }
 
@@ -64,7 +64,7 @@ impl Part {
         Self { keyframe: 1, ..Self::of(frame, frame.whole(), version) }
     }
 
-    /// How the map lies.
+    /// The frame of the map.
     pub const fn frame(&self) -> GridFrame {
         GridFrame {
             cells: self.cells,
@@ -73,12 +73,12 @@ impl Part {
         }
     }
 
-    /// The cells that came along, row-major.
+    /// The cells that the sample carries, row-major.
     pub const fn window(&self) -> Window {
         Window { col: self.col, row: self.row, width: self.width, height: self.height }
     }
 
-    /// Whether they are the whole map.
+    /// Whether the sample carries the whole map.
     pub const fn is_keyframe(&self) -> bool {
         self.keyframe == 1
     }

@@ -61,7 +61,7 @@ impl<T: Copy + PartialEq> Replica<T> {
         let Some((held_frame, held)) = self.state else {
             return Applied::Missed;
         };
-        // Without a change the version stays: one that is newer says that the part with its change was missed.
+        // Only a change makes a new version: if an empty part has one, the changed part was missed.
         let follows =
             if window.area() == 0 { version == held } else { held.checked_add(1) == Some(version) };
         if held_frame != frame || !follows {

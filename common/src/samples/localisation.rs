@@ -32,7 +32,7 @@ payloads! {
     "firsthand.Turn" TurnSample {
         /// Mission time at which the increment ends, nanoseconds.
         capture_ns: u64,
-        /// One more than that of the sample before, where the increment begins.
+        /// The number of the increment: one more than that of the increment at whose end it begins.
         sequence: u64,
         /// Radians counter-clockwise.
         turn_rad: f64,
@@ -44,17 +44,17 @@ payloads! {
 wire_enum! {
     /// Why dead reckoning did not use a fix.
     FixRefusal, unknown = None, text = words {
-        /// It used it, or none came.
+        /// The fix was used, or none came.
         None = 0 "none",
-        /// It was measured more than 2 s ago, or before the oldest tick that dead reckoning still holds.
+        /// The fix was measured more than 2 s ago, or before the oldest tick that dead reckoning still holds.
         Late = 1 "a fix is refused: it is more than 2 s old; publish it sooner",
-        /// It was measured more than a tick after the newest one.
+        /// The fix was measured more than a tick after the newest one.
         Future = 2 "a fix is refused: its capture time is in the future; give mission time",
-        /// A number of it is not finite.
+        /// A number of the fix is not finite.
         NotFinite = 3 "a fix is refused: it has a number that is not finite",
-        /// Its covariance is not positive, or states an error under 5 mm.
+        /// The covariance of the fix is not positive, or states an error under 5 mm.
         Covariance = 4 "a fix is refused: its covariance is not positive or states less than 5 mm",
-        /// It contradicts the pose.
+        /// The fix contradicts the pose.
         Far = 5 "a fix is refused: it contradicts the pose",
         /// Too many fixes of the same 2 s came before it.
         TooMany = 6 "a fix is refused: too many came in 2 s; publish fewer",

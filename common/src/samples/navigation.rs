@@ -96,7 +96,7 @@ impl PoseSample {
     }
 }
 
-/// How many readings of sonars a `grid` sample carries at most: those of 128 ticks of three sonars.
+/// The most readings of sonars in a `grid` sample: those of 128 ticks of three sonars.
 pub const CLEAR_BEAMS: usize = 3 * 128;
 
 /// One reading as evidence of free ground. A reading of the sonar says that nothing square to the beam stands nearer than
@@ -109,13 +109,13 @@ pub struct ClearBeam {
     pub x_m: f32,
     /// The sensor, metres in the mission frame.
     pub y_m: f32,
-    /// Where it looked, radians counter-clockwise from x.
+    /// The direction in which the sensor looked, radians counter-clockwise from x.
     pub bearing_rad: f32,
     /// The distance within which nothing answered, metres.
     pub clear_m: f32,
 }
 
-/// How many rays of infrared rangers a `grid` sample carries at most: the rays of 32 ticks.
+/// The most rays of infrared rangers in a `grid` sample: those of 32 ticks.
 pub const CLEAR_RAYS: usize = 32 * INFRARED_RANGERS;
 
 /// Topic `grid`, header; the slice is one [`crate::grid::CellState`] byte a cell of the window.
@@ -129,11 +129,11 @@ pub struct GridHeader {
     pub safety_events: u64,
     /// The belief's epoch: grows when the sensed belief was reset.
     pub epoch: u64,
-    /// How many of `clear_beams` are readings; none by the paper's method.
+    /// The number of readings in `clear_beams`; 0 by the paper's method.
     pub clear_beam_count: u64,
     /// The newest readings, oldest first.
     pub clear_beams: [ClearBeam; CLEAR_BEAMS],
-    /// How many of `clear_rays` are readings; none without infrared rangers in the evidence.
+    /// The number of readings in `clear_rays`; 0 without infrared rangers in the evidence.
     pub clear_ray_count: u64,
     /// The newest readings of the infrared rangers, oldest first: nothing stands on the ray nearer than `clear_m`, at whatever
     /// angle.
@@ -353,7 +353,7 @@ pub struct FieldCell {
 }
 
 wire_enum! {
-    /// Why a command is what it is.
+    /// The reason for a command.
     CommandState, unknown = Halt {
         /// No guidance to follow: stand.
         Halt = 0,

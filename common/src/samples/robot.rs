@@ -46,7 +46,7 @@ pub struct RangeReading {
 }
 
 impl RangeReading {
-    /// What the reading is.
+    /// The kind of the reading.
     pub const fn status(&self) -> RangeStatus {
         RangeStatus::from_byte(self.status)
     }
@@ -211,7 +211,7 @@ pub struct LinkSample {
     pub unsent: u64,
     /// Samples that the link ignored, because the supervisor does not name their process.
     pub ignored_samples: u64,
-    /// The process that wrote the last of them; 0 for none.
+    /// The process that wrote the last ignored sample; 0 for none.
     pub ignored_writer: u32,
     /// A port that is not the robot's, from which its host answered; 0 for none.
     pub other_port: u32,
@@ -221,9 +221,9 @@ pub struct LinkSample {
     pub reboots: u64,
     /// For how long the robot has not answered, nanoseconds of the machine's clock; 0 while it does.
     pub lost_ns: u64,
-    /// Attempts to reach it since: pings, or attempts to open the connection.
+    /// Attempts to reach the robot since it was lost: pings, or attempts to open the connection.
     pub attempts: u64,
-    /// Until the next attempt, nanoseconds of the machine's clock.
+    /// The time until the next attempt, nanoseconds of the machine's clock.
     pub next_attempt_ns: u64,
     /// Commands sent.
     pub commands_out: u64,
@@ -231,11 +231,11 @@ pub struct LinkSample {
     pub repeated_commands: u64,
     /// Ticks given to the stages a second time, because no command came.
     pub repeated_ticks: u64,
-    /// From the datagram in to the datagram out, last tick, nanoseconds.
+    /// The time from the datagram in to the datagram out in the last tick, nanoseconds.
     pub latency_ns: u64,
-    /// The longest of this process of the link, nanoseconds.
+    /// The longest latency of this process of the link, nanoseconds.
     pub latency_max_ns: u64,
-    /// All of this process, a [`crate::latency::Histogram`]: bucket k counts those from 2^(k/8) microseconds.
+    /// All latencies of this process, a [`crate::latency::Histogram`]: bucket k counts those from 2^(k/8) microseconds.
     pub latency_histogram: [u32; latency::BUCKETS],
 }
 
@@ -275,7 +275,7 @@ impl LinkSample {
         Action::from_byte(self.action)
     }
 
-    /// Why the failsafe acts so.
+    /// The cause of the action.
     pub const fn cause(&self) -> Cause {
         Cause::from_byte(self.cause)
     }

@@ -38,9 +38,8 @@ pub fn name_str(name: &Name) -> &str {
 payloads! {
     /// Topic `health`: the heartbeat of every stage, published from inside its work loop.
     "firsthand.Health" HealthSample {
-        /// The stage.
         stage: Name,
-        /// Its process.
+        /// The process of the stage.
         pid: u32,
         /// A [`HealthState`].
         state: u8,
@@ -48,7 +47,7 @@ payloads! {
         turns: u64,
         /// The newest fault request to this generation; 0 for none.
         last_fault: u64,
-        /// Its answer: a [`FaultAnswer`].
+        /// The answer to that request: a [`FaultAnswer`].
         fault_answer: u8,
     }
 }
@@ -72,20 +71,20 @@ payloads! {
         epoch: u64,
         /// An [`Order`].
         order: u8,
-        /// Why it is not to drive: a [`HoldReason`].
+        /// Why the robot is not to drive: a [`HoldReason`].
         reason: u8,
     }
 }
 
 payloads! {
-    /// Topic `tick_limit`: in lockstep, how far the link may go ahead of the supervisor, so that what the supervisor
-    /// does about a stall holds from a tick that does not depend on the machine.
+    /// Topic `tick_limit`: in lockstep, how far the link may go ahead of the supervisor, so that a recovery step against a stall
+    /// holds from a tick that does not depend on the machine.
     "firsthand.TickLimit" TickLimitSample {
         /// The last tick that the link may begin.
         last_tick: u64,
         /// The first tick in which the newest recovery step holds; 0 for none.
         holds_from_tick: u64,
-        /// The belief's epoch since then.
+        /// The belief's epoch from that tick on.
         epoch: u64,
         /// The number of the current target: no tick follows an arrival before the next target is published.
         target_number: u64,
@@ -99,13 +98,13 @@ wire_enum! {
         Down = 0,
         /// Started, not ready yet.
         Starting = 1,
-        /// Beating.
+        /// The stage sends heartbeats.
         Running = 2,
-        /// Died too often; waits before the next start.
+        /// The stage died too often, and waits before the next start.
         BackingOff = 3,
-        /// Asked to stop, or aborted because it hung.
+        /// The process was asked to stop, or aborted because it hung.
         Stopping = 4,
-        /// Died far too often: only an operator starts it again.
+        /// The stage died far too often: only an operator starts it again.
         Held = 5,
     }
 }
@@ -115,7 +114,7 @@ wire_enum! {
     HoldReason, unknown = Starting {
         /// Not all stages are ready, or the robot does not answer, or there is no field yet.
         Starting = 0,
-        /// It may drive.
+        /// The robot may drive.
         None = 1,
         /// An operator said stop, and has not said resume.
         Operator = 2,
@@ -139,7 +138,7 @@ payloads! {
         simulated: u8,
         /// The request that was answered last; 0 for none.
         last_request: u64,
-        /// Its answer: a [`RequestAnswer`].
+        /// The answer to that request: a [`RequestAnswer`].
         answer: u8,
     }
 }
@@ -149,15 +148,14 @@ payloads! {
 #[type_name("firsthand.RosterEntry")]
 #[repr(C)]
 pub struct RosterEntry {
-    /// The stage.
     pub stage: Name,
-    /// Its process; 0 for none.
+    /// The process of the stage; 0 for none.
     pub pid: u32,
-    /// Its generation.
+    /// The generation.
     pub generation: u32,
     /// A [`StageState`].
     pub state: u8,
-    /// Times it was started again.
+    /// Times the stage was started again.
     pub restarts: u32,
     /// Age of its process, nanoseconds.
     pub uptime_ns: u64,
@@ -170,13 +168,13 @@ pub struct RosterEntry {
 wire_enum! {
     /// How a stage's process ended.
     DeathCause, unknown = Exited {
-        /// By itself; `code` is its exit code.
+        /// The process ended by itself; `code` is its exit code.
         Exited = 0,
-        /// By a signal; `code` is its number.
+        /// A signal ended the process; `code` is the signal's number.
         Signalled = 1,
-        /// By a signal, and it left a core; `code` is its number.
+        /// A signal ended the process, which left a core; `code` is the signal's number.
         SignalledWithCore = 2,
-        /// It was not the supervisor's child: the process that started it knows.
+        /// The cause is not known, because the process was not the supervisor's child.
         Unknown = 3,
     }
 }
@@ -190,7 +188,7 @@ wire_enum! {
         StartNow = 1,
         /// A successor is started after `next_after_ns`.
         StartLater = 2,
-        /// It died too often: only an operator starts it again.
+        /// The stage died too often: only an operator starts it again.
         Hold = 3,
     }
 }
@@ -235,11 +233,10 @@ impl Words {
 payloads! {
     /// Topic `deaths`: a stage's process ended.
     "firsthand.Death" DeathSample {
-        /// The stage.
         stage: Name,
-        /// Its process.
+        /// The process of the stage.
         pid: u32,
-        /// Its generation.
+        /// The generation.
         generation: u32,
         /// Age of its last heartbeat, nanoseconds; u64::MAX if it never beat.
         beat_age_ns: u64,
@@ -255,7 +252,7 @@ payloads! {
         cause: u8,
         /// A [`NextStep`].
         next: u8,
-        /// 1: it hung, or was never ready, and the supervisor ended it.
+        /// 1: the process hung, or was never ready, and the supervisor ended it.
         hung: u8,
         /// The end of its log.
         log_tail: Words,
@@ -281,19 +278,19 @@ wire_enum! {
     #[derive(Serialize)]
     #[serde(rename_all = "snake_case")]
     StallCause, unknown = Still {
-        /// It neither drives nor turns.
+        /// The robot neither drives nor turns.
         Still = 0,
-        /// It moves, and stays where it is.
+        /// The robot moves, but does not leave its place.
         Pinned = 1,
-        /// It stands in hazard, u = 0, and drives without coming out.
+        /// The robot is in hazard, u = 0, and drives without coming out.
         InsideHazard = 2,
-        /// It stands where the belief has no way to the target, u = 0.
+        /// The robot is where the belief has no way to the target, u = 0.
         CutOff = 3,
-        /// Something holds its wheels.
+        /// Something holds the robot's wheels.
         Held = 4,
-        /// It drives far and comes no nearer to its target.
+        /// The robot drives far and comes no nearer to its target.
         Wandering = 5,
-        /// Fixes that agree say that it is elsewhere.
+        /// Fixes that agree say that the robot is elsewhere.
         Relocated = 6,
     }
 }
@@ -313,18 +310,18 @@ payloads! {
         resets: u64,
         /// A [`StallCause`].
         cause: u8,
-        /// A [`RecoveryStep`]: what is done about it.
+        /// The measure against the stall: a [`RecoveryStep`].
         recovery: u8,
     }
 }
 
 impl StallSample {
-    /// Why the robot does not get on.
+    /// The cause of the stall.
     pub const fn cause(&self) -> StallCause {
         StallCause::from_byte(self.cause)
     }
 
-    /// The measure against it.
+    /// The measure against the stall.
     pub const fn recovery(&self) -> RecoveryStep {
         RecoveryStep::from_byte(self.recovery)
     }
@@ -367,7 +364,7 @@ wire_enum! {
 wire_enum! {
     /// The supervisor's answer to a request. Each text completes "the supervisor refuses: ".
     RequestAnswer, unknown = Unknown, text = text {
-        /// It is carried out.
+        /// The request is carried out.
         Taken = 0 "it is not refused",
         /// No such request.
         Unknown = 1 "it knows no such request; are both of the same version?",
@@ -397,11 +394,11 @@ payloads! {
         id: u64,
         /// When the operator asked, nanoseconds of the machine's monotonic clock.
         asked_ns: u64,
-        /// The stage it is about; empty for none.
+        /// The stage that the request is about; empty for none.
         stage: Name,
         /// A [`RequestKind`].
         kind: u8,
-        /// How many of `targets` count.
+        /// The number of targets in `targets`.
         target_count: u8,
         targets: [TargetPoint; MOST_TARGETS],
     }
@@ -454,20 +451,19 @@ payloads! {
     "firsthand.Fault" FaultSample {
         /// Identifies the request: the stage's `last_fault` in `health` says that it was answered. Never 0.
         id: u64,
-        /// The stage it is for.
+        /// The stage that the request is for.
         stage: Name,
         /// A [`FaultKind`].
         kind: u8,
-        /// 1: to be done although the robot is a real one.
+        /// 1: the fault is to be injected although the robot is a real one.
         although_real: u8,
     }
 }
 
 payloads! {
-    /// Topic `inputs`, header; the slice is a piece of what [`crate::inputs`] describes. Pieces of a generation follow each other by
-    /// their sequence.
+    /// Topic `inputs`, header; the slice is a piece of the entries that [`crate::inputs`] describes. Pieces of a generation follow
+    /// each other by their sequence.
     "firsthand.InputsHeader" InputsHeader {
-        /// The stage.
         stage: Name,
     }
 }

@@ -4,8 +4,8 @@ use x80_protocol::{Addressing, Command, Decoder, Frame, MAX_FRAME_BYTES, Report}
 
 const PING: [u8; 10] = [0x5e, 0x02, 0x01, 0x00, 0xff, 0x01, 0x00, 0xdb, 0x5e, 0x0d];
 
-/// Feed `input` to a decoder and hold it to its promises. The first byte says into how large pieces the
-/// rest is cut.
+/// Feed `input` to a decoder and check the decoder's properties. The first byte gives the size of the pieces into which
+/// the rest is cut.
 pub(crate) fn check(input: &[u8]) {
     let Some((&size, bytes)) = input.split_first() else {
         return;
@@ -15,7 +15,7 @@ pub(crate) fn check(input: &[u8]) {
         decoder.push(piece);
         drain(&mut decoder);
     }
-    // Whatever has come, it decodes what follows.
+    // The decoder decodes a frame after any input.
     decoder.push(&[0; MAX_FRAME_BYTES]);
     drain(&mut decoder);
     let before = decoder.tally();
@@ -54,5 +54,5 @@ fn again(write: impl Fn(&mut Vec<u8>), same: impl Fn(&Frame<'_>)) {
     write(&mut bytes);
     let mut decoder = Decoder::default();
     decoder.push(&bytes);
-    same(&decoder.next_frame().expect("what is written can be read"));
+    same(&decoder.next_frame().expect("an encoded frame can be decoded"));
 }

@@ -32,9 +32,8 @@ pub enum Quantity {
 pub enum Targets {
     /// A single channel, 0 to 5.
     One {
-        /// The channel.
         channel: u8,
-        /// Its target.
+        /// The target.
         value: i16,
     },
     /// Every channel that is not left alone.
@@ -81,9 +80,7 @@ pub enum Mode {
     /// The pulse width, without a loop.
     #[default]
     Pwm,
-    /// Position.
     Position,
-    /// Velocity.
     Velocity,
 }
 
@@ -109,7 +106,7 @@ pub enum Parameter {
     Feedback(Feedback),
     /// The quantity that the loop controls.
     Mode(Mode),
-    /// Polarity, bumper protection and whatever else: taken, and nothing done.
+    /// Polarity, bumper protection and other parameters, which are accepted and ignored.
     Other {
         /// The number of the parameter.
         sub: u8,
@@ -160,19 +157,14 @@ pub enum Command {
         channel: Option<u8>,
     },
     /// Start or stop a sensor stream.
-    Stream {
-        /// The stream.
-        stream: Stream,
-        /// The request.
-        request: Request,
-    },
+    Stream { stream: Stream, request: Request },
     /// Ping or acknowledge.
     System(SystemSignal),
 }
 
 impl Command {
-    /// Velocities of channels 0 and 1, counts per second, for `limit_ms` if it is given. The others are
-    /// left alone.
+    /// Velocities of channels 0 and 1, counts per second, for `limit_ms` if it is given. The other channels are left
+    /// alone.
     #[must_use]
     pub fn velocity(wheels: [Option<i16>; 2], limit_ms: impl Into<Option<u16>>) -> Self {
         Self::Motion(Motion {

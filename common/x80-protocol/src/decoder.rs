@@ -13,8 +13,8 @@ use super::{
 
 /// Bytes held at most: the largest datagram, and a frame begun in the one before.
 const CAPACITY: usize = 65_536 + MAX_FRAME_BYTES;
-/// No message that is known is longer. A header that claims more is likely noise, so it does not hold
-/// back the complete frames behind it while the rest of its own is missing.
+/// No known message is longer. A header that claims more is likely noise, so it does not hold back the complete frames behind it while the
+/// rest of its own is missing.
 const LONGEST_PLAUSIBLE: usize = 64;
 
 /// The bytes whose CRC is computed after one push at most. Sound frames need as many as they have; a flood of false headers would need
@@ -36,8 +36,8 @@ pub struct DecoderTally {
 
 /// A streaming decoder: [`Decoder::push`] what came, then take every [`Decoder::next_frame`].
 ///
-/// It holds at most 64 KiB and a frame; of a push that exceeds that, the oldest bytes are dropped and
-/// counted, and of false headers that take too long all that is held. A half frame waits for its rest; a header that was noise waits until its claimed length
+/// It holds at most 64 KiB and a frame. If a push exceeds that, the oldest bytes are dropped; if false headers take too long, all are. An
+/// incomplete frame waits for its rest, and so do the bytes after a false header until its claimed length has come.
 /// has come, and then what follows it is found.
 #[derive(Clone, Debug, Default)]
 pub struct Decoder {
@@ -109,7 +109,7 @@ impl Decoder {
                         self.tally.bad_crc += 1;
                         self.skip(noise + at);
                     }
-                    // The next bytes show which of the two it is.
+                    // The next bytes show which of the two frames is real.
                     Inside::Frame(_) | Inside::Unknown => {
                         self.skip(noise);
                         return None;
@@ -148,7 +148,7 @@ impl Decoder {
         })
     }
 
-    /// Forget what is held: what comes next is not its continuation. The bytes count as noise.
+    /// Forget the held bytes, because the next bytes do not continue them. They count as noise.
     pub fn reset(&mut self) {
         self.skip(self.buffer.len() - self.start);
     }

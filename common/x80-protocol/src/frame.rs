@@ -19,7 +19,7 @@ pub enum Addressing {
     /// Host 00, motion board 01, multimedia board 08: most robots.
     #[default]
     Numbered,
-    /// Host B8, robot 8B: some.
+    /// Host B8, robot 8B: some robots.
     Lettered,
 }
 
@@ -126,26 +126,21 @@ impl SystemSignal {
 /// A frame with a right CRC is not a known message. The receiver can continue after any of these errors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum MessageError {
-    /// Its DID is not in the table.
+    /// The DID is not in the table.
     #[error("no message has DID {did}; pass the frame over, or add the DID to the wire module")]
-    UnknownDid {
-        /// The DID.
-        did: u8,
-    },
-    /// It carries too few data, or a number that no form of it has.
+    UnknownDid { did: u8 },
+    /// The frame carries too few data, or a number of bytes that no form of its message has.
     #[error("DID {did} came with {found} data bytes instead of {expected}; pass the frame over")]
     Length {
-        /// The DID.
         did: u8,
         /// LEN as it came.
         found: usize,
         /// The lengths that are known.
         expected: &'static str,
     },
-    /// A byte of it means nothing.
+    /// A byte of the frame has no meaning.
     #[error("DID {did}: {value} is no {what}; pass the frame over")]
     Value {
-        /// The DID.
         did: u8,
         /// The expected value of the byte.
         what: &'static str,

@@ -15,7 +15,7 @@ pub struct Encoder {
     pub position: u16,
     /// Counts per second, without sign.
     pub speed: u16,
-    /// Whether it turns in the channel's positive direction.
+    /// Whether the wheel turns in the channel's positive direction.
     pub positive: bool,
 }
 

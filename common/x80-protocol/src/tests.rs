@@ -1,4 +1,4 @@
-//! Every worked frame, and every message there and back.
+//! Tests of every worked frame, and of every message encoded and decoded.
 
 use proptest::prelude::*;
 
@@ -223,7 +223,7 @@ proptest! {
         data in prop::collection::vec(any::<u8>(), 0..60),
     ) {
         let frame = Frame { rid: 0, sn: 0, did, data: &data };
-        // A report says everything its data did, up to what the frame keeps free.
+        // A report keeps all of its data, except the bytes that the frame leaves unused.
         if let Ok(report) = Report::parse(&frame) {
             let mut out = Vec::new();
             report.encode(Addressing::Numbered, &mut out);

@@ -7,7 +7,7 @@ use common::mission::LEAST_BAUD;
 pub(crate) enum Answer {
     /// `OK`: a command was carried out.
     Done,
-    /// `Invalid Command`: a command was none, or arrived garbled.
+    /// `Invalid Command`: the board got no command, or a garbled one.
     Invalid,
     /// Two numbers: the encoder counts of the left and the right wheel. No other request is answered so.
     Counts([i32; 2]),
@@ -18,11 +18,11 @@ pub(crate) enum Answer {
 }
 
 impl Answer {
-    /// The answer that `line` is, without its line feed; or why it is none.
+    /// The answer in `line`, which has no line feed; or why the line is none.
     pub(crate) fn parse(line: &[u8]) -> Result<Self, String> {
         let none = || format!("{:?} is no answer of the board", String::from_utf8_lossy(line));
         let line = line.strip_suffix(b"\r").unwrap_or(line);
-        // A carriage return in the line is left of a line feed that was lost. What stands before it is the end of another answer.
+        // A carriage return in the line is the rest of a lost line feed, and the text before it is the end of another answer.
         let text = std::str::from_utf8(line).map_err(|_| none())?.trim_matches(' ');
         match text {
             "OK" => return Ok(Self::Done),
@@ -62,7 +62,7 @@ mod tests {
 
     #[test]
     fn a_line_that_lost_or_gained_bytes_is_refused() {
-        // Of two ranges that lost the line feed between them the carriage return stays: they are no counts.
+        // Two ranges that lost the line feed between them keep the carriage return, so they are no counts.
         for line in
             ["12\r34\r", "12 34 56\r", "2147483648 0", "-1", "1.5", "O", "1  2", "12OK", "", "\r\r"]
         {

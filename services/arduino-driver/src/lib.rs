@@ -31,21 +31,21 @@ use common::{
 
 use self::answers::Answer;
 
-/// So many lines wait to be heard; more are dropped. A round has at most seven.
+/// The most lines that wait to be heard; more are dropped. A round has at most seven.
 const MOST_WAITING: usize = 64;
-/// The board answers within so long, seconds: it waits for an echo for one second at most.
+/// The time within which the board answers, seconds: it waits for an echo for one second at most.
 const LATEST_S: f64 = 2.0;
-/// No wheel turns faster than so many times its top speed.
+/// The greatest speed of a wheel, as a multiple of its top speed.
 const IMPLAUSIBLE: f64 = 1.5;
 
-/// What the driver waits for.
+/// The answer that the driver waits for.
 #[derive(Clone, Debug)]
 enum Waits {
-    /// For nothing: all is answered.
+    /// None, because all requests are answered.
     No,
-    /// For the rest of the round that was asked for at this poll, of which these ranges came, centimetres.
+    /// The rest of the round that was asked for at this poll, of which these ranges came, centimetres.
     Round { since: u64, ranges: Vec<u16> },
-    /// For the baud rate, which was asked for at this poll; not yet if none.
+    /// The baud rate, which was asked for at this poll; not yet if none.
     Baud { since: Option<u64> },
 }
 
@@ -56,7 +56,7 @@ pub struct Arduino {
     rate_hz: f64,
     /// The most counts of a wheel in a second.
     most_counts_s: f64,
-    /// A round is complete after fewer polls, and whatever was asked is answered or lost after so many.
+    /// A round is complete within `overdue` polls, and a request is answered or lost after `lost`.
     overdue: u64,
     lost: u64,
     /// The pin and the row of each sonar, in the order in which they are asked.
@@ -139,7 +139,7 @@ impl Arduino {
     fn motion(&mut self, counts: [i32; 2], since: u64) -> Motion {
         let (speeds, newest) = self.counts.map_or(([0; 2], [0; 2]), |(then, at, speeds)| {
             let gap_s = since.saturating_sub(at).max(1) as f64 / self.rate_hz;
-            // 32 bits wrap.
+            // Counts of 32 bits wrap.
             let turned = [0, 1].map(|wheel| f64::from(counts[wheel].wrapping_sub(then[wheel])));
             let is_plausible = turned.iter().all(|way| way.abs() <= self.most_counts_s * gap_s);
             let newest = if is_plausible { turned.map(|way| (way / gap_s) as i32) } else { [0; 2] };
@@ -161,7 +161,7 @@ impl Arduino {
         Motion { wheels, currents: [0; 2] }
     }
 
-    /// Drop the round, and begin anew with a request whose answer is unmistakable.
+    /// Drop the round, and start again with a request whose answer is unmistakable.
     fn begin_anew(&mut self) {
         if !matches!(self.waits, Waits::Baud { .. }) {
             self.waits = Waits::Baud { since: None };

@@ -4,7 +4,7 @@ use common::samples::RangeStatus;
 
 use super::*;
 
-/// A robot with two sonars, at 10 Hz. A round is complete within three polls, and what is lost is so after 20.
+/// A robot with two sonars, at 10 Hz. A round takes at most three polls, and a request is lost after 20.
 fn mission(set: &str) -> Mission {
     let row = |name: &str, channel: u8, bearing: i32| {
         format!(
@@ -38,7 +38,7 @@ fn heard(driver: &mut Arduino, bytes: &str) -> Heard {
 
 const ROUND: &str = "p 4\rp 5\re\r";
 
-/// What the driver hears of a round that the board answers so.
+/// The driver's result of a round that the board answers so.
 fn round(driver: &mut Arduino, answers: &str) -> Heard {
     assert_eq!(polled(driver), ROUND);
     heard(driver, answers)
@@ -60,7 +60,7 @@ fn a_round_gives_the_range_of_each_sonar_and_the_counts_that_begin_a_tick() {
     assert_eq!(counts(&said), Some([32_763, 70]));
     let want = [(0, RangeStatus::Measured, 1.23), (1, RangeStatus::Nothing, 0.0)];
     assert_eq!((ranges(&said), said.refused), (want.to_vec(), None));
-    // Beyond the sonar's reach is nothing.
+    // An echo from beyond the sonar's reach counts as none.
     let said = round(&mut driver, "300\r\n17241\r\n0 0\r\n");
     assert!(ranges(&said).iter().all(|range| range.1 == RangeStatus::Nothing));
 }
@@ -88,7 +88,7 @@ fn nothing_is_asked_while_a_round_is_unanswered() {
 #[test]
 fn after_a_line_that_does_not_fit_only_a_baud_rate_is_taken() {
     for (bad, why) in [
-        // An answer was lost, so the one of pin 5 stands where that of pin 4 should.
+        // An answer was lost, so that of pin 5 stands where that of pin 4 should.
         ("34\r\n1 2\r\n", "\"1 2\" answers no request"),
         ("12\r\n34\r\n56\r\n1 2\r\n", "\"56\" answers no request"),
         ("Invalid Command\r\n", "garbled"),
@@ -100,7 +100,7 @@ fn after_a_line_that_does_not_fit_only_a_baud_rate_is_taken() {
         let said = round(&mut driver, bad);
         assert!(said.motion.is_none() && said.readings.is_empty(), "{bad:?}: {said:?}");
         assert!(said.refused.as_ref().is_some_and(|refused| refused.contains(why)), "{said:?}");
-        // What was asked for before is late, and a baud rate came unasked.
+        // The answers to earlier requests are late, and a baud rate came unasked.
         let late = heard(&mut driver, "77\r\n88\r\n9 9\r\n57600\r\n");
         assert!(late.motion.is_none() && late.readings.is_empty(), "{late:?}");
         assert_eq!(polled(&mut driver), "\rb\r");
@@ -138,7 +138,7 @@ fn a_round_that_is_overdue_is_dropped_and_its_late_answers_are_no_answers_of_the
 fn a_baud_rate_is_asked_for_again_only_when_its_answer_is_lost() {
     let mut driver = Arduino::new(&mission(""));
     assert_eq!(polled(&mut driver), "\rb\r");
-    // The board boots, and says what is no answer: that makes no second question.
+    // The board boots and says something that is no answer: the driver does not ask again.
     assert!(heard(&mut driver, "booting\r\n").refused.is_some());
     for _ in 1..20 {
         assert_eq!(polled(&mut driver), "");

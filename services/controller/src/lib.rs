@@ -1,6 +1,6 @@
 //! The velocity synchroniser: guidance to wheel speeds, equations (14)-(17).
 //!
-//! [`step`] is the whole of it, pure: one `guidance` sample to one `command`.
+//! [`step`] has the controller, pure: one `guidance` sample to one `command`.
 
 pub mod step;
 

@@ -29,12 +29,12 @@ const FACES_WITHIN_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
 pub struct Alignment {
     /// eta_d: cosine of the angle to the guidance.
     pub cosine: f64,
-    /// eta_c: its sine, positive when the guidance lies to the left. The printed sign turns away.
+    /// eta_c: sine of that angle, positive when the guidance lies to the left. The printed sign turns away.
     pub sine: f64,
 }
 
 impl Alignment {
-    /// (14): of a robot facing `axis` under the unit vector `guidance`.
+    /// (14) for a robot facing `axis` under the unit vector `guidance`.
     pub fn of(axis: DVec2, guidance: DVec2) -> Self {
         Self { cosine: axis.dot(guidance), sine: axis.perp_dot(guidance) }
     }
@@ -45,7 +45,7 @@ impl Alignment {
 enum SpeedLaw {
     /// The paper's (16): the robot drives while it turns.
     Paper,
-    /// The evidential method's: it turns on the spot until it faces its way, then drives no faster than guidance allows.
+    /// The evidential method's: the robot turns on the spot until it faces its way, then drives no faster than guidance allows.
     Evidential,
     /// A car's, by either method: the paper's, no faster than guidance allows. A car does not turn on the spot.
     Car,
@@ -56,7 +56,7 @@ enum SpeedLaw {
 enum Arrival {
     #[default]
     OnTheWay,
-    /// It is there, and turns to the heading that is asked for.
+    /// The robot is there, and turns to the heading that is asked for.
     Turning,
     Arrived,
 }
@@ -146,7 +146,7 @@ impl Step for Controller {
                     (GuidanceStatus::from_byte(guidance.status), direction)
                 }
             };
-        // Shared memory is outside too: only a direction is followed.
+        // Samples may hold anything, so only a unit vector is followed.
         let unit = (direction.length() - 1.0).abs() < 1e-3;
         let is_sent = guidance.target_number != 0;
         let sane = is_sent && unit && distance.is_finite() && pose.heading.is_finite();
@@ -173,7 +173,7 @@ impl Step for Controller {
 
 impl Controller {
     /// How far the robot has come. It never goes back: a robot at rest on the edge of the circle does not start again because of one
-    /// count. A robot beside a target that is not free is there too, if the planner says that it is as near as it can be.
+    /// count. A robot beside a target in a hazard has arrived, too, if the planner says that it is as near as it can be.
     fn arrival(&mut self, guidance: &GuidanceSample, distance: f64) -> Arrival {
         let number = guidance.target_number;
         if self.arrival.0 != number {
@@ -218,7 +218,7 @@ impl Controller {
             (GuidanceStatus::Along | GuidanceStatus::WayOut, SpeedLaw::Evidential) => {
                 let v = self.cautious(alignment, distance, limit);
                 if v == 0.0 {
-                    // It may go nowhere: getting it out of there is the planner's order, which is a limit above 0.
+                    // A robot that may go nowhere only turns. Where it must get out, the planner's limit is above 0.
                     let faces = alignment.cosine > FACES_COSINE;
                     return (!faces).then(|| on_the_spot(self));
                 }
@@ -241,8 +241,7 @@ impl Controller {
         self.turn * self.side
     }
 
-    /// The evidential method's wc on the spot: to the guidance and no farther, and never so slowly that the
-    /// wheels stick.
+    /// The evidential method's wc on the spot: the robot turns to the guidance and no farther, and never so slowly that the wheels stick.
     fn turn_to(&mut self, alignment: Alignment) -> f64 {
         let angle = alignment.sine.atan2(alignment.cosine).abs();
         let side = self.angular(alignment).signum();
@@ -257,7 +256,7 @@ impl Controller {
         let slow = (distance / self.slow_radius).min(1.0);
         let wanted = self.speed * sharp.max(0.0) * slow;
         let least = LEAST_SPEED_M_S.min(self.speed);
-        // Written so that a limit that is no number stands.
+        // This form makes a limit that is no number stand.
         if sharp <= 0.0 {
             0.0
         } else if limit >= least {
@@ -267,8 +266,8 @@ impl Controller {
         }
     }
 
-    /// (16): vc. Slowing down for the target multiplies what alignment allows; printed as a case of its
-    /// own it would override it.
+    /// (16): vc. Slowing down for the target multiplies the speed that alignment allows; as a case of its own, as printed, it would
+    /// override that speed.
     fn tangential(&self, alignment: Alignment, omega: f64, distance: f64) -> f64 {
         let aligned = if !self.modulated {
             1.0

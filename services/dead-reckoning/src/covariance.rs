@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 /// The parts of the error: x, y, theta, ratio of the diameters, track, distance, bias of a gyro; m, rad, shares, rad/s.
 pub(crate) const PARTS: usize = 7;
-/// The place of the bias.
+/// The index of the bias.
 pub(crate) const BIAS: usize = 6;
 
 pub(crate) type Error = SVector<f64, PARTS>;
@@ -42,7 +42,7 @@ pub(crate) struct ErrorModel {
     steers: bool,
 }
 
-/// The effect of a motion on the error: what it makes of the error before, and the covariance that it adds.
+/// The effect of a motion on the error: the factor of the error before, and the covariance that the motion adds.
 pub(crate) struct Transition {
     pub(crate) carried: Matrix,
     pub(crate) noise: Matrix,
@@ -76,8 +76,8 @@ impl ErrorModel {
         ])))
     }
 
-    /// The arc and turn of wheels that are off by the shares `ratio`, `track` and `distance`, where `by_counts` is that of wheels as
-    /// they are known.
+    /// The arc and turn of wheels that are off by `shares` (of ratio, track and distance), where `by_counts` are the arc and turn of
+    /// wheels as they are known.
     pub(crate) fn corrected(&self, by_counts: Twist, shares: [f64; 3]) -> Twist {
         let [ratio, track, distance] = shares;
         let (v, omega) = (by_counts.v * (1.0 + distance), by_counts.omega * (1.0 + distance));
@@ -94,7 +94,7 @@ impl ErrorModel {
     pub(crate) fn transition(&self, pose: Pose2, moved: Twist, seconds: f64) -> Transition {
         let Twist { v: arc, omega: turn } = moved;
         let axis = Pose2 { heading: pose.heading + turn / 2.0, ..pose }.axis();
-        // The error of the pose that follows from one of arc and turn; the turn's acts half way through the arc.
+        // The error of the pose by an error of arc and turn; that of the turn acts half way through the arc.
         let effect = |arc_error: f64, turn_error: f64| {
             let aside = 0.5 * arc * turn_error;
             Error::from([
@@ -116,7 +116,7 @@ impl ErrorModel {
             let slips = [along * (self.slip * arc.abs()).sqrt(), Error::zeros()];
             (effect(0.0, turn), Error::zeros(), slips)
         } else {
-            // A wheel's way is the arc, more or less half the track times the turn.
+            // Each wheel rolls the arc, more or less half the track times the turn.
             let [left, right] = [arc - turn * half_track, arc + turn * half_track];
             let slip = |rolled: f64| (self.slip * rolled.abs()).sqrt();
             let slips = [
@@ -137,7 +137,7 @@ impl ErrorModel {
     /// The covariance that is added by a motion that nobody measured: each wheel rolled any way up to `farthest` metres, forward or
     /// back. The robot may have gone as far aside as ahead, because it may have turned first.
     pub(crate) fn lost(&self, farthest: f64) -> Matrix {
-        // Evenly distributed, for each wheel. A car turns less than two wheels that roll freely, so this holds for it too.
+        // Each way is evenly distributed. A car turns less than two wheels that roll freely, so this holds for a car too.
         let wheel = farthest * farthest / 3.0;
         let place = wheel / 2.0;
         let heading = 2.0 * wheel / (self.track_m * self.track_m);
@@ -187,7 +187,7 @@ mod tests {
 
     #[test]
     fn slip_on_a_straight_way_by_hand() {
-        // Variance of the heading 2 q s / W^2, aside its integral q s^3 2 / (3 W^2), ahead q s / 2.
+        // The variance of the heading is 2 q s / W^2, that aside its integral q s^3 2 / (3 W^2), that ahead q s / 2.
         let model =
             model("slip = 0.01\ndiameter_ratio_sd = 0\ntrack_scale_sd = 0\ndistance_scale_sd = 0");
         let [xx, _, _, yy, _, heading] = drive(&model, 1000, AHEAD);

@@ -1,8 +1,8 @@
 //! The error-state filter: the pose, the errors of the wheels and a gyro's bias, by the wheels, by fixes and by a gyro.
 //!
 //! [`Filter`] is the estimate at one tick. [`History`] has the estimate of 2 s ago and the ticks and fixes since then. A fix of an
-//! earlier time is taken at that time: the estimate of today is computed again from the old one. So the result is the same as if
-//! the fix had come at once, and a tick costs no more than those 2 s.
+//! earlier time is taken at that time, and the present estimate is computed again from the old one. So the result is the same as
+//! if the fix had come at once, and a tick costs no more than those 2 s.
 
 use std::{collections::VecDeque, fmt, time::Duration};
 
@@ -22,9 +22,9 @@ use crate::{
     tick::Tick,
 };
 
-/// A fix that is older is refused.
+/// The age from which on a fix is refused.
 const OLDEST: Duration = Duration::from_secs(2);
-/// The most ticks of a history. At a high rate they are fewer than [`OLDEST`] has.
+/// The most ticks of a history. At a high rate they span less than [`OLDEST`].
 const MOST_TICKS: usize = 64;
 /// The most fixes of a history.
 const MOST_FIXES: usize = 64;
@@ -34,7 +34,7 @@ pub(crate) const GATES: [f64; 2] = [13.8, 16.3];
 const LEAST_VARIANCE: f64 = 25e-6;
 /// The least variance of its heading, rad^2: that of a tenth of a degree.
 const LEAST_HEADING_VARIANCE: f64 = 3e-6;
-/// A gyro's scale is taken to be off by this share.
+/// The share by which a gyro's scale is taken to be off.
 const GYRO_SCALE: f64 = 0.005;
 
 /// The parts of the error, and one more.
@@ -64,7 +64,7 @@ pub(crate) struct Fix {
     pub(crate) position: DVec2,
     pub(crate) heading: Option<f64>,
     pub(crate) covariance: [f64; 6],
-    /// Variances of the error that it shares with the other fixes of its source: of x as of y, and of the heading.
+    /// Variances of the error that the fix shares with the other fixes of its source: of x as of y, and of the heading.
     pub(crate) shared: [f64; 2],
 }
 
@@ -120,7 +120,7 @@ pub(crate) struct Filter {
     pub(crate) pose: Pose2,
     /// The shares by which the ratio of the diameters, the track and the distance are off.
     shares: [f64; 3],
-    /// Of the gyro, rad/s.
+    /// The bias of the gyro, rad/s.
     bias: f64,
     pub(crate) covariance: Covariance,
 }
@@ -145,7 +145,7 @@ impl Filter {
         self.pose = motions.along(self.pose, moved);
         self.covariance = Covariance(carried * before * carried.transpose() + noise);
         if let Some(gyro) = tick.gyro {
-            // The gyro measures the difference of two headings, so the earlier heading is one more part of the error for a moment.
+            // The gyro measures the difference of two headings, so the earlier heading is one more part of the error here.
             let mut both = SMatrix::<f64, JOINT, PARTS>::zeros();
             both.fixed_view_mut::<PARTS, PARTS>(0, 0).copy_from(&carried);
             both[(PARTS, 2)] = 1.0;
@@ -225,8 +225,8 @@ impl Filter {
     }
 }
 
-/// The update of a Kalman filter, in Joseph's form: the error by which the estimate is off, and the covariance afterwards. None if
-/// `residual`, of what is `seen` of the error with `noise`, is beyond `gate`.
+/// The update of a Kalman filter, in Joseph's form: the error of the estimate, and the covariance afterwards. None if `residual`,
+/// of the part `seen` of the error with `noise`, is beyond `gate`.
 fn update<const N: usize, const M: usize>(
     covariance: &SMatrix<f64, N, N>,
     seen: &SMatrix<f64, M, N>,
@@ -248,13 +248,13 @@ where
     Some((gain * residual, (after + after.transpose()) * 0.5))
 }
 
-/// The estimate of the newest tick, and what it follows from.
+/// The estimate of the newest tick, and the ticks and fixes from which it follows.
 #[derive(Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct History {
     /// The estimate of the tick before those of `ticks`.
     base: Filter,
     ticks: VecDeque<Tick>,
-    /// The fixes that were used, each with the time of the tick at which it is taken, in the order of those.
+    /// The fixes that were used, each with the time of the tick at which it is taken, in the order of these times.
     fixes: VecDeque<(MissionTime, Fix)>,
     newest: Filter,
 }
@@ -367,7 +367,7 @@ impl History {
     }
 }
 
-/// A fix was refused; with the pose at its time, if it contradicts that.
+/// A fix was refused; with the pose at its time if the fix contradicts that pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Refused {
     pub(crate) why: FixRefusal,

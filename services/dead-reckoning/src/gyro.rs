@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::tick::{GyroTurn, Tick};
 
-/// The share of a divided increment by which the division is taken to be off. What one tick lacks the next one has, so the errors do
+/// The share of a divided increment by which the division is taken to be off. One tick gains what the other loses, so the errors do
 /// not add up.
 const UNEVEN: f64 = 0.1;
 
@@ -19,7 +19,7 @@ pub(crate) struct Gyro {
     end: MissionTime,
     /// The time at which `turn` begins: the end of a tick, or of the first increment after missing ones.
     since: MissionTime,
-    /// From `since` to the end of the newest increment, radians and rad^2.
+    /// The turn from `since` to the end of the newest increment, and its variance, radians and rad^2.
     turn: f64,
     variance: f64,
 }
@@ -54,7 +54,7 @@ impl Gyro {
             let divided = UNEVEN * share * (1.0 - share) * turn_rad;
             let turn = rest.turn + part * turn_rad;
             let variance = rest.variance + part * variance_rad2 + divided * divided;
-            // A turn that began before the tick contains those of ticks that have left the history.
+            // A turn that began before the tick includes ticks that have left the history.
             if (seconds(rest.since, tick.time) - tick.seconds).abs() < 1e-6 && tick.seconds > 0.0 {
                 tick.gyro = Some(GyroTurn { turn, variance });
                 completed = true;

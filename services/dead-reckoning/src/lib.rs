@@ -46,7 +46,7 @@ pub use step::DeadReckoning;
 
 /// Room for the encoded state, bytes: with 64 ticks and 64 fixes it is under 14,000.
 const STATE_BYTES: usize = 16_384;
-/// Samples of a topic that are taken with a tick, at most. Others are taken with the next one.
+/// The most samples of a topic that are taken with a tick. Others are taken with the next one.
 const MOST_FIXES: usize = 16;
 const MOST_TURNS: usize = 128;
 
@@ -72,7 +72,7 @@ impl Further for Sources {
         fixes.extend(some(scans, MOST_FIXES)?);
         let [outside, own] = turns;
         let (outside, own) = (some(outside, MOST_TURNS)?, some(own, MOST_TURNS)?);
-        // The turns of two gyros do not follow on each other.
+        // The sequences of two gyros do not continue each other.
         Ok(Self { fixes, turns: if own.is_empty() { outside } else { own } })
     }
 }

@@ -8,11 +8,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::filter::{Filter, Fix, GATES, wrapped};
 
-/// So many fixes have to agree.
+/// The number of fixes that have to agree.
 const AGREE: usize = 10;
-/// They are so far apart at least: all take 3 s.
+/// The least time between two of these fixes: all take 3 s.
 const APART: Duration = Duration::from_millis(334);
-/// The variance of the way between two of them by the wheels, m^2.
+/// The variance of the way between two of these fixes by the wheels, m^2.
 const WHEELS: f64 = 4e-4;
 /// The heading follows from the way of the robot among the fixes if its deviation is below this, radians.
 const KNOWN_RAD: f64 = 0.2;
@@ -42,7 +42,7 @@ impl Contradictions {
     }
 
     /// The rigid motion that takes the poses to the fixes with the least squared distance, applied to `estimate`. None if a fix is
-    /// beyond its gate then.
+    /// then beyond its gate.
     fn agreed(&self, estimate: &Filter) -> Option<Filter> {
         let share = 1.0 / self.0.len() as f64;
         let mean = |of: fn(&Pose2, &Fix) -> DVec2| {
@@ -66,7 +66,7 @@ impl Contradictions {
         Some(estimate.moved_to(pose, position, heading))
     }
 
-    /// The turn of that motion, and its variance.
+    /// The turn of the rigid motion, and its variance.
     fn turned(&self, from: DVec2, to: DVec2, variance: f64) -> (f64, f64) {
         let turns = self.0.iter().filter_map(|(pose, fix)| {
             Some((wrapped(fix.heading? - pose.heading), fix.covariance[5]))

@@ -23,25 +23,25 @@ use crate::{
 /// Counts are rejected if a wheel seems to turn faster than this multiple of its top speed. A robot that slides or is pushed stays
 /// below it; a counter that restarted is nearly always above it.
 const PLAUSIBLE: f64 = 2.0;
-/// Counts never rejected, whatever the time between: timestamps jitter by about a tick.
+/// The time, seconds, in which counts are never rejected: timestamps jitter by about a tick.
 const SLACK_S: f64 = 0.3;
 
-/// A speed is an average over at least this share of a tick: frames that come bunched give no speed of their own.
+/// The least share of a tick over which a speed is an average: frames that come bunched give no speed of their own.
 const LEAST_SHARE_OF_A_TICK: f64 = 0.5;
 
-/// A wheel still turns for so long after the time of its last command is over, seconds: delay and lag of its speed loop.
+/// The time for which a wheel still turns after its last command is over, seconds: delay and lag of its speed loop.
 const COASTS_S: f64 = 0.2;
 
-/// No robot is switched off and on again and answers sooner, seconds; a link that was killed is back in a tenth.
+/// The least time in which a robot is switched off and on and answers, seconds; a killed link is back in 0.1 s.
 const BOOTS_IN_S: f64 = 2.0;
 
-/// Farther the pose does not move to the estimate in a tick: the map around the robot must not tear. Metres and radians.
+/// The most that the pose moves to the estimate in a tick, metres and radians: the map around the robot must not tear.
 const MOST_CORRECTION: (f64, f64) = (0.02, std::f64::consts::PI / 180.0);
 
 /// The state that survives the process: the pose, and the counts it was computed at.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State {
-    /// As it is published: it follows the estimate without jumps.
+    /// The published pose, which follows the estimate without jumps.
     pose: Pose2,
     /// The pose in the frame of odometry.
     odometry: Pose2,
@@ -57,7 +57,7 @@ pub struct State {
 }
 
 impl State {
-    /// Tick and mission time of the newest wheel sample in it; none before the first.
+    /// Tick and mission time of the newest wheel sample in the state; none before the first.
     pub fn newest(&self) -> Option<(u64, MissionTime)> {
         self.last.map(|last| (last.tick, last.time))
     }
@@ -71,14 +71,14 @@ pub struct Input<'a> {
     pub turns: &'a [TurnSample],
 }
 
-/// The wheel sample the pose was computed from, and the speeds it gave.
+/// The wheel sample that the pose was computed from, and the speeds by it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Last {
     tick: u64,
     time: MissionTime,
     left: u16,
     right: u16,
-    /// The generation of the link that gave it, and the robot's restarts it knew of.
+    /// The generation of the link that gave the sample, and the robot's restarts that this link knew of.
     generation: u32,
     restarts: u32,
     v: f64,
@@ -92,7 +92,7 @@ pub struct Reckoned {
     /// The counts jumped farther than wheels can turn, or the robot restarted its counters: the pose stays, and its covariance grows
     /// by how far the robot can have gone.
     pub rejected: bool,
-    /// Fixes that agree among themselves contradicted the pose, so it is theirs now.
+    /// Whether fixes that agree among themselves contradicted the pose, which became theirs.
     pub relocated: bool,
     /// Why a fix was refused, unless the one before was refused for the same reason.
     pub refused: Option<FixRefusal>,
@@ -110,7 +110,7 @@ pub struct DeadReckoning {
     motions: Motions,
     /// The period of the ticks, seconds.
     period_s: f64,
-    /// The longest that wheels turn after a tick that no further one follows, seconds.
+    /// The longest time that wheels turn after the last tick, seconds.
     turns_on_s: f64,
     state: State,
 }
@@ -286,7 +286,7 @@ impl DeadReckoning {
         })
     }
 
-    /// Speed and turn rate of a motion, m/s and rad/s: no faster than the body can go, along the same curve.
+    /// Speed and turn rate of a motion, m/s and rad/s, limited to the speed of the body along the same curve.
     fn speeds(&self, moved: Twist, elapsed: f64) -> Twist {
         let time = elapsed.max(LEAST_SHARE_OF_A_TICK * self.period_s);
         let (v, omega) = (moved.v / time, moved.omega / time);
@@ -304,7 +304,7 @@ impl DeadReckoning {
         let (left_counts, right_counts, v, omega) =
             last.map_or((0, 0, 0.0, 0.0), |last| (last.left, last.right, last.v, last.omega));
         let estimate = history.newest();
-        // The error of this pose is that of the estimate and the way to it.
+        // The error of this pose is that of the estimate, plus the way to the estimate.
         let [x, y] = (estimate.pose.position - position).to_array();
         let turn = estimate.pose.heading - heading;
         let way = [x * x, x * y, x * turn, y * y, y * turn, turn * turn];
@@ -340,13 +340,13 @@ enum Taken {
     Relocated,
 }
 
-/// Whether the robot restarted its counts after `last`. The link sees that in the frames between; only
-/// what happened between two generations of it must be read off the counts themselves.
+/// Whether the robot restarted its counts after `last`. The link sees that in the frames between; only a restart between two
+/// generations of the link must be read off the counts themselves.
 fn restarted(last: Last, wheels: &WheelSample, elapsed: f64) -> bool {
     if last.generation == wheels.stamp.generation {
         return last.restarts != wheels.restarts;
     }
-    // A robot that turns back through its start while the link is killed looks the same, but for the time.
+    // A robot that turns back through its start while the link is killed gives the same counts, but sooner.
     elapsed >= BOOTS_IN_S
         && counts_restarted([last.left, last.right], [wheels.left_counts, wheels.right_counts])
 }

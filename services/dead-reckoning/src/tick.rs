@@ -11,7 +11,7 @@ pub(crate) struct Tick {
     /// Arc and turn by the counts, for wheels without errors: metres and radians.
     pub(crate) arc: f64,
     pub(crate) turn: f64,
-    /// How far each wheel may have rolled with its counts lost, metres.
+    /// The way that each wheel may have rolled with its counts lost, metres.
     pub(crate) lost_m: f64,
     pub(crate) gyro: Option<GyroTurn>,
 }

@@ -1,4 +1,4 @@
-//! The driver of robots that speak lines of JSON: [`common::json_wire`] has the words.
+//! The driver of robots that speak lines of JSON: [`common::json_wire`] describes the protocol.
 
 use std::{collections::BTreeMap, time::Duration};
 
@@ -14,7 +14,7 @@ use common::{
     samples::{PowerSample, RangeReading},
 };
 
-/// More orders than these are not counted as answered by one report.
+/// The most orders that count as answered by one report.
 const MOST_ANSWERED: usize = 64;
 
 /// A robot that speaks lines of JSON.
@@ -25,7 +25,7 @@ pub struct Json {
     lines: Lines,
     waiting: Vec<Vec<u8>>,
     readings: Readings,
-    /// None without a laser.
+    /// The laser; none without one.
     laser: Option<Laser>,
     /// The number of orders that the robot has taken.
     answered: Option<u64>,
@@ -49,7 +49,7 @@ impl Json {
         }
     }
 
-    /// Take a report, or say why it is refused; then nothing of it is taken.
+    /// Take a report. A refused report has no effect, and the error says why.
     fn take(&mut self, report: &Report, heard: &mut Heard) -> Result<(), String> {
         let rows = self.rows_of(&report.ranges)?;
         let scan = report.scan.as_deref().map(|scan| self.beams_of(scan)).transpose()?;

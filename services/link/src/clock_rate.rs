@@ -1,13 +1,13 @@
-//! Whether the clock of a robot goes as fast as mission time. That of a simulator goes slower where the machine is too slow for it, and
-//! faster where it is not held back. The robot would seem to drive slower or faster than it does.
+//! Whether the clock of a robot goes as fast as mission time: if not, the robot seems to drive slower or faster than it does. The clock
+//! of a simulator is slow on a machine that is too slow for it, and fast if nothing holds it back.
 
 use common::clock::MissionTime;
 
-/// The clocks are compared over so long, nanoseconds. One such time may be wrong, because a process was frozen in it, so two count.
+/// The time of a comparison of the clocks, nanoseconds. One may be wrong, because a process was frozen, so two count.
 const OVER_NS: u64 = 5_000_000_000;
-/// They go equally fast within this share.
+/// The share within which the clocks go equally fast.
 const SHARE: f64 = 0.1;
-/// A stamp that is later than the one before by more is that of a clock that was set anew, nanoseconds.
+/// The step of a stamp beyond which the robot's clock was set anew, nanoseconds.
 const SET_ANEW_NS: i64 = 1_000_000_000;
 
 /// The comparison of a robot's clock with mission time.
@@ -16,14 +16,14 @@ pub(crate) struct ClockRate {
     newest_ns: i64,
     /// The stamp and mission time from which they are compared.
     since: Option<(i64, MissionTime)>,
-    /// Seconds of the robot in a second of mission time, of the times before; none before the first.
+    /// Seconds of the robot in a second of mission time, in the last comparison; none before the first.
     before: Option<f64>,
     told: Option<f64>,
 }
 
 impl ClockRate {
     /// Take a stamp of the robot that came at `now`. Returns the seconds of the robot in a second of mission time if they are not as many
-    /// and it was not told so before.
+    /// and were not returned before.
     pub(crate) fn take(&mut self, stamp_ns: i64, now: MissionTime) -> Option<f64> {
         let passed_ns = stamp_ns.saturating_sub(std::mem::replace(&mut self.newest_ns, stamp_ns));
         let is_set_anew = !(0..=SET_ANEW_NS).contains(&passed_ns);
@@ -51,7 +51,7 @@ mod tests {
 
     const STEP_NS: u64 = 50_000_000;
 
-    /// What is told of a clock that goes at `rates`, for 20 s each.
+    /// The rates that are returned for a clock that goes at `rates`, for 20 s each.
     fn told(rates: &[f64]) -> Vec<f64> {
         let (mut clock, mut stamp_ns, mut now_ns) = (ClockRate::default(), 7e18, 0);
         let mut told = Vec::new();
@@ -78,7 +78,7 @@ mod tests {
     fn a_link_that_was_frozen_and_a_clock_that_is_set_anew_say_nothing_of_a_rate() {
         let mut clock = ClockRate::default();
         for step in 0..400_u64 {
-            // For a second in 20 nothing is heard but what waits at the end, and the clock is set back and forth.
+            // For one second in 20 only the newest stamp is heard, at its end, and the clock is set back and forth.
             let ms = step * 50;
             let heard_ms = if ms % 20_000 > 7000 && ms % 20_000 < 8000 { 8000 } else { ms };
             let set_s = if step > 200 { -5000 } else { 9_000_000 };

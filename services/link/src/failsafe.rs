@@ -67,11 +67,9 @@ monitors! {
 /// A row of the table.
 #[derive(Debug)]
 pub struct Rule {
-    /// The cause.
     pub cause: Cause,
     /// The condition in words, for the documentation.
     pub when: &'static str,
-    /// The action.
     pub action: Action,
     /// The clearing condition.
     pub clears: Clears,
@@ -240,9 +238,7 @@ pub const TABLE: &[Rule] = &[
 /// An action and its cause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Decision {
-    /// The action.
     pub action: Action,
-    /// Its cause.
     pub cause: Cause,
 }
 

@@ -1,5 +1,5 @@
-//! The link: a robot's words in, samples out, commands to it, and the one place that stops it. A [`common::driver::Driver`] speaks the
-//! protocol of its kind of robot.
+//! The link: messages of a robot in, samples out, commands to it, and the one place that stops it. A [`common::driver::Driver`] speaks
+//! the protocol of its kind of robot.
 //!
 //! | module | holds |
 //! |---|---|

@@ -22,7 +22,8 @@ impl Polls {
         self.next.since(now)
     }
 
-    /// Whether a poll is due at `now`, which is taken then. One that is late does not delay the next, and none is made up for.
+    /// Take the poll that is due at `now`, if one is. A late poll does not delay the next, and missed polls are not made up
+    /// for.
     pub(crate) fn take_due(&mut self, now: MissionTime) -> bool {
         let is_due = self.until_next(now).is_zero();
         if is_due {

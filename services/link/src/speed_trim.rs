@@ -6,7 +6,7 @@
 
 use common::{samples::WheelSample, wire::counts_between};
 
-/// A wheel has reached its steady speed once so many commands agree: its delay and its lag take 0.15 s, a period at 7 Hz.
+/// The number of agreeing commands after which a wheel has its steady speed: its delay and its lag take 0.15 s, a period at 7 Hz.
 const STEADY: usize = 3;
 /// Commands agree if the least of them is at least this share of the greatest.
 const AGREE: f64 = 0.8;
@@ -14,7 +14,7 @@ const AGREE: f64 = 0.8;
 const LEAST_COUNTS_S: f64 = 250.0;
 /// The weight of one interval in the estimate.
 const WEIGHT: f64 = 0.1;
-/// A wheel outside of these shares slips, is held, or has a faulty encoder: that is no evidence about its speed loop.
+/// The shares outside of which a wheel slips, is held, or has a faulty encoder: those are no evidence about its speed loop.
 const SHARES: std::ops::RangeInclusive<f64> = 0.6..=1.15;
 /// The least share that is made good.
 const LEAST_SHARE: f64 = 0.7;
@@ -22,7 +22,7 @@ const LEAST_SHARE: f64 = 0.7;
 /// The estimate of the share of a commanded speed that the wheels reach.
 #[derive(Clone, Debug)]
 pub(crate) struct SpeedTrim {
-    /// How many of the two channels drive: a car's second one steers.
+    /// The number of channels that drive: a car's second one steers.
     wheels: usize,
     /// The newest commands, oldest first, counts/s.
     told: [[f64; 2]; STEADY],

@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::step::{Effect, Event, Input, Link, State};
 
-/// A sample of `wire` has at most so many bytes. Longer data are published in several samples.
+/// The most bytes of a sample of `wire`. Longer data are published in several samples.
 pub(crate) const WIRE_PIECE: usize = 2048;
 
 /// An entry of a recording, from which the link can be replayed. A generation starts from a [`State`].
@@ -34,7 +34,7 @@ pub enum Entry<'a> {
     Telemetry,
     /// The stage stops at this reading of the monotonic clock, nanoseconds.
     Stop(u64),
-    /// The stage goes on from what the driver of the link before it knew.
+    /// The stage goes on from the state of the driver of the link before it.
     Remember(Memory),
 }
 
@@ -95,7 +95,7 @@ impl<'a> Taken<'a> {
 #[derive(Debug)]
 pub struct LinkStage {
     pub(crate) link: Link,
-    /// None if the robot has no laser.
+    /// The header of scans; none if the robot has no laser.
     laser: Option<ScanHeader>,
     infrared: Option<InfraredSample>,
     power: Option<PowerSample>,

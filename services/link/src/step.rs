@@ -43,15 +43,15 @@ pub use event::{Effect, Event, Input, State, Tally};
 const PING_EVERY: Duration = Duration::from_millis(200);
 /// An open tick without a command is repeated after this time, which is ten times the longest tick measured.
 const REPEAT_AFTER: Duration = Duration::from_millis(100);
-/// In lockstep a tick waits at most so long until the supervisor's limit allows it. This is longer than the planner of a stalled
+/// The longest time that a tick waits in lockstep until the supervisor's limit allows it. This is longer than the planner of a stalled
 /// robot may take to restart. If the supervisor is silent, the failsafe stops the robot earlier.
 pub const LIMIT_WAITED: Duration = Duration::from_secs(5);
 /// The least time limit of a command. The wire carries whole milliseconds, and for most robots 0 means no limit.
 const LEAST_LEFT: Duration = Duration::from_millis(1);
-/// A new stop is sent so many times, because datagrams may be lost.
+/// The number of times that a new stop is sent, because datagrams may be lost.
 pub const STOPS: u32 = 3;
-/// While the link stops the robot, it repeats the stop after so long. All stops may be lost while the radio fades, and the robot may
-/// ignore the time limit of its last command.
+/// The time after which the link repeats a stop. All stops may be lost while the radio fades, and the robot may ignore the time limit of
+/// its last command.
 const STOP_AGAIN: Duration = Duration::from_millis(200);
 
 /// A tick that waits for its command.
@@ -71,7 +71,7 @@ struct OpenTick {
 #[derive(Clone, Copy, Debug)]
 struct Repeat {
     counts: [i16; 2],
-    /// Mission time of the tick from which it was computed.
+    /// Mission time of the tick from which the command was computed.
     stamp: MissionTime,
     /// Mission time of the repetition, half a period after the tick.
     due: MissionTime,
@@ -93,7 +93,7 @@ pub struct Link {
     failsafe: Failsafe,
     restart: RestartWatch,
     pinged_ns: Option<u64>,
-    /// None if the mission wants commands sent as they are.
+    /// The trim; none if the mission wants commands sent as they are.
     trim: Option<SpeedTrim>,
     /// The encoders of the newest tick.
     wheels: WheelSample,
@@ -255,12 +255,12 @@ impl Link {
         causes.into_iter().any(|cause| self.failsafe.applied(cause))
     }
 
-    /// What the next link's driver must know; none if the robot itself counts.
+    /// The state that the next link's driver needs; none if the robot itself counts.
     pub(crate) fn driver_memory(&self) -> Option<Memory> {
         self.driver.memory()
     }
 
-    /// Go on from what the driver of an earlier link knew.
+    /// Go on from the state of an earlier link's driver.
     pub(crate) fn remember(&mut self, memory: &Memory) {
         self.driver.remember(memory);
     }
@@ -345,7 +345,7 @@ impl Link {
         let OpenTick { ranges, scan, turn, wheels, contact, .. } = open;
         let time = self.time;
         let turn = turn.map(|Turn { sequence, turn_rad, variance_rad2 }| {
-            // It ends with the motion that the tick's wheels show.
+            // The turn ends with the motion that the tick's wheels show.
             let capture_ns = time.0;
             TurnSample { capture_ns, sequence, turn_rad, variance_rad2, ..TurnSample::default() }
         });
@@ -458,8 +458,8 @@ impl Link {
         true
     }
 
-    /// Send the newest command once more, halfway to the next tick. Its time limit is what is left of the first one, so the robot stops
-    /// no later. In lockstep commands are not repeated: the robot answers each with a frame, so a loss is noticed.
+    /// Send the newest command once more, halfway to the next tick. Its time limit is the rest of the first one, so the robot stops no
+    /// later. In lockstep commands are not repeated: the robot answers each with a frame, so a loss is noticed.
     fn repeat_command(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         if self.in_ticks() {
             return;
@@ -469,7 +469,7 @@ impl Link {
             return;
         };
         let left = self.limit.saturating_sub(now.since(repeat.stamp));
-        // While a tick is open, the next command will follow soon.
+        // While a tick is open, the next command follows soon.
         let superseded = self.open.is_some();
         if superseded || left < LEAST_LEFT || self.decide(now_ns).stops() {
             return;

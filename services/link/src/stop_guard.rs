@@ -1,7 +1,7 @@
 //! The stop guard: a process that stops the robot when its link ended and nobody saw the robot at rest.
 //!
-//! The link starts it and holds the writing end of a pipe, which the kernel closes with the link, however that ends. The guard
-//! is in a session of its own: what is sent to the link, to the supervisor or to their process groups does not reach it. It
+//! The link starts the guard and holds the writing end of a pipe, which the kernel closes with the link, however that ends. The
+//! guard is in a session of its own: signals to the link, to the supervisor or to their process groups do not reach it. It
 //! speaks to the robot itself, by the same [`Link`] as the link's process, and leaves when the robot rests or another link runs.
 
 use std::{
@@ -33,17 +33,17 @@ use crate::{
     transport::Transport,
 };
 
-/// The word of its command line after `firsthand stage`.
+/// The word after `firsthand stage` in the guard's command line.
 pub const NAME: &str = "stop-guard";
 
-/// The guard looks at the clock so often.
+/// The interval at which the guard looks at the clock.
 const LOOKS_AGAIN: Duration = Duration::from_millis(20);
-/// A robot that has said nothing for so long is out of reach.
+/// The silence after which a robot is out of reach.
 const SILENT: Duration = Duration::from_secs(10);
-/// A robot that says for so long that it moves, whatever it is told, may have encoders that are not to be believed.
+/// The time after which a robot that says that it moves, in spite of all stops, may have wrong encoders.
 const TOLD_IN_VAIN: Duration = Duration::from_secs(60);
 
-/// The link's end.
+/// The link's end of the pipe to the guard.
 #[derive(Debug)]
 pub(crate) struct StopGuard {
     pipe: io::PipeWriter,
@@ -65,7 +65,7 @@ impl StopGuard {
         Ok(Self { pipe })
     }
 
-    /// The robot rests: the guard is not needed.
+    /// The robot rests, so the guard is not needed.
     pub(crate) fn release(mut self) {
         // A guard that was killed needs no release.
         let _ = self.pipe.write_all(b"r");
@@ -74,7 +74,7 @@ impl StopGuard {
 
 /// Be the guard of the link with this socket, in the run in `directory`. Standard input ends with the link.
 pub fn run(directory: &Path, link: &Identity) -> Result<(), StageError> {
-    // The link's session may be that of a terminal, or end with it.
+    // The link's session may belong to a terminal, or end with the link.
     let _ = setsid();
     let run = Run::load(directory)?;
     let domain = Domain::of(run.robot.clone());
@@ -89,7 +89,7 @@ pub fn run(directory: &Path, link: &Identity) -> Result<(), StageError> {
 }
 
 /// Tell the robot of `run` to stand, by each method of the protocol in turn, until its encoders say that it rests. Returns
-/// whether they do; not if it is out of reach or told in vain, or `leave` says so.
+/// whether they do: not if the robot is out of reach or does not stop, or if `leave` returns true.
 pub fn stand(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bool, StageError> {
     let MissionClock::Wall { rate, .. } = run.clock else {
         // In lockstep a robot waits for commands.
@@ -99,7 +99,7 @@ pub fn stand(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bool, StageEr
     let is_gone = || run.mission.robot.address.is_none() && !is_taken(&run.address);
     let mut transport = Transport::open(&run.address, &run.mission)?;
     let mut link = Link::new(&run.mission);
-    // A pace is no foreign state.
+    // A pace is never a foreign state.
     let _ = link.restore(State { pace: Pace::Rate(rate), next_tick: 0 });
     let began_ns = monotonic_ns();
     let mut heard_ns = began_ns;
@@ -122,7 +122,7 @@ pub fn stand(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bool, StageEr
             match effect {
                 Effect::Send(bytes) => transport.send(&bytes)?,
                 Effect::StopBy(method) => {
-                    tracing::warn!(by = method, "the robot does not stand; told again");
+                    tracing::warn!(by = method, "the robot does not stand; it is told again");
                 }
                 _ => {}
             }

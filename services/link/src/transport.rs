@@ -1,5 +1,4 @@
-//! The transport of bytes to the robot: datagrams, a connection or a serial line. No call blocks. Bytes that cannot be sent now are
-//! lost, like those of a radio.
+//! The transport of bytes to the robot: datagrams, a connection or a serial line. No call blocks. Bytes that cannot be sent now are lost.
 //!
 //! | module | holds |
 //! |---|---|
@@ -81,7 +80,7 @@ impl Transport {
             wire: wire.map_err(|source| TransportError { address: address.clone(), source })?,
             address: address.clone(),
             reported: None,
-            // The largest datagram.
+            // The buffer holds the largest datagram.
             buffer: vec![0; 65_536].into_boxed_slice(),
         })
     }
@@ -134,7 +133,7 @@ impl Transport {
         }
     }
 
-    /// Send a message, which has one frame or more; one without bytes is not sent.
+    /// Send a message, which has one frame or more; an empty message is not sent.
     pub fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
         if bytes.is_empty() {
             return Ok(());

@@ -1,5 +1,5 @@
-//! The speeds of a command in counts of the encoders, which grow no faster than the body's accelerations allow. They fall at once: the
-//! robot stops as well as it can.
+//! The speeds of a command in counts of the encoders, which grow no faster than the body's accelerations allow. Speeds fall at once: the
+//! robot stops as fast as it can.
 
 use common::{
     kinematics::{DifferentialDrive, Twist, WheelSpeeds as Wheels},
@@ -17,7 +17,7 @@ const STEERING_GAIN: f64 = 0.6;
 pub(crate) struct WheelSpeeds {
     body: Body,
     rate_hz: f64,
-    /// The newest speeds that the robot was told, counts/s.
+    /// The speeds of the robot's newest command, counts/s.
     told: [i16; 2],
 }
 
@@ -26,7 +26,7 @@ impl WheelSpeeds {
         Self { body: mission.body(), rate_hz: mission.robot.rate_hz, told: [0; 2] }
     }
 
-    /// The robot was told these speeds, counts/s.
+    /// Note that the robot was sent these speeds, counts/s.
     pub(crate) const fn told(&mut self, counts: [i16; 2]) {
         self.told = counts;
     }
@@ -47,7 +47,7 @@ impl WheelSpeeds {
         [driven, whole(rate)]
     }
 
-    /// The speeds of the wheels, rad/s, that the robot reaches in a tick of those that are `wanted`.
+    /// The speeds of the wheels, rad/s, that the robot reaches in a tick on the way to the `wanted` ones.
     fn reachable(&self, wanted: [f64; 2]) -> [f64; 2] {
         let Body { wheel_radius_m, track_m, acceleration, .. } = self.body;
         if acceleration == [f64::INFINITY; 2] {
@@ -62,7 +62,7 @@ impl WheelSpeeds {
             now.clamp(-most, most)
         };
         let omega = grown(now.omega, then.omega, acceleration[1]);
-        // The robot slows down so that it keeps its curve, which is clear.
+        // The robot slows down so that it keeps its curve, which is free.
         let turned = if omega == now.omega { 1.0 } else { (omega / now.omega).abs() };
         let v = grown(now.v * turned, then.v, acceleration[0]);
         let Wheels { right, left } = drive.wheels(Twist { v, omega });
@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn a_cars_steering_is_limited_in_angle_and_rate_and_no_number_holds_it() {
-        // 1200 counts a second at most; 30 degrees are 300 counts.
+        // 1200 counts a second are the most; 30 degrees are 300 counts.
         assert_eq!(counts(0.0, 1.5, 1.0, 0), [0, 1200]);
         assert_eq!(counts(0.0, 1.5, 1.0, 300), [0, 0]);
         assert_eq!(counts(f64::NAN, f64::NAN, 1.0, 7), [0, 0]);
@@ -149,7 +149,7 @@ mod tests {
         // 1 m/s^2 and 2 rad/s^2 are 0.1 m/s and 0.2 rad/s in a tick.
         is([0.5, 0.0], [0.1, 0.0]);
         is([0.5, 0.1], [0.2, 0.1]);
-        // The curve of 0.5 m/s and 1 rad/s at the turn rate that it reaches.
+        // The curve is that of 0.5 m/s and 1 rad/s, at the turn rate that is reached.
         is([0.5, 1.0], [0.15, 0.3]);
         is([0.5, -1.0], [0.1, -0.2]);
         is([0.1, 0.0], [0.1, 0.0]);

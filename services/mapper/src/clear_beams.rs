@@ -1,9 +1,8 @@
 //! The newest readings as evidence of free ground.
 //!
-//! A smooth surface answers only a beam along its normal. A beam without an echo therefore excludes only surfaces square
-//! to it, and the evidence grid, which stores no directions, cannot hold that. The newest readings are held for it: the
-//! planner asks them about every surface that the body could touch. The rays of infrared rangers are held beside them,
-//! because a ray ends at a surface of any angle.
+//! A smooth surface answers only a beam along its normal. A beam without an echo therefore excludes only surfaces square to it, and the
+//! evidence grid, which stores no directions, cannot hold that. So the newest readings are kept: the planner compares each surface that
+//! the body could touch with them. The rays of infrared rangers are kept separately, because a ray ends at a surface of any angle.
 
 use common::samples::{CLEAR_BEAMS, CLEAR_RAYS, ClearBeam, GridHeader};
 use glam::DVec2;

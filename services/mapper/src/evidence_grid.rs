@@ -13,10 +13,10 @@
 //! the cell where it ends is occupied, and the absence of an echo is no evidence against that.
 //!
 //! Beside a laser there are two grids, its own and one of the other rangers, and a cell of either is hazard: a laser that looks over or
-//! through a thing is no evidence against it. Where the laser sees a thing, an echo from there is that thing's, and has its place. A pane
-//! of glass that the laser sees only squarely stays so by its echo.
+//! through a thing is no evidence against it. If the laser sees a thing at the range of an echo, the echo is put where that thing is. So a
+//! pane of glass that the laser sees only squarely stays by its echoes.
 //!
-//! Where the body touched something, no ranger is evidence against it: all of them may look over it.
+//! No ranger is evidence against a thing that the body touched, because all of them may look over it.
 
 use std::f64::consts::TAU;
 
@@ -43,12 +43,12 @@ const SEEN: u8 = 2;
 /// Flag of a cell: the body touched the obstacle, which no ranger may see.
 const TOUCHED: u8 = 4;
 
-/// A cell that the axis of a beam crosses is not that of the beam at a greater angle, radians: it is beside the sensor.
+/// The angle beyond which a cell that the axis of a beam crosses does not belong to the beam, radians: such a cell is beside the sensor.
 const WIDEST_SLACK_RAD: f64 = 1.0;
 
-/// An echo is that of a thing which a laser sees if their ranges differ by no more than this, metres: the noise of both, and a cell.
+/// The greatest difference between the ranges of an echo and of the thing that a laser sees there, metres: the noise of both, and a cell.
 const SAME_RANGE_M: f64 = 0.10;
-/// The lobe of a sonar hears what is near as far off its axis as this, radians.
+/// The angle off its axis at which the lobe of a sonar still hears near things, radians.
 const LOBE_RAD: f64 = 28.0 * TAU / 360.0;
 
 /// Distance that the wheels roll until scanned ground is one step less certain, metres.
@@ -154,8 +154,9 @@ impl EvidenceGrid {
         window
     }
 
-    /// Take one reading, which counts as evidence up to `reach` metres, of a robot at `robot` with a body of `radius` metres. Where a laser
-    /// has `seen` what gave the echo, it stands in one of the cells that are occupied there. Appends the cells that flipped to `flips` and returns the window of all cells that changed.
+    /// Take one reading, which counts as evidence up to `reach` metres, of a robot at `robot` with a body of `radius` metres. If a laser
+    /// has `seen` its cause, only cells that are occupied there get the echo. Appends flipped cells to `flips` and returns the window of
+    /// all changed cells.
     pub(crate) fn take(
         &mut self,
         sonar: &SonarModel,
@@ -176,7 +177,7 @@ impl EvidenceGrid {
         let known_to = echo.map_or(scanned_to, |range| range + sonar.behind_m);
         let far = known_to.max(sonar.pointed_m).max(echo.unwrap_or(0.0) + band);
         let came_from = side_of(beam.axis);
-        // Farther than `near`, half a cell's diagonal is narrower than the widest cone.
+        // Beyond `near`, half a cell's diagonal is narrower than the widest cone.
         let near = half_diagonal / sonar.arc.sin();
         let outside = sonar.arc.tan() * (1.0 + 1e-9);
 
@@ -303,7 +304,7 @@ impl EvidenceGrid {
         window
     }
 
-    /// Take one reading of an infrared ranger, as [`EvidenceGrid::take`] does of the sonar.
+    /// Take one reading of an infrared ranger, as [`EvidenceGrid::take`] takes one of the sonar.
     pub(crate) fn take_ray(
         &mut self,
         sonar: &SonarModel,
@@ -350,8 +351,8 @@ impl EvidenceGrid {
         window
     }
 
-    /// Change the weight of a cell that a laser saw by `change`; positive means that an obstacle stands in it. What is seen is scanned.
-    /// Returns whether it looks different now.
+    /// Change the weight of a cell that a laser saw by `change`; positive means that an obstacle stands in it. A cell that was seen is
+    /// scanned. Returns whether the cell looks different now.
     pub(crate) fn weigh_seen(
         &mut self,
         sonar: &SonarModel,
@@ -365,7 +366,7 @@ impl EvidenceGrid {
         let was_scanned = self.is_scanned(sonar, index);
         self.looks[index] = SCANNED;
         if was_scanned && change <= 0 && (change == 0 || weight == sonar.least) {
-            // This is so of most cells.
+            // Most cells return here.
             return false;
         }
         if change > 0 {
@@ -449,12 +450,12 @@ impl EvidenceGrid {
     }
 }
 
-/// The cells inside the map of a square of `reach` metres around `centre`.
+/// The cells inside the map that lie in a square of `reach` metres around `centre`.
 fn around(frame: &GridFrame, centre: DVec2, reach: f64) -> impl Iterator<Item = Cell> + use<> {
     between(frame, centre - reach, centre + reach)
 }
 
-/// The cells inside the map of a rectangle and of the rim around it.
+/// The cells inside the map that lie in a rectangle or in the rim around it.
 fn between(frame: &GridFrame, least: DVec2, greatest: DVec2) -> impl Iterator<Item = Cell> + use<> {
     let last = f64::from(frame.cells) - 1.0;
     let inside = |corner: DVec2| corner.clamp(DVec2::ZERO, DVec2::splat(last));

@@ -20,7 +20,7 @@ use crate::{
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct EvidenceMap {
     evidence: EvidenceGrid,
-    /// What sonars hear and infrared rangers see of things that a laser beside them looks over or through; none without both.
+    /// The evidence of sonars and infrared rangers about things that a laser beside them looks over or through; none without both.
     unseen: Option<Box<EvidenceGrid>>,
     pub(crate) beams: ClearBeams,
     /// The inflation is not saved, because it is recomputed from the evidence.
@@ -42,7 +42,7 @@ pub(crate) struct Observed {
 pub(crate) struct Evidential {
     sonar: SonarModel,
     geometry: Geometry,
-    /// The column of the lattice under the middle of each column of the grid; of rows the same, as both are square and have one centre.
+    /// The column of the lattice under the middle of each column of the grid; rows have the same, as both are square and have one centre.
     under: Vec<Option<u32>>,
     radius: f64,
     map_within: f64,
@@ -137,7 +137,7 @@ impl Evidential {
             Some(unseen) => (unseen.as_mut(), Some(&map.evidence)),
             None => (&mut map.evidence, None),
         };
-        // Rays come first, because what they show explains echoes.
+        // Rays come first, because the things that they show explain echoes.
         for ray in rays {
             map.beams.take_ray(&self.sonar, &ray, rolled_m);
             let seen = grid.take_ray(&self.sonar, lattice, &ray, body, &mut flips);
@@ -172,7 +172,7 @@ impl Evidential {
         self.follow(map, touched, &flips)
     }
 
-    /// Inflate the cells that flipped. Returns the window of the grid that may look different now, with what was `touched` of the lattice.
+    /// Inflate the flipped cells. Returns the window of the grid that may look different now, with that `touched` on the lattice.
     fn follow(&self, map: &mut EvidenceMap, touched: Window, flips: &[Flip]) -> Window {
         let mut window = self.on_grid(touched);
         for flip in flips {
@@ -193,7 +193,7 @@ impl Evidential {
         self.on_grid(map.evidence.grow_stale(&self.sonar, lattice, steps as u8))
     }
 
-    /// Reset all evidence that is not near the robot. Every second reset drops that too, since it may be what is wrong.
+    /// Reset all evidence that is not near the robot. Every second reset drops the near evidence too, since that may be wrong.
     pub(crate) fn reset(&self, map: &mut EvidenceMap, robot: DVec2, epoch: u64) {
         let keep = if epoch % 2 == 1 { self.sonar.near_m } else { 0.0 };
         let mut flips = Vec::new();
@@ -233,7 +233,7 @@ impl Evidential {
             let point = lattice.centre_of(Cell { col, row });
             grid.to_cells(point).clamp(DVec2::ZERO, last)
         };
-        // A cell of the lattice shows as far as half of it, and half a cell of the grid, beyond its centre.
+        // A cell of the lattice has an effect up to half of it, and half a cell of the grid, beyond its centre.
         let more = 0.5 * lattice.resolution_m / grid.resolution_m + 0.5;
         let from = (corner(window.col, window.row) - more).floor().max(DVec2::ZERO);
         let to = corner(window.col + window.width - 1, window.row + window.height - 1) + more;

@@ -1,9 +1,9 @@
 //! The infrared model: the meaning of a ranger's voltage for the cells along its ray.
 //!
 //! A ranger triangulates: it sees a small spot straight ahead, 10 to 80 cm away, at any angle of the surface. Its voltage
-//! grows with 1 / range, so the noise of the AD converter becomes a noise of the range that grows with its square. Nearer
-//! than 10 cm the voltage falls again: such a reading says that an obstacle is near, but not how near. Glass and surfaces
-//! that do not reflect infrared are not seen; the sonar hears those.
+//! grows with 1 / range, so the noise of the AD converter becomes a noise of the range that grows with its square. Nearer than
+//! 10 cm the voltage falls again: such a reading says that an obstacle is near, but not how near. A ranger does not see glass
+//! and surfaces that do not reflect infrared; the sonar hears those.
 
 use common::{
     samples::{RangeReading, RangeStatus},

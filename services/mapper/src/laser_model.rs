@@ -4,11 +4,11 @@
 //! is occupied. A beam without a reading says nothing of the cells along it.
 //!
 //! Many beams cross one cell near the laser, so a scan counts once for each cell. Where a fifth of them end and the others pass, the cell
-//! is occupied: a post, or the edge of a thing, fills a part of its cell. Fewer that end there are noise of a surface behind it, which
-//! must not close a gap.
+//! is occupied: a post, or the edge of a thing, fills a part of its cell. If fewer end there, they are noise of a surface behind it,
+//! which must not close a gap.
 //!
-//! Where beams are no farther apart than a cell is wide, they are not followed one by one: the cells that they passed are those in the
-//! polygon of their ends, which is filled row by row. Farther away each beam is followed, and so is a beam beside one without a reading.
+//! Where beams are no farther apart than a cell is wide, they are not followed one by one: the cells that they passed lie in the polygon
+//! of their ends, which is filled row by row. Farther away each beam is followed, and so is a beam beside one without a reading.
 
 use std::ops::Range;
 
@@ -26,13 +26,13 @@ const HIT: i8 = 6;
 /// Weight taken off a cell that beams passed and in which none ended. Two scans free a cell that many others filled.
 const PASS: i8 = 6;
 
-/// A beam that passes a cell and ends no farther behind it is no evidence against a thing in it: along a wall at a slant most beams pass
-/// a part of it before they end in the next one, metres.
+/// The distance behind a cell, metres, up to which the end of a passing beam is no evidence against a thing in the cell: along a wall at
+/// a slant most beams pass a part of it before they end in the next one.
 const NEAR_END_M: f64 = 0.25;
-/// No robot is farther from its map, cells.
+/// The farthest that a robot can be from its map, cells.
 const FARTHEST: f64 = 1e6;
 
-/// A cell is occupied if of so many beams that pass at least one ends.
+/// The most beams that pass for each one that ends in an occupied cell.
 const PASS_FOR_ONE_THAT_ENDS: u32 = 4;
 
 /// Marks of a cell in a scan: a beam ended in it, a beam passed it, a beam passed it and ended far behind.
@@ -43,11 +43,11 @@ const PASSED_FAR: u8 = 4;
 /// A beam of a scan on the lattice.
 #[derive(Clone, Copy, Debug)]
 struct Beam {
-    /// A unit vector.
+    /// The direction of the beam, a unit vector.
     along: DVec2,
-    /// How far it went, cells; 0 without a reading.
+    /// The length of the beam, cells; 0 without a reading.
     range: f64,
-    /// Whether it ended there.
+    /// Whether the beam ended at that length.
     ends: bool,
 }
 
@@ -104,7 +104,7 @@ impl EvidenceGrid {
 }
 
 impl<'a> Scan<'a> {
-    /// None if the laser is nowhere: its pose comes from shared memory.
+    /// The scan; none if the pose, which comes from shared memory, is no place.
     fn new(lattice: &'a GridFrame, fan: &'a Fan<'a>) -> Option<Self> {
         let origin = lattice.to_cells(fan.origin);
         let beam = |(along, range_m): (DVec2, f64)| {
@@ -192,7 +192,7 @@ impl<'a> Scan<'a> {
     }
 
     fn index(&self, cell: IVec2) -> Option<usize> {
-        // A negative one is a great one without its sign.
+        // The cast makes a negative number a great one.
         let (col, row, side) = (cell.x as u32, cell.y as u32, self.lattice.cells);
         (col < side && row < side).then(|| (row * side + col) as usize)
     }
@@ -206,7 +206,7 @@ fn fill(side: u32, corners: &[DVec2], mut span: impl FnMut(u32, Range<u32>)) {
     for (from, to) in before.zip(corners) {
         let (least, greatest) = (from.y.min(to.y), from.y.max(to.y));
         let slope = (to.x - from.x) / (to.y - from.y);
-        // Of two edges that meet on the centre of a row one crosses it.
+        // If two edges meet on the centre of a row, one of them crosses it.
         let (first, end) = ((least.floor() + 1.0).max(0.0), greatest.floor().min(last) + 1.0);
         for (row, crossings) in
             crossings.iter_mut().enumerate().take(end as usize).skip(first as usize)
@@ -225,7 +225,7 @@ fn fill(side: u32, corners: &[DVec2], mut span: impl FnMut(u32, Range<u32>)) {
     }
 }
 
-/// Cells of the lattice along a beam, each once, in order: the grid's lines that it crosses tell which.
+/// The cells of the lattice along a beam, each once, in the order in which the beam crosses the grid's lines.
 struct Along {
     cell: IVec2,
     step: IVec2,
@@ -235,7 +235,7 @@ struct Along {
 }
 
 impl Along {
-    /// From `origin`, in cells of the lattice, in the unit direction `along`.
+    /// The cells from `origin`, in cells of the lattice, in the unit direction `along`.
     fn new(origin: DVec2, along: DVec2) -> Self {
         // The centre of a cell has whole coordinates.
         let cell = (origin + 0.5).floor();
@@ -333,7 +333,7 @@ mod tests {
 
     #[test]
     fn beams_that_are_close_free_the_cells_that_each_of_them_passes() {
-        // A room of 4 m times 4 m with a post.
+        // The room has 4 m times 4 m, and a post.
         let beam = |number: usize| {
             let (sin, cos) = (number as f64 * 0.25).to_radians().sin_cos();
             let wall = 2.0 / cos.abs().max(sin.abs());

@@ -32,7 +32,7 @@ struct Row {
     mount: Mount,
     reach_m: f64,
     kind: SensorKind,
-    /// The model of a cone; none for others.
+    /// The model of a cone; none for other kinds.
     cone: Option<SonarModel>,
 }
 
@@ -85,7 +85,7 @@ impl Rows {
         self.uses_row(reading.sensor.into())
     }
 
-    /// The hit of (19), metres, with its distance S: where the front sonar of a robot at `robot` hears something.
+    /// The hit of (19), metres, with its distance S: the place where the front sonar of a robot at `robot` hears something.
     pub(crate) fn front_hit(
         &self,
         robot: Pose2,
@@ -129,7 +129,7 @@ impl Rows {
     }
 }
 
-/// S of (19), if the reading says where something is.
+/// S of (19), if the reading has a distance.
 fn safety_distance(reading: &RangeReading) -> Option<f64> {
     match reading.status() {
         RangeStatus::Measured if reading.range_m >= 0.0 => Some(reading.range_m),
@@ -169,7 +169,7 @@ pub(crate) struct Fan<'a> {
     /// Bearing of the first beam, and the angle from beam to beam, radians.
     pub(crate) first_rad: f64,
     pub(crate) step_rad: f64,
-    /// The range up to which it sees, metres.
+    /// The range up to which the laser sees, metres.
     pub(crate) reach_m: f64,
     /// The ranges, metres: infinite for nothing in reach, not a number for no reading.
     pub(crate) beams: &'a [f32],

@@ -1,13 +1,13 @@
-//! The scan matcher: where the robot is, by its laser.
+//! The scan matcher: the pose of the robot by its laser.
 //!
 //! A scan is laid over a reference scan, so that its points come to lie on the lines through the reference's points (point-to-line
-//! matching, Censi 2008). The reference is an earlier scan at the pose that was matched then; it is replaced when the robot has gone
-//! on so far that it sees other things. The pose of dead reckoning is where the search begins, and holds the robot in directions in
-//! which nothing does, as along a corridor.
+//! matching, Censi 2008). The reference is an earlier scan at the pose that was matched then; it is replaced when the robot has gone on so
+//! far that it sees other things. The search begins at the pose of dead reckoning, which also holds the robot in directions in which no
+//! line does, as along a corridor.
 //!
-//! The result is a fix for dead reckoning, whose filter knows the errors of the wheels and takes the errors of fixes for independent.
-//! The errors of matches are alike for a while, so those of [`SHARED_S`] are given the weight of one. All of them share the error of
-//! their reference, and with it those of all references before: a fix says so, because no number of fixes averages that out.
+//! The result is a fix for dead reckoning, whose filter knows the errors of the wheels and takes the errors of fixes for independent. The
+//! errors of matches are alike for a while, so the fixes of [`SHARED_S`] are given the weight of one. They all share the error of their
+//! reference, and so of all references before: a fix states that error, because no number of fixes averages it out.
 
 use common::{
     geometry::principal_axes,
@@ -24,36 +24,36 @@ use crate::reading::{Fan, Rows};
 const POINT_M: f64 = 0.02;
 /// The deviation of the pose at which the search begins: metres and radians.
 const PRIOR: [f64; 2] = [0.10, 0.05];
-/// A point belongs to a line no farther away than this, metres: at the first round, and at the last ones.
+/// The greatest distance of a point from its line, metres: in the first round, and in the last ones.
 const GATES_M: [f64; 2] = [0.30, 0.08];
 const ROUNDS: usize = 6;
-/// A round that changes the pose by no more is the last one, metres and radians.
+/// The change of the pose after which a round is the last one, metres and radians.
 const SETTLED: f64 = 1e-4;
-/// Points that are matched of each scan, about.
+/// The number of points of each scan that are matched, about.
 const POINTS: usize = 240;
 /// Half the length over which a line is laid through points, metres.
 const LINE_M: f64 = 0.06;
-/// Points farther than this from their neighbours are the edge of a thing, metres.
+/// The distance from its neighbours beyond which a point is the edge of a thing, metres.
 const EDGE_M: f64 = 0.20;
-/// Points of a line are no farther from it than this, root mean square, metres.
+/// The greatest distance of points from their line, root mean square, metres.
 const STRAIGHT_M: f64 = 0.03;
-/// Lines that a point is compared with, to either side of the bearing at which it is seen, radians.
+/// The angle from a point's bearing, to either side, within which its lines are sought, radians.
 const BESIDE_RAD: f64 = 0.08;
-/// With fewer points on lines there is no match.
+/// The least number of points on lines in a match.
 const LEAST_POINTS: usize = 10;
-/// The reference is replaced when the robot has gone so far, metres, or turned by so much, radians, or a smaller share of the points
+/// The way, metres, and the turn, radians, after which the reference is replaced. It is also replaced if a smaller share of the points
 /// finds a line.
 const REPLACED_AFTER: (f64, f64) = (2.0, std::f64::consts::FRAC_PI_3);
 const LEAST_SHARE: f64 = 0.6;
-/// What a new reference adds to the deviation of all after it, besides that of its match: metres and radians. An error of its heading
-/// turns what follows. With these, the poses of a Kobuki are 0.03 to 0.38 m off after 31 to 49 m in an office, and expected to be 0.16
+/// The deviation that a new reference adds to all after it, besides that of its match: metres and radians. An error of its heading turns
+/// all later poses. With these values, the poses of a Kobuki are 0.03 to 0.38 m off after 31 to 49 m in an office, and expected to be 0.16
 /// to 0.33 m off.
 const OF_REFERENCE: [f64; 2] = [0.005, 0.001];
-/// More fixes a second would leave no room for those of others.
+/// The most fixes a second; more would leave no room for those of others.
 const MOST_FIXES_HZ: f64 = 20.0;
-/// The errors of matches are alike for so long, seconds.
+/// The time for which the errors of matches are alike, seconds.
 const SHARED_S: f64 = 5.0;
-/// No match is better than this: metres and radians.
+/// The least deviation of a match: metres and radians.
 const LEAST: [f64; 2] = [0.005, 0.002];
 
 /// A scan at a pose that is held to be known.
@@ -63,7 +63,7 @@ pub(crate) struct Reference {
     beams: Vec<f32>,
     /// The covariance of its pose: of x, y and heading, m^2, m rad, rad^2.
     covariance: DMat3,
-    /// The lines through its points, by beams; not saved, because they are laid again.
+    /// The lines through its points, by beams; not saved, because they can be computed again.
     #[serde(skip)]
     lines: Vec<Option<Line>>,
 }
@@ -72,16 +72,16 @@ pub(crate) struct Reference {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Line {
     point: DVec2,
-    /// A unit vector.
+    /// The direction across the line, a unit vector.
     normal: DVec2,
 }
 
 /// Matches the scans of one mission's laser.
 #[derive(Clone, Debug)]
 pub(crate) struct ScanMatcher {
-    /// A match in so many ticks is published.
+    /// The number of ticks from one published match to the next.
     every_ticks: u64,
-    /// The matches that share their errors.
+    /// The number of matches that share their errors.
     shared: f64,
 }
 
@@ -99,8 +99,8 @@ impl ScanMatcher {
         tick.is_multiple_of(self.every_ticks)
     }
 
-    /// Match `beams`, taken by a robot whose pose is `reckoned` by dead reckoning, with the reference, which is replaced if need be. Gives
-    /// the robot's pose by the match with its covariance; none if too little of the reference is seen.
+    /// Match `beams`, taken by a robot whose pose is `reckoned` by dead reckoning, with the reference, which is replaced if necessary.
+    /// Gives the robot's pose by the match with its covariance; none if too little of the reference is seen.
     pub(crate) fn step(
         &self,
         rows: &Rows,
@@ -115,7 +115,7 @@ impl ScanMatcher {
             return None;
         };
         if held.lines.is_empty() {
-            // It was saved without them.
+            // The reference was saved without its lines.
             let saved = std::mem::take(&mut held.beams);
             let fan = rows.scan(held.pose, &saved)?;
             *held = Reference::new(&fan, held.pose, held.covariance);
@@ -151,7 +151,7 @@ impl ScanMatcher {
         let went = pose.position.distance(held.pose.position);
         let turned = (pose.heading - held.pose.heading).abs();
         if went > REPLACED_AFTER.0 || turned > REPLACED_AFTER.1 || share < LEAST_SHARE {
-            // Where nothing was matched, dead reckoning has carried the robot on.
+            // Without a match, the pose is that of dead reckoning.
             let covariance = match found {
                 Some(_) => of_reference + matched + variances(OF_REFERENCE),
                 None => covariance_of(reckoned),
@@ -178,7 +178,7 @@ impl Reference {
     }
 
     /// The pose at which the points of `fan` lie best on the lines, with its covariance and the share of the points that found a line.
-    /// `fan` is the scan at the pose `start`, and `seen_from` the same at the reference's pose.
+    /// `fan` is the scan at the pose `start`, and `seen_from` is the same scan at the reference's pose.
     fn matched(
         &self,
         fan: &Fan<'_>,
@@ -187,7 +187,7 @@ impl Reference {
     ) -> Option<(Pose2, DMat3, f64)> {
         let seen: Vec<_> = points_of(fan).into_iter().flatten().collect();
         let every = seen.len().div_ceil(POINTS).max(1);
-        // Points in the robot's frame.
+        // These points are in the robot's frame.
         let back = DVec2::from_angle(-start.heading);
         let points = seen.iter().step_by(every).map(|point| back.rotate(point - start.position));
         let points: Vec<_> = points.collect();
@@ -222,7 +222,7 @@ impl Reference {
                 break;
             }
         }
-        // Where the scan says nothing, the covariance is that of a guess.
+        // In directions of which the scan says nothing, the covariance is that of a guess.
         let guess = DVec3::new(1.0, 1.0, 1.0);
         let covariance = (information + DMat3::from_diagonal(guess)).inverse();
         let usable =
@@ -230,14 +230,14 @@ impl Reference {
         usable.then(|| (pose, covariance, found as f64 / points.len().max(1) as f64))
     }
 
-    /// The line nearest to `at` within `gate` metres, of those that stand near its bearing from the reference.
+    /// The line nearest to `at` within `gate` metres, among those near its bearing from the reference.
     fn line_near(&self, seen_from: &Fan<'_>, at: DVec2, gate: f64) -> Option<Line> {
         let way = at - seen_from.origin;
         let bearing = (way.to_angle() - seen_from.first_rad).rem_euclid(std::f64::consts::TAU);
         let beam = (bearing / seen_from.step_rad).round() as i32;
         let beside = (BESIDE_RAD.max(gate / way.length().max(gate)) / seen_from.step_rad).ceil();
         let beside = beside as i32;
-        // A scan of 1,081 beams needs not each of them.
+        // Not each beam of a scan of 1,081 beams is needed.
         let stride = (beside / 6).max(1);
         let whole_turn = (std::f64::consts::TAU / seen_from.step_rad).round().max(1.0) as i32;
         let near = |line: &Line| line.point.distance_squared(at);
@@ -287,7 +287,7 @@ fn variances([place, heading]: [f64; 2]) -> DMat3 {
     DMat3::from_diagonal(DVec3::new(place, place, heading).map(|deviation| deviation * deviation))
 }
 
-/// Where the beams of `fan` end; none for those without an end.
+/// The points at which the beams of `fan` end; none for a beam without an end.
 fn points_of(fan: &Fan<'_>) -> Vec<Option<DVec2>> {
     let ends = |(along, range): (DVec2, f64)| {
         (range >= 0.0 && range <= fan.reach_m).then(|| fan.origin + range * along)
@@ -301,7 +301,7 @@ mod tests {
 
     use super::*;
 
-    /// The matcher of a mission's robot, with what it needs of it.
+    /// The matcher of a mission's robot, with the rows that it needs.
     struct Matcher(ScanMatcher, Rows);
 
     impl Matcher {
@@ -325,7 +325,7 @@ mod tests {
         (mission, matcher)
     }
 
-    /// The scan of a robot at `pose` in a room of 6 by 4 metres; of a corridor along x without its ends.
+    /// The scan of a robot at `pose` in a room of 6 by 4 metres, or in a corridor along x without its ends.
     fn scan(mission: &Mission, pose: Pose2, corridor: bool) -> Vec<f32> {
         let mount = mission.sensor_table()[0].mount.on(pose);
         (0..360)

@@ -1,5 +1,5 @@
-//! `pose`, `ranges`, `target` and `directive` in, `grid` out: a window for each change, a keyframe for each new reader and now and
-//! then, nothing but a stamp otherwise, so that every tick goes on to the planner.
+//! `pose`, `ranges`, `target` and `directive` in, `grid` out: a window for each change, a keyframe for each new reader and at
+//! intervals, an empty window otherwise, so that every tick goes on to the planner.
 
 use std::time::Duration;
 
@@ -59,7 +59,7 @@ impl Process for Shell {
         let runner = Runner::open(context, |mapper: &Mapper| mapper.frame().area())?;
         let version = runner.stage.state().version();
         if version > 1 {
-            tracing::info!(version, "belief restored");
+            tracing::info!(version, "the belief is restored");
         }
         Ok(Self {
             pose: context.reader(&POSE)?,
@@ -89,7 +89,7 @@ impl Process for Shell {
         if let Some(DirectiveSample { epoch, .. }) = self.directive.newest()?
             && self.step(Input::Reset { epoch })?
         {
-            tracing::warn!(epoch, "sensed belief reset");
+            tracing::warn!(epoch, "the sensed belief is reset");
         }
         if self.runner.out.has_new_reader(&GRID)? {
             self.publish_again()?;
@@ -115,7 +115,7 @@ impl Process for Shell {
 }
 
 impl Shell {
-    /// Let the step take `input`. Says whether anything was published.
+    /// Let the step take `input`. Returns whether anything was published.
     fn step(&mut self, input: Input) -> Result<bool, StageError> {
         self.take(Entry::Step(input, self.runner.out.at))
     }
@@ -133,7 +133,7 @@ impl Shell {
         Ok(published.is_some())
     }
 
-    /// The readings of `tick`; those before it are dropped, those after it wait for their pose.
+    /// The readings of `tick`; earlier ones are dropped, later ones wait for their pose.
     fn ranges_of(&mut self, tick: u64) -> Result<Vec<RangeReading>, StageError> {
         while self.latest_ranges.as_ref().is_none_or(|(latest, _)| *latest < tick) {
             let Some(slice) = self.ranges.take()? else {

@@ -76,7 +76,7 @@ pub(crate) struct SonarModel {
     /// Range within which the absence of an echo excludes a surface square to the beam, metres. It is half a metre less than
     /// the sonar's reach, where answers grow weak.
     pub(crate) clear_m: f64,
-    /// An obstacle may be nearer than its echo's range by this much, metres: noise, the byte's centimetre.
+    /// The greatest distance of an obstacle before its echo's range, metres: noise, the byte's centimetre.
     pub(crate) ahead_of_echo_m: f64,
     /// A reading is evidence of free ground until the wheels have rolled this far, turns on the spot included, metres.
     pub(crate) clear_for_m: f64,
@@ -88,7 +88,7 @@ pub(crate) struct SonarModel {
 }
 
 impl SonarModel {
-    /// The model of a sonar: that of the X80's with the cone's angles and ranges in the ratio of field of view and reach.
+    /// The model of a sonar: that of the X80 with the cone's angles and ranges in the ratio of field of view and reach.
     pub(crate) fn of(sensor: &Sensor) -> Self {
         let x80 = Self::default();
         let wide = sensor.field_of_view_deg / SensorModel::Dur5200.field_of_view_deg();

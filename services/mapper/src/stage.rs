@@ -1,4 +1,4 @@
-//! The mapper as a stage: what a recording holds of it, what it publishes and persists.
+//! The mapper as a stage: the entries of its recordings, and the samples that it publishes and persists.
 
 use common::{
     grid::Part,
@@ -19,7 +19,7 @@ use crate::step::{Belief, Change, Input, Mapper};
 pub struct Start {
     /// The snapshot, if there was one.
     belief: Option<Belief>,
-    /// The inputs since, oldest first.
+    /// The inputs since the snapshot, oldest first.
     inputs: Vec<Input>,
 }
 
@@ -27,7 +27,7 @@ pub struct Start {
 #[allow(clippy::large_enum_variant, reason = "there is one at a time, on the stack")]
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Entry {
-    /// The step takes this; what changed is published.
+    /// The step takes the input, and the changed window is published.
     Step(Input, Progress),
     /// The whole map is published although nothing changed.
     Again(Progress),
@@ -53,7 +53,7 @@ impl Stage for Mapper {
         for input in start.inputs {
             self.step(input, Progress::default().time);
         }
-        // What the last of them gave was published then.
+        // The fix of the last of these inputs was published before.
         self.take_fix();
         restored
     }
@@ -63,7 +63,7 @@ impl Stage for Mapper {
             Entry::Step(input, at) => {
                 out.at = at;
                 let change = self.step(input.clone(), at.time);
-                // A belief that is wrong is wrong in its journal, too.
+                // A belief that is wrong by a fault is wrong in its journal, too.
                 if change != Change::None || matches!(input, Input::Fault(_)) {
                     out.append(&input)?;
                 }

@@ -40,7 +40,7 @@ pub enum Input {
     },
     /// The supervisor's reset of the sensed belief.
     Reset {
-        /// The number of the belief that begins. A reset to one that has begun already is ignored.
+        /// The number of the belief that begins. A reset to a belief that has begun already is ignored.
         epoch: u64,
     },
     /// A fault that an operator injects into the belief; it acts from the next tick on.
@@ -73,7 +73,7 @@ pub struct Belief {
     /// A [`CellState`] byte for each cell, row-major.
     #[serde(with = "serde_bytes")]
     cells: Vec<u8>,
-    /// Grows by one with every change.
+    /// The version, which grows by one with every change.
     version: u64,
     /// Ticks whose readings put a hazard on the map.
     safety_events: u64,
@@ -92,7 +92,7 @@ pub struct Belief {
     fault: FaultKind,
     /// The target, metres.
     target: DVec2,
-    /// The scan with which others are matched; none before the first.
+    /// The scan with which later ones are matched; none before the first.
     reference: Option<Reference>,
 }
 
@@ -101,7 +101,7 @@ impl Belief {
         &self.cells
     }
 
-    /// 1 for the map a mission starts with.
+    /// The version of the map; 1 for the map that a mission starts with.
     pub const fn version(&self) -> u64 {
         self.version
     }
@@ -111,7 +111,7 @@ impl Belief {
     }
 }
 
-/// How far around a surface the cells of a mission's map are hazard, metres.
+/// The distance around a surface within which the cells of a mission's map are hazard, metres.
 pub fn hazard_reach_m(mission: &Mission) -> f64 {
     match mission.method {
         // A known surface blocks the same cells as a hit on it: its own cell and the margin around.
@@ -128,7 +128,7 @@ pub struct Mapper {
     frame: GridFrame,
     /// The target's cell.
     target: Option<Cell>,
-    /// The shapes that the mission knows, and how far around them cells are hazard, metres.
+    /// The shapes that the mission knows, and the distance around them within which cells are hazard, metres.
     known: (Shapes, f64),
     /// The paper's Im of (19).
     margin: u32,
@@ -243,7 +243,7 @@ impl Mapper {
         self.rows.uses(reading)
     }
 
-    /// Where the robot is by the newest scan, and the scans before it; none if that says nothing.
+    /// The fix by the newest scan and those before it; none if they do not give one.
     pub const fn take_fix(&mut self) -> Option<FixSample> {
         self.fix.take()
     }
@@ -308,8 +308,8 @@ impl Mapper {
         }
     }
 
-    /// The robot is sent to `target`: its cell is no hazard from now on, and that of the target before may be one again. Returns
-    /// the window that changed.
+    /// The robot is sent to `target`: its cell is no hazard from now on, and the cell of the target before may be one again. Returns the
+    /// window that changed.
     fn move_target(&mut self, target: DVec2) -> Window {
         self.belief.target = target;
         let cell = self.frame.cell_at(target).filter(|cell| !self.frame.is_rim(*cell));
@@ -326,7 +326,7 @@ impl Mapper {
         changed
     }
 
-    /// The state of a cell by the target, the known shapes and the evidence. The paper's method has no record of hits but its map.
+    /// The state of a cell by the target, the known shapes and the evidence. The paper's method records hits in its map alone.
     fn state_for_target(&self, cell: Cell) -> CellState {
         let (known, reach) = &self.known;
         let is_target = Some(cell) == self.target;
@@ -340,8 +340,8 @@ impl Mapper {
         }
     }
 
-    /// Map the readings taken at `pose`, and the contact of that tick. Returns the window that changed with what already `changed`, empty
-    /// for none. A tick given twice is mapped once.
+    /// Map the readings taken at `pose`, and the contact of that tick. Returns the window that changed together with `changed`, empty for
+    /// none. A tick given twice is mapped once.
     fn map(
         &mut self,
         pose: &PoseSample,
@@ -395,7 +395,7 @@ impl Mapper {
             return Window::default();
         };
         let stale = self.evidential.roll(map, rolled, self.belief.rolled);
-        // The scan comes first, because what it shows explains echoes.
+        // The scan comes first, because the things that it shows explain echoes.
         let fan = self.rows.scan(robot, scan);
         let seen = fan.map(|fan| self.evidential.take_scan(map, robot.position, &fan));
         let seen = seen.unwrap_or_default();

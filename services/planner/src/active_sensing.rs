@@ -5,9 +5,9 @@
 //! touched there. The robot drives no faster than it could stop before the next thing it believes in, or the next ground
 //! it has not scanned.
 //!
-//! It is computed from the belief and the pose: a scan only turns the sonar, tick by tick, to ground that is not scanned yet, so a
-//! planner that is restarted goes on with it. The only memory is the side to which a scan turns: wheels lag, so a side that is chosen
-//! anew with each tick may change with each tick.
+//! The advice follows from the belief and the pose: a scan only turns the sonar, tick by tick, to ground that is not scanned yet, so a
+//! restarted planner goes on with it. The only memory is the side to which a scan turns: wheels lag, so a side that is chosen anew with
+//! each tick may change with each tick.
 
 use common::{
     kinematics::{FACES_COSINE, LEAST_SPEED_M_S, Pose2},
@@ -22,9 +22,9 @@ use crate::{
     view::{STEP_M, View},
 };
 
-/// The ground under so much of the way ahead must have been scanned, and no surface could be touched there undetected, metres.
+/// The length of the way ahead whose ground must have been scanned, without a surface that could be touched undetected, metres.
 const SCANNED_AHEAD_M: f64 = 0.25;
-/// The planned way is followed so far ahead, metres; the arc at least so far.
+/// The distance for which the planned way is followed, metres; the least distance for the arc.
 const AHEAD_M: f64 = 0.6;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,11 +51,11 @@ pub(crate) struct ActiveSensing {
     stops_within_s: f64,
     /// Unit vector from the robot's axis to the front sonar's, which is turned for a look.
     bearing: DVec2,
-    /// How far ahead the arc is followed on which the robot drives: at its greatest speed it can stop there, metres.
+    /// The distance for which the arc is followed: at its greatest speed the robot can stop there, metres.
     ahead_m: f64,
     /// The number of sonars that the mission uses.
     sonars: usize,
-    /// Whether the mission uses a laser, whose beams end at a surface of any angle: what its scans leave free is free.
+    /// Whether the mission uses a laser, whose beams end at a surface of any angle: ground that its scans leave free is free.
     has_laser: bool,
     /// The side to which the present scan turns; none while there is no scan.
     scan_side: Option<Side>,
@@ -100,7 +100,7 @@ impl ActiveSensing {
         let surfaces = surfaces.filter(|_| !self.has_laser);
         let unseen = ground.chain(surfaces);
         match scan(self.bearing.rotate(pose.axis()), unseen, &mut self.scan_side) {
-            // The robot turns until its sonar faces there.
+            // The robot turns until its sonar faces the unscanned place.
             Some(there) => Advice::Look(DVec2::new(self.bearing.x, -self.bearing.y).rotate(there)),
             None => Advice::Go(self.limit(view, &undetected, belief, pose, direction)),
         }
@@ -145,14 +145,14 @@ impl ActiveSensing {
     }
 }
 
-/// Where to turn from `axis` to scan all directions in `unseen`: to the far end of a side without a stop. A scan that began on a `side`
-/// turns there until nothing is unseen on it; a new one begins on the side whose nearest direction is nearer.
+/// The direction to turn to from `axis` to scan all directions in `unseen`: the far end of a side, without a stop. A scan that began on
+/// a `side` turns there until nothing is unseen on it; a new scan begins on the side whose nearest direction is nearer.
 fn scan(
     axis: DVec2,
     unseen: impl Iterator<Item = DVec2>,
     side: &mut Option<Side>,
 ) -> Option<DVec2> {
-    // For the left and the right: the least angle, the greatest one, and the direction of the greatest.
+    // Each side, left and right, has the least angle, the greatest one, and the direction of the greatest.
     let mut sides = [None::<(f64, f64, DVec2)>; 2];
     for there in unseen {
         let angle = axis.angle_to(there);

@@ -8,11 +8,11 @@
 use common::grid::{Cell, CellState, GridFrame};
 use glam::DVec2;
 
-/// How far from a target that is not free the robot may be sent, metres: less than its body's width.
+/// The greatest distance from a target that is not free at which the robot may be sent, metres: less than its body's width.
 const REACH_M: f64 = 0.35;
 
-/// The cell to lead to for a robot that is to go to `target`: the one nearest to it with free cells all around, or the
-/// target's own where none is within reach; none outside the map.
+/// The cell to lead to for a robot that is to go to `target`: the nearest one with free cells all around, or the target's
+/// own if none is within reach; none outside the map.
 pub(crate) fn cell(frame: &GridFrame, cells: &[u8], target: DVec2) -> Option<Cell> {
     let own = frame.cell_at(target)?;
     let is_free = |cell: Cell| !CellState::from_byte(cells[frame.index(cell)]).is_hazard();
@@ -27,8 +27,8 @@ pub(crate) fn cell(frame: &GridFrame, cells: &[u8], target: DVec2) -> Option<Cel
     nearest.or_else(|| cell_with_a_way_in(frame, cells, target, REACH_M))
 }
 
-/// The free cell nearest to `target`, no farther from it than `reach_m`, that has a free neighbour; the target's own where
-/// there is none, none outside the map.
+/// The free cell nearest to `target`, no farther from it than `reach_m`, that has a free neighbour; the target's own if
+/// there is no such cell, none outside the map.
 pub(crate) fn cell_with_a_way_in(
     frame: &GridFrame,
     cells: &[u8],
@@ -65,7 +65,7 @@ mod tests {
 
     const FRAME: GridFrame = GridFrame { cells: 41, resolution_m: 0.05, centre: DVec2::ZERO };
 
-    /// The map with hazard where `is_hazard` says so of a cell's middle.
+    /// The place of the cell to lead to, on a map with hazard where `is_hazard` says so of a cell's middle.
     fn aim(target: DVec2, is_hazard: impl Fn(DVec2) -> bool) -> Option<DVec2> {
         let mut cells = vec![CellState::Free as u8; FRAME.area()];
         for row in 0..FRAME.cells {

@@ -1,10 +1,10 @@
 //! The direction that the evidential method gives a car: the car can drive the arc in this direction, and no other arc gets
 //! farther along the field.
 //!
-//! The field turns sharper than a car does. So arcs of several curvatures are followed over the belief, as far as the
-//! car looks ahead. An arc that a hazard cuts off before the car could stop is out. Of the others, the one with the greatest
-//! progress is given; progress is the line integral of the field's direction along the arc. Where all arcs are out, the car
-//! stands: it can steer no way on.
+//! The field turns sharper than a car does. So arcs of several curvatures are followed over the belief, as far as the car
+//! looks ahead. An arc that a hazard cuts off before the car could stop is excluded. Among the others, the arc with the
+//! greatest progress is given; progress is the line integral of the field's direction along the arc. If all arcs are
+//! excluded, the car stands: it can steer no way on.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -14,13 +14,13 @@ use harmonic::Guidance;
 
 use crate::view::View;
 
-/// Arcs to either side of straight ahead.
+/// Number of arcs to either side of straight ahead.
 const ARCS_A_SIDE: i32 = 8;
 /// Distance between the points of an arc that are looked at, metres.
 const STEP_M: f64 = 0.05;
 /// How far an arc is followed, metres.
 const AHEAD_M: f64 = 0.8;
-/// In this time the car must be able to stop: the sonar's period, the radio's, the wheels' lag.
+/// The time in which the car must be able to stop, seconds: the sonar's period, the radio's, the wheels' lag.
 const STOPS_WITHIN_S: f64 = 0.6;
 /// An arc that is cut off before this is not driven, metres.
 const LEAST_FREE_M: f64 = 0.1;
@@ -37,14 +37,14 @@ pub(crate) struct Arcs {
 #[derive(Clone, Copy, Debug)]
 struct Followed {
     curvature: f64,
-    /// How much of it no hazard cuts off, metres.
+    /// The length that no hazard cuts off, metres.
     free_m: f64,
-    /// How far along the field it gets, metres.
+    /// The progress along the field, metres.
     progress_m: f64,
 }
 
 impl Arcs {
-    /// For a mission's robot; none if it can turn on the spot.
+    /// The arcs of a mission's robot; none if it can turn on the spot.
     pub(crate) fn new(mission: &Mission) -> Option<Self> {
         let car = mission.body().ackermann()?;
         Some(Self {
@@ -89,7 +89,7 @@ impl Arcs {
         arc
     }
 
-    /// Where to point so that (15) and (16) give `curvature`.
+    /// The direction by which (15) and (16) give `curvature`.
     fn direction(&self, pose: &Pose2, curvature: f64, distance: f64) -> DVec2 {
         // With s the sine to the direction, the turn rate is wd s, the speed vd (1 - s/2), less near the target.
         let speed = self.speed * (distance / self.slow_radius).min(1.0);

@@ -16,7 +16,7 @@ use thread_priority::{
     ThreadSchedulePolicy, set_thread_priority_and_policy, thread_native_id,
 };
 
-/// The thread. Dropping it waits for the job that runs.
+/// The thread. Dropping this waits for the job that runs.
 #[derive(Debug)]
 pub(crate) struct Background<Job, Done> {
     jobs: Option<Sender<Job>>,
@@ -24,7 +24,7 @@ pub(crate) struct Background<Job, Done> {
     done: UnixStream,
     /// Jobs whose end has not been read from `done` yet.
     unread: u64,
-    /// Ends that were read and whose results were not taken; less than 0 where a result was waited for and its end is still to be read.
+    /// Ends that were read and whose results were not taken; negative if results were waited for and their ends are still to be read.
     ended: i64,
     thread: Option<JoinHandle<()>>,
 }
@@ -54,10 +54,10 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
         Ok(Self { jobs: Some(jobs), results, done, unread: 0, ended: 0, thread: Some(thread) })
     }
 
-    /// Have `job` done, after those before it.
+    /// Have the thread do `job`, after those before it.
     pub(crate) fn begin(&mut self, job: Job) {
         if let Some(jobs) = &self.jobs {
-            // The thread ends only when this is dropped.
+            // The thread ends only when this value is dropped.
             let _ = jobs.send(job);
             self.unread += 1;
         }
@@ -81,7 +81,7 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
 
     fn drain(&mut self) {
         let mut wakeups = [0; 64];
-        // Without a job the system call is saved.
+        // Without a job the system call is unnecessary.
         while self.unread > 0 {
             match self.done.read(&mut wakeups) {
                 Ok(read @ 1..) => {
@@ -105,26 +105,26 @@ impl<Job, Done> Drop for Background<Job, Done> {
     fn drop(&mut self) {
         self.jobs = None;
         if let Some(thread) = self.thread.take() {
-            // A panic there has been printed; the process ends anyway.
+            // A panic of the thread has been printed, and the process ends anyway.
             let _ = thread.join();
         }
     }
 }
 
-/// Niceness 10 on the scale of [`ThreadPriority::Crossplatform`], which 99 gives the most.
+/// Niceness 10 on the scale of [`ThreadPriority::Crossplatform`], where 99 is the highest priority.
 const NICENESS_10: u8 = 22;
 
 /// Give this thread a tenth of the share that a stage gets of a processor that both want.
 ///
-/// It gets no less, though nobody waits for it: a killed process ends only once each of its threads has run, and other
-/// threads wait for what it holds in the kernel. With SCHED_IDLE both took seconds on a busy machine.
+/// It gets no less, although nobody waits for it: a killed process ends only once each of its threads has run, and other threads wait
+/// for its locks in the kernel. With SCHED_IDLE both took seconds on a busy machine.
 fn behind_stages() {
     let Ok(value) = ThreadPriorityValue::try_from(NICENESS_10) else {
         return;
     };
     let policy = ThreadSchedulePolicy::Normal(Normal::Other);
     let priority = ThreadPriority::Crossplatform(value);
-    // Where the system refuses, they share the processor equally.
+    // If the system refuses, the threads share the processor equally.
     let _ = set_thread_priority_and_policy(thread_native_id(), priority, policy);
 }
 

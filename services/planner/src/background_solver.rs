@@ -14,7 +14,7 @@ use crate::{
     step::{Job, Solved},
 };
 
-/// A solver on a thread of its own. Dropping it cancels the solve that runs and waits for the thread.
+/// A solver on a thread of its own. Dropping this cancels the solve that runs and waits for the thread.
 #[derive(Debug)]
 pub struct BackgroundSolver {
     cancellation: Cancellation,

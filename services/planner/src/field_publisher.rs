@@ -36,13 +36,14 @@ impl Policy {
 #[derive(Debug)]
 struct Computed {
     policy: Policy,
-    /// The tick whose field it is computed from.
+    /// The tick whose field the policy is computed from.
     at: Progress,
-    /// The window in which it differs from the policy before.
+    /// The window in which the policy differs from that before.
     changed: Window,
 }
 
-/// How often the thread offers the processor to others while it computes a policy. Each time it may have to wait for its turn.
+/// The number of times that the thread offers the processor to others while it computes a policy. Each time it may have to
+/// wait.
 const YIELDS: usize = 8;
 
 /// Computes policies, and holds the last one for comparison.
@@ -58,7 +59,7 @@ impl Worker {
         let mut cells = Vec::with_capacity(frame.area());
         for row in 0..rows {
             snapshot.append_row(row, &mut cells);
-            // A stage that waits for this processor gets it: it might wait for some milliseconds otherwise.
+            // A stage that waits for this processor gets it here; otherwise it might wait for some milliseconds.
             if row % rows.div_ceil(YIELDS) == 0 {
                 std::thread::yield_now();
             }
@@ -74,17 +75,17 @@ impl Worker {
     }
 }
 
-/// Says which part of which policy is to be published: the window that changed, or the whole policy when that is due again
+/// Decides which part of which policy is to be published: the window that changed, or the whole policy when that is due again
 /// or there is a new reader.
 #[derive(Debug)]
 pub(crate) struct FieldPublisher {
     thread: Background<(Snapshot, Progress), Computed>,
-    /// The thread computes a policy.
+    /// Whether the thread computes a policy.
     busy: bool,
     version: u64,
     change_published: Option<MissionTime>,
     keyframe_published: Option<MissionTime>,
-    /// The whole policy is to be published.
+    /// Whether the whole policy is to be published.
     keyframe: bool,
 }
 
@@ -120,8 +121,8 @@ impl FieldPublisher {
         self.busy
     }
 
-    /// The part of `policy` to publish `now`, if any, and its tick: a policy that is ready takes the place of `policy` and has
-    /// its own tick, one that is published again has that of `now`.
+    /// The part of `policy` to publish `now`, if any, and its tick. A policy that is ready takes the place of `policy` and has
+    /// its own tick; one that is published again has that of `now`.
     pub(crate) fn next(
         &mut self,
         now: Progress,

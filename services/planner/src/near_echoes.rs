@@ -1,21 +1,21 @@
 //! The echoes of the newest readings right ahead of the body.
 //!
-//! The belief weighs echoes against silences, so an echo that comes and goes, or one where the map has no room for it, may
-//! leave the way open. Right before the body that is not enough: there the nearest echo counts.
+//! The belief weighs echoes against silences, so an echo that comes and goes, or one for which the map has no room, may leave the
+//! way open. Right before the body that is not enough: there the nearest echo counts.
 
 use common::{kinematics::Pose2, samples::GridHeader};
 use glam::DVec2;
 
-/// How many of the newest readings of each sonar count: about a second of them. One false echo stops the robot no longer than that.
+/// The number of readings of each sonar that count, about a second of them. One false echo stops the robot no longer than that.
 const NEWEST: usize = 8;
-/// A reading taken within this angle of the robot's axis looked ahead: the cone, and a little more.
+/// The angle from the robot's axis within which a reading looked ahead: the cone, and a little more.
 const AHEAD_DEG: f64 = 20.0;
-/// With less free ground than this right ahead, the body does not go there, metres. A reading counts as free only up to 0.05 m
-/// before its echo, so the echo is then 0.13 m away.
+/// The least free ground right ahead with which the body goes there, metres. A reading counts as free only up to 0.05 m before its
+/// echo, so the echo is then 0.13 m away.
 pub(crate) const STANDS_BEFORE_M: f64 = 0.08;
 
 /// Free ground ahead of a body of `radius` metres at `pose`, metres: the least of the newest readings of the robot's `sonars` in
-/// `belief`; infinite where none of them looked ahead.
+/// `belief`; infinite if no reading looked ahead.
 pub(crate) fn clear_ahead_m(belief: &GridHeader, pose: &Pose2, radius: f64, sonars: usize) -> f64 {
     let (axis, within) = (pose.axis(), AHEAD_DEG.to_radians().cos());
     let newest = belief.clear_beams().iter().rev().take(NEWEST * sonars);
@@ -34,7 +34,8 @@ mod tests {
 
     use super::*;
 
-    /// Readings of a sonar 0.19 m ahead, by a robot at the origin: bearing in degrees and how far nothing answered.
+    /// Readings of a sonar 0.19 m ahead of a robot at the origin: bearings in degrees, and the distances within which nothing
+    /// answered.
     fn belief(readings: &[(f32, f32)]) -> GridHeader {
         let mut belief =
             GridHeader { clear_beam_count: readings.len() as u64, ..GridHeader::default() };

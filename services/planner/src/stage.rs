@@ -1,4 +1,4 @@
-//! The planner as a stage: what a recording holds of it, and what it publishes.
+//! The planner as a stage: the entries of its recordings, and the samples that it publishes.
 
 use std::{borrow::Cow, collections::VecDeque, time::Instant};
 
@@ -59,15 +59,15 @@ pub(crate) enum Taken<'a> {
     Target(#[serde(with = "inputs::sample")] TargetSample),
 }
 
-/// The step, and what is computed outside of it: by threads of the process, which take the jobs and give the results, or
-/// here in a replay.
+/// The step, and the computations outside of it: threads of the process take the jobs and give the results, or this
+/// thread in a replay.
 pub struct PlannerStage {
     pub(crate) planner: Planner,
     /// Jobs that are not begun, oldest first.
     pub(crate) jobs: VecDeque<Job>,
     /// The result of a job that is taken next.
     pub(crate) solved: Option<Solved>,
-    /// The field that a policy is due of.
+    /// The field of which a policy is due.
     pub(crate) snapshot: Option<Snapshot>,
     /// The newest policy.
     pub(crate) policy: Option<Policy>,
@@ -170,7 +170,7 @@ impl PlannerStage {
         Solved { number, field: Err(SolveError::Cancelled), took_ns: 0 }
     }
 
-    /// Publish `part` of the newest policy, for the tick `at` that it is of.
+    /// Publish `part` of the newest policy, for its tick `at`.
     fn publish_field(
         &mut self,
         part: Part,

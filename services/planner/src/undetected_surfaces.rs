@@ -11,38 +11,38 @@ use std::f64::consts::TAU;
 use common::samples::{ClearBeam, GridHeader};
 use glam::DVec2;
 
-/// Largest angle between the way and a normal that is checked. A surface at more than this is passed, not met.
+/// Largest angle between the way and a normal that is checked. A surface at a greater angle is passed, not met.
 const WIDEST_DEG: f64 = 75.0;
 /// Angle from one normal to the next: less than a beam is wide.
 const STEP_DEG: f64 = 15.0;
-/// A surface answers a beam within this of its normal: the cone, and a little more.
+/// The angle from its normal within which a surface answers a beam: the cone, and a little more.
 const ANSWERS_WITHIN_DEG: f64 = 17.0;
-/// A surface no farther away than [`NEAR_M`] answers beams within this of its normal.
+/// The angle from its normal within which a surface no farther away than [`NEAR_M`] answers a beam.
 const NEAR_ANSWERS_WITHIN_DEG: f64 = 20.0;
-/// See [`NEAR_ANSWERS_WITHIN_DEG`], metres.
+/// The greatest distance of a near surface, metres.
 const NEAR_M: f64 = 1.2;
-/// How far a supposed surface extends from the point where the body would touch it, metres. A shorter one could be detected
+/// The extent of a supposed surface from the point where the body would touch it, metres. A shorter surface could be detected
 /// only from nearer; its end is an edge, which answers a beam ahead.
 const EXTENDS_M: f64 = 1.0;
 /// Least cosine of the angle between a ray and the normal of a surface that it detects: 70 degrees.
 const LEAST_SLANT: f64 = 0.34;
-/// How far from the point where the body would touch it a ray must meet a supposed surface to exclude it, metres.
+/// The greatest distance from the point of touch at which a ray that meets a supposed surface excludes it, metres.
 const MET_WITHIN_M: f64 = 0.35;
-/// More than the rounding of such distances, metres.
+/// A bound of the rounding of such distances, metres.
 const ROUNDING_M: f64 = 1e-6;
-/// Free ground that is asked for between body and surface, metres.
+/// Free ground that is required between body and surface, metres.
 const MARGIN_M: f64 = 0.02;
-/// An echo from no farther than this before the supposed surface may be the surface's own, metres.
+/// The greatest distance of an echo before a supposed surface at which the echo may be the surface's own, metres.
 const NEAR_ECHO_M: f64 = 0.25;
-/// This many such echoes weigh as much as one silence: pings are lost, but not twice as often as they are answered.
+/// The number of such echoes that weigh as much as one silence: pings are lost, but not twice as often as they are answered.
 const ECHOES_FOR_A_SILENCE: usize = 2;
 
 /// The number of normals: to either side of the way, and along it.
 const NORMALS: usize = 2 * (WIDEST_DEG / STEP_DEG) as usize + 1;
 
-/// The sonars' readings are grouped by bearing into so many sectors, because a normal concerns few of them.
+/// The number of sectors by which the sonars' readings are grouped, because a normal concerns few of them.
 const SECTORS: usize = 32;
-/// Beams that answer a surface lie no farther from the sector of its normal than so many sectors.
+/// The greatest number of sectors between a beam that answers a surface and the sector of the surface's normal.
 const EITHER_SIDE: usize = (NEAR_ANSWERS_WITHIN_DEG * SECTORS as f64 / 360.0) as usize + 1;
 
 /// The readings, and the body that could touch a surface.
@@ -107,7 +107,7 @@ fn sector_of(angle: f64) -> usize {
 }
 
 impl UndetectedSurfaces {
-    /// From the readings in `belief`, for a body of `radius` metres.
+    /// The surfaces by the readings in `belief`, for a body of `radius` metres.
     pub(crate) fn new(belief: &GridHeader, radius: f64) -> Self {
         Self {
             beams: BySector::new(belief.clear_beams()),
@@ -147,7 +147,7 @@ impl UndetectedSurfaces {
     /// Whether the `beams` and `rays` exclude a surface that touches a body at `at` on the side of `normal`.
     fn is_excluded(&self, at: DVec2, normal: DVec2, beams: [&[Beam]; 2], rays: &[Beam]) -> bool {
         let (mut silences, mut echoes) = (0, 0);
-        // The readings that are still to be asked. Once they cannot outweigh the silences, the others need not be.
+        // The readings that are not weighed yet. Once they cannot outweigh the silences, they need not be.
         let mut left = beams[0].len() + beams[1].len() + rays.len();
         let beams = beams.into_iter().flatten();
         let beams = beams.map(|beam| (beam, self.answers_from(beam, at, normal)));
@@ -168,11 +168,11 @@ impl UndetectedSurfaces {
         silences * ECHOES_FOR_A_SILENCE > echoes
     }
 
-    /// The distance from which such a surface answers `beam`, metres; none if it does not.
+    /// The distance from which a surface like that answers `beam`, metres; none if it does not.
     fn answers_from(&self, beam: &Beam, at: DVec2, normal: DVec2) -> Option<f64> {
         let [far, near] = self.answers;
         let square = beam.axis.dot(normal);
-        // However near the surface is, it does not answer such a beam.
+        // A surface at any distance does not answer such a beam.
         if square < near {
             return None;
         }
@@ -182,7 +182,7 @@ impl UndetectedSurfaces {
         (square >= answers && offset.perp_dot(normal).abs() <= EXTENDS_M).then_some(distance)
     }
 
-    /// The distance after which `ray` meets such a surface near the body, metres; none if it does not.
+    /// The distance after which `ray` meets a surface like that near the body, metres; none if it does not.
     fn met_after(&self, ray: &Beam, at: DVec2, normal: DVec2) -> Option<f64> {
         let slant = ray.axis.dot(normal);
         if slant < LEAST_SLANT {

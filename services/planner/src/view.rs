@@ -6,13 +6,13 @@ use harmonic::{Field, Guidance};
 
 /// Distance between the points of a way, metres.
 pub(crate) const STEP_M: f64 = 0.05;
-/// On a fine grid, unscanned cells are looked for in steps of this, metres.
+/// The step in which unscanned cells are searched on a fine grid, metres.
 const GRAIN_M: f64 = 0.025;
 
 /// The belief, and a field over it or over an earlier belief.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct View<'a> {
-    /// Where the cells are.
+    /// The frame of the cells.
     pub(crate) frame: GridFrame,
     /// One [`CellState`] byte a cell, row-major.
     pub(crate) cells: &'a [u8],
@@ -45,7 +45,7 @@ impl View<'_> {
         self.frame.cell_at(at).is_none_or(|cell| self.state(cell).is_hazard())
     }
 
-    /// Whether a cell within `radius` of `at` became a hazard, or free, after the field's map was taken.
+    /// Whether a cell within `radius` of `at` became hazard or free after the field's map was taken.
     pub(crate) fn has_changed(&self, at: DVec2, radius: f64) -> bool {
         self.cells_within(at, radius, 1)
             .any(|cell| self.state(cell).is_hazard() != self.field.is_blocked(field_cell(cell)))

@@ -1,22 +1,22 @@
 //! A robot's gyro: from messages of its IMU to the turn of each tick.
 //!
 //! Turn rates are integrated by the stamps of their messages. A tick begins with odometry, whose stamp lies between two messages of the
-//! IMU, so the turn goes on at the newest rate until there. What that errs is made good with the next message, because each turn is the
+//! IMU, so the turn goes on at the newest rate until there. The next message corrects the error of that, because each turn is the
 //! difference of two angles.
 
 use common::{driver::Turn, geometry::wrap_angle};
 
 use crate::messages::{Imu, ImuTurn, NO_GROWTH, is_repeated};
 
-/// Messages that are farther apart, and odometry that is farther from the newest, leave a turn unknown, nanoseconds.
+/// The greatest time between messages, and between odometry and the newest message, with which the turn is known, nanoseconds.
 const LONGEST_GAP_NS: i64 = 100_000_000;
 /// The noise of a turn whose message states less or none, rad per square root of a second. Nominal: several times that of the gyros in
 /// robots, such as the BMI160's 0.007 degrees.
 const NOISE: f64 = 5e-4;
-/// The turn rate may change by so much between the newest message and the tick, rad/s^2. Nominal.
+/// The most that the turn rate may change between the newest message and the tick, rad/s^2. Nominal.
 const CHANGES_BY: f64 = 5.0;
-/// Gyro and odometry are compared after so much of a turn, radians, over at most so long, in which no bias adds up to that, and agree
-/// within this factor: wheels slip in turns, but not more.
+/// The turn, radians, after which gyro and odometry are compared. It takes at most [`COMPARED_NS`], in which no bias adds up to that, and
+/// both agree within [`AGREES_WITHIN`]: wheels slip in turns, but not more.
 const COMPARED_RAD: f64 = 0.2;
 const COMPARED_NS: i64 = 10_000_000_000;
 const AGREES_WITHIN: f64 = 2.0;
@@ -27,12 +27,12 @@ pub(crate) struct Gyro {
     newest: Option<Newest>,
     /// The turn up to the newest message, radians, and its variance.
     turned: Turned,
-    /// The turn up to the odometry of the newest tick, if the gyro has said it.
+    /// The turn up to the odometry of the newest tick, if the gyro has given it.
     now: Option<Turned>,
-    /// The turn up to the tick of which it was told, from which the next one goes on; none if something is missing since.
+    /// The last turn that a tick was given, from which the next one goes on; none if something is missing since.
     told: Option<Turned>,
     sequence: u64,
-    /// Whether no message is near the newest odometry, which has been said.
+    /// Whether no message is near the newest odometry, as was reported.
     is_missed: bool,
     compared: Compared,
 }
@@ -40,7 +40,7 @@ pub(crate) struct Gyro {
 #[derive(Clone, Copy, Debug)]
 struct Newest {
     imu: Imu,
-    /// Radians a second.
+    /// The turn rate, rad/s.
     rate: f64,
 }
 
@@ -56,14 +56,14 @@ struct Turned {
 #[derive(Clone, Copy, Debug, Default)]
 struct Compared {
     since_ns: i64,
-    /// By odometry and by the gyro since then, radians.
+    /// The turns since then by odometry and by the gyro, radians.
     turned: [f64; 2],
     /// Whether they agreed the last time.
     agrees: bool,
 }
 
 impl Gyro {
-    /// Take a message, or say why it is refused.
+    /// Take a message. The error says why it is refused.
     pub(crate) fn take(&mut self, imu: Imu) -> Result<(), String> {
         if self.newest.is_some_and(|newest| is_repeated(newest.imu.stamp_ns, imu.stamp_ns)) {
             return Err(NO_GROWTH.to_owned());
@@ -79,15 +79,15 @@ impl Gyro {
                 self.turned.angle += angle;
                 self.turned.variance += variance;
             }
-            // How far the robot turned since the message before is not known.
+            // The turn since the message before is not known.
             None => (self.told, self.now) = (None, None),
         }
         self.newest = Some(Newest { imu, rate });
         Ok(())
     }
 
-    /// Odometry with this stamp begins a tick, and says that the robot turned by `by_odometry` since the tick before. Returns what is wrong
-    /// with the gyro, if that is new.
+    /// Odometry with this stamp begins a tick, and says that the robot turned by `by_odometry` since the tick before. Returns a new fault
+    /// of the gyro, if there is one.
     pub(crate) fn odometry(&mut self, stamp_ns: i64, by_odometry: f64) -> Option<String> {
         let newest = self.newest?;
         let since_ns = stamp_ns - newest.imu.stamp_ns;
@@ -112,7 +112,7 @@ impl Gyro {
         self.compared.take(stamp_ns, [by_odometry, now.angle - before?.angle])
     }
 
-    /// The turn for the tick. That after something is missing only says where the next one begins.
+    /// The turn for the tick. After a gap it only says where the next one begins.
     pub(crate) fn for_tick(&mut self) -> Option<Turn> {
         let now = self.now.filter(|_| self.compared.agrees);
         let before = std::mem::replace(&mut self.told, now);
@@ -124,7 +124,7 @@ impl Gyro {
     }
 }
 
-/// The turn from one message to the next, radians, its rate and its variance; none if they are too far apart, or say it in different ways.
+/// The turn from one message to the next, radians, its rate and its variance; none if they are too far apart, or of different kinds.
 fn turn(before: &Imu, now: &Imu) -> Option<(f64, f64, f64)> {
     let gap_ns = now.stamp_ns - before.stamp_ns;
     if !(1..=LONGEST_GAP_NS).contains(&gap_ns) {
@@ -146,7 +146,7 @@ fn turn(before: &Imu, now: &Imu) -> Option<(f64, f64, f64)> {
 }
 
 impl Compared {
-    /// Take turns by odometry and by the gyro up to `now_ns`. Returns how they differ, if they agreed or were not compared before.
+    /// Take turns by odometry and by the gyro up to `now_ns`. Returns their difference if they agreed or were not compared before.
     fn take(&mut self, now_ns: i64, turns: [f64; 2]) -> Option<String> {
         if !(0..COMPARED_NS).contains(&(now_ns - self.since_ns)) {
             (self.since_ns, self.turned) = (now_ns, [0.0; 2]);

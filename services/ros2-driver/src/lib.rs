@@ -1,7 +1,8 @@
 //! The driver of robots that speak ROS 2: messages of topics in, their meaning out; `cmd_vel` for the robot.
 //!
-//! It knows no middleware. A piece of the wire is one message: a byte, the row of its topic in [`Topics`], and its payload as DDS
-//! delivered it; before the payload of another's command stands the number of its writer. What the robot is sent is a payload for the topic of commands.
+//! The driver knows no middleware. A piece of the wire is one message: a byte, the row of its topic in [`Topics`], and its payload as DDS
+//! delivered it; before the payload of another's command stands the number of its writer. The robot is sent a payload for the topic of
+//! commands.
 //!
 //! | module | holds |
 //! |---|---|
@@ -36,13 +37,13 @@ use self::{
     topics::{Content, Topics},
 };
 
-/// So many messages wait to be heard; more are dropped.
+/// The most messages that wait to be heard; more are dropped.
 const MOST_WAITING: usize = 64;
-/// A link is started again within so long, seconds. Nobody knows how far the robot drove meanwhile.
+/// The time within which a link is started again, seconds. Nobody knows how far the robot drove meanwhile.
 const UNSEEN_S: f64 = 5.0;
-/// The beams of a laser's row and of its scans lie at the same bearings if they differ by no more, as a share of the angle between beams.
+/// The greatest difference between the bearings of a laser's row and of its scans, as a share of the angle between beams.
 const SAME_BEARING: f64 = 0.5;
-/// The angle from beam to beam may differ by this share.
+/// The share by which the angle from beam to beam may differ.
 const SAME_STEP: f64 = 0.01;
 
 /// A robot that speaks ROS 2.
@@ -54,7 +55,7 @@ pub struct Ros2 {
     topics: Topics,
     waiting: Vec<Vec<u8>>,
     readings: Readings,
-    /// None without a laser.
+    /// The laser; none without one.
     laser: Option<Laser>,
     odometry: odometry::Odometry,
     gyro: Gyro,
@@ -84,7 +85,7 @@ impl Ros2 {
         }
     }
 
-    /// Take a message, or say why it is refused; then nothing of it is taken.
+    /// Take a message. A refused message has no effect, and the error says why.
     fn take(&mut self, piece: &[u8], heard: &mut Heard) -> Result<(), String> {
         let row_of =
             |(row, payload): (&u8, _)| Some((self.topics.heard.get(usize::from(*row))?, payload));
@@ -93,7 +94,7 @@ impl Ros2 {
         };
         let (content, name) = (*content, topic.name.clone());
         self.take_payload(content, payload, heard).map_err(|why| format!("{name}: {why}"))?;
-        // What others tell the robot does not show that it is there.
+        // Commands of others do not show that the robot is there.
         heard.anything |= content != Content::Command;
         Ok(())
     }
@@ -161,7 +162,7 @@ impl Ros2 {
         if let Some(laser) = &mut self.laser {
             laser.turned(turned);
         }
-        // Of odometry that comes faster than ticks, that begins one which is nearest to its time.
+        // If odometry comes faster than ticks, the message nearest to a tick's time begins the tick.
         let slack_ns = (stamp_ns - newest_ns) / 2;
         let is_tick = stamp_ns - tick_ns >= self.period_ns - slack_ns;
         heard.stamp_ns = Some(stamp_ns);
@@ -209,7 +210,7 @@ fn is_same_fan(scan: &Scan, sensor: &Sensor) -> bool {
         && (step - its_step).abs() <= SAME_STEP * its_step
 }
 
-/// Whether so many beams are a whole circle; the last one may be the first again.
+/// Whether the beams are a whole circle; the last one may be the first again.
 fn is_circle(beams: usize, step: f64) -> bool {
     (beams as f64 * step.abs() - TAU).abs() <= 1.5 * step.abs()
 }
@@ -234,7 +235,7 @@ fn turned_to(sensor: &Sensor, fan: (f64, f64), came: impl Iterator<Item = f32>) 
     beams
 }
 
-/// That the beams of `scan` are not those of the laser's row.
+/// The error that the beams of `scan` are not those of the laser's row.
 fn other_fan(scan: &Scan, sensor: &Sensor) -> String {
     let fan = |(first, step): (f64, f64), beams| {
         let (first, step) = (first.to_degrees(), step.to_degrees());
@@ -286,7 +287,7 @@ impl Driver for Ros2 {
         self.gyro.for_tick()
     }
 
-    /// `Twist` has no word for the limit.
+    /// `Twist` has no field for the limit.
     fn velocity(&self, counts: [i16; 2], _limit: Duration) -> Vec<u8> {
         let Twist { v, omega } = twist(&self.body, counts);
         write_twist(v, omega, self.stamped)

@@ -1,4 +1,4 @@
-//! The messages, as far as the driver needs them. What a newer release of ROS appends to one is passed over.
+//! The messages, as far as the driver needs them. Fields that a newer release of ROS appends are ignored.
 
 use common::mission::MOST_BEAMS;
 use ros2::{
@@ -6,16 +6,16 @@ use ros2::{
     parts::heading,
 };
 
-/// The covariance of a pose or a twist has so many numbers.
+/// The count of numbers in the covariance of a pose or a twist.
 const COVARIANCE: usize = 36;
 
-/// That of a rotation or a turn rate has so many; the first is this where the quantity is not stated.
+/// The count of numbers in the covariance of a rotation or a turn rate; the first is [`NOT_STATED`] if the quantity is not stated.
 const COVARIANCE_3: usize = 9;
 const NOT_STATED: f64 = -1.0;
-/// No robot turns faster, rad/s.
+/// The greatest turn rate of a robot, rad/s.
 const FASTEST_TURN: f64 = 50.0;
 
-/// A stamp that lies before the last by more is that of a clock that was set anew, nanoseconds.
+/// The step back of a stamp beyond which the robot's clock was set anew, nanoseconds.
 const SET_ANEW_NS: i64 = 1_000_000_000;
 /// The reason why a message with a repeated stamp is refused.
 pub const NO_GROWTH: &str =
@@ -29,7 +29,7 @@ pub fn is_repeated(newest_ns: i64, stamp_ns: i64) -> bool {
 /// `nav_msgs/Odometry`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Odometry {
-    /// Its stamp by the robot's clock, nanoseconds.
+    /// The stamp by the robot's clock, nanoseconds.
     pub stamp_ns: i64,
     /// x, y and heading, metres and radians.
     pub pose: [f64; 3],
@@ -38,7 +38,7 @@ pub struct Odometry {
 }
 
 impl Odometry {
-    /// The odometry of `payload`, or why it has none.
+    /// The odometry of `payload`. The error says why there is none.
     pub fn read(payload: &[u8]) -> Result<Self, String> {
         let odometry = Self::decode(payload).map_err(|error| error.to_string())?;
         if odometry.pose[2].is_nan() {
@@ -66,12 +66,12 @@ impl Odometry {
 /// `sensor_msgs/Imu`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Imu {
-    /// Its stamp by the robot's clock, nanoseconds.
+    /// The stamp by the robot's clock, nanoseconds.
     pub stamp_ns: i64,
     pub turn: ImuTurn,
 }
 
-/// What an IMU says of a robot's turns.
+/// The turn by the message of an IMU.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ImuTurn {
     /// The turn rate, rad/s, and the variance of its error, rad^2/s^2, if that is stated.
@@ -81,12 +81,12 @@ pub enum ImuTurn {
 }
 
 impl Imu {
-    /// The turn of `payload`, or why it has none. The turn rate counts where it is stated, else the orientation.
+    /// The turn of `payload`; the turn rate if it is stated, else the orientation. The error says why there is none.
     pub fn read(payload: &[u8]) -> Result<Self, String> {
         let (stamp_ns, heading, rate) = Self::decode(payload).map_err(|error| error.to_string())?;
         let turn = match (rate, heading) {
             (Some((rate, variance)), _) if rate.abs() <= FASTEST_TURN => {
-                // A greater variance than that of any rate is one that nobody knows.
+                // A variance greater than that of any rate means that it is unknown.
                 let most = FASTEST_TURN * FASTEST_TURN;
                 ImuTurn::Rate(rate, Some(variance.min(most)).filter(|_| variance > 0.0))
             }
@@ -124,7 +124,7 @@ impl Imu {
 pub struct Scan {
     /// The bearing of the first beam and the angle from beam to beam, radians counter-clockwise.
     pub fan: (f64, f64),
-    /// Ranges below the least or above the greatest are none, metres.
+    /// The least and the greatest range, metres; other ranges are none.
     pub least_m: f32,
     pub most_m: f32,
     pub ranges: Vec<f32>,
@@ -150,7 +150,7 @@ pub fn read_range(payload: &[u8]) -> Result<f64, Malformed> {
     let _radiation = reader.u8()?;
     let _field_of_view = reader.f32()?;
     let (least_m, most_m, range) = (reader.f32()?, reader.f32()?, reader.f32()?);
-    // A sensor that has one range only says by an infinite one whether it is empty to there.
+    // A sensor with a single range says by an infinite one whether it is empty to there.
     Ok(match range {
         range if range == f32::NEG_INFINITY => 0.0,
         range if range > most_m => f64::INFINITY,
@@ -166,7 +166,7 @@ pub fn read_voltage(payload: &[u8]) -> Result<f32, Malformed> {
     reader.f32()
 }
 
-/// Whether a `geometry_msgs/Twist` or, if `stamped`, a `TwistStamped` is to move a robot. A speed that is no number is none of standing.
+/// Whether a `geometry_msgs/Twist` or, if `stamped`, a `TwistStamped` is to move a robot. A speed that is no number counts as motion.
 pub fn read_moves(payload: &[u8], stamped: bool) -> Result<bool, Malformed> {
     let mut reader = Reader::new(payload)?;
     if stamped {

@@ -180,14 +180,14 @@ fn odometry_that_is_repeated_or_old_is_refused_until_it_goes_on() {
     assert!(refused(5000).is_some_and(|why| why.contains("does not grow")));
     assert!(refused(4900).is_some());
     assert_eq!(refused(5100), None);
-    // A clock that was set anew.
+    // The clock was set anew.
     assert_eq!([refused(100), refused(200)], [None, None]);
 }
 
 #[test]
 fn a_circle_of_beams_is_turned_to_the_missions_and_lacking_ones_have_no_reading() {
     let mut driver = driver("");
-    // As the driver of a TurtleBot 3 does, the first looks ahead: it is the mission's 180th.
+    // The first beam looks ahead, as with the driver of a TurtleBot 3: it is the mission's 180th.
     let mut ranges = vec![f32::INFINITY; 360];
     ranges[0] = 1.0;
     ranges[90] = 0.1;
@@ -276,7 +276,7 @@ fn what_others_tell_the_robot_is_theirs_and_no_sign_of_the_robot() {
     assert_eq!(command(&mut stamped, &stand).commander, other(false));
     let cut = command(&mut stamped, &stand[..40]);
     assert!(cut.commander.is_none() && cut.refused.unwrap().contains("/cmd_vel: "));
-    // Of what came at once, that which moves counts.
+    // Of commands that came at once, the one that moves counts.
     for payload in [bytes(TWIST), stand_of(&plain)] {
         plain.push(&[&[COMMAND], &[7; 16][..], &payload].concat());
     }
@@ -308,7 +308,7 @@ fn jump(after_ms: u32, pose: [f64; 3]) -> (bool, [i32; 2]) {
     let refused = heard.refused.clone().is_some_and(|why| why.contains("odometry that jumps to"));
     assert_eq!((heard.anything, refused), (true, heard.jumped), "{heard:?}");
     let after = counts(&heard);
-    // The next pose follows on this one.
+    // The next pose continues from this one.
     let [x, y, heading] = pose;
     let next = [x + 0.01 * heading.cos(), y + 0.01 * heading.sin(), heading];
     let next = said(&mut driver, ODOM, &odometry_of(1100 + after_ms, next));
@@ -323,7 +323,7 @@ fn odometry_that_jumps_aside_or_farther_than_the_robot_moves_or_starts_again_cou
     for (after_ms, pose) in [
         (100, ahead(0.1)),
         (100, ahead(-0.1)),
-        // A whole cycle of the counts.
+        // This way is a whole cycle of the counts.
         (100, ahead(1.887)),
         (100, aside(0.05)),
         (100, aside(-2.0)),

@@ -1,4 +1,4 @@
-//! THE table of a robot's topics: what the link subscribes to, and where it writes.
+//! THE table of a robot's topics: those that the link subscribes to, and those to which it writes.
 
 use common::mission::Mission;
 use ros2::topic::Topic;
@@ -12,16 +12,16 @@ pub enum Content {
     /// The range of the sensor in this row of the mission.
     Range(usize),
     Imu,
-    /// What others than the link tell the robot. The number of the writer stands before the payload.
+    /// A command from another than the link. The number of its writer stands before the payload.
     Command,
 }
 
 /// The topics of a robot.
 #[derive(Clone, Debug)]
 pub struct Topics {
-    /// What the robot is told.
+    /// The topic of the robot's commands.
     pub command: Topic,
-    /// What it says, and what others tell it. A piece of the wire begins with the row of its topic here.
+    /// The topics that the link reads. A piece of the wire begins with the row of its topic here.
     pub heard: Vec<(Content, Topic)>,
 }
 

@@ -1,5 +1,5 @@
-//! The words of a simulated robot with an Arduino that speaks the protocol of ROSArduinoBridge: its requests become commands of the
-//! boards of a simulated X80, and their readings become answers. A sonar says what it heard at the newest tick.
+//! The protocol of ROSArduinoBridge for a simulated robot: requests become commands of the boards of a simulated X80, and their
+//! readings become answers. A sonar says its reading of the newest tick.
 
 use common::{
     mission::{Mission, RobotConfig},
@@ -8,9 +8,9 @@ use common::{
 
 use crate::motor::Motor;
 
-/// A board that restarts hears nothing for so long, seconds: its boot loader waits for a program.
+/// The time for which a board that restarts hears nothing, seconds: its boot loader waits for a program.
 const BOOTS_S: f64 = 1.5;
-/// The motors stop by themselves so long after the last command, milliseconds.
+/// The time after the last command at which the motors stop by themselves, milliseconds.
 const STOPS_AFTER_MS: u16 = 2000;
 /// The longest request, bytes.
 const LONGEST: usize = 64;
@@ -28,7 +28,7 @@ pub enum Request {
     Range(i32),
     /// `b`: the baud rate.
     Baud,
-    /// None of them.
+    /// Another request.
     Unknown,
 }
 
@@ -51,7 +51,7 @@ impl Request {
     }
 }
 
-/// Bytes to requests.
+/// Splits bytes into requests.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Requests {
     held: Vec<u8>,
@@ -72,7 +72,7 @@ impl Requests {
     }
 }
 
-/// Converts between the words and the boards.
+/// Converts between requests and the boards.
 #[derive(Clone, Debug)]
 pub(crate) struct ArduinoWords {
     robot: RobotConfig,
@@ -80,7 +80,7 @@ pub(crate) struct ArduinoWords {
     sonars: Vec<(i32, usize)>,
     /// The counts at which the board counts 0.
     zero: [f64; 2],
-    /// The mission time until which it boots, seconds; none when it has booted.
+    /// The mission time until which the board boots, seconds; none when it has booted.
     boots_until: Option<f64>,
 }
 
@@ -103,7 +103,7 @@ impl ArduinoWords {
         self.boots_until = Some(now + BOOTS_S);
     }
 
-    /// Whether it hears at mission time `now`. When it has booted, it counts from 0.
+    /// Whether the board hears at mission time `now`. When it has booted, it counts from 0.
     pub(crate) fn hears(&mut self, now: f64, motors: &[Motor; 6]) -> bool {
         if self.boots_until.is_some_and(|until| now < until) {
             return false;
@@ -114,7 +114,7 @@ impl ArduinoWords {
         true
     }
 
-    /// The answer to a request, and the command of the boards that it is.
+    /// The answer to a request, and the command of the boards to which it is converted.
     pub(crate) fn answer(
         &mut self,
         request: Request,

@@ -24,9 +24,9 @@ impl<T> Wheels<T> {
     }
 }
 
-/// A body that touches nothing any more has moved at least this far off, metres.
+/// The distance from which on a body touches nothing any more, metres.
 const RELEASE_M: f64 = 0.005;
-/// The body is pushed out of what it penetrates so many times at most; corners take two.
+/// The most times that the body is pushed out of a thing; corners take two.
 const PUSHES: usize = 4;
 
 /// The disc, its pose and what it has touched.
@@ -70,17 +70,17 @@ impl Body {
         self.touching = self.clearance <= RELEASE_M;
     }
 
-    /// Its pose.
+    /// The pose.
     pub fn pose(&self) -> Pose2 {
         self.pose
     }
 
-    /// Its radius, metres.
+    /// The radius, metres.
     pub fn radius(&self) -> f64 {
         self.radius
     }
 
-    /// Its true track, metres: W is the nominal one.
+    /// The true track, metres; W is the nominal one.
     pub fn track(&self) -> f64 {
         self.track
     }
@@ -95,8 +95,8 @@ impl Body {
         self.clearance
     }
 
-    /// Move as the wheels ask, in metres of ground, and no farther than `world` lets it: it slides along
-    /// what it touches, or halts. Returns how far the ground under either wheel has really gone by, metres.
+    /// Move as the wheels ask, in metres of ground, and no farther than `world` lets the body: it slides along the thing that it
+    /// touches, or halts. Returns the ground that went by under either wheel, metres.
     pub fn roll(&mut self, asked: Wheels<f64>, world: &World) -> Wheels<f64> {
         let turned = asked.map(|metres| metres / self.wheel_radius);
         let step = self.drive.twist(WheelSpeeds { right: turned.right, left: turned.left });
@@ -120,8 +120,8 @@ impl Body {
         touched.then(|| (self.pose.position - before.position).dot(middle))
     }
 
-    /// Push the body out of everything it penetrates, or put it back to `before` where that fails.
-    /// Returns whether it penetrated anything.
+    /// Push the body out of everything it penetrates, or put it back to `before` if that fails. Returns whether it penetrated
+    /// anything.
     fn leave_things(&mut self, before: DVec2, world: &World) -> bool {
         for push in 0..PUSHES {
             let position = self.pose.position;

@@ -17,7 +17,7 @@ use crate::{
 /// The motion of a car by its motors.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Car {
-    /// Its true diameter and wheelbase.
+    /// The true diameter and wheelbase.
     drive: Ackermann,
     steering: Steering,
     driven: OnChannel,
@@ -37,7 +37,7 @@ struct OnChannel {
 impl From<Channel> for OnChannel {
     fn from(channel: Channel) -> Self {
         Self {
-            // A mission is checked: channels are 0 and 1.
+            // The mission was checked, so channels are 0 and 1.
             channel: usize::from(channel.channel.min(1)),
             sign: if channel.reversed { -1.0 } else { 1.0 },
         }
@@ -45,8 +45,8 @@ impl From<Channel> for OnChannel {
 }
 
 impl Car {
-    /// The car of `mission`, with the driven wheel and the wheelbase as far off as `errors` says of a left wheel and of
-    /// a track; none if the robot is no car.
+    /// The car of `mission`, with the driven wheel and the wheelbase off by the `errors` of a left wheel and of a track;
+    /// none if the robot is no car.
     pub(crate) fn new(mission: &Mission, errors: &WheelErrors) -> Option<Self> {
         let body = mission.body();
         let steering = body.steering?;
@@ -72,7 +72,7 @@ impl Car {
         self.steered.channel == channel
     }
 
-    /// Top speed of that motor, counts per second.
+    /// Top speed of the steering's motor, counts per second.
     pub(crate) fn top_steering_counts(&self) -> f64 {
         self.steering.counts(self.steering.rate_rad_s)
     }
@@ -83,7 +83,7 @@ impl Car {
         self.steering.angle(sign * motors[channel].turned())
     }
 
-    /// Its motion by the speeds of its motors.
+    /// The motion by the speeds of its motors.
     pub(crate) fn twist(&self, motors: &[Motor; 6]) -> Twist {
         let OnChannel { channel, sign } = self.driven;
         self.drive.twist(SteeredWheel {
@@ -92,7 +92,7 @@ impl Car {
         })
     }
 
-    /// Move `body` as its motors ask from mission time `now` for `dt` seconds, and no farther than `world` lets it.
+    /// Move `body` as the motors ask from mission time `now` for `dt` seconds, and no farther than `world` lets it.
     pub(crate) fn step(
         &self,
         motors: &mut [Motor; 6],
@@ -179,7 +179,7 @@ mod tests {
     #[test]
     fn the_steering_takes_its_time_and_ends_at_its_stop() {
         let mut robot = car("[simulation.wheels]\nlag_s = 0");
-        // 120 degrees a second are 1200 counts a second, however much is asked for; 30 degrees are 300 counts.
+        // 120 degrees a second are 1200 counts a second, the most for any request; 30 degrees are 300 counts.
         let truth = drive(&mut robot, 0, 5000, 1);
         assert!((steering_counts(&truth) - 171).abs() <= 1, "{truth:?}");
         let truth = drive(&mut robot, 0, 5000, 14);

@@ -13,8 +13,8 @@ pub(crate) fn slipped(metres: f64, physics: &WheelPhysics, noise: &mut Noise) ->
     metres * (1.0 - physics.slip_share) + lost
 }
 
-/// The share by which wheels go with the ground while their body is `held`: the rest slips at the contact. A wheel that nothing
-/// holds turns as it is asked, however it slips.
+/// The share by which wheels go with the ground while their body is `held`: the rest slips at the contact. A wheel that nothing holds
+/// turns as asked, even if it slips.
 pub(crate) fn grip(held: bool, physics: &WheelPhysics) -> Option<f64> {
     held.then_some(1.0 - physics.contact_slip)
 }
@@ -35,7 +35,7 @@ impl Drivetrain {
     pub(crate) fn new(mission: &Mission, diameter: Wheels<f64>) -> Self {
         let wheels = Wheels { left: mission.robot.left, right: mission.robot.right };
         Self {
-            // A mission is checked: channels are 0 and 1.
+            // The mission was checked, so channels are 0 and 1.
             channel: wheels.map(|wheel| usize::from(wheel.channel.min(1))),
             sign: wheels.map(|wheel| if wheel.reversed { -1.0 } else { 1.0 }),
             metres_per_count: mission.body().metres_per_count(),

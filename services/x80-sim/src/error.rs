@@ -13,7 +13,6 @@ pub enum SimError {
         "the simulated robot cannot listen on {address}: {source}; stop what listens there, or give port 0 to take a free one"
     )]
     Bind {
-        /// The address.
         address: SocketAddr,
         /// The system's error.
         source: io::Error,
@@ -29,13 +28,12 @@ pub enum SimError {
         /// The system's error.
         source: io::Error,
     },
-    /// Its state cannot be saved.
+    /// The state cannot be saved.
     #[error(transparent)]
     Keep(#[from] CheckpointError),
     /// The file of its state is in use, or cannot be made.
     #[error("the simulated robot cannot have {file} to itself: {source}; give another file")]
     Lock {
-        /// The file.
         file: PathBuf,
         /// The system's error.
         source: io::Error,

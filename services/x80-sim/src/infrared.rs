@@ -9,10 +9,10 @@ use common::{
 
 use crate::{noise::Noise, world::World};
 
-/// A ranger without an obstacle in reach reads as if one were at this distance, metres.
+/// The reading of a ranger without an obstacle in reach, as a distance, metres.
 const NOTHING_M: f64 = 0.81;
 
-/// Readings of the rangers that are mounted on a robot at `pose`, AD counts; 0 of the others.
+/// Readings of the rangers that are mounted on a robot at `pose`, AD counts; 0 for other rangers.
 pub fn read(
     world: &World,
     pose: Pose2,
@@ -26,7 +26,7 @@ pub fn read(
         };
         let height_m = world.heights().infrared_m;
         let range = if world.is_between(pose.position, ranger.position, height_m) {
-            // A ranger pressed against what the body touches sees that, not what is behind.
+            // A ranger pressed against the thing that the body touches sees that thing, not those behind it.
             0.0
         } else {
             let hit = world.first_hit(ranger.position, ranger.axis(), height_m);

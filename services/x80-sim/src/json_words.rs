@@ -1,4 +1,4 @@
-//! The words of a simulated robot that speaks lines of JSON: orders become commands of the boards of a simulated X80, and their
+//! The protocol of lines of JSON for a simulated robot: orders become commands of the boards of a simulated X80, and their
 //! readings become reports.
 
 use std::f64::consts::TAU;
@@ -14,7 +14,7 @@ use common::{
 
 use crate::{motor::Motor, sensors::STALL_CURRENT};
 
-/// Converts between the words and the boards.
+/// Converts between messages and the boards.
 #[derive(Clone, Debug)]
 pub(crate) struct JsonWords {
     robot: RobotConfig,
@@ -34,7 +34,7 @@ impl JsonWords {
         }
     }
 
-    /// What the boards are to do. The order counts as taken.
+    /// The commands of the boards for an order. The order counts as taken.
     pub(crate) fn commands(&mut self, order: &Order) -> Vec<Command> {
         self.heard += 1;
         let wheels = [self.robot.left, self.robot.right];
@@ -57,7 +57,7 @@ impl JsonWords {
                     let counts = signed.clamp(-32_766, 32_766);
                     channels[usize::from(wheel.channel.min(1))] = Some(counts);
                 }
-                // No time would be a command without an end.
+                // A time of 0 would be a command without an end.
                 let limit_ms = (for_s * 1000.0).round().clamp(1.0, f64::from(u16::MAX));
                 vec![Command::velocity(channels, limit_ms as u16)]
             }
@@ -86,7 +86,7 @@ impl JsonWords {
                 forward(wheel.reversed) * counts / self.counts_per_radian
             })
         };
-        // The current of a rolling motor is left out: it is of an X80's counts, and other robots have more of them in a turn.
+        // The current of a rolling motor is left out: it is in an X80's counts, and other robots have more of them in a turn.
         let held = wheels.map(|wheel| {
             let motor = &motors[usize::from(wheel.channel.min(1))];
             motor.enabled() && STALL_CURRENT * motor.load() >= self.robot.held_current_ad.into()
@@ -114,7 +114,7 @@ impl JsonWords {
     }
 }
 
-/// What a channel has turned by its encoder, which counts in a circle, and by the motor, which does not.
+/// The turn of a channel by its encoder, which counts in a circle, and by the motor, which does not.
 fn turned(sensors: &MotorSensors, motors: &[Motor; 6], channel: usize) -> f64 {
     let cycle = f64::from(common::wire::COUNT_CYCLE);
     let (read, true_counts) =

@@ -1,8 +1,8 @@
 //! A laser: each beam ends at the first thing that stands at its height and is no pane of glass at a slant.
 //!
 //! A beam that ends at a black surface too far away brings nothing back. The sensor cannot tell that from an empty room, so the reading
-//! is "nothing in reach", as drivers publish it: infinity by ROS's REP 117 ("no return") and in Slamtec's `rplidar_ros`. So is a beam
-//! through glass with nothing behind.
+//! is "nothing in reach", as drivers publish it: infinity by ROS's REP 117 ("no return") and in Slamtec's `rplidar_ros`. A beam through
+//! glass with nothing behind gives the same reading.
 
 use common::{
     geometry::Light,
@@ -38,7 +38,7 @@ impl Laser {
         Some(Self { sensor, noise: Noise::new(seed, Source::Laser) })
     }
 
-    /// It measures once in so many ticks.
+    /// The number of ticks from one measurement to the next.
     pub(crate) const fn every_ticks(&self) -> u64 {
         self.sensor.every_ticks
     }
@@ -72,8 +72,8 @@ impl Laser {
     }
 }
 
-/// The range at which a beam from `origin` in the unit direction `along` ends at `solid`, metres, and what that does to light; none if
-/// the beam passes.
+/// The range at which a beam from `origin` in the unit direction `along` ends at `solid`, metres, and the solid's effect on light; none
+/// if the beam passes.
 fn end(solid: &Solid, origin: DVec2, along: DVec2) -> Option<(f64, Light)> {
     let (range, light) = (solid.surface.hit(origin, along)?, solid.profile.light);
     let is_slanted = || {
@@ -119,7 +119,7 @@ mod tests {
         assert!((at(135) - 1.0 / 0.5_f64.sqrt()).abs() < 0.07, "{}", at(135));
     }
 
-    /// What a UST-10LX on a Jackal at the origin reads in a world, by the angle of the beam, degrees from straight ahead.
+    /// The readings of a UST-10LX on a Jackal at the origin in a world, by the angle of the beam, degrees from straight ahead.
     fn reading(shapes: &str) -> impl Fn(f64) -> Option<f32> + use<> {
         let text = format!("target = [0, -5]\nrobot.model = 'jackal'\n{shapes}");
         let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();

@@ -17,7 +17,7 @@
 //! | [`saved_state`] | the state of a robot that the next process restores |
 //! | [`shell`] | the process: transport, pace, ground truth |
 //!
-//! A robot is stepped by whoever holds it; only [`shell`] and its transports know sockets and clocks:
+//! The caller steps a robot; only [`shell`] and its transports know sockets and clocks:
 //!
 //! ```
 //! use std::path::Path;

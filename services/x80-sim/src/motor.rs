@@ -12,14 +12,14 @@ use crate::noise::Noise;
 
 /// Pulse width at which a wheel stands.
 const PWM_STOP: f64 = 16_383.5;
-/// Pulse widths within this of it turn no wheel: a client that drives by them adds as much.
+/// The distance from [`PWM_STOP`] within which pulse widths turn no wheel: a client that drives by them adds as much.
 const PWM_DEAD_BAND: f64 = 8000.0;
 /// Speed per count of position error, 1/s: a position is reached in about a second.
 const POSITION_GAIN: f64 = 4.0;
-/// A wheel has reached its position within this, counts.
+/// The distance within which a wheel has reached its position, counts.
 const POSITION_REACHED: f64 = 0.5;
-/// Below this speed friction holds a wheel that is ordered to stand, counts per second (2 mm/s); the dead band of
-/// starting is friction too, where it is wider.
+/// The speed below which friction holds a wheel that is ordered to stand, counts per second (2 mm/s); the dead band of starting is
+/// friction too, where it is wider.
 const STANDSTILL: f64 = 5.0;
 /// The share of the stall torque at which a tyre slips: half the robot's weight of 34 N with a friction of 0.6, over the 26 N of a
 /// stalled motor at the rim.
@@ -76,7 +76,7 @@ pub struct Motor {
 struct Order {
     quantity: Quantity,
     value: i16,
-    /// Mission time at which it ends.
+    /// Mission time at which the order ends.
     until: Option<f64>,
 }
 
@@ -100,7 +100,7 @@ impl Motor {
         }
     }
 
-    /// Whether it may run.
+    /// Whether the motor may run.
     pub fn enabled(&self) -> bool {
         self.enabled
     }
@@ -115,23 +115,23 @@ impl Motor {
         self.feedback
     }
 
-    /// Gains of the position loop and of the velocity loop. They are stored and reported; the simulated
-    /// loop is the one that was measured, whatever its gains.
+    /// Gains of the position loop and of the velocity loop. They are stored and reported; the simulated loop is the measured one with
+    /// any gains.
     pub fn gains(&self) -> (PidGains, PidGains) {
         (self.position_pid, self.velocity_pid)
     }
 
-    /// Counts per second.
+    /// The speed, counts per second.
     pub fn speed(&self) -> f64 {
         self.speed
     }
 
-    /// Counts since boot.
+    /// The counts since boot.
     pub fn turned(&self) -> f64 {
         self.turned
     }
 
-    /// The share of its stall torque that it gives against something that holds its wheel or the body.
+    /// The share of its stall torque that the motor gives against something that holds its wheel or the body.
     pub fn load(&self) -> f64 {
         self.load
     }
@@ -152,7 +152,7 @@ impl Motor {
         self.order = Some(Order { quantity, value, until });
     }
 
-    /// Enable or suspend it. A suspended motor forgets its order.
+    /// Enable or suspend the motor. A suspended motor forgets its order.
     pub fn enable(&mut self, on: bool) {
         self.enabled = on;
         if !on {
@@ -160,7 +160,7 @@ impl Motor {
         }
     }
 
-    /// Forget the order: stand.
+    /// Forget the order, so that the wheel stands.
     pub fn halt(&mut self) {
         self.order = None;
     }
@@ -186,8 +186,7 @@ impl Motor {
         self.order.and_then(|order| order.until)
     }
 
-    /// Follow the order from mission time `now` for `dt` seconds. Returns the counts the loop asks of the
-    /// wheel.
+    /// Follow the order from mission time `now` for `dt` seconds. Returns the counts that the loop asks of the wheel.
     pub fn step(&mut self, now: f64, dt: f64, noise: &mut Noise) -> f64 {
         self.load = 0.0;
         if self.ends_at().is_some_and(|end| now >= end) {
@@ -227,13 +226,13 @@ impl Motor {
         counts + jitter * dt
     }
 
-    /// The wheel has really turned by `counts`.
+    /// Note that the wheel has really turned by `counts`.
     pub fn turn(&mut self, counts: f64) {
         self.turned += counts;
     }
 
-    /// The ground under it lets the wheel go at `speed` counts per second only; `grip` is the share of its own speed that it
-    /// loses by that, 0 where it slips freely. A push gives it none. Its loop raises the torque until the wheel stalls or slips.
+    /// Note that the ground lets the wheel go at `speed` counts per second only. `grip` is the share of its own speed that the wheel
+    /// loses by that, 0 if it slips freely. A push adds no speed. Its loop raises the torque until the wheel stalls or slips.
     pub fn hold(&mut self, speed: f64, grip: f64) {
         let held = speed.clamp(self.speed.min(0.0), self.speed.max(0.0));
         if self.target != 0.0 {
@@ -262,7 +261,7 @@ impl Motor {
                 let way = if way > cycle / 2.0 { way - cycle } else { way };
                 let left = order.until.map_or(0.0, |end| end - now);
                 let asked = way / left.max(1.0 / POSITION_GAIN);
-                // The loop pushes until the wheel is there: no dead band remains.
+                // The loop pushes until the wheel is there, so no dead band remains.
                 let least = self.physics.dead_band_counts;
                 let there = way.abs() < POSITION_REACHED;
                 if there { 0.0 } else { asked.abs().max(least).copysign(way) }

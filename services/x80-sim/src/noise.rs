@@ -14,13 +14,11 @@ pub enum Source {
     Wheels = 3,
     /// Reported counts.
     Counts = 4,
-    /// The radio.
     Radio = 5,
     /// Diameters and track of the wheels.
     WheelErrors = 6,
     /// Runs of silence of the ultrasonic rangers.
     Silence = 7,
-    /// The laser.
     Laser = 8,
 }
 
@@ -34,12 +32,12 @@ impl Noise {
         Self(Pcg64::new(u128::from(seed), source as u128))
     }
 
-    /// Uniform in [0, 1).
+    /// A number that is uniform in [0, 1).
     pub fn uniform(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Normal with mean 0 and standard deviation `sd`; nothing is drawn for 0.
+    /// A normal number with mean 0 and standard deviation `sd`; nothing is drawn for 0.
     pub fn normal(&mut self, sd: f64) -> f64 {
         if sd <= 0.0 {
             return 0.0;
@@ -50,7 +48,7 @@ impl Noise {
         sd * radius * angle.cos()
     }
 
-    /// Exponential with `mean`; nothing is drawn for 0.
+    /// An exponential number with `mean`; nothing is drawn for 0.
     pub fn exponential(&mut self, mean: f64) -> f64 {
         if mean <= 0.0 {
             return 0.0;
@@ -75,7 +73,7 @@ mod tests {
         assert_eq!(drawn, FIRST_OF_SEED_1);
     }
 
-    // These were drawn once: another release of the generator must give the same numbers.
+    // These numbers were drawn once, and another release of the generator must give the same.
     const FIRST_OF_SEED_1: [f64; 3] = [0.8297300050883016, 0.7306982094730567, 0.8844419132630329];
 
     #[test]

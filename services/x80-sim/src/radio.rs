@@ -1,7 +1,6 @@
 //! The radio between host and robot: outages, delays, losses, and datagrams that are reordered, joined or cut.
 //!
-//! All of it is drawn from one seeded stream, so a run can be repeated; what it did is written
-//! to the ground truth.
+//! All of this is drawn from one seeded stream, so a run can be repeated; the losses are written to the ground truth.
 
 use std::collections::VecDeque;
 
@@ -11,10 +10,10 @@ use crate::noise::{Noise, Source};
 
 /// The greatest number of datagrams under way; further ones are lost.
 const MOST_IN_FLIGHT: usize = 1024;
-/// A datagram that waits for the next one to go behind it, or with it, waits no longer than this, seconds.
+/// The longest time that a datagram waits for the next one, to go behind it or with it, seconds.
 const LONGEST_HOLD_S: f64 = 0.5;
 
-/// Good and out in turns, each for an exponentially distributed time.
+/// A radio that is good and out in turns, each for an exponentially distributed time.
 #[derive(Clone, Debug)]
 struct Fading {
     mean_good: f64,
@@ -29,7 +28,7 @@ struct Fading {
 impl Fading {
     fn new(radio: &mission::Radio, noise: &mut Noise) -> Self {
         let (mean, longest) = (radio.outage_mean_s, radio.outage_max_s);
-        // Cutting the longest outages short makes their mean shorter; the share must stay.
+        // Cutting the longest outages short makes their mean shorter, but the share must stay.
         let cut_mean = mean * (1.0 - (-longest / mean).exp());
         let share = radio.outage_share;
         let mean_good = if share > 0.0 { cut_mean * (1.0 - share) / share } else { f64::INFINITY };
@@ -48,7 +47,7 @@ impl Fading {
         fading
     }
 
-    /// Whether it is out at mission time `now`, which must not go back.
+    /// Whether the radio is out at mission time `now`, which must not go back.
     fn is_out(&mut self, now: f64, noise: &mut Noise) -> bool {
         while now >= self.until {
             self.out = !self.out;
@@ -116,7 +115,7 @@ impl<W: Copy + PartialEq> Radio<W> {
         }
     }
 
-    /// Whether it does nothing at all to datagrams.
+    /// Whether the radio has no effect on datagrams.
     pub fn is_perfect(&self) -> bool {
         let radio = &self.settings;
         [
@@ -133,7 +132,7 @@ impl<W: Copy + PartialEq> Radio<W> {
         .all(|share| *share == 0.0)
     }
 
-    /// Whether a datagram sent at mission time `now` is lost. It counts as sent.
+    /// Whether a datagram sent at mission time `now` is lost. The datagram counts as sent.
     pub fn loses(&mut self, now: f64) -> bool {
         self.sent += 1;
         let out = self.fading.is_out(now, &mut self.noise);
@@ -235,7 +234,7 @@ impl<W: Copy + PartialEq> Radio<W> {
         Some((flight.way, flight.bytes))
     }
 
-    /// Counts of what it has done until mission time `now`.
+    /// The losses until mission time `now`.
     pub fn ground_truth(&mut self, now: f64) -> GroundTruthRadio {
         GroundTruthRadio {
             out: self.fading.is_out(now, &mut self.noise),

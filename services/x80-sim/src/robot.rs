@@ -30,7 +30,7 @@ use crate::{
 /// The longest step of the body, seconds.
 const STEP_S: f64 = 0.005;
 
-/// At the end of its process, a robot whose last command does not expire drives on for at most so long, seconds.
+/// The longest time that a robot drives on at the end of its process if its last command does not expire, seconds.
 const COMES_TO_REST_S: f64 = 3.0;
 
 /// The meaning of a frame from the host.
@@ -57,7 +57,7 @@ pub struct Robot {
     stops_when_silent: Option<f64>,
     rate_hz: f64,
     drivetrain: Drivetrain,
-    /// `None` for a robot with two driven wheels.
+    /// The car; `None` for a robot with two driven wheels.
     car: Option<Car>,
     longest_step: f64,
 
@@ -180,14 +180,14 @@ impl Robot {
         }
     }
 
-    /// Let it come to rest as without further commands; a robot that would never rest is halted.
+    /// Let the robot come to rest as without further commands; a robot that would never rest is halted.
     pub fn come_to_rest(&mut self) {
         let latest = self.time + COMES_TO_REST_S;
         while self.time < latest && self.is_moving() {
             self.advance_to((self.time + STEP_S).min(latest));
         }
         self.motors.iter_mut().for_each(Motor::halt);
-        // No frames are sent on the way: no host listens.
+        // No frames are sent on the way, because no host listens.
         self.tick = self.tick.max((self.time * self.rate_hz) as u64);
     }
 
@@ -229,7 +229,7 @@ impl Robot {
         }
     }
 
-    /// Take a frame from the host and append what is answered at once to `replies`.
+    /// Take a frame from the host and append the immediate answer to `replies`.
     pub fn on_frame(&mut self, frame: &Frame<'_>, replies: &mut Vec<u8>) -> Heard {
         let Some(addressing) = Addressing::of_robot(frame.rid) else {
             return Heard::Foreign;
@@ -282,7 +282,7 @@ impl Robot {
         }
     }
 
-    /// Take an order of a host that speaks lines of JSON, and append what is answered at once to `replies`.
+    /// Take an order of a host that speaks lines of JSON, and append the immediate answer to `replies`.
     pub fn on_order(&mut self, order: &Order, replies: &mut Vec<u8>) -> Heard {
         let Some(json) = &mut self.json else {
             return Heard::Foreign;
@@ -393,7 +393,7 @@ impl Robot {
             }
             let went = self.body.roll(ground, &self.world);
             let at_contact = drivetrain::grip(went != ground, &wheels);
-            // What blocks a wheel lets it not slip.
+            // A blocked wheel does not slip.
             let grip = blocked.map(|blocked| if blocked { Some(1.0) } else { at_contact });
             drivetrain.turn(&mut self.motors, asked, went, grip, dt);
         }
@@ -404,7 +404,7 @@ impl Robot {
         }
     }
 
-    /// For each wheel, whether something in it or around it lets it not turn now.
+    /// For each wheel, whether something in it or around it blocks it now.
     fn blocked_wheels(&self) -> Wheels<bool> {
         let blocks = |wheel: &Block| {
             self.time >= wheel.from_s && wheel.until_s.is_none_or(|until| self.time < until)
@@ -428,7 +428,7 @@ impl Robot {
         }
     }
 
-    /// Its motion by the speeds of its motors.
+    /// The motion by the speeds of its motors.
     fn twist(&self) -> Twist {
         if let Some(car) = &self.car {
             return car.twist(&self.motors);
@@ -464,8 +464,8 @@ impl Robot {
         }
     }
 
-    /// Append the frames of this tick to `out`, one of every stream that runs, the motor frame last. They
-    /// count against what a host has asked for.
+    /// Append the frames of this tick to `out`, one of every stream that runs, the motor frame last. They count against the frames that
+    /// a host has asked for.
     pub fn stream(&mut self, out: &mut Vec<u8>) {
         let due = self.streams.take();
         self.write(due, out);
@@ -483,7 +483,7 @@ impl Robot {
             return;
         }
         if self.arduino.is_some() {
-            // It says nothing unasked.
+            // This robot sends nothing unasked.
             return;
         }
         if due.standard {

@@ -1,14 +1,13 @@
 //! The state of a simulated robot that its next process restores: its pose, and the counts of its wheels.
 //!
-//! A real robot stands where it came to rest when its host went away. A simulated one whose process ends with
-//! its supervisor's comes to rest at once, and its next process begins there. Whatever was under way (an order, a
-//! wheel's speed, a datagram in flight) is gone by then; the random streams of its sensors begin anew, but not
-//! as they began before.
+//! A real robot stands where it came to rest when its host went away. A simulated one whose process ends with its
+//! supervisor's comes to rest at once, and its next process begins there. By then nothing is under way: no order, no
+//! wheel speed, no datagram in flight. The random streams of its sensors begin anew, but not as they began before.
 
 use common::kinematics::Pose2;
 use serde::{Deserialize, Serialize};
 
-/// Size of the encoded [`SavedState`] at most, bytes.
+/// The greatest size of an encoded [`SavedState`], bytes.
 pub(crate) const CAPACITY: usize = 256;
 
 /// A simulated robot at rest.
@@ -16,7 +15,7 @@ pub(crate) const CAPACITY: usize = 256;
 pub struct SavedState {
     /// The last tick.
     pub(crate) tick: u64,
-    /// Its mission time, seconds.
+    /// Mission time of that tick, seconds.
     pub(crate) time_s: f64,
     /// Pose of the body, mission frame.
     pub(crate) pose: Pose2,

@@ -16,13 +16,13 @@ use crate::{
     world::World,
 };
 
-/// Reading of a sensor that sees nothing out of the ordinary, AD counts.
+/// Reading of a sensor in ordinary surroundings, AD counts.
 pub const MIDDLE: u16 = 2048;
 /// Supply of the AD converters, AD counts: drivers convert with it.
 const REFERENCE: u16 = 2048;
 /// Motor current of a standing motor, and for each count per second, AD counts; nominal.
 const CURRENT: (f64, f64) = (20.0, 0.2);
-/// Motor current that a stalled motor draws besides, AD counts; nominal. A stalled motor draws several times what it draws as it rolls.
+/// Further current of a stalled motor, AD counts; nominal. A stalled motor draws several times the current of a rolling one.
 pub(crate) const STALL_CURRENT: f64 = 1500.0;
 
 /// The ultrasonic and infrared rangers and the rest of the multimedia board.
@@ -59,7 +59,7 @@ impl Ranging {
             mounts[usize::from(ranger.index) % SONARS] =
                 Some(Mount { forward_m, bearing_rad, turned_rad: 0.0 });
         }
-        // Of a robot without sonars it is another sensor.
+        // In a robot without sonars this row is another sensor.
         if front.kind == SensorKind::Cone {
             mounts[front_channel] = Some(front.mount);
         }
@@ -169,7 +169,7 @@ fn ad(volts: f64, full_scale: f64) -> u16 {
     (volts / full_scale * 4095.0).round().clamp(0.0, 4095.0) as u16
 }
 
-/// The reported encoder of `motor`, `error` counts off.
+/// The reported encoder of `motor`, which is off by `error` counts.
 pub fn encoder(motor: &Motor, error: f64) -> Encoder {
     let position = (motor.turned() + error).round();
     Encoder {

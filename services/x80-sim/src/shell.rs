@@ -33,14 +33,12 @@ const MOST_AT_ONCE: usize = 64;
 pub struct SimOptions {
     /// The mission, seed and all.
     pub mission: Mission,
-    /// The pace of mission time.
+    /// The pace of mission time. At [`Pace::Max`] it stands still until a motion command comes; then the body moves one period under
+    /// that command and the frames of the next tick are sent. A ping is answered with the frames of this tick once more. The same
+    /// commands give the same bytes.
     ///
-    /// At [`Pace::Max`] it stands still until a motion command comes; then the body moves one period
-    /// under that command and the frames of the next tick are sent. A ping is answered with the frames
-    /// of this tick once more. The same commands give the same bytes.
-    ///
-    /// At [`Pace::Rate`] it follows the machine's clock and frames are sent unasked. While the process
-    /// is not scheduled for more than a period, mission time waits for it.
+    /// At [`Pace::Rate`] mission time follows the machine's clock and frames are sent unasked. While the process is not scheduled for
+    /// more than a period, mission time waits for it.
     pub pace: Pace,
     /// The address to listen on; port 0 takes a free one. A pseudo-terminal gets its path from the system.
     pub listen: SocketAddr,
@@ -99,7 +97,7 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result<(), SimError> {
     }
 }
 
-/// Wait until nobody else has `file`, made if it is not there.
+/// Wait until nobody else has `file`, which is made if it does not exist.
 fn lock(file: &Path) -> io::Result<File> {
     let file = File::options().create(true).append(true).open(file)?;
     file.lock()?;

@@ -1,4 +1,4 @@
-//! A ranger sometimes hears nothing for several readings, whatever stands there.
+//! Runs of silence: a ranger sometimes hears nothing for several readings, whatever stands there.
 
 use common::mission::SonarPhysics;
 
@@ -10,7 +10,7 @@ use crate::noise::{Noise, Source};
 pub(crate) struct Silence {
     /// Probability that a silent ranger hears again at the next reading.
     end: f64,
-    /// Probability that one that hears falls silent.
+    /// Probability that a hearing ranger falls silent.
     begin: f64,
     silent: [bool; 6],
     noise: Noise,

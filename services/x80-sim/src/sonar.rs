@@ -26,9 +26,9 @@ use crate::{
 
 /// The farthest range a ranger gives, metres.
 pub const REACH_M: f64 = 2.55;
-/// An echo is hidden by what lies nearer than this before it, metres.
+/// The distance before an echo within which a surface does not hide it, metres.
 const HIDES_M: f64 = 0.01;
-/// A reflected beam starts so far off its mirror, or it would meet it again, metres.
+/// The distance from its mirror at which a reflected beam starts, or it would meet the mirror again, metres.
 const NUDGE_M: f64 = 1e-6;
 /// Attenuation of sound at 40 kHz in air, dB per metre.
 const ABSORPTION_DB_PER_M: f64 = 1.3;
@@ -39,13 +39,13 @@ const POST_RADIUS_M: f64 = 0.015;
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Candidate {
     range: f64,
-    /// Metres, seen from above.
+    /// The range as seen from above, metres.
     level_range: f64,
     /// Unit vector from the ranger, from above.
     along: DVec2,
-    /// It is near a limit, or an edge: its echo is often lost.
+    /// Whether the echo is often lost, because it is near a limit or comes from an edge.
     weak: bool,
-    /// Share of pings it answers.
+    /// Share of pings that the place answers.
     share: f64,
 }
 
@@ -98,7 +98,7 @@ pub fn listen(
 ) -> f64 {
     let height = world.heights().sonar_m;
     if world.is_between(centre, pose.position, height) {
-        // A ranger pressed against what the body touches hears that, not what is behind.
+        // A ranger pressed against the thing that the body touches hears that thing, not those behind it.
         return 0.0;
     }
     let receiver = Receiver::new(pose, height, physics);
@@ -135,7 +135,7 @@ pub fn byte(range: f64, physics: &SonarPhysics, noise: &mut Noise) -> u8 {
     Echo::byte_at(range + noise.normal(physics.noise_m + physics.noise_per_m * range))
 }
 
-/// The axis of the beam, thrown off a wall that does not answer itself, onto one that is square to it.
+/// The axis of the beam after its reflection by a wall that does not answer itself, onto a wall that is square to it.
 fn bounced(world: &World, pose: Pose2, physics: &SonarPhysics, noise: &mut Noise) -> Option<f64> {
     if !noise.chance(physics.multipath_share) {
         return None;
@@ -159,7 +159,7 @@ struct Receiver<'a> {
     physics: &'a SonarPhysics,
     cone: Sector,
     lobe: f64,
-    /// Above the floor, metres.
+    /// The height above the floor, metres.
     height: f64,
     /// The least amplitude that is detected.
     threshold: f64,
@@ -177,7 +177,7 @@ impl<'a> Receiver<'a> {
         }
     }
 
-    /// The greatest distance at which an echo from so far off the axis is detected, metres. It is full in the cone and decreases
+    /// The greatest distance at which an echo from this far off the axis is detected, metres. It is full in the cone and decreases
     /// outside.
     fn reach(&self, off: f64) -> f64 {
         let cone = self.cone.half;
@@ -204,7 +204,7 @@ impl<'a> Receiver<'a> {
         })
     }
 
-    /// `candidate` where its nearest part is `gap` metres above or below the ranger.
+    /// `candidate`, if its nearest part is `gap` metres above or below the ranger.
     fn off_level(&self, candidate: Candidate, gap: f64) -> Option<Candidate> {
         if gap == 0.0 {
             return Some(candidate);
@@ -239,7 +239,7 @@ impl<'a> Receiver<'a> {
             let weak = off > self.cone.half + 1e-12;
             return Some(heard(to_centre.normalize_or_zero() * range, weak));
         }
-        // Its nearest point is out of the cone, but the cone may still meet its flank.
+        // The drum's nearest point is out of the cone, but the cone may still meet its flank.
         let drum = Surface::Drum { at, radius };
         let limit = self.physics.drum_limit_deg.to_radians();
         let flank = |edge: DVec2| {
@@ -284,7 +284,7 @@ impl<'a> Receiver<'a> {
     }
 }
 
-/// Amplitude of the echo of a hard plane at `range` metres, or of a cylinder of `radius`, in units of its own.
+/// Amplitude of the echo of a hard plane at `range` metres, or of a cylinder of `radius`.
 fn amplitude(range: f64, radius: Option<f64>) -> f64 {
     let spread = radius.map_or(1.0, |radius| (radius / (radius + range)).sqrt());
     spread * 10_f64.powf(-2.0 * ABSORPTION_DB_PER_M * range / 20.0) / range

@@ -74,7 +74,7 @@ impl Streams {
         }
     }
 
-    /// The streams that run, one frame of each counted as sent.
+    /// The streams that run. One frame of each counts as sent.
     pub(crate) fn take(&mut self) -> Due {
         Due { motor: self.motor.take(), custom: self.custom.take(), standard: self.standard.take() }
     }

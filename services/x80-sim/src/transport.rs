@@ -23,7 +23,7 @@ pub enum Transport {
     Pty,
 }
 
-/// An open transport. Bytes that cannot be sent on it are lost, as on a radio.
+/// An open transport. Bytes that cannot be sent are lost.
 #[derive(Debug)]
 pub(crate) enum Way {
     Udp(udp::Udp),
@@ -32,7 +32,7 @@ pub(crate) enum Way {
 }
 
 impl Way {
-    /// Open `transport`, at `address` where it has one. Datagrams of other users may be refused.
+    /// Open `transport`, at `address` if it needs one. Datagrams of other users may be refused.
     pub(crate) fn open(
         transport: Transport,
         address: SocketAddr,
@@ -46,7 +46,7 @@ impl Way {
         }
     }
 
-    /// The peer that is there without having sent anything: a connected host, or the other end of the line.
+    /// The peer that exists before it sends anything: a connected host, or the other end of the line.
     pub(crate) fn connected(&mut self) -> Result<Option<Source>, SimError> {
         let connected = match self {
             Self::Udp(_) => Ok(None),
@@ -56,7 +56,7 @@ impl Way {
         connected.map_err(|source| SimError::Lost { address: self.address(), source })
     }
 
-    /// The address it listens on: `address:port`, or the path of the line.
+    /// The address of the transport: `address:port`, or the path of the line.
     pub(crate) fn address(&self) -> String {
         match self {
             Self::Udp(udp) => udp.address().to_string(),
@@ -65,7 +65,7 @@ impl Way {
         }
     }
 
-    /// File descriptors that become readable when bytes have come; the second only where there are two.
+    /// File descriptors that become readable when bytes have come; the second only if there are two.
     pub(crate) fn readable(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>) {
         match self {
             Self::Udp(udp) => (udp.readable(), None),
@@ -75,7 +75,7 @@ impl Way {
     }
 
     /// Whether a host opened the line or the connection on which the newest bytes came, and they are the first. A line that a host closed
-    /// so that DTR stays high is not opened anew.
+    /// so that DTR stays high does not count as opened again.
     pub(crate) fn take_opened(&mut self) -> bool {
         match self {
             Self::Udp(_) => false,
@@ -101,7 +101,7 @@ impl Way {
         }
     }
 
-    /// Send `bytes` to `to`, if it is still there.
+    /// Send `bytes` to `to`, if that is still there.
     pub(crate) fn send(&mut self, to: Source, bytes: &[u8]) {
         let sent = match (self, to) {
             (Self::Udp(udp), Source::Peer(peer)) => udp.send(peer, bytes),

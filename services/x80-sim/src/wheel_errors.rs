@@ -1,7 +1,7 @@
-//! Systematic errors of the wheels: how far they differ from what the mission says.
+//! Systematic errors of the wheels: their differences from the mission.
 //!
-//! They are a property of the robot, not of the moment: drawn once from the seed of the mission, with a stream of their
-//! own, and the same in each process of a run.
+//! The errors belong to the robot, not to the moment: they are drawn once from the seed of the mission, with a stream of
+//! their own, and are the same in each process of a run.
 
 use common::mission::Mission;
 

@@ -6,7 +6,7 @@ use common::{
 };
 use glam::DVec2;
 
-/// A sensor that is no farther from a surface touches it, metres.
+/// The distance from a surface within which a sensor touches it, metres.
 const TOUCHES_M: f64 = 1e-3;
 
 /// A surface, seen from above.
@@ -23,7 +23,7 @@ pub enum Surface {
     Face {
         /// One end, metres.
         from: DVec2,
-        /// The other.
+        /// The other end, metres.
         to: DVec2,
     },
 }
@@ -90,12 +90,12 @@ impl Surface {
     }
 }
 
-/// A surface with its heights, its echo and what it does to light.
+/// A surface with its heights, its echo and its effect on light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solid {
-    /// Its outline from above.
+    /// The outline from above.
     pub surface: Surface,
-    /// Its heights, its echo and what it does to light.
+    /// The heights, the echo and the effect on light.
     pub profile: Profile,
 }
 
@@ -123,9 +123,9 @@ pub struct World {
 #[derive(Clone, Debug)]
 struct Visitor {
     thing: Thing,
-    /// Its row in the mission.
+    /// The row in the mission.
     solids: Vec<Solid>,
-    /// Its present place.
+    /// The present place.
     offset: DVec2,
     present: bool,
 }
@@ -194,7 +194,7 @@ impl World {
 }
 
 impl World {
-    /// What stands at `height_m` no farther than `reach_m` from `point`.
+    /// The solids at `height_m` no farther than `reach_m` from `point`.
     pub fn near(&self, point: DVec2, reach_m: f64, height_m: f64) -> Vec<Solid> {
         self.solids()
             .filter(|solid| solid.profile.height_gap(height_m) == 0.0)
@@ -202,8 +202,8 @@ impl World {
             .collect()
     }
 
-    /// Whether a surface at `height_m` stands between two points, or within [`TOUCHES_M`] of the second: what a body
-    /// touches may do so between a sensor at its edge and its centre.
+    /// Whether a surface at `height_m` stands between two points, or within [`TOUCHES_M`] of the second: a thing that the body touches
+    /// may stand between a sensor at its edge and its centre.
     pub fn is_between(&self, from: DVec2, to: DVec2, height_m: f64) -> bool {
         let Some(along) = (to - from).try_normalize() else {
             return false;

@@ -1,4 +1,4 @@
-//! A whole simulated robot behind a bad radio.
+//! Tests of a whole simulated robot behind a bad radio.
 
 #![allow(
     clippy::unwrap_used,
@@ -22,8 +22,8 @@ fn forward(counts: i16) -> Vec<u8> {
     bytes
 }
 
-/// Drive in lock-step for `rounds` of so many commands sent at once: every byte that came, and the ground truth of
-/// every tick.
+/// Drive in lockstep for `rounds` of `at_once` commands each. Returns every byte that came, and the ground truth of every
+/// tick.
 fn lock_step(mission: &str, rounds: usize, at_once: usize) -> (Vec<u8>, Vec<GroundTruthTick>) {
     let mut sim = Sim::start(mission, Pace::Max);
     let host = sim.host();
@@ -54,7 +54,7 @@ const OUT_HALF_THE_TIME: &str = "robot.rate_hz = 20\nperimeter.width_m = 200\n[s
 #[test]
 fn in_lock_step_time_passes_through_an_outage_and_the_run_can_be_had_again() {
     let (bytes, ground_truth) = lock_step(OUT_HALF_THE_TIME, 400, 1);
-    // The same must hold when commands come early; they wait until time has passed.
+    // The same holds when commands come early, and wait until time has passed.
     for (rounds, at_once) in [(400, 1), (200, 2)] {
         let (again, truth_again) = lock_step(OUT_HALF_THE_TIME, rounds, at_once);
         assert!(bytes == again && ground_truth == truth_again, "the same seed gave another run");
@@ -78,7 +78,7 @@ fn in_lock_step_a_lost_command_is_not_acknowledged_and_moves_nothing() {
         acks += u16::from(matches!(Report::parse(&frame), Ok(Report::System(_))));
     }
     assert!((120..160).contains(&acks), "{acks} of 200 commands were acknowledged");
-    // 400 counts/s for the period of 1/7 s, or for all of the 150 ms where no command comes behind.
+    // The wheel turns 400 counts/s for the period of 1/7 s, or for all of the 150 ms if no command follows.
     let counts = ground_truth.last().unwrap().right_counts;
     assert!((acks * 57..=acks * 60).contains(&counts), "{counts} counts for {acks} commands");
 }
@@ -91,7 +91,7 @@ fn in_lock_step_a_slow_radio_makes_commands_late() {
         );
         lock_step(&mission, 1, 1).1[1].right_counts
     };
-    // 400 counts/s for a period of 50 ms, less the way there and back.
+    // The wheel turns 400 counts/s for a period of 50 ms, less the delay there and back.
     assert_eq!([counts("0"), counts("0.01"), counts("0.04")], [20, 12, 0]);
 }
 
@@ -130,7 +130,7 @@ fn at_a_rate_every_frame_that_comes_through_the_worst_radio_is_sound() {
     let mut decoder = Decoder::default();
     let mut motor_frames = 0;
     while motor_frames < 100 {
-        // The robot has no peer and sends nothing until one of them arrives.
+        // The robot has no peer and sends nothing until a command arrives.
         host.set_read_timeout(Some(std::time::Duration::from_millis(20))).unwrap();
         host.send(&forward(0)).unwrap();
         let mut buffer = [0; 4096];

@@ -1,5 +1,5 @@
-//! Hosts that other people wrote, as the protocol notes describe them. They share no code with the wire
-//! module: a mistake in it must not be answered by the same mistake here.
+//! Tests with hosts that other people wrote, as the protocol notes describe them. They share no code with the wire
+//! module, so that a mistake in it does not meet the same mistake here.
 
 #![allow(
     clippy::unwrap_used,
@@ -22,7 +22,7 @@ use common::clock::Pace;
 use support::{PATIENCE, Sim};
 use x80_sim::Transport;
 
-/// Bit by bit, as the vendor's documents have it.
+/// The CRC bit by bit, as the vendor's documents have it.
 fn checksum(bytes: &[u8]) -> u8 {
     let mut register = 0_u8;
     for &byte in bytes {
@@ -71,13 +71,13 @@ impl Wire for File {
 }
 
 fn read_some(stream: &mut impl Read) -> Vec<u8> {
-    // Small, so that frames come in pieces.
+    // The buffer is small, so that frames come in pieces.
     let mut buffer = [0; 13];
     let length = stream.read(&mut buffer).expect("the robot sends");
     buffer[..length].to_vec()
 }
 
-/// A foreign host: how it addresses the robot, ends its frames, and what it has not looked at yet.
+/// A foreign host: its addresses, the end of its frames, and its unread bytes.
 struct Host<W> {
     wire: W,
     robot: u8,
@@ -109,7 +109,7 @@ impl<W: Wire> Host<W> {
         self.wire.send(&frame);
     }
 
-    /// The next frame that is no ACK. Everything must be whole and addressed to this host.
+    /// The next frame that is no ACK. Each frame must be whole and addressed to this host.
     fn next(&mut self) -> (u8, Vec<u8>) {
         loop {
             if let Some(frame) = self.frames.pop_front() {
@@ -119,7 +119,7 @@ impl<W: Wire> Host<W> {
         }
     }
 
-    /// Take what comes until a frame is complete.
+    /// Take bytes until a frame is complete.
     fn hear(&mut self) {
         let came = self.wire.receive();
         self.bytes.extend(came);
@@ -228,7 +228,7 @@ fn one_that_begins_with_zeros_ends_wrong_and_leaves_channels_alone_its_own_way()
     let mut host = Host::new(sim.host());
     host.end = [0x5e, 0x13];
     Wire::send(&mut host.wire, &[0; 65]);
-    // Timed, with LEN 15: a flag before the time.
+    // The command is timed, with LEN 15: a flag stands before the time.
     let mut data = words(&[-400, 400, -32_767, -32_767, -32_767, -32_767]);
     data.extend([28, 0xf4, 0x01]);
     host.send(27, &data);
@@ -237,7 +237,7 @@ fn one_that_begins_with_zeros_ends_wrong_and_leaves_channels_alone_its_own_way()
     for _ in 0..20 {
         counts = host.counts();
     }
-    // 400 counts/s for half a second of mission time, and then it stood.
+    // The wheel turned 400 counts/s for half a second of mission time, and then stood.
     assert!((195..=205).contains(&counts[1]), "it moved {counts:?}");
     assert_eq!(host.counts(), counts);
 }
@@ -283,7 +283,7 @@ fn one_on_a_connection_and_one_on_a_serial_line() {
     drive(Host::new(line));
 }
 
-/// A velocity command in two pieces, its ACK, and the robot moves.
+/// Send a velocity command in two pieces, and assert its ACK and that the robot moves.
 fn drive<W: Wire>(mut host: Host<W>) {
     host.wire.send(&[0x5e, 0x02, 0x01]);
     host.wire.send(&[0x00, 0xff, 0x01, 0x00, 0xdb, 0x5e, 0x0d]);
@@ -312,7 +312,7 @@ fn one_of_another_host_is_ignored_until_the_first_is_silent() {
     let short = Duration::from_millis(300);
     second.set_read_timeout(Some(short)).unwrap();
     let began = Instant::now();
-    // It asks again and again; the first has said nothing since.
+    // The second host asks again and again; the first has sent nothing since.
     loop {
         ping(&second);
         if second.recv(&mut [0; 512]).is_ok() {

@@ -1,4 +1,4 @@
-//! The process shell on a real loopback socket, at both paces.
+//! Tests of the process shell on a real loopback socket, at both paces.
 
 #![allow(
     clippy::unwrap_used,
@@ -41,7 +41,7 @@ fn reports(datagram: &[u8]) -> Vec<Report> {
     reports
 }
 
-/// Send a command at the pace of the commands: the datagrams that answer it.
+/// Send a command at the pace of the commands. Returns the datagrams that answer it.
 fn exchange(host: &UdpSocket, command: Command) -> [Vec<u8>; 2] {
     host.send(&encoded(command)).unwrap();
     [receive(host), receive(host)]
@@ -110,14 +110,14 @@ fn at_a_rate_frames_come_unasked_and_truth_goes_with_them() {
             moved = motor.encoders[1].position;
         }
     }
-    // 400 counts/s for 250 ms of mission time, and the lag.
+    // The wheel turns 400 counts/s for 250 ms of mission time, and the lag.
     assert!((95..=105).contains(&moved), "it moved {moved} counts");
     let ticks: Vec<u64> = (0..10).map(|_| sim.next_truth().tick).collect();
     assert_eq!(ticks, (0..10).collect::<Vec<_>>());
     assert!(sim.stop().is_ok());
 }
 
-/// The sensor frames that come without a word from the host.
+/// Assert that sensor frames come without a message from the host.
 fn listen_only(mut line: impl std::io::Read) {
     let mut decoder = Decoder::default();
     let (mut motor, mut standard) = (0, 0);
@@ -205,7 +205,7 @@ fn a_robot_whose_truth_nobody_reads_goes_on() {
     let (reader, writer) = std::os::unix::net::UnixStream::pair().unwrap();
     drop(reader);
     let (stop, stopped) = std::os::unix::net::UnixStream::pair().unwrap();
-    // The ground truth would have told the port: take one that was free a moment ago.
+    // The ground truth would have told the port, so take one that was free a moment ago.
     let listen: SocketAddr = {
         let probe = UdpSocket::bind("127.0.0.1:0").unwrap();
         probe.local_addr().unwrap()

@@ -5,9 +5,9 @@ use crate::simulation::{Block, OutOfRange, Ranger, Simulation, Thing};
 
 /// More things that come and go than this are a mistake.
 const MAX_THINGS: usize = 1000;
-/// More blocks of wheels than this are too.
+/// More blocks of wheels than this are a mistake.
 const MAX_BLOCKS: usize = 100;
-/// More stations on one thing's way than this are too.
+/// More stations on one thing's way than this are a mistake.
 const MAX_MOVES: usize = 1000;
 
 impl Checker {

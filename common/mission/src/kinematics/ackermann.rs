@@ -106,7 +106,7 @@ mod tests {
 
     #[test]
     fn the_least_turning_radius_by_hand() {
-        // 45 degrees: as long as the wheelbase.
+        // At 45 degrees the radius is the wheelbase.
         close(car(FRAC_PI_4).least_turning_radius(), 0.5);
     }
 
@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn a_wheel_at_its_limit_keeps_the_curvature() {
-        // 20 rad/s asked for, 10 can be had: half of both.
+        // 20 rad/s are asked for and 10 are possible, so both are halved.
         let twist = car(1.0).twist(car(1.0).wheel(Twist { v: 2.0, omega: 0.8 }));
         close(twist.v, 1.0);
         close(twist.omega, 0.4);

@@ -39,7 +39,7 @@ impl DifferentialDrive {
         }
     }
 
-    /// (2): wheel speeds to the body's twist. It is linear, so wheel angles give (arc, turn) likewise.
+    /// (2): wheel speeds to the body's twist. The map is linear, so wheel angles give (arc, turn).
     #[must_use]
     pub fn twist(&self, wheels: WheelSpeeds) -> Twist {
         let body = self.g * Vector2::new(wheels.right, wheels.left);

@@ -16,8 +16,8 @@ pub enum Drive {
 }
 
 impl Drive {
-    /// (17): what gives `twist`, as far as the drive can do it. Left and right wheel, rad/s; of a car the driven wheel,
-    /// rad/s, and the steering angle, radians, positive to the left.
+    /// (17): the inputs that give `twist`, as far as the drive can: left and right wheel, rad/s; for a car the driven
+    /// wheel, rad/s, and the steering angle, radians, positive to the left.
     #[must_use]
     pub fn inputs(&self, twist: Twist) -> [f64; 2] {
         match self {

@@ -23,10 +23,10 @@ impl Controller {
         let omega = self.angular(alignment);
         let wanted = self.tangential(alignment, omega, distance);
         let wanted = wanted.max(least);
-        // Written so that a limit that is no number stands.
+        // This form makes a limit that is no number stand.
         if limit >= least {
             let v = wanted.min(limit);
-            // It goes slower along the same curve.
+            // The car goes slower along the same curve.
             let omega = omega * v / wanted;
             Some(Twist { v, omega })
         } else {

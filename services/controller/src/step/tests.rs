@@ -54,7 +54,7 @@ fn close(got: f64, want: f64) {
 
 #[test]
 fn equation_14_by_hand() {
-    // Facing 45 degrees, guidance along x lies 45 degrees to the right.
+    // The robot faces 45 degrees, so guidance along x lies 45 degrees to the right.
     let alignment = Alignment::of(facing(FRAC_PI_4).axis(), DVec2::X);
     close(alignment.cosine, FRAC_1_SQRT_2);
     close(alignment.sine, -FRAC_1_SQRT_2);
@@ -84,7 +84,7 @@ fn equation_15_at_the_antipode_turns_left_first_and_then_keeps_its_side() {
 
 #[test]
 fn equation_16_by_hand() {
-    // Aligned: all of vd. 60 degrees off: 1 - sin 60 / 2. Antipodal: nothing.
+    // vc is vd aligned, 1 - sin 60 / 2 of it 60 degrees off, and 0 antipodal.
     close(controller("").at(facing(0.0), &ahead()).v_m_s, 0.4);
     let off = controller("").at(facing(FRAC_PI_3), &ahead());
     close(off.v_m_s, 0.4 * (1.0 - 3_f64.sqrt() / 4.0));
@@ -101,7 +101,7 @@ fn equation_16_is_continuous_where_its_cases_meet() {
 
 #[test]
 fn near_the_target_slowing_down_multiplies_alignment() {
-    // 0.25 m away, Rc = 0.5: half of what alignment allows.
+    // At 0.25 m with Rc = 0.5, vc is half of what alignment allows.
     let pose = Pose2 { position: DVec2::new(2.75, 0.0), heading: FRAC_PI_3 };
     let command = controller("").at(pose, &ahead());
     close(command.v_m_s, 0.2 * (1.0 - 3_f64.sqrt() / 4.0));
@@ -115,7 +115,7 @@ fn without_modulation_the_speed_is_constant_up_to_rc() {
 
 #[test]
 fn equation_17_by_hand() {
-    // vc = 0.4, wc = 0: both wheels at 4 rad/s.
+    // vc = 0.4 and wc = 0 turn both wheels at 4 rad/s.
     let command = controller("").at(facing(0.0), &ahead());
     close(command.left_rad_s, 4.0);
     close(command.right_rad_s, 4.0);
@@ -175,7 +175,7 @@ fn a_limit_of_0_is_0_however_well_the_robot_faces_its_way() {
 
 #[test]
 fn no_evidential_command_stands_in_the_dead_band_of_the_wheels() {
-    // 20 counts/s after a gain of 0.78, at 1200 counts a turn.
+    // The dead band is 20 counts/s after a gain of 0.78, at 1200 counts a turn.
     let dead = 20.0 / 0.78 / 1200.0 * std::f64::consts::TAU;
     for degrees in -180..180 {
         for limit in [0.0, 0.01, 0.03, 0.05, 0.4] {
@@ -247,7 +247,7 @@ fn a_robot_that_is_to_face_a_heading_turns_on_the_spot_and_then_has_arrived() {
             close(command.v_m_s, 0.0);
             assert!(command.omega_rad_s > 0.0, "{method}: the shorter way");
             pose.heading += command.omega_rad_s / 7.0;
-            // It slips on the spot, and stays at its target.
+            // The robot slips on the spot, and stays at its target.
             pose.position.x -= 0.02;
             command = controller.at(pose, &guidance);
             turned += 1;

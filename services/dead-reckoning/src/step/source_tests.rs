@@ -1,4 +1,4 @@
-//! Fixes and a gyro against a robot of known errors.
+//! Tests of fixes and a gyro with a robot of known errors.
 
 use super::{
     tests::{Take, reckoning_of},
@@ -40,13 +40,13 @@ impl Robot {
         WheelSample { stamp, left_counts, right_counts, ..WheelSample::default() }
     }
 
-    /// Along a curve that winds to either side.
+    /// The wheels after a tick along a curve that winds to either side.
     fn wind(&mut self) -> WheelSample {
         let turn = 0.06 * (self.tick as f64 / 15.0).sin();
         self.drive(0.04, turn)
     }
 
-    /// Normally distributed, nearly: the sum of twelve even ones.
+    /// A number that is nearly normally distributed: the sum of twelve even ones.
     fn noise(&mut self) -> f64 {
         let mut even = || {
             self.seed = self.seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
@@ -55,7 +55,7 @@ impl Robot {
         (0..12).map(|_| even()).sum::<f64>() - 6.0
     }
 
-    /// A fix of now, off by 5 cm.
+    /// A fix at the present time, off by 5 cm.
     fn fix(&mut self) -> FixSample {
         let at = self.truth.position + dvec2(self.noise(), self.noise()) * 0.05;
         FixSample {
@@ -149,7 +149,7 @@ fn the_pose_follows_a_fix_without_tearing_the_map_and_odometry_does_not_jump() {
     let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
     let mut before = reckoning.given(&robot.wind(), &[], &[]).pose;
     let mut lost = robot.drive(0.0, 0.0);
-    // Its counts are lost in motion, so it may be a way off.
+    // The counts are lost in motion, so the pose may be a way off.
     lost.restarts = 1;
     robot.truth.position += dvec2(0.1, 0.08);
     let odometry = |pose: &PoseSample| {
@@ -227,7 +227,7 @@ fn a_fix_that_cannot_be_used_is_refused_with_its_cause() {
     }
 }
 
-/// After 10 s the robot is carried, and seen from `source` for 20 s. The seconds after which it was relocated, and its error then.
+/// The robot is carried after 10 s, and seen from `source` for 20 s. The seconds after which it was relocated, and its error then.
 fn carried(source: impl Fn(&mut Robot, u64) -> FixSample) -> Vec<(u64, f64)> {
     let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
     rms(&mut robot, &mut reckoning, 100, each_second);
@@ -258,7 +258,7 @@ fn fixes_that_agree_for_three_seconds_relocate_a_robot_that_was_carried() {
     assert_eq!(scattered, []);
 }
 
-/// The robot stands for 20 s, and drives for 60 s. The error of its heading, with a gyro of this bias that says how often it is off.
+/// The error of the heading after 20 s at rest and 60 s of driving, with a gyro of this bias that says how often it is off.
 fn heading_error(bias: f64, mut gyro: impl FnMut(u64, f64) -> Vec<TurnSample>) -> f64 {
     let (mut robot, mut reckoning) = (Robot::new(0.01), x80());
     let mut turned = 0.0;
@@ -286,7 +286,7 @@ fn turn(tick: u64, turn_rad: f64) -> TurnSample {
 #[test]
 fn a_gyro_whose_increments_come_after_their_ticks_have_left_the_history_does_no_harm() {
     let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
-    // A source that stands still for 4 s, again and again, while the robot drives in a circle.
+    // The source stands still for 4 s, again and again, while the robot drives in a circle.
     let mut waiting = Vec::new();
     for _ in 0..400 {
         let wheels = robot.drive(0.04, 0.03);
@@ -303,7 +303,7 @@ fn a_gyro_holds_the_heading_and_its_bias_is_learned_at_rest() {
     let without = heading_error(0.0, |_, _| Vec::new());
     let with = heading_error(0.01, |tick, increment| vec![turn(tick, increment)]);
     assert!(without.abs() > 0.5 && with.abs() < 0.01, "{with} with a gyro, {without} without");
-    // Increments that come three ticks late, two at a time, and one in ten is lost.
+    // Increments come three ticks late, two at a time, and one in ten is lost.
     let mut waiting = Vec::new();
     let late = heading_error(0.01, |tick, increment| {
         waiting.extend((tick % 10 != 5).then(|| turn(tick, increment)));
@@ -311,7 +311,7 @@ fn a_gyro_holds_the_heading_and_its_bias_is_learned_at_rest() {
         waiting.drain(..due).collect()
     });
     assert!(late.abs() < 0.2 * without.abs(), "{late}");
-    // Increments that end between the ticks.
+    // Increments end between the ticks.
     let mut before = 0.0;
     let between = heading_error(0.01, |tick, increment| {
         let half = 0.5 * (before + increment);

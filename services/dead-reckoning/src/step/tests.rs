@@ -133,7 +133,7 @@ fn a_restored_state_goes_on_as_if_nothing_had_happened() {
 
 #[test]
 fn no_speed_is_more_than_the_body_can_do_however_the_frames_come() {
-    // 1 m/s at most at the rim, so 5 rad/s on the spot.
+    // The rim does at most 1 m/s, so the robot does 5 rad/s on the spot.
     let mut reckoning = reckoning("");
     reckoning.take(&wheels(0, 0, 0));
     let at = |tick, stamp_ns, left, right| {
@@ -151,7 +151,7 @@ fn no_speed_is_more_than_the_body_can_do_however_the_frames_come() {
         close(reckoning.take(&turned).omega_rad_s, 5.0);
         reckoning.take(&at(102 + 2 * tick, now_ns + 900_000_000, 0, 0));
     }
-    // Two ticks of 7 Hz that come at once are no rush.
+    // Two ticks of 7 Hz that come at once are no motion that is too fast.
     reckoning.take(&at(200, 9_000_000_000, 0, 0));
     let bunched = reckoning.take(&at(201, 9_001_000_000, 50, 50));
     close(bunched.v_m_s, 50.0 * 2e-4 * PI / (0.5 / 7.0));
@@ -163,7 +163,7 @@ fn a_motion_that_nobody_measured_is_in_the_covariance() {
     reckoning.take(&wheels(0, 600, 700));
     let before = reckoning.take(&wheels(1, 600, 700));
     let after = reckoning.take(&WheelSample { restarts: 1, ..wheels(2, 0, 1) });
-    // In 0.5 s each wheel rolls up to 0.5 m at the top speed; evenly distributed: 0.25 / 3.
+    // In 0.5 s each wheel rolls up to 0.5 m at the top speed; the even distribution has the variance 0.25 / 3.
     let wheel = 0.25 / 3.0;
     for (entry, more) in [(0, wheel / 2.0), (3, wheel / 2.0), (5, 2.0 * wheel / 0.16)] {
         close(after.covariance[entry] - before.covariance[entry], more);
@@ -219,7 +219,7 @@ fn a_robot_that_turns_back_through_its_start_while_the_link_is_killed_loses_no_t
         sample
     };
     reckoning.take(&by(1, wheels(0, 0, 0)));
-    // A tenth of a turn of each wheel, against each other, and back.
+    // Each wheel rolls a tenth of a turn, against the other, and back.
     reckoning.take(&by(1, wheels(1, COUNT_CYCLE - 100, 100)));
     let back = by(2, wheels(2, COUNT_CYCLE - 3, 2));
     assert!(!reckoning.rejects(&back));
@@ -263,7 +263,7 @@ fn a_successor_of_one_killed_between_publishing_and_saving_goes_on_with_its_pose
     let mut again = successor();
     assert_eq!(again.take(&wheels(2, 190, 200)), published);
     assert_eq!(again.state(), killed.state());
-    // The next one has come meanwhile: nothing of the way is lost, but 127 mm are one arc in place of two.
+    // The next tick has come meanwhile: nothing of the way is lost, but 127 mm are one arc in place of two.
     let (got, want) = (successor().take(&wheels(3, 280, 310)), killed.take(&wheels(3, 280, 310)));
     close(got.heading_rad, want.heading_rad);
     close(got.travelled_m, want.travelled_m);

@@ -15,8 +15,8 @@ pub(crate) const RECOVERED_V: f64 = 0.3;
 /// A battery is empty below this share of its limit, which is 1.0 V a cell if the limit is 1.1 V. Lower voltages damage cells,
 /// and from there the voltage falls faster than a robot can be fetched.
 pub(crate) const EMPTY_SHARE: f64 = 1.0 / 1.1;
-/// A battery is empty after so long below the empty voltage, mission time. Motors that start lower the voltage for some tenths of a
-/// second.
+/// The time below the empty voltage after which a battery is empty, mission time. Motors that start lower the voltage for some
+/// tenths of a second.
 pub(crate) const EMPTY_AFTER: Duration = Duration::from_secs(2);
 /// Below this voltage there is no battery at all, volts. A robot could not send frames on it.
 const FITTED_V: f64 = 1.0;
@@ -36,18 +36,15 @@ pub enum Charge {
 /// One of the robot's batteries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pack {
-    /// The battery of the boards.
     Board,
-    /// The battery of the motors.
     Motor,
-    /// The battery of the servos.
     Servo,
 }
 
 impl Pack {
     const ALL: [Self; 3] = [Self::Board, Self::Motor, Self::Servo];
 
-    /// Its name in logs.
+    /// The name in logs.
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::Board => "board",
@@ -60,11 +57,10 @@ impl Pack {
 /// The charge of a battery changed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BatteryChange {
-    /// The battery.
     pub pack: Pack,
-    /// Its voltage, volts.
+    /// The voltage, volts.
     pub volts: f64,
-    /// Its charge now.
+    /// The charge now.
     pub charge: Charge,
 }
 

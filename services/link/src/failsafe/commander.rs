@@ -1,7 +1,7 @@
-//! The monitor of other commanders: nodes that publish what the robot is told, beside the link.
+//! The monitor of other commanders: nodes beside the link that publish commands for the robot.
 //!
-//! The robot obeys whoever told it something last, so two commanders at once drive it where neither wants it. A node that may publish
-//! and says nothing does no harm and is no commander.
+//! The robot obeys the newest command, so two commanders at once drive it where neither wants it. A node that may publish and says
+//! nothing does no harm and is no commander.
 
 use std::{fmt::Write as _, time::Duration};
 
@@ -9,22 +9,22 @@ use common::{driver::Commander, mission::Mission, samples::Cause};
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
 
-/// A commander that has said nothing for so long has gone.
+/// The silence after which a commander counts as gone.
 pub(crate) const GONE_AFTER: Duration = Duration::from_secs(1);
-/// Who tells the robot only to stand is a commander after so long. The stop guard of an earlier link does, and leaves sooner.
+/// The time after which a sender of stops alone is a commander. The stop guard of an earlier link sends stops, and leaves sooner.
 pub(crate) const STAYS: Duration = Duration::from_secs(2);
 
-/// What others have told the robot without a pause.
+/// The commands that others have sent to the robot without a pause.
 #[derive(Clone, Copy, Debug)]
 struct Told {
     newest: Commander,
-    /// Whether any of it was to move the robot.
+    /// Whether any of them was to move the robot.
     moves: bool,
     began_ns: u64,
     newest_ns: u64,
 }
 
-/// What is known of other commanders of one robot.
+/// The knowledge about other commanders of one robot.
 #[derive(Clone, Debug)]
 pub struct OtherCommander {
     topic: String,

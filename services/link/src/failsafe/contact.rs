@@ -1,4 +1,4 @@
-//! Held wheels: a bumper made of the wheels.
+//! Held wheels: contacts that the wheels show.
 //!
 //! A wheel that is told to turn and does not has a dead encoder, or something holds it. The motor current tells which: a held motor
 //! draws several times the current of a rolling one. Where a current cannot be right, it tells nothing, and the encoder is suspected:
@@ -12,15 +12,15 @@ use common::{clock::MissionTime, mission::Mission, samples::ContactSample};
 
 use super::monitor::Condition;
 
-/// A wheel that shows it for so long is held.
+/// The time after which a wheel that draws a held wheel's current is held.
 pub(crate) const HELD_AFTER: Duration = Duration::from_millis(400);
-/// The robot stands for so long, while the contact is mapped and the planner is restarted.
+/// The time for which the robot stands while the contact is mapped and the planner is restarted.
 pub(crate) const STANDS_FOR: Duration = Duration::from_millis(500);
-/// Contacts are at least so far apart, so that the answer to one comes before the next, in lockstep too.
+/// The least time between two contacts, so that the answer to one comes before the next, in lockstep too.
 const NEXT_AFTER: Duration = Duration::from_secs(1);
-/// The current of a wheel that stands has fallen after so long.
+/// The time after which the current of a wheel that stands has fallen.
 const FALLEN_AFTER: Duration = Duration::from_millis(350);
-/// A current that is high for so long while its wheel rolls as told is no sign of a held wheel.
+/// The time after which a current that is high while its wheel rolls as told is no sign of a held wheel.
 const HIGH_AND_ROLLS: Duration = Duration::from_secs(2);
 /// The greatest value of the AD converter.
 const MOST_AD: u16 = 4095;
@@ -38,7 +38,7 @@ pub(super) struct Contacts {
     currents: [u16; 2],
     /// The time for which each current was high while its wheel rolled as told, seconds.
     high_and_rolls_s: [f64; 2],
-    /// The wheels that are held, and since when that is known.
+    /// The wheels that are held, and the time since which that is known.
     held: Option<([bool; 2], MissionTime)>,
     /// The contact that no tick has shown yet.
     new: Option<ContactSample>,

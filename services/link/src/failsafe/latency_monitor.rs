@@ -12,11 +12,11 @@ use common::{clock::Pace, mission::Mission, samples::Cause};
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
 
-/// The least limit, machine time: a process may be delayed by so much at any pace of mission time.
+/// The least limit, machine time: a process may be delayed by that much at any pace of mission time.
 const LEAST_LIMIT: Duration = Duration::from_millis(100);
 /// The window is longer than the limit by this, mission time. Commands are sent every 0.2 s to a robot that stands.
 const WINDOW: Duration = Duration::from_millis(400);
-/// A late robot is tested again after so long, mission time.
+/// The pause after which a late robot is tested again, mission time.
 const AGAIN: Duration = Duration::from_secs(2);
 
 /// The present finding.
@@ -110,7 +110,7 @@ impl Monitor for LatencyMonitor {
         }
     }
 
-    /// A robot that is being tested may be late.
+    /// A robot that is tested may be late.
     fn condition(&self, _: Cause, _: Moment) -> Condition {
         (self.state != State::Timely).into()
     }
@@ -138,8 +138,8 @@ mod tests {
         monitor.condition(Cause::RobotLate, Moment::default()) == Condition::Holds
     }
 
-    /// The monitor of a robot that gets a command every 70 ms and acknowledges each after `delay_ms`. It is found at 10 s and then gets
-    /// nothing for `quiet_ms`.
+    /// The monitor of a robot that gets a command every 70 ms and acknowledges each after `delay_ms`. The robot is found at 10 s and
+    /// then gets nothing for `quiet_ms`.
     fn found(delay_ms: u64, quiet_ms: u64) -> LatencyMonitor {
         let text = "target = [3, 0]";
         let mission = Mission::parse(text, Path::new("test.toml")).unwrap();

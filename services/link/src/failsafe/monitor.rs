@@ -12,7 +12,6 @@ use common::{
 /// The two clocks at one moment.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Moment {
-    /// Mission time.
     pub time: MissionTime,
     /// Reading of the machine's monotonic clock, nanoseconds.
     pub machine_ns: u64,
@@ -43,13 +42,13 @@ pub enum Observation<'a> {
     Currents([u16; 2]),
     /// A motor frame came, with these counts of the wheels, growing forward.
     Motor([u16; 2], Counts),
-    /// The voltages of the batteries of the boards, the motors and the servos came; 0 for one that is not fitted.
+    /// The voltages of the batteries of the boards, the motors and the servos came; 0 for a battery that is not fitted.
     Batteries([f64; 3]),
     /// Readings of ranging sensors came.
     Readings(&'a [RangeReading]),
-    /// Another than the link told the robot something.
+    /// A sender other than the link told the robot something.
     Commander(Commander),
-    /// The robot answers after it did not, and was asked for its streams.
+    /// The robot answers again or for the first time, and was asked for its streams.
     Found {
         /// Whether it had answered before.
         again: bool,

@@ -33,9 +33,9 @@ use super::{
     monitor::{Condition, Counts, Moment, Monitor, Observation},
 };
 
-/// The counts are evidence once a command's direction has held for so long.
+/// The time after which counts are evidence about a command in the same direction.
 const SETTLE: Duration = Duration::from_millis(250);
-/// A real wheel has changed its direction after so long, and at 7 Hz has reached 0.6 of its speed.
+/// The time after which a real wheel has changed its direction; at 7 Hz it has reached 0.6 of its speed.
 const TURNS_AFTER: Duration = Duration::from_millis(100);
 /// The slowest commanded motion that is judged, m/s at the rim.
 const LEAST_M_S: f64 = 0.03;
@@ -50,23 +50,23 @@ const LEAST_SHARE: f64 = 0.25;
 const ROLLS_SHARE: f64 = 0.5;
 /// The amount of evidence that leads to a suspicion. A radio that delivers frames does not lose commands for so long.
 pub(crate) const SUSPECTED_AFTER: Duration = Duration::from_millis(550);
-/// A commanded wheel may count nothing for so long, because commands may be lost.
+/// The time for which a commanded wheel may count nothing, because commands may be lost.
 pub(crate) const STILL_AFTER: Duration = Duration::from_millis(1000);
-/// So many jumps lead to a suspicion.
+/// The number of jumps that lead to a suspicion.
 pub(crate) const MOST_JUMPS: usize = 3;
-/// Jumps are counted within this time.
+/// The time within which jumps are counted.
 pub(crate) const JUMPS_WITHIN: Duration = Duration::from_secs(2);
-/// A suspicion about jumps ends after so long without a jump.
+/// The time without a jump after which a suspicion about jumps ends.
 pub(crate) const CALM: Duration = Duration::from_secs(2);
-/// A suspicion about jumps may end by itself so often. The counts of a faulty robot may jump only while it moves.
+/// The number of times that a suspicion about jumps may end by itself. The counts of a faulty robot may jump only while it moves.
 const MOST_RECOVERIES: u32 = 2;
-/// A mission whose robot has been suspected for so long ends.
+/// The time after which the mission of a suspected robot ends.
 pub(crate) const GIVEN_UP_AFTER: Duration = Duration::from_secs(10);
 
 /// A suspicion about the odometry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Suspicion {
-    /// The left wheel, or that of a car, does not turn as told.
+    /// The left wheel, or the wheel of a car, does not turn as told.
     Left,
     /// The right wheel does not turn as told.
     Right,
@@ -77,7 +77,7 @@ pub enum Suspicion {
 }
 
 impl Suspicion {
-    /// Its text for logs.
+    /// The text for logs.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Left => {
@@ -128,7 +128,7 @@ impl Evidence {
         }
         let share = counts * newest.signum() / (gap_s * asked);
         if high && share < LEAST_SHARE {
-            // The motor pushes in vain. A body that turns about what it touches may even push its wheel back.
+            // The motor pushes in vain. A body that turns about the thing that it touches may even push its wheel back.
             self.still_s = 0.0;
             if told_s >= SETTLE.as_secs_f64() {
                 self.held_s += gap_s;
@@ -258,7 +258,7 @@ impl Odometry {
         }
     }
 
-    /// The contact that the newest frame shows, once.
+    /// The contact that the newest frame shows. The next call gives none.
     pub(crate) const fn take_contact(&mut self) -> Option<ContactSample> {
         self.contacts.take()
     }

@@ -9,8 +9,8 @@ use common::{
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
 
-/// A supervisor that has published nothing for so long counts as ended. This is ten times the interval of its directives, so that a
-/// loaded machine does not stop the robot, and a second before systemd's watchdog would kill the supervisor.
+/// The silence after which a supervisor counts as ended. This is ten times the interval of its directives, so that a loaded machine
+/// does not stop the robot, and a second before systemd's watchdog would kill the supervisor.
 pub(crate) const SUPERVISOR_SILENT: Duration = Duration::from_secs(2);
 
 /// The supervisor's newest directive.
@@ -21,7 +21,7 @@ struct Directive {
     heard_ns: u64,
 }
 
-/// The supervisor's directives, and an operator's stop that did not come from it.
+/// The supervisor's directives, and an operator's stop at the link.
 #[derive(Clone, Debug)]
 pub struct Orders {
     newest: Option<Directive>,

@@ -7,14 +7,14 @@ use common::{clock::Pace, mission::Mission, samples::Cause};
 use super::monitor::{Condition, Moment, Monitor, Observation};
 use crate::backoff::Backoff;
 
-/// A robot that has sent nothing for so many command limits is lost. That is longer than a short fade of the radio, and the robot's
-/// last command has expired by then.
+/// The silence after which a robot is lost, in command limits. It is longer than a short fade of the radio, and the robot's last
+/// command has expired by then.
 pub(crate) const SILENT_LIMITS: u32 = 3;
-/// The least silence that counts, machine time: a process may be delayed by so much at any pace of mission time.
+/// The least silence that counts, machine time: a process may be delayed by that much at any pace of mission time.
 const LEAST_SILENCE: Duration = Duration::from_millis(100);
 /// The pause between the first two pings of a robot that does not answer.
 const FIRST_PAUSE: Duration = Duration::from_millis(200);
-/// The longest pause between pings. A robot that waits for a ping is found only after it; one that sends by itself is found at once.
+/// The longest pause between pings. A robot that waits for a ping is found only then; one that sends by itself is found at once.
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 
 /// The absence of a robot that does not answer; times are of the machine's clock.
@@ -48,7 +48,7 @@ impl Silence {
         };
     }
 
-    /// Whether this time has passed at `now_ns` of the machine's clock if the last frame came at `heard_ns`.
+    /// Whether the silence is over at `now_ns` of the machine's clock if the last frame came at `heard_ns`.
     pub(crate) fn is_over(&self, heard_ns: u64, now_ns: u64) -> bool {
         now_ns.saturating_sub(heard_ns) >= self.machine.as_nanos() as u64
     }

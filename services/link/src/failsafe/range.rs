@@ -1,11 +1,11 @@
 //! The range monitor: whether the readings of the ranging sensors change as the motion says they must, and whether the front sonar hears
 //! what the infrared rangers see ([`super::undetected_surface`]).
 //!
-//! An echo of something that stands comes nearer as the robot drives, and another thing answers when it turns. A reading that stays
-//! the same to the centimetre meanwhile is stuck: at one value, or at the last one. In 240 recorded missions, 150 of them with
+//! An echo of something that stands comes nearer as the robot drives, and another thing answers when the robot turns. A reading that
+//! stays the same to the centimetre meanwhile is stuck: at one value, or at the last one. In 240 recorded missions, 150 of them with
 //! measured realism, [`READINGS`] and more equal readings never came with more than 0.53 of the motion that is needed here.
 //!
-//! A sensor that looks aside gives the same reading for long as the robot drives along a wall. Of those only turns on the spot count.
+//! A sensor that looks aside gives the same reading for long as the robot drives along a wall. So only turns on the spot count for it.
 //!
 //! A reading of nothing stays for long in the open, and before smooth walls that stand askew, so it is not judged by motion.
 
@@ -26,7 +26,7 @@ use super::{
 const EQUAL_M: f64 = 0.0101;
 /// The least number of equal readings, 1.1 s at 7 Hz: fewer may be alike by chance.
 const READINGS: u32 = 8;
-/// The way after which the reading must have changed, metres, or the turn, radians. Parts of both add up.
+/// The way after which the reading must have changed, metres, or the turn, radians. Fractions of both add up.
 const WAY_M: f64 = 0.4;
 const TURN_RAD: f64 = std::f64::consts::FRAC_PI_2;
 /// The ranges that are judged, metres. Those at the ends of a sensor's scale are limits, not distances.
@@ -34,7 +34,7 @@ const JUDGED_SONAR_M: RangeInclusive<f64> = 0.05..=2.49;
 const JUDGED_INFRARED_M: RangeInclusive<f64> = 0.10..=0.70;
 /// A robot turns on the spot if its wheels' mean way is less than this share of half their difference.
 const ON_THE_SPOT: f64 = 0.25;
-/// The cause clears after so long with readings that change.
+/// The time with changing readings after which the cause clears.
 pub(crate) const CHANGES: Duration = Duration::from_secs(2);
 
 /// Equal readings in a row.
@@ -72,7 +72,7 @@ impl Row {
             judged_m: match sensor.kind {
                 SensorKind::Cone => JUDGED_SONAR_M,
                 SensorKind::Ray => JUDGED_INFRARED_M,
-                // The nearest of many beams may stay the same for long.
+                // The nearest of many beams may stay equal for long.
                 SensorKind::Scan => 0.0..=0.0,
             },
             equal: Equal::default(),
@@ -118,7 +118,7 @@ impl Row {
 pub struct Range {
     sensing: bool,
     metres_per_count: f64,
-    /// None for a car, whose second encoder is that of the steering.
+    /// The track; none for a car, whose second encoder is that of the steering.
     track_m: Option<f64>,
     counts: Option<[u16; 2]>,
     rows: Vec<Row>,
@@ -237,7 +237,7 @@ mod tests {
         sensor_implausible_at(0, wheels_m, reading)
     }
 
-    /// Likewise for the sensor of row `sensor`, which gives centimetres.
+    /// [`implausible_at`] for the sensor of row `sensor`, which gives centimetres.
     fn sensor_implausible_at(
         sensor: u8,
         wheels_m: [f64; 2],
@@ -291,11 +291,11 @@ mod tests {
     fn a_sensor_that_looks_aside_is_stuck_if_its_reading_stays_while_the_robot_turns_on_the_spot() {
         for sensor in [1, 2, 3, 9] {
             assert_eq!(sensor_implausible_at(sensor, [-0.02, 0.02], |_| 50), Some(11), "{sensor}");
-            // It drives along a wall, or around a drum.
+            // The robot drives along a wall, or around a drum.
             assert_eq!(sensor_implausible_at(sensor, [0.05; 2], |_| 50), None);
             assert_eq!(sensor_implausible_at(sensor, [0.03, 0.05], |_| 50), None);
         }
-        // An infrared ranger that sees nothing says so at any heading.
+        // An infrared ranger that sees nothing says so at each heading.
         assert_eq!(sensor_implausible_at(3, [-0.02, 0.02], |_| 255), None);
     }
 }

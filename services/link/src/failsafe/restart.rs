@@ -15,22 +15,22 @@ use common::{
 
 use super::monitor::Counts;
 
-/// Counts are implausible from so many times the distance that wheels roll at their top speed.
+/// The multiple of the distance that wheels roll at their top speed from which on counts are implausible.
 const IMPLAUSIBLE: f64 = 1.5;
-/// Beyond the known speeds of a wheel, a difference of so many metres is plausible: in a tick a wheel hardly accelerates more.
+/// The difference beyond the known speeds of a wheel that is plausible, metres: in a tick a wheel hardly accelerates more.
 const SLACK_M: f64 = 0.06;
-/// The known speeds bound the motion for so many periods after a command.
+/// The number of periods after a command for which the known speeds bound the motion.
 const PERIODS: f64 = 6.0;
-/// Implausible counts are accepted after so many frames in which each can follow the one before.
+/// The number of frames, in which each can follow the one before, after which implausible counts are accepted.
 const FOLLOW_EACH_OTHER: u32 = 3;
 
 /// The last plausible counts, and the implausible ones since.
 #[derive(Clone, Debug)]
 pub struct RestartWatch {
     last: Option<([u16; 2], MissionTime)>,
-    /// The known speeds of the wheels at the last plausible counts: those that the robot reported and those by the counts, counts/s.
+    /// The speeds of the wheels at the last plausible counts: those that the robot reported, and those by the counts, counts/s.
     turned: [[f64; 2]; 2],
-    /// The speeds of the two newest commands, counts/s, and the time of the newest that was to move a wheel.
+    /// The speeds of the two newest commands, counts/s, and the time of the newest command that was to move a wheel.
     commanded: [[f64; 2]; 2],
     driven: Option<MissionTime>,
     /// The newest implausible counts, their time, and the number of frames in which each can follow the one before.
@@ -84,8 +84,8 @@ impl RestartWatch {
         self.jumped = true;
     }
 
-    /// Classify the counts of the wheels; `speeds` are those that the robot reports with them, counts/s. `was_away` says whether the robot did not answer until this frame. After an absence,
-    /// counts near the value at which robots start mean a restart. Otherwise they must also be farther off than wheels turn.
+    /// Classify the counts of the wheels, with which the robot reports `speeds`, counts/s. `was_away` says whether the robot did not answer
+    /// until this frame: then counts near the start value mean a restart, otherwise only if they are also farther off than wheels turn.
     pub fn step(
         &mut self,
         counts: [u16; 2],
@@ -148,8 +148,8 @@ impl RestartWatch {
         f64::from(farthest.unwrap_or_default()) / reach
     }
 
-    /// The ratio of the difference of the counts to [`IMPLAUSIBLE`] of the most that wheels turn by all that is known of their speeds; 0 if
-    /// the robot is not driven.
+    /// The ratio of the difference of the counts to [`IMPLAUSIBLE`] of the most that wheels turn by their known speeds; 0 if the robot is
+    /// not driven.
     fn share_of_driven(
         &self,
         before: [u16; 2],
@@ -261,7 +261,7 @@ mod tests {
         assert_eq!(watch.step([9100, 17_100], [0; 2], false, at(0.286)), Counts::Implausible);
         assert_eq!(watch.step([9200, 17_200], [0; 2], false, at(0.429)), Counts::Elsewhere);
         assert_eq!(watch.step([9300, 17_300], [0; 2], false, at(0.571)), Counts::Follow);
-        assert_eq!(watch.restarts(), 1, "what lies between is no motion");
+        assert_eq!(watch.restarts(), 1, "the step between them is no motion");
     }
 
     #[test]

@@ -6,22 +6,22 @@ use common::{clock::MissionTime, mission::Mission, samples::Cause, wire::counts_
 
 use super::monitor::{Condition, Counts, Moment, Monitor, Observation};
 
-/// A stopped robot is at rest after so long. That includes the delay and the lag of its speed loop, and the loss of a stop or two.
+/// The time after which a stopped robot is at rest, with the delay and the lag of its speed loop and the loss of a stop or two.
 const COMES_TO_REST: Duration = Duration::from_millis(600);
-/// A robot that still moves for so long after [`COMES_TO_REST`] does not stop. A repeated stop has an effect sooner.
+/// The time after [`COMES_TO_REST`] at which a robot that still moves does not stop. A repeated stop has an effect sooner.
 pub(crate) const DOES_NOT_STOP_AFTER: Duration = Duration::from_millis(500);
 /// A wheel counts as moving from this speed on, m/s at the rim.
 const MOVES_M_S: f64 = 0.03;
-/// A wheel is at rest below this speed, m/s, or below so many counts between two frames, because the counts of a resting encoder
+/// A wheel is at rest below this speed, m/s, or below [`RESTS_COUNTS`] between two frames, because the counts of a resting encoder
 /// vary.
 const RESTS_M_S: f64 = 0.01;
 const RESTS_COUNTS: f64 = 4.0;
-/// A command may show in the counts only after so long, because of the delay of the speed loop and of the radio. Wheels that rest
+/// The time after which a command shows in the counts, because of the delay of the speed loop and of the radio. Wheels that rest
 /// before that may still start by the last command before the stop.
 const SHOWS_AFTER: Duration = Duration::from_millis(150);
-/// The robot is at rest when its wheels have been at rest for so long.
+/// The time for which wheels must be at rest until the robot is.
 const AT_REST_AFTER: Duration = Duration::from_millis(200);
-/// The next method is used after so long on a robot that does not stop.
+/// The time after which the next method is used on a robot that does not stop.
 const NEXT_METHOD_AFTER: Duration = Duration::from_millis(300);
 
 /// The stop monitor of one robot.

@@ -18,8 +18,8 @@ use super::{
 };
 use crate::backoff::Backoff;
 
-/// The robot is slow if all but the two shortest of so many intervals are too long. With a radio that is out half of the time, more
-/// than two intervals are short enough.
+/// The number of intervals of which all but the two shortest must be too long for a slow robot. With a radio that is out half of the
+/// time, more than two intervals are short enough.
 const INTERVALS: usize = 9;
 const SHORT_ONES: usize = 2;
 /// The pause between the first two requests for streams that do not come.
@@ -30,16 +30,16 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(8);
 /// The rate of the motor frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Motor {
-    /// They come often enough.
+    /// Motor frames come often enough.
     #[default]
     Regular,
     /// No motor frame comes although the robot answers.
     Silent,
-    /// Only so many come a second that a command expires before the next frame.
+    /// So few motor frames come, this many a second, that a command expires before the next.
     Slow(f64),
 }
 
-/// A sensor within this of the front sonar's bearing looks where the robot drives, degrees.
+/// The angle from the front sonar's bearing within which a sensor looks where the robot drives, degrees.
 const AHEAD_DEG: f64 = 60.0;
 
 /// The newest valid reading of a sensor.
@@ -47,9 +47,9 @@ const AHEAD_DEG: f64 = 60.0;
 struct Newest {
     row: u8,
     name: String,
-    /// The robot may go on without it.
+    /// Whether the robot may go on without the sensor.
     is_covered: bool,
-    /// When it came by the machine's clock.
+    /// The time of the reading by the machine's clock.
     ns: u64,
 }
 

@@ -383,7 +383,7 @@ fn who_tells_the_robot_to_move_is_a_commander_at_once_and_until_a_second_without
     let mut failsafe = well();
     failsafe.observe(&Observation::Commander(commander(true)), ago(silent));
     assert_eq!(failsafe.decide(false, now()), Decision::GO);
-    // What it says after a pause does not follow on what it said before.
+    // Commands after a pause do not continue those before it.
     failsafe.observe(&Observation::Commander(commander(false)), now());
     assert_eq!(failsafe.decide(false, now()), Decision::GO);
 }

@@ -1,8 +1,8 @@
 //! Whether the front sonar hears what the infrared rangers beside it see.
 //!
-//! A sonar that is stuck at "nothing in range" looks like one before open ground. Where the two infrared rangers that look past it on
-//! either side both see a near surface, and the line through what they see is square to the sonar's axis, the sonar must hear it:
-//! even a smooth wall answers within 20 degrees of its normal.
+//! A sonar that is stuck at "nothing in range" reads like one before open ground. Where the infrared rangers on both sides of it see
+//! a near surface, and the line through their two hits is square to the sonar's axis, the sonar must hear it: even a smooth wall
+//! answers within 20 degrees of its normal.
 
 use common::{
     kinematics::Pose2,
@@ -12,13 +12,13 @@ use common::{
 };
 use glam::DVec2;
 
-/// A surface must be nearer than this to both rangers, metres.
+/// The range below which both rangers must see a surface, metres.
 const NEARER_M: f64 = 0.45;
 /// The greatest angle between the surface's normal and the sonar's axis, degrees.
 const SQUARE_DEG: f64 = 12.0;
-/// Rangers within this of the sonar's axis look at what is in its cone, degrees.
+/// The angle from the sonar's axis within which rangers look into its cone, degrees.
 const BESIDE_DEG: f64 = 15.0;
-/// As many readings without an echo may be chance: runs of four come with a healthy sonar.
+/// The number of readings without an echo that may be chance: runs of four come with a healthy sonar.
 pub(super) const SILENCES: u32 = 4;
 
 /// The front sonar, and the two rangers beside it.
@@ -39,7 +39,7 @@ struct Ranger {
 }
 
 impl UndetectedSurface {
-    /// None for a robot that does not use a ranger on either side of the front sonar.
+    /// The observation of a robot; none if it does not use a ranger on either side of the front sonar.
     pub(super) fn of(mission: &Mission) -> Option<Self> {
         let (table, front) = (mission.sensor_table(), mission.front_row());
         let ahead = table.get(front)?.mount.bearing_rad;

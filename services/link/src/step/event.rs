@@ -13,8 +13,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::failsafe::{Decision, battery::BatteryChange};
 
-/// The state from which a generation starts: the pace of mission time and the number of its first tick. The supervisor gives the
-/// number, because it follows the ticks. The link's checkpoint has only what its driver knows of the robot's odometry.
+/// The state from which a generation starts: the pace of mission time and the number of its first tick. The supervisor gives the number,
+/// because it follows the ticks. The link's checkpoint has only its driver's state of the robot's odometry.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State {
     /// The pace of mission time. [`Pace::Max`] is lockstep, in which the robot waits for each command. At any other pace mission time is
@@ -33,7 +33,6 @@ impl Default for State {
 /// An event and its time by the machine's clock, which the deadlines of the wire use.
 #[derive(Clone, Copy, Debug)]
 pub struct Input<'a> {
-    /// The event.
     pub event: Event<'a>,
     /// Reading of the monotonic clock, nanoseconds.
     pub machine_ns: u64,
@@ -44,7 +43,7 @@ pub struct Input<'a> {
 pub enum Event<'a> {
     /// Bytes from the robot.
     Datagram(&'a [u8]),
-    /// Whether the wire is open now. It counts as open until the first such event. A wire of datagrams is always open.
+    /// Whether the wire is open now. A wire counts as open until the first such event. A wire of datagrams is always open.
     Wire(bool),
     /// A command from the controller.
     Command(&'a CommandSample),
@@ -65,15 +64,15 @@ pub enum Effect {
     Send(Vec<u8>),
     /// Publish the tick: `ranges` first, since `wheels` wakes the pipeline.
     Tick {
-        /// Its number.
+        /// The number of the tick.
         tick: u64,
-        /// Its mission time.
+        /// Mission time of the tick.
         time: MissionTime,
         /// The newest reading of each sensor.
         ranges: Vec<RangeReading>,
         /// The beams of the laser; none if none came.
         scan: Vec<f32>,
-        /// How far the robot turned since the tick before, by its own gyro.
+        /// The turn of the robot since the tick before, by its own gyro.
         turn: Option<TurnSample>,
         /// The encoders.
         wheels: WheelSample,
@@ -103,11 +102,11 @@ pub enum Effect {
     Restarted,
     /// The counts jumped farther than wheels turn, and continue from there.
     CountsElsewhere,
-    /// The robot does not stop, and was stopped by the next method, which has this name.
+    /// The robot does not stop, so the next method was used, which has this name.
     StopBy(&'static str),
     /// A message of the robot is none of the protocol, for this reason.
     Refused(String),
-    /// The robot's clock goes so many times as fast as mission time.
+    /// The ratio of the speed of the robot's clock to that of mission time.
     ClockRate(f64),
     /// The robot was asked for its streams again.
     AskedForStreams,

@@ -21,7 +21,7 @@ impl Link {
         if now.stops() {
             self.repeat = None;
             if !self.in_ticks() {
-                // The robot may be driving still by a command of an earlier link.
+                // The robot may still drive by a command of an earlier link.
                 let new = !before.stops()
                     || self.stop_sent_ns.is_none() && self.monitors().presence.is_wire_open();
                 self.send_stop(new, now_ns, effects);
@@ -41,7 +41,7 @@ impl Link {
         effects: &mut Vec<Effect>,
     ) {
         if self.other_stop().is_some() && counts != [0, 0] {
-            // The robot was stopped by another method than velocity, and must be set up again.
+            // Another method than velocity stopped the robot, so its settings must be sent again.
             effects.push(Effect::Send(self.driver.greeting()));
         }
         self.commanded(counts, now_ns);

@@ -11,7 +11,7 @@ use common::{
 use super::{Effect, Link, PING_EVERY, passed};
 use crate::failsafe::monitor::{Counts, Monitor as _, Observation};
 
-/// Of messages that are refused one a second is logged, and so many letters of the reason.
+/// The pause after which a refused message is logged again, and the letters of the reason that are logged.
 const REFUSED_AGAIN: Duration = Duration::from_secs(1);
 const LONGEST_REFUSAL: usize = 200;
 
@@ -19,7 +19,7 @@ impl Link {
     pub(super) fn take_wire(&mut self, open: bool, now_ns: u64, effects: &mut Vec<Effect>) {
         self.failsafe.monitors.presence.wire(open);
         self.driver.reset();
-        // What was sent while the wire was closed is lost.
+        // Stops that were sent while the wire was closed are lost.
         self.stop_sent_ns = None;
         if !open {
             self.lose(now_ns, effects);
@@ -32,7 +32,7 @@ impl Link {
             && passed(self.refused_ns, now_ns, REFUSED_AGAIN)
         {
             self.refused_ns = Some(now_ns);
-            // The robot chose its words.
+            // The reason may quote the robot, which may send any text.
             let why = why.escape_debug().take(LONGEST_REFUSAL).collect();
             effects.push(Effect::Refused(why));
         }
@@ -40,7 +40,7 @@ impl Link {
         effects.extend(rate.map(Effect::ClockRate));
         if let Some(commander) = heard.commander {
             self.observe(Observation::Commander(commander), now_ns);
-            // The robot obeys whoever was last. At the first command of another the failsafe stops it, below.
+            // The robot obeys the newest command. At the first command of another commander the failsafe stops the robot, below.
             if commander.moves && self.decision.stops() && !self.in_ticks() {
                 effects.push(Effect::Send(self.stop()));
             }
@@ -87,7 +87,7 @@ impl Link {
             }
         }
         if counts == Some(Counts::Implausible) {
-            // They start no tick. The robot stands until its motion is known again, so that little of it is lost.
+            // These counts start no tick. The robot stands until its motion is known again, so that little of it is lost.
             self.repeat = None;
             self.tell([0, 0], self.limit, now_ns, effects);
         } else if let Some(Motion { wheels, .. }) = motion {

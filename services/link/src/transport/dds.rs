@@ -1,9 +1,9 @@
-//! Topics of ROS 2: what the robot publishes is read, and what it is told is written.
+//! Topics of ROS 2: the robot's topics are read, and its commands are written.
 //!
-//! A piece that is received is one message: the row of its topic in [`Topics`] and its payload. The topic of commands is read too, and
-//! what the link itself wrote there is left out; before the payload of another's command stands the number of its writer. A link that
-//! was killed writes nothing, so it is no other writer, however long the network remembers it. Readers are best-effort and volatile,
-//! so they match every publisher. Between calls at most [`DEPTH`] messages of a topic are kept, and older ones are dropped.
+//! A piece that is received is one message: the row of its topic in [`Topics`] and its payload. The topic of commands is read too,
+//! without the messages of the link itself; before the payload of another's command stands the number of its writer. A link that was
+//! killed writes nothing, so it is no other writer, however long the network remembers it. Readers are best-effort and volatile, so
+//! they match every publisher. Between calls at most [`DEPTH`] messages of a topic are kept, and older ones are dropped.
 
 use std::{
     io,
@@ -15,12 +15,12 @@ use ros2_driver::topics::{Content, Topics};
 
 use super::counts::Tally;
 
-/// So many messages of a topic wait at most.
+/// The most messages of a topic that wait.
 const DEPTH: u16 = 16;
 
-/// A participant that has heard nothing for so long joins the domain anew, because it cannot know whether it is deaf.
+/// The silence after which a participant joins the domain anew, because it may be cut off.
 const DEAF_NS: u64 = 2_000_000_000;
-/// A participant that has not heard anything yet does so after this time, in which others discover it also over a slow network.
+/// The silence for a participant that has not heard anything yet: over a slow network, others discover it late.
 const UNDISCOVERED_NS: u64 = 10_000_000_000;
 
 /// A participant for one robot.
@@ -34,7 +34,7 @@ pub(super) struct Dds {
     commands: Option<usize>,
     /// The row of the reader that is asked next, so that a flood on one topic does not hold back the others.
     next: usize,
-    /// When the newest message came since the domain was joined.
+    /// The time of the newest message since the domain was joined.
     heard_ns: Option<u64>,
     joined_ns: Option<u64>,
     tally: Tally,
@@ -59,13 +59,13 @@ impl Dds {
         })
     }
 
-    /// Join the domain anew if nothing is heard there.
+    /// Join the domain anew after a silence.
     pub(super) fn maintain(&mut self, now_ns: u64) -> io::Result<()> {
         let joined_ns = *self.joined_ns.get_or_insert(now_ns);
         let (since_ns, most_ns) =
             self.heard_ns.map_or((joined_ns, UNDISCOVERED_NS), |heard_ns| (heard_ns, DEAF_NS));
         if now_ns.saturating_sub(since_ns) >= most_ns {
-            tracing::info!("nothing is heard in the domain; it is joined anew");
+            tracing::info!("nothing was received in the domain; the domain is joined anew");
             self.participant.rejoin()?;
             (self.readers, self.writer) = endpoints(&self.participant, &self.topics)?;
             (self.joined_ns, self.heard_ns) = (Some(now_ns), None);
@@ -104,7 +104,7 @@ impl Dds {
 
     /// Send a payload. It is lost if the library does not accept it now.
     pub(super) fn send(&mut self, payload: &[u8]) {
-        // A driver has nothing to send where topics need no greeting.
+        // The driver sends nothing where topics need no greeting.
         if !payload.is_empty() && !self.writer.write(payload.to_vec()) {
             self.tally.unsent += 1;
         }
@@ -115,7 +115,7 @@ impl Dds {
     }
 }
 
-/// A reader of each topic that is heard, in their order, and the writer of commands.
+/// A reader of each topic of the robot, in their order, and the writer of commands.
 fn endpoints(participant: &Participant, topics: &Topics) -> io::Result<(Vec<Reader>, Writer)> {
     let heard = Quality { is_reliable: false, is_latched: false, depth: DEPTH };
     let readers = topics.heard.iter().map(|(_, topic)| participant.reader(topic, heard));

@@ -70,8 +70,8 @@ impl Dial for Serial {
             | ControlModes::CSTOPB
             | ControlModes::CRTSCTS;
         settings.control_modes.remove(flow);
-        // An Arduino restarts when DTR rises. Without HUPCL it stays high when this process ends, so the stop guard and the next link find
-        // the board as it is.
+        // An Arduino restarts when DTR rises. Without HUPCL it stays high when this process ends, so the stop guard and the next link do
+        // not restart the board.
         settings.control_modes.remove(ControlModes::HUPCL);
         // CLOCAL ignores modem control lines, so three wires are enough.
         let eight = ControlModes::CS8 | ControlModes::CLOCAL | ControlModes::CREAD;

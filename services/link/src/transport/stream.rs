@@ -25,12 +25,12 @@ use crate::backoff::Backoff;
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 /// The longest pause between attempts, and so the longest wait for a robot that answers again.
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
-/// An attempt that takes longer is given up. A robot that is switched off does not answer.
+/// The time after which an attempt is given up. A robot that is switched off does not answer.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// A way to open a stream.
 pub(super) trait Dial: fmt::Display {
-    /// An open stream counts as closed after so much silence; none if the system reports that it closed.
+    /// The silence after which an open stream counts as closed; none if the system reports that.
     const SILENCE: Option<Duration>;
 
     /// Start to open the stream, without waiting.

@@ -91,7 +91,7 @@ fn equation_18_blocks_the_border_and_nothing_else() {
 
 #[test]
 fn equation_19_by_hand() {
-    // From (0.3, -0.2) facing y: S + offset = 0.5 + 0.2: the hit is at (0.3, 0.5), cell (28, 30).
+    // From (0.3, -0.2) facing y, S + offset = 0.5 + 0.2, so the hit is at (0.3, 0.5), cell (28, 30).
     let mut mapper = mapper("");
     let window =
         mapper.hear(&at(0, 0.3, -0.2, FRAC_PI_2), Some(&reading(RangeStatus::Measured, 0.5)));
@@ -104,7 +104,7 @@ fn equation_19_by_hand() {
 
 #[test]
 fn equation_19_takes_the_sensors_offset_along_its_bearing() {
-    // From the origin facing x: S + offset = 0.8 + 0.2 along the bearing.
+    // From the origin facing x, S + offset = 0.8 + 0.2 along the bearing.
     let half = std::f64::consts::FRAC_1_SQRT_2;
     for (bearing_deg, hit) in
         [(0, DVec2::new(1.0, 0.0)), (45, DVec2::new(half, half)), (-90, DVec2::new(0.0, -1.0))]
@@ -254,7 +254,7 @@ fn the_cell_of_the_target_is_free_as_long_as_the_robot_is_sent_there() {
             let cell = mapper.frame().cell_at(DVec2::new(x, 0.0)).unwrap();
             CellState::from_byte(mapper.state().cells()[mapper.frame().index(cell)])
         };
-        // The margin of the drum, as a place that a list names beforehand may be.
+        // The place is in the margin of the drum; a list may name such a place beforehand.
         let margin = -1.25;
         assert_eq!(state(&mapper, margin), CellState::Known, "{method}");
         let version = mapper.state().version();

@@ -20,6 +20,6 @@ impl Cell {
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub struct Change {
     pub cell: Cell,
-    /// Whether it is blocked from now on.
+    /// Whether the cell is blocked from now on.
     pub blocked: bool,
 }

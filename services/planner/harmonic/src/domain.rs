@@ -6,7 +6,7 @@ use crate::screening::{Coefficients, MIN_SCREENING_CELLS, Screening};
 
 /// A map of `width` x `height` cells with its target and screening, row-major: index = row * width + col.
 ///
-/// Cells outside the map count as blocked, so the rim of a map need not be.
+/// Cells outside the map count as blocked, so the rim of a map may be free.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Domain {
     width: usize,

@@ -34,7 +34,7 @@ pub enum SolveError {
          infinite length is no screening"
     )]
     ScreeningLength {
-        /// Row-major index of the first such cell; 0 for a uniform screening.
+        /// Row-major index of the first cell with such a length; 0 for a uniform screening.
         index: usize,
         /// The length found, in cells.
         cells: f64,

@@ -1,4 +1,4 @@
-//! The harmonic field: u of every cell, with what was verified of it.
+//! The harmonic field: u of every cell, and the result of its verification.
 
 use crate::cell::Cell;
 use crate::domain::Domain;
@@ -61,8 +61,8 @@ impl Field {
         self.store.u(cell.row * self.width + cell.col)
     }
 
-    /// Replaces u of a reachable cell by `u`, which must not be zero: a fault injected on purpose, to see what follows a
-    /// wrong field. Other cells are left as they are. The [`verification`](Self::verification) no longer holds.
+    /// Replaces u of a reachable cell by `u`, which must not be zero: a fault injected on purpose, to see the effects of
+    /// a wrong field. Other cells are left as they are. The [`verification`](Self::verification) no longer holds.
     pub fn overwrite(&mut self, cell: Cell, u: Scaled) {
         if self.is_reachable(cell) && !u.is_zero() {
             let index = cell.row * self.width + cell.col;

@@ -35,7 +35,7 @@ impl Field {
         if !(col.is_finite() && row.is_finite()) {
             return Guidance::Unreachable;
         }
-        // Saturating: positions beyond the map are outside whatever their distance.
+        // The casts saturate: positions beyond the map are outside at any distance.
         let here = (col.round() as i64, row.round() as i64);
         if self.blocked_at(here.0, here.1) {
             return self.way_out(col, row);
@@ -67,8 +67,8 @@ impl Field {
             .map_or(Guidance::Unreachable, Guidance::Along)
     }
 
-    /// The direction at a cell's centre, or `None` where there is none to give (blocked, cut off, the target): what
-    /// [`guidance`](Self::guidance) answers there, where no wall is near enough to matter, for whole maps of cells.
+    /// The direction at a cell's centre, or `None` if there is none (blocked, cut off, the target): the answer of
+    /// [`guidance`](Self::guidance) there, where no wall is near enough to matter, for whole maps of cells.
     pub fn direction(&self, cell: Cell) -> Option<[f64; 2]> {
         if cell == self.target() || !self.is_reachable(cell) {
             return None;
@@ -191,7 +191,7 @@ impl Field {
         allowed
     }
 
-    /// Straight to the centre of the neighbour with the largest u. Two adjacent cells are convex together, so the way
+    /// The direction straight to the centre of the neighbour with the largest u. Two adjacent cells are convex together, so the way
     /// there is free from anywhere in this one, and leads away from every wall it touches.
     fn toward_best_neighbour(&self, here: (i64, i64), position: [f64; 2]) -> Option<[f64; 2]> {
         let [dc, dr] = self.steepest_ascent(here.0, here.1).map(|step| step as f64);

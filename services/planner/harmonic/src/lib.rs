@@ -89,7 +89,7 @@
 //! - [`Solver`] (`solver/`): the choice of a method, the solve.
 //!
 //! The feature `testing` adds generated maps and a slow reference solver. The library has no clock, files or unsafe code, and
-//! starts no thread unless [`Settings::threads`] asks for it; the same input gives the same field to the bit.
+//! starts no thread unless [`Settings::threads`] asks for threads; the same input gives the same field to the bit.
 
 mod cancellation;
 mod cell;

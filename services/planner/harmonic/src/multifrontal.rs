@@ -99,7 +99,7 @@ fn factor(
             };
             matrix.add(at, at, 4.0 * (1.0 + k));
             for neighbour in pass.neighbours(place) {
-                // Cells eliminated before, in a child, have no slot here; pairs within the front are met twice.
+                // Cells that a child eliminated before have no slot here; pairs within the front are met twice.
                 let other = slot.get(neighbour as usize).copied().unwrap_or(NOWHERE);
                 if other != NOWHERE && other as usize > at {
                     matrix.add(at, other as usize, -1.0);

@@ -1,5 +1,5 @@
-//! The direction and the logarithm of u of every cell of a row: for whole maps, where [`Field::direction`] cell by cell
-//! would take several times as long.
+//! The direction and the logarithm of u of every cell of a row. For whole maps, [`Field::direction`] cell by cell would
+//! take several times as long.
 
 use crate::cell::Cell;
 use crate::field::Field;
@@ -33,7 +33,7 @@ impl Field {
         }
     }
 
-    /// [`policy_of_row`](Self::policy_of_row) for a row between two others; `values` are those of all cells as stored.
+    /// [`policy_of_row`](Self::policy_of_row) for a row between two others; `values` are the stored values of all cells.
     fn of_row<T: Copy + Into<f64>>(
         &self,
         values: &[T],
@@ -53,7 +53,7 @@ impl Field {
         Policy { direction: self.direction(cell).unwrap_or_default(), log2_u: self.u(cell).log2() }
     }
 
-    /// The policy of `cell`; `rows` are that above it, its own and that below, as stored.
+    /// The policy of `cell`; `rows` are the stored rows above it, its own and below.
     fn of_cell<T: Copy + Into<f64>>(&self, rows: [&[T]; 3], exponent: i32, cell: Cell) -> Policy {
         let [above, row, below] = rows;
         let col = cell.col;
@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn a_whole_row_answers_what_each_of_its_cells_answers() {
-        // Small values of u on the larger maps, which are stored otherwise.
+        // The small values of u on the larger maps are stored otherwise.
         for (side, seed) in [(24, 1), (40, 2), (64, 3), (200, 4)] {
             let mut solver = Solver::new(Settings::default());
             let domain = domain(side, seed);

@@ -21,25 +21,25 @@ pub(crate) trait Real:
     /// Power of two at which the target's u is put, so that both ends of the exponent's range serve.
     const TOP: i32;
 
-    /// Below this, numbers are taken for zero.
+    /// The least number; smaller ones count as zero.
     const TINY: Self;
 
-    /// u above this is right once its residuals are small, the target's being 2^TOP: u below it is held down to so much less that what
-    /// lies beyond does not count.
+    /// The least u that is right once its residuals are small, if the target's is 2^TOP. A smaller u is held down by so much that
+    /// cells beyond it do not count.
     const KNOWN: f64;
 
     fn of(value: f64) -> Self;
     fn wide(self) -> f64;
     fn size(self) -> Self;
 
-    /// 1 / self where positive, 0 elsewhere: how inactive cells drop out of every sum.
+    /// 1 / self where positive, 0 elsewhere: so inactive cells drop out of every sum.
     #[inline(always)]
     fn inverse(self) -> Self {
         if self > Self::default() { Self::ONE / self } else { Self::default() }
     }
 
-    /// The number, or 0 for one so small that it, or its product with a weight, would be subnormal: those cost a hundred
-    /// times as much as others, and the first cycles are full of them.
+    /// The number, or 0 if it, or its product with a weight, would be subnormal: subnormal numbers cost a hundred times as much as
+    /// others, and the first cycles have many.
     #[inline(always)]
     fn flushed(self) -> Self {
         if self.size() > Self::TINY { self } else { Self::default() }

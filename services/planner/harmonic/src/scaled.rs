@@ -11,7 +11,7 @@ impl Scaled {
     pub const ZERO: Self = Self { mantissa: 0.0, exponent: 0 };
     pub const ONE: Self = Self { mantissa: 1.0, exponent: 0 };
 
-    /// `value` * 2^`exponent`. Whatever is not a positive finite number becomes zero.
+    /// `value` * 2^`exponent`. A value that is no positive finite number becomes zero.
     pub fn new(value: f64, exponent: i32) -> Self {
         if !(value > 0.0 && value.is_finite()) {
             return Self::ZERO;
@@ -34,7 +34,7 @@ impl Scaled {
 
     /// The number divided by 2^`reference`: an ordinary `f64`, 0 where that underflows and infinite where it overflows.
     pub fn relative_to(self, reference: i32) -> f64 {
-        // Zero has no exponent to compare: 0 * 2^huge would be no number.
+        // Zero has no exponent to compare, and 0 * 2^huge would be no number.
         if self.is_zero() {
             0.0
         } else {

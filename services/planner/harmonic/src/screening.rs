@@ -1,10 +1,10 @@
-//! Screening: how fast u decays in open space.
+//! Screening: the decay of u in open space.
 //!
 //! The screened equation is laplacian u = u / L^2; L, the screening length, is the distance in which u falls by a factor of
 //! e besides what the geometry takes. On cells of side h its five-point form is u = (mean of the four neighbours) / (1 + k)
 //! with the screening coefficient k = (h / (2 L))^2.
 
-/// Shortest screening length, in cells: k = 1e6. A cell shorter still is a blocked cell.
+/// Shortest screening length, in cells, at which k = 1e6. A cell with a shorter one is as good as blocked.
 pub const MIN_SCREENING_CELLS: f64 = 5e-4;
 
 /// The screening of a map.
@@ -73,7 +73,7 @@ impl Coefficients {
     }
 }
 
-/// k of a screening length, `cell` being the side of a cell in the same unit.
+/// k of a screening length; `cell` is the side of a cell in the same unit.
 fn coefficient(length: f64, cell: f64) -> f64 {
     (cell / (2.0 * length)).powi(2)
 }

@@ -15,11 +15,12 @@ impl Default for Simd {
 }
 
 impl Simd {
-    /// Runs `kernel`, which must be `#[inline(always)]` all the way down: what is only called keeps the narrow code.
+    /// Runs `kernel`, which must be `#[inline(always)]` all the way down: functions that are not inlined keep the narrow
+    /// code.
     #[inline(always)]
     pub(crate) fn run<O>(self, kernel: impl FnMut() -> O) -> O {
         struct Run<F>(F);
-        // Through `FnMut`: a call through `FnOnce` goes by way of a shim that is not inlined.
+        // `FnMut` is used because a call through `FnOnce` goes by way of a shim that is not inlined.
         impl<O, F: FnMut() -> O> pulp::WithSimd for Run<F> {
             type Output = O;
 

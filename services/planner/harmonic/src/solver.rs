@@ -20,12 +20,11 @@ use crate::store::{BLOCKED, Store};
 use crate::verification::{self, Check};
 use plan::{beyond_single, plan};
 
-/// Cycles before the first check of a solve that starts from the field of a similar map: the first cycle has no correction to
-/// judge by.
+/// Cycles before the first check of a solve that starts from the field of a similar map: the first cycle has no correction to judge by.
 const FIRST_CHECK_NEAR: usize = 2;
 
-/// Most cycles from the field of a similar map; then it is solved from scratch. Maps that need more are mostly those in which cells
-/// were cut off: their u falls by an order of magnitude a cycle, and is zero at once in a solve from scratch.
+/// Most cycles from the field of a similar map, before a solve from scratch. Maps that need more are mostly those in which cells were
+/// cut off: their u falls by an order of magnitude a cycle, and is zero at once in a solve from scratch.
 const NEAR_CYCLES: usize = 20;
 
 /// The resources of a solver. The results of full solves do not depend on them.
@@ -163,7 +162,7 @@ impl Solver {
                     let solved = self.double.solve(task, Some(near), NEAR_CYCLES, observe)?;
                     Some((solved, method))
                 }
-                // The cost of this follows from the shape of the map alone.
+                // The cost of this method follows from the shape of the map alone.
                 Method::Multifrontal => None,
             };
             if let Some(((store, check), method)) = solved
@@ -226,8 +225,8 @@ impl Solver {
 }
 
 impl Solver {
-    /// The field by multigrid in single precision, and where u falls below its range by what costs less there: multifrontal
-    /// factorisation of the passages or multigrid in bands.
+    /// The field by multigrid in single precision. Where u falls below its range, the cheaper of two methods continues: multifrontal
+    /// factorisation of the passages, or multigrid in bands.
     fn single(
         &mut self,
         task: Task<'_>,
@@ -267,8 +266,8 @@ impl<R: Real> Prepared<R>
 where
     Store: From<Vec<R>>,
 {
-    /// Cycles, from the field `near` where there is one, until every cell has converged and the check holds, or this is given up;
-    /// returns what there is then.
+    /// Runs cycles, from the field `near` if there is one, until every cell has converged and the check holds, or the method is given
+    /// up; returns the result so far.
     fn solve(
         &mut self,
         task: Task<'_>,
@@ -306,7 +305,7 @@ where
             observe(Phase::Verified);
             let mut excess = check.excess();
             if check.unreached > 0 {
-                // u falls below what this precision holds: what it holds is right, or needs more cycles.
+                // u falls below the least number of this precision, so the cells above it are right, or need more cycles.
                 excess = verification::check_above(domain, &store, threads, R::KNOWN).excess();
             }
             found = (store, check);

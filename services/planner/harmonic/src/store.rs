@@ -11,7 +11,7 @@ pub(crate) const BLOCKED: f64 = -1.0;
 /// Exponent of the largest u in a store of many bands or fronts with a common exponent: so high that four of it can be added.
 const TOP: i32 = 1020;
 
-/// Exponent of the smallest: so low that it keeps all of its digits.
+/// Exponent of the smallest u in such a store: so low that the u keeps all of its digits.
 const BOTTOM: i32 = -960;
 
 /// u as stored: positive where reachable, 0 where free but cut off, [`BLOCKED`] where blocked.
@@ -86,7 +86,7 @@ impl Store {
         Scaled::new(value, exponent)
     }
 
-    /// u of a run of cells in units of 2^`reference`, 0 where that is below what an `R` holds.
+    /// u of a run of cells in units of 2^`reference`, 0 where the result is below the range of `R`.
     pub(crate) fn read_row_as<R: Real>(&self, cells: Range<usize>, reference: i32, into: &mut [R]) {
         if let Self::Single { values, exponent } = self
             && *exponent == reference
@@ -104,7 +104,8 @@ impl Store {
         }
     }
 
-    /// The store of mantissas, 0 and [`BLOCKED`] among them, and exponents: with a common exponent if an `f64` holds them all.
+    /// The store of mantissas, which may be 0 or [`BLOCKED`], and exponents: with a common exponent if an `f64` holds them
+    /// all.
     pub(crate) fn narrowest(mut mantissas: Vec<f64>, exponents: Vec<i32>) -> Self {
         let positive = mantissas.iter().zip(&exponents).filter(|(mantissa, _)| **mantissa > 0.0);
         if positive.map(|(_, &exponent)| exponent).min().is_none_or(|it| it < BOTTOM - TOP) {

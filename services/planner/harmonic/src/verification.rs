@@ -34,8 +34,8 @@ use tiles::{TILE, Tiles};
 pub struct Verification {
     /// The largest |u - mean / (1 + k)| / u over the reachable cells but the target.
     pub worst_residual: f64,
-    /// The largest share of what bends the field that residuals of one sign account for, over tiles of 64 x 64 cells:
-    /// 4 |sum of the relative residuals| over the sum of (|grad u| / u)^2.
+    /// The largest share, over tiles of 64 x 64 cells, of the field's curvature that residuals of one sign account for: 4
+    /// |sum of the relative residuals| over the sum of (|grad u| / u)^2.
     pub worst_tile: f64,
     /// The method by which the field was computed.
     pub method: Method,
@@ -43,15 +43,15 @@ pub struct Verification {
     pub reachable: usize,
 }
 
-/// Least cells for a thread of their own, which takes some ten microseconds to start.
+/// Least cells for a further thread, which takes some ten microseconds to start.
 const CELLS_PER_THREAD: usize = 1 << 18;
 
-/// Checks every cell of a field, on up to `threads` threads; the result does not depend on how many.
+/// Checks every cell of a field, on up to `threads` threads; the result does not depend on their number.
 pub(crate) fn check(domain: &Domain, store: &Store, threads: NonZeroUsize) -> Check {
     check_above(domain, store, threads, 0.0)
 }
 
-/// Checks the cells of a field in which what is stored is above `floor`.
+/// Checks the cells of a field whose stored value is above `floor`.
 pub(crate) fn check_above(
     domain: &Domain,
     store: &Store,
@@ -74,7 +74,7 @@ pub(crate) fn check_above(
     found
 }
 
-/// Runs `check` on strips of rows, each on a thread of its own where that pays.
+/// Runs `check` on strips of rows, on several threads if that is faster.
 fn in_strips(
     domain: &Domain,
     threads: NonZeroUsize,
@@ -85,7 +85,7 @@ fn in_strips(
     if strips == 1 {
         return check(0..height);
     }
-    // Strips of whole tiles: so no sum depends on how many there are.
+    // Strips have whole tiles, so no sum depends on the number of strips.
     let start = |strip: usize| (height * strip / strips).next_multiple_of(TILE).min(height);
     let rows = |strip: usize| start(strip)..start(strip + 1);
     let check = &check;
@@ -121,7 +121,7 @@ fn check_extended(
     check_strip(domain, mantissas, Cells::above(width, 0.0), ScaledRows::new(width), row_of, strip)
 }
 
-/// Checks those cells of part of a map that have a `weight`, 0.25 / (1 + k), and in which u is above `floor`.
+/// Checks the cells of a part of a map that have a `weight`, 0.25 / (1 + k), and in which u is above `floor`.
 pub(crate) fn check_above_with<R: Real>(
     width: usize,
     values: &[R],
@@ -167,7 +167,8 @@ fn check_strip<'f, R: Real, W: Window<R>>(
     )
 }
 
-/// Checks a strip of rows with wide vectors: `raw` is what is stored, `row_of` gives rows by number, none beyond the map.
+/// Checks a strip of rows with wide vectors: `raw` are the stored values, `row_of` gives rows by number, none beyond the
+/// map.
 fn check_rows<'f, R: Real, W: Window<R>>(
     raw: &[R],
     mut cells: Cells<R>,
@@ -258,7 +259,7 @@ mod tests {
                 [common, extended].map(|store| check(&domain, &store, NonZeroUsize::MIN));
             let counts = |check: Check| (check.local_maxima, check.unreached, check.reachable);
             assert_eq!(counts(common), counts(extended));
-            // Two infinities, or what is no number, agree as well.
+            // Two infinities, or two results that are no numbers, agree as well.
             let agree =
                 |a: f64, b: f64| !a.is_finite() && !b.is_finite() || (a / b - 1.0).abs() < 1e-6;
             assert!(agree(common.worst_residual, extended.worst_residual));

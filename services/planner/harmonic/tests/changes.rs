@@ -1,4 +1,4 @@
-//! Directions after cells changed, where each solve starts from the field before: those of a solve from scratch.
+//! Tests that directions after changes, where each solve starts from the field before, are those of a solve from scratch.
 #![allow(clippy::expect_used, reason = "helpers of tests may stop at the first broken promise")]
 
 use harmonic::testing::{Angles, Kind, Map, Random, exact, follow};
@@ -27,7 +27,7 @@ impl Case {
             .expect("the map has a field");
     }
 
-    /// The free cells but the target of a rectangle, as far as it lies inside the map's rim, to become blocked.
+    /// The changes that block the free cells of a rectangle inside the map's rim, except the target.
     fn block(&self, (col, row): (usize, usize), (width, height): (usize, usize)) -> Vec<Change> {
         let (right, bottom) = (self.domain.width() - 1, self.domain.height() - 1);
         (row.max(1)..(row + height).min(bottom))
@@ -46,7 +46,7 @@ impl Case {
     }
 }
 
-/// A block in one corridor turns all of the hall.
+/// A blocked cell in one corridor turns all directions of the hall.
 #[test]
 fn after_a_block_in_one_of_two_corridors_the_directions_in_the_hall_that_they_feed_are_right() {
     for (wide, size) in [(8, (3, 3)), (12, (3, 8))] {

@@ -1,4 +1,4 @@
-//! Full solves: right in every cell of every kind of map.
+//! Tests that full solves are right in every cell of every kind of map.
 #![allow(
     clippy::expect_used,
     clippy::panic,
@@ -180,7 +180,7 @@ fn a_wide_map_with_strong_screening_is_right_beyond_the_range_of_f64() {
 #[test]
 fn a_hall_with_a_long_passage_one_cell_wide_is_not_factorised_and_right_in_the_passage_too() {
     let mut map = Map::generate(Kind::Empty, 260, 250, 0);
-    // A passage along the rim, but for a door.
+    // The hall has a passage along its rim, closed but for a door.
     for (columns, rows) in [(2..258, 2..6), (2..258, 244..248), (2..6, 2..248), (254..258, 2..248)]
     {
         map.fill(columns, rows, true);

@@ -1,4 +1,4 @@
-//! Guidance at any position of a solved map.
+//! Tests of the guidance at any position of a solved map.
 #![allow(
     clippy::expect_used,
     clippy::panic,
@@ -98,7 +98,7 @@ fn guidance_is_continuous_across_cell_borders_in_open_space() {
         if domain.is_blocked(Cell::new(col, row)) || domain.is_blocked(Cell::new(col + 1, row)) {
             continue;
         }
-        // Just left and just right of the border between two cells, and of a line of centres.
+        // The positions are just left and just right of the border between two cells, and of a line of centres.
         for border in [col as f64 + 0.5, col as f64] {
             let y = row as f64 + random.between(-0.49, 0.49);
             let (a, b) = (field.guidance(border - 1e-7, y), field.guidance(border + 1e-7, y));
@@ -113,8 +113,8 @@ fn guidance_is_continuous_across_cell_borders_in_open_space() {
 
 #[test]
 fn at_a_saddle_point_the_better_neighbour_decides() {
-    // The target straight behind a wall, everything mirrored about row 4: at the middle of the wall's face the gradient
-    // along the wall is zero by symmetry, and that across it points off the wall.
+    // The target is straight behind a wall, and everything is mirrored about row 4: at the middle of the wall's face the
+    // gradient along the wall is zero by symmetry, and that across it points off the wall.
     let mut map = Map::generate(Kind::Empty, 13, 9, 0);
     map.fill(7..8, 1..8, true);
     map.fill(7..8, 1..2, false);

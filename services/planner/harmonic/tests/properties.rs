@@ -1,4 +1,4 @@
-//! Whatever the map: an answer, never a number that is none, and every reachable cell leads to the target.
+//! Tests on any map: there is an answer, each number is one, and every reachable cell leads to the target.
 #![allow(
     clippy::expect_used,
     clippy::panic,

@@ -44,7 +44,7 @@ fn a_car_drives_straight_to_a_target_ahead_and_turns_to_one_at_its_side() {
 
 #[test]
 fn an_arc_that_a_hazard_cuts_off_is_not_driven() {
-    // From y = -0.2 to 0.9: it is passed on the right.
+    // The hazard extends from y = -0.2 to 0.9, so it is passed on the right.
     let (limit, turn) = advice(0.0, |at| (at.x - 0.5).abs() < 0.1 && at.y > -0.2 && at.y < 0.9);
     assert!(limit > 0.0 && turn < 0.0, "{limit} m/s, {turn}");
 }

@@ -21,11 +21,11 @@ pub enum Input<'a> {
         /// The cells of its window.
         cells: &'a [u8],
     },
-    /// The robot is sent there from now on.
+    /// The target to which the robot is sent from now on.
     Target(&'a TargetSample),
-    /// The pose of the tick: it is answered with guidance.
+    /// The pose of the tick, which is answered with guidance.
     Pose(&'a PoseSample),
-    /// The tick has its guidance: the newest map may be solved, or a background solve begin.
+    /// The guidance of the tick was given: the newest map may be solved, or a background solve begin.
     Idle,
     /// The result of a job.
     Solved(Solved),
@@ -57,23 +57,23 @@ impl From<Work> for Outcome {
 /// The effect of an input on the field.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Work {
-    /// Nothing.
+    /// The field is as it was.
     #[default]
     None,
-    /// It was solved.
+    /// The field was solved.
     Solved,
-    /// It is of an older map now.
+    /// The field is now of an older map.
     Stale,
-    /// The result of a background solve took its place.
+    /// The result of a background solve replaced the field.
     SwappedIn,
-    /// A fault was injected into it.
+    /// A fault was injected into the field.
     Broken,
     /// A version of the grid is missing: the field stays as it is until a keyframe comes.
     Missed,
 }
 
 impl Work {
-    /// Whether the field is another now.
+    /// Whether the field was replaced or changed.
     pub const fn changed(self) -> bool {
         matches!(self, Self::Solved | Self::SwappedIn | Self::Broken)
     }
@@ -82,7 +82,7 @@ impl Work {
 /// A solve for the background solver.
 #[derive(Debug)]
 pub struct Job {
-    /// Counted from 1.
+    /// The number of the job, from 1.
     pub number: u64,
     /// The map to solve.
     pub domain: Domain,
@@ -103,7 +103,7 @@ pub struct Solved {
 pub struct Snapshot {
     /// The header of a `field` sample; stamp and part are still to be set.
     pub header: FieldHeader,
-    /// Where its cells are.
+    /// The frame of its cells.
     pub frame: GridFrame,
     pub(super) field: Arc<Field>,
 }

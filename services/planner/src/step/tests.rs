@@ -31,7 +31,7 @@ fn sent(mission: &Mission) -> Planner {
     planner
 }
 
-/// A keyframe with the perimeter, and `hazard` where it says so.
+/// A keyframe with the perimeter, and hazard in the cells for which `hazard` says so.
 fn keyframe(version: u64, hazard: impl Fn(DVec2) -> bool) -> (GridHeader, Vec<u8>) {
     keyframe_of(mission().grid_frame(), version, hazard)
 }
@@ -169,7 +169,7 @@ fn evidential(scanned: impl Fn(DVec2) -> bool) -> Planner {
         let (x_m, y_m, clear_m) = (0.0, 0.0, 2.0);
         *beam = ClearBeam { x_m, y_m, bearing_rad: bearing, clear_m };
     }
-    // The first of them looked ahead.
+    // The first of the beams looked ahead.
     header.clear_beams.swap(0, 5);
     let frame = mission.grid_frame();
     for (index, state) in cells.iter_mut().enumerate() {
@@ -276,7 +276,7 @@ impl LargeRoom {
         Self { planner, header, cells }
     }
 
-    /// The cells for whose centres `becomes` says so become hazard.
+    /// Make the cells hazard for whose centres `becomes` says so.
     fn block(&mut self, becomes: impl Fn(DVec2) -> bool) {
         let frame = self.header.part.frame();
         for (index, cell) in (0..).zip(&mut self.cells) {

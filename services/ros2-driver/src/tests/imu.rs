@@ -1,4 +1,4 @@
-//! The gyro beside odometry.
+//! Tests of the gyro beside odometry.
 
 use super::*;
 use crate::messages::ImuTurn;
@@ -28,7 +28,8 @@ fn imu_at(stamp_us: u64, rate: f64) -> Vec<u8> {
     payload
 }
 
-/// A robot that winds to either side. Its odometry, at 10 Hz, has `odometry` times its turns, its gyro, at 100 Hz, `gyro` times.
+/// A robot that winds to either side. Its odometry, at 10 Hz, has `odometry` times its turns; its gyro, at 100 Hz, has `gyro`
+/// times its turns.
 struct Winding {
     driver: Ros2,
     odometry: f64,
@@ -45,7 +46,7 @@ impl Winding {
         0.8 * (f64::from(self.ms) / 1000.0).sin()
     }
 
-    /// Let a tick pass, in which the IMU speaks or not. Returns the turn that it has, and what was refused.
+    /// Let a tick pass, in which the IMU speaks or not. Returns the turn of the tick, and the reason of a refusal.
     fn tick(&mut self, imu_speaks: bool) -> (Option<Turn>, Option<String>) {
         let mut refused = None;
         for _ in 0..10 {
@@ -73,7 +74,7 @@ fn an_imu_is_read_as_rclpy_serialises_it_and_what_it_does_not_state_is_not_used(
         heading[at..at + 8].copy_from_slice(&value.to_le_bytes());
         Imu::read(&heading).map(|imu| imu.turn)
     };
-    // Without a turn rate there is nothing, until there is an orientation.
+    // Without a turn rate there is no turn, until there is an orientation.
     assert!(set(148, -1.0).unwrap_err().contains("remove robot.ros2.imu"));
     assert!(matches!(set(52, 0.0), Ok(ImuTurn::Heading(at)) if (at - 0.5).abs() < 1e-12));
     assert!(set(44, 7.0).unwrap_err().contains("no rotation"));
@@ -92,7 +93,7 @@ fn an_imu_is_read_as_rclpy_serialises_it_and_what_it_does_not_state_is_not_used(
 
 #[test]
 fn the_turns_of_ticks_are_those_of_the_gyro_up_to_the_stamp_of_odometry_and_follow_on_each_other() {
-    // Wheels that slip in turns.
+    // These wheels slip in turns.
     let mut robot = Winding::new(1.3, 1.0);
     while robot.tick(true).0.is_none() {}
     let (from, mut sum, mut variance) = (robot.heading(), 0.0, 0.0);

@@ -1,4 +1,4 @@
-//! Promises of the robot as a state machine.
+//! Tests of the robot as a state machine.
 
 use std::path::Path;
 
@@ -27,7 +27,7 @@ fn robot(text: &str) -> Robot {
     Robot::new(&mission(text))
 }
 
-/// Tell the robot `command`; what it was to it, and what it answered.
+/// Send the robot `command`. Returns the meaning that it had to the robot, and the answer.
 fn send_as(robot: &mut Robot, command: Command, addressing: Addressing) -> (Heard, Vec<u8>) {
     let mut bytes = Vec::new();
     command.encode(addressing, &mut bytes);
@@ -172,7 +172,7 @@ fn wheels_may_be_wired_the_other_way_round() {
     let mut robot = robot(
         "[robot]\nleft = { channel = 1, reversed = false }\nright = { channel = 0, reversed = true }\n[simulation.wheels]\nlag_s = 0",
     );
-    // Right wheel only: the robot turns left.
+    // Only the right wheel turns, so the robot turns left.
     send(&mut robot, Command::velocity([Some(-500), None], None));
     robot.advance_to_next_tick();
     let ground_truth = robot.ground_truth();
@@ -289,8 +289,8 @@ fn the_front_ranger_and_its_neighbours_fill_the_bytes_the_mission_says() {
     let Some(Report::Standard(sensors)) = streamed(&mut robot).1.first().copied() else {
         panic!("no standard frame");
     };
-    // Ahead: 1 - 0.1915 m. Left: the drum at (0, 1) lies 45 degrees off that ranger, so its flank or
-    // nothing; right: nothing but the end of the wall.
+    // Ahead is a wall at 1 - 0.1915 m. To the left the drum at (0, 1) lies 45 degrees off that ranger, so its flank or
+    // nothing is heard; to the right only the end of the wall is.
     assert_eq!(sensors.ultrasonic[3], 81);
     assert_eq!(sensors.ultrasonic[0], 255);
     assert_eq!(sensors.ultrasonic[1], 255);
@@ -347,7 +347,7 @@ fn a_thing_that_moves_into_the_robot_pushes_it_and_is_a_contact() {
     let ground_truth = robot.ground_truth();
     assert!((ground_truth.x + 0.49).abs() < 0.01, "{ground_truth:?}");
     assert_eq!(ground_truth.contacts, 1);
-    // Pushed straight back, its wheels roll.
+    // The robot is pushed straight back, and its wheels roll.
     let back = 0.49 / (std::f64::consts::TAU * 0.085 / 1200.0);
     let counted = 32_768.0 - f64::from(ground_truth.left_counts);
     assert!((counted - back).abs() < 25.0, "{counted} counts for {back}");
@@ -426,7 +426,7 @@ fn a_robot_that_speaks_lines_of_json_says_that_its_wheels_are_held_before_a_wall
     robot.on_order(&Order::Hello { rate_hz: 7.0 }, &mut Vec::new());
     let mut held = Vec::new();
     for _ in 0..20 {
-        // 0.56 m/s.
+        // 16 rad/s are 0.56 m/s.
         let drive = Order::Drive { wheels: [16.0; 2], twist: [0.56, 0.0], for_s: 0.25 };
         robot.on_order(&drive, &mut Vec::new());
         robot.advance_to_next_tick();

@@ -24,10 +24,10 @@ use crate::{
     transport::{Source, Way},
 };
 
-/// Lockstep makes so many ticks without an answer before it waits for a ping: the longest outage at the highest rate.
+/// The most ticks without an answer in lockstep, before it waits for a ping: the longest outage at the highest rate.
 const MOST_UNHEARD: usize = 120_000;
 
-/// A host that has sent nothing for so long, by the machine's clock, has gone: another may take the robot.
+/// The silence, by the machine's clock, after which a host has gone and another may take the robot.
 const HOST_SILENT: Duration = Duration::from_secs(2);
 
 /// Direction of a datagram through the radio.
@@ -43,15 +43,15 @@ pub(super) struct Session {
     /// Whether time waits for commands.
     lock_step: bool,
     way: Way,
-    /// `None` for a perfect radio.
+    /// The radio; `None` for a perfect one.
     radio: Option<Radio<Leg>>,
     /// The source of the last valid frame of the host that is served: all streams go there.
     peer: Option<Source>,
-    /// The time of that frame.
+    /// The time of the last valid frame of that host.
     heard: Instant,
     /// Frames of other hosts that were ignored since the last warning.
     strangers: u64,
-    /// Decoders of the peer and of one other: half a frame of the one must not garble the other's.
+    /// Decoders of the peer and of one other source: half a frame of one must not garble the frames of the other.
     decoders: Vec<SourceDecoder>,
     protocol: Protocol,
     ground_truth: Option<Box<dyn Write + Send>>,
@@ -83,7 +83,7 @@ impl Words {
     }
 }
 
-/// What a host says.
+/// A message of a host.
 #[derive(Clone, Copy, Debug)]
 enum Said<'a> {
     Frame(&'a Frame<'a>),
@@ -148,7 +148,7 @@ impl Session {
         Ok(())
     }
 
-    /// Let the robot come to rest: the process ends, and with it all commands.
+    /// Let the robot come to rest, because the process ends, and with it all commands.
     pub(super) fn end(mut self) -> Result<(), SimError> {
         self.robot.come_to_rest();
         self.save()
@@ -170,7 +170,7 @@ impl Session {
         flight.map_or(self.next_tick_s(), |due| due.min(self.next_tick_s()))
     }
 
-    /// Take up to `most` pieces of what has come; `now` is mission time where a clock makes it.
+    /// Take up to `most` pieces of the bytes that have come; `now` is mission time by a clock, if there is one.
     pub(super) fn listen(
         &mut self,
         buffer: &mut [u8],
@@ -198,9 +198,9 @@ impl Session {
         Ok(())
     }
 
-    /// Let everything happen that is due by mission time `now`, in its order.
+    /// Let everything happen that is due by mission time `now`, in order.
     pub(super) fn pass(&mut self, now: f64) -> Result<(), SimError> {
-        // A delay of more than a period is not made up for: the shell lets the clock wait.
+        // A delay of more than a period is not made up for, because the shell lets the clock wait.
         let now = now.min(self.next_tick_s() + self.robot.period_s());
         loop {
             let due = self.next_due_s();
@@ -274,7 +274,7 @@ impl Session {
                 for line in lines.push(bytes) {
                     match parse(&line) {
                         Ok(order) => self.on_said(source, Said::Order(&order))?,
-                        Err(why) => tracing::debug!("the host says what is no order: {why}"),
+                        Err(why) => tracing::debug!("the host's message is no order: {why}"),
                     }
                 }
             }
@@ -341,7 +341,7 @@ impl Session {
         Ok(())
     }
 
-    /// The peer; a host that is connected and has not spoken yet is one.
+    /// The peer; a host that is connected and has sent nothing yet is the peer.
     fn peer(&mut self) -> Result<Option<Source>, SimError> {
         if let Some(connected) = self.way.connected()? {
             self.peer = Some(connected);
@@ -349,7 +349,7 @@ impl Session {
         Ok(self.peer)
     }
 
-    /// Whether `source` is of the host that spoke first; of any host after that one's silence.
+    /// Whether `source` belongs to the host that sent first, or to any host after that host's silence.
     fn serves(&mut self, source: Source) -> bool {
         let silent = self.heard.elapsed() >= HOST_SILENT;
         let serves = silent || self.peer.is_none_or(|peer| peer.is_same_host(source));
@@ -375,7 +375,7 @@ impl Session {
         }
     }
 
-    /// Send to the peer what the radio has let through.
+    /// Send to the peer the bytes that the radio has let through.
     fn deliver(&mut self, bytes: &[u8]) {
         if let Some(peer) = self.peer.filter(|_| !bytes.is_empty()) {
             self.way.send(peer, bytes);
@@ -394,7 +394,7 @@ impl Session {
         let Some(ground_truth) = &mut self.ground_truth else {
             return;
         };
-        // Each line is one write: a write to a pipe costs far more than its bytes.
+        // Each line is one write, because a write to a pipe costs far more than its bytes.
         let written = serde_json::to_vec(record)
             .map_err(std::io::Error::from)
             .and_then(|mut line| {
@@ -403,7 +403,7 @@ impl Session {
             })
             .and_then(|()| ground_truth.flush());
         if let Err(error) = written {
-            tracing::warn!(%error, "the ground truth has no reader any more; the robot goes on without");
+            tracing::warn!(%error, "the ground truth has no reader any more; the robot goes on without one");
             self.ground_truth = None;
         }
     }

@@ -1,4 +1,4 @@
-//! Ranges worked by hand, in the laboratory and with smooth walls.
+//! Tests with ranges worked by hand, in the laboratory and with smooth walls.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ fn laboratory(text: &str, heading_deg: f64) -> f64 {
     heard_in(text, &physics, heading_deg)
 }
 
-/// The measured reflections, without what is random.
+/// The range with the measured reflections, without random errors.
 fn smooth(text: &str, heading_deg: f64) -> f64 {
     let physics = SonarPhysics {
         edge_share: 0.0,
@@ -44,7 +44,7 @@ const DRUM: &str = "world.drum = [{ at = [2, 0], radius_m = 0.5 }]";
 fn the_nearest_point_in_the_cone_answers() {
     close(laboratory(WALL, 0.0), 1.5);
     close(laboratory(WALL, 10.0), 1.5);
-    // 40 degrees off: the cone's near edge meets the wall at 25 degrees.
+    // The axis is 40 degrees off the normal; the cone's near edge meets the wall at 25 degrees.
     close(laboratory(WALL, 40.0), 1.5 / 25_f64.to_radians().cos());
     close(laboratory(DRUM, 14.0), 1.5);
     assert_eq!(laboratory(DRUM, 32.0), f64::INFINITY, "out of the cone");
@@ -95,7 +95,7 @@ fn an_oblique_smooth_wall_hides_what_stands_behind_it() {
 
 #[test]
 fn a_drum_answers_over_a_wider_angle_than_a_wall() {
-    // 24 degrees off the axis of a ranger 0.5 m from either.
+    // Both are 24 degrees off the axis of a ranger at 0.5 m.
     let near_wall = "world.wall = [{ points = [[0.5, -3], [0.5, 3]] }]";
     let near_drum = "world.drum = [{ at = [0.7, 0], radius_m = 0.2 }]";
     assert_eq!(smooth(near_wall, 24.0), f64::INFINITY);
@@ -104,7 +104,7 @@ fn a_drum_answers_over_a_wider_angle_than_a_wall() {
 
 #[test]
 fn an_oblique_wall_throws_the_beam_on_to_a_square_one() {
-    // Off a wall at 45 degrees 1 m ahead, onto a wall 0.8 m to the left: 1.8 m in all.
+    // The way is 1.8 m in all: 1 m to a wall at 45 degrees ahead, then 0.8 m to a wall on the left.
     let scene =
         "world.wall = [{ points = [[0.9, -0.1], [1.3, 0.3]] }, { points = [[0, 0.8], [3, 0.8]] }]";
     let physics = SonarPhysics {
@@ -154,7 +154,7 @@ fn the_byte_has_the_noise_of_its_range_and_whole_centimetres() {
     assert_eq!(byte(f64::INFINITY, &physics, &mut noise), 255);
 }
 
-/// The farthest at which the smooth disc of `radius_m` and `echo` straight ahead is heard, metres.
+/// The farthest range at which a smooth disc of `radius_m` and `echo` straight ahead is heard, metres.
 fn reach_of(radius_m: f64, echo: f64) -> f64 {
     let is_heard = |centimetres: &u16| {
         let at = f64::from(*centimetres) / 100.0 + radius_m;
@@ -186,13 +186,13 @@ fn in_the_laboratory_every_hard_thing_thicker_than_a_post_is_heard_as_far_as_the
 fn what_is_low_hides_nothing_that_is_higher() {
     let scene =
         format!("{WALL}\nworld.box = [{{ at = [0.35, 0], size_m = [0.1, 2], top_m = 0.05 }}]");
-    // The cone meets what is 0.05 m high from 0.13 m / tan(15 degrees) = 0.49 m on.
+    // The cone meets a thing of 0.05 m height from 0.13 m / tan(15 degrees) = 0.49 m on.
     close(laboratory(&scene, 0.0), 1.5);
 }
 
 #[test]
 fn a_sensor_at_or_within_the_bodys_edge_never_looks_through_a_wall_that_the_body_touches() {
-    // A body of 0.19 m, its centre at x = 1, that touches the wall at x = 1.19; behind it another one, 2.33 m on.
+    // A body of 0.19 m with its centre at x = 1 touches the wall at x = 1.19; another wall is 2.33 m behind it.
     let text = "target = [0, -5]\nworld.wall = [{ points = [[1.19, -3], [1.19, 3]] }, { points = [[3.52, -3], [3.52, 3]] }]";
     let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
     let world = World::new(&mission);

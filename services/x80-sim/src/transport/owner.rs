@@ -7,9 +7,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// A sender's port may be another user's after so long.
+/// The time after which a sender's port may be another user's.
 const ASKED_AGAIN: Duration = Duration::from_millis(500);
-/// Senders that are remembered.
+/// The most senders that are remembered.
 const MOST_SENDERS: usize = 16;
 
 /// Admits senders of this user only.
@@ -31,7 +31,7 @@ impl OwnUser {
         self.senders.push_front((sender, Instant::now(), own));
         if !own && !self.told {
             self.told = true;
-            tracing::warn!(%sender, "another user sends to the simulated robot of this run; that is ignored");
+            tracing::warn!(%sender, "another user sends to the simulated robot of this run; its datagrams are ignored");
         }
         own
     }

@@ -14,7 +14,8 @@ use rustix::{
 
 use super::source::Source;
 
-/// The speed to which the robot sets the line. A host that opens it sets the speed that it needs, by which the robot sees it.
+/// The speed to which the robot sets the line. A host sets the speed that it needs when it opens the line, which shows the
+/// robot that it did.
 const NOBODYS_BAUD: u32 = 50;
 
 #[derive(Debug)]
@@ -22,7 +23,8 @@ pub(crate) struct Pty {
     robot: OwnedFd,
     /// The host's end is held open: while nobody holds it, reading the robot's end is an error.
     host: OwnedFd,
-    /// Whether DTR falls when the host closes the line, as it says itself (HUPCL), so that it rises when the next opens it.
+    /// Whether DTR falls when the host closes the line, by the host's own setting (HUPCL), so that it rises when the next
+    /// host opens it.
     hangs_up: bool,
     opened: bool,
     path: String,
@@ -36,7 +38,7 @@ impl Pty {
         let path = ptsname(&robot, Vec::new())?;
         let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
         let host = open(path.as_c_str(), flags, Mode::empty())?;
-        // Bytes pass as they are: no echo, no line editing, no signals.
+        // Bytes pass unchanged: no echo, no line editing, no signals.
         let mut settings = tcgetattr(&host)?;
         settings.make_raw();
         settings.set_speed(NOBODYS_BAUD)?;

@@ -13,9 +13,9 @@ pub(crate) struct Tcp {
     listener: TcpListener,
     address: SocketAddr,
     connection: Option<TcpStream>,
-    /// Connections accepted so far: the number of the one that is open.
+    /// The number of connections accepted so far, which is that of the open one.
     accepted: u64,
-    /// Whether the newest connection was not asked for yet by [`Tcp::take_opened`].
+    /// Whether [`Tcp::take_opened`] has not yet returned the newest connection.
     opened: bool,
 }
 
@@ -54,7 +54,7 @@ impl Tcp {
             Ok(length) => Ok(Some((Source::Connection(self.accepted), length))),
             Err(error) if error.kind() == ErrorKind::WouldBlock => Ok(None),
             Err(error) if error.kind() == ErrorKind::Interrupted => Ok(None),
-            // A host that vanished is no fault of the robot's.
+            // A host that vanished is no error of the robot.
             Err(_) => {
                 self.connection = None;
                 Ok(None)
@@ -92,7 +92,7 @@ impl Tcp {
         }
     }
 
-    /// The connection to a host that does not read is closed: half a frame would garble all that follow.
+    /// The connection to a host that does not read is closed: half a frame would garble all later ones.
     pub(super) fn send(&mut self, number: u64, bytes: &[u8]) -> io::Result<()> {
         let Some(connection) = self.connection.as_mut().filter(|_| number == self.accepted) else {
             return Err(ErrorKind::NotConnected.into());

@@ -12,7 +12,7 @@ use super::{owner::OwnUser, source::Source};
 pub(crate) struct Udp {
     socket: UdpSocket,
     address: SocketAddr,
-    /// None where every sender is admitted.
+    /// The check of senders; none if every sender is admitted.
     own_user: Option<OwnUser>,
 }
 
@@ -39,7 +39,7 @@ impl Udp {
                 Ok((length, from)) => return Ok(Some((Source::Peer(from), length))),
                 Err(error) => match error.kind() {
                     ErrorKind::WouldBlock => return Ok(None),
-                    // An answer to a peer that has gone comes back as an error of ours.
+                    // An answer to a peer that has gone comes back as an error here.
                     ErrorKind::Interrupted
                     | ErrorKind::ConnectionRefused
                     | ErrorKind::ConnectionReset => {}

@@ -25,7 +25,7 @@ use common::{
 };
 use x80_sim::{SimError, SimOptions, Transport, run};
 
-/// Longer than anything here takes: a test that waits this long has failed.
+/// The time after which a waiting test has failed; nothing here takes as long.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(20);
 
 /// A mission with ideal sensors and wheels, unless `text` names a realism.
@@ -41,7 +41,7 @@ pub(crate) fn mission(text: &str) -> Mission {
 /// A running simulated robot; dropping it stops it.
 pub(crate) struct Sim {
     pub(crate) listening: String,
-    /// Lines of ground truth, read as they come: a robot waits for a reader that is slow.
+    /// Lines of ground truth, read as they come: a robot waits for a slow reader.
     ground_truth: Receiver<String>,
     stop: Option<UnixStream>,
     thread: Option<JoinHandle<Result<(), SimError>>>,
@@ -83,7 +83,7 @@ impl Sim {
         serde_json::from_str(&self.ground_truth.recv_timeout(PATIENCE).unwrap()).unwrap()
     }
 
-    /// Stop it; what it has told stays to be read.
+    /// Stop the robot; its ground truth stays to be read.
     pub(crate) fn finish(&mut self) {
         drop(self.stop.take());
         self.thread.take().unwrap().join().unwrap().unwrap();
@@ -103,7 +103,7 @@ impl Sim {
         socket
     }
 
-    /// Stop it and see how it ended.
+    /// Stop the robot, and return how it ended.
     pub(crate) fn stop(mut self) -> Result<(), SimError> {
         drop(self.stop.take());
         self.thread.take().unwrap().join().unwrap()

@@ -116,7 +116,7 @@ fn an_honest_robot_is_not_suspected_whatever_it_is_told() {
 
 #[test]
 fn an_honest_robot_is_not_suspected_with_its_radio_out_a_fifth_or_half_of_the_time() {
-    // The radio is out for bursts of 1 to 8 frames.
+    // The radio is out for 1 to 8 frames at a time.
     for share in [5, 2] {
         for seed in 1..60_u32 {
             let mut state = seed;

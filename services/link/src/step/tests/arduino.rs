@@ -1,4 +1,4 @@
-//! A robot that says nothing unasked: when it is polled, and what becomes of answers that are late or missing.
+//! Tests of a robot that says nothing unasked: when it is polled, and the effect of late or missing answers.
 
 use super::*;
 
@@ -18,9 +18,9 @@ struct Scene {
     link: Link,
     rate: f64,
     ms: u64,
-    /// The delay of the board, none if it says nothing.
+    /// The delay of the board; none if it says nothing.
     delay_ms: Option<u64>,
-    /// What it will say, and when.
+    /// The answers that it will give, and their times.
     answers: Vec<(u64, String)>,
     sent: Vec<(u64, String)>,
     ticks: Vec<u64>,
@@ -114,7 +114,7 @@ impl Scene {
         }
     }
 
-    /// When the board was asked for a round.
+    /// The times at which the board was asked for a round.
     fn rounds(&self) -> Vec<u64> {
         let rounds = self.sent.iter().filter(|(_, said)| said == ROUND);
         rounds.map(|(at, _)| *at).collect()

@@ -1,4 +1,4 @@
-//! What the failsafe makes of a robot that speaks ROS 2.
+//! Tests of the failsafe with a robot that speaks ROS 2.
 
 use ::ros2::cdr::Writer;
 use ros2_driver::{
@@ -15,12 +15,12 @@ fn mission() -> Mission {
     Mission::parse(text, Path::new("test.toml")).unwrap()
 }
 
-/// A robot, its link and their time. It moves as it was told last.
+/// A robot, its link and their time. The robot moves by its newest command.
 struct Scene {
     link: Link,
     topics: Topics,
     ms: u64,
-    /// Its odometry: x, y and heading.
+    /// The robot's odometry: x, y and heading.
     pose: [f64; 3],
     told: [f64; 2],
     tick: u64,
@@ -33,7 +33,7 @@ struct Scene {
     /// The shares of the speed that its left and its right wheel are commanded.
     shares: [f64; 2],
     turns: Vec<TurnSample>,
-    /// How fast the robot's clock goes, and how fast the link says that it does.
+    /// The speed of the robot's clock, and the speed that the link says.
     clock: f64,
     rates: Vec<f64>,
     decided: Vec<(u64, Cause)>,
@@ -178,7 +178,7 @@ fn beside_another_commander_the_robot_is_told_to_stand_after_each_of_its_command
     let mut scene = Scene::driving();
     for _ in 0..20 {
         scene.commanded(0.1);
-        // The robot obeys the other for no longer than a stop is on its way.
+        // The robot obeys the other commander only until a stop arrives.
         assert_eq!(scene.sent.last(), Some(&(scene.ms, [0.0; 2])));
         scene.holds(Cause::AnotherCommander);
         scene.told = [0.0; 2];

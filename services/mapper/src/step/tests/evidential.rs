@@ -54,7 +54,7 @@ fn see(mapper: &mut Mapper, tick: u64, infrared_ad: [u16; 7]) {
     mapper.sense(&pose, rays(infrared_ad));
 }
 
-/// The readings that the link makes of these counts.
+/// The readings that the link computes from these counts.
 fn rays(infrared_ad: [u16; 7]) -> Vec<RangeReading> {
     let of = |(sensor, ad)| {
         let status = match ad {
@@ -69,7 +69,7 @@ fn rays(infrared_ad: [u16; 7]) -> Vec<RangeReading> {
 
 const INFRARED: &str = "sensors = 'front+infrared'";
 
-/// The rear ranger, which looks along -x from (-0.19, 0), sees something so far away; the others are dead.
+/// The rear ranger, which looks along -x from (-0.19, 0), sees something at `range_m`; the others are dead.
 fn rear(range_m: f64) -> [u16; 7] {
     let mut counts = [0; 7];
     counts[5] = infrared_ad(range_m);
@@ -119,7 +119,7 @@ fn an_infrared_reading_nearer_than_10_cm_frees_nothing() {
 #[test]
 fn silence_of_the_sonar_does_not_take_back_what_infrared_saw() {
     let mut mapper = mapper(INFRARED);
-    // Ahead to the left, from (0.19, 0) turned by 11.25 degrees.
+    // The obstacle is ahead to the left, seen from (0.19, 0) at 11.25 degrees.
     let mut counts = [0; 7];
     counts[1] = infrared_ad(0.5);
     see(&mut mapper, 0, counts);
@@ -155,7 +155,7 @@ fn no_echo_at_a_slant_does_not_take_back_what_was_heard_squarely() {
     for tick in 0..3 {
         hear(&mut mapper, tick, 0.0, 0.0, Some(0.7));
     }
-    // The beam comes from the other side now, from which a smooth wall would give no echo.
+    // The beam comes from the other side now, from where a smooth wall would give no echo.
     for tick in 3..30 {
         hear(&mut mapper, tick, 1.9, std::f64::consts::PI, None);
     }
@@ -173,7 +173,7 @@ fn a_well_known_thing_explains_the_echo_and_does_not_grow_at_its_ends() {
         cells.filter(|&&cell| CellState::from_byte(cell).is_hazard()).count()
     };
     let before = hazards(&mapper);
-    // Turned by the arc's half: its edge meets the thing, its middle meets nothing new.
+    // The robot turned by half the arc: its edge meets the thing, its middle meets nothing new.
     hear(&mut mapper, 4, 0.0, 0.25, Some(0.7));
     assert_eq!(hazards(&mapper), before);
 }
@@ -191,7 +191,7 @@ fn scanned_ground_grows_stale_as_the_wheels_roll() {
     let mut mapper = mapper("");
     hear(&mut mapper, 0, 0.0, 0.0, None);
     assert_eq!(state(&mapper, 0.9, 0.0), CellState::Scanned);
-    // Six turns on the spot: 4.9 m of each wheel; the beam looks the other way at the end.
+    // The robot turns six times on the spot: each wheel rolls 4.9 m, and the beam looks the other way at the end.
     let heading = 13.0 * std::f64::consts::PI;
     hear(&mut mapper, 1, 0.0, heading, None);
     assert_eq!(state(&mapper, 0.9, 0.0), CellState::Free);
@@ -262,7 +262,7 @@ fn readings_are_published_until_the_wheels_have_rolled_too_far() {
         hear(&mut mapper, tick, 0.0, 0.5 + tick as f64, None);
     }
     assert!(beams(&mapper).len() < 50, "{}", beams(&mapper).len());
-    // A reset forgets them: a wrong pose may be why.
+    // A reset deletes the readings, because a wrong pose may be the cause.
     mapper.reset(1);
     assert!(beams(&mapper).is_empty());
 }
@@ -276,7 +276,7 @@ fn a_contact_is_hazard_where_the_body_touches_and_no_ranger_is_evidence_against_
         state(mapper, 0.2, 0.0).is_hazard() && state(mapper, 0.4, 0.0).is_hazard()
     };
     assert!(touched(&mapper));
-    // The robot has backed off and looks over it.
+    // The robot has backed off, and the ranger looks over the thing.
     let far = [infrared_ad(0.8); 7];
     for tick in 1..40 {
         let stamp = Stamp { tick, ..Stamp::default() };
@@ -286,12 +286,12 @@ fn a_contact_is_hazard_where_the_body_touches_and_no_ranger_is_evidence_against_
         mapper.sense(&pose, readings);
     }
     assert!(touched(&mapper));
-    // Where the body is, nothing stands.
+    // Nothing stands where the body is.
     hear(&mut mapper, 40, 0.2, 0.0, None);
     assert!(!state(&mapper, 0.2, 0.0).is_hazard());
 }
 
-/// The number of `grid`'s readings of sonars after so many ticks of a robot that stands.
+/// The number of readings of sonars in `grid` after so many ticks of a robot that stands.
 fn beams_after(sensors: &str, ticks: u64) -> usize {
     let mut mapper = mapper(&format!("sensors = '{sensors}'"));
     for tick in 0..ticks {

@@ -1,4 +1,4 @@
-//! A belief that was broken on purpose.
+//! Tests of a belief with an injected fault.
 
 use super::*;
 
@@ -19,7 +19,7 @@ fn is_hazard(mapper: &Mapper, x: f64, y: f64) -> bool {
     CellState::from_byte(mapper.state().cells()[mapper.frame().index(cell)]).is_hazard()
 }
 
-/// Whether the free cells lead from the origin to the target's.
+/// Whether free cells lead from the origin to the target's cell.
 fn is_connected(mapper: &Mapper) -> bool {
     let frame = mapper.frame();
     let free =

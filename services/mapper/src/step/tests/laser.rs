@@ -1,4 +1,4 @@
-//! A laser beside a sonar.
+//! Tests of a laser beside a sonar.
 
 use super::*;
 
@@ -61,7 +61,7 @@ fn an_echo_of_what_the_laser_sees_marks_nothing_beside_it() {
     sense(&mut mapper, 0, 1.0, 0.8);
     let by_scan = hazards(&mapper);
     for tick in 1..5 {
-        // The noise of the sonar.
+        // The range has the noise of the sonar.
         sense(&mut mapper, tick, 1.0, 0.78 + 0.01 * tick as f64);
     }
     assert_eq!(hazards(&mapper), by_scan);
@@ -81,8 +81,8 @@ fn a_pane_of_glass_stays_though_the_laser_looks_through_it_at_a_slant() {
     assert!(is_hazard(&mapper, 0.6, 0.0));
 }
 
-/// The least y that is hazard before the wall y = 1.25 at some x, by a laser with this row that is mounted at `at`, metres ahead of and
-/// to the left of the robot's centre, and whose middle beam looks to `looks_deg`.
+/// The least y that is hazard before the wall y = 1.25, for several x, by a laser with this row that is mounted at `at`, metres ahead
+/// of and to the left of the robot's centre, and whose middle beam looks to `looks_deg`.
 fn wall_of(row: &str, at: DVec2, looks_deg: f64) -> Vec<f64> {
     let text = format!(
         "target = [2, 0]\nrobot.model = 'create3'\nperimeter = {{ width_m = 5, cells = 100 }}\n\

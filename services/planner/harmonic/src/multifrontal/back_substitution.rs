@@ -12,10 +12,10 @@ use crate::store::{BLOCKED, Store};
 /// Binary orders of magnitude a front may span to be computed in plain `f64` with one common exponent.
 const PLAIN_SPAN: i32 = 300;
 
-/// Below this, sums in plain `f64` may have unreached terms to underflow.
+/// The least sum in plain `f64` that loses no terms to underflow.
 const PLAIN_LEAST: f64 = 1e-180;
 
-/// u of every cell of `domain`; that of the cells from which `pass` begins is `known`, or 1 at the target.
+/// u of every cell of `domain`; the cells from which `pass` begins have the u in `known`, or 1 at the target.
 ///
 /// # Errors
 /// [`SolveError::Cancelled`].
@@ -52,7 +52,7 @@ pub(super) fn substitute(
     Ok(store(domain, pass, u, known))
 }
 
-/// The store of `u`, given by place, and of what is `known` of the other cells.
+/// The store of `u`, which is given by place, and of the `known` u of other cells.
 fn store(domain: &Domain, pass: &BreadthFirst, u: &[Scaled], known: Option<&Store>) -> Store {
     let (width, height) = (domain.width(), domain.height());
     let blocked = |row: usize| domain.blocked()[row * width..(row + 1) * width].iter();
@@ -80,7 +80,7 @@ struct Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    /// Last eliminated first, each with its position.
+    /// The rows and their positions, the last eliminated first.
     fn backwards(self) -> impl Iterator<Item = (usize, &'a [f64])> {
         let mut rest = self.rows;
         self.lengths.iter().enumerate().rev().map(move |(row, &length)| {
@@ -91,7 +91,8 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Computes a front with one common exponent; false, with nothing written, if its range is too wide for that.
+/// Computes a front with one common exponent. Returns false, with nothing written, if the front's range is too wide for
+/// that.
 fn in_plain_range(u: &mut [Scaled], cells: &[u32], rows: Rows<'_>, plain: &mut Vec<f64>) -> bool {
     let own = rows.lengths.len();
     let boundary = cells[own..].iter().map(|&place| u[place as usize]).filter(|u| !u.is_zero());

@@ -11,9 +11,9 @@ pub(crate) const ABSENT: u32 = u32::MAX;
 /// Distances between two checks of the cancellation: at most some hundred microseconds on the largest maps.
 const CHECKED_EVERY: usize = 64;
 
-/// The cells whose u is known and that have others beside them, and those others that can be reached, in order of their distance.
+/// The cells whose u is known and that have others beside them, and the others that can be reached, in order of their distance.
 pub(crate) struct BreadthFirst {
-    /// Indices into the padded map of these cells by distance, at first those whose u is known, such as the target.
+    /// Indices into the padded map of the cells by distance, at first those whose u is known, such as the target.
     order: Vec<u32>,
     /// Place in `order` of each cell of the padded map, or [`ABSENT`].
     place: Vec<u32>,

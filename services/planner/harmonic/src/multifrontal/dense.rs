@@ -10,7 +10,7 @@ const BLOCK: usize = 4;
 pub(super) struct Matrix {
     entries: Vec<f64>,
     size: usize,
-    /// Entries from one row to the next: whole blocks.
+    /// Entries from one row to the next; a multiple of [`BLOCK`].
     stride: usize,
     /// For each row to be eliminated, the column after its last entry that is not zero. It is never less than that of the row before,
     /// because the rows of one distance meet those of the next in order.
@@ -72,7 +72,7 @@ impl Matrix {
         }
     }
 
-    /// The diagonal entry of an eliminated row and what follows it, up to the last that is not zero.
+    /// The diagonal entry of an eliminated row and the entries after it, up to the last that is not zero.
     pub(super) fn row(&self, row: usize) -> (f64, &[f64]) {
         let start = row * self.stride;
         let entries = &self.entries[start + row..start + self.ends[row]];
@@ -104,7 +104,7 @@ impl Matrix {
 fn eliminate(entries: &mut [f64], stride: usize, ends: &[usize]) {
     let mut start = 0;
     while start < ends.len() {
-        // A block of columns that is eliminated at once has a power of two of them, the largest that is left up to the limit.
+        // The rows eliminated at once are a power of two in number, the largest of those that fit up to the limit.
         start += match ends.len() - start {
             8.. => panel::<8>(entries, stride, start, ends),
             4.. => panel::<4>(entries, stride, start, ends),
@@ -159,7 +159,7 @@ fn panel<const P: usize>(
             q += 1;
         }
         for (at, target) in target.iter_mut().enumerate() {
-            // Two chains of sums, for the latency.
+            // Two chains of sums hide the latency.
             let mut sums = [[0.0; BLOCK]; 2];
             let mut q = 0;
             while q < P {

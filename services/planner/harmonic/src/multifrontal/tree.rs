@@ -21,15 +21,15 @@ use super::budget::Budget;
 use crate::cancellation::Cancellation;
 use crate::error::SolveError;
 
-/// Cells that are eliminated together, followed by those it leaves an update on.
+/// Cells that are eliminated together, followed by the cells on which they leave an update.
 #[derive(Clone, Copy)]
 pub(crate) struct Front {
     first: usize,
     /// Cells the front eliminates.
     pub own: u32,
-    /// Cells eliminated later on which it leaves an update.
+    /// Cells eliminated later on which the front leaves an update.
     pub boundary: u32,
-    /// Whether a later front eliminates its boundary; otherwise that is the target alone.
+    /// Whether a later front eliminates the boundary; otherwise the boundary is the target alone.
     pub has_parent: bool,
     first_child: u32,
     next_sibling: u32,
@@ -156,14 +156,14 @@ impl Tree {
         })
     }
 
-    /// Bytes of what grows with every front, and of the weights that the factorisation will keep.
+    /// Bytes of the memory that grows with every front, and of the weights that the factorisation will keep.
     fn growing_bytes(&self) -> u64 {
         let fronts = self.places.len() * size_of::<u32>() + self.fronts.len() * size_of::<Front>();
         fronts as u64 + 8 * self.cost.weights as u64
     }
 
     fn bytes(&self, pass: &BreadthFirst) -> u64 {
-        // Places of the pass and slots, updates alive at once bounded by the largest few fronts.
+        // The places of the pass and the slots are fixed; the updates alive at once are bounded by the largest few fronts.
         let fixed = pass.len() * 12;
         let largest = self
             .fronts
@@ -208,7 +208,7 @@ struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    /// Fronts and places there is room for at first.
+    /// The fronts and places for which there is room at first.
     fn capacities(pass: &BreadthFirst) -> (usize, usize) {
         (pass.len() / 4, pass.len() * 3)
     }
@@ -284,7 +284,8 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Joins the pieces of a stage by the boundaries of the fronts that waited for it, and gives it those as children.
+    /// Joins the pieces of a stage by the boundaries of the fronts that waited for it, and makes these fronts its
+    /// children.
     fn adopt(&mut self, stage: &Range<u32>, waiting: &[u32]) {
         for &child in waiting {
             let boundary = self.tree.boundary(&self.tree.fronts[child as usize]);
@@ -308,8 +309,8 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Adds the front of one piece: of a separator, or of a stage of the slab inside the separator `outer`. Returns its
-    /// index and whether it touches that.
+    /// Adds the front of one piece: of a separator, or of a stage of the slab inside the separator `outer`. Returns the
+    /// front's index and whether it touches `outer`.
     fn add_front(
         &mut self,
         piece: usize,
@@ -348,8 +349,8 @@ impl<'a> Builder<'a> {
             }
             child = front.next_sibling;
         }
-        // The next stage first and the outer separator last: so the rows of an update mostly stay in order on their way
-        // up the tree.
+        // The next stage comes first and the outer separator last: so the rows of an update mostly stay in order on their
+        // way up the tree.
         let boundary = &mut tree.places[first + own..];
         boundary.sort_unstable_by_key(|&place| (outer.contains(&place), Reverse(place)));
         let touches_outer = boundary.last().is_some_and(|place| outer.contains(place));
@@ -396,7 +397,7 @@ impl Pieces {
 
     fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));
-        // The smaller becomes the root, so a root comes before its members.
+        // The smaller index becomes the root, so a root comes before its members.
         self.parent[a.max(b) as usize] = a.min(b);
     }
 

@@ -12,12 +12,12 @@ pub(crate) struct Workspace {
     pub(super) u: Vec<Scaled>,
 }
 
-/// Most memory held between solves, in bytes: a maze of half a million cells takes this. A map that needs more takes so long that fresh
-/// pages no longer count.
+/// The most bytes held between solves: a maze of half a million cells takes this. A map that needs more takes so long that fresh pages
+/// no longer count.
 const MOST_HELD_BYTES: usize = 64 << 20;
 
 impl Workspace {
-    /// Frees the memory if it is more than that.
+    /// Frees the memory if it exceeds [`MOST_HELD_BYTES`].
     pub(super) fn trim(&mut self) {
         let bytes = size_of::<f64>() * self.factors.rows.capacity()
             + size_of::<u32>() * (self.factors.lengths.capacity() + self.slot.capacity())

@@ -1,9 +1,9 @@
 //! A coarser level: nine-point equations for the correction of the finer one, solved from a zero guess.
 //!
-//! The four planes are relaxed in turn. On the way down they start from zero, so each plane only sees those before it, and
-//! the residual on a plane is the sum over the planes after it: neither the right-hand side nor the diagonal is read again. The
-//! odd-odd cells are last on the way down, so their residual is zero, and first on the way up, so they need no correction.
-//! Interpolation to them is therefore never stored.
+//! The four planes are relaxed in turn. On the way down they start from zero, so each plane only sees those before it, and the residual
+//! on a plane is the sum over the planes after it: neither the right-hand side nor the diagonal is read again. The odd-odd cells are
+//! last on the way down, so their residual is zero, and first on the way up, so they need no correction. So no interpolation to them is
+//! stored.
 
 use super::grid::{
     EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Whole, add_products, join, join_row, split,
@@ -105,7 +105,7 @@ impl<R: Real> Coarse<R> {
         self.scratch = scratch;
     }
 
-    /// [`descend`](Self::descend) for a small level, plane by plane: `span` places of each.
+    /// [`descend`](Self::descend) for a small level, plane by plane, with `span` places of each.
     #[inline(always)]
     fn descend_whole(&mut self, next: &mut Self, span: usize) {
         let (o, stride) = (self.grid.start(0), self.grid.stride);
@@ -129,8 +129,8 @@ impl<R: Real> Coarse<R> {
         self.whole = whole;
     }
 
-    /// Restricts residuals to as many cells of the next level from `o` on as `out` has. `odd_even` starts one cell to the west,
-    /// the two of even-odd cells a row above and here.
+    /// Restricts residuals to as many cells of the next level from `o` on as `out` has. `odd_even` starts one cell to the west; the two
+    /// rows of even-odd cells are that above and this one.
     #[inline(always)]
     fn restrict(
         &self,
@@ -180,7 +180,7 @@ impl<R: Real> Coarse<R> {
         self.scratch = scratch;
     }
 
-    /// [`ascend`](Self::ascend) for a small level, plane by plane: `span` places of each.
+    /// [`ascend`](Self::ascend) for a small level, plane by plane, with `span` places of each.
     #[inline(always)]
     fn ascend_whole(&mut self, next: &Self, share: R, span: usize) {
         let o = self.grid.start(0);
@@ -276,7 +276,7 @@ impl<R: Real> Coarse<R> {
         n: usize,
         steps: [(isize, isize); COUNT],
     ) -> [(&[R], &[R]); COUNT] {
-        // A plain loop: `map` is not always inlined, and this runs for every row.
+        // This is a plain loop because `map` is not always inlined, and the loop runs for every row.
         let mut terms: [(&[R], &[R]); COUNT] = [(&[], &[]); COUNT];
         for (term, &step) in terms.iter_mut().zip(&steps) {
             *term = self.term(plane, o, n, step);

@@ -8,7 +8,7 @@ use crate::real::Real;
 pub(super) struct Coarsest {
     /// Plane and place of each cell.
     cells: Vec<(usize, usize)>,
-    /// Row-major, `cells.len()` squared.
+    /// The inverse, row-major, `cells.len()` squared.
     inverse: Vec<f64>,
     right: Vec<f64>,
 }

@@ -43,7 +43,7 @@ pub(super) struct Finest<R> {
     /// Weight of the coarse cell to the north in each even-odd cell.
     pub north: Vec<R>,
     pub south: Vec<R>,
-    /// Sorted by plane and row.
+    /// The sources, sorted by plane and row.
     pub sources: Vec<Source<R>>,
     scratch: Scratch<R>,
     whole: Whole<R>,
@@ -58,7 +58,8 @@ pub(super) struct Work<R> {
     pub sweeps: usize,
     /// Whether a half sweep follows whose changes are restricted to the next level as the residual.
     pub descend: bool,
-    /// A cell whose direction the correction turns by more than this, radians, counts as unsettled; none without.
+    /// The angle, radians, beyond which a cell whose direction the correction turns counts as unsettled; none for no such
+    /// check.
     pub tolerance: Option<R>,
 }
 
@@ -227,7 +228,7 @@ impl<R: Real> Finest<R> {
         progress
     }
 
-    /// [`pass`](Self::pass) for a small level, plane by plane: `span` places of each.
+    /// [`pass`](Self::pass) for a small level, plane by plane, with `span` places of each.
     #[inline(always)]
     fn pass_whole(&mut self, next: &mut Coarse<R>, work: Work<R>, span: usize) -> Progress {
         let grid = self.grid;
@@ -272,8 +273,8 @@ impl<R: Real> Finest<R> {
 
     /// Counts the even-even cells that the coarse correction unsettles, of `n` places from `o` on.
     ///
-    /// Their differences of u, to the next even-even cell east and south, are those of one gradient; the correction's are
-    /// what it changes by, so the cross product of both is the angle it turns by.
+    /// The differences of u to the next even-even cell east and south are those of one gradient. The correction's differences
+    /// are the change of the gradient, so the cross product of both is the angle by which the correction turns it.
     #[inline(always)]
     fn unsettled(&self, o: usize, upper: &[R], lower: &[R], tolerance: R, n: usize) -> usize {
         let stride = self.grid.stride;
@@ -310,8 +311,8 @@ impl<R: Real> Finest<R> {
         add_products(u, (to_north, upper), (to_south, lower));
     }
 
-    /// Restricts the residuals of black cells to as many coarse cells from `o` on as `out` has. `odd_even` starts one cell
-    /// to the west, the two of even-odd cells a row above and here.
+    /// Restricts the residuals of black cells to as many coarse cells from `o` on as `out` has. `odd_even` starts one cell to
+    /// the west; the two rows of even-odd cells are that above and this one.
     #[inline(always)]
     fn restrict(&self, o: usize, odd_even: &[R], (above, here): (&[R], &[R]), out: &mut [R]) {
         let weights = [
@@ -323,7 +324,7 @@ impl<R: Real> Finest<R> {
         sum_weighted(out, weights, [&odd_even[1..], odd_even, here, above]);
     }
 
-    /// Relaxes row `y` of a plane from its four neighbours; `change`, if given, takes what each cell changes by.
+    /// Relaxes row `y` of a plane from its four neighbours; `change`, if given, takes the change of each cell.
     #[inline(always)]
     fn relax(&mut self, plane: usize, y: usize, mut change: Option<&mut [R]>) {
         let o = self.grid.start(y);
@@ -353,7 +354,7 @@ impl<R: Real> Finest<R> {
         self.u[plane] = row;
     }
 
-    /// Adds what flows into the cells of a plane, to u and to its noted change.
+    /// Adds the inflow of a plane's cells to u and to its noted change.
     #[inline(always)]
     fn add_sources_of(&mut self, plane: usize, mut change: Option<&mut [R]>) {
         for source in self.sources.iter().filter(|source| source.plane == plane) {
@@ -365,7 +366,7 @@ impl<R: Real> Finest<R> {
         }
     }
 
-    /// Adds what flows into the cells of one row, to u and to its noted change.
+    /// Adds the inflow of one row's cells to u and to its noted change.
     #[inline(always)]
     fn add_sources(&mut self, plane: usize, row: usize, mut change: Option<&mut [R]>) {
         let first =
@@ -404,9 +405,9 @@ fn relax_noting<R: Real>(u: &mut [R], inverse: &[R], [a, b, c, d]: [&[R]; 4], ch
     }
 }
 
-/// The residual of black cells, as many as the outputs have: the sum of what their red neighbours changed by. Blocked cells get
+/// The residual of black cells, as many as the outputs have: the sum of the changes of their red neighbours. Blocked cells get
 /// one too; their interpolation weights are zero. The changes of even-even cells are those here and a row below, those of
-/// odd-odd ones a row above and here, from one cell to the west on.
+/// odd-odd cells a row above and here, from one cell to the west on.
 #[inline(always)]
 fn residual_on_black<R: Real>(
     [even, even_below]: [&[R]; 2],

@@ -52,7 +52,7 @@ impl Grid {
         }
     }
 
-    /// Values of a plane, its margin included.
+    /// Values of a plane with its margin.
     pub(super) fn len(&self) -> usize {
         self.stride * (self.rows + 2) + MARGIN
     }
@@ -78,11 +78,11 @@ impl Grid {
             .then(|| self.rows.saturating_sub(1) * self.stride + self.columns)
     }
 
-    /// Makes `planes` those of this level, of zeros.
+    /// Makes `planes` the planes of this level, filled with zeros.
     pub(super) fn reset<'a, R: Real>(&self, planes: impl IntoIterator<Item = &'a mut Vec<R>>) {
         for plane in planes {
             if plane.capacity() < self.len() {
-                // Fresh pages are zero already.
+                // Fresh pages are already zero.
                 *plane = vec![R::default(); self.len()];
                 continue;
             }
@@ -107,7 +107,7 @@ pub(super) struct Scratch<R> {
     /// Changes of even-even and odd-odd cells in the last two rows.
     pub change_ee: [Vec<R>; 2],
     pub change_oo: [Vec<R>; 2],
-    /// Residuals of even-odd cells in the last two rows, of odd-even and of even-even cells in one.
+    /// Residuals of even-odd cells in the last two rows, and of odd-even and even-even cells in the last row.
     pub residual_eo: [Vec<R>; 2],
     pub residual_oe: Vec<R>,
     pub residual_ee: Vec<R>,
@@ -138,7 +138,7 @@ impl<R: Real> Whole<R> {
     }
 }
 
-/// Reads all rows of the level `next` of that of `grid`, times `share`, into one of its planes.
+/// Reads all rows of `next`, the level after that of `grid`, times `share`, into one of its planes.
 #[inline(always)]
 pub(super) fn join<R: Real>(
     grid: &Grid,
@@ -171,7 +171,7 @@ pub(super) fn add_products<R: Real>(out: &mut [R], (w, a): (&[R], &[R]), (v, b):
 }
 
 impl<R: Real> Scratch<R> {
-    /// Makes all rows zero, and as long as `grid` and the `next` need them.
+    /// Makes all rows zero, and as long as `grid` and `next` need them.
     pub(super) fn reset(&mut self, grid: &Grid, next: &Grid) {
         let reset = |row: &mut Vec<R>, len: usize| {
             row.clear();

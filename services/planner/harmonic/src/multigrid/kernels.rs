@@ -26,7 +26,7 @@ pub(super) fn add_active<R: Real>(u: &mut [R], inverse: &[R], values: &[R]) {
     }
 }
 
-/// `own` where active, and four weighted values.
+/// The sum of `own` where active and four weighted values.
 #[inline(always)]
 pub(super) fn sum_weighted<R: Real>(
     out: &mut [R],
@@ -68,7 +68,8 @@ pub(super) fn gather<R: Real, const COUNT: usize>(out: &mut [R], terms: &[(&[R],
     }
 }
 
-/// The sum of products at one place of the rows. Pairwise, and by index: the compiler then keeps the rows in registers.
+/// The sum of products at one place of the rows. It is pairwise and by index: the compiler then keeps the rows in
+/// registers.
 #[inline(always)]
 fn sum_at<R: Real, const COUNT: usize>(terms: &[(&[R], &[R]); COUNT], x: usize) -> R {
     let product = |k: usize| terms[k].0[x] * terms[k].1[x];

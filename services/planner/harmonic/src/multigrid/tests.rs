@@ -1,4 +1,4 @@
-//! The algebra of the levels against dense matrices.
+//! Tests of the algebra of the levels against dense matrices.
 
 use super::grid::{EE, EO, OE};
 use super::*;
@@ -21,7 +21,7 @@ fn domain() -> Domain {
     ];
     let blocked = rows.iter().flat_map(|row| row.bytes().map(|cell| cell == b'#')).collect();
     let domain = Domain::new(11, 9, blocked, Cell::new(0, 0)).unwrap();
-    // k = 0.1.
+    // This length gives k = 0.1.
     domain.with_screening(&Screening::cells(0.5 / 0.1_f64.sqrt())).unwrap()
 }
 

@@ -13,19 +13,19 @@ use crate::multifrontal::{BreadthFirst, Budget, Tree};
 use crate::real::Real as _;
 use crate::store::Store;
 
-/// Free space of this mean width, cells, is left to multigrid without a further look.
+/// The mean width of free space, cells, from which multigrid is chosen without a further look.
 const WIDE: f64 = 32.0;
 
 /// Orders of magnitude of u that fit single precision between the largest and the smallest normal number, less some.
 const SINGLE_DECADES: f64 = 62.0;
 
-/// Measured on one machine; only their ratios matter. Nanoseconds.
+/// Nanoseconds, measured on one machine; only their ratios matter.
 const SET_UP_PER_CELL: f64 = 3.0;
 const SINGLE_CYCLE_PER_CELL: f64 = 1.1;
 const MULTIFRONTAL_PER_CELL: f64 = 65.0;
 const MULTIFRONTAL_PER_OPERATION: f64 = 0.15;
 
-/// A further band has a set-up of its own and more cycles, but no more than the cells that it is deep take: a cycle takes u some
+/// A further band has a set-up of its own and more cycles, but no more cycles than its depth in cells needs: a cycle takes u some
 /// cells further where u falls steeply.
 const BAND_PER_CELL: f64 = 15.0;
 const BAND_CYCLE_PER_CELL: f64 = 2.2;
@@ -39,7 +39,7 @@ fn further_bands(bands: f64, decades_per_cell: f64) -> f64 {
     bands.max(0.0) * (BAND_PER_CELL + BAND_CYCLE_PER_CELL * cycles)
 }
 
-/// Cycles multigrid takes for a range of u: in narrow passages one converges three to four orders of magnitude.
+/// Cycles of multigrid for a range of u: in narrow passages one cycle converges three to four orders of magnitude.
 fn cycles(decades: f64) -> f64 {
     6.0 + decades / 3.5
 }
@@ -60,7 +60,7 @@ impl Plan {
     }
 }
 
-/// The plan for `domain`; the multifrontal factorisation is in it only as the last resort where `budget` refuses it.
+/// The plan for `domain`. If `budget` refuses the multifrontal factorisation, it is only the last resort.
 ///
 /// # Errors
 /// [`SolveError::Cancelled`].
@@ -86,7 +86,7 @@ pub(super) fn plan(
     let first = SET_UP_PER_CELL + SINGLE_CYCLE_PER_CELL * cycles(decades.min(SINGLE_DECADES));
     let further = further_bands(decades / SINGLE_DECADES - 1.0, per_cell);
     let cost = domain.blocked().len() as f64 * (first + further);
-    // The factorisation costs more than this on any map: no need to build its tree.
+    // The factorisation costs more than this on any map, so its tree is not built.
     if cost < 0.5 * MULTIFRONTAL_PER_CELL * cells {
         return Ok(multigrid);
     }
@@ -113,7 +113,7 @@ fn cheaper_tree(
     }
 }
 
-/// The cells in which u is smaller than `store` says, which has what single precision can hold, and the tree of their fronts; none if
+/// The cells whose u is smaller than that in `store`, which has the range of single precision, and the tree of their fronts; none if
 /// multigrid in bands costs less.
 ///
 /// # Errors
@@ -156,7 +156,7 @@ fn mean_width(domain: &Domain) -> f64 {
     let mut above: &[bool] = &walls;
     let (mut free, mut along_rows, mut along_columns) = (0_usize, 0_usize, 0_usize);
     for row in domain.blocked().chunks_exact(width) {
-        // Short sums in bytes, which the compiler adds up sixteen or more at a time.
+        // Short sums fit in bytes, of which the compiler adds up sixteen or more at a time.
         for (row, above) in row.chunks(128).zip(above.chunks(128)) {
             let (mut open, mut starts) = (0_u8, 0_u8);
             for (&here, &above) in row.iter().zip(above) {

@@ -1,4 +1,4 @@
-//! The field by elimination, whatever it costs, and how far directions are from those of another field.
+//! The field by elimination, and the angles between its directions and those of another field.
 
 use std::num::NonZeroUsize;
 
@@ -32,22 +32,23 @@ pub fn exact(domain: &Domain) -> Result<Field, SolveError> {
 /// Angles between the directions of two fields of one map, degrees, over the cells that can reach the target.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Angles {
-    /// Half of the directions are off by no more.
+    /// The median.
     pub p50: f64,
-    /// 99 of 100 are off by no more.
+    /// The 99th percentile.
     pub p99: f64,
-    /// The largest.
+    /// The largest angle.
     pub max: f64,
-    /// The largest away from saddle points: of the cells where u changes by at least [`CLEAR`] of itself from one cell to the next.
+    /// The largest angle away from saddle points: in cells where u changes by at least [`CLEAR`] of itself from one cell to the
+    /// next.
     pub clear_max: f64,
 }
 
-/// A direction is clear from this relative change of u a cell on. Nearer to a saddle point, a change of u by a thousandth turns the
-/// direction by degrees in any solution.
+/// The relative change of u to the next cell from which on a direction is clear. Nearer to a saddle point, a change of u by a
+/// thousandth turns the direction by degrees in any solution.
 const CLEAR: f64 = 2e-3;
 
 impl Angles {
-    /// The angles between `field` and `right`, of the cells `counted` holds for.
+    /// The angles between `field` and `right`, of the cells for which `counted` holds.
     pub fn between(field: &Field, right: &Field, counted: impl Fn(Cell) -> bool) -> Self {
         let mut angles = Vec::new();
         let mut clear_max = 0.0_f64;

@@ -1,4 +1,4 @@
-//! Generated maps: the kinds of place a ground robot meets, and the ones that break solvers.
+//! Generated maps: the kinds of place a ground robot meets, and those that break solvers.
 
 use super::random::Random;
 use crate::cell::Cell;
@@ -34,7 +34,7 @@ pub struct Map {
     pub width: usize,
     pub height: usize,
     pub blocked: Vec<bool>,
-    /// A free cell.
+    /// The target, a free cell.
     pub target: Cell,
 }
 
@@ -159,13 +159,14 @@ impl Map {
         }
     }
 
-    /// Columns and rows of squares of this side, with walls of one cell between them, that the map has room for.
+    /// The number of columns and rows of squares of this side, with walls of one cell between them, for which the map has
+    /// room.
     fn squares(&self, side: usize) -> (usize, usize) {
         let count = |cells: usize| cells.saturating_sub(1) / (side + 1);
         (count(self.width), count(self.height))
     }
 
-    /// Frees nothing but the squares of this side in `pairs`, each joined to the other by an opening of the same width.
+    /// Frees only the squares of this side in `pairs`, each joined to the other by an opening of the same width.
     fn carve(&mut self, side: usize, pairs: impl IntoIterator<Item = Pair>) {
         let pitch = side + 1;
         self.fill(0..self.width, 0..self.height, true);

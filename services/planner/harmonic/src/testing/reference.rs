@@ -21,7 +21,7 @@ impl Reference {
         let cells = domain.blocked().len();
         let target = domain.target().row * width + domain.target().col;
         let free = |i: usize| !domain.blocked()[i];
-        // Row i keeps its couplings (positive, i.e. minus the entry) to i + 1 ..= i + width, and its diagonal.
+        // Row i has its couplings (positive, i.e. minus the entry) to i + 1 ..= i + width, and its diagonal.
         let mut coupling = vec![0.0; cells * width];
         let mut diagonal = vec![1.0; cells];
         let mut right = vec![Scaled::ZERO; cells];
@@ -70,7 +70,7 @@ impl Reference {
         self.u[self.domain.index(cell)]
     }
 
-    /// Central difference of u in units of the largest u around, and that largest; `None` where u is zero.
+    /// Central difference of u in units of the largest u around, and that largest u; `None` where u is zero.
     pub fn gradient(&self, cell: Cell) -> Option<[f64; 2]> {
         let i = self.domain.index(cell);
         let [west, east, north, south] = self.around(i);
@@ -148,7 +148,7 @@ pub fn angle(a: [f64; 2], b: [f64; 2]) -> f64 {
 pub fn follow(field: &Field) -> f64 {
     let width = field.width();
     let cell = |index: usize| Cell::new(index % width, index / width);
-    // Whether the walk from a cell arrives, once known.
+    // For each cell, whether the walk from it arrives, once known.
     let mut arrives = vec![None; width * field.height()];
     arrives[field.target().row * width + field.target().col] = Some(true);
     let (mut arrived, mut all) = (0_usize, 0_usize);

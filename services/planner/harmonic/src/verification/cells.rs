@@ -28,7 +28,7 @@ pub(crate) struct Check {
 }
 
 impl Check {
-    /// The result for the cells of both.
+    /// The combined result of both.
     pub(super) fn and(self, other: Self) -> Self {
         Self {
             worst_residual: self.worst_residual.max(other.worst_residual),
@@ -67,21 +67,21 @@ pub(super) struct Around<'a, R> {
     pub south: &'a [R],
 }
 
-/// The equations of the cells of a row, and how well they hold.
+/// The equations of the cells of a row, and their residuals.
 pub(super) struct Cells<R> {
     /// 0.25 / (1 + k) of each cell, 0 where no equation holds.
     pub weights: Vec<R>,
     weights_set: bool,
     /// Relative residuals, with their signs, of the cells an equation holds for.
     pub residuals: Vec<R>,
-    /// (|grad u| / u)^2 of the same.
+    /// (|grad u| / u)^2 of the cells in `residuals`.
     pub slopes: Vec<R>,
     /// Cells in which u is no larger are not checked.
     floor: R,
 }
 
 impl<R: Real> Cells<R> {
-    /// Rows of so many cells, of which those with a larger u than `floor` are checked.
+    /// Rows of `width` cells, of which those with a larger u than `floor` are checked.
     pub(super) fn above(width: usize, floor: f64) -> Self {
         let row = vec![R::default(); width];
         Self {
@@ -134,7 +134,7 @@ impl<R: Real> Cells<R> {
         }
     }
 
-    /// Checks the cells of `columns`, `raw` as stored.
+    /// Checks the cells of `columns`; `raw` are their stored values.
     #[inline(always)]
     pub(super) fn check(
         &mut self,
@@ -160,7 +160,7 @@ impl<R: Real> Cells<R> {
             let best = larger(larger(west[x], east[x]), larger(north[x], south[x]));
             let positive = here[x] > floor;
             reachable += u32::from(positive);
-            // A value that is no number is neither blocked nor positive: unreached.
+            // A value that is no number is neither blocked nor positive, so it counts as unreached.
             let blocked = raw[x] < zero;
             unreached += u32::from(!positive & !blocked & (sum > zero));
             let residual = here[x] - weights[x] * sum;

@@ -10,10 +10,10 @@ pub(super) trait Window<R> {
     /// A row as the field stores it.
     type Row<'f>;
 
-    /// Moves one row on; `next` is the one that comes in below, none after the last.
+    /// Moves one row on; `next` is the row below, none after the last.
     fn take(&mut self, next: Option<Self::Row<'_>>);
 
-    /// The middle row and what lies around it.
+    /// The middle row and the rows around it.
     fn around(&mut self) -> Around<'_, R>;
 }
 
@@ -88,7 +88,7 @@ impl ScaledRows {
 }
 
 impl Window<f64> for ScaledRows {
-    /// Mantissas and exponents.
+    /// The mantissas and exponents.
     type Row<'f> = (&'f [f64], &'f [i32]);
 
     #[inline(always)]

@@ -49,7 +49,7 @@ impl Tiles {
     }
 }
 
-/// The sum in lanes, whose order is the same whatever the width of vectors.
+/// The sum in lanes, whose order is the same with any width of vectors.
 #[inline(always)]
 fn sum<R: Real>(values: &[R]) -> f64 {
     let mut lanes = [R::default(); 16];

@@ -40,7 +40,7 @@ fn a_robot_on_a_wider_track_turns_less_than_its_counts_say() {
 
 #[test]
 fn an_aged_range_lags_a_turn_by_age_times_turn_rate() {
-    // A beam without width onto a rough wall: range + forward_m = 1.5 m / cos(heading).
+    // The beam has no width and meets a rough wall: range + forward_m = 1.5 m / cos(heading).
     let wall = "world.wall = [{ points = [[1.5, -9], [1.5, 9]] }]\n\
         [simulation.wheels]\nlag_s = 0\n\
         [simulation.sonar]\ncone_deg = 0\nlobe_deg = 0\nnoise_m = 0\nnoise_per_m = 0\n";
@@ -57,7 +57,7 @@ fn an_aged_range_lags_a_turn_by_age_times_turn_rate() {
         truth.heading.to_degrees() - (1.5 / (range + forward_m)).acos().to_degrees()
     };
     assert!(lag_deg(0.0).abs() < 0.5, "{}", lag_deg(0.0));
-    // 0.07 s at 1.4 rad/s.
+    // The robot turns for 0.07 s at 1.4 rad/s.
     assert!((lag_deg(0.07) - 5.6).abs() < 0.5, "{}", lag_deg(0.07));
     // No range is older than the tick before.
     let tick_deg = 1.4_f64.to_degrees() / 7.0;
@@ -77,7 +77,7 @@ fn wheels_count_on_at_a_contact_where_they_slip_and_not_where_they_stall() {
     };
     let (stalled, slipping) = (counted(0.0), counted(1.0));
     assert!((stalled.0 - 0.31).abs() < 0.005, "{stalled:?}");
-    // Four seconds at 0.25 m/s, less what the speed loop lags.
+    // The robot drives for four seconds at 0.25 m/s, less the lag of the speed loop.
     assert!((slipping.0 - 0.985).abs() < 0.02, "{slipping:?}");
     assert!(stalled.1 < 0.01 && slipping.1 > 0.24, "{stalled:?} {slipping:?}");
 }
@@ -144,7 +144,8 @@ fn what_is_low_is_heard_at_middle_ranges_only_and_touched_and_a_sill_is_passed_o
             let truth = robot.ground_truth();
             let ahead = 1.7 - truth.x - 0.1915;
             let heard = u32::from(truth.sonar_cm < 255);
-            // Its edge is too weak beyond 1.2 m; the beam passes above it nearer than 0.08 m / tan(15 degrees) = 0.3 m.
+            // The box's edge is too weak beyond 1.2 m; nearer than 0.08 m / tan(15 degrees) = 0.3 m the beam passes above
+            // it.
             if !(0.27..1.25).contains(&ahead) {
                 outside += heard;
             } else if (0.35..1.15).contains(&ahead) {
