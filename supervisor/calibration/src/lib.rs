@@ -1,8 +1,8 @@
-//! How the wheels of a robot differ from nominal ones: their ratio, the track on the ground, and how much they slip.
+//! Calibration: the differences between a robot's wheels and nominal ones, which are their ratio, the track on the ground, and their slip.
 //!
 //! A calibration is a run whose planner stage is [`shell::Shell`]. It orders loops before a wall. The normal of the wall, found by turning
-//! to and fro, says by how much the robot really turned between two visits, and the encoders say by how much they took it to turn.
-//! The stage saves what it found in each tick, and the command reads that when the run has ended.
+//! to and fro, shows how far the robot really turned between two visits, and the encoders show how far it turned by them. The stage saves
+//! its findings in each tick, and the command reads them when the run has ended.
 //!
 //! | module | holds |
 //! |---|---|

@@ -28,7 +28,7 @@ const PRIOR_LN_SLIP: f64 = 1.2;
 /// The values of slip that are considered: from the least to the greatest by equal factors.
 const SLIPS: u32 = 60;
 const LEAST_SLIP: f64 = 0.0001;
-/// More slip than this is no floor to drive on.
+/// The greatest slip of a floor that can be driven on.
 const MOST_SLIP: f64 = 0.01;
 /// The prior of a normal's standard deviation, radians, and the number of sweeps that it is worth.
 const PRIOR_NORMAL_RAD: f64 = 0.01;
@@ -39,15 +39,15 @@ pub const HELD_OUT: usize = 2;
 pub const FEWEST_LOOPS: usize = 6;
 /// Deviations within which the loops that are held out must lie.
 const AGREES: f64 = 3.0;
-/// A residual of more deviations is an accident; two are a fault of the floor or the robot.
+/// The deviations of a residual beyond which it is an accident; two such residuals are a fault of the floor or the robot.
 const ACCIDENT: f64 = 5.0;
-/// The most of chi^2 per degree of freedom.
+/// The greatest chi^2 per degree of freedom.
 const MOST_CHI2: f64 = 4.0;
 
 /// A loop, from one visit to the wall to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Loop {
-    /// Its number among all loops; those next to each other share a normal.
+    /// The number of the loop among all; those next to each other share a normal.
     pub number: u32,
     /// Whole turns, counter-clockwise positive.
     pub turns: f64,
@@ -120,7 +120,7 @@ pub struct Estimate {
     covariance: Matrix2<f64>,
     pub slip: f64,
     pub slip_sd: f64,
-    /// Of each loop, in units of its standard deviation.
+    /// The residual of each loop, in units of its standard deviation.
     pub residuals: Vec<f64>,
     pub chi2_per_dof: f64,
 }
@@ -150,7 +150,7 @@ pub enum Refusal {
     Singular,
 }
 
-/// What is fitted: a row for each loop.
+/// The data of the fit: a row for each loop.
 struct Rows {
     design: DMatrix<f64>,
     values: DVector<f64>,
@@ -242,8 +242,8 @@ impl Estimate {
         values.copied().all(f64::is_finite)
     }
 
-    /// How far an end by tape is from what these wheels predict, in standard deviations of a coordinate. `by` gives the end by wheels,
-    /// and its variance by slip of 1.
+    /// The distance of an end by tape from the prediction by these wheels, in standard deviations of a coordinate. `by` gives the end by
+    /// wheels, and its variance by slip of 1.
     pub(crate) fn deviations_of_end(
         &self,
         by: impl Fn(Wheels) -> (DVec2, f64),
@@ -252,7 +252,7 @@ impl Estimate {
     ) -> f64 {
         let (here, by_slip) = by(self.wheels());
         let square = self.slip.powi(2) + self.slip_sd.powi(2);
-        // The values that are a deviation off, along the axes of their ellipse.
+        // These are the values that are a deviation off, along the axes of their ellipse.
         let axes = self.covariance.symmetric_eigen();
         let by_values: f64 = (0..2)
             .map(|axis| {
@@ -293,7 +293,7 @@ impl Estimate {
         Wheels { e: self.values.x, track: self.values.y }
     }
 
-    /// How far `held_out` is from what this predicts, in standard deviations of the prediction.
+    /// The difference of `held_out` from the prediction of this estimate, in standard deviations of the prediction.
     fn deviations(&self, held_out: &Loop, normal_sd: f64, track_m: f64) -> f64 {
         let rows = Rows::of(&[*held_out], normal_sd, track_m);
         let square = self.slip * self.slip + self.slip_sd * self.slip_sd;
@@ -319,11 +319,11 @@ impl Estimate {
     }
 }
 
-/// The wheels by `loops`, and those that were used, if they agree: at most one is an accident, which is left out, and two that are held
-/// out lie where the others say.
+/// The wheels by `loops`, and the loops that were used, if they agree: at most one is an accident, which is left out, and two that are
+/// held out lie where the others predict.
 ///
 /// # Errors
-/// Why nothing may be written.
+/// The reason why nothing may be written.
 pub fn checked(
     loops: &[Loop],
     normal_sd: f64,
@@ -358,7 +358,7 @@ pub fn checked(
     let by_others = Estimate::of(others, normal_sd, track_m)?;
     for held_out in held_out {
         let deviations = by_others.deviations(held_out, normal_sd, track_m).abs();
-        // What is no number does not agree.
+        // A deviation that is no number does not agree.
         let agrees = deviations <= AGREES;
         if !agrees {
             return Err(Refusal::Contradicted { deviations });

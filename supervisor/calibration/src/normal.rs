@@ -2,10 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-/// An echo is of the wall if its range is within so much of the median, metres. A rough wall answers over the whole sweep; the next
-/// of these limits leaves its ends out.
+/// The distances from the median range within which an echo is of the wall, metres. A rough wall answers over the whole sweep; the next of
+/// these limits leaves its ends out.
 const WITHIN_M: [f64; 3] = [0.12, 0.06, 0.03];
-/// Readings at either end of a leg that must not be of the wall: the arc that answers is whole.
+/// The readings at either end of a leg that must not be of the wall: then the arc that answers is whole.
 const MARGIN: usize = 2;
 /// The fewest readings of a wall.
 const FEWEST: usize = 5;
@@ -66,8 +66,8 @@ impl Leg {
 pub(crate) struct Normal {
     /// The heading that faces the wall, radians.
     pub(crate) heading: f64,
-    /// The middle of the first turn's arc less that of the second one. The age of the ranges makes it the same in each sweep; its scatter is
-    /// that of the normals.
+    /// The middle of the first turn's arc less that of the second one. The age of the ranges makes this the same in each sweep; its scatter
+    /// is that of the normals.
     pub(crate) difference: f64,
     /// The distance of the wall from the sonar, metres.
     pub(crate) range_m: f64,
@@ -76,7 +76,7 @@ pub(crate) struct Normal {
 /// A sweep that gives no normal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NoNormal {
-    /// A leg has not seen both ends of the arc that answers.
+    /// A leg has not both ends of the arc that answers.
     Narrow,
     /// The arcs of both legs are not alike.
     Unequal,
@@ -103,7 +103,7 @@ pub(crate) fn normal(legs: &[Leg; 2]) -> Result<Normal, NoNormal> {
 mod tests {
     use super::*;
 
-    /// A turn from `from` to `to`, in which a wall at heading `wall` answers within `half` to either side, `late` radians behind.
+    /// A turn from `from` to `to`, with a wall at heading `wall` that answers within `half` to either side, `late` radians behind.
     fn leg(from: f64, to: f64, wall: f64, half: f64, late: f64) -> Leg {
         let mut leg = Leg::default();
         for step in 0..=90 {

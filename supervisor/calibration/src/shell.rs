@@ -72,7 +72,7 @@ pub struct Shell {
     guidance: Writer<GuidanceSample>,
     saved: Saved,
     body: Body,
-    /// Where the robot faces the wall.
+    /// The place where the robot faces the wall.
     target: TargetSample,
     drive: Drive,
     poses: VecDeque<PoseSample>,
@@ -164,7 +164,7 @@ impl Shell {
             distance_m: self.target.target.position().distance(DVec2::new(order.x_m, 0.0)),
             speed_limit_m_s: order.speed_limit_m_s,
             status: order.status.into(),
-            // The place before the wall: dead reckoning with uncalibrated wheels would be metres off after some loops.
+            // This is the place before the wall: dead reckoning with uncalibrated wheels would be metres off after some loops.
             x_m: order.x_m,
             y_m: 0.0,
             heading_rad,

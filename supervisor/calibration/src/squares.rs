@@ -17,7 +17,7 @@ use crate::{
     ways::Ways,
 };
 
-/// A corner is turned when so much is left, radians; it is ordered at most so far ahead.
+/// The rest of a corner at which it counts as turned, radians; the order is at most this far ahead.
 const TURNED_RAD: f64 = 0.03;
 const SLOW_RAD: f64 = 0.08;
 const FAST_RAD: f64 = 0.5;
@@ -197,7 +197,7 @@ fn estimate(squares: &[Driven], track_m: f64) -> Result<Estimate, Refusal> {
 /// The wheels by `squares`, if the last pair lies where the others say.
 ///
 /// # Errors
-/// Why nothing may be written.
+/// The reason why nothing may be written.
 pub fn checked(squares: &[Driven], track_m: f64) -> Result<Estimate, Refusal> {
     if squares.len() < FEWEST_SQUARES {
         return Err(Refusal::TooFewSquares { found: squares.len() });
@@ -207,7 +207,7 @@ pub fn checked(squares: &[Driven], track_m: f64) -> Result<Estimate, Refusal> {
     for square in held_out {
         let deviations =
             by_others.deviations_of_end(|wheels| square.by(wheels, track_m), square.end, TAPE_M);
-        // What is no number does not agree.
+        // A deviation that is no number does not agree.
         let agrees = deviations <= AGREES;
         if !agrees {
             return Err(Refusal::Contradicted { deviations });

@@ -20,19 +20,19 @@ use crate::{
 /// The range at which a drive to the wall ends, metres, and that at which it goes slowly.
 const STOP_M: f64 = 0.42;
 const NEAR_M: f64 = 0.7;
-/// A drive away from the wall ends when something is so near ahead, metres.
+/// The free distance ahead below which a drive away from the wall ends, metres.
 const AHEAD_M: f64 = 0.5;
 /// The longest first drive to the wall, metres, and the readings without an echo at which it ends before.
 const APPROACH_M: f64 = 2.0;
 const SILENT: u32 = 7;
-/// A single near echo may be false: so many in a row are none.
+/// The number of near echoes in a row that count: a single one may be false.
 const NEAR: u32 = 2;
-/// The shortest drive away of which a loop learns something, metres.
+/// The shortest drive away from which a loop gains knowledge, metres.
 const SHORTEST_M: f64 = 0.5;
-/// A drive back that comes so much nearer to the wall than it may has missed the wall's echo, metres.
+/// The distance beyond its limit at which a drive back has missed the wall's echo, metres.
 const BEYOND_M: f64 = 0.15;
-/// Half the angle of a sweep. One that was too narrow, because the robot had turned by less or more than it took itself to, is followed
-/// by one that is wider by a third, up to the greatest share.
+/// Half the angle of a sweep. If a sweep was too narrow, because the robot turned by less or more than it reckoned, the next one is
+/// wider by a third, up to the greatest share.
 const SWEEP_RAD: f64 = FRAC_PI_4;
 const WIDER: f64 = 1.0 / 3.0;
 const MOST_WIDER: u32 = 2;
@@ -41,11 +41,11 @@ const SWEEPS: u32 = 5;
 /// Whole turns of a loop before the half one: the first number of them after which the heading is known this well, radians.
 const TURNS: [f64; 2] = [3.0, 1.0];
 const HEADING_SD_RAD: f64 = 0.13;
-/// The controller turns on the spot by a rate in proportion to the angle that is left, at least 0.25 rad/s: so much ahead of the robot
-/// is the direction that it is ordered to, radians, in a sweep and at most in another turn.
+/// The angle by which the ordered direction is ahead of the robot, radians, in a sweep and at most in another turn. The controller
+/// turns on the spot by a rate in proportion to the angle that is left, at least 0.25 rad/s.
 const SLOW_RAD: f64 = 0.08;
 const FAST_RAD: f64 = 0.5;
-/// A turn is over when so much is left, radians.
+/// The rest of a turn at which it is over, radians.
 const TURNED_RAD: f64 = 0.04;
 /// Speeds, m/s.
 const SPEED_M_S: f64 = 0.35;
@@ -62,7 +62,7 @@ pub struct Wall {
     wheels: Wheels,
     /// The ways when the robot faced the wall.
     visit: Ways,
-    /// Whether that is a normal that was measured: the first one is where the robot started.
+    /// Whether the wall was faced by a measured normal: at first it is where the robot started.
     is_measured: bool,
     /// The heading of the wall that is expected next, radians.
     facing: f64,
@@ -78,7 +78,7 @@ pub struct Wall {
     near: u32,
     silent: u32,
     sweeps: u32,
-    /// How often the sweep was made wider.
+    /// The number of times that the sweep was made wider.
     wider: u32,
     legs: [Leg; 2],
     /// Differences between the two ways of each sweep, radians.
@@ -90,13 +90,13 @@ pub struct Wall {
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 enum Phase {
-    /// To the wall.
+    /// The robot drives to the wall.
     Approach,
-    /// To the beginning of the sweep.
+    /// The robot turns to the beginning of the sweep.
     Aside,
     /// The sweep: the first leg, then the second.
     Sweep(usize),
-    /// Turns, and away from the wall.
+    /// The robot turns, before it drives away from the wall.
     Turn(f64),
     Away(f64),
     /// The half turn back to the wall.
@@ -290,7 +290,7 @@ impl Wall {
                 return;
             }
         };
-        // The wheels stood there if the robot had turned on the spot from here to the normal.
+        // The wheels would stand there if the robot had turned on the spot from here to the normal.
         let aside_m = (normal.heading - nominal) * body.track_m / 2.0;
         let mut faced = self.ways;
         faced.left_m -= aside_m;
@@ -325,7 +325,7 @@ impl Wall {
         SWEEP_RAD * (1.0 + WIDER * f64::from(self.wider))
     }
 
-    /// The whole turns of the next loop: none before both sides were tried once.
+    /// The whole turns of the next loop: none until both sides were tried once.
     fn turns(&self, estimate: Option<&Estimate>, body: &Body) -> f64 {
         let Some(estimate) = estimate.filter(|_| self.loops.len() >= 2) else {
             return 0.0;
@@ -364,7 +364,7 @@ impl Wall {
         };
         let is_near = echo_m.is_some_and(|echo| echo <= NEAR_M);
         let speed = if is_near { NEAR_M_S } else { SPEED_M_S };
-        // Beyond the end of a leg, so that the robot is still turning there.
+        // The ordered direction is beyond the end of a leg, so that the robot is still turning there.
         let beyond = self.half_rad() + SLOW_RAD;
         let (status, aside_rad, speed_limit_m_s) = match self.phase {
             Phase::Approach => along(self.facing, speed),
@@ -374,7 +374,7 @@ impl Wall {
             Phase::Turn(target) => turn(target, true),
             Phase::Away(target) => along(target, SPEED_M_S),
             Phase::Back => turn(self.facing, true),
-            // Either way the run is over.
+            // The run is over in both phases.
             Phase::Finished | Phase::Failed(_) => (GuidanceStatus::AtTarget, 0.0, 0.0),
         };
         let driven = (self.ways.arc_m() - self.phase_from_m).abs();

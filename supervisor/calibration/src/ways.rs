@@ -9,7 +9,7 @@ pub(crate) struct Ways {
     counts: Option<[u16; 2]>,
     pub(crate) left_m: f64,
     pub(crate) right_m: f64,
-    /// The sum of both, each counted forward whichever way it rolled.
+    /// The sum of both ways, each counted forward whichever way the wheel rolled.
     pub(crate) rolled_m: f64,
 }
 

@@ -38,8 +38,8 @@ use crate::tools::{
 };
 use crate::{console::failure::Failure, renamed};
 
-/// Declares the subcommands by groups: the name of each and the module that has its `Arguments` and its `main`, which takes in
-/// addition what stands in parentheses. `@tools`, `@page`, `@foxglove` and `@simulator` are the features without which it
+/// Declares the subcommands by groups: the name of each and the module that has its `Arguments` and its `main`, whose further
+/// arguments stand in parentheses. `@tools`, `@page`, `@foxglove` and `@simulator` are the features without which a subcommand
 /// does not exist.
 macro_rules! commands {
     ($($heading:literal {
@@ -177,7 +177,7 @@ pub(crate) fn command_line() -> clap::Command {
     Arguments::command()
 }
 
-/// The subcommand that `words` name, those after the executable.
+/// The subcommand that `words` name, which stand after the executable.
 pub(crate) fn parse<T: AsRef<OsStr>>(words: &[T]) -> Result<Command, clap::Error> {
     let executable = OsString::from("firsthand");
     let words = std::iter::once(executable).chain(renamed::words(words));
@@ -186,7 +186,7 @@ pub(crate) fn parse<T: AsRef<OsStr>>(words: &[T]) -> Result<Command, clap::Error
 }
 
 impl Command {
-    /// From which level on standard error shows the log; none where the command sees to its log itself.
+    /// The least level of the log on standard error; none if the command sees to its log itself.
     pub(crate) fn log_level(&self) -> Option<&'static str> {
         match self {
             Self::Run(_) => None,
@@ -198,7 +198,7 @@ impl Command {
             // A client could fill the log with its own errors.
             #[cfg(feature = "foxglove")]
             Self::Foxglove(_) => Some("error,foxglove=off"),
-            // What is refused of what others ask is said.
+            // Refused requests of other nodes are logged.
             #[cfg(feature = "tools")]
             Self::Ros2(_) => Some("warn,rustdds=off"),
             _ => Some("error"),

@@ -1,4 +1,4 @@
-//! Where this process logs: to standard error, to a file, and, under systemd, to the journal.
+//! The log of this process: to standard error, to a file, and, under systemd, to the journal.
 //!
 //! The journal takes lines from standard error and reads a priority from a leading `<N>` (sd-daemon(3)); it
 //! records the time itself. That needs no library, and a line is the same wherever it is read.
@@ -37,7 +37,7 @@ pub(crate) fn to_journal() -> bool {
     journal.to_str() == Some(&format!("{}:{}", found.dev(), found.ino()))
 }
 
-/// Log to standard error what FIRSTHAND_LOG asks for, or else everything from level `default` up.
+/// Log to standard error as FIRSTHAND_LOG says, or else everything from level `default` up.
 pub(crate) fn to_stderr(default: &str) {
     start(vec![stderr_layer()], default);
 }
@@ -67,7 +67,7 @@ fn stderr_layer() -> AnyLayer {
 
 fn start(layers: Vec<AnyLayer>, default: &str) {
     let filter =
-        // The library of ROS 2 remarks on each of its sockets and on each message that it sends to itself. Of two levels the later counts.
+        // The library of ROS 2 logs each of its sockets and each message that it sends to itself. Of two levels the later one counts.
         EnvFilter::try_from_env("FIRSTHAND_LOG")
             .unwrap_or_else(|_| EnvFilter::new(format!("rustdds=error,{default}")));
     tracing_subscriber::registry().with(layers).with(filter).init();

@@ -1,4 +1,4 @@
-//! The subcommands that a robot does without, and what only they need.
+//! The subcommands that a robot does not need, and the code that only they use.
 
 pub(crate) mod bench;
 pub(crate) mod calibrate;

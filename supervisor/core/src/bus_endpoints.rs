@@ -38,7 +38,7 @@ pub(crate) struct BusEndpoints {
     /// The request that was answered last, and the answer; 0 for none.
     last_request: (u64, RequestAnswer),
     published: Option<Instant>,
-    // Dropped last.
+    // The bus is dropped last.
     bus: Rc<Bus>,
 }
 
@@ -95,7 +95,7 @@ impl BusEndpoints {
         self.requests.take()
     }
 
-    /// The request `id` has this answer, which the roster tells from now on.
+    /// Note that the request `id` has this answer, which the roster has from now on.
     pub(crate) const fn answered(&mut self, id: u64, answer: RequestAnswer) {
         self.last_request = (id, answer);
     }
@@ -141,7 +141,7 @@ impl BusEndpoints {
         self.tick_limit.publish(tick, time, limit)
     }
 
-    /// Publish a death. It only reports, so a failure is a warning in the log.
+    /// Publish a death. A failure is a warning in the log, because this only reports.
     pub(crate) fn publish_death(&mut self, death: DeathSample) {
         let stamp = self.observer.record.pose.unwrap_or_default().stamp;
         warn_if_failed(self.deaths.publish(stamp.tick, stamp.time(), death));

@@ -14,7 +14,7 @@ const DELAY: Duration = Duration::from_millis(50);
 /// The cleanup that is due, and the time of the last one.
 pub(crate) struct Cleanup {
     done: Instant,
-    /// Deaths since then, and when the last one was.
+    /// Deaths since that time, and the time of the last one.
     deaths: (usize, Instant),
     /// Ended processes whose resources are not all freed.
     pending: Vec<u32>,
@@ -26,7 +26,7 @@ impl Cleanup {
         Self { done: now, deaths: (0, now), pending: Vec::new() }
     }
 
-    /// These stages died. Their successors are started already.
+    /// Note that these stages died. Their successors are started already.
     pub(crate) fn on_deaths(&mut self, deaths: &[Death], bus: &Bus) {
         if deaths.is_empty() {
             return;
@@ -39,8 +39,9 @@ impl Cleanup {
         }
     }
 
-    /// Clean up if it is due. After deaths it is due once no stage is starting, because a starting stage would wait for the cleanup,
-    /// which takes about as long as a start. It is due earlier if so many processes died that places on the bus may run out.
+    /// Clean up if that is due. After deaths it is due once no stage is starting, because a starting stage would wait for the
+    /// cleanup, which takes about as long as a start. It is due earlier if so many processes died that places on the bus may run
+    /// out.
     pub(crate) fn run_if_due(&mut self, bus: &Bus, any_starting: bool) {
         let (deaths, last) = self.deaths;
         let quiet = deaths > 0 && last.elapsed() >= DELAY && !any_starting;

@@ -16,7 +16,7 @@ use serde::Serialize;
 
 use crate::process::ExitCause;
 
-/// Bytes of its log that are recorded with a stage's death: a few lines.
+/// Bytes of a stage's log that are recorded with its death: a few lines.
 const LOG_TAIL_BYTES: u64 = 400;
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -25,11 +25,11 @@ pub struct Death {
     pub pid: u32,
     pub generation: u32,
     pub cause: ExitCause,
-    /// Whether the supervisor ended it because it hung or was never ready.
+    /// Whether the supervisor ended the process because it hung or was never ready.
     pub hung: bool,
     /// Age of its last beat when the supervisor noticed.
     pub noticed_after_s: Option<f64>,
-    /// Age of its last beat; none if it never beat.
+    /// Age of its last beat; none if the process never beat.
     pub beat_age_s: Option<f64>,
     /// Age of the process.
     pub uptime_s: f64,
@@ -47,13 +47,13 @@ pub enum Next {
     StartLater {
         after_s: f64,
     },
-    /// It died too often: only an operator starts it again.
+    /// The stage died too often: only an operator starts it again.
     Hold,
     Nothing,
 }
 
 impl Death {
-    /// Whether it ended because the bus refused it.
+    /// Whether the process ended because the bus refused it.
     pub fn was_refused(&self) -> bool {
         self.cause == ExitCause::Exited(start::REFUSED.into())
     }
@@ -110,7 +110,7 @@ fn nanoseconds(seconds: f64) -> u64 {
     Duration::try_from_secs_f64(seconds).map_or(u64::MAX, |time| time.as_nanos() as u64)
 }
 
-/// The end of a stage's log, from where a line begins; empty if there is none.
+/// The end of a stage's log, from the beginning of a line; empty if there is none.
 pub(crate) fn log_tail(log: &Path, since: u64) -> String {
     let read = || -> io::Result<Vec<u8>> {
         let mut file = File::open(log)?;
@@ -122,7 +122,7 @@ pub(crate) fn log_tail(log: &Path, since: u64) -> String {
     };
     let bytes = read().unwrap_or_default();
     let text = String::from_utf8_lossy(&bytes);
-    // The first line may be half of one.
+    // The first line may be incomplete.
     let whole = match text.split_once('\n') {
         Some((_, rest)) if bytes.len() as u64 == LOG_TAIL_BYTES => rest,
         _ => &text,

@@ -20,7 +20,7 @@ pub(crate) fn first_contact(truth: &[GroundTruthTick]) -> Option<&GroundTruthTic
 #[derive(Debug, PartialEq)]
 pub(crate) struct Decided {
     pub ending: Ending,
-    /// The last complete tick; none where no tick decided. The tick of a contact, a timeout or a stall may be incomplete,
+    /// The last complete tick; none if no tick decided. The tick of a contact, a timeout or a stall may be incomplete,
     /// because the stages are stopped during it.
     pub last_tick: Option<u64>,
     /// Number of ticks of the ground truth that count: up to the contact, or up to the last tick.
@@ -30,7 +30,7 @@ pub(crate) struct Decided {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Timeout {
     pub deadline: Deadline,
-    /// Time is that of the simulated robot's own clock, which also counts ticks that nobody received: in lockstep.
+    /// Whether time is that of the simulated robot's own clock, which also counts ticks that nobody received, in lockstep.
     pub by_robot: bool,
 }
 
@@ -71,7 +71,7 @@ pub(crate) fn first(
         return undecided(ending);
     };
     let last_tick = match ending.outcome {
-        // The command of the arrival is the last of the mission.
+        // The command of the arrival is the last command of the mission.
         Outcome::Reached => tick,
         _ => tick.saturating_sub(1),
     };

@@ -28,7 +28,7 @@ const SMALL_TOPICS_BYTES: u64 = (16 << 20) + (32 << 20);
 /// that are under way at once.
 const CELL_BYTES: u64 = 8 * 13;
 
-/// A killed supervisor holds its lock no longer than this, even on a loaded machine.
+/// The longest time that a killed supervisor holds its lock, even on a loaded machine.
 const LAST_HOLDER_ENDS: Duration = Duration::from_secs(1);
 /// Pause between attempts to lock. A file lock has no descriptor to wait on.
 const RETRY: Duration = Duration::from_millis(10);
@@ -36,24 +36,24 @@ const RETRY: Duration = Duration::from_millis(10);
 /// A domain locked by this process. Dropping it removes all files of the domain.
 pub struct DomainLock {
     domain: Domain,
-    // Dropped before the files are removed.
+    // The bus is dropped before the files are removed.
     bus: Option<(Services, Rc<Bus>)>,
-    // Locked while the bus is made and removed, so that no stage joins meanwhile.
+    // This lock is held while the bus is made and removed, so that no stage joins meanwhile.
     stages_lock: Option<File>,
-    // Locked likewise, so that no consumer joins meanwhile, except one that is stuck.
+    // This lock keeps consumers from joining while the bus is made and removed, except one that is stuck.
     joining_lock: Option<File>,
     cells: usize,
     _lock: File,
 }
 
 impl DomainLock {
-    /// Lock `domain`, remove the files of an earlier supervisor, create the services for a map of so many `cells`.
+    /// Lock `domain`, remove the files of an earlier supervisor, create the services for a map of `cells` cells.
     pub fn acquire(domain: Domain, cells: usize) -> Result<Self, DomainError> {
         descriptors::raise_limit().map_err(|limit| DomainError::Descriptors { limit })?;
         let lock = lock(&domain)?;
         let mut acquired =
             Self { domain, bus: None, stages_lock: None, joining_lock: None, cells, _lock: lock };
-        // No consumer takes the bus of a supervisor that was killed for the one that is made now.
+        // No consumer mistakes the bus of a supervisor that was killed for the new one.
         remove_file(&acquired.domain.middleware_config())?;
         remove_run(&acquired.domain)?;
         acquired.recreate_bus()?;
@@ -90,7 +90,7 @@ impl DomainLock {
 
 impl Drop for DomainLock {
     fn drop(&mut self) {
-        // The lock is removed last, with its directory; a process that waits for it then makes its own.
+        // The lock is removed last, with its directory; a process that waits for the lock then makes its own.
         let _ = self.clear();
         let domain = &self.domain;
         let _ = remove_run(domain);
@@ -101,14 +101,14 @@ impl Drop for DomainLock {
     }
 }
 
-/// The user's directory and the robot's in it, for their owner only.
+/// Make the user's directory and the robot's in it, for their owner only.
 fn make_directory(domain: &Domain) -> Result<(), DomainError> {
     let directory = domain.directory();
     let mut both = directory.parent().into_iter().chain([directory]);
     both.try_for_each(make_own_directory)
 }
 
-/// A directory for its owner only, in a place where another user may have made it before.
+/// Make a directory for its owner only, in a place where another user may have made it before.
 fn make_own_directory(path: &Path) -> Result<(), DomainError> {
     match DirBuilder::new().mode(0o700).create(path) {
         Ok(()) => {}
@@ -168,7 +168,7 @@ fn lock(domain: &Domain) -> Result<File, DomainError> {
     }
 }
 
-/// Remove what names a run and its link.
+/// Remove the links to a run and to its directory, and the socket of its link.
 fn remove_run(domain: &Domain) -> Result<(), DomainError> {
     let files = [domain.run_link(), domain.run_directory(), domain.stop_socket()];
     files.iter().try_for_each(|file| remove_file(file))
@@ -269,7 +269,7 @@ mod tests {
 
     use super::*;
 
-    /// A robot of this process: a test that was killed leaves nothing for the next.
+    /// The domain of a robot of this process, so that a killed test leaves nothing for the next.
     fn domain(name: &str) -> Domain {
         Domain::of(format!("{name}-{}", std::process::id()).parse().unwrap())
     }

@@ -18,8 +18,8 @@ pub enum ExecutableError {
     Refused(#[from] io::Error),
 }
 
-/// The absolute path of the executable `named`: a path from the current directory, or a plain name beside this
-/// executable or on `PATH`.
+/// The absolute path of the executable `named`: a path from the current directory, or a plain name beside this executable
+/// or on `PATH`.
 pub fn find(named: &Path) -> Result<PathBuf, ExecutableError> {
     let is_name = named.components().count() == 1 && !named.is_absolute();
     let is_name = is_name && !named.as_os_str().as_encoded_bytes().contains(&b'/');

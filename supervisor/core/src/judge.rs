@@ -16,12 +16,12 @@ use crate::{
     records,
 };
 
-/// A pipeline without a tick for so long, although nothing holds it, is stuck. This is time in which the supervisor ran: in
+/// The time without a tick after which a pipeline that nothing holds is stuck. This is time in which the supervisor ran: in
 /// lockstep mission time does not advance meanwhile, so the mission's own timeout would not end it.
 const NO_PROGRESS: Duration = Duration::from_secs(15);
 
-/// A robot that was told to stand and does not rest by then could not be stopped: the link has used each method of the
-/// protocol twice by then.
+/// The time after which a robot that was told to stand and does not rest could not be stopped: the link has used each
+/// method of the protocol twice by then.
 pub(crate) const RESTS_WITHIN: Duration = Duration::from_secs(5);
 
 /// The input of the judgement.
@@ -35,11 +35,11 @@ pub(crate) struct Snapshot<'a> {
     pub collision_m: Option<[f64; 2]>,
     pub time: MissionTime,
     pub deadline: Deadline,
-    /// Mission time advances with ticks, not with the wall clock.
+    /// Whether mission time advances with ticks, not with the wall clock.
     pub in_ticks: bool,
     /// The time when the newest tick was first seen or the order last changed, whichever is later.
     pub progress: Now,
-    /// The robot was once ready to drive.
+    /// Whether the robot was once ready to drive.
     pub was_ready: bool,
     pub reason: HoldReason,
     pub held: Vec<&'static str>,
@@ -54,7 +54,7 @@ pub(crate) struct Snapshot<'a> {
 pub(crate) struct Arrival {
     /// Distance of the newest pose from the target, metres.
     pub distance_m: f64,
-    /// When it was first seen.
+    /// The time when the arrival was first seen.
     pub since: Now,
 }
 
@@ -83,7 +83,7 @@ pub(crate) fn touched([x, y]: [f64; 2]) -> Ending {
 /// The deadline of a target. Time in which an operator stopped the robot does not count.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Deadline {
-    /// Mission time at which the robot was sent there, seconds.
+    /// Mission time at which the robot was sent to the target, seconds.
     pub began_s: f64,
     /// The mission's own limit, seconds.
     pub timeout_s: f64,
@@ -92,7 +92,7 @@ pub(crate) struct Deadline {
 }
 
 impl Deadline {
-    /// Mission time at which it is given up, seconds.
+    /// Mission time at which the target is given up, seconds.
     pub(crate) const fn at_s(self) -> f64 {
         self.began_s + self.timeout_s + self.stopped_s
     }
@@ -182,7 +182,7 @@ pub(crate) struct StopClock {
 }
 
 impl StopClock {
-    /// Seconds of the stop since the last call; `stopped` says whether one holds at `now`.
+    /// Seconds of the stop since the last call; `stopped` says whether a stop holds at `now`.
     pub(crate) fn passed_s(&mut self, stopped: bool, now: MissionTime) -> f64 {
         let before = std::mem::replace(&mut self.stopped_at, stopped.then_some(now));
         before.map_or(0.0, |before| now.since(before).as_secs_f64())

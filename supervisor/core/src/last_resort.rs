@@ -22,11 +22,12 @@ use common::{
 };
 use rustix::process::{Pid, Signal, kill_process};
 
-/// A healthy loop turns five times a second; on an overloaded machine it may take longer.
+/// The time without an iteration after which the loop hangs. A healthy loop turns five times a second; an overloaded machine may
+/// slow it.
 const STUCK: Duration = Duration::from_secs(2);
 /// Time between SIGTERM and SIGKILL to the stages.
 const GRACE: Duration = Duration::from_millis(300);
-/// The exit code of a run that ends like this, the same as of any run that failed.
+/// The exit code of a run that ends like this, which is that of any run that failed.
 const FAILED: u8 = 1;
 
 /// The interval between checks of the loop.
@@ -44,7 +45,7 @@ impl Turns {
         self.count.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// The stages have ended in order. The rest may take longer.
+    /// Note that the stages have ended in order. The rest may take longer.
     pub(crate) fn end(&self) {
         self.ended.store(true, Ordering::Relaxed);
     }
@@ -62,7 +63,7 @@ impl Turns {
             }
             let began = Instant::now();
             thread::park_timeout(LOOK_EVERY);
-            // A machine on which this thread has to wait keeps the loop waiting, too.
+            // A machine on which this thread has to wait delays the loop, too.
             stuck += began.elapsed().min(2 * LOOK_EVERY);
         }
         false

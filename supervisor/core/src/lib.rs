@@ -1,10 +1,10 @@
 //! A robot's supervisor: starts its stages, lets the robot drive, watches, restarts, stops.
 //!
-//! Each stage is a process of its own. The supervisor owns the robot's directory and shared memory, starts the stages
-//! in the order of their inputs, and reads their heartbeats and outputs from the bus. A stage that ends, stops beating
-//! or leaves its inputs unanswered is replaced by a new generation, which goes on from its checkpoint; the link stops
-//! the robot meanwhile. The supervisor orders the robot to drive or to stand, looks for stalls, and judges when the
-//! mission is over. Whatever only reports (logs, records, published deaths) may fail; it never ends a mission.
+//! Each stage is a process of its own. The supervisor owns the robot's directory and shared memory, starts the stages in the
+//! order of their inputs, and reads their heartbeats and outputs from the bus. A stage that ends, stops beating or leaves its
+//! inputs unanswered is replaced by a new generation, which goes on from its checkpoint; the link stops the robot meanwhile.
+//! The supervisor orders the robot to drive or to stand, looks for stalls, and judges when the mission is over. Code that only
+//! reports (logs, records, published deaths) may fail; it never ends a mission.
 //!
 //! # The loop
 //!

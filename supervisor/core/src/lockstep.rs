@@ -10,11 +10,11 @@ use std::time::{Duration, Instant};
 
 use common::samples::{RecoveryStep, StallSample, TickLimitSample};
 
-/// The number of ticks that the link may be ahead. With this number it seldom waits, and a robot that has not moved for seconds
-/// loses little time.
+/// The number of ticks that the link may be ahead. With this number the link seldom waits, and a robot that has not moved for
+/// seconds loses little time.
 const AHEAD: u64 = 4;
-/// A recovery step waits at most so long for its answer. That is less than the link waits for the limit, and as long as a planner
-/// may take to start.
+/// The longest time that a recovery step waits for its answer. It is less than the link waits for the limit, and as long as a
+/// planner may take to start.
 const ANSWERED: Duration = Duration::from_secs(3);
 
 /// The newest output of the stages.
@@ -35,7 +35,7 @@ pub(crate) struct Published {
 /// The next action on the recovery step under way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Next {
-    /// No recovery step is under way: check further ticks.
+    /// No recovery step is under way, so further ticks are to be checked.
     Look,
     Wait,
     Begin(RecoveryStep),
@@ -45,7 +45,7 @@ pub(crate) enum Next {
 #[derive(Clone, Copy, Debug)]
 struct Step {
     stall: StallSample,
-    /// The time when it was carried out, and the samples that were published by then.
+    /// The time when the step was carried out, and the samples that were published by then.
     begun: Option<(Instant, Published)>,
 }
 
@@ -57,7 +57,7 @@ pub(crate) struct Lockstep {
 }
 
 impl Lockstep {
-    /// A run whose ticks from `first_tick` on are not checked yet.
+    /// The limit of a run whose ticks from `first_tick` on are not checked yet.
     pub(crate) fn new(first_tick: u64) -> Self {
         let limit = TickLimitSample { last_tick: first_tick + AHEAD, ..TickLimitSample::default() };
         Self { limit, step: None }
@@ -67,12 +67,12 @@ impl Lockstep {
         self.limit
     }
 
-    /// All ticks up to `tick` are checked, and no recovery step is open.
+    /// Note that all ticks up to `tick` are checked, and no recovery step is open.
     pub(crate) fn looked_at(&mut self, tick: u64) {
         self.limit.last_tick = self.limit.last_tick.max(tick + AHEAD);
     }
 
-    /// The robot stalled. Later ticks are not checked before the recovery step is in force.
+    /// Note that the robot stalled. Later ticks are not checked before the recovery step is in force.
     pub(crate) fn stalled(&mut self, stall: StallSample) {
         self.looked_at(stall.stamp.tick);
         self.step = Some(Step { stall, begun: None });

@@ -1,4 +1,4 @@
-//! Records of each tick of a run that take no more memory however long it lasts: older ticks are thinned out.
+//! Records of each tick of a run whose memory is bounded: older ticks are thinned out.
 
 use common::{ground_truth::GroundTruthTick, samples::PoseSample};
 
@@ -7,7 +7,7 @@ const MOST_TICKS: usize = 16_384;
 
 /// A tick of a record.
 pub(crate) trait Recorded: Copy {
-    /// This tick, standing for the `next` one too; none if both are needed.
+    /// This tick in place of itself and the `next` one; none if both are needed.
     fn with(self, next: Self) -> Option<Self>;
 }
 

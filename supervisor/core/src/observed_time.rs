@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use crate::policy::Now;
 
-/// A wait, or the work between two waits, does not count as observed time if it takes so much longer than planned. On a machine that
-/// is not overloaded a wait is late by at most a hundredth of this.
+/// The excess over its plan beyond which a wait, or the work between two waits, does not count as observed time. On a machine that is not
+/// overloaded a wait is late by at most a hundredth of this.
 const TOLERANCE: Duration = Duration::from_millis(20);
 
 /// The clock of the stages' deadlines.
@@ -26,7 +26,7 @@ impl ObservedTime {
     }
 
     /// Note that a wait ended at `now` which should have taken at most `planned`. If it took longer, it is unknown when the machine stood
-    /// still, so only a little of it counts. Some of it must count, or a supervisor that is always late would never notice anything.
+    /// still, so only a little of it counts. Some must count, or a supervisor that is always late would never notice anything.
     pub(crate) fn on_waited(&mut self, planned: Duration, now: Instant) {
         let took = self.since(now);
         self.observed += if took <= planned + TOLERANCE { took } else { TOLERANCE };
@@ -58,9 +58,9 @@ mod tests {
     fn a_stall_of_everything_does_not_count_wherever_it_falls() {
         let began = Instant::now();
         let mut time = ObservedTime::new(began);
-        // A stall in the work between two waits.
+        // The work between two waits stalls.
         assert_eq!(time.at(began + 600 * MS), TOLERANCE);
-        // Stalls in several waits: the stages had no time to beat between them.
+        // Several waits stall, so that the stages have no time to beat between them.
         for stall in 1..=5 {
             time.on_waited(200 * MS, began + stall * 600 * MS);
             assert_eq!(time.at(began + stall * 600 * MS), stall * TOLERANCE);

@@ -1,4 +1,4 @@
-//! The supervisor's readers on the bus, and the record that a run is judged, summarised and drawn from.
+//! The supervisor's readers on the bus, and the record by which a run is judged, summarised and drawn.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -22,9 +22,9 @@ use crate::{
     totals::{LookTotals, Totals, WheelTotals},
 };
 
-/// Guidance samples recorded: that of the arrival tick must still be there when its command is read.
+/// The most guidance samples that are recorded: that of the arrival tick must still be there when its command is read.
 const MOST_GUIDANCE: usize = 1024;
-/// Contacts recorded: more than come between two checks for stalls.
+/// The most contacts that are recorded: more than come between two checks for stalls.
 const MOST_CONTACTS: usize = 64;
 
 pub struct Observer {
@@ -44,7 +44,7 @@ pub struct Observer {
 /// The data read so far.
 #[derive(Default)]
 pub struct Record {
-    /// The pose of every tick; in a long run of fewer of the older ones.
+    /// The pose of every tick; in a long run older ticks are thinned out.
     pub poses: Vec<PoseSample>,
     pub pose: Option<PoseSample>,
     /// The newest guidance samples, oldest first.
@@ -53,12 +53,12 @@ pub struct Record {
     commands: u64,
     /// The generation and tick of the planner's newest heartbeat.
     planner: (u32, u64),
-    /// The epoch of the newest grid, and whether the grid changed when it began.
+    /// The epoch of the newest grid, and whether the grid changed when that epoch began.
     grid_epoch: u64,
     grid_changed: bool,
     /// The newest ticks at which something held the wheels, oldest first.
     contacts: VecDeque<u64>,
-    /// The number of the current target, and the first command that said that it is reached.
+    /// The number of the current target, and the first command that said that this target is reached.
     pub(crate) target_number: u64,
     pub arrival: Option<CommandSample>,
     pub link: Option<LinkSample>,
@@ -75,8 +75,8 @@ pub struct Record {
 
 impl Observer {
     /// Read everything on `bus`, to complete `record`. `waiter` wakes for heartbeats, for the state of the link, which ends a
-    /// tick, and for fields. The other samples of a tick are read then, so that the supervisor takes no processor time from the
-    /// stages during the tick.
+    /// tick, and for fields. The other samples of a tick are read at its end, so that the supervisor takes no processor time
+    /// from the stages during the tick.
     pub fn new(bus: &Bus, waiter: &mut Waiter, record: Record) -> Result<Self, BusError> {
         waiter.on(bus.wakeup(&topics::HEALTH)?);
         waiter.on(bus.wakeup(&topics::LINK)?);

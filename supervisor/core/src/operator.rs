@@ -1,5 +1,5 @@
-//! An operator's requests to a robot, from any process: stop, resume, targets, a new generation of a stage. Each function returns
-//! when the robot's link or its supervisor has confirmed it, or says why not.
+//! An operator's requests to a robot, from any process: stop, resume, targets, a new generation of a stage. Each function returns when
+//! the robot's link or its supervisor has confirmed the request, or says why not.
 
 use std::{
     io::{self, Read as _},
@@ -28,7 +28,7 @@ use thiserror::Error;
 
 use crate::process;
 
-/// The roster is published five times a second; a frozen supervisor publishes none.
+/// The patience with a roster, which is published five times a second; a frozen supervisor publishes none.
 pub const PATIENCE: Duration = Duration::from_secs(2);
 
 /// A request was not confirmed.
@@ -37,7 +37,7 @@ pub enum OperatorError {
     /// The robot does not run, or its bus cannot be used.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// The robot, its link or its supervisor does not do it; `code` is for scripts.
+    /// The robot, its link or its supervisor refuses; `code` is for scripts.
     #[error("{message}")]
     Refused { code: &'static str, message: String },
     /// The robot could not be told directly.
@@ -71,13 +71,14 @@ const fn code(answer: RequestAnswer) -> &'static str {
 /// A stop that holds although its supervisor was not told; the text says why.
 pub type Untold = Option<String>;
 
-/// A process that tells the supervisor has started by then, too.
+/// The time for a process to start and to tell the supervisor.
 const TOLD_WITHIN: Duration = Duration::from_secs(4);
 
-/// A robot that obeys rests within a second. The link repeats a stop five times a second, and uses the next method after a second.
+/// The patience with a stop. A robot that obeys rests within a second: the link repeats a stop five times a second, and changes its
+/// method after a second.
 const REST_PATIENCE: Duration = Duration::from_secs(5);
 
-/// A link that is scheduled answers within milliseconds.
+/// The patience with a link, which answers within milliseconds if it is scheduled.
 const LINK_ANSWERS: Duration = Duration::from_millis(200);
 
 /// Let the robot stand, and wait until it rests. The link is asked directly, without the middleware. The supervisor is told as
@@ -99,7 +100,7 @@ pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
     let supervisor = tell_supervisor(robot, asked_ns)?;
     let rests = match (link, run) {
         (Some(link), _) => rests_by(&link),
-        // A link that answers nobody sends nothing either.
+        // A link that answers nobody does not command the robot either.
         (None, Ok(run)) => stop_guard::stand(&run, || false)?,
         (None, Err(_)) => false,
     };
@@ -135,11 +136,11 @@ fn tell_supervisor(robot: &RobotName, asked_ns: u64) -> Result<Child, OperatorEr
     child.map_err(system)
 }
 
-/// Whether the process that tells the supervisor did.
+/// Whether the process that tells the supervisor succeeded.
 fn told(mut teller: Child) -> Result<(), OperatorError> {
     let mut why = String::new();
     let mut said = teller.stderr.take();
-    // Its end closes the pipe.
+    // The end of the process closes the pipe.
     let ended =
         said.as_ref().is_none_or(|said| poll::is_readable(said, TOLD_WITHIN).unwrap_or(true));
     if !ended {
@@ -160,7 +161,7 @@ fn told(mut teller: Child) -> Result<(), OperatorError> {
     }
 }
 
-/// Wait until the link says that it stopped the robot, and the robot's encoders that it rests.
+/// Wait until the link says that it stopped the robot, and the encoders say that the robot rests.
 fn await_rest(robot: &RobotName) -> Result<(), OperatorError> {
     let bus = roster::join(&Domain::of(robot.clone()), "operator")?;
     let mut links = bus.reader(&topics::LINK)?;
@@ -197,14 +198,15 @@ fn rests(link: &LinkSample) -> bool {
 
 /// Let a stopped robot go on.
 pub fn resume(robot: &RobotName) -> Result<(), OperatorError> {
-    // A stop of which the supervisor was not told is the link's alone.
+    // A stop that the supervisor was not told of holds at the link alone.
     if let Ok(Some(link)) = stop_socket::Operator::connect(&Domain::of(robot.clone())) {
         let _ = link.send(Request::Resume);
     }
     ask(robot, request(RequestKind::Resume))
 }
 
-/// Tell the supervisor alone of a stop that was asked at `asked_ns` of the monotonic clock. It is over if the robot was resumed since.
+/// Tell the supervisor alone of a stop that was asked at `asked_ns` of the monotonic clock. The stop is over if the robot was resumed
+/// since.
 pub fn request_stop(robot: &RobotName, asked_ns: u64) -> Result<(), OperatorError> {
     ask(robot, RequestSample { asked_ns, ..request(RequestKind::Stop) })
 }

@@ -1,18 +1,18 @@
-//! Whether the robot may drive, and if not, why. Pure.
+//! The decision whether the robot may drive, and the reason if not. Pure.
 
 use common::samples::{HoldReason, Order};
 
 /// The input of the decision.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Snapshot {
-    /// The robot was once ready to drive on this bus.
+    /// Whether the robot was once ready to drive on this bus.
     pub was_ready: bool,
     pub all_running: bool,
-    /// The link receives data from the robot.
+    /// Whether the link receives data from the robot.
     pub robot_answers: bool,
-    /// The planner has published a field, so the first tick does not wait for one.
+    /// Whether the planner has published a field, so that the first tick does not wait for one.
     pub field_known: bool,
-    /// An operator's stop holds.
+    /// Whether an operator's stop holds.
     pub operator_stop: bool,
     pub stage_held: bool,
 }

@@ -1,4 +1,5 @@
-//! Stages that still run in a robot's domain when a new supervisor has locked it. It waits for them, and kills those that stay.
+//! Stages that still run in a robot's domain when a new supervisor has locked it, which waits for them and kills those that
+//! stay.
 //!
 //! Each stage holds a shared lock on one file of the domain as long as it runs, and stops when its supervisor ends. A frozen
 //! stage cannot. Only the process that holds the supervisor's lock can need the stages of the domain, so such an orphan is
@@ -18,9 +19,9 @@ use rustix::process::Signal;
 
 use crate::domain_error::{DomainError, failed};
 
-/// Stages get SIGTERM when their supervisor ends, and end within this.
+/// The time within which stages end: they get SIGTERM when their supervisor ends.
 const STOP_GRACE: Duration = Duration::from_secs(2);
-/// A killed process ends within this, unless it hangs in the kernel.
+/// The time within which a killed process ends, unless it hangs in the kernel.
 const KILLED: Duration = Duration::from_secs(1);
 /// Time for a consumer to join.
 const JOINED_WITHIN: Duration = Duration::from_millis(300);

@@ -4,11 +4,11 @@ use common::{ground_truth::GroundTruthTick, mission::Mission, samples::PoseSampl
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-/// A simulated robot that reports its arrival and by the ground truth stands farther from its target than this is in the wrong
-/// place, metres. Other benchmarks use the same limit. A wider tolerance of the mission takes its place.
+/// The distance from its target beyond which a simulated robot that reports its arrival is in the wrong place by the ground truth,
+/// metres. Other benchmarks use the same limit. A wider tolerance of the mission takes its place.
 pub const RIGHT_PLACE_M: f64 = 0.5;
 
-/// How far from its target a robot may be that reports its arrival, metres.
+/// The greatest distance from its target of a robot that reports its arrival, metres.
 pub(crate) const fn allowed_m(mission: &Mission) -> f64 {
     RIGHT_PLACE_M.max(mission.arrival_tolerance_m)
 }
@@ -27,7 +27,7 @@ pub enum Outcome {
     Unreachable,
     Timeout,
     Collision,
-    /// Stopped by hand, or something failed.
+    /// The run was stopped by hand, or something failed.
     #[default]
     Aborted,
     /// The robot was told to stand by every method of its protocol, and its encoders say that it moves.
@@ -113,7 +113,7 @@ impl Ending {
         Self::failed(outcome, contradicted)
     }
 
-    /// This ending, with what the encoders said when the stages were stopped.
+    /// This ending, with the encoders' answer when the stages were stopped.
     pub(crate) fn with(self, wheels: Wheels) -> Self {
         match wheels {
             Wheels::AtRest => self,

@@ -14,7 +14,7 @@ use crate::{
 
 pub(crate) struct OutputWatchdog(Vec<StageOutput>);
 
-/// The newest output of one stage, and since when its input has been unanswered.
+/// The newest output of one stage, and the time since which its input is unanswered.
 struct StageOutput {
     stage: &'static Stage,
     /// Longest time that its input may stay unanswered.
@@ -55,7 +55,7 @@ impl OutputWatchdog {
         }
     }
 
-    /// A generation of `stage` starts. Ticks under way belong to an earlier one.
+    /// Note that a generation of `stage` starts. Ticks under way belong to an earlier one.
     pub(crate) fn on_start(&mut self, stage: &str) {
         let newest = self.0.iter().filter_map(|output| output.published).max();
         if let Some(output) = self.find(stage) {

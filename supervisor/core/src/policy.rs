@@ -18,20 +18,20 @@ use std::{collections::VecDeque, time::Duration};
 
 use crate::stages::Deadlines;
 
-/// A generation that was ready for so long was stable; the count of deaths in a row begins again.
+/// The time for which a generation must be ready to be stable; the count of deaths in a row then begins again.
 pub const STABLE_AFTER: Duration = Duration::from_millis(500);
 /// Wait before the second start in a row; it doubles with each further one. It is shorter than a start, because a death
 /// in the start-up is mostly chance.
 const FIRST_BACKOFF: Duration = Duration::from_millis(2);
 /// Longest wait between starts: a person who has repaired the cause should not wait longer.
 const LONGEST_BACKOFF: Duration = Duration::from_secs(1);
-/// A stage that died so often within [`HOLD_WINDOW`], or in a row without having been stable, is held. A stage that
-/// cannot run at all is held after two seconds; no person or test kills one stage that fast.
+/// The number of deaths within [`HOLD_WINDOW`], or in a row without a stable generation, after which a stage is held. A stage that cannot
+/// run at all is held after two seconds; no person or test kills one stage that fast.
 pub const HOLD_AFTER: usize = 12;
 /// The window in which deaths are counted.
 pub const HOLD_WINDOW: Duration = Duration::from_secs(10);
-/// Starts in a row that the bus may have blocked before it is recreated. A single one may have met incomplete files of
-/// the generation before, which are removed when it ends.
+/// Starts in a row that the bus may have blocked before it is recreated. A single one may have met incomplete files of the generation
+/// before, which are removed when that ends.
 const BLOCKED_STARTS: u32 = 2;
 const ABORT_GRACE: Duration = Duration::from_millis(100);
 /// Time for a terminated stage to stop in order. The link sends three datagrams in it.
@@ -43,20 +43,20 @@ pub type Now = Duration;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Event {
     Start,
-    /// Its process could not be started.
+    /// The process could not be started.
     StartFailed,
-    /// It beat, not ready yet.
+    /// The process beat, but is not ready yet.
     BeatStarting,
     BeatReady,
-    /// It beats, but does not answer its inputs.
+    /// The process beats, but does not answer its inputs.
     OutputStale,
-    /// Its process is reaped.
+    /// The process is reaped.
     Exited,
-    /// Its process is reaped; its exit code says that the bus refused it.
+    /// The process is reaped, and its exit code says that the bus refused it.
     Refused,
-    /// It should be replaced by a new generation. A held stage is released.
+    /// The stage should be replaced by a new generation. A held stage is released.
     Replace,
-    /// It should stop, without a successor.
+    /// The stage should stop, without a successor.
     Stop,
     Time,
 }
@@ -74,12 +74,12 @@ pub enum Action {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Phase {
-    /// No process, none wanted.
+    /// There is no process, and none is wanted.
     Down,
     BackingOff {
         until: Now,
     },
-    /// No process; it died too often, and only an operator starts it again.
+    /// There is no process; the stage died too often, and only an operator starts it again.
     Held,
     /// A process that has not beaten as ready.
     Starting {
@@ -109,14 +109,14 @@ pub enum Phase {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stability {
     NeverReady,
-    /// It was ready for less than [`STABLE_AFTER`].
+    /// The generation was ready for less than [`STABLE_AFTER`].
     Brief,
-    /// It was ready for [`STABLE_AFTER`].
+    /// The generation was ready for [`STABLE_AFTER`].
     Stable,
 }
 
 impl Stability {
-    /// The stability of a generation that was ready from `since` to its last sign, at `until`.
+    /// The stability of a generation that was ready from `since` to its last sign of life, at `until`.
     fn of(since: Now, until: Now) -> Self {
         if until.saturating_sub(since) >= STABLE_AFTER { Self::Stable } else { Self::Brief }
     }
@@ -126,7 +126,7 @@ impl Stability {
 pub struct Policy {
     deadlines: Deadlines,
     phase: Phase,
-    /// Deaths in a row, none of a generation that was stable.
+    /// Deaths in a row, none of a stable generation.
     deaths: usize,
     /// Deaths within the window; at most [`HOLD_AFTER`].
     recent: VecDeque<Now>,
@@ -182,7 +182,7 @@ impl Policy {
                 Some(self.start(now))
             }
             (Phase::Starting { .. }, Event::StartFailed) => {
-                // Some resource is used up, so it is not started again at once.
+                // Some resource is used up, so the stage is not started again at once.
                 self.deaths = self.deaths.max(1);
                 self.record_death(Stability::NeverReady, now)
             }
@@ -294,7 +294,7 @@ impl Policy {
         self.deaths += 1;
         self.recent.retain(|then| now.saturating_sub(*then) < HOLD_WINDOW);
         self.recent.push_back(now);
-        // A held stage that is stopped and started again can exceed the number that matters.
+        // A held stage that is stopped and started again can exceed [`HOLD_AFTER`].
         if self.recent.len() > HOLD_AFTER {
             self.recent.pop_front();
         }

@@ -25,12 +25,12 @@ use serde::Serialize;
 
 use crate::planner_executable;
 
-/// The kernel ends a killed process within this, unless it hangs in the kernel itself.
+/// The time within which the kernel ends a killed process, unless the process hangs in the kernel itself.
 const KILLED_WITHIN: Duration = Duration::from_millis(50);
 
 /// A `firsthand` subcommand in a process of its own.
 ///
-/// It is started through `/proc/self/exe`, so that a rebuild under way does no harm.
+/// The process is started through `/proc/self/exe`, so that a rebuild under way does no harm.
 pub fn firsthand(arguments: &[&str]) -> Command {
     let mut command = child("/proc/self/exe");
     command.arg0("firsthand").args(arguments);
@@ -59,7 +59,7 @@ pub fn child(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
     command
         .process_group(0)
-        // The supervisor's connection to systemd is not its children's.
+        // The supervisor's connection to systemd is not for its children.
         .env_remove("NOTIFY_SOCKET")
         .env_remove("WATCHDOG_USEC")
         .env_remove("WATCHDOG_PID")
@@ -82,12 +82,12 @@ pub struct Process {
 pub enum ExitCause {
     Exited(i32),
     Signalled {
-        /// Its number.
+        /// The number of the signal.
         signal: i32,
-        /// Whether it left a core.
+        /// Whether the process left a core.
         core: bool,
     },
-    /// It was the child of another process, which alone is told.
+    /// The process was the child of another one, which alone knows the cause.
     Unknown,
 }
 
@@ -128,14 +128,14 @@ impl fmt::Display for ExitCause {
 }
 
 impl Process {
-    /// Start `command`. It inherits no descriptor but the standard ones.
+    /// Start `command`. The process inherits no descriptor but the standard ones.
     pub fn spawn(mut command: Command) -> io::Result<Self> {
         close_all_on_exec()?;
         let mut child = command.spawn()?;
         match pidfd_open(Pid::from_child(&child), PidfdFlags::empty()) {
             Ok(pidfd) => Ok(Self { id: child.id(), child: Some(child), pidfd }),
             Err(error) => {
-                // It must not run without being watched.
+                // The process must not run without being watched.
                 let _ = child.kill();
                 let _ = child.wait();
                 Err(error.into())
@@ -148,7 +148,7 @@ impl Process {
         let pid = i32::try_from(id).ok().and_then(Pid::from_raw);
         let pid = pid.ok_or(io::ErrorKind::NotFound)?;
         let pidfd = pidfd_open(pid, PidfdFlags::empty())?;
-        // It may have ended meanwhile, and its id may belong to another process, which must not be signalled.
+        // The process may have ended meanwhile, and its id may belong to another one, which must not be signalled.
         let called = fs::read_to_string(format!("/proc/{id}/comm"))?;
         if called.trim_end() != name {
             return Err(io::ErrorKind::NotFound.into());
@@ -160,7 +160,7 @@ impl Process {
         self.id
     }
 
-    /// Its standard output, once, if it is piped.
+    /// The standard output, once, if it is piped.
     pub fn take_stdout(&mut self) -> Option<ChildStdout> {
         self.child.as_mut()?.stdout.take()
     }
@@ -169,7 +169,7 @@ impl Process {
         let _ = pidfd_send_signal(&self.pidfd, signal);
     }
 
-    /// Whether this process started it.
+    /// Whether this process started the other.
     pub(crate) const fn is_child(&self) -> bool {
         self.child.is_some()
     }
@@ -182,12 +182,12 @@ impl Process {
         Ok(child.try_wait()?.map(ExitCause::from))
     }
 
-    /// Wait until it has ended. Returns whether it has.
+    /// Wait until the process has ended. Returns whether it has.
     fn wait(&self, patience: Duration) -> io::Result<bool> {
         poll::is_readable(&self.pidfd, patience)
     }
 
-    /// SIGTERM, and SIGKILL if it has not ended after `grace`.
+    /// Send SIGTERM, and SIGKILL if the process has not ended after `grace`.
     pub fn end(&mut self, grace: Duration) {
         self.signal(Signal::TERM);
         let began = Instant::now();
@@ -196,7 +196,7 @@ impl Process {
             if left.is_zero() {
                 self.signal(Signal::KILL);
             }
-            // The loop's condition asks whether it ended.
+            // The loop's condition asks whether the process ended.
             let _ = self.wait(left.max(KILLED_WITHIN));
         }
     }
@@ -209,7 +209,7 @@ impl AsFd for Process {
 }
 
 impl Drop for Process {
-    /// No child is left running after an error.
+    /// The destructor leaves no child running after an error.
     fn drop(&mut self) {
         if let Some(child) = &mut self.child
             && !matches!(child.try_wait(), Ok(Some(_)))

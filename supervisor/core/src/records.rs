@@ -1,5 +1,5 @@
-//! Files of records in the run directory, one JSON object a line. They only report: a record that cannot be written is a
-//! warning in the log, and the mission goes on.
+//! Files of records in the run directory, one JSON object a line. A record that cannot be written is a warning in the
+//! log, and the mission goes on.
 
 use std::{
     fs::File,

@@ -25,24 +25,24 @@ pub const SUMMARY: &str = "summary.json";
 /// The name of the simulated robot's checkpoint.
 const SIMULATOR: &str = "x80-sim";
 
-/// The state of a supervisor that survives it.
+/// The state of a supervisor that its successor restores.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SupervisorState {
-    /// An operator's stop holds.
+    /// Whether an operator's stop holds.
     pub operator_stop: bool,
     /// Mission time of operators' stops on the way to the current target, seconds.
     pub operator_stopped_s: f64,
     /// Times the run was resumed.
     pub resumes: u32,
     pub(crate) targets: Option<TargetList>,
-    /// The boot of the machine it ran in.
+    /// The boot of the machine in which the supervisor ran.
     boot: String,
-    /// The time of the last save, [`boot_ns`]. Its clock includes the time in which the machine is suspended, when the robot may be
-    /// moved.
+    /// The time of the last save, [`boot_ns`]. That clock includes the time in which the machine is suspended, when the robot may
+    /// be moved.
     saved_ns: u64,
 }
 
-/// Its checkpoint in the run directory.
+/// The checkpoint of the supervisor in the run directory.
 #[derive(Debug)]
 pub struct StateFile {
     checkpoint: Checkpoint,
@@ -66,7 +66,7 @@ impl StateFile {
     }
 }
 
-/// The current boot of the machine; empty where the kernel does not say.
+/// The current boot of the machine; empty if the kernel does not say.
 fn boot() -> String {
     let id = fs::read_to_string(BOOT_ID).unwrap_or_default();
     id.trim().to_owned()
@@ -84,11 +84,11 @@ pub fn age_s(directory: &Path) -> Result<Option<f64>, CheckpointError> {
 /// A run whose supervisor ended, to be resumed.
 #[derive(Clone, Debug)]
 pub struct RecoveredRun {
-    /// Its run file; its clock goes on.
+    /// The run file, whose clock goes on.
     pub run: Run,
     /// The first tick that did not happen yet.
     pub first_tick: u64,
-    /// Mission time by then.
+    /// Mission time at that tick.
     pub time: MissionTime,
 }
 
@@ -124,7 +124,7 @@ impl RecoveredRun {
         Ok(Self { run, first_tick, time })
     }
 
-    /// Its clock from now on.
+    /// The clock from now on.
     pub fn clock(&self) -> MissionClock {
         match self.run.clock {
             ticks @ MissionClock::Ticks { .. } => ticks,

@@ -36,7 +36,7 @@ impl Supervisor<'_> {
                 tracing::warn!(stage, "an operator asks for a new generation");
                 self.stages.replace(stage, first_tick);
             }
-            // Its teller was slow: the link obeyed it at once, and an operator has resumed since.
+            // The process that told of this stop was slow: the link obeyed at once, and an operator has resumed since.
             RequestKind::Stop if request.asked_ns < self.resumed_ns => {
                 tracing::warn!("an operator's stop is over, because the robot was resumed since");
             }
@@ -47,7 +47,7 @@ impl Supervisor<'_> {
             RequestKind::Resume => {
                 tracing::warn!("an operator lets the robot go on");
                 self.state_file.state.operator_stop = false;
-                // A time to come would void the stops until then.
+                // A future time would void all stops until then.
                 self.resumed_ns = request.asked_ns.min(monotonic_ns());
             }
             kind @ (RequestKind::Goto | RequestKind::Append) => {
@@ -122,7 +122,7 @@ impl Supervisor<'_> {
         self.bus.observer.record.target_number = sample.number;
         self.bus.observer.record.arrival = None;
         self.arrived = None;
-        // The deadline counts for each target.
+        // The deadline counts anew for each target.
         self.state_file.state.operator_stopped_s = 0.0;
     }
 }

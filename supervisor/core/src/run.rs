@@ -26,14 +26,14 @@ use crate::{
 pub struct Finished {
     /// The outcome, and its reason.
     pub ending: Ending,
-    /// The last complete tick before the deciding event; none where no tick decided. Later ticks do not count, because their
-    /// number depends on how fast the stop was.
+    /// The last complete tick before the deciding event; none if no tick decided. Later ticks do not count, because their number
+    /// depends on how fast the stop was.
     pub last_tick: Option<u64>,
     /// The time from the first motion order to the end, seconds of the robot's clock. For a run that was resumed in wall-clock time it
     /// begins at the start of the run.
     pub duration_s: f64,
     pub record: Record,
-    /// The ground truth of a simulated robot until then.
+    /// The ground truth of a simulated robot until that tick.
     pub truth: Vec<GroundTruthTick>,
     /// Whether the robot was ever ordered to drive.
     pub drove: bool,
@@ -49,7 +49,7 @@ pub struct Finished {
     pub targets: Vec<TargetResult>,
 }
 
-/// A robot that could not be stopped. Its link goes on telling it to stand, by each method of the protocol in turn.
+/// A robot that could not be stopped. Its link goes on ordering it to stand, by each method of the protocol in turn.
 pub struct StillMoving<'a> {
     supervisor: Supervisor<'a>,
     signals: Signals,
@@ -97,7 +97,7 @@ pub fn run<'a>(
             Err(error) => break Err(error),
         }
     };
-    // After an error too, the robot is stopped first, and then the stages in order.
+    // The robot is stopped first after an error, too, and then the stages in order.
     let given_up = Some(Cause::OdometryGivenUp.name());
     let trusts_encoders = ending.as_ref().map_or(true, |ending| ending.cause != given_up);
     let stopped = shutdown::stop(&mut supervisor, trusts_encoders);

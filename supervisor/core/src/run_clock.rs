@@ -25,8 +25,8 @@ impl RunClock {
         Self { clock: run.clock(), first_tick: run.first_tick, start: run.time }
     }
 
-    /// The clock of a new run. Only a `simulated` robot can have another pace than the wall clock's, and one that speaks ROS 2, which may be
-    /// simulated elsewhere.
+    /// The clock of a new run. Another pace than the wall clock's is possible only for a `simulated` robot, and for one that speaks ROS 2,
+    /// which may be simulated elsewhere.
     pub(crate) fn begin(pace: Pace, robot: &RobotConfig, simulated: bool) -> Self {
         let has_pace = simulated || robot.protocol() == Protocol::Ros2;
         let clock = match pace {
@@ -90,7 +90,7 @@ impl RunClock {
                 || self.pose_time(pose),
                 |truth| MissionTime::from_seconds(truth.time_s),
             ),
-            // It passes also without a robot or a pose.
+            // Wall-clock time passes also without a robot or a pose.
             MissionClock::Wall { .. } => self.clock.at(0, monotonic_ns()),
         }
     }

@@ -11,7 +11,7 @@ const STATUS_EVERY: Duration = Duration::from_secs(1);
 
 /// The service manager, as a receiver of notifications.
 pub(crate) struct ServiceManager {
-    /// Time without a notification after which it kills the process.
+    /// Time without a notification after which systemd kills the process.
     watchdog: Option<Duration>,
     fed: Option<Instant>,
     shown: Option<Instant>,
@@ -19,12 +19,12 @@ pub(crate) struct ServiceManager {
 }
 
 impl ServiceManager {
-    /// The one named by the environment of this process.
+    /// The service manager that the environment of this process names.
     pub(crate) fn of_environment() -> Self {
         Self { watchdog: sd_notify::watchdog_enabled(), fed: None, shown: None, ready: false }
     }
 
-    /// The service is up. It is notified once.
+    /// Notify once that the service is up.
     pub(crate) fn ready(&mut self) {
         if !self.ready {
             self.ready = true;
@@ -32,7 +32,7 @@ impl ServiceManager {
         }
     }
 
-    /// The service is going down.
+    /// Notify that the service is going down.
     pub(crate) fn stopping(&self) {
         notify(&[NotifyState::Stopping, NotifyState::Status("stopping")]);
     }
@@ -46,7 +46,8 @@ impl ServiceManager {
         }
     }
 
-    /// Feed the watchdog if that is due. Only the loop may call this, because another thread would feed it while the loop hangs.
+    /// Feed the watchdog if that is due. Only the loop may call this, because another thread would feed the watchdog while the
+    /// loop hangs.
     pub(crate) fn feed(&mut self) {
         if self.time_to_feed().is_some_and(|left| left.is_zero()) {
             self.fed = Some(Instant::now());
@@ -54,7 +55,7 @@ impl ServiceManager {
         }
     }
 
-    /// Time until the watchdog is to be fed: at half of what it allows, as systemd recommends.
+    /// Time until the watchdog is to be fed: half of its time limit, as systemd recommends.
     pub(crate) fn time_to_feed(&self) -> Option<Duration> {
         let every = self.watchdog? / 2;
         let since = self.fed.map(|fed| fed.elapsed());

@@ -19,11 +19,11 @@ use crate::{
 
 /// Time for the link to confirm that the robot was ordered to stand, before the link is stopped.
 const STAND_CONFIRMED: Duration = Duration::from_millis(100);
-/// A robot whose encoders nobody reads is waited for so long: its link may be starting.
+/// The time that a robot whose encoders nobody reads is waited for: its link may be starting.
 const HEARD_WITHIN: Duration = Duration::from_secs(1);
 
-/// Bring the robot to rest and stop the stages; the link, which stops the robot, comes last, and not while wheels turn:
-/// [`finish`] ends it then. Where `trusts_encoders` is false, nobody knows of wheels that they turn.
+/// Bring the robot to rest and stop the stages. The link, which stops the robot, comes last, and not while wheels turn:
+/// [`finish`] ends it then. If `trusts_encoders` is false, the encoders do not show whether wheels turn.
 pub(crate) fn stop(
     supervisor: &mut Supervisor<'_>,
     trusts_encoders: bool,
@@ -42,7 +42,7 @@ pub(crate) fn stop(
     Ok(wheels)
 }
 
-/// Stop what still runs: the stages, then the simulated robot.
+/// Stop the rest: the stages, then the simulated robot.
 pub(crate) fn finish(supervisor: &mut Supervisor<'_>) -> Result<(), SupervisorError> {
     supervisor.stages.start_no_more();
     stop_all(supervisor)?;
@@ -107,7 +107,7 @@ fn come_to_rest(supervisor: &mut Supervisor<'_>) -> Result<Wheels, SupervisorErr
     }
 }
 
-/// The link's answer since it was told that the mission ends.
+/// The link's answer since the end of the mission was ordered.
 pub(crate) fn wheels(supervisor: &Supervisor<'_>) -> Wheels {
     let link = supervisor.bus.observer.record.link;
     match link.filter(|_| supervisor.stages.runs(topics::LINK.spec().writer)) {
@@ -127,7 +127,7 @@ pub(crate) fn turn(supervisor: &mut Supervisor<'_>) -> Result<(), SupervisorErro
     supervisor.service.feed();
     supervisor.bus.observer.take(&mut supervisor.stages)?;
     supervisor.poll_processes(supervisor.first_tick())?;
-    // The simulated robot's pipe must not fill: the robot could not answer the link.
+    // The simulated robot's pipe must not fill, or the robot could not answer the link.
     supervisor.robot.poll()?;
     if supervisor.bus.is_due(topics::RESTATE) {
         supervisor.publish_state()?;

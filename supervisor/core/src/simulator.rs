@@ -29,7 +29,7 @@ pub const GROUND_TRUTH: &str = "ground_truth.jsonl";
 /// Time for the simulator to write its address.
 const STARTUP: Duration = Duration::from_secs(5);
 const STOP_GRACE: Duration = Duration::from_millis(300);
-/// A line of ground truth is under 300 bytes; a longer one is an error.
+/// The greatest length of a line of ground truth, which has under 300 bytes; a longer one is an error.
 const LONGEST_LINE: usize = 64 * 1024;
 
 #[derive(Debug, Error)]
@@ -54,7 +54,7 @@ pub struct Simulator {
 
 struct GroundTruth {
     pipe: ChildStdout,
-    /// The lines of ticks as they came, for simulated sources of fixes; none once it cannot be written.
+    /// The file of the lines of ticks, for simulated sources of fixes; none once it cannot be written.
     file: Option<File>,
     /// The beginning of an incomplete line.
     unfinished: Vec<u8>,
@@ -63,8 +63,8 @@ struct GroundTruth {
 }
 
 impl Simulator {
-    /// Start one in the world of `mission`, overrides included, and wait until it listens. Its files are in `directory`;
-    /// it goes on from the checkpoint of an earlier one there.
+    /// Start a simulator in the world of `mission`, overrides included, and wait until it listens. Its files are in
+    /// `directory`; it goes on from the checkpoint of an earlier one there.
     pub fn start(directory: &Path, mission: &Mission, pace: Pace) -> Result<Self, SimulatorError> {
         let text = toml::to_string(mission)
             .map_err(|error| system("write the mission of")(io::Error::other(error)))?;
@@ -122,12 +122,12 @@ impl Simulator {
         self.address
     }
 
-    /// Readable when the process ended. Ground truth wakes nobody: it comes when a tick begins, and is read when the tick ends.
+    /// A descriptor that is readable when the process ended. Ground truth wakes nobody: it is read when the tick ends.
     pub fn descriptor(&self) -> BorrowedFd<'_> {
         self.process.as_fd()
     }
 
-    /// Read its output. Returns whether it still runs.
+    /// Read the output of the simulator. Returns whether it still runs.
     pub fn poll(&mut self) -> Result<bool, SimulatorError> {
         self.truth.take()?;
         Ok(self.process.try_reap().map_err(system("watch"))?.is_none())
@@ -137,7 +137,7 @@ impl Simulator {
         &self.truth.ticks
     }
 
-    /// End it. The ground truth stays.
+    /// End the simulator. The ground truth stays.
     pub fn stop(&mut self) -> Result<(), SimulatorError> {
         self.process.end(STOP_GRACE);
         self.truth.take()
@@ -168,7 +168,7 @@ impl GroundTruth {
         };
         let rest = self.unfinished.split_off(end + 1);
         if self.listening.is_some() {
-            // It only reports, so the mission goes on without it.
+            // The file only reports, so the mission goes on without it.
             self.file.take_if(|file| file.write_all(&self.unfinished).is_err());
         }
         for line in self.unfinished.split(|&byte| byte == b'\n') {

@@ -42,12 +42,12 @@ pub(crate) struct StageProcess {
     started: Now,
     beat: Option<Now>,
     output: Option<Now>,
-    /// Length of its log when this generation was started, bytes.
+    /// Length of the log when this generation was started, bytes.
     log_start: u64,
     hung: Option<Now>,
-    /// Its last beat announced that it stops on request.
+    /// Whether the last beat announced that the process stops on request.
     stopping: bool,
-    /// The turn before found it ended.
+    /// Whether the iteration before found that the process had ended.
     found_ended: bool,
 }
 
@@ -75,7 +75,7 @@ impl StageProcess {
         self.policy.phase()
     }
 
-    /// Whether it beats as ready.
+    /// Whether the stage beats as ready.
     pub(crate) const fn is_running(&self) -> bool {
         matches!(self.phase(), Phase::Running { .. })
     }
@@ -88,7 +88,7 @@ impl StageProcess {
         self.process.take()
     }
 
-    /// Its process's number; 0 for none.
+    /// The number of the process; 0 for none.
     fn pid(&self) -> u32 {
         self.process.as_ref().map_or(0, Process::id)
     }
@@ -97,12 +97,12 @@ impl StageProcess {
         self.generation.saturating_sub(1)
     }
 
-    /// Whether its last beat announced that it stops on request.
+    /// Whether the last beat announced that the process stops on request.
     pub(crate) const fn is_stopping(&self) -> bool {
         self.stopping
     }
 
-    /// The time when its policy needs the next [`Event::Time`].
+    /// The time when the policy needs the next [`Event::Time`].
     pub(crate) fn deadline(&self) -> Option<Now> {
         self.policy.deadline()
     }
@@ -127,7 +127,7 @@ impl StageProcess {
         true
     }
 
-    /// A heartbeat of this stage came. Returns whether the roster is to be published.
+    /// Take a heartbeat of this stage. Returns whether the roster is to be published.
     pub(crate) fn on_beat(&mut self, health: &HealthSample, now: Now) -> bool {
         if self.process.is_none() || self.pid() != health.pid {
             return false;
@@ -149,7 +149,7 @@ impl StageProcess {
         self.output = Some(now);
     }
 
-    /// Start its next generation, which logs to the run `directory` and answers ticks from `first_tick` on.
+    /// Start the next generation, which logs to the run `directory` and answers ticks from `first_tick` on.
     pub(crate) fn start(&mut self, directory: &Path, first_tick: u64, now: Now) {
         let stage = self.stage.name;
         (self.started, self.hung) = (now, None);
@@ -161,9 +161,9 @@ impl StageProcess {
         });
         match spawned {
             Ok(process) => self.process = Some(process),
-            // Tried again with growing pauses; the other stages go on.
+            // The start is tried again with growing pauses, and the other stages go on.
             Err(error) => {
-                tracing::error!(stage, %error, "stage cannot be started; are processes, descriptors or disk used up?");
+                tracing::error!(stage, %error, "the stage cannot be started; are processes, descriptors or disk used up?");
                 self.policy.step(Event::StartFailed, now);
             }
         }
@@ -185,7 +185,7 @@ impl StageProcess {
         Process::spawn(command)
     }
 
-    /// The log of all its generations in the run `directory`.
+    /// The log of all generations in the run `directory`.
     fn log(&self, directory: &Path) -> PathBuf {
         directory.join(format!("{}.log", self.stage.name))
     }
@@ -200,7 +200,7 @@ impl StageProcess {
         }
     }
 
-    /// The cause of the end of its process, if it has ended. For an external process that did not announce its end, the result comes an
+    /// The cause of the end of the process, if it has ended. For an external process that did not announce its end, the result comes an
     /// iteration later, because its last beat may have come after the beats of this iteration were read.
     pub(crate) fn try_reap(&mut self) -> Result<Option<ExitCause>, StageProcessError> {
         let Some(process) = &mut self.process else {
@@ -214,7 +214,7 @@ impl StageProcess {
         Ok(cause.filter(|_| is_known))
     }
 
-    /// Its process is reaped. Returns the record of the death, without the next step.
+    /// Note that the process is reaped. Returns the record of the death, without the next step.
     pub(crate) fn record_death(&mut self, cause: ExitCause, directory: &Path, now: Now) -> Death {
         let age = |then: Now| now.saturating_sub(then).as_secs_f64();
         let hung_after = |(hung, beat): (Now, Now)| hung.saturating_sub(beat).as_secs_f64();
@@ -252,7 +252,7 @@ impl StageProcess {
         };
     }
 
-    /// Its row of the `roster` topic.
+    /// The stage's row of the `roster` topic.
     pub(crate) fn roster_entry(&self, now: Now) -> RosterEntry {
         let age = |then: Option<Now>| {
             then.map_or(u64::MAX, |then| now.saturating_sub(then).as_nanos() as u64)

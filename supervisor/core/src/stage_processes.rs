@@ -30,7 +30,8 @@ const STOP_GRACE: Duration = Duration::from_millis(300);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Starter {
     Supervisor,
-    /// Systemd or a person. An external stage is known once it beats; after its death the supervisor waits for the next generation.
+    /// Systemd or a person starts the stages. An external stage is known once it beats; after its death the supervisor waits for
+    /// the next one.
     External,
 }
 
@@ -41,13 +42,13 @@ pub struct StageProcesses {
     directory: PathBuf,
     clock: ObservedTime,
     starter: Starter,
-    /// Stages that end stay down.
+    /// Whether stages that end stay down.
     ending: bool,
     start_blocked: bool,
 }
 
 impl StageProcesses {
-    /// Stages that do not run yet. They log to the run `directory`.
+    /// The stages before any runs. They log to the run `directory`.
     pub fn new(directory: PathBuf, starter: Starter, mission: &Mission) -> Self {
         let cells = mission.grid_frame().area();
         let stages = start_order().into_iter();
@@ -67,7 +68,7 @@ impl StageProcesses {
         self.clock.at(Instant::now())
     }
 
-    /// A wait ended that should have taken at most `planned`. Longer time does not count against the stages.
+    /// Note the end of a wait that should have taken at most `planned`. Longer time does not count against the stages.
     pub fn on_waited(&mut self, planned: Duration) {
         self.clock.on_waited(planned, Instant::now());
     }
@@ -101,7 +102,7 @@ impl StageProcesses {
         deadline.map(|deadline| deadline.saturating_sub(self.now()))
     }
 
-    /// A heartbeat came. Returns whether the roster changed by it.
+    /// Take a heartbeat. Returns whether the roster changed by it.
     pub fn on_health(&mut self, health: &HealthSample) -> bool {
         let Some(index) = self.position(name_str(&health.stage)) else {
             return false;
@@ -132,7 +133,7 @@ impl StageProcesses {
         }
         let now = self.now();
         if let Some(stage) = self.watchdog.stale(now) {
-            tracing::warn!(stage, "stage beats but does not answer its inputs");
+            tracing::warn!(stage, "the stage beats but does not answer its inputs");
             if let Some(index) = self.position(stage) {
                 self.apply(index, Event::OutputStale, now, first_tick);
             }
@@ -143,7 +144,7 @@ impl StageProcesses {
     /// deaths.
     pub fn poll(&mut self, bus: &Bus, first_tick: u64) -> Result<Vec<Death>, StageProcessError> {
         let mut deaths = Vec::new();
-        // Heartbeats were read until now. The rest may wait for the disk; that must not make a stage late.
+        // Heartbeats were read until now. The rest may wait for the disk, which must not make a stage late.
         let taken = self.now();
         for index in 0..self.stages.len() {
             if let Some(cause) = self.stages[index].try_reap()? {
@@ -161,7 +162,7 @@ impl StageProcesses {
                 let event = if death.was_refused() { Event::Refused } else { Event::Exited };
                 self.apply(index, event, self.now(), first_tick);
                 self.stages[index].record_next(&mut death, self.now());
-                // A stage that stopped on request is no death.
+                // A stage that stopped on request did not die.
                 if asked {
                     tracing::info!(stage = death.stage, cause = %death.cause, "stage ended");
                 } else {
@@ -231,7 +232,7 @@ impl StageProcesses {
             Action::Kill => stage.signal(Signal::KILL, now),
             Action::RecreateBus => {
                 let stage = stage.stage.name;
-                tracing::error!(stage, "stage cannot start on this bus");
+                tracing::error!(stage, "the stage cannot start on this bus");
                 // External stages are stopped and started by others.
                 self.start_blocked = self.starter == Starter::Supervisor;
             }
@@ -286,7 +287,8 @@ impl StageProcesses {
     }
 }
 
-/// After an error of the supervisor too, the stages are stopped in reverse order. The link is the last and stops the robot.
+/// The destructor stops the stages in reverse order, after an error of the supervisor too. The link is the last and stops the
+/// robot.
 impl Drop for StageProcesses {
     fn drop(&mut self) {
         while let Some(mut stage) = self.stages.pop() {

@@ -16,13 +16,13 @@ use common::{
 
 /// A row of the table.
 pub struct Stage {
-    /// Its name, as its wiring says.
+    /// The name, as its wiring says.
     pub name: &'static str,
     /// The topics that its process opens on the bus, and the state that it persists.
     pub wiring: &'static Wiring,
     /// Deadlines on a map without cells.
     pub deadlines: Deadlines,
-    /// Added to each deadline for a million cells of the map.
+    /// The time added to each deadline for a million cells of the map.
     pub per_million_cells: Duration,
     /// The robot's behaviour while the stage is down.
     pub while_down: &'static str,
@@ -43,7 +43,7 @@ pub struct Deadlines {
 }
 
 impl Stage {
-    /// A stage with the deadlines of most, whose process is `P`.
+    /// A stage with the usual deadlines, whose process is `P`.
     const fn new<P: Process>(replay: Begin, while_down: &'static str) -> Self {
         Self {
             name: P::WIRING.stage,
@@ -61,13 +61,13 @@ impl Stage {
         Self::new::<Answers<A>>(replay::<A>, while_down)
     }
 
-    /// The executable that `mission` names for this stage; none where the stage is `firsthand`'s own.
+    /// The executable that `mission` names for this stage; none if the stage is `firsthand`'s own.
     pub fn executable<'mission>(&self, mission: &'mission Mission) -> Option<&'mission Path> {
         let named = mission.planner.executable.as_deref();
         named.filter(|_| self.name == PLANNER)
     }
 
-    /// Its deadlines on a map of so many `cells`.
+    /// The deadlines on a map of `cells` cells.
     pub fn deadlines_on(&self, cells: usize) -> Deadlines {
         let more = self.per_million_cells.mul_f64(cells as f64 * 1e-6);
         Deadlines {
@@ -78,14 +78,14 @@ impl Stage {
     }
 }
 
-/// A stage that has not opened its topics after this time is stuck, for example by incomplete services. On a loaded machine of two
+/// The time after which a stage that has not opened its topics is stuck, for example by incomplete services. On a loaded machine of two
 /// cores the slowest start took a tenth of it.
 const STARTUP: Duration = Duration::from_secs(3);
-/// Five beats. A loaded machine with more stages than cores delays a beat by 200 ms now and then; with 500 ms and a build
-/// on the same machine, three healthy stages were aborted in 70 missions. The robot's stop does not depend on it: the link
-/// stops the robot when the command is stale.
+/// The time of five beats. A loaded machine with more stages than cores delays a beat by 200 ms at times; with 500 ms and a build on
+/// the same machine, three healthy stages were aborted in 70 missions. The robot's stop does not depend on this: the link stops the
+/// robot when the command is stale.
 const HEARTBEAT: Duration = Duration::from_millis(750);
-/// The slowest answers take a hundredth of it.
+/// The time for an answer; the slowest take a hundredth of it.
 const ANSWERS: Duration = Duration::from_secs(1);
 const DEADLINES: Deadlines = Deadlines { startup: STARTUP, heartbeat: HEARTBEAT, answers: ANSWERS };
 /// The planner beats between solves, and leaves ticks unanswered while it solves.

@@ -31,26 +31,26 @@ const CUT_OFF_AFTER: Duration = Duration::from_secs(1);
 const FIELD_WITHIN: Duration = Duration::from_secs(60);
 /// Turns on the spot that a robot makes first when it is cut off, with the evidential method, at half the ordered speed.
 const SCAN_TURNS: f64 = 1.2;
-/// Turns at one place, at the slower of its two rates, beyond which a robot makes no progress.
+/// Turns at one place, at the slower of the robot's two rates, beyond which it makes no progress.
 const TURNS_AT_A_PLACE: f64 = 2.0;
-/// Poses within this distance count as the same place, metres. For a slow robot it is less.
+/// The distance within which poses count as the same place, metres. For a slow robot it is less.
 const PLACE_M: f64 = 0.2;
-/// A robot may circle its target. Its place then ends at this many radii of the circle.
+/// The radii of a circle around its target at which the place of a circling robot ends.
 const CIRCLES: f64 = 1.2;
-/// A robot that drove less than this counts as standing, metres. For a slow robot it is less.
+/// The distance below which a robot counts as standing, metres. For a slow robot it is less.
 const MOVED_M: f64 = 0.02;
-/// A robot that turned less than this counts as not turning, radians. For a slow robot it is less.
+/// The turn below which a robot counts as not turning, radians. For a slow robot it is less.
 const TURNED_RAD: f64 = 0.1;
 /// Share of the motion at full speed that counts as motion: near its target a robot crawls.
 const SHARE: f64 = 0.05;
 /// Distance that leads out of any margin, even of several overlapping ones, metres.
 const WAY_OUT_M: f64 = 1.0;
-/// Contacts within this distance are at the same place, metres: a robot that turns about a blocked wheel stays within it.
+/// The distance within which contacts are at the same place, metres: a robot that turns about a blocked wheel stays within it.
 const HELD_WITHIN_M: f64 = 0.5;
-/// A robot wanders once it has driven this many times as far as its target was away, and at least [`WANDERS_LEAST_M`]. The way around a
-/// trap takes two to three times as far.
+/// The multiple of the distance to its target after which a robot wanders, once it has driven [`WANDERS_LEAST_M`]. The way around a
+/// trap is two to three times as long.
 const WANDERS: f64 = 3.0;
-/// See [`WANDERS`], metres.
+/// The least distance after which a robot wanders, metres.
 const WANDERS_LEAST_M: f64 = 12.0;
 /// The side of a square in which a robot was, metres. The map of a laser is to be trusted, and the way through a large building may be
 /// many times as long as the straight one: each square in which such a robot has not been lets it drive [`WANDERS`] times that farther.
@@ -109,20 +109,20 @@ pub(crate) struct StallWatch {
     anchor: Option<Anchor>,
     place: Option<Place>,
     cut_off_since: Option<MissionTime>,
-    /// The time since which it waits for the planner's field.
+    /// The time since which the robot waits for the planner's field.
     waits_since: Option<MissionTime>,
-    /// Distance travelled when it was first seen in a hazard, metres.
+    /// Distance travelled when the robot was first seen in a hazard, metres.
     inside_hazard_since: Option<f64>,
     /// Whether long ways are a reason to reset the map. The paper's method has no such rule.
     forgets: bool,
     /// The distance travelled at which the robot wanders, metres; none before the first tick, and after a reset.
     wanders_at: Option<f64>,
-    /// The squares in which a robot with a laser was on the way to its target; none of another robot.
+    /// The squares in which a robot with a laser was on the way to its target; none without a laser.
     been: Option<HashSet<IVec2>>,
     /// Replans at this place, since the last reset.
     replans_here: u32,
     replans: u32,
-    /// Where the wheels were held, and the replans there since the last reset.
+    /// The place where the wheels were held, and the replans there since the last reset.
     held_at: Option<(DVec2, u32)>,
     epoch: u64,
     /// Epochs without a reset of their own, and resets because the robot was relocated.
@@ -163,7 +163,7 @@ impl StallWatch {
         let slowest_turn = TAU / mission.turn_rad_s().min(mission.hurry().look_rad_s);
         let at_a_place = TURNS_AT_A_PLACE * slowest_turn;
         let car = mission.body().ackermann();
-        // It turns on the spot, or as it drives.
+        // A robot turns on the spot, or as it drives.
         let on_the_spot = mission.method == Method::Evidential && car.is_none();
         let tightest = car.map_or(0.0, |car| car.least_turning_radius());
         let circle = tightest.max(mission.speed_m_s() / mission.turn_rad_s());
@@ -187,7 +187,7 @@ impl StallWatch {
             cut_off_since: None,
             waits_since: None,
             inside_hazard_since: None,
-            // A calibration drives to and fro.
+            // A calibration drives to and fro, so its long way is no reason.
             forgets: mission.method == Method::Evidential && mission.planner.calibration.is_none(),
             wanders_at: None,
             been: (mission.used(SensorKind::Scan) > 0).then(HashSet::new),
@@ -284,7 +284,7 @@ impl StallWatch {
             self.replans += 1;
             RecoveryStep::Replan
         } else if relocated || self.resets() - self.relocated - self.resets_before < MOST_RESETS {
-            // In an even epoch the mapper drops what is near the robot, too.
+            // In an even epoch the mapper resets the evidence near the robot, too.
             let skips = u64::from(relocated) * ((self.epoch + 1) % 2);
             self.relocated += u64::from(relocated);
             self.skipped += skips;
@@ -317,7 +317,7 @@ impl StallWatch {
         Some(stall)
     }
 
-    /// Whether a fresh planner is the next step against `cause`, which is counted.
+    /// Whether a fresh planner is the next step against `cause`; if so, that is counted.
     fn may_replan(&mut self, cause: StallCause, here: DVec2) -> bool {
         let replans = match cause {
             StallCause::Still | StallCause::Pinned => &mut self.replans_here,
@@ -336,7 +336,7 @@ impl StallWatch {
         may
     }
 
-    /// The robot is sent elsewhere: nothing so far is a stall on the way there.
+    /// Note that the robot is sent elsewhere, so nothing so far is a stall on the way there.
     fn on_new_target(&mut self, tick: u64) {
         self.hold(tick);
         (self.inside_hazard_since, self.wanders_at, self.held_at) = (None, None, None);
@@ -345,13 +345,13 @@ impl StallWatch {
         self.resets_before = self.resets() - self.relocated;
     }
 
-    /// The robot was not ordered to drive until `tick`, so nothing by then is a stall.
+    /// Note that the robot was not ordered to drive until `tick`, so nothing by then is a stall.
     pub(crate) fn hold(&mut self, tick: u64) {
         self.tick = Some(tick);
         self.forget_motion();
     }
 
-    /// Something held the robot until now, perhaps without a tick: its time at its place begins anew.
+    /// Note that something held the robot until now, perhaps without a tick, so its time at its place begins anew.
     pub(crate) const fn forget_motion(&mut self) {
         (self.anchor, self.place) = (None, None);
         (self.cut_off_since, self.waits_since) = (None, None);
@@ -389,7 +389,7 @@ impl StallWatch {
         None
     }
 
-    /// Whether the robot has driven for so long, since the start or the last reset, that its map must be wrong.
+    /// The stall of a robot that has driven for so long, since the start or the last reset, that its map must be wrong.
     fn without_end(&mut self, pose: &PoseSample, guidance: &GuidanceSample) -> Option<StallCause> {
         let most_m = (WANDERS * guidance.distance_m).max(WANDERS_LEAST_M);
         let wanders_at = self.wanders_at.get_or_insert(pose.travelled_m + most_m);
@@ -401,7 +401,7 @@ impl StallWatch {
         (self.forgets && pose.travelled_m >= *wanders_at).then_some(StallCause::Wandering)
     }
 
-    /// Whether the robot has not moved or turned for a while; or moves or turns for longer and stays at its place.
+    /// The stall of a robot that has not moved or turned for a while, or moves or turns for longer at one place.
     fn without_motion(
         &mut self,
         pose: &PoseSample,
@@ -425,7 +425,7 @@ impl StallWatch {
             // A robot that crawls to its target makes progress, too.
             self.place = Some(Place { middle: place.middle, ..arrived });
         }
-        // The planner looks around first; that has a timeout of its own.
+        // The planner looks around first, which has a timeout of its own.
         if GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::Unreachable {
             return None;
         }

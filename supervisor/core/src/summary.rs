@@ -40,7 +40,7 @@ pub struct Summary {
     pub reason: String,
     /// The row of the failsafe table that ended the mission, by its name (`firsthand table failsafe`).
     pub cause: Option<String>,
-    /// From the first motion order to the end by the robot's clock, which goes on while the link is lost.
+    /// The time from the first motion order to the end by the robot's clock, which goes on while the link is lost.
     pub mission_time_s: f64,
     pub path_length_m: f64,
     pub straight_m: f64,
@@ -62,8 +62,8 @@ pub struct Summary {
     pub true_distance_m: Option<f64>,
     /// The time at which the robot had moved 0.1 m, by the ground truth.
     pub departed_s: Option<f64>,
-    /// The longest that a wheel turned after the last command the robot had received: command limit and speed loop
-    /// together, in an outage or when a stage is down.
+    /// The longest that a wheel turned after the last command the robot had received: command limit and speed loop together, in an
+    /// outage or when a stage is down.
     pub stopping_time_s: Option<f64>,
     pub safety_events: u64,
     pub full_solves: u64,
@@ -78,8 +78,8 @@ pub struct Summary {
     pub wheel_range_rad_s: Option<f64>,
     pub ticks: u64,
     pub restarts: BTreeMap<String, u32>,
-    /// Times another supervisor went on with the run. Clearance, solves and latencies are then those of the last supervisor's
-    /// part; the path is the believed one, which is complete.
+    /// Times another supervisor went on with the run. Clearance, solves and latencies are then those of the last supervisor's part;
+    /// the path is the believed one, which is complete.
     pub resumes: u32,
     /// Generations of the planner started because the robot stalled.
     pub replans: u32,
@@ -93,7 +93,7 @@ pub struct Summary {
     pub full_solve_us: Quantiles,
 }
 
-/// A robot has departed after this distance, metres.
+/// The distance after which a robot has departed, metres.
 const DEPARTED_M: f64 = 0.1;
 /// d_safe of MRPB, metres. The value is nominal, because MRPB leaves it to its user.
 pub const SAFE_M: f64 = 0.3;
@@ -291,7 +291,7 @@ mod tests {
 
     #[test]
     fn the_metrics_of_mrpb_are_those_of_its_definitions() {
-        // One metre ahead, then two, then one to the left; times 0, 1, 2 and 4 s.
+        // The robot drives one metre ahead, two more, and one to the left, at the times 0, 1, 2 and 4 s.
         let tick = |time_s, x, y, v, clearance_m| GroundTruthTick {
             time_s,
             x,

@@ -49,7 +49,7 @@ pub struct Options {
 }
 
 pub(crate) struct Robot {
-    /// Its process, if it is a simulated one.
+    /// The process of a simulated robot.
     pub simulator: Option<Simulator>,
     address: Address,
 }
@@ -83,13 +83,13 @@ pub(crate) struct Supervisor<'a> {
     pub state_file: StateFile,
     pub clock: RunClock,
     pub decision: Decision,
-    /// When an operator last resumed, nanoseconds of the monotonic clock.
+    /// The time when an operator last resumed, nanoseconds of the monotonic clock.
     pub resumed_ns: u64,
     /// Whether the robot was ever ordered to drive.
     pub drove: bool,
     pub tick_progress: TickProgress,
     pub targets: TargetList,
-    /// When the arrival was first seen.
+    /// The time when the arrival was first seen.
     pub arrived: Option<Now>,
     stop_clock: StopClock,
     pub stall_watch: StallWatch,
@@ -338,7 +338,7 @@ impl<'a> Supervisor<'a> {
             tracing::error!(%error, "cannot save the state; a supervisor that resumes this run will not know the last requests");
         }
         let (tick, time) = self.published_as_of();
-        // A stage that is told to drive knows where.
+        // A stage that is told to drive already knows the target.
         self.bus.publish_target(tick, time, self.targets.sample())?;
         if self.clock.in_ticks() {
             // The limit is published before the order that starts the first tick.

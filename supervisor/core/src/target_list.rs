@@ -1,4 +1,4 @@
-//! The targets of a run: the one that the robot is sent to, those after it, and what became of those before. Pure.
+//! The targets of a run: the one that the robot is sent to, those after it, and the outcomes of those before. Pure.
 
 use common::{
     ground_truth::GroundTruthTick,
@@ -16,42 +16,42 @@ use crate::{
     outcome::{Ending, Outcome},
 };
 
-/// Results that are stored; the oldest are dropped.
+/// The most results that are stored; the oldest are dropped.
 const MOST_RESULTS: usize = 128;
 
-/// What became of a target.
+/// The outcome of a target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TargetOutcome {
     Reached,
     /// The robot reports its arrival, and the ground truth contradicts it.
     WrongPlace,
-    /// As with [`Outcome::ReachedUnsure`].
+    /// The robot reports its arrival and is not sure of it, as in [`Outcome::ReachedUnsure`].
     ReachedUnsure,
     /// An operator named another target before it was reached.
     Replaced,
-    /// The run ended on the way to it.
+    /// The run ended on the way to the target.
     Missed,
     /// The run ended before the robot was sent to it.
     NotTried,
 }
 
-/// A target and what became of it.
+/// A target and its outcome.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TargetResult {
     pub number: u64,
     pub x_m: f64,
     pub y_m: f64,
     pub outcome: TargetOutcome,
-    /// Mission time at which that was known; none for a target that was not tried.
+    /// Mission time at which the outcome was known; none for a target that was not tried.
     pub at_s: Option<f64>,
     /// The robot's distance from the target by its own pose on arrival.
     pub distance_m: Option<f64>,
-    /// The same by the ground truth of a simulated robot.
+    /// The distance by the ground truth of a simulated robot.
     pub truth_m: Option<f64>,
 }
 
-/// A result, as it is persisted.
+/// A persisted result.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Stored {
     result: TargetResult,
@@ -65,13 +65,13 @@ pub struct TargetList {
     /// The current target's number, from 1.
     number: u64,
     current: TargetPoint,
-    /// The first tick in which it holds.
+    /// The first tick in which the current target holds.
     since_tick: u64,
-    /// Mission time at which it became the current one, seconds.
+    /// Mission time at which the target became the current one, seconds.
     began_s: f64,
-    /// The targets after it.
+    /// The targets after the current one.
     ahead: Vec<TargetPoint>,
-    /// The targets before it.
+    /// The targets before the current one.
     results: Vec<Stored>,
 }
 
@@ -105,7 +105,7 @@ impl TargetList {
         self.ahead.is_empty()
     }
 
-    /// Its sample.
+    /// The sample of the current target.
     pub(crate) fn sample(&self) -> TargetSample {
         let mut sample = TargetSample {
             number: self.number,
@@ -129,8 +129,8 @@ impl TargetList {
         fits
     }
 
-    /// The robot is sent to `points` instead, from `since_tick` at `now_s` on. `arrival` is the arrival at the current target, if
-    /// that is reached already.
+    /// Send the robot to `points` instead, from `since_tick` at `now_s` on. `arrival` is the arrival at the current target, if that
+    /// is reached already.
     pub(crate) fn replace(
         &mut self,
         points: &[TargetPoint],
@@ -159,8 +159,8 @@ impl TargetList {
         }
     }
 
-    /// The robot arrived at the current target by `command`, and its pose was sure or not: it is sent to the next, from `since_tick`
-    /// on.
+    /// Send the robot, which arrived at the current target by `command` with a pose that was sure or not, to the next, from
+    /// `since_tick` on.
     pub(crate) fn advance(&mut self, command: &CommandSample, is_sure: bool, since_tick: u64) {
         if self.ahead.is_empty() {
             return;
@@ -200,7 +200,8 @@ impl TargetList {
         self.results.push(stored);
     }
 
-    /// Complete the results of arrivals by the ground truth as far as it is known. `allowed_m` is as far as a robot may be off.
+    /// Complete the results of arrivals by the ground truth as far as that is known. `allowed_m` is the greatest error of an
+    /// arrival.
     pub(crate) fn compare(&mut self, record: &Record, truth: &[GroundTruthTick], allowed_m: f64) {
         for Stored { result, tick } in &mut self.results {
             let Some(tick) = tick.filter(|_| result.truth_m.is_none()) else {
@@ -292,12 +293,12 @@ pub(crate) fn of_all(ending: Ending, results: &[TargetResult]) -> Ending {
     }
 }
 
-/// Whether `pose` says surely enough where the robot is.
+/// Whether `pose` is sure enough for an arrival.
 pub(crate) fn is_sure(pose: Option<&PoseSample>, mission: &Mission) -> bool {
     pose.is_none_or(|pose| pose.is_sure(mission))
 }
 
-/// Why the robot is not sent to `points`; none if it is.
+/// The reason why the robot is not sent to `points`; none if it is.
 pub(crate) fn refusal(
     points: Option<&[TargetPoint]>,
     reason: HoldReason,

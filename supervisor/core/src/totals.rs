@@ -5,13 +5,13 @@ use std::collections::VecDeque;
 
 use common::samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus};
 
-/// Ticks whose totals are stored: that of the arrival must still be there when its command is read.
+/// The number of ticks whose totals are stored: that of the arrival must still be there when its command is read.
 const MOST: usize = 1024;
 
 /// Totals that grow from tick to tick.
 #[derive(Clone, Debug)]
 pub struct Totals<T> {
-    /// Oldest first, one for each tick.
+    /// The totals of the newest ticks, oldest first.
     newest: VecDeque<(u64, T)>,
 }
 

@@ -15,14 +15,14 @@ pub const PAGE_FILE: &str = "index.html";
 pub enum DirectoryError {
     #[error("--resume: the command in {} was another: {earlier}", directory.display())]
     Another { directory: PathBuf, earlier: String },
-    /// It has results, and `resume` is not set.
+    /// The directory has results, and `resume` is not set.
     #[error("{} contains results; continue them with --resume, or give another --out", directory.display())]
     Taken { directory: PathBuf },
     #[error("cannot use {} for results: {source}; give another --out", path.display())]
     System { path: PathBuf, source: io::Error },
 }
 
-/// Make `directory` for the rows of `command`, or check that it is of that command. Returns its absolute path.
+/// Make `directory` for the rows of `command`, or check that its rows are of that command. Returns its absolute path.
 pub fn claim(directory: &Path, command: &str, resume: bool) -> Result<PathBuf, DirectoryError> {
     let file = directory.join(PLAN_FILE);
     let system = |path: &Path| {

@@ -27,7 +27,7 @@ pub use map::{Map, PlacedMap};
 pub use prior::{save_believed, with_prior_map};
 pub use ros::load_placed;
 
-/// The map in `file`. The ending of its name says its format.
+/// The map in `file`. The ending of the file's name gives the format.
 pub fn load(file: &Path) -> Result<Map, MapError> {
     let extension = file.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     match extension.as_deref() {

@@ -14,9 +14,9 @@ use crate::{
 /// The totals of every setting, and the differences of each from the first.
 #[derive(Clone, Debug)]
 pub struct Report {
-    /// In the order of the settings.
+    /// The totals in the order of the settings.
     pub totals: Vec<Totals>,
-    /// Each setting but the first, compared with the first.
+    /// The comparisons of each setting but the first with the first.
     pub comparisons: Vec<Comparison>,
 }
 
@@ -32,7 +32,7 @@ impl Report {
 }
 
 impl fmt::Display for Report {
-    /// A table in text, with 95 % intervals.
+    /// Write a table in text, with 95 % intervals.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for totals in &self.totals {
             writeln!(f, "{}: {} missions", totals.setting, totals.count)?;

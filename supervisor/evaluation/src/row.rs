@@ -9,7 +9,7 @@ use crate::{
     trial::Trial,
 };
 
-/// How a mission ended, by the ground truth.
+/// The outcome of a mission by the ground truth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
@@ -75,13 +75,13 @@ pub struct Row {
     pub barn_score: Option<f64>,
     /// Least true clearance.
     pub min_clearance_m: Option<f64>,
-    /// Of MRPB, see [`Summary`]: share of the time near something, path smoothness, velocity smoothness.
+    /// MRPB's metrics, see [`Summary`]: share of the time near something, path smoothness, velocity smoothness.
     pub p_o: Option<f64>,
     pub f_ps_m2: Option<f64>,
     pub f_vs_m_s2: Option<f64>,
     /// Distance from the estimated to the true position at the end.
     pub pose_error_m: Option<f64>,
-    /// Its expected root mean square, by the covariance of the last pose.
+    /// The expected root mean square of that error, by the covariance of the last pose.
     pub pose_error_expected_m: Option<f64>,
     /// True distance to the target at the end.
     pub true_distance_m: Option<f64>,
@@ -92,14 +92,14 @@ pub struct Row {
     /// Dynamic range of the wheel signals: the greatest commanded speed of either wheel less the least one, rad/s.
     pub wheel_range_rad_s: Option<f64>,
     pub looks: u64,
-    /// Time it looked.
+    /// Mission time spent looking.
     pub look_s: f64,
     pub replans: u64,
     pub resets: u64,
     pub full_solves: u64,
 }
 
-/// A robot that takes the first number of optimal times or less gets the best score, the second or more the worst.
+/// The multiples of the optimal time up to which a robot gets the best score, and from which on the worst.
 const BARN_CLIP: [f64; 2] = [2.0, 8.0];
 /// The speed of the challenge's optimal times, m/s.
 const BARN_SPEED_M_S: f64 = 2.0;

@@ -34,11 +34,11 @@ pub struct Plan {
     /// Missions on each world for each setting, with different noise.
     pub repeats: u64,
     pub noise: NoiseSeeds,
-    /// Pictures of missions with this noise seed are kept, too, not only of failures.
+    /// The noise seed whose missions get pictures even if they did not fail.
     pub pictured_seed: Option<u64>,
     /// Missions in parallel.
     pub jobs: usize,
-    /// Whether the robot of each mission is calibrated before, as its owner would do it. Where that fails the mission runs as it is.
+    /// Whether the robot of each mission is calibrated before, as its owner would do it. If that fails the mission runs without.
     pub calibrates: bool,
     /// Directory of worlds, rows and pictures of failures; it must exist.
     pub directory: PathBuf,
@@ -46,7 +46,7 @@ pub struct Plan {
 
 #[derive(Clone, Copy, Debug)]
 pub enum NoiseSeeds {
-    /// Every world has the same seeds: this one and the following ones.
+    /// Every world has the same seeds: this seed and the following ones.
     Counted(u64),
     /// Every mission has a seed of its own, derived from the seed of the set.
     Derived(u64),
@@ -66,8 +66,7 @@ impl NoiseSeeds {
     }
 }
 
-/// An invertible hash of `bits`: multiplications by odd numbers and shifts, as in the finaliser of MurmurHash3 (A. Appleby,
-/// 2011).
+/// An invertible hash of `bits`: multiplications by odd numbers and shifts, as in the finaliser of MurmurHash3 (A. Appleby, 2011).
 const fn mixed(bits: u32) -> u32 {
     let bits = (bits ^ (bits >> 16)).wrapping_mul(0x85eb_ca6b);
     let bits = (bits ^ (bits >> 13)).wrapping_mul(0xc2b2_ae35);
@@ -263,7 +262,7 @@ fn mission(
         let _ = fs::rename(directory.join(PICTURE), plan.picture(&row));
     }
     if !matches!(row.outcome, Outcome::Success | Outcome::Aborted) {
-        // It runs again, to the bit, because recordings of all missions would take too long.
+        // The mission can be run again, to the bit, and recordings of all missions would take too much room.
         let _ = fs::remove_dir_all(&directory);
         run(&[])?;
         let _ = fs::rename(directory.join(PAGE), page(&plan.picture(&row)));

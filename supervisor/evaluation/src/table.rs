@@ -14,7 +14,7 @@ pub type Key = (String, u64, String);
 
 /// A row of a table.
 pub trait Record: Serialize + DeserializeOwned {
-    /// The key of its mission.
+    /// The key of the row's mission.
     fn key(&self) -> Key;
 }
 

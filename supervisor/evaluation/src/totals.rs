@@ -31,7 +31,7 @@ pub struct Totals {
     pub barn_score: Option<f64>,
     /// Median of the least clearance of the successes, metres.
     pub median_clearance_m: Option<f64>,
-    /// Medians of MRPB's metrics, likewise.
+    /// Medians of MRPB's metrics over the successes.
     pub median_p_o: Option<f64>,
     pub median_f_ps_m2: Option<f64>,
     pub median_f_vs_m_s2: Option<f64>,
@@ -129,7 +129,7 @@ impl Comparison {
 }
 
 impl fmt::Display for Estimate {
-    /// For example `.620 [.564, .673]`, or with signs as `{:+}`.
+    /// Write the estimate, for example as `.620 [.564, .673]`, or with signs as `{:+}`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { value, low, high } = self;
         if f.sign_plus() {

@@ -24,11 +24,11 @@ pub struct Rules {
     pub success_within_m: f64,
     /// Whether the clock starts once the robot has moved 0.1 m, as BARN's does, or with the mission.
     pub clock_after_departure: bool,
-    /// Time after the clock's start within which an arrival is a success, seconds; none where the mission's timeout says it.
+    /// Time after the clock's start within which an arrival is a success, seconds; none if the mission's timeout limits it.
     pub most_s: Option<f64>,
     /// Whether missions get a BARN score.
     pub scored: bool,
-    /// Time of the reference path at 2 m/s, seconds, for the score; none where the shortest path of the body takes its place.
+    /// Time of the reference path at 2 m/s, seconds, for the score; none if the shortest path of the body takes its place.
     pub optimal_time_s: Option<f64>,
 }
 
@@ -47,9 +47,9 @@ impl Default for Rules {
 /// A world with a start and a target, in the frame of the world it comes from.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// What stands in it, metres.
+    /// The shapes that stand in the world, metres.
     pub shapes: Shapes,
-    /// What moves in it; the shortest path does not heed it.
+    /// The things that move in the world; the shortest path does not regard them.
     pub things: Vec<Thing>,
     pub start: DVec2,
     /// Heading at the start, radians counter-clockwise from x.

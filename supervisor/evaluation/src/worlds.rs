@@ -32,7 +32,7 @@ pub enum Worlds {
 /// A kind of world that is drawn.
 #[derive(Debug)]
 pub struct Kind {
-    /// Its stream of random numbers.
+    /// The stream of random numbers.
     stream: u64,
     name: &'static str,
     draw: fn(&mut Random, usize) -> Scene,

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use crate::collector::COLUMNS;
 
-/// What `run` is: the first message of a page.
+/// The first message of a page, which describes `run`.
 pub fn about(run: &Run) -> Value {
     let mission = &run.mission;
     let simulated = mission.robot.address.is_none();

@@ -22,10 +22,10 @@ use glam::DVec2;
 /// Steps of a turn.
 const STEPS: f32 = 254.0;
 const NONE: u8 = 255;
-/// A field has at most so many cells a side; of a larger one every second, third, ... cell is sent.
+/// The most cells a side of a field; from a larger one every second, third, ... cell is sent.
 const MOST_A_SIDE: usize = 256;
 
-/// What a message shows.
+/// The content of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Shown {
     Map = 1,

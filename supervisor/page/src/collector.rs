@@ -51,7 +51,7 @@ pub(crate) const COLUMNS: [&str; 24] = [
     "true_y",
     "true_heading",
 ];
-/// A state in which only ages have changed is given again after this mission time, seconds.
+/// The mission time after which a state is given again although only ages have changed, seconds.
 const STATE_AGAIN_S: f64 = 1.0;
 /// Most ticks whose samples come in at a time.
 const MOST_TICKS: usize = 4096;
@@ -70,7 +70,7 @@ struct Tick {
     latency_ns: Option<u64>,
 }
 
-/// What the newest samples say.
+/// The content of the newest samples.
 #[derive(Debug)]
 pub struct Collector {
     mission: Mission,
@@ -95,7 +95,7 @@ pub struct Collector {
     ahead: Vec<DVec2>,
     /// The ground truth from the tick of the newest row on, as far as it was read.
     truths: VecDeque<GroundTruthTick>,
-    /// What decided the newest state, and its time.
+    /// The facts that decided the newest state, and their time.
     state_of: Option<(Vec<u64>, f64)>,
     map_of: Option<u64>,
     field_of: Option<u64>,
@@ -118,7 +118,7 @@ impl Collector {
         &topics::STALLS,
         &topics::REQUESTS,
         &topics::FAULTS,
-        // It ends a tick, so it is read last.
+        // The link ends a tick, so it is read last.
         &topics::LINK,
     ];
 
@@ -266,7 +266,7 @@ impl Collector {
         self.link = link;
     }
 
-    /// The row of `tick`. What did not come in it is as before.
+    /// The row of `tick`. Values that did not come in it are as before.
     fn row(&mut self, tick: Tick) -> Option<Value> {
         let pose = &tick.pose?;
         let Tick { wheels, command, guidance, ranges, latency_ns, .. } =
@@ -319,7 +319,7 @@ impl Collector {
         Some(values.into_iter().map(rounded).chain(ranges).collect())
     }
 
-    /// Take a line of the ground truth, which is written before the tick's pose is published. Returns whether a further one may come
+    /// Take a line of the ground truth, which is written before the tick's pose is published. Returns whether a further line may come
     /// before the next pose.
     pub fn truth(&mut self, line: &str) -> bool {
         if let Ok(truth) = serde_json::from_str(line) {
@@ -342,7 +342,7 @@ impl Collector {
         stages.chain([self.roster.supervisor_pid]).collect()
     }
 
-    /// What these processes use, in the order of [`Self::processes`].
+    /// Take the usage of these processes, in the order of [`Self::processes`].
     pub fn used(&mut self, usage: Vec<Usage>) {
         self.usage = usage;
     }
@@ -392,7 +392,7 @@ impl Collector {
         Some((GridHeader { part, ..self.grid_header }, self.grid.cells()))
     }
 
-    /// Where the robot is sent, metres.
+    /// The target of the robot, metres.
     pub const fn target(&self) -> DVec2 {
         self.target
     }
@@ -401,7 +401,7 @@ impl Collector {
         &self.mission
     }
 
-    /// Whether the link stops the robot for an operator, and what it does.
+    /// Whether the link stops the robot for an operator, and the link's action in words.
     #[cfg(feature = "live")]
     pub(crate) fn link_says(&self) -> (bool, String) {
         let (action, cause) = (self.link.action().effect(), self.link.cause());
@@ -412,7 +412,7 @@ impl Collector {
         )
     }
 
-    /// The state of the robot's processes, if it has changed since the last time; one in which only ages differ is given once a second.
+    /// The state of the robot's processes, if it has changed since the last time; if only ages differ, once a second.
     pub fn take_state(&mut self) -> Option<Value> {
         if self.stages.is_empty() {
             return None;
@@ -483,12 +483,12 @@ impl Collector {
     }
 }
 
-/// To a tenth of a millimetre; null where there is no number.
+/// `value` to a tenth of a millimetre; null if it is no number.
 fn rounded(value: f64) -> Value {
     Value::from((value * 1e4).round() / 1e4)
 }
 
-/// Null for an age that is not known.
+/// An age in seconds; null if it is not known.
 fn seconds(ns: u64) -> Value {
     if ns == u64::MAX { Value::Null } else { Value::from((ns / 1_000_000) as f64 / 1e3) }
 }

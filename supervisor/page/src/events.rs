@@ -18,21 +18,21 @@ const LONGEST: usize = 300;
 pub struct Event {
     /// Mission time, seconds.
     pub t: f64,
-    /// The stage, or the part of the system, that it is about.
+    /// The stage, or the part of the system, that the event is about.
     pub of: String,
     pub kind: Kind,
     pub text: String,
 }
 
-/// How much an event matters.
+/// The importance of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
-    /// A death, a stall, a stop.
+    /// The event is a death, a stall or a stop.
     Bad,
     Good,
     Note,
-    /// A line of a process's log.
+    /// The event is a line of a process's log.
     Log,
 }
 
@@ -53,7 +53,7 @@ pub(crate) struct Events {
 }
 
 impl Events {
-    /// Take what was found since the last time.
+    /// Take the events since the last time.
     pub(crate) fn take(&mut self) -> Vec<Event> {
         std::mem::take(&mut self.found)
     }
@@ -108,7 +108,7 @@ impl Events {
         self.add("failsafe", kind, text);
     }
 
-    /// How the state of `link` is to be judged.
+    /// The importance of the state of `link`.
     pub(crate) fn kind(&self, link: &LinkSample) -> Kind {
         match link.cause() {
             Cause::NotOrdered => Kind::Note,
@@ -174,7 +174,7 @@ impl Events {
     }
 }
 
-/// `CommandStale` as `command stale`.
+/// The name of a variant in words: `CommandStale` as `command stale`.
 pub(crate) fn words(of: impl Debug) -> String {
     let mut words = String::new();
     for letter in format!("{of:?}").chars() {

@@ -1,8 +1,8 @@
 //! The live page: a consumer of one robot, and a small web server beside it.
 //!
-//! One thread reads the bus and fills what browsers are shown; a second one runs the server. A browser takes what is new ten times a
-//! second, so a slow one costs nobody anything: of maps, fields and states it gets the newest, of rows and events those that are
-//! still there.
+//! One thread reads the bus and fills the data that browsers are shown; a second one runs the server. A browser takes the new data
+//! ten times a second, so a slow one delays nobody: it gets the newest maps, fields and states, and those rows and events that are
+//! still stored.
 //!
 //! | module | holds |
 //! |---|---|
@@ -37,7 +37,7 @@ use self::{access::Access, context::Context, orders::Operator, shared::Shared};
 /// A page that is served.
 #[derive(Debug)]
 pub struct Page {
-    /// Where it listens.
+    /// The address on which the page listens.
     pub address: SocketAddr,
     pub access: Arc<Access>,
     domain: Domain,
@@ -81,7 +81,7 @@ impl Page {
         })
     }
 
-    /// Show the robot, from run to run, until `ended` says so.
+    /// Show the robot, from run to run, until `ended` returns true.
     pub fn show(&self, ended: &mut dyn FnMut() -> bool) {
         robot::follow(&self.domain, &self.shared, ended);
     }

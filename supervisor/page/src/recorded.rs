@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::assets;
 
-/// A page that refers to something must be blocked from it.
+/// The policy that blocks a page from everything to which it might refer.
 const POLICY: &str = "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'unsafe-inline'; \
 style-src 'unsafe-inline'; img-src data:\">";
 /// The modules, each before those that import it.
@@ -37,7 +37,7 @@ impl Recorded {
         self.add(1, message);
     }
 
-    /// Each message has its length, and a byte that is 0 for text.
+    /// Add a message with its length, and a byte that is 0 for text.
     fn add(&mut self, kind: u8, message: &[u8]) {
         let length = message.len() as u32;
         // Writing to a Vec cannot fail.
@@ -88,7 +88,7 @@ fn asset(file: &str) -> &'static str {
     found.map_or("", |(_, _, text)| text)
 }
 
-/// The modules as one script, each in a scope of its own, which gives what it exports.
+/// The modules as one script, each in a scope of its own, which gives its exports.
 fn bundle() -> String {
     let mut bundle = String::new();
     for module in MODULES {

@@ -12,11 +12,11 @@ use super::{
 /// The style of the bands.
 #[derive(Debug)]
 pub(super) struct Style {
-    /// Bytes this layer may take: a field in shreds is drawn coarser, not larger.
+    /// The most bytes of this layer: an irregular field is drawn coarser, not larger.
     pub(super) budget: usize,
-    /// Samples along the longer side: more than this is finer than the bands are wide.
+    /// The most samples along the longer side: more would be finer than the bands are wide.
     pub(super) finest: usize,
-    /// About so many bands.
+    /// The approximate number of bands.
     pub(super) bands: f64,
     /// Colours from the target outwards.
     pub(super) ramp: &'static [[f64; 3]],
@@ -24,7 +24,7 @@ pub(super) struct Style {
     pub(super) stroke: &'static str,
 }
 
-/// The bands behind a mission: pale, as many as the eye still tells apart.
+/// The bands behind a mission: pale, as many as the eye can distinguish.
 pub(super) const MISSION: Style = Style {
     budget: 130_000,
     finest: 160,
@@ -56,7 +56,7 @@ pub(super) struct Levels {
 impl Levels {
     /// The number of levels above `log2_u`.
     pub(super) fn band(&self, log2_u: f32) -> u32 {
-        // Saturating: above the target's own level there is none.
+        // The cast saturates: there is no level above the target's own.
         ((-f64::from(log2_u) / self.step) as u32).min(self.count)
     }
 
@@ -151,8 +151,8 @@ impl<'a> Bands<'a> {
     }
 }
 
-/// Samples around the map: the inner ones carry the bands on to the edge of the plot, the outer ones
-/// are nowhere, so that every level set closes.
+/// Samples around the map: the inner ones continue the bands to the edge of the plot, the outer ones have no value, so that every
+/// level set closes.
 const AROUND: usize = 2;
 
 /// log2 u at the middles of square blocks of cells, and [`AROUND`] them.
@@ -191,7 +191,7 @@ impl Samples {
                 }
             }
         }
-        // Far below the last level nothing can be told apart; a floor keeps the level sets smooth.
+        // Far below the last level no values can be told apart, and a floor keeps the level sets smooth.
         let last = -levels.step * f64::from(levels.count);
         let floor = last - 0.5 * levels.step;
         let nowhere = last - 2.0 * levels.step;

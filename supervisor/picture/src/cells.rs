@@ -8,7 +8,7 @@ use super::{
     page::{Path, ink},
 };
 
-/// Bytes this layer may take: a belief in shreds is drawn coarser, not larger.
+/// The most bytes of this layer: an irregular belief is drawn coarser, not larger.
 const BUDGET: usize = 90_000;
 
 /// The hazard cells of a belief, as areas of the sheet.
@@ -75,7 +75,7 @@ pub(super) struct Blocks<'a, Kind> {
     pub(super) kinds: Vec<Kind>,
 }
 
-/// The state of each block: hazard if any of its cells is, of the kind most of them are.
+/// The state of each block: hazard if any of its cells is, of the most frequent kind of hazard.
 fn coarsened(lattice: &Lattice, cells: &[u8], block: usize) -> Vec<CellState> {
     let across = lattice.cols.div_ceil(block);
     let mut tally = vec![[0_u32; 6]; across * lattice.rows.div_ceil(block)];
@@ -103,7 +103,7 @@ fn coarsened(lattice: &Lattice, cells: &[u8], block: usize) -> Vec<CellState> {
 }
 
 impl<Kind: Copy + PartialEq> Blocks<'_, Kind> {
-    /// Everything of one kind: runs along x, joined along y where they are alike.
+    /// The area of one kind: runs along x, joined along y where they are equal.
     pub(super) fn area(&self, kind: Kind) -> Path {
         let across = self.lattice.cols.div_ceil(self.side);
         let mut path = Path::default();
@@ -135,7 +135,7 @@ impl<Kind: Copy + PartialEq> Blocks<'_, Kind> {
     }
 }
 
-/// Blocks `from..until` of one kind, alike in every row from `since` on.
+/// Blocks `from..until` of one kind, equal in every row from `since` on.
 #[derive(Clone, Copy)]
 struct Run {
     from: usize,

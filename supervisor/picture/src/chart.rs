@@ -9,7 +9,7 @@ use super::{
 
 /// Height of the plot.
 const HEIGHT: f64 = 230.0;
-/// Points of one series that are drawn at most; of more the least and the greatest of each stretch.
+/// The most points of one series that are drawn; from more, the least and the greatest of each stretch are.
 const MOST_POINTS: usize = 2400;
 
 /// The style of a series.
@@ -21,7 +21,7 @@ pub enum Mark {
     Crosses,
 }
 
-/// Values to draw.
+/// A series of values.
 #[derive(Clone, Debug)]
 pub struct Series {
     /// Name for the legend.
@@ -34,7 +34,7 @@ pub struct Series {
 
 #[derive(Clone, Debug)]
 pub struct Chart {
-    /// Above it.
+    /// The title above the chart.
     pub title: String,
     /// A description in a sentence, for people who cannot see it.
     pub description: String,
@@ -112,7 +112,7 @@ fn drawn(mark: Mark, points: impl Iterator<Item = DVec2>) -> String {
     path.element(&style(mark))
 }
 
-/// Two strokes.
+/// Add a cross of two strokes.
 fn add_cross(path: &mut Path, at: DVec2, reach: f64) {
     for side in [DVec2::new(1.0, 1.0), DVec2::new(1.0, -1.0)] {
         path.move_to(at - side * reach);

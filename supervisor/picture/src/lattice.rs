@@ -1,4 +1,4 @@
-//! A rectangle of cells and where it lies on a sheet: what the layers of a field are drawn on.
+//! A rectangle of cells and its place on a sheet, on which the layers of a field are drawn.
 
 use common::grid::GridFrame;
 use glam::DVec2;

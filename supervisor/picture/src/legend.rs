@@ -28,7 +28,7 @@ pub(super) struct Legend<'a> {
 const COLUMN: f64 = PLOT_LEFT + PLOT_SIDE + 30.0;
 /// Distance between rows.
 const ROW: f64 = 25.0;
-/// Middle of the symbols, and where their text starts, from the left edge of a column.
+/// The middle of the symbols, and the start of their text, from the left edge of a column.
 const SYMBOL: f64 = 19.0;
 const WORDS: f64 = 50.0;
 
@@ -131,7 +131,7 @@ impl Legend<'_> {
         }
     }
 
-    /// A round length of a sixth to a third of the plot, in the lower corner.
+    /// A bar of a round length, a sixth to a third of the plot, in the lower corner.
     fn scale_bar(&self) -> String {
         let length = round_up(self.view.side_m() / 8.0);
         let (y, right) = (PLOT_TOP + PLOT_SIDE - 4.0, COLUMN + self.view.px(length));
@@ -158,13 +158,13 @@ pub(super) struct Column {
 }
 
 impl Column {
-    /// An empty one.
+    /// An empty column.
     pub(super) const fn at(corner: DVec2) -> Self {
         Self { x: corner.x, y: corner.y, text: String::new() }
     }
 
     fn heading(&mut self, words: &str) {
-        // The first one stands at the top of the plot, the others apart from what is above.
+        // The first group stands at the top of the plot, the others apart from the group above.
         if !self.text.is_empty() {
             self.y += 14.0;
         }
@@ -229,7 +229,7 @@ fn colour_bar(levels: Levels, left: f64, y: f64) -> String {
             levels.colour(nth)
         );
     }
-    // Labels at every so many levels: as many as their longest leaves room for.
+    // Labels are so many levels apart that the longest has room.
     let longest = format!("-{}", levels.step * f64::from(levels.count)).len() as f64;
     let apart = ((longest * 7.0 + 14.0) / width).ceil().max(1.0) as usize;
     for nth in (0..=levels.count).step_by(apart) {

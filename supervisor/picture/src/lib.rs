@@ -89,7 +89,7 @@ pub fn svg(scene: &Scene<'_>) -> String {
     })
 }
 
-/// The plot of `scene` and what explains it, put together by `sheet`.
+/// The plot of `scene` and its explanations, put together by `sheet`.
 fn drawn(scene: &Scene<'_>, sheet: impl FnOnce(&View, String, &Legend<'_>) -> String) -> String {
     let view = View::of(&scene.mission.grid_frame());
     let field = scene.field.filter(|(frame, cells)| cells.len() == frame.area());

@@ -1,7 +1,7 @@
 //! The field of a bare map: level sets of log u, lines of the guidance, walls, cells cut off, the target.
 //!
-//! Unlike the picture of a mission it is drawn to be made pixels of, large and without text. Cells become squares of
-//! whole pixels where there is room for that.
+//! Unlike the picture of a mission, this is drawn for conversion to pixels, large and without text. Cells become squares
+//! of whole pixels if there is room for that.
 
 use common::samples::FieldCell;
 use glam::DVec2;
@@ -16,9 +16,9 @@ use super::{
 
 /// Longest side of a drawn map, pixels.
 const LARGEST: usize = 2368;
-/// Maps of fewer cells along their longer side are drawn smaller: on a large sheet their lines would be lost.
+/// The cells along the longer side below which a map is drawn smaller: on a large sheet its lines would be lost.
 const SMALL: usize = 100;
-/// Longest side of those, pixels.
+/// Longest side of such a small map, pixels.
 const SMALL_SIDE: usize = 1200;
 /// Margin around the map, pixels.
 const FRAME: f64 = 16.0;
@@ -80,7 +80,7 @@ pub fn map_svg(map: &FieldOnMap<'_>) -> String {
         .map_or(String::new(), |bands| bands.layer() + &flat_cells(map, &lattice, bands.levels()));
     let lines = streamlines::layer(&lattice, map.cells, &LINES);
     let kinds = Blocks { lattice: &lattice, side: 1, kinds: kinds(map) };
-    // Anti-aliased, neighbouring rectangles would show a seam.
+    // Neighbouring rectangles would show a seam if they were anti-aliased.
     let crisp = "shape-rendering=\"crispEdges\"";
     let cut_off = kinds.area(Kind::CutOff);
     let squares = [
@@ -108,7 +108,7 @@ pub fn map_svg(map: &FieldOnMap<'_>) -> String {
 const HATCH: &str = "<pattern id=\"hatch\" width=\"8\" height=\"8\" patternUnits=\"userSpaceOnUse\" \
      patternTransform=\"rotate(45)\"><path d=\"M0 0V8\" stroke=\"#8b9199\" stroke-width=\"3\"/></pattern>";
 
-/// Pixels along the side of a cell: a whole number, or one part of it, so that the squares are sharp.
+/// Pixels along the side of a cell: a whole number, or the reciprocal of one, so that the squares are sharp.
 fn cell_size((cols, rows): (usize, usize)) -> f64 {
     let longest = cols.max(rows).max(1);
     let room = if longest < SMALL { SMALL_SIDE } else { LARGEST };
@@ -127,10 +127,10 @@ fn kinds(map: &FieldOnMap<'_>) -> Vec<Kind> {
         .collect()
 }
 
-/// Cells beside a wall so thin that the level sets of its other side would show on this one: each in the one colour it
-/// has at its centre.
+/// Cells beside a wall so thin that the level sets of its other side would show on this one: each gets the one colour of
+/// its centre.
 fn flat_cells(map: &FieldOnMap<'_>, lattice: &Lattice, levels: Levels) -> String {
-    // A wall of a pixel or less hides nothing either way.
+    // A wall of a pixel or less hides nothing.
     if cell_size(map.size) < 2.0 {
         return String::new();
     }
@@ -151,7 +151,7 @@ fn flat_cells(map: &FieldOnMap<'_>, lattice: &Lattice, levels: Levels) -> String
 /// The greatest change of log2 u between cells this near to each other that no wall separates.
 const OPEN: f64 = 8.0;
 
-/// Whether a reachable cell and one across a blocked neighbour lie more than two bands apart, and that for the wall.
+/// Whether a reachable cell and one across a blocked neighbour lie more than two bands apart, because of the wall.
 fn is_beside_thin_wall(map: &FieldOnMap<'_>, at: usize, step: f64) -> bool {
     let own = map.cells[at].log2_u;
     let apart = OPEN.max(2.0 * step);
@@ -171,7 +171,7 @@ fn around((cols, rows): (usize, usize), at: usize) -> impl Iterator<Item = usize
         .flat_map(move |row| columns.clone().map(move |col| row * cols + col))
 }
 
-/// A large bull's eye.
+/// The target as a large bull's eye.
 fn target(lattice: &Lattice, (col, row): (usize, usize)) -> String {
     let at = lattice.place(DVec2::new(col as f64, row as f64));
     let (x, y) = (Px(at.x), Px(at.y));

@@ -8,14 +8,14 @@ use super::{
     world,
 };
 
-/// Text without fonts of its own; digits of one width where the font has them.
+/// The font of all text, which needs no font file; digits have one width if the font has such.
 pub(super) const FONT: &str = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, \
      'DejaVu Sans', sans-serif";
 /// Characters of 12 px that surely fit across the sheet.
 const ACROSS: usize = 150;
-/// Captions that are drawn.
+/// The most captions that are drawn.
 const MOST_CAPTIONS: usize = 8;
-/// Below the plot, before the first caption.
+/// The distance from the plot to the first caption.
 const BELOW: f64 = 58.0;
 /// Distance between lines of captions.
 const LINE: f64 = 18.0;
@@ -37,7 +37,7 @@ pub(super) fn open(scene: &Scene<'_>) -> String {
     )
 }
 
-/// Mission and outcome, and below them how it went.
+/// Mission and outcome, and below them the numbers of the run.
 pub(super) fn title(scene: &Scene<'_>) -> String {
     let colour = if scene.facts.reached { ink::TARGET } else { ink::FAILURE };
     format!(
@@ -86,7 +86,7 @@ pub(super) fn axes(view: &View) -> String {
     for axis in 0..2 {
         let first = (low[axis] / step).ceil();
         let last = ((low[axis] + view.side_m()) / step).floor();
-        // Twelve steps by construction; the bound holds however far from 0 the perimeter lies.
+        // There are twelve steps by construction; the bound holds for a perimeter at any distance from 0.
         for nth in (0..=20).map(|nth| first + f64::from(nth)).take_while(|nth| *nth <= last) {
             let mut at = low;
             at[axis] = nth * step;

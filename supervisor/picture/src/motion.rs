@@ -8,13 +8,13 @@ use super::{
     scene::Scene,
 };
 
-/// Poses of one trajectory that are drawn at most: a day at 7 Hz still makes a small file.
+/// The most poses of one trajectory that are drawn: a day at 7 Hz still makes a small file.
 const MOST_POSES: usize = 4000;
-/// About as many bodies along the way.
+/// The approximate number of bodies along the way.
 const BODIES: f64 = 16.0;
 /// The number of standard deviations within which 95 % of a normal distribution in a plane are: the root of -2 ln 0.05.
 const WITHIN_95: f64 = 2.4477;
-/// Never more, whatever the times say.
+/// The most bodies, whatever the times are.
 const MOST_BODIES: usize = 200;
 
 /// The robot in its world.
@@ -68,7 +68,7 @@ impl<'a> Motion<'a> {
         self.covariance.is_some() && self.has_belief()
     }
 
-    /// Mission time between two bodies, seconds, where any are drawn.
+    /// Mission time between two bodies, seconds, if any are drawn.
     pub(super) fn period_s(&self) -> Option<f64> {
         self.every.map(|(seconds, _)| seconds)
     }
@@ -196,7 +196,7 @@ fn line_style(colour: &str, width: &str, dashes: &str) -> String {
     )
 }
 
-/// White below a line, so that it stands out from field and hatch alike.
+/// A white line below a line, which separates it from field and hatch.
 fn halo(line: &Path) -> String {
     line.element(
         "fill=\"none\" stroke=\"#fff\" stroke-width=\"5.5\" stroke-opacity=\"0.75\" \
@@ -211,7 +211,7 @@ fn trajectory(view: &View, poses: &[Pose2]) -> Path {
 }
 
 fn is_shown(view: &View, pose: &Pose2) -> bool {
-    // A body beside the plot would only be cut away.
+    // A body beside the plot would only be cut off.
     view.shows(pose.position, 0.0) && pose.heading.is_finite()
 }
 
@@ -236,7 +236,7 @@ pub(super) fn target(at: DVec2, tolerance: f64) -> String {
     )
 }
 
-/// A square where it began.
+/// A square at the start of the run.
 pub(super) fn start_mark(at: DVec2) -> String {
     format!(
         "<rect x=\"{}\" y=\"{}\" width=\"9\" height=\"9\" fill=\"#fff\" stroke=\"{}\" \

@@ -1,4 +1,4 @@
-//! The sheet: how the mission frame lies on it, and how numbers, lines and text are written.
+//! The sheet: the place of the mission frame on it, and the format of numbers, lines and text.
 
 use std::fmt::{self, Display, Write};
 
@@ -19,8 +19,8 @@ const OVERHANG: f64 = 20.0;
 /// Steps of a line shorter than this cannot be seen.
 const FINEST: f64 = 0.6;
 
-/// The colours, in one place so that they stay apart from each other. Hue tells belief (orange,
-/// violet) from motion (black, magenta); the field stays pale below both.
+/// The colours, in one place so that they stay distinct. Hue tells belief (orange, violet) from motion (black, magenta);
+/// the field stays pale below both.
 pub(super) mod ink {
     /// Text and the plot's frame.
     pub(crate) const TEXT: &str = "#1f2933";
@@ -65,7 +65,7 @@ impl View {
         if side_m.is_finite() && side_m > 0.0 && low.is_finite() {
             return Self { low, side_m };
         }
-        // No mission that was validated comes here; a picture must come out all the same.
+        // No valid mission leads here, but a picture is made all the same.
         Self { low: DVec2::splat(-0.5), side_m: 1.0 }
     }
 
@@ -90,7 +90,7 @@ impl View {
         metres * PLOT_SIDE / self.side_m
     }
 
-    /// Whether any of a disc (metres) is on the plot. NaN is not.
+    /// Whether any of a disc (metres) is on the plot; false for NaN.
     pub(super) fn shows(&self, centre: DVec2, radius_m: f64) -> bool {
         let reach = radius_m + self.side_m / 2.0;
         let from_middle = (centre - self.low - DVec2::splat(self.side_m / 2.0)).abs();
@@ -130,7 +130,7 @@ pub(super) fn metres(frame: &GridFrame, cells: DVec2) -> DVec2 {
     frame.centre + (cells - centre) * frame.resolution_m
 }
 
-/// The part of `from`..`to` on the plot or little beside it: Liang and Barsky's clipping.
+/// The part of `from`..`to` that is on the plot or little beside it, by Liang and Barsky's clipping.
 fn cut(from: DVec2, to: DVec2) -> Option<(DVec2, DVec2)> {
     let low = DVec2::new(PLOT_LEFT, PLOT_TOP) - OVERHANG;
     let high = low + PLOT_SIDE + 2.0 * OVERHANG;
@@ -153,8 +153,7 @@ fn cut(from: DVec2, to: DVec2) -> Option<(DVec2, DVec2)> {
     (enter <= leave && ends.0.is_finite() && ends.1.is_finite()).then_some(ends)
 }
 
-/// A coordinate as it is written: a tenth is finer than any screen, and what is not a number is
-/// none in the file either.
+/// A coordinate in the file: a tenth is finer than any screen, and a value that is no number is left out.
 pub(super) struct Px(pub(super) f64);
 
 impl Display for Px {
@@ -179,7 +178,7 @@ impl Path {
         self.data.is_empty()
     }
 
-    /// Bytes it takes.
+    /// The bytes that the path takes.
     pub(super) const fn len(&self) -> usize {
         self.data.len()
     }

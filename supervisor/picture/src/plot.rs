@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::page::{Path, Px, escape, ink, round_up};
 
-/// Width of the sheet: on a telephone its text is still read, across a column of print it is as large as the text.
+/// Width of the sheet: its text is readable on a telephone, and as large as the text in a column of print.
 const WIDTH: f64 = 620.0;
 /// Left edge of the plot.
 const LEFT: f64 = 70.0;

@@ -1,12 +1,12 @@
-//! A drawing as pixels. It must hold no text: no fonts are looked for.
+//! A drawing as pixels. It must contain no text, because no fonts are loaded.
 
 use resvg::{tiny_skia::Pixmap, usvg};
 use thiserror::Error;
 
-/// A drawing that did not become pixels: a fault of the program, whatever the map.
+/// A drawing that did not become pixels, which is a fault of the program with any map.
 #[derive(Debug, Error)]
 pub enum RasterError {
-    /// The SVG is none.
+    /// The drawing is no SVG.
     #[error("the picture could not be read back: {0}; report this map")]
     Drawing(#[from] usvg::Error),
     /// A pixmap of that size cannot be allocated.
@@ -22,7 +22,7 @@ pub enum RasterError {
     Encoding(String),
 }
 
-/// `svg` as the bytes of a PNG file, a pixel each of its units.
+/// `svg` as the bytes of a PNG file, with a pixel for each unit.
 pub fn png(svg: &str) -> Result<Vec<u8>, RasterError> {
     let tree = usvg::Tree::from_str(svg, &usvg::Options::default())?;
     let size = tree.size().to_int_size();

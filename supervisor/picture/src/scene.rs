@@ -12,11 +12,11 @@ pub struct Scene<'a> {
     pub field: Option<(GridFrame, &'a [FieldCell])>,
     /// The poses of dead reckoning, at equal steps of mission time from its beginning.
     pub believed: &'a [Pose2],
-    /// Covariance of its position at the end, xx, xy, yy, m^2; none if nobody knows.
+    /// Covariance of the estimated position at the end, xx, xy, yy, m^2; none if it is not known.
     pub covariance: Option<[f64; 3]>,
     /// The true poses at the same times; empty with a real robot.
     pub truth: &'a [Pose2],
-    /// Where the robot was sent, metres; empty for the targets of the mission.
+    /// The targets of the robot, metres; empty for those of the mission.
     pub targets: &'a [DVec2],
     /// The facts about the run.
     pub facts: Facts<'a>,
@@ -29,7 +29,7 @@ pub struct Scene<'a> {
 pub struct Facts<'a> {
     /// The outcome in a word: reached, unreachable, timeout, ...
     pub outcome: &'a str,
-    /// Whether that is what was wanted.
+    /// Whether that is the wanted outcome.
     pub reached: bool,
     /// Mission time, seconds.
     pub mission_time_s: f64,

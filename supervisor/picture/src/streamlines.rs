@@ -12,11 +12,11 @@ use super::{
 /// The style of the lines.
 #[derive(Debug)]
 pub(super) struct Style {
-    /// Bytes the lines may take: a field in shreds is drawn sparser, not larger.
+    /// The most bytes of the lines: an irregular field is drawn sparser, not larger.
     pub(super) budget: usize,
     /// The distance from a line to the beginning of the next one, on the sheet.
     pub(super) spacing: f64,
-    /// Never nearer than this, in cells: between two cells there is nothing new to see.
+    /// The least spacing, in cells: between two cells the field has no further details.
     pub(super) least_cells: f64,
     /// Colour of lines and arrowheads.
     pub(super) colour: &'static str,
@@ -33,13 +33,13 @@ pub(super) const MISSION: Style = Style {
     stroke: (0.8, 0.6, 0.75),
 };
 
-/// Lines end where they come this near to another, in spacings.
+/// The distance to another line at which a line ends, in spacings.
 const MERGED: f64 = 0.5;
-/// Shorter lines are left out, in spacings.
+/// The length below which lines are left out, in spacings.
 const SHORTEST: f64 = 1.4;
 /// Distance between arrowheads along a line, in spacings.
 const ARROWS_APART: f64 = 6.0;
-/// A line is straight while it turns by less than this (its cosine).
+/// The cosine of the turn up to which a line is straight.
 const STRAIGHT: f64 = 0.9985;
 /// Half the width and half the length of an arrowhead, on the sheet.
 const ARROWHEAD: (f64, f64) = (2.3, 3.4);
@@ -125,13 +125,13 @@ fn evenly_spaced(lattice: &Lattice, cells: &[FieldCell], spacing: f64) -> Vec<Ve
     };
 
     let mut lines: Vec<Vec<DVec2>> = Vec::new();
-    // Seeds all over the map come last: they find the regions no line led into.
+    // Seeds all over the map come last, in the regions into which no line led.
     for at in 0..bins[0] * bins[1] {
         let (col, row) = (at % bins[0], at / bins[0]);
         let seed = DVec2::new(col as f64, row as f64) * tracer.spacing;
         let mut seeded_from = lines.len();
         lines.extend(tracer.line_through(seed));
-        // Beside a line that was drawn the next ones are begun.
+        // The next lines are begun beside a line that was drawn.
         while let Some(line) = lines.get(seeded_from) {
             let beside = tracer.beside(line);
             for seed in beside {
@@ -181,7 +181,7 @@ impl Tracer<'_> {
         below.lerp(above, part.y).try_normalize()
     }
 
-    /// The line through `seed`, if there is room for one that is long enough; it is taken as drawn.
+    /// The line through `seed`, if there is room for one that is long enough; it counts as drawn.
     fn line_through(&mut self, seed: DVec2) -> Option<Vec<DVec2>> {
         if self.is_crowded(seed, 0.98) || self.direction(seed).is_none() {
             return None;
@@ -194,7 +194,7 @@ impl Tracer<'_> {
         if length < SHORTEST * self.spacing {
             return None;
         }
-        // A tenth of the spacing apart is near enough to keep others away.
+        // Points a tenth of the spacing apart are enough to keep other lines away.
         let mut kept: Option<DVec2> = None;
         for &point in &line {
             if kept.is_some_and(|kept| kept.distance(point) < 0.1 * self.spacing) {
@@ -222,7 +222,7 @@ impl Tracer<'_> {
                 .and_then(|here| self.direction(at + here * (step / 2.0)))
                 .map(|half_way| at + half_way * step);
             match next {
-                // A turn by more than a right angle within a step: the target, or a ridge.
+                // A turn by more than a right angle within a step means the target, or a ridge.
                 Some(next) if self.turns_back(at, next) => break,
                 Some(next) if !self.is_crowded(next, MERGED) => points.push(next),
                 _ => break,

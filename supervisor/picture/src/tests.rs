@@ -1,4 +1,4 @@
-//! The promises of the picture, on a true harmonic field and on scenes nobody would draw.
+//! Tests of the picture, on a true harmonic field and on unusual scenes.
 
 use std::path::Path;
 
@@ -83,7 +83,7 @@ fn mission(cells: u32) -> Mission {
     Mission::parse(&text, Path::new("three-drums.toml")).unwrap()
 }
 
-/// The belief of a robot that came along y = 0: the near sides of what stands there.
+/// The belief of a robot that came along y = 0: the near sides of the shapes there.
 fn belief(mission: &Mission) -> Vec<u8> {
     let frame = mission.grid_frame();
     let margin = 0.25;
@@ -177,18 +177,18 @@ fn three_drums() -> Run {
     }
 }
 
-/// Numbers without a pattern, the same in every run of the tests.
+/// Pseudorandom numbers, the same in every run of the tests.
 struct Dice(u64);
 
 impl Dice {
     fn next(&mut self) -> u64 {
-        // Knuth's MMIX generator; its low bits are poor.
+        // This is Knuth's MMIX generator, whose low bits are poor.
         self.0 =
             self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         self.0 >> 33
     }
 
-    /// Mostly a fair number, at times an unfair one.
+    /// A number that is mostly ordinary, at times an extreme one.
     fn number(&mut self) -> f64 {
         match self.next() % 12 {
             0 => f64::NAN,
@@ -229,7 +229,8 @@ impl Dice {
     }
 }
 
-/// Every tag closed in order, every attribute quoted, no stray `<`, `&` or control character.
+/// Assert that every tag is closed in order, every attribute is quoted, and no stray `<`, `&` or control character is
+/// left.
 fn assert_well_formed(xml: &str) {
     let mut open = Vec::new();
     let mut rest = xml;
@@ -298,7 +299,7 @@ fn a_run_that_ended_at_once_still_makes_a_picture() {
     assert_numbers(&picture);
     assert!(picture.contains("three-drums"));
 
-    // A field of another size than its frame says is as good as none.
+    // A field of another size than its frame says is not drawn.
     scene.field = Some((run.mission.grid_frame(), &run.field[1..]));
     assert_eq!(svg(&scene), picture);
 }

@@ -1,7 +1,7 @@
 //! The real shapes over the robot's map: dark outlines and a hatch, so that both are visible.
 //!
-//! Shapes that do not reach from the floor to above the robot have dashed outlines, those of glass dash-dotted ones,
-//! those that absorb sound dotted ones.
+//! Shapes that do not reach from the floor to above the robot have dashed outlines, shapes of glass dash-dotted ones,
+//! shapes that absorb sound dotted ones.
 
 use common::geometry::{Light, Profile, Shapes};
 
@@ -15,18 +15,18 @@ pub(super) const HATCH: &str = "<pattern id=\"hatch\" width=\"6\" height=\"6\" \
 /// The outline of an obstacle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outline {
-    /// Hard, from the floor to above the robot.
+    /// The obstacle is hard, from the floor to above the robot.
     Full,
-    /// Lower than that, or above the floor.
+    /// The obstacle is lower than that, or above the floor.
     Partial,
-    /// As high as the robot, of glass.
+    /// The obstacle is as high as the robot, and of glass.
     Glass,
     /// The obstacle is as high as the robot, but absorbs sound.
     Soft,
 }
 
 impl Outline {
-    /// All, in the order in which they are drawn.
+    /// All outlines, in the order in which they are drawn.
     pub(super) const ALL: [Self; 4] = [Self::Full, Self::Partial, Self::Glass, Self::Soft];
 
     fn of(profile: Profile) -> Self {
@@ -41,7 +41,7 @@ impl Outline {
         }
     }
 
-    /// Whether anything in `world` is drawn so.
+    /// Whether anything in `world` has this outline.
     pub(super) fn is_in(self, world: &Shapes) -> bool {
         let drums = world.drums.iter().map(|drum| drum.profile());
         let walls = world.walls.iter().map(|wall| wall.profile());
@@ -49,7 +49,7 @@ impl Outline {
         drums.chain(walls).chain(boxes).any(|profile| Self::of(profile) == self)
     }
 
-    /// Its line of the legend.
+    /// The text of the outline in the legend.
     pub(super) const fn name(self) -> &'static str {
         match self {
             Self::Full => "drum, box, wall",

@@ -2,7 +2,7 @@
 
 use std::{collections::VecDeque, fs, path::PathBuf};
 
-/// A budget has room for so many files, so that at least three quarters of it are the newest samples.
+/// The number of files for which a budget has room, so that at least three quarters of it are the newest samples.
 const FILES: u64 = 4;
 
 pub(crate) struct Budget {
@@ -35,7 +35,7 @@ impl Budget {
         while total + self.bytes / FILES > self.bytes
             && let Some((oldest, size)) = self.complete.pop_front()
         {
-            // Somebody else may have removed it.
+            // Another process may have removed the file.
             let _ = fs::remove_file(&oldest);
             total -= size;
         }

@@ -9,7 +9,7 @@ pub fn drop_every_second<T>(items: &mut Vec<T>) {
     });
 }
 
-/// Samples in order. When there are more than `MOST`, every second one is dropped, and from then on only every second one is taken.
+/// Samples in order. When there are more than `MOST`, every second one is dropped, and only every second one is taken from then on.
 #[derive(Clone, Debug)]
 pub struct Downsampled<T, const MOST: usize> {
     items: Vec<T>,

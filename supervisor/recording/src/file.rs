@@ -21,7 +21,7 @@ use mcap::{
 
 use crate::{error::RecordingError, schema, viewers};
 
-/// A chunk is written when it has so many bytes, or after [`CHUNK_EVERY`].
+/// The bytes at which a chunk is written, unless it is written after [`CHUNK_EVERY`].
 const CHUNK_BYTES: u64 = 1 << 19;
 /// Longest time between two chunks: a killed recorder loses no more.
 const CHUNK_EVERY: Duration = Duration::from_secs(1);
@@ -35,20 +35,20 @@ pub(crate) struct RecordingFile {
     writer: Writer<BufWriter<File>>,
     path: PathBuf,
     channels: HashMap<String, u16>,
-    /// Nanoseconds since 1970.
+    /// The start of the recording, nanoseconds since 1970.
     began_ns: u64,
     chunk_began: Instant,
 }
 
-/// Nanoseconds since 1970.
+/// The time, nanoseconds since 1970.
 pub(crate) fn now_ns() -> u64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     since.map_or(0, |since| since.as_nanos() as u64)
 }
 
 impl RecordingFile {
-    /// Make a new file `about` a run, with a channel for each of `topics` and for what viewers draw of `mission`. It gets its name when
-    /// all of that is written, so a file of this name can always be read.
+    /// Make a new file `about` a run, with a channel for each of `topics` and for the drawings of `mission` in viewers. The file gets
+    /// its name when all of that is written, so a file of this name can always be read.
     pub(crate) fn create(
         path: &Path,
         topics: &[&'static dyn EncodedTopic],

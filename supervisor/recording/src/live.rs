@@ -1,6 +1,7 @@
 //! A websocket server for Foxglove and Lichtblick: the channels of a recording, live. It is a consumer, and its clients can only watch.
 //!
-//! Each client has a queue of its own. What does not fit is dropped for this client, so a slow one costs neither the robot nor others.
+//! Each client has a queue of its own. Messages that do not fit are dropped for this client, so a slow one delays neither the robot nor
+//! others.
 
 use std::{
     collections::HashMap,
@@ -31,12 +32,12 @@ use crate::{
     viewers::{self, Drawn},
 };
 
-/// How often a run that has ended or begun, or the end of this process, is noticed when nothing is published.
+/// The interval at which a run that has ended or begun, or the end of this process, is noticed when nothing is published.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 const LOGS_EVERY: Duration = Duration::from_millis(500);
-/// A bus that cannot be used is tried again after this time.
+/// The time after which a bus that cannot be used is tried again.
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
-/// Messages that wait for a client: those of some ticks.
+/// The most messages that wait for a client: those of some ticks.
 const MOST_WAITING: usize = 512;
 
 /// A server that cannot be started.
@@ -56,13 +57,13 @@ pub struct Live {
 
 type Readers = Vec<(&'static str, Box<dyn EncodedReader>)>;
 
-/// Topics that are served: those that are recorded without being asked for.
+/// The topics that are served, which are those that are recorded by default.
 fn served() -> impl Iterator<Item = &'static dyn EncodedTopic> {
     let all = topics::ENCODED.iter().copied();
     all.filter(|topic| matches!(topic.spec().logged, Logged::Yes))
 }
 
-/// What is served of one run.
+/// The channels of one run.
 struct Serving {
     channels: HashMap<String, Arc<RawChannel>>,
     drawn: Drawn,
@@ -89,7 +90,7 @@ impl Live {
         self.server.port()
     }
 
-    /// Serve the robot of `domain`, from run to run, until `ended` says so.
+    /// Serve the robot of `domain`, from run to run, until `ended` returns true.
     pub fn serve(&self, domain: &Domain, ended: &mut dyn FnMut() -> bool) {
         let open = |bus: &Bus| -> Result<Readers, BusError> {
             served().map(|topic| Ok((topic.spec().name, topic.encoded_reader(bus)?))).collect()
@@ -134,7 +135,7 @@ impl Live {
         })
     }
 
-    /// The channels of a recording. A channel that the run before had, too, is the same one.
+    /// The channels of a recording. A channel that the run before had, too, stays the same.
     fn channels(&self, mission: &Mission) -> HashMap<String, Arc<RawChannel>> {
         let topics = served().map(|topic| {
             let schema::Schema { name, text } = schema::of(topic);
@@ -162,7 +163,7 @@ impl Serving {
         for (topic, reader) in readers {
             while reader.take(&mut message)?.is_some() {
                 send(topic, &message);
-                // Of a message that does not match its topic nothing is drawn.
+                // A message that does not match its topic is not drawn.
                 let _ = drawn.take(topic, &message, now_ns(), &mut send);
             }
         }

@@ -19,7 +19,7 @@ pub struct LogFiles {
 }
 
 impl LogFiles {
-    /// Follow logs from their beginning, or only lines from now on.
+    /// Follow logs from their beginning, or only from their present ends on.
     pub fn follow(directory: &Path, from_the_beginning: bool) -> Self {
         let mut files = Self { directory: directory.to_path_buf(), read: HashMap::new() };
         if !from_the_beginning {

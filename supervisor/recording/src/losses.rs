@@ -15,13 +15,13 @@ const STAMP: std::ops::Range<usize> = 4..28;
 struct Last {
     sequence: u32,
     crc32: u32,
-    /// The number of its bus.
+    /// The number of the bus.
     bus: u32,
 }
 
 #[derive(Debug, Default)]
 pub(crate) struct Losses {
-    /// By topic, stage where every stage writes, and generation.
+    /// The last sample by topic, by stage if every stage writes the topic, and by generation.
     last: HashMap<(&'static str, Name, u32), Last>,
     bus: u32,
     counts: BTreeMap<&'static str, u64>,
@@ -53,8 +53,8 @@ impl Losses {
         (now.sequence, now.crc32) != (last.sequence, last.crc32)
     }
 
-    /// A bus was joined, another one or the same again. Writers may have restarted, and samples published meanwhile cannot be
-    /// counted.
+    /// Note that a bus was joined, another one or the same again. Writers may have restarted, and samples published meanwhile
+    /// cannot be counted.
     pub(crate) const fn joined_again(&mut self) {
         self.bus += 1;
     }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// `F.mcap`, `F-2.mcap`, ...
+/// The name of recording `number`: `F.mcap`, `F-2.mcap`, ...
 pub(crate) fn numbered(out: &Path, number: u32) -> PathBuf {
     if number <= 1 {
         return out.to_path_buf();
@@ -19,7 +19,7 @@ fn places(run: &Path) -> impl DoubleEndedIterator<Item = PathBuf> + use<> {
     (1..=MOST_PARTS).map(move |number| numbered(&first, number))
 }
 
-/// The file behind the recordings in a run's directory.
+/// The next free file name for a recording in a run's directory.
 pub fn next_place(run: &Path) -> PathBuf {
     let free = places(run).rev().take_while(|file| !file.exists()).last();
     free.unwrap_or_else(|| numbered(&run.join("recording.mcap"), MOST_PARTS + 1))

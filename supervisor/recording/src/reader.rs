@@ -35,9 +35,9 @@ pub enum End {
     Complete,
     /// The recorder was killed, or the disk was full: the file ends after the last whole chunk.
     Cut {
-        /// From the first message to the last.
+        /// The time from the first message to the last.
         after: Duration,
-        /// The problem after that.
+        /// The problem behind the last message.
         problem: String,
     },
 }
@@ -62,18 +62,18 @@ pub struct Recording {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Message {
     pub topic: Arc<str>,
-    /// When the recorder took it, nanoseconds since 1970.
+    /// The time when the recorder took the message, nanoseconds since 1970.
     pub log_ns: u64,
     /// The sample's number, counted by its writer.
     pub sequence: u32,
-    /// In the topic's encoding.
+    /// The message in the topic's encoding.
     pub data: Vec<u8>,
 }
 
 /// A sample of a topic of structs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample<P> {
-    /// When the recorder took it, nanoseconds since 1970.
+    /// The time when the recorder took the sample, nanoseconds since 1970.
     pub log_ns: u64,
     pub sample: P,
 }
@@ -81,7 +81,7 @@ pub struct Sample<P> {
 /// A sample of a topic of slices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SliceSample<H, T> {
-    /// When the recorder took it, nanoseconds since 1970.
+    /// The time when the recorder took the sample, nanoseconds since 1970.
     pub log_ns: u64,
     pub header: H,
     pub elements: Vec<T>,
@@ -220,7 +220,7 @@ fn losses(message: &[u8]) -> Option<BTreeMap<String, u64>> {
 /// The messages of some topics, in the order of the file.
 #[derive(Debug)]
 pub struct Messages {
-    /// None after the last.
+    /// The rest of the file; none after the last record.
     records: Option<Records>,
     wanted: Vec<String>,
 }

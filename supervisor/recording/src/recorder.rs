@@ -39,7 +39,7 @@ const NICE: i32 = 5;
 #[derive(Clone)]
 pub struct Options {
     pub domain: Domain,
-    /// The file. That of the robot's next run is called `F-2.mcap`.
+    /// The file. The file of the robot's next run is called `F-2.mcap`.
     pub out: PathBuf,
     /// The topics; without names, those that the table logs.
     pub topics: Option<Vec<&'static dyn EncodedTopic>>,
@@ -67,22 +67,22 @@ impl Options {
 /// Events for the caller.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Happened<'a> {
-    /// It is attached, and records into this file from now on.
+    /// The recorder is attached, and records into this file from now on.
     Attached(&'a Path),
-    /// A file is complete. So many samples were lost.
+    /// A file is complete, and this number of samples was lost.
     Complete(&'a Path, u64),
 }
 
 /// The readers of one bus.
 type Readers = Vec<(&'static dyn EncodedTopic, Box<dyn EncodedReader>)>;
 
-/// Record until `stop` returns true; a single run until its end.
+/// Record until `stop` returns true, or a single run until its end.
 pub fn record(
     options: &Options,
     stop: &mut dyn FnMut() -> bool,
     tell: &mut dyn FnMut(Happened<'_>),
 ) -> Result<(), RecordingError> {
-    // If that is refused, the recorder shares the processor with the stages.
+    // If the kernel refuses, the recorder shares the processor with the stages.
     let _ = rustix::process::nice(NICE);
     let chosen = options.topics();
     let open = |bus: &Bus| -> Result<Readers, BusError> {
@@ -90,7 +90,7 @@ pub fn record(
         chosen.iter().map(read).collect()
     };
     let domain = options.domain.clone();
-    // It wakes at the end of a tick, and at the start of a generation, which may be killed soon.
+    // The recorder wakes at the end of a tick, and at the start of a generation, which may be killed soon.
     let mut follower = Follower::new(domain, "recorder", &topics::LINK, open)
         .also_on([&topics::INPUTS as &'static dyn topics::AnyTopic]);
     let mut current: Option<CurrentRun> = None;
@@ -225,7 +225,7 @@ impl CurrentRun {
         })
     }
 
-    /// Go on in another file, which can be read alone. Returns the file that is complete now.
+    /// Go on in another file, which can be read alone. Returns the file that is now complete.
     fn go_on_in(
         &mut self,
         path: &Path,
@@ -253,7 +253,7 @@ impl CurrentRun {
                 }
                 file.sample(spec, &stamp, &self.message)?;
                 let mut written = Ok(());
-                // Of a message that does not match its topic nothing is drawn.
+                // A message that does not match its topic is not drawn.
                 let _ =
                     self.drawn.take(spec.name, &self.message, now_ns(), &mut |topic, message| {
                         if written.is_ok() {

@@ -1,4 +1,4 @@
-//! The schema of a topic, made from its layout: the text of a ROS 2 message, and those of the messages in it.
+//! The schema of a topic, made from its layout: the text of a ROS 2 message, and the texts of the messages in it.
 
 use common::{
     bus::{Kind, Structure},
@@ -7,9 +7,9 @@ use common::{
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Schema {
-    /// `firsthand/msg/Pose`.
+    /// The name, for example `firsthand/msg/Pose`.
     pub name: String,
-    /// Its fields, then the messages that it contains.
+    /// The fields of the message, then the messages that it contains.
     pub text: String,
 }
 

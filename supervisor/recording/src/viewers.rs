@@ -37,11 +37,11 @@ const MAP: &str = "map";
 const BASE: &str = "base";
 /// Mission time between scenes and between maps, nanoseconds.
 const EVERY_NS: u64 = 1_000_000_000;
-/// Points of the trajectory that are drawn. From a longer one every second, fourth, ... point is drawn.
+/// The most points of the trajectory that are drawn. From a longer one every second, fourth, ... point is drawn.
 const TRAJECTORY: usize = 1000;
-/// A drawn map has at most so many cells a side; of a larger one a cell stands for several.
+/// The most cells a side of a drawn map; in a larger one a cell stands for several.
 const MOST_A_SIDE: usize = 1024;
-/// The bytes of a drawn cell and their names. `state` is a [`CellState`]; viewers paint the other four without being told.
+/// The bytes of a drawn cell and their names. `state` is a [`CellState`]; viewers use the other four as its colour by default.
 const CELL: [&str; 5] = ["state", "red", "green", "blue", "alpha"];
 
 /// A channel for viewers: topic, schema, encoding of its messages.
@@ -79,7 +79,7 @@ fn send(sink: Sink<'_>, topic: &str, message: &impl Encode) {
     }
 }
 
-/// What viewers are shown of a run.
+/// The drawings of a run for viewers.
 pub(crate) struct Drawn {
     mission: Option<Mission>,
     sensors: Vec<Sensor>,
@@ -105,8 +105,8 @@ impl Drawn {
         }
     }
 
-    /// Give `sink` what viewers draw of a `message` of `topic` that was read at `now_ns` since 1970. Viewers play messages by that time,
-    /// which is not mission time in lockstep. None if it does not match its topic; of other topics nothing is drawn.
+    /// Give `sink` the drawings of a `message` of `topic` that was read at `now_ns` since 1970. Viewers play messages by that time,
+    /// which is not mission time in lockstep. None if the message does not match its topic; other topics are not drawn.
     pub(crate) fn take(
         &mut self,
         topic: &str,
@@ -192,7 +192,7 @@ impl Drawn {
         }
     }
 
-    /// The trajectory, the targets, the body, and where it is by two standard deviations.
+    /// The trajectory, the targets, the body, and its place within two standard deviations.
     fn scene(&self, timestamp: Option<Timestamp>) -> SceneUpdate {
         let entity = |id: &str, frame: &str| SceneEntity {
             timestamp,
@@ -246,7 +246,7 @@ fn grid(frame: GridFrame, cells: &[u8], timestamp: Option<Timestamp>) -> Grid {
             let inside = rows.flat_map(|row| {
                 &cells[row * side..][..side][col * each..][..each.min(side - col * each)]
             });
-            // A hazard in any of them is one of all.
+            // A drawn cell is hazard if any of its cells is.
             let state = inside.max_by_key(|cell| CellState::from_byte(**cell).is_hazard());
             let state = CellState::from_byte(state.copied().unwrap_or_default());
             data.push(state as u8);
@@ -272,7 +272,7 @@ fn grid(frame: GridFrame, cells: &[u8], timestamp: Option<Timestamp>) -> Grid {
     }
 }
 
-/// Red, green, blue, alpha.
+/// The colour of a state: red, green, blue, alpha.
 const fn paint(state: CellState) -> [u8; 4] {
     match state {
         CellState::Free => [0; 4],

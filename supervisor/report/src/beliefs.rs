@@ -10,11 +10,11 @@ use glam::DVec2;
 use planner::step::{Input, Planner};
 use recording::downsampled::drop_every_second;
 
-/// Most maps. When there are more, every second one is dropped, and from then on half as many are taken.
+/// Most maps. When there are more, every second one is dropped, and half as many are taken from then on.
 const MOST: usize = 8;
 /// First period of maps, seconds of mission time.
 const FIRST_APART_S: f64 = 2.0;
-/// Cells of a map beyond which it has no field here.
+/// The most cells of a map whose field is computed here.
 const LARGEST: usize = 1024 * 1024;
 
 #[derive(Clone, Debug)]
@@ -23,12 +23,12 @@ struct Belief {
     header: GridHeader,
     /// One [`common::grid::CellState`] byte a cell, row-major.
     cells: Vec<u8>,
-    /// Where the robot was sent, metres.
+    /// The target of the robot, metres.
     target: DVec2,
 }
 
 impl Belief {
-    /// Its field as a message of the page, as the planner computes it; none if there is none.
+    /// The field of the map as a message of the page, as the planner computes it; none if there is none.
     fn field(&self, mission: &Mission) -> Option<Vec<u8>> {
         let mut planner = Planner::new(mission);
         let target = TargetPoint::at(self.target);
@@ -56,7 +56,7 @@ impl Default for Beliefs {
 }
 
 impl Beliefs {
-    /// The map at `time_s` is `cells`, and the robot is sent to `target`.
+    /// Take the map `cells` at `time_s`, when the robot is sent to `target`.
     pub(crate) fn push(&mut self, time_s: f64, target: DVec2, header: &GridHeader, cells: &[u8]) {
         if self.held.last().is_some_and(|last| time_s < last.time_s + self.apart_s) {
             return;
@@ -68,14 +68,14 @@ impl Beliefs {
         self.end(time_s, target, header, cells);
     }
 
-    /// The last map is `cells`, at `time_s`.
+    /// Take the last map `cells`, at `time_s`.
     pub(crate) fn end(&mut self, time_s: f64, target: DVec2, header: &GridHeader, cells: &[u8]) {
         if cells.len() <= LARGEST {
             self.held.push(Belief { time_s, header: *header, cells: cells.to_vec(), target });
         }
     }
 
-    /// Their fields, as messages of the page.
+    /// The fields of the maps, as messages of the page.
     pub(crate) fn fields(&self, mission: &Mission) -> impl Iterator<Item = Vec<u8>> {
         self.held.iter().filter_map(|belief| belief.field(mission))
     }

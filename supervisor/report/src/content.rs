@@ -28,9 +28,9 @@ use crate::{
 const LOG: &str = "log";
 /// Most bytes of the ground truth: an hour at 10 Hz takes 10 MB.
 const LARGEST_TRUTH: u64 = 1 << 28;
-/// Maps follow each other after this mission time at the earliest, seconds.
+/// The least mission time between two maps, seconds.
 const MAP_EVERY_S: f64 = 0.5;
-/// Most rows, states and events of a page. Of a longer run the page shows the beginning; metrics count all.
+/// Most rows, states and events of a page. The page shows the beginning of a longer run; metrics count all.
 const MOST: usize = 60_000;
 /// Most maps of a page.
 const MOST_MAPS: usize = 2400;
@@ -42,8 +42,7 @@ pub(crate) struct Content {
     /// Gaps of the recordings.
     pub(crate) remarks: Vec<String>,
     pub(crate) summary: Map<String, Value>,
-    /// The row of the front sonar.
-    /// The row of the front sonar; none of a robot without sonars.
+    /// The row of the front sonar; none for a robot without sonars.
     front: Option<usize>,
     pub(crate) measured: Measured,
     collector: Collector,
@@ -124,7 +123,7 @@ impl Content {
         Ok(())
     }
 
-    /// None if the message does not match its topic.
+    /// Take a message. None if the message does not match its topic.
     fn take(&mut self, message: &Message) -> Option<()> {
         fn sample<P: Layout>(message: &Message) -> Option<P> {
             decode_sample(&message.data)
@@ -169,7 +168,7 @@ impl Content {
         Some(())
     }
 
-    /// Add to the page what the collector has since the last time.
+    /// Add to the page the new content of the collector.
     fn add(&mut self) {
         let (rows, events) = (self.collector.take_rows(), self.collector.take_events());
         let state = self.collector.take_state();
@@ -244,7 +243,7 @@ impl Content {
         self.summary.get(field)?.as_f64()
     }
 
-    /// How the run ended; none if that is not known.
+    /// The outcome of the run; none if that is not known.
     pub(crate) fn outcome(&self) -> Option<&str> {
         self.summary.get("outcome")?.as_str()
     }

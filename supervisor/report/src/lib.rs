@@ -49,7 +49,7 @@ pub fn write(run: &Path, out: Option<&Path>) -> Result<PathBuf, ReportError> {
     fs::create_dir_all(&out).map_err(FileError::of("make", &out))?;
     let page = out.join(PAGE);
     fs::write(&page, html(content)).map_err(|error| {
-        // A part of a page is of no use.
+        // An incomplete page is of no use.
         let _ = fs::remove_file(&page);
         FileError::of("write", &page)(error)
     })?;

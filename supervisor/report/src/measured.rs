@@ -31,7 +31,7 @@ pub(crate) struct Measured {
 }
 
 impl Measured {
-    /// Take a pose. If a late machine receives two ticks together, its speed does not count: it is a distance divided by almost no time.
+    /// Take a pose. If a late machine receives two ticks together, the speed does not count: it is a distance divided by almost no time.
     pub(crate) fn pose(&mut self, pose: &PoseSample, mission: &Mission) {
         self.ticks += 1;
         self.time_s = self.time_s.max(pose.stamp.time().seconds());
@@ -71,7 +71,7 @@ impl Measured {
         }
     }
 
-    /// Each process counts from 0.
+    /// Take a sample of the link, each process of which counts from 0.
     pub(crate) fn link(&mut self, link: &LinkSample) {
         let last = self.link.replace(*link);
         if let Some(last) = last.filter(|last| last.stamp.generation != link.stamp.generation) {

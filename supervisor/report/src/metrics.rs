@@ -7,11 +7,11 @@ use serde_json::{Value, json};
 use crate::content::Content;
 
 struct Metric {
-    /// Its name in the literature.
+    /// The name in the literature.
     name: &'static str,
-    /// Its field in `summary.json`, or its formula.
+    /// The field in `summary.json`, or the formula.
     field: &'static str,
-    /// With its unit; a dash if it is unknown.
+    /// The value with its unit; a dash if it is unknown.
     value: String,
 }
 
@@ -135,7 +135,7 @@ fn table(content: &Content) -> Vec<Metric> {
     ]
 }
 
-/// A car has only one wheel speed; the other value is a steering angle.
+/// The range of the wheel speeds; none for a car, which has only one wheel speed and a steering angle.
 fn wheel_range(content: &Content) -> Option<f64> {
     if content.mission.body().steering.is_some() {
         return None;

@@ -11,11 +11,11 @@ use serde_json::{Map, Value};
 
 use crate::error::ReportError;
 
-/// A summary takes 2 kB.
+/// The greatest size of a summary, which takes 2 kB.
 const LARGEST_SUMMARY: u64 = 1 << 20;
 
 pub(crate) struct Source {
-    /// Parts of the run, the first one first; never none.
+    /// Parts of the run, the first one first; never empty.
     pub(crate) files: Vec<PathBuf>,
     is_run: bool,
 }
@@ -45,7 +45,7 @@ impl Source {
     }
 }
 
-/// The summary of the run of `recording`, if it is beside it.
+/// The summary of the run of `recording`, if its file is beside the recording.
 pub(crate) fn summary(recording: &Recording) -> Option<Map<String, Value>> {
     let file = run_directory(recording)?.join("summary.json");
     let is_small = fs::metadata(&file).ok()?.len() <= LARGEST_SUMMARY;

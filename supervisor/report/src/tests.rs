@@ -1,4 +1,4 @@
-//! The promises of a report, on recordings made by the tests.
+//! Tests of reports, on recordings made by the tests.
 
 use std::path::Path;
 

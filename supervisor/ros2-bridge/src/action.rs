@@ -1,7 +1,7 @@
 //! The server of the action `navigate_to_pose`: goals, their states, and the messages of its services and topics. Pure.
 //!
-//! It has one goal at a time: a newer one takes its place, as in Nav2. A goal is reached when the controller says so of the target
-//! that the supervisor made of it.
+//! The server has one goal at a time: a newer one takes its place, as in Nav2. A goal is reached when the controller reports the
+//! arrival at the target that the supervisor made of the goal.
 
 use std::collections::VecDeque;
 
@@ -43,7 +43,7 @@ pub const FEEDBACK: (&str, &str) = (
 pub const STATUS: (&str, &str) =
     ("navigate_to_pose/_action/status", "action_msgs::msg::dds_::GoalStatusArray_");
 
-/// So many goals are remembered, the newest.
+/// The most goals that are remembered; older ones are forgotten.
 const MOST_GOALS: usize = 16;
 
 /// A `action_msgs/GoalStatus`.
@@ -57,7 +57,7 @@ pub enum Status {
 }
 
 impl Status {
-    /// Whether it stays as it is.
+    /// Whether the status is final.
     pub const fn is_final(self) -> bool {
         matches!(self, Self::Succeeded | Self::Canceled | Self::Aborted)
     }
@@ -75,12 +75,12 @@ enum Cancel {
 #[derive(Clone, Debug)]
 struct Goal {
     id: Uuid,
-    /// When it was accepted, nanoseconds since 1970.
+    /// The time when the goal was accepted, nanoseconds since 1970.
     at_ns: u64,
     point: TargetPoint,
-    /// The number of its target, once the supervisor has published it.
+    /// The number of the goal's target, once the supervisor has published it.
     number: Option<u64>,
-    /// Targets up to this one are older.
+    /// The number of the newest target that is older than the goal.
     after: u64,
     status: Status,
 }
@@ -103,7 +103,7 @@ pub struct Sent {
 }
 
 impl Server {
-    /// What a client sends. Who does not understand it refuses it.
+    /// The goal that a client sends. The error says why the payload is none.
     pub fn read_goal(payload: &[u8]) -> Result<Sent, String> {
         let mut reader = Reader::new(payload).map_err(malformed)?;
         let id = uuid(&mut reader)?;
@@ -132,7 +132,7 @@ impl Server {
         self.is_changed = true;
     }
 
-    /// Let the goal that is not over end so.
+    /// Let the goal that is not over end with `status`.
     pub fn end(&mut self, status: Status) {
         for goal in self.goals.iter_mut().filter(|goal| !goal.status.is_final()) {
             goal.status = status;
@@ -140,7 +140,7 @@ impl Server {
         }
     }
 
-    /// Another run begins, which counts its targets from 1.
+    /// Forget the numbers of targets, because another run counts them from 1.
     pub fn forget_targets(&mut self) {
         self.newest_target = 0;
     }
@@ -169,7 +169,7 @@ impl Server {
         }
     }
 
-    /// Take a request to cancel. Returns the reply, and whether the robot is to stand for it.
+    /// Take a request to cancel. Returns the reply, and whether the robot is to stand because of it.
     pub fn cancel(&mut self, payload: &[u8]) -> Result<(Vec<u8>, bool), String> {
         let mut reader = Reader::new(payload).map_err(malformed)?;
         let (id, until_ns) = (uuid(&mut reader)?, reader.time().map_err(malformed)?);
@@ -205,14 +205,14 @@ impl Server {
         uuid(&mut Reader::new(payload).map_err(malformed)?)
     }
 
-    /// The result of a goal; none while it is not over. Of an unknown one the state is 0.
+    /// The result of a goal; none while it is not over. An unknown goal has the state 0.
     pub fn result(&self, id: Uuid) -> Option<Vec<u8>> {
         let goal = self.goals.iter().find(|goal| goal.id == id);
         if goal.is_some_and(|goal| !goal.status.is_final()) {
             return None;
         }
         let status = goal.map_or(0, |goal| goal.status as u8);
-        // No error code, and no text of one.
+        // There is no error code, and no text of one.
         Some(Writer::default().u8(status).u16(0).text("").take())
     }
 
@@ -225,7 +225,7 @@ impl Server {
         is_changed.then(|| Writer::default().list(&self.goals, status).take())
     }
 
-    /// How far the robot is with its goal; none without one.
+    /// The progress of the robot with its goal; none without a goal.
     pub fn feedback(&self, pose: &PoseSample, recoveries: u64, now_ns: u64) -> Option<Vec<u8>> {
         let goal = self.goals.back().filter(|goal| !goal.status.is_final())?;
         let at = pose.pose();

@@ -1,4 +1,5 @@
-//! What nodes ask for by topics: messages in, their meaning out. Each is refused whole, with a reason, or taken.
+//! The requests of nodes by topics: messages in, their meaning out. Each message is taken, or refused as a whole with a
+//! reason.
 
 use common::{kinematics::Pose2, samples::TargetPoint};
 use glam::DVec2;
@@ -6,11 +7,11 @@ use ros2::cdr::{Malformed, Reader};
 
 use crate::shown::MAP;
 
-/// Where a node says that the robot is.
+/// The robot's place by a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
     pub pose: Pose2,
-    /// Of x, y and heading: xx, xy, x theta, yy, y theta, theta theta.
+    /// Covariance of x, y and heading: xx, xy, x theta, yy, y theta, theta theta.
     pub covariance: [f64; 6],
 }
 

@@ -1,4 +1,4 @@
-//! The bridge: it follows one robot from run to run, publishes what it reads, and has done what nodes may ask for.
+//! The bridge: it follows one robot from run to run, publishes its samples, and has the permitted requests of nodes carried out.
 
 use std::{
     io,
@@ -33,24 +33,24 @@ use crate::{
     topics::{Accept, Id},
 };
 
-/// How often what nodes ask, a run that has ended or begun, or the end of this process is noticed when nothing is published.
+/// The interval at which requests, a run that has ended or begun, or the end of this process is noticed when nothing is published.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
-/// Feedback of a goal is published so often.
+/// The interval at which feedback of a goal is published.
 const FEEDBACK_EVERY: Duration = Duration::from_millis(100);
-/// A bus that cannot be used is tried again after this time.
+/// The time after which a bus that cannot be used is tried again.
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
-/// A place that a node names is given for so long, so often: dead reckoning believes fixes that contradict it when ten of them agree
-/// over three seconds.
+/// The time for which a place that a node names is published, and how often: dead reckoning believes fixes that contradict it when ten of
+/// them agree over three seconds.
 const PLACED_FOR: Duration = Duration::from_secs(4);
 const PLACED_EVERY: Duration = Duration::from_millis(350);
-/// A place is not known better than this, metres and radians, whatever its covariance says.
+/// The least deviations of a place, metres and radians, whatever its covariance says.
 const PLACE_SIGMAS: [f64; 2] = [0.05, 0.05];
-/// So many clients wait for results at most.
+/// The most clients that wait for results.
 const MOST_RESULTS: usize = 32;
-/// What is refused is told so often at most.
+/// The least interval between reports of refusals.
 const TELL_EVERY: Duration = Duration::from_secs(1);
 
-/// How the bridge is set up.
+/// The options of the bridge.
 #[derive(Clone, Debug)]
 pub struct Options {
     pub robot: RobotName,
@@ -58,9 +58,9 @@ pub struct Options {
     pub domain: u16,
     /// The address of the network interface; all of them without it.
     pub interface: Option<Ipv4Addr>,
-    /// Below which topics stand.
+    /// The namespace of the topics.
     pub namespace: String,
-    /// What others may ask for.
+    /// The requests of others that are permitted.
     pub accepted: Vec<Accept>,
 }
 
@@ -90,7 +90,7 @@ struct Readers {
     stalls: Reader<StallSample>,
     requests: Reader<RequestSample>,
     link: Reader<LinkSample>,
-    /// None where nobody may say where the robot is.
+    /// The writer of fixes; none if nobody may say where the robot is.
     fixes: Option<Writer<FixSample>>,
 }
 
@@ -119,13 +119,13 @@ impl Readers {
 /// A place that a node named.
 struct Placed {
     place: Place,
-    /// The pose when it was named.
+    /// The pose when the place was named.
     then: Pose2,
     since: Instant,
     newest: Option<Instant>,
 }
 
-/// What is bridged.
+/// The state of the bridge.
 struct Bridge {
     robot: RobotName,
     endpoints: Endpoints,
@@ -137,13 +137,13 @@ struct Bridge {
     recoveries: u64,
     feedback_at: Instant,
     placed: Option<Placed>,
-    /// The number of stops that were asked for since the robot was told to stand for a canceled goal; one of them is that itself. None if
-    /// it does not stand for one.
+    /// The number of stops that were asked for since the robot was ordered to stand for a canceled goal, that order included. None if the
+    /// robot does not stand for one.
     stands_for_cancel: Option<u32>,
     told_at: Option<Instant>,
 }
 
-/// Bridge a robot, from run to run, until `ended` says so.
+/// Bridge a robot, from run to run, until `ended` returns true.
 pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), BridgeError> {
     let Options { robot, domain, interface, namespace, accepted } = options;
     let join = || {
@@ -170,7 +170,7 @@ pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), B
     let mut follower = follow();
     while !ended() {
         if continued.came() {
-            // The library's threads end when a call of theirs is interrupted, as it is when the process is stopped and continued. New
+            // The library's threads end when a call of theirs is interrupted, as happens when the process is stopped and continued. New
             // readers of the bus get whole maps for the new writers.
             (bridge.endpoints, bridge.shown) = (join()?, None);
             follower = follow();
@@ -200,14 +200,14 @@ pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), B
     Ok(())
 }
 
-/// Nanoseconds since 1970.
+/// The time, nanoseconds since 1970.
 fn now_ns() -> u64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
 }
 
 impl Bridge {
-    /// Show the run of `domain`, if it is not shown yet. Its file may not be there when its first samples are.
+    /// Show the run of `domain`, if it is not shown yet. The run's file may be missing when the first samples come.
     fn begin(&mut self, domain: &Domain) {
         if self.shown.is_some() {
             return;
@@ -225,7 +225,7 @@ impl Bridge {
         self.shown = Some(shown);
     }
 
-    /// The run has ended: no goal is reached any more.
+    /// Note that the run has ended: no goal is reached any more.
     fn end(&mut self) {
         self.goals.end(Status::Aborted);
         self.goals.forget_targets();
@@ -233,7 +233,7 @@ impl Bridge {
         self.recoveries = 0;
     }
 
-    /// Take all that was published on the robot's bus.
+    /// Take all samples that were published on the robot's bus.
     fn take(&mut self, readers: &mut Readers) -> Result<(), BusError> {
         let Self { endpoints, shown, goals, .. } = self;
         let Some(shown) = shown else {
@@ -288,7 +288,7 @@ impl Bridge {
         readers.fixes.as_mut().map_or(Ok(()), |fixes| self.place(fixes))
     }
 
-    /// Give the place that a node named, carried on by how far the robot has moved since.
+    /// Publish the place that a node named, moved by the robot's way since then.
     fn place(&mut self, fixes: &mut Writer<FixSample>) -> Result<(), BusError> {
         let (Some(placed), Some(shown)) = (&mut self.placed, &self.shown) else {
             return Ok(());
@@ -321,7 +321,7 @@ impl Bridge {
         fixes.publish(now.stamp.tick, now.stamp.time(), fix)
     }
 
-    /// Take what nodes have sent.
+    /// Take the messages that nodes have sent.
     fn hear(&mut self) {
         for (id, message) in self.endpoints.heard() {
             if let Err(why) = self.hear_topic(id, &message) {
@@ -354,7 +354,7 @@ impl Bridge {
     }
 
     fn go(&self, to: TargetPoint, why: Why) {
-        // Only a stop that was nobody's but the cancelled goal's ends with the next goal.
+        // The next goal ends only a stop that was the cancelled goal's alone.
         let resumes = self.stands_for_cancel.is_some_and(|stops| stops <= 1);
         self.orders.give(Order::Go { to, resumes, why });
     }
@@ -389,7 +389,7 @@ impl Bridge {
         Ok(())
     }
 
-    /// An order was done, or was not.
+    /// Take an order with its result.
     fn done(&mut self, (order, result): Done) {
         if let Err(why) = &result {
             self.tell(&format!("what was asked is not done: {why}"));
@@ -408,13 +408,13 @@ impl Bridge {
                 }
             }
             Order::Stand { is_cancel: true } if result.is_ok() => self.goals.end(Status::Canceled),
-            // A robot that did not obey is not said to stand.
+            // A robot that did not obey is not reported to stand.
             Order::Stand { is_cancel: true } => self.goals.end(Status::Aborted),
             Order::Stand { is_cancel: false } | Order::Resume => {}
         }
     }
 
-    /// Publish what is due.
+    /// Publish the samples that are due.
     fn publish(&mut self) {
         let now_ns = now_ns();
         if let Some(status) = self.goals.take_status() {
@@ -441,7 +441,7 @@ impl Bridge {
         }
     }
 
-    /// Say why something is not done, at most once a second: other nodes must not fill the log.
+    /// Log why a request is not carried out, at most once a second: other nodes must not fill the log.
     fn tell(&mut self, why: &str) {
         if self.told_at.is_none_or(|told| told.elapsed() >= TELL_EVERY) {
             self.told_at = Some(Instant::now());

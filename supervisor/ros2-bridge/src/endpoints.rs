@@ -15,14 +15,14 @@ use crate::{
 
 /// The name of the node.
 const NODE: &str = "firsthand";
-/// Messages of a topic that wait for a slow reader, or for the bridge.
+/// The most messages of a topic that wait for a slow reader, or for the bridge.
 const DEPTH: u16 = 10;
-/// So many messages of a topic are taken at a time.
+/// The most messages of a topic that are taken at a time.
 const AT_A_TIME: usize = 16;
 
-/// Sends again what was lost; for messages that count each.
+/// The quality that sends lost messages again, for messages that all count.
 const SURE: Quality = Quality { is_reliable: true, is_latched: false, depth: DEPTH };
-/// Keeps the newest message for who comes later.
+/// The quality that stores the newest message for readers that join later.
 const LATCHED: Quality = Quality { is_reliable: true, is_latched: true, depth: 1 };
 
 /// A service.
@@ -54,9 +54,9 @@ pub(crate) struct Endpoints {
     namespace: String,
     writers: BTreeMap<Id, Writer>,
     readers: Vec<(Id, Reader)>,
-    /// None where goals are not accepted.
+    /// The action; none if goals are not accepted.
     action: Option<Action>,
-    /// What the participant has, for other nodes.
+    /// The list of the participant's readers and writers, for other nodes.
     entities: Writer,
     participant: Participant,
 }
@@ -86,7 +86,7 @@ impl Endpoints {
         };
         for row in TABLE {
             match row.accepted_by {
-                // Those of sensors are opened for each robot.
+                // The topics of sensors are opened for each robot.
                 None if matches!(row.id, Id::Range(_) | Id::Scan) => {}
                 None => endpoints.write_to(row.id, row, "")?,
                 Some(by) if accepted.contains(&by) => {
@@ -109,7 +109,7 @@ impl Endpoints {
         &mut self,
         sensors: impl Iterator<Item = (Id, &'a str)>,
     ) -> io::Result<()> {
-        // Those of the robot before are closed.
+        // The topics of the sensors of the robot before are closed.
         self.writers.retain(|id, _| !matches!(id, Id::Range(_) | Id::Scan));
         for (id, sensor) in sensors {
             if let Some(row) = spec(id) {
@@ -171,14 +171,14 @@ impl Endpoints {
         self.entities.write(entities.take());
     }
 
-    /// Send a message. It is lost if the library does not accept it now, as a newer one follows.
+    /// Send a message. If the library does not accept it now, it is lost, and a newer one follows.
     pub(crate) fn publish(&self, id: Id, payload: Vec<u8>) {
         if let Some(writer) = self.writers.get(&id) {
             writer.write(payload);
         }
     }
 
-    /// What has come on the topics.
+    /// The messages that have come on the topics.
     pub(crate) fn heard(&self) -> Vec<(Id, Message)> {
         let heard = self.readers.iter().flat_map(|(id, reader)| {
             reader.messages().take(AT_A_TIME).map(|message| (*id, message))
@@ -186,7 +186,7 @@ impl Endpoints {
         heard.collect()
     }
 
-    /// What clients of the action have called.
+    /// The calls of clients of the action.
     pub(crate) fn called(&self) -> Vec<(Call, Message)> {
         let services = self.action.iter().flat_map(|action| &action.services);
         let taken = services.flat_map(|(call, service)| {
@@ -203,7 +203,7 @@ impl Endpoints {
         }
     }
 
-    /// Publish how far the robot is with its goal.
+    /// Publish the progress of the robot with its goal.
     pub(crate) fn feedback(&self, payload: Vec<u8>) {
         if let Some(action) = &self.action {
             action.feedback.write(payload);

@@ -1,4 +1,5 @@
-//! The bridge to ROS 2: what RViz and other nodes read of a robot, and what they may ask of it. It is a consumer, which anyone may kill.
+//! The bridge to ROS 2: the topics of a robot for RViz and other nodes, and the requests that nodes may make. It is a consumer, which
+//! anyone may kill.
 //!
 //! | module | holds |
 //! |---|---|

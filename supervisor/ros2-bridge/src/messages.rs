@@ -1,25 +1,25 @@
-//! The messages that the bridge writes. Their definitions are those of ROS 2 Kilted; of what later releases appended to a message,
-//! earlier ones read the beginning. Lengths are metres, angles radians.
+//! The messages that the bridge writes. Their definitions are those of ROS 2 Kilted; earlier releases read the beginning of a
+//! message to which later ones appended. Lengths are metres, angles radians.
 
 use std::f64::consts::TAU;
 
 use ros2::{cdr::Writer, parts::Pose};
 
-/// The covariance of a pose or a twist has so many numbers.
+/// The count of numbers in the covariance of a pose or a twist.
 const COVARIANCE: usize = 36;
 
-/// The time of a message, nanoseconds since 1970, and the frame that it is in.
+/// The time of a message, nanoseconds since 1970, and its frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Header<'a>(pub u64, pub &'a str);
 
-/// A message with this header, so far.
+/// The beginning of a message with this header.
 fn begin(Header(ns, frame): Header<'_>) -> Writer {
     let mut writer = Writer::default();
     writer.header(ns, frame);
     writer
 }
 
-/// A `tf2_msgs/TFMessage` of frames and what is in them.
+/// A `tf2_msgs/TFMessage` of frames and the frames in them.
 pub fn transforms(ns: u64, transforms: &[(&str, &str, Pose)]) -> Vec<u8> {
     let mut writer = Writer::default();
     let transform = |writer: &mut Writer, &(parent, child, pose): &(&str, &str, Pose)| {
@@ -40,7 +40,7 @@ pub fn odometry(header: Header<'_>, child: &str, pose: Pose, [v, omega]: [f64; 2
     begin(header).text(child).pose(pose).f64s(&unknown).f64s(&twist).f64s(&unknown).take()
 }
 
-/// A `nav_msgs/OccupancyGrid` of square cells; `corner` is that of the first one, and its rows go along x.
+/// A `nav_msgs/OccupancyGrid` of square cells; `corner` is the corner of the first cell, and its rows go along x.
 pub fn map(
     header: Header<'_>,
     resolution: f64,
@@ -71,7 +71,7 @@ pub fn path(header: Header<'_>, poses: &[Pose]) -> Vec<u8> {
     begin(header).list(poses, stamped).take()
 }
 
-/// A `geometry_msgs/PoseStamped`, as a part of a message.
+/// A `geometry_msgs/PoseStamped` as a part of a message.
 pub fn pose_stamped(writer: &mut Writer, Header(ns, frame): Header<'_>, pose: Pose) {
     writer.header(ns, frame).pose(pose);
 }
@@ -80,7 +80,7 @@ pub fn pose_stamped(writer: &mut Writer, Header(ns, frame): Header<'_>, pose: Po
 #[derive(Clone, Copy, Debug)]
 pub enum Shape {
     Cylinder = 3,
-    /// Each two points are the ends of a line.
+    /// Lines, each between two points.
     Lines = 5,
 }
 
@@ -91,14 +91,14 @@ pub struct Marker {
     pub id: i32,
     pub shape: Shape,
     pub pose: Pose,
-    /// Its size along x, y and z; of lines the first is their width.
+    /// The size along x, y and z; lines have their width in the first.
     pub scale: [f64; 3],
-    /// Red, green, blue, alpha.
+    /// The colour: red, green, blue, alpha.
     pub color: [f32; 4],
     pub points: Vec<[f64; 2]>,
 }
 
-/// Removes all markers that were sent before.
+/// The action that removes all markers that were sent before.
 const DELETE_ALL: i32 = 3;
 
 /// A `visualization_msgs/MarkerArray` that replaces the one before.
@@ -127,14 +127,14 @@ fn marker(writer: &mut Writer, Header(ns, frame): Header<'_>, marker: &Marker, a
     for part in marker.color {
         writer.f32(part);
     }
-    // It has no end, and stays where it is if its frame moves.
+    // The marker has no end, and stays where it is if its frame moves.
     writer.i32(0).u32(0).u8(0);
     writer.list(&marker.points, |writer, &[x, y]| {
         writer.f64s(&[x, y, 0.0]);
     });
-    // No colours of points; no texture with its header, format, bytes and coordinates.
+    // There are no colours of points, and no texture with its header, format, bytes and coordinates.
     writer.length(0).text("").header(0, "").text("").length(0).length(0);
-    // No text, no mesh.
+    // There is no text and no mesh.
     writer.text("").text("").text("").length(0).u8(0);
 }
 
@@ -154,7 +154,7 @@ pub fn scan(
     let range = |writer: &mut Writer, range: &f32| {
         writer.f32(*range);
     };
-    // No intensities.
+    // There are no intensities.
     writer.list(ranges, range).length(0).take()
 }
 
@@ -182,11 +182,11 @@ pub fn battery(header: Header<'_>, volts: f64) -> Vec<u8> {
     for _temperature_current_charge_capacity_design_percentage in 0..6 {
         writer.f32(f32::NAN);
     }
-    // Status, health and technology are unknown; it is there; no cells, place or number.
+    // Status, health and technology are unknown; the battery is present; there are no cells, place or number.
     writer.u8(0).u8(0).u8(0).u8(1).length(0).length(0).text("").text("").take()
 }
 
-/// How a `diagnostic_msgs/DiagnosticStatus` is to be judged.
+/// The severity of a `diagnostic_msgs/DiagnosticStatus`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
     #[default]

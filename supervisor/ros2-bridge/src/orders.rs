@@ -1,5 +1,5 @@
-//! What nodes asked for is done by threads of its own, so that it does not hold up what is published: an order waits for the supervisor,
-//! and a stop until the robot rests. Targets do not wait behind stops, nor stops behind targets.
+//! Threads of their own carry out requests of nodes, so that publishing does not wait: an order waits for the supervisor, and a stop
+//! until the robot rests. Targets do not wait behind stops, nor stops behind targets.
 
 use std::{
     io,
@@ -13,13 +13,13 @@ use supervisor::operator::{self, OperatorError};
 
 use crate::action::Sent;
 
-/// So many orders wait at most.
+/// The most orders that wait.
 const MOST_WAITING: usize = 16;
 
-/// What the robot is to do.
+/// An order to the robot.
 #[derive(Clone, Debug)]
 pub(crate) enum Order {
-    /// Go there; if `resumes`, it stands for a goal that was canceled, and goes on first.
+    /// Go to a target. If `resumes`, the robot stands for a goal that was canceled, and is resumed first.
     Go {
         to: TargetPoint,
         resumes: bool,
@@ -32,7 +32,7 @@ pub(crate) enum Order {
     Resume,
 }
 
-/// Who sends the robot to a target.
+/// The sender of a target.
 #[derive(Clone, Debug)]
 pub(crate) enum Why {
     Topic,
@@ -44,10 +44,10 @@ pub(crate) enum Why {
     },
 }
 
-/// An order, and why it was not done.
+/// An order, and the reason if it was not carried out.
 pub(crate) type Done = (Order, Result<(), String>);
 
-/// Threads that do orders, in turn.
+/// Threads that carry out orders in turn.
 pub(crate) struct Orders {
     targets: SyncSender<Order>,
     stops: SyncSender<Order>,
@@ -75,7 +75,7 @@ impl Orders {
         Ok(Self { targets: worker("targets")?, stops: worker("stops")?, done, refused })
     }
 
-    /// Have `order` done.
+    /// Have `order` carried out.
     pub(crate) fn give(&self, order: Order) {
         let worker = match order {
             Order::Go { .. } => &self.targets,
@@ -88,7 +88,7 @@ impl Orders {
         }
     }
 
-    /// An order that was done, or was not.
+    /// An order that was carried out, or was not.
     pub(crate) fn done(&self) -> Option<Done> {
         self.done.try_recv().ok()
     }
@@ -101,7 +101,7 @@ fn perform(robot: &RobotName, order: &Order) -> Result<(), OperatorError> {
                 operator::resume(robot)?;
             }
             match operator::send_to(robot, &[*to], false) {
-                // A car goes there at the heading that it then has.
+                // A car goes there without a target heading.
                 Err(OperatorError::Refused { code: "no-heading", .. }) => {
                     operator::send_to(robot, &[TargetPoint { has_heading: 0, ..*to }], false)
                 }

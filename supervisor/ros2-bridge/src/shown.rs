@@ -1,4 +1,4 @@
-//! What is published of a robot: samples of its bus in, messages out. Pure.
+//! The messages that show a robot: samples of its bus in, messages out. Pure.
 
 use std::collections::BTreeMap;
 
@@ -28,17 +28,17 @@ const BASE: &str = "base_link";
 
 /// Wall-clock time between whole maps, and between diagnostics that have not changed, nanoseconds.
 const EVERY_NS: u64 = 1_000_000_000;
-/// So many directions of the field are drawn along a side at most.
+/// The most directions of the field that are drawn along a side.
 const ARROWS: usize = 48;
-/// A path has at most so many steps for each cell of a side.
+/// The most steps of a path, for each cell of a side.
 const STEPS_A_CELL: usize = 8;
-/// A path has a pose for each of so many steps of half a cell.
+/// The number of steps of half a cell from one pose of a path to the next.
 const POSE_EVERY: usize = 4;
 
 /// Takes a message: its topic and its payload.
 pub type Sink<'a> = &'a mut dyn FnMut(Id, Vec<u8>);
 
-/// A robot as ROS sees it.
+/// A robot as the messages show it.
 #[derive(Debug)]
 pub struct Shown {
     robot: String,
@@ -47,7 +47,7 @@ pub struct Shown {
     pose: PoseSample,
     target: TargetSample,
     grid: Replica<u8>,
-    /// The version of the whole map that was published, and when.
+    /// The version of the last whole map that was published, and its time.
     map: Option<(u64, u64)>,
     field: Replica<FieldCell>,
     link: LinkSample,
@@ -58,7 +58,7 @@ pub struct Shown {
 }
 
 impl Shown {
-    /// A robot of which nothing has been read yet.
+    /// A robot before any sample of it has been read.
     pub fn new(robot: String, mission: Mission) -> Self {
         Self {
             robot,
@@ -162,7 +162,7 @@ impl Shown {
         }
     }
 
-    /// The whole map if it has changed and is due.
+    /// Publish the whole map if it has changed and is due.
     fn map(&mut self, now_ns: u64, sink: Sink<'_>) {
         let version = self.grid.version();
         let is_due = self.map.is_none_or(|(published, at_ns)| {
@@ -236,7 +236,7 @@ impl Shown {
         self.deaths.insert(name_str(&death.stage).to_owned(), how);
     }
 
-    /// What is published by time: the map, and diagnostics if they have changed or are due.
+    /// Publish the messages that depend on time: the map, and diagnostics if they have changed or are due.
     pub fn tick(&mut self, now_ns: u64, sink: Sink<'_>) {
         self.map(now_ns, sink);
         let statuses = self.statuses();
@@ -305,12 +305,13 @@ impl Shown {
     }
 }
 
-/// What decides whether diagnostics are published at once.
+/// The parts of diagnostics whose change publishes them at once.
 fn judged(statuses: &[Status]) -> impl Iterator<Item = (Level, &str)> {
     statuses.iter().map(|status| (status.level, status.message.as_str()))
 }
 
-/// A cell's occupancy, as a byte: -1 is not known, and what the robot's centre must not enter is 99, as in a costmap of Nav2.
+/// A cell's occupancy, as a byte: -1 is unknown, and 99 is a cell that the robot's centre must not enter, as in a costmap of
+/// Nav2.
 fn occupancy(cell: u8) -> u8 {
     match CellState::from_byte(cell) {
         CellState::Free => -1_i8 as u8,

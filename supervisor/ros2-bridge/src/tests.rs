@@ -90,12 +90,12 @@ fn a_goal_is_taken_in_the_frame_of_the_map_only_and_never_in_part() {
     assert!(asked::goal(&nowhere).unwrap_err().contains("metres"));
 }
 
-/// A call of the action that names the goal `id`, with what follows in it.
+/// A call of the action that names the goal `id`, with `rest` behind that.
 fn call(id: u8, rest: &[u8]) -> Vec<u8> {
     Writer::default().raw(&[id; 16]).raw(rest).take()
 }
 
-/// The state of the goal `id` as its result says it; none while it is not over.
+/// The state of the goal `id` by its result; none while it is not over.
 fn state(goals: &Server, id: u8) -> Option<u8> {
     let result = goals.result([id; 16])?;
     Some(Reader::new(&result).unwrap().u8().unwrap())

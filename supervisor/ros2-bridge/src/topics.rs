@@ -1,6 +1,7 @@
-//! THE table of what the bridge publishes and takes. Writers and readers are made from it, and the guide's list is printed from it.
+//! THE table of the topics that the bridge publishes and takes. Writers and readers are made from it, and the guide's list is
+//! printed from it.
 
-/// What a topic carries.
+/// The content of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Id {
     Tf,
@@ -21,7 +22,7 @@ pub enum Id {
     Stop,
 }
 
-/// What others may do, if whoever starts the bridge lets them.
+/// The requests of others, each of which the user must permit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Accept {
     /// Send the robot elsewhere: `goal_pose` and the action `navigate_to_pose`.
@@ -36,15 +37,15 @@ pub enum Accept {
 #[derive(Clone, Copy, Debug)]
 pub struct Spec {
     pub id: Id,
-    /// Relative to the bridge's namespace.
+    /// The name, relative to the bridge's namespace.
     pub name: &'static str,
     /// The package and the name of its type.
     pub message: [&'static str; 2],
     /// The name of its type in DDS.
     pub type_name: &'static str,
-    /// Who subscribes later gets the newest message.
+    /// Whether a reader that joins later gets the newest message.
     pub is_latched: bool,
-    /// What lets it in; none of a topic that the bridge publishes.
+    /// The permission for it; none for a topic that the bridge publishes.
     pub accepted_by: Option<Accept>,
     pub meaning: &'static str,
 }

@@ -1,4 +1,4 @@
-//! Promises of the estimator, on loops that are drawn.
+//! Tests of the estimator, on loops that are drawn.
 
 use super::*;
 
@@ -10,7 +10,7 @@ struct Drawn(u64);
 
 impl Drawn {
     fn uniform(&mut self) -> f64 {
-        // SplitMix64.
+        // This is SplitMix64.
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -38,7 +38,7 @@ fn drawn(seed: u64, count: u32, ratio: f64, track: f64, slip: f64) -> Vec<Loop> 
             let rolled_m = 2.0 * arc_m + turn_m;
             let before = std::mem::replace(&mut off, NORMAL_SD * drawn.normal());
             let by_slip = slip * rolled_m.sqrt() / TRACK_M * drawn.normal();
-            // The right side of the equation: what the nominal wheels say of a turn that was whole.
+            // The right side of the equation: the turn by the nominal wheels, for a turn that was whole.
             let turned = TAU * turns * track - 2.0 * e * arc_m / TRACK_M + by_slip + off - before;
             Loop {
                 number,
@@ -92,7 +92,7 @@ fn loops_that_agree_pass_and_a_held_out_pair_that_contradicts_is_refused() {
     let (estimate, used) = checked(&loops, NORMAL_SD, TRACK_M).unwrap();
     assert_eq!(used, loops);
     assert!((estimate.ratio() - 1.004).abs() <= 3.0 * estimate.ratio_sd());
-    // The last loops are of a robot whose wheel has lost its tyre.
+    // The last loops are those of a robot whose wheel has lost its tyre.
     let mut other = loops;
     other[6] = drawn(4, 8, 1.03, 1.01, 0.001)[6];
     other[7] = drawn(4, 8, 1.03, 1.01, 0.001)[7];

@@ -1,4 +1,4 @@
-//! Promises of the squares.
+//! Tests of the squares.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! Promises of the procedure, on a robot whose wheels and world are a few lines.
+//! Tests of the procedure, on a robot whose wheels and world are a few lines.
 
 use common::checkpoint::Checkpoint;
 
@@ -11,7 +11,7 @@ fn body() -> Body {
     common::mission::Model::X80.body()
 }
 
-/// A robot that does as it is ordered, before a wall that answers within 22 degrees of its normal.
+/// A robot that follows its orders, before a wall that answers within 22 degrees of its normal.
 struct Robot {
     x: f64,
     y: f64,
@@ -127,6 +127,6 @@ fn the_state_of_a_whole_calibration_fits_into_its_checkpoint_and_comes_back() {
     let file = folder.path().join("planner.checkpoint");
     let open = || Checkpoint::open::<Wall>(&file, crate::shell::STATE_BYTES).unwrap();
     open().0.save(&wall).unwrap();
-    // Ranges without an echo are no number, which equals nothing.
+    // Ranges without an echo are NaN, which equals nothing.
     assert_eq!(format!("{:?}", open().1), format!("{:?}", Some(wall)));
 }

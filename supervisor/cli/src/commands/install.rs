@@ -29,7 +29,7 @@ pub(crate) struct Arguments {
 struct Part {
     path: &'static str,
     text: &'static str,
-    /// Whether users may change it; such a file is not overwritten.
+    /// Whether users may change the file; such a file is not overwritten.
     configuration: bool,
 }
 
@@ -98,7 +98,7 @@ fn put(file: &Path, text: &str) -> Result<(), InstallError> {
     written.map_err(|source| InstallError { file: file.to_path_buf(), source })
 }
 
-/// The commands, and the units they concern.
+/// The commands, with the units that they concern.
 fn remaining() -> String {
     let units = stages::TABLE.iter().map(|stage| format!("\n    firsthand-stage@{}", stage.name));
     format!("{THEN}{}", units.collect::<String>())

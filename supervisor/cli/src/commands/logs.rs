@@ -65,7 +65,7 @@ fn newest(arguments: &Arguments) -> Option<PathBuf> {
     })
 }
 
-/// The logs in `directory`, which must have the one that is asked for.
+/// The logs in `directory`, which must have the requested one.
 fn opened(arguments: &Arguments, directory: &Path) -> Result<Logs, Failure> {
     let stage = arguments.stage.as_deref();
     let unreadable = |error| format!("cannot read logs in {}: {error}", directory.display());

@@ -59,7 +59,7 @@ struct Operator {
     robot: RobotName,
 }
 
-/// What was confirmed, or why it was not done.
+/// The confirmation, or the reason why the request was not carried out.
 fn told(done: Result<(), impl ToString>, confirmed: &str) -> Result<String, String> {
     done.map(|()| confirmed.to_owned()).map_err(|error| error.to_string())
 }

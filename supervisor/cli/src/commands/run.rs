@@ -269,7 +269,7 @@ fn prepare(options: &Options) -> Result<SummaryFile, Failure> {
         tracing::warn!("{remark}");
         write_stderr(&format!("firsthand: {remark}\n"));
     }
-    // A run that is resumed has its files.
+    // A resumed run has its files.
     let needed = match options.recovered {
         Some(_) => 0,
         None => summary_file::room_of_run(options.mission.grid_frame().area()),
@@ -292,7 +292,7 @@ fn may_be_removed(arguments: &Arguments, options: &Options, finished: &Finished)
     made_here && !finished.drove && finished.restarts.values().all(|&restarts| restarts == 0)
 }
 
-/// After a longer time without supervisor the robot may have been moved.
+/// The longest time without a supervisor after which a run is resumed: later the robot may have been moved.
 const RESUMED_WITHIN_S: f64 = 60.0;
 /// The exit code of `--resume-last` if it does not start.
 const CUT_OFF: u8 = 7;

@@ -50,11 +50,11 @@ struct Status<'a> {
     order: &'static str,
     tick: u64,
     mission_time_s: f64,
-    /// None if it is not published.
+    /// The target; none if it is not published.
     target: Option<TargetStatus>,
-    /// None if no link publishes.
+    /// The link; none if no link publishes.
     link: Option<LinkStatus>,
-    /// None if the robot does not report it.
+    /// The power; none if the robot does not report it.
     power: Option<PowerStatus>,
     stages: Vec<StageStatus<'a>>,
 }

@@ -52,7 +52,7 @@ pub(crate) fn exit_code(error: &(dyn Error + 'static)) -> ExitCode {
     }
 }
 
-/// The code of `error`; none if no script could react to it in particular.
+/// The code of `error`; none if no script could react to the error in particular.
 pub(crate) fn code(error: &(dyn Error + 'static)) -> Option<&'static str> {
     let code = error.downcast_ref().map(|refused: &Refused| refused.code);
     code.or_else(|| error.downcast_ref().and_then(of_supervisor))

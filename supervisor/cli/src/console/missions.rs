@@ -57,7 +57,7 @@ pub(crate) fn load(name: &str, assignments: &[String]) -> Result<Mission, Lookup
     complete(as_assigned(name, assignments)?)
 }
 
-/// `mission` with what the files that it names say.
+/// `mission` with the content of the files that it names.
 pub(crate) fn complete(mission: Mission) -> Result<Mission, LookupError> {
     if mission.robot.protocol() == Protocol::Ros2 && !link::transport::SPEAKS_ROS2 {
         return Err(LookupError::NoRos2);
@@ -97,14 +97,14 @@ pub(crate) fn parsed(
 
 fn as_parsed(text: &str, name: &str, assignments: &[String]) -> Result<Mission, LookupError> {
     let as_written = Mission::parse(text, Path::new(name));
-    // Values are checked after all assignments, because one may correct what is refused without it.
+    // Values are checked after all assignments, because one assignment may correct what would be refused without it.
     let table = text.parse::<toml::Table>();
     let (false, Ok(table)) = (assignments.is_empty(), table) else {
         return Ok(as_written?);
     };
     let assigned = assign(table, assignments)?;
     Mission::parse(&assigned, Path::new(name)).map_err(|error| match as_written {
-        // The error of the file names the line.
+        // The error of the file is better, because it names the line.
         Err(of_file) if of_file.is_same_fault(&error) => of_file.into(),
         // The fault is in no line of the file.
         _ => LookupError::Assigned {

@@ -1,4 +1,4 @@
-//! The operator's part: requests to the supervisor of a robot, signals to its processes.
+//! Requests of an operator to the supervisor of a robot, and signals to its processes.
 
 use std::fs::File;
 
@@ -36,7 +36,7 @@ pub(crate) fn known_stage(stage: &str) -> Result<&'static Stage, Refused> {
     stages::find(stage).ok_or_else(|| Refused::new("unknown-stage", stages::unknown(stage)))
 }
 
-/// Send a signal to the process of `stage`, or to the supervisor. It is sent only to a process that holds the lock of its robot.
+/// Send a signal to the process of `stage`, or to the supervisor, only if that process holds the lock of its robot.
 pub(crate) fn send(robot: &RobotName, stage: &str, signal: Signal) -> Result<(), Failure> {
     let domain = Domain::of(robot.clone());
     // A frozen supervisor publishes nothing.

@@ -7,7 +7,7 @@ use std::{
 
 use serde::Serialize;
 
-/// Write `text` to standard output, at once. It is no failure when its reader has read enough (`firsthand help tables | head`).
+/// Write `text` to standard output at once. A reader that has read enough is no failure (`firsthand help tables | head`).
 pub(crate) fn print_text(text: &str) -> io::Result<()> {
     let mut stdout = io::stdout();
     unless_closed(stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()))
@@ -24,13 +24,13 @@ pub(crate) fn json_lines<T: Serialize>(values: &[T]) -> serde_json::Result<Strin
     lines.map(|line| Ok(line? + "\n")).collect()
 }
 
-/// Write to standard error; a reader that was closed does not end what is under way.
+/// Write to standard error; a closed reader does not end the work under way.
 pub(crate) fn write_stderr(text: &str) {
     let mut stderr = io::stderr();
     let _ = stderr.write_all(text.as_bytes()).and_then(|()| stderr.flush());
 }
 
-/// `written`, where a pipe whose reader has ended, or a terminal that was closed, is no failure.
+/// `written`, but a pipe whose reader has ended, or a terminal that was closed, is no failure.
 pub(super) fn unless_closed(written: io::Result<()>) -> io::Result<()> {
     match written {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),

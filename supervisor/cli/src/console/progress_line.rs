@@ -1,4 +1,4 @@
-//! Progress on standard error: one line rewritten on a terminal, a line now and then elsewhere.
+//! Progress on standard error: one line rewritten on a terminal, lines at intervals elsewhere.
 
 use std::{
     io::{self, IsTerminal as _},
@@ -15,7 +15,7 @@ pub(crate) struct ProgressLine {
 }
 
 impl ProgressLine {
-    /// Nothing is shown yet. Lines that cannot be rewritten are shown once in each `every`.
+    /// A progress that shows nothing yet. Lines that cannot be rewritten are shown once in each `every`.
     pub(crate) fn new(every: Duration) -> Self {
         Self { rewrites: io::stderr().is_terminal(), every, shown: None }
     }
@@ -24,7 +24,7 @@ impl ProgressLine {
         self.shown.is_none_or(|shown| self.rewrites || shown.elapsed() >= self.every)
     }
 
-    /// A line is due now. Returns whether it is the first.
+    /// Note that a line is due now. Returns whether it is the first.
     pub(crate) fn begin(&mut self) -> bool {
         self.shown.replace(Instant::now()).is_none()
     }
@@ -52,8 +52,8 @@ fn columns() -> usize {
     size.map_or(0, |size| size.ws_col.into())
 }
 
-/// The beginning of `line` that fits into `columns`, of which the last stays free; all of it for 0 columns. A line that the
-/// terminal wraps cannot be rewritten.
+/// The beginning of `line` that fits into `columns` but the last; all of it for 0 columns. A line that the terminal wraps
+/// cannot be rewritten.
 fn cut(line: &str, columns: usize) -> &str {
     let shown = columns.checked_sub(1).unwrap_or(usize::MAX);
     let end = line.char_indices().nth(shown);

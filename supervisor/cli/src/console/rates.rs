@@ -19,7 +19,7 @@ use super::{
     words::age,
 };
 
-/// A topic is late after this many of its intervals, because its writer looks at the clock only once in each turn of its loop.
+/// The number of its intervals after which a topic is late: its writer looks at the clock only once in each turn of its loop.
 const LATE: u32 = 2;
 
 #[derive(Debug)]
@@ -73,13 +73,13 @@ pub(crate) struct Report {
 }
 
 impl TopicRates {
-    /// No sample has come yet on the topic of `spec`.
+    /// The rates of the topic of `spec` before any sample.
     pub(crate) fn new(spec: &'static Spec, now: Instant) -> Self {
         Self { spec, writers: BTreeMap::new(), at: None, since: now, counts: Counts::default() }
     }
 
-    /// A sample of `author` came at `now`. The first sample of each process may be old, because a topic keeps one for new readers: it
-    /// is not counted.
+    /// Take a sample of `author` that came at `now`. The first sample of each process is not counted, because it may be old: a topic
+    /// stores one for new readers.
     pub(crate) fn add(&mut self, author: Author, stamp: Stamp, now: Instant) {
         self.at = Some(now);
         let newest = Newest { at: now, stamp };

@@ -10,13 +10,13 @@ use common::{domain::Domain, domain::RobotName};
 
 /// The supervisor's log, in the directory of its run.
 pub(crate) const SUPERVISOR_LOG: &str = "supervisor.log";
-/// Begins the name of each user's directory, before the user's number.
+/// The beginning of the name of each user's directory, before the user's number.
 const USER_DIRECTORY: &str = "firsthand-";
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Robot {
     pub(crate) name: RobotName,
-    /// The process of its supervisor; none if that was killed.
+    /// The process of its supervisor; none if the supervisor was killed.
     pub(crate) supervisor: Option<u32>,
     /// The directory of its run; none if the system does not say.
     pub(crate) run: Option<PathBuf>,
@@ -32,7 +32,7 @@ impl Robot {
 
 /// The robots of this user that run, or whose supervisor was killed, by name.
 pub(crate) fn own() -> Vec<Robot> {
-    // Any name will do, because all robots of a user are in one directory.
+    // The name does not matter, because all robots of a user are in one directory.
     let Ok(any) = "any".parse() else {
         return Vec::new();
     };

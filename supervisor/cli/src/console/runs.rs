@@ -19,7 +19,7 @@ use super::{
 
 /// The file that marks a run that was cut off and reported.
 const CUT_OFF: &str = "cut-off";
-/// A summary takes 2 kB; a larger file is not read.
+/// The greatest size of a summary, which takes 2 kB; a larger file is not read.
 const LARGEST_SUMMARY: u64 = 1 << 20;
 
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -37,7 +37,7 @@ pub(crate) enum Outcome {
     /// The supervisor was killed, or the machine was switched off.
     CutOff,
     Ended {
-        /// Its outcome, such as `reached`.
+        /// The outcome, such as `reached`.
         outcome: String,
         mission_time_s: Option<f64>,
     },
@@ -52,7 +52,7 @@ pub(crate) fn list(runs: &Path) -> Vec<RunDirectory> {
     #[derive(Deserialize)]
     struct Named {
         robot: RobotName,
-        // Another version may have other keys beside these.
+        // Another version may have further keys.
         mission: Option<Mission>,
     }
     let read = |entry: fs::DirEntry| {
@@ -71,7 +71,7 @@ pub(crate) fn list(runs: &Path) -> Vec<RunDirectory> {
 }
 
 impl RunDirectory {
-    /// Whether nobody goes on with it: it has a summary, or it was reported as cut off.
+    /// Whether nobody continues the run: it has a summary, or was reported as cut off.
     pub(crate) fn has_ended(&self) -> bool {
         self.has(SUMMARY) || self.has(CUT_OFF)
     }
@@ -106,19 +106,19 @@ impl RunDirectory {
         its.is_some() && its == fs::canonicalize(&self.directory).ok()
     }
 
-    /// Its size on the disk, bytes.
+    /// The size on the disk, bytes.
     pub(crate) fn size(&self) -> u64 {
         size(&self.directory, MOST_LEVELS)
     }
 }
 
-/// Deeper directories are not counted; a run directory has one level.
+/// The most levels of directories that are counted; a run directory has one.
 const MOST_LEVELS: u32 = 8;
 
 fn size(directory: &Path, levels: u32) -> u64 {
     let entries = fs::read_dir(directory).into_iter().flatten().flatten();
     let sizes = entries.filter_map(|entry| {
-        // A link counts by itself, without the file that it leads to.
+        // A link counts by itself, without the file to which it leads.
         let file = entry.metadata().ok()?;
         let below = if file.is_dir() && levels > 0 { size(&entry.path(), levels - 1) } else { 0 };
         // The kernel counts blocks of 512 bytes on every file system.
@@ -127,7 +127,7 @@ fn size(directory: &Path, levels: u32) -> u64 {
     sizes.fold(0, u64::saturating_add)
 }
 
-/// The directory that was asked for. It is refused if it holds an earlier run.
+/// The requested directory. It is refused if it holds an earlier run.
 pub(crate) fn own(directory: &Path) -> Result<PathBuf, Failure> {
     fs::create_dir_all(directory).map_err(|error| {
         format!("cannot make {}: {error}; give another --out", directory.display())

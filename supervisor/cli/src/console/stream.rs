@@ -12,16 +12,16 @@ use common::{
 
 use super::output::unless_closed;
 
-/// A pipe that is writable takes this much at once (pipe(7)).
+/// The bytes that a writable pipe takes at once (pipe(7)).
 const CHUNK: usize = 4096;
-/// A command that waits looks after this time whether it must end.
+/// The interval at which a command that waits looks whether it must end.
 pub(crate) const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 const NICE: i32 = 5;
 
 /// Give the stages of robots the processor before this process.
 pub(crate) fn let_stages_go_first() {
-    // If the kernel refuses, they share it.
+    // If the kernel refuses, the processes share the processor.
     let _ = rustix::process::nice(NICE);
 }
 

@@ -1,4 +1,4 @@
-//! Tables of text: each column as wide as its widest cell.
+//! Tables of text, in which each column is as wide as its widest cell.
 
 /// The side on which a column is filled with blanks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,4 +1,4 @@
-//! `firsthand calibrate`: how the wheels of a robot differ from nominal ones.
+//! `firsthand calibrate`: the differences between a robot's wheels and nominal ones.
 
 mod drive;
 mod ends;
@@ -84,7 +84,7 @@ pub(crate) struct Arguments {
 const LOOP_S: f64 = 180.0;
 const SQUARE_S: f64 = 120.0;
 
-/// The simulated robot, a metre before a wall. The target is beside the place where it sweeps: only the planner ends the run.
+/// The simulated robot, a metre before a wall. The target is beside the place where the robot sweeps: only the planner ends the run.
 const SIMULATED: &str = "target = [0.3, 0]\nsimulation.realism = 'measured'";
 const WALL: &str = "[[wall]]\npoints = [[1.0, -2.5], [1.0, 2.5]]";
 
@@ -114,7 +114,7 @@ impl Arguments {
         Ok(self.runs.join("calibration.log"))
     }
 
-    /// The mission of a run with this plan: the robot of the mission that is named, and nothing else of it.
+    /// The mission of a run with this plan: the robot of the named mission, and nothing else of it.
     fn mission(&self, plan: CalibrationPlan) -> Result<Mission, Failure> {
         let named = match &self.mission {
             Some(name) => missions::load(name, &self.set)?,
@@ -146,11 +146,11 @@ impl Arguments {
         mission.planner.executable = Some(calibration::PLANNER.into());
         mission.planner.calibration = Some(plan);
         mission.controller.speed_m_s = Some(0.35);
-        // It turns many times at one place, which is no stall.
+        // The robot turns many times at one place, which is no stall.
         mission.controller.turn_rad_s = Some(0.1);
         mission.controller.look_rad_s = Some(1.5);
         mission.controller.slow_radius_m = 0.01;
-        // It is checked like a mission that somebody wrote.
+        // The mission is checked like one that a person wrote.
         Ok(missions::parsed(&toml::to_string(&mission)?, "calibration", &[])?)
     }
 }
@@ -191,7 +191,7 @@ fn by_wall(arguments: &Arguments, plan: CalibrationPlan) -> Result<Found, Failur
     Ok(Found { robot, method: "wall", before, estimate, metres, seconds, residuals, directory })
 }
 
-/// Give the simulated robot of a square noise of its own, and the wheels that it has in all of them.
+/// Give the simulated robot of a square noise of its own, and the wheels that it has in all squares.
 #[cfg(feature = "simulator")]
 fn noise_of_its_own(mission: &mut Mission, number: u32) {
     let errors = x80_sim::wheel_errors::WheelErrors::of(mission);

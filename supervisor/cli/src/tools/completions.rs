@@ -43,10 +43,10 @@ pub(crate) fn answer_shell(whole: fn() -> Command, pages: fn() -> Vec<String>) {
     CompleteEnv::with_factory(|| with_candidates(whole(), pages)).var(VARIABLE).complete();
 }
 
-/// `command` with candidates for what its arguments name.
+/// `command` with candidates for the values of its arguments.
 fn with_candidates(command: Command, pages: fn() -> Vec<String>) -> Command {
     command
-        // Only `stage` asks for these: no other command takes a word that is no subcommand.
+        // Only `stage` asks for these, because no other command takes a word that is no subcommand.
         .add(SubcommandCandidates::new(|| candidates("", stage_names())))
         .mut_args(|argument| match completer(&argument, pages) {
             Some(completer) => argument.add(completer),

@@ -1,4 +1,4 @@
-//! `firsthand runs diff A B`: where two recordings differ.
+//! `firsthand runs diff A B`: the first difference of two recordings.
 
 use std::{path::PathBuf, process::ExitCode};
 

@@ -8,7 +8,7 @@ use report::ReportError;
 
 use crate::console::failure;
 
-/// The code of `error`; none if no script could react to it in particular.
+/// The code of `error`; none if no script could react to the error in particular.
 pub(crate) fn of(error: &(dyn Error + 'static)) -> Option<&'static str> {
     if let Some(ExperimentError::Unknown { .. }) = error.downcast_ref() {
         return Some("unknown-experiment");

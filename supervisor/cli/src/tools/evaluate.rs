@@ -207,7 +207,7 @@ fn methods(arguments: &Arguments) -> Vec<(String, Vec<String>)> {
     methods.into_iter().flat_map(with_sensors).collect()
 }
 
-/// The settings to compare, each planner by each method; the first is what the others are compared with.
+/// The settings to compare, each planner by each method; the others are compared with the first.
 fn settings(arguments: &Arguments) -> Result<Vec<Setting>, Failure> {
     let mut set = vec![
         format!("simulation.realism='{}'", arguments.realism),
@@ -255,7 +255,7 @@ fn executable(planner: &str) -> Result<Option<String>, Failure> {
     Ok(Some(format!("planner.executable={value}")))
 }
 
-/// The body that every world must let through, by the robot's model and what `set` changes of it.
+/// The body that must fit through every world, by the robot's model and the changes in `set`.
 fn body(robot: &str, set: &[String]) -> Result<BodySize, Failure> {
     let radius = set.iter().rfind(|assignment| assignment.starts_with("robot.radius_m"));
     let radius = radius.map_or("", String::as_str);

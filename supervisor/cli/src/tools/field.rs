@@ -57,7 +57,7 @@ pub(crate) struct Arguments {
     threads: NonZeroUsize,
 }
 
-/// A cell as it is given on the command line.
+/// A cell of the command line.
 #[derive(Clone, Copy, Debug)]
 struct TargetCell(Cell);
 
@@ -83,7 +83,7 @@ enum FieldError {
         map.display()
     )]
     NothingFree { map: PathBuf },
-    /// The solver's own sentence.
+    /// The solver's own message.
     #[error("{}: {cause}", map.display())]
     Solve { map: PathBuf, cause: SolveError },
     /// A file cannot be written.
@@ -158,7 +158,7 @@ fn solve(domain: &Domain, threads: NonZeroUsize) -> Result<(Field, Times), Solve
     Ok((field, times))
 }
 
-/// The whole of `field --json`. Times are in milliseconds.
+/// The object of `field --json`. Times are in milliseconds.
 #[derive(Debug, Serialize)]
 struct Report {
     rows: usize,
@@ -177,7 +177,7 @@ struct Report {
     medians: Option<Medians>,
     worst_residual: f64,
     log10_u_min: f64,
-    /// Memory of the process when the field was solved: map, solver and field, not the files made of it.
+    /// Memory of the process when the field was solved: map, solver and field, not the output files.
     peak_memory_bytes: Option<u64>,
 }
 
@@ -293,7 +293,7 @@ fn add_array<T: npyz::AutoSerialize>(
     name: &str,
     values: impl Iterator<Item = T>,
 ) -> io::Result<()> {
-    // Stored as they are, as `numpy.savez` does: a reader may map them into its memory.
+    // The members are stored uncompressed, as `numpy.savez` does: a reader may map them into its memory.
     let options = zip::write::SimpleFileOptions::default()
         .compression_method(zip::CompressionMethod::Stored)
         .large_file(true);
@@ -317,7 +317,7 @@ fn guidance(field: &Field, cell: Cell) -> [f32; 2] {
     let direction = if field.is_reachable(cell) {
         field.direction(cell)
     } else {
-        // The field would look for a way out of the wall, which nobody asked for.
+        // A blocked cell gets no direction; the field would give its way out of the wall.
         None
     };
     direction.unwrap_or_default().map(|component| component as f32)

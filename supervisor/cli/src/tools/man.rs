@@ -16,7 +16,7 @@ pub(crate) fn main(_: &Arguments, whole: Command) -> Result<(), Failure> {
     Ok(print_text(&String::from_utf8_lossy(&page(whole)?))?)
 }
 
-/// One page: the whole, and a section for each subcommand.
+/// The page: the whole command line, and a section for each subcommand.
 fn page(mut whole: Command) -> io::Result<Vec<u8>> {
     // Usage lines name the whole command only once it is built.
     whole.build();
@@ -36,7 +36,7 @@ fn page(mut whole: Command) -> io::Result<Vec<u8>> {
     Ok(page)
 }
 
-/// Add the sections of the subcommands of `command`, and of theirs; `names` are the words before.
+/// Add the sections of the subcommands of `command`, and of theirs; `names` are the words before them.
 fn add_subcommands(command: &Command, names: &str, page: &mut Vec<u8>) -> io::Result<()> {
     for subcommand in command.get_subcommands().filter(|it| !it.is_hide_set()) {
         let names = format!("{names}{}", subcommand.get_name().to_uppercase());
@@ -46,7 +46,7 @@ fn add_subcommands(command: &Command, names: &str, page: &mut Vec<u8>) -> io::Re
         man.render_synopsis_section(&mut sections)?;
         man.render_description_section(&mut sections)?;
         man.render_options_section(&mut sections)?;
-        // Its sections are parts of this one.
+        // The sections of a subcommand are parts of this section.
         let sections = String::from_utf8_lossy(&sections).replace(".SH ", ".SS ");
         page.extend_from_slice(sections.as_bytes());
         add_subcommands(subcommand, &(names + " "), page)?;

@@ -1,4 +1,4 @@
-//! `firsthand map save RUN`: what a robot believed, as a map of the ROS map_server.
+//! `firsthand map save RUN`: the belief of a robot, as a map of the ROS map_server.
 
 use std::path::PathBuf;
 

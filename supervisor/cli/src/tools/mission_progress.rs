@@ -13,7 +13,7 @@ use crate::console::progress_line::ProgressLine;
 /// Time between lines that cannot be rewritten.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
-/// Missions at once: as many as asked for, or one for each processor.
+/// Missions at once: the requested number, or one for each processor.
 pub(super) fn jobs(asked_for: Option<NonZero<usize>>) -> usize {
     asked_for.map_or_else(|| thread::available_parallelism().map_or(1, NonZero::get), NonZero::get)
 }

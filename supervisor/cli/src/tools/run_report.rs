@@ -26,7 +26,7 @@ pub(crate) fn picture(options: &Options, finished: &Finished, summary: &Summary)
     let picture = options.directory.join("picture.svg");
     let svg = svg(&options.mission, finished, summary);
     if let Err(error) = fs::write(&picture, svg) {
-        // A part of a picture is of no use.
+        // An incomplete picture is of no use.
         let _ = fs::remove_file(&picture);
         return Err(format!("cannot write {}: {error}", picture.display()));
     }

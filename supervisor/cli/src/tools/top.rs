@@ -1,4 +1,4 @@
-//! `firsthand top`: stages, map, field and robot on the screen of a terminal; keys that do what an operator does.
+//! `firsthand top`: stages, map, field and robot on the screen of a terminal, and keys for the actions of an operator.
 //!
 //! | file | holds |
 //! |---|---|
@@ -62,7 +62,7 @@ enum TopError {
 
 /// The longest time until a key is noticed when nothing is published.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
-/// The screen is drawn again after this time.
+/// The interval at which the screen is drawn again.
 const DRAW_EVERY: Duration = Duration::from_millis(200);
 
 pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
@@ -80,7 +80,7 @@ fn show(robot: &RobotName) -> Result<(), TopError> {
     let mut terminal = ratatui::try_init()?;
     let shown = run(robot, &mut signals, &mut terminal);
     if terminal.show_cursor().is_err() {
-        // Its destructor would report on standard error that it cannot show the cursor, and panic if that is closed too.
+        // The destructor would report on standard error that it cannot show the cursor, and panic if that is closed too.
         std::mem::forget(terminal);
     }
     let restored = ratatui::try_restore();
@@ -105,7 +105,7 @@ fn run(
     let mut view = View::of(robot.clone());
     let mut operator = Operator::new(robot);
     let mut drawn = None::<Instant>;
-    // Keys are read here: the reader of the terminal's library never ends where the terminal was closed.
+    // Keys are read here, because the reader of the terminal's library never ends if the terminal was closed.
     let mut typed = Vec::new();
     while !signals.came() && !is_closed() {
         match follower.wait(LOOK_EVERY)? {

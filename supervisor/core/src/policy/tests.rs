@@ -1,5 +1,5 @@
-//! The rules one by one, then all of them against a plain model of one process, over every short history and a
-//! great many long ones.
+//! Tests of the rules one by one, then of all against a plain model of one process, over every short history and many
+//! long ones.
 
 mod model;
 
@@ -42,7 +42,7 @@ fn deaths_in_a_row_wait_longer_and_longer_up_to_a_second() {
     assert_eq!(waits, [2, 4, 8, 16, 32, 64, 128, 256, 512, 1000]);
 }
 
-/// It exits as soon as it is started, until it is held. Returns the time of that.
+/// Let the process exit as soon as it is started, until the stage is held. Returns the time of the hold.
 fn crash_until_held(policy: &mut Policy, mut now: Duration) -> Duration {
     for _ in 0..100 {
         policy.step(Event::Exited, now);

@@ -81,7 +81,7 @@ fn a_robot_that_waits_for_a_field_is_not_stalled_until_that_takes_too_long() {
     });
     let least = FIELD_WITHIN.as_secs() as i32;
     assert_eq!(first, Some(least + STALLED_AFTER.as_secs() as i32));
-    // The next one is asked for after as long again.
+    // The next recovery step comes after as long again.
     let second = pose(f64::from(least) + 10.0, 0.0);
     assert_eq!(watch.step(&second, &waiting, false, false), None);
 }
@@ -158,7 +158,7 @@ fn an_answer_from_before_the_reset_does_not_reset_again() {
     assert_eq!(watch.step(&pose(2.5, 0.1), &old, false, false), None);
 }
 
-/// Moves to and fro at one place for `seconds`.
+/// Move to and fro at one place for `seconds`.
 fn rock(watch: &mut StallWatch, seconds: std::ops::Range<u32>) -> Vec<StallSample> {
     let along = guidance(GuidanceStatus::Along, 0);
     let rocking = seconds.filter_map(|second| {
@@ -289,7 +289,7 @@ fn held_wheels_get_a_fresh_planner_at_once_and_again_elsewhere_and_are_held_fast
     let mut steps = Vec::new();
     while steps.last() != Some(&GiveUp) {
         let second = 10 + steps.len() as u32;
-        // A robot that turns about a blocked wheel.
+        // The robot turns about a blocked wheel.
         steps.push(held(&mut watch, second, 10.0 + 0.2 * f64::from(second % 2)).1);
     }
     let round = [Replan, Replan, Reset];
@@ -346,7 +346,7 @@ fn a_robot_with_a_laser_wanders_where_it_has_been_and_not_where_it_has_not() {
         })
     };
     assert_eq!(first(|metre| metre), None);
-    // 12 m, and 3 m for each of four squares.
+    // The limit is 12 m, and 3 m for each of four squares.
     assert_eq!(first(|metre| metre % 4.0), Some(24));
 }
 
@@ -361,7 +361,7 @@ fn a_relocated_robot_forgets_all_of_its_map_each_time_and_gives_up_for_it_never(
         let pose = PoseSample { relocations, x_m: place, ..pose(place, place) };
         resets.extend(watch.step(&pose, &along, false, false).map(|stall| parts(&stall)));
     }
-    // Only in an even epoch the mapper drops what is near the robot.
+    // Only in an even epoch the mapper resets the evidence near the robot.
     let want =
         [2, 4, 6, 8, 10, 12].map(|epoch| (StallCause::Relocated, RecoveryStep::Reset, epoch));
     assert_eq!(resets, want);

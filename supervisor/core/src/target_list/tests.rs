@@ -14,7 +14,7 @@ fn at(x: f64, y: f64) -> TargetPoint {
     TargetPoint::at(DVec2::new(x, y))
 }
 
-/// A command that says arrived, in a tick of as many seconds.
+/// A command that says arrived, in tick `tick` at as many seconds.
 fn arrival(tick: u64) -> CommandSample {
     let stamp = Stamp { tick, stamp_ns: tick * 1_000_000_000, ..Stamp::default() };
     CommandSample { stamp, distance_m: 0.1, ..CommandSample::default() }

@@ -20,7 +20,7 @@ pub struct Belief {
 #[derive(Clone, Copy, Debug)]
 pub struct Map<'a> {
     pub frame: GridFrame,
-    /// Increases when the map is reset.
+    /// The epoch, which increases when the map is reset.
     pub epoch: u64,
     cells: &'a [u8],
 }

@@ -2,8 +2,8 @@
 //! straight to the target; where a hazard is in the way, around it with the hazard on the right, until the robot is on
 //! the line from start to target again, nearer to the target than where it met the hazard, and the way is free.
 //!
-//! The point of the algorithm is the robot's centre: the map's hazards have the margin of the body. It sees no farther
-//! than [`AHEAD_M`]. A robot that comes back to where it met the hazard has no way.
+//! The point of the algorithm is the robot's centre: the map's hazards have the margin of the body. It sees no farther than
+//! [`AHEAD_M`]. A robot that comes back to the place where it met the hazard has no way.
 
 mod boundary;
 
@@ -24,7 +24,7 @@ const AWAY_M: f64 = 0.5;
 /// Distance within which the robot is on the line from start to target, in cells, and at least in metres.
 const ON_LINE_CELLS: f64 = 0.75;
 const ON_LINE_M: f64 = 0.05;
-/// The most cells of a boundary that are looked at ahead.
+/// The most cells of a boundary that are searched ahead.
 const MOST_CELLS: usize = 256;
 
 /// The planner of Bug2.
@@ -36,14 +36,14 @@ pub struct Bug {
     line_from: Option<DVec2>,
     /// The hazard that the robot circumvents.
     following: Option<Following>,
-    /// The robot came back to the place where it met the hazard.
+    /// Whether the robot came back to the place where it met the hazard.
     enclosed: bool,
 }
 
 /// A hazard that the robot circumvents.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Following {
-    /// The place where the robot met it, metres.
+    /// The place where the robot met the hazard, metres.
     hit: DVec2,
     /// The robot's place on the boundary.
     place: Place,
@@ -96,7 +96,7 @@ impl Straight<'_> {
         self.map.last_free(here, ahead)
     }
 
-    /// To the left of the way from `here`, a unit vector.
+    /// The unit vector to the left of the way from `here`.
     fn left(&self, here: DVec2) -> DVec2 {
         (self.target - here).normalize_or(DVec2::X).perp()
     }

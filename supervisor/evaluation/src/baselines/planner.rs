@@ -1,4 +1,4 @@
-//! A planner to compare with, and what all of them share: the map, and the guidance along a way.
+//! A planner to compare with, and the parts that all of them share: the map, and the guidance along a way.
 
 use std::fmt::Debug;
 
@@ -14,7 +14,7 @@ use crate::baselines::belief::{Belief, Map};
 /// Speed of a robot that leaves a hazard, m/s: that of the harmonic planner with the evidential method.
 const WAY_OUT_M_S: f64 = 0.08;
 
-/// A planner to compare with. It saves itself whenever it has answered.
+/// A planner to compare with. It is saved whenever it has answered.
 pub trait Planner: Default + Debug + Serialize + DeserializeOwned {
     /// The way from `here` to `target` (metres) on `map`.
     fn way(&mut self, map: &Map<'_>, here: DVec2, target: DVec2) -> Way;
@@ -43,7 +43,7 @@ impl Way {
 /// A planner on a copy of the map.
 #[derive(Debug)]
 pub struct Baseline<P> {
-    /// Where the robot is sent; none before the supervisor has said so.
+    /// The target of the robot; none before the supervisor has published one.
     target: Option<TargetSample>,
     looks_around: bool,
     belief: Belief,
@@ -51,7 +51,7 @@ pub struct Baseline<P> {
 }
 
 impl<P: Planner> Baseline<P> {
-    /// For the robot of `mission`, without a map.
+    /// The baseline for the robot of `mission`, without a map.
     pub fn new(mission: &Mission) -> Self {
         Self {
             target: None,
@@ -66,7 +66,7 @@ impl<P: Planner> Baseline<P> {
         self.belief.follow(header, cells)
     }
 
-    /// The robot is sent to `target`. On the way to another one the planner begins anew.
+    /// Note that the robot is sent to `target`. On the way to another target the planner begins anew.
     pub fn send_to(&mut self, target: TargetSample) {
         if self.target.replace(target).is_some() {
             self.planner = P::default();

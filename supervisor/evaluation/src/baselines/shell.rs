@@ -66,7 +66,7 @@ impl<P: Planner> Process for Shell<P> {
                 tracing::warn!(version = header.part.version, "missed a grid version");
                 continue;
             }
-            // The whole map, published again behind the tick it belongs to, asks for nothing; a tick that is given
+            // The whole map, published again after the tick to which it belongs, asks for nothing; a tick that is given
             // again was not answered to the end.
             asked |= header.part.keyframe == 0 || self.answered != Some(header.stamp.tick);
             self.progress = Progress::of(&header.stamp);
@@ -79,7 +79,7 @@ impl<P: Planner> Process for Shell<P> {
 }
 
 impl<P: Planner> Shell<P> {
-    /// Guidance for the pose of the tick, which was published before the grid was.
+    /// Publish guidance for the pose of the tick, which was published before the grid was.
     fn answer(&mut self) -> Result<(), StageError> {
         self.latest_pose = self.pose.newest()?.or(self.latest_pose);
         let Progress { tick, time } = self.progress;

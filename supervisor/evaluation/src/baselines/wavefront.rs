@@ -11,7 +11,7 @@ use crate::baselines::{
     planner::{Planner, Way},
 };
 
-/// The robot heads for a point of its path that is no farther than this, metres.
+/// The greatest distance to the point of its path for which the robot heads, metres.
 const AIM_M: f64 = 0.6;
 /// A* counts in thousandths of a cell.
 const STRAIGHT: u64 = 1000;

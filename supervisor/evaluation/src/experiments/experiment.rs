@@ -19,14 +19,14 @@ const UNKNOWN_AT_M: (f64, f64) = (2.3, -1.7);
 /// An experiment of section V.B of the paper.
 #[derive(Debug)]
 pub struct Experiment {
-    /// Its number in the paper, and the variant.
+    /// The number in the paper, and the variant.
     pub name: &'static str,
     pub title: &'static str,
-    /// The paper's report of it.
+    /// The paper's report of the experiment.
     pub reported: &'static str,
     /// The paper's time, seconds.
     pub reported_time_s: Option<f64>,
-    /// Name and text of the shipped mission that it changes.
+    /// Name and text of the shipped mission that the experiment changes.
     mission: (&'static str, &'static str),
     change: fn(&mut Mission),
     methods: &'static [Method],
@@ -153,7 +153,7 @@ impl Experiment {
         self.methods.contains(&method)
     }
 
-    /// Its mission, without the method.
+    /// The mission of the experiment, without the method.
     pub fn mission(&self) -> Result<Mission, MissionError> {
         let (name, text) = self.mission;
         let mut mission = Mission::parse(text, Path::new(name))?;
@@ -172,7 +172,7 @@ impl Experiment {
     }
 }
 
-/// The experiments of these names in the order of the table; without names all.
+/// The experiments of these names in the order of the table; all without names.
 pub fn named(names: &[String]) -> Result<Vec<&'static Experiment>, ExperimentError> {
     let is_known = |name: &String| TABLE.iter().any(|experiment| experiment.name == name);
     if let Some(name) = names.iter().find(|name| !is_known(name)) {

@@ -25,7 +25,7 @@ impl Method {
         }
     }
 
-    /// Its setting for every mission.
+    /// The setting of the method for every mission.
     pub fn setting(self, realism: Realism) -> Setting {
         let own: &[&str] = match self {
             Self::Paper => &["method='paper'", "dead_reckoning.integration='euler'"],

@@ -38,7 +38,7 @@ const COLUMNS: [Column; 7] = [
     ("wheel range, rad/s", |of| of.wheel_range_rad_s, 2),
 ];
 
-/// Like `51.2 (48.0-55.1)`: the median and the middle half.
+/// The median and the middle half, like `51.2 (48.0-55.1)`.
 fn shown(spread: Option<Spread>, digits: usize) -> String {
     let Some(Spread { low, median, high }) = spread else {
         return "-".to_owned();

@@ -10,14 +10,14 @@ use thiserror::Error;
 
 use super::map::MOST_BOXES;
 
-/// Every message begins with the file.
+/// Errors of maps. Every message begins with the file.
 #[derive(Debug, Error)]
 pub enum MapError {
     #[error("{}: {cause}; give a map file that can be read", file.display())]
     Unreadable { file: PathBuf, cause: io::Error },
     #[error("{}: {cause}; give the name of a map to write", file.display())]
     Unwritable { file: PathBuf, cause: io::Error },
-    /// It is a directory, a pipe or a device.
+    /// The path leads to a directory, a pipe or a device.
     #[error("{}: not a regular file; give a map file", file.display())]
     NotAFile { file: PathBuf },
     #[error(

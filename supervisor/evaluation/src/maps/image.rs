@@ -1,4 +1,4 @@
-//! Images as maps: what is light is free.
+//! Images as maps, in which light pixels are free.
 
 use std::{
     error::Error,
@@ -17,14 +17,14 @@ use crate::maps::{
 /// The largest map in 16 bits a channel, four channels, with room for the words of a Netpbm in ASCII.
 const LONGEST: u64 = (MAX_SIDE as u64).pow(2) * 8 + (1 << 20);
 
-/// Which pixels are free, as the ROS map_server tells them in its trinary mode.
+/// The rule by which pixels are free, as in the trinary mode of the ROS map_server.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lightness {
     /// Whether dark means free.
     pub(super) negate: bool,
-    /// A pixel is free if its darkness, 0 to 1, is below this
+    /// The darkness, 0 to 1, below which a pixel is free.
     pub(super) free_thresh: f64,
-    /// and not above this.
+    /// The darkness above which a pixel is occupied.
     pub(super) occupied_thresh: f64,
 }
 
@@ -45,24 +45,24 @@ impl Lightness {
 
 type Cause = Box<dyn Error>;
 
-/// Which pixels are free, row by row.
+/// The free pixels, row by row.
 pub(super) struct Free {
     pub(super) cols: usize,
     pub(super) pixels: Vec<bool>,
 }
 
-/// The map in an image, a cell a pixel.
+/// The map in an image; each pixel is a cell.
 pub(super) fn load(file: &Path, lightness: Lightness) -> Result<Map, MapError> {
     let Free { cols, pixels } = pixels(file, lightness)?;
     Ok(Map::new(cols, pixels.len() / cols, pixels.into_iter()))
 }
 
-/// The pixels of an image; it has at least one.
+/// The pixels of an image, which has at least one.
 pub(super) fn pixels(file: &Path, lightness: Lightness) -> Result<Free, MapError> {
     let mut reader = BufReader::new(open(file, LONGEST)?);
     let start =
         reader.fill_buf().map_err(|cause| MapError::Unreadable { file: file.to_owned(), cause })?;
-    // By its first bytes: a PNG that is called .pgm is still a PNG.
+    // The first bytes decide: a PNG that is called .pgm is still a PNG.
     let decoded = match start {
         [0x89, b'P', b'N', b'G', ..] => png(reader, lightness, file),
         [b'P', kind @ (b'2' | b'3' | b'5' | b'6'), ..] => {
@@ -96,7 +96,7 @@ fn netpbm(
     let mut bytes = reader.bytes();
     let mut header = || number(&mut bytes);
     let (cols, rows, most) = (header()?, header()?, header()?);
-    // Its size first: decoding takes memory for whatever the header claims.
+    // The size is checked first, because decoding takes as much memory as the header claims.
     check_size(file, cols.into(), rows.into())?;
     if !(1..=0xffff).contains(&most) {
         return Err(format!("its brightest is {most}").into());
@@ -151,7 +151,7 @@ fn png(reader: impl BufRead + Seek, lightness: Lightness, file: &Path) -> Result
     decoder.set_ignore_text_chunk(true);
     decoder.set_ignore_iccp_chunk(true);
     let (cols, rows) = decoder.read_header_info()?.size();
-    // Its size first: decoding takes memory for whatever the header claims.
+    // The size is checked first, because decoding takes as much memory as the header claims.
     check_size(file, cols.into(), rows.into())?;
     let mut reader = decoder.read_info()?;
     let (colour, depth) = reader.output_color_type();
@@ -205,7 +205,7 @@ mod tests {
         for (grey, free) in [(0, false), (205, false), (206, true), (255, true)] {
             assert_eq!(middle_is_free(b"P5 3 3 255\n", &[grey], usual), free, "{grey}");
         }
-        // A quarter of the range in 16 bits, and in colours.
+        // The pixel has a quarter of the range, in 16 bits and in colours.
         assert!(!middle_is_free(b"P5 3 3 65535\n", &[0x40, 0], usual));
         assert!(middle_is_free(b"P6 3 3 255\n", &[255, 255, 200], usual));
         assert!(middle_is_free(b"P5 3 3 100\n", &[90], usual));

@@ -3,7 +3,7 @@
 use common::geometry::Box2;
 use glam::DVec2;
 
-/// Of a map that needs more boxes no mission is made: a mission file with so many has 2 MB.
+/// The most boxes of a map from which a mission is made: a mission file with so many has 2 MB.
 pub(crate) const MOST_BOXES: usize = 20_000;
 
 /// A map of cells, row-major, row 0 at the top.
@@ -11,7 +11,7 @@ pub(crate) const MOST_BOXES: usize = 20_000;
 pub struct Map {
     pub cols: usize,
     pub rows: usize,
-    /// Everything that is not free, and the whole rim.
+    /// The cells that are not free, and the whole rim.
     pub blocked: Vec<bool>,
 }
 
@@ -60,7 +60,7 @@ impl PlacedMap {
     }
 
     /// Boxes that cover the cells `wanted` and none but `solid` ones: each grows to the right as far as cells are solid, and down while
-    /// that covers more. They are made as they are asked for.
+    /// that covers more. The iterator makes each box when it is asked for.
     pub(crate) fn boxes(
         &self,
         solid: &[bool],

@@ -90,7 +90,8 @@ fn header<'a>(
     }
 }
 
-/// Whether a robot can be there: on plain ground and swamp, not out of bounds, in trees or water. None for another character.
+/// Whether a robot can be in the cell: on plain ground and swamp, not out of bounds, in trees or water. None for another
+/// character.
 fn is_free(cell: u8) -> Option<bool> {
     match cell {
         b'.' | b'G' | b'S' => Some(true),

@@ -1,4 +1,4 @@
-//! A ROS map as hazards that a mission knows before it starts, and such a map of what a robot believed at the end of one.
+//! A ROS map as hazards that a mission knows before it starts, and the belief of a robot at the end of one as such a map.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use common::{
 
 use crate::maps::{MOST_BOXES, MapError, PlacedMap, ros};
 
-/// Cells farther outside of the perimeter than this concern no robot inside, metres.
+/// The distance outside of the perimeter beyond which cells concern no robot inside, metres.
 const BEYOND_M: f64 = 1.0;
 
 const OCCUPIED: u8 = 0;
@@ -44,7 +44,7 @@ fn known(file: &Path, placed: &PlacedMap, frame: &GridFrame) -> Result<Vec<Box2>
     if boxes.len() > MOST_BOXES { Err(MapError::too_many_boxes(file)) } else { Ok(boxes) }
 }
 
-/// Write what was believed in `cells` of `frame`, one [`CellState`] byte each, to the YAML `file` and an image beside it.
+/// Write the belief in `cells` of `frame`, one [`CellState`] byte each, to the YAML `file` and an image beside it.
 ///
 /// Hazards of the grid reach as far around a surface as the body does. The map has the surfaces: cells with nothing but hazard within
 /// that reach, so that a mission which starts from the map has the same hazards again.
@@ -63,7 +63,7 @@ pub fn save_believed(
         let byte = is_inside.then(|| cells.get((row * side + col) as usize)).flatten();
         byte.map_or(CellState::Perimeter, |byte| CellState::from_byte(*byte))
     };
-    // A surface fills its cell in the map. Half a cell less: what was believed may lie anywhere in it.
+    // A surface fills its cell in the map. Half a cell is taken off, because the believed surface may lie anywhere in its cell.
     let reach = mapper::step::hazard_reach_m(mission) / frame.resolution_m - 0.5;
     let around = (reach + 0.5).ceil() as i64;
     let beyond = |cells: i64| (cells.abs() as f64 - 0.5).max(0.0);
@@ -83,7 +83,7 @@ pub fn save_believed(
             }
         }
     };
-    // Row 0 of the grid is the lowest, that of an image the highest.
+    // Row 0 is the lowest row of the grid and the highest of an image.
     let pixels = (0..side).rev().flat_map(|row| (0..side).map(move |col| (col, row)));
     let map = ros::Saved {
         cols: frame.cells as usize,

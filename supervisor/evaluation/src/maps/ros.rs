@@ -61,12 +61,12 @@ pub(super) fn load(file: &Path) -> Result<Map, MapError> {
     image_of(file, &text(file)?)
 }
 
-/// The map that the YAML `file` of the ROS map_server describes, and where it lies.
+/// The map that the YAML `file` of the ROS map_server describes, with its place.
 pub fn load_placed(file: &Path) -> Result<PlacedMap, MapError> {
     placed(file, image_of)
 }
 
-/// Likewise, with only those cells blocked that the map says are occupied.
+/// [`load_placed`], with only those cells blocked that the map says are occupied.
 pub(super) fn load_occupied(file: &Path) -> Result<PlacedMap, MapError> {
     placed(file, |file, text| {
         let (image, lightness) = named_image(file, text)?;
@@ -111,7 +111,7 @@ fn text(file: &Path) -> Result<String, MapError> {
         .map_err(|_| MapError::malformed(file, "not UTF-8 text; give the YAML of a map_server map"))
 }
 
-/// The keys of `text` that `T` has. `needed` names the least that the file must have.
+/// The keys of `text` that `T` has. `needed` names the keys that the file must have.
 fn parse<T: DeserializeOwned>(file: &Path, text: &str, needed: &str) -> Result<T, MapError> {
     serde_saphyr::from_str(text).map_err(|error| {
         let problem = error.to_string();
@@ -130,7 +130,7 @@ fn image_of(file: &Path, text: &str) -> Result<Map, MapError> {
     image::load(&image, lightness)
 }
 
-/// The name of that image, and which of its pixels are free.
+/// The name of that image, and the rule by which its pixels are free.
 fn named_image(file: &Path, text: &str) -> Result<(PathBuf, Lightness), MapError> {
     let parsed: MapFile = parse(file, text, "image: FILE")?;
     let lightness = parsed.lightness(file)?;
@@ -142,7 +142,7 @@ fn named_image(file: &Path, text: &str) -> Result<(PathBuf, Lightness), MapError
 /// A map to write: cells, row-major, row 0 at the top.
 pub(super) struct Saved {
     pub(super) cols: usize,
-    /// 0 for occupied, 254 for free, 205 for unknown, as the map_saver writes them.
+    /// The pixels: 0 for occupied, 254 for free, 205 for unknown, as the map_saver writes them.
     pub(super) pixels: Vec<u8>,
     pub(super) cell_m: f64,
     /// The corner where x and y are least, metres.
@@ -157,7 +157,7 @@ pub(super) fn save(file: &Path, map: &Saved) -> Result<(), MapError> {
     bytes.extend_from_slice(&map.pixels);
     file::replace(&image, bytes).map_err(unwritable)?;
     let (name, [x, y]) = (image.file_name().unwrap_or_default().to_string_lossy(), map.corner_m);
-    // A name in single quotes is taken as it is, but for quotes, which are doubled.
+    // A name in single quotes is taken literally, except that quotes in it are doubled.
     let name = name.replace('\'', "''");
     let yaml = format!(
         "image: '{name}'\nmode: trinary\nresolution: {:?}\norigin: [{x:?}, {y:?}, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",

@@ -10,9 +10,9 @@ use crate::trial::Scene;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Bends {
-    /// Straight, along x, empty.
+    /// The corridor is straight, along x, and empty.
     None,
-    /// Two to four legs, each at an angle of up to 50 degrees with the one before.
+    /// The corridor has two to four legs, each at an angle of up to 50 degrees with the one before.
     Oblique,
 }
 

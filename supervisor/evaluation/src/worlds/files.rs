@@ -20,7 +20,7 @@ use crate::trial::{BodySize, Rules, Scene, Trial};
 
 /// Starts and targets drawn on a map without any, if no number is asked for.
 const DRAWN: usize = 10;
-/// Their stream of random numbers.
+/// The stream of random numbers of these starts and targets.
 const DRAWN_KIND: u64 = 7;
 /// Name of a map's file of tests, as in MRPB.
 const TESTS_FILE: &str = "config.txt";

@@ -10,7 +10,7 @@ use glam::DVec2;
 
 use super::{ends::Ends, error::WorldError, random::Random};
 
-/// Longest side of a map, metres: that of the check of solvability.
+/// Longest side of a map, metres: that of the check whether it can be crossed.
 const LARGEST_M: f64 = 95.0;
 /// Range of the straight distance to a drawn target, metres.
 const DRAWN_M: [f64; 2] = [3.0, 15.0];
@@ -53,8 +53,8 @@ impl Floor {
         Ok(Shapes { boxes, ..Shapes::default() })
     }
 
-    /// For each stream of random numbers a start, and a target 3 to 15 m away that a body is connected to which needs
-    /// `swept_m` around its centre; fewer where there is hardly any.
+    /// For each stream of random numbers a start, and a target 3 to 15 m away that a body which needs `swept_m` around
+    /// its centre can reach; fewer if there is hardly any.
     pub(super) fn draw(&self, streams: impl Iterator<Item = Random>, swept_m: f64) -> Vec<Ends> {
         let roomy = self.roomy(swept_m);
         let places: Vec<usize> = (0..roomy.len()).filter(|&at| roomy[at]).collect();

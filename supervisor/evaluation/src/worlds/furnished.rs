@@ -92,15 +92,15 @@ fn thing(random: &mut Random, at: DVec2) -> (Shapes, f64) {
     };
     let block = Box2 { at, size_m, angle_deg: angle.to_degrees(), ..Box2::default() };
     let shapes = match kind {
-        // The seat of a chair and the top of a table, above the robot.
+        // These are above the robot: the seat of a chair and the top of a table.
         0..=3 => on_legs(random, &block, 0.42, 0.47),
         4..=5 => on_legs(random, &block, 0.70, 0.74),
-        // The shelf of a low table: above the sonar, lower than the robot.
+        // The shelf of a low table is above the sonar and lower than the robot.
         6 => {
             let bottom = random.within(0.20, 0.24);
             on_legs(random, &block, bottom, bottom + 0.02)
         }
-        // A step, the foot of a lamp: lower than the sonar.
+        // A step or the foot of a lamp is lower than the sonar.
         7..=8 => one(Box2 { top_m: Some(random.within(0.05, 0.10)), ..block }),
         _ => one(Box2 { top_m: Some(0.8), echo: Some(SOFT), ..block }),
     };

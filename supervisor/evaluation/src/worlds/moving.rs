@@ -7,8 +7,9 @@
 //! of the trajectories in these worlds, the orders are inferred from their stations, and the standard deviations of the speed are
 //! nominal.
 //!
-//! What differs: a cylinder goes back at the end of its path, where DynaBARN's jumps to the beginning; it goes straight between
-//! stations, where DynaBARN's follows a spline; and a path that leaves the hall ends at the last station inside, not at the wall.
+//! These are the differences: a cylinder goes back at the end of its path, where DynaBARN's jumps to the beginning; it goes
+//! straight between stations, where DynaBARN's follows a spline; and a path that leaves the hall ends at the last station inside,
+//! not at the wall.
 
 use std::f64::consts::PI;
 
@@ -29,10 +30,10 @@ const WALL_M: f64 = 0.5;
 const RADIUS_M: f64 = 0.5;
 /// Stations of a path beside the points that its polynomial is drawn through, evenly spread along x.
 const STATIONS: usize = 10;
-/// The time until which cylinders move at least, seconds: longer than a mission by the challenge's rules.
+/// The least time for which cylinders move, seconds: longer than a mission by the challenge's rules.
 const MOVES_S: f64 = 130.0;
 
-/// How hard a world is; each range includes its ends.
+/// The difficulty of a world; each range includes its ends.
 struct Difficulty {
     cylinders: [usize; 2],
     /// Orders of the polynomials.
@@ -105,7 +106,7 @@ fn cylinder(random: &mut Random, difficulty: &Difficulty) -> Thing {
         if at_s > MOVES_S {
             break;
         }
-        // By rejection.
+        // The speed is drawn by rejection.
         let speed = loop {
             let speed = random.within(least, most);
             if random.share() < (-0.5 * ((speed - mean) / deviation).powi(2)).exp() {

@@ -12,17 +12,17 @@ impl Random {
         Self(Pcg64::new(u128::from(seed), u128::from(kind) << 64 | u128::from(number)))
     }
 
-    /// Uniform in [0, 1).
+    /// A number that is uniform in [0, 1).
     pub(super) fn share(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Uniform in [`from`, `to`).
+    /// A number that is uniform in [`from`, `to`).
     pub(super) fn within(&mut self, from: f64, to: f64) -> f64 {
         from + (to - from) * self.share()
     }
 
-    /// Uniform over the square of half side `half` around `centre`.
+    /// A point that is uniform over the square of half side `half` around `centre`.
     pub(super) fn point(&mut self, centre: DVec2, half: DVec2) -> DVec2 {
         let x = self.within(-half.x, half.x);
         let y = self.within(-half.y, half.y);

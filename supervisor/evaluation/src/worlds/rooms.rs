@@ -19,9 +19,9 @@ const DOOR_SHARE: f64 = 1.0 / 3.0;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Doors {
-    /// One in three has a partition with a door.
+    /// One room in three has a partition with a door.
     Some,
-    /// All have a partition with a door.
+    /// All rooms have a partition with a door.
     All,
 }
 
@@ -50,8 +50,8 @@ pub(super) fn rotated(random: &mut Random, number: usize, doors: Doors) -> Scene
     scene
 }
 
-/// Room `number` with a partition. It and the loose walls are of glass; of three boxes one is of glass, a display cabinet, and one black; of
-/// three drums one is black.
+/// Room `number` with a partition. It and the loose walls are of glass; one box in three is of glass, a display cabinet, and one is black;
+/// one drum in three is black.
 pub(super) fn glazed(random: &mut Random, number: usize) -> Scene {
     let mut scene = room(random, number, Doors::All, false);
     let Shapes { drums, boxes, walls } = &mut scene.shapes;
@@ -75,7 +75,7 @@ fn room(random: &mut Random, number: usize, doors: Doors, oblique: bool) -> Scen
         let reach = half_width - gap / 2.0 - 0.1;
         let middle = random.within(-reach, reach);
         let most = if oblique { MOST_OBLIQUE_DEG } else { 0.0 };
-        // It stays clear of start and target.
+        // The thing stays clear of start and target.
         let most = most
             .min((0.7 * (at.min(distance - at) - KEPT_FREE_M) / half_width).atan().to_degrees());
         let slant = if oblique { random.within(-most, most).to_radians().tan() } else { 0.0 };
@@ -115,7 +115,7 @@ fn partition(shapes: &mut Shapes, at: f64, slant: f64, middle: f64, gap: f64, ha
     }
 }
 
-/// A drum, a box or a loose wall at `at`; none if start or target would not be free.
+/// Add a drum, a box or a loose wall at `at`, or nothing if start or target would not be free.
 fn add_thing(shapes: &mut Shapes, random: &mut Random, at: DVec2, target: DVec2) {
     let is_free =
         |reach: f64| at.length() > reach + KEPT_FREE_M && at.distance(target) > reach + KEPT_FREE_M;

@@ -8,7 +8,7 @@ use crate::trial::Scene;
 
 /// Distance from the start to the bottom of the U, metres.
 const BOTTOM_M: f64 = 2.4;
-/// Gap between drums, metres. A body does not pass it.
+/// Gap between drums, metres, which a body does not pass.
 const DRUM_SPACING_M: f64 = 0.36;
 const DRUM_RADIUS_M: f64 = 0.17;
 

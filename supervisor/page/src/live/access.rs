@@ -1,22 +1,22 @@
-//! Who may: the names that the page answers to, and the two tokens.
+//! The access to a page: the names that it answers to, and the two tokens.
 //!
-//! On a loopback address everybody on the machine may watch and stop the robot. On another address that needs a token; orders besides
-//! the stop need the token to drive on each.
+//! On a loopback address everybody on the machine may watch and stop the robot. On another address that needs a token. Orders besides
+//! the stop need the token to drive on each address.
 
 use std::{fmt, fs::File, io::Read as _, net::SocketAddr};
 
 use super::options::PageError;
 
-/// What a browser may do.
+/// The rights of a browser.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
-    /// Look, and stop the robot.
+    /// The browser may watch and stop the robot.
     Watch,
-    /// Everything.
+    /// The browser may do everything.
     Drive,
 }
 
-/// A secret that whoever knows it shows. It is printed once, at the start.
+/// A secret that gives rights to its owner. It is printed once, at the start.
 #[derive(Clone)]
 pub struct Token(String);
 
@@ -34,13 +34,13 @@ impl Token {
         self.0.len() == shown.len() && differing == 0
     }
 
-    /// Its text, to be shown to the operator alone.
+    /// The text of the token, to be shown to the operator alone.
     pub fn reveal(&self) -> &str {
         &self.0
     }
 }
 
-/// A log never has it.
+/// The debug format hides the token from logs.
 impl fmt::Debug for Token {
     fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
         to.write_str("Token")
@@ -52,7 +52,7 @@ impl fmt::Debug for Token {
 pub struct Access {
     /// `http` or `https`.
     scheme: &'static str,
-    /// What a request may name as its host.
+    /// The hosts that a request may name.
     hosts: Vec<String>,
     is_loopback: bool,
     pub watch: Token,
@@ -60,7 +60,7 @@ pub struct Access {
 }
 
 impl Access {
-    /// The rules at `address`, to which `names` lead besides it.
+    /// The rules at `address`, to which `names` lead, too.
     pub(crate) fn new(
         address: SocketAddr,
         names: &[String],
@@ -106,13 +106,13 @@ impl Access {
         origin.strip_prefix(self.scheme).and_then(|rest| rest.strip_prefix("://")) == Some(host)
     }
 
-    /// Where a page at `host` may open its websocket.
+    /// The addresses at which a page at `host` may open its websocket.
     pub(crate) fn websocket(&self, host: &str) -> String {
         let scheme = if self.scheme == "https" { "wss" } else { "ws" };
         format!("{scheme}://{host}")
     }
 
-    /// What whoever shows `token` may do; none for nothing at all.
+    /// The rights of a browser that shows `token`; none if it has no rights at all.
     pub(crate) fn role(&self, token: &str) -> Option<Role> {
         if self.drive.is(token) {
             Some(Role::Drive)

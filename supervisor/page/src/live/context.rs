@@ -1,4 +1,4 @@
-//! What every connection needs.
+//! The data that every connection needs.
 
 use std::sync::Arc;
 

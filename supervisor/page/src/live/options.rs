@@ -1,11 +1,11 @@
-//! Where a page is served, and why it cannot be.
+//! The options of a page that is served, and its errors.
 
 use std::{io, net::SocketAddr, path::PathBuf};
 
 use common::domain::RobotName;
 use thiserror::Error;
 
-/// Where the page is served.
+/// The options of a page.
 #[derive(Clone, Debug)]
 pub struct Options {
     pub robot: RobotName,

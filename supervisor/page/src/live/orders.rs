@@ -1,4 +1,4 @@
-//! What an operator may ask for in the browser, and who does it.
+//! The orders that an operator may give in the browser, and their execution.
 
 use serde::Deserialize;
 
@@ -7,26 +7,27 @@ use super::access::Role;
 /// Most targets in one order.
 const MOST_TARGETS: usize = 16;
 
-/// Does what is asked, and waits until it is confirmed. Each returns what was confirmed, or why it was not done.
+/// Carries out orders, and waits until each is confirmed. The result is the confirmation, or the reason why it was not
+/// carried out.
 pub trait Operator: Send + Sync + 'static {
-    /// The robot stands.
+    /// Let the robot stand.
     fn stop(&self) -> Result<String, String>;
-    /// A stopped robot goes on.
+    /// Let a stopped robot go on.
     fn resume(&self) -> Result<String, String>;
-    /// A new generation of a stage.
+    /// Start a new generation of a stage.
     fn restart(&self, stage: &str) -> Result<String, String>;
     /// Kill the process of a stage.
     fn kill(&self, stage: &str) -> Result<String, String>;
     /// Go to these places, one after the other; metres in the mission frame.
     fn go_to(&self, targets: &[[f64; 2]]) -> Result<String, String>;
-    /// Go back to where the run began.
+    /// Go back to the place where the run began.
     fn go_back(&self) -> Result<String, String>;
 }
 
 /// A message of a browser that has shown its token.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub(crate) struct Asked {
-    /// The answer has it, too.
+    /// The number of the message, which the answer has, too.
     pub(crate) id: u64,
     #[serde(flatten)]
     pub(crate) order: Order,
@@ -55,7 +56,7 @@ pub(crate) enum Order {
 }
 
 impl Order {
-    /// Why a browser of `role` may not have this done to a robot that is `simulated`.
+    /// The reason why a browser of `role` may not give this order to a robot that is `simulated` or not.
     pub(crate) fn refusal(&self, role: Role, simulated: bool) -> Option<&'static str> {
         match self {
             Self::Stop => None,
@@ -72,7 +73,7 @@ impl Order {
         }
     }
 
-    /// Have it done by `operator`.
+    /// Have `operator` carry out the order.
     pub(crate) fn perform(&self, operator: &dyn Operator) -> Result<String, String> {
         match self {
             Self::Stop => operator.stop(),

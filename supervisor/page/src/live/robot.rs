@@ -1,4 +1,4 @@
-//! The thread that reads the bus. It waits as any consumer does, and survives runs that end and begin.
+//! The thread that reads the bus. It waits as any consumer does, and goes on when runs end and begin.
 
 use std::{
     fs::File,
@@ -33,22 +33,22 @@ use crate::{
     collector::Collector,
 };
 
-/// How often a run that has ended or begun, or the end of this process, is noticed when nothing is published.
+/// The interval at which a run that has ended or begun, or the end of this process, is noticed when nothing is published.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
-/// Maps and fields are packed so often at most.
+/// The least interval at which maps and fields are packed.
 const PACK_EVERY: Duration = Duration::from_millis(500);
 const LOGS_EVERY: Duration = Duration::from_millis(500);
-/// A bus that cannot be used is tried again after this time.
+/// The time after which a bus that cannot be used is tried again.
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
-/// Most bytes of the ground truth that are read at once; what is behind them is skipped.
+/// Most bytes of the ground truth that are read at once; the bytes behind them are skipped.
 const TRUTH_AT_ONCE: usize = 1 << 16;
-/// Of a larger map no field is computed for a target that is only looked at.
+/// The most cells of a map for which a field is computed to a target that is only looked at.
 const PREVIEW_MOST_CELLS: usize = 512 * 512;
 
 struct Readers {
-    /// Of [`Collector::TOPICS`].
+    /// The readers of [`Collector::TOPICS`].
     messages: Vec<(&'static str, Box<dyn EncodedReader>)>,
-    /// It is looked at only while somebody watches.
+    /// The reader of the field, which is read only while somebody watches.
     field: SliceReader<FieldHeader, FieldCell>,
 }
 
@@ -83,7 +83,7 @@ impl Readers {
     }
 }
 
-/// What is read of one run.
+/// The data of one run.
 struct Reading {
     collector: Collector,
     processes: Processes,
@@ -110,7 +110,7 @@ impl Reading {
         })
     }
 
-    /// Give browsers what is new.
+    /// Give browsers the new data.
     fn publish(&mut self, shared: &Shared) {
         let Self { collector, processes, logs, logs_read, packed, .. } = self;
         if logs_read.elapsed() >= LOGS_EVERY {
@@ -202,7 +202,7 @@ impl Truth {
     }
 }
 
-/// Show the robot of `domain` in `shared`, from run to run, until `ended` says so.
+/// Show the robot of `domain` in `shared`, from run to run, until `ended` returns true.
 pub(super) fn follow(domain: &Domain, shared: &Shared, ended: &mut dyn FnMut() -> bool) {
     let mut follower = Follower::new(domain.clone(), "page", &topics::LINK, Readers::open)
         .also_on([&topics::ROSTER as _, &topics::DEATHS as _]);
@@ -222,7 +222,7 @@ pub(super) fn follow(domain: &Domain, shared: &Shared, ended: &mut dyn FnMut() -
                 reading = reading.or_else(|| Reading::begin(domain, shared));
                 match &mut reading {
                     Some(Reading { collector, truth, .. }) => {
-                        // A robot that is not simulated writes none.
+                        // A robot that is not simulated writes no ground truth.
                         let _ = truth.take(collector);
                         readers.take(collector, shared.is_watched())
                     }

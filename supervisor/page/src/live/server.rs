@@ -1,4 +1,5 @@
-//! Connections and requests. Whatever a client does, its connection costs a bounded amount of memory for a bounded time.
+//! Connections and requests. Each connection takes a bounded amount of memory for a bounded time, whatever its client
+//! does.
 
 use std::{convert::Infallible, io, net::TcpListener, path::Path, sync::Arc, time::Duration};
 
@@ -35,9 +36,9 @@ use crate::assets;
 const MOST_CONNECTIONS: usize = 64;
 /// Most websockets at a time.
 const MOST_SESSIONS: usize = 16;
-/// A connection has so long for its handshake, and so long for its request.
+/// The time for the handshake of a connection, and for its request.
 const REQUEST_WITHIN: Duration = Duration::from_secs(3);
-/// A connection that does not become a websocket ends by then.
+/// The time within which a connection that does not become a websocket ends.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(10);
 /// Most bytes of a request and its headers.
 const MOST_HEADER_BYTES: usize = 16 << 10;
@@ -46,7 +47,7 @@ const MOST_MESSAGE_BYTES: usize = 4 << 10;
 /// The path of the websocket.
 const LIVE: &str = "/live";
 
-/// The keys of `options`; none where the page is not encrypted.
+/// The keys of `options`; none if the page is not encrypted.
 pub(super) fn tls(options: &Options) -> Result<Option<TlsAcceptor>, PageError> {
     let Some((certificates, key)) = &options.tls else {
         return Ok(None);
@@ -86,7 +87,7 @@ pub(super) async fn serve(context: Arc<Context>, listener: TcpListener, tls: Opt
         };
         let (context, sessions, tls) = (context.clone(), sessions.clone(), tls.clone());
         tokio::spawn(async move {
-            // A connection that fails is the client's business.
+            // The failure of a connection concerns only its client.
             let _ = match tls {
                 None => connection(&context, stream, &sessions).await,
                 Some(tls) => match timeout(REQUEST_WITHIN, tls.accept(stream)).await {
@@ -164,7 +165,7 @@ async fn answer(context: &Arc<Context>, request: Request, sessions: &Arc<Semapho
     answer
 }
 
-/// The host that `request` names, once and everywhere the same, if the page answers to it.
+/// The host that `request` names, once and everywhere the same, if the page answers to that host.
 fn host(context: &Context, request: &Request) -> Option<String> {
     let host = context.access.host(single(request.headers(), &header::HOST)?)?;
     let absolute = request.uri().authority();

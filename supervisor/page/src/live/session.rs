@@ -1,4 +1,4 @@
-//! One browser: it shows its token, then is sent what is new and may ask for orders.
+//! One browser: it shows its token, then is sent the new data and may give orders.
 
 use std::{
     sync::Arc,
@@ -22,15 +22,15 @@ use super::{
     shared::Cursor,
 };
 
-/// A browser has so long to show its token.
+/// The time for a browser to show its token.
 const TOKEN_WITHIN: Duration = Duration::from_secs(3);
-/// What is new is sent so often.
+/// The interval at which new data are sent.
 const SEND_EVERY: Duration = Duration::from_millis(100);
-/// A message says that the server lives after this time without another one.
+/// The time without another message after which a message says that the server lives.
 const ALIVE_EVERY: Duration = Duration::from_millis(300);
-/// A browser that does not take a message for so long is left.
+/// The time after which a browser that does not take a message is left.
 const TAKEN_WITHIN: Duration = Duration::from_secs(10);
-/// A robot that may go on goes on within this time.
+/// The time within which a robot that may go on does so.
 const GOES_WITHIN: Duration = Duration::from_secs(3);
 /// Most messages of a browser in a second.
 const MOST_A_SECOND: u32 = 50;
@@ -95,7 +95,7 @@ pub(super) async fn run(mut socket: WebSocket, context: &Arc<Context>) {
     }
 }
 
-/// What the task that sends is told.
+/// The messages to the task that sends.
 enum Told {
     Answer(String),
     Close(u16),
@@ -142,7 +142,7 @@ async fn close(mut sender: Sender, code: u16, reason: &'static str) {
     let _ = timeout(TAKEN_WITHIN, sender.send(Message::Close(Some(frame)))).await;
 }
 
-/// Have `asked` done, and tell the browser what was confirmed.
+/// Have `asked` carried out, and send the confirmation to the browser.
 async fn perform(asked: Asked, role: Role, context: Arc<Context>, answers: mpsc::Sender<Told>) {
     let Asked { id, order } = asked;
     let simulated = context.shared.lock().simulated;
@@ -176,7 +176,7 @@ async fn done(order: Order, context: &Arc<Context>) -> Result<String, String> {
     if resumes { resumed(context).await } else { Ok(told) }
 }
 
-/// What the link says after the supervisor has taken a request to resume.
+/// The link's answer after the supervisor has taken a request to resume.
 async fn resumed(context: &Arc<Context>) -> Result<String, String> {
     let began = Instant::now();
     loop {

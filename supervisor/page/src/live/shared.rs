@@ -1,4 +1,4 @@
-//! What browsers are shown, between the thread that reads the bus and those that serve.
+//! The data for browsers, shared by the thread that reads the bus and those that serve.
 
 use std::{
     collections::VecDeque,
@@ -15,7 +15,7 @@ use serde_json::Value;
 /// Rows of ten minutes at 10 Hz.
 const MOST_ROWS: usize = 6000;
 const MOST_EVENTS: usize = 1000;
-/// Most of each in one message.
+/// The most items of a series in one message.
 const AT_ONCE: usize = 500;
 
 /// A value and its number, which grows with each new one.
@@ -37,10 +37,10 @@ impl<T: Clone> Newest<T> {
     }
 }
 
-/// The newest of a series, each with its number.
+/// The newest items of a series, each with its number.
 #[derive(Debug, Default)]
 pub(crate) struct Ring {
-    /// The number of the first one.
+    /// The number of the first item.
     first: u64,
     items: VecDeque<Arc<str>>,
 }
@@ -54,7 +54,7 @@ impl Ring {
         self.items.push_back(item.to_string().into());
     }
 
-    /// Those that a browser at `cursor` does not have, at most [`AT_ONCE`].
+    /// The items that a browser at `cursor` does not have, at most [`AT_ONCE`].
     fn after(&self, cursor: &mut u64) -> Vec<Arc<str>> {
         let from = cursor.saturating_sub(self.first) as usize;
         let found: Vec<_> = self.items.iter().skip(from).take(AT_ONCE).cloned().collect();
@@ -66,12 +66,12 @@ impl Ring {
 /// The robot's run as browsers are shown it.
 #[derive(Debug, Default)]
 pub(crate) struct Shown {
-    /// Counts the runs.
+    /// The number of the run.
     run: u64,
     about: Option<Arc<str>>,
     pub(crate) connected: bool,
     pub(crate) simulated: bool,
-    /// Whether the link stops the robot for an operator, and what it does.
+    /// Whether the link stops the robot for an operator, and the link's action in words.
     pub(crate) link: (bool, String),
     rows: Ring,
     events: Ring,
@@ -81,12 +81,12 @@ pub(crate) struct Shown {
     pub(crate) preview: Newest<Bytes>,
     /// The target whose field is wanted; a new one replaces it.
     pub(crate) wanted: Option<[f64; 2]>,
-    /// Why the robot cannot be shown; empty where it can.
+    /// The reason why the robot cannot be shown; empty if it can.
     pub(crate) problem: String,
 }
 
 impl Shown {
-    /// A run began: what was of the last one is dropped.
+    /// Note that a run began, and drop the data of the last one.
     pub(crate) fn begin(&mut self, about: &Value, simulated: bool) {
         *self = Self {
             run: self.run + 1,
@@ -123,7 +123,7 @@ impl Shared {
     }
 }
 
-/// What one browser has been sent.
+/// The data that one browser has been sent.
 #[derive(Debug)]
 pub(crate) struct Cursor {
     shared: Arc<Shared>,
@@ -138,10 +138,10 @@ pub(crate) struct Cursor {
     preview: u64,
 }
 
-/// What is new for a browser.
+/// The new data for a browser.
 #[derive(Debug, Default)]
 pub(crate) struct News {
-    /// JSON; empty where there is nothing new in it.
+    /// JSON; empty if nothing in it is new.
     pub(crate) text: String,
     pub(crate) blobs: Vec<Bytes>,
 }
@@ -163,7 +163,7 @@ impl Cursor {
         }
     }
 
-    /// What is new since the last time.
+    /// The new data since the last time.
     pub(crate) fn news(&mut self) -> News {
         let shared = self.shared.clone();
         let shown = shared.lock();

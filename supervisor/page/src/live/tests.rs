@@ -1,4 +1,4 @@
-//! Attacks on a page that is served, over real sockets, and what an operator may do.
+//! Tests of attacks on a page that is served, over real sockets, and of the operator's rights.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::{
@@ -103,7 +103,7 @@ const UPGRADE: [&str; 4] = [
     "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
 ];
 
-/// A websocket's client, no more of it than these tests need.
+/// A websocket's client with the features that these tests need.
 struct Browser(TcpStream);
 
 #[derive(Debug, PartialEq)]
@@ -147,7 +147,7 @@ impl Browser {
         let _ = self.0.write_all(&frame);
     }
 
-    /// The next frame; closed without a code where the connection ends.
+    /// The next frame; closed without a code if the connection ends.
     fn hear(&mut self) -> Frame {
         let mut head = [0; 2];
         if self.0.read_exact(&mut head).is_err() {
@@ -219,7 +219,7 @@ fn a_request_that_names_another_host_or_none_or_two_is_misdirected() {
         &["GET http://evil.example/ HTTP/1.1", &own],
     ] {
         let answer = ask(&page, lines);
-        // The HTTP library itself refuses what no server may accept.
+        // The HTTP library itself refuses requests that no server may accept.
         assert!(["421", "400"].contains(&status(&answer)), "{lines:?}: {answer}");
     }
     assert_eq!(status(&ask(&page, &["GET / HTTP/1.1", &own])), "200");
@@ -346,7 +346,7 @@ fn connections_beyond_the_limit_are_closed_at_once_and_silent_ones_soon() {
     let mut watching = Browser::with_token(&page, "");
     watching.await_key("role");
     let mut silent: Vec<_> = (0..300).map(|_| connect(&page)).collect();
-    // Half a request, so that the header is never whole.
+    // Half a request is sent, so that the header is never complete.
     for stream in &mut silent {
         let _ = stream.write_all(b"GET / HTTP/1.1\r\n");
     }
@@ -354,7 +354,7 @@ fn connections_beyond_the_limit_are_closed_at_once_and_silent_ones_soon() {
     assert_eq!(watching.await_key("answer")["ok"], true, "who watches is served meanwhile");
     for stream in &mut silent {
         let mut answer = Vec::new();
-        // Whatever it says, it ends.
+        // The connection ends with any answer.
         if let Err(error) = stream.read_to_end(&mut answer) {
             assert_eq!(error.kind(), ErrorKind::ConnectionReset);
         }

@@ -1,4 +1,4 @@
-//! Where two recordings part: the first tick in which a stage published other values, and its inputs by then.
+//! The difference of two recordings: the first tick in which a stage published other values, and its inputs by then.
 
 use std::fmt;
 
@@ -17,11 +17,11 @@ pub struct Parting {
     /// The builds, if they differ.
     pub builds: Option<[String; 2]>,
     pub first: Option<First>,
-    /// Ticks that are in both.
+    /// Ticks that both recordings have.
     pub ticks: u64,
 }
 
-/// Find where `first` and `second` part.
+/// Find the first difference of `first` and `second`.
 pub fn diff(first: &Recording, second: &Recording) -> Result<Parting, RecordingError> {
     let mut parting =
         Parting { run: run_differences(&first.run_text, &second.run_text), ..Parting::default() };

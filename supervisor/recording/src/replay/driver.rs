@@ -28,7 +28,8 @@ use crate::{
 pub struct Options {
     /// The stages, by their names; all without names.
     pub stages: Vec<String>,
-    /// Compare from this mission time on. Earlier ticks are computed, too, because the state follows from them.
+    /// The mission time from which on outputs are compared. Earlier ticks are computed, too, because the state follows
+    /// from them.
     pub from: MissionTime,
     pub pace: Pace,
     /// A run to replay in place of the recorded one, to try another mission with the same inputs.
@@ -103,7 +104,7 @@ fn wait_for(message: &Message, rate: f64, began: Instant) {
 
 struct Generations {
     chosen: Vec<&'static Stage>,
-    /// By the stage's place in the table, and the number of the generation.
+    /// The generations, by the stage's place in the table and the number.
     all: BTreeMap<(usize, &'static str, u32), Generation>,
 }
 

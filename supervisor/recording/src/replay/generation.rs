@@ -1,5 +1,5 @@
-//! One generation, which is replayed while its inputs are read. A recorded output may come before the input it follows from or
-//! after it; each waits for its partner.
+//! One generation, which is replayed while its inputs are read. A recorded output may come before the input from which it
+//! follows or after it; each waits for the other.
 
 use std::{
     collections::{BTreeMap, VecDeque},
@@ -27,7 +27,7 @@ const GENERATION: usize = 20;
 const SEQUENCE: usize = 24;
 /// Inputs before an output that a difference shows.
 const SHOWN_INPUTS: usize = 4;
-/// Most characters of each.
+/// The most characters of each input.
 const SHOWN_LENGTH: usize = 600;
 
 /// The data that all generations of a recording share.
@@ -69,7 +69,7 @@ pub(crate) struct Generation {
     compared: u64,
     unrecorded: u64,
     pieces_came: bool,
-    /// It beat as ready or published an output, so it has taken an input.
+    /// Whether the generation beat as ready or published an output, so that it must have taken an input.
     worked: bool,
 }
 
@@ -92,7 +92,7 @@ impl Generation {
         }
     }
 
-    /// It is known to have taken an input.
+    /// Note that the generation must have taken an input.
     pub(crate) const fn worked(&mut self) {
         self.worked = true;
     }
@@ -281,7 +281,7 @@ impl Generation {
         }
     }
 
-    /// None of a generation that was replayed, or that ended before its first input.
+    /// The reason why the generation was not replayed; none if it was, or if it ended before its first input.
     fn why_not_replayed(&self, setting: &Setting<'_>) -> Option<String> {
         if self.not_replayed.is_some() || self.pieces_came || !self.worked {
             return self.not_replayed.clone();

@@ -55,7 +55,7 @@ static NOT_PLAYED: [&dyn AnyTopic; 5] =
 const LONGEST_PIECE: usize = 1 << 16;
 /// Longest wait until a stop request is seen.
 const POLL: Duration = Duration::from_millis(50);
-/// A wait of this length for an answer is reported.
+/// The length of a wait for an answer after which it is reported.
 const TELL_AFTER: Duration = Duration::from_secs(2);
 
 pub struct Options {
@@ -64,7 +64,7 @@ pub struct Options {
     /// The stages that run in processes of their own.
     pub stages: Vec<&'static Stage>,
     pub pace: Pace,
-    /// Until this time it is played as fast as possible.
+    /// The time until which the recording is played as fast as possible.
     pub from: MissionTime,
     /// The mission of the live stages, if it is not the recorded one.
     pub mission: Option<Mission>,
@@ -223,7 +223,7 @@ impl Player {
         Ok(true)
     }
 
-    /// Name a live stage in the roster, as a supervisor does: it waits for that.
+    /// Name a live stage in the roster, as a supervisor does, because the stage waits for that.
     fn name(&mut self, health: &HealthSample) -> Result<(), BusError> {
         let HealthSample { stamp, stage, pid, .. } = *health;
         let entry =

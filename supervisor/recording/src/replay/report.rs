@@ -9,7 +9,7 @@ pub struct Report {
     pub stages: BTreeMap<&'static str, StageReport>,
     /// The first difference by tick.
     pub difference: Option<Difference>,
-    /// Where the recording was cut off, seconds after its first message; none if it is complete.
+    /// The time at which the recording was cut off, seconds after its first message; none if it is complete.
     pub cut_after_s: Option<f64>,
 }
 
@@ -34,7 +34,7 @@ pub struct Difference {
     pub generation: u32,
     pub tick: u64,
     pub topic: String,
-    /// The field; of a slice, with its index.
+    /// The field, with its index if it is part of a slice.
     pub field: String,
     pub recorded: String,
     pub computed: String,

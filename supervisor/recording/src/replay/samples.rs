@@ -1,4 +1,4 @@
-//! Recorded samples of a tick: their tick and time, and where two of them differ.
+//! Recorded samples of a tick: their tick and time, and the difference of two of them.
 
 use common::{
     bus::{Layout as _, Stamp, cdr::Decoder},
@@ -18,7 +18,7 @@ pub(crate) static COMPARED: [&dyn AnyTopic; 6] = [
     &topics::GUIDANCE,
     &topics::COMMAND,
 ];
-/// Fields that a process measures of itself, or that count its restarts. No two runs have the same.
+/// The fields that a process measures of itself, or that count its restarts, which differ in every run.
 const OWN: [&str; 4] = ["stamp.generation", "stamp.sequence", "full_solve_ns", "full_solves"];
 
 /// The first difference of two recordings.
@@ -26,11 +26,11 @@ const OWN: [&str; 4] = ["stamp.generation", "stamp.sequence", "full_solve_ns", "
 pub struct First {
     pub tick: u64,
     pub time_s: f64,
-    /// The first of the topics of that tick that differs.
+    /// The first topic of that tick that differs.
     pub topic: &'static str,
     pub writer: &'static str,
     pub field: String,
-    /// Its value in both.
+    /// The value in both recordings.
     pub values: [String; 2],
 }
 
@@ -48,14 +48,14 @@ pub(crate) fn time_of(message: &[u8]) -> MissionTime {
     stamp_of(message).time()
 }
 
-/// Place of a grid's `keyframe`: behind stamp, version and five numbers.
+/// Whether a grid's message is a keyframe: the field is behind stamp, version and five numbers.
 pub(crate) fn is_keyframe(message: &[u8]) -> bool {
     message.get(4 + 24 + 8 + 20) == Some(&1)
 }
 
 /// The first field that differs between two samples of the same tick on `topic`, apart from a process's own measurements.
 pub(crate) fn difference(topic: &'static dyn AnyTopic, a: &[u8], b: &[u8]) -> Option<First> {
-    // The fields behind the stamp's generation and sequence.
+    // Only the fields other than the stamp's generation and sequence count.
     if a.get(..20) == b.get(..20) && a.get(28..) == b.get(28..) {
         return None;
     }

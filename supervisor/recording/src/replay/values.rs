@@ -80,7 +80,7 @@ impl Walk<'_> {
             "u32" => u32::decode(from)?.to_string(),
             "u64" => u64::decode(from)?.to_string(),
             "i32" => i32::decode(from)?.to_string(),
-            // Digits that distinguish any two values.
+            // The format has the digits that distinguish any two values.
             "f32" => format!("{:?}", f32::decode(from)?),
             "f64" => format!("{:?}", f64::decode(from)?),
             _ => return None,

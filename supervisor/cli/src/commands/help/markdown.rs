@@ -7,10 +7,10 @@ const CODE: char = '\u{2}';
 const INDENT: &str = "    ";
 /// Blanks between the columns of a table.
 const GAP: usize = 2;
-/// No column becomes narrower so that a table fits.
+/// The least width to which a column is made narrower so that a table fits.
 const NARROWEST: usize = 4;
 
-/// `text` with lines of at most `width` characters, but for lines of code.
+/// `text` with lines of at most `width` characters, except lines of code.
 pub(super) fn render(text: &str, width: usize) -> String {
     let mut rendered = String::new();
     let mut lines = text.lines().peekable();
@@ -113,7 +113,7 @@ fn link(text: &str) -> Option<(&str, &str, &str)> {
     (!label.contains(']')).then_some((label, target, after))
 }
 
-/// Characters that are seen.
+/// The number of visible characters.
 fn width_of(text: &str) -> usize {
     text.chars().filter(|&letter| letter != BOLD && letter != CODE).count()
 }
@@ -154,7 +154,7 @@ fn push(lines: &mut [String], letter: char) {
     }
 }
 
-/// Replaces the marks in `lines` of one text by the styles of a terminal, none of which goes on in the next line.
+/// Replaces the marks in `lines` of one text by the styles of a terminal, each of which ends with its line.
 fn styled(lines: &[String]) -> Vec<String> {
     let (mut bold, mut code) = (false, false);
     let start = |bold: bool, code: bool| match (bold, code) {
@@ -237,7 +237,7 @@ fn table(mut rows: Vec<Vec<String>>, width: usize) -> String {
         let cells = row.iter().zip(&widths);
         let cells: Vec<_> = cells.map(|(cell, &width)| wrapped(cell, width)).collect();
         let height = cells.iter().map(Vec::len).max().unwrap_or_default();
-        // Each line of a cell as it is shown, and the blanks after it.
+        // These are the lines of a cell as they are shown, and the blanks after each.
         let cells = cells.iter().zip(&widths).map(|(cell, width)| {
             let blanks = cell.iter().map(|line| width - width_of(line));
             styled(cell).into_iter().zip(blanks.collect::<Vec<_>>())

@@ -8,7 +8,7 @@ use std::{
 
 use crate::console::output::print_text;
 
-/// Lines of text are not made longer, because longer ones are hard to read.
+/// The greatest width of text, because longer lines are hard to read.
 const WIDEST: usize = 100;
 /// The width where the terminal tells none.
 const DEFAULT: usize = 80;

@@ -36,7 +36,7 @@ fn documents() -> Vec<Document> {
 }
 
 impl Document {
-    /// Lines of the blocks that a shell would read, and what stands in backticks elsewhere.
+    /// Lines of the blocks that a shell would read, and the code spans elsewhere.
     fn code(&self) -> Vec<String> {
         let mut code = Vec::new();
         let mut fence = None;
@@ -63,7 +63,7 @@ impl Document {
         code
     }
 
-    /// Where its links lead to, from the root.
+    /// The targets of its links, as paths from the root.
     fn links(&self) -> Vec<PathBuf> {
         let targets = self.text.split("](").skip(1);
         targets
@@ -103,7 +103,7 @@ fn commands(line: &str) -> Vec<Vec<String>> {
     commands
 }
 
-/// `word` with a value in place of what stands for one.
+/// `word` with a value in place of its placeholder.
 fn filled_in(word: &str) -> String {
     let value = |word: &str| match word {
         "S" | "N" | "H" | "K" | "$s" => Some("256"),
@@ -219,7 +219,7 @@ fn every_link_and_path_in_readme_and_guide_exists() {
         let words = code.iter().flat_map(|code| code.split_whitespace());
         let paths = words.filter(|word| of_the_tree.iter().any(|top| word.starts_with(top)));
         for path in paths {
-            // The crate that the reader makes.
+            // The reader makes this crate.
             if !path.contains("odometer") {
                 assert!(root().join(path).exists(), "{at}: {path}");
             }

@@ -7,7 +7,7 @@ use std::{
 };
 
 const LOG: &str = "log";
-/// A longer line is cut, because a process may write lines of any length.
+/// The greatest length of a line, because a process may write lines of any length; a longer one is cut.
 const LONGEST_LINE: u64 = 64 << 10;
 /// The length of a time like 2026-11-21T06:04:22.729158Z.
 const TIME: usize = 27;
@@ -16,7 +16,7 @@ const TIME: usize = 27;
 #[derive(Debug)]
 pub(crate) struct Logs {
     directory: PathBuf,
-    /// If named, only this process has its log read.
+    /// The only process whose log is read; none for all.
     process: Option<String>,
     logs: Vec<Log>,
 }
@@ -25,13 +25,13 @@ pub(crate) struct Logs {
 struct Log {
     process: String,
     file: BufReader<File>,
-    /// Its length at the beginning of this round.
+    /// The length at the beginning of this round.
     end: u64,
     position: u64,
     /// The beginning of a line whose end is not written yet.
     unfinished: Vec<u8>,
     head: Option<Line>,
-    /// The time of the last line that began with one.
+    /// The time of the last line that began with a time.
     time: String,
 }
 

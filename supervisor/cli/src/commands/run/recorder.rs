@@ -10,9 +10,9 @@ use supervisor::{
 
 use crate::commands::record::DiskBudget;
 
-/// A recorder that is attached later misses the beginning.
+/// The time within which the recorder must be attached, or it misses the beginning.
 const ATTACHED_WITHIN: Duration = Duration::from_secs(2);
-/// The recorder takes some milliseconds to write its last chunk.
+/// The time for the recorder's last chunk, which takes some milliseconds.
 const ENDED_WITHIN: Duration = Duration::from_secs(5);
 
 pub(crate) struct RunRecorder {
@@ -20,7 +20,8 @@ pub(crate) struct RunRecorder {
 }
 
 impl RunRecorder {
-    /// Start it with this budget for its files, and wait until it is attached. None if it cannot be started, which is logged.
+    /// Start a recorder with this budget for its files, and wait until it is attached. None if it cannot be started, which is
+    /// logged.
     pub(crate) fn start(options: &Options, budget: Option<DiskBudget>) -> Option<Self> {
         match Self::spawn(options, budget) {
             Ok(recorder) => Some(recorder),
@@ -35,7 +36,7 @@ impl RunRecorder {
         let directory = &options.directory;
         let log = File::options().create(true).append(true).open(directory.join("recorder.log"))?;
         let mut command = firsthand(&["record", "--robot", &options.robot.to_string()]);
-        // A run that is resumed may have a recording already.
+        // A resumed run may have a recording already.
         command.arg("--out").arg(recording::next_place(directory));
         if let Some(DiskBudget(bytes)) = budget {
             command.args(["--disk-budget", &bytes.to_string()]);
@@ -57,7 +58,7 @@ impl RunRecorder {
         Ok(Self { process })
     }
 
-    /// Let it write the rest at the end of the run.
+    /// Let the recorder write the rest at the end of the run.
     pub(crate) fn end(mut self) {
         self.process.end(ENDED_WITHIN);
     }

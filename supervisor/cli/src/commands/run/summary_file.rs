@@ -16,9 +16,9 @@ use crate::console::failure::Refused;
 
 /// The name of the file until it is complete. A file that is called [`SUMMARY`] is complete, and means that the run has ended.
 const UNFINISHED: &str = "summary.json.unfinished";
-/// A summary takes 2 kB.
+/// Room for a summary, which takes 2 kB.
 const ROOM: u64 = 16 << 10;
-/// Logs, checkpoints and the beginning of a recording.
+/// Room for logs, checkpoints and the beginning of a recording.
 const RUN_ROOM: u64 = 2 << 20;
 /// Room for a cell of the map in the mapper's checkpoint.
 const CELL_ROOM: u64 = 16;
@@ -34,10 +34,10 @@ pub(crate) struct SummaryFile {
 }
 
 impl SummaryFile {
-    /// Reserve its room in the run `directory`, where `needed` bytes more must be free.
+    /// Reserve the file's room in the run `directory`, where `needed` bytes more must be free.
     pub(crate) fn reserve(directory: &Path, needed: u64) -> Result<Self, Refused> {
         let path = directory.join(UNFINISHED);
-        // A run that is resumed has its room.
+        // A resumed run has its room.
         let opened = File::options().create(true).truncate(false).write(true).open(&path);
         let reserved = opened.and_then(|file| {
             match fallocate(&file, FallocateFlags::KEEP_SIZE, 0, ROOM) {
@@ -51,7 +51,7 @@ impl SummaryFile {
             let code = if full { "disk-full" } else { "not-writable" };
             Refused::new(code, failed("reserve room for", &path)(error))
         })?;
-        // A file system that does not say what is free is not full.
+        // A file system that does not tell its free space is not full.
         let free = fstatvfs(&file).map_or(u64::MAX, |space| space.f_bavail * space.f_frsize);
         if free < needed {
             let _ = fs::remove_file(&path);
@@ -67,7 +67,7 @@ impl SummaryFile {
     pub(crate) fn write(mut self, text: &str) -> Result<(), String> {
         let (from, to) = (self.directory.join(UNFINISHED), self.directory.join(SUMMARY));
         let written = self.file.write_all(text.as_bytes());
-        // The reserved room that is not needed is released.
+        // The rest of the reserved room is released.
         let written = written.and_then(|()| self.file.set_len(text.len() as u64));
         written.map_err(failed("write", &from))?;
         fs::rename(&from, &to).map_err(failed("make", &to))

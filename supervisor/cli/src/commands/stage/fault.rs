@@ -37,7 +37,7 @@ pub(super) struct Arguments {
     break_a_real_robot: bool,
 }
 
-/// A real robot is not broken unless its operator insists.
+/// The error for a fault of a real robot without the operator's consent.
 fn real_robot(robot: &RobotName) -> Refused {
     let message = format!(
         "robot {robot} is a real one, and a fault may drive it into things; to do it all the same, clear its surroundings \

@@ -21,7 +21,7 @@ use crate::console::{
     words,
 };
 
-/// The roster is published five times a second.
+/// The patience with a roster, which is published five times a second.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 #[derive(Serialize)]

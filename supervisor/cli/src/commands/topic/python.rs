@@ -28,7 +28,7 @@ pub(super) fn module() -> String {
     module
 }
 
-/// The class of a struct after those of its fields, each once.
+/// Declare the class of a struct after those of its fields, each once.
 fn declare(kind: &Kind, known: &mut BTreeSet<&'static str>, module: &mut String) {
     let structure = match kind {
         Kind::Number(_) => return,

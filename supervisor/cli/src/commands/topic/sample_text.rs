@@ -1,5 +1,5 @@
 //! A sample of any topic as text, one field a line, or as JSON, one object a line. Names and order of the fields follow from
-//! the layouts; nothing here knows a topic.
+//! the layouts; this module knows no topic.
 
 use std::fmt::Write as _;
 
@@ -11,7 +11,7 @@ use serde::{
 
 /// The name of a slice's elements, beside the fields of their header.
 const ELEMENTS: &str = "elements";
-/// Text shows this many elements of an array unless all are asked for.
+/// The number of elements of an array that text shows, unless all are asked for.
 const SHOWN: usize = 16;
 
 /// `sample` as text, one field a line. The fields of a struct stand below its name. Arrays of more than 16 elements are cut,

@@ -1,4 +1,4 @@
-//! `firsthand bench chaos`: signals to random stages at random times, and what became of the missions.
+//! `firsthand bench chaos`: signals to random stages at random times, and the results of the missions.
 
 use std::{path::Path, process::ExitCode};
 
@@ -65,7 +65,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(if report.is_clean() { 0 } else { NOT_CLEAN }))
 }
 
-/// Remove the `directory` of missions if all were `right`, or else tell where it is.
+/// Remove the `directory` of missions if all were `right`, or else print its path.
 fn remove_unless_wrong(right: bool, directory: &Path) -> std::io::Result<()> {
     if right {
         return std::fs::remove_dir_all(directory);

@@ -22,7 +22,7 @@ use crate::{
 /// Time between lines that cannot be rewritten.
 const LINE_EVERY: Duration = Duration::from_secs(5);
 
-/// What all runs of a calibration have in common.
+/// The data that all runs of a calibration share.
 #[derive(Clone, Copy)]
 pub(super) struct Setting<'a> {
     pub(super) robot: &'a RobotName,
@@ -38,7 +38,7 @@ pub(super) struct Carried {
     pub(super) seconds: f64,
     /// The encoders in each tick.
     pub(super) counts: Vec<[u16; 2]>,
-    /// Where a simulated robot really stands in the end, metres.
+    /// The true place of a simulated robot in the end, metres.
     pub(super) truth: Option<DVec2>,
 }
 
@@ -83,7 +83,7 @@ pub(super) fn carry_out(
     let truth = finished.truth.last().map(|truth| DVec2::new(truth.x, truth.y));
     let ending = &finished.ending;
     match ending.outcome {
-        // Where it stands by wheels that are not calibrated does not matter. A planner that gave up says why in its checkpoint.
+        // The end by wheels that are not calibrated does not matter. A planner that gave up says why in its checkpoint.
         Outcome::Reached | Outcome::WrongPlace | Outcome::ReachedUnsure | Outcome::Unreachable => {
             let counts = |pose: &PoseSample| [pose.left_counts, pose.right_counts];
             let counts = finished.record.poses.iter().map(counts).collect();

@@ -1,4 +1,4 @@
-//! The ends of squares, as a person types them or a file has them.
+//! The ends of squares, typed by a person or read from a file.
 
 use std::{
     fs::File,
@@ -19,7 +19,7 @@ const FARTHEST_M: f64 = 10.0;
 /// The time between looks for a signal while somebody measures.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 
-/// Where the ends come from.
+/// The source of the ends.
 pub(super) enum Ends {
     Typed,
     File(BufReader<File>),

@@ -1,4 +1,4 @@
-//! What a calibration found: its file, its picture and its lines.
+//! The result of a calibration: its file, its picture and its lines.
 
 use std::{
     fs,
@@ -30,7 +30,7 @@ pub(super) struct Found {
     pub(super) directory: PathBuf,
 }
 
-/// How far a loop or a square is from the estimate.
+/// The difference of a loop or a square from the estimate.
 pub(super) struct Residual {
     pub(super) number: u32,
     pub(super) to_the_left: bool,
@@ -38,7 +38,7 @@ pub(super) struct Residual {
 }
 
 impl Found {
-    /// Write the file at once: a kill leaves the old one or the new one.
+    /// Write the file at once, so that a kill leaves the old file or the new one.
     pub(super) fn write(&self, file: &Path) -> Result<(), Failure> {
         let mut odometry = self.estimate.odometry(&self.before);
         odometry.calibrated = Some(Provenance {

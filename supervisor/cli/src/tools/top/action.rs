@@ -28,7 +28,7 @@ impl Action {
         row.map_or("", |(_, name, _)| name)
     }
 
-    /// Whether it concerns a stage rather than the robot.
+    /// Whether the action concerns a stage rather than the robot.
     const fn is_of_a_stage(self) -> bool {
         !matches!(self, Self::Stop | Self::Resume)
     }
@@ -54,7 +54,7 @@ pub(super) enum Key {
     Quit,
 }
 
-/// The keys: how the last line of the screen shows each, its effect, and its meaning.
+/// The keys: the text for each in the last line of the screen, its effect, and its meaning.
 pub(super) const KEYS: [(&str, &str, Key); 8] = [
     ("↑↓", "choose", Key::Down),
     ("k", "kill", Key::Act(Action::Kill)),
@@ -103,7 +103,7 @@ pub(super) fn take_keys(typed: &mut Vec<u8>) -> Vec<Key> {
 const ESCAPE: u8 = 0x1b;
 /// Ctrl-C, which a terminal in raw mode sends as a byte.
 const CONTROL_C: u8 = 0x03;
-/// No key sends more bytes.
+/// The most bytes that a key sends.
 const LONGEST_SEQUENCE: usize = 32;
 
 /// The meaning of a letter; none if it has none.
@@ -123,7 +123,7 @@ impl Operator {
         Self { robot: robot.clone(), under_way: None }
     }
 
-    /// Begin `action`. Returns what to show meanwhile.
+    /// Begin `action`. Returns the text to show meanwhile.
     pub(super) fn ask(&mut self, action: Action, stage: Option<&str>) -> String {
         if self.under_way.is_some() {
             return "the last action goes on".to_owned();
@@ -148,7 +148,7 @@ impl Operator {
         format!("{asked} ...")
     }
 
-    /// The result of the action, once.
+    /// The result of the action. The next call gives none.
     pub(super) fn answer(&mut self) -> Option<String> {
         let (_, receiver) = self.under_way.as_ref()?;
         let message = match receiver.try_recv() {
@@ -167,7 +167,7 @@ impl Operator {
     }
 }
 
-/// An action that goes on is awaited, so that it leaves the bus in order.
+/// The destructor awaits an action under way, so that the action leaves the bus in order.
 impl Drop for Operator {
     fn drop(&mut self) {
         self.end();

@@ -16,7 +16,7 @@ use supervisor::stages;
 use super::{view::View, words};
 use crate::console::rates::TopicRates;
 
-/// Rates are counted over this time.
+/// The time over which rates are counted.
 const COUNT_FOR: Duration = Duration::from_secs(1);
 
 pub(super) struct Feed {

@@ -17,7 +17,7 @@ const FIELD: [char; 8] = ['→', '↗', '↑', '↖', '←', '↙', '↓', '↘'
 const ROBOT: [char; 8] = ['▶', '◥', '▲', '◤', '◀', '◣', '▼', '◢'];
 pub(super) const TARGET: char = 'X';
 pub(super) const WAY: char = '·';
-/// The field is drawn at one letter of this many to the right, and of this many down.
+/// The intervals at which the field is drawn, letters to the right and down.
 const FIELD_EVERY: (usize, usize) = (4, 2);
 
 const SCANNED: Color = Color::Indexed(236);
@@ -49,7 +49,7 @@ impl Square {
         }
     }
 
-    /// Its colour, if it is a hazard.
+    /// The colour of a hazard; none for another square.
     const fn hazard(self) -> Option<Color> {
         match self {
             Self::Free | Self::Scanned => None,
@@ -167,7 +167,7 @@ fn letter(view: &View, scale: &Scale, col: usize, line: usize) -> (char, Style) 
     }
 }
 
-/// The field's direction in the middle of a letter; none where it is not drawn, or has none.
+/// The field's direction in the middle of a letter; none if it is not drawn there, or the field has none.
 fn field(view: &View, scale: &Scale, col: usize, line: usize) -> Option<char> {
     let (every_col, every_line) = FIELD_EVERY;
     let drawn = col % every_col == every_col / 2 && line % every_line == every_line / 2;

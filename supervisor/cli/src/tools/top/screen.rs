@@ -24,7 +24,7 @@ use crate::console::{
 
 /// Columns of the table of stages.
 const TABLE_WIDTH: u16 = 80;
-/// From this width on the map is beside the table instead of below it.
+/// The width from which on the map is beside the table instead of below it.
 const WIDE: u16 = TABLE_WIDTH + 50;
 
 const TITLE: Style = Style::new().add_modifier(Modifier::BOLD);
@@ -75,7 +75,7 @@ pub(super) fn draw(view: &View, frame: &mut Frame<'_>) {
 
 /// The lines of `message` when it is wrapped between words.
 fn message_height(message: &str, width: u16) -> u16 {
-    // A fifth more is for lines that end early before a long word.
+    // A fifth is added for lines that end early before a long word.
     let letters = message.chars().count() * 6 / 5;
     1 + (letters / usize::from(width).max(1)).min(4) as u16
 }

@@ -1,4 +1,4 @@
-//! The screen, drawn into memory.
+//! Tests of the screen, drawn into memory.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::f64::consts::FRAC_PI_2;

@@ -14,7 +14,7 @@ use common::{
 use glam::DVec2;
 use recording::downsampled::drop_every_second;
 
-/// The longest way, in points. From a longer one every second point is dropped.
+/// The longest way, in points. If it is longer, every second point is dropped.
 const MOST_POINTS: usize = 4000;
 /// The distance between two points of the way, metres.
 const POINT_EVERY_M: f64 = 0.05;
@@ -79,7 +79,7 @@ impl View {
         }
     }
 
-    /// A run of the robot began, so the data of the last run is dropped.
+    /// Note that a run of the robot began, and drop the data of the last run.
     pub(super) fn on_connected(&mut self) {
         let chosen = self.chosen;
         *self = Self::of(self.robot.clone());

@@ -13,11 +13,10 @@ struct Model {
     now: Now,
     /// The process, if there is one.
     generation: Option<Generation>,
-    /// Whether a process is wanted.
     wanted: bool,
-    /// Held, until somebody starts it.
+    /// Whether the stage is held, until somebody starts it.
     held: bool,
-    /// Deaths, when they happened: those in a row, of no generation that was stable, and the last wait between them.
+    /// Deaths and their times: those in a row, of no stable generation, and the last wait between them.
     deaths: Vec<Now>,
     row: usize,
     wait: Duration,
@@ -27,9 +26,9 @@ struct Model {
 #[derive(Clone, PartialEq, Eq, Hash)]
 struct Generation {
     ready: Option<Now>,
-    /// Its last sign; its start counts.
+    /// The last sign of life; the start counts.
     sign: Now,
-    /// Asked to stop, for a successor or for good: that is no death.
+    /// Whether the process was asked to stop, for a successor or for good: that is no death.
     stopping: bool,
     aborted: bool,
     /// The time when it must be killed.
@@ -64,11 +63,11 @@ impl Model {
         }
     }
 
-    /// Whether that can happen: only a process can beat or end.
+    /// Whether `event` can happen: only a process can beat or end.
     fn can(&self, event: Event) -> bool {
         match event {
             Event::Start => self.generation.is_none(),
-            // Known in the moment of the start.
+            // The failure is known in the moment of the start.
             Event::StartFailed => self.generation.as_ref().is_some_and(|generation| {
                 generation.sign == self.now && generation.ready.is_none() && !generation.stopping
             }),
@@ -202,7 +201,7 @@ impl Model {
         self.wait.is_zero().then(|| self.begin())
     }
 
-    /// Let it happen, and compare.
+    /// Let `event` happen, and compare.
     fn step(&mut self, event: Event) {
         let expected = self.expect(event);
         let action = self.policy.step(event, self.now);
@@ -215,7 +214,7 @@ impl Model {
         assert_eq!(no_process, self.generation.is_none(), "{event:?}: {phase:?}");
     }
 
-    /// The moments at and around what is due, and one long after anything.
+    /// The moments at and around the due time, and one long after anything.
     fn moments(&self) -> Vec<Duration> {
         let mut pauses = vec![ms(0), ms(20), ms(11_000)];
         if let Some(due) = self.due() {
@@ -227,7 +226,7 @@ impl Model {
 
     /// This model with its clock set back: two models of equal ages are equal.
     fn at_zero(&self) -> Self {
-        // A common origin of all times, so that what lies behind stays behind.
+        // All times have a common origin, so that past times stay in the past.
         const ORIGIN: Duration = Duration::from_secs(100);
         let back = |then: &mut Now| *then = (*then + ORIGIN).saturating_sub(self.now);
         let mut same = self.clone();
@@ -297,7 +296,7 @@ fn two_million_steps_of_long_histories_keep_every_rule() {
         for _ in 0..1_000 {
             let moments = model.moments();
             let pause = moments[chance.next_u64() as usize % moments.len()];
-            // Mostly the short ones: after a long pause earlier events no longer matter.
+            // Short pauses are more frequent: after a long pause earlier events no longer matter.
             if pause < ms(5_000) || chance.next_u64().is_multiple_of(50) {
                 model.now += pause;
             }

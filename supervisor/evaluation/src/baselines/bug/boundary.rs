@@ -34,7 +34,7 @@ impl Place {
             .max_by(|a, b| along(a).total_cmp(&along(b)))
     }
 
-    /// Whether it still is a free cell with the hazard where it should be.
+    /// Whether the place still is a free cell with the hazard where it should be.
     pub(super) fn is_on(&self, map: &Map<'_>) -> bool {
         let hazard = |cols, rows| {
             let col = self.cell.col.checked_add_signed(cols);

@@ -57,7 +57,7 @@ impl Drive {
         self.bug.guidance(&pose(self.at.into()))
     }
 
-    /// Drive along the guidance until it is of another status or `is_over`; the guidance then.
+    /// Drive along the guidance until it has another status or `is_over`. Returns the guidance then.
     fn until(&mut self, is_over: impl Fn(&Self) -> bool) -> GuidanceSample {
         for _ in 0..1000 {
             let guidance = self.guidance();

@@ -40,7 +40,7 @@ fn the_way_leads_around_a_wall_and_cuts_no_corner() {
         assert!(belief.map().unwrap().free_cell_at(at).is_some(), "in the wall at {at}");
         assert!(driven < 2.0, "no end of it, at {at}");
     }
-    // The path leads around the end of the wall: two legs of 0.3 by 0.3 m, 0.85 m in all; cells round it up.
+    // The path leads around the end of the wall: two legs of 0.3 by 0.3 m, 0.85 m in all; whole cells make it longer.
     assert!((0.8..1.1).contains(&driven), "{driven}");
 }
 

@@ -6,7 +6,7 @@ use common::topics;
 
 use crate::{Message, RecordingError, replay::samples::tick_of};
 
-/// Messages that are held: those of some hundred ticks, which is more than a bus holds for its recorder.
+/// The most messages that are held: those of some hundred ticks, which is more than a bus holds for its recorder.
 const HELD: usize = 4096;
 
 /// Gives messages by tick, within a tick by the table of topics, within a topic in the order of the file.

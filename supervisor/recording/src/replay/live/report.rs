@@ -17,9 +17,9 @@ pub struct LiveReport {
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LiveStageReport {
-    /// Ticks that both it and the recorded stage answered.
+    /// Ticks that both the live and the recorded stage answered.
     pub answered: u64,
-    /// The ticks of these that have equal values.
+    /// The number of these ticks that have equal values.
     pub equal: u64,
     /// Ticks that only the recorded stage answered in time.
     pub unanswered: u64,

@@ -35,7 +35,7 @@ pub(super) struct LiveStage {
     answers: Vec<Answers>,
 }
 
-/// Its samples on one topic.
+/// The samples of the stage on one topic.
 struct Answers {
     topic: &'static dyn topics::EncodedTopic,
     reader: Box<dyn EncodedReader>,
@@ -87,7 +87,7 @@ impl LiveStage {
         Ok(Self { stage, process, log, answers })
     }
 
-    /// How it ended, and the end of its log; none while it runs.
+    /// The cause of its end, and the end of its log; none while it runs.
     pub(super) fn ended(&mut self) -> io::Result<Option<(ExitCause, String)>> {
         let Some(cause) = self.process.try_reap()? else {
             return Ok(None);
@@ -98,7 +98,7 @@ impl LiveStage {
         Ok(Some((cause, tail.trim().to_owned())))
     }
 
-    /// Take a recorded sample of the current tick. Returns whether it is this stage's.
+    /// Take a recorded sample of the current tick. Returns whether the sample is this stage's.
     pub(super) fn recorded(&mut self, topic: &str, message: &[u8]) -> bool {
         let own = |answers: &&mut Answers| answers.topic.spec().name == topic;
         if let Some(answers) = self.answers.iter_mut().find(own) {
@@ -111,7 +111,8 @@ impl LiveStage {
         outputs.map(|output| output.spec().name).any(|name| name == topic)
     }
 
-    /// Read its samples. Returns whether it has answered `tick` on every topic on which the recorded stage did.
+    /// Read the samples of the stage. Returns whether it has answered `tick` on every topic on which the recorded stage
+    /// did.
     pub(super) fn has_answered(&mut self, tick: u64) -> Result<bool, BusError> {
         let mut all = true;
         for answers in &mut self.answers {
@@ -122,7 +123,7 @@ impl LiveStage {
         Ok(all)
     }
 
-    /// `tick` is over: compare.
+    /// Compare the answers of `tick`, which is over.
     pub(super) fn compare(&mut self, tick: u64) {
         for answers in &mut self.answers {
             answers.compare(tick);
@@ -153,7 +154,7 @@ impl Drop for LiveStage {
 }
 
 impl Answers {
-    /// A keyframe for new readers answers no tick.
+    /// Whether `message` answers a tick: a keyframe for new readers does not.
     fn is_answer(&self, message: &[u8]) -> bool {
         self.topic.layout().1.is_none() || !is_keyframe(message)
     }

@@ -29,7 +29,7 @@ fn test_functions() -> BTreeSet<String> {
                 functions.extend(text.split("#[test]").skip(1).filter_map(|after| {
                     let (attributes, function) = after.split_once("fn ")?;
                     let name = function.split_once('(')?.0;
-                    // A test that is run on demand only guards nothing.
+                    // A test that runs on demand only guards nothing.
                     (!attributes.contains("#[ignore")).then(|| name.to_owned())
                 }));
             }
@@ -87,7 +87,7 @@ fn a_contract_without_a_test_or_with_one_that_does_not_exist_is_found() {
     }
 }
 
-/// `text` with what stands behind each `<!-- table NAME SECTION -->` printed anew.
+/// `text` with the tables after each `<!-- table NAME SECTION -->` printed anew.
 fn renewed(text: &str, print: impl Fn(&str, Option<&str>) -> String) -> String {
     let mut renewed = String::new();
     let mut lines = text.lines().peekable();
@@ -146,7 +146,7 @@ fn a_table_behind_its_marker_is_renewed_and_nothing_else() {
     assert_eq!(renewed(&text, print), text);
 }
 
-/// The crates of the workspace and what each is, by their manifests.
+/// The crates of the workspace and their descriptions, by their manifests.
 fn crates() -> String {
     let manifest = |folder: &Path| -> toml::Table {
         let text = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
