@@ -1,7 +1,8 @@
-// Reads what firsthand gives viewers by the packages with which Foxglove and Lichtblick read it, and checks that they can draw it:
+// Reads the messages for viewers with the packages by which Foxglove and Lichtblick read them, and checks that these can draw
+// them:
 //   node foxglove.mjs recording FILE [SENSOR POINTS]
 //   node foxglove.mjs live ws://ADDRESS:PORT
-// SENSOR is the sensor whose scans are looked at, and POINTS the number of points in each that has any.
+// SENSOR is the sensor whose scans are checked, and POINTS the number of points in each scan that has any.
 import assert from "node:assert/strict";
 import { open } from "node:fs/promises";
 import internal from "@foxglove/schemas/internal.js";
@@ -96,7 +97,7 @@ class Seen {
     this.columns = columns;
     this.occupied = 0;
     for (let index = 0; index < data.length; index += cell) {
-      // A hazard that was sensed.
+      // The hazard was sensed.
       if (data[index + at.state] === 1) {
         assert.equal(data[index + at.alpha], 255);
         this.occupied += 1;
@@ -151,14 +152,14 @@ async function recording(path) {
 }
 
 function connect(url) {
-  // Lichtblick offers both.
+  // Lichtblick offers both protocols.
   const ws = new WebSocket(url, [wsProtocol.FoxgloveClient.SUPPORTED_SUBPROTOCOL, "foxglove.sdk.v1"]);
   return { ws, client: new wsProtocol.FoxgloveClient({ ws }) };
 }
 
 async function live(url) {
   const seen = new Seen();
-  // A client that wants everything and reads nothing costs others nothing.
+  // A client that wants everything and reads nothing delays no other.
   const stalled = connect(url);
   stalled.client.on("advertise", (channels) => {
     channels.forEach(({ id }) => stalled.client.subscribe(id));
@@ -168,7 +169,7 @@ async function live(url) {
   await new Promise((resolve, reject) => {
     setTimeout(() => reject(new Error(`after ${PATIENCE_MS / 1000} s: ${seen.problem}`)), PATIENCE_MS).unref();
     const subscribed = new Map();
-    // What a listener throws fails the test.
+    // An error that a listener throws fails the test.
     const on = (event, listener) => client.on(event, (value) => {
       try {
         listener(value);

@@ -16,7 +16,7 @@ import tempfile
 import time
 from dataclasses import dataclass, field
 
-# All of it stays on this machine.
+# All traffic stays on this machine.
 os.environ.setdefault("ROS_DOMAIN_ID", str(100 + os.getpid() % 100))
 os.environ.update(ROS_LOCALHOST_ONLY="1", RMW_IMPLEMENTATION="rmw_fastrtps_cpp")
 LOOPBACK = '<Interfaces><NetworkInterface address="127.0.0.1" multicast="true"/></Interfaces>'
@@ -248,7 +248,7 @@ def main(firsthand):
         node = heard.node
         processes += [subprocess.Popen([sys.executable, __file__, role]) for role in ["--echo", "--latency"]]
 
-        # Nothing is let in unless it is asked for, and everything is published.
+        # No request is permitted by default, and everything is published.
         deaf = bridge()
         run = mission("shown", "--set", "robot.model='kobuki'", "--set", "robot.rate_hz=10")
         for name in ["pose", "odom", "map", "path", "field", "scan", "diagnostics", "tf", "tf_static", "map_updates"]:
@@ -269,13 +269,13 @@ def main(firsthand):
             goals.publish(goal)
             heard.turn()
         assert not is_at(heard, 1.0, 1.0)
-        # Who kills it harms nothing.
+        # Killing the bridge harms nothing.
         deaf.send_signal(signal.SIGKILL)
         heard.until("the end of the mission", lambda: run.poll() is not None, 120)
         assert json.loads(run.stdout.read())["outcome"] == "reached"
         heard.messages.clear()
 
-        # A goal, a place, a stop.
+        # The requests are a goal, a place and a stop.
         bridged = bridge("--accept", "goals,pose,stop")
         run = mission("asked", "--timeout", "600")
         heard.until("range, battery", lambda: heard.messages.get("range/front") and heard.messages.get("battery_state"))
@@ -286,7 +286,7 @@ def main(firsthand):
         goals.publish(goal)
         heard.until("the goal", lambda: is_at(heard, 2.5, 0.8))
         stops = node.create_publisher(Bool, "stop", 10)
-        # As Ctrl-Z and `fg` do.
+        # This is what Ctrl-Z and `fg` do.
         bridged.send_signal(signal.SIGSTOP)
         bridged.send_signal(signal.SIGCONT)
         heard.messages.clear()
@@ -333,7 +333,7 @@ def main(firsthand):
         heard.until("the end of the mission", lambda: run.poll() is not None, 120)
         assert json.loads(run.stdout.read())["outcome"] == "reached"
 
-        # A robot that is said to be elsewhere believes it.
+        # A robot that is said to be elsewhere believes that.
         run = mission("placed")
         heard.messages.clear()
         heard.until("movement", lambda: heard.messages.get("odom") and heard.newest("odom").twist.twist.linear.x > 0.1)
@@ -341,7 +341,7 @@ def main(firsthand):
         heard.until("a reader of places", lambda: places.get_subscription_count() > 0)
         place = PoseWithCovarianceStamped()
         place.header.frame_id, place.pose.pose.position.y, place.pose.pose.orientation.w = "map", -2.0, 1.0
-        # As RViz sends it.
+        # This is how RViz sends it.
         place.pose.covariance[0] = place.pose.covariance[7] = 0.25
         place.pose.covariance[35] = 0.0685
         places.publish(place)

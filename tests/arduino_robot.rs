@@ -76,7 +76,7 @@ fn a_robot_with_an_arduino_whose_link_is_killed_arrives_over_a_serial_line() {
     let status = run.wait_until("the robot drives on", |status| {
         status["link"]["connected"] == true && status["link"]["stopped"] == false
     });
-    // The successor finds the board as it is.
+    // The successor finds the board as the killed link left it.
     assert_eq!((&status["link"]["losses"], &status["link"]["reboots"]), (&0.into(), &0.into()));
     assert_arrives(run, robot);
 }

@@ -1,5 +1,5 @@
-//! The states of the middleware's files in which it lets no process join any more, each made by a test in the middle of
-//! a mission: the mission goes on by itself.
+//! The states of the middleware's files in which it lets no process join any more, each made by a test in the middle of a
+//! mission, which goes on by itself.
 
 use std::{
     fs,
@@ -19,7 +19,7 @@ use common::{
 use rustix::process::Signal;
 use serde_json::Value;
 
-/// Mission time runs so many times as fast as the wall's.
+/// Mission time runs this many times as fast as the wall clock.
 const PACE: [&str; 2] = ["--pace", "4"];
 
 /// The process in a port's or a node's number.
@@ -37,25 +37,25 @@ fn nodes_of(bus: &BusInstance, pid: u32) -> Vec<PathBuf> {
     nodes.collect()
 }
 
-/// The files in shared memory of a bus instance that end so.
+/// The files in shared memory of a bus instance that end with `suffix`.
 fn shared(bus: &BusInstance, suffix: &str) -> Vec<String> {
     let paths = shared_memory(&bus.shared_memory_prefix()).into_iter();
     let names = paths.map(|path| path.file_name().unwrap().to_str().unwrap().to_owned());
     names.filter(|name| name.ends_with(suffix)).collect()
 }
 
-/// A connection of port `port` to another, half made.
+/// Make half of a connection of port `port` to another.
 fn half_make_connection(bus: &BusInstance, port: u128) {
     let made = shared(bus, ".connection");
-    // Prefix and hash of the type: up to the first port's number.
+    // The start has the prefix and the hash of the type, up to the first port's number.
     let start = made[0].rsplitn(3, '_').last().unwrap();
     half_make(Path::new(&format!("/dev/shm/{start}_{port}_{port}.connection")));
 }
 
-/// The mission is finished as if nothing had happened, and leaves nothing.
+/// Assert that the mission is finished as if nothing had happened, and leaves nothing.
 fn assert_arrives(run: Run) -> Value {
     let summary = run.arrives();
-    // A lost pose is metres.
+    // The error of a lost pose is metres.
     assert!(summary["pose_error_m"].as_f64() < Some(0.05), "{summary}");
     summary
 }
@@ -143,7 +143,7 @@ fn places_in_a_topic_that_are_never_given_back_block_starts_until_the_bus_is_rec
             }
         };
         let all_but_one = take_all();
-        // The last place, too: the supervisor that would start a successor is held until it is taken.
+        // The last place is taken, too: the supervisor that would start a successor is held until then.
         run.signal(Signal::STOP);
         signal_process(pid(&status, "dead-reckoning"), Signal::KILL);
         let began = Instant::now();
@@ -152,7 +152,7 @@ fn places_in_a_topic_that_are_never_given_back_block_starts_until_the_bus_is_rec
             joined.clear_up(&[]).unwrap();
         }
         run.signal(Signal::CONT);
-        // Never given back: as when their owners were killed while they held them.
+        // The places are never given back, as if their owners were killed while they held them.
         std::mem::forget((places, joined));
         assert_bus_was_recreated(&assert_arrives(run));
     });

@@ -1,4 +1,4 @@
-//! Calibrations through real processes.
+//! Tests of calibrations through real processes.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::support::{assert_nothing_left, directory_of, printed, refused};
 
-/// Wheels that nobody but the simulator knows: a larger right wheel on a narrower track, on a floor as measured.
+/// Wheels that only the simulator knows: a larger right wheel on a narrower track, on a floor as measured.
 const UNKNOWN: [&str; 8] = [
     "--set",
     "simulation.wheels.diameter_ratio=1.006",

@@ -1,4 +1,4 @@
-//! `firsthand bench chaos` through real processes: its table of signals, and consumers that are hit.
+//! Tests of `firsthand bench chaos` through real processes: its table of signals, and consumers that are hit.
 
 use std::{fs, process::Stdio, time::Instant};
 
@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::support::{self, PATIENCE, assert_nothing_left, firsthand, output, refused, status_of};
 
-/// A machine with other work may take its time.
+/// Arguments for a mission that also a machine with other work completes.
 const SLOW: [&str; 4] = ["--set", "timeout_s=600", "--set", "controller.speed_m_s=0.2"];
 
 fn number(value: &Value) -> u64 {
@@ -84,7 +84,7 @@ fn consumers_that_are_killed_and_frozen_do_not_change_the_outcome_and_leave_noth
     let consumers = &report["consumers"];
     for name in ["record", "logs -f", &given] {
         let counts = &consumers[name];
-        // It was started again after each kill.
+        // The consumer was started again after each kill.
         assert!(number(&counts["started"]) > number(&counts["killed"]), "{name}: {report}");
     }
     let hit = |counts: &Value| number(&counts["killed"]) + number(&counts["frozen"]);
@@ -132,7 +132,7 @@ fn chaos_that_is_killed_keeps_its_rows_and_its_consumers_end_with_it() {
     while rows().lines().count() < 4 {
         assert!(began.elapsed() < PATIENCE, "{}", rows());
         assert_eq!(chaos.try_wait().unwrap(), None);
-        // Each answer waits for what the supervisor publishes next.
+        // Each answer waits for the supervisor's next sample.
         status_of("chd-cut");
     }
     chaos.kill().unwrap();

@@ -1,5 +1,5 @@
-//! Commands at the prompt: echo, hz, list, runs, logs, completions, the manual page. Consumers like any other, which end quietly
-//! when their reader has gone.
+//! Commands at the prompt: echo, hz, list, runs, logs, completions, the manual page. They are consumers like any other, and end
+//! quietly when their reader has gone.
 
 use std::{
     collections::BTreeSet,
@@ -18,7 +18,7 @@ use crate::support::{
     output, refused, run, signal_process, start_quietly, wait_for_status,
 };
 
-/// A command whose lines are read as they come. Ended when the test ends.
+/// A command whose lines are read as they come. It is ended when the test ends.
 struct Reading {
     child: Child,
     lines: BufReader<ChildStdout>,
@@ -45,7 +45,7 @@ impl Reading {
         serde_json::from_str(&line).unwrap_or_else(|error| panic!("{line:?}: {error}"))
     }
 
-    /// Close the pipe; how the command ended by that, and what it said.
+    /// Close the pipe. Returns the exit code of the command, which ends by that, and its messages.
     fn close(self) -> (Option<i32>, String) {
         let Self { mut child, lines, mut said } = self;
         drop(lines);
@@ -67,7 +67,7 @@ fn printed(arguments: &[&str]) -> String {
 #[test]
 fn echo_prints_every_topic_with_the_fields_of_its_layout() {
     let robot = "con-echo";
-    // Slow enough that all is printed before it arrives.
+    // The robot is slow enough that all is printed before it arrives.
     let slow = ["--pace", "2", "--set", "controller.speed_m_s=0.05"];
     let mut run = Run::start(robot, "open-room", &slow);
     run.wait_until_under_way(0.2);
@@ -83,7 +83,7 @@ fn echo_prints_every_topic_with_the_fields_of_its_layout() {
     assert!(ticks.windows(2).all(|pair| pair[1] == pair[0] + 1), "{ticks:?}");
     for topic in topics::TABLE {
         let name = topic.spec().name;
-        // These come when something happens, or of a laser; that of lockstep is not this run's.
+        // These topics come when something happens, or from a laser; that of lockstep is not this run's.
         if [
             "tick_limit",
             "contact",
@@ -142,7 +142,7 @@ fn echo_follows_its_robot_from_run_to_run_and_ends_on_a_signal() {
     signal_process(echo.child.id(), Signal::TERM);
     let (code, said) = echo.close();
     assert_eq!(code, Some(0));
-    // Once, when the first run ended.
+    // The message came once, when the first run ended.
     assert_eq!(said.lines().filter(|line| line.contains(robot)).count(), 1, "{said}");
     second.arrives();
 }
@@ -192,7 +192,7 @@ fn hz_counts_every_topic_and_finds_one_that_is_not_published_as_the_table_says()
     let second = |topic: &str| {
         reports[table.len()..].iter().find(|report| report["topic"] == topic).unwrap()
     };
-    // 7 ticks a second.
+    // There are 7 ticks a second.
     let rate = second("pose")["rate_hz"].as_f64().unwrap();
     assert!((0.5..=20.0).contains(&rate), "{}", second("pose"));
     assert!(second("pose")["missing_ticks"].is_u64(), "{}", second("pose"));

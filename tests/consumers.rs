@@ -1,4 +1,4 @@
-//! A consumer that comes late gets everything, and going away changes nothing.
+//! Tests that a consumer that comes late gets everything, and that its leaving changes nothing.
 
 use std::{
     process::{Child, Stdio},
@@ -139,7 +139,7 @@ fn a_logger_follows_its_robot_through_five_runs_one_of_them_killed_and_harms_non
                 let supervisor = status["supervisor_pid"].as_u64().unwrap() as u32;
                 support::signal_process(supervisor, rustix::process::Signal::KILL);
                 started.reap();
-                // Its bus stays, until the next run removes it.
+                // The bus of a killed supervisor stays until the next run removes it.
                 std::thread::park_timeout(Duration::from_secs(3));
                 continue;
             }
@@ -196,7 +196,7 @@ fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_noti
     });
 }
 
-/// A consumer's process, killed in the end.
+/// A consumer's process, which is killed in the end.
 struct Staying(Child);
 
 impl Drop for Staying {
@@ -206,7 +206,8 @@ impl Drop for Staying {
     }
 }
 
-/// Join the bus of `robot`, read grid and field and leave, again and again until `over`; how often there was a place.
+/// Join the bus of `robot`, read grid and field and leave, again and again until `over`. Returns how often there was a
+/// place.
 fn join_again_and_again(robot: &str, over: &AtomicBool) -> usize {
     let domain = support::domain(robot);
     let mut joined = 0;
@@ -246,7 +247,7 @@ fn ten_consumers_that_stay_and_three_that_join_again_and_again_harm_no_stage_and
             let bus = Bus::join(&support::domain(robot), robot).unwrap();
             let all_that_there_are: Vec<_> =
                 std::iter::from_fn(|| bus.slice_reader(&topics::GRID).ok()).collect();
-            // A stage that ends gets its place, whoever else waits for one.
+            // A stage that ends gets its place, even if consumers wait for one.
             run.kill_and_await_successor("planner", rustix::process::Signal::KILL);
             run.wait_until_under_way(8.0);
             over.store(true, Ordering::Relaxed);

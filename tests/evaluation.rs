@@ -1,4 +1,4 @@
-//! Evaluations: many missions, judged by the ground truth.
+//! Tests of evaluations: many missions, judged by the ground truth.
 
 use serde_json::Value;
 
@@ -10,7 +10,7 @@ fn two_rooms<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
     [&rooms[..], &[out, "--json"], more].concat()
 }
 
-/// The object that it ends with.
+/// The object with which the evaluation ends.
 fn evaluate(out: &str, more: &[&str]) -> Value {
     serde_json::from_str(&printed(&two_rooms(out, more))).unwrap()
 }
@@ -29,7 +29,7 @@ fn an_evaluation_that_was_cut_off_goes_on_and_another_is_not_mixed_with_it() {
 
     let rows = std::fs::read_to_string(out.join("rows.csv")).unwrap();
     let (first, _) = rows.trim_end().rsplit_once('\n').unwrap();
-    // Killed while it wrote the last row.
+    // The evaluation was killed while it wrote the last row.
     std::fs::write(out.join("rows.csv"), format!("{first}\nrooms-5-0001,6,evid")).unwrap();
     let resumed = evaluate(name, &["--seed", "5", "--resume"]);
     assert_eq!(resumed["count"], 2, "{resumed}");
@@ -81,7 +81,7 @@ fn with_infrared_the_same_seed_gives_the_same_rows_twice_and_their_setting_names
 #[test]
 fn a_robot_drives_through_a_ros_map_from_a_start_to_a_target_of_the_map() {
     let folder = tempfile::tempdir().unwrap();
-    // A hall of 6 m by 3 m with a wall across its lower half, its corner at (-10, 20).
+    // The map is a hall of 6 m by 3 m with a wall across its lower half, its corner at (-10, 20).
     let (cols, rows) = (60, 30);
     let grey = |at: usize| {
         let (col, row) = (at % cols, at / cols);

@@ -1,4 +1,4 @@
-//! The paper's experiments: their rows, and going on with those that were cut off.
+//! Tests of the paper's experiments: their rows, and the continuation of those that were cut off.
 
 use std::{fs, path::Path};
 
@@ -13,7 +13,7 @@ fn three_of_them<'a>(out: &'a Path, seeds: &'a str, more: &[&'a str]) -> Vec<&'a
     [&only[..], &into, &["--seeds", seeds], more].concat()
 }
 
-/// The objects that they end with.
+/// The objects with which the experiments end.
 fn experiments(out: &Path, more: &[&str]) -> Vec<Value> {
     let lines = printed(&three_of_them(out, "1", more));
     let objects = lines.lines().map(|line| serde_json::from_str(line).unwrap());
@@ -44,7 +44,7 @@ fn experiments_give_a_row_each_and_the_same_ones_again_when_they_were_cut_off() 
     let rows = fs::read_to_string(out.join("rows.csv")).unwrap();
     assert_eq!(rows.lines().count(), 6, "{rows}");
     let (first, last) = rows.trim_end().rsplit_once('\n').unwrap();
-    // Killed while it wrote the last row.
+    // The experiments were killed while they wrote the last row.
     fs::write(out.join("rows.csv"), format!("{first}\n{}", &last[..9])).unwrap();
     let resumed = experiments(&out, &["--resume"]);
     assert_eq!(resumed, whole);

@@ -27,7 +27,7 @@ struct Heard {
 }
 
 impl Heard {
-    /// Whether it is the command of a tick: a repetition has less time left.
+    /// Whether this is the command of a tick: a repetition has less time left.
     fn valid(&self) -> bool {
         self.moving && self.limit == LIMIT
     }
@@ -56,7 +56,7 @@ impl Tap {
         self.heard.recv_timeout(PATIENCE).unwrap()
     }
 
-    /// Wait for a command that is so.
+    /// Wait for a command for which `is_so` is true.
     fn next_that(&self, is_so: impl Fn(&Heard) -> bool) -> Heard {
         let began = Instant::now();
         loop {
@@ -68,15 +68,15 @@ impl Tap {
         }
     }
 
-    /// Once nobody sends any more: the last command that was sent does not move the robot.
+    /// Assert, once nobody sends any more, that the last command does not move the robot.
     #[track_caller]
     pub(crate) fn assert_last_is_zero(&self) {
         let last = self.heard.try_iter().last().unwrap();
         assert!(!last.moving, "{last:?}");
     }
 
-    /// The longest that the robot was left with a valid command, among all that was heard by now: until the next
-    /// valid one or a zero, or until now; if the link was down, also until the end of the time that commands had.
+    /// The longest time that the robot was left with a valid command, among all commands heard by now: until the next
+    /// valid one or a zero, or until now; if the link was down, also until the end of the time limit of commands.
     fn longest_uncommanded(&self, first: Heard, link_down: bool) -> Duration {
         let mut longest = Duration::ZERO;
         let (mut valid, mut ends) = (Some(first.at), first.at + first.limit);
@@ -196,7 +196,7 @@ fn stages_end_with_their_supervisor_that_is_killed_and_the_last_command_is_zero(
     run.kill();
     support::wait_until_all_ended("tap-orphan");
     tap.assert_last_is_zero();
-    // The files that it left do not hinder the next run, and are removed with it.
+    // The files that the run left do not hinder the next run, and are removed with it.
     Run::start("tap-orphan", "open-room", &[]).arrives();
 }
 

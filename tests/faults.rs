@@ -1,4 +1,4 @@
-//! Robots that make no progress because of a fault that was put into a running stage: every recovery frees one, and the
+//! Tests of robots that make no progress because of a fault that was put into a running stage: each recovery step frees one, and the
 //! last says that it could not.
 
 use crate::support::{
@@ -14,8 +14,8 @@ use common::{
 };
 use serde_json::Value;
 
-/// At this speed the mission has thousands of ticks, which take seconds in lockstep. That is time enough for a fault, however loaded
-/// the machine is. Its wheels are as good as the laboratory's, because the drift of a hundred looks would make its arrival unsure.
+/// At this speed the mission has thousands of ticks, which take seconds in lockstep: time enough for a fault, even on a loaded
+/// machine. The wheels are those of the laboratory, because the drift of a hundred looks would make the arrival unsure.
 const SLOW: [&str; 6] = [
     "--set",
     "controller.speed_m_s=0.004",
@@ -26,7 +26,7 @@ const SLOW: [&str; 6] = [
 ];
 const PAPER: [&str; 2] = ["--set", "method=\"paper\""];
 
-/// `firsthand stage fault`, which must succeed.
+/// Run `firsthand stage fault`, which must succeed.
 fn inject(robot: &str, stage: &str, fault: &str) {
     operate(robot, &["stage", "fault", stage, fault]);
 }
@@ -36,7 +36,7 @@ fn count(stalls: &[Value], recovery: &str) -> usize {
     stalls.iter().filter(|stall| stall["recovery"] == recovery).count()
 }
 
-/// A mission of open-room in which `stage` is broken on the way, and which arrives all the same: its stalls.
+/// The stalls of a mission of open-room in which `stage` is broken on the way, and which arrives all the same.
 fn broken(robot: &str, stage: &str, fault: &str, arguments: &[&str]) -> Vec<Value> {
     let mut run = Run::start(robot, "open-room", &[&SLOW[..], arguments].concat());
     run.wait_until("the robot drives", |status| {
@@ -123,7 +123,7 @@ fn a_stage_that_beats_and_answers_nothing_is_replaced_and_nobody_behind_it() {
     let slow = ["--pace", "4", "--set", "controller.speed_m_s=0.02", "--timeout", "2000"];
     let mut run = Run::start("mutes", "open-room", &slow);
     run.wait_until_under_way(1.0);
-    // The link has no input from a stage that it owes an answer for.
+    // The link owes no answer to the output of another stage.
     for stage in STAGES.into_iter().skip(1) {
         let status = run.wait_until("all run and it drives", |status| {
             status["order"] == "driving" && all_run(status)
@@ -143,13 +143,13 @@ fn a_stage_that_beats_and_answers_nothing_is_replaced_and_nobody_behind_it() {
         let death = run.records("deaths.jsonl").pop().unwrap();
         assert_eq!(death["stage"], stage, "{death}");
         assert_eq!(death["hung"], true, "{death}");
-        // It still beat when it was found hung.
+        // The stage still beat when it was found hung.
         assert!(death["noticed_after_s"].as_f64().unwrap() < 0.5, "{death}");
     }
     run.stop();
 }
 
-/// Ask the planner for a fault past the command line; what it answered.
+/// Ask the planner for a fault without the command line. Returns its answer.
 fn ask_planner(robot: &str, although_real: bool) -> FaultAnswer {
     let bus = Bus::join(&support::domain(robot), "careless").unwrap();
     let mut health = bus.reader(&topics::HEALTH).unwrap();
@@ -179,7 +179,7 @@ fn ask_planner(robot: &str, although_real: bool) -> FaultAnswer {
 #[test]
 fn a_real_robot_is_not_broken_unless_it_is_meant_neither_by_the_command_line_nor_by_the_stage() {
     in_own_process(|| {
-        // An address makes it real. Nobody answers there: it never moves.
+        // An address makes the robot a real one. Nobody answers there, so it never moves.
         let address = ["--set", "robot.address=\"127.0.0.1:9\"", "--pace", "1"];
         let mut run = Run::start("metal", "open-room", &address);
         run.wait_until("its stages run", |status| find(status, "planner")["state"] == "running");

@@ -1,11 +1,11 @@
-//! `firsthand field`: the field of a map, and refusals of files that are no maps.
+//! Tests of `firsthand field`: the field of a map, and refusals of files that are no maps.
 
 use std::path::{Path, PathBuf};
 
 use crate::support::{printed, refused};
 use serde_json::Value;
 
-/// A room of 24 x 16 cells in its rim, a wall across it with one doorway, and a closet nobody can leave.
+/// A room of 24 x 16 cells in its rim, a wall across it with one doorway, and a closed closet.
 fn rooms() -> Vec<String> {
     (0..16)
         .map(|row| {
@@ -45,7 +45,7 @@ fn report(map: &Path, arguments: &[&str]) -> Value {
     serde_json::from_str(&printed(&[&field, arguments].concat())).unwrap()
 }
 
-/// A solve must fail with `code`, and name each of `names`.
+/// Assert that a solve fails with `code`, and names each of `names`.
 #[track_caller]
 fn assert_refuses(map: &Path, arguments: &[&str], code: &str, names: &[&str]) {
     let field = ["field", map.to_str().unwrap()];
@@ -67,7 +67,7 @@ fn array(npz: &[u8], name: &str, bytes_each: usize) -> Vec<u8> {
     npz[data..data + 24 * 16 * bytes_each].to_vec()
 }
 
-/// u and guidance of the rooms as they are in the file, (u, ex, ey) a cell.
+/// u and guidance of the rooms in the file, (u, ex, ey) a cell.
 fn solved(screening: &[&str]) -> Vec<(f64, f64, f64)> {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("rooms.npz");
@@ -98,7 +98,7 @@ const CLOSET: usize = 9 * 24 + 19;
 
 #[test]
 fn u_in_the_file_is_the_mean_of_its_neighbours_over_1_plus_k() {
-    // A screening length of 2.5 cells: k = (1 / (2 x 2.5))^2.
+    // A screening length of 2.5 cells gives k = (1 / (2 x 2.5))^2.
     let screened = ["--screening-cells", "2.5"];
     for (screening, k) in [(&[][..], 0.0), (&screened[..], 0.04)] {
         let cells = solved(screening);

@@ -1,4 +1,4 @@
-//! Sources outside a robot publish where it is: by real processes on its bus.
+//! Tests of sources outside a robot that publish its place, by real processes on its bus.
 
 use std::process::{Child, Stdio};
 
@@ -30,7 +30,7 @@ const UNEQUAL: [&str; 12] = [
     "--set",
     "robot.odometry.track_scale_sd=0.015",
 ];
-/// An arrival within that is in the right place.
+/// The error within which an arrival is in the right place.
 const SURE: [&str; 2] = ["--set", "sure_within_m=0.5"];
 
 /// Simulated sources for `run`.
@@ -40,7 +40,8 @@ fn sources(run: &Run, arguments: &[&str]) -> Child {
     command.arg(directory).args(arguments).stdout(Stdio::null()).spawn().unwrap()
 }
 
-/// A run with unequal wheels and `sources`. `meanwhile` sees it drive. Its summary, and the recording in its directory.
+/// A run with unequal wheels and `sources`, which `meanwhile` sees drive. Returns its summary, and the recording in its
+/// directory.
 fn driven(
     robot: &str,
     arguments: &[&str],

@@ -1,4 +1,4 @@
-//! Stages are frozen again and again, and each freeze must be noticed soon.
+//! Tests that stages which are frozen again and again are noticed soon.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 
 mod support;
@@ -7,10 +7,11 @@ use rustix::process::Signal;
 use supervisor::stages::find as find_stage;
 use support::{Run, STAGES};
 
-/// A freeze may be noticed so long after its deadline, seconds.
+/// The longest time after its deadline in which a freeze is noticed, seconds.
 const SLACK: f64 = 0.020;
 
-/// Freeze each stage so often in a mission at the pace of the wall, and print how late each was noticed.
+/// Freeze each stage `times` times in a mission at the pace of the wall clock, and print how late each freeze was
+/// noticed.
 fn freeze_each(robot: &str, times: usize) -> Vec<f64> {
     // At this speed the mission outlasts every freeze.
     let slow = ["--pace", "1", "--set", "controller.speed_m_s=0.002", "--timeout", "80000"];
@@ -50,12 +51,12 @@ fn freeze_each(robot: &str, times: usize) -> Vec<f64> {
 #[test]
 fn frozen_stages_are_noticed_when_their_beat_is_due() {
     let late = freeze_each("freezes", 2);
-    // The processors are shared with other tests: not each of them.
+    // The processors are shared with other tests, so only the median counts.
     let median = late[late.len() / 2];
     assert!(late[0] >= 0.0 && median < SLACK, "{late:?}");
 }
 
-/// Ten minutes, on a machine that does nothing else:
+/// This takes ten minutes, on a machine that does nothing else:
 /// `cargo test --release -p firsthand --test freezes -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes ten minutes and a quiet machine"]

@@ -1,4 +1,4 @@
-//! A robot that is sent elsewhere while it drives.
+//! Tests of a robot that is sent elsewhere while it drives.
 
 use std::{path::Path, time::Duration};
 
@@ -18,16 +18,16 @@ use serde_json::Value;
 
 use crate::support::{self, Run, json_of, operate, output, refused};
 
-/// Mission time runs so many times as fast as the wall's.
+/// Mission time runs this many times as fast as the wall clock.
 const PACE: [&str; 2] = ["--pace", "2"];
 
-/// The targets of a summary: their outcomes.
+/// The outcomes of the targets in a summary.
 fn outcomes(summary: &Value) -> Vec<&str> {
     let targets = summary["targets"].as_array().unwrap();
     targets.iter().map(|target| target["outcome"].as_str().unwrap()).collect()
 }
 
-/// The commands of a robot, for each new one of which `is_enough` is asked.
+/// Read the commands of a robot until `is_enough` returns true for one.
 fn follow(robot: &str, mut is_enough: impl FnMut(&CommandSample) -> bool) {
     let bus = Bus::join(&support::domain(robot), "follower").unwrap();
     let mut commands = bus.reader(&topics::COMMAND).unwrap();
@@ -45,7 +45,7 @@ fn follow(robot: &str, mut is_enough: impl FnMut(&CommandSample) -> bool) {
     }
 }
 
-/// Every generation of a recorded run gives what it gave, to the bit.
+/// Assert that every generation of a recorded run is replayed to the bit.
 #[track_caller]
 fn assert_replays(run: &Path) {
     let mut files: Vec<_> =

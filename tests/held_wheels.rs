@@ -1,4 +1,4 @@
-//! Robots whose wheels are held: by a thing that no sensor notices, or by something in the wheels.
+//! Tests of robots whose wheels are held by a thing that no sensor notices, or by something in the wheels.
 
 use serde_json::Value;
 
@@ -6,7 +6,7 @@ use crate::support::{
     Run, assert_ended, assert_nothing_left, find, generation, records, wire::Robot,
 };
 
-/// On the wall clock, in which the link judges the robot's frames.
+/// The pace of the wall clock, at which the link judges the robot's frames.
 const ON_THE_WALL: [&str; 2] = ["--pace", "2"];
 
 /// The causes and recovery steps of the stalls.
@@ -50,7 +50,7 @@ fn a_robot_whose_wheels_are_held_for_ever_is_unreachable_and_its_odometry_is_not
 
 #[test]
 fn a_robot_that_is_held_by_a_thing_that_no_sensor_notices_maps_it_and_goes_another_way() {
-    // A box that stands there, and one that appears before the robot.
+    // The box stands there, or appears before the robot.
     let shape = "[{at=[2,0],size_m=[0.3,0.8],top_m=0.1,echo=0}]";
     let things = [
         ("unheard", format!("world.box={shape}")),

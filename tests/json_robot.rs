@@ -20,7 +20,7 @@ const EXAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../guide/example-rob
 /// The guide's robot, as a process.
 struct PythonRobot {
     process: Child,
-    /// Reads what it says about itself, so that it never waits, and gives the last.
+    /// A thread that reads the robot's lines about itself, so that the robot never waits, and returns the last.
     last: JoinHandle<String>,
     port: u64,
 }
@@ -48,7 +48,7 @@ impl PythonRobot {
         Run::start(robot, &format!("{EXAMPLE}/robot.toml"), &set)
     }
 
-    /// What it says about itself last, once it has been ended.
+    /// End the robot. Returns its last line about itself.
     fn end(mut self) -> Value {
         self.process.kill().unwrap();
         self.process.wait().unwrap();

@@ -19,13 +19,13 @@ use crate::support::{
 
 /// The phase in which stages get a signal.
 enum Phase {
-    /// Each stage gets it as soon as its first process runs.
+    /// Each stage gets the signal as soon as its first process runs.
     StartUp,
-    /// The stages get it one after the other while the robot drives.
+    /// The stages get the signal one after the other while the robot drives.
     Driving,
-    /// The stages get it one after the other while the robot waits for an operator.
+    /// The stages get the signal one after the other while the robot waits for an operator.
     Waiting,
-    /// All stages get it at once after the supervisor was told to end.
+    /// All stages get the signal at once after the supervisor was told to end.
     Stopping,
 }
 
@@ -49,7 +49,7 @@ const CAR: &[&str] = &["--pace", "4", "--set", "robot.model=\"car\""];
 /// At this speed a mission in lockstep has tens of thousands of ticks, which take seconds. That is time enough for the signals.
 const LOCKSTEP: &[&str] = &["--set", "controller.speed_m_s=0.002", "--timeout", "80000"];
 
-/// A test for each row, called by the promise that it guards.
+/// A test for each row, named by the promise that it guards.
 macro_rules! rows {
     ($($promise:ident: $robot:literal $phase:ident $signals:ident $mission:literal $arguments:ident;)*) => {
         $(#[test]
@@ -152,7 +152,7 @@ fn waits(status: &Value) -> bool {
     status["order"] == "stopped by an operator"
 }
 
-/// The first process of `stage` in `run`, as soon as it is there.
+/// The first process of `stage` in `run`, as soon as it exists.
 fn first_process(run: &Run, stage: &str) -> u32 {
     let directory = run.directory();
     let directory = directory.to_str().unwrap();
@@ -171,16 +171,16 @@ fn assert_at_least_one_restart(summary: &Value) {
     }
 }
 
-/// Another way reads the wheels at other fractions of a count, which is 9 mm across at a target 6 m away, and a car's tyres
-/// slip by some centimetres. Wheels slip more where the robot looks around for long, as on a loaded machine: three standard
-/// deviations of the covariance. A lost pose is metres.
+/// Assert that the pose was not lost, which would be metres. Another way reads the wheels at other fractions of a count, which is
+/// 9 mm across at a target 6 m away, and a car's tyres slip by some centimetres. Wheels slip more if the robot looks around for
+/// long, as on a loaded machine: three standard deviations of the covariance.
 fn assert_pose_was_not_lost(summary: &Value) {
     let metres = |key: &str| summary[key].as_f64().unwrap();
     let allowed_m = (1.5 * metres("pose_within_m")).clamp(0.15, 0.5);
     assert!(metres("pose_error_m") < allowed_m, "{summary}");
 }
 
-/// Every generation of every stage is bit-equal, or ended before it took anything.
+/// Assert that every generation of every stage is bit-equal, or ended before it took anything.
 fn assert_every_generation_replays(directory: &Path, row: &Row) {
     let deaths = records(&directory.join("deaths.jsonl"));
     let hit: Vec<_> = deaths.iter().map(|death| &death["stage"]).collect();
@@ -231,14 +231,14 @@ fn a_frozen_stage_is_recorded_as_hung_and_a_thawed_one_goes_on() {
     run.stop();
 }
 
-/// Go on with the run in `directory`.
+/// The command that goes on with the run in `directory`.
 fn resume(directory: &Path) -> std::process::Command {
     let mut command = firsthand(&["run", "--json", "--resume"]);
     command.arg(directory).stderr(Stdio::inherit());
     command
 }
 
-/// Go on with it to its end: the robot arrives, knows where it is, and was resumed so often.
+/// Go on with a run to its end. Assert that the robot arrives and knows its place, and that the run was resumed `resumes` times.
 fn assert_resumed_run_arrives(robot: &str, directory: &Path, resumes: u32) {
     let output = resume(directory).output().unwrap();
     let summary: Value = serde_json::from_slice(&output.stdout).unwrap();

@@ -1,4 +1,4 @@
-//! Robots with a laser, which is simulated, through real processes.
+//! Tests of robots with a simulated laser, through real processes.
 
 use recording::{
     Recording,
@@ -11,7 +11,7 @@ use crate::support::{Run, STAGES, printed, run};
 #[test]
 fn a_robot_with_a_laser_arrives_though_each_stage_is_killed_and_replays_to_the_bit() {
     let robot = ["--pace", "2", "--set", "robot.model='kobuki'", "--set", "robot.rate_hz=20"];
-    // It is slow enough not to arrive between two kills.
+    // The robot is slow enough not to arrive between two kills.
     let slow = ["--set", "controller.speed_m_s=0.35"];
     let mut run = Run::start("laser-kills", "obstacle-course", &[&robot[..], &slow].concat());
     run.wait_until_under_way(0.3);

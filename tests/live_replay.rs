@@ -1,4 +1,4 @@
-//! Recordings played on a bus, with stages in processes of their own.
+//! Tests of recordings played on a bus, with stages in processes of their own.
 
 use std::{
     io::{BufRead as _, BufReader, Lines},
@@ -19,14 +19,14 @@ fn wait_for(said: &mut Lines<BufReader<ChildStderr>>, words: &str) -> String {
     lines.find(|line| line.contains(words)).unwrap()
 }
 
-/// The process that is told to be that of `stage`.
+/// The process that is reported as that of `stage`.
 fn process_of(stage: &str, said: &mut Lines<BufReader<ChildStderr>>) -> u32 {
     let line = wait_for(said, &format!("{stage}: process"));
     let (_, process) = line.rsplit_once(' ').unwrap();
     process.parse().unwrap()
 }
 
-/// `stage` answered every tick that the recorded one did, with the same values.
+/// Assert that `stage` answered every tick that the recorded one did, with the same values.
 fn assert_as_recorded(report: &Value, stage: &str) {
     let found = &report["stages"][stage];
     assert_eq!(found["equal"], found["answered"], "{report}");

@@ -1,4 +1,4 @@
-//! The machine around a run: it stands still, its disk is full, its terminal is closed, it was suspended.
+//! Tests of the machine around a run: it stands still, its disk is full, its terminal is closed, it was suspended.
 
 use std::{
     fs::{self, File},
@@ -32,7 +32,7 @@ fn stages_are_not_taken_for_hung_when_the_supervisor_stood_still_with_them() {
         for &process in &all {
             signal_process(process, Signal::STOP);
         }
-        // The duration is what is tested: longer than a stage may go without a beat.
+        // The duration is what is tested: it is longer than a stage may go without a beat.
         thread::sleep(Duration::from_millis(800));
         for &process in all.iter().rev() {
             signal_process(process, Signal::CONT);
@@ -49,7 +49,7 @@ fn a_full_disk_ends_no_mission_and_loses_no_result() {
     on_small_disk(8, |disk| {
         let robot = "mach-full";
         let out = disk.path().join("run");
-        // It is slow enough not to arrive between two looks at its stages.
+        // The robot is slow enough not to arrive between two looks at its stages.
         let slow = ["--pace", "2", "--set", "controller.speed_m_s=0.25"];
         let run = firsthand(&["run", "obstacle-course", "--robot", robot, "--json"])
             .args(slow)
@@ -73,7 +73,7 @@ fn a_full_disk_ends_no_mission_and_loses_no_result() {
         let (exit, printed) = json_of(&ended);
         assert_reached(exit.code(), &printed[0]);
         assert_eq!(support::records(&out.join("summary.json")), printed);
-        // The file that was lost is named.
+        // The message names the lost file.
         let said = String::from_utf8(ended.stderr).unwrap();
         assert!(said.contains("picture.svg"), "{said}");
         assert_nothing_left(robot);
@@ -91,7 +91,7 @@ fn a_disk_without_room_for_the_result_is_told_before_the_start_and_names_the_fil
         let run = ["run", "open-room", "--robot", robot, "--out", out];
         assert_eq!(refused(&run, "disk-full", &["summary.json"]), Some(1));
         disk.empty();
-        // Room for the summary, and not for the other files of a run.
+        // The disk has room for the summary, and not for the other files of a run.
         assert_eq!(refused(&run, "disk-full", &[out, "KiB"]), Some(1));
         assert_eq!(fs::read_dir(out).unwrap().filter(is_summary).count(), 0);
         assert_nothing_left(robot);
@@ -159,7 +159,7 @@ fn a_robot_that_is_off_leaves_no_directory_start_by_start() {
     let runs = directory_of("mach-off");
     for _ in 0..2 {
         let mut run = firsthand(&["run", "open-room", "--robot", "mach-off", "--runs"]);
-        // Nobody answers there.
+        // Nobody answers at this address.
         let address = ["--set", "robot.address='127.0.0.1:9'"];
         let mut run = start_quietly(run.arg(runs.path()).args(address));
         support::wait_for_status("mach-off", all_run);
@@ -172,7 +172,7 @@ fn a_robot_that_is_off_leaves_no_directory_start_by_start() {
 
 #[test]
 fn the_robot_of_another_user_is_named_and_not_said_to_be_missing() {
-    // Named as this user's would be, except for the user's number.
+    // The file has the name of this user's bus, except for the user's number.
     let bus = Path::new("/dev/shm/fh54321_mach-whose_bus");
     fs::create_dir_all(bus).unwrap();
     let status = output(&["status", "--robot", "mach-whose"]);
@@ -224,7 +224,7 @@ fn descriptors(process: u32) -> usize {
 fn a_stage_inherits_no_descriptor_of_its_supervisor() {
     let mut run = Run::start("mach-fds", "open-room", &SLOW);
     run.wait_until_under_way(0.3);
-    // A stage that was started when its supervisor had everything open.
+    // The stage was started when its supervisor had everything open.
     let status = run.kill_and_await_successor("planner", Signal::KILL);
     let (own, supervisors) = (descriptors(pid(&status, "planner")), descriptors(run.pid()));
     // A stage has 61 descriptors of its own and its supervisor some 200, of which a stage would inherit 86.
@@ -254,7 +254,7 @@ fn a_checkpoint_of_another_version_is_refused_by_name_and_not_taken_for_none() {
 
 #[test]
 fn a_run_is_not_resumed_after_the_machine_was_suspended_for_hours() {
-    // A clock that went on for two hours while CLOCK_MONOTONIC stood, as over a suspension.
+    // The clock went on for two hours while CLOCK_MONOTONIC stood, as over a suspension.
     let suspended = [
         "unshare",
         "--user",
@@ -286,7 +286,7 @@ fn a_run_is_not_resumed_after_the_machine_was_suspended_for_hours() {
     let late = run(&suspended).status().unwrap();
     assert_eq!(late.code(), Some(7));
     support::wait_until_all_ended(robot);
-    // The next run removes what the killed one left.
+    // The next run removes the files of the killed one.
     Run::start(robot, "open-room", &[]).arrives();
 }
 
@@ -320,7 +320,7 @@ fn a_supervisor_waits_for_one_that_was_killed_a_moment_ago() {
     let out = runs.path().join("run");
     let mut run = firsthand(&["run", "open-room", "--robot", "mach-gone", "--out"]);
     let mut run = start_quietly(run.arg(&out));
-    // It logs before it locks, and asks again for a second.
+    // The supervisor logs before it locks, and tries again for a second.
     support::wait_until("it logs", || out.join("supervisor.log").exists());
     thread::sleep(Duration::from_millis(100));
     drop(held);
@@ -331,7 +331,7 @@ fn a_supervisor_waits_for_one_that_was_killed_a_moment_ago() {
 #[test]
 fn a_latency_measurement_removes_no_directory_but_its_own() {
     let user = rustix::process::geteuid().as_raw();
-    // Another robot of this user, whose directory is below the one that was removed.
+    // This is another robot of this user, whose directory is below the removed one.
     let mut run = Run::start("mach-lat", "open-room", &SLOW);
     run.wait_until_under_way(0.3);
     support::printed(&["bench", "tick", "--robot", support::suite(), "--rounds", "1", "--json"]);

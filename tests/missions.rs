@@ -1,10 +1,10 @@
-//! Whole missions through real processes.
+//! Tests of whole missions through real processes.
 
 use serde_json::Value;
 
 use crate::support::{self, Run, assert_ended, assert_nothing_left, printed, run};
 
-/// The robot reaches its target and touches nothing.
+/// Assert that the robot reaches its target and touches nothing.
 #[track_caller]
 fn arrives_untouched(robot: &str, mission: &str, arguments: &[&str]) -> Value {
     println!("{arguments:?}");
@@ -13,13 +13,13 @@ fn arrives_untouched(robot: &str, mission: &str, arguments: &[&str]) -> Value {
     summary
 }
 
-/// Its way, in lengths of the straight line.
+/// The length of the robot's way, in lengths of the straight line.
 fn detour(summary: &Value) -> f64 {
     let metres = |key: &str| summary[key].as_f64().unwrap();
     metres("path_length_m") / metres("straight_m")
 }
 
-/// A whole run that must end with that exit code and outcome.
+/// Assert that a whole run ends with that exit code and outcome.
 #[track_caller]
 fn ends(robot: &str, mission: &str, arguments: &[&str], code: i32, outcome: &str) -> Value {
     let (found, summary) = run(robot, mission, arguments);
@@ -40,7 +40,7 @@ fn the_default_mission_reaches_its_target_untouched_for_seeds_1_to_10() {
 
 #[test]
 fn by_the_papers_method_it_does_for_seeds_1_to_8() {
-    // The way is twice as long, so by wheels like measured ones the arrival would be unsure. Those of the laboratory are better.
+    // The way is twice as long, so with measured wheels the arrival would be unsure. Those of the laboratory are better.
     let wheels =
         ["--set", "robot.odometry.diameter_ratio_sd=0", "--set", "robot.odometry.slip=0.001"];
     for seed in 1..=8 {
@@ -63,7 +63,7 @@ fn wheels_and_sonar_as_measured_under_a_fading_radio_touch_nothing() {
         let arguments = [&MEASURED[..], &fading, &["--seed", &seed]].concat();
         let (_, summary) = run("faded", "obstacle-course", &arguments);
         let outcome = summary["outcome"].as_str().unwrap();
-        // Measured wheels drift: where the target is taken to be is not what this is about.
+        // Measured wheels drift, and this test is not about the place where the robot takes the target to be.
         let arrived = ["reached", "reached_unsure", "wrong_place"].contains(&outcome);
         assert!(arrived, "{arguments:?}: {summary}");
         assert_eq!(summary["collisions"], 0, "{arguments:?}");
@@ -126,7 +126,7 @@ fn a_car_crosses_the_course_untouched_for_seeds_1_to_5() {
 
 #[test]
 fn a_car_that_faces_a_wall_too_near_to_turn_ends_with_its_turning_radius() {
-    // A pocket open behind: a robot that turns on the spot leaves it.
+    // The pocket is open behind, and a robot that turns on the spot leaves it.
     let wall = "world.wall=[{points=[[0.5,0.6],[0.5,-0.6]]},{points=[[0.5,0.6],[-0.3,0.6]]},\
                 {points=[[0.5,-0.6],[-0.3,-0.6]]}]";
     let arguments = ["--set", wall, "--timeout", "600"];
@@ -183,7 +183,7 @@ fn a_mission_that_takes_too_long_ends_in_time() {
 
 #[test]
 fn a_touch_ends_the_mission_as_a_collision() {
-    // Blind: hits beyond 5 cm are not mapped.
+    // The robot is blind, because hits beyond 5 cm are not mapped.
     let blind = [&PAPER[..], &["--set", "mapper.map_within_m=0.05"]].concat();
     let summary = ends("blind", "obstacle-course", &blind, 5, "collision");
     assert!(summary["collisions"].as_u64() > Some(0));
@@ -194,7 +194,7 @@ fn every_run_leaves_a_picture_a_summary_and_logs() {
     let (summary, directory) = Run::start("picture", "open-room", &[]).arrives_in();
     let directory = directory.path().join("run");
     let picture = std::fs::read_to_string(directory.join("picture.svg")).unwrap();
-    // It is parsed for that.
+    // The conversion parses the picture.
     picture::png(&picture).unwrap();
     let written = support::records(&directory.join("summary.json"));
     assert_eq!(written, [summary]);

@@ -1,4 +1,5 @@
-//! Other processes and users beside a robot: they neither drive it nor keep it from starting, and what they break ends.
+//! Tests of other processes and users beside a robot: they neither drive it nor keep it from starting, and the processes that they
+//! break end.
 
 use std::{
     fs,
@@ -170,7 +171,7 @@ fn another_user_who_waits_for_the_files_of_a_new_bus_opens_none() {
 /// tried, and how many opened.
 fn race(prefix: &str, over: &AtomicBool) -> (usize, usize) {
     let nobody = Uid::from_raw(65534);
-    // The user of this thread alone.
+    // This sets the user of this thread alone.
     set_thread_res_uid(nobody, nobody, nobody).unwrap();
     let watched = inotify::init(inotify::CreateFlags::NONBLOCK).unwrap();
     let events = inotify::WatchFlags::CREATE | inotify::WatchFlags::ATTRIB;
@@ -336,7 +337,7 @@ fn files_of_the_bus_truncated_or_removed_in_a_run_leave_sigterm_its_three_second
         if remove {
             fs::remove_dir_all(root).unwrap();
         }
-        // A stage that has to join meets them.
+        // A stage that has to join finds these files.
         signal_process(pid(&status, "mapper"), Signal::KILL);
         std::thread::park_timeout(Duration::from_millis(500));
         if Path::new(&format!("/proc/{supervisor}")).exists() {
@@ -347,7 +348,7 @@ fn files_of_the_bus_truncated_or_removed_in_a_run_leave_sigterm_its_three_second
         let took = began.elapsed();
         println!("{robot}: ended {took:?} after SIGTERM");
         assert!(took < Duration::from_secs(4), "{robot}: {took:?}");
-        // The next start is as any other.
+        // The next start is a normal one.
         Run::start(robot, "open-room", &[]).arrives();
     }
 }

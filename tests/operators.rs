@@ -1,10 +1,10 @@
-//! An operator's actions on a robot that runs: stop and resume, kill, hold and release.
+//! Tests of an operator's actions on a robot that runs: stop and resume, kill, hold and release.
 
 use common::clock::monotonic_ns;
 
 use crate::support::{Run, find, operate, refused};
 
-/// Mission time runs so many times as fast as the wall's.
+/// Mission time runs this many times as fast as the wall clock.
 const PACE: [&str; 2] = ["--pace", "4"];
 
 #[test]
@@ -14,7 +14,7 @@ fn a_robot_told_to_stop_stands_until_it_is_told_to_go_on() {
     operate("halt", &["stop"]);
     let stopped =
         run.wait_until("it is stopped", |status| status["order"] == "stopped by an operator");
-    // Its ticks go on: it may be carried.
+    // The ticks of a stopped robot go on, because it may be carried.
     let tick = stopped["tick"].as_u64().unwrap();
     let later = run.wait_until("some ticks have passed", |status| {
         status["tick"].as_u64().unwrap() > tick + 10

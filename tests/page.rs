@@ -1,4 +1,4 @@
-//! The page, in a headless browser.
+//! Tests of the page in a headless browser.
 
 use std::{
     io::{BufRead as _, BufReader},
@@ -41,7 +41,7 @@ impl Page {
         Self { child, watch, drive }
     }
 
-    /// Where it listens.
+    /// The address on which the page listens.
     fn listen(&self) -> &str {
         self.watch.strip_prefix("http://").unwrap().split('/').next().unwrap()
     }
@@ -92,7 +92,7 @@ fn says(id: &str, text: &str) -> String {
     format!("document.getElementById('{id}').textContent.includes('{text}')")
 }
 
-/// Watch a live run in a window of that width, and do what an operator does.
+/// Watch a live run in a window of that width, and act as an operator.
 fn operate(robot: &str, width: u32) {
     let page = Page::start(robot, "127.0.0.1:0");
     let browser = Browser::open(width);
@@ -128,7 +128,7 @@ fn operate(robot: &str, width: u32) {
     browser.tap("resume", 0, 0);
     browser.wait_until(GOES);
 
-    // Scrub back, and follow again.
+    // The browser scrubs back, and follows again.
     browser.run("const time = document.getElementById('time'); time.value = time.min; time.dispatchEvent(new Event('input'))");
     browser.wait_until("document.getElementById('live').getAttribute('aria-pressed') === 'false'");
     browser.tap("live", 0, 0);
@@ -142,7 +142,7 @@ fn operate(robot: &str, width: u32) {
     let listen = page.listen().to_owned();
     page.end(Signal::KILL);
     browser.wait_until(IS_LOST);
-    // The next page has other tokens: who could drive watches now.
+    // The next page has other tokens, so a browser that could drive only watches now.
     let page = Page::start(robot, &listen);
     browser.wait_until(IS_THERE);
     browser.wait_until("!document.body.classList.contains('drive')");

@@ -1,4 +1,4 @@
-//! Planners that are executables of their own: a mission names them, and they are treated as every stage.
+//! Tests of planners that are executables of their own: a mission names them, and they are treated like every stage.
 
 use std::{fs, os::unix::fs::PermissionsExt as _, path::Path, process::Stdio};
 

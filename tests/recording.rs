@@ -1,4 +1,4 @@
-//! Runs recorded through real processes, opened, replayed to the bit; recorders killed.
+//! Tests of runs that real processes record, and that are opened and replayed to the bit; and of killed recorders.
 
 use std::{
     fs,
@@ -26,7 +26,8 @@ fn replayed(recording: &Recording) -> Report {
     replay(recording, &Options::default()).unwrap()
 }
 
-/// Every generation of every stage is bit-equal, or ended before it took anything; the number of those that took something.
+/// Assert that every generation of every stage is bit-equal, or ended before it took anything. Returns the number of the
+/// others.
 fn assert_all_equal(report: &Report) -> u64 {
     assert_eq!(report.difference, None, "{report}");
     assert_eq!(report.not_replayed(), 0, "{report}");
@@ -81,7 +82,7 @@ fn on_a_wall_clock_a_tick_is_answered_again_when_its_map_is_solved() {
     assert_all_equal(&replayed(&recording));
 }
 
-/// Kill a recorder of `robot` that has written for so many answers of `status`; its file.
+/// Kill a recorder of `robot` that has written for `answers` answers of `status`. Returns its file.
 fn killed_recorder(run: &mut Run, file: PathBuf, answers: usize) -> PathBuf {
     let mut recorder = firsthand(&["record", "--robot", &run.robot, "--out"])
         .arg(&file)
@@ -117,7 +118,7 @@ fn recorders_killed_leave_readable_files_that_say_so_and_the_mission_as_it_was()
         let file = killed_recorder(&mut run, file, shot * 2);
         let recording = Recording::open(&file).unwrap();
         if recording.end == End::Complete {
-            // The mission ended before: the machine is very loaded.
+            // The mission ended before, because the machine is very loaded.
             break;
         }
         cut += 1;
@@ -133,7 +134,7 @@ fn recorders_killed_leave_readable_files_that_say_so_and_the_mission_as_it_was()
     assert_eq!((code, &summary["outcome"]), (Some(0), &"reached".into()), "{summary}");
     let restarts = summary["restarts"].as_object().unwrap();
     assert!(restarts.values().all(|times| times == 0), "{summary}");
-    // The run's own recorder was not touched by that.
+    // The run's own recorder was not affected.
     assert_eq!(assert_all_equal(&replayed(&open(directory.path()))), 5);
     assert_nothing_left("rec-shot");
 }
@@ -151,7 +152,7 @@ fn a_disk_budget_ends_files_at_a_quarter_of_it_removes_the_oldest_and_each_can_b
     let size = |file: &PathBuf| fs::metadata(file).unwrap().len();
     let total: u64 = files.iter().map(size).sum();
     assert!(!run.join("recording.mcap").exists(), "{files:?}");
-    // A file has its share by a chunk more.
+    // A file exceeds its share by at most a chunk.
     assert!(total < 2_100_000, "{total} in {files:?}");
     for file in &files {
         let recording = Recording::open(file).unwrap();

@@ -1,4 +1,4 @@
-//! A run in lockstep is the same each time, whatever the machine does meanwhile.
+//! Tests that a run in lockstep is the same each time, whatever the machine does meanwhile.
 
 use std::{collections::BTreeMap, fmt::Debug, time::Duration};
 
@@ -13,7 +13,7 @@ use serde_json::Value;
 
 use crate::support::{self, Run, assert_nothing_left, in_own_process};
 
-/// The summary without what is measured on the wall's clock.
+/// The summary without the values that are measured on the wall clock.
 fn numbers(mut summary: Value) -> Value {
     for wall_clock in ["tick_latency_us", "full_solve_us"] {
         summary.as_object_mut().unwrap().remove(wall_clock);
@@ -26,9 +26,9 @@ fn numbers(mut summary: Value) -> Value {
 struct Recording {
     /// Each sample, by topic and tick.
     samples: BTreeMap<(&'static str, u64), String>,
-    /// The cells of each version of the grid that was put together. A reader that was late has missed some.
+    /// The cells of each version of the grid that was put together. A late reader has missed some.
     grids: BTreeMap<u64, Vec<u8>>,
-    /// The version of the grid by which the last guidance leads.
+    /// The version of the grid from which the last guidance was computed.
     last_grid: u64,
     summary: Value,
 }
@@ -48,7 +48,7 @@ impl Recording {
         self.samples.insert(("ranges", tick), format!("{readings:?}"));
     }
 
-    /// Whether a sample of each of so many topics was received for each tick, and the grid to the last.
+    /// Whether a sample of each of `topics` topics was received for each tick, and the grid to the last.
     fn is_whole(&self, topics: usize) -> bool {
         let ticks = self.summary["ticks"].as_u64().unwrap();
         self.samples.len() as u64 == topics as u64 * ticks
@@ -82,7 +82,7 @@ fn record(robot: &str) -> Recording {
     };
     let mut grid = Replica::default();
     loop {
-        // Asked first: what was published until then is received below.
+        // This is asked first, so that all samples published until then are received below.
         let over = !run.is_running();
         while let Ok(Some(part)) = grids.take() {
             grid.apply(&part.header().part, &part);
@@ -101,7 +101,7 @@ fn record(robot: &str) -> Recording {
             received.add("pose", sample);
         }
         while let Ok(Some(mut sample)) = guidances.take() {
-            // Measured on the wall's clock.
+            // This value is measured on the wall clock.
             sample.full_solve_ns = 0;
             received.last_grid = sample.grid_version;
             received.add("guidance", sample);
@@ -122,7 +122,7 @@ fn record(robot: &str) -> Recording {
 #[test]
 fn the_same_seed_gives_the_same_samples_and_grids_to_the_bit() {
     in_own_process(|| {
-        // A consumer that the machine did not let run in time has lost some.
+        // A consumer that the machine did not schedule in time has lost some samples.
         let whole = || {
             let mut records = (0..20).map(|_| record("recorded"));
             records.find(|recording| recording.is_whole(5)).expect("a recording without a gap")
@@ -150,7 +150,7 @@ fn the_same_seed_gives_the_same_samples_and_grids_to_the_bit() {
 
 #[test]
 fn a_mission_that_ends_by_a_touch_or_its_timeout_gives_the_same_summary_to_the_bit() {
-    // Blind: hits beyond 5 cm are not mapped.
+    // The robot is blind, because hits beyond 5 cm are not mapped.
     let blind = ["--set", "method='paper'", "--set", "mapper.map_within_m=0.05"];
     for (outcome, arguments) in [("collision", &blind[..]), ("timeout", &["--timeout", "5"])] {
         let summary = || numbers(support::run("again", "obstacle-course", arguments).1);
@@ -168,7 +168,7 @@ fn a_mission_whose_robot_stalls_gives_the_same_summary_to_the_bit() {
     let closed = [
         "--set",
         "world.wall=[{points=[[1.5,-2],[1.5,2],[-1.5,2],[-1.5,-2],[1.5,-2]]}]",
-        // Long enough to find all four walls.
+        // The mission is long enough to find all four walls.
         "--timeout",
         "300",
     ];

@@ -1,4 +1,4 @@
-//! A consumer that joined before the bus was recreated can tell, joins again, and does no harm when it leaves.
+//! Tests that a consumer that joined before the bus was recreated can tell, joins again, and does no harm when it leaves.
 
 use std::time::{Duration, Instant};
 
@@ -11,7 +11,7 @@ use rustix::process::Signal;
 
 const ROBOT: &str = "recreated";
 
-/// The next pose on `bus`, received like the guide's consumer does.
+/// The next pose on `bus`, received in the way of the guide's consumer.
 fn next_pose(bus: &Bus) -> PoseSample {
     let mut poses = bus.reader(&topics::POSE).unwrap();
     let mut waiter = Waiter::default();
@@ -58,7 +58,7 @@ fn a_consumer_of_a_bus_that_was_replaced_joins_again_and_leaves_the_old_one_with
         assert!(!new.is_replaced());
         assert!(next_pose(&new).stamp.tick > heard.stamp.tick);
 
-        // The last to leave it: all others use the new one.
+        // This consumer is the last to leave the old bus, because all others use the new one.
         drop((old_poses, old));
         let before = run.wait_until("all work", |status| status["order"] == "driving");
         let after = run.kill_and_await_successor("dead-reckoning", Signal::KILL);

@@ -1,4 +1,4 @@
-//! Reports of runs through real processes.
+//! Tests of reports of runs through real processes.
 
 use std::fs;
 
@@ -60,7 +60,7 @@ fn a_run_that_was_not_recorded_has_no_report_and_the_command_says_why() {
 fn a_report_that_cannot_be_written_does_not_end_the_mission() {
     let mut run = Run::start("report-full", "open-room", &["--pace", "4"]);
     run.wait_until_under_way(0.2);
-    // A file where the directory goes.
+    // A file stands in the place of the directory.
     fs::write(run.directory().join("report"), "").unwrap();
     let (code, summary, _directory) = run.finish_in();
     assert_eq!((code, &summary["outcome"]), (Some(0), &"reached".into()), "{summary}");

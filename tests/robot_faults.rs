@@ -1,4 +1,5 @@
-//! Robots with a fault that their link has to notice, through real processes (`firsthand bench chaos --robot-faults`).
+//! Tests of robots with a fault that their link has to notice, through real processes (`firsthand bench chaos
+//! --robot-faults`).
 
 use serde_json::Value;
 
@@ -35,7 +36,7 @@ fn a_robot_that_rests_has_a_reason_although_a_killed_mission_left_its_bus() {
 
 #[test]
 fn a_robot_that_does_not_stop_is_told_as_long_as_it_moves() {
-    // Whether it is brought to rest or not, the exit code and the table agree.
+    // The exit code and the table agree whether the robot is brought to rest or not.
     let (code, entry) = stop_time("rf-moves", "does-not-stop");
     let in_time = entry["rest_s"].as_f64().unwrap() <= 2.0;
     assert_eq!(code, Some(if in_time { 0 } else { 8 }), "{entry}");

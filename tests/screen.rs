@@ -1,4 +1,4 @@
-//! `firsthand top`, on a pseudo-terminal.
+//! Tests of `firsthand top` on a pseudo-terminal.
 
 use std::{
     fs::File,
@@ -48,7 +48,7 @@ fn shown(written: &[u8]) -> String {
             numbers.push(*letter);
             letter.is_ascii_alphabetic()
         });
-        // A movement; the others are colours and modes.
+        // This sequence moves the cursor; the others are colours and modes.
         if end == Some('H')
             && let Some((line, column)) = numbers.trim_end_matches('H').split_once(';')
         {
@@ -91,7 +91,8 @@ impl Screen {
         }
     }
 
-    /// Read some of what is written; whether there was any. A terminal that nobody has open any more gives an error.
+    /// Read some of the written bytes. Returns whether there were any. A terminal that nobody has open any more gives an
+    /// error.
     fn read(&mut self) -> bool {
         let mut some = [0; 4096];
         let Some(Ok(read)) = self.terminal.as_mut().map(|it| it.read(&mut some)) else {
@@ -106,7 +107,7 @@ impl Screen {
         terminal.write_all(keys.as_bytes()).unwrap();
     }
 
-    /// The exit code, once it has ended, and all that it wrote.
+    /// The exit code, once the command has ended, and all that it wrote.
     fn end(&mut self) -> (Option<i32>, String) {
         while self.read() {}
         let code = self.child.wait().unwrap().code();
@@ -132,7 +133,7 @@ fn the_keys_of_top_do_what_they_say_and_the_mission_arrives() {
     screen.wait_for("dead-reckoning");
     screen.wait_for("perimeter");
     run.wait_until_under_way(1.0);
-    // The planner is the fourth.
+    // The planner is the fourth stage.
     screen.press("\x1b[B\x1b[B\x1b[Bk");
     screen.wait_for("kill planner: done");
     run.wait_until("it is replaced", |status| {
@@ -158,7 +159,7 @@ fn the_keys_of_top_do_what_they_say_and_the_mission_arrives() {
     screen.press("q");
     let (code, written) = screen.end();
     assert_eq!(code, Some(0), "{written:?}");
-    // Back to the first screen, cursor and all.
+    // The terminal is restored to its first screen and cursor.
     for restored in ["\x1b[?1049l", "\x1b[?25h"] {
         assert!(written.contains(restored), "{written:?}");
     }

@@ -1,4 +1,4 @@
-//! Runs under a service manager, whose part these tests play.
+//! Tests of runs under a service manager, which the tests replace.
 
 use std::{
     os::unix::{fs::MetadataExt, net::UnixDatagram},
@@ -46,7 +46,7 @@ impl Manager {
             .env("WATCHDOG_USEC", WATCHDOG.as_micros().to_string());
     }
 
-    /// The lines of what is said next.
+    /// The lines of the next message.
     fn hear(&self) -> Vec<String> {
         let mut message = [0; 4096];
         let length = self.socket.recv(&mut message).unwrap();
@@ -54,7 +54,7 @@ impl Manager {
         text.lines().map(str::to_owned).collect()
     }
 
-    /// Everything up to the message with `line`.
+    /// All lines up to the message with `line`.
     fn hear_until(&self, line: &str) -> Vec<String> {
         let began = Instant::now();
         let mut heard = Vec::new();
@@ -85,7 +85,7 @@ fn systemd_hears_ready_a_status_the_watchdog_at_half_its_time_and_stopping() {
     manager.adopt(&mut command);
     let mut run = command.spawn().unwrap();
     manager.hear_until("READY=1");
-    // A loop that is late by a whole half would be killed; so much is left of what is allowed.
+    // A loop that is late by half of the time limit would be killed, so that much must be left.
     let mut fed = Instant::now();
     for _ in 0..3 {
         manager.hear_until("WATCHDOG=1");
@@ -124,14 +124,14 @@ fn a_frozen_supervisor_does_not_feed_the_watchdog() {
     let mut run = command.spawn().unwrap();
     manager.hear_until("READY=1");
     signal_process(run.id(), Signal::STOP);
-    // These messages were sent before it froze.
+    // These messages were sent before the supervisor froze.
     manager.socket.set_nonblocking(true).unwrap();
     let mut message = [0; 4096];
     while manager.socket.recv(&mut message).is_ok() {}
     manager.socket.set_nonblocking(false).unwrap();
     manager.socket.set_read_timeout(Some(WATCHDOG)).unwrap();
     assert!(manager.socket.recv(&mut message).is_err(), "it speaks");
-    // Systemd would do so; then the stages end, too, and nothing hinders the next run.
+    // Systemd would kill it; then the stages end, too, and nothing hinders the next run.
     signal_process(run.id(), Signal::KILL);
     run.wait().unwrap();
     Run::start("hang", "open-room", &[]).arrives();
@@ -175,7 +175,7 @@ fn in_a_journal_a_stages_death_has_its_priority() {
 struct Units {
     keepers: Vec<(&'static str, JoinHandle<Option<i32>>)>,
     over: Arc<AtomicBool>,
-    // They log to files there.
+    // The directory of the stages' logs.
     directory: TempDir,
 }
 
@@ -191,7 +191,7 @@ impl Units {
         Self { keepers: support::STAGES.map(keep).into(), over, directory }
     }
 
-    /// Wait until all have ended of themselves, each in order.
+    /// Wait until all stages have ended by themselves, each in order.
     fn assert_all_leave(&mut self) {
         self.over.store(true, Ordering::Relaxed);
         for (stage, keeper) in std::mem::take(&mut self.keepers) {
@@ -219,7 +219,7 @@ fn keep_up(robot: &str, stage: &str, log: &Path, over: &AtomicBool) -> Option<i3
 }
 
 impl Drop for Units {
-    /// The stages end with their supervisor; then they are let go. A test that fails shows what they logged.
+    /// The destructor waits for the stages to end with their supervisor. A test that fails shows their logs.
     fn drop(&mut self) {
         self.over.store(true, Ordering::Relaxed);
         for stage in support::STAGES.iter().filter(|_| thread::panicking()) {
@@ -345,7 +345,7 @@ fn a_stage_without_a_place_is_refused_with_the_remedy() {
     drop(units);
 }
 
-/// A service with `--resume-last`, killed when its robot drives; what starts it again.
+/// A service with `--resume-last`, killed when its robot drives. Returns the command that starts it again, too.
 fn killed_service(robot: &'static str) -> (TempDir, impl Fn() -> Command) {
     let directory = support::directory_of(robot);
     let runs = directory.path().to_path_buf();

@@ -1,5 +1,5 @@
-//! A robot stands whatever happens to the processes that drive it. The robots are processes of their own, and ignore the time
-//! limit of commands: without a stop they go on for ever.
+//! Tests that a robot stands whatever happens to the processes that drive it. The robots are processes of their own, and
+//! ignore the time limit of commands: without a stop they go on for ever.
 
 use std::{fs, path::PathBuf, time::Instant};
 
@@ -64,12 +64,12 @@ fn stands_after_kills(transport: &str) {
     signal_process(pid(&status, "link"), Signal::KILL);
     robot.wait_until_at_rest();
 
-    // With its parent each stage ends, the link too.
+    // Each stage ends with its parent, and so does the link.
     let (_directory, mut robot, mut run) = under_way(&format!("ss-{transport}"), transport);
     run.kill();
     robot.wait_until_at_rest();
 
-    // As systemd does with a unit: every process at once, and then ExecStopPost.
+    // This is what systemd does with a unit: it ends every process at once, and then runs ExecStopPost.
     let (_directory, mut robot, mut run) = under_way(&format!("sa-{transport}"), transport);
     let status = run.status().unwrap();
     let mut all = guards(&run);
@@ -100,7 +100,7 @@ fn a_robot_on_a_serial_line_stands_after_kills_of_its_link_its_supervisor_or_all
     stands_after_kills("pty");
 }
 
-/// Passes on what the host sends, without the commands that `ignored` names.
+/// Passes on the bytes of the host, without the commands that `ignored` names.
 fn without(ignored: fn(&Command) -> bool) -> Box<Pass> {
     let mut decoder = Decoder::default();
     Box::new(move |bytes| {

@@ -1,5 +1,5 @@
-//! The rules of the tree that the compiler does not check: no circle of `use` between the files of a crate, and who
-//! may depend on whom.
+//! The rules of the tree that the compiler does not check: no circle of `use` between the files of a crate, and the
+//! permitted dependencies between crates.
 
 mod modules;
 
@@ -34,7 +34,7 @@ fn files(folder: &Path, end: &str) -> Vec<PathBuf> {
     found
 }
 
-/// The manifests of all crates, without what needs another compiler.
+/// The manifests of all crates, except those that need another compiler.
 fn manifests() -> Vec<PathBuf> {
     let folders = ["common", "services", "supervisor", "tests"];
     let all = folders.iter().flat_map(|folder| files(&root().join(folder), "/Cargo.toml"));
@@ -91,7 +91,7 @@ fn a_circle_is_found_however_it_is_written_and_only_where_there_is_one() {
         "pub struct B; fn f() { let _ = crate::a::A::default(); }",
         "pub struct B; use super::a; fn f(_: &a::A) {}",
         "pub struct B; use super::a::*; fn f(_: &A) {}",
-        // Past what is imported again elsewhere.
+        // The circle passes a module that imports the item again.
         "pub struct B; use crate::A;",
         "pub struct B; mod inner { use super::super::a::A; }",
         "pub struct B; const C: char = '\\''; const Q: &str = \"//\"; use crate::a::A;",
@@ -112,7 +112,7 @@ fn a_circle_is_found_however_it_is_written_and_only_where_there_is_one() {
     for b in straight {
         assert_eq!(circles(a, b), 0, "{b}");
     }
-    // A parent that re-exports what its child defines, while the child needs the parent; and through a third file.
+    // A parent re-exports an item of its child, and the child needs the parent, directly or through a third file.
     let lib = ("lib.rs", "pub mod a;");
     let child = ("a/b.rs", "use super::Base; pub struct B(Base);");
     assert_eq!(circles_of(&[lib, ("a.rs", "mod b; pub use b::B; pub struct Base;"), child]), 1);
@@ -151,7 +151,7 @@ fn no_stage_knows_another_nor_the_supervisor() {
         .collect();
     for stage in &stages {
         for name in dependencies(&services.join(stage).join("Cargo.toml")) {
-            // The link has its drivers.
+            // The link may depend on its drivers.
             let driver = stage == "link" && name.ends_with("-driver");
             let foreign = stages.contains(&name) && !driver
                 || ["supervisor", "firsthand", "bench", "picture", "evaluation"].contains(&&*name);

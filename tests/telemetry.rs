@@ -1,4 +1,5 @@
-//! Infrared ranges, power and surroundings, which the robot measures besides wheels and front sonar, reach a consumer.
+//! Tests that infrared ranges, power and surroundings, which the robot measures besides wheels and front sonar, reach a
+//! consumer.
 
 use std::time::Instant;
 

@@ -1,11 +1,11 @@
-//! Missions over every wire, by robots that are not the run's own children: they come and go by themselves.
+//! Tests of missions over every wire, by robots that are not the run's own children: they come and go by themselves.
 
 use std::path::{Path, PathBuf};
 
 use crate::support::{Run, assert_nothing_left, assert_reached, wire::Robot};
 use tempfile::TempDir;
 
-/// A few seconds straight ahead.
+/// The way of a few seconds straight ahead, metres.
 const TARGET_M: f64 = 0.6;
 const TOLERANCE_M: f64 = 0.1;
 
@@ -80,7 +80,7 @@ fn goes_away_and_comes_back(transport: &str) {
     });
     assert_eq!(back["link"]["losses"], 1, "{back}");
     let (code, summary) = run.finish();
-    // Nobody knows how far its wheels rolled while it was away: the longer that took, the less sure the pose is.
+    // Nobody knows how far its wheels rolled while the robot was away: the longer that took, the less sure the pose is.
     let outcome = summary["outcome"].as_str().unwrap();
     assert!(
         [("reached", Some(0)), ("reached_unsure", Some(11))].contains(&(outcome, code)),

@@ -1,5 +1,5 @@
-//! Robots whose frames cannot be true, or do not come: every datagram between link and simulated robot passes through a
-//! fault injector here.
+//! Tests of robots whose frames cannot be true, or do not come: every datagram between link and simulated robot passes
+//! through a fault injector here.
 
 use std::{
     fs,
@@ -22,13 +22,13 @@ const BOUND: Duration = Duration::from_millis(1500);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fault {
     None,
-    /// Every motor frame the same.
+    /// Every motor frame is the same.
     SameFrame,
     /// The right encoder stays at 0.
     DeadEncoder,
     /// The counts of both wheels have the wrong sign.
     Reversed,
-    /// Other counts in every frame.
+    /// Every frame has other counts.
     Random,
     /// The counts of both wheels go on elsewhere.
     Elsewhere,
@@ -40,18 +40,18 @@ enum Fault {
     DeafSonar,
     /// An infrared ranger that looks into the front sonar's cone says 0, which is not valid.
     DeadRanger,
-    /// Velocity 0 does not reach the robot, nor does the time limit of commands.
+    /// Neither velocity 0 nor the time limit of commands reaches the robot.
     IgnoresZero,
 }
 
-/// The state of a fault injector: what it does, and what it has seen.
+/// The state of a fault injector: its fault, and the traffic that it has seen.
 #[derive(Debug)]
 struct Shared {
     fault: Fault,
     frames: u16,
     first_motion: Option<Instant>,
     last_motion: Option<Instant>,
-    /// Whether a command asked for more than a turn on the spot.
+    /// Whether the link asked for streams since they were stopped.
     asked_for_streams: bool,
     /// Commands to send to the robot as if the link had sent them.
     inject: Vec<Command>,
@@ -188,7 +188,7 @@ impl Shared {
                 left.position = frames.wrapping_mul(9973) % 32_768;
                 right.position = frames.wrapping_mul(20_011) % 32_768;
             }
-            // 7 frames a second.
+            // These are the counts at 7 frames a second.
             Fault::RollsOn => right.position = frames.wrapping_mul(80) % 32_768,
         }
     }
@@ -264,10 +264,10 @@ fn a_robot_that_ignores_velocity_0_is_made_to_stand_by_other_means() {
     let (_body, faults, mut run) = faulty("fi-zero", Fault::None);
     faults.wait_until_moving(&mut run, Duration::from_millis(500));
     faults.set(Fault::IgnoresZero);
-    // A command without its time limit has passed.
+    // Commands without their time limit have passed.
     let moved = faults.moved_for();
     faults.wait_until_moving(&mut run, moved + Duration::from_millis(200));
-    // It fails unless the robot rests.
+    // The command fails unless the robot rests.
     operate("fi-zero", &["stop"]);
     assert!(run.link_logged(&["by=\"disable\""]));
     faults.set(Fault::None);
@@ -304,7 +304,7 @@ fn with_one_dead_infrared_ranger_before_a_sonar_the_robot_says_so_and_arrives() 
 fn before_a_wall_that_the_front_sonar_does_not_hear_the_robot_stands_until_it_hears_it() {
     let directory = tempfile::tempdir().unwrap();
     let file = directory.path().join("wall.toml");
-    // It turns so slowly that the wall stays square ahead for seconds.
+    // The robot turns so slowly that the wall stays square ahead for seconds.
     let wall = "target = [-3, 0]\nworld.wall = [{ points = [[0.5, -1], [0.5, 1]] }]\n\
         controller = { look_rad_s = 0.02, turn_rad_s = 0.02 }";
     fs::write(&file, wall).unwrap();

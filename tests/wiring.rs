@@ -1,4 +1,4 @@
-//! The table of stages says what every process opens on the bus: compared with what the bus itself says.
+//! Tests that every process opens on the bus what the table of stages says, by the bus itself.
 
 use std::collections::BTreeSet;
 

@@ -1,4 +1,4 @@
-//! The modules of a crate as its sources say, and which file names items of which.
+//! The modules of a crate by its sources, and the files that name items of each.
 //!
 //! An edge A -> B: code of A outside of tests names an item that B defines, by a `use` or by a path. A name is
 //! followed through re-exports to the file that defines it, else to the module that should have it. Declaring a
@@ -12,7 +12,7 @@ use std::{
 
 type Names = Vec<String>;
 
-/// A module: where it is written, what it defines, imports and names.
+/// A module: its file, and the items that it defines, imports and names.
 #[derive(Default)]
 struct Module {
     file: PathBuf,
@@ -46,7 +46,7 @@ fn reached<'a>(edges: &'a Edges<'_>, from: &'a Path) -> BTreeSet<&'a Path> {
     reached
 }
 
-/// Words, `::` and single characters; comments, strings, characters and lifetimes left out.
+/// Words, `::` and single characters, without comments, strings, characters and lifetimes.
 pub(super) fn tokens(source: &str) -> Names {
     let text: Vec<char> = source.chars().collect();
     let starts =
@@ -122,7 +122,7 @@ fn closing(tokens: &[String], open: usize) -> usize {
     tokens.len() - 1
 }
 
-/// Past the item at `at`, its attributes included.
+/// The index after the item at `at`, its attributes included.
 fn past_item(tokens: &[String], mut at: usize) -> usize {
     while tokens[at] == "#" {
         at = closing(tokens, at + 1) + 1;
@@ -241,7 +241,7 @@ impl Crate {
                     let name = if word(at + 1) == "mut" { at + 2 } else { at + 1 };
                     module.items.insert(word(name).to_owned());
                 }
-                // A macro may define what stands alone at the top of its braces.
+                // The arguments of a macro may define items at the top of its braces.
                 "!" if depth == 0 && word(at + 1) == "{" => {
                     let (mut inner, end) = (at + 2, closing(tokens, at + 1));
                     while inner < end {

@@ -35,7 +35,7 @@ impl Browser {
             .spawn()
             .unwrap();
         let lines = BufReader::new(driver.stdout.take().unwrap()).lines();
-        // "ChromeDriver was started successfully on port N."
+        // The line is "ChromeDriver was started successfully on port N."
         let started = lines.map(Result::unwrap).find(|line| line.contains("successfully"));
         let port = started.unwrap().trim_end_matches('.').rsplit(' ').next().unwrap().parse();
         let mut browser = Self { driver, port: port.unwrap(), session: String::new() };
@@ -53,7 +53,7 @@ impl Browser {
         browser
     }
 
-    /// The value that the driver answers with.
+    /// The value in the driver's answer.
     fn ask(&self, method: &str, path: &str, body: &Value) -> Value {
         let mut stream = TcpStream::connect(("127.0.0.1", self.port)).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
@@ -96,7 +96,7 @@ impl Browser {
         self.ask("POST", &format!("{}/goog/cdp/execute", self.session), &asked)
     }
 
-    /// Each text of the page can be read, in light and in dark colours.
+    /// Assert that each text of the page can be read, in light and in dark colours.
     #[track_caller]
     pub fn assert_legible(&self) {
         for scheme in ["light", "dark"] {

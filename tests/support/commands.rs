@@ -1,4 +1,4 @@
-//! Commands of the real executable, and what they print.
+//! Commands of the real executable, and their output.
 
 use std::process::{Child, Command, ExitStatus, Output, Stdio};
 

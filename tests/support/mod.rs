@@ -1,4 +1,4 @@
-//! The system tests share this: commands of the real executable, runs, and the state of robots.
+//! The shared code of the system tests: commands of the real executable, runs, and the state of robots.
 //!
 //! Every test names its own robots. Each process that a test starts gets SIGKILL when the test ends, however it ends. So a suite
 //! that was killed leaves nothing behind that hinders the next.

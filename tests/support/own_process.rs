@@ -27,7 +27,7 @@ pub fn on_small_disk<T: FnOnce(SmallDisk)>(mebibytes: u32, test: T) {
     on_small_file_system(directory.path(), mebibytes, test);
 }
 
-/// [`on_small_disk`] with so little shared memory.
+/// [`on_small_disk`] for shared memory of this size.
 pub fn on_small_shared_memory<T: FnOnce(SmallDisk)>(mebibytes: u32, test: T) {
     on_small_file_system(Path::new("/dev/shm"), mebibytes, test);
 }
@@ -62,7 +62,7 @@ impl SmallDisk {
         &self.0
     }
 
-    /// Give back what [`SmallDisk::fill`] used up.
+    /// Free the space that [`SmallDisk::fill`] used up.
     pub fn empty(&self) {
         fs::remove_file(self.0.join("filler")).unwrap();
     }

@@ -21,7 +21,7 @@ use super::commands::output;
 /// Every stage, in the order of the pipeline.
 pub const STAGES: [&str; 5] = ["link", "dead-reckoning", "mapper", "planner", "controller"];
 
-/// A wait that takes so long has failed, because no event that a test waits for takes nearly as long.
+/// The time after which a wait has failed, because no event that a test waits for takes nearly as long.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Call `is_so` until it returns true, for [`PATIENCE`] at most.
@@ -85,13 +85,13 @@ pub fn suite() -> &'static str {
     &SUITE
 }
 
-/// `t` and the process number to the base 36, the last four places of it.
+/// `t` and the last four digits of the process number to the base 36.
 fn suite_of(process: u32) -> String {
     let place = |power| char::from_digit(process / 36_u32.pow(power) % 36, 36).unwrap();
     std::iter::once('t').chain([3, 2, 1, 0].map(place)).collect()
 }
 
-/// Remove what suites left that were killed.
+/// Remove the files of suites that were killed.
 fn remove_ended_suites() {
     let run = processes("").into_iter().map(|(pid, _)| suite_of(pid)).collect::<Vec<_>>();
     let left = |name: &str| {
@@ -155,7 +155,8 @@ pub fn assert_nothing_left(robot: &str) {
     assert!(shared.is_empty(), "left in shared memory: {shared:?}");
     let directory = domain.directory();
     assert!(!directory.exists(), "{} is left", directory.display());
-    // A stop guard ends after its link, when its robot rests or is gone; a recorder whose supervisor was killed writes the rest first.
+    // A stop guard ends after its link, when its robot rests or is gone; a recorder whose supervisor was killed first writes its last
+    // chunk.
     wait_until("no stop guard and no recorder is left", || {
         let lasts =
             |line: &String| line.contains("stop-guard") || line.contains("firsthand record");

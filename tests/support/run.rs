@@ -1,4 +1,4 @@
-//! Runs of missions, and the records they leave.
+//! Runs of missions, and their records.
 
 use std::{
     fs,
@@ -25,7 +25,7 @@ use super::{
 pub struct Run {
     pub robot: String,
     child: Option<Child>,
-    // It is removed when the test ends.
+    // The directory is removed when the test ends.
     directory: TempDir,
 }
 
@@ -183,7 +183,7 @@ impl Run {
     }
 }
 
-/// A test that fails leaves no process behind, because the stages end with their supervisor.
+/// The destructor of a test that fails leaves no process behind, because the stages end with their supervisor.
 impl Drop for Run {
     fn drop(&mut self) {
         if let Some(child) = &mut self.child {

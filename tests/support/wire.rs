@@ -17,13 +17,13 @@ use serde_json::Value;
 
 use super::{PATIENCE, firsthand};
 
-/// A simulated robot, until this is dropped.
+/// A simulated robot, which runs until this value is dropped.
 pub struct Robot {
     process: Child,
     pub listening: String,
     /// The records of ground truth. They are received at once, because the robot waits for a slow reader.
     truth: Receiver<Value>,
-    /// Its last known distance from its start, metres.
+    /// The last known distance of the robot from its start, metres.
     went: f64,
 }
 
@@ -121,7 +121,7 @@ pub struct Proxy {
     threads: Vec<JoinHandle<()>>,
 }
 
-/// Turns the bytes that arrive into the bytes that are passed on.
+/// Converts the bytes that arrive to the bytes that are passed on.
 pub type Pass = dyn FnMut(&[u8]) -> Vec<u8> + Send;
 
 impl Proxy {

@@ -1,5 +1,4 @@
-//! Signals to random stages at random times, and the results of the missions: a test of the supervisor through real
-//! processes.
+//! Signals to random stages at random times, and the results of the missions: a test of the supervisor through real processes.
 //!
 //! Each mission is run twice with one seed: undisturbed, then attacked. It must reach its target without touching
 //! anything, know its pose about as well as the undisturbed one, and leave nothing on the machine.

@@ -1,4 +1,4 @@
-//! Why a bench ended early.
+//! The reasons why a bench ended early.
 
 use std::{io, path::PathBuf, time::Duration};
 
@@ -6,7 +6,7 @@ use common::{bus::BusError, file::FileError, start::StageError};
 use supervisor::{DomainError, simulator::SimulatorError, summary::Summary};
 use thiserror::Error;
 
-/// A trip takes microseconds, the forwarders' start some milliseconds; a sample that takes longer is lost.
+/// The time after which a sample is lost: a trip takes microseconds, the forwarders' start some milliseconds.
 pub(crate) const LOST: Duration = Duration::from_secs(5);
 
 #[derive(Debug, Error)]
@@ -15,7 +15,7 @@ pub enum BenchError {
     Domain(#[from] DomainError),
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// A forwarder or a consumer reports it from its own process.
+    /// A forwarder or a consumer reports the error from its own process.
     #[error(transparent)]
     Stage(#[from] StageError),
     #[error(transparent)]
@@ -42,7 +42,7 @@ pub(crate) fn system(action: &'static str) -> impl FnOnce(io::Error) -> BenchErr
     move |source| BenchError::System { action, source }
 }
 
-/// The summary that `firsthand run --json` printed; `said` is the error otherwise.
+/// The summary that `firsthand run --json` printed; without one `said` is the error.
 pub(crate) fn summary(stdout: &[u8], said: &[u8]) -> Result<Summary, BenchError> {
     serde_json::from_slice(stdout)
         .map_err(|_| BenchError::NoSummary(String::from_utf8_lossy(said).trim().to_owned()))

@@ -27,7 +27,7 @@ pub(crate) fn command_line(process: u32) -> Vec<u8> {
     fs::read(format!("/proc/{process}/cmdline")).unwrap_or_default()
 }
 
-/// The value that `share` of all values do not exceed; none of nothing.
+/// The value that `share` of all values do not exceed; none without values.
 pub(crate) fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
     let mut values: Vec<f64> = values.into_iter().collect();
     values.sort_by(f64::total_cmp);

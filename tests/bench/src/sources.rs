@@ -115,7 +115,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Publish what is measured at the new poses.
+    /// Publish the measurements at the new poses.
     fn take(
         &mut self,
         poses: &mut Reader<PoseSample>,
@@ -210,12 +210,12 @@ impl<'a> Source<'a> {
         Ok(())
     }
 
-    /// Evenly distributed between 0 and 1.
+    /// A number that is evenly distributed between 0 and 1.
     fn even(&mut self) -> f64 {
         (self.chance.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Normally distributed with the deviation 1: the sum of twelve even ones, nearly.
+    /// A number that is nearly normally distributed with the deviation 1: the sum of twelve even ones.
     fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.even()).sum::<f64>() - 6.0
     }

@@ -33,7 +33,7 @@ use crate::chaos::{
 };
 use crate::error::{BenchError, system};
 
-/// The generation of a supervisor's samples. Its successor has a bus of its own.
+/// The generation that stands for the samples of a supervisor, whose successor has a bus of its own.
 const NEWEST: u32 = u32::MAX;
 /// Signals to one stage within the window of the hold rule. A stage that dies more often is held until an operator releases
 /// it, and chaos has no operator. A second signal may follow in the start-up, and each may be counted late.
@@ -47,7 +47,7 @@ pub(crate) struct Attack {
     consumers: Consumers,
     entries: Vec<RosterEntry>,
     supervisor: u32,
-    /// The supervisor was hit. Later samples of it and its stages are no sign of its successor.
+    /// Whether the supervisor was hit. Later samples of it and its stages are no sign of its successor.
     supervisor_hit: bool,
     driving: bool,
     pending: Vec<PendingRecovery>,
@@ -133,7 +133,7 @@ impl Attack {
         Ok(())
     }
 
-    /// The mission is over: end all measurements.
+    /// Note that the mission is over, and end all measurements.
     pub(crate) fn end(
         &mut self,
         series: &mut Series<'_>,
@@ -151,7 +151,7 @@ impl Attack {
         Row::new(self.seed, time_s, stage, kind, generation)
     }
 
-    /// Recordings of the run's recorder that was hit; those of other recorders.
+    /// The recordings of the run's recorder that was hit, and those of other recorders.
     pub(crate) fn hit_recordings(&self) -> (&[PathBuf], Vec<PathBuf>) {
         let consumers = &self.consumers;
         (consumers.hit_recordings(), consumers.other_recordings())
@@ -183,7 +183,7 @@ impl Attack {
         Some(tick.pose_error_m(&pose))
     }
 
-    /// Read new samples: which stages run, beat and publish.
+    /// Read new samples, which show the stages that run, beat and publish.
     fn read(
         &mut self,
         subscriptions: &mut Subscriptions,
@@ -248,7 +248,7 @@ impl Attack {
         }
     }
 
-    /// A sign of work of a generation of `stage`: a ready beat, or a sample of a tick.
+    /// Note a sign of work of a generation of `stage`: a ready beat, or a sample of a tick.
     fn on_sign(&mut self, stage: &str, generation: u32, beat: bool, report: &mut Report) {
         let awaited = |recovery: &PendingRecovery| {
             recovery.stage == stage && generation > recovery.generation

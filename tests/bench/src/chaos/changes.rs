@@ -1,5 +1,6 @@
-//! Targets that change every few seconds while a mission is attacked, as an operator sends them; and whether the run told what
-//! became of each.
+//! Targets that change every few seconds while a mission is attacked, as an operator sends them; and whether the run reported
+//! the
+//! outcome of each.
 
 use std::{
     f64::consts::TAU,
@@ -22,11 +23,11 @@ use supervisor::{
 const MOST_CHANGES: usize = 6;
 /// Wall-clock time from one change to the next, seconds.
 const PAUSE_S: [f64; 2] = [0.8, 3.0];
-/// Targets are no farther from the start, metres.
+/// The greatest distance of a target from the start, metres.
 const WITHIN_M: f64 = 2.5;
-/// What is left free around a target beside the body, metres.
+/// The free ground around a target beside the body, metres.
 const CLEARANCE_M: f64 = 0.45;
-/// As far from a target a robot may be that reached it by the ground truth, metres.
+/// The greatest distance by the ground truth of a robot from a target that it reached, metres.
 const REACHED_WITHIN_M: f64 = 0.5;
 
 /// Results of all missions.
@@ -36,11 +37,11 @@ pub(crate) struct Changes {
     /// Requests that the supervisor confirmed.
     taken: u64,
     refused: u64,
-    /// Requests without an answer: the supervisor was hit.
+    /// Requests without an answer, because the supervisor was hit.
     unanswered: u64,
     reached: u64,
     replaced: u64,
-    /// Targets that were taken and not told of, or not reached.
+    /// Targets that were accepted and not reported, or not reached.
     wrong: Vec<String>,
 }
 
@@ -108,7 +109,7 @@ fn send(robot: &RobotName, mission: &Mission, seed: u64, stopped: &Receiver<()>)
     sent
 }
 
-/// A random place that the robot can stand at, in whole centimetres.
+/// A random place at which the robot can stand, in whole centimetres.
 fn place(mission: &Mission, uniform: &mut impl FnMut() -> f64) -> [f64; 2] {
     let (world, frame) = (mission.obstacles(), mission.grid_frame());
     let clear_m = mission.body().radius_m + CLEARANCE_M;
@@ -127,7 +128,7 @@ fn place(mission: &Mission, uniform: &mut impl FnMut() -> f64) -> [f64; 2] {
 
 impl Changes {
     /// Count the mission `seed` with the changes of `operator`. Returns whether every target was reached in truth or its outcome
-    /// told.
+    /// reported.
     pub(crate) fn add(
         &mut self,
         seed: u64,

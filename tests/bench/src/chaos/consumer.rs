@@ -1,4 +1,4 @@
-//! The consumers that are hit beside the stages, and how each is started.
+//! The consumers that are hit beside the stages, and the command of each.
 
 use std::{
     ffi::OsString,
@@ -106,7 +106,8 @@ impl Consumer {
         }
     }
 
-    /// The command that starts it for `robot`; a recorder writes into `recording`. None for the run's own recorder.
+    /// The command that starts the consumer for `robot`; a recorder writes into `recording`. None for the run's own
+    /// recorder.
     pub(crate) fn command(&self, robot: &RobotName, recording: &Path) -> Option<Command> {
         let own = |arguments: &[&str]| {
             let mut words: Vec<OsString> = vec!["/proc/self/exe".into()];

@@ -17,7 +17,7 @@ use supervisor::process::Process;
 use crate::chaos::{consumer::Consumer, kind::Kind, options::Options, report::Report, terminal};
 use crate::error::{BenchError, system};
 
-/// Time to end. A recorder writes its last chunk within milliseconds; a user's program may take longer.
+/// The time for a consumer to end. A recorder writes its last chunk within milliseconds; a user's program may take longer.
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
 /// Bytes of a consumer's last output that are read.
 const LONGEST_LINE: u64 = 500;
@@ -39,7 +39,7 @@ struct Setting {
 
 struct Running {
     consumer: Consumer,
-    /// None if it ended by itself; of the run's recorder only while that is frozen.
+    /// The process; none if it ended by itself, and for the run's recorder except while that is frozen.
     process: Option<Process>,
     starts: u32,
     frozen_until: Option<Instant>,
@@ -48,7 +48,7 @@ struct Running {
 
 pub(crate) struct Hit {
     pub(crate) name: String,
-    /// Its starts in this mission; none for the run's recorder.
+    /// The number of starts in this mission; none for the run's recorder.
     pub(crate) generation: Option<u32>,
 }
 
@@ -171,7 +171,7 @@ impl Consumers {
         Ok(Some(Hit { name, generation }))
     }
 
-    /// The mission is over: let all consumers write their files and end.
+    /// Note that the mission is over, and let all consumers write their files and end.
     pub(crate) fn end(&mut self) {
         for running in &mut self.all {
             running.thaw();
@@ -188,7 +188,7 @@ impl Consumers {
 }
 
 impl Running {
-    /// Start or restart it, unless it is the run's own recorder.
+    /// Start or restart the consumer, unless it is the run's own recorder.
     fn start(&mut self, setting: &Setting, report: &mut Report) -> Result<(), BenchError> {
         let Setting { robot, directory } = setting;
         let recording = directory.join(format!("record-{}.mcap", self.starts + 1));

@@ -1,4 +1,4 @@
-//! Changes the bytes between robot and link as a robot fault says. Pure: bytes and times in, bytes and times out.
+//! Changes the bytes between robot and link as a robot fault demands. Pure: bytes and times in, bytes and times out.
 
 use std::{collections::VecDeque, time::Duration};
 
@@ -12,7 +12,7 @@ mod words;
 
 const LATE: Duration = Duration::from_secs(2);
 const LATE_FROM_BOOT: Duration = Duration::from_millis(500);
-/// Age of an old message that comes again.
+/// Age of an old message that is repeated.
 const OLD: Duration = Duration::from_secs(3);
 const AGAIN_EVERY: Duration = Duration::from_secs(2);
 /// Period of slow messages: three a second.
@@ -47,9 +47,9 @@ pub(crate) struct FaultInjector {
     next_slow: [Duration; 256],
     /// The last command that moved the wheels.
     moving: Option<Vec<u8>>,
-    /// The newest command of a speed moves the wheels.
+    /// Whether the newest command of a speed moves the wheels.
     pushes: bool,
-    /// The link stopped the robot by other means than speed 0.
+    /// Whether the link stopped the robot by other means than speed 0.
     disabled: bool,
 }
 
@@ -151,7 +151,7 @@ impl FaultInjector {
 
     fn keep(&mut self, said: &Said, now: Duration) {
         self.kept.push_back(Late { at: now, bytes: said.bytes() });
-        // One message that is older than [`OLD`] stays.
+        // One message that is older than [`OLD`] is left.
         while self.kept.len() > MOST_KEPT
             || self.kept.get(1).is_some_and(|next| next.at + OLD <= now)
         {
@@ -159,7 +159,7 @@ impl FaultInjector {
         }
     }
 
-    /// The bytes of the message that the fault makes of `said`.
+    /// The bytes into which the fault changes the message `said`.
     fn changed(&mut self, said: Said, now: Duration) -> Vec<u8> {
         use RobotFault as F;
         match self.fault {
@@ -200,7 +200,7 @@ impl FaultInjector {
         }
     }
 
-    /// The wheels that the fault makes of `true_ones`, which were at `base` when it began.
+    /// The wheels into which the fault changes `true_ones`, which were at `base` when it began.
     fn counted(&mut self, fault: RobotFault, true_ones: Wheels, base: Wheels) -> Wheels {
         let mut told = true_ones;
         let channel = self.channel;

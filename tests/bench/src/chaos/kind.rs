@@ -1,4 +1,4 @@
-//! How a process is hit.
+//! The kinds of hits on a process.
 
 use rustix::process::Signal;
 use serde::{Deserialize, Serialize};
@@ -9,8 +9,8 @@ pub(crate) enum Kind {
     Kill,
     /// SIGKILL in the first milliseconds of a generation.
     KillAtStart,
-    /// SIGABRT, as after a panic that cannot unwind. SIGSEGV would not do: Rust's runtime takes the first one for an overflow of
-    /// the stack, finds none, and goes on.
+    /// SIGABRT, as after a panic that cannot unwind. SIGSEGV would not serve: Rust's runtime takes the first one for an overflow
+    /// of the stack, finds none, and goes on.
     Crash,
     Terminate,
     /// SIGSTOP.

@@ -14,7 +14,7 @@ use crate::{command_line, processes};
 
 /// Longest time that a stop guard goes on after a mission.
 const GUARDS_END: Duration = Duration::from_secs(10);
-/// Pause between looks at the processes.
+/// Pause between checks of the processes.
 const LOOK: Duration = Duration::from_millis(10);
 
 /// Files and shared memory of `robot`, and processes with files in `directory`, that still exist: paths and command lines.

@@ -23,7 +23,7 @@ use supervisor::{
     summary::Summary,
 };
 
-/// A mission that takes longer is stopped. In wall-clock time a mission takes half a minute.
+/// The time after which a mission is stopped. In wall-clock time a mission takes half a minute.
 const PATIENCE: Duration = Duration::from_secs(600);
 
 pub(crate) fn command(
@@ -168,12 +168,11 @@ fn deaths(directory: &Path) -> Vec<Value> {
     lines.filter_map(Result::ok).collect()
 }
 
-/// Allowed pose error at the end beyond that of the undisturbed run, metres.
-///
-/// Each signal may cost one wheel count of travel. Besides, a run that was hit takes another path, so its wheels are read at
-/// other fractions of a count: one count between the wheels turns the heading by `count / track`, which displaces the robot by
-/// that fraction of the distance to the target. Wheels that slip do so otherwise in each run: three standard deviations of what the
-/// robot says of its pose, because a hundred missions hold a few beyond two.
+/// Allowed pose error at the end beyond that of the undisturbed run, metres. Each signal may cost one wheel count of travel.
+/// Besides, a run that was hit takes another path, so its wheels are read at other fractions of a count: one count between the
+/// wheels turns the heading by `count / track`, which displaces the robot by that fraction of the distance to the target. Slip
+/// differs in each run, too: by three standard deviations of the robot's stated pose error, because a hundred missions include a
+/// few beyond two.
 fn pose_allowance_m(mission: &Mission, kills: u32, summary: &Summary) -> f64 {
     let body = mission.body();
     let target = mission.start_pose().position.distance(mission.target);
@@ -210,7 +209,7 @@ fn one_supervisor(
     attacked.map(|()| summary)
 }
 
-/// Read its standard output to the end in a thread, because a long summary would fill the pipe.
+/// Read the standard output to the end in a thread, because a long summary would fill the pipe.
 pub(crate) fn read_stdout(child: &mut Process) -> JoinHandle<Vec<u8>> {
     let stdout = child.take_stdout();
     std::thread::spawn(move || {

@@ -77,7 +77,7 @@ impl Proxy {
         self.shared.faulty.store(true, Ordering::Relaxed);
     }
 
-    /// When the host last ordered a wheel to turn.
+    /// The time when the host last ordered a wheel to turn.
     pub(crate) fn last_moving(&self) -> Option<Instant> {
         let last = self.shared.last_moving.lock();
         *last.unwrap_or_else(PoisonError::into_inner)

@@ -22,9 +22,9 @@ pub(crate) struct PendingRecovery {
 #[derive(Clone, Copy)]
 pub(crate) enum StartupHit {
     None,
-    /// This long after its start.
+    /// The successor is to be hit this long after its start.
     After(Duration),
-    /// It has started, and is hit at this time.
+    /// The successor has started, and is hit at this time.
     At {
         when: Instant,
         process: u32,
@@ -50,7 +50,7 @@ impl PendingRecovery {
         self.row.rest_ms.get_or_insert_with(|| ms_since(self.at));
     }
 
-    /// A sign of the successor was read: a ready beat, or a sample of a tick. Returns whether the measurement is complete.
+    /// Note a sign of the successor: a ready beat, or a sample of a tick. Returns whether the measurement is complete.
     pub(crate) fn sign(&mut self, beat: bool, recovery: &mut Recovery) -> bool {
         let took_ns = self.at.elapsed().as_nanos() as u64;
         let frozen = self.row.kind == Kind::Freeze;

@@ -48,7 +48,7 @@ impl Replays {
         self.wrong.is_empty()
     }
 
-    /// Replay the recordings of the mission in `directory`. Returns whether all of it is bit-equal. Recordings among `hit` and
+    /// Replay the recordings of the mission in `directory`. Returns whether all is bit-equal. Recordings among `hit` and
     /// `others` are replayed only as far as they go.
     pub(crate) fn add(
         &mut self,

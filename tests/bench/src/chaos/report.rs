@@ -41,7 +41,7 @@ pub struct Report {
     longest_stopping_time_s: f64,
     /// Files, shared memory and processes that outlived a mission.
     pub leftovers: usize,
-    /// The first of them, with the missions that left them.
+    /// The first leftovers, with the missions that left them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     left_behind: Vec<String>,
     /// Largest growth of a supervisor's resources from its robot's departure to its end.
@@ -49,7 +49,7 @@ pub struct Report {
     /// Results of replaying the missions' recordings.
     #[serde(skip_serializing_if = "Option::is_none")]
     replays: Option<Replays>,
-    /// Targets that changed meanwhile.
+    /// The results of changed targets.
     #[serde(skip_serializing_if = "Option::is_none")]
     targets: Option<Changes>,
     /// Ticks with and without consumers, if nothing else is hit.
@@ -61,10 +61,10 @@ pub struct Report {
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct ConsumerCounts {
     pub killed: u32,
-    /// Times it was frozen for a moment.
+    /// Times the consumer was frozen for a moment.
     pub frozen: u32,
     pub started: u32,
-    /// Times it ended without a signal of chaos.
+    /// Times the consumer ended without a signal of chaos.
     pub ended_by_itself: u32,
     /// The last such end, and the last line of its standard error.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -88,11 +88,11 @@ impl fmt::Display for ConsumerCounts {
 /// Times from the signal to the successor.
 #[derive(Debug, Default)]
 pub(crate) struct Recovery {
-    /// To its first ready beat, after kills: a death is noticed at once.
+    /// The time to the first ready beat, after kills: a death is noticed at once.
     pub ready: Histogram,
-    /// To its first ready beat, after freezes: these are noticed by missing beats.
+    /// The time to the first ready beat, after freezes, which are noticed by missing beats.
     pub after_freeze: Histogram,
-    /// To its first sample of a tick, which may come up to a tick later.
+    /// The time to the first sample of a tick, which may come up to a tick later.
     pub output: Histogram,
 }
 
@@ -182,7 +182,7 @@ impl Report {
         self.tick_latencies.get_or_insert_default()
     }
 
-    /// A supervisor held `first` when its robot began to drive, and `last` at its end.
+    /// Count the growth of a supervisor that held `first` when its robot began to drive, and `last` at its end.
     pub fn add_growth(&mut self, first: Resources, last: Resources) {
         let most = &mut self.supervisor_growth;
         most.descriptors = most.descriptors.max(last.descriptors - first.descriptors);
@@ -212,7 +212,7 @@ impl Report {
     }
 }
 
-/// Milliseconds.
+/// Quantiles, milliseconds.
 #[derive(Serialize)]
 struct Quantiles {
     p50: Option<f64>,

@@ -6,7 +6,7 @@ use serde::{Serialize, Serializer};
 /// Longest time from the fault to the last moving command and to wheels at rest, seconds: 1.5 s of motion until command and
 /// report are known to disagree, half a second to come to rest.
 pub const REST_WITHIN_S: f64 = 2.0;
-/// Longest time where the fault shows later, seconds: counts of 0 first look like a restart of the robot; swapped encoders
+/// Longest time for faults that show later, seconds: counts of 0 first look like a restart of the robot; swapped encoders
 /// show in turns; a rate needs nine slow frames. Each command lasts for 0.25 s meanwhile.
 pub const REST_LATER_S: f64 = 4.0;
 
@@ -22,9 +22,9 @@ pub enum Promise {
     Rests,
     /// The robot is at rest within [`REST_LATER_S`] and stays so, with a reason, and touches nothing.
     RestsLater,
-    /// It touches nothing, and does not report its arrival in a wrong place: its data are poor, but not false.
+    /// The robot touches nothing, and does not report its arrival in a wrong place: its data are poor, but not false.
     Unharmed,
-    /// As [`Promise::Unharmed`], and it rests when its mission ends.
+    /// As [`Promise::Unharmed`], and the robot rests when its mission ends.
     EndsAtRest,
 }
 
@@ -64,9 +64,9 @@ pub struct Row {
     pub fault: RobotFault,
     /// Name on the command line and in reports.
     pub name: &'static str,
-    /// What it does to an X80; [`NOTHING`] if it has no meaning there.
+    /// The effect on an X80; [`NOTHING`] if the fault has no meaning there.
     pub x80: &'static str,
-    /// What it does to a robot that speaks lines of JSON; [`LIKEWISE`] if that is the same.
+    /// The effect on a robot that speaks lines of JSON; [`LIKEWISE`] if that is the same.
     pub json: &'static str,
     pub promise: Promise,
 }
@@ -139,7 +139,7 @@ impl RobotFault {
         TABLE.iter().find(|row| row.fault == self).unwrap_or(&TABLE[0])
     }
 
-    /// Whether a robot that speaks `protocol` can have it.
+    /// Whether a robot that speaks `protocol` can have the fault.
     pub fn has_meaning(self, protocol: Protocol) -> bool {
         let row = self.row();
         let does = match protocol {
@@ -150,7 +150,7 @@ impl RobotFault {
         does != NOTHING
     }
 
-    /// Whether the robot has it from its start on.
+    /// Whether the robot has the fault from its start on.
     pub const fn from_boot(self) -> bool {
         matches!(self, Self::LateFromBoot)
     }

@@ -43,9 +43,9 @@ use crate::{
 const FAULT_AFTER_S: (f64, f64) = (1.0, 4.0);
 /// Distance after which a robot has departed, metres.
 const DEPARTED_M: f64 = 0.1;
-/// How long a faulty robot is watched: several times as long as it may move.
+/// The time for which a faulty robot is watched: several times as long as it may move.
 const WATCHED: Duration = Duration::from_secs(10);
-/// How long a faulty robot is watched that may go on: until it has arrived, because only then it can report a wrong place.
+/// The time for a faulty robot that may go on: until it has arrived, because only then it can report a wrong place.
 const WATCHED_ON_ITS_WAY: Duration = Duration::from_secs(90);
 const DEPARTS_WITHIN: Duration = Duration::from_secs(60);
 const END_GRACE: Duration = Duration::from_secs(5);
@@ -54,7 +54,7 @@ const LOOK: Duration = Duration::from_millis(10);
 
 /// The faults, and the missions of each.
 pub struct FaultOptions {
-    /// The mission, the robot and the first seed; the rest is not used.
+    /// The mission, the robot and the first seed; the other options are not used.
     pub base: Options,
     pub faults: Vec<RobotFault>,
 }
@@ -110,12 +110,12 @@ fn start(
 
 #[derive(Debug, Default)]
 struct Observed {
-    /// When the fault began, and the newest tick of the ground truth then.
+    /// The time when the fault began, and the newest tick of the ground truth then.
     fault_began: Option<(Instant, usize)>,
     /// The last command that moved a wheel.
     last_moving: Option<Instant>,
     ended: Option<Instant>,
-    /// Whether the mission ended by itself before that.
+    /// Whether the mission ended by itself before the fault.
     ended_by_itself: bool,
     link: Option<LinkSample>,
     /// The machine's time at the robot's mission time 0: the least estimate of all ticks, because a tick is read some time
@@ -140,7 +140,7 @@ impl Observed {
         let chance = Pcg64::new(u128::from(seed), 17 + fault as u128).next_u64() >> 11;
         let fault_after_s = least + more * chance as f64 / (1_u64 << 53) as f64;
         let (mut departed, mut stop) = (None, None);
-        // It leaves the bus of the mission before, which that may have left behind.
+        // The process leaves the bus of the mission before, which that mission may have left behind.
         let robot_domain = Domain::of(options.asked.robot.clone());
         let mut link =
             Follower::new(robot_domain, "chaos", &topics::LINK, |bus| bus.reader(&topics::LINK));
@@ -282,7 +282,7 @@ fn directory(options: &Options, fault: RobotFault, seed: u64) -> PathBuf {
     options.directory.join(format!("{}-{seed}", fault.row().name))
 }
 
-/// Kill what `fault` says of the mission with its files in `directory`.
+/// Kill the processes that `fault` names, of the mission with its files in `directory`.
 fn kill(fault: RobotFault, supervisor: &Process, directory: &Path) {
     let run = directory.join("run");
     let run = run.to_string_lossy();
@@ -291,7 +291,7 @@ fn kill(fault: RobotFault, supervisor: &Process, directory: &Path) {
     let others = lines.filter(|(pid, line)| *pid != std::process::id() && line.contains(&*run));
     let others: Vec<_> = others.collect();
     if fault == RobotFault::LinkKilled {
-        // It starts no other link.
+        // A stopped supervisor starts no other link.
         supervisor.signal(Signal::STOP);
     } else {
         supervisor.signal(Signal::KILL);

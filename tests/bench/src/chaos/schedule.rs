@@ -12,7 +12,7 @@ const MEAN_PAUSE: Duration = Duration::from_millis(500);
 /// A hit in the start-up falls within this time of the start, in which the stage joins the bus.
 const STARTUP: Duration = Duration::from_millis(12);
 /// Share of the signals that are followed by one to the successor in its start-up, with `--include-startup`. A fifth of all
-/// signals are such; the rest is not sent, because there was no successor, or it was ready too soon.
+/// signals are such; the others are not sent, because there was no successor, or it was ready too soon.
 const STARTUP_SHARE: f64 = 0.3;
 
 /// Share of the signals that hit the supervisor, with `--include-supervisor`.
@@ -23,8 +23,8 @@ const CONSUMER_SHARE: f64 = 0.5;
 
 /// Share of the hits that freeze everything, with `--freeze-all`.
 const FREEZE_ALL_SHARE: f64 = 0.5;
-/// Range of the time for which everything, or a consumer, is frozen, seconds: from less than a stage's deadline to three times
-/// as long.
+/// Range of the time for which everything, or a consumer, is frozen, seconds: from less than a stage's deadline to three times as
+/// long.
 const FREEZE_S: Range<f64> = 0.3..1.5;
 
 /// A seeded sequence of decisions.
@@ -36,7 +36,7 @@ impl Schedule {
         Self(Pcg64::new(u128::from(seed), 7))
     }
 
-    /// Uniform in [0, 1).
+    /// A number that is uniform in [0, 1).
     fn uniform(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
@@ -55,7 +55,7 @@ impl Schedule {
         self.uniform() < SUPERVISOR_SHARE
     }
 
-    /// How to hit the supervisor. SIGTERM would end the run, and only systemd notices a frozen supervisor.
+    /// The hit of the supervisor. SIGTERM would end the run, and only systemd notices a frozen supervisor.
     pub(crate) fn supervisor_kind(&mut self) -> Kind {
         match self.uniform() {
             ..0.8 => Kind::Kill,
@@ -75,8 +75,8 @@ impl Schedule {
         Duration::from_secs_f64(start + (end - start) * self.uniform())
     }
 
-    /// The consumer to hit instead of a stage or the supervisor, `always` or sometimes; and for how long it is frozen, or none to
-    /// kill it.
+    /// The consumer to hit instead of a stage or the supervisor, `always` or sometimes; and the time for which it is frozen, or
+    /// none to kill it.
     pub(crate) fn consumer(
         &mut self,
         count: usize,
@@ -105,7 +105,7 @@ impl Schedule {
 
     /// The time after its start at which to hit the successor too, if it is to be hit.
     pub(crate) fn startup_hit(&mut self) -> Option<Duration> {
-        // The share of all signals, as a share of those that can be followed by one.
+        // This converts the share of all signals to a share of those that can be followed by one.
         let hit = self.uniform() < STARTUP_SHARE / (1.0 - STARTUP_SHARE);
         hit.then(|| STARTUP.mul_f64(self.uniform()))
     }

@@ -12,7 +12,7 @@ pub(crate) struct Series<'a> {
     pub(crate) options: &'a Options,
     pub(crate) schedule: Schedule,
     pub(crate) report: Report,
-    /// The table of signals, if results are written.
+    /// The table of signals; none if no results are written.
     pub(crate) signals: Option<SignalsFile>,
 }
 

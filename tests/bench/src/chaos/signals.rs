@@ -1,5 +1,5 @@
-//! `signals.csv`: a row for each signal, written when its last measurement is known. A chaos that is killed leaves the rows
-//! that are known by then.
+//! `signals.csv`: a row for each signal, written when its last measurement is known. A chaos that is killed leaves the rows that are
+//! known by then.
 
 use std::{
     fs::{self, File},
@@ -26,21 +26,21 @@ pub(crate) struct Row {
     /// The stage, `supervisor`, `everything`, or the consumer's name.
     pub(crate) stage: String,
     pub(crate) kind: Kind,
-    /// Its generation; for a consumer the number of its starts in that mission. None for the supervisor, for everything and for
-    /// the run's own recorder.
+    /// The generation; for a consumer the number of its starts in that mission. None for the supervisor, for everything and for the
+    /// run's own recorder.
     pub(crate) generation: Option<u32>,
-    /// Whether it was to be hit in its first milliseconds.
+    /// Whether the process was to be hit in its first milliseconds.
     pub(crate) start_up: bool,
-    /// From the signal until the supervisor's record of the death was read, milliseconds. Only for stages.
+    /// The time from the signal until the supervisor's record of the death was read, milliseconds. Only for stages.
     pub(crate) noticed_ms: Option<f64>,
-    /// From the signal until the successor's first sign of work was read, milliseconds. For stages and the supervisor.
+    /// The time from the signal until the successor's first sign of work was read, milliseconds. For stages and the supervisor.
     pub(crate) ready_ms: Option<f64>,
-    /// From the signal until the successor's first sample of a tick was read, milliseconds. For stages and the supervisor.
+    /// The time from the signal until the successor's first sample of a tick was read, milliseconds. For stages and the supervisor.
     pub(crate) first_output_ms: Option<f64>,
-    /// From the signal until the first sample in which no wheel turned, milliseconds; none if it did not come before the first output.
+    /// The time from the signal until the first sample in which no wheel turned, milliseconds; none if the first output was earlier.
     pub(crate) rest_ms: Option<f64>,
-    /// From the newest pose to the true one when the row was written, metres. It is known only if the robot is a process of its
-    /// own, whose ground truth is read during the mission.
+    /// The distance from the newest pose to the true one when the row was written, metres. It is known only if the robot is a process
+    /// of its own, whose ground truth is read during the mission.
     pub(crate) pose_error_m: Option<f64>,
 }
 
@@ -126,7 +126,7 @@ mod tests {
         for row in [&plain, &odd] {
             file.add(row).unwrap();
         }
-        // Another process reads it like this while it is written.
+        // Another process reads the file like this while it is written.
         assert_eq!(read(&directory.join(FILE_NAME)), [plain, odd]);
         let text = fs::read_to_string(directory.join(FILE_NAME)).unwrap();
         let columns = "mission,time_s,stage,kind,generation,start_up,noticed_ms,";

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::chaos::robot_fault::{Promise, REST_AT_ONCE_S, REST_LATER_S, REST_WITHIN_S, RobotFault};
 
-/// A mission that ends at rest ends at least so long after the last tick in which a wheel turned, seconds.
+/// The least time from the last tick in which a wheel turned to the end of a mission that ends at rest, seconds.
 const AT_REST_BEFORE_S: f64 = 0.15;
 
 #[derive(Clone, Debug, Serialize)]
@@ -15,17 +15,17 @@ pub struct Entry {
     pub seed: u64,
     /// Whether the fault began: a mission may end before.
     pub fault_began: bool,
-    /// From the fault to the link's last command that moves a wheel, seconds.
+    /// The time from the fault to the link's last command that moves a wheel, seconds.
     pub last_moving_s: Option<f64>,
-    /// From the fault to the last tick in which a wheel turned, by the ground truth, seconds.
+    /// The time from the fault to the last tick in which a wheel turned, by the ground truth, seconds.
     pub rest_s: Option<f64>,
     /// Time from the fault to the end of the watch, seconds.
     pub watched_s: f64,
     /// Touches after the fault.
     pub collisions: u64,
-    /// How the mission ended; `goes on` if it had not when the watch ended.
+    /// The outcome of the mission; `goes on` if it had none when the watch ended.
     pub outcome: String,
-    /// Why it ended; for a mission that goes on, why the link lets no command pass, empty if commands pass.
+    /// The reason of the outcome; for a mission that goes on, why the link lets no command pass, empty if commands pass.
     pub reason: String,
 }
 
@@ -46,7 +46,7 @@ impl Entry {
 
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct StopTimeTable {
-    /// In the order of the missions.
+    /// The entries, in the order of the missions.
     pub entries: Vec<Entry>,
 }
 

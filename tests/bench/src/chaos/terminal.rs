@@ -23,7 +23,7 @@ pub(crate) fn open() -> io::Result<(File, File)> {
     let name = ptsname(&reads, Vec::new())?;
     let name = name.to_str().map_err(io::Error::other)?;
     let mut draws = File::options();
-    // It must not become the controlling terminal of this process.
+    // The terminal must not become the controlling terminal of this process.
     draws.read(true).write(true);
     draws.custom_flags(OFlags::NOCTTY.bits().cast_signed());
     let draws = draws.open(name)?;

@@ -80,7 +80,7 @@ fn bytes_pass_unchanged_until_the_fault_begins_and_every_frame_of_a_fault_is_val
         for number in 0..50 {
             let now = at(1.1 + 0.1 * f64::from(number));
             let passed = injector.report(&tick([110, 210]), now);
-            // It panics if a frame is invalid.
+            // The call panics if a frame is invalid.
             let reports = reports(&passed);
             let acknowledged = reports.contains(&Report::System(SystemSignal::Ack));
             assert_eq!(acknowledged, row.fault != RobotFault::Silence, "{}", row.name);
@@ -116,7 +116,7 @@ fn the_sonar_is_wrong_as_the_table_says() {
     assert_eq!(told(RobotFault::RangeStuck), Some(STUCK_CM));
     assert_eq!(told(RobotFault::EncoderDead), Some(90));
     assert_eq!(told(RobotFault::RangeSilent), Some(255));
-    // What the robot hears after the fault began changes nothing.
+    // Messages that the robot hears after the fault began change nothing.
     let mut injector = FaultInjector::new(RobotFault::RangeFrozen, Protocol::X80, 1);
     injector.report(&tick([100, 200]), at(1.0));
     injector.begin();

@@ -1,4 +1,4 @@
-//! The words of robot and host in either protocol, as far as faults change them.
+//! The messages of robot and host in either protocol, as far as faults change them.
 
 use std::{collections::BTreeMap, f64::consts::TAU};
 
@@ -19,16 +19,16 @@ pub(super) const STUCK_M: f64 = 0.3;
 /// The frozen echo of a sonar that has heard nothing yet, centimetres.
 const FROZEN_CM: u8 = 150;
 const NOTHING: u8 = 255;
-/// What a robot that speaks lines of JSON says for no reading.
+/// The value for no reading of a robot that speaks lines of JSON.
 const NO_READING: f64 = -1.0;
 /// The current of a held motor, as that of the simulated robot, AD counts.
 const HELD_AD: u16 = 1520;
 /// Ultrasonic bytes at the front of a standard frame's data.
 const ULTRASONIC: usize = 6;
-/// The angle of a count, where angles are said, radians: that of an X80.
+/// The angle of a count, radians, in messages with angles: that of an X80.
 const COUNT_RAD: f64 = TAU / 1200.0;
 
-/// Takes bytes to the words of one protocol.
+/// Converts bytes to the messages of one protocol.
 #[derive(Debug)]
 pub(super) enum Words {
     X80 { robot: Decoder, host: Decoder },
@@ -39,14 +39,14 @@ impl Words {
     pub(super) fn of(protocol: Protocol) -> Self {
         match protocol {
             Protocol::X80 => Self::X80 { robot: Decoder::default(), host: Decoder::default() },
-            // The others have no fault that is injected on a wire.
+            // The other protocols have no fault that is injected on a wire.
             Protocol::Json | Protocol::Arduino | Protocol::Ros2 => {
                 Self::Json { robot: Lines::default(), host: Lines::default() }
             }
         }
     }
 
-    /// What the robot says with these bytes.
+    /// The messages of the robot in these bytes.
     pub(super) fn said(&mut self, bytes: &[u8]) -> Vec<Said> {
         match self {
             Self::X80 { robot, .. } => frames(robot, bytes, |frame| {
@@ -60,7 +60,7 @@ impl Words {
         }
     }
 
-    /// What the host orders with these bytes.
+    /// The orders of the host in these bytes.
     pub(super) fn ordered(&mut self, bytes: &[u8]) -> Vec<Ordered> {
         match self {
             Self::X80 { host, .. } => frames(host, bytes, Ordered::of_frame),
@@ -137,7 +137,7 @@ impl Said {
         }
     }
 
-    /// The sensor stream that it belongs to; none for an answer.
+    /// The sensor stream to which the message belongs; none for an answer.
     pub(super) fn stream(&self) -> Option<u8> {
         match self {
             Self::Frame { did, .. } => {
@@ -158,7 +158,7 @@ impl Said {
         }
     }
 
-    /// Its wheels, counted on from those of `base`.
+    /// The wheels of the message, counted on from those of `base`.
     pub(super) fn wheels(&self, base: &Self) -> Option<Wheels> {
         if let Self::Line(report) = self {
             let counts = |angles: [f64; 2]| angles.map(|angle| angle / COUNT_RAD);
@@ -198,7 +198,7 @@ impl Said {
         self.bytes()
     }
 
-    /// The message with data that are all `byte`, where it says wheels; in lines of JSON the wheels are 0.
+    /// The message with data that are all `byte`, if it has wheels; in lines of JSON the wheels are 0.
     pub(super) fn with_data(mut self, byte: u8) -> Vec<u8> {
         match &mut self {
             Self::Frame { did: did::MOTOR, data, .. } => data.fill(byte),
@@ -211,7 +211,7 @@ impl Said {
         self.bytes()
     }
 
-    /// The message with the readings of `fault`, whose robot read `newest` before; none where no readings come.
+    /// The message with the readings of `fault`, whose robot read `newest` before; none if no readings come.
     pub(super) fn with_readings(mut self, fault: RobotFault, newest: &Readings) -> Vec<u8> {
         match &mut self {
             Self::Frame { did: did::STANDARD, data, .. } => {
@@ -272,7 +272,7 @@ pub(super) struct Ordered {
 
 #[derive(Clone, Debug)]
 pub(super) enum Effect {
-    /// The wheels turn; with these bytes instead they would stand.
+    /// The wheels turn; these bytes in place of the order make them stand.
     Moves {
         stand: Vec<u8>,
     },
