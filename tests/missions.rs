@@ -203,34 +203,40 @@ fn every_run_leaves_a_picture_a_summary_and_logs() {
     }
 }
 
-#[test]
-fn latency_measures_ticks_beside_bare_hops_and_leaves_nothing() {
-    let arguments = ["bench", "tick", "--rounds", "1", "--json", "--robot", "hops"];
-    let report: Value = serde_json::from_str(&printed(&arguments)).unwrap();
-    for key in ["tick_p50_us", "tick_p99_us", "hops_p50_us", "hops_p99_us", "ratio"] {
-        assert!(report[key].as_f64().unwrap() > 0.0, "{key}: {report}");
-    }
-    assert_nothing_left("hops");
+/// The reports of `bench tick` with these arguments, one for each regime. The mission is over after a few seconds.
+fn latency(robot: &str, arguments: &[&str]) -> Vec<Value> {
+    let short = ["bench", "tick", "--rounds", "1", "--set", "timeout_s=5", "--json"];
+    let printed = printed(&[&short[..], &["--robot", robot], arguments].concat());
+    assert_nothing_left(robot);
+    printed.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
 #[test]
-fn latency_at_a_rate_prints_ticks_and_bare_hops_at_that_rate_and_their_ratio() {
-    let mut arguments = vec!["bench", "tick", "--rate", "7", "--rounds", "1"];
-    arguments.extend(["--set", "timeout_s=5", "--robot", "hops-7hz"]);
-    arguments.push("--json");
-    let report: Value = serde_json::from_str(&printed(&arguments)).unwrap();
-    assert_eq!(report["regime"], "at 7 Hz", "{report}");
-    for key in ["tick_p50_us", "hops_p50_us", "ratio"] {
-        assert!(report[key].as_f64() > Some(0.0), "{key}: {report}");
+fn latency_measures_ticks_beside_hops_in_both_regimes_and_leaves_nothing() {
+    let reports = latency("hops", &["--busy", "2"]);
+    let regimes: Vec<_> = reports.iter().map(|report| &report["regime"]).collect();
+    assert_eq!(regimes, ["back to back", "at 7 Hz"]);
+    for report in &reports {
+        let times = report["times"].as_array().unwrap();
+        assert_eq!(times.len(), 4, "{report}");
+        for (row, key) in times.iter().flat_map(|row| ["p50_us", "p99_us"].map(|key| (row, key))) {
+            assert!(row[key].as_f64() > Some(0.0), "{key}: {report}");
+        }
+        assert!(report["ratio"].as_f64() > Some(0.0), "{report}");
     }
-    assert_nothing_left("hops-7hz");
+}
+
+#[test]
+fn latency_at_a_rate_is_measured_at_that_rate_alone() {
+    let reports = latency("hops-9hz", &["--rate", "9", "--no-record", "--consumers", "0"]);
+    assert_eq!(reports.len(), 1, "{reports:?}");
+    assert_eq!(reports[0]["regime"], "at 9 Hz");
 }
 
 #[test]
 fn a_latency_budget_has_every_item_of_every_stage() {
-    let mut arguments = vec!["bench", "tick", "--rounds", "1", "--budget", "--json"];
-    arguments.extend(["--robot", "tick-budget"]);
-    let report: Value = serde_json::from_str(&printed(&arguments)).unwrap();
+    let reports = latency("tick-budget", &["--pace", "max", "--budget"]);
+    let report = &reports[0];
     assert_eq!(report["regime"], "back to back", "{report}");
     let rows = report["budget"].as_array().unwrap();
     for stage in support::STAGES {
@@ -243,5 +249,4 @@ fn a_latency_budget_has_every_item_of_every_stage() {
             assert_eq!(cell["p50_us"].as_f64().is_some(), known, "{row}");
         }
     }
-    assert_nothing_left("tick-budget");
 }

@@ -69,7 +69,7 @@ fn a_run_is_recorded_from_its_first_sample_and_every_stage_replays_to_the_bit() 
 
 #[test]
 fn on_a_wall_clock_a_tick_is_answered_again_when_its_map_is_solved() {
-    let run = Run::start("rec-again", "obstacle-course", &["--pace", "1", "--set", "timeout_s=4"]);
+    let run = Run::start("rec-again", "obstacle-course", &["--pace", "2", "--set", "timeout_s=12"]);
     let (_, summary, directory) = run.finish_in();
     let recording = open(directory.path());
     let guidance = recording.samples(&topics::GUIDANCE).unwrap();
