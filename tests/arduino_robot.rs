@@ -55,6 +55,9 @@ fn over(transport: &str, name: &str) -> (Robot, Run) {
 fn a_robot_with_an_arduino_arrives_in_lockstep_on_the_same_way_each_time() {
     let [first, second] = ["arduino-max", "arduino-again"].map(|name| {
         let summary = Run::start(name, MISSION, &["--pace", "max"]).arrives();
+        // The mission ends with the tick of the arrival, and not when the robot stands.
+        let last_tick = summary["ticks"].as_f64().unwrap() - 1.0;
+        assert_eq!(summary["mission_time_s"], last_tick / 10.0, "{summary}");
         let keys = ["ticks", "mission_time_s", "path_length_m", "pose_error_m"];
         keys.map(|key| summary[key].to_string())
     });

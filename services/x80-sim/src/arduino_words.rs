@@ -124,9 +124,7 @@ impl ArduinoWords {
         let mut command = None;
         let text = match request {
             Request::Counts => {
-                let turned = self.turned(motors);
-                let [left, right] =
-                    [0, 1].map(|wheel| (turned[wheel] - self.zero[wheel]).round() as i64 as i32);
+                let [left, right] = self.counts(motors);
                 format!("{left} {right}")
             }
             Request::Reset => {
@@ -162,7 +160,13 @@ impl ArduinoWords {
         Command::velocity(channels, STOPS_AFTER_MS)
     }
 
-    /// The counts of the wheels, forward positive.
+    /// The counts of the left and the right wheel, as the board says them.
+    pub(crate) fn counts(&self, motors: &[Motor; 6]) -> [i32; 2] {
+        let turned = self.turned(motors);
+        [0, 1].map(|wheel| (turned[wheel] - self.zero[wheel]).round() as i64 as i32)
+    }
+
+    /// The counts that the wheels have turned since the start, forward positive.
     fn turned(&self, motors: &[Motor; 6]) -> [f64; 2] {
         [self.robot.left, self.robot.right].map(|wheel| {
             let counts = motors[usize::from(wheel.channel.min(1))].turned();

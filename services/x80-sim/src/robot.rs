@@ -6,8 +6,8 @@ use common::{
     kinematics::Twist,
     mission::{Block, BlockedWheels, Mission, Physics, Protocol},
     wire::{
-        Addressing, Command, CustomSensors, Frame, Motion, MotorSensors, Report, StandardSensors,
-        SystemSignal,
+        Addressing, COUNT_CYCLE, Command, CustomSensors, Frame, Motion, MotorSensors, Report,
+        StandardSensors, SystemSignal,
     },
 };
 
@@ -501,7 +501,16 @@ impl Robot {
     pub fn ground_truth(&mut self) -> GroundTruthTick {
         let pose = self.body.pose();
         let Twist { v, omega } = self.twist();
-        let counts = self.drivetrain.counts(&self.motor.encoders);
+        // Those that the host hears: the summary finds by them the tick of a pose.
+        let [left_counts, right_counts] = match &self.arduino {
+            Some(arduino) => arduino
+                .counts(&self.motors)
+                .map(|counts| counts.rem_euclid(i32::from(COUNT_CYCLE)) as u16),
+            None => {
+                let counts = self.drivetrain.counts(&self.motor.encoders);
+                [counts.left, counts.right]
+            }
+        };
         let clearance_m = self.least_clearance.min(GroundTruthTick::NOTHING_NEAR);
         self.least_clearance = self.body.clearance();
         GroundTruthTick {
@@ -514,8 +523,8 @@ impl Robot {
             omega,
             clearance_m,
             contacts: self.body.contacts(),
-            left_counts: counts.left,
-            right_counts: counts.right,
+            left_counts,
+            right_counts,
             sonar_cm: self.ranging.front(&self.standard),
             stopping_time_s: self.stopping_time,
             radio: None,
