@@ -5,7 +5,8 @@
 
 use std::{
     collections::BTreeMap,
-    fs,
+    fs::{self, File},
+    io::{self, BufRead, BufReader},
     path::{Path, PathBuf},
     time::{Duration, Instant},
 };
@@ -298,8 +299,23 @@ impl CurrentRun {
 
 /// The build: its version, and a checksum of this executable.
 fn build() -> String {
-    let crc = fs::read("/proc/self/exe").map_or(0, |bytes| crc32fast::hash(&bytes));
+    let crc = File::open("/proc/self/exe").and_then(checksum).unwrap_or_default();
     format!("{}, executable crc32 {crc:08x}", env!("CARGO_PKG_VERSION"))
+}
+
+/// The CRC-32 of a file, which is never in memory as a whole.
+fn checksum(file: File) -> io::Result<u32> {
+    let mut reader = BufReader::with_capacity(1 << 16, file);
+    let mut crc = crc32fast::Hasher::new();
+    loop {
+        let piece = reader.fill_buf()?;
+        if piece.is_empty() {
+            return Ok(crc.finalize());
+        }
+        crc.update(piece);
+        let read = piece.len();
+        reader.consume(read);
+    }
 }
 
 /// The machine: name, system and processors.
