@@ -140,9 +140,10 @@ impl EvidenceGrid {
         let rows = self.looks.chunks_exact_mut(lattice.cells as usize);
         for (row, looks) in (0..).zip(rows) {
             if looks.iter().fold(false, |any, &looks| any | is_over(looks)) {
-                let over = (0..).zip(looks.iter()).filter(|(_, looks)| is_over(**looks));
-                for (col, _) in over {
-                    window = window.including(Cell { col, row });
+                let over = |looks: &u8| is_over(*looks);
+                let ends = [looks.iter().position(over), looks.iter().rposition(over)];
+                for col in ends.into_iter().flatten() {
+                    window = window.including(Cell { col: col as u32, row });
                 }
             }
             for looks in looks {
@@ -156,7 +157,7 @@ impl EvidenceGrid {
 
     /// Take one reading, which counts as evidence up to `reach` metres, of a robot at `robot` with a body of `radius` metres. If a laser
     /// has `seen` its cause, only cells that are occupied there get the echo. Appends flipped cells to `flips` and returns the window of
-    /// all changed cells.
+    /// the cells that became scanned.
     pub(crate) fn take(
         &mut self,
         sonar: &SonarModel,
@@ -234,7 +235,6 @@ impl EvidenceGrid {
                 let same = apart(self.side[index], came_from) <= sonar.same_side;
                 if weight <= 0 || same && self.occupied[index] & (SEEN | TOUCHED) == 0 {
                     self.set(sonar, lattice, cell, weight.saturating_sub(pass), flips);
-                    window = window.including(cell);
                 }
             } else if let Some(echo) = echo
                 && (range - echo).abs() <= band
@@ -256,7 +256,6 @@ impl EvidenceGrid {
             let weight = self.weight_of(index).max(-sonar.pass) + more as i8;
             self.side[index] = came_from;
             self.set(sonar, lattice, cell, weight, flips);
-            window = window.including(cell);
         }
         window.union(self.stand(sonar, lattice, (robot, radius), flips))
     }
@@ -297,7 +296,7 @@ impl EvidenceGrid {
             if stands {
                 self.set(sonar, lattice, cell, 0, flips);
             }
-            if stands || was < sonar.pointed_enough {
+            if was < sonar.pointed_enough {
                 window = window.including(cell);
             }
         }
@@ -318,12 +317,16 @@ impl EvidenceGrid {
         let Seen { clear_m, hit_m } = ray.seen;
         let far = clear_m.max(hit_m.unwrap_or(0.0)) + half_cell;
         let came_from = side_of(ray.axis);
-        for cell in around(lattice, ray.origin, far) {
+        let aside = half_cell.max(SCANNED_ASIDE_M);
+        let end = ray.origin + far * ray.axis;
+        let (least, greatest) = (ray.origin.min(end), ray.origin.max(end));
+        let reach = aside + half_cell;
+        for cell in between(lattice, least - reach, greatest + reach) {
             let centre = lattice.centre_of(cell);
             let offset = centre - ray.origin;
             let (across, along) = (ray.axis.perp_dot(offset), ray.axis.dot(offset));
             let on_ray = across.abs() <= half_cell;
-            if across.abs() > half_cell.max(SCANNED_ASIDE_M) || along < -half_cell {
+            if across.abs() > aside || along < -half_cell {
                 continue;
             }
             let index = lattice.index(cell);
@@ -338,15 +341,15 @@ impl EvidenceGrid {
                 let weight = weight.max(-sonar.pass) + sonar.hit as i8;
                 self.set(sonar, lattice, cell, weight, flips);
             } else if along <= clear_m {
-                self.looks[index] = SCANNED;
+                let was = std::mem::replace(&mut self.looks[index], SCANNED);
+                if was < sonar.pointed_enough {
+                    window = window.including(cell);
+                }
                 if on_ray && self.occupied[index] & TOUCHED == 0 {
                     let weight = weight.saturating_sub(sonar.pass);
                     self.set(sonar, lattice, cell, weight, flips);
                 }
-            } else {
-                continue;
             }
-            window = window.including(cell);
         }
         window
     }

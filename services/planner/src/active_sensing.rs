@@ -84,7 +84,8 @@ impl ActiveSensing {
         pose: &Pose2,
         direction: DVec2,
     ) -> Advice {
-        let undetected = UndetectedSurfaces::new(belief, self.radius);
+        let (place, ahead_m) = (pose.position, self.ahead_m);
+        let undetected = UndetectedSurfaces::new(belief, self.radius, place, ahead_m);
         let way = view.way(pose.position, direction, AHEAD_M);
         let steps = (SCANNED_AHEAD_M / STEP_M) as usize;
         let ahead = &way[..steps.min(way.len())];

@@ -62,6 +62,8 @@ struct Beam {
     origin: DVec2,
     axis: DVec2,
     clear: f64,
+    /// Whether a surface that is supposed may lie beyond its free length, so that it may have an echo before the surface.
+    may_echo: bool,
 }
 
 impl From<&ClearBeam> for Beam {
@@ -70,6 +72,7 @@ impl From<&ClearBeam> for Beam {
             origin: DVec2::new(beam.x_m.into(), beam.y_m.into()),
             axis: DVec2::from_angle(beam.bearing_rad.into()),
             clear: beam.clear_m.into(),
+            may_echo: true,
         }
     }
 }
@@ -77,28 +80,59 @@ impl From<&ClearBeam> for Beam {
 /// Beams by their sectors.
 #[derive(Clone, Debug)]
 struct BySector {
+    /// In each sector, those that may have an echo come last.
     beams: Vec<Beam>,
     /// The first beam of each sector, and the end of the last.
     starts: [usize; SECTORS + 1],
 }
 
 impl BySector {
-    fn new(readings: &[ClearBeam]) -> Self {
-        let sector = |beam: &&ClearBeam| sector_of(beam.bearing_rad.into());
-        let mut sorted: Vec<_> = readings.iter().collect();
-        sorted.sort_by_key(sector);
+    /// The `readings`, where no surface is supposed farther than `within` metres from `place`.
+    fn new(readings: &[ClearBeam], place: DVec2, within: f64) -> Self {
+        let beams = readings.iter().map(|reading| {
+            let beam = Beam::from(reading);
+            let may_echo = beam.clear < beam.origin.distance(place) + within + ROUNDING_M;
+            (sector_of(reading.bearing_rad.into()), Beam { may_echo, ..beam })
+        });
+        let mut sorted: Vec<_> = beams.collect();
+        sorted.sort_by_key(|(sector, beam)| (*sector, beam.may_echo));
         Self {
-            beams: sorted.iter().copied().map(Beam::from).collect(),
-            starts: std::array::from_fn(|start| sorted.partition_point(|it| sector(it) < start)),
+            starts: std::array::from_fn(|start| sorted.partition_point(|it| it.0 < start)),
+            beams: sorted.into_iter().map(|(_, beam)| beam).collect(),
         }
     }
 
-    /// The beams that may answer a surface whose normal lies in `sector`.
-    fn around(&self, sector: usize) -> [&[Beam]; 2] {
-        let first = (sector + SECTORS - EITHER_SIDE) % SECTORS;
-        let end = first + 2 * EITHER_SIDE + 1;
-        let of = |from: usize, to: usize| &self.beams[self.starts[from]..self.starts[to]];
-        [of(first, end.min(SECTORS)), of(0, end.saturating_sub(SECTORS))]
+    /// The beams that may answer a surface whose normal lies in `sector`, by sectors. The sector itself comes first, because most of
+    /// its beams answer.
+    fn around(&self, sector: usize) -> [&[Beam]; 2 * EITHER_SIDE + 1] {
+        std::array::from_fn(|step| {
+            let beside = if step % 2 == 0 { step / 2 } else { SECTORS - step.div_ceil(2) };
+            let sector = (sector + beside) % SECTORS;
+            &self.beams[self.starts[sector]..self.starts[sector + 1]]
+        })
+    }
+}
+
+/// The readings that were weighed for one surface.
+#[derive(Clone, Copy, Debug)]
+struct Tally {
+    silences: usize,
+    echoes: usize,
+    /// The readings that may have an echo and are not weighed yet.
+    left: usize,
+}
+
+impl Tally {
+    /// Weigh a `reading` that such a surface answers from this distance, if it does. Returns whether the echoes cannot outweigh the
+    /// silences any more.
+    fn is_decided_by(&mut self, reading: &Beam, distance: Option<f64>) -> bool {
+        self.left -= usize::from(reading.may_echo);
+        match distance {
+            Some(distance) if distance <= reading.clear => self.silences += 1,
+            Some(distance) if distance <= reading.clear + NEAR_ECHO_M => self.echoes += 1,
+            _ => {}
+        }
+        self.silences * ECHOES_FOR_A_SILENCE > self.echoes + self.left
     }
 }
 
@@ -107,12 +141,13 @@ fn sector_of(angle: f64) -> usize {
 }
 
 impl UndetectedSurfaces {
-    /// The surfaces by the readings in `belief`, for a body of `radius` metres.
-    pub(crate) fn new(belief: &GridHeader, radius: f64) -> Self {
+    /// The surfaces that a body of `radius` metres could touch within `ahead_m` metres of `place`, by the readings in `belief`.
+    pub(crate) fn new(belief: &GridHeader, radius: f64, place: DVec2, ahead_m: f64) -> Self {
+        let reach = radius + MARGIN_M;
         Self {
-            beams: BySector::new(belief.clear_beams()),
+            beams: BySector::new(belief.clear_beams(), place, ahead_m + reach),
             rays: belief.clear_rays().iter().map(Beam::from).collect(),
-            reach: radius + MARGIN_M,
+            reach,
             normals: std::array::from_fn(|index| {
                 let step = index as i32 - (NORMALS / 2) as i32;
                 let angle = (f64::from(step) * STEP_DEG).to_radians();
@@ -131,7 +166,7 @@ impl UndetectedSurfaces {
         self.normals.iter().filter_map(move |(normal, angle)| {
             let normal = normal.rotate(along);
             let beams = self.beams.around(sector_of(heading + angle));
-            (!self.is_excluded(at, normal, beams, &rays)).then_some(normal)
+            (!self.is_excluded(at, normal, &beams, &rays)).then_some(normal)
         })
     }
 
@@ -145,27 +180,14 @@ impl UndetectedSurfaces {
     }
 
     /// Whether the `beams` and `rays` exclude a surface that touches a body at `at` on the side of `normal`.
-    fn is_excluded(&self, at: DVec2, normal: DVec2, beams: [&[Beam]; 2], rays: &[Beam]) -> bool {
-        let (mut silences, mut echoes) = (0, 0);
-        // The readings that are not weighed yet. Once they cannot outweigh the silences, they need not be.
-        let mut left = beams[0].len() + beams[1].len() + rays.len();
-        let beams = beams.into_iter().flatten();
-        let beams = beams.map(|beam| (beam, self.answers_from(beam, at, normal)));
-        let rays = rays.iter().map(|ray| (ray, self.met_after(ray, at, normal)));
-        for (reading, distance) in beams.chain(rays) {
-            left -= 1;
-            match distance {
-                Some(distance) if distance <= reading.clear => {
-                    silences += 1;
-                    if silences * ECHOES_FOR_A_SILENCE > echoes + left {
-                        return true;
-                    }
-                }
-                Some(distance) if distance <= reading.clear + NEAR_ECHO_M => echoes += 1,
-                _ => {}
-            }
-        }
-        silences * ECHOES_FOR_A_SILENCE > echoes
+    fn is_excluded(&self, at: DVec2, normal: DVec2, beams: &[&[Beam]], rays: &[Beam]) -> bool {
+        let may_echo =
+            |beams: &&[Beam]| beams.iter().rev().take_while(|beam| beam.may_echo).count();
+        let left = beams.iter().map(may_echo).sum::<usize>() + rays.len();
+        let mut tally = Tally { silences: 0, echoes: 0, left };
+        let mut beams = beams.iter().copied().flatten();
+        beams.any(|beam| tally.is_decided_by(beam, self.answers_from(beam, at, normal)))
+            || rays.iter().any(|ray| tally.is_decided_by(ray, self.met_after(ray, at, normal)))
     }
 
     /// The distance from which a surface like that answers `beam`, metres; none if it does not.
@@ -228,7 +250,7 @@ mod tests {
     }
 
     fn undetected_by(beams: &[ClearBeam], rays: &[ClearBeam]) -> Vec<i32> {
-        let surfaces = UndetectedSurfaces::new(&belief(beams, rays), BODY_M);
+        let surfaces = UndetectedSurfaces::new(&belief(beams, rays), BODY_M, DVec2::ZERO, 0.0);
         let normals = surfaces.normals(DVec2::ZERO, DVec2::X);
         normals.map(|normal| normal.to_angle().to_degrees().round() as i32).collect()
     }
@@ -291,5 +313,29 @@ mod tests {
         let silence = beam(0.0, 0.0, 2.0);
         assert!(!undetected(&[echo, silence]).contains(&0));
         assert!(undetected(&[echo, silence, echo]).contains(&0));
+    }
+
+    #[test]
+    fn a_surface_is_decided_early_only_where_the_rest_of_the_readings_could_not_change_it() {
+        // Readings all around, of lengths about the distances of the surfaces.
+        let beams: Vec<_> = (0..120_i16)
+            .map(|n| {
+                let n = f64::from(n);
+                beam(0.3 * (n * 0.7).sin(), n * 137.5 % 360.0, 0.15 + 0.2 * (n * 1.3).sin())
+            })
+            .collect();
+        let belief = belief(&beams, &[]);
+        // If surfaces may be at any distance, every reading may have an echo and none is left out.
+        let [near, far] = [0.6, f64::INFINITY]
+            .map(|ahead_m| UndetectedSurfaces::new(&belief, BODY_M, DVec2::ZERO, ahead_m));
+        let mut excluded = 0;
+        for n in 0..60 {
+            let along = DVec2::from_angle(f64::from(n));
+            let at = 0.01 * f64::from(n) * along;
+            let found: Vec<_> = near.normals(at, along).collect();
+            assert_eq!(found, far.normals(at, along).collect::<Vec<_>>(), "{at}");
+            excluded += NORMALS - found.len();
+        }
+        assert!((60..60 * NORMALS - 60).contains(&excluded), "{excluded}");
     }
 }
