@@ -51,6 +51,8 @@ pub(crate) struct UndetectedSurfaces {
     beams: BySector,
     rays: Vec<Beam>,
     reach: f64,
+    /// The greatest distance from the body's centre at which a ray that meets a supposed surface excludes it, metres.
+    met_within: f64,
     /// The normals that are checked for a way along x, and their angles.
     normals: [(DVec2, f64); NORMALS],
     /// Least cosine of the angle between a beam and the normal of a surface that answers it: of a far one, and of a near one.
@@ -148,6 +150,7 @@ impl UndetectedSurfaces {
             beams: BySector::new(belief.clear_beams(), place, ahead_m + reach),
             rays: belief.clear_rays().iter().map(Beam::from).collect(),
             reach,
+            met_within: reach.hypot(MET_WITHIN_M) + ROUNDING_M,
             normals: std::array::from_fn(|index| {
                 let step = index as i32 - (NORMALS / 2) as i32;
                 let angle = (f64::from(step) * STEP_DEG).to_radians();
@@ -162,7 +165,9 @@ impl UndetectedSurfaces {
     /// reading excludes.
     pub(crate) fn normals(&self, at: DVec2, along: DVec2) -> impl Iterator<Item = DVec2> {
         let heading = along.to_angle();
-        let rays: Vec<_> = self.rays.iter().filter(|ray| self.may_meet(ray, at)).copied().collect();
+        let near = self.rays.iter().filter_map(|ray| self.near(ray, at));
+        let mut rays: Vec<_> = near.collect();
+        rays.sort_unstable_by_key(|ray| ray.may_echo);
         self.normals.iter().filter_map(move |(normal, angle)| {
             let normal = normal.rotate(along);
             let beams = self.beams.around(sector_of(heading + angle));
@@ -170,20 +175,20 @@ impl UndetectedSurfaces {
         })
     }
 
-    /// Whether `ray` may meet a surface that touches a body at `at`, near enough to the body and not too far behind its end.
-    fn may_meet(&self, ray: &Beam, at: DVec2) -> bool {
+    /// The `ray`, if it may meet a surface that touches a body at `at`, near enough to the body and not too far behind its end.
+    fn near(&self, ray: &Beam, at: DVec2) -> Option<Beam> {
         let offset = at - ray.origin;
-        let near = self.reach + MET_WITHIN_M + ROUNDING_M;
-        let along = ray.axis.dot(offset);
-        ray.axis.perp_dot(offset).abs() <= near
-            && (-near..=ray.clear + NEAR_ECHO_M + near).contains(&along)
+        let (along, near) = (ray.axis.dot(offset), self.met_within);
+        let meets = ray.axis.perp_dot(offset).abs() <= near
+            && (-near..=ray.clear + NEAR_ECHO_M + near).contains(&along);
+        meets.then_some(Beam { may_echo: ray.clear < along + near, ..*ray })
     }
 
     /// Whether the `beams` and `rays` exclude a surface that touches a body at `at` on the side of `normal`.
     fn is_excluded(&self, at: DVec2, normal: DVec2, beams: &[&[Beam]], rays: &[Beam]) -> bool {
         let may_echo =
             |beams: &&[Beam]| beams.iter().rev().take_while(|beam| beam.may_echo).count();
-        let left = beams.iter().map(may_echo).sum::<usize>() + rays.len();
+        let left = beams.iter().chain(&[rays]).map(may_echo).sum();
         let mut tally = Tally { silences: 0, echoes: 0, left };
         let mut beams = beams.iter().copied().flatten();
         beams.any(|beam| tally.is_decided_by(beam, self.answers_from(beam, at, normal)))
