@@ -15,12 +15,13 @@ use common::{
 use serde_json::Value;
 
 /// At this speed the mission has thousands of ticks, which take seconds in lockstep: time enough for a fault, even on a loaded
-/// machine. The wheels are those of the laboratory, because the drift of a hundred looks would make the arrival unsure.
+/// machine. The odometry is told that the wheels are those of the laboratory, because a hundred looks, and the turns under a broken
+/// field until the supervisor notices, would make the arrival unsure.
 const SLOW: [&str; 6] = [
     "--set",
     "controller.speed_m_s=0.004",
     "--set",
-    "robot.odometry.slip=0.001",
+    "robot.odometry={slip=0.001,diameter_ratio_sd=0,track_scale_sd=0,distance_scale_sd=0}",
     "--timeout",
     "20000",
 ];
