@@ -99,7 +99,9 @@ fn operate(robot: &str, width: u32) {
     browser.go(&page.drive);
     browser.wait_until(&says("status", "no robot runs"));
     assert_eq!(browser.run("return location.hash"), "", "the token is not shown");
-    let mut run = Run::start(robot, "open-room", &["--pace", "1", "--set", "timeout_s=600"]);
+    // The robot is so slow that it does not arrive while it is watched, on a busy machine either.
+    let slow = ["--pace", "1", "--set", "timeout_s=600", "--set", "controller.speed_m_s=0.02"];
+    let mut run = Run::start(robot, "open-room", &slow);
     run.wait_until_driving();
     browser.wait_until(GOES);
     browser.wait_until("document.querySelectorAll('#stages tr').length === 6");
