@@ -1,7 +1,7 @@
 //! A headless Chromium, by the W3C WebDriver protocol.
 
 use std::{
-    io::{BufRead as _, BufReader, Read as _, Write as _},
+    io::{self, BufRead as _, BufReader, Read as _, Write as _},
     net::TcpStream,
     process::{Child, Command, Stdio},
     time::Instant,
@@ -55,29 +55,36 @@ impl Browser {
 
     /// The value in the driver's answer.
     fn ask(&self, method: &str, path: &str, body: &Value) -> Value {
-        let mut stream = TcpStream::connect(("127.0.0.1", self.port)).unwrap();
-        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        let (status, value) = self.answer(method, path, body).unwrap();
+        assert!(status.starts_with("HTTP/1.1 200"), "{path}: {value}");
+        value["value"].clone()
+    }
+
+    /// The head and the body of the driver's answer.
+    fn answer(&self, method: &str, path: &str, body: &Value) -> io::Result<(String, Value)> {
+        let mut stream = TcpStream::connect(("127.0.0.1", self.port))?;
+        stream.set_read_timeout(Some(PATIENCE))?;
         let body = body.to_string();
         let length = body.len();
         let head = format!(
             "{method} {path} HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\nContent-Length: {length}\r\n\r\n"
         );
-        stream.write_all((head + &body).as_bytes()).unwrap();
+        stream.write_all((head + &body).as_bytes())?;
         let mut answer = BufReader::new(stream);
         let (mut head, mut length) = (String::new(), 0);
         while !head.ends_with("\r\n\r\n") {
             let start = head.len();
-            answer.read_line(&mut head).unwrap();
+            if answer.read_line(&mut head)? == 0 {
+                return Err(io::ErrorKind::UnexpectedEof.into());
+            }
             let line = head[start..].to_lowercase();
             if let Some(value) = line.strip_prefix("content-length:") {
-                length = value.trim().parse().unwrap();
+                length = value.trim().parse().map_err(io::Error::other)?;
             }
         }
         let mut body = vec![0; length];
-        answer.read_exact(&mut body).unwrap();
-        let value: Value = serde_json::from_slice(&body).unwrap();
-        assert!(head.starts_with("HTTP/1.1 200"), "{path}: {value}");
-        value["value"].clone()
+        answer.read_exact(&mut body)?;
+        Ok((head, serde_json::from_slice(&body)?))
     }
 
     pub fn go(&self, url: &str) {
@@ -154,9 +161,9 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // The driver ends its browser when its session ends.
-        if !self.session.is_empty() && !std::thread::panicking() {
-            self.ask("DELETE", &self.session, &json!({}));
+        // The driver ends its browser when its session ends, and a browser that a failed test opened stays without that.
+        if !self.session.is_empty() {
+            let _ = self.answer("DELETE", &self.session, &json!({}));
         }
         let _ = self.driver.kill();
         let _ = self.driver.wait();
