@@ -13,6 +13,7 @@ use std::{
 
 use common::{
     bus::{Bus, BusError, EncodedReader, Logged},
+    clock::MissionClock,
     domain::Domain,
     follower::{Event, Follower},
     mission::Mission,
@@ -34,7 +35,7 @@ use crate::{
 const POLL: Duration = Duration::from_millis(10);
 const LOGS_EVERY: Duration = Duration::from_millis(250);
 const LONGEST_RUN_FILE: u64 = 1 << 24;
-/// Niceness of the process: stages that answer the robot go first.
+/// Niceness of the process.
 const NICE: i32 = 5;
 
 #[derive(Clone)]
@@ -83,8 +84,6 @@ pub fn record(
     stop: &mut dyn FnMut() -> bool,
     tell: &mut dyn FnMut(Happened<'_>),
 ) -> Result<(), RecordingError> {
-    // If the kernel refuses, the recorder shares the processor with the stages.
-    let _ = rustix::process::nice(NICE);
     let chosen = options.topics();
     let open = |bus: &Bus| -> Result<Readers, BusError> {
         let read = |topic: &&'static dyn EncodedTopic| Ok((*topic, topic.encoded_reader(bus)?));
@@ -167,6 +166,16 @@ pub fn record(
     }
 }
 
+/// Let the stages go first that answer a robot, once the recorder is attached. In lockstep no robot waits for them, and a recorder that
+/// falls behind them loses what they publish.
+fn give_way(run: Option<&Run>) {
+    let in_lockstep = run.is_some_and(|run| matches!(run.clock, MissionClock::Ticks { .. }));
+    if !in_lockstep && rustix::process::getpriority_process(None).is_ok_and(|nice| nice < NICE) {
+        // If the kernel refuses, the recorder shares the processor with the stages.
+        let _ = rustix::process::setpriority_process(None, NICE);
+    }
+}
+
 fn find_run(options: &Options) -> Option<PathBuf> {
     let link = options.domain.run_directory();
     options.run.clone().or_else(|| fs::read_link(link).ok())
@@ -207,6 +216,7 @@ impl CurrentRun {
         }
         let about = about.into_iter();
         let about: BTreeMap<_, _> = about.map(|(key, value)| (key.to_owned(), value)).collect();
+        give_way(run.as_ref());
         let mission = run.map(|run| run.mission);
         let file = RecordingFile::create(path, topics, mission.as_ref(), about.clone())?;
         let whole = options.run.is_some();

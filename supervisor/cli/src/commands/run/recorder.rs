@@ -10,10 +10,11 @@ use supervisor::{
 
 use crate::commands::record::DiskBudget;
 
-/// The time within which the recorder must be attached, or it misses the beginning.
-const ATTACHED_WITHIN: Duration = Duration::from_secs(2);
-/// The time for the recorder's last chunk, which takes some milliseconds.
-const ENDED_WITHIN: Duration = Duration::from_secs(5);
+/// The time within which the recorder must be attached, or it misses the beginning. It takes milliseconds, and seconds beside 30 busy
+/// processes a core.
+const ATTACHED_WITHIN: Duration = Duration::from_secs(20);
+/// The time for the recorder's last chunks, which take as long.
+const ENDED_WITHIN: Duration = Duration::from_secs(60);
 
 pub(crate) struct RunRecorder {
     process: Process,
