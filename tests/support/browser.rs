@@ -55,8 +55,8 @@ impl Browser {
 
     /// The value in the driver's answer.
     fn ask(&self, method: &str, path: &str, body: &Value) -> Value {
-        let (status, value) = self.answer(method, path, body).unwrap();
-        assert!(status.starts_with("HTTP/1.1 200"), "{path}: {value}");
+        let (head, value) = self.answer(method, path, body).unwrap();
+        assert!(head.starts_with("HTTP/1.1 200"), "{path}: {value}");
         value["value"].clone()
     }
 

@@ -35,7 +35,7 @@ use crate::{
 const POLL: Duration = Duration::from_millis(10);
 const LOGS_EVERY: Duration = Duration::from_millis(250);
 const LONGEST_RUN_FILE: u64 = 1 << 24;
-/// Niceness of the process.
+/// Niceness of a recorder of stages that answer a robot.
 const NICE: i32 = 5;
 
 #[derive(Clone)]

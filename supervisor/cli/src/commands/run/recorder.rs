@@ -2,7 +2,7 @@
 
 use std::{fs::File, process::Stdio, time::Duration};
 
-use common::poll;
+use common::{clock::Pace, poll};
 use supervisor::{
     Options,
     process::{Process, firsthand},
@@ -10,14 +10,29 @@ use supervisor::{
 
 use crate::commands::record::DiskBudget;
 
-/// The time within which the recorder must be attached, or it misses the beginning. It takes milliseconds, and seconds beside 30 busy
-/// processes a core.
-const ATTACHED_WITHIN: Duration = Duration::from_secs(20);
-/// The time for the recorder's last chunks, which take as long.
-const ENDED_WITHIN: Duration = Duration::from_secs(60);
+/// How long a run waits for its recorder, which takes milliseconds for either, and seconds beside 30 busy processes a core.
+#[derive(Clone, Copy)]
+struct Patience {
+    /// Until it is attached, or it misses the beginning.
+    attached: Duration,
+    /// Until its last chunks are written.
+    ended: Duration,
+}
+
+impl Patience {
+    /// A robot and the service manager wait for a run on a wall clock, nobody for one in lockstep.
+    const fn at(pace: Pace) -> Self {
+        let (attached, ended) = match pace {
+            Pace::Max => (20, 60),
+            Pace::Rate(_) => (2, 5),
+        };
+        Self { attached: Duration::from_secs(attached), ended: Duration::from_secs(ended) }
+    }
+}
 
 pub(crate) struct RunRecorder {
     process: Process,
+    patience: Patience,
 }
 
 impl RunRecorder {
@@ -46,9 +61,10 @@ impl RunRecorder {
         command.args(["--supervisor", &std::process::id().to_string()]);
         command.stdout(Stdio::piped()).stderr(log);
         let mut process = Process::spawn(command)?;
+        let patience = Patience::at(options.pace);
         let said = process.take_stdout();
         let attached = match &said {
-            Some(said) => poll::is_readable(said, ATTACHED_WITHIN)?,
+            Some(said) => poll::is_readable(said, patience.attached)?,
             None => false,
         };
         if !attached {
@@ -56,11 +72,11 @@ impl RunRecorder {
                 "the recorder is not attached yet; what is published now is not recorded"
             );
         }
-        Ok(Self { process })
+        Ok(Self { process, patience })
     }
 
     /// Let the recorder write the rest at the end of the run.
     pub(crate) fn end(mut self) {
-        self.process.end(ENDED_WITHIN);
+        self.process.end(self.patience.ended);
     }
 }
