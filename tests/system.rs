@@ -25,7 +25,6 @@ mod held_wheels;
 mod json_robot;
 mod kills_and_freezes;
 mod laser;
-mod live_replay;
 mod machine;
 mod missions;
 mod neighbours;

@@ -1,21 +1,23 @@
 //! The one list of subcommands: parser, dispatch and the groups of `--help` follow from it.
 
+pub(crate) mod calibrate;
 pub(crate) mod check;
-#[cfg(feature = "foxglove")]
-pub(crate) mod foxglove;
+pub(crate) mod diff;
 pub(crate) mod go_back;
 pub(crate) mod goto;
 pub(crate) mod help;
 pub(crate) mod install;
 pub(crate) mod logs;
+pub(crate) mod man;
+pub(crate) mod map;
 pub(crate) mod missions;
-#[cfg(feature = "page")]
-pub(crate) mod page;
 pub(crate) mod record;
+pub(crate) mod replay;
+pub(crate) mod report;
 pub(crate) mod resume;
 pub(crate) mod run;
+pub(crate) mod run_report;
 pub(crate) mod runs;
-#[cfg(feature = "simulator")]
 pub(crate) mod sim;
 pub(crate) mod stage;
 pub(crate) mod status;
@@ -24,76 +26,41 @@ pub(crate) mod table;
 pub(crate) mod topic;
 
 use std::{
+    error::Error,
     ffi::{OsStr, OsString},
     fmt::Write as _,
     process::{ExitCode, Termination as _},
 };
 
+use ::report::ReportError;
 use clap::{CommandFactory as _, Parser, Subcommand};
-
-#[cfg(feature = "tools")]
-use crate::tools::{
-    bench, calibrate, completions, evaluate, experiments, field, man, map, replay, report, ros2,
-    top,
+use console::{
+    completion,
+    failure::{self, Failure},
 };
-use crate::{console::failure::Failure, renamed};
+
+use crate::companions;
 
 /// Declares the subcommands by groups: the name of each and the module that has its `Arguments` and its `main`, whose further
-/// arguments stand in parentheses. `@tools`, `@page`, `@foxglove` and `@simulator` are the features without which a subcommand
-/// does not exist.
+/// arguments stand in parentheses. Behind `@` stand the companions of the group.
 macro_rules! commands {
     ($($heading:literal {
         $($name:ident $module:ident $(($whole:ident))?,)*
-        $(@tools { $($tool:ident $tool_module:ident $(($tool_whole:ident))?,)* })?
-        $(@page { $page:ident $page_module:ident })?
-        $(@foxglove { $viewer:ident $viewer_module:ident })?
-        $(@simulator { $sim:ident $sim_module:ident })?
+        $(@ $companion:literal)*
     })*) => {
         #[derive(Debug, Subcommand)]
         pub(crate) enum Command {
-            $(
-                $($name($module::Arguments),)*
-                $($(#[cfg(feature = "tools")] $tool($tool_module::Arguments),)*)?
-                $(#[cfg(feature = "page")] $page($page_module::Arguments),)?
-                $(#[cfg(feature = "foxglove")] $viewer($viewer_module::Arguments),)?
-                $(#[cfg(feature = "simulator")] $sim($sim_module::Arguments),)?
-            )*
+            $($($name($module::Arguments),)*)*
         }
 
         /// Headings, and the subcommands below each.
-        const GROUPS: &[(&str, &[&str])] = &[$((
-            $heading,
-            &[
-                $(stringify!($name),)*
-                $($(#[cfg(feature = "tools")] stringify!($tool),)*)?
-                $(#[cfg(feature = "page")] stringify!($page),)?
-                $(#[cfg(feature = "foxglove")] stringify!($viewer),)?
-                $(#[cfg(feature = "simulator")] stringify!($sim),)?
-            ],
-        )),*];
+        const GROUPS: &[(&str, &[&str])] =
+            &[$(($heading, &[$(stringify!($name),)* $($companion,)*])),*];
 
         impl Command {
             pub(crate) fn execute(&self) -> Result<ExitCode, Failure> {
                 Ok(match self {
-                    $(
-                        $(Self::$name(arguments) => $module::main(arguments $(, $whole())?)?.report(),)*
-                        $($(
-                            #[cfg(feature = "tools")]
-                            Self::$tool(arguments) => $tool_module::main(arguments $(, $tool_whole())?)?.report(),
-                        )*)?
-                        $(
-                            #[cfg(feature = "page")]
-                            Self::$page(arguments) => $page_module::main(arguments)?.report(),
-                        )?
-                        $(
-                            #[cfg(feature = "foxglove")]
-                            Self::$viewer(arguments) => $viewer_module::main(arguments)?.report(),
-                        )?
-                        $(
-                            #[cfg(feature = "simulator")]
-                            Self::$sim(arguments) => $sim_module::main(arguments)?.report(),
-                        )?
-                    )*
+                    $($(Self::$name(arguments) => $module::main(arguments $(, $whole())?)?.report(),)*)*
                 })
             }
         }
@@ -108,35 +75,37 @@ commands! {
         Return go_back,
         Stop stop,
         Resume resume,
-        @tools { Top top, }
-        @page { Page page }
+        @"top" @"page"
     }
     "Look at it" {
         Topic topic,
         Logs logs,
         Runs runs,
         Table table,
-        @tools { Map map, Ros2 ros2, }
-        @foxglove { Foxglove foxglove }
+        Map map,
+        @"ros2" @"foxglove"
     }
     "Record it" {
         Record record,
-        @tools { Replay replay, Report report, }
+        Replay replay,
+        Report report,
     }
     "Judge it" {
         Check check,
-        @tools { Evaluate evaluate, Experiments experiments, Field field, }
+        @"evaluate" @"experiments" @"field"
     }
     "Break it" {
         Stage stage,
-        @tools { Bench bench, }
+        @"bench"
     }
     "Set up" {
         Missions missions,
         Install install,
         Help help(command_line),
-        @tools { Calibrate calibrate, Completions completions, Man man(command_line), }
-        @simulator { Sim sim }
+        Calibrate calibrate,
+        Completions completion,
+        Man man(command_line),
+        Sim sim,
     }
 }
 
@@ -174,13 +143,22 @@ An error message ends with a code in brackets, which scripts can match.";
 
 /// The command line of the executable, for help, completions and the manual page.
 pub(crate) fn command_line() -> clap::Command {
-    Arguments::command()
+    Arguments::command().subcommands(companions::TABLE.iter().map(companions::Companion::command))
+}
+
+/// The code of `error`, if only this executable has such errors.
+pub(crate) fn error_code(error: &(dyn Error + 'static)) -> Option<&'static str> {
+    match error.downcast_ref()? {
+        ReportError::Recording(error) => failure::code_of_recording(error),
+        _ => None,
+    }
 }
 
 /// The subcommand that `words` name, which stand after the executable.
 pub(crate) fn parse<T: AsRef<OsStr>>(words: &[T]) -> Result<Command, clap::Error> {
     let executable = OsString::from("firsthand");
-    let words = std::iter::once(executable).chain(renamed::words(words));
+    let words =
+        std::iter::once(executable).chain(words.iter().map(|word| word.as_ref().to_owned()));
     let arguments = Arguments::try_parse_from(words)?;
     Ok(arguments.command.unwrap_or_else(|| Command::Run(run::Arguments::default())))
 }
@@ -189,18 +167,9 @@ impl Command {
     /// The least level of the log on standard error; none if the command sees to its log itself.
     pub(crate) fn log_level(&self) -> Option<&'static str> {
         match self {
-            Self::Run(_) => None,
-            #[cfg(feature = "tools")]
-            Self::Calibrate(_) => None,
+            Self::Run(_) | Self::Calibrate(_) => None,
             Self::Stage(arguments) if arguments.is_process() => Some("info"),
-            #[cfg(feature = "simulator")]
             Self::Sim(_) => Some("info"),
-            // A client could fill the log with its own errors.
-            #[cfg(feature = "foxglove")]
-            Self::Foxglove(_) => Some("error,foxglove=off"),
-            // Refused requests of other nodes are logged.
-            #[cfg(feature = "tools")]
-            Self::Ros2(_) => Some("warn,rustdds=off"),
             _ => Some("error"),
         }
     }
@@ -209,6 +178,7 @@ impl Command {
 /// The subcommands by groups, each with the beginning of its help.
 fn listed() -> String {
     let all = Command::augment_subcommands(clap::Command::new(""));
+    let all = all.subcommands(companions::TABLE.iter().map(companions::Companion::command));
     let mut text = String::new();
     for (heading, names) in GROUPS {
         // Writing to a String cannot fail.

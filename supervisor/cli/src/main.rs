@@ -1,41 +1,27 @@
-//! The one executable: the command line of a robot's supervisor, its stages, the simulated robot and the tools.
+//! `firsthand`, the robot: the command line of its supervisor, its stages, its recordings, and the simulated robot.
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`commands`] | the one list of subcommands, and those that a robot needs |
-//! | [`tools`] | the subcommands that a robot does without |
-//! | [`console`] | what subcommands share: output, failures, robots, runs, words |
-//! | [`renamed`] | the names that subcommands had before |
-//! | [`logging`] | logs to standard error, to a file, to the journal |
+//! | [`commands`] | the one list of subcommands |
+//! | [`companions`] | the subcommands that are executables beside this one: viewers, laboratory |
 
 mod commands;
-mod console;
-mod logging;
-mod renamed;
-#[cfg(feature = "tools")]
-mod tools;
+mod companions;
 
 use std::process::ExitCode;
 
-use console::{failure, output::write_stderr};
+use console::{completion, failure, logging};
 
 fn main() -> ExitCode {
-    #[cfg(feature = "tools")]
-    tools::completions::answer_shell(commands::command_line, commands::help::page_names);
-    let words: Vec<_> = std::env::args_os().skip(1).collect();
-    let command = commands::parse(&words).unwrap_or_else(|error| error.exit());
-    if let Some(level) = command.log_level() {
-        logging::to_stderr(level);
-    }
-    command.execute().unwrap_or_else(|error| {
-        let code = failure::code(error.as_ref());
-        #[cfg(feature = "tools")]
-        let code = code.or_else(|| tools::error_code::of(error.as_ref()));
-        let code = code.map_or(String::new(), |code| format!(" [{code}]"));
-        write_stderr(&format!("firsthand: {error}{code}\n"));
-        if let Some(remark) = failure::remark(error.as_ref()) {
-            write_stderr(&format!("firsthand: {remark}\n"));
+    let words: Vec<_> = std::env::args_os().collect();
+    companions::answer_shell(&words);
+    completion::answer_shell(commands::command_line, commands::help::page_names);
+    let executed = companions::execute(&words[1..]).unwrap_or_else(|| {
+        let command = commands::parse(&words[1..]).unwrap_or_else(|error| error.exit());
+        if let Some(level) = command.log_level() {
+            logging::to_stderr(level);
         }
-        failure::exit_code(error.as_ref())
-    })
+        command.execute()
+    });
+    failure::report(executed, commands::error_code)
 }

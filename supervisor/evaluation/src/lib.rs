@@ -13,7 +13,6 @@
 //! | [`report`], [`page`] | the results as a page; the common parts of pages |
 //! | [`directory`] | the directory of an evaluation |
 //! | [`experiments`] | the paper's experiments with many seeds |
-//! | [`maps`] | readers of ROS, PGM, PNG and MovingAI maps |
 //! | [`baselines`] | planners to compare with: shortest paths, Bug2 |
 //!
 //! Every setting runs on the same worlds with the same noise, so that results differ only by the setting.
@@ -22,7 +21,6 @@ pub mod baselines;
 pub mod directory;
 pub mod experiments;
 pub mod latency;
-pub mod maps;
 pub mod page;
 pub mod report;
 pub mod results;

@@ -13,12 +13,10 @@
 //! | `values` | the fields of a message as text |
 //! | [`diff`] | where two recordings part |
 //! | `samples` | recorded samples of a tick, and where two of them differ |
-//! | [`live`] | a recording played on a bus, with stages in processes of their own |
 
 pub mod diff;
 pub mod driver;
 mod generation;
-pub mod live;
 mod pieces;
 pub mod report;
 mod samples;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use common::mission::Mission;
 
-use crate::console::{
+use console::{
     failure::Failure,
     missions,
     output::{print_text, write_stderr},
@@ -20,6 +20,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     let mission = missions::complete(Mission::load(&arguments.file)?)?;
+    super::run::refuse_unspoken(&mission)?;
     for remark in &mission.remarks {
         write_stderr(&format!("firsthand: {remark}\n"));
     }

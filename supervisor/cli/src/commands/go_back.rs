@@ -4,7 +4,7 @@ use clap::Args;
 use common::{domain::RobotName, samples::TargetPoint};
 use supervisor::operator;
 
-use crate::console::failure::Failure;
+use console::failure::Failure;
 
 /// Send a robot that drives back to its start.
 #[derive(Debug, Args)]

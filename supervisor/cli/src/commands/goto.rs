@@ -4,7 +4,7 @@ use clap::Args;
 use common::{domain::RobotName, samples::TargetPoint};
 use supervisor::operator;
 
-use crate::console::failure::{Failure, Refused};
+use console::failure::{Failure, Refused};
 
 /// Send a robot that drives to another target, or to several in turn; it goes on without a stop. Fails if the supervisor
 /// refuses: a place in a believed hazard or outside the perimeter, a robot that an operator stopped.

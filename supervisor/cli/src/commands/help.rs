@@ -7,10 +7,7 @@ use std::fmt::Write as _;
 
 use clap::{Args, Command, error::ErrorKind};
 
-use crate::{
-    console::{failure::Failure, output::print_text},
-    renamed,
-};
+use console::{failure::Failure, output::print_text};
 
 /// Print a page of the guide, or the options of a subcommand; without a name, list both.
 #[derive(Debug, Args)]
@@ -67,7 +64,6 @@ fn page(name: &str) -> Option<&'static Page> {
     GUIDE.iter().find(|page| page.file.eq_ignore_ascii_case(name))
 }
 
-#[cfg(feature = "tools")]
 pub(crate) fn page_names() -> Vec<String> {
     GUIDE.iter().map(Page::name).collect()
 }
@@ -109,10 +105,8 @@ pub(crate) fn main(arguments: &Arguments, mut whole: Command) -> Result<(), Fail
 }
 
 fn subcommand<'a>(whole: &'a mut Command, words: &[String]) -> Option<&'a mut Command> {
-    let words = renamed::words(words);
-    let mut words = words.iter();
-    words.try_fold(whole, |command, word| command.find_subcommand_mut(word))
+    words.iter().try_fold(whole, |command, word| command.find_subcommand_mut(word))
 }
 
-#[cfg(all(test, feature = "simulator", feature = "tools"))]
+#[cfg(test)]
 mod tests;

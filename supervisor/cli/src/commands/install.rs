@@ -11,7 +11,7 @@ use clap::Args;
 use supervisor::stages;
 use thiserror::Error;
 
-use crate::console::{failure::Failure, output::print_text};
+use console::{failure::Failure, output::print_text};
 
 /// Make this executable a service of systemd: units, user, configuration.
 ///

@@ -11,7 +11,7 @@ use clap::Args;
 use common::domain::RobotName;
 
 use self::merged::Logs;
-use crate::console::{
+use console::{
     failure::{Failure, Refused},
     operator,
     robots::Robot,

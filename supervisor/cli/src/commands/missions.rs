@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use crate::console::{
+use console::{
     failure::Failure,
     missions::{self, LookupError, SHIPPED},
     output::print_text,

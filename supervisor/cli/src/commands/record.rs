@@ -11,7 +11,7 @@ use common::{
 };
 use recording::{Options, recorder::Happened};
 
-use crate::console::{
+use console::{
     failure::Failure,
     output::{print_text, write_stderr},
 };

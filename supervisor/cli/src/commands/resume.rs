@@ -5,7 +5,7 @@ use common::domain::RobotName;
 
 use supervisor::operator;
 
-use crate::console::failure::Failure;
+use console::failure::Failure;
 
 /// Let a stopped robot go on.
 #[derive(Debug, Args)]

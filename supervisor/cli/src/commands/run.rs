@@ -6,7 +6,13 @@ mod summary_file;
 use std::{fs, path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::Args;
-use common::{clock::Pace, domain::RobotName, mission::Mission, start::become_child};
+use common::{
+    clock::Pace,
+    domain::RobotName,
+    mission::{Mission, Protocol},
+    start::become_child,
+};
+use link::transport::SPEAKS_ROS2;
 use supervisor::{
     Finished, Options, Progress, Starter,
     outcome::{Ending, Outcome},
@@ -16,19 +22,14 @@ use supervisor::{
 };
 
 use self::{recorder::RunRecorder, summary_file::SummaryFile};
-#[cfg(feature = "tools")]
-use crate::tools::run_report;
-use crate::{
-    commands::record::DiskBudget,
-    console::{
-        failure::{Failure, Refused},
-        missions,
-        output::{print_text, write_stderr},
-        progress_line::ProgressLine,
-        robots::SUPERVISOR_LOG,
-        runs,
-    },
-    logging,
+use super::{record::DiskBudget, run_report};
+use console::{
+    failure::{Failure, Refused},
+    logging, missions,
+    output::{print_text, write_stderr},
+    progress_line::ProgressLine,
+    robots::SUPERVISOR_LOG,
+    runs,
 };
 
 /// Carry out a mission: start a robot's stages, let it drive, summarise.
@@ -169,6 +170,7 @@ fn starter(arguments: &Arguments) -> Starter {
 /// The mission with all that is set on the command line.
 fn mission(arguments: &Arguments) -> Result<Mission, Failure> {
     let mut mission = missions::load(&arguments.mission, &arguments.set)?;
+    refuse_unspoken(&mission)?;
     if let Some(seed) = arguments.seed {
         mission.seed = seed;
     }
@@ -180,6 +182,15 @@ fn mission(arguments: &Arguments) -> Result<Mission, Failure> {
     }
     planner_executable::resolve(&mut mission)?;
     Ok(mission)
+}
+
+/// Refuse a mission whose robot speaks ROS 2 if this executable does not.
+pub(super) fn refuse_unspoken(mission: &Mission) -> Result<(), Refused> {
+    if mission.robot.protocol() != Protocol::Ros2 || SPEAKS_ROS2 {
+        return Ok(());
+    }
+    let message = "robot.protocol: this executable speaks no ROS 2; build it with `cargo build --release --features ros2`";
+    Err(Refused::new("mission", message))
 }
 
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -242,18 +253,15 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         let _ = fs::remove_dir_all(directory);
     } else {
         // Picture and report come last and have no effect on the result.
-        #[cfg(feature = "tools")]
-        {
-            let show = |written: run_report::Written| {
-                let (name, file) = written?;
-                let line = format!("{name}: {}\n", file.display());
-                let printed = if arguments.json { Ok(()) } else { print_text(&line) };
-                printed.map_err(|error| format!("cannot print where the {name} is: {error}"))
-            };
-            complain(show(run_report::picture(&options, &finished, &summary)));
-            if !arguments.no_record {
-                complain(show(run_report::report(&options)));
-            }
+        let show = |written: run_report::Written| {
+            let (name, file) = written?;
+            let line = format!("{name}: {}\n", file.display());
+            let printed = if arguments.json { Ok(()) } else { print_text(&line) };
+            printed.map_err(|error| format!("cannot print where the {name} is: {error}"))
+        };
+        complain(show(run_report::picture(&options, &finished, &summary)));
+        if !arguments.no_record {
+            complain(show(run_report::report(&options)));
         }
     }
     Ok(exit_code(&summary, &finished.ending))

@@ -11,7 +11,8 @@ use clap::{Args, Subcommand};
 use common::domain::RobotName;
 use serde::Serialize;
 
-use crate::console::{
+use super::diff;
+use console::{
     failure::Failure,
     output::{json_lines, print_text},
     runs::{self, Outcome, RunDirectory},
@@ -21,8 +22,6 @@ use crate::console::{
     },
     words,
 };
-#[cfg(feature = "tools")]
-use crate::tools::diff;
 
 /// List runs, remove the oldest, find where two differ. Without a subcommand: `firsthand runs list`.
 #[derive(Debug, Args)]
@@ -37,7 +36,6 @@ pub(crate) struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     List(List),
-    #[cfg(feature = "tools")]
     Diff(diff::Arguments),
 }
 
@@ -74,7 +72,6 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     match &arguments.command {
         None => list(&arguments.list),
         Some(Command::List(arguments)) => list(arguments),
-        #[cfg(feature = "tools")]
         Some(Command::Diff(arguments)) => diff::main(arguments),
     }
 }

@@ -10,7 +10,7 @@ use common::{
 };
 use x80_sim::{SimError, SimOptions};
 
-use crate::console::{
+use console::{
     failure::{Failure, Refused},
     missions,
 };

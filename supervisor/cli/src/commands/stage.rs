@@ -10,7 +10,7 @@ use common::domain::RobotName;
 use rustix::process::Signal;
 
 use super::table;
-use crate::console::{failure::Failure, operator, output::print_text};
+use console::{failure::Failure, operator, output::print_text};
 
 /// List, kill, freeze, restart and break the stages of a robot; or be one of them.
 ///

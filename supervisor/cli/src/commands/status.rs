@@ -19,7 +19,7 @@ use common::{
 };
 use serde::Serialize;
 
-use crate::console::{
+use console::{
     failure::Failure,
     output::print,
     table::{

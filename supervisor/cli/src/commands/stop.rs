@@ -3,7 +3,7 @@
 use clap::Args;
 use common::domain::{Domain, RobotName};
 
-use crate::console::{failure::Failure, operator};
+use console::{failure::Failure, operator};
 
 /// Let the robot stand until `firsthand resume`; the mission goes on then. Fails unless the encoders confirm that it rests.
 ///

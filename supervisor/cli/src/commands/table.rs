@@ -1,7 +1,5 @@
 //! `firsthand table`, and the tables of topics and stages: Markdown, as the guide shows it.
 
-mod item;
-#[cfg(feature = "tools")]
 pub(crate) mod stored;
 
 use clap::{Args, Subcommand};
@@ -13,8 +11,7 @@ use common::{
 use link::failsafe::{self, monitor::Clears};
 use supervisor::stages;
 
-use self::item::item;
-use crate::console::{failure::Failure, output::print_text};
+use console::{failure::Failure, item::item, output::print_text};
 
 /// Print a table of the guide.
 #[derive(Debug, Args)]
@@ -29,14 +26,9 @@ enum Table {
     Failsafe,
     /// Print the faults that can be put into stages (`firsthand stage fault`).
     Faults,
-    /// Print the topics of the bridge to ROS 2 (`firsthand ros2`).
-    #[cfg(feature = "tools")]
-    Ros2,
     /// Print what was measured.
-    #[cfg(feature = "tools")]
     Results,
     /// Print what is promised, and the tests of it.
-    #[cfg(feature = "tools")]
     Capabilities,
 }
 
@@ -44,24 +36,20 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     Ok(print_text(&match arguments.table {
         Table::Failsafe => failsafe(),
         Table::Faults => faults(),
-        #[cfg(feature = "tools")]
-        Table::Ros2 => ros2(),
-        #[cfg(feature = "tools")]
         Table::Results => stored::results(),
-        #[cfg(feature = "tools")]
         Table::Capabilities => stored::markdown("capabilities", None).unwrap_or_default(),
     })?)
 }
 
 /// The text that a page of the guide shows behind `<!-- table NAME SECTION -->`; none of an unknown name.
-#[cfg(all(test, feature = "tools"))]
+#[cfg(test)]
 pub(crate) fn shown(name: &str, section: Option<&str>) -> Option<String> {
     match name {
         "topics" => Some(topics()),
         "stages" => Some(stages()),
         "failsafe" => Some(failsafe()),
         "faults" => Some(faults()),
-        "ros2" => Some(ros2()),
+        "ros2" => Some(firsthand_ros2::topics()),
         stored => stored::markdown(stored, section),
     }
 }
@@ -151,19 +139,6 @@ fn faults() -> String {
         item(&format!("`{}` ({stage}): {}; until: {}", fault.name, fault.meaning, fault.ends))
     };
     faults::TABLE.iter().map(row).collect()
-}
-
-#[cfg(feature = "tools")]
-fn ros2() -> String {
-    let row = |spec: &ros2_bridge::topics::Spec| {
-        let [package, message] = spec.message;
-        let way = match spec.accepted_by {
-            None => String::new(),
-            Some(by) => format!("taken with `--accept {}`; ", format!("{by:?}").to_lowercase()),
-        };
-        item(&format!("`{}` (`{package}/{message}`): {way}{}", spec.name, spec.meaning))
-    };
-    ros2_bridge::topics::TABLE.iter().map(row).collect()
 }
 
 #[cfg(test)]

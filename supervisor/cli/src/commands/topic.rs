@@ -8,7 +8,7 @@ mod sample_text;
 use clap::{Args, Subcommand};
 
 use super::table;
-use crate::console::{failure::Failure, output::print_text};
+use console::{failure::Failure, output::print_text};
 
 /// List the topics, print their samples as they come, count their rates. Without a subcommand: `firsthand topic list`.
 #[derive(Debug, Args)]

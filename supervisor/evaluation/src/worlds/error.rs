@@ -5,8 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::maps::MapError;
 use common::mission::MissionError;
+use maps::MapError;
 use thiserror::Error;
 
 #[derive(Debug, Error)]

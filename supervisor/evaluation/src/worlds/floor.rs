@@ -4,9 +4,9 @@
 
 use std::{collections::VecDeque, f64::consts::PI, path::Path};
 
-use crate::maps::{MOST_BOXES, MapError, PlacedMap};
 use common::geometry::{Box2, Shapes};
 use glam::DVec2;
+use maps::{MOST_BOXES, MapError, PlacedMap};
 
 use super::{ends::Ends, error::WorldError, random::Random};
 
@@ -25,7 +25,7 @@ pub(super) struct Floor {
 impl Floor {
     /// The map of a YAML file.
     pub(super) fn load(file: &Path) -> Result<Self, WorldError> {
-        let map = crate::maps::load_placed(file)?;
+        let map = maps::load_placed(file)?;
         let side_m = map.map.cols.max(map.map.rows) as f64 * map.cell_m;
         if side_m > LARGEST_M {
             return Err(WorldError::TooLarge {

@@ -6,7 +6,7 @@ use std::{
     process::{Command, Stdio},
 };
 
-use crate::console::output::print_text;
+use console::output::print_text;
 
 /// The greatest width of text, because longer lines are hard to read.
 const WIDEST: usize = 100;

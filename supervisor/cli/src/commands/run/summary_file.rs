@@ -12,7 +12,7 @@ use rustix::{
 };
 use supervisor::recovery::SUMMARY;
 
-use crate::console::failure::Refused;
+use console::failure::Refused;
 
 /// The name of the file until it is complete. A file that is called [`SUMMARY`] is complete, and means that the run has ended.
 const UNFINISHED: &str = "summary.json.unfinished";

@@ -16,7 +16,7 @@ use common::{
 
 use supervisor::operator::{PATIENCE, find, new_id};
 
-use crate::console::{
+use console::{
     failure::{Failure, Refused},
     operator::known,
 };

@@ -2,22 +2,22 @@
 
 use std::{ffi::OsString, os::unix::process::CommandExt as _, path::Path, process::Command};
 
-#[cfg(feature = "baselines")]
-use common::shell::{StageError, run_stage};
 use common::{
     external,
     mission::Mission,
+    shell::run_stage,
     stage_command::{self, SUBCOMMAND},
     start::Start,
     stop_socket::Identity,
 };
-#[cfg(feature = "baselines")]
-use evaluation::baselines::{bug::Bug, shell::Shell, wavefront::Wavefront};
-#[cfg(feature = "baselines")]
-use supervisor::stages::PLANNER;
-use supervisor::{STOP_GUARD, guard, planner_executable, stages::Stage};
+use supervisor::{
+    STOP_GUARD, guard, planner_executable,
+    stages::{PLANNER, Stage},
+};
 
-use crate::console::{failure::Failure, operator};
+use crate::companions::{self, LABORATORY};
+
+use console::{failure::Failure, operator};
 
 /// Be the stage that `words` name: its name, and its options.
 pub(super) fn run(words: &[OsString]) -> Result<(), Failure> {
@@ -30,10 +30,14 @@ pub(super) fn run(words: &[OsString]) -> Result<(), Failure> {
         let link = Identity(link.to_string_lossy().into_owned());
         return Ok(guard(Path::new(directory), &link)?);
     }
-    #[cfg(feature = "baselines")]
-    if let Some(run) = baseline(&name) {
+    if name == calibration::PLANNER {
         let start = stage_command::start_with(PLANNER, options.iter().cloned())?;
-        return Ok(run(&start)?);
+        return Ok(run_stage::<calibration::shell::Shell>(&start)?);
+    }
+    if planner_executable::baseline(Path::new(&*name)).is_some() {
+        // The planners to compare with are in the laboratory.
+        let words = std::iter::once(SUBCOMMAND.into()).chain(words.iter().cloned());
+        return Err(companions::become_executable(LABORATORY, words));
     }
     let stage = operator::known_stage(&name)?;
     let start = stage_command::start_with(stage.name, options.iter().cloned())?;
@@ -41,21 +45,6 @@ pub(super) fn run(words: &[OsString]) -> Result<(), Failure> {
         become_executable(stage, &external::mission(robot)?, options)?;
     }
     Ok((stage.run)(&start)?)
-}
-
-/// The function that runs a stage's process until it is asked to stop.
-#[cfg(feature = "baselines")]
-type RunStage = fn(&Start) -> Result<(), StageError>;
-
-/// The process of the baseline `name`, which takes the place of the planner.
-#[cfg(feature = "baselines")]
-fn baseline(name: &str) -> Option<RunStage> {
-    match name {
-        "wavefront" => Some(run_stage::<Shell<Wavefront>>),
-        "bug" => Some(run_stage::<Shell<Bug>>),
-        calibration::PLANNER => Some(run_stage::<calibration::shell::Shell>),
-        _ => None,
-    }
 }
 
 /// Become the executable that `mission` names for `stage`, if it names one.

@@ -10,7 +10,7 @@ use common::{
 };
 use serde::Serialize;
 
-use crate::console::{
+use console::{
     failure::Failure,
     output::{json_lines, print_text, write_stderr},
     robots::{self, Robot},

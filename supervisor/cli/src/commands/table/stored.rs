@@ -4,7 +4,7 @@
 
 use std::fmt::Write as _;
 
-use super::item::item;
+use console::item::item;
 
 macro_rules! stored {
     ($($name:literal in $file:literal),* $(,)?) => {

@@ -9,7 +9,7 @@ use common::{
 };
 
 use super::sample_text;
-use crate::console::{
+use console::{
     failure::{Failure, Refused},
     stream::{LOOK_EVERY, Stream},
     waiting::Waiting,

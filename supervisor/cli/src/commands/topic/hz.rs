@@ -11,7 +11,7 @@ use common::{
 };
 
 use super::echo::readable;
-use crate::console::{
+use console::{
     failure::Failure,
     output::json_lines,
     rates::{self, TopicRates},

@@ -1,0 +1,105 @@
+//! A run of a calibration.
+
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use common::{clock::Pace, domain::RobotName, mission::Mission, samples::PoseSample};
+use glam::DVec2;
+use supervisor::{Options, Progress, Starter, outcome::Outcome};
+
+use console::{
+    failure::{Failure, Refused},
+    output::write_stderr,
+    progress_line::ProgressLine,
+    runs,
+};
+
+use crate::commands::run::recorder::RunRecorder;
+
+/// Time between lines that cannot be rewritten.
+const LINE_EVERY: Duration = Duration::from_secs(5);
+
+/// The data that all runs of a calibration share.
+#[derive(Clone, Copy)]
+pub(super) struct Setting<'a> {
+    pub(super) robot: &'a RobotName,
+    pub(super) pace: Pace,
+    /// The directory in which the directories of runs are.
+    pub(super) runs: &'a Path,
+}
+
+/// A run that came to the end of its procedure.
+pub(super) struct Carried {
+    pub(super) directory: PathBuf,
+    /// Mission time, seconds.
+    pub(super) seconds: f64,
+    /// The encoders in each tick.
+    pub(super) counts: Vec<[u16; 2]>,
+    /// The true place of a simulated robot in the end, metres.
+    pub(super) truth: Option<DVec2>,
+}
+
+/// Carry out `mission` to the end of its procedure.
+pub(super) fn carry_out(
+    setting: Setting<'_>,
+    mission: Mission,
+    title: &str,
+) -> Result<Carried, Failure> {
+    let directory = runs::numbered(setting.runs, &mission.name)?;
+    let options = Options {
+        mission,
+        robot: setting.robot.clone(),
+        pace: setting.pace,
+        directory,
+        starter: Starter::Supervisor,
+        recovered: None,
+    };
+    let place = options.directory.display();
+    let mut line = ProgressLine::new(LINE_EVERY);
+    let mut recorder = None;
+    let ran = supervisor::run(
+        &options,
+        &mut || recorder = RunRecorder::start(&options, None),
+        &mut |progress| {
+            if line.is_due() {
+                if line.begin() {
+                    write_stderr(&format!("{title}: everything of this run is in {place}\n"));
+                }
+                line.show(&shown(progress), true);
+            }
+        },
+    );
+    if let Some(recorder) = recorder {
+        recorder.end();
+    }
+    line.end();
+    let (finished, still_moving) = ran?;
+    if still_moving.is_some() {
+        return Err("THE ROBOT MOVES although it was told to stand by every method".into());
+    }
+    let truth = finished.truth.last().map(|truth| DVec2::new(truth.x, truth.y));
+    let ending = &finished.ending;
+    match ending.outcome {
+        // The end by wheels that are not calibrated does not matter. A planner that gave up says why in its checkpoint.
+        Outcome::Reached | Outcome::WrongPlace | Outcome::ReachedUnsure | Outcome::Unreachable => {
+            let counts = |pose: &PoseSample| [pose.left_counts, pose.right_counts];
+            let counts = finished.record.poses.iter().map(counts).collect();
+            let seconds = finished.duration_s;
+            Ok(Carried { directory: options.directory, seconds, counts, truth })
+        }
+        outcome => {
+            let (outcome, reason) = (outcome.as_str(), &ending.reason);
+            let message =
+                format!("nothing was written: the run ended in {outcome}, {reason}; see {place}");
+            Err(Refused::new("not-calibrated", message).into())
+        }
+    }
+}
+
+fn shown(progress: &Progress<'_>) -> String {
+    let pose = progress.record.pose.unwrap_or_default();
+    let state = if progress.driving { "" } else { ", starting" };
+    format!("{:6.1} s  {:5.1} m driven{state}", pose.stamp.time().seconds(), pose.travelled_m)
+}

@@ -1,0 +1,30 @@
+//! `firsthand runs diff A B`: the first difference of two recordings.
+
+use std::{path::PathBuf, process::ExitCode};
+
+use clap::Args;
+use recording::{Recording, replay::diff};
+
+use console::{failure::Failure, output::print};
+
+/// Find the first tick, topic and field in which two recordings differ. Exits with 1 if they do.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// The first recording, or the directory of its run.
+    #[arg(value_name = "A|A.mcap")]
+    first: PathBuf,
+    /// The second.
+    #[arg(value_name = "B|B.mcap")]
+    second: PathBuf,
+    /// Print one line of JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let first = Recording::open(&arguments.first)?;
+    let second = Recording::open(&arguments.second)?;
+    let parting = diff::diff(&first, &second)?;
+    print(&parting, arguments.json)?;
+    Ok(ExitCode::from(u8::from(parting.first.is_some())))
+}

@@ -1,0 +1,99 @@
+//! Completions of shells, `firsthand completions`. The script of a shell asks the executable at each tab, so that it completes
+//! robots, stages, topics, missions and pages too.
+
+use std::ffi::OsStr;
+
+use clap::{
+    Arg, Args, Command,
+    builder::{PossibleValuesParser, ValueParser},
+};
+use clap_complete::{
+    ArgValueCompleter, CompleteEnv, CompletionCandidate, PathCompleter,
+    engine::{SubcommandCandidates, ValueCompleter as _},
+    env::Shells,
+};
+use common::{domain::RobotName, topics};
+use supervisor::stages;
+
+use crate::{failure::Failure, missions, output::print_text, robots};
+
+/// Print completions for a shell: `firsthand completions bash > ~/.local/share/bash-completion/completions/firsthand`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// The shell.
+    #[arg(value_parser = PossibleValuesParser::new(Shells::builtins().names()))]
+    shell: String,
+}
+
+/// The environment variable by which the script of a shell asks.
+pub const VARIABLE: &str = "FIRSTHAND_COMPLETE";
+/// The environment variable in which bash and zsh give the number of the word that is completed.
+pub const INDEX: &str = "_CLAP_COMPLETE_INDEX";
+/// The executable, which the shell finds on PATH.
+const EXECUTABLE: &str = "firsthand";
+
+pub fn main(arguments: &Arguments) -> Result<(), Failure> {
+    let shells = Shells::builtins();
+    let shell = shells.completer(&arguments.shell).ok_or("name a shell")?;
+    let mut script = Vec::new();
+    shell.write_registration(VARIABLE, EXECUTABLE, EXECUTABLE, EXECUTABLE, &mut script)?;
+    Ok(print_text(&String::from_utf8_lossy(&script))?)
+}
+
+/// If a shell asks, answer and end the process. `whole` is the command line of the executable, `pages` those of the guide.
+pub fn answer_shell(whole: fn() -> Command, pages: fn() -> Vec<String>) {
+    CompleteEnv::with_factory(|| with_candidates(whole(), pages)).var(VARIABLE).complete();
+}
+
+/// `command` with candidates for the values of its arguments.
+fn with_candidates(command: Command, pages: fn() -> Vec<String>) -> Command {
+    command
+        // Only `stage` asks for these, because no other command takes a word that is no subcommand.
+        .add(SubcommandCandidates::new(|| candidates("", stage_names())))
+        .mut_args(|argument| match completer(&argument, pages) {
+            Some(completer) => argument.add(completer),
+            None => argument,
+        })
+        .mut_subcommands(|subcommand| with_candidates(subcommand, pages))
+}
+
+/// The completer of an argument that names a robot, a stage, a topic, a mission, or a page of the guide.
+fn completer(argument: &Arg, pages: fn() -> Vec<String>) -> Option<ArgValueCompleter> {
+    let robot = ValueParser::new(|name: &str| name.parse::<RobotName>()).type_id();
+    if argument.get_value_parser().type_id() == robot {
+        return Some(named(|| {
+            let robots = robots::own().into_iter();
+            robots.map(|robot| robot.name.to_string()).collect()
+        }));
+    }
+    Some(match argument.get_id().as_str() {
+        "stage" => named(stage_names),
+        "topic" | "topics" => named(|| {
+            let topics = topics::TABLE.iter();
+            topics.map(|topic| topic.spec().name.to_owned()).collect()
+        }),
+        "mission" => ArgValueCompleter::new(|current: &OsStr| {
+            let files = PathCompleter::file().complete(current);
+            let shipped = missions::SHIPPED.map(|(name, _)| name.to_owned());
+            let mut all = candidates(&current.to_string_lossy(), shipped.to_vec());
+            all.extend(files);
+            all
+        }),
+        "page" => named(pages),
+        _ => return None,
+    })
+}
+
+fn named(names: impl Fn() -> Vec<String> + Send + Sync + 'static) -> ArgValueCompleter {
+    ArgValueCompleter::new(move |current: &OsStr| candidates(&current.to_string_lossy(), names()))
+}
+
+fn candidates(current: &str, names: Vec<String>) -> Vec<CompletionCandidate> {
+    let fit = names.into_iter().filter(|name| name.starts_with(current));
+    fit.map(CompletionCandidate::new).collect()
+}
+
+fn stage_names() -> Vec<String> {
+    let stages = stages::TABLE.iter();
+    stages.map(|stage| stage.name.to_owned()).collect()
+}

@@ -1,0 +1,194 @@
+//! Why a subcommand failed: one sentence, a code for scripts, an exit code, and sometimes a remark.
+//!
+//! `firsthand` prints the code in brackets at the end of the message, `[not-running]`. A script matches the code; the sentence
+//! before it may change.
+
+use std::{error::Error, fs, path::Path, process::ExitCode};
+
+use common::{
+    address::AddressError, bus::BusError, checkpoint::CheckpointError, domain::SHARED_MEMORY,
+    mission::MissionError, start::StageError,
+};
+use recording::RecordingError;
+use supervisor::{
+    DomainError, SupervisorError, operator::OperatorError,
+    planner_executable::PlannerExecutableError, recovery::ResumeError,
+};
+use thiserror::Error;
+
+use super::{missions::LookupError, output::write_stderr};
+
+/// One sentence that names the input and the remedy.
+pub type Failure = Box<dyn Error>;
+
+/// A failure with a code that the command line itself gives.
+#[derive(Debug, Error)]
+#[error("{message}")]
+pub struct Refused {
+    code: &'static str,
+    message: String,
+}
+
+impl Refused {
+    pub fn new(code: &'static str, message: impl Into<String>) -> Self {
+        let message = message.into();
+        Self { code, message }
+    }
+}
+
+/// The exit code of an executable whose subcommand gave `result`. An error is reported on standard error, with its code: the one
+/// that `own_code` knows, of errors that only this executable has, or else that of [`code`].
+pub fn report(
+    result: Result<ExitCode, Failure>,
+    own_code: fn(&(dyn Error + 'static)) -> Option<&'static str>,
+) -> ExitCode {
+    result.unwrap_or_else(|error| {
+        let error = error.as_ref();
+        let code = own_code(error).or_else(|| code(error));
+        let code = code.map_or(String::new(), |code| format!(" [{code}]"));
+        write_stderr(&format!("firsthand: {error}{code}\n"));
+        if let Some(remark) = remark(error) {
+            write_stderr(&format!("firsthand: {remark}\n"));
+        }
+        exit_code(error)
+    })
+}
+
+/// The exit code of an invalid mission file: a service manager need not retry.
+const INVALID_MISSION: u8 = 78;
+
+/// The exit code of a subcommand that failed with `error`.
+fn exit_code(error: &(dyn Error + 'static)) -> ExitCode {
+    match code(error) {
+        Some("mission" | "unknown-mission" | "planner-executable" | "address") => {
+            ExitCode::from(INVALID_MISSION)
+        }
+        _ => match error.downcast_ref() {
+            Some(error) => ExitCode::from(StageError::exit_code(error)),
+            None => ExitCode::FAILURE,
+        },
+    }
+}
+
+/// The code of `error`; none if no script could react to the error in particular.
+pub fn code(error: &(dyn Error + 'static)) -> Option<&'static str> {
+    let code = error.downcast_ref().map(|refused: &Refused| refused.code);
+    code.or_else(|| error.downcast_ref().and_then(of_supervisor))
+        .or_else(|| error.downcast_ref().and_then(of_resumption))
+        .or_else(|| error.downcast_ref().and_then(of_operator))
+        .or_else(|| error.downcast_ref().and_then(of_bus))
+        .or_else(|| error.downcast_ref().and_then(code_of_recording))
+        .or_else(|| error.downcast_ref().map(of_lookup))
+        .or_else(|| error.is::<MissionError>().then_some("mission"))
+        .or_else(|| {
+            let planner = error.is::<PlannerExecutableError>();
+            planner.then_some("planner-executable")
+        })
+}
+
+fn of_supervisor(error: &SupervisorError) -> Option<&'static str> {
+    match error {
+        SupervisorError::Domain(error) => of_domain(error),
+        SupervisorError::Bus(error) => of_bus(error),
+        SupervisorError::Checkpoint(error) => of_checkpoint(error),
+        SupervisorError::Address(AddressError::Form { .. }) => Some("address"),
+        _ => None,
+    }
+}
+
+fn of_operator(error: &OperatorError) -> Option<&'static str> {
+    match error {
+        OperatorError::Refused { code, .. } => Some(code),
+        OperatorError::Bus(error) => of_bus(error),
+        OperatorError::Stage(_) | OperatorError::System(..) => None,
+    }
+}
+
+fn of_domain(error: &DomainError) -> Option<&'static str> {
+    match error {
+        DomainError::Supervised { .. } => Some("supervised"),
+        DomainError::SharedMemory { .. } => Some("shared-memory"),
+        DomainError::Descriptors { .. } => Some("descriptors"),
+        DomainError::Bus(error) => of_bus(error),
+        _ => None,
+    }
+}
+
+fn of_bus(error: &BusError) -> Option<&'static str> {
+    match error {
+        BusError::NotRunning { .. } => Some("not-running"),
+        BusError::Incompatible { .. } => Some("other-payload"),
+        BusError::NoPlace { .. } => Some("no-place"),
+        _ => None,
+    }
+}
+
+fn of_resumption(error: &ResumeError) -> Option<&'static str> {
+    match error {
+        ResumeError::Ended { .. } => Some("ended"),
+        ResumeError::Checkpoint(error) => of_checkpoint(error),
+        _ => None,
+    }
+}
+
+fn of_checkpoint(error: &CheckpointError) -> Option<&'static str> {
+    matches!(error, CheckpointError::Foreign { .. }).then_some("other-version")
+}
+
+pub fn code_of_recording(error: &RecordingError) -> Option<&'static str> {
+    match error {
+        RecordingError::NoRecording(_) => Some("no-recording"),
+        RecordingError::Several { .. } => Some("several-recordings"),
+        RecordingError::Foreign { .. } => Some("not-a-recording"),
+        _ => None,
+    }
+}
+
+fn of_lookup(error: &LookupError) -> &'static str {
+    match error {
+        LookupError::Unknown { .. } | LookupError::Neither { .. } => "unknown-mission",
+        _ => "mission",
+    }
+}
+
+/// A remark to the message of `error`: a robot that does not run for this user may run for another one, whose bus nobody else
+/// can join.
+fn remark(error: &(dyn Error + 'static)) -> Option<String> {
+    let operator = error.downcast_ref().and_then(|error| match error {
+        OperatorError::Bus(error) => Some(error),
+        _ => None,
+    });
+    let Some(BusError::NotRunning { robot, .. }) = operator.or_else(|| error.downcast_ref()) else {
+        return None;
+    };
+    let user = users(Path::new(SHARED_MEMORY), robot).next()?;
+    Some(format!("a robot {robot:?} runs here for user {user}: `sudo -u '#{user}' firsthand ...`"))
+}
+
+/// The users who have files of a robot of that name in `shared` memory: the names of files begin with the number of the user.
+fn users<'a>(shared: &Path, robot: &'a str) -> impl Iterator<Item = u32> + use<'a> {
+    let entries = fs::read_dir(shared).into_iter().flatten().flatten();
+    entries.filter_map(move |entry| {
+        let name = entry.file_name();
+        let (user, rest) = name.to_str()?.strip_prefix("fh")?.split_once('_')?;
+        let named = rest.strip_prefix(robot)?.starts_with('_');
+        named.then_some(user.parse().ok()?)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_user_of_a_robot_is_told_by_its_files_in_shared_memory() {
+        let shared = tempfile::tempdir().unwrap();
+        for name in ["fh1000_x80_bus", "fh7_x80-2_bus", "other"] {
+            fs::create_dir(shared.path().join(name)).unwrap();
+        }
+        let users_of = |robot| users(shared.path(), robot).collect::<Vec<_>>();
+        assert_eq!(users_of("x80"), [1000]);
+        assert_eq!(users_of("x80-2"), [7]);
+        assert_eq!(users_of("x8"), Vec::<u32>::new());
+    }
+}

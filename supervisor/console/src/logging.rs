@@ -1,0 +1,121 @@
+//! The log of this process: to standard error, to a file, and, under systemd, to the journal.
+//!
+//! The journal takes lines from standard error and reads a priority from a leading `<N>` (sd-daemon(3)); it
+//! records the time itself. That needs no library, and a line is the same wherever it is read.
+//!
+//! A line that cannot be written, because the disk is full or the terminal is closed, is dropped silently: tracing would report
+//! it on standard error and panic if that fails too.
+
+use std::{
+    fs::File,
+    io::{self, Write},
+    os::{fd::AsFd, unix::fs::MetadataExt},
+    path::Path,
+    sync::Mutex,
+};
+
+use tracing::{Level, Metadata};
+use tracing_subscriber::{
+    EnvFilter, Layer, Registry,
+    fmt::{self, MakeWriter},
+    layer::SubscriberExt,
+    util::SubscriberInitExt,
+};
+
+type AnyLayer = Box<dyn Layer<Registry> + Send + Sync>;
+
+/// Whether standard error goes to the journal. `JOURNAL_STREAM` says which file the journal reads, and children
+/// inherit it even if their standard error is redirected, so the file is compared.
+pub fn to_journal() -> bool {
+    let Some(journal) = std::env::var_os("JOURNAL_STREAM") else {
+        return false;
+    };
+    let stderr = io::stderr().as_fd().try_clone_to_owned().map(File::from);
+    let Ok(found) = stderr.and_then(|stderr| stderr.metadata()) else {
+        return false;
+    };
+    journal.to_str() == Some(&format!("{}:{}", found.dev(), found.ino()))
+}
+
+/// Log to standard error as FIRSTHAND_LOG says, or else everything from level `default` up.
+pub fn to_stderr(default: &str) {
+    start(vec![stderr_layer()], default);
+}
+
+/// Log to the end of `file`, and to the journal if there is one.
+pub fn to_file(file: &Path, default: &str) -> io::Result<()> {
+    let log = Mutex::new(File::options().create(true).append(true).open(file)?);
+    let mut layers: Vec<AnyLayer> =
+        vec![fmt::layer().with_writer(log).log_internal_errors(false).with_ansi(false).boxed()];
+    if to_journal() {
+        layers.push(stderr_layer());
+    }
+    start(layers, default);
+    Ok(())
+}
+
+fn stderr_layer() -> AnyLayer {
+    if to_journal() {
+        let lines = fmt::layer().without_time().with_level(false);
+        let lines = lines.log_internal_errors(false);
+        lines.with_writer(Journal).with_ansi(false).boxed()
+    } else {
+        let lines = fmt::layer().with_writer(io::stderr).log_internal_errors(false);
+        lines.with_ansi(false).boxed()
+    }
+}
+
+fn start(layers: Vec<AnyLayer>, default: &str) {
+    let filter =
+        // The library of ROS 2 logs each of its sockets and each message that it sends to itself. Of two levels the later one counts.
+        EnvFilter::try_from_env("FIRSTHAND_LOG")
+            .unwrap_or_else(|_| EnvFilter::new(format!("rustdds=error,{default}")));
+    tracing_subscriber::registry().with(layers).with(filter).init();
+}
+
+/// Standard error with a priority before each line.
+struct Journal;
+
+struct Entry {
+    priority: &'static str,
+}
+
+impl<'writer> MakeWriter<'writer> for Journal {
+    type Writer = Entry;
+
+    fn make_writer(&'writer self) -> Entry {
+        Entry { priority: "<6>" }
+    }
+
+    fn make_writer_for(&'writer self, event: &Metadata<'_>) -> Entry {
+        Entry { priority: priority(*event.level()) }
+    }
+}
+
+/// syslog(3): 3 error, 4 warning, 6 informational, 7 debug.
+fn priority(level: Level) -> &'static str {
+    match level {
+        Level::ERROR => "<3>",
+        Level::WARN => "<4>",
+        Level::INFO => "<6>",
+        _ => "<7>",
+    }
+}
+
+impl Write for Entry {
+    /// Each call writes one event. Each of its lines is an entry of the journal and gets the priority. All lines are written at
+    /// once, so that lines of two processes do not mix.
+    fn write(&mut self, event: &[u8]) -> io::Result<usize> {
+        let mut entry = Vec::with_capacity(event.len() + self.priority.len());
+        for line in event.split_inclusive(|&byte| byte == b'\n') {
+            entry.extend_from_slice(self.priority.as_bytes());
+            entry.extend_from_slice(line);
+        }
+        io::stderr().write_all(&entry)?;
+        Ok(event.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        io::stderr().flush()
+    }
+}

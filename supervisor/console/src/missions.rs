@@ -1,0 +1,205 @@
+//! The missions that ship with the program, mission files, and assignments over both.
+
+use std::path::Path;
+
+use common::mission::{Mission, MissionError};
+use thiserror::Error;
+
+macro_rules! shipped {
+    ($($name:literal),*) => {
+        [$(($name, include_str!(concat!("../../missions/", $name, ".toml")))),*]
+    };
+}
+
+pub static SHIPPED: [(&str, &str); 5] =
+    shipped!("open-room", "obstacle-course", "trap", "passage", "one-drum");
+
+#[derive(Debug, Error)]
+pub enum LookupError {
+    #[error("no shipped mission is called {name:?}; shipped are {}", names())]
+    Unknown { name: String },
+    #[error("{name:?} is neither a shipped mission ({}) nor a file", names())]
+    Neither { name: String },
+    #[error(
+        "--set {assignment:?} is not KEY=VALUE with a TOML value: {problem}; for example --set start.heading_deg=90"
+    )]
+    Assignment { assignment: String, problem: String },
+    #[error("{name} with --set {assignments}: {problem}")]
+    Assigned { name: String, assignments: String, problem: String },
+    #[error(transparent)]
+    Mission(#[from] MissionError),
+    #[error("map: {0}")]
+    Map(#[from] maps::MapError),
+}
+
+fn names() -> String {
+    SHIPPED.map(|(name, _)| name).join(", ")
+}
+
+pub fn shipped(name: &str) -> Option<&'static str> {
+    let found = SHIPPED.iter().find(|(shipped, _)| *shipped == name);
+    found.map(|(_, text)| *text)
+}
+
+/// The shipped mission `name`, or the one in the file `name`, with `KEY=VALUE` assignments on top and the values of its calibration
+/// in place.
+pub fn load(name: &str, assignments: &[String]) -> Result<Mission, LookupError> {
+    complete(as_assigned(name, assignments)?)
+}
+
+/// `mission` with the content of the files that it names.
+pub fn complete(mission: Mission) -> Result<Mission, LookupError> {
+    Ok(maps::with_prior_map(mission.with_calibration()?)?)
+}
+
+fn as_assigned(name: &str, assignments: &[String]) -> Result<Mission, LookupError> {
+    let file = Path::new(name);
+    let (text, origin) = match shipped(name) {
+        Some(text) => (text.to_owned(), format!("{name}.toml")),
+        None if file.extension().is_some() || file.exists() => {
+            (Mission::read(file)?, name.to_owned())
+        }
+        None => {
+            return Err(LookupError::Neither { name: name.to_owned() });
+        }
+    };
+    as_parsed(&text, &origin, assignments)
+}
+
+/// The mission in `text`, called `origin`, with `KEY=VALUE` assignments on top.
+pub fn parsed(text: &str, origin: &str, assignments: &[String]) -> Result<Mission, LookupError> {
+    complete(as_parsed(text, origin, assignments)?)
+}
+
+fn as_parsed(text: &str, name: &str, assignments: &[String]) -> Result<Mission, LookupError> {
+    let as_written = Mission::parse(text, Path::new(name));
+    // Values are checked after all assignments, because one assignment may correct what would be refused without it.
+    let table = text.parse::<toml::Table>();
+    let (false, Ok(table)) = (assignments.is_empty(), table) else {
+        return Ok(as_written?);
+    };
+    let assigned = assign(table, assignments)?;
+    Mission::parse(&assigned, Path::new(name)).map_err(|error| match as_written {
+        // The error of the file is better, because it names the line.
+        Err(of_file) if of_file.is_same_fault(&error) => of_file.into(),
+        // The fault is in no line of the file.
+        _ => LookupError::Assigned {
+            name: name.to_owned(),
+            assignments: assignments.join(" --set "),
+            problem: error.without_place(),
+        },
+    })
+}
+
+/// The recorded `mission` with `KEY=VALUE` assignments on top; none if there are no assignments.
+pub fn with(mission: &Mission, assignments: &[String]) -> Result<Option<Mission>, LookupError> {
+    if assignments.is_empty() {
+        return Ok(None);
+    }
+    let failed = |problem: String| LookupError::Assigned {
+        name: mission.name.clone(),
+        assignments: assignments.join(" --set "),
+        problem,
+    };
+    let table = toml::Table::try_from(mission).map_err(|error| failed(error.to_string()))?;
+    let assigned = assign(table, assignments)?;
+    let mission = Mission::parse(&assigned, Path::new(&mission.name));
+    complete(mission.map_err(|error| failed(error.without_place()))?).map(Some)
+}
+
+/// The text of `table` with all assignments.
+fn assign(mut table: toml::Table, assignments: &[String]) -> Result<String, LookupError> {
+    for assignment in assignments {
+        let failed = |problem: &str| LookupError::Assignment {
+            assignment: assignment.clone(),
+            problem: problem.trim().replace('\n', " "),
+        };
+        let (path, _) = assignment.split_once('=').ok_or_else(|| failed("no '='"))?;
+        let layer: toml::Table =
+            toml::from_str(assignment).map_err(|error| failed(error.message()))?;
+        if path.trim().is_empty() {
+            return Err(failed("no key"));
+        }
+        merge(&mut table, layer);
+    }
+    toml::to_string(&table).map_err(|error| LookupError::Assignment {
+        assignment: assignments.join(" "),
+        problem: error.to_string(),
+    })
+}
+
+/// Put `layer` over `base`, table by table.
+fn merge(base: &mut toml::Table, layer: toml::Table) {
+    for (key, value) in layer {
+        match (base.get_mut(&key), value) {
+            (Some(toml::Value::Table(below)), toml::Value::Table(above)) => merge(below, above),
+            (_, value) => {
+                base.insert(key, value);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_shipped_mission_is_valid_and_says_what_it_is() {
+        for (name, _) in SHIPPED {
+            let mission = load(name, &[]).unwrap();
+            assert_eq!(mission.name, name);
+            assert!(!mission.description.is_empty(), "{name} has no description");
+        }
+    }
+
+    #[test]
+    fn the_mission_in_the_guide_is_valid_and_shows_the_defaults() {
+        let guide = include_str!("../../guide/mission-file.md");
+        let text = guide.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
+        let mut shown = Mission::parse(text, Path::new("mission-file.md")).unwrap();
+        shown.known = common::geometry::Shapes::default();
+        shown.world = common::geometry::Shapes::default();
+        let plain = Mission::parse("target = [4.0, 0.0]", Path::new("mission-file.md")).unwrap();
+        assert_eq!(shown, plain);
+    }
+
+    #[test]
+    fn an_assignment_changes_one_key_and_keeps_its_table() {
+        let mission =
+            load("trap", &["start.heading_deg=90".into(), "perimeter.cells = 60".into()]).unwrap();
+        assert_eq!((mission.start.heading_deg, mission.perimeter.cells), (90.0, Some(60)));
+        assert_eq!(mission.perimeter.width_m, 9.0, "the rest of the table stays");
+    }
+
+    #[test]
+    fn values_are_judged_after_all_assignments_and_what_remains_wrong_is_told_with_its_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("far.toml");
+        std::fs::write(&file, "\n\ntarget = [20, 0]").unwrap();
+        let name = file.to_str().unwrap();
+        let load = |set: &[&str]| {
+            let set: Vec<String> = set.iter().map(|it| (*it).to_owned()).collect();
+            load(name, &set)
+        };
+        let refused = |set: &[&str]| load(set).unwrap_err().to_string();
+        assert!(refused(&[]).contains("far.toml:3: target"));
+        assert!(refused(&["seed=3"]).contains("far.toml:3: target"));
+        let mended = load(&["perimeter.width_m=12", "perimeter.centre=[10, 0]"]);
+        assert!(refused(&["perimeter.width_m=-1"]).contains("perimeter.width_m"));
+        let set = refused(&["perimeter.width_m=-1"]);
+        assert!(!set.contains(".toml:"), "cites a line of the file: {set}");
+        let too_far = mended.unwrap_err().to_string();
+        assert!(too_far.contains("perimeter.centre"), "{too_far}");
+        let mended = load(&["perimeter.width_m=24", "perimeter.centre=[10, 0]"]).unwrap();
+        assert_eq!(mended.target, glam::DVec2::new(20.0, 0.0));
+    }
+
+    #[test]
+    fn a_bad_assignment_is_refused_with_its_text() {
+        for bad in ["heading", "start.heading_deg=", "start.headin=3", "=3"] {
+            let error = load("trap", &[bad.to_owned()]).unwrap_err().to_string();
+            assert!(!error.is_empty(), "{bad} was accepted");
+        }
+    }
+}

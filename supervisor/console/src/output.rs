@@ -1,0 +1,55 @@
+//! Standard output and standard error of a subcommand.
+
+use std::{
+    fmt::Display,
+    io::{self, Write as _},
+};
+
+use serde::Serialize;
+
+/// Write `text` to standard output at once. A reader that has read enough is no failure (`firsthand help tables | head`).
+pub fn print_text(text: &str) -> io::Result<()> {
+    let mut stdout = io::stdout();
+    unless_closed(stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()))
+}
+
+/// Print `value` as text, or as one line of JSON.
+pub fn print(value: &(impl Display + Serialize), json: bool) -> io::Result<()> {
+    print_text(&if json { serde_json::to_string(value)? + "\n" } else { value.to_string() })
+}
+
+/// Each of `values` as one line of JSON.
+pub fn json_lines<T: Serialize>(values: &[T]) -> serde_json::Result<String> {
+    let lines = values.iter().map(serde_json::to_string);
+    lines.map(|line| Ok(line? + "\n")).collect()
+}
+
+/// Write to standard error; a closed reader does not end the work under way.
+pub fn write_stderr(text: &str) {
+    let mut stderr = io::stderr();
+    let _ = stderr.write_all(text.as_bytes()).and_then(|()| stderr.flush());
+}
+
+/// `written`, but a pipe whose reader has ended, or a terminal that was closed, is no failure.
+pub(crate) fn unless_closed(written: io::Result<()>) -> io::Result<()> {
+    match written {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        Err(error) if error.raw_os_error() == Some(CLOSED_TERMINAL) => Ok(()),
+        written => written,
+    }
+}
+
+/// The error of writing to a terminal that was closed.
+const CLOSED_TERMINAL: i32 = rustix::io::Errno::IO.raw_os_error();
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reader_that_went_away_is_no_failure() {
+        assert!(unless_closed(Err(io::ErrorKind::BrokenPipe.into())).is_ok());
+        assert!(unless_closed(Err(io::Error::from_raw_os_error(CLOSED_TERMINAL))).is_ok());
+        assert!(unless_closed(Err(io::ErrorKind::StorageFull.into())).is_err());
+    }
+}

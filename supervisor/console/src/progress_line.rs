@@ -1,0 +1,74 @@
+//! Progress on standard error: one line rewritten on a terminal, lines at intervals elsewhere.
+
+use std::{
+    io::{self, IsTerminal as _},
+    time::{Duration, Instant},
+};
+
+use super::output::write_stderr;
+
+pub struct ProgressLine {
+    rewrites: bool,
+    /// Time between lines that cannot be rewritten.
+    every: Duration,
+    shown: Option<Instant>,
+}
+
+impl ProgressLine {
+    /// A progress that shows nothing yet. Lines that cannot be rewritten are shown once in each `every`.
+    pub fn new(every: Duration) -> Self {
+        Self { rewrites: io::stderr().is_terminal(), every, shown: None }
+    }
+
+    pub fn is_due(&self) -> bool {
+        self.shown.is_none_or(|shown| self.rewrites || shown.elapsed() >= self.every)
+    }
+
+    /// Note that a line is due now. Returns whether it is the first.
+    pub fn begin(&mut self) -> bool {
+        self.shown.replace(Instant::now()).is_none()
+    }
+
+    /// Show `line`. If it cannot be rewritten, it is shown only if it `may_stay`.
+    pub fn show(&self, line: &str, may_stay: bool) {
+        if self.rewrites {
+            let line = cut(line, columns());
+            write_stderr(&format!("\r\x1b[K{line}"));
+        } else if may_stay {
+            write_stderr(&format!("{line}\n"));
+        }
+    }
+
+    pub fn end(&self) {
+        if self.rewrites {
+            write_stderr("\n");
+        }
+    }
+}
+
+/// Columns of the terminal; 0 if it does not say.
+fn columns() -> usize {
+    let size = rustix::termios::tcgetwinsize(io::stderr());
+    size.map_or(0, |size| size.ws_col.into())
+}
+
+/// The beginning of `line` that fits into `columns` but the last; all of it for 0 columns. A line that the terminal wraps
+/// cannot be rewritten.
+fn cut(line: &str, columns: usize) -> &str {
+    let shown = columns.checked_sub(1).unwrap_or(usize::MAX);
+    let end = line.char_indices().nth(shown);
+    end.map_or(line, |(end, _)| &line[..end])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_cut_to_less_than_the_terminal_is_wide() {
+        assert_eq!(cut("12.3 s  0.50 m", 8), "12.3 s ");
+        assert_eq!(cut("12.3 s", 8), "12.3 s");
+        assert_eq!(cut("µµµµ", 3), "µµ");
+        assert_eq!(cut("12.3 s", 0), "12.3 s");
+    }
+}

@@ -1,0 +1,246 @@
+//! The rates and gaps of topics, compared with the table of topics.
+
+use std::{
+    collections::BTreeMap,
+    time::{Duration, Instant},
+};
+
+use common::{
+    bus::{Author, Stamp},
+    topics::{Rate, Spec},
+};
+use serde::Serialize;
+
+use super::{
+    table::{
+        Align::{Left, Right},
+        Table,
+    },
+    words::age,
+};
+
+/// The number of its intervals after which a topic is late: its writer looks at the clock only once in each turn of its loop.
+const LATE: u32 = 2;
+
+#[derive(Debug)]
+pub struct TopicRates {
+    spec: &'static Spec,
+    /// The newest sample of each process, because a topic may have many writers.
+    writers: BTreeMap<u32, Newest>,
+    /// The arrival of the last sample.
+    at: Option<Instant>,
+    /// The beginning of the counts.
+    since: Instant,
+    counts: Counts,
+}
+
+#[derive(Debug)]
+struct Newest {
+    at: Instant,
+    stamp: Stamp,
+}
+
+#[derive(Debug, Default)]
+struct Counts {
+    samples: u64,
+    lost: u64,
+    ticks: u64,
+    missing_ticks: u64,
+    longest_gap: Duration,
+    late: bool,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    pub topic: &'static str,
+    /// Samples a second of the machine's clock.
+    pub rate_hz: f64,
+    /// The longest time between two samples of one process, or since the last sample; none before the first.
+    pub longest_gap_s: Option<f64>,
+    /// Time since the last sample; none before the first.
+    pub age_s: Option<f64>,
+    /// Samples that were overwritten before this reader took them.
+    pub lost: u64,
+    /// Ticks from the first sample to the last.
+    pub ticks: u64,
+    /// Ticks without a sample; none if the table does not promise a sample in each tick.
+    pub missing_ticks: Option<u64>,
+    /// Whether a gap was more than twice as long as the table promises; none if it promises nothing.
+    pub late: Option<bool>,
+    /// The rate by the table.
+    #[serde(skip)]
+    rate: Rate,
+}
+
+impl TopicRates {
+    /// The rates of the topic of `spec` before any sample.
+    pub fn new(spec: &'static Spec, now: Instant) -> Self {
+        Self { spec, writers: BTreeMap::new(), at: None, since: now, counts: Counts::default() }
+    }
+
+    /// Take a sample of `author` that came at `now`. The first sample of each process is not counted, because it may be old: a topic
+    /// stores one for new readers.
+    pub fn add(&mut self, author: Author, stamp: Stamp, now: Instant) {
+        self.at = Some(now);
+        let newest = Newest { at: now, stamp };
+        let Some(last) = self.writers.insert(author.process, newest) else {
+            return;
+        };
+        let counts = &mut self.counts;
+        counts.samples += 1;
+        if last.stamp.generation == stamp.generation {
+            let next = last.stamp.sequence.wrapping_add(1);
+            counts.lost += u64::from(stamp.sequence.wrapping_sub(next).min(i32::MAX as u32));
+        }
+        let ticks = stamp.tick.saturating_sub(last.stamp.tick);
+        counts.ticks += ticks;
+        counts.missing_ticks += ticks.saturating_sub(1);
+        let gap = now.saturating_duration_since(last.at);
+        // A rate may be in mission time, which may pass faster or slower than the clock.
+        let mission = stamp.stamp_ns.saturating_sub(last.stamp.stamp_ns);
+        counts.late |= is_late(self.spec.rate, gap.min(Duration::from_nanos(mission)));
+        counts.longest_gap = counts.longest_gap.max(gap);
+    }
+
+    /// The report at `now`; counting begins again.
+    pub fn report(&mut self, now: Instant) -> Report {
+        let counts = std::mem::take(&mut self.counts);
+        let over = now.saturating_duration_since(self.since).as_secs_f64();
+        self.since = now;
+        let age = self.at.map(|at| now.saturating_duration_since(at));
+        let gap = (!counts.longest_gap.is_zero()).then_some(counts.longest_gap);
+        // The gap of a topic that is silent now has no second sample yet.
+        let gap = gap.max(age);
+        let rate = self.spec.rate;
+        Report {
+            topic: self.spec.name,
+            rate_hz: if over > 0.0 { counts.samples as f64 / over } else { 0.0 },
+            longest_gap_s: gap.map(|gap| gap.as_secs_f64()),
+            age_s: age.map(|age| age.as_secs_f64()),
+            lost: counts.lost,
+            ticks: counts.ticks,
+            missing_ticks: (rate == Rate::EachTick).then_some(counts.missing_ticks),
+            late: matches!(rate, Rate::OnChange { .. })
+                .then(|| counts.late || age.is_some_and(|age| is_late(rate, age))),
+            rate,
+        }
+    }
+}
+
+/// Whether `gap` is longer than `rate` allows.
+fn is_late(rate: Rate, gap: Duration) -> bool {
+    matches!(rate, Rate::OnChange { again_after, .. } if gap > LATE * again_after)
+}
+
+pub fn table(reports: &[Report]) -> String {
+    let mut table = Table::new([
+        ("topic", Left),
+        ("samples/s", Right),
+        ("longest gap", Right),
+        ("age", Right),
+        ("lost", Right),
+        ("by the table", Left),
+    ]);
+    for report in reports {
+        let gap = report.longest_gap_s;
+        table.row([
+            report.topic.to_owned(),
+            format!("{:.1}", report.rate_hz),
+            gap.map_or("-".to_owned(), |gap| age(Some(gap))),
+            age(report.age_s),
+            report.lost.to_string(),
+            report.by_the_table(),
+        ]);
+    }
+    table.to_string()
+}
+
+impl Report {
+    fn by_the_table(&self) -> String {
+        match self.rate {
+            Rate::EachTick => match self.missing_ticks.unwrap_or_default() {
+                0 => "each tick: ok".to_owned(),
+                missing => format!("each tick: MISSING {missing} of {}", self.ticks),
+            },
+            Rate::EachFrame => "each frame of the robot".to_owned(),
+            Rate::WhenItHappens => "when it happens".to_owned(),
+            Rate::OnChange { again_after, .. } => {
+                let seen = match (self.age_s, self.late) {
+                    (None, _) => "never came",
+                    (_, Some(true)) => "LATE",
+                    _ => "ok",
+                };
+                format!("again after {} ms: {seen}", again_after.as_millis())
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use common::topics::{self, AnyTopic as _};
+
+    use super::*;
+
+    const MS: Duration = Duration::from_millis(1);
+
+    fn stamp(number: u32, tick: u64) -> Stamp {
+        Stamp { tick, stamp_ns: u64::from(number) * 100_000_000, generation: 1, sequence: number }
+    }
+
+    fn of(process: u32) -> Author {
+        Author { process, generation: 1 }
+    }
+
+    #[test]
+    fn a_tick_without_a_sample_is_missing_and_one_that_was_overwritten_is_lost() {
+        let began = Instant::now();
+        let mut pose = TopicRates::new(topics::POSE.spec(), began);
+        for (at, number, tick) in [(0, 0, 10), (100, 1, 11), (200, 3, 13), (500, 4, 13)] {
+            pose.add(of(1), stamp(number, tick), began + at * MS);
+        }
+        let report = pose.report(began + 1000 * MS);
+        assert_eq!((report.rate_hz, report.lost), (3.0, 1));
+        assert_eq!((report.ticks, report.missing_ticks), (3, Some(1)));
+        assert_eq!(report.age_s, Some(0.5));
+        assert_eq!(report.longest_gap_s, Some(0.5), "the silence since");
+        let next = pose.report(began + 2000 * MS);
+        assert_eq!((next.rate_hz, next.missing_ticks), (0.0, Some(0)));
+    }
+
+    #[test]
+    fn a_topic_that_is_not_published_again_in_time_is_late_and_writers_are_told_apart() {
+        let began = Instant::now();
+        let mut health = TopicRates::new(topics::HEALTH.spec(), began);
+        for number in 0..50 {
+            for process in [1, 2] {
+                health.add(of(process), stamp(number, 0), began + 20 * number * MS);
+            }
+        }
+        let report = health.report(began + 1000 * MS);
+        assert_eq!((report.rate_hz, report.late), (98.0, Some(false)));
+        assert_eq!(report.longest_gap_s, Some(0.02));
+        // One of the two writers has stopped.
+        for number in 50..100 {
+            health.add(of(1), stamp(number, 0), began + 20 * number * MS);
+        }
+        health.add(of(2), stamp(60, 0), began + 2000 * MS);
+        let report = health.report(began + 2000 * MS);
+        assert_eq!((report.late, report.longest_gap_s), (Some(true), Some(1.02)));
+    }
+
+    #[test]
+    fn a_rate_in_mission_time_that_passes_fast_or_slowly_is_kept() {
+        for pace in [1, 10] {
+            let began = Instant::now();
+            let mut field = TopicRates::new(topics::FIELD.spec(), began);
+            for number in 0..3 {
+                let stamp =
+                    Stamp { stamp_ns: u64::from(number) * 1_000_000_000, ..stamp(number, 0) };
+                field.add(of(1), stamp, began + 1000 * number * MS * pace);
+            }
+            let report = field.report(began + 2000 * MS * pace);
+            assert_eq!(report.late, Some(false), "at a pace of 1/{pace}");
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! The robots of this machine.
+
+use std::{
+    fs,
+    os::unix::fs::MetadataExt as _,
+    path::{Path, PathBuf},
+};
+
+use common::{domain::Domain, domain::RobotName};
+
+/// The supervisor's log, in the directory of its run.
+pub const SUPERVISOR_LOG: &str = "supervisor.log";
+/// The beginning of the name of each user's directory, before the user's number.
+const USER_DIRECTORY: &str = "firsthand-";
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Robot {
+    pub name: RobotName,
+    /// The process of its supervisor; none if the supervisor was killed.
+    pub supervisor: Option<u32>,
+    /// The directory of its run; none if the system does not say.
+    pub run: Option<PathBuf>,
+}
+
+impl Robot {
+    /// The robot `name` as it is now.
+    pub fn find(name: RobotName) -> Self {
+        let supervisor = Domain::of(name.clone()).supervisor().ok().flatten();
+        Self { name, supervisor, run: supervisor.and_then(run_directory) }
+    }
+}
+
+/// The robots of this user that run, or whose supervisor was killed, by name.
+pub fn own() -> Vec<Robot> {
+    // The name does not matter, because all robots of a user are in one directory.
+    let Ok(any) = "any".parse() else {
+        return Vec::new();
+    };
+    let domain = Domain::of(any);
+    let mut robots: Vec<_> = domain.directory().parent().map_or(Vec::new(), |directory| {
+        let entries = fs::read_dir(directory).into_iter().flatten().flatten();
+        let names = entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
+        names.map(Robot::find).collect()
+    });
+    robots.sort_by(|one, other| one.name.cmp(&other.name));
+    robots
+}
+
+/// Numbers of other users who have, or had, robots on this machine. Only these users can list them.
+pub fn other_users() -> Vec<u32> {
+    let own = rustix::process::geteuid().as_raw();
+    users_in(Path::new("/tmp"), own)
+}
+
+fn users_in(directory: &Path, own: u32) -> Vec<u32> {
+    let entries = fs::read_dir(directory).into_iter().flatten().flatten();
+    let user = |entry: fs::DirEntry| {
+        let name = entry.file_name();
+        let user = name.to_str()?.strip_prefix(USER_DIRECTORY)?.parse().ok()?;
+        // Every user can create a directory of any name there.
+        let its = entry.metadata().ok()?.uid() == user;
+        (user != own && its).then_some(user)
+    };
+    let mut users: Vec<_> = entries.filter_map(user).collect();
+    users.sort_unstable();
+    users
+}
+
+/// The directory of the run of the process `supervisor`, which has its log open there.
+fn run_directory(supervisor: u32) -> Option<PathBuf> {
+    let opened = fs::read_dir(format!("/proc/{supervisor}/fd")).ok()?;
+    let files = opened.flatten().filter_map(|entry| fs::read_link(entry.path()).ok());
+    let mut logs = files.filter(|file| file.ends_with(SUPERVISOR_LOG));
+    Some(logs.next()?.parent()?.to_path_buf())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_run_directory_is_where_the_supervisor_has_its_log_open() {
+        let directory = tempfile::tempdir().unwrap();
+        let directory = fs::canonicalize(directory.path()).unwrap();
+        let own = std::process::id();
+        assert_eq!(run_directory(own), None);
+        let _log = fs::File::create(directory.join(SUPERVISOR_LOG)).unwrap();
+        assert_eq!(run_directory(own), Some(directory));
+    }
+
+    #[test]
+    fn another_users_directory_is_one_that_the_user_owns() {
+        let directory = tempfile::tempdir().unwrap();
+        let own = rustix::process::geteuid().as_raw();
+        for name in [format!("firsthand-{own}"), format!("firsthand-{}", own + 1)] {
+            fs::create_dir(directory.path().join(name)).unwrap();
+        }
+        assert_eq!(users_in(directory.path(), own), Vec::<u32>::new());
+        assert_eq!(users_in(directory.path(), own + 1), [own]);
+    }
+}

@@ -1,0 +1,289 @@
+//! The runs of a directory: each is a directory with a run file. They are made, found and removed.
+
+use std::{
+    fs, io,
+    os::unix::fs::MetadataExt as _,
+    path::{Path, PathBuf},
+    time::SystemTime,
+};
+
+use common::{domain::RobotName, run};
+use serde::Deserialize;
+use supervisor::recovery::SUMMARY;
+
+use super::{
+    failure::{Failure, Refused},
+    output::write_stderr,
+    robots::Robot,
+};
+
+/// The file that marks a run that was cut off and reported.
+const CUT_OFF: &str = "cut-off";
+/// The greatest size of a summary, which takes 2 kB; a larger file is not read.
+const LARGEST_SUMMARY: u64 = 1 << 20;
+
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct RunDirectory {
+    pub began: SystemTime,
+    pub directory: PathBuf,
+    pub robot: RobotName,
+    /// The name of the mission; none if another version wrote the run file.
+    pub mission: Option<String>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    Running,
+    /// The supervisor was killed, or the machine was switched off.
+    CutOff,
+    Ended {
+        /// The outcome, such as `reached`.
+        outcome: String,
+        mission_time_s: Option<f64>,
+    },
+}
+
+/// The runs in directories below `runs`, in no order.
+pub fn list(runs: &Path) -> Vec<RunDirectory> {
+    #[derive(Deserialize)]
+    struct Mission {
+        name: String,
+    }
+    #[derive(Deserialize)]
+    struct Named {
+        robot: RobotName,
+        // Another version may have further keys.
+        mission: Option<Mission>,
+    }
+    let read = |entry: fs::DirEntry| {
+        let directory = entry.path();
+        let file = directory.join(run::FILE_NAME);
+        let named: Named = toml::from_str(&fs::read_to_string(&file).ok()?).ok()?;
+        Some(RunDirectory {
+            began: fs::metadata(file).ok()?.modified().ok()?,
+            directory,
+            robot: named.robot,
+            mission: named.mission.map(|mission| mission.name),
+        })
+    };
+    let entries = fs::read_dir(runs).into_iter().flatten().flatten();
+    entries.filter_map(read).collect()
+}
+
+impl RunDirectory {
+    /// Whether nobody continues the run: it has a summary, or was reported as cut off.
+    pub fn has_ended(&self) -> bool {
+        self.has(SUMMARY) || self.has(CUT_OFF)
+    }
+
+    fn has(&self, file: &str) -> bool {
+        self.directory.join(file).exists()
+    }
+
+    pub fn outcome(&self) -> Outcome {
+        #[derive(Deserialize)]
+        struct Summary {
+            outcome: String,
+            mission_time_s: Option<f64>,
+        }
+        let file = self.directory.join(SUMMARY);
+        let readable = fs::metadata(&file).is_ok_and(|file| file.len() <= LARGEST_SUMMARY);
+        let text = readable.then(|| fs::read_to_string(&file).ok()).flatten();
+        match text.map(|text| serde_json::from_str::<Summary>(&text)) {
+            Some(Ok(summary)) => {
+                Outcome::Ended { outcome: summary.outcome, mission_time_s: summary.mission_time_s }
+            }
+            _ if self.has(SUMMARY) => {
+                Outcome::Ended { outcome: "unreadable".to_owned(), mission_time_s: None }
+            }
+            _ if self.is_running() => Outcome::Running,
+            _ => Outcome::CutOff,
+        }
+    }
+
+    fn is_running(&self) -> bool {
+        let its = Robot::find(self.robot.clone()).run;
+        its.is_some() && its == fs::canonicalize(&self.directory).ok()
+    }
+
+    /// The size on the disk, bytes.
+    pub fn size(&self) -> u64 {
+        size(&self.directory, MOST_LEVELS)
+    }
+}
+
+/// The most levels of directories that are counted; a run directory has one.
+const MOST_LEVELS: u32 = 8;
+
+fn size(directory: &Path, levels: u32) -> u64 {
+    let entries = fs::read_dir(directory).into_iter().flatten().flatten();
+    let sizes = entries.filter_map(|entry| {
+        // A link counts by itself, without the file to which it leads.
+        let file = entry.metadata().ok()?;
+        let below = if file.is_dir() && levels > 0 { size(&entry.path(), levels - 1) } else { 0 };
+        // The kernel counts blocks of 512 bytes on every file system.
+        Some(file.blocks().saturating_mul(512).saturating_add(below))
+    });
+    sizes.fold(0, u64::saturating_add)
+}
+
+/// The requested directory. It is refused if it holds an earlier run.
+pub fn own(directory: &Path) -> Result<PathBuf, Failure> {
+    fs::create_dir_all(directory).map_err(|error| {
+        format!("cannot make {}: {error}; give another --out", directory.display())
+    })?;
+    if directory.join(run::FILE_NAME).exists() {
+        let message = format!(
+            "{} holds an earlier run; give an empty or new directory with --out",
+            directory.display()
+        );
+        return Err(Refused::new("results-there", message).into());
+    }
+    Ok(fs::canonicalize(directory)?)
+}
+
+/// `NAME-NNN` below `runs`, with the number after the highest one there.
+pub fn numbered(runs: &Path, name: &str) -> Result<PathBuf, Failure> {
+    fs::create_dir_all(runs).map_err(|error| {
+        format!("cannot make {}: {error}; say where with --out", runs.display())
+    })?;
+    let mut number = highest_number(runs, name) + 1;
+    loop {
+        let directory = runs.join(format!("{name}-{number:03}"));
+        match fs::create_dir(&directory) {
+            Ok(()) => return Ok(fs::canonicalize(directory)?),
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => number += 1,
+            Err(error) => {
+                return Err(format!("cannot make {}: {error}", directory.display()).into());
+            }
+        }
+    }
+}
+
+fn highest_number(runs: &Path, name: &str) -> u64 {
+    let number = |entry: fs::DirEntry| {
+        let file_name = entry.file_name();
+        let rest = file_name.to_str()?.strip_prefix(name)?;
+        rest.strip_prefix('-')?.parse().ok()
+    };
+    let entries = fs::read_dir(runs).into_iter().flatten().flatten();
+    entries.filter_map(number).max().unwrap_or_default()
+}
+
+/// Remove the directories of all but the newest `keep` runs of `robot` that have ended. If one cannot be removed, it stays and
+/// the mission starts all the same.
+pub fn prune(runs: &Path, robot: &RobotName, keep: usize) {
+    let mut ended = runs_of(robot, runs);
+    ended.retain(RunDirectory::has_ended);
+    ended.sort();
+    let surplus = ended.len().saturating_sub(keep);
+    for RunDirectory { directory, .. } in &ended[..surplus] {
+        if let Err(error) = fs::remove_dir_all(directory) {
+            let directory = directory.display();
+            write_stderr(&format!("firsthand: cannot remove {directory}: {error}\n"));
+        }
+    }
+}
+
+fn runs_of(robot: &RobotName, runs: &Path) -> Vec<RunDirectory> {
+    let mut runs = list(runs);
+    runs.retain(|run| run.robot == *robot);
+    runs
+}
+
+/// The newest run of `robot` below `runs` that was cut off and not reported yet: it has no summary, because its supervisor was
+/// killed or the machine was switched off.
+pub fn cut_off(runs: &Path, robot: &RobotName) -> io::Result<Option<PathBuf>> {
+    let runs = runs_of(robot, runs).into_iter();
+    let newest = runs.filter(|run| !run.has_ended()).max();
+    newest.map(|run| fs::canonicalize(run.directory)).transpose()
+}
+
+/// Mark that a run was reported as cut off, so that the next start begins a new one.
+pub fn mark_cut_off(directory: &Path) -> io::Result<()> {
+    fs::write(directory.join(CUT_OFF), "")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_ended_says_how_and_what_was_cut_off_is_told_from_it() {
+        let runs = tempfile::tempdir().unwrap();
+        let begun = |name: &str| {
+            let directory = runs.path().join(name);
+            fs::create_dir(&directory).unwrap();
+            let run = "robot = 'listed-runs'\n[mission]\nname = 'trap'";
+            fs::write(directory.join(run::FILE_NAME), run).unwrap();
+            directory
+        };
+        fs::create_dir(runs.path().join("no-run")).unwrap();
+        let summary = r#"{"outcome":"timeout","mission_time_s":2.5,"new":[]}"#;
+        fs::write(begun("a-ended").join(SUMMARY), summary).unwrap();
+        fs::write(begun("b-broken").join(SUMMARY), "{").unwrap();
+        begun("c-cut");
+        let mut listed = list(runs.path());
+        listed.sort_by_key(|run| run.directory.clone());
+        let outcomes: Vec<_> = listed.iter().map(RunDirectory::outcome).collect();
+        let ended = |outcome: &str, mission_time_s| Outcome::Ended {
+            outcome: outcome.to_owned(),
+            mission_time_s,
+        };
+        let expected = [ended("timeout", Some(2.5)), ended("unreadable", None), Outcome::CutOff];
+        assert_eq!(outcomes, expected);
+        assert_eq!(listed[0].mission.as_deref(), Some("trap"));
+        assert!(listed[0].size() >= 1024, "{}", listed[0].size());
+        let ended: Vec<_> = listed.iter().map(RunDirectory::has_ended).collect();
+        assert_eq!(ended, [true, true, false]);
+    }
+
+    /// The directory of a run of `robot` that has begun.
+    fn begun(runs: &Path, robot: &str, name: &str) -> PathBuf {
+        let directory = runs.join(name);
+        fs::create_dir(&directory).unwrap();
+        let run = format!("robot = '{robot}'");
+        fs::write(directory.join(run::FILE_NAME), run).unwrap();
+        directory
+    }
+
+    fn x80() -> RobotName {
+        "x80".parse().unwrap()
+    }
+
+    #[test]
+    fn a_run_that_was_cut_off_is_reported_once_and_to_its_robot_alone() {
+        let runs = tempfile::tempdir().unwrap();
+        let runs = runs.path();
+        fs::write(begun(runs, "x80", "ended").join(SUMMARY), "").unwrap();
+        begun(runs, "other", "others");
+        assert_eq!(cut_off(runs, &x80()).unwrap(), None);
+        let cut = fs::canonicalize(begun(runs, "x80", "cut")).unwrap();
+        assert_eq!(cut_off(runs, &x80()).unwrap(), Some(cut.clone()));
+        mark_cut_off(&cut).unwrap();
+        assert_eq!(cut_off(runs, &x80()).unwrap(), None, "reported again");
+    }
+
+    #[test]
+    fn the_oldest_runs_that_ended_are_removed_and_no_other() {
+        let runs = tempfile::tempdir().unwrap();
+        let runs = runs.path();
+        let began = SystemTime::now();
+        for (age, name) in ["a-001", "a-002", "a-003"].iter().rev().enumerate() {
+            let directory = begun(runs, "x80", name);
+            fs::write(directory.join(SUMMARY), "").unwrap();
+            let file = fs::File::open(directory.join(run::FILE_NAME)).unwrap();
+            let minutes = std::time::Duration::from_secs(60 * age as u64);
+            file.set_modified(began - minutes).unwrap();
+        }
+        begun(runs, "x80", "a-004");
+        fs::write(begun(runs, "other", "b-001").join(SUMMARY), "").unwrap();
+        prune(runs, &x80(), 1);
+        let mut left: Vec<_> = fs::read_dir(runs).unwrap().flatten().collect();
+        left.sort_by_key(fs::DirEntry::file_name);
+        let left: Vec<_> = left.iter().map(fs::DirEntry::file_name).collect();
+        assert_eq!(left, ["a-003", "a-004", "b-001"]);
+        let next = numbered(runs, "a").unwrap();
+        assert!(next.ends_with("a-005"), "{}", next.display());
+    }
+}

@@ -1,0 +1,62 @@
+//! Standard output of a command that goes on until a signal comes or its reader closes it.
+
+use std::{
+    io::{self, Write as _},
+    time::Duration,
+};
+
+use common::{
+    poll,
+    signals::{SIGHUP, SIGINT, SIGTERM, Signals},
+};
+
+use super::output::unless_closed;
+
+/// The bytes that a writable pipe takes at once (pipe(7)).
+const CHUNK: usize = 4096;
+/// The interval at which a command that waits looks whether it must end.
+pub const LOOK_EVERY: Duration = Duration::from_millis(100);
+
+const NICE: i32 = 5;
+
+/// Give the stages of robots the processor before this process.
+pub fn let_stages_go_first() {
+    // If the kernel refuses, the processes share the processor.
+    let _ = rustix::process::nice(NICE);
+}
+
+/// Standard output, and the signals that end the command.
+pub struct Stream {
+    signals: Signals,
+    ended: bool,
+}
+
+impl Stream {
+    /// From now on a signal lets the command leave the bus before it ends, and stages get the processor first.
+    pub fn open() -> io::Result<Self> {
+        let_stages_go_first();
+        Ok(Self { signals: Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?, ended: false })
+    }
+
+    pub fn has_ended(&mut self) -> bool {
+        self.ended |= self.signals.came() || poll::is_closed(io::stdout()).unwrap_or(true);
+        self.ended
+    }
+
+    /// Write `text`; the rest of it is dropped if the command must end.
+    pub fn write(&mut self, text: &str) -> io::Result<()> {
+        let mut stdout = io::stdout();
+        for chunk in text.as_bytes().chunks(CHUNK) {
+            loop {
+                if self.has_ended() {
+                    return Ok(());
+                }
+                if poll::is_writable(&stdout, LOOK_EVERY)? {
+                    break;
+                }
+            }
+            unless_closed(stdout.write_all(chunk).and_then(|()| stdout.flush()))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,59 @@
+//! Maps in the formats of others: ROS map_server, PGM, PNG, MovingAI. A map says which cells are free.
+//!
+//! | module | reads |
+//! |---|---|
+//! | `ros` | a ROS map_server YAML and the image it names |
+//! | `image` | a PGM (any Netpbm) or PNG image |
+//! | `prior` | a ROS map as hazards that a mission knows; it also writes one of what a robot believed |
+//! | `moving_ai` | the `.map` grids of the MovingAI benchmarks |
+//!
+//! [`load`] chooses a reader by the file's name; [`load_placed`] reads a ROS map with its place in metres.
+//!
+//! Files are not trusted: sizes are checked before memory is allocated, and errors name the file, the cause and the remedy.
+
+mod error;
+mod file;
+mod image;
+mod map;
+mod moving_ai;
+mod prior;
+mod ros;
+
+use std::path::Path;
+
+pub use error::MapError;
+pub use map::{MOST_BOXES, Map, PlacedMap};
+pub use prior::{save_believed, with_prior_map};
+pub use ros::load_placed;
+
+/// The map in `file`. The ending of the file's name gives the format.
+pub fn load(file: &Path) -> Result<Map, MapError> {
+    let extension = file.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+    match extension.as_deref() {
+        Some("yaml" | "yml") => ros::load(file),
+        Some("pgm" | "png" | "pbm" | "ppm" | "pnm") => {
+            image::load(file, image::Lightness::default())
+        }
+        Some("map") => moving_ai::load(file),
+        _ => Err(MapError::UnknownFormat { file: file.to_owned() }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn what_is_no_file_of_a_known_kind_is_refused() {
+        let directory = tempfile::tempdir().unwrap();
+        let folder = directory.path().join("folder.map");
+        fs::create_dir(&folder).unwrap();
+        assert!(matches!(load(&folder), Err(MapError::NotAFile { .. })));
+        let missing = directory.path().join("missing.png");
+        assert!(matches!(load(&missing), Err(MapError::Unreadable { .. })));
+        let nameless = directory.path().join("map");
+        assert!(matches!(load(&nameless), Err(MapError::UnknownFormat { .. })));
+    }
+}

@@ -1,0 +1,109 @@
+//! A map of free and blocked cells.
+
+use common::geometry::Box2;
+use glam::DVec2;
+
+/// The most boxes of a map from which a mission is made: a mission file with so many has 2 MB.
+pub const MOST_BOXES: usize = 20_000;
+
+/// A map of cells, row-major, row 0 at the top.
+#[derive(Debug)]
+pub struct Map {
+    pub cols: usize,
+    pub rows: usize,
+    /// The cells that are not free, and the whole rim.
+    pub blocked: Vec<bool>,
+}
+
+#[derive(Debug)]
+pub struct PlacedMap {
+    pub map: Map,
+    /// Side of a cell, metres.
+    pub cell_m: f64,
+    /// The corner of the map where x and y are least, metres.
+    pub corner_m: [f64; 2],
+}
+
+impl Map {
+    /// A map of `free` cells. Its rim is blocked, like the perimeter of a mission.
+    pub(crate) fn new(cols: usize, rows: usize, free: impl Iterator<Item = bool>) -> Self {
+        let mut blocked: Vec<bool> = free.map(|free| !free).collect();
+        for (row, line) in blocked.chunks_mut(cols.max(1)).enumerate() {
+            if row == 0 || row + 1 == rows {
+                line.fill(true);
+            }
+            for rim in [0, cols.saturating_sub(1)] {
+                if let Some(cell) = line.get_mut(rim) {
+                    *cell = true;
+                }
+            }
+        }
+        Self { cols, rows, blocked }
+    }
+
+    /// The free cell nearest to (`col`, `row`), as column and row; none if no cell is free.
+    pub fn nearest_free(&self, col: usize, row: usize) -> Option<(usize, usize)> {
+        let free = self.blocked.iter().enumerate().filter(|cell| !cell.1);
+        free.map(|(at, _)| (at % self.cols, at / self.cols)).min_by_key(|cell| {
+            let (x, y) = (cell.0.abs_diff(col) as u64, cell.1.abs_diff(row) as u64);
+            // Far outside the map a distance may not fit.
+            x.saturating_mul(x).saturating_add(y.saturating_mul(y))
+        })
+    }
+}
+
+impl PlacedMap {
+    /// The place `cols` cells from the left edge and `rows` from the top one, metres.
+    pub fn place(&self, cols: f64, rows: f64) -> DVec2 {
+        let up = self.map.rows as f64 - rows;
+        DVec2::from(self.corner_m) + DVec2::new(cols, up) * self.cell_m
+    }
+
+    /// Boxes that cover the cells `wanted` and none but `solid` ones: each grows to the right as far as cells are solid, and down while
+    /// that covers more. The iterator makes each box when it is asked for.
+    pub fn boxes(&self, solid: &[bool], mut wanted: Vec<bool>) -> impl Iterator<Item = Box2> {
+        let Map { cols, rows, .. } = self.map;
+        (0..wanted.len()).filter_map(move |first| {
+            if !wanted[first] {
+                return None;
+            }
+            let (col, row) = (first % cols, first / cols);
+            let run = (first..(row + 1) * cols).take_while(|&cell| solid[cell]);
+            let width = run.filter(|&cell| wanted[cell]).last().map_or(1, |last| last - first + 1);
+            let line = |row: usize| row * cols + col..row * cols + col + width;
+            let covers = |row: &usize| {
+                line(*row).all(|cell| solid[cell]) && line(*row).any(|cell| wanted[cell])
+            };
+            let height = (row..rows).take_while(covers).count();
+            for row in row..row + height {
+                wanted[line(row)].fill(false);
+            }
+            let least = self.place(col as f64, (row + height) as f64);
+            let size_m = DVec2::new(width as f64, height as f64) * self.cell_m;
+            Some(Box2 { at: least + size_m / 2.0, size_m, ..Box2::default() })
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rim_of_a_map_is_blocked_and_nothing_else() {
+        let map = Map::new(4, 3, [true; 12].into_iter());
+        let free: Vec<usize> = (0..12).filter(|&at| !map.blocked[at]).collect();
+        assert_eq!(free, [5, 6]);
+        let map = Map::new(1, 1, [true].into_iter());
+        assert_eq!(map.blocked, [true]);
+    }
+
+    #[test]
+    fn the_nearest_free_cell_is_found_from_outside_too() {
+        let map = Map::new(5, 5, [true; 25].into_iter());
+        assert_eq!(map.nearest_free(0, 2), Some((1, 2)));
+        assert_eq!(map.nearest_free(usize::MAX, 3), Some((1, 1)));
+        let walled = Map::new(2, 2, [true; 4].into_iter());
+        assert_eq!(walled.nearest_free(0, 0), None);
+    }
+}

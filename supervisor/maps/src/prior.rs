@@ -1,0 +1,168 @@
+//! A ROS map as hazards that a mission knows before it starts, and the belief of a robot at the end of one as such a map.
+
+use std::path::Path;
+
+use common::{
+    geometry::Box2,
+    grid::{Cell, CellState, GridFrame},
+    mission::Mission,
+};
+
+use crate::{MOST_BOXES, MapError, PlacedMap, ros};
+
+/// The distance outside of the perimeter beyond which cells concern no robot inside, metres.
+const BEYOND_M: f64 = 1.0;
+
+const OCCUPIED: u8 = 0;
+const UNKNOWN: u8 = 205;
+const FREE: u8 = 254;
+
+/// `mission` with the occupied cells of its map among the shapes that it knows: a run does not depend on the file any more.
+///
+/// # Errors
+/// If the file is no map, or its occupied cells are too many boxes.
+pub fn with_prior_map(mut mission: Mission) -> Result<Mission, MapError> {
+    if let Some(file) = mission.map.take() {
+        let boxes = known(&file, &ros::load_occupied(&file)?, &mission.grid_frame())?;
+        mission.known.boxes.extend(boxes);
+    }
+    Ok(mission)
+}
+
+/// Boxes that cover the occupied cells of `placed` in the perimeter `frame` and no other cell.
+fn known(file: &Path, placed: &PlacedMap, frame: &GridFrame) -> Result<Vec<Box2>, MapError> {
+    let within = f64::from(frame.cells) * frame.resolution_m / 2.0 + BEYOND_M;
+    let map = &placed.map;
+    let wanted: Vec<bool> = (0..map.blocked.len())
+        .map(|cell| {
+            let (col, row) = ((cell % map.cols) as f64, (cell / map.cols) as f64);
+            let away = placed.place(col + 0.5, row + 0.5) - frame.centre;
+            map.blocked[cell] && away.abs().max_element() <= within
+        })
+        .collect();
+    let boxes: Vec<Box2> = placed.boxes(&wanted, wanted.clone()).take(MOST_BOXES + 1).collect();
+    if boxes.len() > MOST_BOXES { Err(MapError::too_many_boxes(file)) } else { Ok(boxes) }
+}
+
+/// Write the belief in `cells` of `frame`, one [`CellState`] byte each, to the YAML `file` and an image beside it.
+///
+/// Hazards of the grid reach as far around a surface as the body does. The map has the surfaces: cells with nothing but hazard within
+/// that reach, so that a mission which starts from the map has the same hazards again.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn save_believed(
+    file: &Path,
+    mission: &Mission,
+    frame: &GridFrame,
+    cells: &[u8],
+) -> Result<(), MapError> {
+    let side = i64::from(frame.cells);
+    let state = |col: i64, row: i64| {
+        let is_inside = (0..side).contains(&col) && (0..side).contains(&row);
+        let byte = is_inside.then(|| cells.get((row * side + col) as usize)).flatten();
+        byte.map_or(CellState::Perimeter, |byte| CellState::from_byte(*byte))
+    };
+    // A surface fills its cell in the map. Half a cell is taken off, because the believed surface may lie anywhere in its cell.
+    let reach = mapper::step::hazard_reach_m(mission) / frame.resolution_m - 0.5;
+    let around = (reach + 0.5).ceil() as i64;
+    let beyond = |cells: i64| (cells.abs() as f64 - 0.5).max(0.0);
+    let disc: Vec<(i64, i64)> = (-around..=around)
+        .flat_map(|row| (-around..=around).map(move |col| (col, row)))
+        .filter(|&(col, row)| beyond(col).hypot(beyond(row)) <= reach)
+        .collect();
+    let pixel = |col: i64, row: i64| match state(col, row) {
+        CellState::Scanned => FREE,
+        CellState::Free | CellState::Perimeter => UNKNOWN,
+        its => {
+            let is_surface = disc.iter().all(|(x, y)| state(col + x, row + y).is_hazard());
+            match (is_surface, its) {
+                (true, _) => OCCUPIED,
+                (false, CellState::Margin) => FREE,
+                (false, _) => UNKNOWN,
+            }
+        }
+    };
+    // Row 0 is the lowest row of the grid and the highest of an image.
+    let pixels = (0..side).rev().flat_map(|row| (0..side).map(move |col| (col, row)));
+    let map = ros::Saved {
+        cols: frame.cells as usize,
+        pixels: pixels.map(|(col, row)| pixel(col, row)).collect(),
+        cell_m: frame.resolution_m,
+        corner_m: frame.corner_of(Cell { col: 0, row: 0 }).to_array(),
+    };
+    ros::save(file, &map)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use common::step::Step as _;
+    use glam::DVec2;
+
+    fn mission(text: &str) -> Mission {
+        let text = format!("target = [2, 0]\nperimeter.width_m = 6\n{text}");
+        Mission::parse(&text, Path::new("m.toml")).unwrap()
+    }
+
+    fn hazards(mission: &Mission) -> Vec<bool> {
+        let mapper = mapper::step::Mapper::new(mission);
+        mapper.state().cells().iter().map(|cell| CellState::from_byte(*cell).is_hazard()).collect()
+    }
+
+    #[test]
+    fn occupied_pixels_become_boxes_where_the_map_says_and_unknown_ones_do_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("office.yaml");
+        let map = ros::Saved {
+            cols: 4,
+            pixels: vec![FREE, OCCUPIED, OCCUPIED, FREE, UNKNOWN, OCCUPIED, OCCUPIED, OCCUPIED],
+            cell_m: 0.5,
+            corner_m: [-1.0, 1.0],
+        };
+        ros::save(&file, &map).unwrap();
+        let named = mission(&format!("map = '{}'", file.display()));
+        let known = with_prior_map(named).unwrap();
+        assert_eq!(known.map, None);
+        let boxes: Vec<_> = known.known.boxes.iter().map(|it| (it.at, it.size_m)).collect();
+        let expected = [
+            (DVec2::new(0.0, 1.5), DVec2::new(1.0, 1.0)),
+            (DVec2::new(0.75, 1.25), DVec2::new(0.5, 0.5)),
+        ];
+        assert_eq!(boxes, expected);
+    }
+
+    #[test]
+    fn a_saved_map_lies_where_its_cells_do() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("believed.yaml");
+        let mission = mission("");
+        for cells in [60, 61] {
+            let frame = GridFrame { cells, ..mission.grid_frame() };
+            let cells = vec![0; frame.area()];
+            save_believed(&file, &mission, &frame, &cells).unwrap();
+            let placed = ros::load_occupied(&file).unwrap();
+            // The image's rows count from the top.
+            let place = placed.place(7.5, f64::from(frame.cells) - 2.5);
+            let apart = place - frame.centre_of(Cell { col: 7, row: 2 });
+            assert!(apart.length() < 1e-6, "{apart} m apart of {} cells", frame.cells);
+        }
+    }
+
+    #[test]
+    fn a_mission_from_a_saved_map_has_the_hazards_that_were_believed() {
+        let text = "known.drum = [{ at = [1.2, 1.0], radius_m = 0.3 }]\nknown.box = [{ at = [0, -1.5], size_m = [1, 0.4] }]";
+        let before = mission(text);
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("believed.yaml");
+        let frame = before.grid_frame();
+        let mapper = mapper::step::Mapper::new(&before);
+        save_believed(&file, &before, &frame, mapper.state().cells()).unwrap();
+        let after = with_prior_map(mission(&format!("map = '{}'", file.display()))).unwrap();
+        let (before, after) = (hazards(&before), hazards(&after));
+        let lost = before.iter().zip(&after).filter(|(was, is)| **was && !**is).count();
+        let gained = before.iter().zip(&after).filter(|(was, is)| !**was && **is).count();
+        assert_eq!(lost, 0, "{gained} gained");
+        assert!(gained * 10 < before.iter().filter(|it| **it).count(), "{gained} gained");
+    }
+}

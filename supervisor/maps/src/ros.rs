@@ -1,0 +1,300 @@
+//! Map files of the ROS map_server: a YAML file that names an image and its thresholds.
+//!
+//! [`load`] does not read resolution and origin, because a field is solved in cells. [`load_placed`] does.
+
+use std::{
+    ops::RangeInclusive,
+    path::{Path, PathBuf},
+};
+
+use common::file;
+use serde::{Deserialize, de::DeserializeOwned};
+
+use crate::{
+    error::MapError,
+    file::read,
+    image::{self, Free, Lightness},
+    map::{Map, PlacedMap},
+};
+
+/// Most bytes of a map file, which has a dozen short lines.
+const LONGEST: u64 = 64 << 10;
+/// Range of a cell's side, metres.
+const CELL_M: RangeInclusive<f64> = 0.005..=1.0;
+/// Largest distance from the origin, metres.
+const FARTHEST_M: f64 = 1e6;
+
+/// The keys that are read. The file may have keys of other programs.
+#[derive(Deserialize)]
+struct MapFile {
+    image: PathBuf,
+    #[serde(default)]
+    negate: Negate,
+    free_thresh: Option<f64>,
+    occupied_thresh: Option<f64>,
+    mode: Option<String>,
+}
+
+/// The keys of the map's place.
+#[derive(Deserialize)]
+struct Place {
+    resolution: f64,
+    origin: Vec<f64>,
+}
+
+/// The map_server writes 0 and 1, people write false and true.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Negate {
+    Word(bool),
+    Number(i64),
+}
+
+impl Default for Negate {
+    fn default() -> Self {
+        Self::Word(false)
+    }
+}
+
+/// The map a YAML describes.
+pub(super) fn load(file: &Path) -> Result<Map, MapError> {
+    image_of(file, &text(file)?)
+}
+
+/// The map that the YAML `file` of the ROS map_server describes, with its place.
+pub fn load_placed(file: &Path) -> Result<PlacedMap, MapError> {
+    placed(file, image_of)
+}
+
+/// [`load_placed`], with only those cells blocked that the map says are occupied.
+pub(super) fn load_occupied(file: &Path) -> Result<PlacedMap, MapError> {
+    placed(file, |file, text| {
+        let (image, lightness) = named_image(file, text)?;
+        let free_thresh = f64::INFINITY;
+        let Free { cols, pixels } = image::pixels(&image, Lightness { free_thresh, ..lightness })?;
+        let blocked: Vec<bool> = pixels.into_iter().map(|is_free| !is_free).collect();
+        Ok(Map { cols, rows: blocked.len() / cols, blocked })
+    })
+}
+
+fn placed(
+    file: &Path,
+    map_of: fn(&Path, &str) -> Result<Map, MapError>,
+) -> Result<PlacedMap, MapError> {
+    let text = text(file)?;
+    let place: Place = parse(file, &text, "resolution: METRES` and `origin: [x, y, 0]")?;
+    if !CELL_M.contains(&place.resolution) {
+        let problem = format!(
+            "resolution: {} is not the side of a cell; set it to {} to {} m",
+            place.resolution,
+            CELL_M.start(),
+            CELL_M.end()
+        );
+        return Err(MapError::malformed(file, problem));
+    }
+    match place.origin[..] {
+        [x, y, turn] if x.abs() <= FARTHEST_M && y.abs() <= FARTHEST_M && turn == 0.0 => {
+            Ok(PlacedMap { map: map_of(file, &text)?, cell_m: place.resolution, corner_m: [x, y] })
+        }
+        _ => Err(MapError::malformed(
+            file,
+            format!(
+                "origin: {:?} is not read here; set it to [x, y, 0] in metres, the image not turned",
+                place.origin.get(..3).unwrap_or(&place.origin)
+            ),
+        )),
+    }
+}
+
+fn text(file: &Path) -> Result<String, MapError> {
+    String::from_utf8(read(file, LONGEST)?)
+        .map_err(|_| MapError::malformed(file, "not UTF-8 text; give the YAML of a map_server map"))
+}
+
+/// The keys of `text` that `T` has. `needed` names the keys that the file must have.
+fn parse<T: DeserializeOwned>(file: &Path, text: &str, needed: &str) -> Result<T, MapError> {
+    serde_saphyr::from_str(text).map_err(|error| {
+        let problem = error.to_string();
+        // The rest of the message shows the source over several lines.
+        let cause = problem.lines().next().unwrap_or_default();
+        MapError::malformed(
+            file,
+            format!("not a map_server map: {cause}; it needs at least `{needed}`"),
+        )
+    })
+}
+
+/// The image that the YAML `text` of `file` names.
+fn image_of(file: &Path, text: &str) -> Result<Map, MapError> {
+    let (image, lightness) = named_image(file, text)?;
+    image::load(&image, lightness)
+}
+
+/// The name of that image, and the rule by which its pixels are free.
+fn named_image(file: &Path, text: &str) -> Result<(PathBuf, Lightness), MapError> {
+    let parsed: MapFile = parse(file, text, "image: FILE")?;
+    let lightness = parsed.lightness(file)?;
+    let folder = file.parent().unwrap_or(Path::new(""));
+    // `join` leaves an absolute path as it is.
+    Ok((folder.join(&parsed.image), lightness))
+}
+
+/// A map to write: cells, row-major, row 0 at the top.
+pub(super) struct Saved {
+    pub(super) cols: usize,
+    /// The pixels: 0 for occupied, 254 for free, 205 for unknown, as the map_saver writes them.
+    pub(super) pixels: Vec<u8>,
+    pub(super) cell_m: f64,
+    /// The corner where x and y are least, metres.
+    pub(super) corner_m: [f64; 2],
+}
+
+/// Write `map` to the YAML `file` and to an image of the same name beside it.
+pub(super) fn save(file: &Path, map: &Saved) -> Result<(), MapError> {
+    let unwritable = |cause| MapError::Unwritable { file: file.to_owned(), cause };
+    let image = file.with_extension("pgm");
+    let mut bytes = format!("P5\n{} {}\n255\n", map.cols, map.pixels.len() / map.cols).into_bytes();
+    bytes.extend_from_slice(&map.pixels);
+    file::replace(&image, bytes).map_err(unwritable)?;
+    let (name, [x, y]) = (image.file_name().unwrap_or_default().to_string_lossy(), map.corner_m);
+    // A name in single quotes is taken literally, except that quotes in it are doubled.
+    let name = name.replace('\'', "''");
+    let yaml = format!(
+        "image: '{name}'\nmode: trinary\nresolution: {:?}\norigin: [{x:?}, {y:?}, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
+        map.cell_m
+    );
+    file::replace(file, yaml).map_err(unwritable)
+}
+
+impl MapFile {
+    fn lightness(&self, file: &Path) -> Result<Lightness, MapError> {
+        match self.mode.as_deref() {
+            None | Some("trinary") => {}
+            Some(mode) => {
+                return Err(MapError::malformed(
+                    file,
+                    format!("mode: {mode:?} is not read here; set it to trinary"),
+                ));
+            }
+        }
+        let negate = match self.negate {
+            Negate::Word(negate) => negate,
+            Negate::Number(0) => false,
+            Negate::Number(1) => true,
+            Negate::Number(other) => {
+                return Err(MapError::malformed(
+                    file,
+                    format!("negate: {other} is neither 0 nor 1; set it to one of them"),
+                ));
+            }
+        };
+        let usual = Lightness::default();
+        let share = |key: &str, value: Option<f64>, usual: f64| match value.unwrap_or(usual) {
+            value if (0.0..=1.0).contains(&value) => Ok(value),
+            value => Err(MapError::malformed(
+                file,
+                format!("{key}: {value} is not a share of darkness; set it to 0 to 1"),
+            )),
+        };
+        Ok(Lightness {
+            negate,
+            free_thresh: share("free_thresh", self.free_thresh, usual.free_thresh)?,
+            occupied_thresh: share("occupied_thresh", self.occupied_thresh, usual.occupied_thresh)?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The map of that YAML beside an image of 5 x 5 pixels of one grey.
+    fn map_of(yaml: &str, grey: u8) -> Result<Map, MapError> {
+        read_by(load, yaml, grey)
+    }
+
+    fn read_by<T>(
+        read: fn(&Path) -> Result<T, MapError>,
+        yaml: &str,
+        grey: u8,
+    ) -> Result<T, MapError> {
+        let directory = tempfile::tempdir().unwrap();
+        let image = [b"P5 5 5 255\n".as_slice(), &[grey; 25]].concat();
+        std::fs::write(directory.path().join("grey.pgm"), image).unwrap();
+        let file = directory.path().join("map.yaml");
+        std::fs::write(&file, yaml).unwrap();
+        read(&file)
+    }
+
+    fn is_free(yaml: &str, grey: u8) -> bool {
+        !map_of(yaml, grey).unwrap().blocked[12]
+    }
+
+    #[test]
+    fn thresholds_and_negation_are_those_of_the_file() {
+        let whole = "# saved\nimage: grey.pgm\nmode: trinary\nresolution: 0.05\norigin: [0.0, -1, 0]\n\
+                     negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n";
+        assert!(is_free(whole, 200));
+        assert!(!is_free(whole, 190));
+        assert!(!is_free("image: grey.pgm", 200), "0.196 unless it says so");
+        for negate in ["1", "true"] {
+            let negated = format!("image: ./grey.pgm\nnegate: {negate}");
+            assert!(is_free(&negated, 20) && !is_free(&negated, 235));
+        }
+        assert!(!is_free("image: grey.pgm\nfree_thresh: 0.9\noccupied_thresh: 0.2", 128));
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_meant_is_refused_with_its_key() {
+        let cases = [
+            ("", "image"),
+            ("free_thresh: 0.2", "image"),
+            ("image: [1, 2]", "image"),
+            ("image: grey.pgm\nmode: scale", "mode"),
+            ("image: grey.pgm\nnegate: 7", "negate"),
+            ("image: grey.pgm\nfree_thresh: 1.5", "free_thresh"),
+            ("image: grey.pgm\noccupied_thresh: .nan", "occupied_thresh"),
+            ("image: elsewhere.pgm", "elsewhere.pgm"),
+            ("image: {{{{", "map_server"),
+            ("\u{0}\u{1}", "map_server"),
+        ];
+        for (yaml, named) in cases {
+            let error = map_of(yaml, 255).unwrap_err().to_string();
+            assert!(error.contains(named) && error.lines().count() == 1, "{yaml:?} gave {error}");
+        }
+    }
+
+    #[test]
+    fn a_yaml_made_to_explode_is_refused() {
+        let mut bomb = String::from("a0: &a0 [x, x, x, x, x, x, x, x, x]\n");
+        for nth in 1..12 {
+            let last = nth - 1;
+            bomb +=
+                &format!("a{nth}: &a{nth} [*a{last}, *a{last}, *a{last}, *a{last}, *a{last}]\n");
+        }
+        bomb += "image: *a11\n";
+        assert!(map_of(&bomb, 255).is_err());
+        assert!(matches!(map_of(&"#".repeat(1 << 17), 255), Err(MapError::TooLong { .. })));
+    }
+
+    #[test]
+    fn a_placed_map_has_its_cells_in_metres_and_one_that_lies_nowhere_is_refused_with_its_key() {
+        let placed = |place: &str| read_by(load_placed, &format!("image: grey.pgm\n{place}"), 255);
+        let map = placed("resolution: 0.05\norigin: [-2.5, 3, 0.0]").unwrap();
+        assert_eq!((map.cell_m, map.corner_m), (0.05, [-2.5, 3.0]));
+        let cases = [
+            ("origin: [0, 0, 0]", "resolution"),
+            ("resolution: 0.05", "origin"),
+            ("resolution: 0\norigin: [0, 0, 0]", "resolution"),
+            ("resolution: -1\norigin: [0, 0, 0]", "resolution"),
+            ("resolution: .nan\norigin: [0, 0, 0]", "resolution"),
+            ("resolution: 0.05\norigin: [0, 0]", "origin"),
+            ("resolution: 0.05\norigin: [0, .inf, 0]", "origin"),
+            ("resolution: 0.05\norigin: [0, 0, 0.7]", "origin"),
+        ];
+        for (place, named) in cases {
+            let error = placed(place).unwrap_err().to_string();
+            assert!(error.contains(named), "{place:?} gave {error}");
+        }
+    }
+}

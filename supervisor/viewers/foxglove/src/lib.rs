@@ -1,0 +1,45 @@
+//! `firsthand foxglove`: the robot in Foxglove or Lichtblick.
+
+use std::{net::SocketAddr, process::ExitCode};
+
+use clap::Parser;
+use common::{
+    domain::{Domain, RobotName},
+    signals::{SIGHUP, SIGINT, SIGTERM, Signals},
+};
+use recording::live::{Live, LiveError};
+
+use console::{executable, failure::Failure, output::print_text, stream::let_stages_go_first};
+
+/// Serve a robot to Foxglove or Lichtblick, live: what a recording has, by a websocket.
+///
+/// It prints the address to open there. Viewers only watch.
+#[derive(Debug, Parser)]
+#[command(name = "firsthand-foxglove", version)]
+pub struct Arguments {
+    /// Name of the robot; it need not run yet.
+    #[arg(long, default_value = "x80")]
+    robot: RobotName,
+    /// Where to listen. The protocol has no authentication: whoever reaches another address than one of this machine can watch
+    /// the robot, and so can any web page in a browser on this machine. Nobody can send it anything.
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8765")]
+    listen: SocketAddr,
+}
+
+/// The main function of the executable.
+pub fn main() -> ExitCode {
+    // A client could fill the log with its own errors.
+    executable::run("error,foxglove=off", serve, |error| {
+        error.is::<LiveError>().then_some("cannot-listen")
+    })
+}
+
+fn serve(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let_stages_go_first();
+    let mut signals = Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?;
+    let live = Live::open(&arguments.robot, arguments.listen)?;
+    let address = SocketAddr::new(arguments.listen.ip(), live.port());
+    print_text(&format!("ws://{address}\n"))?;
+    live.serve(&Domain::of(arguments.robot.clone()), &mut || signals.came());
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,109 @@
+//! `firsthand ros2`: the robot in ROS 2.
+
+use std::{net::Ipv4Addr, process::ExitCode};
+
+use clap::{Parser, ValueEnum};
+use common::{
+    address::domain_of_environment,
+    domain::RobotName,
+    signals::{SIGHUP, SIGINT, SIGTERM, Signals},
+};
+
+use console::{
+    executable, failure::Failure, item::item, output::print_text, stream::let_stages_go_first,
+};
+use ros2_bridge::{
+    bridge::{Options, serve},
+    topics::{Accept as Accepted, Spec, TABLE},
+};
+
+/// Show a robot in ROS 2: to RViz, to other nodes, to other machines. `--topics` lists its topics.
+///
+/// It is a consumer: it may be killed, and started again. Nobody may ask anything of the robot unless --accept says what. DDS has
+/// no authentication here: whoever reaches the domain may do it. The robot's link is no part of it.
+#[derive(Debug, Parser)]
+#[command(name = "firsthand-ros2", version)]
+pub struct Arguments {
+    /// Name of the robot; it need not run yet.
+    #[arg(long, default_value = "x80")]
+    robot: RobotName,
+    /// The domain of ROS, 0 to 232, instead of that which `ROS_DOMAIN_ID` names.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(0..=232))]
+    domain: Option<u16>,
+    /// The address of the only network interface to use. Without it, this machine's own with `ROS_LOCALHOST_ONLY=1`, else all.
+    #[arg(long, value_name = "ADDRESS")]
+    interface: Option<Ipv4Addr>,
+    /// The namespace of all topics, `tf` too. A robot that speaks ROS 2 itself publishes `/tf` and `/odom`, so give it one.
+    #[arg(long, default_value = "", value_parser = namespace)]
+    namespace: String,
+    /// Print the table of its topics, and nothing else.
+    #[arg(long)]
+    topics: bool,
+    /// What others may do.
+    #[arg(long, value_delimiter = ',', value_name = "LIST")]
+    accept: Vec<Accept>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Accept {
+    /// Send the robot to targets: `goal_pose` and the action `navigate_to_pose`.
+    Goals,
+    /// Say where it is: `initialpose`.
+    Pose,
+    /// Let it stand and go on: `stop`.
+    Stop,
+}
+
+/// A namespace of ROS: names of letters, digits and `_` between slashes.
+fn namespace(text: &str) -> Result<String, String> {
+    let is_letter = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
+    let is_name = |name: &str| !name.is_empty() && name.chars().all(is_letter);
+    let path = text.trim_matches('/');
+    if path.is_empty() || path.split('/').all(is_name) {
+        Ok(path.to_owned())
+    } else {
+        Err("no namespace of ROS; give letters, digits and _, such as robots/one".to_owned())
+    }
+}
+
+/// The main function of the executable.
+pub fn main() -> ExitCode {
+    // Refused requests of other nodes are logged.
+    executable::run("warn,rustdds=off", show, |_| None)
+}
+
+/// The table of topics as a Markdown list.
+pub fn topics() -> String {
+    let row = |spec: &Spec| {
+        let [package, message] = spec.message;
+        let way = match spec.accepted_by {
+            None => String::new(),
+            Some(by) => format!("taken with `--accept {}`; ", format!("{by:?}").to_lowercase()),
+        };
+        item(&format!("`{}` (`{package}/{message}`): {way}{}", spec.name, spec.meaning))
+    };
+    TABLE.iter().map(row).collect()
+}
+
+fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    if arguments.topics {
+        print_text(&topics())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let_stages_go_first();
+    let mut signals = Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?;
+    let accepted = arguments.accept.iter().map(|accept| match accept {
+        Accept::Goals => Accepted::Goals,
+        Accept::Pose => Accepted::Pose,
+        Accept::Stop => Accepted::Stop,
+    });
+    let options = Options {
+        robot: arguments.robot.clone(),
+        domain: arguments.domain.map_or_else(domain_of_environment, Ok)?,
+        interface: arguments.interface,
+        namespace: arguments.namespace.clone(),
+        accepted: accepted.collect(),
+    };
+    serve(&options, &mut || signals.came())?;
+    Ok(ExitCode::SUCCESS)
+}

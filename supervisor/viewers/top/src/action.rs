@@ -1,0 +1,196 @@
+//! Keys, and the actions that they start.
+
+use std::{
+    sync::mpsc::{Receiver, TryRecvError, channel},
+    thread::{self, JoinHandle},
+};
+
+use common::domain::RobotName;
+use rustix::process::Signal;
+use supervisor::operator as requests;
+
+use console::operator;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Action {
+    Kill,
+    Freeze,
+    Thaw,
+    Restart,
+    Stop,
+    Resume,
+}
+
+impl Action {
+    /// The name of the subcommand that does the same.
+    fn name(self) -> &'static str {
+        let row = KEYS.iter().find(|(_, _, key)| *key == Key::Act(self));
+        row.map_or("", |(_, name, _)| name)
+    }
+
+    /// Whether the action concerns a stage rather than the robot.
+    const fn is_of_a_stage(self) -> bool {
+        !matches!(self, Self::Stop | Self::Resume)
+    }
+
+    fn perform(self, robot: &RobotName, stage: &str) -> Result<(), String> {
+        let done = match self {
+            Self::Kill => operator::send(robot, stage, Signal::KILL),
+            Self::Freeze => operator::send(robot, stage, Signal::STOP),
+            Self::Thaw => operator::send(robot, stage, Signal::CONT),
+            Self::Restart => requests::restart(robot, stage).map_err(Into::into),
+            Self::Stop => operator::stand(robot),
+            Self::Resume => requests::resume(robot).map_err(Into::into),
+        };
+        done.map_err(|error| error.to_string())
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Key {
+    Up,
+    Down,
+    Act(Action),
+    Quit,
+}
+
+/// The keys: the text for each in the last line of the screen, its effect, and its meaning.
+pub(super) const KEYS: [(&str, &str, Key); 8] = [
+    ("↑↓", "choose", Key::Down),
+    ("k", "kill", Key::Act(Action::Kill)),
+    ("f", "freeze", Key::Act(Action::Freeze)),
+    ("t", "thaw", Key::Act(Action::Thaw)),
+    ("r", "restart", Key::Act(Action::Restart)),
+    ("s", "stop", Key::Act(Action::Stop)),
+    ("c", "resume", Key::Act(Action::Resume)),
+    ("q", "quit", Key::Quit),
+];
+
+/// Take the keys out of `typed`, the bytes of a terminal in raw mode. The beginning of an incomplete key stays there.
+pub(super) fn take_keys(typed: &mut Vec<u8>) -> Vec<Key> {
+    let mut keys = Vec::new();
+    let mut rest = &typed[..];
+    loop {
+        rest = match rest {
+            // A sequence of bytes for one key ends with a letter or `~`.
+            [ESCAPE, b'[' | b'O', sequence @ ..] => {
+                let Some(last) = sequence.iter().position(|byte| (b'@'..=b'~').contains(byte))
+                else {
+                    break;
+                };
+                match sequence[last] {
+                    b'A' => keys.push(Key::Up),
+                    b'B' => keys.push(Key::Down),
+                    _ => {}
+                }
+                &sequence[last + 1..]
+            }
+            [] | [ESCAPE] => break,
+            [byte, others @ ..] => {
+                keys.extend(meaning(*byte));
+                others
+            }
+        };
+    }
+    let left = rest.len();
+    typed.drain(..typed.len() - left);
+    if left > LONGEST_SEQUENCE {
+        typed.clear();
+    }
+    keys
+}
+
+const ESCAPE: u8 = 0x1b;
+/// Ctrl-C, which a terminal in raw mode sends as a byte.
+const CONTROL_C: u8 = 0x03;
+/// The most bytes that a key sends.
+const LONGEST_SEQUENCE: usize = 32;
+
+/// The meaning of a letter; none if it has none.
+fn meaning(letter: u8) -> Option<Key> {
+    let row = KEYS.iter().find(|(key, ..)| key.as_bytes() == [letter]);
+    if letter == CONTROL_C { Some(Key::Quit) } else { row.map(|(.., key)| *key) }
+}
+
+/// Performs one action at a time in a thread, because a stop takes until the robot rests.
+pub(super) struct Operator {
+    robot: RobotName,
+    under_way: Option<(JoinHandle<()>, Receiver<String>)>,
+}
+
+impl Operator {
+    pub(super) fn new(robot: &RobotName) -> Self {
+        Self { robot: robot.clone(), under_way: None }
+    }
+
+    /// Begin `action`. Returns the text to show meanwhile.
+    pub(super) fn ask(&mut self, action: Action, stage: Option<&str>) -> String {
+        if self.under_way.is_some() {
+            return "the last action goes on".to_owned();
+        }
+        let stage = match stage {
+            _ if !action.is_of_a_stage() => String::new(),
+            Some(stage) => stage.to_owned(),
+            None => return "no stage is known yet".to_owned(),
+        };
+        let asked = format!("{} {stage}", action.name()).trim_end().to_owned();
+        let (robot, name) = (self.robot.clone(), asked.clone());
+        let (sender, receiver) = channel();
+        let thread = thread::spawn(move || {
+            let message = match action.perform(&robot, &stage) {
+                Ok(()) => format!("{name}: done"),
+                Err(problem) => format!("{name}: {problem}"),
+            };
+            // The screen may have ended.
+            let _ = sender.send(message);
+        });
+        self.under_way = Some((thread, receiver));
+        format!("{asked} ...")
+    }
+
+    /// The result of the action. The next call gives none.
+    pub(super) fn answer(&mut self) -> Option<String> {
+        let (_, receiver) = self.under_way.as_ref()?;
+        let message = match receiver.try_recv() {
+            Ok(message) => message,
+            Err(TryRecvError::Empty) => return None,
+            Err(TryRecvError::Disconnected) => "failed".to_owned(),
+        };
+        self.end();
+        Some(message)
+    }
+
+    fn end(&mut self) {
+        if let Some((thread, _)) = self.under_way.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// The destructor awaits an action under way, so that the action leaves the bus in order.
+impl Drop for Operator {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_are_understood_however_their_bytes_come() {
+        let mut typed = b"\x1b[B\x1bOA\x1b[3~xk\x1b".to_vec();
+        let keys = [Key::Down, Key::Up, Key::Act(Action::Kill)];
+        assert_eq!(take_keys(&mut typed), keys);
+        assert_eq!(typed, [ESCAPE], "the rest may come");
+        typed.extend(b"[1;5");
+        assert_eq!(take_keys(&mut typed), []);
+        typed.extend(b"B\x03");
+        assert_eq!(take_keys(&mut typed), [Key::Down, Key::Quit]);
+        typed.extend([ESCAPE, b'[']);
+        typed.extend([b'1'; 100]);
+        assert_eq!(take_keys(&mut typed), []);
+        assert!(typed.is_empty(), "unknown bytes stay");
+    }
+}

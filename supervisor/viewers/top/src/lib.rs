@@ -1,0 +1,156 @@
+//! `firsthand top`: stages, map, field and robot on the screen of a terminal, and keys for the actions of an operator.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `view` | what the screen shows |
+//! | `feed` | brings it up to date from the bus |
+//! | `screen`, `map` | draw it |
+//! | `action` | what the keys do |
+//! | `words` | guidance, deaths and stalls in words |
+
+mod action;
+mod feed;
+mod map;
+mod screen;
+#[cfg(test)]
+mod tests;
+mod view;
+mod words;
+
+use std::{
+    io::{self, IsTerminal as _},
+    process::ExitCode,
+    time::{Duration, Instant},
+};
+
+use clap::Parser;
+use common::{
+    bus::BusError,
+    domain::{Domain, RobotName},
+    follower::{Event, Follower},
+    poll,
+    signals::{SIGHUP, SIGINT, SIGTERM, Signals},
+    topics,
+};
+use ratatui::DefaultTerminal;
+use thiserror::Error;
+
+use self::{
+    action::{Key, Operator},
+    feed::Feed,
+    view::View,
+};
+use console::{
+    executable,
+    failure::{Failure, Refused},
+    stream::let_stages_go_first,
+};
+
+/// Show a robot on the terminal: stages, believed map, field; keys kill, freeze, restart, stop, resume.
+#[derive(Debug, Parser)]
+#[command(name = "firsthand-top", version)]
+pub struct Arguments {
+    /// Name of the robot.
+    #[arg(long, default_value = "x80")]
+    robot: RobotName,
+}
+
+#[derive(Debug, Error)]
+enum TopError {
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    #[error("cannot draw on this terminal: {0}; `firsthand status` needs none")]
+    Terminal(#[from] io::Error),
+}
+
+/// The longest time until a key is noticed when nothing is published.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+/// The interval at which the screen is drawn again.
+const DRAW_EVERY: Duration = Duration::from_millis(200);
+
+/// The main function of the executable.
+pub fn main() -> ExitCode {
+    executable::run("error", show_on_terminal, |_| None)
+}
+
+fn show_on_terminal(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
+        let message = "top draws on a terminal; elsewhere there are `firsthand status` and `firsthand topic hz`";
+        return Err(Refused::new("no-terminal", message).into());
+    }
+    let_stages_go_first();
+    show(&arguments.robot)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Show `robot` until q is pressed, a signal comes, or the terminal is closed.
+fn show(robot: &RobotName) -> Result<(), TopError> {
+    let mut signals = Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?;
+    let mut terminal = ratatui::try_init()?;
+    let shown = run(robot, &mut signals, &mut terminal);
+    if terminal.show_cursor().is_err() {
+        // The destructor would report on standard error that it cannot show the cursor, and panic if that is closed too.
+        std::mem::forget(terminal);
+    }
+    let restored = ratatui::try_restore();
+    match shown.and(restored.map_err(TopError::from)) {
+        Err(TopError::Terminal(_)) if signals.came() || is_closed() => Ok(()),
+        shown => shown,
+    }
+}
+
+fn is_closed() -> bool {
+    poll::is_closed(io::stdin()).unwrap_or(true)
+}
+
+fn run(
+    robot: &RobotName,
+    signals: &mut Signals,
+    terminal: &mut DefaultTerminal,
+) -> Result<(), TopError> {
+    let domain = Domain::of(robot.clone());
+    let mut follower = Follower::new(domain, "top", &topics::POSE, Feed::open)
+        .also_on([&topics::ROSTER as _, &topics::LINK as _]);
+    let mut view = View::of(robot.clone());
+    let mut operator = Operator::new(robot);
+    let mut drawn = None::<Instant>;
+    // Keys are read here, because the reader of the terminal's library never ends if the terminal was closed.
+    let mut typed = Vec::new();
+    while !signals.came() && !is_closed() {
+        match follower.wait(LOOK_EVERY)? {
+            Event::Connected => view.on_connected(),
+            Event::Disconnected => view.connected = false,
+            Event::Nothing => {}
+            Event::Samples(feed) => feed.take(&mut view)?,
+        }
+        let mut changed = false;
+        while poll::is_readable(io::stdin(), Duration::ZERO)? {
+            let mut bytes = [0; 64];
+            let read = rustix::io::read(io::stdin(), &mut bytes).map_err(io::Error::from)?;
+            if read == 0 {
+                // The terminal was closed.
+                return Ok(());
+            }
+            typed.extend_from_slice(&bytes[..read]);
+        }
+        for key in action::take_keys(&mut typed) {
+            changed = true;
+            match key {
+                Key::Quit => return Ok(()),
+                Key::Up => view.chosen = view.chosen.saturating_sub(1),
+                Key::Down => {
+                    view.chosen = (view.chosen + 1).min(view.stages.len().saturating_sub(1));
+                }
+                Key::Act(action) => view.message = operator.ask(action, view.chosen_stage()),
+            }
+        }
+        if let Some(message) = operator.answer() {
+            (view.message, changed) = (message, true);
+        }
+        if changed || drawn.is_none_or(|drawn| drawn.elapsed() >= DRAW_EVERY) {
+            terminal.draw(|frame| screen::draw(&view, frame))?;
+            drawn = Some(Instant::now());
+        }
+    }
+    Ok(())
+}

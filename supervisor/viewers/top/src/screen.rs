@@ -1,0 +1,304 @@
+use common::{
+    latency::Histogram,
+    process_usage::Usage,
+    samples::{Action, HoldReason, LinkSample, Order, StageState, name_str},
+};
+use ratatui::{
+    Frame,
+    layout::{Constraint, Layout, Rect},
+    style::{Color, Modifier, Style},
+    text::{Line, Span},
+    widgets::{Paragraph, Row, Table, TableState, Wrap},
+};
+
+use super::{
+    action::KEYS,
+    map,
+    view::{Stage, View},
+    words as top_words,
+};
+use console::{
+    waiting,
+    words::{self, age},
+};
+
+/// Columns of the table of stages.
+const TABLE_WIDTH: u16 = 80;
+/// The width from which on the map is beside the table instead of below it.
+const WIDE: u16 = TABLE_WIDTH + 50;
+
+const TITLE: Style = Style::new().add_modifier(Modifier::BOLD);
+const DIM: Style = Style::new().fg(Color::DarkGray);
+const BAD: Style = Style::new().fg(Color::Red).add_modifier(Modifier::BOLD);
+
+pub(super) fn draw(view: &View, frame: &mut Frame<'_>) {
+    let [title, body, message, keys] = Layout::vertical([
+        Constraint::Length(1),
+        Constraint::Min(0),
+        Constraint::Length(message_height(&view.message, frame.area().width)),
+        Constraint::Length(1),
+    ])
+    .areas(frame.area());
+    frame.render_widget(Paragraph::new(heading(view)), title);
+    let table_height = view.stages.len() as u16 + 3;
+    if body.width >= WIDE {
+        let [left, _, right] = Layout::horizontal([
+            Constraint::Length(TABLE_WIDTH),
+            Constraint::Length(2),
+            Constraint::Min(0),
+        ])
+        .areas(body);
+        let [stages, below] =
+            Layout::vertical([Constraint::Length(table_height), Constraint::Min(0)]).areas(left);
+        table(view, frame, stages);
+        details(view, frame, below);
+        draw_map(view, frame, right);
+    } else {
+        let [stages, below] =
+            Layout::vertical([Constraint::Length(table_height), Constraint::Min(0)]).areas(body);
+        table(view, frame, stages);
+        // The map is square, and a line is as high as two letters are wide.
+        let side = (2 * below.height).min(below.width / 2);
+        let [left, _, right] = Layout::horizontal([
+            Constraint::Length(side),
+            Constraint::Length(2),
+            Constraint::Min(0),
+        ])
+        .areas(below);
+        draw_map(view, frame, left);
+        details(view, frame, right);
+    }
+    let wrapped = Paragraph::new(view.message.as_str()).wrap(Wrap { trim: true });
+    frame.render_widget(wrapped, message);
+    frame.render_widget(Paragraph::new(keys_line()), keys);
+}
+
+/// The lines of `message` when it is wrapped between words.
+fn message_height(message: &str, width: u16) -> u16 {
+    // A fifth is added for lines that end early before a long word.
+    let letters = message.chars().count() * 6 / 5;
+    1 + (letters / usize::from(width).max(1)).min(4) as u16
+}
+
+fn heading(view: &View) -> Line<'static> {
+    let robot = format!("robot {}", view.robot);
+    let Some(supervisor) = view.supervisor else {
+        let state = if view.connected { "is here" } else { waiting::NOT_RUNNING };
+        return Line::from(vec![Span::styled(robot, TITLE), Span::raw(format!(" {state}"))]);
+    };
+    let kind = if supervisor.simulated == 1 { " (simulated): " } else { ": " };
+    let state = if view.connected {
+        let order = words::order(
+            Order::from_byte(supervisor.order),
+            HoldReason::from_byte(supervisor.reason),
+        );
+        format!("{order}, {:.1} s", supervisor.stamp.time().seconds())
+    } else {
+        waiting::ENDED.to_owned()
+    };
+    Line::from(vec![Span::styled(robot, TITLE), Span::raw(kind), Span::raw(state)])
+}
+
+fn keys_line() -> Line<'static> {
+    let spans = KEYS.iter().flat_map(|(key, what, _)| {
+        [Span::styled(*key, TITLE), Span::styled(format!(" {what}  "), DIM)]
+    });
+    Line::from(spans.collect::<Vec<_>>())
+}
+
+fn table(view: &View, frame: &mut Frame<'_>, area: Rect) {
+    let right = |text: String, width: usize| format!("{text:>width$}");
+    let mut rows: Vec<_> = view.stages.iter().map(|stage| stage_row(view, stage)).collect();
+    if let Some(supervisor) = view.supervisor {
+        let pid = supervisor.supervisor_pid.to_string();
+        let state = if view.connected { "running" } else { "ended" };
+        let usage = view.supervisor_usage;
+        let blank = String::new;
+        rows.push(Cells {
+            texts: [
+                "supervisor".to_owned(),
+                state.to_owned(),
+                pid,
+                blank(),
+                blank(),
+                blank(),
+                blank(),
+                cpu(usage),
+                memory(usage),
+            ],
+            style: Style::new(),
+        });
+    }
+    let widths: [u16; 9] = [14, 11, 7, 3, 8, 7, 7, 5, 8];
+    let heads = ["stage", "state", "pid", "gen", "restarts", "rate", "beat", "CPU", "memory"];
+    let cells = |texts: [String; 9]| {
+        let mut at = 0;
+        texts.map(|text| {
+            at += 1;
+            match at {
+                1 | 2 => text,
+                _ => right(text, usize::from(widths[at - 1])),
+            }
+        })
+    };
+    let heads = Row::new(cells(heads.map(str::to_owned))).style(DIM);
+    let rows = rows.into_iter().map(|row| Row::new(cells(row.texts)).style(row.style));
+    let table = Table::new(rows, widths)
+        .header(heads)
+        .column_spacing(1)
+        .highlight_symbol("> ")
+        .row_highlight_style(Style::new().add_modifier(Modifier::REVERSED));
+    let chosen = (!view.stages.is_empty()).then_some(view.chosen);
+    let mut state = TableState::default().with_selected(chosen);
+    frame.render_stateful_widget(table, area, &mut state);
+}
+
+struct Cells {
+    texts: [String; 9],
+    style: Style,
+}
+
+fn stage_row(view: &View, stage: &Stage) -> Cells {
+    let entry = &stage.entry;
+    let state = StageState::from_byte(entry.state);
+    let runs = view.connected && entry.pid != 0;
+    Cells {
+        texts: [
+            name_str(&entry.stage).to_owned(),
+            words::state(state).to_owned(),
+            if runs { entry.pid.to_string() } else { "-".to_owned() },
+            entry.generation.to_string(),
+            entry.restarts.to_string(),
+            stage.rate_hz.map_or("-".to_owned(), rate),
+            age(words::seconds(entry.beat_age_ns)),
+            cpu(stage.usage),
+            memory(stage.usage),
+        ],
+        style: match state {
+            StageState::Running => Style::new(),
+            StageState::Held => BAD,
+            _ => Style::new().fg(Color::Yellow),
+        },
+    }
+}
+
+fn rate(hz: f64) -> String {
+    if hz < 100.0 { format!("{hz:.1} Hz") } else { format!("{hz:.0} Hz") }
+}
+
+fn cpu(usage: Usage) -> String {
+    usage.cpu.map_or("-".to_owned(), |share| format!("{:.0} %", share * 100.0))
+}
+
+fn memory(usage: Usage) -> String {
+    usage.memory_bytes.map_or("-".to_owned(), words::size)
+}
+
+fn draw_map(view: &View, frame: &mut Frame<'_>, area: Rect) {
+    let lines = map::lines(view, area.width, area.height);
+    let map = lines.unwrap_or_else(|| vec![Line::styled("no map yet", DIM)]);
+    frame.render_widget(Paragraph::new(map), area);
+}
+
+fn details(view: &View, frame: &mut Frame<'_>, area: Rect) {
+    let mut lines = numbers(view);
+    let legend = legend();
+    // The events get the room between the numbers and the legend at the foot.
+    let room = usize::from(area.height).saturating_sub(lines.len() + legend.len() + 1);
+    lines.push(Line::default());
+    lines.extend(view.events.iter().take(room).map(|event| Line::raw(event.clone())));
+    let [above, foot] =
+        Layout::vertical([Constraint::Min(0), Constraint::Length(legend.len() as u16)]).areas(area);
+    frame.render_widget(Paragraph::new(lines), above);
+    frame.render_widget(Paragraph::new(legend), foot);
+}
+
+fn numbers(view: &View) -> Vec<Line<'static>> {
+    let mut lines = Vec::new();
+    let mut line = |name: &str, text: String, style: Style| {
+        let name = Span::styled(format!("{name:<10}"), DIM);
+        lines.push(Line::from(vec![name, Span::styled(text, style)]));
+    };
+    let plain = Style::new();
+    if let Some(pose) = view.pose {
+        let heading = pose.heading_rad.to_degrees().rem_euclid(360.0);
+        let within_m = pose.position_within_m();
+        let place = format!("{:.2}, {:.2} ±{within_m:.2} m, {heading:.0}°", pose.x_m, pose.y_m);
+        line("pose", place, plain);
+        line("speed", format!("{:.2} m/s, {:.2} rad/s", pose.v_m_s, pose.omega_rad_s), plain);
+        if let Some(command) = view.command {
+            let (left, driven) = (command.distance_m, pose.travelled_m);
+            line("to go", format!("{left:.2} m; driven {driven:.2} m"), plain);
+        }
+    }
+    if let Some(guidance) = view.guidance {
+        let limit = guidance.speed_limit_m_s;
+        let limit =
+            if limit.is_finite() { format!(", at most {limit:.2} m/s") } else { String::new() };
+        line("guidance", format!("{}{limit}", top_words::guidance(guidance.status)), plain);
+        let (events, full) = (guidance.safety_events, guidance.full_solves);
+        line("map", format!("{events} safety events"), plain);
+        line("solves", format!("{full} full"), plain);
+    }
+    if let Some(link) = &view.link {
+        let (text, style) = robot_words(link);
+        line("robot", text, style);
+        line("latency", latency(link), plain);
+    }
+    if let Some(power) = view.power {
+        let (board, motor, servo) = (power.board_v, power.motor_v, power.servo_v);
+        let style = if power.is_low() { BAD } else { plain };
+        line("battery", format!("board {board:.1}, motors {motor:.1}, servos {servo:.1} V"), style);
+    }
+    lines
+}
+
+fn robot_words(link: &LinkSample) -> (String, Style) {
+    if link.connected == 0 {
+        let lost = age(Some(link.lost_ns as f64 * 1e-9));
+        return (format!("LOST for {lost}"), BAD);
+    }
+    let does = link.action().effect();
+    match link.action() {
+        Action::Go => (does.to_owned(), Style::new()),
+        _ => {
+            let cause = link.cause().name();
+            (format!("{does}: {cause}"), Style::new().fg(Color::Yellow))
+        }
+    }
+}
+
+/// The latency of the ticks since this process of the link began.
+fn latency(link: &LinkSample) -> String {
+    let mut histogram = Histogram::default();
+    histogram.add(&link.latency_histogram, link.latency_max_ns);
+    let quantile = |share| histogram.quantile_us(share).map_or("-".to_owned(), time);
+    format!("{}, 99 % {}, longest {}", quantile(0.5), quantile(0.99), quantile(1.0))
+}
+
+fn time(microseconds: f64) -> String {
+    if microseconds < 1000.0 {
+        format!("{microseconds:.0} µs")
+    } else {
+        format!("{:.1} ms", microseconds / 1e3)
+    }
+}
+
+/// The meaning of the letters of the map.
+fn legend() -> Vec<Line<'static>> {
+    let mut letters = Vec::new();
+    let mut of = |letter: char, style: Style, what: &'static str| {
+        letters.push(Span::styled(letter.to_string(), style));
+        letters.push(Span::styled(format!(" {what}  "), DIM));
+    };
+    of(map::robot(0.0), map::ROBOT_STYLE, "robot");
+    of(map::TARGET, map::TARGET_STYLE, "target");
+    of(map::WAY, map::WAY_STYLE, "way");
+    of('→', map::FIELD_STYLE, "field");
+    let mut hazards = Vec::new();
+    for (style, what) in map::legend() {
+        hazards.push(Span::styled("█", style));
+        hazards.push(Span::styled(format!(" {what}  "), DIM));
+    }
+    vec![Line::from(letters), Line::from(hazards)]
+}

@@ -1,0 +1,337 @@
+//! `firsthand field MAP`: the harmonic field of a map, without a robot.
+
+use std::{
+    fmt,
+    fs::File,
+    io::{self, BufWriter, Write},
+    num::NonZeroUsize,
+    path::{Path, PathBuf},
+    str::FromStr,
+    time::{Duration, Instant},
+};
+
+use clap::Args;
+use common::{process_status::kibibytes, samples::FieldCell};
+use evaluation::statistics::median;
+use harmonic::{Cancellation, Cell, Domain, Field, Phase, Screening, Settings, SolveError, Solver};
+use maps::Map;
+use npyz::WriterBuilder as _;
+use picture::FieldOnMap;
+use serde::Serialize;
+use thiserror::Error;
+
+use console::{
+    failure::{Failure, Refused},
+    output::print,
+};
+
+/// Solve the harmonic field of a map: numbers for NumPy, a picture, how long it took.
+///
+/// Cells that are not free count as blocked, and so does the rim of the map.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// A ROS map_server YAML, a PGM or PNG image (light is free), or a MovingAI .map.
+    map: PathBuf,
+    /// The target's column and row, from 0; row 0 is the top of the map.
+    #[arg(long, value_name = "COL,ROW")]
+    target_cell: TargetCell,
+    /// The screening length, in cells: in it u falls by a further factor of e. Without it there is no screening.
+    #[arg(long, value_name = "LENGTH", allow_negative_numbers = true)]
+    screening_cells: Option<f64>,
+    /// Write u (arrays mantissa, exponent) and the guidance (ex, ey) as a NumPy .npz.
+    #[arg(long, value_name = "F.npz")]
+    out: Option<PathBuf>,
+    /// Draw level sets of log u and lines of the guidance as a PNG.
+    #[arg(long, value_name = "F.png")]
+    picture: Option<PathBuf>,
+    /// Print one line of JSON at the end, and nothing else on standard output.
+    #[arg(long)]
+    json: bool,
+    /// Solve K times, each time from scratch, and give the least and the median time.
+    #[arg(long, value_name = "K", default_value = "1")]
+    repeat: NonZeroUsize,
+    /// Threads a solve may use; the field is the same.
+    #[arg(long, value_name = "T", default_value = "1")]
+    threads: NonZeroUsize,
+}
+
+/// A cell of the command line.
+#[derive(Clone, Copy, Debug)]
+struct TargetCell(Cell);
+
+impl FromStr for TargetCell {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let number = |text: &str| text.trim().parse::<usize>().ok();
+        text.split_once(',')
+            .and_then(|(col, row)| Some(Self(Cell::new(number(col)?, number(row)?))))
+            .ok_or("a cell is its column and its row, from 0: 120,45")
+    }
+}
+
+#[derive(Debug, Error)]
+enum FieldError {
+    /// The target is blocked or outside.
+    #[error("{}: {cause}; the free cell nearest to it is --target-cell {},{}", map.display(), nearest.0, nearest.1)]
+    Target { map: PathBuf, cause: SolveError, nearest: (usize, usize) },
+    /// There is nothing to solve.
+    #[error(
+        "{}: no cell is free (the rim counts as blocked); check the thresholds, or `negate`, of the map",
+        map.display()
+    )]
+    NothingFree { map: PathBuf },
+    /// The solver's own message.
+    #[error("{}: {cause}", map.display())]
+    Solve { map: PathBuf, cause: SolveError },
+    /// A file cannot be written.
+    #[error("cannot write {}: {cause}; give another file", file.display())]
+    Write { file: PathBuf, cause: io::Error },
+}
+
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+    let map = maps::load(&arguments.map)?;
+    let domain = domain(arguments, &map).map_err(|error| match error {
+        FieldError::Target { .. } => Failure::from(Refused::new("target", error.to_string())),
+        error => error.into(),
+    })?;
+    let failed = |cause| FieldError::Solve { map: arguments.map.clone(), cause };
+    let mut runs = Vec::new();
+    let (first, times) = solve(&domain, arguments.threads).map_err(failed)?;
+    runs.push(times);
+    for _ in 1..arguments.repeat.get() {
+        runs.push(solve(&domain, arguments.threads).map_err(failed)?.1);
+    }
+    let report = Report::of(arguments, &first, &runs);
+    if let Some(file) = &arguments.out {
+        write(file, |to| write_npz(to, &first))?;
+    }
+    if let Some(file) = &arguments.picture {
+        let png = picture::png(&draw(&map, &first))?;
+        write(file, |to| to.write_all(&png))?;
+    }
+    Ok(print(&report, arguments.json)?)
+}
+
+fn domain(arguments: &Arguments, map: &Map) -> Result<Domain, FieldError> {
+    let target = arguments.target_cell.0;
+    let screening = arguments.screening_cells.map_or(Screening::None, Screening::cells);
+    Domain::new(map.cols, map.rows, map.blocked.clone(), target)
+        .and_then(|domain| domain.with_screening(&screening))
+        .map_err(|cause| {
+            let file = arguments.map.clone();
+            let at_target =
+                matches!(cause, SolveError::TargetBlocked { .. } | SolveError::Outside { .. });
+            match map.nearest_free(target.col, target.row) {
+                Some(nearest) if at_target => FieldError::Target { map: file, cause, nearest },
+                None if at_target => FieldError::NothingFree { map: file },
+                _ => FieldError::Solve { map: file, cause },
+            }
+        })
+}
+
+/// The time each phase of a solve took, summed over its attempts.
+#[derive(Clone, Copy, Debug, Default)]
+struct Times {
+    setup: Duration,
+    solve: Duration,
+    verify: Duration,
+}
+
+fn solve(domain: &Domain, threads: NonZeroUsize) -> Result<(Field, Times), SolveError> {
+    let mut solver = Solver::new(Settings { threads, ..Settings::default() });
+    let mut times = Times::default();
+    let mut last = Instant::now();
+    let field = solver.solve_observed(domain, &Cancellation::new(), &mut |phase| {
+        let now = Instant::now();
+        let took = now - std::mem::replace(&mut last, now);
+        match phase {
+            Phase::SetUp => times.setup += took,
+            Phase::Cycled | Phase::Solved => times.solve += took,
+            Phase::Verified => times.verify += took,
+            // A phase this program does not know is no reason to fail.
+            _ => {}
+        }
+    })?;
+    Ok((field, times))
+}
+
+/// The object of `field --json`. Times are in milliseconds.
+#[derive(Debug, Serialize)]
+struct Report {
+    rows: usize,
+    cols: usize,
+    /// Column and row.
+    target: [usize; 2],
+    screening_cells: Option<f64>,
+    reachable: usize,
+    method: &'static str,
+    repeats: usize,
+    threads: usize,
+    setup_ms: f64,
+    solve_ms: f64,
+    verify_ms: f64,
+    #[serde(flatten)]
+    medians: Option<Medians>,
+    worst_residual: f64,
+    log10_u_min: f64,
+    /// Memory of the process when the field was solved: map, solver and field, not the output files.
+    peak_memory_bytes: Option<u64>,
+}
+
+/// Medians, if there is more than one repeat.
+#[derive(Debug, Serialize)]
+struct Medians {
+    setup_ms_median: f64,
+    solve_ms_median: f64,
+    verify_ms_median: f64,
+}
+
+impl Report {
+    fn of(arguments: &Arguments, field: &Field, runs: &[Times]) -> Self {
+        let ms = |phase: fn(&Times) -> Duration| {
+            runs.iter().map(move |run| phase(run).as_secs_f64() * 1e3)
+        };
+        let least = |phase| ms(phase).fold(f64::INFINITY, f64::min);
+        let middle = |phase| median(ms(phase)).unwrap_or_default();
+        let verification = field.verification();
+        Self {
+            rows: field.height(),
+            cols: field.width(),
+            target: [field.target().col, field.target().row],
+            screening_cells: arguments.screening_cells,
+            reachable: verification.reachable,
+            method: verification.method.name(),
+            repeats: runs.len(),
+            threads: arguments.threads.get(),
+            setup_ms: least(|run| run.setup),
+            solve_ms: least(|run| run.solve),
+            verify_ms: least(|run| run.verify),
+            medians: (runs.len() > 1).then(|| Medians {
+                setup_ms_median: middle(|run| run.setup),
+                solve_ms_median: middle(|run| run.solve),
+                verify_ms_median: middle(|run| run.verify),
+            }),
+            worst_residual: verification.worst_residual,
+            log10_u_min: field.log10_u_min(),
+            peak_memory_bytes: kibibytes("self", "VmHWM").map(|kib| kib * 1024),
+        }
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [col, row] = self.target;
+        writeln!(
+            f,
+            "{} x {} cells, {} of them lead to the target at {col},{row}",
+            self.cols, self.rows, self.reachable
+        )?;
+        let screening = self.screening_cells.map_or_else(
+            || "without screening".to_owned(),
+            |cells| format!("with a screening length of {cells} cells"),
+        );
+        writeln!(
+            f,
+            "u down to 1e{:.1} {screening}, worst relative residual {:.1e}",
+            self.log10_u_min, self.worst_residual
+        )?;
+        writeln!(
+            f,
+            "{}: set-up {:.2} ms, solve {:.2} ms, verification {:.2} ms{}",
+            self.method,
+            self.setup_ms,
+            self.solve_ms,
+            self.verify_ms,
+            if self.repeats > 1 { " at least" } else { "" }
+        )?;
+        if let Some(medians) = &self.medians {
+            writeln!(
+                f,
+                "median of {}: set-up {:.2} ms, solve {:.2} ms, verification {:.2} ms",
+                self.repeats,
+                medians.setup_ms_median,
+                medians.solve_ms_median,
+                medians.verify_ms_median
+            )?;
+        }
+        if let Some(bytes) = self.peak_memory_bytes {
+            writeln!(f, "peak memory {:.1} MB", bytes as f64 * 1e-6)?;
+        }
+        Ok(())
+    }
+}
+
+fn write(
+    file: &Path,
+    fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> Result<(), FieldError> {
+    File::create(file)
+        .map(BufWriter::new)
+        .and_then(|mut to| fill(&mut to).and_then(|()| to.flush()))
+        .map_err(|cause| FieldError::Write { file: file.to_owned(), cause })
+}
+
+/// u and guidance of every cell as arrays of shape (rows, cols).
+fn write_npz(to: &mut BufWriter<File>, field: &Field) -> io::Result<()> {
+    let mut archive = zip::ZipWriter::new(to);
+    let u = || cells(field).map(|cell| field.u(cell));
+    let guidance: Vec<[f32; 2]> = cells(field).map(|cell| guidance(field, cell)).collect();
+    add_array(&mut archive, field, "mantissa", u().map(|u| u.mantissa))?;
+    add_array(&mut archive, field, "exponent", u().map(|u| u.exponent))?;
+    add_array(&mut archive, field, "ex", guidance.iter().map(|e| e[0]))?;
+    add_array(&mut archive, field, "ey", guidance.iter().map(|e| e[1]))?;
+    archive.finish()?;
+    Ok(())
+}
+
+fn add_array<T: npyz::AutoSerialize>(
+    archive: &mut zip::ZipWriter<&mut BufWriter<File>>,
+    field: &Field,
+    name: &str,
+    values: impl Iterator<Item = T>,
+) -> io::Result<()> {
+    // The members are stored uncompressed, as `numpy.savez` does: a reader may map them into its memory.
+    let options = zip::write::SimpleFileOptions::default()
+        .compression_method(zip::CompressionMethod::Stored)
+        .large_file(true);
+    archive.start_file(format!("{name}.npy"), options)?;
+    let mut array = npyz::WriteOptions::new()
+        .default_dtype()
+        .shape(&[field.height() as u64, field.width() as u64])
+        .writer(archive)
+        .begin_nd()?;
+    array.extend(values)?;
+    array.finish()
+}
+
+fn cells(field: &Field) -> impl Iterator<Item = Cell> {
+    let width = field.width();
+    (0..field.height()).flat_map(move |row| (0..width).map(move |col| Cell::new(col, row)))
+}
+
+/// The direction at a cell's centre, (0, 0) where there is none.
+fn guidance(field: &Field, cell: Cell) -> [f32; 2] {
+    let direction = if field.is_reachable(cell) {
+        field.direction(cell)
+    } else {
+        // A blocked cell gets no direction; the field would give its way out of the wall.
+        None
+    };
+    direction.unwrap_or_default().map(|component| component as f32)
+}
+
+fn draw(map: &Map, field: &Field) -> String {
+    let drawn: Vec<FieldCell> = cells(field)
+        .map(|cell| {
+            let [ex, ey] = guidance(field, cell);
+            FieldCell { ex, ey, log2_u: field.u(cell).log2() as f32 }
+        })
+        .collect();
+    picture::map_svg(&FieldOnMap {
+        size: (map.cols, map.rows),
+        blocked: &map.blocked,
+        cells: &drawn,
+        target: (field.target().col, field.target().row),
+    })
+}

@@ -1,0 +1,7 @@
+//! The executable `firsthand-lab`; see the library.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    firsthand_lab::main()
+}
