@@ -103,17 +103,10 @@ fn parse(text: &str, origin: &Path) -> Result<Mission, MissionError> {
     }
 }
 
-/// Remarks about old names in a mission, and about requests that this robot cannot fulfil.
+/// Remarks about requests that this robot cannot fulfil.
 fn remarks(text: &str, origin: &Path, tree: &DeTable<'_>, mission: &Mission) -> Vec<String> {
-    let method = tree.get("method").and_then(|value| value.get_ref().as_str());
     let file = origin.display();
     let line = |key| line_of(text, span_of(tree, key));
-    let renamed = method.filter(|name| *name == "careful").map(|_| {
-        let line = line("method");
-        format!(
-            "{file}:{line}: method: \"careful\" is called \"evidential\" now; both are accepted"
-        )
-    });
     let looks = mission.method == Method::Evidential && mission.sensing;
     let car = mission.body().ackermann().filter(|_| looks).map(|car| {
         let (line, radius) = (line("robot.model"), car.least_turning_radius());
@@ -128,7 +121,7 @@ fn remarks(text: &str, origin: &Path, tree: &DeTable<'_>, mission: &Mission) -> 
         let line = line("robot.calibration");
         format!("{file}:{line}: robot.calibration: its values replace those of robot.odometry; remove one of them")
     });
-    renamed.into_iter().chain(car).chain(twice).collect()
+    car.into_iter().chain(twice).collect()
 }
 
 /// 1-based line of byte `offset`.

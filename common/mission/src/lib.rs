@@ -173,7 +173,6 @@ pub enum Method {
     /// The robot looks before it drives: evidence for and against hazards, scanned ground, a speed that fits
     /// what is known of the way ahead.
     #[default]
-    #[serde(alias = "careful")] // This was its name before; a remark says so.
     Evidential,
     /// The paper's method: every hit is a hazard with its margin, (19), the map only grows, (10), and the robot drives in the direction
     /// of the field, (15), (16).

@@ -16,7 +16,8 @@ use std::{
 
 use tracing::{Level, Metadata};
 use tracing_subscriber::{
-    EnvFilter, Layer, Registry,
+    Layer, Registry,
+    filter::Targets,
     fmt::{self, MakeWriter},
     layer::SubscriberExt,
     util::SubscriberInitExt,
@@ -66,10 +67,11 @@ fn stderr_layer() -> AnyLayer {
 }
 
 fn start(layers: Vec<AnyLayer>, default: &str) {
-    let filter =
-        // The library of ROS 2 logs each of its sockets and each message that it sends to itself. Of two levels the later one counts.
-        EnvFilter::try_from_env("FIRSTHAND_LOG")
-            .unwrap_or_else(|_| EnvFilter::new(format!("rustdds=error,{default}")));
+    // The library of ROS 2 logs each of its sockets and each message that it sends to itself.
+    let wanted = std::env::var("FIRSTHAND_LOG").ok().and_then(|wanted| wanted.parse().ok());
+    let filter: Targets = wanted
+        .or_else(|| format!("rustdds=error,{default}").parse().ok())
+        .unwrap_or_else(|| Targets::new().with_default(Level::INFO));
     tracing_subscriber::registry().with(layers).with(filter).init();
 }
 

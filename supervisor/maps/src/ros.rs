@@ -3,12 +3,13 @@
 //! [`load`] does not read resolution and origin, because a field is solved in cells. [`load_placed`] does.
 
 use std::{
+    collections::HashMap,
     ops::RangeInclusive,
     path::{Path, PathBuf},
 };
 
 use common::file;
-use serde::{Deserialize, de::DeserializeOwned};
+use yaml_rust2::parser::{Event, Parser};
 
 use crate::{
     error::MapError,
@@ -24,36 +25,10 @@ const CELL_M: RangeInclusive<f64> = 0.005..=1.0;
 /// Largest distance from the origin, metres.
 const FARTHEST_M: f64 = 1e6;
 
-/// The keys that are read. The file may have keys of other programs.
-#[derive(Deserialize)]
-struct MapFile {
-    image: PathBuf,
-    #[serde(default)]
-    negate: Negate,
-    free_thresh: Option<f64>,
-    occupied_thresh: Option<f64>,
-    mode: Option<String>,
-}
-
-/// The keys of the map's place.
-#[derive(Deserialize)]
-struct Place {
-    resolution: f64,
-    origin: Vec<f64>,
-}
-
-/// The map_server writes 0 and 1, people write false and true.
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum Negate {
-    Word(bool),
-    Number(i64),
-}
-
-impl Default for Negate {
-    fn default() -> Self {
-        Self::Word(false)
-    }
+/// The keys of a map file whose value is a scalar or a list of scalars. The file may have keys of other programs.
+struct Keys<'a> {
+    file: &'a Path,
+    values: HashMap<String, Vec<String>>,
 }
 
 /// The map a YAML describes.
@@ -82,25 +57,27 @@ fn placed(
     map_of: fn(&Path, &str) -> Result<Map, MapError>,
 ) -> Result<PlacedMap, MapError> {
     let text = text(file)?;
-    let place: Place = parse(file, &text, "resolution: METRES` and `origin: [x, y, 0]")?;
-    if !CELL_M.contains(&place.resolution) {
+    let keys = Keys::parse(file, &text)?;
+    let cell_m = keys.number("resolution")?.ok_or_else(|| keys.missing("resolution: METRES"))?;
+    if !CELL_M.contains(&cell_m) {
         let problem = format!(
-            "resolution: {} is not the side of a cell; set it to {} to {} m",
-            place.resolution,
+            "resolution: {cell_m} is not the side of a cell; set it to {} to {} m",
             CELL_M.start(),
             CELL_M.end()
         );
         return Err(MapError::malformed(file, problem));
     }
-    match place.origin[..] {
-        [x, y, turn] if x.abs() <= FARTHEST_M && y.abs() <= FARTHEST_M && turn == 0.0 => {
-            Ok(PlacedMap { map: map_of(file, &text)?, cell_m: place.resolution, corner_m: [x, y] })
+    let origin = keys.values.get("origin").ok_or_else(|| keys.missing("origin: [x, y, 0]"))?;
+    let numbers: Vec<f64> = origin.iter().map_while(|number| number.parse().ok()).collect();
+    match numbers[..] {
+        [x, y, 0.0] if x.abs() <= FARTHEST_M && y.abs() <= FARTHEST_M && origin.len() == 3 => {
+            Ok(PlacedMap { map: map_of(file, &text)?, cell_m, corner_m: [x, y] })
         }
         _ => Err(MapError::malformed(
             file,
             format!(
                 "origin: {:?} is not read here; set it to [x, y, 0] in metres, the image not turned",
-                place.origin.get(..3).unwrap_or(&place.origin)
+                origin.get(..3).unwrap_or(origin)
             ),
         )),
     }
@@ -111,19 +88,6 @@ fn text(file: &Path) -> Result<String, MapError> {
         .map_err(|_| MapError::malformed(file, "not UTF-8 text; give the YAML of a map_server map"))
 }
 
-/// The keys of `text` that `T` has. `needed` names the keys that the file must have.
-fn parse<T: DeserializeOwned>(file: &Path, text: &str, needed: &str) -> Result<T, MapError> {
-    serde_saphyr::from_str(text).map_err(|error| {
-        let problem = error.to_string();
-        // The rest of the message shows the source over several lines.
-        let cause = problem.lines().next().unwrap_or_default();
-        MapError::malformed(
-            file,
-            format!("not a map_server map: {cause}; it needs at least `{needed}`"),
-        )
-    })
-}
-
 /// The image that the YAML `text` of `file` names.
 fn image_of(file: &Path, text: &str) -> Result<Map, MapError> {
     let (image, lightness) = named_image(file, text)?;
@@ -132,11 +96,11 @@ fn image_of(file: &Path, text: &str) -> Result<Map, MapError> {
 
 /// The name of that image, and the rule by which its pixels are free.
 fn named_image(file: &Path, text: &str) -> Result<(PathBuf, Lightness), MapError> {
-    let parsed: MapFile = parse(file, text, "image: FILE")?;
-    let lightness = parsed.lightness(file)?;
+    let keys = Keys::parse(file, text)?;
+    let image = keys.scalar("image")?.ok_or_else(|| keys.missing("image: FILE"))?;
     let folder = file.parent().unwrap_or(Path::new(""));
     // `join` leaves an absolute path as it is.
-    Ok((folder.join(&parsed.image), lightness))
+    Ok((folder.join(image), keys.lightness()?))
 }
 
 /// A map to write: cells, row-major, row 0 at the top.
@@ -166,40 +130,94 @@ pub(super) fn save(file: &Path, map: &Saved) -> Result<(), MapError> {
     file::replace(file, yaml).map_err(unwritable)
 }
 
-impl MapFile {
-    fn lightness(&self, file: &Path) -> Result<Lightness, MapError> {
-        match self.mode.as_deref() {
-            None | Some("trinary") => {}
-            Some(mode) => {
-                return Err(MapError::malformed(
-                    file,
-                    format!("mode: {mode:?} is not read here; set it to trinary"),
-                ));
+impl<'a> Keys<'a> {
+    /// The keys of the YAML `text`. It is read event by event, and aliases are refused, so that no text needs more memory than it has
+    /// bytes.
+    fn parse(file: &'a Path, text: &str) -> Result<Self, MapError> {
+        let refused =
+            |problem: &str| MapError::malformed(file, format!("not a map_server map: {problem}"));
+        let mut values: HashMap<String, Vec<String>> = HashMap::new();
+        let mut parser = Parser::new_from_str(text);
+        let (mut depth, mut key) = (0_u32, None);
+        loop {
+            let (event, _) = parser.next_token().map_err(|error| refused(&error.to_string()))?;
+            match event {
+                Event::StreamEnd => return Ok(Self { file, values }),
+                Event::Alias(_) => return Err(refused("it has aliases; write each value out")),
+                Event::MappingStart(..) | Event::SequenceStart(..) => depth += 1,
+                Event::MappingEnd | Event::SequenceEnd => {
+                    depth -= 1;
+                    if depth == 1 {
+                        key = None;
+                    }
+                }
+                Event::Scalar(scalar, ..) => match (depth, key.take()) {
+                    (1, None) => {
+                        values.insert(scalar.clone(), Vec::new());
+                        key = Some(scalar);
+                    }
+                    (1 | 2, Some(named)) => {
+                        values.entry(named.clone()).or_default().push(scalar);
+                        // A list goes on until its end.
+                        key = (depth == 2).then_some(named);
+                    }
+                    _ => {}
+                },
+                _ => {}
             }
         }
-        let negate = match self.negate {
-            Negate::Word(negate) => negate,
-            Negate::Number(0) => false,
-            Negate::Number(1) => true,
-            Negate::Number(other) => {
-                return Err(MapError::malformed(
-                    file,
-                    format!("negate: {other} is neither 0 nor 1; set it to one of them"),
-                ));
+    }
+
+    fn missing(&self, needed: &str) -> MapError {
+        let problem = format!("not a map_server map: it needs at least `{needed}`");
+        MapError::malformed(self.file, problem)
+    }
+
+    /// The scalar of `key`; none where the file has no such key.
+    fn scalar(&self, key: &str) -> Result<Option<&str>, MapError> {
+        match self.values.get(key).map(Vec::as_slice) {
+            None => Ok(None),
+            Some([scalar]) => Ok(Some(scalar)),
+            Some(_) => Err(MapError::malformed(self.file, format!("{key}: is no single value"))),
+        }
+    }
+
+    fn number(&self, key: &str) -> Result<Option<f64>, MapError> {
+        let number = |text: &str| {
+            let problem = || format!("{key}: {text:?} is not a number");
+            text.parse().map_err(|_| MapError::malformed(self.file, problem()))
+        };
+        self.scalar(key)?.map(number).transpose()
+    }
+
+    fn lightness(&self) -> Result<Lightness, MapError> {
+        let malformed = |problem| MapError::malformed(self.file, problem);
+        if let Some(mode) = self.scalar("mode")?.filter(|mode| *mode != "trinary") {
+            let problem = format!("mode: {mode:?} is not read here; set it to trinary");
+            return Err(malformed(problem));
+        }
+        // The map_server writes 0 and 1, people write false and true.
+        let negate = match self.scalar("negate")? {
+            None | Some("0" | "false") => false,
+            Some("1" | "true") => true,
+            Some(other) => {
+                let problem = format!("negate: {other} is neither 0 nor 1; set it to one of them");
+                return Err(malformed(problem));
             }
         };
         let usual = Lightness::default();
-        let share = |key: &str, value: Option<f64>, usual: f64| match value.unwrap_or(usual) {
+        let share = |key: &str, usual: f64| match self.number(key)?.unwrap_or(usual) {
             value if (0.0..=1.0).contains(&value) => Ok(value),
-            value => Err(MapError::malformed(
-                file,
-                format!("{key}: {value} is not a share of darkness; set it to 0 to 1"),
-            )),
+            value => {
+                let problem =
+                    format!("{key}: {value} is not a share of darkness; set it to 0 to 1");
+                Err(malformed(problem))
+            }
         };
         Ok(Lightness {
             negate,
-            free_thresh: share("free_thresh", self.free_thresh, usual.free_thresh)?,
-            occupied_thresh: share("occupied_thresh", self.occupied_thresh, usual.occupied_thresh)?,
+            free_thresh: share("free_thresh", usual.free_thresh)?,
+            occupied_thresh: share("occupied_thresh", usual.occupied_thresh)?,
         })
     }
 }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::Method;
+
 
 /// The error with which a mission file of this text is refused.
 #[track_caller]
@@ -83,16 +83,6 @@ fn every_refusal_names_line_and_key() {
         let refusal = refusal(text);
         assert!(refusal.starts_with(start), "{text:?} gave {refusal:?}");
     }
-}
-
-#[test]
-fn the_former_name_of_a_method_is_accepted_with_a_remark() {
-    let text = "target = [3, 0]\nmethod = 'careful'";
-    let former = parse(text, Path::new("m.toml")).unwrap();
-    assert_eq!(former.method, Method::Evidential);
-    assert!(former.remarks[0].starts_with("m.toml:2: method: "));
-    let today = parse("target = [3, 0]\nmethod = 'evidential'", Path::new("m.toml")).unwrap();
-    assert_eq!((today.method, today.remarks), (former.method, vec![]));
 }
 
 #[test]

@@ -1,9 +1,9 @@
 //! `firsthand help [PAGE]`: a page of the guide, or the options of a subcommand.
 
-mod markdown;
-mod pager;
-
-use std::fmt::Write as _;
+use std::{
+    fmt::Write as _,
+    io::{self, IsTerminal as _},
+};
 
 use clap::{Args, Command, error::ErrorKind};
 
@@ -83,11 +83,8 @@ pub(crate) fn main(arguments: &Arguments, mut whole: Command) -> Result<(), Fail
     if let [name] = &arguments.page[..]
         && let Some(page) = page(name)
     {
-        match pager::width() {
-            Some(width) => pager::show(&markdown::render(page.text, width))?,
-            None => print_text(page.text)?,
-        }
-        return Ok(());
+        let text = terminal_width().map_or(page.text.to_owned(), |width| wrapped(page.text, width));
+        return Ok(print_text(&text)?);
     }
     // Usage lines name the whole command only once it is built.
     whole.build();
@@ -102,6 +99,40 @@ pub(crate) fn main(arguments: &Arguments, mut whole: Command) -> Result<(), Fail
         }
     }
     Ok(())
+}
+
+/// Columns of the terminal to which text is wrapped; none where standard output is no terminal: another program gets the Markdown
+/// as it is.
+fn terminal_width() -> Option<usize> {
+    let stdout = io::stdout();
+    let size = stdout.is_terminal().then(|| rustix::termios::tcgetwinsize(&stdout).ok())??;
+    (size.ws_col > 0).then_some(size.ws_col.into())
+}
+
+/// Markdown whose sentences fit in `width` columns. Rows of tables and code stay as they are.
+fn wrapped(markdown: &str, width: usize) -> String {
+    let mut text = String::new();
+    let mut is_code = false;
+    for line in markdown.lines() {
+        is_code ^= line.starts_with("```");
+        let mut column = 0;
+        if is_code || line.starts_with('|') {
+            text.push_str(line);
+        } else {
+            for word in line.split_inclusive(' ') {
+                let letters = word.trim_end().chars().count();
+                if column > 0 && column + letters > width {
+                    text.truncate(text.trim_end().len());
+                    text.push('\n');
+                    column = 0;
+                }
+                text.push_str(word);
+                column += word.chars().count();
+            }
+        }
+        text.push('\n');
+    }
+    text
 }
 
 fn subcommand<'a>(whole: &'a mut Command, words: &[String]) -> Option<&'a mut Command> {

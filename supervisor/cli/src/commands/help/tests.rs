@@ -295,3 +295,12 @@ fn the_guide_has_the_three_presets_of_every_key_of_the_simulation_and_its_source
         assert!(told, "{key}: {source}");
     }
 }
+
+#[test]
+fn a_page_is_wrapped_to_the_terminal_except_its_tables_and_code() {
+    let page = "# Title\n\none two three\n\n| a | table row |\n\n```sh\nfirsthand run trap\n```\n";
+    let expected =
+        "# Title\n\none two\nthree\n\n| a | table row |\n\n```sh\nfirsthand run trap\n```\n";
+    assert_eq!(wrapped(page, 9), expected);
+    assert_eq!(wrapped(page, 80), page);
+}
