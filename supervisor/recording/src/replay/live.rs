@@ -21,14 +21,14 @@ use std::{
 };
 
 use common::{
-    bus::{Bus, BusError, EncodedWriter, Reader, SliceWriter},
+    bus::{AnyWriter, Bus, BusError, Reader, Writer},
     clock::{MissionClock, MissionTime, Pace},
     domain::{Domain, RobotName},
     mission::Mission,
     roster,
     run::Run,
     samples::{HealthSample, HealthState, RosterEntry, RosterHeader, name_str},
-    topics::{self, AnyTopic, EncodedTopic},
+    topics::{self, AnyTopic},
     waiter::Waiter,
 };
 use supervisor::{
@@ -119,21 +119,21 @@ pub fn play(
 }
 
 /// The topic of a message, if it is played.
-fn writer_of(topic: &str) -> Option<&'static dyn EncodedTopic> {
+fn writer_of(topic: &str) -> Option<&'static dyn AnyTopic> {
     let named = |known: &str| known == topic;
     if NOT_PLAYED.iter().any(|other| named(other.spec().name)) {
         return None;
     }
-    let mut known = topics::ENCODED.iter();
+    let mut known = topics::TABLE.iter();
     known.find(|known| named(known.spec().name)).copied()
 }
 
 /// The bus and the live stages of a played recording. The fields are dropped in this order, the bus last.
 struct Player {
     stages: Vec<LiveStage>,
-    writers: BTreeMap<&'static str, Box<dyn EncodedWriter>>,
+    writers: BTreeMap<&'static str, Box<dyn AnyWriter>>,
     health: Reader<HealthSample>,
-    roster: SliceWriter<RosterHeader, RosterEntry>,
+    roster: Writer<RosterHeader, RosterEntry>,
     named: Vec<RosterEntry>,
     waiter: Waiter,
     bus: Rc<Bus>,
@@ -206,7 +206,7 @@ impl Player {
     ) -> Result<bool, LiveError> {
         let mut waiting: Vec<_> = self.stages.iter().map(|live| live.stage.name).collect();
         while !waiting.is_empty() {
-            while let Some(health) = self.health.take()? {
+            while let Some(health) = self.health.next_sample()? {
                 self.name(&health)?;
                 let ready = HealthState::from_byte(health.state) == HealthState::Ready;
                 let named = |stage: &&str| *stage == name_str(&health.stage);
@@ -234,7 +234,7 @@ impl Player {
             writers.name(roster::named(&self.named));
         }
         let header = RosterHeader { supervisor_pid: std::process::id(), ..RosterHeader::default() };
-        self.roster.publish(0, MissionTime::default(), header, self.named.iter().copied())
+        self.roster.publish_slice(0, MissionTime::default(), header, &self.named)
     }
 
     fn check_stages(&mut self) -> Result<(), LiveError> {
@@ -252,7 +252,7 @@ impl Player {
     /// Read the samples of the live stages. Returns one that has not answered the current tick.
     fn look(&mut self) -> Result<Option<&'static str>, LiveError> {
         // Heartbeats wake this process too, and are dropped.
-        while self.health.take()?.is_some() {}
+        while self.health.next_sample()?.is_some() {}
         let mut waiting = None;
         for live in &mut self.stages {
             if !live.has_answered(self.tick)? {
@@ -318,7 +318,7 @@ impl Player {
     fn play(
         &mut self,
         recording: &Recording,
-        topic: &'static dyn EncodedTopic,
+        topic: &'static dyn AnyTopic,
         message: &Message,
     ) -> Result<(), LiveError> {
         let mut stages = self.stages.iter_mut();
@@ -327,11 +327,11 @@ impl Player {
         }
         let name = topic.spec().name;
         if !self.writers.contains_key(name) {
-            let writer = topic.encoded_writer(&self.bus, self.longest)?;
+            let writer = topic.any_writer(&self.bus, 0, self.longest)?;
             self.writers.insert(name, writer);
         }
         if let Some(writer) = self.writers.get_mut(name)
-            && !writer.publish(&message.data)?
+            && !writer.publish_message(&message.data)?
         {
             return Err(RecordingError::Message {
                 file: recording.path.to_path_buf(),

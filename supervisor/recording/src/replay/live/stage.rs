@@ -9,7 +9,7 @@ use std::{
 };
 
 use common::{
-    bus::{Bus, BusError, EncodedReader},
+    bus::{AnyReader, Bus, BusError},
     run::Run,
     start::Generation,
     topics,
@@ -37,8 +37,8 @@ pub(super) struct LiveStage {
 
 /// The samples of the stage on one topic.
 struct Answers {
-    topic: &'static dyn topics::EncodedTopic,
-    reader: Box<dyn EncodedReader>,
+    topic: &'static dyn topics::AnyTopic,
+    reader: Box<dyn AnyReader>,
     /// The recorded sample of the current tick.
     recorded: Option<Vec<u8>>,
     /// The live sample of the newest tick.
@@ -57,14 +57,14 @@ impl LiveStage {
         waiter: &mut Waiter,
     ) -> Result<Self, LiveError> {
         let mut answers = Vec::new();
-        for topic in topics::ENCODED {
+        for topic in topics::TABLE {
             let is_compared =
                 COMPARED.iter().any(|compared| compared.spec().name == topic.spec().name);
             if is_compared && topic.spec().writer == stage.name {
                 waiter.on(bus.wakeup(*topic)?);
                 answers.push(Answers {
                     topic: *topic,
-                    reader: topic.encoded_reader(bus)?,
+                    reader: topic.recorder_reader(bus)?,
                     recorded: None,
                     given: None,
                     report: LiveStageReport::default(),
@@ -162,7 +162,7 @@ impl Answers {
     fn take(&mut self) -> Result<(), BusError> {
         loop {
             let mut message = Vec::new();
-            if self.reader.take(&mut message)?.is_none() {
+            if self.reader.next_message(&mut message)?.is_none() {
                 return Ok(());
             }
             if self.is_answer(&message) {
