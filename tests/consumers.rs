@@ -33,8 +33,8 @@ struct Heard {
 fn listen(robot: &str, enough: impl Fn(&Heard) -> bool) -> Heard {
     let bus = Bus::join(&support::domain(robot), "dashboard").unwrap();
     let mut pose = bus.reader(&topics::POSE).unwrap();
-    let mut grid = bus.slice_reader(&topics::GRID).unwrap();
-    let mut field = bus.slice_reader(&topics::FIELD).unwrap();
+    let mut grid = bus.reader(&topics::GRID).unwrap();
+    let mut field = bus.reader(&topics::FIELD).unwrap();
     let mut waiter = Waiter::default();
     waiter.on(bus.wakeup(&topics::POSE).unwrap());
     let mut heard = Heard::default();
@@ -42,15 +42,15 @@ fn listen(robot: &str, enough: impl Fn(&Heard) -> bool) -> Heard {
     while !enough(&heard) {
         assert!(began.elapsed() < support::PATIENCE, "heard {} poses", heard.poses.len());
         waiter.wait(support::PATIENCE).unwrap();
-        while let Some(sample) = pose.take().unwrap() {
+        while let Some(sample) = pose.next_sample().unwrap() {
             heard.poses.push((sample.stamp.tick, sample.x_m));
         }
-        while let Some(sample) = grid.take().unwrap() {
+        while let Some(sample) = grid.next_slice().unwrap() {
             let before = heard.grid.version();
             heard.grid.apply(&sample.header().part, &sample);
             heard.grid_changes += usize::from(heard.grid.version() > before && before > 0);
         }
-        while let Some(sample) = field.take().unwrap() {
+        while let Some(sample) = field.next_slice().unwrap() {
             let before = heard.field.version();
             heard.field.apply(&sample.header().part, &sample);
             heard.field_changes += usize::from(heard.field.version() > before && before > 0);
@@ -101,7 +101,7 @@ type HeardPoses = Mutex<Vec<usize>>;
 fn follow(robot: &str, runs: usize, heard: &HeardPoses) {
     let domain = support::domain(robot);
     let mut follower = Follower::new(domain, "logger", &topics::POSE, |bus| {
-        Ok((bus.reader(&topics::POSE)?, bus.slice_reader(&topics::GRID)?))
+        Ok((bus.reader(&topics::POSE)?, bus.reader(&topics::GRID)?))
     });
     let mut here = false;
     let patience = support::PATIENCE * runs as u32;
@@ -116,10 +116,10 @@ fn follow(robot: &str, runs: usize, heard: &HeardPoses) {
             Event::Disconnected => here = false,
             Event::Nothing => {}
             Event::Samples((poses, grids)) => {
-                while poses.take().unwrap().is_some() {
+                while poses.next_sample().unwrap().is_some() {
                     *heard.lock().unwrap().last_mut().unwrap() += 1;
                 }
-                while grids.take().unwrap().is_some() {}
+                while grids.next_slice().unwrap().is_some() {}
             }
         }
     }
@@ -162,11 +162,11 @@ fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_noti
         let mut run = Run::start("greedy", "open-room", &["--pace", "2"]);
         run.wait_until_under_way(0.5);
         let bus = Bus::join(&support::domain("greedy"), "greedy").unwrap();
-        let mut grids = bus.slice_reader(&topics::GRID).unwrap();
+        let mut grids = bus.reader(&topics::GRID).unwrap();
         let mut held = Vec::new();
         let began = Instant::now();
         let refused = loop {
-            match grids.take() {
+            match grids.next_slice() {
                 Ok(sample) => held.extend(sample),
                 Err(error) => break error,
             }
@@ -215,11 +215,11 @@ fn join_again_and_again(robot: &str, over: &AtomicBool) -> usize {
         let Ok(bus) = Bus::join(&domain, "visitor") else {
             continue;
         };
-        let grid = bus.slice_reader(&topics::GRID);
-        let field = bus.slice_reader(&topics::FIELD);
+        let grid = bus.reader(&topics::GRID);
+        let field = bus.reader(&topics::FIELD);
         if let (Ok(mut grid), Ok(mut field)) = (grid, field) {
             joined += 1;
-            let _ = (grid.take(), field.take());
+            let _ = (grid.next_slice(), field.next_slice());
         }
     }
     joined
@@ -246,7 +246,7 @@ fn ten_consumers_that_stay_and_three_that_join_again_and_again_harm_no_stage_and
             run.wait_until_under_way(5.0);
             let bus = Bus::join(&support::domain(robot), robot).unwrap();
             let all_that_there_are: Vec<_> =
-                std::iter::from_fn(|| bus.slice_reader(&topics::GRID).ok()).collect();
+                std::iter::from_fn(|| bus.reader(&topics::GRID).ok()).collect();
             // A stage that ends gets its place, even if consumers wait for one.
             run.kill_and_await_successor("planner", rustix::process::Signal::KILL);
             run.wait_until_under_way(8.0);

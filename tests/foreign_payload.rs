@@ -4,7 +4,7 @@ use crate::support::{self, Run, in_own_process};
 use common::{
     bus::{Bus, BusError, Topic},
     samples::WheelSample,
-    topics::{self, AnyTopic as _},
+    topics,
 };
 use rustix::process::Signal;
 

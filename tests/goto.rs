@@ -35,7 +35,7 @@ fn follow(robot: &str, mut is_enough: impl FnMut(&CommandSample) -> bool) {
     waiter.on(bus.wakeup(&topics::COMMAND).unwrap());
     let began = std::time::Instant::now();
     loop {
-        while let Some(command) = commands.take().unwrap() {
+        while let Some(command) = commands.next_sample().unwrap() {
             if is_enough(&command) {
                 return;
             }

@@ -112,10 +112,10 @@ fn samples_that_seem_newer_than_all_others_wedge_no_mission_and_no_consumer_what
         let mut grid = bus.slice_writer(&topics::GRID, u32::MAX, 1).unwrap();
         for tick in [0, u64::MAX] {
             let time = MissionTime(tick);
-            ranges.publish(tick, time, RangesHeader::default(), std::iter::empty()).unwrap();
+            ranges.publish_slice(tick, time, RangesHeader::default(), &[]).unwrap();
             wheels.publish(tick, time, WheelSample::default()).unwrap();
             pose.publish(tick, time, PoseSample::default()).unwrap();
-            grid.publish(tick, time, GridHeader::default(), std::iter::empty()).unwrap();
+            grid.publish_slice(tick, time, GridHeader::default(), &[]).unwrap();
             guidance.publish(tick, time, GuidanceSample::default()).unwrap();
             link.publish(tick, time, LinkSample::default()).unwrap();
         }

@@ -66,12 +66,12 @@ fn record(robot: &str) -> Recording {
             Err(error) => assert!(run.is_running(), "{error}"),
         }
     };
-    let mut ranges = bus.slice_reader(&topics::RANGES).unwrap();
+    let mut ranges = bus.reader(&topics::RANGES).unwrap();
     let mut wheels = bus.reader(&topics::WHEELS).unwrap();
     let mut poses = bus.reader(&topics::POSE).unwrap();
     let mut guidances = bus.reader(&topics::GUIDANCE).unwrap();
     let mut commands = bus.reader(&topics::COMMAND).unwrap();
-    let mut grids = bus.slice_reader(&topics::GRID).unwrap();
+    let mut grids = bus.reader(&topics::GRID).unwrap();
     let mut waiter = Waiter::default();
     waiter.on(bus.wakeup(&topics::GRID).unwrap());
     let mut received = Recording {
@@ -84,29 +84,29 @@ fn record(robot: &str) -> Recording {
     loop {
         // This is asked first, so that all samples published until then are received below.
         let over = !run.is_running();
-        while let Ok(Some(part)) = grids.take() {
+        while let Ok(Some(part)) = grids.next_slice() {
             grid.apply(&part.header().part, &part);
             // After a missed part the map is empty until the next keyframe.
             if grid.version() > 0 {
                 received.grids.insert(grid.version(), grid.cells().to_vec());
             }
         }
-        while let Ok(Some(sample)) = ranges.take() {
+        while let Ok(Some(sample)) = ranges.next_slice() {
             received.add_readings(sample.header().stamp.tick, &sample);
         }
-        while let Ok(Some(sample)) = wheels.take() {
+        while let Ok(Some(sample)) = wheels.next_sample() {
             received.add("wheels", sample);
         }
-        while let Ok(Some(sample)) = poses.take() {
+        while let Ok(Some(sample)) = poses.next_sample() {
             received.add("pose", sample);
         }
-        while let Ok(Some(mut sample)) = guidances.take() {
+        while let Ok(Some(mut sample)) = guidances.next_sample() {
             // This value is measured on the wall clock.
             sample.full_solve_ns = 0;
             received.last_grid = sample.grid_version;
             received.add("guidance", sample);
         }
-        while let Ok(Some(sample)) = commands.take() {
+        while let Ok(Some(sample)) = commands.next_sample() {
             received.add("command", sample);
         }
         if over {

@@ -18,7 +18,7 @@ fn next_pose(bus: &Bus) -> PoseSample {
     waiter.on(bus.wakeup(&topics::POSE).unwrap());
     let began = Instant::now();
     loop {
-        if let Some(pose) = poses.take().unwrap() {
+        if let Some(pose) = poses.next_sample().unwrap() {
             return pose;
         }
         assert!(began.elapsed() < PATIENCE, "no pose");

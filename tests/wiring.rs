@@ -23,7 +23,7 @@ fn every_stage_has_open_what_its_row_lists_and_nothing_else() {
         let mut run = Run::start("wiring", "obstacle-course", &["--pace", "1"]);
         let status = run.wait_until_under_way(0.3);
         let bus = Bus::join(&domain("wiring"), "test").unwrap();
-        let opened: Vec<_> = topics::OPEN
+        let opened: Vec<_> = topics::TABLE
             .iter()
             .map(|topic| (topic.spec().name, topic.opened_by(&bus).unwrap()))
             .collect();

@@ -121,7 +121,7 @@ impl Requests {
 
     /// The next request for this stage.
     pub(crate) fn take(&mut self) -> Result<Option<Asked>, BusError> {
-        while let Some(request) = self.requests.take()? {
+        while let Some(request) = self.requests.next_sample()? {
             if name_str(&request.stage) == self.stage {
                 return Ok(Some(Asked {
                     id: request.id,

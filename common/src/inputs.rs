@@ -12,7 +12,7 @@
 use serde::Serialize;
 
 use crate::{
-    bus::{BusError, SliceWriter},
+    bus::{BusError, Writer},
     samples::{InputsHeader, name},
     shell::{Context, Progress},
     start::StageError,
@@ -29,7 +29,7 @@ pub const LONGEST_ENTRY: usize = 1 << 30;
 /// Publishes the inputs of a step.
 #[derive(Debug)]
 pub(crate) struct InputLog {
-    writer: SliceWriter<InputsHeader, u8>,
+    writer: Writer<InputsHeader, u8>,
     header: InputsHeader,
     piece: usize,
     unpublished: Vec<u8>,
@@ -78,7 +78,7 @@ impl InputLog {
     /// Publish the inputs that were noted, before something that follows from them.
     pub(crate) fn publish(&mut self, at: Progress) -> Result<(), BusError> {
         for piece in self.unpublished.chunks(self.piece) {
-            self.writer.publish_slice_quietly(at.tick, at.time, self.header, piece)?;
+            self.writer.publish_quietly(at.tick, at.time, self.header, piece)?;
         }
         self.unpublished.clear();
         Ok(())

@@ -5,7 +5,7 @@ use std::any::Any;
 use serde::Serialize;
 
 use crate::{
-    bus::{AnyTopic, BusError, Layout, Payload, SliceTopic, SliceWriter, Stamped, Topic, Writer},
+    bus::{AnyWriter, Payload, Stamped, Topic, Writer},
     checkpoint::CheckpointError,
     inputs::InputLog,
     latency_budget::{Answers, Item, LatencyBudget},
@@ -30,7 +30,7 @@ enum Destination {
 }
 
 struct Process {
-    writers: Vec<(&'static str, Box<dyn Any>)>,
+    writers: Vec<(&'static str, Box<dyn AnyWriter>)>,
     inputs: InputLog,
     saved: Saved,
     budget: LatencyBudget,
@@ -116,84 +116,58 @@ impl Outputs {
     }
 
     /// Publish a sample, and wake its readers.
-    pub fn publish<P>(&mut self, topic: &'static Topic<P>, sample: P) -> Result<(), StageError>
-    where
-        P: Payload + Stamped + Layout,
-    {
-        let Progress { tick, time } = self.at;
-        match &mut self.to {
-            Destination::Replay { published, .. } => {
-                published.push(Output::of(topic, tick, time, sample));
-                Ok(())
-            }
-            Destination::Process(process) => {
-                let publish = |writer: &mut Writer<P>| writer.publish_quietly(tick, time, sample);
-                let writer: &Writer<P> = process.publish(topic.spec().name, self.at, publish)?;
-                Ok(writer.wake()?)
-            }
-        }
+    pub fn publish<H: Stamped>(
+        &mut self,
+        topic: &'static Topic<H>,
+        sample: H,
+    ) -> Result<(), StageError> {
+        self.publish_slice(topic, sample, &[])
     }
 
     /// Publish a header with a slice, and wake its readers.
-    pub fn publish_slice<H, T>(
+    pub fn publish_slice<H: Stamped, E: Payload>(
         &mut self,
-        topic: &'static SliceTopic<H, T>,
+        topic: &'static Topic<H, E>,
         header: H,
-        slice: &[T],
-    ) -> Result<(), StageError>
-    where
-        H: Payload + Stamped + Layout,
-        T: Payload + Layout,
-    {
-        self.publish_slice_quietly(topic, header, slice)?;
+        slice: &[E],
+    ) -> Result<(), StageError> {
+        self.publish_quietly(topic, header, slice)?;
         match &mut self.to {
             Destination::Replay { .. } => Ok(()),
-            Destination::Process(process) => {
-                let writer: &mut SliceWriter<H, T> = process.writer(topic.spec().name)?;
-                Ok(writer.wake()?)
-            }
+            Destination::Process(process) => Ok(process.writer(topic)?.wake()?),
         }
     }
 
     /// Publish a header with a slice on a topic that wakes nobody.
-    pub fn publish_slice_quietly<H, T>(
+    pub fn publish_quietly<H: Stamped, E: Payload>(
         &mut self,
-        topic: &'static SliceTopic<H, T>,
+        topic: &'static Topic<H, E>,
         header: H,
-        slice: &[T],
-    ) -> Result<(), StageError>
-    where
-        H: Payload + Stamped + Layout,
-        T: Payload + Layout,
-    {
-        let Progress { tick, time } = self.at;
+        slice: &[E],
+    ) -> Result<(), StageError> {
+        let at @ Progress { tick, time } = self.at;
         match &mut self.to {
             Destination::Replay { published, .. } => {
-                published.push(Output::of_slice(topic, tick, time, header, slice));
+                published.push(Output::of(topic, tick, time, header, slice));
             }
             Destination::Process(process) => {
-                let publish = |writer: &mut SliceWriter<H, T>| {
-                    writer.publish_slice_quietly(tick, time, header, slice)
-                };
-                process.publish(topic.spec().name, self.at, publish)?;
+                process.publish_inputs(at)?;
+                process.writer(topic)?.publish_quietly(tick, time, header, slice)?;
+                if process.answer == Some(topic.spec().name) {
+                    process.budget.published(tick, Answers::Inputs);
+                }
             }
         }
         Ok(())
     }
 
     /// Whether a reader of `topic` came since this was last asked: it needs a keyframe.
-    pub fn has_new_reader<H: Payload + Stamped, T: Payload>(
+    pub fn has_new_reader<H: Stamped, E: Payload>(
         &mut self,
-        topic: &'static SliceTopic<H, T>,
-    ) -> Result<bool, StageError>
-    where
-        SliceTopic<H, T>: AnyTopic,
-    {
+        topic: &'static Topic<H, E>,
+    ) -> Result<bool, StageError> {
         match &mut self.to {
-            Destination::Process(process) => {
-                let writer: &mut SliceWriter<H, T> = process.writer(topic.spec().name)?;
-                Ok(writer.has_new_reader())
-            }
+            Destination::Process(process) => Ok(process.writer(topic)?.has_new_reader()),
             Destination::Replay { .. } => Ok(false),
         }
     }
@@ -254,33 +228,22 @@ impl Process {
             if (topic.spec().rate == Rate::EachFrame) == late {
                 context.opened.add(Access::Write, topic.spec().name)?;
                 let number = context.generation.number;
-                let writer = topic.open_writer(&context.bus, number, longest)?;
+                let writer = topic.any_writer(&context.bus, number, longest)?;
                 self.writers.push((topic.spec().name, writer));
             }
         }
         Ok(())
     }
 
-    fn writer<W: 'static>(&mut self, topic: &'static str) -> Result<&mut W, StageError> {
-        let mut writers = self.writers.iter_mut();
-        let writer = writers.find(|(name, _)| *name == topic);
-        let writer = writer.and_then(|(_, writer)| writer.downcast_mut());
-        writer.ok_or(WiringError::NotListed(Access::Write, topic).into())
-    }
-
-    /// Publish the inputs that were noted, then a sample on `topic`. The caller wakes the readers.
-    fn publish<W: 'static>(
+    fn writer<H: Stamped, E: Payload>(
         &mut self,
-        topic: &'static str,
-        at: Progress,
-        publish: impl FnOnce(&mut W) -> Result<(), BusError>,
-    ) -> Result<&mut W, StageError> {
-        self.publish_inputs(at)?;
-        publish(self.writer(topic)?)?;
-        if self.answer == Some(topic) {
-            self.budget.published(at.tick, Answers::Inputs);
-        }
-        self.writer(topic)
+        topic: &Topic<H, E>,
+    ) -> Result<&mut Writer<H, E>, StageError> {
+        let name = topic.spec().name;
+        let mut writers = self.writers.iter_mut();
+        let writer = writers.find(|(topic, _)| *topic == name);
+        let writer = writer.and_then(|(_, writer)| (&mut **writer as &mut dyn Any).downcast_mut());
+        writer.ok_or(WiringError::NotListed(Access::Write, name).into())
     }
 
     fn publish_inputs(&mut self, at: Progress) -> Result<(), StageError> {

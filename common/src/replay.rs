@@ -5,10 +5,9 @@ use serde::Deserialize;
 use thiserror::Error;
 
 use crate::{
-    bus::{Layout, SliceTopic, Stamp, Stamped, Topic, encode_sample, encode_slice},
+    bus::{Payload, Stamp, Stamped, Topic, encode_slice},
     clock::MissionTime,
     run::Run,
-    topics::AnyTopic as _,
 };
 
 /// A sample that a generation published, or must have published.
@@ -20,44 +19,19 @@ pub struct Output {
 }
 
 impl Output {
-    /// `sample` of `topic`, published for `tick` at mission `time`.
-    pub fn of<P: Stamped + Layout>(
-        topic: &Topic<P>,
-        tick: u64,
-        time: MissionTime,
-        mut sample: P,
-    ) -> Self
-    where
-        Topic<P>: crate::topics::AnyTopic,
-    {
-        *sample.stamp_mut() = stamp(tick, time);
-        let mut message = Vec::new();
-        encode_sample(&sample, &mut message);
-        let topic = topic.spec().name;
-        Self { topic, message }
-    }
-
     /// `header` with `slice` of `topic`, published for `tick` at mission `time`.
-    pub fn of_slice<H: Stamped + Layout, T: Layout>(
-        topic: &SliceTopic<H, T>,
+    pub fn of<H: Stamped, E: Payload>(
+        topic: &Topic<H, E>,
         tick: u64,
         time: MissionTime,
         mut header: H,
-        slice: &[T],
-    ) -> Self
-    where
-        SliceTopic<H, T>: crate::topics::AnyTopic,
-    {
-        *header.stamp_mut() = stamp(tick, time);
+        slice: &[E],
+    ) -> Self {
+        *header.stamp_mut() = Stamp { tick, stamp_ns: time.0, generation: 0, sequence: 0 };
         let mut message = Vec::new();
         encode_slice(&header, slice, &mut message);
-        let topic = topic.spec().name;
-        Self { topic, message }
+        Self { topic: topic.spec().name, message }
     }
-}
-
-const fn stamp(tick: u64, time: MissionTime) -> Stamp {
-    Stamp { tick, stamp_ns: time.0, generation: 0, sequence: 0 }
 }
 
 /// An entry of a generation's inputs cannot be taken.

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use crate::{
-    bus::{Author, Bus, BusError, Names, SliceReader},
+    bus::{Author, Bus, BusError, Names, Reader},
     domain::Domain,
     samples::{RosterEntry, RosterHeader, name_str},
     topics,
@@ -17,7 +17,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 #[derive(Debug)]
 pub struct Roster {
     /// The rosters, as they are published.
-    pub samples: SliceReader<RosterHeader, RosterEntry>,
+    pub samples: Reader<RosterHeader, RosterEntry>,
     /// Wakes for the rosters.
     pub waiter: Waiter,
 }
@@ -35,17 +35,17 @@ pub fn named(entries: &[RosterEntry]) -> impl Iterator<Item = (String, Author)> 
 pub fn join(domain: &Domain, name: &str) -> Result<Bus, BusError> {
     let bus = Bus::join_as_consumer(domain, name)?;
     if let Some(writers) = bus.writers() {
-        writers.read_from(names(bus.slice_reader(&topics::ROSTER)?));
+        writers.read_from(names(bus.reader(&topics::ROSTER)?));
         writers.wait_for_names(PATIENCE);
     }
     Ok(bus)
 }
 
 /// The processes of all rosters since the last call.
-fn names(mut rosters: SliceReader<RosterHeader, RosterEntry>) -> Names {
+fn names(mut rosters: Reader<RosterHeader, RosterEntry>) -> Names {
     Box::new(move || {
         let mut all: Option<Vec<_>> = None;
-        while let Some(entries) = rosters.take()? {
+        while let Some(entries) = rosters.next_slice()? {
             all.get_or_insert_default().extend(named(&entries));
         }
         Ok(all)
@@ -57,7 +57,7 @@ impl Roster {
     pub fn open(bus: &Bus) -> Result<Self, BusError> {
         let mut waiter = Waiter::default();
         waiter.on(bus.wakeup(&topics::ROSTER)?);
-        Ok(Self { samples: bus.slice_reader(&topics::ROSTER)?, waiter })
+        Ok(Self { samples: bus.reader(&topics::ROSTER)?, waiter })
     }
 
     /// Wait until the supervisor names this process, then let its readers on `bus` admit the processes that rosters name. A roster that
@@ -87,7 +87,7 @@ impl Roster {
     ) -> Result<Option<T>, BusError> {
         let began = Instant::now();
         loop {
-            while let Some(entries) = self.samples.take()? {
+            while let Some(entries) = self.samples.next_slice()? {
                 let found = find(entries.header(), &entries);
                 if found.is_some() {
                     return Ok(found);

@@ -15,10 +15,7 @@ use std::{
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::{
-    bus::{
-        AnyTopic, Bus, Layout, Payload, Reader, SliceReader, SliceTopic, Stamp, Stamped, Topic,
-        Writer, Writers,
-    },
+    bus::{Bus, Payload, Reader, Stamp, Stamped, Topic, Writer, Writers},
     checkpoint::Checkpoint,
     clock::{MissionClock, MissionTime},
     external,
@@ -59,25 +56,12 @@ pub struct Context {
 
 impl Context {
     /// Read a topic of the wiring.
-    pub fn reader<P>(&mut self, topic: &Topic<P>) -> Result<Reader<P>, StageError>
-    where
-        P: Payload + Stamped + Layout,
-    {
+    pub fn reader<H: Stamped, E: Payload>(
+        &mut self,
+        topic: &Topic<H, E>,
+    ) -> Result<Reader<H, E>, StageError> {
         self.opened.add(Access::Read, topic.spec().name)?;
         Ok(self.bus.reader(topic)?)
-    }
-
-    /// Read the slices of a topic of the wiring.
-    pub fn slice_reader<H, T>(
-        &mut self,
-        topic: &SliceTopic<H, T>,
-    ) -> Result<SliceReader<H, T>, StageError>
-    where
-        H: Payload + Stamped + Layout,
-        T: Payload + Layout,
-    {
-        self.opened.add(Access::Read, topic.spec().name)?;
-        Ok(self.bus.slice_reader(topic)?)
     }
 
     /// The processes whose samples the readers return.
@@ -86,10 +70,7 @@ impl Context {
     }
 
     /// Write a topic of the wiring.
-    pub fn writer<P>(&mut self, topic: &Topic<P>) -> Result<Writer<P>, StageError>
-    where
-        P: Payload + Stamped + Layout,
-    {
+    pub fn writer<H: Stamped>(&mut self, topic: &Topic<H>) -> Result<Writer<H>, StageError> {
         self.opened.add(Access::Write, topic.spec().name)?;
         Ok(self.bus.writer(topic, self.generation.number)?)
     }
@@ -366,7 +347,7 @@ impl Heartbeat {
                 pid: std::process::id(),
                 ..HealthSample::default()
             },
-            period: topics::HEALTH.restated_every(),
+            period: topics::HEALTH.spec().restated_every(),
             last: Instant::now(),
             tick: 0,
         })
@@ -381,7 +362,7 @@ impl Heartbeat {
     fn beat_quietly(&mut self, state: HealthState, progress: Progress) -> Result<(), StageError> {
         self.sample.state = state.into();
         (self.last, self.tick) = (Instant::now(), progress.tick);
-        self.writer.publish_quietly(progress.tick, progress.time, self.sample)?;
+        self.writer.publish_quietly(progress.tick, progress.time, self.sample, &[])?;
         Ok(())
     }
 

@@ -11,7 +11,7 @@ use std::fmt::Debug;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::{
-    bus::{AnyTopic as _, Layout, Payload, Reader, Stamped, Topic},
+    bus::{Layout, Reader, Stamped, Topic},
     clock::MissionTime,
     inputs,
     mission::Mission,
@@ -136,8 +136,8 @@ impl<S: Stage> Replay for Generation<S> {
 
 /// A stage that answers each sample of one topic with a sample of another.
 pub trait Answering: Step<State: Clone + Debug> + 'static {
-    type In: Payload + Stamped + Layout;
-    type Out: Payload + Stamped + Layout;
+    type In: Stamped;
+    type Out: Stamped;
     /// The samples of further topics that it takes with a sample of its input; `()` for none.
     type Further: Further;
     const NAME: &'static str;
@@ -278,7 +278,7 @@ impl<A: Answering> Process for Answers<A> {
         loop {
             let next = match A::NEWEST_ONLY {
                 true => self.input.newest()?,
-                false => self.input.take()?,
+                false => self.input.next_sample()?,
             };
             let Some(input) = next else {
                 return Ok(self.runner.out.at);

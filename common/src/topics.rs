@@ -12,8 +12,7 @@ use crate::{
 };
 
 pub use crate::bus::{
-    AnyTopic, EVERY_STAGE, EncodedTopic, Limits, Logged, OPERATOR, OpenTopic, Rate, ReadableTopic,
-    SUPERVISOR, SliceTopic, Spec, Topic,
+    AnyTopic, EVERY_STAGE, Limits, Logged, OPERATOR, Rate, SUPERVISOR, Spec, Topic,
 };
 
 /// How often the supervisor publishes its order and the roster again, for consumers that joined later.
@@ -39,12 +38,12 @@ const fn on_change(again_after: Duration) -> Rate {
 }
 
 macro_rules! topics {
-    ($($(#[doc = $meaning:literal])+ $id:ident: $kind:ident<$($payload:ty),+> {
+    ($($(#[doc = $meaning:literal])+ $id:ident: Topic<$($payload:ty),+> {
         name: $name:literal, writer: $writer:expr, rate: $rate:expr, limits: $limits:expr, logged: $logged:ident $(,)?
     })*) => {
         $(
             $(#[doc = $meaning])+
-            pub static $id: $kind<$($payload),+> = $kind::new(&Spec {
+            pub static $id: Topic<$($payload),+> = Topic::new(&Spec {
                 name: $name,
                 writer: $writer,
                 rate: $rate,
@@ -55,12 +54,6 @@ macro_rules! topics {
         )*
         /// Every topic, in the order of the pipeline.
         pub static TABLE: &[&dyn AnyTopic] = &[$(&$id),*];
-        /// Every topic, for consumers that read one by its name.
-        pub static READABLE: &[&dyn ReadableTopic] = &[$(&$id),*];
-        /// Every topic, to be opened from a list.
-        pub static OPEN: &[&dyn OpenTopic] = &[$(&$id),*];
-        /// Every topic, to be read without knowing its payload.
-        pub static ENCODED: &[&dyn EncodedTopic] = &[$(&$id),*];
     };
 }
 
@@ -70,11 +63,11 @@ topics! {
         name: "target", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::SMALL, logged: Yes,
     }
     /// Readings of the sonars and infrared rangers, one for each row of the mission's sensors.
-    RANGES: SliceTopic<RangesHeader, RangeReading> {
+    RANGES: Topic<RangesHeader, RangeReading> {
         name: "ranges", writer: "link", rate: Rate::EachTick, limits: Limits::slices(MOST_SENSORS), logged: Yes,
     }
     /// The beams of the laser.
-    SCAN: SliceTopic<ScanHeader, f32> {
+    SCAN: Topic<ScanHeader, f32> {
         name: "scan", writer: "link", rate: Rate::WhenItHappens, limits: Limits::slices(MOST_BEAMS), logged: Yes,
     }
     /// Encoder counts and wheel speeds.
@@ -106,7 +99,7 @@ topics! {
         name: "pose", writer: "dead-reckoning", rate: Rate::EachTick, limits: Limits::SMALL, logged: Yes,
     }
     /// The safety map: keyframes and changed windows.
-    GRID: SliceTopic<GridHeader, u8> {
+    GRID: Topic<GridHeader, u8> {
         name: "grid", writer: "mapper", rate: Rate::EachTick, limits: Limits::MAP, logged: Yes,
     }
     /// The reference direction at the robot's pose.
@@ -114,7 +107,7 @@ topics! {
         name: "guidance", writer: "planner", rate: Rate::EachTick, limits: Limits::SMALL, logged: Yes,
     }
     /// The whole-domain policy, for consumers.
-    FIELD: SliceTopic<FieldHeader, FieldCell> {
+    FIELD: Topic<FieldHeader, FieldCell> {
         name: "field", writer: "planner", rate: FIELD_RATE, limits: Limits::WHOLE_MAP, logged: WithFields,
     }
     /// Wheel speeds for the robot.
@@ -150,7 +143,7 @@ topics! {
         name: "tick_limit", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::SMALL, logged: Yes,
     }
     /// The stages' processes, as the supervisor sees them.
-    ROSTER: SliceTopic<RosterHeader, RosterEntry> {
+    ROSTER: Topic<RosterHeader, RosterEntry> {
         name: "roster", writer: SUPERVISOR, rate: on_change(RESTATE), limits: ROSTERS, logged: Yes,
     }
     /// A stage's process ended: cause, ages, the end of its log, what follows.
@@ -170,12 +163,12 @@ topics! {
         name: "faults", writer: OPERATOR, rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
     }
     /// The bytes that the link received from the robot and sent to it. Wakes nobody: a reader waits for `link`.
-    WIRE: SliceTopic<WireHeader, u8> {
+    WIRE: Topic<WireHeader, u8> {
         name: "wire", writer: "link", rate: Rate::WhenItHappens, limits: Limits::DEEP, logged: Yes,
     }
     /// The inputs of every stage's step, and the checkpoint each generation started from, for a replay.
     /// Wakes nobody: a reader waits for `link`.
-    INPUTS: SliceTopic<InputsHeader, u8> {
+    INPUTS: Topic<InputsHeader, u8> {
         name: "inputs", writer: EVERY_STAGE, rate: Rate::WhenItHappens, limits: Limits::DEEP, logged: Yes,
     }
 }

@@ -6,12 +6,12 @@ use std::fmt;
 use thiserror::Error;
 
 use crate::{
-    bus::OpenTopic,
+    bus::AnyTopic,
     topics::{FAULTS, HEALTH, INPUTS, ROSTER, Rate},
 };
 
 /// Rows of the table of topics.
-pub type Topics = &'static [&'static dyn OpenTopic];
+pub type Topics = &'static [&'static dyn AnyTopic];
 
 /// Every stage's process also reads the requests of faults, and the roster, which names the processes that it admits.
 pub static EVERY_STAGE_READS: Topics = &[&FAULTS, &ROSTER];

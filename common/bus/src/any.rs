@@ -1,84 +1,129 @@
-//! Readers of any topic, for consumers that count or show samples without knowing their payload.
+//! Topics of a table, and their readers and writers, without the types of their samples.
+
+use std::any::Any;
 
 use super::{
     authors::Author,
     error::BusError,
-    layout::{Layout, Value},
-    make::Bus,
-    payload::{Payload, Stamp, Stamped},
-    read::{Reader, Slice, SliceReader},
-    topic::{AnyTopic, SliceTopic, Topic},
+    layout::{Kind, Value, type_name},
+    make::{Bus, Services},
+    payload::{Payload, Stamp, Stamped, decode_slice, encode_slice, has_slice},
+    ports::{self, Carried, OpenedBy},
+    read::{Reader, Slice, Wakeup},
+    spec::Spec,
+    topic::Topic,
+    write::Writer,
 };
+use crate::domain::Domain;
 
-/// A row of the table that can be read without knowing its payload.
-pub trait ReadableTopic: AnyTopic {
-    /// Opens a reader with [`Bus::reader`] or [`Bus::slice_reader`].
+/// A row of the table, without the types of its samples.
+pub trait AnyTopic: Sync {
+    /// The topic's description.
+    fn spec(&self) -> &'static Spec;
+    /// The name of its payload in all languages: of a struct, or of a header and a slice of elements.
+    fn payload(&self) -> String;
+    /// The kind of a sample's header, and that of its elements where it has a slice.
+    fn layout(&self) -> (Kind, Option<Kind>);
+    /// The types of its samples for the middleware. The result has no name outside this crate.
+    #[doc(hidden)]
+    fn carried(&self) -> Carried;
+    /// Opens a reader with [`Bus::reader`].
     fn any_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>, BusError>;
+    /// Opens a reader of the samples of all generations, with the buffer of a recorder.
+    fn recorder_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>, BusError>;
+    /// Opens a [`Writer`] with [`Bus::slice_writer`].
+    fn any_writer(
+        &self,
+        bus: &Bus,
+        generation: u32,
+        longest: usize,
+    ) -> Result<Box<dyn AnyWriter>, BusError>;
+    /// The processes that have the topic open. It fails if the topic is missing or carries another payload.
+    fn opened_by(&self, bus: &Bus) -> Result<OpenedBy, BusError> {
+        ports::opened_by(&bus.node, self.spec(), &self.carried())
+    }
 }
 
 /// Receives samples of a topic.
 pub trait AnyReader {
-    /// The next sample in order of publication; none when all were taken. An error means that the connection to the writer broke.
-    fn take(&mut self) -> Result<Option<Box<dyn AnySample>>, BusError>;
+    /// [`Reader::next_slice`].
+    fn next_sample(&mut self) -> Result<Option<Box<dyn AnySample>>, BusError>;
+    /// Puts the next sample as a message (see [`super::cdr`]) in place of what is in `message`. Returns its stamp; none when all samples
+    /// were taken.
+    fn next_message(&mut self, message: &mut Vec<u8>) -> Result<Option<Stamp>, BusError>;
 }
 
-/// A sample of a topic. A sample with a slice stays in shared memory, and its writer cannot reuse that memory while the sample is
-/// held.
+/// A sample of a topic. It stays in shared memory, and its writer cannot reuse that memory while the sample is held.
 pub trait AnySample {
     fn stamp(&self) -> &Stamp;
     /// The process that wrote the sample.
     fn author(&self) -> Author;
-    /// The fields of the struct, or of the header.
+    /// The fields of the header.
     fn value(&self) -> Value;
-    /// The elements of the slice; none where the topic carries structs.
+    /// The elements of the slice; none where samples have no slice.
     fn elements(&self) -> Option<Vec<Value>>;
 }
 
-impl<P: Payload + Layout + Stamped> ReadableTopic for Topic<P> {
+/// A [`Writer`] of some topic.
+pub trait AnyWriter: Any {
+    /// Publish the sample in `message` with the stamp that it has, and wake the readers. Returns whether `message` is of this topic.
+    fn publish_message(&mut self, message: &[u8]) -> Result<bool, BusError>;
+}
+
+impl<H: Stamped, E: Payload> AnyTopic for Topic<H, E> {
+    fn spec(&self) -> &'static Spec {
+        self.spec
+    }
+
+    fn payload(&self) -> String {
+        match has_slice::<E>() {
+            true => format!("{} + [{}]", type_name::<H>(), type_name::<E>()),
+            false => type_name::<H>().to_owned(),
+        }
+    }
+
+    fn layout(&self) -> (Kind, Option<Kind>) {
+        (H::kind(), has_slice::<E>().then(E::kind))
+    }
+
+    fn carried(&self) -> Carried {
+        Carried::of::<H, E>()
+    }
+
     fn any_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>, BusError> {
         Ok(Box::new(bus.reader(self)?))
     }
-}
 
-impl<H: Payload + Layout + Stamped, T: Payload + Layout> ReadableTopic for SliceTopic<H, T> {
-    fn any_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>, BusError> {
-        Ok(Box::new(bus.slice_reader(self)?))
+    fn recorder_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>, BusError> {
+        let reader = bus.reader_that_keeps(self, self.spec.limits.recorder_buffer)?;
+        Ok(Box::new(reader.of_all_generations()))
+    }
+
+    fn any_writer(
+        &self,
+        bus: &Bus,
+        generation: u32,
+        longest: usize,
+    ) -> Result<Box<dyn AnyWriter>, BusError> {
+        Ok(Box::new(bus.slice_writer(self, generation, longest)?))
     }
 }
 
-impl<P: Payload + Layout + Stamped> AnyReader for Reader<P> {
-    fn take(&mut self) -> Result<Option<Box<dyn AnySample>>, BusError> {
-        let taken = self.take_with_author()?;
-        Ok(taken.map(|sample| Box::new(sample) as Box<dyn AnySample>))
+impl<H: Stamped, E: Payload> AnyReader for Reader<H, E> {
+    fn next_sample(&mut self) -> Result<Option<Box<dyn AnySample>>, BusError> {
+        Ok(self.next_slice()?.map(|sample| Box::new(sample) as Box<dyn AnySample>))
+    }
+
+    fn next_message(&mut self, message: &mut Vec<u8>) -> Result<Option<Stamp>, BusError> {
+        message.clear();
+        Ok(self.next_slice()?.map(|sample| {
+            encode_slice(sample.header(), &sample, message);
+            *sample.header().stamp()
+        }))
     }
 }
 
-impl<H: Payload + Layout + Stamped, T: Payload + Layout> AnyReader for SliceReader<H, T> {
-    fn take(&mut self) -> Result<Option<Box<dyn AnySample>>, BusError> {
-        let taken = Self::take(self)?;
-        Ok(taken.map(|sample| Box::new(sample) as Box<dyn AnySample>))
-    }
-}
-
-impl<P: Payload + Layout + Stamped> AnySample for (Author, P) {
-    fn stamp(&self) -> &Stamp {
-        self.1.stamp()
-    }
-
-    fn author(&self) -> Author {
-        self.0
-    }
-
-    fn value(&self) -> Value {
-        self.1.value()
-    }
-
-    fn elements(&self) -> Option<Vec<Value>> {
-        None
-    }
-}
-
-impl<H: Payload + Layout + Stamped, T: Payload + Layout> AnySample for Slice<H, T> {
+impl<H: Stamped, E: Payload> AnySample for Slice<H, E> {
     fn stamp(&self) -> &Stamp {
         self.header().stamp()
     }
@@ -92,6 +137,31 @@ impl<H: Payload + Layout + Stamped, T: Payload + Layout> AnySample for Slice<H, 
     }
 
     fn elements(&self) -> Option<Vec<Value>> {
-        Some(self.iter().map(T::value).collect())
+        has_slice::<E>().then(|| self.iter().map(E::value).collect())
+    }
+}
+
+impl<H: Stamped, E: Payload> AnyWriter for Writer<H, E> {
+    fn publish_message(&mut self, message: &[u8]) -> Result<bool, BusError> {
+        let sample = decode_slice(message);
+        let sent = sample.map(|(header, slice)| self.publish_as_stamped(header, &slice));
+        Ok(sent.transpose()?.is_some())
+    }
+}
+
+impl Bus {
+    /// Create the bus of a robot: its configuration, which consumers in other languages load too, and the services of all topics of
+    /// `table`. The new bus replaces an earlier one, and nobody can join it before all services exist. Only the supervisor calls this.
+    pub fn make(
+        domain: &Domain,
+        name: &str,
+        table: &[&dyn AnyTopic],
+    ) -> Result<(Self, Services), BusError> {
+        Self::make_services(domain, name, table.iter().map(|topic| (topic.spec(), topic.carried())))
+    }
+
+    /// A wakeup that is readable once a sample was published on `topic`. It fails if the topic is missing or has no place left.
+    pub fn wakeup(&self, topic: &dyn AnyTopic) -> Result<Wakeup, BusError> {
+        Wakeup::open(self, topic.spec())
     }
 }

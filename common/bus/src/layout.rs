@@ -1,10 +1,18 @@
 //! The layout of payloads in memory, for programs in other languages: names, types and offsets of all fields. The same
 //! description gives the values of a payload, field by field, and encodes it where there is no shared memory.
+//!
+//! Why `unsafe` is allowed here: the name of a payload can be read only through an `unsafe` call, which does nothing else.
+#![allow(unsafe_code)]
 
-use super::{
-    cdr::{Decoder, Encoder},
-    payload::{Payload, Stamp, type_name},
-};
+use iceoryx2::prelude::ZeroCopySend;
+
+use super::cdr::{Decoder, Encoder};
+
+/// The name of a payload in all languages.
+pub(super) fn type_name<P: ZeroCopySend>() -> &'static str {
+    // SAFETY: the call only returns the name. Each payload promises its uniform layout where it derives the trait.
+    unsafe { <P as ZeroCopySend>::type_name() }
+}
 
 /// A payload or a field whose layout is known.
 pub trait Layout: Copy {
@@ -60,38 +68,6 @@ pub enum Value {
     Struct(Vec<(&'static str, Self)>),
 }
 
-/// `sample` as a message of its own.
-pub fn encode_sample<P: Layout>(sample: &P, bytes: &mut Vec<u8>) {
-    sample.encode(&mut Encoder::new(bytes));
-}
-
-/// `header` and `slice` as a message of their own.
-pub fn encode_slice<H: Layout, T: Layout>(header: &H, slice: &[T], bytes: &mut Vec<u8>) {
-    let mut to = Encoder::new(bytes);
-    header.encode(&mut to);
-    (slice.len() as u32).encode(&mut to);
-    T::encode_all(slice, &mut to);
-}
-
-/// The sample in a message; none if the message holds another.
-#[must_use]
-pub fn decode_sample<P: Layout>(message: &[u8]) -> Option<P> {
-    P::decode(&mut Decoder::new(message)?)
-}
-
-/// The header and slice in a message; none if the message holds others.
-#[must_use]
-pub fn decode_slice<H: Layout, T: Layout + Default>(message: &[u8]) -> Option<(H, Vec<T>)> {
-    let mut from = Decoder::new(message)?;
-    let header = H::decode(&mut from)?;
-    let count = u32::decode(&mut from)? as usize;
-    // The message may state any length, but each element takes at least a byte.
-    let count = (count <= from.left()).then_some(count)?;
-    let mut slice = vec![T::default(); count];
-    T::decode_all(&mut slice, &mut from)?;
-    Some((header, slice))
-}
-
 /// The type of a payload or a field.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Kind {
@@ -126,7 +102,7 @@ pub struct Field {
 impl Structure {
     /// The kind of `P`, which has these fields.
     #[must_use]
-    pub fn of<P: Payload>(fields: Vec<Field>) -> Kind {
+    pub fn of<P: ZeroCopySend>(fields: Vec<Field>) -> Kind {
         Kind::Struct(Self { name: type_name::<P>(), size: size_of::<P>(), fields })
     }
 }
@@ -193,6 +169,23 @@ impl Layout for u8 {
     }
 }
 
+/// The element of a sample without a slice.
+impl Layout for () {
+    fn kind() -> Kind {
+        Structure::of::<Self>(Vec::new())
+    }
+
+    fn value(&self) -> Value {
+        Value::Struct(Vec::new())
+    }
+
+    fn encode(&self, _: &mut Encoder<'_>) {}
+
+    fn decode(_: &mut Decoder<'_>) -> Option<Self> {
+        Some(())
+    }
+}
+
 impl<T: Layout + Default, const N: usize> Layout for [T; N] {
     fn kind() -> Kind {
         Kind::Array(Box::new(T::kind()), N)
@@ -244,7 +237,4 @@ macro_rules! layouts {
             }
         }
     )*};
-}
-layouts! {
-    Stamp { tick stamp_ns generation sequence }
 }

@@ -8,10 +8,9 @@
 //! | [`lock_holders`] | the processes that hold a lock on a file |
 //! | [`bus_instance`] | the names of one bus instance |
 //! | [`poll`], [`waiter`] | waiting for descriptors; one wait for topics, sockets, signals, processes |
-//! | `payload` | the types that samples may have, and the stamp that every sample begins with |
-//! | `layout` | the layout of payloads in memory, for other languages; their values; their encoding |
 //! | [`cdr`] | the encoding of payloads outside shared memory |
-//! | `encoded` | readers and writers of encoded samples of any topic |
+//! | `layout` | the layout of payloads in memory, for other languages; their values; their encoding |
+//! | `payload` | the types that samples may have, the stamp that every sample begins with, and samples as messages |
 //! | `spec` | the description of a topic |
 //! | `topic` | the rows of a table of topics |
 //! | `ports` | typed publishers and subscribers; in `ports/raw.rs` the middleware's ports, compiled once for all payloads |
@@ -22,8 +21,7 @@
 //! | `close_on_exec` | descriptors that a child must not inherit |
 //! | `authors` | the processes whose samples a reader returns |
 //! | `write`, `read` | writers; readers and wakeups |
-//! | `any` | readers of any topic |
-//! | `open` | writers of any topic, and the processes that have it open |
+//! | `any` | topics of a table, and their readers and writers, without the types of their samples |
 //! | `error` | errors of the bus |
 //!
 //! The crate follows these rules, each found by experiment:
@@ -42,13 +40,11 @@ pub mod cdr;
 pub mod clock;
 mod close_on_exec;
 pub mod domain;
-mod encoded;
 mod error;
 mod layout;
 mod leftovers;
 pub mod lock_holders;
 mod make;
-mod open;
 mod ownership;
 mod payload;
 pub mod poll;
@@ -61,21 +57,19 @@ pub mod waiter;
 mod write;
 
 pub use self::{
-    any::{AnyReader, AnySample, ReadableTopic},
+    any::{AnyReader, AnySample, AnyTopic, AnyWriter},
     authors::{Author, Ignored, Names, Writers},
     close_on_exec::close_all_on_exec,
-    encoded::{EncodedReader, EncodedTopic, EncodedWriter},
     error::BusError,
-    layout::{
-        Field, Kind, Layout, Structure, Value, decode_sample, decode_slice, encode_sample,
-        encode_slice, kind_of,
-    },
+    layout::{Field, Kind, Layout, Structure, Value, kind_of},
     make::{Bus, Services},
-    open::OpenTopic,
-    payload::{Payload, Stamp, Stamped, ZeroCopySend},
+    payload::{
+        Payload, Stamp, Stamped, ZeroCopySend, decode_sample, decode_slice, encode_sample,
+        encode_slice,
+    },
     ports::OpenedBy,
-    read::{Reader, Slice, SliceReader, Wakeup},
+    read::{Reader, Slice, Wakeup},
     spec::{EVERY_STAGE, Limits, Logged, OPERATOR, Rate, SUPERVISOR, Spec},
-    topic::{AnyTopic, SliceTopic, Topic},
-    write::{SliceWriter, Writer},
+    topic::Topic,
+    write::Writer,
 };

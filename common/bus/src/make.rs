@@ -22,8 +22,8 @@ use super::{
     authors::Writers,
     error::BusError,
     leftovers, ownership,
-    ports::{self, BusNode},
-    topic::AnyTopic,
+    ports::{self, BusNode, Carried},
+    spec::Spec,
 };
 use crate::{
     bus_instance::BusInstance,
@@ -57,12 +57,11 @@ fn not_running(domain: &Domain) -> impl Fn(io::Error) -> BusError {
 }
 
 impl Bus {
-    /// Create the bus of a robot: its configuration, which consumers in other languages load too, and the services of all topics of
-    /// `table`. The new bus replaces an earlier one, and nobody can join it before all services exist. Only the supervisor calls this.
-    pub fn make(
+    /// Create the bus of a robot with the services of `topics`.
+    pub(super) fn make_services(
         domain: &Domain,
         name: &str,
-        table: &[&dyn AnyTopic],
+        topics: impl Iterator<Item = (&'static Spec, Carried)>,
     ) -> Result<(Self, Services), BusError> {
         let failed = |error: io::Error| no_join(domain)(error.to_string());
         let instance = BusInstance::new(domain);
@@ -73,9 +72,8 @@ impl Bus {
         let mut bus = Self::join_instance(instance, name)?;
         bus.writers = Some(Writers::of(std::process::id()));
         bus.is_stage = true;
-        let services = table
-            .iter()
-            .map(|topic| ports::create(&bus.node, topic.spec(), &topic.carried()))
+        let services = topics
+            .map(|(spec, carried)| ports::create(&bus.node, spec, &carried))
             .collect::<Result<_, _>>()?;
         leftovers::back_up(&bus.services(), &bus.backup()).map_err(failed)?;
         bus.instance.make_current().map_err(failed)?;

@@ -1,8 +1,7 @@
-//! The types that samples in shared memory may have, and the stamp that every sample begins with.
+//! The types that samples in shared memory may have, the stamp that every sample begins with, and samples as messages.
 //!
 //! Why `unsafe` is allowed here: deriving `ZeroCopySend` writes an `unsafe impl`, which promises a self-contained type of uniform
-//! layout. [`Stamp`] is a `repr(C)` struct of numbers, so the promise holds. The name of a payload can be read only through an
-//! `unsafe` call, which does nothing else.
+//! layout. [`Stamp`] is a `repr(C)` struct of numbers, so the promise holds.
 #![allow(unsafe_code)]
 
 use std::fmt::Debug;
@@ -10,16 +9,20 @@ use std::fmt::Debug;
 pub use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
-use crate::clock::MissionTime;
+use crate::{
+    cdr::{Decoder, Encoder},
+    clock::MissionTime,
+    layout::Layout,
+    layouts,
+};
 
 /// A type that may lie in shared memory.
-pub trait Payload: ZeroCopySend + Copy + Debug + Default + 'static {}
-impl<P: ZeroCopySend + Copy + Debug + Default + 'static> Payload for P {}
+pub trait Payload: ZeroCopySend + Layout + Debug + Default + 'static {}
+impl<P: ZeroCopySend + Layout + Debug + Default + 'static> Payload for P {}
 
-/// The name of a payload in all languages.
-pub(super) fn type_name<P: Payload>() -> &'static str {
-    // SAFETY: the call only returns the name. Each payload promises its uniform layout where it derives the trait.
-    unsafe { <P as ZeroCopySend>::type_name() }
+/// Whether a sample of elements `E` has a slice: it has none if `E` is `()`.
+pub(super) const fn has_slice<E>() -> bool {
+    size_of::<E>() > 0
 }
 
 /// The tick, the time and the origin of a sample: the first field of every payload and header.
@@ -37,6 +40,8 @@ pub struct Stamp {
     pub sequence: u32,
 }
 
+layouts! { Stamp { tick stamp_ns generation sequence } }
+
 impl Stamp {
     /// Mission time.
     #[must_use]
@@ -45,9 +50,46 @@ impl Stamp {
     }
 }
 
-/// A payload or header that starts with a [`Stamp`].
-pub trait Stamped {
+/// The header of a sample: a payload that starts with a [`Stamp`].
+pub trait Stamped: Payload {
     fn stamp(&self) -> &Stamp;
     /// The stamp, which the writer fills in.
     fn stamp_mut(&mut self) -> &mut Stamp;
+}
+
+/// `header` and `slice` as a message of their own (see [`super::cdr`]).
+pub fn encode_slice<H: Layout, E: Layout>(header: &H, slice: &[E], bytes: &mut Vec<u8>) {
+    let mut to = Encoder::new(bytes);
+    header.encode(&mut to);
+    if has_slice::<E>() {
+        (slice.len() as u32).encode(&mut to);
+        E::encode_all(slice, &mut to);
+    }
+}
+
+/// [`encode_slice`] of a sample without a slice.
+pub fn encode_sample<H: Layout>(sample: &H, bytes: &mut Vec<u8>) {
+    encode_slice::<H, ()>(sample, &[], bytes);
+}
+
+/// The header and slice in a message; none if the message holds others.
+#[must_use]
+pub fn decode_slice<H: Layout, E: Layout + Default>(message: &[u8]) -> Option<(H, Vec<E>)> {
+    let mut from = Decoder::new(message)?;
+    let header = H::decode(&mut from)?;
+    if !has_slice::<E>() {
+        return Some((header, Vec::new()));
+    }
+    let count = u32::decode(&mut from)? as usize;
+    // The message may state any length, but each element takes at least a byte.
+    let count = (count <= from.left()).then_some(count)?;
+    let mut slice = vec![E::default(); count];
+    E::decode_all(&mut slice, &mut from)?;
+    Some((header, slice))
+}
+
+/// The header in a message; none if the message holds another.
+#[must_use]
+pub fn decode_sample<H: Layout>(message: &[u8]) -> Option<H> {
+    Some(decode_slice::<H, ()>(message)?.0)
 }

@@ -2,8 +2,9 @@
 //! again for each payload.
 //!
 //! Why `unsafe` is allowed here, and why it is sound:
-//! - A sample is one `H` and a whole number of `T`, each aligned: its service is opened with their names, sizes and alignments.
-//! - `H` and `T` are [`Payload`]s: self-contained types without a destructor, of which any bytes are a value.
+//! - A sample is one `H` and a whole number of `E`, each aligned: its service is opened with their names, sizes and alignments.
+//!   Where samples have no slice, the `H` is the one element that the service says, and otherwise it is the header.
+//! - `H` and `E` are [`Payload`]s: self-contained types without a destructor, of which any bytes are a value.
 //! - A sample does not change after it was sent.
 //! - A reference to a header is made from the address that the middleware gives for it. The middleware computes that address as a
 //!   number from the address of the sample, so access through a number is what it relies on itself.
@@ -16,36 +17,30 @@ use std::{collections::HashSet, marker::PhantomData, mem::MaybeUninit, ptr};
 pub use self::raw::OpenedBy;
 pub(super) use self::raw::{BusNode, Carried, Listener, Notifier, create, opened_by};
 use self::raw::{RawPublisher, RawSample, RawService, RawSubscriber};
-use super::{error::BusError, payload::Payload, spec::Spec};
+use super::{
+    error::BusError,
+    payload::{Payload, has_slice},
+    spec::Spec,
+};
 
-/// The service that carries headers `H` with elements `T`.
+/// The service that carries headers `H` with elements `E`.
 #[derive(Debug)]
-pub(super) struct Service<H, T> {
+pub(super) struct Service<H, E> {
     raw: RawService,
     spec: &'static Spec,
-    carries: PhantomData<fn() -> (H, T)>,
+    carries: PhantomData<fn() -> (H, E)>,
 }
 
-impl<P: Payload> Service<(), P> {
-    /// Open a topic of structs.
-    pub(super) fn of_structs(node: &BusNode, spec: &'static Spec) -> Result<Self, BusError> {
-        Self::open(node, spec, &Carried::one::<P>())
-    }
-}
-
-impl<H: Payload, T: Payload> Service<H, T> {
-    /// Open a topic of slices.
-    pub(super) fn of_slices(node: &BusNode, spec: &'static Spec) -> Result<Self, BusError> {
-        Self::open(node, spec, &Carried::slice::<H, T>())
-    }
-
-    /// Open a topic; `carried` must describe `H` and `T`.
-    fn open(node: &BusNode, spec: &'static Spec, carried: &Carried) -> Result<Self, BusError> {
-        Ok(Self { raw: RawService::open(node, spec, carried)?, spec, carries: PhantomData })
+impl<H: Payload, E: Payload> Service<H, E> {
+    /// Open a topic.
+    pub(super) fn open(node: &BusNode, spec: &'static Spec) -> Result<Self, BusError> {
+        let raw = RawService::open(node, spec, &Carried::of::<H, E>())?;
+        Ok(Self { raw, spec, carries: PhantomData })
     }
 
     /// A publisher of samples of at most `longest` elements.
-    pub(super) fn publisher(&self, longest: usize) -> Result<Publisher<H, T>, BusError> {
+    pub(super) fn publisher(&self, longest: usize) -> Result<Publisher<H, E>, BusError> {
+        let longest = if has_slice::<E>() { longest } else { 1 };
         Ok(Publisher {
             raw: self.raw.publisher(self.spec, longest)?,
             topic: self.spec.name,
@@ -54,7 +49,7 @@ impl<H: Payload, T: Payload> Service<H, T> {
     }
 
     /// A subscriber with a buffer for the newest `buffer` samples that were not taken yet.
-    pub(super) fn subscriber(&self, buffer: usize) -> Result<Subscriber<H, T>, BusError> {
+    pub(super) fn subscriber(&self, buffer: usize) -> Result<Subscriber<H, E>, BusError> {
         Ok(Subscriber {
             raw: self.raw.subscriber(self.spec, buffer)?,
             spec: self.spec,
@@ -72,87 +67,77 @@ impl<H: Payload, T: Payload> Service<H, T> {
     }
 }
 
-/// Publishes headers `H` with elements `T`.
+/// Publishes headers `H` with elements `E`.
 #[derive(Debug)]
-pub(super) struct Publisher<H, T> {
+pub(super) struct Publisher<H, E> {
     raw: RawPublisher,
     topic: &'static str,
-    carries: PhantomData<fn() -> (H, T)>,
+    carries: PhantomData<fn() -> (H, E)>,
 }
 
-impl<H: Payload, T: Payload> Publisher<H, T> {
-    /// Publish `count` elements, which `write` writes in place.
-    fn send(
-        &self,
-        header: H,
-        count: usize,
-        mut write: impl FnMut(&mut [MaybeUninit<T>]),
-    ) -> Result<(), BusError> {
+impl<H: Payload, E: Payload> Publisher<H, E> {
+    /// The name of the topic.
+    pub(super) const fn topic(&self) -> &'static str {
+        self.topic
+    }
+
+    /// Publish `header` with `slice`.
+    pub(super) fn send(&self, header: H, slice: &[E]) -> Result<(), BusError> {
+        let count = if has_slice::<E>() { slice.len() } else { 1 };
         self.raw.send(self.topic, count, &mut |loan| {
-            // SAFETY: uninitialised bytes are viewed as uninitialised `T`s where they are aligned for it.
-            let (_, elements, _) = unsafe { loan.elements.align_to_mut::<MaybeUninit<T>>() };
-            if elements.len() != count {
+            let place = match has_slice::<E>() {
+                true => loan.header.addr(),
+                false => loan.elements.as_mut_ptr().expose_provenance(),
+            };
+            // SAFETY: uninitialised bytes are viewed as uninitialised `E`s where they are aligned for it.
+            let (_, slots, _) = unsafe { loan.elements.align_to_mut::<MaybeUninit<E>>() };
+            if slots.len() != slice.len() {
                 return false;
             }
-            write(elements);
+            slots.write_copy_of_slice(slice);
             // SAFETY: the sample has an aligned `H` at this address, and nobody else uses the sample until it is sent.
-            unsafe { ptr::with_exposed_provenance_mut::<H>(loan.header.addr()).write(header) };
+            unsafe { ptr::with_exposed_provenance_mut::<H>(place).write(header) };
             true
         })
     }
-
-    /// Publish `elements`.
-    pub(super) fn send_all(
-        &self,
-        header: H,
-        mut elements: impl ExactSizeIterator<Item = T>,
-    ) -> Result<(), BusError> {
-        self.send(header, elements.len(), |slots| {
-            for slot in slots {
-                slot.write(elements.next().unwrap_or_default());
-            }
-        })
-    }
-
-    /// Publish `elements`, copied in one piece.
-    pub(super) fn send_slice(&self, header: H, elements: &[T]) -> Result<(), BusError> {
-        self.send(header, elements.len(), |slots| {
-            slots.write_copy_of_slice(elements);
-        })
-    }
 }
 
-/// Receives headers `H` with elements `T`.
+/// Receives headers `H` with elements `E`.
 #[derive(Debug)]
-pub(super) struct Subscriber<H, T> {
+pub(super) struct Subscriber<H, E> {
     raw: RawSubscriber,
     spec: &'static Spec,
-    carries: PhantomData<fn() -> (H, T)>,
+    carries: PhantomData<fn() -> (H, E)>,
 }
 
-impl<H: Payload, T: Payload> Subscriber<H, T> {
-    pub(super) fn take(&self) -> Result<Option<Sample<H, T>>, BusError> {
-        let raw = self.raw.take(self.spec)?;
+impl<H: Payload, E: Payload> Subscriber<H, E> {
+    /// The next sample; none when all were taken.
+    pub(super) fn receive(&self) -> Result<Option<Sample<H, E>>, BusError> {
+        let raw = self.raw.receive_sample(self.spec)?;
         Ok(raw.map(|raw| Sample { raw, carries: PhantomData }))
     }
 }
 
 /// A header with its elements, in shared memory.
 #[derive(Debug)]
-pub(super) struct Sample<H, T> {
+pub(super) struct Sample<H, E> {
     raw: RawSample,
-    carries: PhantomData<fn() -> (H, T)>,
+    carries: PhantomData<fn() -> (H, E)>,
 }
 
-impl<H: Payload, T: Payload> Sample<H, T> {
+impl<H: Payload, E: Payload> Sample<H, E> {
     pub(super) fn header(&self) -> &H {
+        let place = match has_slice::<E>() {
+            true => self.raw.header().addr(),
+            false => self.raw.elements().as_ptr().expose_provenance(),
+        };
         // SAFETY: the sample has an aligned `H` at this address, which does not change while the sample is held.
-        unsafe { &*ptr::with_exposed_provenance::<H>(self.raw.header().addr()) }
+        unsafe { &*ptr::with_exposed_provenance::<H>(place) }
     }
 
-    pub(super) fn elements(&self) -> &[T] {
-        // SAFETY: any bytes that are aligned for a `T` are a value of it.
-        let (_, elements, _) = unsafe { self.raw.elements().align_to::<T>() };
+    pub(super) fn elements(&self) -> &[E] {
+        // SAFETY: any bytes that are aligned for an `E` are a value of it.
+        let (_, elements, _) = unsafe { self.raw.elements().align_to::<E>() };
         elements
     }
 

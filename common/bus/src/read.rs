@@ -9,64 +9,34 @@ use super::{
     authors::{Admitted, Author},
     error::BusError,
     make::Bus,
-    payload::{Payload, Stamp, Stamped},
+    payload::{Payload, Stamped},
     ports::{Listener, Sample, Service, Subscriber},
     spec::{Limits, Spec},
-    topic::{AnyTopic, SliceTopic, Topic},
+    topic::Topic,
 };
 
 impl Bus {
     /// Read `topic`. It fails if the topic is missing, carries another payload, or has no place left.
-    pub fn reader<P: Payload + Stamped>(&self, topic: &Topic<P>) -> Result<Reader<P>, BusError> {
+    pub fn reader<H: Stamped, E: Payload>(
+        &self,
+        topic: &Topic<H, E>,
+    ) -> Result<Reader<H, E>, BusError> {
         self.reader_that_keeps(topic, topic.spec.limits.buffer)
     }
 
     /// [`Bus::reader`] with a buffer for the newest `buffer` samples that were not taken yet.
-    pub(super) fn reader_that_keeps<P: Payload + Stamped>(
+    pub(super) fn reader_that_keeps<H: Stamped, E: Payload>(
         &self,
-        topic: &Topic<P>,
+        topic: &Topic<H, E>,
         buffer: usize,
-    ) -> Result<Reader<P>, BusError> {
+    ) -> Result<Reader<H, E>, BusError> {
         let _held = self.hold()?;
-        let service = Service::of_structs(&self.node, topic.spec)?;
+        let service = Service::open(&self.node, topic.spec)?;
         self.leave_places(topic.spec, topic.spec.limits.readers, service.number_of_readers())?;
         Ok(Reader {
             subscriber: service.subscriber(buffer)?,
             admitted: Admitted::of(topic.spec, self.writers.as_ref()),
         })
-    }
-
-    /// Read the slices of `topic`. It fails if the topic is missing, carries another payload, or has no place left.
-    pub fn slice_reader<H: Payload + Stamped, T: Payload>(
-        &self,
-        topic: &SliceTopic<H, T>,
-    ) -> Result<SliceReader<H, T>, BusError> {
-        self.slice_reader_that_keeps(topic, topic.spec.limits.buffer)
-    }
-
-    /// [`Bus::slice_reader`] with a buffer for the newest `buffer` samples that were not taken yet.
-    pub(super) fn slice_reader_that_keeps<H: Payload + Stamped, T: Payload>(
-        &self,
-        topic: &SliceTopic<H, T>,
-        buffer: usize,
-    ) -> Result<SliceReader<H, T>, BusError> {
-        let _held = self.hold()?;
-        let service = Service::of_slices(&self.node, topic.spec)?;
-        self.leave_places(topic.spec, topic.spec.limits.readers, service.number_of_readers())?;
-        Ok(SliceReader {
-            subscriber: service.subscriber(buffer)?,
-            admitted: Admitted::of(topic.spec, self.writers.as_ref()),
-        })
-    }
-
-    /// A wakeup that is readable once a sample was published on `topic`. It fails if the topic is missing or has no place left.
-    pub fn wakeup(&self, topic: &dyn AnyTopic) -> Result<Wakeup, BusError> {
-        let spec = topic.spec();
-        let _held = self.hold()?;
-        let listener = Listener::open(&self.node, spec, |taken| {
-            self.leave_places(spec, Limits::LISTENERS, taken)
-        })?;
-        Ok(Wakeup { listener })
     }
 
     /// Refuse a consumer the last places, which the stages may need.
@@ -79,36 +49,23 @@ impl Bus {
     }
 }
 
-/// The author of a sample. The process is part of the id of the port that published the sample.
-fn author<H: Payload, T: Payload>(sample: &Sample<H, T>, stamp: &Stamp) -> Author {
-    Author { process: sample.process(), generation: stamp.generation }
-}
-
-/// Receives structs.
+/// Receives samples.
 #[derive(Debug)]
-pub struct Reader<P: Payload> {
-    subscriber: Subscriber<(), P>,
+pub struct Reader<H, E = ()> {
+    subscriber: Subscriber<H, E>,
     admitted: Admitted,
 }
 
-impl<P: Payload + Stamped> Reader<P> {
+impl<H: Stamped, E: Payload> Reader<H, E> {
     /// The next sample in order of publication; none when all were taken. An error means that the connection to the writer broke.
-    pub fn take(&mut self) -> Result<Option<P>, BusError> {
-        Ok(self.take_with_author()?.map(|(_, sample)| sample))
-    }
-
-    /// [`Reader::take`] with the author of the sample.
-    pub fn take_with_author(&mut self) -> Result<Option<(Author, P)>, BusError> {
+    pub fn next_slice(&mut self) -> Result<Option<Slice<H, E>>, BusError> {
         if self.admitted.hold_samples()? {
             return Ok(None);
         }
-        while let Some(sample) = self.subscriber.take()? {
-            let Some(&payload) = sample.elements().first() else {
-                continue;
-            };
-            let author = author(&sample, payload.stamp());
-            if self.admitted.admits(author)? {
-                return Ok(Some((author, payload)));
+        while let Some(sample) = self.subscriber.receive()? {
+            let slice = Slice { sample };
+            if self.admitted.admits(slice.author())? {
+                return Ok(Some(slice));
             }
         }
         Ok(None)
@@ -120,73 +77,48 @@ impl<P: Payload + Stamped> Reader<P> {
         self.admitted = self.admitted.of_all_generations();
         self
     }
+}
 
-    /// Take all samples, and return the newest.
-    pub fn newest(&mut self) -> Result<Option<P>, BusError> {
+impl<H: Stamped> Reader<H> {
+    /// A copy of the [next](Self::next_slice) sample, which has no slice.
+    pub fn next_sample(&mut self) -> Result<Option<H>, BusError> {
+        Ok(self.next_slice()?.map(|sample| *sample.header()))
+    }
+
+    /// Take all samples, and return the newest. It fails as [`Self::next_slice`] does.
+    pub fn newest(&mut self) -> Result<Option<H>, BusError> {
         let mut newest = None;
-        while let Some(sample) = self.take()? {
+        while let Some(sample) = self.next_sample()? {
             newest = Some(sample);
         }
         Ok(newest)
     }
 }
 
-/// Receives headers with slices.
-#[derive(Debug)]
-pub struct SliceReader<H: Payload, T: Payload> {
-    subscriber: Subscriber<H, T>,
-    admitted: Admitted,
-}
-
 /// A header with its slice in shared memory, which the writer cannot reuse while this is held.
 #[derive(Debug)]
-pub struct Slice<H: Payload, T: Payload> {
-    sample: Sample<H, T>,
+pub struct Slice<H, E = ()> {
+    sample: Sample<H, E>,
 }
 
-impl<H: Payload, T: Payload> Slice<H, T> {
+impl<H: Stamped, E: Payload> Slice<H, E> {
     #[must_use]
     pub fn header(&self) -> &H {
         self.sample.header()
     }
-}
 
-impl<H: Payload + Stamped, T: Payload> Slice<H, T> {
-    /// The process and the generation that wrote the slice.
+    /// The process and the generation that wrote the sample. The process is part of the id of the port that published it.
     #[must_use]
     pub fn author(&self) -> Author {
-        author(&self.sample, self.header().stamp())
+        Author { process: self.sample.process(), generation: self.header().stamp().generation }
     }
 }
 
-impl<H: Payload, T: Payload> Deref for Slice<H, T> {
-    type Target = [T];
+impl<H: Payload, E: Payload> Deref for Slice<H, E> {
+    type Target = [E];
 
-    fn deref(&self) -> &[T] {
+    fn deref(&self) -> &[E] {
         self.sample.elements()
-    }
-}
-
-impl<H: Payload + Stamped, T: Payload> SliceReader<H, T> {
-    /// [`Reader::of_all_generations`] for slices.
-    #[must_use]
-    pub fn of_all_generations(mut self) -> Self {
-        self.admitted = self.admitted.of_all_generations();
-        self
-    }
-
-    /// [`Reader::take`] for slices.
-    pub fn take(&mut self) -> Result<Option<Slice<H, T>>, BusError> {
-        if self.admitted.hold_samples()? {
-            return Ok(None);
-        }
-        while let Some(sample) = self.subscriber.take()? {
-            let author = author(&sample, sample.header().stamp());
-            if self.admitted.admits(author)? {
-                return Ok(Some(Slice { sample }));
-            }
-        }
-        Ok(None)
     }
 }
 
@@ -197,6 +129,12 @@ pub struct Wakeup {
 }
 
 impl Wakeup {
+    pub(super) fn open(bus: &Bus, spec: &'static Spec) -> Result<Self, BusError> {
+        let _held = bus.hold()?;
+        let admit = |taken| bus.leave_places(spec, Limits::LISTENERS, taken);
+        Ok(Self { listener: Listener::open(&bus.node, spec, admit)? })
+    }
+
     /// Clear the wakeup, which stays readable until then. Drain it before taking the samples.
     pub(crate) fn drain(&self) -> Result<(), BusError> {
         self.listener.drain()

@@ -57,6 +57,24 @@ pub const OPERATOR: &str = "operator";
 pub const SUPERVISOR: &str = "supervisor";
 
 impl Spec {
+    /// The time after which its writer publishes the topic again if nothing changes; zero if it does not.
+    #[must_use]
+    pub const fn restated_every(&self) -> Duration {
+        match self.rate {
+            Rate::EachTick | Rate::EachFrame | Rate::WhenItHappens => Duration::ZERO,
+            Rate::OnChange { again_after, .. } => again_after,
+        }
+    }
+
+    /// The least time between two changes that its writer publishes; zero if there is none.
+    #[must_use]
+    pub const fn changes_at_most_every(&self) -> Duration {
+        match self.rate {
+            Rate::EachTick | Rate::EachFrame | Rate::WhenItHappens => Duration::ZERO,
+            Rate::OnChange { at_most_every, .. } => at_most_every,
+        }
+    }
+
     /// Whether at most one process at a time writes the topic.
     pub(super) fn has_one_writer(&self) -> bool {
         ![EVERY_STAGE, OPERATOR].contains(&self.writer)
@@ -68,7 +86,7 @@ impl Spec {
 pub struct Limits {
     /// Samples that wait for a reader; when there are more, the oldest are dropped.
     pub buffer: usize,
-    /// Samples that wait for a recorder ([`crate::EncodedReader`]).
+    /// Samples that wait for a recorder.
     pub recorder_buffer: usize,
     /// Samples that a reader may hold at once.
     pub borrowed: usize,

@@ -83,7 +83,7 @@ where
 {
     let mut taken = Vec::new();
     while taken.len() < most
-        && let Some(sample) = reader.take()?
+        && let Some(sample) = reader.next_sample()?
     {
         taken.push(sample);
     }

@@ -19,7 +19,7 @@ use common::{
     stage::Runner,
     step::Step as _,
     stop_socket::{Identity, Request, StopMark, StopSocket},
-    topics::{self, AnyTopic as _},
+    topics,
     wiring::{Persists, Wiring},
 };
 
@@ -155,7 +155,7 @@ impl Process for Shell {
             let TickLimitSample { last_tick, target_number, .. } = limit;
             self.take(Event::TickLimit { last_tick, target_number }, monotonic_ns())?;
         }
-        while let Some(command) = self.command.take()? {
+        while let Some(command) = self.command.next_sample()? {
             self.take(Event::Command(&command), monotonic_ns())?;
         }
         let began_ns = monotonic_ns();
@@ -177,7 +177,8 @@ impl Process for Shell {
         self.maintain()?;
         self.take(Event::Quiet, monotonic_ns())?;
         self.answer_operators();
-        if monotonic_ns() - self.stated_ns >= topics::LINK.restated_every().as_nanos() as u64 {
+        if monotonic_ns() - self.stated_ns >= topics::LINK.spec().restated_every().as_nanos() as u64
+        {
             self.state()?;
         }
         self.runner.publish_rest()?;

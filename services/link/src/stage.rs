@@ -233,7 +233,7 @@ impl Stage for LinkStage {
         for (at, header, bytes) in self.wire.drain(..) {
             out.at = at;
             for piece in bytes.chunks(WIRE_PIECE) {
-                out.publish_slice_quietly(&WIRE, header, piece)?;
+                out.publish_quietly(&WIRE, header, piece)?;
             }
         }
         out.at = now;

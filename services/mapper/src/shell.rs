@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use common::{
-    bus::{Reader, SliceReader},
+    bus::Reader,
     clock::MissionTime,
     mission::{MOST_BEAMS, MOST_SENSORS},
     samples::{
@@ -31,12 +31,12 @@ const KEYFRAME_EVERY: Duration = Duration::from_secs(1);
 /// The mapper process.
 pub struct Shell {
     pose: Reader<PoseSample>,
-    ranges: SliceReader<RangesHeader, RangeReading>,
+    ranges: Reader<RangesHeader, RangeReading>,
     contact: Reader<ContactSample>,
     directive: Reader<DirectiveSample>,
     target: TargetReader,
     runner: Runner<Mapper>,
-    scan: SliceReader<ScanHeader, f32>,
+    scan: Reader<ScanHeader, f32>,
     /// The newest scan, and its tick.
     latest_scan: Option<(u64, Vec<f32>)>,
     /// The newest readings that are used, and their tick.
@@ -63,8 +63,8 @@ impl Process for Shell {
         }
         Ok(Self {
             pose: context.reader(&POSE)?,
-            ranges: context.slice_reader(&RANGES)?,
-            scan: context.slice_reader(&SCAN)?,
+            ranges: context.reader(&RANGES)?,
+            scan: context.reader(&SCAN)?,
             latest_scan: None,
             contact: context.reader(&CONTACT)?,
             directive: context.reader(&DIRECTIVE)?,
@@ -77,7 +77,7 @@ impl Process for Shell {
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {
-        while let Some(pose) = self.pose.take()? {
+        while let Some(pose) = self.pose.next_sample()? {
             let ranges = self.ranges_of(pose.stamp.tick)?;
             self.runner.out.at = Progress::of(&pose.stamp);
             let scan = self.scan_of(pose.stamp.tick)?;
@@ -136,7 +136,7 @@ impl Shell {
     /// The readings of `tick`; earlier ones are dropped, later ones wait for their pose.
     fn ranges_of(&mut self, tick: u64) -> Result<Vec<RangeReading>, StageError> {
         while self.latest_ranges.as_ref().is_none_or(|(latest, _)| *latest < tick) {
-            let Some(slice) = self.ranges.take()? else {
+            let Some(slice) = self.ranges.next_slice()? else {
                 break;
             };
             let readings = slice.iter().take(MOST_SENSORS).copied();
@@ -150,7 +150,7 @@ impl Shell {
     /// The scan of `tick`; none if the laser gave none, or the mission uses none.
     fn scan_of(&mut self, tick: u64) -> Result<Vec<f32>, StageError> {
         while self.latest_scan.as_ref().is_none_or(|(latest, _)| *latest < tick) {
-            let Some(slice) = self.scan.take()? else {
+            let Some(slice) = self.scan.next_slice()? else {
                 break;
             };
             let used = self.runner.stage.uses_row(slice.header().sensor);
@@ -165,7 +165,7 @@ impl Shell {
     /// The contact of `tick`; most ticks have none.
     fn contact_of(&mut self, tick: u64) -> Result<Option<ContactSample>, StageError> {
         while self.latest_contact.is_none_or(|contact| contact.stamp.tick < tick) {
-            match self.contact.take()? {
+            match self.contact.next_sample()? {
                 Some(contact) => self.latest_contact = Some(contact),
                 None => break,
             }

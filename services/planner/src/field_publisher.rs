@@ -12,7 +12,7 @@ use common::{
     grid::{GridFrame, Part, Window},
     samples::{FieldCell, FieldHeader},
     shell::Progress,
-    topics::{self, AnyTopic as _},
+    topics,
 };
 
 use crate::{background::Background, step::Snapshot};
@@ -106,7 +106,9 @@ impl FieldPublisher {
     /// Whether the policy of a field that `changed` is to be computed now, at mission time `now`.
     pub(crate) fn is_due(&self, changed: bool, now: MissionTime) -> bool {
         let age = self.change_published.map(|then| now.since(then));
-        changed && !self.busy && age.is_none_or(|age| age >= topics::FIELD.changes_at_most_every())
+        changed
+            && !self.busy
+            && age.is_none_or(|age| age >= topics::FIELD.spec().changes_at_most_every())
     }
 
     /// Begin to compute the policy of `snapshot`.
@@ -138,7 +140,7 @@ impl FieldPublisher {
             *policy = Some(computed.policy);
         }
         let age = self.keyframe_published.map(|then| now.time.since(then));
-        self.keyframe |= age.is_none_or(|age| age >= topics::FIELD.restated_every());
+        self.keyframe |= age.is_none_or(|age| age >= topics::FIELD.spec().restated_every());
         let frame = policy.as_ref()?.frame;
         if changed.area() > 0 {
             self.version += 1;

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use common::{
-    bus::{Reader, SliceReader},
+    bus::Reader,
     clock::MissionClock,
     samples::{FaultKind, GridHeader, PoseSample},
     shell::{Context, Process, Progress},
@@ -23,7 +23,7 @@ use crate::{
 
 /// The planner process.
 pub struct Shell {
-    grid: SliceReader<GridHeader, u8>,
+    grid: Reader<GridHeader, u8>,
     pose: Reader<PoseSample>,
     target: TargetReader,
     /// Without a target no grid counts as followed.
@@ -61,7 +61,7 @@ impl Process for Shell {
         let cells = context.run.mission.grid_frame().area();
         Ok(Self {
             runner: Runner::open(context, |_| cells)?,
-            grid: context.slice_reader(&GRID)?,
+            grid: context.reader(&GRID)?,
             pose: context.reader(&POSE)?,
             target: TargetReader::open(context)?,
             has_target: false,
@@ -185,7 +185,7 @@ impl Shell {
     /// Follow every grid sample that came. Says whether an answer is due.
     fn follow_grid(&mut self) -> Result<bool, StageError> {
         let mut asked = false;
-        while let Some(grid) = self.grid.take()? {
+        while let Some(grid) = self.grid.next_slice()? {
             let GridHeader { stamp, part, .. } = *grid.header();
             self.take_target(stamp.tick)?;
             let work = self.take(Taken::Grid((*grid.header(), Cow::Borrowed(&grid))))?;

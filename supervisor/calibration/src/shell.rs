@@ -3,7 +3,7 @@
 use std::{collections::VecDeque, path::Path};
 
 use common::{
-    bus::{Reader, SliceReader, Writer},
+    bus::{Reader, Writer},
     checkpoint::{Checkpoint, CheckpointError},
     kinematics::Pose2,
     mission::{Body, CalibrationPlan, Procedure},
@@ -66,7 +66,7 @@ impl Drive {
 
 pub struct Shell {
     pose: Reader<PoseSample>,
-    ranges: SliceReader<RangesHeader, RangeReading>,
+    ranges: Reader<RangesHeader, RangeReading>,
     /// The row of the front sonar.
     front: usize,
     guidance: Writer<GuidanceSample>,
@@ -103,7 +103,7 @@ impl Process for Shell {
         }
         Ok(Self {
             pose: context.reader(&POSE)?,
-            ranges: context.slice_reader(&RANGES)?,
+            ranges: context.reader(&RANGES)?,
             front,
             guidance: context.writer(&GUIDANCE)?,
             saved: context.take_saved(),
@@ -118,7 +118,7 @@ impl Process for Shell {
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {
-        while let Some(pose) = self.pose.take()? {
+        while let Some(pose) = self.pose.next_sample()? {
             self.progress = Progress::of(&pose.stamp);
             self.poses.push_back(pose);
             if self.poses.len() > MOST_POSES {
@@ -134,7 +134,7 @@ impl Process for Shell {
         while let Some(pose) = self.poses.front().copied() {
             // Pose and readings of a tick come in any order.
             while self.newest.is_none_or(|(tick, _)| tick < pose.stamp.tick) {
-                let Some(ranges) = self.ranges.take()? else {
+                let Some(ranges) = self.ranges.next_slice()? else {
                     return Ok(self.progress);
                 };
                 let front = ranges.iter().find(|it| usize::from(it.sensor) == self.front);

@@ -178,7 +178,7 @@ impl Report {
 
 #[cfg(test)]
 mod tests {
-    use common::topics::{self, AnyTopic as _};
+    use common::topics;
 
     use super::*;
 

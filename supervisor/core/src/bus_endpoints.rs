@@ -7,7 +7,7 @@ use std::{
 };
 
 use common::{
-    bus::{Bus, BusError, Reader, SliceWriter, Writer},
+    bus::{Bus, BusError, Reader, Writer},
     clock::MissionTime,
     samples::{
         DeathSample, DirectiveSample, PoseSample, RequestAnswer, RequestSample, RosterEntry,
@@ -31,7 +31,7 @@ pub(crate) struct BusEndpoints {
     target: Writer<TargetSample>,
     directive: Writer<DirectiveSample>,
     tick_limit: Writer<TickLimitSample>,
-    roster: SliceWriter<RosterHeader, RosterEntry>,
+    roster: Writer<RosterHeader, RosterEntry>,
     deaths: Writer<DeathSample>,
     stalls: Writer<StallSample>,
     requests: Reader<RequestSample>,
@@ -92,7 +92,7 @@ impl BusEndpoints {
 
     /// The next request of an operator.
     pub(crate) fn take_request(&mut self) -> Result<Option<RequestSample>, BusError> {
-        self.requests.take()
+        self.requests.next_sample()
     }
 
     /// Note that the request `id` has this answer, which the roster has from now on.
@@ -122,13 +122,13 @@ impl BusEndpoints {
         time: MissionTime,
         directive: DirectiveSample,
         header: RosterHeader,
-        entries: Vec<RosterEntry>,
+        entries: &[RosterEntry],
     ) -> Result<(), BusError> {
         self.published = Some(Instant::now());
         self.directive.publish(tick, time, directive)?;
         let (last_request, answer) = self.last_request;
         let header = RosterHeader { last_request, answer: answer.into(), ..header };
-        self.roster.publish(tick, time, header, entries.into_iter())
+        self.roster.publish_slice(tick, time, header, entries)
     }
 
     /// Publish the limit of the link, as of `tick`.

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use common::{
-    bus::{Bus, BusError, Reader, SliceReader, Writers},
+    bus::{Bus, BusError, Reader, Writers},
     grid::{Applied, Replica},
     latency::Histogram,
     roster,
@@ -11,7 +11,7 @@ use common::{
         CommandSample, CommandState, ContactSample, FieldCell, FieldHeader, GridHeader,
         GuidanceSample, HealthSample, LinkSample, PoseSample, name_str,
     },
-    topics::{self, AnyTopic},
+    topics,
     waiter::Waiter,
 };
 
@@ -32,9 +32,9 @@ pub struct Observer {
     link: Reader<LinkSample>,
     pose: Reader<PoseSample>,
     contact: Reader<ContactSample>,
-    grid: SliceReader<GridHeader, u8>,
+    grid: Reader<GridHeader, u8>,
     guidance: Reader<GuidanceSample>,
-    field: SliceReader<FieldHeader, FieldCell>,
+    field: Reader<FieldHeader, FieldCell>,
     command: Reader<CommandSample>,
     writers: Writers,
     /// The data read so far.
@@ -86,9 +86,9 @@ impl Observer {
             link: bus.reader(&topics::LINK)?,
             pose: bus.reader(&topics::POSE)?,
             contact: bus.reader(&topics::CONTACT)?,
-            grid: bus.slice_reader(&topics::GRID)?,
+            grid: bus.reader(&topics::GRID)?,
             guidance: bus.reader(&topics::GUIDANCE)?,
-            field: bus.slice_reader(&topics::FIELD)?,
+            field: bus.reader(&topics::FIELD)?,
             command: bus.reader(&topics::COMMAND)?,
             writers: bus.writers().cloned().unwrap_or_default(),
             record,
@@ -100,7 +100,7 @@ impl Observer {
         // Only samples of the stages' own processes are read.
         self.writers.name(roster::named(&stages.roster()));
         let mut roster_changed = false;
-        while let Some(health) = self.health.take()? {
+        while let Some(health) = self.health.next_sample()? {
             roster_changed |= stages.on_health(&health);
             if name_str(&health.stage) == crate::stages::PLANNER {
                 self.record.planner = (health.stamp.generation, health.stamp.tick);
@@ -109,7 +109,7 @@ impl Observer {
         let record = &mut self.record;
         // The command of a tick is read before the samples it was computed from, so that these are in the record whenever
         // the command is.
-        while let Some(command) = self.command.take()? {
+        while let Some(command) = self.command.next_sample()? {
             stages.on_output(topics::COMMAND.spec().writer, command.stamp.tick);
             record.command = Some(command);
             record.commands += 1;
@@ -121,11 +121,11 @@ impl Observer {
                 record.arrival.get_or_insert(command);
             }
         }
-        while let Some(guidance) = self.guidance.take()? {
+        while let Some(guidance) = self.guidance.next_sample()? {
             stages.on_output(topics::GUIDANCE.spec().writer, guidance.stamp.tick);
             record.take_guidance(guidance);
         }
-        while let Some(grid) = self.grid.take()? {
+        while let Some(grid) = self.grid.next_slice()? {
             stages.on_output(topics::GRID.spec().writer, grid.header().stamp.tick);
             let epoch = grid.header().epoch;
             let applied = record.grid.apply(&grid.header().part, &grid);
@@ -134,22 +134,22 @@ impl Observer {
                 (record.grid_epoch, record.grid_changed) = (epoch, !same);
             }
         }
-        while let Some(field) = self.field.take()? {
+        while let Some(field) = self.field.next_slice()? {
             record.field.apply(&field.header().part, &field);
         }
-        while let Some(pose) = self.pose.take()? {
+        while let Some(pose) = self.pose.next_sample()? {
             stages.on_output(topics::POSE.spec().writer, pose.stamp.tick);
             record.pose = Some(pose);
             long_record::push(&mut record.poses, pose);
         }
         // Poses are computed from the link's samples, so these are read last.
-        while let Some(contact) = self.contact.take()? {
+        while let Some(contact) = self.contact.next_sample()? {
             if record.contacts.len() == MOST_CONTACTS {
                 record.contacts.pop_front();
             }
             record.contacts.push_back(contact.stamp.tick);
         }
-        while let Some(link) = self.link.take()? {
+        while let Some(link) = self.link.next_sample()? {
             stages.on_output(topics::LINK.spec().writer, link.stamp.tick);
             record.latencies.insert(link.stamp.generation, link);
             record.link = Some(link);

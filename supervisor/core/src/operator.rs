@@ -20,7 +20,7 @@ use common::{
     },
     start::StageError,
     stop_socket::{self, Answer, Request},
-    topics::{self, AnyTopic as _},
+    topics,
     waiter::Waiter,
 };
 use link::stop_guard;
@@ -174,7 +174,7 @@ fn await_rest(robot: &RobotName) -> Result<(), OperatorError> {
         if newest.as_ref().is_some_and(rests) {
             return Ok(());
         }
-        waiter.wait(topics::LINK.restated_every())?;
+        waiter.wait(topics::LINK.spec().restated_every())?;
     }
     let seen = match newest {
         None => "its link publishes nothing; the robot's timed command has ended".to_owned(),

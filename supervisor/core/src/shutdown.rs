@@ -2,10 +2,7 @@
 
 use std::time::Duration;
 
-use common::{
-    samples::Action,
-    topics::{self, AnyTopic as _},
-};
+use common::{samples::Action, topics};
 
 use crate::{
     domain::DomainLock,

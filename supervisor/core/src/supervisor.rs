@@ -360,7 +360,7 @@ impl<'a> Supervisor<'a> {
             ..RosterHeader::default()
         };
         let entries = self.stages.roster();
-        self.bus.publish_state(tick, time, directive, header, entries)?;
+        self.bus.publish_state(tick, time, directive, header, &entries)?;
         Ok(())
     }
 

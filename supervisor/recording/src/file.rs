@@ -12,7 +12,7 @@ use common::{
     bus::Stamp,
     file::FileError,
     mission::Mission,
-    topics::{EncodedTopic, Spec},
+    topics::{AnyTopic, Spec},
 };
 use mcap::{
     Compression, WriteOptions, Writer,
@@ -51,7 +51,7 @@ impl RecordingFile {
     /// its name when all of that is written, so a file of this name can always be read.
     pub(crate) fn create(
         path: &Path,
-        topics: &[&'static dyn EncodedTopic],
+        topics: &[&'static dyn AnyTopic],
         mission: Option<&Mission>,
         about: BTreeMap<String, String>,
     ) -> Result<Self, RecordingError> {

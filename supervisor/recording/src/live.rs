@@ -12,12 +12,12 @@ use std::{
 };
 
 use common::{
-    bus::{Bus, BusError, EncodedReader, Logged},
+    bus::{AnyReader, Bus, BusError, Logged},
     domain::{Domain, RobotName},
     follower::{Event, Follower},
     mission::Mission,
     run::Run,
-    topics::{self, EncodedTopic},
+    topics::{self, AnyTopic},
 };
 use foxglove::{
     ChannelBuilder, Context, FoxgloveError, RawChannel, Schema, WebSocketServer,
@@ -55,11 +55,11 @@ pub struct Live {
     server: WebSocketServerHandle,
 }
 
-type Readers = Vec<(&'static str, Box<dyn EncodedReader>)>;
+type Readers = Vec<(&'static str, Box<dyn AnyReader>)>;
 
 /// The topics that are served, which are those that are recorded by default.
-fn served() -> impl Iterator<Item = &'static dyn EncodedTopic> {
-    let all = topics::ENCODED.iter().copied();
+fn served() -> impl Iterator<Item = &'static dyn AnyTopic> {
+    let all = topics::TABLE.iter().copied();
     all.filter(|topic| matches!(topic.spec().logged, Logged::Yes))
 }
 
@@ -93,7 +93,7 @@ impl Live {
     /// Serve the robot of `domain`, from run to run, until `ended` returns true.
     pub fn serve(&self, domain: &Domain, ended: &mut dyn FnMut() -> bool) {
         let open = |bus: &Bus| -> Result<Readers, BusError> {
-            served().map(|topic| Ok((topic.spec().name, topic.encoded_reader(bus)?))).collect()
+            served().map(|topic| Ok((topic.spec().name, topic.recorder_reader(bus)?))).collect()
         };
         let mut follower = Follower::new(domain.clone(), "foxglove", &topics::LINK, open);
         let mut serving = None;
@@ -161,7 +161,7 @@ impl Serving {
         };
         let mut message = Vec::new();
         for (topic, reader) in readers {
-            while reader.take(&mut message)?.is_some() {
+            while reader.next_message(&mut message)?.is_some() {
                 send(topic, &message);
                 // A message that does not match its topic is not drawn.
                 let _ = drawn.take(topic, &message, now_ns(), &mut send);

@@ -76,7 +76,7 @@ impl Losses {
 
 #[cfg(test)]
 mod tests {
-    use common::topics::{AnyTopic as _, POSE};
+    use common::topics::POSE;
 
     use super::*;
 

@@ -10,10 +10,9 @@ use std::{
 };
 
 use common::{
-    bus::{Layout, Payload, SliceTopic, Stamped, Topic, decode_sample, decode_slice},
+    bus::{Layout, Payload, Stamped, Topic, decode_sample, decode_slice},
     file::FileError,
     run::Run,
-    topics::AnyTopic,
 };
 use mcap::{
     McapError,
@@ -178,7 +177,7 @@ impl Recording {
     /// The headers and slices of `topic`, in the order of the file.
     pub fn slices<H: Payload + Stamped + Layout, T: Payload + Layout>(
         &self,
-        topic: &'static SliceTopic<H, T>,
+        topic: &'static Topic<H, T>,
     ) -> Result<
         impl Iterator<Item = Result<SliceSample<H, T>, RecordingError>> + use<H, T>,
         RecordingError,

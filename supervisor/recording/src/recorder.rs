@@ -12,13 +12,13 @@ use std::{
 };
 
 use common::{
-    bus::{Bus, BusError, EncodedReader, Logged},
+    bus::{AnyReader, Bus, BusError, Logged},
     clock::MissionClock,
     domain::Domain,
     follower::{Event, Follower},
     mission::Mission,
     run::{self, Run},
-    topics::{self, EncodedTopic},
+    topics::{self, AnyTopic},
 };
 
 use crate::{
@@ -44,7 +44,7 @@ pub struct Options {
     /// The file. The file of the robot's next run is called `F-2.mcap`.
     pub out: PathBuf,
     /// The topics; without names, those that the table logs.
-    pub topics: Option<Vec<&'static dyn EncodedTopic>>,
+    pub topics: Option<Vec<&'static dyn AnyTopic>>,
     /// Whether topics that the table logs only with fields are recorded too.
     pub fields: bool,
     /// The directory of the one run that is recorded; none to find it and to follow the robot from run to run.
@@ -54,14 +54,14 @@ pub struct Options {
 }
 
 impl Options {
-    fn topics(&self) -> Vec<&'static dyn EncodedTopic> {
-        let logged = |topic: &&&'static dyn EncodedTopic| match topic.spec().logged {
+    fn topics(&self) -> Vec<&'static dyn AnyTopic> {
+        let logged = |topic: &&&'static dyn AnyTopic| match topic.spec().logged {
             Logged::Yes => true,
             Logged::WithFields => self.fields,
         };
         match &self.topics {
             Some(topics) => topics.clone(),
-            None => topics::ENCODED.iter().filter(logged).copied().collect(),
+            None => topics::TABLE.iter().filter(logged).copied().collect(),
         }
     }
 }
@@ -76,7 +76,7 @@ pub enum Happened<'a> {
 }
 
 /// The readers of one bus.
-type Readers = Vec<(&'static dyn EncodedTopic, Box<dyn EncodedReader>)>;
+type Readers = Vec<(&'static dyn AnyTopic, Box<dyn AnyReader>)>;
 
 /// Record until `stop` returns true, or a single run until its end.
 pub fn record(
@@ -86,13 +86,13 @@ pub fn record(
 ) -> Result<(), RecordingError> {
     let chosen = options.topics();
     let open = |bus: &Bus| -> Result<Readers, BusError> {
-        let read = |topic: &&'static dyn EncodedTopic| Ok((*topic, topic.encoded_reader(bus)?));
+        let read = |topic: &&'static dyn AnyTopic| Ok((*topic, topic.recorder_reader(bus)?));
         chosen.iter().map(read).collect()
     };
     let domain = options.domain.clone();
     // The recorder wakes at the end of a tick, and at the start of a generation, which may be killed soon.
     let mut follower = Follower::new(domain, "recorder", &topics::LINK, open)
-        .also_on([&topics::INPUTS as &'static dyn topics::AnyTopic]);
+        .also_on([&topics::INPUTS as &'static dyn AnyTopic]);
     let mut current: Option<CurrentRun> = None;
     let mut files = 0;
     let mut supervisor = None;
@@ -197,7 +197,7 @@ struct CurrentRun {
 impl CurrentRun {
     fn begin(
         options: &Options,
-        topics: &[&'static dyn EncodedTopic],
+        topics: &[&'static dyn AnyTopic],
         path: &Path,
         directory: Option<PathBuf>,
     ) -> Result<Self, RecordingError> {
@@ -240,7 +240,7 @@ impl CurrentRun {
     fn go_on_in(
         &mut self,
         path: &Path,
-        topics: &[&'static dyn EncodedTopic],
+        topics: &[&'static dyn AnyTopic],
     ) -> Result<PathBuf, RecordingError> {
         let (mission, about) = (self.mission.as_ref(), self.about.clone());
         let next = RecordingFile::create(path, topics, mission, about)?;
@@ -258,7 +258,7 @@ impl CurrentRun {
         let file = &mut self.file;
         for (topic, reader) in readers {
             let spec = topic.spec();
-            while let Some(stamp) = reader.take(&mut self.message)? {
+            while let Some(stamp) = reader.next_message(&mut self.message)? {
                 if !self.losses.came(spec, &stamp, &self.message) {
                     continue;
                 }

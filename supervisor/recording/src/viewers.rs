@@ -11,7 +11,7 @@ use common::{
     samples::{
         GridHeader, PoseSample, RangeReading, RangeStatus, RangesHeader, ScanHeader, TargetSample,
     },
-    topics::{self, AnyTopic as _},
+    topics,
 };
 use foxglove::{
     Decode as _, Encode, Schema,

@@ -7,7 +7,7 @@ use std::{
 };
 
 use common::{
-    bus::{Bus, BusError, Reader, SliceReader, Writer},
+    bus::{Bus, BusError, Reader, Writer},
     domain::{Domain, RobotName},
     follower::{Event, Follower},
     kinematics::Pose2,
@@ -78,14 +78,14 @@ pub enum BridgeError {
 /// The readers of a robot's bus.
 struct Readers {
     pose: Reader<PoseSample>,
-    ranges: SliceReader<RangesHeader, RangeReading>,
-    scan: SliceReader<ScanHeader, f32>,
+    ranges: Reader<RangesHeader, RangeReading>,
+    scan: Reader<ScanHeader, f32>,
     target: Reader<TargetSample>,
-    grid: SliceReader<GridHeader, u8>,
-    field: SliceReader<FieldHeader, FieldCell>,
+    grid: Reader<GridHeader, u8>,
+    field: Reader<FieldHeader, FieldCell>,
     command: Reader<CommandSample>,
     power: Reader<PowerSample>,
-    roster: SliceReader<RosterHeader, RosterEntry>,
+    roster: Reader<RosterHeader, RosterEntry>,
     deaths: Reader<DeathSample>,
     stalls: Reader<StallSample>,
     requests: Reader<RequestSample>,
@@ -99,14 +99,14 @@ impl Readers {
         let is_placed = accepted.contains(&Accept::Pose);
         Ok(Self {
             pose: bus.reader(&topics::POSE)?,
-            ranges: bus.slice_reader(&topics::RANGES)?,
-            scan: bus.slice_reader(&topics::SCAN)?,
+            ranges: bus.reader(&topics::RANGES)?,
+            scan: bus.reader(&topics::SCAN)?,
             target: bus.reader(&topics::TARGET)?,
-            grid: bus.slice_reader(&topics::GRID)?,
-            field: bus.slice_reader(&topics::FIELD)?,
+            grid: bus.reader(&topics::GRID)?,
+            field: bus.reader(&topics::FIELD)?,
             command: bus.reader(&topics::COMMAND)?,
             power: bus.reader(&topics::POWER)?,
-            roster: bus.slice_reader(&topics::ROSTER)?,
+            roster: bus.reader(&topics::ROSTER)?,
             deaths: bus.reader(&topics::DEATHS)?,
             stalls: bus.reader(&topics::STALLS)?,
             requests: bus.reader(&topics::REQUESTS)?,
@@ -241,48 +241,48 @@ impl Bridge {
         };
         let now_ns = now_ns();
         let sink = &mut |id: Id, payload: Vec<u8>| endpoints.publish(id, payload);
-        while let Some(pose) = readers.pose.take()? {
+        while let Some(pose) = readers.pose.next_sample()? {
             shown.pose(&pose, now_ns, sink);
         }
-        while let Some(ranges) = readers.ranges.take()? {
+        while let Some(ranges) = readers.ranges.next_slice()? {
             shown.ranges(&ranges, now_ns, sink);
         }
-        while let Some(scan) = readers.scan.take()? {
+        while let Some(scan) = readers.scan.next_slice()? {
             shown.scan(scan.header(), &scan, now_ns, sink);
         }
-        while let Some(target) = readers.target.take()? {
+        while let Some(target) = readers.target.next_sample()? {
             shown.target(&target);
             goals.target(&target);
         }
-        while let Some(command) = readers.command.take()? {
+        while let Some(command) = readers.command.next_sample()? {
             goals.command(&command);
         }
-        while let Some(grid) = readers.grid.take()? {
+        while let Some(grid) = readers.grid.next_slice()? {
             shown.grid(grid.header(), &grid, now_ns, sink);
         }
-        while let Some(field) = readers.field.take()? {
+        while let Some(field) = readers.field.next_slice()? {
             shown.field(field.header(), &field, now_ns, sink);
         }
-        while let Some(power) = readers.power.take()? {
+        while let Some(power) = readers.power.next_sample()? {
             shown.power(&power, now_ns, sink);
         }
-        while let Some(roster) = readers.roster.take()? {
+        while let Some(roster) = readers.roster.next_slice()? {
             shown.roster(&roster);
         }
-        while let Some(death) = readers.deaths.take()? {
+        while let Some(death) = readers.deaths.next_sample()? {
             shown.death(&death);
         }
-        while readers.stalls.take()?.is_some() {
+        while readers.stalls.next_sample()?.is_some() {
             self.recoveries += 1;
         }
-        while let Some(request) = readers.requests.take()? {
+        while let Some(request) = readers.requests.next_sample()? {
             if RequestKind::from_byte(request.kind) == RequestKind::Stop
                 && let Some(stops) = &mut self.stands_for_cancel
             {
                 *stops += 1;
             }
         }
-        while let Some(link) = readers.link.take()? {
+        while let Some(link) = readers.link.next_sample()? {
             shown.link(&link);
         }
         readers.fixes.as_mut().map_or(Ok(()), |fixes| self.place(fixes))

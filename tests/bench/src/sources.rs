@@ -121,7 +121,7 @@ impl<'a> Source<'a> {
         poses: &mut Reader<PoseSample>,
         writers: &mut Writers,
     ) -> Result<(), BenchError> {
-        while let Some(pose) = poses.take()? {
+        while let Some(pose) = poses.next_sample()? {
             self.poses.push_back(pose);
         }
         self.read_truth().map_err(system("read the ground truth of the run"))?;

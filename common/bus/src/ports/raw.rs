@@ -34,8 +34,9 @@ use iceoryx2::{
 
 use crate::{
     error::{BusError, opening, reading, refused, taking},
+    layout::type_name,
     leftovers::process_of,
-    payload::{Payload, type_name},
+    payload::{Payload, has_slice},
     spec::{Limits, Spec},
 };
 
@@ -114,7 +115,8 @@ impl Type {
     }
 }
 
-/// The types of a topic's samples: a header and elements. The samples of a topic of structs have no header and one element.
+/// The types of a topic's samples for the middleware: a header and elements. A sample without a slice is one element, and has no
+/// header.
 #[derive(Clone, Copy, Debug)]
 pub struct Carried {
     header: Type,
@@ -123,18 +125,13 @@ pub struct Carried {
 }
 
 impl Carried {
-    /// A topic of structs.
-    pub(crate) fn one<P: Payload>() -> Self {
-        Self {
-            header: Type::of::<()>(),
-            element: Type::of::<P>(),
-            elements: TypeVariant::FixedSize,
-        }
-    }
-
-    /// A topic of headers with slices.
-    pub(crate) fn slice<H: Payload, T: Payload>() -> Self {
-        Self { header: Type::of::<H>(), element: Type::of::<T>(), elements: TypeVariant::Dynamic }
+    /// The types of headers `H` with slices of `E`.
+    pub(crate) fn of<H: Payload, E: Payload>() -> Self {
+        let (header, element, elements) = match has_slice::<E>() {
+            true => (Type::of::<H>(), Type::of::<E>(), TypeVariant::Dynamic),
+            false => (Type::of::<E>(), Type::of::<H>(), TypeVariant::FixedSize),
+        };
+        Self { header, element, elements }
     }
 }
 
@@ -283,7 +280,7 @@ impl RawPublisher {
         elements: usize,
         fill: &mut dyn FnMut(Loan<'_>) -> bool,
     ) -> Result<(), BusError> {
-        // SAFETY: for a topic of structs, `elements` is 1.
+        // SAFETY: `elements` is 1 where samples have no slice.
         let mut sample =
             unsafe { self.loan_custom_payload(elements) }.map_err(refused("publish on", topic))?;
         let header = ptr::from_mut(sample.user_header_mut());
@@ -298,7 +295,7 @@ impl RawPublisher {
 
 impl RawSubscriber {
     #[inline(never)]
-    pub(super) fn take(&self, spec: &Spec) -> Result<Option<RawSample>, BusError> {
+    pub(super) fn receive_sample(&self, spec: &Spec) -> Result<Option<RawSample>, BusError> {
         let sample = self.receive().map_err(taking(spec))?;
         Ok(sample.map(RawSample::from))
     }

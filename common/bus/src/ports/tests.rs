@@ -6,7 +6,7 @@ use iceoryx2::prelude::{ServiceName, ZeroCopySend};
 
 use super::*;
 use crate::{
-    AnyTopic, Bus, Logged, Rate, SliceTopic, Stamp, Stamped, Topic,
+    AnyTopic, Bus, Logged, Rate, Stamp, Stamped, Topic,
     bus_instance::BusInstance,
     clock::MissionTime,
     domain::{Domain, SHARED_MEMORY},
@@ -59,8 +59,8 @@ const fn spec(name: &'static str) -> Spec {
 }
 
 static STRUCTS: Topic<Test> = Topic::new(&spec("structs"));
-static SLICES: SliceTopic<Test, Cell> = SliceTopic::new(&spec("slices"));
-static BYTES: SliceTopic<Test, u8> = SliceTopic::new(&spec("bytes"));
+static SLICES: Topic<Test, Cell> = Topic::new(&spec("slices"));
+static BYTES: Topic<Test, u8> = Topic::new(&spec("bytes"));
 
 /// Run `test` on a bus of these topics, and remove the bus.
 fn with_bus(robot: &str, test: impl FnOnce(&Bus)) {
@@ -94,30 +94,30 @@ fn what_the_bus_writes_is_read_with_the_middlewares_own_types_and_the_reverse() 
         writer.publish(5, TIME, sent).unwrap();
         (sent.stamp.tick, sent.stamp.stamp_ns, sent.stamp.generation) = (5, 7, 3);
         assert_eq!(*typed.receive().unwrap().unwrap(), sent);
-        assert_eq!(reader.take().unwrap(), Some(sent));
+        assert_eq!(reader.next_sample().unwrap(), Some(sent));
         sent.small = 4;
         let publisher = structs.publisher_builder().create().unwrap();
         publisher.send_copy(sent).unwrap();
-        let (author, taken) = reader.take_with_author().unwrap().unwrap();
-        assert_eq!((author.process, taken), (std::process::id(), sent));
+        let taken = reader.next_slice().unwrap().unwrap();
+        assert_eq!((taken.author().process, *taken.header()), (std::process::id(), sent));
 
         let slices = bus.node.service_builder(&name("slices"));
         let slices = slices.publish_subscribe::<[Cell]>().user_header::<Test>().open().unwrap();
         let typed = slices.subscriber_builder().create().unwrap();
-        let mut reader = bus.slice_reader(&SLICES).unwrap();
+        let mut reader = bus.reader(&SLICES).unwrap();
         let cells = [1.0, 2.0, 3.0].map(|first| Cell { first, second: 8, third: -first });
         let mut writer = bus.slice_writer(&SLICES, 3, 4).unwrap();
-        writer.publish(5, TIME, sent, cells.into_iter()).unwrap();
+        writer.publish_slice(5, TIME, sent, &cells).unwrap();
         let sample = typed.receive().unwrap().unwrap();
         assert_eq!((sample.payload(), sample.user_header().rest), (&cells[..], 9));
-        let slice = reader.take().unwrap().unwrap();
+        let slice = reader.next_slice().unwrap().unwrap();
         assert_eq!((&*slice, slice.header().number), (&cells[..], 0.5));
         let publisher = slices.publisher_builder().initial_max_slice_len(2);
         let publisher = publisher.create().unwrap();
         let mut loan = publisher.loan_slice_uninit(2).unwrap();
         *loan.user_header_mut() = sent;
         loan.write_from_slice(&cells[1..]).send().unwrap();
-        let slice = reader.take().unwrap().unwrap();
+        let slice = reader.next_slice().unwrap().unwrap();
         assert_eq!((&*slice, *slice.header()), (&cells[1..], sent));
     });
 }
@@ -125,14 +125,14 @@ fn what_the_bus_writes_is_read_with_the_middlewares_own_types_and_the_reverse() 
 #[test]
 fn slices_of_any_length_up_to_the_longest_arrive_and_longer_ones_are_refused() {
     with_bus("slices", |bus| {
-        let mut reader = bus.slice_reader(&BYTES).unwrap();
+        let mut reader = bus.reader(&BYTES).unwrap();
         let mut writer = bus.slice_writer(&BYTES, 1, 3).unwrap();
         for sent in [&[][..], &[1], &[1, 2, 3]] {
-            writer.publish_slice_quietly(1, TIME, Test::default(), sent).unwrap();
-            assert_eq!(&*reader.take().unwrap().unwrap(), sent);
+            writer.publish_quietly(1, TIME, Test::default(), sent).unwrap();
+            assert_eq!(&*reader.next_slice().unwrap().unwrap(), sent);
         }
         let long = [0; 4];
-        let refused = writer.publish_slice_quietly(1, TIME, Test::default(), &long);
+        let refused = writer.publish_quietly(1, TIME, Test::default(), &long);
         assert!(matches!(refused, Err(BusError::Refused { topic: "bytes", .. })));
     });
 }
@@ -140,12 +140,12 @@ fn slices_of_any_length_up_to_the_longest_arrive_and_longer_ones_are_refused() {
 #[test]
 fn a_topic_is_not_opened_as_another_payload_or_another_shape() {
     with_bus("foreign", |bus| {
-        let as_cells = SliceTopic::<Test, Cell>::new(BYTES.spec());
-        let as_slices = SliceTopic::<Test, Test>::new(STRUCTS.spec());
+        let as_cells = Topic::<Test, Cell>::new(BYTES.spec());
+        let as_slices = Topic::<Test, Test>::new(STRUCTS.spec());
         let as_structs = Topic::<Test>::new(SLICES.spec());
         for error in [
-            bus.slice_reader(&as_cells).unwrap_err(),
-            bus.slice_reader(&as_slices).unwrap_err(),
+            bus.reader(&as_cells).unwrap_err(),
+            bus.reader(&as_slices).unwrap_err(),
             bus.reader(&as_structs).unwrap_err(),
         ] {
             assert!(matches!(error, BusError::Incompatible { .. }), "{error}");

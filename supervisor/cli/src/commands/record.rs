@@ -7,7 +7,7 @@ use common::{
     domain::{Domain, RobotName},
     signals::{SIGHUP, SIGINT, SIGTERM, Signals},
     start::become_child,
-    topics::{self, EncodedTopic},
+    topics::{self, AnyTopic},
 };
 use recording::{Options, recorder::Happened};
 
@@ -68,8 +68,8 @@ impl FromStr for DiskBudget {
     }
 }
 
-fn topic(name: &str) -> Result<&'static dyn EncodedTopic, String> {
-    let found = topics::ENCODED.iter().find(|topic| topic.spec().name == name);
+fn topic(name: &str) -> Result<&'static dyn AnyTopic, String> {
+    let found = topics::TABLE.iter().find(|topic| topic.spec().name == name);
     found.copied().ok_or_else(|| {
         format!("no topic is called {name:?}; `firsthand topic list` prints the table of topics")
     })

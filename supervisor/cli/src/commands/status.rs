@@ -132,7 +132,7 @@ fn print_one(arguments: &Arguments) -> Result<(), Failure> {
     let began = Instant::now();
     let (mut entries, mut link, mut power) = (None, None, None);
     let entries = loop {
-        entries = roster.samples.take()?.or(entries);
+        entries = roster.samples.next_slice()?.or(entries);
         link = links.newest()?.or(link);
         power = powers.newest()?.or(power);
         let lost = link.is_some_and(|link| link.connected == 0);

@@ -1,7 +1,7 @@
 //! `grid` and `pose` in, `guidance` out, the state saved before the guidance is published.
 
 use common::{
-    bus::{Reader, SliceReader, Writer},
+    bus::{Reader, Writer},
     samples::{GridHeader, GuidanceSample, PoseSample},
     saved::Saved,
     shell::{Context, Process, Progress, StageError},
@@ -18,7 +18,7 @@ const STATE_BYTES: usize = 256;
 /// The process of the planner `P`.
 #[derive(Debug)]
 pub struct Shell<P> {
-    grid: SliceReader<GridHeader, u8>,
+    grid: Reader<GridHeader, u8>,
     pose: Reader<PoseSample>,
     target: TargetReader,
     guidance: Writer<GuidanceSample>,
@@ -46,7 +46,7 @@ impl<P: Planner> Process for Shell<P> {
             tracing::info!(state = ?baseline.planner, "restored");
         }
         Ok(Self {
-            grid: context.slice_reader(&GRID)?,
+            grid: context.reader(&GRID)?,
             pose: context.reader(&POSE)?,
             target: TargetReader::open(context)?,
             guidance: context.writer(&GUIDANCE)?,
@@ -60,7 +60,7 @@ impl<P: Planner> Process for Shell<P> {
 
     fn turn(&mut self) -> Result<Progress, StageError> {
         let mut asked = false;
-        while let Some(grid) = self.grid.take()? {
+        while let Some(grid) = self.grid.next_slice()? {
             let header = grid.header();
             if !self.baseline.follow(header, &grid) {
                 tracing::warn!(version = header.part.version, "missed a grid version");

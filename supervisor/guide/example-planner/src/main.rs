@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use common::{
-    bus::{Reader, SliceReader, Writer},
+    bus::{Reader, Writer},
     grid::{Applied, CellState, Replica},
     samples::{GridHeader, GuidanceSample, GuidanceStatus, PoseSample, TargetSample},
     shell::{self, Context, Process, Progress, StageError},
@@ -17,7 +17,7 @@ use glam::DVec2;
 const AHEAD_M: f64 = 0.5;
 
 struct Planner {
-    grid: SliceReader<GridHeader, u8>,
+    grid: Reader<GridHeader, u8>,
     pose: Reader<PoseSample>,
     guidance: Writer<GuidanceSample>,
     followed: TargetReader,
@@ -37,7 +37,7 @@ impl Process for Planner {
 
     fn open(context: &mut Context) -> Result<Self, StageError> {
         Ok(Self {
-            grid: context.slice_reader(&GRID)?,
+            grid: context.reader(&GRID)?,
             pose: context.reader(&POSE)?,
             guidance: context.writer(&GUIDANCE)?,
             followed: TargetReader::open(context)?,
@@ -49,7 +49,7 @@ impl Process for Planner {
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {
-        while let Some(grid) = self.grid.take()? {
+        while let Some(grid) = self.grid.next_slice()? {
             let header = *grid.header();
             if self.map.apply(&header.part, &grid) == Applied::Missed {
                 continue; // The mapper publishes the whole map again within a second.

@@ -11,7 +11,7 @@ use std::{
 
 use axum::body::Bytes;
 use common::{
-    bus::{Bus, BusError, EncodedReader, SliceReader},
+    bus::{AnyReader, Bus, BusError, Reader},
     clock::MissionTime,
     domain::Domain,
     follower::{Event, Follower},
@@ -47,34 +47,34 @@ const PREVIEW_MOST_CELLS: usize = 512 * 512;
 
 struct Readers {
     /// The readers of [`Collector::TOPICS`].
-    messages: Vec<(&'static str, Box<dyn EncodedReader>)>,
+    messages: Vec<(&'static str, Box<dyn AnyReader>)>,
     /// The reader of the field, which is read only while somebody watches.
-    field: SliceReader<FieldHeader, FieldCell>,
+    field: Reader<FieldHeader, FieldCell>,
 }
 
 impl Readers {
     fn open(bus: &Bus) -> Result<Self, BusError> {
         let names = Collector::TOPICS.map(|topic| topic.spec().name);
         let found = names.into_iter().filter_map(|name| {
-            let mut all = topics::ENCODED.iter();
+            let mut all = topics::TABLE.iter();
             all.find(|topic| topic.spec().name == name).map(|topic| (name, topic))
         });
-        let messages = found.map(|(name, topic)| Ok((name, topic.encoded_reader(bus)?)));
+        let messages = found.map(|(name, topic)| Ok((name, topic.recorder_reader(bus)?)));
         Ok(Self {
             messages: messages.collect::<Result<_, BusError>>()?,
-            field: bus.slice_reader(&topics::FIELD)?,
+            field: bus.reader(&topics::FIELD)?,
         })
     }
 
     fn take(&mut self, collector: &mut Collector, watched: bool) -> Result<(), BusError> {
         let mut message = Vec::new();
         for (topic, reader) in &mut self.messages {
-            while reader.take(&mut message)?.is_some() {
+            while reader.next_message(&mut message)?.is_some() {
                 // A message that does not match its topic is not shown.
                 let _ = collector.take(topic, &message);
             }
         }
-        while let Some(field) = self.field.take()? {
+        while let Some(field) = self.field.next_slice()? {
             if watched {
                 collector.field(field.header(), &field);
             }

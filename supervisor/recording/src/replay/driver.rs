@@ -11,7 +11,7 @@ use common::{
     clock::{MissionTime, Pace},
     run::Run,
     samples::{DeathSample, HealthSample, HealthState, InputsHeader, name_str},
-    topics::{self, AnyTopic as _},
+    topics,
 };
 use supervisor::stages::{self, Stage};
 

@@ -11,7 +11,7 @@ use common::{
     clock::MissionTime,
     replay::{Beginning, Replay},
     run::Run,
-    topics::{self, AnyTopic},
+    topics,
 };
 use supervisor::stages::Stage;
 

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use common::{
-    bus::{AnyReader, Bus, BusError, Reader, SliceReader},
+    bus::{AnyReader, Bus, BusError, Reader},
     process_usage::Processes,
     samples::{
         CommandSample, DeathSample, FieldCell, FieldHeader, GridHeader, GuidanceSample, LinkSample,
@@ -20,10 +20,10 @@ use console::rates::TopicRates;
 const COUNT_FOR: Duration = Duration::from_secs(1);
 
 pub(super) struct Feed {
-    roster: SliceReader<RosterHeader, RosterEntry>,
+    roster: Reader<RosterHeader, RosterEntry>,
     pose: Reader<PoseSample>,
-    grid: SliceReader<GridHeader, u8>,
-    field: SliceReader<FieldHeader, FieldCell>,
+    grid: Reader<GridHeader, u8>,
+    field: Reader<FieldHeader, FieldCell>,
     target: Reader<TargetSample>,
     guidance: Reader<GuidanceSample>,
     command: Reader<CommandSample>,
@@ -49,7 +49,7 @@ impl Feed {
         let now = Instant::now();
         let first_outputs = stages::TABLE.iter().filter_map(|stage| {
             let first = stage.wiring.outputs.first()?.spec().name;
-            let mut all = topics::READABLE.iter();
+            let mut all = topics::TABLE.iter();
             Some((stage.name, all.find(|topic| topic.spec().name == first)?))
         });
         let outputs = first_outputs.map(|(stage, topic)| {
@@ -61,10 +61,10 @@ impl Feed {
             })
         });
         Ok(Self {
-            roster: bus.slice_reader(&topics::ROSTER)?,
+            roster: bus.reader(&topics::ROSTER)?,
             pose: bus.reader(&topics::POSE)?,
-            grid: bus.slice_reader(&topics::GRID)?,
-            field: bus.slice_reader(&topics::FIELD)?,
+            grid: bus.reader(&topics::GRID)?,
+            field: bus.reader(&topics::FIELD)?,
             target: bus.reader(&topics::TARGET)?,
             guidance: bus.reader(&topics::GUIDANCE)?,
             command: bus.reader(&topics::COMMAND)?,
@@ -80,13 +80,13 @@ impl Feed {
 
     /// Bring `view` up to date.
     pub(super) fn take(&mut self, view: &mut View) -> Result<(), BusError> {
-        while let Some(pose) = self.pose.take()? {
+        while let Some(pose) = self.pose.next_sample()? {
             view.on_pose(pose);
         }
-        while let Some(grid) = self.grid.take()? {
+        while let Some(grid) = self.grid.next_slice()? {
             view.grid.apply(&grid.header().part, &grid);
         }
-        while let Some(field) = self.field.take()? {
+        while let Some(field) = self.field.next_slice()? {
             view.field.apply(&field.header().part, &field);
         }
         if let Some(target) = self.target.newest()? {
@@ -97,14 +97,14 @@ impl Feed {
         view.command = self.command.newest()?.or(view.command);
         view.link = self.link.newest()?.or(view.link);
         view.power = self.power.newest()?.or(view.power);
-        while let Some(death) = self.deaths.take()? {
+        while let Some(death) = self.deaths.next_sample()? {
             view.on_event(words::death(&death));
         }
-        while let Some(stall) = self.stalls.take()? {
+        while let Some(stall) = self.stalls.next_sample()? {
             view.on_event(words::stall(&stall));
         }
         let mut roster = None;
-        while let Some(newest) = self.roster.take()? {
+        while let Some(newest) = self.roster.next_slice()? {
             roster = Some(newest);
         }
         if let Some(roster) = roster {
@@ -129,7 +129,7 @@ impl Feed {
         let now = Instant::now();
         let due = now.saturating_duration_since(self.counted) >= COUNT_FOR;
         for output in &mut self.outputs {
-            while let Some(sample) = output.reader.take()? {
+            while let Some(sample) = output.reader.next_sample()? {
                 output.rates.add(sample.author(), *sample.stamp(), now);
             }
             if due {

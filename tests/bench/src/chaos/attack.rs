@@ -9,7 +9,7 @@ use common::{
     clock::MissionTime,
     ground_truth::GroundTruthTick,
     samples::{HealthState, Order, PoseSample, RosterEntry, StageState, name_str},
-    topics::{self, AnyTopic as _, SUPERVISOR},
+    topics::{self, SUPERVISOR},
 };
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
@@ -189,7 +189,7 @@ impl Attack {
         subscriptions: &mut Subscriptions,
         report: &mut Report,
     ) -> Result<(), BenchError> {
-        while let Some(death) = subscriptions.deaths.take()? {
+        while let Some(death) = subscriptions.deaths.next_sample()? {
             let (stage, generation) = (name_str(&death.stage), death.generation);
             let mut pending = self.pending.iter_mut();
             if let Some(recovery) = pending
@@ -198,7 +198,7 @@ impl Attack {
                 recovery.noticed();
             }
         }
-        while let Some(entries) = subscriptions.roster.samples.take()? {
+        while let Some(entries) = subscriptions.roster.samples.next_slice()? {
             self.driving = Order::from_byte(entries.header().order) == Order::Drive;
             self.supervisor = entries.header().supervisor_pid;
             self.entries = entries.to_vec();
@@ -213,12 +213,12 @@ impl Attack {
                 }
             }
         }
-        while let Some(health) = subscriptions.health.take()? {
+        while let Some(health) = subscriptions.health.next_sample()? {
             if HealthState::from_byte(health.state) == HealthState::Ready {
                 self.on_sign(name_str(&health.stage), health.stamp.generation, true, report);
             }
         }
-        while let Some(sample) = subscriptions.wheels.take()? {
+        while let Some(sample) = subscriptions.wheels.next_sample()? {
             self.time = Some(sample.stamp.time());
             if sample.left_counts_per_s == 0 && sample.right_counts_per_s == 0 {
                 self.pending.iter_mut().for_each(PendingRecovery::rests);
@@ -226,13 +226,13 @@ impl Attack {
             let writer = topics::WHEELS.spec().writer;
             self.on_sign(writer, sample.stamp.generation, false, report);
         }
-        while let Some(sample) = subscriptions.pose.take()? {
+        while let Some(sample) = subscriptions.pose.next_sample()? {
             let writer = topics::POSE.spec().writer;
             self.on_sign(writer, sample.stamp.generation, false, report);
             self.pose = Some(sample);
         }
         for (writer, reader) in &mut subscriptions.outputs {
-            while let Some(sample) = reader.take()? {
+            while let Some(sample) = reader.next_sample()? {
                 self.on_sign(writer, sample.stamp().generation, false, report);
                 if *writer == topics::COMMAND.spec().writer {
                     self.on_supervisor_sign(false, report);

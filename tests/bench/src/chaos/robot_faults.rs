@@ -203,7 +203,7 @@ impl Observed {
     }
 
     fn hear(&mut self, link: &mut Reader<LinkSample>) -> Result<(), BenchError> {
-        while let Some(sample) = link.take()? {
+        while let Some(sample) = link.next_sample()? {
             self.link = Some(sample);
         }
         Ok(())

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use common::{
-    bus::{AnyReader, Bus, BusError, ReadableTopic, Reader},
+    bus::{AnyReader, AnyTopic, Bus, BusError, Reader},
     domain::Domain,
     roster::Roster,
     samples::{DeathSample, HealthSample, PoseSample, RosterEntry, RosterHeader, WheelSample},
@@ -34,7 +34,7 @@ impl Subscriptions {
         roster.waiter.on(bus.wakeup(&topics::DEATHS)?);
         roster.waiter.on(bus.wakeup(&topics::HEALTH)?);
         roster.waiter.on(bus.wakeup(&topics::COMMAND)?);
-        let outputs: [&dyn ReadableTopic; 3] = [&topics::GRID, &topics::GUIDANCE, &topics::COMMAND];
+        let outputs: [&dyn AnyTopic; 3] = [&topics::GRID, &topics::GUIDANCE, &topics::COMMAND];
         let outputs = outputs.iter().map(|it| Ok((it.spec().writer, it.any_reader(&bus)?)));
         let mut subscriptions = Self {
             roster,

@@ -33,12 +33,12 @@ pub fn run(robot: &RobotName, supervisor: u32) -> Result<(), BenchError> {
     become_child("consumer", supervisor)?;
     let domain = Domain::of(robot.clone());
     let mut follower = Follower::new(domain, "consumer", &topics::GRID, |bus| {
-        Ok((bus.slice_reader(&topics::GRID)?, bus.slice_reader(&topics::FIELD)?))
+        Ok((bus.reader(&topics::GRID)?, bus.reader(&topics::FIELD)?))
     });
     while !terminated.came() {
         if let Event::Samples((grids, fields)) = follower.wait(LOOK_EVERY)? {
-            while grids.take()?.is_some() {}
-            while fields.take()?.is_some() {}
+            while grids.next_slice()?.is_some() {}
+            while fields.next_slice()?.is_some() {}
         }
     }
     Ok(())

@@ -6,14 +6,14 @@
 use std::time::{Duration, Instant};
 
 use common::{
-    bus::{Author, Bus, BusError},
+    bus::{Author, Bus, BusError, Payload, Stamped, Topic},
     clock::{MissionTime, monotonic_ns},
     domain::{Domain, RobotName},
     latency::Histogram,
-    samples::{CommandSample, GridHeader, GuidanceSample, PoseSample, WheelSample},
+    samples::WheelSample,
     signals::{SIGTERM, Signals},
     start::become_child,
-    topics::{self, AnyTopic},
+    topics,
     waiter::Waiter,
 };
 use supervisor::{
@@ -73,7 +73,7 @@ pub fn measure(
                 start.publish(trip, MissionTime::default(), WheelSample::default())?;
             }
             waiter.wait(if trip < WARM_UP { SEND_AGAIN } else { LOST })?;
-            while let Some(command) = end.take()? {
+            while let Some(command) = end.next_sample()? {
                 arrived |= command.stamp.tick == trip;
             }
         }
@@ -111,61 +111,31 @@ pub fn run_forwarder(robot: &RobotName, place: &str, supervisor: u32) -> Result<
 /// Forwards all new samples.
 type Forward = Box<dyn FnMut() -> Result<(), BusError>>;
 
-/// A closure that gives, for each sample from `$from`, what `$publish` publishes on `$to`.
-macro_rules! forward {
-    ($from:expr, $to:expr, |$sample:ident, $writer:ident| $publish:expr) => {{
-        let (mut from, mut $writer) = ($from, $to);
-        Box::new(move || {
-            while let Some($sample) = from.take()? {
-                $publish?;
-            }
-            Ok(())
-        })
-    }};
+/// Publishes an empty sample on `to` for each sample of `from`, which wakes the process.
+fn forward<H: Stamped, E: Payload, G: Stamped, F: Payload>(
+    bus: &Bus,
+    waiter: &mut Waiter,
+    from: &'static Topic<H, E>,
+    to: &'static Topic<G, F>,
+) -> Result<Forward, BusError> {
+    let (mut reader, mut writer) = (bus.reader(from)?, bus.slice_writer(to, 1, CELLS)?);
+    waiter.on(bus.wakeup(from)?);
+    Ok(Box::new(move || {
+        while let Some(sample) = reader.next_slice()? {
+            let tick = sample.header().stamp().tick;
+            writer.publish_slice(tick, MissionTime::default(), G::default(), &[])?;
+        }
+        Ok(())
+    }))
 }
 
 fn forwarder(bus: &Bus, place: &str, waiter: &mut Waiter) -> Result<Forward, BenchError> {
-    let now = MissionTime::default();
-    let (wakes, forward): (&dyn AnyTopic, Forward) = match PLACES
-        .iter()
-        .position(|name| *name == place)
-    {
-        Some(0) => (
-            &topics::WHEELS,
-            forward!(bus.reader(&topics::WHEELS)?, bus.writer(&topics::POSE, 1)?, |sample, to| {
-                to.publish(sample.stamp.tick, now, PoseSample::default())
-            }),
-        ),
-        Some(1) => (
-            &topics::POSE,
-            forward!(
-                bus.reader(&topics::POSE)?,
-                bus.slice_writer(&topics::GRID, 1, CELLS)?,
-                |sample, to| {
-                    to.publish(sample.stamp.tick, now, GridHeader::default(), std::iter::empty())
-                }
-            ),
-        ),
-        Some(2) => (
-            &topics::GRID,
-            forward!(
-                bus.slice_reader(&topics::GRID)?,
-                bus.writer(&topics::GUIDANCE, 1)?,
-                |sample, to| {
-                    to.publish(sample.header().stamp.tick, now, GuidanceSample::default())
-                }
-            ),
-        ),
-        Some(_) => (
-            &topics::GUIDANCE,
-            forward!(
-                bus.reader(&topics::GUIDANCE)?,
-                bus.writer(&topics::COMMAND, 1)?,
-                |sample, to| { to.publish(sample.stamp.tick, now, CommandSample::default()) }
-            ),
-        ),
+    use topics::{COMMAND, GRID, GUIDANCE, POSE, WHEELS};
+    Ok(match PLACES.iter().position(|name| *name == place) {
+        Some(0) => forward(bus, waiter, &WHEELS, &POSE),
+        Some(1) => forward(bus, waiter, &POSE, &GRID),
+        Some(2) => forward(bus, waiter, &GRID, &GUIDANCE),
+        Some(_) => forward(bus, waiter, &GUIDANCE, &COMMAND),
         None => return Err(BenchError::Place(place.to_owned())),
-    };
-    waiter.on(bus.wakeup(wakes)?);
-    Ok(forward)
+    }?)
 }

@@ -98,7 +98,7 @@ fn request_fault(
     requests.publish(0, MissionTime::default(), request)?;
     let began = Instant::now();
     loop {
-        while let Some(beat) = health.take()? {
+        while let Some(beat) = health.next_sample()? {
             if name_str(&beat.stage) == stage && beat.last_fault == request.id {
                 return Ok(Some(FaultAnswer::from_byte(beat.fault_answer)));
             }

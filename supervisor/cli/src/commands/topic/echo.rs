@@ -2,7 +2,6 @@
 
 use clap::Args;
 use common::{
-    bus::ReadableTopic,
     domain::{Domain, RobotName},
     follower::{Event, Follower},
     topics::{self, AnyTopic},
@@ -51,15 +50,16 @@ pub(super) fn main(arguments: &Arguments) -> Result<(), Failure> {
             Event::Samples(samples) => {
                 while left > 0
                     && !stream.has_ended()
-                    && let Some(sample) = samples.take()?
+                    && let Some(sample) = samples.next_sample()?
                 {
-                    let text = if arguments.json {
-                        sample_text::json(&*sample)? + "\n"
-                    } else {
-                        sample_text::text(&*sample, arguments.whole) + "---\n"
-                    };
+                    let fields = sample_text::fields(sample.value(), sample.elements());
                     // The writer may need the sample's place while a slow reader takes the text.
                     drop(sample);
+                    let text = if arguments.json {
+                        sample_text::json(fields)? + "\n"
+                    } else {
+                        sample_text::text(&fields, arguments.whole) + "---\n"
+                    };
                     stream.write(&text)?;
                     left -= 1;
                 }
@@ -69,8 +69,8 @@ pub(super) fn main(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-pub(super) fn readable(name: &str) -> Result<&'static dyn ReadableTopic, Failure> {
-    let mut all = topics::READABLE.iter();
+pub(super) fn readable(name: &str) -> Result<&'static dyn AnyTopic, Failure> {
+    let mut all = topics::TABLE.iter();
     all.find(|topic| topic.spec().name == name).copied().ok_or_else(|| {
         let names: Vec<_> = topics::TABLE.iter().map(|topic| topic.spec().name).collect();
         let message = format!("there is no topic {name:?}; there are {}", names.join(", "));

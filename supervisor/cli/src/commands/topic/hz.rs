@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use common::{
-    bus::{AnyReader, Bus, BusError, ReadableTopic},
+    bus::{AnyReader, Bus, BusError},
     domain::{Domain, RobotName},
     follower::{Event, Follower},
     topics::{self, AnyTopic},
@@ -41,7 +41,7 @@ const REPORT_EVERY: Duration = Duration::from_secs(1);
 struct Readers(Vec<(Box<dyn AnyReader>, TopicRates)>);
 
 impl Readers {
-    fn open(bus: &Bus, topics: &[&'static dyn ReadableTopic]) -> Result<Self, BusError> {
+    fn open(bus: &Bus, topics: &[&'static dyn AnyTopic]) -> Result<Self, BusError> {
         let now = Instant::now();
         let opened = topics.iter().map(|topic| {
             let rates = TopicRates::new(topic.spec(), now);
@@ -52,7 +52,7 @@ impl Readers {
 
     fn take(&mut self) -> Result<(), BusError> {
         for (reader, rates) in &mut self.0 {
-            while let Some(sample) = reader.take()? {
+            while let Some(sample) = reader.next_sample()? {
                 rates.add(sample.author(), *sample.stamp(), Instant::now());
             }
         }
@@ -70,7 +70,7 @@ impl Readers {
 pub(super) fn main(arguments: &Arguments) -> Result<(), Failure> {
     let topics = match &arguments.topic {
         Some(name) => vec![readable(name)?],
-        None => topics::READABLE.to_vec(),
+        None => topics::TABLE.to_vec(),
     };
     let mut stream = Stream::open()?;
     let domain = Domain::of(arguments.robot.clone());

@@ -3,7 +3,7 @@
 
 use std::fmt::Write as _;
 
-use common::bus::{AnySample, Value};
+use common::bus::Value;
 use serde::{
     Serialize, Serializer,
     ser::{SerializeMap as _, SerializeSeq as _},
@@ -14,30 +14,32 @@ const ELEMENTS: &str = "elements";
 /// The number of elements of an array that text shows, unless all are asked for.
 const SHOWN: usize = 16;
 
-/// `sample` as text, one field a line. The fields of a struct stand below its name. Arrays of more than 16 elements are cut,
+/// A sample as text, one field a line. The fields of a struct stand below its name. Arrays of more than 16 elements are cut,
 /// unless `whole`.
-pub(super) fn text(sample: &dyn AnySample, whole: bool) -> String {
+pub(super) fn text(fields: &Fields, whole: bool) -> String {
     let most = if whole { usize::MAX } else { SHOWN };
     let mut text = String::new();
-    for (name, value) in &fields(sample) {
+    for (name, value) in fields {
         write_field(&mut text, 0, name, value, most);
     }
     text
 }
 
-/// `sample` as a JSON object, whole. A number that is not finite is null.
-pub(super) fn json(sample: &dyn AnySample) -> serde_json::Result<String> {
-    serde_json::to_string(&Json(&Value::Struct(fields(sample))))
+/// A sample as a JSON object, whole. A number that is not finite is null.
+pub(super) fn json(fields: Fields) -> serde_json::Result<String> {
+    serde_json::to_string(&Json(&Value::Struct(fields)))
 }
 
-/// The fields of the struct or header, and the elements of a slice.
-fn fields(sample: &dyn AnySample) -> Vec<(&'static str, Value)> {
-    let mut fields = match sample.value() {
+/// The names and values of a sample's fields.
+pub(super) type Fields = Vec<(&'static str, Value)>;
+
+/// The fields of the header, and the elements of the slice if there is one.
+pub(super) fn fields(header: Value, elements: Option<Vec<Value>>) -> Fields {
+    let mut fields = match header {
         Value::Struct(fields) => fields,
         other => vec![("value", other)],
     };
-    let elements = sample.elements().map(Value::Array);
-    fields.extend(elements.map(|elements| (ELEMENTS, elements)));
+    fields.extend(elements.map(|elements| (ELEMENTS, Value::Array(elements))));
     fields
 }
 
@@ -122,18 +124,16 @@ impl Serialize for Json<'_> {
 #[cfg(test)]
 mod tests {
     use common::{
-        bus::Author,
+        bus::Layout as _,
         samples::{GuidanceSample, HealthSample, InfraredSample, name},
     };
 
     use super::*;
 
-    const AUTHOR: Author = Author { process: 7, generation: 1 };
-
     #[test]
     fn text_has_one_field_a_line_in_the_order_of_the_layout() {
         let infrared = InfraredSample { range_m: [0.5; 7], ..InfraredSample::default() };
-        let shown = text(&(AUTHOR, infrared), false);
+        let shown = text(&fields(infrared.value(), None), false);
         let lines: Vec<_> = shown.lines().collect();
         assert_eq!(lines[0], "stamp:");
         assert_eq!(lines[1], "  tick: 0");
@@ -144,10 +144,10 @@ mod tests {
     #[test]
     fn names_are_text_and_numbers_that_are_not_finite_are_null() {
         let health = HealthSample { stage: name("mapper"), ..HealthSample::default() };
-        assert!(text(&(AUTHOR, health), false).contains("\nstage: \"mapper\"\n"));
+        assert!(text(&fields(health.value(), None), false).contains("\nstage: \"mapper\"\n"));
         let guidance =
             GuidanceSample { speed_limit_m_s: f64::INFINITY, ..GuidanceSample::default() };
-        let line = json(&(AUTHOR, guidance)).unwrap();
+        let line = json(fields(guidance.value(), None)).unwrap();
         let read: serde_json::Value = serde_json::from_str(&line).unwrap();
         assert!(read["speed_limit_m_s"].is_null() && read["stamp"]["tick"] == 0, "{line}");
     }
