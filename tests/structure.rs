@@ -154,7 +154,8 @@ fn no_stage_knows_another_nor_the_supervisor() {
             // The link may depend on its drivers.
             let driver = stage == "link" && name.ends_with("-driver");
             let foreign = stages.contains(&name) && !driver
-                || ["supervisor", "firsthand", "bench", "picture", "evaluation"].contains(&&*name);
+                || ["processes", "mission-control", "firsthand", "bench", "picture", "evaluation"]
+                    .contains(&&*name);
             assert!(!foreign, "{stage} depends on {name}");
         }
     }
@@ -183,9 +184,10 @@ fn what_watches_a_robot_contains_no_pictures_no_file_formats_and_no_chance() {
         assert!(output.status.success(), "{output:?}");
         String::from_utf8(output.stdout).unwrap()
     };
-    for arguments in
-        [&["--package", "supervisor"][..], &["--package", "firsthand", "--no-default-features"]]
-    {
+    for arguments in [
+        &["--package", "mission-control"][..],
+        &["--package", "firsthand", "--no-default-features"],
+    ] {
         let tree = tree(arguments);
         let names: BTreeSet<_> = tree.lines().filter_map(|line| line.split(' ').next()).collect();
         assert!(names.contains("common"), "{tree}");

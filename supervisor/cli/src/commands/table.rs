@@ -11,7 +11,7 @@ use common::{
     wiring::{EVERY_STAGE_READS, EVERY_STAGE_WRITES, Persists, Topics},
 };
 use link::failsafe::{self, monitor::Clears};
-use supervisor::stages;
+use processes::stages;
 
 use self::item::item;
 use crate::console::{failure::Failure, output::print_text};

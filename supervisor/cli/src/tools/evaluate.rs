@@ -21,13 +21,16 @@ use evaluation::{
     worlds::{self, Ends, Worlds},
 };
 use glam::DVec2;
+use processes::planner_executable;
 use serde_json::json;
-use supervisor::planner_executable;
 
 use super::mission_progress::{MissionProgress, jobs};
-use crate::console::{
-    failure::Failure,
-    output::{print_text, write_stderr},
+use crate::{
+    commands::stage::OTHER_PLANNERS,
+    console::{
+        failure::Failure,
+        output::{print_text, write_stderr},
+    },
 };
 
 /// Run missions on many worlds and count successes by the ground truth, with 95 % intervals, a picture and a page of every failure.
@@ -250,7 +253,7 @@ fn executable(planner: &str) -> Result<Option<String>, Failure> {
         return Ok(None);
     }
     // A missing executable is reported before anything starts.
-    planner_executable::find(Path::new(planner))?;
+    planner_executable::find_planner(Path::new(planner), OTHER_PLANNERS)?;
     let value = toml::Value::from(planner);
     Ok(Some(format!("planner.executable={value}")))
 }

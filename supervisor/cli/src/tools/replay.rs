@@ -9,6 +9,10 @@ use common::{
     domain::RobotName,
     signals::{SIGHUP, SIGINT, SIGTERM, Signals},
 };
+use processes::{
+    planner_executable,
+    stages::{self, Stage},
+};
 use recording::{
     Recording,
     replay::{
@@ -16,15 +20,14 @@ use recording::{
         live::{self, Happened},
     },
 };
-use supervisor::{
-    planner_executable,
-    stages::{self, Stage},
-};
 
-use crate::console::{
-    failure::Failure,
-    missions, operator,
-    output::{print, write_stderr},
+use crate::{
+    commands::stage::OTHER_PLANNERS,
+    console::{
+        failure::Failure,
+        missions, operator,
+        output::{print, write_stderr},
+    },
 };
 
 /// Replay a recording: give each generation of each stage its recorded inputs, and compare its outputs with the recorded ones to
@@ -88,7 +91,7 @@ fn play(arguments: &Arguments, recording: &Recording) -> Result<ExitCode, Failur
     };
     let mut mission = missions::with(&recording.run.mission, &arguments.set)?;
     if let Some(mission) = &mut mission {
-        planner_executable::resolve(mission)?;
+        planner_executable::resolve(mission, OTHER_PLANNERS)?;
     }
     let options = live::Options {
         robot: arguments.robot.clone(),

@@ -13,7 +13,7 @@ use common::{
     run::Run,
     topics::{self, AnyTopic},
 };
-use supervisor::stages::Stage;
+use processes::stages::Stage;
 
 use crate::replay::{
     pieces::Pieces,

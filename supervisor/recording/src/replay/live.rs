@@ -31,7 +31,7 @@ use common::{
     topics::{self, AnyTopic, EncodedTopic},
     waiter::Waiter,
 };
-use supervisor::{
+use processes::{
     domain::DomainLock,
     stages::{self, Stage},
 };

@@ -16,7 +16,7 @@ use common::{
     topics::{self, AnyTopic},
     waiter::Waiter,
 };
-use supervisor::{
+use processes::{
     domain::DomainLock,
     process::{Process, firsthand},
 };

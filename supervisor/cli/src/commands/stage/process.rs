@@ -14,8 +14,8 @@ use common::{
 #[cfg(feature = "baselines")]
 use evaluation::baselines::{bug::Bug, shell::Shell, wavefront::Wavefront};
 #[cfg(feature = "baselines")]
-use supervisor::stages::PLANNER;
-use supervisor::{STOP_GUARD, guard, planner_executable, stages::Stage};
+use processes::stages::PLANNER;
+use processes::{STOP_GUARD, guard, process::program_of, stages::Stage};
 
 use crate::console::{failure::Failure, operator};
 
@@ -47,6 +47,12 @@ pub(super) fn run(words: &[OsString]) -> Result<(), Failure> {
 #[cfg(feature = "baselines")]
 type RunStage = fn(&Start) -> Result<(), StageError>;
 
+/// The planners that take the place of `firsthand`'s own: two to compare with, and the one of `firsthand calibrate`.
+#[cfg(feature = "baselines")]
+pub(crate) const OTHER_PLANNERS: &[&str] = &["wavefront", "bug", calibration::PLANNER];
+#[cfg(not(feature = "baselines"))]
+pub(crate) const OTHER_PLANNERS: &[&str] = &[];
+
 /// The process of the baseline `name`, which takes the place of the planner.
 #[cfg(feature = "baselines")]
 fn baseline(name: &str) -> Option<RunStage> {
@@ -67,9 +73,9 @@ fn become_executable(
     let Some(executable) = stage.executable(mission) else {
         return Ok(());
     };
-    let baseline = planner_executable::baseline(executable);
-    let mut command = Command::new(baseline.map_or(executable, |_| Path::new("/proc/self/exe")));
-    command.args([SUBCOMMAND, baseline.unwrap_or(stage.name)]);
+    let (program, called) = program_of(Some(executable), stage.name);
+    let mut command = Command::new(program);
+    command.args([SUBCOMMAND, called]);
     let error = command.args(options).exec();
     Err(format!("cannot execute {}: {error}", executable.display()).into())
 }

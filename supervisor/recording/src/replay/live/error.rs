@@ -3,7 +3,7 @@
 use std::io;
 
 use common::{bus::BusError, run::RunError};
-use supervisor::{DomainError, process::ExitCause};
+use processes::{DomainError, process::ExitCause};
 use thiserror::Error;
 
 use crate::RecordingError;

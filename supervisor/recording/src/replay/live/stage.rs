@@ -15,7 +15,7 @@ use common::{
     topics,
     waiter::Waiter,
 };
-use supervisor::{
+use processes::{
     process::{self, ExitCause, Process},
     stages::Stage,
 };
