@@ -32,7 +32,7 @@
 //! | `run`, `shutdown` | a run from start to end; the robot to rest and the stages stopped |
 //! | [`target_list`], `requests` | the robot's targets, pure; operators' requests, and the next target |
 //! | [`operator`] | requests of an operator, in any process |
-//! | `bus_endpoints`, [`observer`] | what the supervisor reads from and writes to the bus |
+//! | `bus_endpoints`, `observer` | what the supervisor reads from and writes to the bus |
 //! | `long_record` | records of each tick that stay bounded, pure |
 //! | `run_clock` | mission time of a run, and its first tick that is not made yet |
 //! | [`recovery`] | what another supervisor needs to go on with a run |
@@ -45,7 +45,7 @@ mod decisive;
 mod error;
 mod judge;
 mod long_record;
-pub mod observer;
+mod observer;
 pub mod operator;
 mod order;
 pub mod outcome;
@@ -63,7 +63,7 @@ mod supervisor;
 pub mod target_list;
 
 pub use error::SupervisorError;
-pub use observer::{Heard, Listener};
+pub use observer::{Heard, Listener, Record};
 pub use progress::Progress;
 pub use run::{Finished, StillMoving, run};
 pub use supervisor::Options;

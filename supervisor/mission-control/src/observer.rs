@@ -48,7 +48,7 @@ pub enum Heard<'a> {
 /// Called with every such sample. It only listens: nothing that the run does depends on it.
 pub type Listener = Box<dyn FnMut(Heard<'_>)>;
 
-pub struct Observer {
+pub(crate) struct Observer {
     health: Reader<HealthSample>,
     link: Reader<LinkSample>,
     pose: Reader<PoseSample>,
@@ -69,12 +69,7 @@ pub struct Record {
     pub pose: Option<PoseSample>,
     guidance: VecDeque<GuidanceSample>,
     pub command: Option<CommandSample>,
-    commands: u64,
-    /// The generation and tick of the planner's newest heartbeat.
-    planner: (u32, u64),
-    /// The epoch of the newest grid, and whether the grid changed when that epoch began.
-    grid_epoch: u64,
-    grid_changed: bool,
+    pub(crate) published: Published,
     /// The newest ticks at which something held the wheels, oldest first.
     contacts: VecDeque<u64>,
     /// The number of the current target, and the first command that said that this target is reached.
@@ -89,7 +84,7 @@ impl Observer {
     /// Read everything on `bus`, to complete `record`. `waiter` wakes for heartbeats, for the state of the link, which ends a
     /// tick, and for fields. The other samples of a tick are read at its end, so that the supervisor takes no processor time
     /// from the stages during the tick.
-    pub fn new(bus: &Bus, waiter: &mut Waiter, record: Record) -> Result<Self, BusError> {
+    pub(crate) fn new(bus: &Bus, waiter: &mut Waiter, record: Record) -> Result<Self, BusError> {
         waiter.on(bus.wakeup(&topics::HEALTH)?);
         waiter.on(bus.wakeup(&topics::LINK)?);
         waiter.on(bus.wakeup(&topics::FIELD)?);
@@ -108,7 +103,7 @@ impl Observer {
     }
 
     /// Read all new samples, and tell `listener` of them. Returns whether the roster changed by them.
-    pub fn read_all(
+    pub(crate) fn read_all(
         &mut self,
         stages: &mut StageProcesses,
         listener: &mut Listener,
@@ -119,7 +114,7 @@ impl Observer {
         while let Some(health) = self.health.take()? {
             roster_changed |= stages.on_health(&health);
             if name_str(&health.stage) == processes::stages::PLANNER {
-                self.record.planner = (health.stamp.generation, health.stamp.tick);
+                self.record.published.planner = (health.stamp.generation, health.stamp.tick);
             }
         }
         let record = &mut self.record;
@@ -128,7 +123,8 @@ impl Observer {
         while let Some(command) = self.command.take()? {
             stages.on_output(topics::COMMAND.spec().writer, command.stamp.tick);
             record.command = Some(command);
-            record.commands += 1;
+            record.published.tick = Some(command.stamp.tick);
+            record.published.commands += 1;
             listener(Heard::Command(&command));
             if CommandState::from_byte(command.state) == CommandState::Arrived
                 && command.target_number == record.target_number
@@ -139,15 +135,16 @@ impl Observer {
         while let Some(guidance) = self.guidance.take()? {
             stages.on_output(topics::GUIDANCE.spec().writer, guidance.stamp.tick);
             listener(Heard::Guidance(&guidance));
+            record.published.epoch = guidance.epoch;
             record.push_guidance(guidance);
         }
         while let Some(grid) = self.grid.take()? {
             stages.on_output(topics::GRID.spec().writer, grid.header().stamp.tick);
             let epoch = grid.header().epoch;
             let applied = record.grid.apply(&grid.header().part, &grid);
-            if epoch > record.grid_epoch {
+            if epoch > record.published.grid_epoch {
                 let same = matches!(applied, Applied::Window(window) if window.area() == 0);
-                (record.grid_epoch, record.grid_changed) = (epoch, !same);
+                (record.published.grid_epoch, record.published.grid_changed) = (epoch, !same);
             }
         }
         while let Some(field) = self.field.take()? {
@@ -223,17 +220,5 @@ impl Record {
             self.link.map(|link| link.stamp.tick),
         ];
         ticks.into_iter().flatten().max()
-    }
-
-    pub(crate) fn published(&self) -> Published {
-        let guidance = self.newest_guidance();
-        Published {
-            tick: self.command.map(|command| command.stamp.tick),
-            commands: self.commands,
-            planner: self.planner,
-            epoch: guidance.map_or(0, |guidance| guidance.epoch),
-            grid_epoch: self.grid_epoch,
-            grid_changed: self.grid_changed,
-        }
     }
 }

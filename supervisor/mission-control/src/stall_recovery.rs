@@ -27,7 +27,7 @@ impl Supervisor<'_> {
             return Ok(None);
         }
         loop {
-            let published = self.bus.observer.record.published();
+            let published = self.bus.observer.record.published;
             match self.recovery_steps.next(published, Instant::now()) {
                 Next::Wait => break,
                 Next::Begin(step) => self.carry_out(step)?,
@@ -62,7 +62,7 @@ impl Supervisor<'_> {
             self.stall_watch.forget_motion();
         }
         // A tick without its command may be incomplete here.
-        let newest = record.published().tick.filter(|_| in_ticks);
+        let newest = record.published.tick.filter(|_| in_ticks);
         // Several ticks may have passed since the last check. Each is checked, so the result does not depend on their number.
         let mut found = None;
         for (pose, guidance) in record.ticks_since(self.stall_watch.tick()) {

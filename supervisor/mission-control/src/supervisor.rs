@@ -8,7 +8,7 @@ use common::{
     domain::{Domain, RobotName},
     mission::Mission,
     run::Run,
-    samples::{DirectiveSample, HoldReason, Order, PoseSample, RosterHeader, TickLimitSample},
+    samples::{DirectiveSample, HoldReason, Order, RosterHeader, TickLimitSample},
     signals::Signals,
     topics,
 };
@@ -240,7 +240,8 @@ impl<'a> Supervisor<'a> {
             was_ready: self.decision.ready,
             all_running: self.stages.all_running(),
             robot_answers: record.link.is_some_and(|link| link.connected == 1),
-            field_known: record.field_known || self.is_planner_foreign(),
+            // A planner of the user need not publish a field.
+            field_known: record.field_known || self.options.mission.planner.executable.is_some(),
             operator_stop: self.state_file.state.operator_stop,
             stage_held: !self.stages.held().is_empty(),
         });
@@ -258,15 +259,11 @@ impl<'a> Supervisor<'a> {
         changed
     }
 
-    /// Whether the mission names an executable for the planner. Such a planner need not publish a field.
-    fn is_planner_foreign(&self) -> bool {
-        self.options.mission.planner.executable.is_some()
-    }
-
     fn judge(&mut self, simulator_ended: bool) -> Option<Ending> {
         let now = self.stages.now();
         let record = &self.bus.observer.record;
-        let newest_m = record.pose.as_ref().map(|pose| self.to_target_m(pose));
+        let target = self.targets.current().position();
+        let newest_m = record.pose.map(|pose| target.distance(pose.pose().position));
         let last = record.arrival.filter(|_| self.targets.is_last());
         let arrival = last.map(|command| Arrival {
             distance_m: newest_m.unwrap_or(command.distance_m),
@@ -300,10 +297,6 @@ impl<'a> Supervisor<'a> {
         )
     }
 
-    pub(crate) fn to_target_m(&self, pose: &PoseSample) -> f64 {
-        self.targets.current().position().distance(pose.pose().position)
-    }
-
     pub(crate) const fn deadline(&self) -> Deadline {
         Deadline {
             began_s: self.targets.began_s(),
@@ -315,11 +308,6 @@ impl<'a> Supervisor<'a> {
     /// The tick that a new generation of a stage starts from.
     pub(crate) fn first_tick(&self) -> u64 {
         self.clock.first_tick(self.bus.observer.record.newest_tick())
-    }
-
-    fn epoch(&self) -> u64 {
-        let epoch = self.stall_watch.epoch();
-        epoch - u64::from(self.recovery_steps.withholds(epoch))
     }
 
     /// The tick and the time of the supervisor's own samples.
@@ -345,10 +333,11 @@ impl<'a> Supervisor<'a> {
         self.published_limit = None;
         self.publish_tick_limit()?;
         let (order, reason) = (self.decision.order(), self.decision.reason);
+        let epoch = self.stall_watch.epoch();
         let directive = DirectiveSample {
             order: order.into(),
             reason: reason.into(),
-            epoch: self.epoch(),
+            epoch: epoch - u64::from(self.recovery_steps.withholds(epoch)),
             ..DirectiveSample::default()
         };
         let header = RosterHeader {
