@@ -56,8 +56,7 @@ struct GroundTruth {
 }
 
 impl Simulator {
-    /// Start a simulator in the world of `mission`, overrides included, and wait until it listens. Its files are in
-    /// `directory`; it goes on from the checkpoint of an earlier one there.
+    /// Start a simulator in the world of `mission` and wait until it listens. It goes on from an earlier one's checkpoint in `directory`.
     pub fn start(directory: &Path, mission: &Mission, pace: Pace) -> Result<Self, SimulatorError> {
         let text = toml::to_string(mission)
             .map_err(|error| system("write the mission of")(io::Error::other(error)))?;
