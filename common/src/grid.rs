@@ -1,10 +1,5 @@
-//! The grid of cells over the perimeter: its frame, and the parts of a map that samples carry.
-//!
-//! | file | holds |
-//! |---|---|
-//! | [`mission::grid`] | the state of a cell, windows of cells, cells and metres |
-//! | `part.rs` | which part of which version of a map a sample carries |
-//! | `replica.rs` | a follower's copy of a map, updated from such parts |
+//! The grid of cells over the perimeter: [`mission::grid`] has states, windows and frames of cells; a [`Part`] says which part of which
+//! version of a map a sample carries, and a [`Replica`] is a follower's copy, updated from such parts.
 
 mod part;
 mod replica;
