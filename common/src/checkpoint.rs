@@ -41,7 +41,7 @@ pub enum CheckpointError {
 
 /// "firsthand checkpoint", before the version.
 const MAGIC: [u8; 3] = *b"FHC";
-/// Of the states of all processes. Raise it when the encoding of one changes.
+/// Raise it when the encoding of any process's state changes.
 const VERSION: u8 = b'3';
 /// magic u32, sequence u64, length u32, crc32 u32.
 const HEADER: usize = 20;

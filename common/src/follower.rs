@@ -48,8 +48,8 @@ pub enum Event<'a, Topics> {
     Disconnected,
 }
 
-/// For samples of each tick a consumer wakes by the link's state, which ends the tick, so it takes no processor from stages that the
-/// tick has still to pass.
+/// A consumer of samples of each tick wakes by the link's state, which ends the tick: it takes no processor from stages that the tick
+/// has still to pass.
 fn wakes_for(topic: &'static dyn AnyTopic) -> &'static dyn AnyTopic {
     match topic.spec().rate {
         Rate::EachTick | Rate::EachFrame => &topics::LINK,

@@ -8,7 +8,6 @@ use crate::samples::PoseSample;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GroundTruthHeader {
-    /// `address:port`.
     pub listening: String,
 }
 
@@ -22,7 +21,7 @@ pub struct GroundTruthTick {
     pub y: f64,
     /// Radians counter-clockwise from x, not wrapped.
     pub heading: f64,
-    /// Along the heading, m/s.
+    /// m/s along the heading.
     pub v: f64,
     /// rad/s.
     pub omega: f64,
@@ -55,7 +54,7 @@ pub struct GroundTruthRadio {
 }
 
 impl GroundTruthTick {
-    /// Of a wheel's rim, m/s.
+    /// The speed of a wheel's rim, m/s.
     pub const AT_REST_M_S: f64 = 0.01;
     /// Metres; JSON has no infinity.
     pub const NOTHING_NEAR: f64 = 1e9;
@@ -69,7 +68,7 @@ impl GroundTruthTick {
         }
     }
 
-    /// By the wheel counts of both.
+    /// Compares wheel counts.
     pub const fn is_of(&self, pose: &PoseSample) -> bool {
         self.left_counts == pose.left_counts && self.right_counts == pose.right_counts
     }

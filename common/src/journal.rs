@@ -26,7 +26,7 @@ const SNAPSHOT_AFTER: (u64, u64) = (8, 128);
 const BYTES_FOR_AN_ENTRY: u64 = 20_480;
 /// number u64, length u32, crc32 u32.
 const HEADER: usize = 16;
-/// After the last entry. No header is all zeros, for the checksum of zeros is not 0.
+/// It follows the last entry. No header is all zeros, for the checksum of zeros is not 0.
 const END: [u8; HEADER] = [0; HEADER];
 const LONGEST: usize = 8192;
 /// Room for each entry until the next snapshot, bytes: an entry of the mapper takes 250, and 4,500 with a laser scan.
@@ -49,7 +49,7 @@ pub struct Journal {
 #[derive(Debug, PartialEq, Eq)]
 pub struct Restored<S, E> {
     pub state: Option<S>,
-    /// After the state, oldest first.
+    /// Oldest first.
     pub entries: Vec<E>,
 }
 

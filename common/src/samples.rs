@@ -81,7 +81,7 @@ macro_rules! wire_enum {
     };
 }
 
-// After the macros that these modules use.
+// These modules use the macros above.
 mod localisation;
 mod navigation;
 mod robot;

@@ -38,7 +38,7 @@ impl Signals {
     }
 }
 
-/// As inherited from whoever started this process.
+/// The process that started this one may have had `signal` ignored.
 fn is_ignored(signal: c_int) -> bool {
     let mask = process_status::field("self", "SigIgn")
         .and_then(|mask| u64::from_str_radix(&mask, 16).ok());

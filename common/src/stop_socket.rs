@@ -32,7 +32,7 @@ pub enum Request {
 pub enum Answer {
     /// The link obeys.
     Heard,
-    /// By its encoders.
+    /// The encoders say so.
     AtRest,
 }
 
@@ -150,7 +150,6 @@ impl Operator {
 pub struct Identity(pub String);
 
 impl Identity {
-    /// Of the socket that is there now.
     pub fn now(domain: &Domain) -> Self {
         let found = fs::symlink_metadata(domain.stop_socket());
         Self(found.map_or_else(
@@ -165,7 +164,7 @@ impl Identity {
     }
 }
 
-/// In a run's directory an operator's stop leaves this mark, so that a new link obeys it too.
+/// An operator's stop leaves this mark in a run's directory, so that a new link obeys it too.
 #[derive(Debug)]
 pub struct StopMark {
     path: PathBuf,

@@ -25,7 +25,7 @@ pub struct Laser {
     is_blind: bool,
     /// The wheels' angles.
     turned: [f64; 2],
-    /// Since the last tick.
+    /// The beams since the last tick.
     scan: Vec<f32>,
 }
 

@@ -105,7 +105,7 @@ fn is_start(pose: Pose2) -> bool {
     pose.position.length() <= NEAR_START && wrap_angle(pose.heading).abs() <= NEAR_START
 }
 
-/// Without a limit of the wheels' speeds.
+/// The drive of wheels without a speed limit.
 #[must_use]
 pub fn drive(body: &Body) -> DifferentialDrive {
     DifferentialDrive::new(body.wheel_radius_m, body.track_m, f64::INFINITY)
@@ -131,14 +131,14 @@ pub fn motion(body: &Body, turned: [f64; 2], speeds: [f64; 2], held: [bool; 2]) 
     }
 }
 
-/// For wheel speeds in counts/s.
+/// `counts` are wheel speeds, counts/s.
 #[must_use]
 pub fn twist(body: &Body, counts: [i16; 2]) -> Twist {
     let [left, right] = wheel_speeds(body, counts);
     drive(body).twist(WheelSpeeds { right, left })
 }
 
-/// From counts/s to rad/s.
+/// Converts counts/s to rad/s.
 #[must_use]
 pub fn wheel_speeds(body: &Body, counts: [i16; 2]) -> [f64; 2] {
     counts.map(|counts| f64::from(counts) * TAU / body.counts_per_turn)

@@ -9,7 +9,7 @@ use glam::DVec2;
 use bus::{ZeroCopySend, layouts};
 use mission::grid::{GridFrame, Window};
 
-/// In the headers of `grid` and `field`: a map's frame, and the window of one version.
+/// A map's frame, and the window of one version, in the headers of `grid` and `field`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.Part")]
 #[repr(C)]

@@ -44,7 +44,7 @@ wire_enum! {
     FixRefusal, unknown = None, text = words {
         /// The fix was used, or none came.
         None = 0 "none",
-        /// Also one older than the oldest tick that dead reckoning holds.
+        /// It may also be older than the oldest tick that dead reckoning holds.
         Late = 1 "a fix is refused: it is more than 2 s old; publish it sooner",
         /// More than a tick after the newest one.
         Future = 2 "a fix is refused: its capture time is in the future; give mission time",

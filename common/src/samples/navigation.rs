@@ -220,7 +220,7 @@ impl From<Waypoint> for TargetPoint {
 payloads! {
     /// Topic `target`: where the robot is sent.
     "firsthand.Target" TargetSample {
-        /// From 1 in the run. A target that replaces another has a number of its own.
+        /// Counted from 1 in the run. A target that replaces another has a number of its own.
         number: u64,
         last: u64,
         /// The first tick in which it holds. A stage without another target takes it at once.

@@ -210,7 +210,7 @@ pub struct LinkSample {
     pub repeated_commands: u64,
     /// Ticks given to the stages again, because no command came.
     pub repeated_ticks: u64,
-    /// From the datagram in to the datagram out in the last tick.
+    /// The last tick's, from the datagram in to the datagram out.
     pub latency_ns: u64,
     /// The longest in this process of the link.
     pub latency_max_ns: u64,

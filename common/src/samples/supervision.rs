@@ -107,7 +107,7 @@ wire_enum! {
         /// A stage is not ready, the robot does not answer, or there is no field yet.
         Starting = 0,
         None = 1,
-        /// Until the operator says resume.
+        /// It lasts until the operator says resume.
         Operator = 2,
         StageHeld = 3,
         Ending = 4,
@@ -155,7 +155,7 @@ wire_enum! {
         Exited = 0,
         /// `code` is the signal's number.
         Signalled = 1,
-        /// With a core dump; `code` is the signal's number.
+        /// A core was dumped; `code` is the signal's number.
         SignalledWithCore = 2,
         /// The process was not the supervisor's child.
         Unknown = 3,
@@ -223,7 +223,7 @@ payloads! {
         next_after_ns: u64,
         /// Exit code or signal number.
         code: i32,
-        /// In the last ten seconds, this one included.
+        /// Counted over the last ten seconds, this one included.
         deaths_in_window: u32,
         /// A [`DeathCause`].
         cause: u8,
@@ -255,7 +255,7 @@ wire_enum! {
         Still = 0,
         /// It moves, but does not leave its place.
         Pinned = 1,
-        /// In hazard, u = 0, it drives without coming out.
+        /// The robot drives in hazard, u = 0, and does not come out.
         InsideHazard = 2,
         /// The belief has no way to the target, u = 0.
         CutOff = 3,
@@ -273,7 +273,7 @@ payloads! {
         /// The believed place, metres.
         x_m: f64,
         y_m: f64,
-        /// From now on.
+        /// It holds from now on.
         epoch: u64,
         /// Planner generations for a stall in this mission, this one included.
         replans: u32,

@@ -12,7 +12,7 @@ use common::{
 };
 use glam::DVec2;
 
-/// Below it the wheels stick.
+/// The wheels stick below it.
 const LEAST_TURN_RAD_S: f64 = 0.25;
 /// Turn rate on the spot per remaining angle, 1/s.
 const TURN_GAIN: f64 = 3.0;
@@ -44,7 +44,7 @@ enum SpeedLaw {
     Paper,
     /// The robot turns on the spot until it faces its way, then drives no faster than guidance allows.
     Evidential,
-    /// By either method: the paper's, no faster than guidance allows, since a car does not turn on the spot.
+    /// The paper's law by either method, no faster than guidance allows: a car does not turn on the spot.
     Car,
 }
 
@@ -69,7 +69,7 @@ pub struct Controller {
     turns: f64,
     slow_radius: f64,
     dead_zone: f64,
-    /// By the paper's law.
+    /// The paper's law applies.
     modulated: bool,
     law: SpeedLaw,
     /// The turn of an antipodal robot: 1 left, -1 right.
@@ -212,7 +212,7 @@ impl Controller {
             (GuidanceStatus::Along | GuidanceStatus::WayOut, SpeedLaw::Evidential) => {
                 let v = self.cautious(alignment, distance, limit);
                 if v == 0.0 {
-                    // Without a limit above 0 a robot only turns; the planner allows speed where it must get out.
+                    // A robot without a limit above 0 only turns; the planner allows speed where it must get out.
                     let faces = alignment.cosine > FACES_COSINE;
                     return (!faces).then(|| on_the_spot(self));
                 }
@@ -249,7 +249,7 @@ impl Controller {
         let slow = (distance / self.slow_radius).min(1.0);
         let wanted = self.speed * sharp.max(0.0) * slow;
         let least = LEAST_SPEED_M_S.min(self.speed);
-        // In this form a limit that is no number means stand.
+        // A limit that is no number means stand.
         if sharp <= 0.0 {
             0.0
         } else if limit >= least {

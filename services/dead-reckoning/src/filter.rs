@@ -23,7 +23,7 @@ use crate::{
 
 /// An older fix is refused.
 const OLDEST: Duration = Duration::from_secs(2);
-/// At a high rate they span less than [`OLDEST`].
+/// They span less than [`OLDEST`] at a high rate.
 const MOST_TICKS: usize = 64;
 const MOST_FIXES: usize = 64;
 /// Squared Mahalanobis distance beyond which a fix is refused: one good one in a thousand, for 2 and 3 degrees of freedom.
@@ -103,7 +103,7 @@ impl Fix {
     }
 }
 
-/// From -pi to pi.
+/// The result is from -pi to pi.
 pub(crate) fn wrapped(turn: f64) -> f64 {
     turn - (turn / std::f64::consts::TAU).round() * std::f64::consts::TAU
 }
@@ -357,7 +357,7 @@ impl History {
     }
 }
 
-/// With the pose at the fix's time if the fix contradicts it.
+/// It has the pose at the fix's time if the fix contradicts it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Refused {
     pub(crate) why: FixRefusal,

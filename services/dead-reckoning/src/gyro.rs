@@ -18,7 +18,7 @@ pub(crate) struct Gyro {
     end: MissionTime,
     /// The start of `turn`: the end of a tick, or of the first increment after missing ones.
     since: MissionTime,
-    /// From `since` to the newest increment's end, with its variance; radians, rad^2.
+    /// Turn from `since` to the newest increment's end, and its variance; radians, rad^2.
     turn: f64,
     variance: f64,
 }

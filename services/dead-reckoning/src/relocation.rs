@@ -13,7 +13,7 @@ const AGREE: usize = 10;
 const APART: Duration = Duration::from_millis(334);
 /// Variance of the way between two fixes by the wheels, m^2.
 const WHEELS: f64 = 4e-4;
-/// With a lower deviation the heading follows from the robot's way among the fixes, radians.
+/// The robot's way among the fixes gives the heading if its deviation is lower, radians.
 const KNOWN_RAD: f64 = 0.2;
 /// The heading's variance otherwise, rad^2.
 const UNKNOWN: f64 = 1.0;

@@ -55,7 +55,7 @@ pub struct State {
 }
 
 impl State {
-    /// Of the newest wheel sample; none before the first.
+    /// The newest wheel sample's; none before the first.
     pub fn newest(&self) -> Option<(u64, MissionTime)> {
         self.last.map(|last| (last.tick, last.time))
     }
@@ -99,7 +99,7 @@ pub struct Reckoned {
 #[derive(Clone, Debug)]
 pub struct DeadReckoning {
     drive: Drive,
-    /// With the known track.
+    /// Its track is the known one.
     body: Body,
     /// Ways of the left and right wheel over the nominal ones.
     wheel_scales: [f64; 2],

@@ -5,10 +5,10 @@ use serde::{Deserialize, Serialize};
 pub(crate) struct Tick {
     pub(crate) time: MissionTime,
     pub(crate) seconds: f64,
-    /// By the counts, for wheels without errors; metres and radians.
+    /// The counts' arc and turn, for wheels without errors; metres and radians.
     pub(crate) arc: f64,
     pub(crate) turn: f64,
-    /// What each wheel may have rolled with its counts lost, metres.
+    /// Each wheel may have rolled so far with its counts lost, metres.
     pub(crate) lost_m: f64,
     pub(crate) gyro: Option<GyroTurn>,
 }

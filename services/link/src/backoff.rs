@@ -18,7 +18,6 @@ impl Backoff {
         Self { first, longest, pause: first, attempts: 0, next_ns: None }
     }
 
-    /// At `now_ns` of the monotonic clock.
     pub fn is_due(&self, now_ns: u64) -> bool {
         self.next_ns.is_none_or(|next| now_ns >= next)
     }
@@ -29,7 +28,7 @@ impl Backoff {
         self.pause = (self.pause * 2).min(self.longest);
     }
 
-    /// After a success the shortest pause comes again.
+    /// The shortest pause comes again after a success.
     pub const fn reset(&mut self) {
         *self = Self::new(self.first, self.longest);
     }

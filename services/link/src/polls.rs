@@ -4,7 +4,6 @@ use std::time::Duration;
 
 use common::{clock::MissionTime, mission::Mission};
 
-/// With the period.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Polls {
     period_ns: u64,
@@ -17,7 +16,7 @@ impl Polls {
         Self { period_ns: (1e9 / mission.robot.rate_hz) as u64, next: MissionTime::default() }
     }
 
-    /// In mission time.
+    /// The result is mission time.
     pub(crate) fn until_next(&self, now: MissionTime) -> Duration {
         self.next.since(now)
     }

@@ -55,7 +55,7 @@ pub struct Shell {
     /// None where it could not be made, which the log says.
     stop_socket: Option<StopSocket>,
     stop_mark: StopMark,
-    /// As far as this link knows.
+    /// The link knows of no other.
     marked: bool,
     /// None in lockstep, where a robot waits for commands, and where it could not be started, as the log says.
     guard: Option<StopGuard>,
@@ -302,7 +302,6 @@ impl Shell {
         self.carry_out(effects)
     }
 
-    /// Those effects that need the process.
     fn carry_out(&mut self, effects: Vec<Effect>) -> Result<(), StageError> {
         for effect in effects {
             match effect {

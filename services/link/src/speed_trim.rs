@@ -37,12 +37,12 @@ impl SpeedTrim {
         Self { wheels, told, tick: None, longest_gap_s: 2.0 * period_s, share: 1.0 }
     }
 
-    /// At most 1.
+    /// It is at most 1.
     pub(crate) const fn share(&self) -> f64 {
         self.share
     }
 
-    /// As it was sent, counts/s.
+    /// `counts` were sent, counts/s.
     pub(crate) fn told(&mut self, counts: [i16; 2]) {
         self.told.rotate_left(1);
         self.told[STEADY - 1] = counts.map(f64::from);

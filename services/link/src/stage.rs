@@ -31,7 +31,7 @@ pub enum Entry<'a> {
     Step(#[serde(borrow)] Taken<'a>, u64, MissionTime),
     /// The newest telemetry is published.
     Telemetry,
-    /// At this reading of the monotonic clock, nanoseconds.
+    /// The reading of the monotonic clock, nanoseconds.
     Stop(u64),
     /// The driver's state of the link before.
     Remember(Memory),
@@ -165,7 +165,7 @@ impl LinkStage {
 impl Stage for LinkStage {
     type Start = State;
     type Entry<'a> = Entry<'a>;
-    /// For the process, in order.
+    /// The process carries them out in order.
     type Outcome = Vec<Effect>;
 
     fn new(mission: &Mission) -> Self {

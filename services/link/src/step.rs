@@ -39,7 +39,7 @@ use crate::{
 
 pub use event::{Effect, Event, Input, State, Tally};
 
-/// Between pings to a robot whose next motor frame is missing.
+/// The pause of pings to a robot whose next motor frame is missing.
 const PING_EVERY: Duration = Duration::from_millis(200);
 /// Ten times the longest tick measured.
 const REPEAT_AFTER: Duration = Duration::from_millis(100);
@@ -70,13 +70,12 @@ struct OpenTick {
 #[derive(Clone, Copy, Debug)]
 struct Repeat {
     counts: [i16; 2],
-    /// Of the tick behind the command.
+    /// The tick behind the command.
     stamp: MissionTime,
     /// Half a period after the tick.
     due: MissionTime,
 }
 
-/// In the protocol of its driver.
 #[derive(Debug)]
 pub struct Link {
     state: State,
@@ -95,15 +94,15 @@ pub struct Link {
     wheels: WheelSample,
     time: MissionTime,
     open: Option<OpenTick>,
-    /// In lockstep the last tick that may begin; `None` for no limit.
+    /// The last tick that may begin in lockstep; `None` for no limit.
     last_tick: Option<u64>,
-    /// In lockstep.
+    /// It is set in lockstep.
     target_number: u64,
     newest_command: Option<CommandSample>,
     repeat: Option<Repeat>,
     decision: Decision,
     stop_sent_ns: Option<u64>,
-    /// In lockstep, motor frames still to come: one for each command and ping since the order.
+    /// Motor frames still to come in lockstep: one for each command and ping since the order.
     due: u32,
     tally: Tally,
     /// When a refused message was last logged.
@@ -211,7 +210,7 @@ impl Link {
         self.restart.restarts()
     }
 
-    /// By the encoders. In lockstep a held robot counts as at rest, because mission time stands still.
+    /// The encoders say so. A held robot counts as at rest in lockstep, because mission time stands still.
     pub fn is_at_rest(&self) -> bool {
         if self.in_ticks() {
             self.decision.stops()
@@ -220,12 +219,11 @@ impl Link {
         }
     }
 
-    /// With the observed values, and a remedy.
+    /// The text has the observed values, and a remedy.
     pub fn explain(&self, cause: Cause, now_ns: u64) -> Option<String> {
         self.failsafe.explain(cause, self.moment(now_ns))
     }
 
-    /// At `now_ns` of the monotonic clock.
     pub fn absence(&self, now_ns: u64) -> Absence {
         self.monitors().presence.absence(now_ns)
     }
@@ -248,12 +246,10 @@ impl Link {
         self.driver.memory()
     }
 
-    /// From an earlier link's driver.
     pub(crate) fn remember(&mut self, memory: &Memory) {
         self.driver.remember(memory);
     }
 
-    /// At its link.
     pub const fn is_stopped_by_operator(&self) -> bool {
         self.monitors().orders.stopped_here()
     }
@@ -301,7 +297,7 @@ impl Link {
             return;
         }
         if self.in_ticks() {
-            // Of several due answers, only the last shows the robot's present state.
+            // The last of several due answers shows the robot's present state.
             self.due = self.due.saturating_sub(1);
             if self.open.is_some() || self.due > 0 {
                 return;

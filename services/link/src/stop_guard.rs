@@ -50,7 +50,7 @@ pub(crate) struct StopGuard {
 }
 
 impl StopGuard {
-    /// For the link with this socket. Fails when the process cannot be started.
+    /// Fails when the process cannot be started.
     pub(crate) fn start(directory: &Path, link: &Identity) -> io::Result<Self> {
         close_all_on_exec()?;
         let (ended, pipe) = io::pipe()?;

@@ -150,7 +150,7 @@ impl Transport {
         }
     }
 
-    /// At `now_ns` of the monotonic clock; none while the wire is open.
+    /// None while the wire is open.
     pub fn attempts(&self, now_ns: u64) -> Option<Attempts> {
         match &self.wire {
             Wire::Udp(_) => None,

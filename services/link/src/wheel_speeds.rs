@@ -71,7 +71,7 @@ impl WheelSpeeds {
         self.body.counts_per_turn / std::f64::consts::TAU
     }
 
-    /// From rad/s, limited to the wheel's top speed; NaN gives 0.
+    /// Converts rad/s, limited to the wheel's top speed; NaN gives 0.
     fn counts_per_second(&self, speed: f64) -> i16 {
         let top = self.body.top_speed_m_s / self.body.metres_per_count();
         whole((speed * self.counts_per_radian()).clamp(-top, top))

@@ -41,7 +41,7 @@ impl ClearBeams {
         append(&mut self.beams, (OF_ONE_SONAR * sonars).min(CLEAR_BEAMS), sonar, newest);
     }
 
-    /// As [`ClearBeams::take`], for an infrared ranger.
+    /// Does for an infrared ranger as [`ClearBeams::take`].
     pub(crate) fn take_ray(&mut self, sonar: &SonarModel, ray: &Ray, rolled_m: f64) {
         let beam = clear_beam(ray.origin, ray.axis, ray.seen.clear_m);
         let newest = Dated { beam, rolled_m };

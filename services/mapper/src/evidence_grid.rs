@@ -107,7 +107,7 @@ impl EvidenceGrid {
             .all(|layer| layer.len() == lattice.area())
     }
 
-    /// Also true if the sonar can learn nothing more of the cell.
+    /// The sonar may also be unable to learn more of the cell.
     pub(crate) fn is_scanned(&self, sonar: &SonarModel, index: usize) -> bool {
         self.looks[index] >= sonar.pointed_enough
     }
@@ -291,7 +291,7 @@ impl EvidenceGrid {
         window
     }
 
-    /// As [`EvidenceGrid::take`], for an infrared ranger.
+    /// Does for an infrared ranger as [`EvidenceGrid::take`].
     pub(crate) fn take_ray(
         &mut self,
         sonar: &SonarModel,
@@ -460,7 +460,7 @@ fn side_of(axis: DVec2) -> u8 {
     (axis.to_angle() / TAU * 256.0).rem_euclid(256.0) as u8
 }
 
-/// Between two of [`side_of`], radians.
+/// The angle between two of [`side_of`], radians.
 fn apart(a: u8, b: u8) -> f64 {
     let steps = a.wrapping_sub(b);
     f64::from(steps.min(steps.wrapping_neg())) * TAU / 256.0

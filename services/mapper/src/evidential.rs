@@ -69,7 +69,7 @@ impl Evidential {
         }
     }
 
-    /// Up to here a surface blocks the cells around it, metres.
+    /// A surface blocks cells within this, metres.
     pub(crate) const fn reach(&self) -> f64 {
         self.geometry.reach
     }
@@ -198,7 +198,7 @@ impl Evidential {
         }
     }
 
-    /// By the evidence, of a cell neither known nor perimeter.
+    /// The evidence decides, of a cell neither known nor perimeter.
     pub(crate) fn state(&self, map: &EvidenceMap, cell: Cell, is_target: bool) -> CellState {
         let Geometry { lattice, grid, .. } = self.geometry;
         let hazard = map.inflation.is_hazard(grid.index(cell)) && !is_target;
@@ -213,7 +213,6 @@ impl Evidential {
         }
     }
 
-    /// From the lattice to the grid.
     fn on_grid(&self, window: Window) -> Window {
         if window.area() == 0 {
             return window;

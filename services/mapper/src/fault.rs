@@ -5,16 +5,16 @@ use glam::DVec2;
 
 /// Around the robot, metres.
 const AROUND_M: f64 = 0.5;
-/// From the target to the wall that encloses it, metres.
+/// Distance of the wall that encloses the target, metres.
 const WALL_M: f64 = 0.5;
 /// No step to a neighbouring cell crosses the wall.
 const WALL_CELLS: f64 = 1.5;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Area {
-    /// Of [`AROUND_M`] around this point.
+    /// Its radius is [`AROUND_M`].
     Disc(DVec2),
-    /// At [`WALL_M`] from this point.
+    /// Its distance from this point is [`WALL_M`].
     Wall(DVec2),
 }
 
@@ -38,7 +38,7 @@ pub(crate) fn hazard(fault: FaultKind, robot: DVec2, target: DVec2) -> Option<Ar
     }
 }
 
-/// What stays after a reset of the sensed belief.
+/// A fault may outlast a reset of the sensed belief.
 pub(crate) fn after_reset(fault: FaultKind) -> FaultKind {
     match fault {
         FaultKind::CutOff => fault,

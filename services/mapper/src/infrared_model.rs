@@ -9,7 +9,7 @@ use common::{
     wire::infrared_ad,
 };
 
-/// Below this the obstacle may be nearer than the reading, metres.
+/// The obstacle may be nearer than a reading below this, metres.
 const UNAMBIGUOUS_M: f64 = 0.10;
 /// Farther readings are no hits, metres: a ranger that sees nothing can give them.
 const HIT_WITHIN_M: f64 = 0.70;
@@ -32,7 +32,7 @@ pub(crate) struct Seen {
     pub(crate) hit_m: Option<f64>,
 }
 
-/// For ranges used up to `reach_m`; none where the ranger may be dead or saturated.
+/// Ranges are used up to `reach_m`; none where the ranger may be dead or saturated.
 pub(crate) fn seen(reading: &RangeReading, reach_m: f64) -> Option<Seen> {
     let range_m = match reading.status() {
         RangeStatus::Measured if reading.range_m > 0.0 => reading.range_m,

@@ -43,13 +43,13 @@ const PASSED_FAR: u8 = 4;
 struct Beam {
     /// Unit vector.
     along: DVec2,
-    /// In cells; 0 without a reading.
+    /// Cells; 0 without a reading.
     range: f64,
-    /// At that length.
+    /// The beam ends at `range`.
     ends: bool,
 }
 
-/// On the lattice, whose cells have sides of 1.
+/// Cells of the lattice have sides of 1.
 struct Scan<'a> {
     fan: &'a Fan<'a>,
     lattice: &'a GridFrame,
@@ -121,7 +121,7 @@ impl<'a> Scan<'a> {
 
     /// Mark cells that beams left at least `near` cells before their ends.
     fn pass(&mut self, near: f64, mark: u8) {
-        // Beyond this range a cell may lie between two beams.
+        // A cell may lie between two beams beyond this range.
         let close = self.fan.step_rad.recip();
         let corner = |beam: &Beam| self.origin + (beam.range - near).clamp(0.0, close) * beam.along;
         let mut corners: Vec<_> = self.beams.iter().map(corner).collect();
@@ -159,7 +159,7 @@ impl<'a> Scan<'a> {
         }
     }
 
-    /// By the share of its beams that end in it.
+    /// The share of its beams that end in it decides.
     fn is_thing(&self, cell: Cell) -> bool {
         let offset = DVec2::new(cell.col.into(), cell.row.into()) - self.origin;
         let away = offset.length();
@@ -202,7 +202,7 @@ fn fill(side: u32, corners: &[DVec2], mut span: impl FnMut(u32, Range<u32>)) {
     for (from, to) in before.zip(corners) {
         let (least, greatest) = (from.y.min(to.y), from.y.max(to.y));
         let slope = (to.x - from.x) / (to.y - from.y);
-        // Of two edges that meet on a row's centre, one crosses it.
+        // One of two edges that meet on a row's centre crosses it.
         let (first, end) = ((least.floor() + 1.0).max(0.0), greatest.floor().min(last) + 1.0);
         for (row, crossings) in
             crossings.iter_mut().enumerate().take(end as usize).skip(first as usize)
@@ -231,7 +231,6 @@ struct Along {
 }
 
 impl Along {
-    /// From `origin`, in cells, in the unit direction `along`.
     fn new(origin: DVec2, along: DVec2) -> Self {
         // Centres of cells have whole coordinates.
         let cell = (origin + 0.5).floor();
@@ -247,7 +246,7 @@ impl Along {
         }
     }
 
-    /// In cells.
+    /// The range in cells.
     fn ends(&self) -> f64 {
         self.next.min_element()
     }

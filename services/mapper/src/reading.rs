@@ -93,7 +93,6 @@ impl Rows {
         Some((distance, self.of(reading)?.mount.hit(robot, distance)))
     }
 
-    /// In the order of `readings`.
     pub(crate) fn beams(
         &self,
         robot: Pose2,
@@ -111,7 +110,7 @@ impl Rows {
         })
     }
 
-    /// Of live rays, in the order of `readings`.
+    /// Dead rays give none.
     pub(crate) fn rays(
         &self,
         robot: Pose2,
@@ -135,10 +134,9 @@ fn safety_distance(reading: &RangeReading) -> Option<f64> {
     }
 }
 
-/// In the mission's frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reading {
-    /// Of the sensor, metres.
+    /// The sensor's place, metres in the mission frame.
     pub(crate) origin: DVec2,
     /// Unit vector.
     pub(crate) axis: DVec2,
@@ -147,10 +145,9 @@ pub(crate) struct Reading {
     pub(crate) sonar: SonarModel,
 }
 
-/// In the mission's frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ray {
-    /// Of the ranger, metres.
+    /// The ranger's place, metres in the mission frame.
     pub(crate) origin: DVec2,
     /// Unit vector.
     pub(crate) axis: DVec2,
@@ -159,7 +156,7 @@ pub(crate) struct Ray {
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fan<'a> {
-    /// Of the laser, metres, in the mission's frame.
+    /// The laser's place, metres in the mission frame.
     pub(crate) origin: DVec2,
     /// Bearing of the first beam, and the angle from beam to beam.
     pub(crate) first_rad: f64,

@@ -59,14 +59,14 @@ const LEAST: [f64; 2] = [0.005, 0.002];
 pub(crate) struct Reference {
     pose: Pose2,
     beams: Vec<f32>,
-    /// Of x, y and heading; m^2, m rad, rad^2.
+    /// x, y and heading; m^2, m rad, rad^2.
     covariance: DMat3,
     /// Lines by beams; not saved, because they can be computed again.
     #[serde(skip)]
     lines: Vec<Option<Line>>,
 }
 
-/// In the mission's frame.
+/// Its frame is the mission's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Line {
     point: DVec2,
@@ -76,7 +76,7 @@ struct Line {
 
 #[derive(Clone, Debug)]
 pub(crate) struct ScanMatcher {
-    /// From one published match to the next.
+    /// Published matches are so far apart.
     every_ticks: u64,
     /// Matches that share their errors.
     shared: f64,
@@ -147,7 +147,7 @@ impl ScanMatcher {
         let went = pose.position.distance(held.pose.position);
         let turned = (pose.heading - held.pose.heading).abs();
         if went > REPLACED_AFTER.0 || turned > REPLACED_AFTER.1 || share < LEAST_SHARE {
-            // Without a match the pose is dead reckoning's.
+            // The pose is dead reckoning's without a match.
             let covariance = match found {
                 Some(_) => of_reference + matched + variances(OF_REFERENCE),
                 None => covariance_of(reckoned),
@@ -183,7 +183,7 @@ impl Reference {
     ) -> Option<(Pose2, DMat3, f64)> {
         let seen: Vec<_> = points_of(fan).into_iter().flatten().collect();
         let every = seen.len().div_ceil(POINTS).max(1);
-        // In the robot's frame.
+        // The frame is the robot's.
         let back = DVec2::from_angle(-start.heading);
         let points = seen.iter().step_by(every).map(|point| back.rotate(point - start.position));
         let points: Vec<_> = points.collect();
@@ -278,7 +278,7 @@ fn covariance_of(pose: &PoseSample) -> DMat3 {
     DMat3::from_cols(DVec3::new(xx, xy, xt), DVec3::new(xy, yy, yt), DVec3::new(xt, yt, tt))
 }
 
-/// From deviations of the place, metres, and of the heading, radians.
+/// Deviations of the place, metres, and of the heading, radians.
 fn variances([place, heading]: [f64; 2]) -> DMat3 {
     DMat3::from_diagonal(DVec3::new(place, place, heading).map(|deviation| deviation * deviation))
 }

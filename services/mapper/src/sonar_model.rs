@@ -22,10 +22,10 @@ pub(crate) struct SonarModel {
     pub(crate) arc: f64,
     /// Error of an echo's range, metres: noise, the byte's centimetre, half a cell.
     pub(crate) band_m: f64,
-    /// In the middle of the arc.
+    /// An echo's weight in the middle of its arc.
     pub(crate) hit: f64,
-    /// At the arc's end, where the sound is weakest; between, the weight falls linearly. It is 0, because a beam that points there hears
-    /// an obstacle better, and gaps stay open.
+    /// An echo's weight at the end of its arc, where the sound is weakest; between, it falls linearly. It is 0, because a beam that
+    /// points there hears an obstacle better, and gaps stay open.
     pub(crate) hit_at_edge: f64,
 
     /// An obstacle this far before an echo may be its cause, metres, so the beam does not free the ground there.
@@ -34,7 +34,7 @@ pub(crate) struct SonarModel {
     pub(crate) behind_m: f64,
     /// Weight taken off a passed cell.
     pub(crate) pass: i8,
-    /// At the beam's edge, where it may have missed.
+    /// Less, because the beam's edge may have missed.
     pub(crate) pass_at_edge: i8,
     /// Half the angle in which a beam is evidence against an earlier echo. Farther out it may have missed.
     pub(crate) against: f64,
@@ -63,7 +63,7 @@ pub(crate) struct SonarModel {
     pub(crate) pointed: f64,
     /// The range of that, metres.
     pub(crate) pointed_m: f64,
-    /// After so many such readings the cell counts as scanned: there is nothing more to learn.
+    /// The cell counts as scanned after so many such readings: there is nothing more to learn.
     pub(crate) pointed_enough: u8,
     /// Ground stays scanned for this way of the wheels, turns included, metres. By then the pose's error is about the clearance of
     /// hazards.

@@ -18,7 +18,7 @@ use crate::step::{Belief, Change, Input, Mapper};
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Start {
     belief: Option<Belief>,
-    /// Since the snapshot, oldest first.
+    /// Oldest first, after the snapshot.
     inputs: Vec<Input>,
 }
 

@@ -31,19 +31,19 @@ pub enum Input {
         pose: PoseSample,
         /// None if none came.
         ranges: Vec<RangeReading>,
-        /// As the topic `scan` has them; none if none came.
+        /// Metres; none if none came.
         scan: Vec<f32>,
         /// Something holds the wheels at this tick.
         contact: Option<ContactSample>,
         /// It holds from this tick on, metres; none if unchanged.
         target: Option<DVec2>,
     },
-    /// By the supervisor.
+    /// The supervisor's reset.
     Reset {
         /// A belief that has begun already is not reset.
         epoch: u64,
     },
-    /// By an operator; it acts from the next tick on.
+    /// An operator's; it acts from the next tick on.
     Fault(FaultKind),
 }
 
@@ -131,7 +131,7 @@ pub struct Mapper {
     footprint: f64,
     half_track: f64,
     matcher: ScanMatcher,
-    /// By the newest scan.
+    /// The newest scan's.
     fix: Option<FixSample>,
     belief: Belief,
 }
@@ -234,7 +234,7 @@ impl Mapper {
         self.rows.uses(reading)
     }
 
-    /// By the newest scan and those before; none if they do not give one.
+    /// The newest scan and those before may give none.
     pub const fn take_fix(&mut self) -> Option<FixSample> {
         self.fix.take()
     }
@@ -247,7 +247,6 @@ impl Mapper {
         self.belief.target
     }
 
-    /// Of an encoded belief.
     pub const fn saved_bytes(&self) -> usize {
         let evidence = match self.belief.sensed {
             Sensed::Hits => 0,
@@ -256,7 +255,6 @@ impl Mapper {
         self.frame.area() + evidence + 5 * MOST_BEAMS + 240
     }
 
-    /// For a `grid` sample with `part`.
     pub fn header(&self, part: Part) -> GridHeader {
         let mut header = GridHeader {
             part,
@@ -315,7 +313,7 @@ impl Mapper {
         changed
     }
 
-    /// By the target, the known shapes and the evidence. The paper's hits are in its map alone.
+    /// The target, the known shapes and the evidence decide. The paper's hits are in its map alone.
     fn state_for_target(&self, cell: Cell) -> CellState {
         let (known, reach) = &self.known;
         let is_target = Some(cell) == self.target;
@@ -406,7 +404,7 @@ impl Mapper {
         changed
     }
 
-    /// By the evidence. Returns the changed window.
+    /// The evidence decides. Returns the changed window.
     fn redraw(&mut self, window: Window) -> Window {
         let mut changed = Window::default();
         let Sensed::Evidence(map) = &self.belief.sensed else {

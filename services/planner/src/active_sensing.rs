@@ -46,7 +46,7 @@ pub(crate) struct ActiveSensing {
     turn: f64,
     /// The time to stop, seconds.
     stops_within_s: f64,
-    /// From the robot's axis to the front sonar's, which is turned for a look.
+    /// Turns the robot's axis to the front sonar's, which is turned for a look.
     bearing: DVec2,
     /// The arc is followed so far: at top speed the robot can stop there, metres.
     ahead_m: f64,
@@ -72,7 +72,7 @@ impl ActiveSensing {
         }
     }
 
-    /// For a robot at `pose` that is to go along `direction`, a unit vector.
+    /// `direction` is a unit vector.
     pub(crate) fn advise(
         &mut self,
         view: &View<'_>,
@@ -97,13 +97,13 @@ impl ActiveSensing {
         let surfaces = surfaces.filter(|_| !self.has_laser);
         let unseen = ground.chain(surfaces);
         match scan(self.bearing.rotate(pose.axis()), unseen, &mut self.scan_side) {
-            // Until the sonar faces the unscanned place.
+            // The sonar is turned to the unscanned place.
             Some(there) => Advice::Look(DVec2::new(self.bearing.x, -self.bearing.y).rotate(there)),
             None => Advice::Go(self.limit(view, &undetected, belief, pose, direction)),
         }
     }
 
-    /// By the newest readings along the robot's axis, m/s: none towards an echo right before the body.
+    /// The limit by the newest readings along the robot's axis, m/s: none towards an echo right before the body.
     pub(crate) fn limit_before_echoes(&self, belief: &GridHeader, pose: &Pose2) -> f64 {
         let clear_m = clear_ahead_m(belief, pose, self.radius, self.sonars);
         if clear_m < STANDS_BEFORE_M {

@@ -14,7 +14,7 @@ use crate::view::View;
 
 /// To either side of straight ahead.
 const ARCS_A_SIDE: i32 = 8;
-/// Between looked-at points of an arc, metres.
+/// Looked-at points of an arc are so far apart.
 const STEP_M: f64 = 0.05;
 /// An arc is followed so far, metres.
 const AHEAD_M: f64 = 0.8;
@@ -25,7 +25,7 @@ const LEAST_FREE_M: f64 = 0.1;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Arcs {
-    /// Of the tightest circle, 1/m.
+    /// The tightest circle's, 1/m.
     most_curvature: f64,
     speed: f64,
     turn: f64,
@@ -35,9 +35,9 @@ pub(crate) struct Arcs {
 #[derive(Clone, Copy, Debug)]
 struct Followed {
     curvature: f64,
-    /// Until a hazard cuts it off.
+    /// The length until a hazard.
     free_m: f64,
-    /// Along the field.
+    /// Progress along the field.
     progress_m: f64,
 }
 
@@ -89,7 +89,7 @@ impl Arcs {
 
     /// The direction that makes (15) and (16) give `curvature`.
     fn direction(&self, pose: &Pose2, curvature: f64, distance: f64) -> DVec2 {
-        // With the sine s to the direction, the turn rate is wd s and the speed vd (1 - s/2), less near the target.
+        // The turn rate is wd s and the speed vd (1 - s/2), less near the target, with the sine s to the direction.
         let speed = self.speed * (distance / self.slow_radius).min(1.0);
         let sine = curvature * speed / (self.turn + curvature.abs() * speed / 2.0);
         let angle = if sine.abs() < 1.0 { sine.asin() } else { FRAC_PI_2.copysign(sine) };

@@ -53,7 +53,7 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
         Ok(Self { jobs: Some(jobs), results, done, unread: 0, ended: 0, thread: Some(thread) })
     }
 
-    /// After those before it.
+    /// Jobs are done in turn.
     pub(crate) fn begin(&mut self, job: Job) {
         if let Some(jobs) = &self.jobs {
             // The thread ends only when this value is dropped.
@@ -62,7 +62,7 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
         }
     }
 
-    /// If its end was signalled: a signal after its result was taken would wake the process for ever.
+    /// The end must have been signalled: a signal after its result was taken would wake the process for ever.
     pub(crate) fn take(&mut self) -> Option<Done> {
         self.drain();
         let result = (self.ended > 0).then(|| self.results.try_recv().ok()).flatten();

@@ -30,12 +30,11 @@ impl BackgroundSolver {
         Ok(Self { cancellation, thread: Background::start("full-solve", solve)? })
     }
 
-    /// After those before it.
+    /// Jobs are done in turn.
     pub fn begin(&mut self, job: Job) {
         self.thread.begin(job);
     }
 
-    /// If there is one.
     pub fn take(&mut self) -> Option<Solved> {
         self.thread.take()
     }

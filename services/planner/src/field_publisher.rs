@@ -101,7 +101,6 @@ impl FieldPublisher {
         changed && !self.busy && age.is_none_or(|age| age >= topics::FIELD.changes_at_most_every())
     }
 
-    /// Of `snapshot`.
     pub(crate) fn begin(&mut self, snapshot: Snapshot, at: Progress) {
         self.busy = true;
         self.change_published = Some(at.time);

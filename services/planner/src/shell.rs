@@ -32,7 +32,7 @@ pub struct Shell {
     background: BackgroundSolver,
     field: FieldPublisher,
     lockstep: bool,
-    /// In lockstep: the last job and its tick, until its result is taken.
+    /// The last job and its tick, in lockstep, until its result is taken.
     job: Option<(u64, u64)>,
     latest_pose: Option<PoseSample>,
     /// The last answered tick.
@@ -170,7 +170,6 @@ impl Shell {
         Ok(self.take(Taken::Solved(number))? == Work::SwappedIn)
     }
 
-    /// If it is another.
     fn take_target(&mut self, tick: u64) -> Result<(), StageError> {
         if let Some(target) = self.target.next(tick)? {
             self.has_target = true;
@@ -211,7 +210,7 @@ impl Shell {
         Ok(())
     }
 
-    /// After the robot has its guidance.
+    /// The robot has its guidance by then.
     fn publish_field(&mut self) -> Result<(), StageError> {
         let Runner { stage, out } = &mut self.runner;
         let (now, has_new_reader) = (out.at, out.has_new_reader(&FIELD)?);

@@ -42,19 +42,19 @@ pub(crate) enum Taken<'a> {
     Pose {
         #[serde(with = "inputs::sample")]
         pose: PoseSample,
-        /// Of the last full solve, added to the guidance.
+        /// The last full solve's, added to the guidance.
         full_solve_ns: u64,
     },
     Idle,
     /// The result of this job.
     Solved(u64),
-    /// With the robot's place, metres.
+    /// The robot is here, metres.
     Fault(FaultKind, DVec2),
-    /// Of the newest policy, published.
+    /// This part of the newest policy is published.
     Field(#[serde(with = "inputs::sample")] Part),
     /// A policy of the field is due.
     Policy,
-    /// Another target.
+    /// The target is another.
     Target(#[serde(with = "inputs::sample")] TargetSample),
 }
 
@@ -74,7 +74,7 @@ pub struct PlannerStage {
 impl Stage for PlannerStage {
     type Start = ();
     type Entry<'a> = Entry<'a>;
-    /// After an error the process ends.
+    /// The process ends after an error.
     type Outcome = Result<Work, SolveError>;
 
     fn new(mission: &Mission) -> Self {
@@ -165,7 +165,7 @@ impl PlannerStage {
         Solved { number, field: Err(SolveError::Cancelled), took_ns: 0 }
     }
 
-    /// For its tick `at`.
+    /// `at` is the policy's tick.
     fn publish_field(
         &mut self,
         part: Part,

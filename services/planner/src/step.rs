@@ -38,11 +38,11 @@ enum Advisor {
     Follow,
     /// The evidential method: whether the sonar has looked there.
     LookFirst(ActiveSensing),
-    /// Of a car: whether it can steer there.
+    /// Checks whether a car can steer there.
     Steer(Arcs),
 }
 
-/// (11).
+/// The equation is (11).
 #[derive(Debug)]
 pub struct Planner {
     /// None before the supervisor names one.
@@ -152,7 +152,7 @@ impl Planner {
         Ok(Work::Stale)
     }
 
-    /// Without an earlier field.
+    /// There is no earlier field.
     fn solve_first(&mut self) -> Result<Work, SolveError> {
         self.live = None;
         let Some(frame) = self.grid.frame() else {
@@ -194,7 +194,7 @@ impl Planner {
         self.live.as_ref().is_some_and(|live| live.is_small() && !live.is_current())
     }
 
-    /// From the field before.
+    /// The solve starts from the field before.
     fn solve_newest(&mut self) -> Result<Work, SolveError> {
         let Some(live) = &mut self.live else {
             return Ok(Work::None);
@@ -218,7 +218,7 @@ impl Planner {
         Domain::new(side, side, blocked, aim)?.with_screening(&self.screening)
     }
 
-    /// Metres.
+    /// The target, metres.
     fn place(&self) -> Option<DVec2> {
         self.target.map(|target| target.target.position())
     }
@@ -361,7 +361,7 @@ impl Planner {
     }
 }
 
-/// In the unit of the mission's grid.
+/// The unit is the mission's grid.
 fn screening(mission: &Mission) -> Screening {
     mission.screening_length_m().map_or(Screening::None, |length| Screening::Uniform {
         length,

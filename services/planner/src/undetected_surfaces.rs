@@ -13,7 +13,7 @@ use glam::DVec2;
 
 /// Largest checked angle between the way and a normal: beyond it a surface is passed, not met.
 const WIDEST_DEG: f64 = 75.0;
-/// Between normals: less than a beam is wide.
+/// Angle between normals: less than a beam is wide.
 const STEP_DEG: f64 = 15.0;
 /// A surface answers a beam within this angle of its normal: the cone, and a little more.
 const ANSWERS_WITHIN_DEG: f64 = 17.0;
@@ -50,9 +50,9 @@ pub(crate) struct UndetectedSurfaces {
     beams: BySector,
     rays: Vec<Beam>,
     reach: f64,
-    /// From the body's centre to where a ray excludes a supposed surface, metres, at most.
+    /// A ray excludes a supposed surface no farther from the body's centre, metres.
     met_within: f64,
-    /// For a way along x, with their angles.
+    /// The way is along x; with the normals' angles.
     normals: [(DVec2, f64); NORMALS],
     /// Least cosine between a beam and the normal of a far surface that answers it, and of a near one.
     answers: [f64; 2],
@@ -82,7 +82,7 @@ impl From<&ClearBeam> for Beam {
 struct BySector {
     /// In each sector, those that may have an echo come last.
     beams: Vec<Beam>,
-    /// By sectors, and the end of the last.
+    /// The first beam of each sector, and the end of the last.
     starts: [usize; SECTORS + 1],
 }
 
@@ -170,7 +170,7 @@ impl UndetectedSurfaces {
         })
     }
 
-    /// If it may meet a surface that touches a body at `at`, near the body and not too far behind its end.
+    /// The ray may meet a surface that touches a body at `at`, near the body and not too far behind its end.
     fn near(&self, ray: &Beam, at: DVec2) -> Option<Beam> {
         let offset = at - ray.origin;
         let (along, near) = (ray.axis.dot(offset), self.met_within);
@@ -179,7 +179,7 @@ impl UndetectedSurfaces {
         meets.then_some(Beam { may_echo: ray.clear < along + near, ..*ray })
     }
 
-    /// On the side of `normal` of a body at `at`.
+    /// The surface touches a body at `at` on the side of `normal`.
     fn is_excluded(&self, at: DVec2, normal: DVec2, beams: &[&[Beam]], rays: &[Beam]) -> bool {
         let may_echo =
             |beams: &&[Beam]| beams.iter().rev().take_while(|beam| beam.may_echo).count();
@@ -190,7 +190,7 @@ impl UndetectedSurfaces {
             || rays.iter().any(|ray| tally.is_decided_by(ray, self.met_after(ray, at, normal)))
     }
 
-    /// From where such a surface answers `beam`, metres; none if it does not.
+    /// The distance from which such a surface answers `beam`, metres; none if it does not.
     fn answers_from(&self, beam: &Beam, at: DVec2, normal: DVec2) -> Option<f64> {
         let [far, near] = self.answers;
         let square = beam.axis.dot(normal);

@@ -4,7 +4,7 @@ use common::grid::{Cell, CellState, GridFrame};
 use glam::DVec2;
 use harmonic::{Field, Guidance};
 
-/// Between points of a way, metres.
+/// Points of a way are so far apart.
 pub(crate) const STEP_M: f64 = 0.05;
 /// Step of the search for unscanned cells on a fine grid, metres.
 const GRAIN_M: f64 = 0.025;
@@ -58,7 +58,7 @@ impl View<'_> {
             .map(|cell| self.frame.centre_of(cell))
     }
 
-    /// In every `step`th column and row, with centres within `radius`.
+    /// Cells in every `step`th column and row, with centres within `radius`.
     fn cells_within(&self, at: DVec2, radius: f64, step: usize) -> impl Iterator<Item = Cell> {
         let frame = self.frame;
         let last = f64::from(frame.cells) - 1.0;

@@ -23,10 +23,10 @@ impl Controller {
         let omega = self.angular(alignment);
         let wanted = self.tangential(alignment, omega, distance);
         let wanted = wanted.max(least);
-        // In this form a limit that is no number means stand.
+        // A limit that is no number means stand.
         if limit >= least {
             let v = wanted.min(limit);
-            // The same curve at a lower speed.
+            // A lower speed, on the same curve.
             let omega = omega * v / wanted;
             Some(Twist { v, omega })
         } else {

@@ -17,12 +17,12 @@ pub(crate) const RECOVERED_V: f64 = 0.3;
 pub(crate) const EMPTY_SHARE: f64 = 1.0 / 1.1;
 /// Time below the empty voltage until a battery is empty, mission time. Starting motors lower the voltage for some tenths of a second.
 pub(crate) const EMPTY_AFTER: Duration = Duration::from_secs(2);
-/// Below this there is no battery at all, volts: a robot could not send frames on it.
+/// A robot could not send frames on less: there is no such battery, volts.
 const FITTED_V: f64 = 1.0;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Charge {
-    /// Or there is no such battery.
+    /// Enough, or there is no such battery.
     #[default]
     Enough,
     /// The robot drives slowly.
@@ -60,7 +60,7 @@ pub struct BatteryChange {
 #[derive(Clone, Copy, Debug, Default)]
 struct Gauge {
     charge: Charge,
-    /// Below the empty voltage since then.
+    /// The voltage has been too low since then.
     sunk_since: Option<MissionTime>,
 }
 
@@ -86,7 +86,7 @@ impl Gauge {
 #[derive(Clone, Debug)]
 pub struct Batteries {
     limits: BatteryLimits,
-    /// In the order of [`Pack::ALL`].
+    /// Ordered as [`Pack::ALL`].
     gauges: [Gauge; 3],
     changes: Vec<BatteryChange>,
 }

@@ -9,7 +9,7 @@ use common::{driver::Commander, mission::Mission, samples::Cause};
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
 
-/// After this silence a commander is gone.
+/// A commander is gone after this silence.
 pub(crate) const GONE_AFTER: Duration = Duration::from_secs(1);
 /// A sender of stops alone is a commander after this time. An earlier link's stop guard leaves sooner.
 pub(crate) const STAYS: Duration = Duration::from_secs(2);

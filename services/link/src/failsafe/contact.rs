@@ -12,13 +12,13 @@ use common::{clock::MissionTime, mission::Mission, samples::ContactSample};
 
 use super::monitor::Condition;
 
-/// Until a wheel with a held one's current is held.
+/// A wheel with a held one's current is held after this.
 pub(crate) const HELD_AFTER: Duration = Duration::from_millis(400);
 /// The robot stands while the contact is mapped and the planner restarted.
 pub(crate) const STANDS_FOR: Duration = Duration::from_millis(500);
-/// Between two contacts, so that one is answered before the next, in lockstep too.
+/// The least time between two contacts: one is answered before the next, in lockstep too.
 const NEXT_AFTER: Duration = Duration::from_secs(1);
-/// By then a standing wheel's current has fallen.
+/// A standing wheel's current has fallen by then.
 const FALLEN_AFTER: Duration = Duration::from_millis(350);
 /// A current that is so long high while its wheel rolls as told is no sign of a held wheel.
 const HIGH_AND_ROLLS: Duration = Duration::from_secs(2);
@@ -26,7 +26,7 @@ const HIGH_AND_ROLLS: Duration = Duration::from_secs(2);
 const MOST_AD: u16 = 4095;
 /// Half the arc of a touch with both wheels held, radians.
 const HALF_WIDTH: f64 = PI / 4.0;
-/// With one wheel held, the arc's bearing, to its side, and half of it, radians.
+/// The touched arc of a body with one wheel held: its bearing, to that side, and half of it, radians.
 const AT_ONE_WHEEL: (f64, f64) = (PI / 4.0, PI / 6.0);
 /// A command below this share of the rims' relative speed is a turn on the spot.
 const LEAST_AHEAD_SHARE: f64 = 0.5;
@@ -67,7 +67,6 @@ impl Contacts {
         })
     }
 
-    /// As told, with a high current.
     pub(super) fn rolled(&mut self, wheel: usize, gap_s: f64) {
         self.high_and_rolls_s[wheel] += gap_s;
     }
@@ -99,7 +98,7 @@ impl Contacts {
         [0, 1].into_iter().find(|&wheel| stands && held[wheel] && high[wheel])
     }
 
-    /// For the next tick alone.
+    /// The next tick alone has it.
     pub(super) const fn take(&mut self) -> Option<ContactSample> {
         self.new.take()
     }

@@ -14,7 +14,7 @@ use super::monitor::{Condition, Moment, Monitor, Observation};
 const LEAST_LIMIT: Duration = Duration::from_millis(100);
 /// The window beyond the limit, mission time: a standing robot gets commands every 0.2 s.
 const WINDOW: Duration = Duration::from_millis(400);
-/// Until a late robot is tested again, mission time.
+/// A late robot is tested again after this mission time.
 const AGAIN: Duration = Duration::from_secs(2);
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -24,11 +24,11 @@ enum State {
     Timely,
     /// Nothing was sent since then, to see late acknowledgements.
     Testing(u64),
-    /// Since then.
+    /// Late since then.
     Late(u64),
 }
 
-/// By the machine's clock, nanoseconds.
+/// Times are the machine's, nanoseconds.
 #[derive(Clone, Debug)]
 pub struct LatencyMonitor {
     command_limit: Duration,

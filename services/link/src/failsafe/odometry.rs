@@ -29,19 +29,19 @@ use super::{
     monitor::{Condition, Counts, Moment, Monitor, Observation},
 };
 
-/// Then counts are evidence about a command in one direction.
+/// Counts are evidence about a command in one direction after this.
 const SETTLE: Duration = Duration::from_millis(250);
-/// By then a real wheel has changed direction; at 7 Hz it has 0.6 of its speed.
+/// A real wheel has changed direction by then; at 7 Hz it has 0.6 of its speed.
 const TURNS_AFTER: Duration = Duration::from_millis(100);
 /// The slowest judged motion, m/s at the rim.
 const LEAST_M_S: f64 = 0.03;
 /// The least judged difference of the wheels, m/s.
 const LEAST_TURN_M_S: f64 = 0.1;
-/// The same as a share of their mean speed: two motors differ by some hundredths.
+/// The least judged share of the wheels' mean speed: two motors differ by some hundredths.
 const LEAST_TURN_SHARE: f64 = 0.25;
 /// A plausible wheel turns at least this share of its command.
 const LEAST_SHARE: f64 = 0.25;
-/// From this share on a wheel rolls as told.
+/// A wheel rolls as told from this share on.
 const ROLLS_SHARE: f64 = 0.5;
 /// Evidence for a suspicion. A radio that delivers frames does not lose commands for so long.
 pub(crate) const SUSPECTED_AFTER: Duration = Duration::from_millis(550);
@@ -53,12 +53,12 @@ pub(crate) const JUMPS_WITHIN: Duration = Duration::from_secs(2);
 pub(crate) const CALM: Duration = Duration::from_secs(2);
 /// So often it ends by itself: a faulty robot's counts may jump only while it moves.
 const MOST_RECOVERIES: u32 = 2;
-/// Then a suspected robot's mission ends.
+/// A suspected robot's mission ends after this.
 pub(crate) const GIVEN_UP_AFTER: Duration = Duration::from_secs(10);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Suspicion {
-    /// Or the wheel of a car.
+    /// It may be the wheel of a car.
     Left,
     Right,
     /// Both wheels roll: they are swapped, or one is read wrongly.
@@ -83,7 +83,7 @@ impl Suspicion {
     }
 }
 
-/// Against one wheel, or the difference of both.
+/// Evidence against one wheel, or the difference of both.
 #[derive(Clone, Copy, Debug, Default)]
 struct Evidence {
     asked: [f64; 2],
@@ -244,7 +244,7 @@ impl Odometry {
         }
     }
 
-    /// By the newest frame; the next call gives none.
+    /// The newest frame's contact; the next call gives none.
     pub(crate) const fn take_contact(&mut self) -> Option<ContactSample> {
         self.contacts.take()
     }

@@ -9,7 +9,7 @@ use common::{
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
 
-/// Then a supervisor has ended. Ten times the interval of directives, so that a loaded machine does not stop the robot, and a second
+/// A silent supervisor has ended. Ten times the interval of directives, so that a loaded machine does not stop the robot, and a second
 /// before systemd's watchdog would kill the supervisor.
 pub(crate) const SUPERVISOR_SILENT: Duration = Duration::from_secs(2);
 
@@ -36,7 +36,6 @@ impl Orders {
             || self.newest.is_some_and(|directive| directive.reason == HoldReason::Operator)
     }
 
-    /// At its link.
     pub const fn stopped_here(&self) -> bool {
         self.stopped_here
     }

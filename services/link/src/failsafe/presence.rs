@@ -11,17 +11,17 @@ use crate::backoff::Backoff;
 pub(crate) const SILENT_LIMITS: u32 = 3;
 /// Machine time: any process may be delayed by so much at any pace.
 const LEAST_SILENCE: Duration = Duration::from_millis(100);
-/// Between the first two pings.
+/// The first pause between pings.
 const FIRST_PAUSE: Duration = Duration::from_millis(200);
 /// A robot that waits for a ping is found only then; one that sends by itself at once.
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 
-/// By the machine's clock.
+/// Times are the machine's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Absence {
-    /// Since the robot was lost, or since the first attempt to find it; 0 while it answers.
+    /// Counted from the loss, or from the first attempt to find the robot; 0 while it answers.
     pub lost_ns: u64,
-    /// Since the robot was lost.
+    /// Counted from the loss.
     pub pings: u64,
     pub next_ping_ns: u64,
 }
@@ -46,7 +46,6 @@ impl Silence {
         };
     }
 
-    /// At `now_ns` of the machine's clock, after a frame at `heard_ns`.
     pub(crate) fn is_over(&self, heard_ns: u64, now_ns: u64) -> bool {
         now_ns.saturating_sub(heard_ns) >= self.machine.as_nanos() as u64
     }
@@ -98,7 +97,7 @@ impl Presence {
         new
     }
 
-    /// After a change the robot is pinged at once.
+    /// A change makes the robot pinged at once.
     pub const fn wire(&mut self, open: bool) {
         self.wire_open = open;
         self.pings.reset();

@@ -34,7 +34,7 @@ const JUDGED_SONAR_M: RangeInclusive<f64> = 0.05..=2.49;
 const JUDGED_INFRARED_M: RangeInclusive<f64> = 0.10..=0.70;
 /// The wheels' mean way is less than this share of half their difference.
 const ON_THE_SPOT: f64 = 0.25;
-/// Of changing readings, until the cause clears.
+/// The cause clears after readings changed for so long.
 pub(crate) const CHANGES: Duration = Duration::from_secs(2);
 
 #[derive(Clone, Copy, Debug, Default)]

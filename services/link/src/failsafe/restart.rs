@@ -39,7 +39,7 @@ pub struct RestartWatch {
     restarts: u32,
     /// A wheel's counts in a second at top speed.
     top_counts: f64,
-    /// Of frames, seconds.
+    /// Jitter of frames.
     jitter_s: f64,
     /// [`SLACK_M`] in counts.
     slack: f64,
@@ -63,7 +63,7 @@ impl RestartWatch {
         }
     }
 
-    /// In counts/s.
+    /// `counts` are counts/s.
     pub fn commanded(&mut self, counts: [i16; 2], now: MissionTime) {
         self.commanded = [self.commanded[1], counts.map(f64::from)];
         if counts != [0, 0] {

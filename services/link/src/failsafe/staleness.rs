@@ -10,7 +10,6 @@ use common::{
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
 
-/// In mission time.
 #[derive(Clone, Copy, Debug)]
 struct Times {
     /// The answered tick's.

@@ -6,11 +6,11 @@ use common::{clock::MissionTime, mission::Mission, samples::Cause, wire::counts_
 
 use super::monitor::{Condition, Counts, Moment, Monitor, Observation};
 
-/// With delay and lag of the speed loop, and a lost stop or two.
+/// Delay and lag of the speed loop, and a lost stop or two, are included.
 const COMES_TO_REST: Duration = Duration::from_millis(600);
-/// After [`COMES_TO_REST`]. A repeated stop has an effect sooner.
+/// It counts from [`COMES_TO_REST`]. A repeated stop has an effect sooner.
 pub(crate) const DOES_NOT_STOP_AFTER: Duration = Duration::from_millis(500);
-/// At the rim, m/s.
+/// Speed of the rim.
 const MOVES_M_S: f64 = 0.03;
 /// Rest is below this, m/s, or below [`RESTS_COUNTS`] between two frames: a resting encoder's counts vary.
 const RESTS_M_S: f64 = 0.01;
@@ -20,7 +20,7 @@ const RESTS_COUNTS: f64 = 4.0;
 const SHOWS_AFTER: Duration = Duration::from_millis(150);
 /// Wheels rest so long until the robot does.
 const AT_REST_AFTER: Duration = Duration::from_millis(200);
-/// Until the next method for a robot that does not stop.
+/// A robot that does not stop gets the next method after this.
 const NEXT_METHOD_AFTER: Duration = Duration::from_millis(300);
 
 #[derive(Clone, Debug)]
@@ -80,7 +80,6 @@ impl StopMonitor {
         self.resting = Duration::ZERO;
     }
 
-    /// By the encoders.
     pub fn is_at_rest(&self) -> bool {
         self.resting >= AT_REST_AFTER
     }
@@ -90,7 +89,7 @@ impl StopMonitor {
         self.method
     }
 
-    /// If it is due; returns whether it was. `does_not_stop` is whether the cause applies.
+    /// The next method may be due; returns whether it was. `does_not_stop` is whether the cause applies.
     pub fn takes_next_method(&mut self, does_not_stop: bool, now: MissionTime) -> bool {
         if !does_not_stop {
             self.tried = None;

@@ -22,7 +22,7 @@ use crate::backoff::Backoff;
 /// short ones.
 const INTERVALS: usize = 9;
 const SHORT_ONES: usize = 2;
-/// Between the first two requests for missing streams.
+/// The first pause between requests for missing streams.
 const FIRST_PAUSE: Duration = Duration::from_secs(1);
 const LONGEST_PAUSE: Duration = Duration::from_secs(8);
 
@@ -45,7 +45,7 @@ struct Newest {
     name: String,
     /// The robot may go on without the sensor.
     is_covered: bool,
-    /// By the machine's clock.
+    /// Time of the machine's clock.
     ns: u64,
 }
 
@@ -73,7 +73,6 @@ impl Streams {
         }
     }
 
-    /// Of a robot that answers.
     pub fn motor_frames(&self, now_ns: u64) -> Motor {
         let since = self.motor_ns.max(self.found_ns);
         if self.silence.is_over(since, now_ns) {
@@ -89,7 +88,7 @@ impl Streams {
         }
     }
 
-    /// Without a valid reading.
+    /// Sensors without a valid reading.
     fn silent_sensors(&self, now_ns: u64) -> Vec<&Newest> {
         // A robot that was just found must send a new reading: older ones do not show what is ahead now.
         let is_silent = |sensor: &&Newest| self.sensing && self.silence.is_over(sensor.ns, now_ns);

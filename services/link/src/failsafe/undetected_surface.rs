@@ -14,7 +14,7 @@ use glam::DVec2;
 
 /// Both rangers must see a surface nearer than this, metres.
 const NEARER_M: f64 = 0.45;
-/// Between the surface's normal and the sonar's axis at most, degrees.
+/// The greatest angle between the surface's normal and the sonar's axis.
 const SQUARE_DEG: f64 = 12.0;
 /// Rangers within this of the axis look into the sonar's cone, degrees.
 const BESIDE_DEG: f64 = 15.0;
@@ -63,7 +63,6 @@ impl UndetectedSurface {
         (!is_one).then_some(Self { front: front as u8, axis, beside, silences: 0 })
     }
 
-    /// From the newest frames.
     pub(super) fn take(&mut self, readings: &[RangeReading]) {
         for ranger in &mut self.beside {
             if let Some(reading) = readings.iter().find(|reading| reading.sensor == ranger.row) {

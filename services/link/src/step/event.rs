@@ -65,10 +65,10 @@ pub enum Effect {
         ranges: Vec<RangeReading>,
         /// None if none came.
         scan: Vec<f32>,
-        /// Since the tick before, by the robot's own gyro.
+        /// The turn since the tick before, by the robot's own gyro.
         turn: Option<TurnSample>,
         wheels: WheelSample,
-        /// By these encoders.
+        /// These encoders show it.
         contact: Option<ContactSample>,
     },
     /// A tick's command was sent.
@@ -96,7 +96,6 @@ pub enum Effect {
     Refused(String),
     /// The speed of the robot's clock over mission time's.
     ClockRate(f64),
-    /// Again.
     AskedForStreams,
     Infrared(InfraredSample),
     Power(PowerSample),
@@ -106,7 +105,7 @@ pub enum Effect {
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Velocity commands.
+    /// Counts velocity commands.
     pub commands: u64,
     pub repeated_commands: u64,
     pub repeated_ticks: u64,

@@ -32,7 +32,7 @@ impl Link {
         }
     }
 
-    /// In counts/s.
+    /// `counts` are counts/s.
     pub(super) fn tell(
         &mut self,
         counts: [i16; 2],
@@ -92,7 +92,7 @@ impl Link {
         self.driver.velocity([0, 0], self.limit)
     }
 
-    /// If it is due. Returns whether it was.
+    /// Returns whether it was due.
     fn takes_next_stop_method(&mut self) -> bool {
         let does_not_stop = self.failsafe.applied(Cause::RobotDoesNotStop);
         self.failsafe.monitors.stop.takes_next_method(does_not_stop, self.now)

@@ -95,7 +95,7 @@ impl Link {
         }
     }
 
-    /// In lockstep all counts are plausible, because a simulated robot does not restart; only contacts are noticed.
+    /// All counts are plausible in lockstep, because a simulated robot does not restart; only contacts are noticed.
     fn judge_counts(&mut self, motion: &Motion, now_ns: u64) -> Counts {
         let wheels = motion.wheels;
         let counts = [wheels.left_counts, wheels.right_counts];

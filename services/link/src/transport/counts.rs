@@ -13,7 +13,7 @@ pub struct Tally {
 /// To open a closed wire.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Attempts {
-    /// Since the robot last sent something.
+    /// Counted since the robot last sent something.
     pub made: u64,
     /// 0 during an attempt.
     pub next_ns: u64,

@@ -17,18 +17,18 @@ use super::counts::Tally;
 
 const DEPTH: u16 = 16;
 
-/// After such a silence a participant may be cut off, and joins anew.
+/// A participant may be cut off after such a silence, and joins anew.
 const DEAF_NS: u64 = 2_000_000_000;
-/// For one that has heard nothing yet: over a slow network, others discover it late.
+/// A participant that has heard nothing yet waits longer: over a slow network, others discover it late.
 const UNDISCOVERED_NS: u64 = 10_000_000_000;
 
 #[derive(Debug)]
 pub(super) struct Dds {
-    /// By the topics' rows.
+    /// Rows of the topics.
     readers: Vec<Reader>,
     writer: Writer,
     topics: Topics,
-    /// Of the topic of commands.
+    /// The row of the topic of commands.
     commands: Option<usize>,
     /// The reader that is asked next, so that a flood on one topic does not hold back others.
     next: usize,
@@ -57,7 +57,7 @@ impl Dds {
         })
     }
 
-    /// After a silence, join anew.
+    /// Join anew after a silence.
     pub(super) fn maintain(&mut self, now_ns: u64) -> io::Result<()> {
         let joined_ns = *self.joined_ns.get_or_insert(now_ns);
         let (since_ns, most_ns) =

@@ -21,7 +21,7 @@ use rustix::{
 
 use super::stream::Dial;
 
-/// Without an Arduino, bits a second.
+/// Bits a second, without an Arduino.
 const BAUD: u32 = 115_200;
 
 #[derive(Debug)]
@@ -73,7 +73,7 @@ impl Dial for Serial {
         // CLOCAL ignores modem lines, so three wires are enough.
         let eight = ControlModes::CS8 | ControlModes::CLOCAL | ControlModes::CREAD;
         settings.control_modes.insert(eight);
-        // With VMIN = 1 a read without bytes fails with EAGAIN; with 0 it returns 0, the end of the line.
+        // A read without bytes fails with EAGAIN; with VMIN = 0 it would return 0, the end of the line.
         settings.special_codes[SpecialCodeIndex::VMIN] = 1;
         settings.special_codes[SpecialCodeIndex::VTIME] = 0;
         tcsetattr(&line, OptionalActions::Now, &settings)?;

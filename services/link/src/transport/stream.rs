@@ -21,15 +21,15 @@ use rustix::{
 use super::counts::{Attempts, Tally};
 use crate::backoff::Backoff;
 
-/// Between the first two attempts: short, so that a robot that only restarts its network is found at once.
+/// The first pause is short, so that a robot that only restarts its network is found at once.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
-/// Also the longest wait for a robot that answers again.
+/// It is also the longest wait for a robot that answers again.
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 /// An attempt is given up after this: a robot that is off does not answer.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 pub(super) trait Dial: fmt::Display {
-    /// After this an open stream counts as closed; none if the system reports that.
+    /// An open stream counts as closed after this; none if the system reports that.
     const SILENCE: Option<Duration>;
 
     /// Start to open, without waiting. Fails when the system refuses.
@@ -54,7 +54,7 @@ pub(super) struct Stream<D> {
     dial: D,
     epoll: OwnedFd,
     state: State,
-    /// Of a message sent in part.
+    /// The rest of a message sent in part.
     tail: Vec<u8>,
     backoff: Backoff,
     unsent: u64,
@@ -153,7 +153,7 @@ impl<D: Dial> Stream<D> {
         None
     }
 
-    /// If the stream accepts them now.
+    /// They are lost if the stream does not accept them now. Fails when the stream is closed.
     pub(super) fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.flush()?;
         let State::Open { descriptor, .. } = &self.state else {

@@ -18,7 +18,7 @@ pub(super) struct Udp {
 }
 
 impl Udp {
-    /// From any free port. Fails when the system refuses a socket.
+    /// Binds any free port. Fails when the system refuses a socket.
     pub(super) fn open(robot: SocketAddr) -> io::Result<Self> {
         let any = match robot.ip() {
             // A loopback socket receives nothing from other machines.

@@ -51,7 +51,7 @@ enum State {
 pub(super) struct Live {
     pub(super) frame: GridFrame,
     pub(super) map: Domain,
-    /// Of `map` or of one before; shared with its snapshots.
+    /// The field of `map` or of one before; shared with its snapshots.
     pub(super) field: Arc<Field>,
     /// Unless the field is current.
     field_version: u64,
@@ -86,7 +86,7 @@ impl Live {
         }
     }
 
-    /// On the newest map, of version `version`. No job is awaited any longer.
+    /// The newest map has version `version`. No job is awaited any longer.
     pub(super) fn target_changed(&mut self, version: u64) {
         self.map_changed(version);
         self.leads_elsewhere = true;
