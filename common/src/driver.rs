@@ -1,9 +1,4 @@
 //! The interface between the link and a robot's protocol.
-//!
-//! | module | holds |
-//! |---|---|
-//! | [`odometry`] | the way of a robot as angles of its wheels |
-//! | [`laser`] | the newest beams of a laser, and whether it is stuck or blind |
 
 pub mod laser;
 pub mod odometry;
@@ -55,7 +50,6 @@ pub trait Driver: fmt::Debug {
         Vec::new()
     }
 
-    /// Whether the robot says nothing unasked.
     fn is_polled(&self) -> bool {
         false
     }
@@ -66,7 +60,6 @@ pub trait Driver: fmt::Debug {
         Vec::new()
     }
 
-    /// The answer to a ping of the robot.
     fn acknowledge(&self) -> Vec<u8> {
         Vec::new()
     }
@@ -75,7 +68,7 @@ pub trait Driver: fmt::Debug {
     /// after `limit`.
     fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8>;
 
-    /// The state with which the next driver continues the wheels' counts; none if the robot counts.
+    /// Continues the wheels' counts in the next driver; none if the robot counts.
     fn memory(&self) -> Option<Memory> {
         None
     }
@@ -143,7 +136,6 @@ pub struct Heard {
     pub jumped: bool,
     /// Its newest odometry by its own clock, if it says that.
     pub stamp_ns: Option<i64>,
-    /// A sender other than the link that commands the robot.
     pub commander: Option<Commander>,
     /// Why the newest refused message is none of the protocol.
     pub refused: Option<String>,
@@ -154,7 +146,6 @@ pub struct Heard {
 pub struct Commander {
     /// Its number in the network.
     pub number: [u8; 16],
-    /// Whether it told the robot to move.
     pub moves: bool,
 }
 

@@ -73,7 +73,6 @@ impl GroundTruthTick {
         self.left_counts == pose.left_counts && self.right_counts == pose.right_counts
     }
 
-    /// Distance of `pose` from the true position.
     pub fn pose_error_m(&self, pose: &PoseSample) -> f64 {
         (pose.x_m - self.x).hypot(pose.y_m - self.y)
     }

@@ -60,7 +60,6 @@ impl PoseSample {
         whole
     }
 
-    /// Root mean square of the position's error by the covariance, metres.
     pub fn position_rms_m(&self) -> f64 {
         let [xx, _, _, yy, ..] = self.covariance;
         (xx + yy).max(0.0).sqrt()
@@ -72,7 +71,6 @@ impl PoseSample {
         2.0 * worst
     }
 
-    /// The [`principal_axes`] of the position's error.
     pub fn position_axes(&self) -> ([f64; 2], f64) {
         let [xx, xy, _, yy, ..] = self.covariance;
         principal_axes([xx, xy, yy])
@@ -101,7 +99,6 @@ pub struct ClearBeam {
     pub y_m: f32,
     /// The direction of the sensor, radians counter-clockwise from x.
     pub bearing_rad: f32,
-    /// The distance within which nothing answered, metres.
     pub clear_m: f32,
 }
 
@@ -117,7 +114,7 @@ pub struct GridHeader {
     pub part: Part,
     /// Range samples that have put a hazard on the map.
     pub safety_events: u64,
-    /// The belief's epoch, which grows with each reset of the sensed belief.
+    /// Each reset of the sensed belief begins another epoch.
     pub epoch: u64,
     /// 0 by the paper's method.
     pub clear_beam_count: u64,
@@ -165,7 +162,6 @@ wire_enum! {
     GuidanceStatus, unknown = Waiting {
         /// No field yet.
         Waiting = 0,
-        /// Go along (ex, ey).
         Along = 1,
         /// Arrived beside the target, which is not free itself: no free place is nearer.
         AtTarget = 2,
@@ -265,7 +261,6 @@ payloads! {
         safety_events: u64,
         epoch: u64,
         full_solves: u64,
-        /// Wall-clock of the last full solve, nanoseconds.
         full_solve_ns: u64,
         /// 0 for none.
         target_number: u64,
@@ -274,7 +269,6 @@ payloads! {
 }
 
 impl GuidanceSample {
-    /// A guidance without a direction yet.
     pub fn for_pose(pose: &PoseSample, belief: &GridHeader, target: &TargetSample) -> Self {
         Self {
             target_number: target.number,
@@ -301,12 +295,11 @@ payloads! {
         part: Part,
         /// The version of `grid`.
         grid_version: u64,
-        /// X_T, metres.
         target_x_m: f64,
         target_y_m: f64,
         /// The worst componentwise relative residual of the last full solve, a verification.
         worst_residual: f64,
-        /// Free cells from which the target can be reached, a verification.
+        /// Free cells that can reach the target, a verification.
         reachable: u64,
     }
 }
@@ -323,7 +316,6 @@ pub struct FieldCell {
 }
 
 wire_enum! {
-    /// The reason for a command.
     CommandState, unknown = Halt {
         /// No guidance to follow: stand.
         Halt = 0,

@@ -13,7 +13,6 @@ wire_enum! {
     RangeStatus, unknown = Absent {
         /// No frame with it came since the last tick: the map stays as it is.
         Absent = 0,
-        /// `range_m` holds a distance.
         Measured = 1,
         /// No echo, or a ray without end.
         Nothing = 2,
@@ -60,9 +59,7 @@ payloads! {
         y_m: f64,
         /// Bearing of the first beam from the robot's axis, radians.
         first_rad: f64,
-        /// Angle from beam to beam, radians.
         step_rad: f64,
-        /// The range of the laser, metres.
         reach_m: f64,
     }
 }
@@ -142,20 +139,15 @@ wire_enum! {
         RobotLost = 7 "robot lost",
         /// No command yet, or an old one: a stage is down or slow.
         CommandStale = 8 "command stale",
-        /// The command was computed from too old a pose.
         PoseStale = 9 "pose stale",
-        /// The command follows too old a guidance.
         GuidanceStale = 10 "guidance stale",
         BatteryLow = 11 "battery low",
-        /// The encoders contradict the commands.
         OdometryImplausible = 12 "odometry implausible",
-        /// They have for so long that the mission ends.
+        /// The encoders have contradicted the commands for so long that the mission ends.
         OdometryGivenUp = 13 "odometry implausible for long",
         /// The robot was told to stand, and its encoders say that it moves.
         RobotDoesNotStop = 14 "robot does not obey",
-        /// The robot answers all the same.
         FramesSilent = 15 "motor frames missing",
-        /// Motor frames come less often than commands last.
         FramesSlow = 16 "motor frames too slow",
         RangeSilent = 17 "ranging sensor silent",
         RobotLate = 18 "robot late",
@@ -183,11 +175,10 @@ pub struct LinkSample {
     pub cause: u8,
     /// 1: no wheel turns, by the encoders; 0: one does, or it is not known.
     pub at_rest: u8,
-    /// Frames received whole.
     pub frames_in: u64,
     /// Bytes that belonged to no frame.
     pub bytes_dropped: u64,
-    /// Datagrams dropped because another address sent them.
+    /// Dropped, because another address sent them.
     pub foreign_datagrams: u64,
     pub unsent: u64,
     /// Samples of processes that the supervisor does not name.

@@ -39,7 +39,6 @@ payloads! {
         pid: u32,
         /// A [`HealthState`].
         state: u8,
-        /// Iterations of the work loop.
         turns: u64,
         /// The newest fault request to this generation; 0 for none.
         last_fault: u64,
@@ -75,7 +74,6 @@ payloads! {
     /// Topic `tick_limit`: in lockstep, how far the link may go ahead of the supervisor, so that a recovery step against a stall begins
     /// at a tick that no machine's speed changes.
     "firsthand.TickLimit" TickLimitSample {
-        /// The last tick that the link may begin.
         last_tick: u64,
         /// The first tick of the newest recovery step; 0 for none.
         holds_from_tick: u64,
@@ -376,7 +374,6 @@ wire_enum! {
         CorruptField = 2,
         /// No direction, as where the gradient is zero.
         Saddle = 3,
-        /// Hazard believed wherever the robot is.
         HazardAroundRobot = 4,
         /// A closed wall believed around the target, also after a reset.
         CutOff = 5,

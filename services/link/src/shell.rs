@@ -55,7 +55,6 @@ pub struct Shell {
     /// None where it could not be made, which the log says.
     stop_socket: Option<StopSocket>,
     stop_mark: StopMark,
-    /// The link knows of no other.
     marked: bool,
     /// None in lockstep, where a robot waits for commands, and where it could not be started, as the log says.
     guard: Option<StopGuard>,
@@ -227,7 +226,6 @@ impl Process for Shell {
     }
 }
 
-/// A log line that the link goes on without `what`.
 fn without(what: &'static str) -> impl Fn(&io::Error) {
     move |error| tracing::error!(%error, "the link goes on without its {what}")
 }
@@ -380,7 +378,6 @@ impl Shell {
         Ok(())
     }
 
-    /// The state of link and wire.
     fn state(&mut self) -> Result<(), StageError> {
         let now_ns = monotonic_ns();
         self.stated_ns = now_ns;

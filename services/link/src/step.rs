@@ -53,7 +53,6 @@ pub const STOPS: u32 = 3;
 /// A stop is repeated after this: a fading radio may lose all stops, and the robot may ignore the limit of its last command.
 const STOP_AGAIN: Duration = Duration::from_millis(200);
 
-/// It waits for its command.
 #[derive(Clone, Debug)]
 struct OpenTick {
     ranges: Vec<RangeReading>,
@@ -219,7 +218,6 @@ impl Link {
         }
     }
 
-    /// The text has the observed values, and a remedy.
     pub fn explain(&self, cause: Cause, now_ns: u64) -> Option<String> {
         self.failsafe.explain(cause, self.moment(now_ns))
     }
@@ -419,7 +417,6 @@ impl Link {
         self.open = Some(open);
     }
 
-    /// Publish it now?
     fn is_due(&mut self, open: &mut OpenTick, now_ns: u64, effects: &mut Vec<Effect>) -> bool {
         let (tick, in_ticks) = (self.open_number(), self.in_ticks());
         match open.given_ns {

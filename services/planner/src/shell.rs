@@ -124,7 +124,6 @@ impl Process for Shell {
 }
 
 impl Shell {
-    /// Returns its effect on the field.
     fn take(&mut self, taken: Taken<'_>) -> Result<Work, StageError> {
         self.take_at(taken, self.runner.out.at)
     }
@@ -210,7 +209,6 @@ impl Shell {
         Ok(())
     }
 
-    /// The robot has its guidance by then.
     fn publish_field(&mut self) -> Result<(), StageError> {
         let Runner { stage, out } = &mut self.runner;
         let (now, has_new_reader) = (out.at, out.has_new_reader(&FIELD)?);

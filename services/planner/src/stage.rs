@@ -46,7 +46,6 @@ pub(crate) enum Taken<'a> {
         full_solve_ns: u64,
     },
     Idle,
-    /// The result of this job.
     Solved(u64),
     /// The robot is here, metres.
     Fault(FaultKind, DVec2),
@@ -54,7 +53,6 @@ pub(crate) enum Taken<'a> {
     Field(#[serde(with = "inputs::sample")] Part),
     /// A policy of the field is due.
     Policy,
-    /// The target is another.
     Target(#[serde(with = "inputs::sample")] TargetSample),
 }
 
@@ -165,7 +163,6 @@ impl PlannerStage {
         Solved { number, field: Err(SolveError::Cancelled), took_ns: 0 }
     }
 
-    /// `at` is the policy's tick.
     fn publish_field(
         &mut self,
         part: Part,

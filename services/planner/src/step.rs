@@ -152,7 +152,6 @@ impl Planner {
         Ok(Work::Stale)
     }
 
-    /// There is no earlier field.
     fn solve_first(&mut self) -> Result<Work, SolveError> {
         self.live = None;
         let Some(frame) = self.grid.frame() else {

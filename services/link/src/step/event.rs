@@ -68,10 +68,8 @@ pub enum Effect {
         /// The turn since the tick before, by the robot's own gyro.
         turn: Option<TurnSample>,
         wheels: WheelSample,
-        /// These encoders show it.
         contact: Option<ContactSample>,
     },
-    /// A tick's command was sent.
     Answered {
         /// The tick's beginning on the monotonic clock, nanoseconds.
         began_ns: u64,
@@ -85,7 +83,6 @@ pub enum Effect {
         before: Decision,
         now: Decision,
     },
-    /// Whether the robot answers.
     Connected(bool),
     Restarted,
     /// Counts jumped farther than wheels turn, and continue from there.
@@ -105,7 +102,6 @@ pub enum Effect {
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Counts velocity commands.
     pub commands: u64,
     pub repeated_commands: u64,
     pub repeated_ticks: u64,
