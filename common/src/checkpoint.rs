@@ -1,8 +1,8 @@
 //! State that outlives a SIGKILL: a small file of two slots, written in turn.
 //!
-//! Each slot is `magic | sequence | length | crc32 | body`, little-endian. A save overwrites the older slot, so a kill at any
-//! instruction leaves one whole, as the checksum shows. Nothing is synced: the kernel keeps what a killed process wrote, and a power cut
-//! takes the encoder counts too. Opening reserves room for both slots, so a full disk does not prevent a save.
+//! Each slot is `magic | sequence | length | crc32 | body`, little-endian. A save overwrites the older slot, so a kill leaves one whole,
+//! as the checksum shows. Nothing is synced: the kernel keeps what a killed process wrote, and a power cut takes the encoder counts too.
+//! Opening reserves room for both slots, so a full disk prevents no save.
 //!
 //! The magic ends with the version of the states. A state of another version, or a whole one that cannot be decoded, is refused: to
 //! start without it would lose it silently.
@@ -170,7 +170,6 @@ fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<Option<(u64, T)>, String>
     }
 }
 
-/// None if the slot is torn.
 fn whole(bytes: &[u8]) -> Option<(u64, &[u8])> {
     let word = |at: usize| Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?));
     let sequence = u64::from_le_bytes(bytes.get(4..12)?.try_into().ok()?);

@@ -11,7 +11,6 @@ use crate::{
     waiter::Waiter,
 };
 
-/// Interval between looks for a robot that is away.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 /// A bus that cannot be used is an error after this time; one that is being removed is gone by then.
 const REFUSED_FOR: Duration = Duration::from_secs(2);
@@ -25,7 +24,6 @@ pub struct Follower<Topics, Open> {
     /// The robot is gone, and its last samples are given first.
     ending: bool,
     joined: Option<Joined<Topics>>,
-    /// The unusable bus, and since when.
     refused: Option<(BusInstance, Instant)>,
 }
 
@@ -38,11 +36,9 @@ struct Joined<Topics> {
 
 #[derive(Debug, PartialEq, Eq)]
 pub enum Event<'a, Topics> {
-    /// The bus has just been joined.
     Connected,
     /// Something may have been published: take all there is.
     Samples(&'a mut Topics),
-    /// The time is over.
     Nothing,
     /// The run has ended, or its bus was replaced: the follower waits for the robot again.
     Disconnected,

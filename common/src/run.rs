@@ -19,7 +19,6 @@ pub const FILE_NAME: &str = "run.toml";
 pub struct Run {
     pub robot: RobotName,
     pub address: Address,
-    /// It stamps samples.
     pub clock: MissionClock,
     pub mission: Mission,
 }
@@ -56,9 +55,9 @@ impl Run {
     }
 }
 
-/// The number of a new generation of `stage`, from 1. It counts on when a new supervisor resumes the run, because readers drop samples
-/// of older generations. Each generation appends a line: that is atomic, and a slow disk does not delay it as it would the replacement
-/// of a file. Fails when the file cannot be read or written.
+/// The number of a new generation of `stage`, from 1. It counts on in a resumed run, because readers drop samples of older generations.
+/// Each generation appends a line, which is atomic, and a slow disk delays it less than replacing a file. Fails when the file cannot be
+/// read or written.
 pub fn next_generation(directory: &Path, stage: &str) -> Result<u32, RunError> {
     let file = directory.join(format!("{stage}.generations"));
     let count = || {
@@ -74,7 +73,6 @@ pub fn next_generation(directory: &Path, stage: &str) -> Result<u32, RunError> {
     })
 }
 
-/// Where a process saves the state that its successor restores.
 pub fn checkpoint_file(directory: &Path, process: &str) -> PathBuf {
     directory.join(format!("{process}.checkpoint"))
 }

@@ -30,9 +30,7 @@ pub enum Request {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// The link obeys.
     Heard,
-    /// The encoders say so.
     AtRest,
 }
 
@@ -79,7 +77,6 @@ impl StopSocket {
         }
     }
 
-    /// Answer those who asked for a stop.
     pub fn tell_at_rest(&mut self) {
         for operator in std::mem::take(&mut self.asking) {
             self.answer(&operator, AT_REST);

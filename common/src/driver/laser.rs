@@ -23,7 +23,6 @@ pub struct Laser {
     /// The beams that ended near in the newest scan that saw anything, and the wheels' angles then.
     near: (usize, [f64; 2]),
     is_blind: bool,
-    /// The wheels' angles.
     turned: [f64; 2],
     /// The beams since the last tick.
     scan: Vec<f32>,
@@ -48,7 +47,6 @@ impl Laser {
         &self.sensor
     }
 
-    /// Note the wheels' angles.
     pub const fn turned(&mut self, turned: [f64; 2]) {
         self.turned = turned;
     }

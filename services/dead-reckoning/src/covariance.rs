@@ -29,7 +29,6 @@ const BIAS_RAD_S: f64 = 0.002;
 /// Growth of the bias's deviation, rad/s per square root of a second.
 const BIAS_WALK: f64 = 2e-5;
 
-/// The errors that motions add.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ErrorModel {
     /// Variance, m^2 per metre rolled.

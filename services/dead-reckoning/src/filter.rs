@@ -35,7 +35,6 @@ const LEAST_HEADING_VARIANCE: f64 = 3e-6;
 /// The gyro's assumed scale error, a share.
 const GYRO_SCALE: f64 = 0.005;
 
-/// One more than the parts of the error.
 const JOINT: usize = PARTS + 1;
 
 #[derive(Clone, Copy, Debug)]
@@ -239,7 +238,6 @@ where
     Some((gain * residual, (after + after.transpose()) * 0.5))
 }
 
-/// The newest estimate, and the ticks and fixes behind it.
 #[derive(Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct History {
     /// The estimate before `ticks`.
@@ -268,7 +266,6 @@ impl History {
         &self.newest
     }
 
-    /// Begin again at the newest tick.
     pub(crate) fn restart(&mut self, estimate: Filter) {
         let last = self.ticks.back().map(|tick| Tick { time: tick.time, ..Tick::default() });
         *self = Self::new(estimate);

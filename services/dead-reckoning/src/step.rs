@@ -99,7 +99,6 @@ pub struct Reckoned {
 #[derive(Clone, Debug)]
 pub struct DeadReckoning {
     drive: Drive,
-    /// Its track is the known one.
     body: Body,
     /// Ways of the left and right wheel over the nominal ones.
     wheel_scales: [f64; 2],

@@ -12,7 +12,6 @@ const STEADY: usize = 3;
 const AGREE: f64 = 0.8;
 /// Slower commands give no evidence, counts/s: dead band and noise are too large a part of them.
 const LEAST_COUNTS_S: f64 = 250.0;
-/// Weight of one interval.
 const WEIGHT: f64 = 0.1;
 /// Outside these shares a wheel slips, is held, or has a faulty encoder, which says nothing of its speed loop.
 const SHARES: std::ops::RangeInclusive<f64> = 0.6..=1.15;

@@ -36,14 +36,12 @@ use crate::{
 /// Follows `firsthand stage` in the command line.
 pub const NAME: &str = "stop-guard";
 
-/// Interval of looks at the clock.
 const LOOKS_AGAIN: Duration = Duration::from_millis(20);
 /// A robot that is silent for longer is out of reach.
 const SILENT: Duration = Duration::from_secs(10);
 /// A robot that says that it moves, in spite of all stops, for longer may have wrong encoders.
 const TOLD_IN_VAIN: Duration = Duration::from_secs(60);
 
-/// The link's end of the guard's pipe.
 #[derive(Debug)]
 pub(crate) struct StopGuard {
     pipe: io::PipeWriter,

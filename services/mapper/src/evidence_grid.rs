@@ -1,11 +1,11 @@
 //! The occupancy evidence grid of the evidential method.
 //!
-//! Its cells follow the sonar's resolution and not the map's grid, because the evidence must not depend on the field's resolution. A
-//! cell has the weight of the evidence for an obstacle, the direction of the beam with the last echo, and whether it was ever scanned.
+//! Its cells follow the sonar's resolution, because the evidence must not depend on the field's. A cell has the weight of the evidence
+//! for an obstacle, the direction of the last echo's beam, and whether it was scanned.
 //!
-//! An echo comes from somewhere on an arc, and the ground before the arc is free: cells of the arc gain weight, most in the middle, and
-//! cells before it along the axis lose weight. A cell on the arc that is well known to be occupied explains the echo, and the rest of
-//! the arc learns nothing; otherwise every wall would grow at each end.
+//! An echo comes from somewhere on an arc: cells of the arc gain weight, most in the middle, and cells before it along the axis lose
+//! weight. A well known occupied cell on the arc explains the echo, and the rest learns nothing; otherwise every wall would grow at each
+//! end.
 //!
 //! An infrared ray is as thin as a cell and ends at a surface of any angle: passed cells are free, the last one is occupied, and the
 //! absence of an echo is no evidence against that.
@@ -194,7 +194,6 @@ impl EvidenceGrid {
             let offset = lattice.centre_of(cell) - beam.origin;
             let range = offset.length();
             let (across, along) = (beam.axis.perp_dot(offset).abs(), beam.axis.dot(offset));
-            // This excludes most cells.
             if range > far || range > near && across > along * outside {
                 continue;
             }
@@ -440,7 +439,6 @@ impl EvidenceGrid {
     }
 }
 
-/// Cells of the map in a square of `reach` metres around `centre`.
 fn around(frame: &GridFrame, centre: DVec2, reach: f64) -> impl Iterator<Item = Cell> + use<> {
     between(frame, centre - reach, centre + reach)
 }

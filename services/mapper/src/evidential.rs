@@ -30,7 +30,6 @@ pub(crate) struct EvidenceMap {
 
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Observed {
-    /// The cells that may look different now.
     pub(crate) window: Window,
     pub(crate) safety_event: bool,
 }

@@ -45,7 +45,6 @@ struct Beam {
     along: DVec2,
     /// Cells; 0 without a reading.
     range: f64,
-    /// The beam ends at `range`.
     ends: bool,
 }
 
@@ -246,7 +245,6 @@ impl Along {
         }
     }
 
-    /// The range in cells.
     fn ends(&self) -> f64 {
         self.next.min_element()
     }

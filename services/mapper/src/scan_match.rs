@@ -4,9 +4,9 @@
 //! earlier one at its matched pose, replaced when the robot has gone so far that it sees other things. The search begins at dead
 //! reckoning's pose, which also holds the robot in directions without lines, as along a corridor.
 //!
-//! The result is a fix for dead reckoning, whose filter takes the errors of fixes for independent. Errors of matches are alike for a
-//! while, so the fixes of [`SHARED_S`] weigh like one. All share the error of their reference, and so of all references before; a fix
-//! states that error, because no number of fixes averages it out.
+//! The result is a fix for dead reckoning, whose filter takes fixes' errors for independent. Errors of matches are alike for a while, so
+//! the fixes of [`SHARED_S`] weigh like one. All share the error of their reference, and so of all references before; a fix states it,
+//! because no number of fixes averages it out.
 
 use common::{
     geometry::principal_axes,
@@ -111,7 +111,6 @@ impl ScanMatcher {
             return None;
         };
         if held.lines.is_empty() {
-            // Saved without its lines.
             let saved = std::mem::take(&mut held.beams);
             let fan = rows.scan(held.pose, &saved)?;
             *held = Reference::new(&fan, held.pose, held.covariance);
@@ -147,7 +146,6 @@ impl ScanMatcher {
         let went = pose.position.distance(held.pose.position);
         let turned = (pose.heading - held.pose.heading).abs();
         if went > REPLACED_AFTER.0 || turned > REPLACED_AFTER.1 || share < LEAST_SHARE {
-            // The pose is dead reckoning's without a match.
             let covariance = match found {
                 Some(_) => of_reference + matched + variances(OF_REFERENCE),
                 None => covariance_of(reckoned),
@@ -183,7 +181,6 @@ impl Reference {
     ) -> Option<(Pose2, DMat3, f64)> {
         let seen: Vec<_> = points_of(fan).into_iter().flatten().collect();
         let every = seen.len().div_ceil(POINTS).max(1);
-        // The frame is the robot's.
         let back = DVec2::from_angle(-start.heading);
         let points = seen.iter().step_by(every).map(|point| back.rotate(point - start.position));
         let points: Vec<_> = points.collect();

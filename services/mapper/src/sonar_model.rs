@@ -12,7 +12,7 @@ use common::mission::{Sensor, SensorModel};
 
 const DEGREE: f64 = TAU / 360.0;
 
-/// The evidence grid's inverse sensor model, with bounds and ageing of evidence. The default is the X80's.
+/// The evidence grid's inverse sensor model. The default is the X80's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SonarModel {
     /// Side of a cell, metres: a third of the cone's width where a hit starts to matter, as fine as the sonar resolves.
@@ -24,8 +24,8 @@ pub(crate) struct SonarModel {
     pub(crate) band_m: f64,
     /// An echo's weight in the middle of its arc.
     pub(crate) hit: f64,
-    /// An echo's weight at the end of its arc, where the sound is weakest; between, it falls linearly. It is 0, because a beam that
-    /// points there hears an obstacle better, and gaps stay open.
+    /// An echo's weight at the end of its arc, where the sound is weakest; between, it falls linearly. It is 0, so that gaps stay open:
+    /// a beam that points there hears an obstacle better.
     pub(crate) hit_at_edge: f64,
 
     /// An obstacle this far before an echo may be its cause, metres, so the beam does not free the ground there.
@@ -61,7 +61,6 @@ pub(crate) struct SonarModel {
     pub(crate) scanned_m: f64,
     /// Half the angle in which the sonar counts as pointed at a cell that it cannot see.
     pub(crate) pointed: f64,
-    /// The range of that, metres.
     pub(crate) pointed_m: f64,
     /// The cell counts as scanned after so many such readings: there is nothing more to learn.
     pub(crate) pointed_enough: u8,

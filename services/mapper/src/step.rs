@@ -26,7 +26,6 @@ use crate::{
 #[allow(clippy::large_enum_variant, reason = "one is held at a time")]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Input {
-    /// A tick's pose, with what the robot sensed.
     Tick {
         pose: PoseSample,
         /// None if none came.
@@ -38,7 +37,6 @@ pub enum Input {
         /// It holds from this tick on, metres; none if unchanged.
         target: Option<DVec2>,
     },
-    /// The supervisor's reset.
     Reset {
         /// A belief that has begun already is not reset.
         epoch: u64,
@@ -47,7 +45,6 @@ pub enum Input {
     Fault(FaultKind),
 }
 
-/// The changed part of the map, which is published.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
     /// Nothing changed, and no stage waits for an answer.
@@ -61,17 +58,14 @@ pub enum Change {
 enum Sensed {
     /// Method `paper`: hits are marked in the cells and stay.
     Hits,
-    /// Method `evidential`.
     Evidence(EvidenceMap),
 }
 
-/// It survives the process.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Belief {
     /// A [`CellState`] byte a cell, row-major.
     #[serde(with = "serde_bytes")]
     cells: Vec<u8>,
-    /// It grows by one with every change.
     version: u64,
     /// Ticks whose readings put a hazard on the map.
     safety_events: u64,
@@ -131,7 +125,6 @@ pub struct Mapper {
     footprint: f64,
     half_track: f64,
     matcher: ScanMatcher,
-    /// The newest scan's.
     fix: Option<FixSample>,
     belief: Belief,
 }
@@ -268,7 +261,6 @@ impl Mapper {
         header
     }
 
-    /// Known shapes block cells within `reach` metres.
     fn mark_known(&mut self) {
         let (frame, (known, reach)) = (self.frame, &self.known);
         let reach = *reach;

@@ -97,7 +97,6 @@ impl ActiveSensing {
         let surfaces = surfaces.filter(|_| !self.has_laser);
         let unseen = ground.chain(surfaces);
         match scan(self.bearing.rotate(pose.axis()), unseen, &mut self.scan_side) {
-            // The sonar is turned to the unscanned place.
             Some(there) => Advice::Look(DVec2::new(self.bearing.x, -self.bearing.y).rotate(there)),
             None => Advice::Go(self.limit(view, &undetected, belief, pose, direction)),
         }

@@ -42,7 +42,6 @@ struct Computed {
 /// While it computes a policy the thread offers the processor to others so often; each time it may have to wait.
 const YIELDS: usize = 8;
 
-/// Holds the last policy for comparison.
 #[derive(Default)]
 struct Worker {
     before: Arc<Vec<FieldCell>>,
@@ -107,7 +106,6 @@ impl FieldPublisher {
         self.thread.begin((snapshot, at));
     }
 
-    /// A begun policy may be ready.
     pub(crate) const fn is_busy(&self) -> bool {
         self.busy
     }

@@ -1,10 +1,9 @@
 //! Surfaces that could stand in the way undetected.
 //!
-//! A smooth surface answers from the foot of the sonar's perpendicular on it, and only if the axis is near its normal (Kuc and Siegel
-//! 1987: a surface hit at a slant reflects the sound away), so a silent beam ahead does not exclude a wall at 45 degrees. A surface that
-//! the body touches has its normal within a right angle of the motion. For each point of the way and each normal, a tangent surface is
-//! supposed, and the readings are searched for one that would have detected it. An infrared ranger detects a surface at any angle, but
-//! only where its ray meets it.
+//! A smooth surface answers from the foot of the sonar's perpendicular on it, and only near its normal (Kuc and Siegel 1987: a slanted
+//! surface reflects the sound away), so a silent beam ahead does not exclude a wall at 45 degrees. A surface that the body touches has
+//! its normal within a right angle of the motion. For each point of the way and each normal a tangent surface is supposed, and a reading
+//! searched that would have detected it. An infrared ranger detects a surface at any angle, but only where its ray meets it.
 
 use std::f64::consts::TAU;
 
@@ -19,7 +18,6 @@ const STEP_DEG: f64 = 15.0;
 const ANSWERS_WITHIN_DEG: f64 = 17.0;
 /// No farther away than [`NEAR_M`].
 const NEAR_ANSWERS_WITHIN_DEG: f64 = 20.0;
-/// A near surface is within this, metres.
 const NEAR_M: f64 = 1.2;
 /// Extent of a supposed surface from the point of touch, metres. A shorter one could be detected only from nearer; its end is an edge,
 /// which answers a beam ahead.

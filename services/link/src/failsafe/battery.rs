@@ -60,7 +60,6 @@ pub struct BatteryChange {
 #[derive(Clone, Copy, Debug, Default)]
 struct Gauge {
     charge: Charge,
-    /// The voltage has been too low since then.
     sunk_since: Option<MissionTime>,
 }
 

@@ -22,7 +22,6 @@ const NEXT_AFTER: Duration = Duration::from_secs(1);
 const FALLEN_AFTER: Duration = Duration::from_millis(350);
 /// A current that is so long high while its wheel rolls as told is no sign of a held wheel.
 const HIGH_AND_ROLLS: Duration = Duration::from_secs(2);
-/// The AD converter's greatest value.
 const MOST_AD: u16 = 4095;
 /// Half the arc of a touch with both wheels held, radians.
 const HALF_WIDTH: f64 = PI / 4.0;

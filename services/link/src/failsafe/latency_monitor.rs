@@ -24,7 +24,6 @@ enum State {
     Timely,
     /// Nothing was sent since then, to see late acknowledgements.
     Testing(u64),
-    /// Late since then.
     Late(u64),
 }
 

@@ -41,7 +41,6 @@ const LEAST_TURN_M_S: f64 = 0.1;
 const LEAST_TURN_SHARE: f64 = 0.25;
 /// A plausible wheel turns at least this share of its command.
 const LEAST_SHARE: f64 = 0.25;
-/// A wheel rolls as told from this share on.
 const ROLLS_SHARE: f64 = 0.5;
 /// Evidence for a suspicion. A radio that delivers frames does not lose commands for so long.
 pub(crate) const SUSPECTED_AFTER: Duration = Duration::from_millis(550);
@@ -53,7 +52,6 @@ pub(crate) const JUMPS_WITHIN: Duration = Duration::from_secs(2);
 pub(crate) const CALM: Duration = Duration::from_secs(2);
 /// So often it ends by itself: a faulty robot's counts may jump only while it moves.
 const MOST_RECOVERIES: u32 = 2;
-/// A suspected robot's mission ends after this.
 pub(crate) const GIVEN_UP_AFTER: Duration = Duration::from_secs(10);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,7 +85,6 @@ impl Suspicion {
 #[derive(Clone, Copy, Debug, Default)]
 struct Evidence {
     asked: [f64; 2],
-    /// When the commanded direction last changed.
     since: MissionTime,
     against_s: f64,
     /// Counting nothing although commanded.

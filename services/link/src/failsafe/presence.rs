@@ -11,7 +11,6 @@ use crate::backoff::Backoff;
 pub(crate) const SILENT_LIMITS: u32 = 3;
 /// Machine time: any process may be delayed by so much at any pace.
 const LEAST_SILENCE: Duration = Duration::from_millis(100);
-/// The first pause between pings.
 const FIRST_PAUSE: Duration = Duration::from_millis(200);
 /// A robot that waits for a ping is found only then; one that sends by itself at once.
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
@@ -21,7 +20,6 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 pub struct Absence {
     /// Counted from the loss, or from the first attempt to find the robot; 0 while it answers.
     pub lost_ns: u64,
-    /// Counted from the loss.
     pub pings: u64,
     pub next_ping_ns: u64,
 }
@@ -103,7 +101,6 @@ impl Presence {
         self.pings.reset();
     }
 
-    /// Whether a ping to a silent robot is due.
     pub fn wants_ping(&mut self, now_ns: u64) -> bool {
         if self.connected {
             return false;

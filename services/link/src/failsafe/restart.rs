@@ -39,7 +39,6 @@ pub struct RestartWatch {
     restarts: u32,
     /// A wheel's counts in a second at top speed.
     top_counts: f64,
-    /// Jitter of frames.
     jitter_s: f64,
     /// [`SLACK_M`] in counts.
     slack: f64,
@@ -71,7 +70,6 @@ impl RestartWatch {
         }
     }
 
-    /// The robot does not answer.
     pub const fn lost(&mut self) {
         self.away = true;
     }
@@ -170,7 +168,6 @@ impl RestartWatch {
         share(0).max(share(1))
     }
 
-    /// Counts that restarted or continued elsewhere.
     pub const fn restarts(&self) -> u32 {
         self.restarts
     }

@@ -30,7 +30,6 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(8);
 pub enum Motor {
     #[default]
     Regular,
-    /// Although the robot answers.
     Silent,
     /// So few a second that a command expires before the next.
     Slow(f64),
@@ -43,7 +42,6 @@ const AHEAD_DEG: f64 = 60.0;
 struct Newest {
     row: u8,
     name: String,
-    /// The robot may go on without the sensor.
     is_covered: bool,
     /// Time of the machine's clock.
     ns: u64,
@@ -88,7 +86,6 @@ impl Streams {
         }
     }
 
-    /// Sensors without a valid reading.
     fn silent_sensors(&self, now_ns: u64) -> Vec<&Newest> {
         // A robot that was just found must send a new reading: older ones do not show what is ahead now.
         let is_silent = |sensor: &&Newest| self.sensing && self.silence.is_over(sensor.ns, now_ns);

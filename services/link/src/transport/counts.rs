@@ -10,7 +10,6 @@ pub struct Tally {
     pub unsent: u64,
 }
 
-/// To open a closed wire.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Attempts {
     /// Counted since the robot last sent something.

@@ -1,9 +1,9 @@
 //! Topics of ROS 2: the robot's are read, and its commands written.
 //!
-//! A received piece is one message: the row of its topic in [`Topics`] and its payload. The topic of commands is read too, without the
-//! link's own; another's command has the number of its writer before the payload. A killed link writes nothing, so it is no other
-//! writer, however long the network remembers it. Readers are best-effort and volatile, so they match every publisher. At most [`DEPTH`]
-//! messages of a topic wait; older ones are dropped.
+//! A received piece is one message: the row of its topic in [`Topics`] and its payload. Others' commands are read too, with the number
+//! of their writer before the payload. A killed link writes nothing, so it is no other writer, however long the network remembers it.
+//! Readers are best-effort and volatile, so they match every publisher. At most [`DEPTH`] messages of a topic wait; older ones are
+//! dropped.
 
 use std::{
     io,
@@ -24,7 +24,6 @@ const UNDISCOVERED_NS: u64 = 10_000_000_000;
 
 #[derive(Debug)]
 pub(super) struct Dds {
-    /// Rows of the topics.
     readers: Vec<Reader>,
     writer: Writer,
     topics: Topics,
@@ -57,7 +56,6 @@ impl Dds {
         })
     }
 
-    /// Join anew after a silence.
     pub(super) fn maintain(&mut self, now_ns: u64) -> io::Result<()> {
         let joined_ns = *self.joined_ns.get_or_insert(now_ns);
         let (since_ns, most_ns) =

@@ -179,7 +179,6 @@ impl<D: Dial> Stream<D> {
         Ok(())
     }
 
-    /// The rest of a message.
     fn flush(&mut self) -> io::Result<()> {
         let State::Open { descriptor, .. } = &self.state else {
             return Ok(());
