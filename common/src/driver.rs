@@ -149,7 +149,6 @@ pub struct Commander {
     pub moves: bool,
 }
 
-/// A turn by the robot's own gyro.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turn {
     /// One more than the number of the turn at whose end this one begins; another number if one between is missing.

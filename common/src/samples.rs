@@ -1,5 +1,5 @@
-//! The payloads of the topics, as they lie in shared memory: `repr(C)`, no pointers, units in every name or doc. Size and `type_name`,
-//! for other languages, are checked at attach.
+//! The payloads of [`crate::topics`], as they lie in shared memory: `repr(C)`, no pointers, units in every name or doc. Size and
+//! `type_name`, for other languages, are checked at attach.
 //!
 //! `unsafe` is allowed because deriving `ZeroCopySend` writes an `unsafe impl`, which promises a self-contained type of uniform layout:
 //! all fields are plain numbers, and arrays of them, in `repr(C)` structs.

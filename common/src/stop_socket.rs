@@ -115,6 +115,7 @@ impl Operator {
         }
     }
 
+    /// Fails when the link is gone.
     pub fn send(&self, request: Request) -> io::Result<()> {
         let byte = match request {
             Request::Stop => STOP,
@@ -178,6 +179,7 @@ impl StopMark {
         self.path.exists()
     }
 
+    /// Fails when the directory cannot be written.
     pub fn set(&self, stopped: bool) -> io::Result<()> {
         if stopped {
             return fs::File::create(&self.path).map(drop);

@@ -6,7 +6,7 @@ use super::Name;
 use crate::bus::ZeroCopySend;
 
 payloads! {
-    /// Topic `fix`: where a source outside saw the robot, for example a camera or a satellite receiver.
+    /// A source outside is, for example, a camera or a satellite receiver.
     #[derive(Serialize, Deserialize)]
     "firsthand.Fix" FixSample {
         /// Mission time of the measurement, nanoseconds; at most 2 s ago.
@@ -25,7 +25,6 @@ payloads! {
         shared: [f64; 2],
     }
 
-    /// Topic `turn`: the turn of a gyro since its last sample.
     #[derive(Serialize, Deserialize)]
     "firsthand.Turn" TurnSample {
         /// Mission time at which the increment ends, nanoseconds.

@@ -12,7 +12,7 @@ use crate::{
 };
 
 payloads! {
-    /// Topic `pose`: where dead reckoning believes the robot is, by its wheels and by what came on `fix` and `turn`.
+    /// The pose follows from the wheels, and from what came on `fix` and `turn`.
     #[derive(Serialize, Deserialize)]
     "firsthand.Pose" PoseSample {
         /// Metres in the mission frame.
@@ -105,7 +105,7 @@ pub struct ClearBeam {
 /// The most infrared rays in a `grid` sample: 32 ticks.
 pub const CLEAR_RAYS: usize = 32 * INFRARED_RANGERS;
 
-/// Topic `grid`, header; the slice is one [`crate::grid::CellState`] byte a cell of the window.
+/// The slice is one [`crate::grid::CellState`] byte a cell of the window.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.GridHeader")]
 #[repr(C)]
@@ -214,7 +214,6 @@ impl From<Waypoint> for TargetPoint {
 }
 
 payloads! {
-    /// Topic `target`: where the robot is sent.
     "firsthand.Target" TargetSample {
         /// Counted from 1 in the run. A target that replaces another has a number of its own.
         number: u64,
@@ -239,7 +238,7 @@ impl TargetSample {
 }
 
 payloads! {
-    /// Topic `guidance`: E of (11) at the robot's pose.
+    /// E of (11) at the robot's pose.
     "firsthand.Guidance" GuidanceSample {
         /// (ex, ey): unit vector, 0 where there is none.
         ex: f64,
@@ -290,7 +289,7 @@ impl GuidanceSample {
 }
 
 payloads! {
-    /// Topic `field`, header; the slice is one [`FieldCell`] a cell of the window.
+    /// The slice is one [`FieldCell`] a cell of the window.
     "firsthand.FieldHeader" FieldHeader {
         part: Part,
         /// The version of `grid`.
@@ -326,7 +325,7 @@ wire_enum! {
 }
 
 payloads! {
-    /// Topic `command`: U of (17).
+    /// U of (17).
     "firsthand.Command" CommandSample {
         /// omega_L, rad/s; omega_h of a car's driven wheel.
         left_rad_s: f64,

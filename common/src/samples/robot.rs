@@ -24,7 +24,7 @@ wire_enum! {
 }
 
 payloads! {
-    /// Topic `ranges`, header; the slice is one [`RangeReading`] a sensor of the mission.
+    /// The slice is one [`RangeReading`] a sensor of the mission.
     "firsthand.RangesHeader" RangesHeader {}
 }
 
@@ -49,8 +49,7 @@ impl RangeReading {
 }
 
 payloads! {
-    /// Topic `scan`, header; the slice is the laser's ranges counter-clockwise, metres: infinite for nothing in reach, not a number for
-    /// no reading.
+    /// The slice is the laser's ranges counter-clockwise, metres: infinite for nothing in reach, not a number for no reading.
     "firsthand.ScanHeader" ScanHeader {
         /// The row of [`crate::mission::Mission::sensor_table`].
         sensor: u64,
@@ -65,7 +64,6 @@ payloads! {
 }
 
 impl ScanHeader {
-    /// The header of scans by `sensor`, in `row` of the mission's table.
     pub fn of(row: usize, sensor: &Sensor) -> Self {
         let at = sensor.mount.forward_m * DVec2::from_angle(sensor.mount.bearing_rad);
         let (first, step_rad) = sensor.fan();
@@ -82,8 +80,7 @@ impl ScanHeader {
 }
 
 payloads! {
-    /// Topic `wheels`: the encoders. A car has the driven wheel's at the left, and at the right the steering's: 0 straight ahead,
-    /// growing to the left.
+    /// A car has the driven wheel's encoder at the left, and at the right the steering's: 0 straight ahead, growing to the left.
     "firsthand.Wheels" WheelSample {
         /// Counts modulo 32768, growing forward.
         left_counts: u16,
@@ -98,7 +95,7 @@ payloads! {
 }
 
 payloads! {
-    /// Topic `contact`: wheels told to turn are held: they stand by their encoders, and their motors draw a high current.
+    /// Held wheels stand by their encoders, and their motors draw a high current.
     #[derive(Serialize, Deserialize)]
     "firsthand.Contact" ContactSample {
         /// Direction of the touch from the body's centre, radians counter-clockwise from the robot's axis.
@@ -161,7 +158,6 @@ wire_enum! {
     }
 }
 
-/// Topic `link`: the state of the connection to the robot.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.Link")]
 #[repr(C)]
@@ -254,7 +250,7 @@ impl LinkSample {
 }
 
 payloads! {
-    /// Topic `infrared`: the seven infrared rangers, in the order of their channels.
+    /// The order is that of the rangers' channels.
     "firsthand.Infrared" InfraredSample {
         /// Metres from each ranger, 0.09 to 0.81; 0.81 is also nothing.
         range_m: [f64; INFRARED_RANGERS],
@@ -263,7 +259,6 @@ payloads! {
 }
 
 payloads! {
-    /// Topic `power`: batteries in volts, motors' currents.
     "firsthand.Power" PowerSample {
         board_v: f64,
         motor_v: f64,
@@ -286,7 +281,6 @@ impl PowerSample {
 }
 
 payloads! {
-    /// Topic `surroundings`: human sensors, tilt, temperature.
     "firsthand.Surroundings" SurroundingsSample {
         /// At the board, degrees Celsius by the vendor's formula.
         temperature_c: f64,
@@ -306,7 +300,7 @@ wire_enum! {
 }
 
 payloads! {
-    /// Topic `wire`, header; the slice is the bytes of one datagram, or of one read from a connection or serial line.
+    /// The slice is the bytes of one datagram, or of one read from a connection or serial line.
     "firsthand.WireHeader" WireHeader {
         /// The machine's monotonic clock in the step that took or gave the bytes.
         machine_ns: u64,

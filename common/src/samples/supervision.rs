@@ -14,10 +14,9 @@ wire_enum! {
     }
 }
 
-/// A short name in shared memory: UTF-8, padded with zeros.
 pub type Name = [u8; 24];
 
-/// `text` as a [`Name`], cut at 24 bytes.
+/// `text` as UTF-8, cut at 24 bytes and padded with zeros.
 pub fn name(text: &str) -> Name {
     let mut name = [0; 24];
     for (slot, byte) in name.iter_mut().zip(text.bytes()) {
@@ -33,7 +32,6 @@ pub fn name_str(name: &Name) -> &str {
 }
 
 payloads! {
-    /// Topic `health`: a stage's heartbeat, published inside its work loop.
     "firsthand.Health" HealthSample {
         stage: Name,
         pid: u32,
@@ -59,7 +57,6 @@ wire_enum! {
 }
 
 payloads! {
-    /// Topic `directive`: the supervisor's order to all stages.
     "firsthand.Directive" DirectiveSample {
         /// The belief's epoch: a mapper with a lower one resets the sensed belief.
         epoch: u64,
@@ -71,8 +68,8 @@ payloads! {
 }
 
 payloads! {
-    /// Topic `tick_limit`: in lockstep, how far the link may go ahead of the supervisor, so that a recovery step against a stall begins
-    /// at a tick that no machine's speed changes.
+    /// The link may go so far ahead of the supervisor in lockstep, so that a recovery step against a stall begins at a tick that no
+    /// machine's speed changes.
     "firsthand.TickLimit" TickLimitSample {
         last_tick: u64,
         /// The first tick of the newest recovery step; 0 for none.
@@ -88,7 +85,6 @@ wire_enum! {
     StageState, unknown = Down {
         Down = 0,
         Starting = 1,
-        /// It sends heartbeats.
         Running = 2,
         /// It died too often, and waits before the next start.
         BackingOff = 3,
@@ -113,14 +109,13 @@ wire_enum! {
 }
 
 payloads! {
-    /// Topic `roster`, header; the slice is one [`RosterEntry`] a stage.
+    /// The slice is one [`RosterEntry`] a stage.
     "firsthand.RosterHeader" RosterHeader {
         supervisor_pid: u32,
         /// The current [`Order`].
         order: u8,
         /// A [`HoldReason`].
         reason: u8,
-        /// 1: the robot is a simulated one.
         simulated: u8,
         /// The newest answered request; 0 for none.
         last_request: u64,
@@ -209,7 +204,6 @@ impl Words {
 }
 
 payloads! {
-    /// Topic `deaths`: a stage's process ended.
     "firsthand.Death" DeathSample {
         stage: Name,
         pid: u32,
@@ -219,7 +213,6 @@ payloads! {
         uptime_ns: u64,
         /// Pause before its successor.
         next_after_ns: u64,
-        /// Exit code or signal number.
         code: i32,
         /// Counted over the last ten seconds, this one included.
         deaths_in_window: u32,
@@ -266,7 +259,7 @@ wire_enum! {
 }
 
 payloads! {
-    /// Topic `stalls`: the robot should progress and does not. Serialized it is a line of `stalls.jsonl`.
+    /// It is serialized as a line of `stalls.jsonl`.
     "firsthand.Stall" StallSample {
         /// The believed place, metres.
         x_m: f64,
@@ -341,7 +334,6 @@ wire_enum! {
 }
 
 payloads! {
-    /// Topic `requests`: an operator's requests to the supervisor.
     "firsthand.Request" RequestSample {
         /// The roster's `last_request` names it when it is answered. Never 0.
         id: u64,
@@ -394,7 +386,6 @@ wire_enum! {
 }
 
 payloads! {
-    /// Topic `faults`: requests to inject a fault into a stage.
     "firsthand.Fault" FaultSample {
         /// The stage's `last_fault` in `health` names it when it is answered. Never 0.
         id: u64,
@@ -407,7 +398,7 @@ payloads! {
 }
 
 payloads! {
-    /// Topic `inputs`, header; the slice is a piece of the entries of [`crate::inputs`]. A generation's pieces follow by sequence.
+    /// The slice is a piece of the entries of [`crate::inputs`]. A generation's pieces follow by sequence.
     "firsthand.InputsHeader" InputsHeader {
         stage: Name,
     }

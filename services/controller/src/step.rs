@@ -37,7 +37,6 @@ impl Alignment {
     }
 }
 
-/// Speed as a function of the alignment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum SpeedLaw {
     /// (16): the robot drives while it turns.
@@ -69,7 +68,6 @@ pub struct Controller {
     turns: f64,
     slow_radius: f64,
     dead_zone: f64,
-    /// The paper's law applies.
     modulated: bool,
     law: SpeedLaw,
     /// The turn of an antipodal robot: 1 left, -1 right.

@@ -69,7 +69,6 @@ struct OpenTick {
 #[derive(Clone, Copy, Debug)]
 struct Repeat {
     counts: [i16; 2],
-    /// The tick behind the command.
     stamp: MissionTime,
     /// Half a period after the tick.
     due: MissionTime,
@@ -104,7 +103,6 @@ pub struct Link {
     /// Motor frames still to come in lockstep: one for each command and ping since the order.
     due: u32,
     tally: Tally,
-    /// When a refused message was last logged.
     refused_ns: Option<u64>,
 }
 
@@ -252,7 +250,6 @@ impl Link {
         self.monitors().orders.stopped_here()
     }
 
-    /// They are sent when the stage ends.
     pub fn final_stops(&self) -> Vec<Vec<u8>> {
         (0..STOPS).map(|_| self.velocity_0()).collect()
     }

@@ -24,7 +24,6 @@ impl WheelSpeeds {
         Self { body: mission.body(), rate_hz: mission.robot.rate_hz, told: [0; 2] }
     }
 
-    /// The robot was sent these, counts/s.
     pub(crate) const fn told(&mut self, counts: [i16; 2]) {
         self.told = counts;
     }

@@ -43,7 +43,6 @@ pub(crate) struct Evidential {
     radius: f64,
     map_within: f64,
     sonars: usize,
-    /// Whether other rangers are used beside a laser.
     beside_laser: bool,
 }
 

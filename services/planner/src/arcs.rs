@@ -37,7 +37,6 @@ struct Followed {
     curvature: f64,
     /// The length until a hazard.
     free_m: f64,
-    /// Progress along the field.
     progress_m: f64,
 }
 

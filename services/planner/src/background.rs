@@ -53,7 +53,6 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
         Ok(Self { jobs: Some(jobs), results, done, unread: 0, ended: 0, thread: Some(thread) })
     }
 
-    /// Jobs are done in turn.
     pub(crate) fn begin(&mut self, job: Job) {
         if let Some(jobs) = &self.jobs {
             // The thread ends only when this value is dropped.

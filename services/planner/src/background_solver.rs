@@ -30,7 +30,6 @@ impl BackgroundSolver {
         Ok(Self { cancellation, thread: Background::start("full-solve", solve)? })
     }
 
-    /// Jobs are done in turn.
     pub fn begin(&mut self, job: Job) {
         self.thread.begin(job);
     }

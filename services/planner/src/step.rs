@@ -31,7 +31,6 @@ pub use input::{Input, Job, Outcome, Snapshot, Solved, Work};
 /// Speed out of a hazard that the robot stands in, m/s: something is near.
 const WAY_OUT_M_S: f64 = 0.08;
 
-/// The check of a direction before it is given.
 #[derive(Clone, Copy, Debug)]
 enum Advisor {
     /// The paper's method, and any without sensing.
@@ -217,7 +216,6 @@ impl Planner {
         Domain::new(side, side, blocked, aim)?.with_screening(&self.screening)
     }
 
-    /// The target, metres.
     fn place(&self) -> Option<DVec2> {
         self.target.map(|target| target.target.position())
     }
@@ -232,7 +230,6 @@ impl Planner {
         aim.map(field_cell)
     }
 
-    /// None if no solve is due.
     fn begin_job(&mut self) -> Option<Job> {
         let live = self.live.as_mut()?;
         let job = live.begin_job(self.jobs + 1, self.grid.version())?;

@@ -9,7 +9,6 @@ pub(crate) const STEP_M: f64 = 0.05;
 /// Step of the search for unscanned cells on a fine grid, metres.
 const GRAIN_M: f64 = 0.025;
 
-/// The field may be over an earlier belief.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct View<'a> {
     pub(crate) frame: GridFrame,

@@ -38,7 +38,6 @@ pub(super) struct Contacts {
     high_and_rolls_s: [f64; 2],
     /// The held wheels, and since when that is known.
     held: Option<([bool; 2], MissionTime)>,
-    /// No tick has shown it yet.
     new: Option<ContactSample>,
 }
 

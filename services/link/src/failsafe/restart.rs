@@ -40,7 +40,6 @@ pub struct RestartWatch {
     /// A wheel's counts in a second at top speed.
     top_counts: f64,
     jitter_s: f64,
-    /// [`SLACK_M`] in counts.
     slack: f64,
 }
 

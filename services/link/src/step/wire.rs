@@ -116,7 +116,6 @@ impl Link {
         are
     }
 
-    /// Sensors that do not begin a tick.
     fn take_sensors(&mut self, heard: &Heard, now_ns: u64, effects: &mut Vec<Effect>) {
         if let Some(power) = heard.power {
             let volts = [power.board_v, power.motor_v, power.servo_v];

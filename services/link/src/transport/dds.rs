@@ -27,7 +27,6 @@ pub(super) struct Dds {
     readers: Vec<Reader>,
     writer: Writer,
     topics: Topics,
-    /// The row of the topic of commands.
     commands: Option<usize>,
     /// The reader that is asked next, so that a flood on one topic does not hold back others.
     next: usize,

@@ -54,7 +54,6 @@ pub(super) struct Stream<D> {
     dial: D,
     epoll: OwnedFd,
     state: State,
-    /// The rest of a message sent in part.
     tail: Vec<u8>,
     backoff: Backoff,
     unsent: u64,
@@ -209,7 +208,6 @@ impl<D: Dial> Stream<D> {
         Ok(())
     }
 
-    /// Wake the waiter for `events`.
     fn watch(&self, events: EventFlags) -> io::Result<()> {
         if let State::Open { descriptor, .. } = &self.state {
             epoll::modify(&self.epoll, descriptor, EventData::new_u64(0), events)?;

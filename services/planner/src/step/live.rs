@@ -107,7 +107,6 @@ impl Live {
         matches!(self.state, State::Solving { job, .. } if job == number)
     }
 
-    /// The running job's field.
     pub(super) fn solved(&mut self, field: Arc<Field>) {
         let State::Solving { version, changed, .. } = self.state else {
             return;
@@ -118,14 +117,12 @@ impl Live {
         self.state = if changed { State::Stale } else { State::Current };
     }
 
-    /// The newest map's field.
     pub(super) fn solve(&mut self, field: Field) {
         self.field = Arc::new(field);
         self.leads_elsewhere = false;
         self.state = State::Current;
     }
 
-    /// Where the newest version is `newest`.
     pub(super) fn field_version(&self, newest: u64) -> u64 {
         match self.state {
             State::Current => newest,
@@ -204,7 +201,6 @@ impl Live {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Robot {
     radius_m: f64,
-    /// The way on which nothing may have changed.
     ahead_m: f64,
 }
 
