@@ -1,7 +1,5 @@
-//! THE table of faults that can be injected into a running stage, to see whether the others go on.
-//!
-//! `firsthand stage fault`, its help and the guide read it. Each stage's shell reads the topic `faults`, and refuses a fault of a real
-//! robot unless the request says that it means one.
+//! THE table of faults that can be injected into a running stage, to see whether the others go on. `firsthand stage fault`, its help and
+//! the guide read it. A stage's shell refuses a fault of a real robot unless the request says that it means one.
 
 use crate::{
     bus::{Bus, BusError, Reader},

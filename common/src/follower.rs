@@ -44,8 +44,8 @@ pub enum Event<'a, Topics> {
     Disconnected,
 }
 
-/// A consumer of samples of each tick wakes by the link's state, which ends the tick: it takes no processor from stages that the tick
-/// has still to pass.
+/// The link's state ends the tick, and wakes consumers of its samples: they take no processor from stages that the tick has still to
+/// pass.
 fn wakes_for(topic: &'static dyn AnyTopic) -> &'static dyn AnyTopic {
     match topic.spec().rate {
         Rate::EachTick | Rate::EachFrame => &topics::LINK,
@@ -122,8 +122,8 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
         self.joined.as_mut().map(|joined| &mut joined.topics)
     }
 
-    /// Open the readers again: like a new consumer's, they get whole maps. Returns the earlier ones for their last samples; none while
-    /// the robot is away. Fails when the bus cannot be used.
+    /// Open the readers again: they get whole maps. Returns the earlier ones for their last samples; none while the robot is away. Fails
+    /// when the bus cannot be used.
     pub fn reopen(&mut self) -> Result<Option<Topics>, BusError> {
         let Some(joined) = &mut self.joined else {
             return Ok(None);

@@ -1,5 +1,4 @@
-//! The grid of cells over the perimeter: [`mission::grid`] has states, windows and frames of cells; a [`Part`] says which part of which
-//! version of a map a sample carries, and a [`Replica`] is a follower's copy, updated from such parts.
+//! The grid of cells over the perimeter: its frame, the [`Part`] of a map that a sample carries, and a follower's [`Replica`].
 
 mod part;
 mod replica;

@@ -1,6 +1,5 @@
-//! The ground truth of a simulated robot, one JSON object a line, for the summary and the pictures.
-//!
-//! The first line is a [`GroundTruthHeader`], each further one a [`GroundTruthTick`]. No stage reads it.
+//! The ground truth of a simulated robot, one JSON object a line: a [`GroundTruthHeader`], then a [`GroundTruthTick`] each. No stage
+//! reads it.
 
 use serde::{Deserialize, Serialize};
 

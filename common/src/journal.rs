@@ -1,13 +1,12 @@
 //! A large state that outlives a SIGKILL: a snapshot now and then, and the entries since.
 //!
-//! The state is the fold of its entries. Each is appended when it happens, a small write however large the state is; a new process folds
-//! those after the snapshot into it.
+//! The state is the fold of its entries. To append one is a small write however large the state is; a new process folds those after the
+//! snapshot into it.
 //!
 //! An entry is `number | length | crc32 | body`, little-endian. A kill during an append leaves a torn tail, which is cut off. A kill
 //! between a snapshot and the emptying of the journal leaves entries that the snapshot holds, as their numbers show.
 //!
-//! Room is reserved at opening, for a disk that is full later. An end mark at the beginning empties the journal; shortening it would
-//! give the room away.
+//! Room is reserved at opening, for a full disk. An end mark empties the journal, because shortening it would give the room away.
 
 use std::{
     fs::{File, OpenOptions},
@@ -21,8 +20,8 @@ use crate::checkpoint::{Checkpoint, CheckpointError, failed, reserve};
 
 /// The fewest and the most entries after which a snapshot is due.
 const SNAPSHOT_AFTER: (u64, u64) = (8, 128);
-/// Bytes of the state for each further entry before a snapshot. To write them takes about as long as to fold an entry, and a new process
-/// folds all entries before it is ready.
+/// Bytes of the state for each further entry before a snapshot: to write them takes about as long as to fold an entry, as a new process
+/// must before it is ready.
 const BYTES_FOR_AN_ENTRY: u64 = 20_480;
 /// number u64, length u32, crc32 u32.
 const HEADER: usize = 16;

@@ -1,7 +1,4 @@
-//! The part of a map's version that a sample carries.
-//!
-//! `unsafe` is allowed because deriving `ZeroCopySend` writes an `unsafe impl`, which promises a self-contained type of uniform layout:
-//! the fields are plain numbers in a `repr(C)` struct.
+//! The part of a map's version that a sample carries. `unsafe` is allowed for the reason that [`crate::samples`] gives.
 #![allow(unsafe_code)]
 
 use glam::DVec2;

@@ -29,8 +29,7 @@ impl WheelSpeeds {
     }
 
     /// Speeds of the two wheels, or of a car's wheel and steering, for `command` at `share` of its speed, counts/s; `wheels` are the
-    /// newest counts. A car's steering has a speed loop like a wheel's and is driven towards its angle, so a timed command ends its
-    /// motion too.
+    /// newest counts. Steering is driven towards its angle by a speed loop like a wheel's, so a timed command ends its motion too.
     pub(crate) fn of(&self, command: &CommandSample, share: f64, wheels: &WheelSample) -> [i16; 2] {
         let Some(steering) = self.body.steering else {
             let wanted = [command.left_rad_s, command.right_rad_s].map(|speed| share * speed);

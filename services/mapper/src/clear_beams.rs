@@ -1,8 +1,8 @@
 //! The newest readings as evidence of free ground.
 //!
-//! A smooth surface answers only a beam along its normal, so a silent beam excludes only surfaces square to it; the evidence grid,
-//! without directions, cannot hold that. The planner therefore compares each surface that the body could touch with the newest readings.
-//! Infrared rays are kept apart: they end at a surface of any angle.
+//! A smooth surface answers only a beam along its normal, so a silent beam excludes only surfaces square to it, which the evidence grid,
+//! without directions, cannot hold. So the planner compares each surface that the body could touch with the newest readings. Infrared
+//! rays, kept apart, end at a surface of any angle.
 
 use common::samples::{CLEAR_BEAMS, CLEAR_RAYS, ClearBeam, GridHeader};
 use glam::DVec2;

@@ -7,12 +7,12 @@
 //! weight. A well known occupied cell on the arc explains the echo, and the rest learns nothing; otherwise every wall would grow at each
 //! end.
 //!
-//! An infrared ray is as thin as a cell and ends at a surface of any angle: passed cells are free, the last one is occupied, and the
-//! absence of an echo is no evidence against that.
+//! An infrared ray is as thin as a cell and ends at a surface of any angle: passed cells are free, the last one is occupied, and silence
+//! is no evidence against that.
 //!
-//! Beside a laser there are two grids, its own and the other rangers', and a cell of either is hazard: a laser that looks over or
-//! through a thing is no evidence against it. An echo whose range the laser confirms is put where the laser sees the thing. So glass
-//! that the laser sees only squarely stays by its echoes.
+//! A laser that looks over or through a thing is no evidence against it, so beside it the other rangers have a grid of their own, and a
+//! cell of either is hazard. An echo whose range the laser confirms is put where the laser sees the thing. So glass that the laser sees
+//! only squarely stays by its echoes.
 //!
 //! No ranger is evidence against a thing that the body touched: all may look over it.
 

@@ -1,9 +1,8 @@
 //! The on-demand safety map: range samples to hazard cells, equations (8)-(10), (18), (19).
 //!
-//! [`step`] is the pure mapper: poses and ranges to the window that changed. [`stage`] records and publishes it, [`shell`] is its
-//! process. `reading` puts readings into the mission frame; `sonar_model`, `infrared_model` and `laser_model` say what they mean for
-//! cells, `evidence_grid` sums that up, `inflation` grows occupied cells by the body, and `evidential` joins both. `scan_match` gives
-//! poses by the laser, `clear_beams` keeps readings for the planner, `fault` injects hazard.
+//! [`step`] is the pure mapper, [`stage`] records and publishes it, [`shell`] is its process. `reading` puts readings into the mission
+//! frame, the models say what they mean for cells, `evidence_grid` sums that up, `inflation` grows occupied cells by the body, and
+//! `evidential` joins both. `scan_match` gives poses by the laser.
 
 mod clear_beams;
 mod evidence_grid;

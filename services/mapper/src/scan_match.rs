@@ -95,8 +95,8 @@ impl ScanMatcher {
         tick.is_multiple_of(self.every_ticks)
     }
 
-    /// Match `beams`, taken at `reckoned` by dead reckoning, with the reference, replaced if necessary. Gives the pose and its
-    /// covariance; none if too little of the reference is seen.
+    /// Match `beams`, taken at `reckoned` by dead reckoning, with the reference, replaced if necessary. None if too little of the
+    /// reference is seen.
     pub(crate) fn step(
         &self,
         rows: &Rows,
@@ -171,8 +171,8 @@ impl Reference {
         carried * self.covariance * carried.transpose()
     }
 
-    /// The pose that lays the points of `fan` best on the lines, with its covariance and the share of the points that found a line.
-    /// `fan` is the scan at `start`, `seen_from` at the reference's pose.
+    /// The pose that lays the points of `fan` best on the lines, its covariance, and the share of points that found a line. `fan` is the
+    /// scan at `start`, `seen_from` at the reference's pose.
     fn matched(
         &self,
         fan: &Fan<'_>,

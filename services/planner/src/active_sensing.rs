@@ -111,8 +111,8 @@ impl ActiveSensing {
         clear_m / self.stops_within_s
     }
 
-    /// The speed that the readings, and the arc on which the controller turns the robot into `direction`, allow, m/s. Where the arc
-    /// allows none, a robot that faces a permitted way would stand for ever: it goes as slowly as it can, as far as the readings allow.
+    /// The speed by the readings and by the arc on which the controller turns the robot into `direction`, m/s. Where the arc allows
+    /// none, a robot that faces a permitted way would stand for ever: it goes as slowly as it can, if the readings allow.
     fn limit(
         &self,
         view: &View<'_>,
@@ -139,8 +139,8 @@ impl ActiveSensing {
     }
 }
 
-/// The direction to turn to from `axis` to scan all of `unseen`: the far end of a side, without a stop. A scan stays on its `side` until
-/// nothing is unseen there; a new one begins on the side whose nearest direction is nearer.
+/// The direction to turn to from `axis` to scan all of `unseen`: the far end of a side. A scan stays on its `side` until nothing is
+/// unseen there; a new one begins on the side whose nearest direction is nearer.
 fn scan(
     axis: DVec2,
     unseen: impl Iterator<Item = DVec2>,

@@ -1,8 +1,8 @@
 //! The cell that the field leads to.
 //!
-//! The pose drifts against the world, where the target is a point: when the robot comes near, the target's cell may be one where the
-//! body cannot be. Then the field leads to the nearest free cell, where the robot has arrived. The paper's method never marks the
-//! target's own cell, but margins may cover all around it; then the field leads to a free cell from which the target counts as reached.
+//! The pose drifts against the world, where the target is a point: near it the robot may find the target's cell where the body cannot
+//! be. Then the field leads to the nearest free cell, where the robot has arrived. The paper's method never marks the target's own cell,
+//! but margins may cover all around it; then the field leads to a free cell from which the target counts as reached.
 
 use common::grid::{Cell, CellState, GridFrame};
 use glam::DVec2;

@@ -1,10 +1,10 @@
 //! Contacts, seen by held wheels.
 //!
 //! A wheel that does not turn as told is held, or its encoder is dead. A held motor draws several times the current of a rolling one.
-//! Where a current cannot be right, the encoder is suspected:
-//! - a current above the range of the AD converter
-//! - a current that stays high while the wheel is told to stand: the frames repeat
-//! - a current that is high while the wheel rolls as told: `robot.held_current_ad` is not this robot's
+//! The encoder is suspected where a current cannot be right:
+//! - it is above the range of the AD converter
+//! - it stays high while the wheel is told to stand: the frames repeat
+//! - it is high while the wheel rolls as told: `robot.held_current_ad` is not this robot's
 
 use std::{f64::consts::PI, time::Duration};
 

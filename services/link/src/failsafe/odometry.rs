@@ -1,17 +1,18 @@
-//! The odometry monitor: whether wheels turn as commanded, by their encoders.
+//! The odometry monitor: whether wheels turn as commanded, by their encoders. Each wheel is checked, and the difference of both, because
+//! a robot with swapped wheels turns the wrong way.
 //!
-//! Each wheel is checked, and the difference of both, because a robot with swapped wheels turns the wrong way.
-//! - An interval between two frames is evidence about a wheel that was commanded in one direction for [`SETTLE`], at [`LEAST_M_S`] or
-//!   more. Wheels follow after 0.07 s of delay and 0.08 s of lag, and the dead band of 20 counts/s (9 mm/s) is well below.
-//! - The wheel must then roll [`LEAST_SHARE`] of the smaller speed of the two newest commands. Real wheels roll 0.75 to 0.8 of it.
-//! - Evidence against a wheel adds up; evidence for it counts down at most twice as fast.
-//! - A wheel that turns the other way counts twice, and already after [`TURNS_AFTER`]: a controller whose robot turns away from the
-//!   target changes direction every other tick.
-//! - At [`SUSPECTED_AFTER`] the robot must stand: at 7 Hz 0.86 s after a motion began, and at rest 0.2 s later.
-//! - A commanded wheel that counts nothing is suspected after [`STILL_AFTER`]: a controller whose pose turns the wrong way changes
-//!   direction too often for the other evidence.
-//! - A wheel that does not turn while its motor draws a held one's current is held, and not suspected ([`super::contact`]).
-//! - Intervals over two periods are no evidence, because commands may have been lost.
+//! An interval between two frames is evidence about a wheel that was commanded in one direction for [`SETTLE`], at [`LEAST_M_S`] or
+//! more. Wheels follow after 0.07 s of delay and 0.08 s of lag; the dead band of 20 counts/s (9 mm/s) is well below. The wheel must then
+//! roll [`LEAST_SHARE`] of the smaller speed of the two newest commands; real wheels roll 0.75 to 0.8 of it. Intervals over two periods
+//! are no evidence, because commands may have been lost.
+//!
+//! Evidence against a wheel adds up; evidence for it counts down at most twice as fast. The other direction counts twice, and already
+//! after [`TURNS_AFTER`]: a controller whose robot turns away from the target changes direction every other tick. At [`SUSPECTED_AFTER`]
+//! the robot must stand: at 7 Hz 0.86 s after a motion began, and at rest 0.2 s later.
+//!
+//! A commanded wheel that counts nothing is suspected after [`STILL_AFTER`]: a controller whose pose turns the wrong way changes
+//! direction too often for the other evidence. If its motor draws a held one's current, it is held, and not suspected
+//! ([`super::contact`]).
 //!
 //! Single counts farther off than wheels turn are dropped ([`super::restart`]); [`MOST_JUMPS`] within [`JUMPS_WITHIN`] are suspect too.
 
@@ -102,8 +103,8 @@ impl Evidence {
         self.asked = [before, counts_s];
     }
 
-    /// The wheel rolled `counts` in `gap_s` until `now`, its motor drawing a held wheel's current if `high`. Commands below `least`
-    /// counts/s give no evidence. Returns whether it rolled as told.
+    /// The wheel rolled `counts` in `gap_s` until `now`, its motor drawing a held one's current if `high`. Commands below `least`
+    /// counts/s are no evidence. Returns whether it rolled as told.
     fn weigh(&mut self, counts: f64, gap_s: f64, least: f64, high: bool, now: MissionTime) -> bool {
         let [before, newest] = self.asked;
         let asked = before.abs().min(newest.abs());

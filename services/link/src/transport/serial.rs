@@ -1,6 +1,5 @@
-//! A serial line: 115200 baud, or the mission's Arduino's, 8 data bits, no parity, 1 stop bit, no translation.
-//!
-//! rustix opens it, because the waiter needs a `BorrowedFd`, which the ports of the crate `serialport` give only by `unsafe`.
+//! A serial line: 115200 baud, or the mission's Arduino's, 8 data bits, no parity, 1 stop bit, no translation. rustix opens it, because
+//! the waiter needs a `BorrowedFd`, which the crate `serialport` gives only by `unsafe`.
 
 use std::{
     fmt, io,

@@ -1,10 +1,9 @@
 //! A connection or serial line, reopened whenever it closes.
 //!
-//! Frames are sent whole, because a partial one would corrupt the next. If the system accepts part of a message, the rest goes before
-//! anything else, and messages meanwhile are lost.
+//! Frames are sent whole, because a partial one would corrupt the next. If the system accepts part of a message, the rest goes first,
+//! and messages meanwhile are lost.
 //!
-//! A waiter needs a descriptor that stays the same while the stream's changes: an epoll descriptor, readable when the present one is
-//! ready.
+//! The stream's descriptor changes, and a waiter needs one that stays: an epoll descriptor, readable when the present one is ready.
 
 use std::{
     fmt, io,
