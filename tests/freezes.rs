@@ -3,8 +3,8 @@
 
 mod support;
 
+use processes::stages::find as find_stage;
 use rustix::process::Signal;
-use supervisor::stages::find as find_stage;
 use support::{Run, STAGES};
 
 /// The longest time after its deadline in which a freeze is noticed, seconds.

@@ -28,13 +28,13 @@ use common::{
     topics,
     wire::{Addressing, Command},
 };
+use processes::domain::DomainLock;
 use recording::Recording;
 use rustix::{
     fs::inotify,
     process::{Pid, PidfdFlags, Signal, pidfd_open},
     thread::{Uid, set_thread_res_uid},
 };
-use supervisor::domain::DomainLock;
 
 /// The files of a robot in shared memory.
 fn shared(robot: &str) -> Vec<std::path::PathBuf> {

@@ -74,7 +74,7 @@ fn no_stage_knows_another_nor_the_supervisor() {
 
 #[test]
 fn what_watches_a_robot_contains_no_pictures_no_file_formats_and_no_chance() {
-    let names = linked(&["--package", "supervisor"]);
+    let names = linked(&["--package", "mission-control"]);
     assert!(names.contains("common"), "{names:?}");
     for tool in ["png", "mcap", "csv", "rand_pcg", "picture", "x80-sim", "clap"] {
         assert!(!names.contains(tool), "{tool}");

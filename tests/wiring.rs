@@ -7,8 +7,8 @@ use common::{
     topics,
     wiring::{EVERY_STAGE_READS, EVERY_STAGE_WRITES, Topics},
 };
+use processes::stages;
 use rustix::process::Signal;
-use supervisor::stages;
 
 use crate::support::{Run, domain, in_own_process, pid};
 

@@ -14,7 +14,7 @@ use console::{
     completion::{INDEX, VARIABLE},
     failure::{Failure, Refused},
 };
-use supervisor::executable;
+use processes::executable;
 
 /// A subcommand of another executable.
 pub(crate) struct Companion {

@@ -13,7 +13,7 @@ use clap_complete::{
     env::Shells,
 };
 use common::{domain::RobotName, topics};
-use supervisor::stages;
+use processes::stages;
 
 use crate::{failure::Failure, missions, output::print_text, robots};
 

@@ -9,11 +9,9 @@ use common::{
     address::AddressError, bus::BusError, checkpoint::CheckpointError, domain::SHARED_MEMORY,
     mission::MissionError, start::StageError,
 };
+use mission_control::{SupervisorError, operator::OperatorError, recovery::ResumeError};
+use processes::{DomainError, planner_executable::PlannerExecutableError};
 use recording::RecordingError;
-use supervisor::{
-    DomainError, SupervisorError, operator::OperatorError,
-    planner_executable::PlannerExecutableError, recovery::ResumeError,
-};
 use thiserror::Error;
 
 use super::{missions::LookupError, output::write_stderr};

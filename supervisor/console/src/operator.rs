@@ -8,11 +8,9 @@ use common::{
     roster::{self, Roster},
     samples::name_str,
 };
+use mission_control::operator;
+use processes::stages::{self, Stage};
 use rustix::process::Signal;
-use supervisor::{
-    operator,
-    stages::{self, Stage},
-};
 
 use super::{
     failure::{Failure, Refused},

@@ -8,8 +8,8 @@ use std::{
 };
 
 use common::{domain::RobotName, run};
+use mission_control::recovery::SUMMARY;
 use serde::Deserialize;
-use supervisor::recovery::SUMMARY;
 
 use super::{
     failure::{Failure, Refused},

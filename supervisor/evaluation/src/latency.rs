@@ -1,7 +1,7 @@
 //! Latencies of a mission's ticks and solves. They have a table of their own, because they differ in every run.
 
 use serde::{Deserialize, Serialize};
-use supervisor::summary::Summary;
+use summary::Summary;
 
 use crate::{
     row::Row,

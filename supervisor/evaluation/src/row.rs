@@ -1,7 +1,8 @@
 //! One mission's result: a row of the table.
 
+use mission_control::outcome::Outcome as Reported;
 use serde::{Deserialize, Serialize};
-use supervisor::{outcome::Outcome as Reported, summary::Summary};
+use summary::Summary;
 
 use crate::{
     setting::Setting,

@@ -10,7 +10,8 @@ use std::{
 };
 
 use common::file::FileError;
-use supervisor::{process::firsthand, summary::Summary};
+use processes::process::firsthand;
+use summary::Summary;
 use thiserror::Error;
 
 use crate::{

@@ -5,8 +5,8 @@ use common::{
     mission::{Heights, Mission, MissionError, Realism, Thing},
 };
 use glam::DVec2;
+use mission_control::outcome::RIGHT_PLACE_M;
 use std::path::Path;
-use supervisor::outcome::RIGHT_PLACE_M;
 
 use crate::shortest_path::{ShortestPath, shortest_path};
 

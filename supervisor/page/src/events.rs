@@ -7,8 +7,8 @@ use common::samples::{
     FaultSample, HoldReason, LinkSample, Order, RequestKind, RequestSample, RosterEntry,
     StageState, StallSample, TargetSample, name_str,
 };
+use processes::process::ExitCause;
 use serde::Serialize;
-use supervisor::process::ExitCause;
 
 /// Most letters of a text.
 const LONGEST: usize = 300;

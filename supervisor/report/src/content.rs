@@ -6,6 +6,7 @@ use std::{
     path::Path,
 };
 
+use common::ground_truth::GROUND_TRUTH;
 use common::{
     bus::{Layout, decode_sample, decode_slice},
     mission::{Mission, SensorKind},
@@ -15,7 +16,6 @@ use common::{
 use page::{Collector, Kind, Recorded};
 use recording::{End, Message, Recording};
 use serde_json::{Map, Value, json};
-use supervisor::simulator::GROUND_TRUTH;
 
 use crate::{
     beliefs::Beliefs,

@@ -8,8 +8,8 @@ use std::{
 };
 
 use common::{domain::RobotName, samples::TargetPoint};
+use mission_control::operator::{self, OperatorError};
 use ros2::participant::Request;
-use supervisor::operator::{self, OperatorError};
 
 use crate::action::Sent;
 

@@ -13,8 +13,8 @@ use common::{
     },
 };
 use glam::DVec2;
+use processes::process::ExitCause;
 use ros2::parts::Pose;
-use supervisor::process::ExitCause;
 
 use crate::{
     messages::{self, Header, Level, Marker, Shape, Status},

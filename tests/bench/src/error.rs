@@ -3,7 +3,9 @@
 use std::{io, path::PathBuf, time::Duration};
 
 use common::{bus::BusError, file::FileError, start::StageError};
-use supervisor::{DomainError, simulator::SimulatorError, summary::Summary};
+use mission_control::simulator::SimulatorError;
+use processes::DomainError;
+use summary::Summary;
 use thiserror::Error;
 
 /// The time after which a sample is lost: a trip takes microseconds, the forwarders' start some milliseconds.

@@ -9,6 +9,7 @@ use std::{
 };
 
 use clap::Args;
+use common::ground_truth::GROUND_TRUTH;
 use common::{
     bus::{Bus, BusError, Reader, Writer},
     domain::{Domain, RobotName},
@@ -18,7 +19,6 @@ use common::{
     topics,
 };
 use rand_pcg::{Pcg64, rand_core::Rng as _};
-use supervisor::simulator::GROUND_TRUTH;
 
 use crate::error::{BenchError, system};
 

@@ -21,10 +21,13 @@ use evaluation::{
     worlds::{self, Ends, Worlds},
 };
 use glam::DVec2;
+use processes::planner_executable;
 use serde_json::json;
-use supervisor::planner_executable;
 
-use crate::mission_progress::{MissionProgress, jobs};
+use crate::{
+    mission_progress::{MissionProgress, jobs},
+    stage::BASELINES,
+};
 use console::{
     failure::Failure,
     output::{print_text, write_stderr},
@@ -250,7 +253,7 @@ fn executable(planner: &str) -> Result<Option<String>, Failure> {
         return Ok(None);
     }
     // A missing executable is reported before anything starts.
-    planner_executable::find(Path::new(planner))?;
+    planner_executable::find_planner(Path::new(planner), BASELINES)?;
     let value = toml::Value::from(planner);
     Ok(Some(format!("planner.executable={value}")))
 }

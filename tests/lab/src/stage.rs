@@ -6,7 +6,10 @@ use clap::Args;
 use common::{shell::run_stage, stage_command};
 use console::failure::{Failure, Refused};
 use evaluation::baselines::{bug::Bug, shell::Shell, wavefront::Wavefront};
-use supervisor::stages::PLANNER;
+use processes::stages::PLANNER;
+
+/// The planners to compare with.
+pub(crate) const BASELINES: &[&str] = &["wavefront", "bug"];
 
 /// Be a planner to compare with: wavefront or bug.
 #[derive(Debug, Args)]

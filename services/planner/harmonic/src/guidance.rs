@@ -218,7 +218,7 @@ impl Field {
                 }
             }
         }
-        best.and_then(|(_, cell)| toward(cell, [col, row]))
+        best.and_then(|(_, cell)| unit([cell.0 as f64 - col, cell.1 as f64 - row], 0.0))
             .map_or(Guidance::Unreachable, Guidance::WayOut)
     }
 }
@@ -239,10 +239,6 @@ fn ring_cells(
     edges
         .flat_map(move |r| columns.clone().map(move |c| (c, r)))
         .chain(sides.flat_map(move |c| rows.clone().map(move |r| (c, r))))
-}
-
-fn toward(cell: (i64, i64), position: [f64; 2]) -> Option<[f64; 2]> {
-    unit([cell.0 as f64 - position[0], cell.1 as f64 - position[1]], 0.0)
 }
 
 /// `vector` at unit length, or `None` if it is no longer than `least`.

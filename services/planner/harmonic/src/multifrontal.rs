@@ -55,7 +55,6 @@ pub(crate) fn solve(
 /// The cell is not part of the front.
 const NOWHERE: u32 = u32::MAX;
 
-/// The factors of all fronts.
 fn factor(
     domain: &Domain,
     pass: &BreadthFirst,

@@ -55,7 +55,6 @@ const BETWEEN_CHECKS: f64 = 4.0;
 pub(crate) const SINGLE_CYCLES: usize = 60;
 pub(crate) const DOUBLE_CYCLES: usize = 450;
 
-/// Sweeps after the last correction.
 const SMOOTHING: usize = 2;
 
 /// The levels visited twice each time, as in a W-cycle, counted from the first coarse one. One visit of the levels below is
@@ -77,7 +76,6 @@ const SMALL_SIDE: usize = 128;
 /// cells wide, which the coarser levels do not resolve, need them.
 const SWEEPS: usize = 3;
 
-/// Levels end when neither side is longer.
 const COARSEST_SIDE: usize = 5;
 
 /// The levels of one map, in one precision.
@@ -322,14 +320,9 @@ impl<R: Real> Multigrid<R> {
     pub(crate) fn cycle(&mut self, tolerance: Option<f64>) -> Progress {
         let sweeps = if self.corrects && self.is_large() { SWEEPS } else { 1 };
         let progress = self.pass(sweeps, true, tolerance);
-        self.correct();
-        progress
-    }
-
-    /// Solves the residual equation of the finest level on the coarser ones.
-    fn correct(&mut self) {
         self.solve_level(0);
         self.corrects = true;
+        progress
     }
 
     /// Solves on a coarse level, from zero, by one cycle through it and those below; on some it is followed by another.
@@ -376,10 +369,6 @@ impl<R: Real> Multigrid<R> {
     /// cell to cell: near a saddle point the direction depends on the last digits. Cycles may follow.
     pub(crate) fn finish(&mut self) {
         self.pass(1 + SMOOTHING, false, None);
-        self.clear_correction();
-    }
-
-    fn clear_correction(&mut self) {
         for plane in &mut self.coarse[0].u {
             plane.fill(R::default());
         }

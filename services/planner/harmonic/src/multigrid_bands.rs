@@ -42,7 +42,6 @@ const STEEP: usize = 96;
 /// The sides of rectangles are multiples of this, for whole vectors.
 const SIDES: usize = 16;
 
-/// Column and row of a cell.
 type Place = [u16; 2];
 
 /// u of the cells resolved so far, and the cells from which the next band begins.
@@ -56,7 +55,6 @@ struct Bands<'a> {
     edge: Vec<Place>,
 }
 
-/// The unknowns of a band.
 #[derive(Default)]
 struct Unknowns {
     /// In order of their distance in steps from the inflow.
@@ -148,7 +146,6 @@ impl<'a> Bands<'a> {
         bands
     }
 
-    /// Row-major index of a cell of the map.
     fn index(&self, [col, row]: Place) -> usize {
         usize::from(row) * self.domain.width() + usize::from(col)
     }
@@ -158,7 +155,6 @@ impl<'a> Bands<'a> {
         Scaled { mantissa: self.mantissas[cell], exponent: self.exponents[cell] }
     }
 
-    /// The neighbours of a cell that are not resolved.
     fn open(&self, [col, row]: Place) -> impl Iterator<Item = Place> {
         let (width, height) = (self.domain.width(), self.domain.height());
         let around = [
@@ -278,13 +274,11 @@ impl Rectangle {
             && (self.row..self.row + self.height).contains(&row)
     }
 
-    /// The place in the rectangle of a cell of the map.
     fn cell(self, at: Place) -> Cell {
         let [col, row] = at.map(usize::from);
         Cell::new(col - self.col, row - self.row)
     }
 
-    /// Its row-major index in the rectangle.
     fn index(self, at: Place) -> usize {
         let Cell { col, row } = self.cell(at);
         row * self.width + col

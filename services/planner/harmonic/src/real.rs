@@ -2,7 +2,6 @@
 
 use std::ops::{Add, AddAssign, Div, Mul, Sub};
 
-/// A floating-point type.
 pub(crate) trait Real:
     Copy
     + Default

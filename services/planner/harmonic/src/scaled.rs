@@ -32,6 +32,14 @@ impl Scaled {
         self.mantissa == 0.0
     }
 
+    /// The sum of `terms`, in their order.
+    pub(crate) fn sum(terms: impl Iterator<Item = Self> + Clone) -> Self {
+        let largest = terms.clone().filter(|it| !it.is_zero()).map(|it| it.exponent).max();
+        largest.map_or(Self::ZERO, |largest| {
+            Self::new(terms.map(|it| it.relative_to(largest)).sum(), largest)
+        })
+    }
+
     /// The number divided by 2^`reference`: an ordinary `f64`, 0 where that underflows and infinite where it overflows.
     pub fn relative_to(self, reference: i32) -> f64 {
         // Zero has no exponent to compare, and 0 * 2^huge would be no number.

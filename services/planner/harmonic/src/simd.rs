@@ -4,7 +4,6 @@
 //! runs is decided when the program starts. No operation is fused or reordered by that, so the results are the same bit
 //! for bit on every machine.
 
-/// The vectors of this machine.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Simd(pulp::Arch);
 

@@ -152,23 +152,13 @@ impl Solver {
         let budget = Budget::of(domain, self.settings.memory_limit);
         if let Some(near) = near.filter(|near| near.fits(domain)) {
             let method = near.verification().method;
-            let solved = match method {
-                Method::MultigridSingle
-                | Method::MultigridAndMultifrontal
-                | Method::MultigridBands => {
-                    Some(self.single(task, Some(near), NEAR_CYCLES, &budget, observe)?)
+            // The cost of the factorisation follows from the shape of the map alone.
+            if method != Method::Multifrontal {
+                let ((store, check), method) =
+                    self.multigrid(method, task, Some(near), &budget, observe)?;
+                if check.holds() {
+                    return Ok(Field::new(domain, store, &check, method));
                 }
-                Method::MultigridDouble => {
-                    let solved = self.double.solve(task, Some(near), NEAR_CYCLES, observe)?;
-                    Some((solved, method))
-                }
-                // The cost of this method follows from the shape of the map alone.
-                Method::Multifrontal => None,
-            };
-            if let Some(((store, check), method)) = solved
-                && check.holds()
-            {
-                return Ok(Field::new(domain, store, &check, method));
             }
         }
         let mut plan = plan(domain, &budget, cancellation)?;
@@ -177,11 +167,9 @@ impl Solver {
             let ((store, check), method) = match method {
                 Method::MultigridSingle
                 | Method::MultigridAndMultifrontal
-                | Method::MultigridBands => {
-                    self.single(task, None, SINGLE_CYCLES, &budget, observe)?
-                }
-                Method::MultigridDouble => {
-                    (self.double.solve(task, None, DOUBLE_CYCLES, observe)?, method)
+                | Method::MultigridBands
+                | Method::MultigridDouble => {
+                    self.multigrid(method, task, None, &budget, observe)?
                 }
                 Method::Multifrontal => {
                     let (pass, tree) = if let Some(planned) = plan.multifrontal.take() {
@@ -225,18 +213,23 @@ impl Solver {
 }
 
 impl Solver {
-    /// The field by multigrid in single precision. Where u falls below its range, the cheaper of two methods continues: multifrontal
-    /// factorisation of the passages, or multigrid in bands.
-    fn single(
+    /// The field by multigrid, in double precision if that is the `method`. Where u falls below the range of single precision, the
+    /// cheaper of two methods continues: multifrontal factorisation of the passages, or multigrid in bands.
+    fn multigrid(
         &mut self,
+        method: Method,
         task: Task<'_>,
         near: Option<&Field>,
-        most_cycles: usize,
         budget: &Budget,
         observe: &mut dyn FnMut(Phase),
     ) -> Result<((Store, Check), Method), SolveError> {
         let Task { threads, domain, cancellation } = task;
-        let (store, check) = self.single.solve(task, near, most_cycles, observe)?;
+        let most_cycles = |from_scratch| if near.is_some() { NEAR_CYCLES } else { from_scratch };
+        if method == Method::MultigridDouble {
+            let solved = self.double.solve(task, near, most_cycles(DOUBLE_CYCLES), observe)?;
+            return Ok((solved, method));
+        }
+        let (store, check) = self.single.solve(task, near, most_cycles(SINGLE_CYCLES), observe)?;
         if check.holds() || check.unreached == 0 {
             return Ok(((store, check), Method::MultigridSingle));
         }

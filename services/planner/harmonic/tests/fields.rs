@@ -5,8 +5,10 @@
     reason = "helpers of tests may stop at the first broken promise"
 )]
 
-use harmonic::testing::{Kind, Map, Reference, follow};
-use harmonic::{Cancellation, Cell, Domain, Field, Method, Screening, SolveError, Solver};
+use harmonic::testing::{Angles, Kind, Map, Reference, exact, follow};
+use harmonic::{
+    Cancellation, Cell, Domain, Field, Method, Screening, Settings, SolveError, Solver,
+};
 
 fn solve(domain: &Domain) -> Field {
     Solver::default().solve(domain, &Cancellation::new()).expect("the map has a field")
@@ -214,4 +216,17 @@ fn a_narrow_passage_beside_a_wide_one_is_right_where_its_far_end_takes_over() {
     let turn = (100..1400).find(|&col| toward(col) > 0.0).expect("a turning point");
     // Both ways cost the same where, roughly, 0.572 x = 0.0647 * 1500 + 0.572 (1490 - x).
     assert!((780..900).contains(&turn), "the way turns at column {turn}");
+}
+
+#[test]
+fn double_precision_solves_what_fails_verification_in_single_precision_and_has_no_memory_to_be_factorised()
+ {
+    let noise = Kind::Noise { density: 0.114_933_575_027_424_09 };
+    let domain = Map::generate(noise, 219, 322, 161).domain().expect("a valid map");
+    let mut solver = Solver::new(Settings { memory_limit: 16 << 20, ..Settings::default() });
+    let field = solver.solve(&domain, &Cancellation::new()).expect("the map has a field");
+    assert_eq!(field.verification().method, Method::MultigridDouble);
+    assert_eq!(follow(&field), 1.0);
+    let angles = Angles::between(&field, &exact(&domain).expect("a field"), |_| true);
+    assert!(angles.clear_max < 1.0, "{angles:?}");
 }

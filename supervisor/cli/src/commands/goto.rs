@@ -2,7 +2,7 @@
 
 use clap::Args;
 use common::{domain::RobotName, samples::TargetPoint};
-use supervisor::operator;
+use mission_control::operator;
 
 use console::failure::{Failure, Refused};
 

@@ -8,7 +8,7 @@ use std::{
 };
 
 use clap::Args;
-use supervisor::stages;
+use processes::stages;
 use thiserror::Error;
 
 use console::{failure::Failure, output::print_text};

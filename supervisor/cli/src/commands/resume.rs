@@ -3,7 +3,7 @@
 use clap::Args;
 use common::domain::RobotName;
 
-use supervisor::operator;
+use mission_control::operator;
 
 use console::failure::Failure;
 

@@ -13,16 +13,16 @@ use common::{
     start::become_child,
 };
 use link::transport::SPEAKS_ROS2;
-use supervisor::{
-    Finished, Options, Progress, Starter,
+use mission_control::{
+    Finished, Options, Progress,
     outcome::{Ending, Outcome},
-    planner_executable,
     recovery::{self, RecoveredRun},
-    summary::Summary,
 };
+use processes::{Starter, planner_executable};
+use summary::{Hearer, Summary};
 
 use self::{recorder::RunRecorder, summary_file::SummaryFile};
-use super::{record::DiskBudget, run_report};
+use super::{record::DiskBudget, run_report, stage::OTHER_PLANNERS};
 use console::{
     failure::{Failure, Refused},
     logging, missions,
@@ -152,7 +152,7 @@ fn options(arguments: &Arguments) -> Result<Option<Options>, Failure> {
 fn resumed(arguments: &Arguments, directory: PathBuf) -> Result<Options, Failure> {
     let recovered = RecoveredRun::load(&directory)?;
     let mut mission = recovered.run.mission.clone();
-    planner_executable::resolve(&mut mission)?;
+    planner_executable::resolve(&mut mission, OTHER_PLANNERS)?;
     Ok(Options {
         mission,
         robot: recovered.run.robot.clone(),
@@ -180,7 +180,7 @@ fn mission(arguments: &Arguments) -> Result<Mission, Failure> {
         }
         mission.timeout_s = timeout;
     }
-    planner_executable::resolve(&mut mission)?;
+    planner_executable::resolve(&mut mission, OTHER_PLANNERS)?;
     Ok(mission)
 }
 
@@ -215,7 +215,8 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
             recorder = RunRecorder::start(&options, arguments.disk_budget);
         }
     };
-    let ran = supervisor::run(&options, &mut attach, &mut |progress| {
+    let (heard, listener) = Hearer::with_listener();
+    let ran = mission_control::run(&options, &mut attach, listener, &mut |progress| {
         console.show(progress);
     });
     let end_recorder = || {
@@ -232,7 +233,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         }
     };
     console.line.end();
-    let summary = Summary::new(&options.mission, &finished);
+    let summary = Summary::new(&options.mission, &finished, &heard.borrow());
     let json = serde_json::to_string(&summary)?;
     let text = if arguments.json { format!("{json}\n") } else { summary.to_string() };
     complain(print_text(&text).map_err(|error| format!("cannot print the summary: {error}")));
@@ -259,7 +260,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
             let printed = if arguments.json { Ok(()) } else { print_text(&line) };
             printed.map_err(|error| format!("cannot print where the {name} is: {error}"))
         };
-        complain(show(run_report::picture(&options, &finished, &summary)));
+        complain(show(run_report::picture(&options, &finished, &heard.borrow(), &summary)));
         if !arguments.no_record {
             complain(show(run_report::report(&options)));
         }

@@ -6,13 +6,13 @@ use common::{
     ground_truth::GroundTruthTick, kinematics::Pose2, mission::Mission, samples::PoseSample,
 };
 use glam::DVec2;
-use picture::{Facts, Scene};
-use supervisor::{
+use mission_control::{
     Finished, Options,
     outcome::Outcome,
-    summary::Summary,
     target_list::{TargetOutcome, TargetResult},
 };
+use picture::{Facts, Scene};
+use summary::{Hearer, Summary};
 
 /// The name of a result and its file.
 pub(crate) type Written = Result<(&'static str, PathBuf), String>;
@@ -22,9 +22,14 @@ pub(crate) fn report(options: &Options) -> Written {
     Ok(("report", page.map_err(|error| format!("no report of this run: {error}"))?))
 }
 
-pub(crate) fn picture(options: &Options, finished: &Finished, summary: &Summary) -> Written {
+pub(crate) fn picture(
+    options: &Options,
+    finished: &Finished,
+    heard: &Hearer,
+    summary: &Summary,
+) -> Written {
     let picture = options.directory.join("picture.svg");
-    let svg = svg(&options.mission, finished, summary);
+    let svg = svg(&options.mission, finished, heard, summary);
     if let Err(error) = fs::write(&picture, svg) {
         // An incomplete picture is of no use.
         let _ = fs::remove_file(&picture);
@@ -33,7 +38,7 @@ pub(crate) fn picture(options: &Options, finished: &Finished, summary: &Summary)
     Ok(("picture", picture))
 }
 
-fn svg(mission: &Mission, finished: &Finished, summary: &Summary) -> String {
+fn svg(mission: &Mission, finished: &Finished, heard: &Hearer, summary: &Summary) -> String {
     let record = &finished.record;
     let believed: Vec<Pose2> = record.poses.iter().map(PoseSample::pose).collect();
     let mut captions = summary.captions();
@@ -50,7 +55,7 @@ fn svg(mission: &Mission, finished: &Finished, summary: &Summary) -> String {
     picture::svg(&Scene {
         mission,
         grid: record.grid.frame().map(|frame| (frame, record.grid.cells())),
-        field: record.field.frame().map(|frame| (frame, record.field.cells())),
+        field: heard.field.frame().map(|frame| (frame, heard.field.cells())),
         believed: &believed,
         covariance: record.poses.last().map(|pose| {
             let [xx, xy, _, yy, ..] = pose.covariance;

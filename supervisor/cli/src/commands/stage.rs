@@ -3,6 +3,8 @@
 mod fault;
 mod process;
 
+pub(crate) use self::process::OTHER_PLANNERS;
+
 use std::ffi::OsString;
 
 use clap::{Args, Subcommand};
@@ -75,7 +77,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
         Command::Freeze(process) => process.send(Signal::STOP)?,
         Command::Thaw(process) => process.send(Signal::CONT)?,
         Command::Restart { stage, robot } => {
-            supervisor::operator::restart(robot, operator::known(stage)?)?;
+            mission_control::operator::restart(robot, operator::known(stage)?)?;
         }
         Command::Fault(arguments) => fault::main(arguments)?,
         Command::Process(words) => process::run(words)?,

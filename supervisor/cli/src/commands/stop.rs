@@ -27,7 +27,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
         return Ok(());
     }
     if let Some(asked_ns) = arguments.through_supervisor {
-        return Ok(supervisor::operator::request_stop(&arguments.robot, asked_ns)?);
+        return Ok(mission_control::operator::request_stop(&arguments.robot, asked_ns)?);
     }
     operator::stand(&arguments.robot)
 }

@@ -9,7 +9,7 @@ use common::{
     wiring::{EVERY_STAGE_READS, EVERY_STAGE_WRITES, Persists, Topics},
 };
 use link::failsafe::{self, monitor::Clears};
-use supervisor::stages;
+use processes::stages;
 
 use console::{failure::Failure, item::item, output::print_text};
 

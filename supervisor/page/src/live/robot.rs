@@ -10,6 +10,7 @@ use std::{
 };
 
 use axum::body::Bytes;
+use common::ground_truth::GROUND_TRUTH;
 use common::{
     bus::{AnyReader, Bus, BusError, Reader},
     clock::MissionTime,
@@ -24,7 +25,6 @@ use common::{
 use glam::DVec2;
 use planner::step::{Input, Planner};
 use recording::log_files::LogFiles;
-use supervisor::simulator::GROUND_TRUTH;
 
 use super::shared::Shared;
 use crate::{

@@ -13,7 +13,7 @@ use common::{
     samples::{DeathSample, HealthSample, HealthState, InputsHeader, name_str},
     topics,
 };
-use supervisor::stages::{self, Stage};
+use processes::stages::{self, Stage};
 
 use crate::{
     End, Message, Recording, RecordingError,

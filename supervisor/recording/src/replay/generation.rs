@@ -13,7 +13,7 @@ use common::{
     run::Run,
     topics,
 };
-use supervisor::stages::Stage;
+use processes::stages::Stage;
 
 use crate::replay::{
     pieces::Pieces,

@@ -9,9 +9,9 @@ use common::{
     signals::{SIGHUP, SIGINT, SIGTERM, Signals},
 };
 use glam::DVec2;
+use mission_control::operator;
 use page::live::{Options, Page, PageError, orders};
 use rustix::process::Signal;
-use supervisor::operator;
 
 use console::{executable, failure::Failure, output::print_text, stream::let_stages_go_first};
 

@@ -6,8 +6,8 @@ use std::{
 };
 
 use common::domain::RobotName;
+use mission_control::operator as requests;
 use rustix::process::Signal;
-use supervisor::operator as requests;
 
 use console::operator;
 

@@ -11,7 +11,7 @@ use common::{
     },
     topics,
 };
-use supervisor::stages;
+use processes::stages;
 
 use super::{view::View, words};
 use console::rates::TopicRates;

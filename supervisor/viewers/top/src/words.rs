@@ -3,7 +3,7 @@
 use common::samples::{
     DeathSample, GuidanceStatus, RecoveryStep, StallCause, StallSample, name_str,
 };
-use supervisor::process::ExitCause;
+use processes::process::ExitCause;
 
 /// The status of the planner, a [`GuidanceStatus`].
 pub(super) const fn guidance(status: u8) -> &'static str {

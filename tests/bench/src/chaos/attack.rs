@@ -14,10 +14,10 @@ use common::{
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
-use supervisor::{
+use mission_control::simulator::Simulator;
+use processes::{
     policy::{HOLD_AFTER, HOLD_WINDOW},
     process::Process,
-    simulator::Simulator,
     stages,
 };
 

@@ -11,13 +11,11 @@ use std::{
 };
 
 use common::{domain::RobotName, ground_truth::GroundTruthTick, mission::Mission};
+use mission_control::target_list::{TargetOutcome, TargetResult};
+use processes::process::firsthand;
 use rand_pcg::{Pcg64, rand_core::Rng};
 use serde::Serialize;
-use supervisor::{
-    process::firsthand,
-    summary::Summary,
-    target_list::{TargetOutcome, TargetResult},
-};
+use summary::Summary;
 
 /// Changes of the targets of one mission.
 const MOST_CHANGES: usize = 6;

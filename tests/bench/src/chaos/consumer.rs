@@ -8,7 +8,7 @@ use std::{
 };
 
 use common::domain::RobotName;
-use supervisor::{
+use processes::{
     executable::{self, ExecutableError},
     process::firsthand,
 };

@@ -11,8 +11,8 @@ use std::{
 };
 
 use common::domain::RobotName;
+use processes::process::Process;
 use rustix::process::{Pid, Signal, kill_process_group};
-use supervisor::process::Process;
 
 use crate::chaos::{consumer::Consumer, kind::Kind, options::Options, report::Report, terminal};
 use crate::error::{BenchError, system};

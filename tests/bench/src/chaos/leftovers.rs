@@ -7,8 +7,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use ::processes::STOP_GUARD;
 use common::domain::{Domain, RobotName, SHARED_MEMORY};
-use supervisor::STOP_GUARD;
 
 use crate::{command_line, processes};
 

@@ -16,12 +16,12 @@ use crate::chaos::{
     series::Series,
 };
 use crate::error::{self, BenchError, system};
-use supervisor::{
+use mission_control::simulator::Simulator;
+use processes::{
     DEATHS,
     process::{Process, firsthand},
-    simulator::Simulator,
-    summary::Summary,
 };
+use summary::Summary;
 
 /// The time after which a mission is stopped. In wall-clock time a mission takes half a minute.
 const PATIENCE: Duration = Duration::from_secs(600);

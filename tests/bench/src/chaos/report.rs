@@ -9,7 +9,8 @@ use crate::chaos::{
     changes::Changes, kind::Kind, replays::Replays, resources::Resources,
     tick_latencies::TickLatencies,
 };
-use supervisor::{outcome::Outcome, stages::TABLE};
+use mission_control::outcome::Outcome;
+use processes::stages::TABLE;
 
 /// The name for supervisor and stages together.
 pub(crate) const EVERYTHING: &str = "everything";

@@ -17,14 +17,11 @@ use common::{
     samples::LinkSample,
     topics,
 };
+use mission_control::{outcome::RIGHT_PLACE_M, simulator::Simulator};
+use processes::process::{Process, firsthand};
 use rand_pcg::{Pcg64, rand_core::Rng};
 use rustix::process::{Pid, Signal, kill_process};
-use supervisor::{
-    outcome::RIGHT_PLACE_M,
-    process::{Process, firsthand},
-    simulator::Simulator,
-    summary::Summary,
-};
+use summary::Summary;
 
 use crate::chaos::{
     mission,

@@ -2,8 +2,8 @@
 
 use std::{ops::Range, time::Duration};
 
+use processes::stages::TABLE;
 use rand_pcg::{Pcg64, rand_core::Rng};
-use supervisor::stages::TABLE;
 
 use crate::chaos::kind::Kind;
 

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use serde::Serialize;
-use supervisor::summary::{Quantiles, Summary};
+use summary::{Quantiles, Summary};
 
 use crate::quantile;
 

@@ -8,8 +8,8 @@ use std::{
 };
 
 use common::latency_budget::{self, Answers, Item, TickTimes};
+use processes::stages;
 use serde::Serialize;
-use supervisor::stages;
 
 use crate::error::BenchError;
 

@@ -1,7 +1,7 @@
 //! Processes that take the processor from a mission whose ticks are measured.
 
 use common::start::become_child;
-use supervisor::process::{Process, firsthand};
+use processes::process::{Process, firsthand};
 use thread_priority::{
     NormalThreadSchedulePolicy as Normal, ThreadPriority, ThreadPriorityValue,
     ThreadSchedulePolicy, set_thread_priority_and_policy, thread_native_id,

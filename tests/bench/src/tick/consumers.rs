@@ -9,7 +9,7 @@ use common::{
     start::become_child,
     topics,
 };
-use supervisor::process::{Process, firsthand};
+use processes::process::{Process, firsthand};
 
 use crate::error::{BenchError, system};
 

@@ -16,7 +16,7 @@ use common::{
     topics,
     waiter::Waiter,
 };
-use supervisor::{
+use processes::{
     domain::DomainLock,
     process::{Process, firsthand},
 };

@@ -8,7 +8,8 @@ use std::{
 };
 
 use common::{clock::Pace, domain::RobotName, latency_budget};
-use supervisor::{process, summary::Quantiles};
+use processes::process;
+use summary::Quantiles;
 
 use super::{
     budget::Budget,

@@ -12,8 +12,8 @@ use std::{
 };
 
 use common::{clock::monotonic_ns, latency::Histogram, poll, start::become_child};
+use processes::process::{Process, firsthand};
 use rustix::event::{EventfdFlags, eventfd};
-use supervisor::process::{Process, firsthand};
 
 use super::hops::{PLACES, WARM_UP};
 use crate::error::{BenchError, LOST, system};

@@ -1,4 +1,4 @@
-//! `cargo bench -p harmonic --features bench` prints the times of the solver, of plain passes over the grid and of other algorithms.
+//! `cargo bench -p harmonic --features bench` prints the times of the solver and of other algorithms.
 //!
 //! It does not use criterion, because the results are ratios, which hold only between times that are measured in turn in one run.
 //! Every time is the least of several runs. Arguments after `--` select the measurements:
@@ -7,7 +7,7 @@
 //! - `accuracy` measures angles instead of times, also along a thousand changes of a map.
 //! - `split` measures the phases of a solve; with `quick` on small maps.
 //! - `growth` measures time and memory by the size of the map.
-//! - `sweep` measures a sweep over widths of corridors and doors, densities and depths of u, the worst first; `sweep angles` its angles.
+//! - `sweep` measures a sweep over widths of corridors and doors, densities and depths of u, the worst first.
 //! - `--maps DIR` adds the PGM and MovingAI maps of a directory.
 #![allow(
     clippy::expect_used,
@@ -17,7 +17,6 @@
 )]
 
 mod accuracy;
-mod machine;
 mod others;
 mod real;
 mod split;
@@ -28,7 +27,7 @@ mod wavefront;
 use std::{path::Path, time::Instant};
 
 use harmonic::testing::{Kind, Map};
-use harmonic::{Cancellation, Cell, Change, Domain, Phase, Screening, Solver};
+use harmonic::{Cancellation, Cell, Change, Domain, Solver};
 
 /// Milliseconds of the fastest of `runs` calls.
 fn fastest(runs: usize, mut call: impl FnMut()) -> f64 {
@@ -63,20 +62,18 @@ fn main() {
     }
     if asked("sweep") {
         let real = maps_directory().map(|it| real::load_all(Path::new(&it)));
-        return if asked("angles") { sweep::angle_table() } else { sweep::table(real) };
+        return sweep::table(real);
     }
     if asked("accuracy") {
         accuracy::angle_table();
         return accuracy::sequence_table(sequence_maps());
     }
-    machine_table(quick);
     full_table(quick);
     if let Some(directory) = maps_directory() {
         for (name, domain) in real::load_all(Path::new(&directory)) {
-            full_row(&name, &domain, true, false);
+            full_row(&name, &domain, true);
         }
     }
-    screening_table();
     updates::table(quick);
 }
 
@@ -97,31 +94,13 @@ fn maps_directory() -> Option<String> {
     std::env::args().skip_while(|it| it != "--maps").nth(1)
 }
 
-fn machine_table(quick: bool) {
-    println!("\nThe machine: one pass over the grid, ms");
-    println!("{:>6} {:>14} {:>24}", "N", "stream f32", "red-black sweep f32");
-    for n in if quick { vec![50, 256, 512] } else { vec![50, 256, 512, 1024, 2048, 4096] } {
-        println!("{n:>6} {:>14.4} {:>24.4}", machine::stream(n), machine::sweep(n));
-    }
-}
-
 fn full_table(quick: bool) {
     println!(
         "\nFull solves without screening: set-up + solve + verification, ms, and as multiples of a wavefront's time"
     );
     println!(
-        "{:<24} {:>9} {:<14} {:>9} {:>9} {:>9} {:>6} {:>6} {:>9} {:>8} {:>9}",
-        "map",
-        "cells",
-        "method",
-        "scratch",
-        "target",
-        "wavefront",
-        "x",
-        "x",
-        "dijkstra",
-        "faer",
-        "log10 u"
+        "{:<24} {:>9} {:<14} {:>9} {:>9} {:>9} {:>6} {:>6} {:>9} {:>9}",
+        "map", "cells", "method", "scratch", "target", "wavefront", "x", "x", "dijkstra", "log10 u"
     );
     let kinds = [
         Kind::Empty,
@@ -147,7 +126,7 @@ fn full_table(quick: bool) {
                 continue;
             }
             let domain = Map::generate(kind, n, n, 1).domain().expect("a valid map");
-            full_row(&format!("{kind:?}"), &domain, n <= 1024, n <= 512);
+            full_row(&format!("{kind:?}"), &domain, n <= 1024);
         }
     }
 }
@@ -165,7 +144,7 @@ fn others_than(domain: &Domain) -> [Domain; 2] {
 }
 
 /// Print the times of a map from scratch and with the set-up reused, and those of other algorithms.
-fn full_row(name: &str, domain: &Domain, with_dijkstra: bool, with_faer: bool) {
+fn full_row(name: &str, domain: &Domain, with_dijkstra: bool) {
     let cells = domain.blocked().len();
     let cancellation = Cancellation::new();
     let (width, height) = (domain.width(), domain.height());
@@ -187,63 +166,15 @@ fn full_row(name: &str, domain: &Domain, with_dijkstra: bool, with_faer: bool) {
     let (wavefront, reached) = wavefront::time(domain, runs(cells));
     assert_eq!(reached, field.verification().reachable, "cells reached");
     let dijkstra = with_dijkstra.then(|| others::dijkstra(domain));
-    let faer = with_faer.then(|| others::sparse_cholesky(domain));
-    let show = |time: Option<f64>| time.map_or("-".to_owned(), |time| format!("{time:.2}"));
     println!(
-        "{name:<24} {:>9} {:<14} {scratch:>9.3} {target:>9.3} {wavefront:>9.3} {:>6.2} {:>6.2} {:>9} {:>8} {:>9.1}",
+        "{name:<24} {:>9} {:<14} {scratch:>9.3} {target:>9.3} {wavefront:>9.3} {:>6.2} {:>6.2} {:>9} {:>9.1}",
         format!("{width}x{height}"),
         field.verification().method.name(),
         scratch / wavefront,
         target / wavefront,
-        show(dijkstra),
-        show(faer),
+        dijkstra.map_or("-".to_owned(), |time| format!("{time:.2}")),
         field.log10_u_min(),
     );
-}
-
-fn screening_table() {
-    println!("\nFull solves by screening length in cells, N = 512: ms by phase");
-    println!(
-        "{:<24} {:>6} {:<14} {:>9} {:>9} {:>9} {:>9}",
-        "map", "length", "method", "set-up", "solve", "verify", "log10 u"
-    );
-    for length in [f64::INFINITY, 11.18, 3.54] {
-        for kind in [Kind::Empty, Kind::Drums, Kind::Office] {
-            let domain = Map::generate(kind, 512, 512, 1).domain().expect("a valid map");
-            let domain =
-                domain.with_screening(&Screening::cells(length)).expect("a valid screening");
-            let mut phases = [f64::INFINITY; 3];
-            let mut method = "";
-            let mut least = 0.0;
-            for _ in 0..5 {
-                let mut times = [0.0; 3];
-                let mut start = Instant::now();
-                let field = Solver::default()
-                    .solve_observed(&domain, &Cancellation::new(), &mut |phase| {
-                        let slot = match phase {
-                            Phase::SetUp => 0,
-                            Phase::Verified => 2,
-                            _ => 1,
-                        };
-                        times[slot] += start.elapsed().as_secs_f64() * 1e3;
-                        start = Instant::now();
-                    })
-                    .expect("a field");
-                for (best, time) in phases.iter_mut().zip(times) {
-                    *best = best.min(time);
-                }
-                method = field.verification().method.name();
-                least = field.log10_u_min();
-            }
-            println!(
-                "{:<24} {length:>6} {method:<14} {:>9.3} {:>9.3} {:>9.3} {least:>9.1}",
-                format!("{kind:?}"),
-                phases[0],
-                phases[1],
-                phases[2]
-            );
-        }
-    }
 }
 
 pub(crate) fn block(domain: &Domain, col: usize, row: usize) -> Vec<Change> {

@@ -1,7 +1,7 @@
 //! A sweep over the shapes of maps that decide what a solve costs: the width of corridors and of doors, the density of obstacles and
 //! the depth of u.
 
-use harmonic::testing::{Angles, Kind, Map, exact, follow};
+use harmonic::testing::{Kind, Map};
 use harmonic::{Cancellation, Domain, Screening, Solver};
 
 use crate::split::{bytes_of_a_process, split};
@@ -9,12 +9,6 @@ use crate::{others_than, wavefront};
 
 /// Side of the maps whose time is measured, cells.
 const SIDE: usize = 512;
-
-/// Side of the maps whose directions are compared: a factorisation of larger halls takes gigabytes.
-const SIDE_OF_EXACT: usize = 256;
-
-/// Maps of each kind whose directions are compared; the worst counts.
-const SEEDS: u64 = 3;
 
 /// Runs of each solve; the fastest counts.
 const RUNS: usize = 3;
@@ -119,39 +113,4 @@ fn row(name: &str, domain: &Domain, bytes: Option<f64>) -> (f64, String) {
         bytes.map_or("-".to_owned(), |it| format!("{:.0}", it / cells)),
     );
     (ratio, line)
-}
-
-/// Print the angles between the directions of the sweep's maps and exact ones, the worst first.
-pub(crate) fn angle_table() {
-    let mut rows = Vec::new();
-    for (name, kind, length) in kinds().into_iter().filter(|it| chosen(&it.0)) {
-        let mut worst = (Angles::default(), 1.0, "");
-        for seed in 1..=SEEDS {
-            let domain = domain(kind, length, SIDE_OF_EXACT, seed);
-            let field = Solver::default().solve(&domain, &Cancellation::new()).expect("a field");
-            let angles = Angles::between(&field, &exact(&domain).expect("a field"), |_| true);
-            let follow = follow(&field).min(worst.1);
-            if angles.clear_max >= worst.0.clear_max {
-                worst = (angles, follow, field.verification().method.name());
-            }
-            worst.1 = follow;
-        }
-        let (angles, follow, method) = worst;
-        let line = format!(
-            "{name:<28} {:>8.4} {:>8.4} {:>8.3} {:>8.2} {follow:>7} {method}",
-            angles.p50, angles.p99, angles.clear_max, angles.max,
-        );
-        rows.push((angles.clear_max, line));
-    }
-    rows.sort_by(|a, b| b.0.total_cmp(&a.0));
-    println!(
-        "\nDirections beside exact ones, {SIDE_OF_EXACT} x {SIDE_OF_EXACT} cells, degrees, the worst first"
-    );
-    println!(
-        "{:<28} {:>8} {:>8} {:>8} {:>8} {:>7} method",
-        "map", "p50", "p99", "clear", "max", "follow"
-    );
-    for (_, line) in rows {
-        println!("{line}");
-    }
 }

@@ -72,7 +72,6 @@ fn store(domain: &Domain, pass: &BreadthFirst, u: &[Scaled], known: Option<&Stor
     Store::narrowest(mantissas, exponents)
 }
 
-/// The weights of a front.
 #[derive(Clone, Copy)]
 struct Rows<'a> {
     rows: &'a [f64],
@@ -120,20 +119,11 @@ fn in_plain_range(u: &mut [Scaled], cells: &[u32], rows: Rows<'_>, plain: &mut V
 /// Computes a front with an exponent for every term.
 fn in_extended_range(u: &mut [Scaled], cells: &[u32], rows: Rows<'_>) {
     for (row, weights) in rows.backwards() {
-        let terms = || {
-            weights.iter().zip(&cells[row + 1..]).map(|(&weight, &place)| {
-                let u = u[place as usize];
-                Scaled::new(weight * u.mantissa, u.exponent)
-            })
-        };
-        let largest = terms().filter(|term| !term.is_zero()).map(|term| term.exponent).max();
-        let sum = largest.map_or(Scaled::ZERO, |largest| {
-            Scaled::new(
-                terms().filter(|term| !term.is_zero()).map(|term| term.relative_to(largest)).sum(),
-                largest,
-            )
+        let terms = weights.iter().zip(&cells[row + 1..]).map(|(&weight, &place)| {
+            let u = u[place as usize];
+            Scaled::new(weight * u.mantissa, u.exponent)
         });
-        u[cells[row] as usize] = sum;
+        u[cells[row] as usize] = Scaled::sum(terms);
     }
 }
 

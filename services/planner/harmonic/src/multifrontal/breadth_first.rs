@@ -113,7 +113,6 @@ impl BreadthFirst {
         Ok(Self { order, place, levels, width })
     }
 
-    /// The places of the cells whose u is not known.
     pub(crate) fn unknown(&self) -> std::ops::Range<u32> {
         self.levels[1]..self.len() as u32
     }
@@ -123,7 +122,6 @@ impl BreadthFirst {
         self.order.len()
     }
 
-    /// Row-major index of the cell at `place`.
     pub(crate) fn cell(&self, place: u32) -> usize {
         let padded = self.order[place as usize];
         let stride = self.width as u32 + 2;
@@ -131,7 +129,6 @@ impl BreadthFirst {
         row as usize * self.width + col as usize
     }
 
-    /// Places of the cells of one row of the map.
     pub(crate) fn row(&self, row: usize) -> &[u32] {
         let start = (row + 1) * (self.width + 2) + 1;
         &self.place[start..start + self.width]

@@ -99,7 +99,6 @@ impl Matrix {
     }
 }
 
-/// See [`Matrix::eliminate`].
 #[inline(always)]
 fn eliminate(entries: &mut [f64], stride: usize, ends: &[usize]) {
     let mut start = 0;

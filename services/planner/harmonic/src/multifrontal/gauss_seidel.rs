@@ -22,17 +22,11 @@ pub(crate) fn relax(domain: &Domain, pass: &BreadthFirst, store: &mut Store) {
         let mut change = 0.0_f64;
         let places = pass.unknown();
         for place in places.clone().rev().chain(places) {
-            let mut largest = i32::MIN;
-            let around = pass.neighbours(place).map(|place| {
-                let u = if place == ABSENT { Scaled::ZERO } else { store.u(pass.cell(place)) };
-                if !u.is_zero() {
-                    largest = largest.max(u.exponent);
-                }
-                u
-            });
-            let sum: f64 = around.iter().map(|u| u.relative_to(largest)).sum();
+            let around = pass.neighbours(place).into_iter().filter(|&it| it != ABSENT);
+            let sum = Scaled::sum(around.map(|place| store.u(pass.cell(place))));
             let index = pass.cell(place);
-            let u = Scaled::new(0.25 * sum / (1.0 + domain.screening_coefficient(index)), largest);
+            let mean = 0.25 * sum.mantissa / (1.0 + domain.screening_coefficient(index));
+            let u = Scaled::new(mean, sum.exponent);
             let before = store.u(index);
             change = change.max((before.relative_to(u.exponent) / u.mantissa - 1.0).abs());
             store.set(index, u.mantissa, u.exponent);

@@ -25,7 +25,6 @@ use crate::error::SolveError;
 #[derive(Clone, Copy)]
 pub(crate) struct Front {
     first: usize,
-    /// Cells the front eliminates.
     pub own: u32,
     /// Cells eliminated later on which the front leaves an update.
     pub boundary: u32,
@@ -35,13 +34,10 @@ pub(crate) struct Front {
     next_sibling: u32,
 }
 
-/// No front.
 const NONE: u32 = u32::MAX;
 
-/// The cost of a factorisation.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Cost {
-    /// Multiplications.
     pub operations: f64,
     /// Most weights stored for the substitution.
     pub weights: usize,
@@ -49,7 +45,6 @@ pub(crate) struct Cost {
     pub bytes: u64,
 }
 
-/// The division of the distances into stages.
 #[derive(Clone, Copy, Debug)]
 struct Shape {
     /// Distances a stage takes at once.
@@ -194,7 +189,6 @@ enum Next {
     Separator,
 }
 
-/// A tree under construction.
 struct Builder<'a> {
     pass: &'a BreadthFirst,
     tree: Tree,
@@ -208,7 +202,6 @@ struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    /// The fronts and places for which there is room at first.
     fn capacities(pass: &BreadthFirst) -> (usize, usize) {
         (pass.len() / 4, pass.len() * 3)
     }
@@ -372,7 +365,6 @@ impl<'a> Builder<'a> {
 #[derive(Default)]
 struct Pieces {
     parent: Vec<u32>,
-    /// Piece of each cell.
     piece: Vec<u32>,
     /// The end of each piece's members.
     ends: Vec<u32>,
@@ -438,7 +430,6 @@ impl Pieces {
         self.ends.len()
     }
 
-    /// The members of a piece in descending order.
     fn members(&self, piece: usize) -> &[u32] {
         let start = if piece == 0 { 0 } else { self.ends[piece - 1] };
         &self.members[start as usize..self.ends[piece] as usize]

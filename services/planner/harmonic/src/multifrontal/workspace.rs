@@ -8,7 +8,6 @@ pub(crate) struct Workspace {
     pub(super) factors: Factors,
     /// Position in the current front of each place; all `NOWHERE` between fronts.
     pub(super) slot: Vec<u32>,
-    /// u by place.
     pub(super) u: Vec<Scaled>,
 }
 
@@ -33,6 +32,5 @@ impl Workspace {
 pub(super) struct Factors {
     /// The weights of the cells after each eliminated cell in its front, up to the last that is not zero.
     pub(super) rows: Vec<f64>,
-    /// The number of weights of each cell.
     pub(super) lengths: Vec<u32>,
 }

@@ -6,8 +6,8 @@
 //! stored.
 
 use super::grid::{
-    EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Whole, add_products, join, join_row, split,
-    split_row,
+    EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Weights, Whole, around, correct, cut, join,
+    join_row, split, split_row,
 };
 use super::kernels::{add_active, gather, relax, subtract, sum_weighted};
 use crate::real::Real;
@@ -19,7 +19,6 @@ pub(super) const SOUTH: usize = 1;
 pub(super) const SOUTH_EAST: usize = 2;
 pub(super) const SOUTH_WEST: usize = 3;
 
-/// The steps to the eight neighbours.
 const W: (isize, isize) = (-1, 0);
 const E: (isize, isize) = (1, 0);
 const N: (isize, isize) = (0, -1);
@@ -30,24 +29,18 @@ const SW: (isize, isize) = (-1, 1);
 const SE: (isize, isize) = (1, 1);
 const ALL: [(isize, isize); 8] = [W, E, N, S, NW, NE, SW, SE];
 
-/// Cells of one coarse level.
 #[derive(Debug, Default)]
 pub(super) struct Coarse<R> {
     pub grid: Grid,
     pub u: Planes<R>,
     /// u of the first of two visits in a W-cycle, while the second solves for its residual.
     first_visit: Planes<R>,
-    /// Right-hand side.
     pub f: Planes<R>,
     /// 1 / diagonal, 0 where the cell is inactive.
     pub inverse: Planes<R>,
     /// Couplings (minus the matrix entries) by direction, then by plane.
     pub coupling: [Planes<R>; 4],
-    /// Interpolation from the next level, as in the finest one.
-    pub west: Vec<R>,
-    pub east: Vec<R>,
-    pub north: Vec<R>,
-    pub south: Vec<R>,
+    pub weights: Weights<R>,
     scratch: Scratch<R>,
     whole: Whole<R>,
 }
@@ -56,10 +49,9 @@ impl<R: Real> Coarse<R> {
     /// Makes this a level of `grid` without cells.
     pub(super) fn reshape(&mut self, grid: Grid) {
         self.grid = grid;
-        let weights = [&mut self.west, &mut self.east, &mut self.north, &mut self.south];
         let values = self.u.iter_mut().chain(&mut self.first_visit).chain(&mut self.f);
         let equations = self.inverse.iter_mut().chain(self.coupling.iter_mut().flatten());
-        grid.reset(values.chain(equations).chain(weights));
+        grid.reset(values.chain(equations).chain(&mut self.weights));
         self.whole.reset(&grid);
     }
 
@@ -140,12 +132,7 @@ impl<R: Real> Coarse<R> {
         (above, here): (&[R], &[R]),
         out: &mut [R],
     ) {
-        let weights = [
-            &self.west[o..],
-            &self.east[o - 1..],
-            &self.north[o..],
-            &self.south[o - self.grid.stride..],
-        ];
+        let weights = around(&self.weights, o, self.grid.stride);
         let around = [&odd_even[1..], odd_even, here, above];
         sum_weighted(out, &self.inverse[EE][o..], even_even, weights, around);
     }
@@ -199,12 +186,7 @@ impl<R: Real> Coarse<R> {
     #[inline(always)]
     fn correct(&mut self, o: usize, upper: &[R], lower: &[R], n: usize) {
         add_active(&mut self.u[EE][o..][..n], &self.inverse[EE][o..], upper);
-        let (west, east) = (&self.west[o..], &self.east[o..]);
-        let u = &mut self.u[OE][o..][..n];
-        add_products(u, (west, upper), (east, &upper[1..]));
-        let (north, south) = (&self.north[o..], &self.south[o..]);
-        let u = &mut self.u[EO][o..][..n];
-        add_products(u, (north, upper), (south, lower));
+        correct(&mut self.u, &self.weights, (upper, lower), o, n);
     }
 
     /// Keeps u of the first visit and makes its residual the right-hand side of the second.
@@ -228,7 +210,6 @@ impl<R: Real> Coarse<R> {
         std::mem::swap(&mut self.first_visit, &mut self.u);
     }
 
-    /// Adds u of the first visit to its correction.
     pub(super) fn end_second_visit(&mut self) {
         for (u, first) in self.u.iter_mut().zip(&self.first_visit) {
             for (u, &first) in u.iter_mut().zip(first) {
@@ -267,7 +248,6 @@ impl<R: Real> Coarse<R> {
         gather(into, &terms);
     }
 
-    /// The couplings and u of the neighbour at each step.
     #[inline(always)]
     fn terms<const COUNT: usize>(
         &self,
@@ -287,44 +267,28 @@ impl<R: Real> Coarse<R> {
     #[inline(always)]
     fn term(&self, plane: usize, o: usize, n: usize, step: (isize, isize)) -> (&[R], &[R]) {
         let (there, at) = neighbour(&self.grid, plane, o, step);
-        let coupling = match step {
-            E => &self.coupling[EAST][plane][o..][..n],
-            S => &self.coupling[SOUTH][plane][o..][..n],
-            SE => &self.coupling[SOUTH_EAST][plane][o..][..n],
-            SW => &self.coupling[SOUTH_WEST][plane][o..][..n],
-            W => &self.coupling[EAST][there][at..][..n],
-            N => &self.coupling[SOUTH][there][at..][..n],
-            NW => &self.coupling[SOUTH_EAST][there][at..][..n],
-            _ => &self.coupling[SOUTH_WEST][there][at..][..n],
+        let here = step.1 > 0 || step == E;
+        let (owner, from) = if here { (plane, o) } else { (there, at) };
+        let direction = match step {
+            E | W => EAST,
+            S | N => SOUTH,
+            SE | NW => SOUTH_EAST,
+            _ => SOUTH_WEST,
         };
-        (coupling, &self.u[there][at..][..n])
-    }
-
-    /// The coupling of a cell, given by plane and place, in one of the eight directions.
-    fn coupling_at(&self, plane: usize, at: usize, step: (isize, isize)) -> R {
-        let (there, other) = neighbour(&self.grid, plane, at, step);
-        match step {
-            E => self.coupling[EAST][plane][at],
-            S => self.coupling[SOUTH][plane][at],
-            SE => self.coupling[SOUTH_EAST][plane][at],
-            SW => self.coupling[SOUTH_WEST][plane][at],
-            W => self.coupling[EAST][there][other],
-            N => self.coupling[SOUTH][there][other],
-            NW => self.coupling[SOUTH_EAST][there][other],
-            _ => self.coupling[SOUTH_WEST][there][other],
-        }
+        (&self.coupling[direction][owner][from..][..n], &self.u[there][at..][..n])
     }
 
     /// The weights of the odd-odd cell at `at` on the four coarse cells around it, in the order of the finest level.
     pub(super) fn corner_weights(&self, at: usize) -> [R; 4] {
-        let a = |step| self.coupling_at(OO, at, step);
+        let a = |step| self.term(OO, at, 1, step).0[0];
         let m = self.inverse[OO][at];
         let below = at + self.grid.stride;
+        let [west, east, north, south] = &self.weights;
         [
-            m * (a(NW) + a(N) * self.west[at] + a(W) * self.north[at]),
-            m * (a(NE) + a(N) * self.east[at] + a(E) * self.north[at + 1]),
-            m * (a(SW) + a(S) * self.west[below] + a(W) * self.south[at]),
-            m * (a(SE) + a(S) * self.east[below] + a(E) * self.south[at + 1]),
+            m * (a(NW) + a(N) * west[at] + a(W) * north[at]),
+            m * (a(NE) + a(N) * east[at] + a(E) * north[at + 1]),
+            m * (a(SW) + a(S) * west[below] + a(W) * south[at]),
+            m * (a(SE) + a(S) * east[below] + a(E) * south[at + 1]),
         ]
     }
 
@@ -345,13 +309,14 @@ impl<R: Real> Coarse<R> {
         };
         for y in rows {
             let o = self.grid.start(y);
+            let [to_west, to_east, to_north, to_south] = &mut self.weights;
+            cut!(o, n, to_west, to_east, to_north, to_south);
             let own = &self.inverse[OE][o..][..n];
             let (w, nw, sw) =
                 (&right[EE][o..][..n], &down_right[EO][o - s..][..n], &down_left[OE][o..][..n]);
             let (e, ne, se) =
                 (&right[OE][o..][..n], &down_left[EO][o + 1 - s..][..n], &down_right[OE][o..][..n]);
             let (no, so) = (&down[OO][o - s..][..n], &down[OE][o..][..n]);
-            let (to_west, to_east) = (&mut self.west[o..][..n], &mut self.east[o..][..n]);
             for x in 0..n {
                 let share = share(own[x].inverse(), no[x], so[x]);
                 to_west[x] = w[x].is_active() * (w[x] + nw[x] + sw[x]) * share;
@@ -363,7 +328,6 @@ impl<R: Real> Coarse<R> {
             let (so, sw, se) =
                 (&down[EO][o..][..n], &down_left[EO][o..][..n], &down_right[EO][o..][..n]);
             let (w, e) = (&right[OO][o - 1..][..n], &right[EO][o..][..n]);
-            let (to_north, to_south) = (&mut self.north[o..][..n], &mut self.south[o..][..n]);
             for x in 0..n {
                 let share = share(own[x].inverse(), w[x], e[x]);
                 to_north[x] = no[x].is_active() * (no[x] + nw[x] + ne[x]) * share;
@@ -373,7 +337,6 @@ impl<R: Real> Coarse<R> {
     }
 }
 
-/// The plane and place of the neighbour one `step` from a cell.
 #[inline(always)]
 fn neighbour(grid: &Grid, plane: usize, at: usize, (dx, dy): (isize, isize)) -> (usize, usize) {
     let (x, y) = ((plane & 1) as isize + dx, (plane >> 1) as isize + dy);

@@ -3,10 +3,8 @@
 use super::coarse::{Coarse, EAST, SOUTH, SOUTH_EAST, SOUTH_WEST};
 use crate::real::Real;
 
-/// The inverse of the coarsest equations.
 #[derive(Debug, Default)]
 pub(super) struct Coarsest {
-    /// Plane and place of each cell.
     cells: Vec<(usize, usize)>,
     /// The inverse, row-major, `cells.len()` squared.
     inverse: Vec<f64>,
@@ -14,7 +12,6 @@ pub(super) struct Coarsest {
 }
 
 impl Coarsest {
-    /// Inverts the equations of `level`.
     pub(super) fn set_up<R: Real>(&mut self, level: &Coarse<R>) {
         let grid = &level.grid;
         self.cells.clear();
@@ -42,7 +39,6 @@ impl Coarsest {
         self.right.resize(n, 0.0);
     }
 
-    /// Solves for the right-hand side of `level`.
     pub(super) fn solve<R: Real>(&mut self, level: &mut Coarse<R>) {
         for (value, &(plane, at)) in self.right.iter_mut().zip(&self.cells) {
             *value = level.f[plane][at].wide();

@@ -6,10 +6,12 @@
 //! own), black from red, then red again. The changes of that last half sweep, summed over the red neighbours of a black cell,
 //! are exactly its residual, which is restricted at once.
 
+use std::ops::Range;
+
 use super::coarse::Coarse;
 use super::grid::{
-    EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Whole, add_products, join, join_row, split,
-    split_row,
+    EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Weights, Whole, around, correct, cut, join,
+    join_row, split, split_row,
 };
 use crate::real::Real;
 
@@ -18,7 +20,6 @@ use crate::real::Real;
 pub(super) struct Source<R> {
     pub plane: usize,
     pub row: usize,
-    /// Place in the plane.
     pub at: usize,
     pub value: R,
 }
@@ -30,26 +31,19 @@ const LARGEST_CHANGE: f64 = 0.05;
 /// the tolerance is that of a cell with a change as large as this.
 const FLAT: f64 = 0.5;
 
-/// The cells of the map and their interpolation from the next level.
 #[derive(Debug, Default)]
 pub(super) struct Finest<R> {
     pub grid: Grid,
     pub u: Planes<R>,
     /// 1 / diagonal, 0 where blocked.
     pub inverse: Planes<R>,
-    /// Weight of the coarse cell to the west in each odd-even cell.
-    pub west: Vec<R>,
-    pub east: Vec<R>,
-    /// Weight of the coarse cell to the north in each even-odd cell.
-    pub north: Vec<R>,
-    pub south: Vec<R>,
+    pub weights: Weights<R>,
     /// The sources, sorted by plane and row.
     pub sources: Vec<Source<R>>,
     scratch: Scratch<R>,
     whole: Whole<R>,
 }
 
-/// The work of a pass.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Work<R> {
     /// The factor of the correction from the next level.
@@ -63,7 +57,6 @@ pub(super) struct Work<R> {
     pub tolerance: Option<R>,
 }
 
-/// The convergence that a pass found.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Progress {
     /// Even-even cells whose direction the coarse correction turned by more than the tolerance, or whose u it changed
@@ -75,8 +68,7 @@ impl<R: Real> Finest<R> {
     /// Makes this a level of `grid` without cells.
     pub(super) fn reshape(&mut self, grid: Grid) {
         self.grid = grid;
-        let weights = [&mut self.west, &mut self.east, &mut self.north, &mut self.south];
-        grid.reset(self.u.iter_mut().chain(&mut self.inverse).chain(weights));
+        grid.reset(self.u.iter_mut().chain(&mut self.inverse).chain(&mut self.weights));
         self.sources.clear();
         self.whole.reset(&grid);
     }
@@ -104,19 +96,20 @@ impl<R: Real> Finest<R> {
     /// Interpolation by the equation itself: an odd-even cell takes its neighbours to the north and south to be its
     /// equals, which leaves those to the west and east. Blocked cells give and take nothing.
     #[inline(always)]
-    pub(super) fn interpolate_rows(&mut self, rows: std::ops::Range<usize>) {
+    pub(super) fn interpolate_rows(&mut self, rows: Range<usize>) {
         let Grid { columns: n, stride, .. } = self.grid;
         let least = R::of(1e-4);
         for row in rows {
             let o = self.grid.start(row);
             let of = |plane: usize, start: usize| &self.inverse[plane][start..start + n];
+            let [to_west, to_east, to_north, to_south] = &mut self.weights;
+            cut!(o, n, to_west, to_east, to_north, to_south);
             let weights = |d: R, a: R, b: R| {
                 let rest = d - a.is_active() - b.is_active();
                 if rest > least * d { R::ONE / rest } else { R::default() }
             };
             let (own, west, east, north, south) =
                 (of(OE, o), of(EE, o), of(EE, o + 1), of(OO, o - stride), of(OO, o));
-            let (to_west, to_east) = (&mut self.west[o..o + n], &mut self.east[o..o + n]);
             for x in 0..n {
                 let weight = weights(own[x].inverse(), north[x], south[x]);
                 to_west[x] = west[x].is_active() * weight;
@@ -124,7 +117,6 @@ impl<R: Real> Finest<R> {
             }
             let (own, north, south, west, east) =
                 (of(EO, o), of(EE, o), of(EE, o + stride), of(OO, o - 1), of(OO, o));
-            let (to_north, to_south) = (&mut self.north[o..o + n], &mut self.south[o..o + n]);
             for x in 0..n {
                 let weight = weights(own[x].inverse(), west[x], east[x]);
                 to_north[x] = north[x].is_active() * weight;
@@ -138,11 +130,12 @@ impl<R: Real> Finest<R> {
     pub(super) fn corner_weights(&self, at: usize) -> [R; 4] {
         let m = self.inverse[OO][at];
         let below = at + self.grid.stride;
+        let [west, east, north, south] = &self.weights;
         [
-            m * (self.west[at] + self.north[at]),
-            m * (self.east[at] + self.north[at + 1]),
-            m * (self.west[below] + self.south[at]),
-            m * (self.east[below] + self.south[at + 1]),
+            m * (west[at] + north[at]),
+            m * (east[at] + north[at + 1]),
+            m * (west[below] + south[at]),
+            m * (east[below] + south[at + 1]),
         ]
     }
 
@@ -177,7 +170,7 @@ impl<R: Real> Finest<R> {
                     progress.unsettled +=
                         self.unsettled(self.grid.start(y), upper, lower, tolerance, n);
                 }
-                self.correct_black(self.grid.start(y), upper, lower, n);
+                correct(&mut self.u, &self.weights, (upper, lower), grid.start(y), n);
                 std::mem::swap(upper, lower);
             }
             // Every sweep follows the one before at a distance of one row.
@@ -241,17 +234,17 @@ impl<R: Real> Finest<R> {
         if let Some(tolerance) = work.tolerance {
             progress.unsettled = self.unsettled(o, upper, lower, tolerance, span);
         }
-        self.correct_black(o, upper, lower, span);
+        correct(&mut self.u, &self.weights, (upper, lower), o, span);
         for _ in 0..work.sweeps {
             for plane in [EE, OO, OE, EO] {
                 self.relax_places(plane, o, span, None);
-                self.add_sources_of(plane, None);
+                self.add_sources(plane, 0..grid.rows, 0, None);
             }
         }
         if work.descend {
             for (plane, change) in [(EE, &mut *change_ee), (OO, &mut *change_oo)] {
                 self.relax_places(plane, o, span, Some(&mut change[o..]));
-                self.add_sources_of(plane, Some(change));
+                self.add_sources(plane, 0..grid.rows, 0, Some(change));
             }
             residual_on_black(
                 [&change_ee[o..], &change_ee[o + stride..]],
@@ -300,27 +293,11 @@ impl<R: Real> Finest<R> {
         unsettled as usize
     }
 
-    /// Adds the coarse correction to `n` black cells of either plane from `o` on.
-    #[inline(always)]
-    fn correct_black(&mut self, o: usize, upper: &[R], lower: &[R], n: usize) {
-        let (to_west, to_east) = (&self.west[o..], &self.east[o..]);
-        let u = &mut self.u[OE][o..][..n];
-        add_products(u, (to_west, upper), (to_east, &upper[1..]));
-        let (to_north, to_south) = (&self.north[o..], &self.south[o..]);
-        let u = &mut self.u[EO][o..][..n];
-        add_products(u, (to_north, upper), (to_south, lower));
-    }
-
     /// Restricts the residuals of black cells to as many coarse cells from `o` on as `out` has. `odd_even` starts one cell to
     /// the west; the two rows of even-odd cells are that above and this one.
     #[inline(always)]
     fn restrict(&self, o: usize, odd_even: &[R], (above, here): (&[R], &[R]), out: &mut [R]) {
-        let weights = [
-            &self.west[o..],
-            &self.east[o - 1..],
-            &self.north[o..],
-            &self.south[o - self.grid.stride..],
-        ];
+        let weights = around(&self.weights, o, self.grid.stride);
         sum_weighted(out, weights, [&odd_even[1..], odd_even, here, above]);
     }
 
@@ -330,7 +307,7 @@ impl<R: Real> Finest<R> {
         let o = self.grid.start(y);
         let noted = change.as_deref_mut().map(|change| &mut change[MARGIN..]);
         self.relax_places(plane, o, self.grid.columns, noted);
-        self.add_sources(plane, y, change);
+        self.add_sources(plane, y..y + 1, o - MARGIN, change);
     }
 
     /// Relaxes `n` places of a plane from `o` on, without sources.
@@ -354,31 +331,25 @@ impl<R: Real> Finest<R> {
         self.u[plane] = row;
     }
 
-    /// Adds the inflow of a plane's cells to u and to its noted change.
+    /// Adds the inflow of the cells in `rows` of a plane to u and to its noted change, which starts at place `origin`.
     #[inline(always)]
-    fn add_sources_of(&mut self, plane: usize, mut change: Option<&mut [R]>) {
-        for source in self.sources.iter().filter(|source| source.plane == plane) {
-            let inflow = self.inverse[plane][source.at] * source.value;
-            self.u[plane][source.at] += inflow;
-            if let Some(change) = change.as_deref_mut() {
-                change[source.at] += inflow;
-            }
-        }
-    }
-
-    /// Adds the inflow of one row's cells to u and to its noted change.
-    #[inline(always)]
-    fn add_sources(&mut self, plane: usize, row: usize, mut change: Option<&mut [R]>) {
+    fn add_sources(
+        &mut self,
+        plane: usize,
+        rows: Range<usize>,
+        origin: usize,
+        mut change: Option<&mut [R]>,
+    ) {
         let first =
-            self.sources.partition_point(|source| (source.plane, source.row) < (plane, row));
+            self.sources.partition_point(|source| (source.plane, source.row) < (plane, rows.start));
         for source in &self.sources[first..] {
-            if (source.plane, source.row) != (plane, row) {
+            if source.plane != plane || source.row >= rows.end {
                 break;
             }
             let inflow = self.inverse[plane][source.at] * source.value;
             self.u[plane][source.at] += inflow;
             if let Some(change) = change.as_deref_mut() {
-                change[source.at - self.grid.start(row) + MARGIN] += inflow;
+                change[source.at - origin] += inflow;
             }
         }
     }

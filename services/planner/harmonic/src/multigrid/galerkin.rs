@@ -11,7 +11,7 @@ use std::ops::Range;
 
 use super::coarse::{Coarse, EAST, SOUTH, SOUTH_EAST, SOUTH_WEST};
 use super::finest::Finest;
-use super::grid::{EE, EO, Grid, MARGIN, OE, OO, split_row};
+use super::grid::{EE, EO, Grid, MARGIN, OE, OO, cut, split_row};
 use crate::real::Real;
 
 /// Columns of a product row by the coarse cell they belong to. Around an odd-even cell these are west, east and the
@@ -39,11 +39,19 @@ pub(super) struct Products<R> {
     /// Coarse rows: diagonal, then couplings.
     out: Rows<R, 5>,
 }
+#[inline(always)]
+fn places<R, const COUNT: usize>(rows: &Rows<R, COUNT>, start: usize, n: usize) -> [&[R]; COUNT] {
+    let mut slices: [&[R]; COUNT] = [&[]; COUNT];
+    for (slice, row) in slices.iter_mut().zip(rows) {
+        *slice = &row[start..][..n];
+    }
+    slices
+}
 
 impl<R: Real> Products<R> {
     pub(super) fn new(grid: &Grid) -> Self {
         fn rows<R: Real, const COUNT: usize>(grid: &Grid) -> Rows<R, COUNT> {
-            std::array::from_fn(|_| grid.row_buffer())
+            std::array::from_fn(|_| vec![R::default(); grid.stride + MARGIN])
         }
         Self {
             n: grid.columns,
@@ -55,7 +63,6 @@ impl<R: Real> Products<R> {
         }
     }
 
-    /// Makes the rows above the first zero.
     fn start(&mut self) {
         let [_, corner] = &mut self.corner;
         let [_, even_odd] = &mut self.even_odd;
@@ -69,11 +76,15 @@ impl<R: Real> Products<R> {
         self.even_odd.swap(0, 1);
     }
 
-    /// Adds up row `y` of the coarse equations and stores it in `next`.
+    /// Adds up row `y` of the coarse equations, with the weights of the cells around its cells, and stores it in `next`.
     #[inline(always)]
-    fn finish_row(&mut self, weights: &Weights<'_, R>, next: &mut Coarse<R>, y: usize) {
+    fn finish_row(
+        &mut self,
+        [west, east, north, south]: [&[R]; 4],
+        next: &mut Coarse<R>,
+        y: usize,
+    ) {
         let n = self.n;
-        let Weights { west, east, north, south } = weights;
         let q = |column: usize| &self.odd_even[column][MARGIN..][..n];
         let q_west = |column: usize| &self.odd_even[column][MARGIN - 1..][..n];
         let v = |column: usize| &self.even_odd[1][column][MARGIN..][..n];
@@ -106,19 +117,10 @@ impl<R: Real> Products<R> {
             *out = out.inverse();
         }
         split_row(&next.grid, &mut next.inverse, y, diagonal);
-        split_row(&next.grid, &mut next.coupling[EAST], y, right);
-        split_row(&next.grid, &mut next.coupling[SOUTH], y, down);
-        split_row(&next.grid, &mut next.coupling[SOUTH_EAST], y, down_right);
-        split_row(&next.grid, &mut next.coupling[SOUTH_WEST], y, down_left);
+        for (coupling, row) in next.coupling.iter_mut().zip([right, down, down_right, down_left]) {
+            split_row(&next.grid, coupling, y, row);
+        }
     }
-}
-
-/// The weights of the cells around a coarse row on its cells.
-struct Weights<'a, R> {
-    west: &'a [R],
-    east: &'a [R],
-    north: &'a [R],
-    south: &'a [R],
 }
 
 impl<R: Real> Finest<R> {
@@ -133,19 +135,19 @@ impl<R: Real> Finest<R> {
         let Grid { columns: n, stride: s, .. } = self.grid;
         products.start();
         let zero = R::default();
+        let [west, east, north, south] = &self.weights;
+        let we = |at: usize| [&west[at..][..n], &east[at..][..n]];
+        let ns = |at: usize| [&north[at..][..n], &south[at..][..n]];
         // The row before the first is included, because its contribution belongs to the first row.
         for y in rows.start.saturating_sub(1)..rows.end {
             products.next_row();
             let o = self.grid.start(y);
             let m = MARGIN;
-            let (w, e) = (&self.west[o..][..n], &self.east[o..][..n]);
-            let (w_below, e_below) = (&self.west[o + s..][..n], &self.east[o + s..][..n]);
-            let (no, so) = (&self.north[o..][..n], &self.south[o..][..n]);
-            let (no_east, so_east) = (&self.north[o + 1..][..n], &self.south[o + 1..][..n]);
+            let ([w, e], [no, so]) = (we(o), ns(o));
+            let ([w_below, e_below], [no_east, so_east]) = (we(o + s), ns(o + 1));
 
             let [nw, ne, sw, se] = &mut products.corner[1];
-            let (nw, ne, sw, se) =
-                (&mut nw[m..][..n], &mut ne[m..][..n], &mut sw[m..][..n], &mut se[m..][..n]);
+            cut!(m, n, nw, ne, sw, se);
             let inverse = &self.inverse[OO][o..][..n];
             for x in 0..n {
                 nw[x] = inverse[x] * (w[x] + no[x]);
@@ -154,25 +156,22 @@ impl<R: Real> Finest<R> {
                 se[x] = inverse[x] * (e_below[x] + so_east[x]);
             }
 
+            let (e_west, s_above) = (&east[o - 1..][..n], &south[o - s..][..n]);
             let [above, here] = &products.corner;
             let active = &self.inverse[EE][o..][..n];
             let active_east = &self.inverse[EE][o + 1..][..n];
             let active_south = &self.inverse[EE][o + s..][..n];
             {
                 let d = &self.inverse[OE][o..][..n];
-                let a = |k: usize| &above[k][m..][..n];
-                let h = |k: usize| &here[k][m..][..n];
-                let (a_nw, a_ne, a_sw, a_se) = (a(0), a(1), a(2), a(3));
-                let (h_nw, h_ne, h_sw, h_se) = (h(0), h(1), h(2), h(3));
+                let [a_nw, a_ne, a_sw, a_se] = places(above, m, n);
+                let [h_nw, h_ne, h_sw, h_se] = places(here, m, n);
                 let [q0, q1, q2, q3, q4, q5] = &mut products.odd_even;
-                let (q0, q1) = (&mut q0[m..][..n], &mut q1[m..][..n]);
+                cut!(m, n, q0, q1, q2, q3, q4, q5);
                 for x in 0..n {
                     let d = d[x].inverse();
                     q0[x] = d * w[x] - active[x].is_active() - a_sw[x] - h_nw[x];
                     q1[x] = d * e[x] - active_east[x].is_active() - a_se[x] - h_ne[x];
                 }
-                let (q2, q3, q4, q5) =
-                    (&mut q2[m..][..n], &mut q3[m..][..n], &mut q4[m..][..n], &mut q5[m..][..n]);
                 for x in 0..n {
                     q2[x] = zero - a_nw[x];
                     q3[x] = zero - a_ne[x];
@@ -182,19 +181,15 @@ impl<R: Real> Finest<R> {
             }
             {
                 let d = &self.inverse[EO][o..][..n];
-                let h = |k: usize| &here[k][m..][..n];
-                let l = |k: usize| &here[k][m - 1..][..n];
-                let (h_nw, h_ne, h_sw, h_se) = (h(0), h(1), h(2), h(3));
-                let (l_nw, l_ne, l_sw, l_se) = (l(0), l(1), l(2), l(3));
+                let [h_nw, h_ne, h_sw, h_se] = places(here, m, n);
+                let [l_nw, l_ne, l_sw, l_se] = places(here, m - 1, n);
                 let [v0, v1, v2, v3, v4, v5] = &mut products.even_odd[1];
-                let (v0, v1) = (&mut v0[m..][..n], &mut v1[m..][..n]);
+                cut!(m, n, v0, v1, v2, v3, v4, v5);
                 for x in 0..n {
                     let d = d[x].inverse();
                     v0[x] = d * no[x] - active[x].is_active() - l_ne[x] - h_nw[x];
                     v1[x] = d * so[x] - active_south[x].is_active() - l_se[x] - h_sw[x];
                 }
-                let (v2, v3, v4, v5) =
-                    (&mut v2[m..][..n], &mut v3[m..][..n], &mut v4[m..][..n], &mut v5[m..][..n]);
                 for x in 0..n {
                     v2[x] = zero - l_nw[x];
                     v3[x] = zero - h_ne[x];
@@ -203,26 +198,19 @@ impl<R: Real> Finest<R> {
                 }
             }
             {
-                let (e_west, s_above) = (&self.east[o - 1..][..n], &self.south[o - s..][..n]);
                 let [p0, p1, p2, p3, p4] = &mut products.even_even;
-                let (p0, p1, p2) = (&mut p0[m..][..n], &mut p1[m..][..n], &mut p2[m..][..n]);
+                cut!(m, n, p0, p1, p2, p3, p4);
                 for x in 0..n {
                     let on = active[x].is_active();
                     p0[x] = active[x].inverse() - on * (w[x] + e_west[x] + no[x] + s_above[x]);
                     p1[x] = zero - on * e[x];
                     p2[x] = zero - on * so[x];
                 }
-                p3[m..][..n].fill(zero);
-                p4[m..][..n].fill(zero);
+                p3.fill(zero);
+                p4.fill(zero);
             }
-            let weights = Weights {
-                west: w,
-                east: &self.east[o - 1..][..n],
-                north: no,
-                south: &self.south[o - s..][..n],
-            };
             if y >= rows.start {
-                products.finish_row(&weights, next, y);
+                products.finish_row([w, e_west, no, s_above], next, y);
             }
         }
     }
@@ -239,25 +227,21 @@ impl<R: Real> Coarse<R> {
         let a = |direction: usize, plane: usize, start: usize| {
             &self.coupling[direction][plane][start..][..n]
         };
+        let [west, east, north, south] = &self.weights;
+        let we = |at: usize| [&west[at..][..n], &east[at..][..n]];
+        let ns = |at: usize| [&north[at..][..n], &south[at..][..n]];
         // The row before the first is included, because its contribution belongs to the first row.
         for y in rows.start.saturating_sub(1)..rows.end {
             products.next_row();
             let o = self.grid.start(y);
-            let (w, e) = (&self.west[o..][..n], &self.east[o..][..n]);
-            let (w_west, e_west) = (&self.west[o - 1..][..n], &self.east[o - 1..][..n]);
-            let (w_below, e_below) = (&self.west[o + s..][..n], &self.east[o + s..][..n]);
-            let (w_below_west, e_below_west) =
-                (&self.west[o + s - 1..][..n], &self.east[o + s - 1..][..n]);
-            let (no, so) = (&self.north[o..][..n], &self.south[o..][..n]);
-            let (no_east, so_east) = (&self.north[o + 1..][..n], &self.south[o + 1..][..n]);
-            let (no_above, so_above) = (&self.north[o - s..][..n], &self.south[o - s..][..n]);
-            let (no_above_east, so_above_east) =
-                (&self.north[o - s + 1..][..n], &self.south[o - s + 1..][..n]);
+            let ([w, e], [no, so], [no_east, so_east]) = (we(o), ns(o), ns(o + 1));
+            let ([w_west, e_west], [w_below, e_below]) = (we(o - 1), we(o + s));
+            let [w_below_west, e_below_west] = we(o + s - 1);
+            let ([no_above, so_above], [no_above_east, so_above_east]) = (ns(o - s), ns(o - s + 1));
 
             {
                 let [nw, ne, sw, se] = &mut products.corner[1];
-                let (nw, ne, sw, se) =
-                    (&mut nw[m..][..n], &mut ne[m..][..n], &mut sw[m..][..n], &mut se[m..][..n]);
+                cut!(m, n, nw, ne, sw, se);
                 let inverse = &self.inverse[OO][o..][..n];
                 let (up, down) = (a(SOUTH, OE, o), a(SOUTH, OO, o));
                 let (left, right) = (a(EAST, EO, o), a(EAST, OO, o));
@@ -273,18 +257,16 @@ impl<R: Real> Coarse<R> {
                 }
             }
             let [above, here] = &products.corner;
-            let above = |k: usize, start: usize| &above[k][start..][..n];
-            let here = |k: usize, start: usize| &here[k][start..][..n];
             {
                 let inverse = &self.inverse[OE][o..][..n];
                 let (left, right) = (a(EAST, EE, o), a(EAST, OE, o));
                 let (up, down) = (a(SOUTH, OO, o - s), a(SOUTH, OE, o));
                 let (c_nw, c_ne) = (a(SOUTH_EAST, EO, o - s), a(SOUTH_WEST, EO, o - s + 1));
                 let (c_sw, c_se) = (a(SOUTH_WEST, OE, o), a(SOUTH_EAST, OE, o));
-                let (a_nw, a_ne, a_sw, a_se) = (above(0, m), above(1, m), above(2, m), above(3, m));
-                let (h_nw, h_ne, h_sw, h_se) = (here(0, m), here(1, m), here(2, m), here(3, m));
+                let [a_nw, a_ne, a_sw, a_se] = places(above, m, n);
+                let [h_nw, h_ne, h_sw, h_se] = places(here, m, n);
                 let [q0, q1, q2, q3, q4, q5] = &mut products.odd_even;
-                let (q0, q1) = (&mut q0[m..][..n], &mut q1[m..][..n]);
+                cut!(m, n, q0, q1, q2, q3, q4, q5);
                 for x in 0..n {
                     let d = inverse[x].inverse();
                     q0[x] = d * w[x]
@@ -300,8 +282,6 @@ impl<R: Real> Coarse<R> {
                         - c_ne[x] * so_above_east[x]
                         - c_se[x] * no_east[x];
                 }
-                let (q2, q3, q4, q5) =
-                    (&mut q2[m..][..n], &mut q3[m..][..n], &mut q4[m..][..n], &mut q5[m..][..n]);
                 for x in 0..n {
                     q2[x] = zero - up[x] * a_nw[x] - c_nw[x] * no_above[x];
                     q3[x] = zero - up[x] * a_ne[x] - c_ne[x] * no_above_east[x];
@@ -315,11 +295,10 @@ impl<R: Real> Coarse<R> {
                 let (left, right) = (a(EAST, OO, o - 1), a(EAST, EO, o));
                 let (c_nw, c_ne) = (a(SOUTH_EAST, OE, o - 1), a(SOUTH_WEST, OE, o));
                 let (c_sw, c_se) = (a(SOUTH_WEST, EO, o), a(SOUTH_EAST, EO, o));
-                let (l_nw, l_ne, l_sw, l_se) =
-                    (here(0, m - 1), here(1, m - 1), here(2, m - 1), here(3, m - 1));
-                let (h_nw, h_ne, h_sw, h_se) = (here(0, m), here(1, m), here(2, m), here(3, m));
+                let [l_nw, l_ne, l_sw, l_se] = places(here, m - 1, n);
+                let [h_nw, h_ne, h_sw, h_se] = places(here, m, n);
                 let [v0, v1, v2, v3, v4, v5] = &mut products.even_odd[1];
-                let (v0, v1) = (&mut v0[m..][..n], &mut v1[m..][..n]);
+                cut!(m, n, v0, v1, v2, v3, v4, v5);
                 for x in 0..n {
                     let d = inverse[x].inverse();
                     v0[x] = d * no[x]
@@ -335,8 +314,6 @@ impl<R: Real> Coarse<R> {
                         - c_sw[x] * e_below_west[x]
                         - c_se[x] * w_below[x];
                 }
-                let (v2, v3, v4, v5) =
-                    (&mut v2[m..][..n], &mut v3[m..][..n], &mut v4[m..][..n], &mut v5[m..][..n]);
                 for x in 0..n {
                     v2[x] = zero - left[x] * l_nw[x] - c_nw[x] * w_west[x];
                     v3[x] = zero - right[x] * h_ne[x] - c_ne[x] * e[x];
@@ -350,11 +327,12 @@ impl<R: Real> Coarse<R> {
                 let (up, down) = (a(SOUTH, EO, o - s), a(SOUTH, EE, o));
                 let (c_nw, c_ne) = (a(SOUTH_EAST, OO, o - s - 1), a(SOUTH_WEST, OO, o - s));
                 let (c_sw, c_se) = (a(SOUTH_WEST, EE, o), a(SOUTH_EAST, EE, o));
-                let (h_nw, h_ne, h_sw, h_se) = (here(0, m), here(1, m), here(2, m), here(3, m));
-                let (l_ne, l_sw, l_se) = (here(1, m - 1), here(2, m - 1), here(3, m - 1));
-                let (a_sw, a_se, al_se) = (above(2, m), above(3, m), above(3, m - 1));
+                let [h_nw, h_ne, h_sw, h_se] = places(here, m, n);
+                let [_, l_ne, l_sw, l_se] = places(here, m - 1, n);
+                let [_, _, a_sw, a_se] = places(above, m, n);
+                let al_se = &above[3][m - 1..][..n];
                 let [p0, p1, p2, p3, p4] = &mut products.even_even;
-                let p0 = &mut p0[m..][..n];
+                cut!(m, n, p0, p1, p2, p3, p4);
                 for x in 0..n {
                     p0[x] = inverse[x].inverse()
                         - (right[x] * w[x]
@@ -366,8 +344,6 @@ impl<R: Real> Coarse<R> {
                             + c_ne[x] * a_sw[x]
                             + c_nw[x] * al_se[x]);
                 }
-                let (p1, p2, p3, p4) =
-                    (&mut p1[m..][..n], &mut p2[m..][..n], &mut p3[m..][..n], &mut p4[m..][..n]);
                 for x in 0..n {
                     p1[x] = zero - right[x] * e[x] - c_se[x] * h_ne[x] - c_ne[x] * a_se[x];
                     p2[x] = zero - down[x] * so[x] - c_se[x] * h_sw[x] - c_sw[x] * l_se[x];
@@ -375,9 +351,8 @@ impl<R: Real> Coarse<R> {
                     p4[x] = zero - c_sw[x] * l_sw[x];
                 }
             }
-            let weights = Weights { west: w, east: e_west, north: no, south: so_above };
             if y >= rows.start {
-                products.finish_row(&weights, next, y);
+                products.finish_row([w, e_west, no, so_above], next, y);
             }
         }
     }

@@ -8,12 +8,12 @@ use crate::real::Real;
 
 /// Even column, even row: the cells of the next coarser level.
 pub(super) const EE: usize = 0;
-/// Odd column, even row.
 pub(super) const OE: usize = 1;
-/// Even column, odd row.
 pub(super) const EO: usize = 2;
-/// Odd column, odd row.
 pub(super) const OO: usize = 3;
+
+/// Weights of the coarse cells to the west and east in each odd-even cell, and to the north and south in each even-odd cell.
+pub(super) type Weights<R> = [Vec<R>; 4];
 
 /// Zeros before the first row; one would do, eight keep the rows aligned.
 pub(super) const MARGIN: usize = 8;
@@ -21,19 +21,22 @@ pub(super) const MARGIN: usize = 8;
 /// Largest plane that is gone through as one row, in values.
 const SMALL: usize = 1 << 15;
 
+/// Makes each of these rows `n` of its values from `start` on, to be written. It is a macro because loops are vectorised only where the
+/// lengths of their rows are known, and `array::map` is not always inlined.
+macro_rules! cut {
+    ($start:expr, $n:expr, $($row:ident),+) => { $(let $row = &mut $row[$start..][..$n];)+ };
+}
+pub(super) use cut;
+
 /// A value for each cell, by plane.
 pub(super) type Planes<R> = [Vec<R>; 4];
 
-/// The shape of a level.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 pub(super) struct Grid {
-    /// Columns of the level.
     pub width: usize,
-    /// Rows of the level.
     pub height: usize,
-    /// Columns of each plane.
+    /// Columns and rows of each plane.
     pub columns: usize,
-    /// Rows of each plane.
     pub rows: usize,
     /// Values from one row of a plane to the next.
     pub stride: usize,
@@ -57,13 +60,11 @@ impl Grid {
         self.stride * (self.rows + 2) + MARGIN
     }
 
-    /// The index at which row `row` of a plane starts.
     #[inline(always)]
     pub(super) fn start(&self, row: usize) -> usize {
         (row + 1) * self.stride + MARGIN
     }
 
-    /// The plane of a cell and its place in it.
     #[inline(always)]
     pub(super) fn locate(&self, col: usize, row: usize) -> (usize, usize) {
         ((col & 1) + 2 * (row & 1), self.start(row / 2) + col / 2)
@@ -89,11 +90,6 @@ impl Grid {
             plane.clear();
             plane.resize(self.len(), R::default());
         }
-    }
-
-    /// A row of values with the margins of a plane's row, and zeros in it.
-    pub(super) fn row_buffer<R: Real>(&self) -> Vec<R> {
-        vec![R::default(); self.stride + MARGIN]
     }
 }
 
@@ -160,9 +156,31 @@ pub(super) fn split<R: Real>(grid: &Grid, next: &Grid, planes: &mut Planes<R>, f
     }
 }
 
-/// Adds two products to every value.
+/// The weights on the coarse cells from place `o` on in the cells around them: to the east, west, south and north.
 #[inline(always)]
-pub(super) fn add_products<R: Real>(out: &mut [R], (w, a): (&[R], &[R]), (v, b): (&[R], &[R])) {
+pub(super) fn around<R>(
+    [west, east, north, south]: &Weights<R>,
+    o: usize,
+    stride: usize,
+) -> [&[R]; 4] {
+    [&west[o..], &east[o - 1..], &north[o..], &south[o - stride..]]
+}
+
+/// Adds a coarse correction to `n` cells from `o` on of the odd-even and even-odd planes.
+#[inline(always)]
+pub(super) fn correct<R: Real>(
+    u: &mut Planes<R>,
+    [west, east, north, south]: &Weights<R>,
+    (upper, lower): (&[R], &[R]),
+    o: usize,
+    n: usize,
+) {
+    add_products(&mut u[OE][o..][..n], (&west[o..], upper), (&east[o..], &upper[1..]));
+    add_products(&mut u[EO][o..][..n], (&north[o..], upper), (&south[o..], lower));
+}
+
+#[inline(always)]
+fn add_products<R: Real>(out: &mut [R], (w, a): (&[R], &[R]), (v, b): (&[R], &[R])) {
     let n = out.len();
     let (w, a, v, b) = (&w[..n], &a[..n], &v[..n], &b[..n]);
     for x in 0..n {

@@ -16,7 +16,6 @@ pub(super) fn relax<R: Real, const COUNT: usize>(
     }
 }
 
-/// Adds `values` to active cells.
 #[inline(always)]
 pub(super) fn add_active<R: Real>(u: &mut [R], inverse: &[R], values: &[R]) {
     let n = u.len();
@@ -60,7 +59,6 @@ pub(super) fn subtract<R: Real, const COUNT: usize>(
     }
 }
 
-/// The sum of `terms`.
 #[inline(always)]
 pub(super) fn gather<R: Real, const COUNT: usize>(out: &mut [R], terms: &[(&[R], &[R]); COUNT]) {
     for (x, out) in out.iter_mut().enumerate() {

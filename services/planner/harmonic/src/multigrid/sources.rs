@@ -13,7 +13,7 @@ pub(super) fn restrict<R: Real>(finest: &Finest<R>, coarse: &mut [Coarse<R>]) {
     let mut flows = Vec::new();
     for source in &finest.sources {
         let at = source.at;
-        let line = [finest.west[at], finest.east[at], finest.north[at], finest.south[at]];
+        let line = finest.weights.each_ref().map(|row| row[at]);
         let corner = || finest.corner_weights(at);
         spread(&finest.grid, source.plane, at, source.value, line, corner, &mut flows);
     }
@@ -28,7 +28,7 @@ pub(super) fn restrict<R: Real>(finest: &Finest<R>, coarse: &mut [Coarse<R>]) {
             }
             let (plane, at) = level.grid.locate(col, row);
             level.f[plane][at] += value;
-            let line = [level.west[at], level.east[at], level.north[at], level.south[at]];
+            let line = level.weights.each_ref().map(|row| row[at]);
             let corner = || level.corner_weights(at);
             spread(&level.grid, plane, at, value, line, corner, &mut next);
         }

@@ -44,7 +44,6 @@ fn cycles(decades: f64) -> f64 {
     6.0 + decades / 3.5
 }
 
-/// The methods to try, and the results that the choice needed.
 pub(super) struct Plan {
     /// Methods in the order in which to try them; the multifrontal factorisation is the last resort in any case.
     pub methods: Vec<Method>,

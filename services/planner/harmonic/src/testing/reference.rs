@@ -40,7 +40,7 @@ impl Reference {
             for (a, &weight) in row.iter().enumerate().filter(|(_, w)| **w > 0.0) {
                 let j = i + 1 + a;
                 let share = weight / diagonal[i];
-                right[j] = sum([right[j], scale(right[i], share)]);
+                right[j] = Scaled::sum([right[j], scale(right[i], share)].into_iter());
                 diagonal[j] -= share * weight;
                 for (b, &other) in row.iter().enumerate().skip(a + 1).filter(|(_, w)| **w > 0.0) {
                     coupling[j * width + (b - a - 1)] += share * other;
@@ -55,7 +55,7 @@ impl Reference {
                 .enumerate()
                 .filter(|(_, w)| **w > 0.0)
                 .map(|(a, &w)| scale(u[i + 1 + a], w));
-            let total = terms.fold(right[i], |total, term| sum([total, term]));
+            let total = terms.fold(right[i], |total, term| Scaled::sum([total, term].into_iter()));
             u[i] = if i == target { Scaled::ONE } else { scale(total, 1.0 / diagonal[i]) };
         }
         let mut reference = Self { domain: domain.clone(), u, worst_residual: f64::INFINITY };
@@ -65,13 +65,8 @@ impl Reference {
         reference
     }
 
-    /// u of a cell of the map.
-    pub fn u(&self, cell: Cell) -> Scaled {
-        self.u[self.domain.index(cell)]
-    }
-
     /// Central difference of u in units of the largest u around, and that largest u; `None` where u is zero.
-    pub fn gradient(&self, cell: Cell) -> Option<[f64; 2]> {
+    fn gradient(&self, cell: Cell) -> Option<[f64; 2]> {
         let i = self.domain.index(cell);
         let [west, east, north, south] = self.around(i);
         let largest = [west, east, north, south, self.u[i]]
@@ -127,7 +122,7 @@ impl Reference {
                     continue;
                 }
                 let weight = 0.25 / (1.0 + self.domain.screening_coefficient(i));
-                let mean = scale(sum(self.around(i)), weight);
+                let mean = scale(Scaled::sum(self.around(i).into_iter()), weight);
                 if pass == 1 {
                     let ratio = mean.relative_to(self.u[i].exponent) / self.u[i].mantissa;
                     worst = worst.max((ratio - 1.0).abs());
@@ -178,14 +173,4 @@ pub fn follow(field: &Field) -> f64 {
 
 fn scale(a: Scaled, factor: f64) -> Scaled {
     Scaled::new(a.mantissa * factor, a.exponent)
-}
-
-fn sum<const N: usize>(terms: [Scaled; N]) -> Scaled {
-    let largest = terms.into_iter().filter(|t| !t.is_zero()).map(|t| t.exponent).max();
-    largest.map_or(Scaled::ZERO, |largest| {
-        Scaled::new(
-            terms.into_iter().filter(|t| !t.is_zero()).map(|t| t.relative_to(largest)).sum(),
-            largest,
-        )
-    })
 }

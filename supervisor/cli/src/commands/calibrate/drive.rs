@@ -7,7 +7,8 @@ use std::{
 
 use common::{clock::Pace, domain::RobotName, mission::Mission, samples::PoseSample};
 use glam::DVec2;
-use supervisor::{Options, Progress, Starter, outcome::Outcome};
+use mission_control::{Options, Progress, outcome::Outcome};
+use processes::Starter;
 
 use console::{
     failure::{Failure, Refused},
@@ -59,9 +60,10 @@ pub(super) fn carry_out(
     let place = options.directory.display();
     let mut line = ProgressLine::new(LINE_EVERY);
     let mut recorder = None;
-    let ran = supervisor::run(
+    let ran = mission_control::run(
         &options,
         &mut || recorder = RunRecorder::start(&options, None),
+        Box::new(|_| {}),
         &mut |progress| {
             if line.is_due() {
                 if line.begin() {

@@ -3,10 +3,8 @@
 use std::{fs::File, process::Stdio, time::Duration};
 
 use common::{clock::Pace, poll};
-use supervisor::{
-    Options,
-    process::{Process, firsthand},
-};
+use mission_control::Options;
+use processes::process::{Process, firsthand};
 
 use crate::commands::record::DiskBudget;
 

@@ -6,11 +6,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use mission_control::recovery::SUMMARY;
 use rustix::{
     fs::{FallocateFlags, fallocate, fstatvfs},
     io::Errno,
 };
-use supervisor::recovery::SUMMARY;
 
 use console::failure::Refused;
 

@@ -14,7 +14,7 @@ use common::{
     waiter::Waiter,
 };
 
-use supervisor::operator::{PATIENCE, find, new_id};
+use mission_control::operator::{PATIENCE, find, new_id};
 
 use console::{
     failure::{Failure, Refused},

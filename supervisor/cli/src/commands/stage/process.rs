@@ -10,8 +10,9 @@ use common::{
     start::Start,
     stop_socket::Identity,
 };
-use supervisor::{
-    STOP_GUARD, guard, planner_executable,
+use processes::{
+    STOP_GUARD, guard,
+    process::program_of,
     stages::{PLANNER, Stage},
 };
 
@@ -34,8 +35,8 @@ pub(super) fn run(words: &[OsString]) -> Result<(), Failure> {
         let start = stage_command::start_with(PLANNER, options.iter().cloned())?;
         return Ok(run_stage::<calibration::shell::Shell>(&start)?);
     }
-    if planner_executable::baseline(Path::new(&*name)).is_some() {
-        // The planners to compare with are in the laboratory.
+    if OTHER_PLANNERS.contains(&&*name) {
+        // The other ones are in the laboratory.
         let words = std::iter::once(SUBCOMMAND.into()).chain(words.iter().cloned());
         return Err(companions::become_executable(LABORATORY, words));
     }
@@ -47,6 +48,9 @@ pub(super) fn run(words: &[OsString]) -> Result<(), Failure> {
     Ok((stage.run)(&start)?)
 }
 
+/// The planners that take the place of `firsthand`'s own: two to compare with, and the one of `firsthand calibrate`.
+pub(crate) const OTHER_PLANNERS: &[&str] = &["wavefront", "bug", calibration::PLANNER];
+
 /// Become the executable that `mission` names for `stage`, if it names one.
 fn become_executable(
     stage: &Stage,
@@ -56,9 +60,9 @@ fn become_executable(
     let Some(executable) = stage.executable(mission) else {
         return Ok(());
     };
-    let baseline = planner_executable::baseline(executable);
-    let mut command = Command::new(baseline.map_or(executable, |_| Path::new("/proc/self/exe")));
-    command.args([SUBCOMMAND, baseline.unwrap_or(stage.name)]);
+    let (program, called) = program_of(Some(executable), stage.name);
+    let mut command = Command::new(program);
+    command.args([SUBCOMMAND, called]);
     let error = command.args(options).exec();
     Err(format!("cannot execute {}: {error}", executable.display()).into())
 }

@@ -1,0 +1,121 @@
+//! The supervisor's readers and writers on one bus. They are replaced when the bus is recreated.
+
+use std::{
+    io,
+    rc::Rc,
+    time::{Duration, Instant},
+};
+
+use common::{
+    bus::{Bus, BusError, Reader, Writer},
+    clock::MissionTime,
+    samples::{
+        DeathSample, DirectiveSample, RequestAnswer, RequestSample, RosterEntry, RosterHeader,
+        StallSample, TargetSample, TickLimitSample,
+    },
+    topics,
+    waiter::Waiter,
+};
+use processes::{domain::DomainLock, stages};
+
+use crate::{
+    error::{SupervisorError, system},
+    observer::{Observer, Record},
+};
+
+pub(crate) struct BusEndpoints {
+    pub observer: Observer,
+    /// Wakes for heartbeats, ends of ticks and requests.
+    pub waiter: Waiter,
+    pub target: Writer<TargetSample>,
+    directive: Writer<DirectiveSample>,
+    pub tick_limit: Writer<TickLimitSample>,
+    roster: Writer<RosterHeader, RosterEntry>,
+    deaths: Writer<DeathSample>,
+    stalls: Writer<StallSample>,
+    pub requests: Reader<RequestSample>,
+    /// The request that was answered last, and the answer, which the roster has; 0 for none.
+    pub last_request: (u64, RequestAnswer),
+    published: Option<Instant>,
+    // The bus is dropped last.
+    pub bus: Rc<Bus>,
+}
+
+impl BusEndpoints {
+    pub(crate) fn open(lock: &DomainLock) -> Result<Self, SupervisorError> {
+        Self::continued(lock, Record::default(), (0, RequestAnswer::Taken))
+    }
+
+    fn continued(
+        lock: &DomainLock,
+        record: Record,
+        last_request: (u64, RequestAnswer),
+    ) -> Result<Self, SupervisorError> {
+        let bus = lock.bus();
+        let bus = bus.ok_or_else(|| system("open the bus")(io::ErrorKind::NotConnected.into()))?;
+        let mut waiter = Waiter::default();
+        let observer = Observer::new(&bus, &mut waiter, record)?;
+        waiter.on(bus.wakeup(&topics::REQUESTS)?);
+        Ok(Self {
+            observer,
+            waiter,
+            target: bus.writer(&topics::TARGET, 1)?,
+            directive: bus.writer(&topics::DIRECTIVE, 1)?,
+            tick_limit: bus.writer(&topics::TICK_LIMIT, 1)?,
+            roster: bus.slice_writer(&topics::ROSTER, 1, stages::TABLE.len())?,
+            deaths: bus.writer(&topics::DEATHS, 1)?,
+            stalls: bus.writer(&topics::STALLS, 1)?,
+            requests: bus.reader(&topics::REQUESTS)?,
+            last_request,
+            published: None,
+            bus,
+        })
+    }
+
+    pub(crate) fn recreate(mut self, lock: &mut DomainLock) -> Result<Self, SupervisorError> {
+        let mut record = std::mem::take(&mut self.observer.record);
+        // The next link opens the connection to the robot again.
+        record.link = None;
+        let last_request = self.last_request;
+        // The old endpoints are closed before the new bus is made.
+        drop(self);
+        lock.recreate_bus()?;
+        Self::continued(lock, record, last_request)
+    }
+
+    /// Whether the state was last published a `period` ago or earlier, or a consumer waits for the first roster.
+    pub(crate) fn is_due(&mut self, period: Duration) -> bool {
+        self.roster.has_new_reader() || self.published.is_none_or(|last| last.elapsed() >= period)
+    }
+
+    pub(crate) fn publish_state(
+        &mut self,
+        tick: u64,
+        time: MissionTime,
+        directive: DirectiveSample,
+        header: RosterHeader,
+        entries: &[RosterEntry],
+    ) -> Result<(), BusError> {
+        self.published = Some(Instant::now());
+        self.directive.publish(tick, time, directive)?;
+        let (last_request, answer) = self.last_request;
+        let header = RosterHeader { last_request, answer: answer.into(), ..header };
+        self.roster.publish_slice(tick, time, header, entries)
+    }
+
+    /// Publish a death. A failure is a warning in the log, because this only reports.
+    pub(crate) fn publish_death(&mut self, death: DeathSample) {
+        let stamp = self.observer.record.pose.unwrap_or_default().stamp;
+        warn_if_failed(self.deaths.publish(stamp.tick, stamp.time(), death));
+    }
+
+    pub(crate) fn publish_stall(&mut self, stall: StallSample) {
+        warn_if_failed(self.stalls.publish(stall.stamp.tick, stall.stamp.time(), stall));
+    }
+}
+
+fn warn_if_failed(published: Result<(), BusError>) {
+    if let Err(error) = published {
+        tracing::warn!(%error, "cannot publish a record");
+    }
+}

@@ -1,0 +1,179 @@
+//! The event that ended a mission first, and the part of the run that counts. Pure.
+//!
+//! The stages go on until the supervisor has seen an event and stopped the robot. How far they get by then depends on
+//! the machine; which event came first does not.
+
+use common::{ground_truth::GroundTruthTick, samples::PoseSample};
+
+use crate::{
+    judge::{Deadline, reached, touched},
+    observer::Record,
+    outcome::{Ending, Outcome},
+};
+
+pub(crate) fn first_contact(truth: &[GroundTruthTick]) -> Option<&GroundTruthTick> {
+    truth.get(truth.partition_point(|tick| tick.contacts == 0))
+}
+
+#[derive(Debug, PartialEq)]
+pub(crate) struct Decided {
+    pub ending: Ending,
+    /// The last complete tick; none if no tick decided. The tick of a contact, a timeout or a stall may be incomplete,
+    /// because the stages are stopped during it.
+    pub last_tick: Option<u64>,
+    /// Number of ticks of the ground truth that count: up to the contact, or up to the last tick.
+    pub truth_ticks: usize,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Timeout {
+    pub deadline: Deadline,
+    /// Whether time is that of the simulated robot's own clock, which also counts ticks that nobody received, in lockstep.
+    pub by_robot: bool,
+}
+
+impl Timeout {
+    fn tick(self, poses: &[PoseSample], truth: &[GroundTruthTick]) -> Option<u64> {
+        let seconds = self.deadline.at_s();
+        if self.by_robot {
+            let late = truth.partition_point(|tick| tick.time_s < seconds);
+            return truth.get(late).map(|tick| tick_of(tick, poses));
+        }
+        let late = poses.partition_point(|pose| pose.stamp.time().seconds() < seconds);
+        poses.get(late).map(|pose| pose.stamp.tick)
+    }
+}
+
+/// The first event of a run that the supervisor saw end with `ending`. `stall` is the tick and the ending of the stall at
+/// which no recovery step was left.
+pub(crate) fn first(
+    ending: Ending,
+    record: &Record,
+    truth: &[GroundTruthTick],
+    timeout: Timeout,
+    stall: Option<(u64, Ending)>,
+) -> Decided {
+    let undecided = |ending| Decided { ending, last_tick: None, truth_ticks: truth.len() };
+    if ending.outcome == Outcome::Aborted {
+        return undecided(ending);
+    }
+    let poses = &record.poses;
+    let contact = first_contact(truth)
+        .map(|contact| (tick_of(contact, poses), touched([contact.x, contact.y])));
+    let arrival = record.arrival.map(|command| (command.stamp.tick, reached(command.distance_m)));
+    let late = timeout.tick(poses, truth);
+    let late = late.map(|tick| (tick, timeout.deadline.timed_out()));
+    // If two events have the same tick, the first of the list counts.
+    let events = [contact, arrival, late, stall];
+    let Some((tick, ending)) = events.into_iter().flatten().min_by_key(|event| event.0) else {
+        return undecided(ending);
+    };
+    let last_tick = match ending.outcome {
+        // The command of the arrival is the last command of the mission.
+        Outcome::Reached => tick,
+        _ => tick.saturating_sub(1),
+    };
+    let truth_ticks = match ending.outcome {
+        Outcome::Collision => truth.partition_point(|tick| tick.contacts == 0) + 1,
+        Outcome::Timeout if timeout.by_robot => {
+            truth.partition_point(|tick| tick.time_s < timeout.deadline.at_s())
+        }
+        _ => record
+            .pose_at(last_tick)
+            .and_then(|pose| truth_of(pose, truth))
+            .map_or(truth.len(), |index| index + 1),
+    };
+    Decided { ending, last_tick: Some(last_tick), truth_ticks }
+}
+
+/// The index in the ground truth of the tick that `pose` was computed from. A robot at rest measures the same for many
+/// ticks; then it is the tick with the nearest number.
+pub(crate) fn truth_of(pose: &PoseSample, truth: &[GroundTruthTick]) -> Option<usize> {
+    let shown = truth.iter().enumerate().filter(|(_, it)| it.is_of(pose));
+    shown.min_by_key(|(_, it)| it.heard_tick().abs_diff(pose.stamp.tick)).map(|(index, _)| index)
+}
+
+/// The tick of the pose that was computed from the measurement at `truth`; if there is none, the number that it would have.
+fn tick_of(truth: &GroundTruthTick, poses: &[PoseSample]) -> u64 {
+    poses
+        .iter()
+        .filter(|pose| truth.is_of(pose))
+        .map(|pose| pose.stamp.tick)
+        .min_by_key(|tick| tick.abs_diff(truth.heard_tick()))
+        .unwrap_or(truth.heard_tick())
+}
+
+#[cfg(test)]
+mod tests {
+    use common::samples::{CommandSample, Stamp};
+
+    use super::*;
+
+    const TIMEOUT: Timeout = Timeout {
+        deadline: Deadline { began_s: 0.0, timeout_s: 20.0, stopped_s: 0.0 },
+        by_robot: true,
+    };
+
+    fn truth(tick: u64, contacts: u64) -> GroundTruthTick {
+        GroundTruthTick {
+            tick,
+            time_s: tick as f64,
+            contacts,
+            left_counts: tick as u16,
+            right_counts: tick as u16,
+            ..GroundTruthTick::default()
+        }
+    }
+
+    /// A run of `ticks` ticks of a second, in which the robot arrived and touched something at given ones.
+    fn run(
+        ticks: u64,
+        arrival: Option<u64>,
+        contact: Option<u64>,
+    ) -> (Record, Vec<GroundTruthTick>) {
+        let stamp = |tick| Stamp { tick, stamp_ns: tick * 1_000_000_000, ..Stamp::default() };
+        let pose = |tick| PoseSample {
+            stamp: stamp(tick),
+            left_counts: tick as u16,
+            right_counts: tick as u16,
+            ..PoseSample::default()
+        };
+        let mut record = Record::default();
+        record.poses = (0..ticks).map(pose).collect();
+        record.arrival =
+            arrival.map(|tick| CommandSample { stamp: stamp(tick), ..CommandSample::default() });
+        let touched = |tick| u64::from(contact.is_some_and(|contact| tick >= contact));
+        let truth = (0..ticks).map(|tick| truth(tick, touched(tick))).collect();
+        (record, truth)
+    }
+
+    #[test]
+    fn what_came_first_ends_a_run_however_late_it_was_seen() {
+        use Outcome::{Aborted, Collision, Reached, Timeout, Unreachable};
+        #[rustfmt::skip]
+        let rows = [
+            ("the arrival", 10, Some(8), None, Reached, (Reached, Some(8), 9)),
+            ("a touch before the arrival, which was read first", 12, Some(8), Some(6), Reached, (Collision, Some(5), 7)),
+            ("an arrival before a touch, which was read first", 12, Some(8), Some(9), Collision, (Reached, Some(8), 9)),
+            ("a touch at the tick of the arrival", 12, Some(8), Some(8), Reached, (Collision, Some(7), 9)),
+            ("a touch seen some ticks later", 15, None, Some(6), Collision, (Collision, Some(5), 7)),
+            ("the timeout seen some ticks later", 25, None, None, Timeout, (Timeout, Some(19), 20)),
+            ("a stall", 18, None, None, Unreachable, (Unreachable, Some(14), 15)),
+            ("a stall before a touch, which was read first", 18, None, Some(16), Collision, (Unreachable, Some(14), 15)),
+            ("a touch before a stall", 18, None, Some(3), Unreachable, (Collision, Some(2), 4)),
+            ("what no tick decided", 18, None, Some(3), Aborted, (Aborted, None, 18)),
+        ];
+        for (what, ticks, arrival, contact, seen, want) in rows {
+            let (record, truth) = run(ticks, arrival, contact);
+            let decided = first(
+                Ending::failed(seen, ""),
+                &record,
+                &truth,
+                TIMEOUT,
+                (ticks == 18).then(|| (15, Ending::failed(Unreachable, ""))),
+            );
+            let Decided { ending, last_tick, truth_ticks } = decided;
+            assert_eq!((ending.outcome, last_tick, truth_ticks), want, "{what}");
+        }
+    }
+}

@@ -1,0 +1,32 @@
+use std::io;
+
+use common::{address::AddressError, bus::BusError, checkpoint::CheckpointError, run::RunError};
+use processes::{DomainError, StageProcessError};
+use thiserror::Error;
+
+use crate::simulator::SimulatorError;
+
+#[derive(Debug, Error)]
+pub enum SupervisorError {
+    #[error(transparent)]
+    Domain(#[from] DomainError),
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    #[error(transparent)]
+    StageProcess(#[from] StageProcessError),
+    #[error(transparent)]
+    Simulator(#[from] SimulatorError),
+    #[error(transparent)]
+    Run(#[from] RunError),
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    #[error("robot.address: {0}")]
+    Address(#[from] AddressError),
+    #[error("cannot {action}: {source}")]
+    System { action: String, source: io::Error },
+}
+
+pub(crate) fn system(action: impl Into<String>) -> impl FnOnce(io::Error) -> SupervisorError {
+    let action = action.into();
+    move |source| SupervisorError::System { action, source }
+}

@@ -1,0 +1,200 @@
+//! Whether the mission is over, and how it ended. Pure.
+
+use std::time::Duration;
+
+use common::{
+    address::Address,
+    clock::MissionTime,
+    domain::RobotName,
+    samples::{Action, HoldReason, LinkSample},
+};
+use link::failsafe;
+use processes::{policy::Now, records};
+
+use crate::outcome::{Ending, Outcome};
+
+/// The time without a tick after which a pipeline that nothing holds is stuck. This is time in which the supervisor ran: in
+/// lockstep mission time does not advance meanwhile, so the mission's own timeout would not end it.
+const NO_PROGRESS: Duration = Duration::from_secs(15);
+
+/// The time after which a robot that was told to stand and does not rest could not be stopped: the link has used each
+/// method of the protocol twice by then.
+pub(crate) const RESTS_WITHIN: Duration = Duration::from_secs(5);
+
+#[derive(Clone, Debug)]
+pub(crate) struct Snapshot<'a> {
+    pub arrival: Option<Arrival>,
+    pub link: Option<&'a LinkSample>,
+    pub simulated: bool,
+    pub simulator_ended: bool,
+    /// Place at which a simulated robot touched something, metres.
+    pub collision_m: Option<[f64; 2]>,
+    pub time: MissionTime,
+    pub deadline: Deadline,
+    pub in_ticks: bool,
+    /// The time when the newest tick was first seen or the order last changed, whichever is later.
+    pub progress: Now,
+    /// Whether the robot was once ready to drive.
+    pub was_ready: bool,
+    pub reason: HoldReason,
+    pub held: Vec<&'static str>,
+    /// Stages that do not run although another should have started them.
+    pub not_started: Vec<&'static str>,
+    pub robot: &'a RobotName,
+    pub address: &'a Address,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Arrival {
+    pub distance_m: f64,
+    pub since: Now,
+}
+
+/// The end of the mission at `now`, if it has come. The first rule that applies decides.
+pub(crate) fn judge(snapshot: &Snapshot<'_>, now: Now) -> Option<Ending> {
+    simulator_ended(snapshot)
+        .or_else(|| arrived(snapshot, now))
+        .or_else(|| ended_by_failsafe(snapshot))
+        .or_else(|| collided(snapshot))
+        .or_else(|| overran(snapshot))
+        .or_else(|| stuck(snapshot, now))
+}
+
+pub(crate) fn reached(distance_m: f64) -> Ending {
+    let reason = format!("{distance_m:.2} m from the target");
+    Ending::asked_for(Outcome::Reached, reason)
+}
+
+pub(crate) fn touched([x, y]: [f64; 2]) -> Ending {
+    let reason = format!("touched something near ({x:.2}, {y:.2})");
+    Ending::failed(Outcome::Collision, reason)
+}
+
+/// The deadline of a target. Time in which an operator stopped the robot does not count.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Deadline {
+    /// Mission time at which the robot was sent to the target, seconds.
+    pub began_s: f64,
+    pub timeout_s: f64,
+    /// Mission time of operators' stops, seconds.
+    pub stopped_s: f64,
+}
+
+impl Deadline {
+    /// Mission time at which the target is given up, seconds.
+    pub(crate) const fn at_s(self) -> f64 {
+        self.began_s + self.timeout_s + self.stopped_s
+    }
+
+    pub(crate) fn timed_out(self) -> Ending {
+        let Self { timeout_s, stopped_s, .. } = self;
+        let mut reason = format!("not there after {timeout_s} s");
+        if stopped_s > 0.0 {
+            reason += &format!(", {stopped_s:.0} s of an operator's stop not counted");
+        }
+        Ending::failed(Outcome::Timeout, reason)
+    }
+}
+
+fn simulator_ended(snapshot: &Snapshot<'_>) -> Option<Ending> {
+    let reason = "the simulated robot ended; see x80-sim.log";
+    (snapshot.simulator_ended).then(|| Ending::failed(Outcome::Aborted, reason))
+}
+
+/// An arrival counts when the encoders say that the robot rests. In lockstep it does when no command follows.
+fn arrived(snapshot: &Snapshot<'_>, now: Now) -> Option<Ending> {
+    let Arrival { distance_m, since } = snapshot.arrival?;
+    let at_rest = snapshot.link.is_some_and(|link| link.at_rest == 1);
+    if snapshot.in_ticks || at_rest {
+        return Some(reached(distance_m));
+    }
+    let arrived = format!("arrived {distance_m:.2} m from the target");
+    (now.saturating_sub(since) >= RESTS_WITHIN)
+        .then(|| Ending::failed(Outcome::Aborted, format!("{arrived}, and was not seen at rest")))
+}
+
+fn ended_by_failsafe(snapshot: &Snapshot<'_>) -> Option<Ending> {
+    let link = snapshot.link.filter(|link| link.action() == Action::End)?;
+    let rule = failsafe::rule(link.cause())?;
+    let name = rule.cause.name();
+    let reason = format!("{name}: {}", rule.when);
+    Some(Ending { cause: Some(name), ..Ending::failed(Outcome::Aborted, reason) })
+}
+
+fn collided(snapshot: &Snapshot<'_>) -> Option<Ending> {
+    snapshot.collision_m.map(touched)
+}
+
+fn overran(snapshot: &Snapshot<'_>) -> Option<Ending> {
+    let late = snapshot.time.seconds() >= snapshot.deadline.at_s();
+    late.then(|| snapshot.deadline.timed_out())
+}
+
+fn stuck(snapshot: &Snapshot<'_>, now: Now) -> Option<Ending> {
+    let may_wait = match snapshot.reason {
+        // A real robot may be out of reach for any time.
+        HoldReason::None => !snapshot.simulated,
+        HoldReason::Operator => true,
+        // In wall-clock time the mission's timeout ends such a mission.
+        HoldReason::StageHeld => !snapshot.in_ticks,
+        HoldReason::Starting | HoldReason::Ending => false,
+    };
+    if may_wait || now.saturating_sub(snapshot.progress) < NO_PROGRESS {
+        return None;
+    }
+    let robot_answers = snapshot.link.is_some_and(|link| link.connected == 1);
+    let reason = if !snapshot.not_started.is_empty() {
+        let (robot, stages) = (snapshot.robot, snapshot.not_started.join(", "));
+        format!("not running: {stages}; start each with `firsthand stage NAME --robot {robot}`")
+    } else if !snapshot.held.is_empty() {
+        let (held, file) = (snapshot.held.join(", "), records::DEATHS);
+        format!("{held} died again and again and is held; see {file} in the run directory")
+    } else if !snapshot.was_ready && !robot_answers {
+        let address = snapshot.address;
+        match snapshot.link.map_or(0, |link| link.other_port) {
+            0 => format!("no robot answers at {address}; is it on, is robot.address right?"),
+            port => format!(
+                "no robot answers at {address}, but its host does from port {port}; name that one in robot.address"
+            ),
+        }
+    } else {
+        "the pipeline makes no progress; see the stages' logs".to_owned()
+    };
+    Some(Ending::failed(Outcome::Aborted, reason))
+}
+
+#[derive(Debug, Default)]
+pub(crate) struct StopClock {
+    /// Time of the last call, if the robot was stopped then.
+    stopped_at: Option<MissionTime>,
+}
+
+impl StopClock {
+    /// Seconds of the stop since the last call; `stopped` says whether a stop holds at `now`.
+    pub(crate) fn passed_s(&mut self, stopped: bool, now: MissionTime) -> f64 {
+        let before = std::mem::replace(&mut self.stopped_at, stopped.then_some(now));
+        before.map_or(0.0, |before| now.since(before).as_secs_f64())
+    }
+}
+
+#[derive(Debug)]
+pub(crate) struct TickProgress {
+    tick: Option<u64>,
+    since: Now,
+}
+
+impl TickProgress {
+    pub(crate) const fn new(now: Now) -> Self {
+        Self { tick: None, since: now }
+    }
+
+    pub(crate) fn update(&mut self, tick: Option<u64>, now: Now) -> Now {
+        if tick != self.tick {
+            (self.tick, self.since) = (tick, now);
+        }
+        self.since
+    }
+}
+
+#[cfg(test)]
+mod tests;

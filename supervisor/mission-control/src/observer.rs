@@ -1,0 +1,224 @@
+//! The supervisor's readers on the bus, and the record by which a run is judged.
+
+use std::collections::VecDeque;
+
+use common::{
+    bus::{Bus, BusError, Reader, Writers},
+    grid::{Applied, Part, Replica},
+    roster,
+    samples::{
+        CommandSample, CommandState, ContactSample, FieldCell, FieldHeader, GridHeader,
+        GuidanceSample, HealthSample, LinkSample, PoseSample, name_str,
+    },
+    topics,
+    waiter::Waiter,
+};
+use processes::stage_processes::StageProcesses;
+
+use crate::long_record;
+
+/// The most guidance samples that are recorded: that of the arrival tick must still be there when its command is read.
+const MOST_GUIDANCE: usize = 1024;
+/// The most contacts that are recorded: more than come between two checks for stalls.
+const MOST_CONTACTS: usize = 64;
+
+/// The newest output of the stages.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Published {
+    /// The tick of the newest command.
+    pub tick: Option<u64>,
+    pub commands: u64,
+    /// The generation of the planner's newest heartbeat, and the tick of the newest grid that it has used.
+    pub planner: (u32, u64),
+    /// The epoch of the newest guidance.
+    pub epoch: u64,
+    pub grid_epoch: u64,
+    /// Whether the grid changed when that epoch began. The planner does not answer a grid that did not change.
+    pub grid_changed: bool,
+}
+
+/// A sample that a run has read, for whoever computes numbers or draws from it.
+pub enum Heard<'a> {
+    Command(&'a CommandSample),
+    Guidance(&'a GuidanceSample),
+    Field(&'a Part, &'a [FieldCell]),
+    Link(&'a LinkSample),
+}
+
+/// Called with every such sample. It only listens: nothing that the run does depends on it.
+pub type Listener = Box<dyn FnMut(Heard<'_>)>;
+
+pub(crate) struct Observer {
+    health: Reader<HealthSample>,
+    link: Reader<LinkSample>,
+    pose: Reader<PoseSample>,
+    contact: Reader<ContactSample>,
+    grid: Reader<GridHeader, u8>,
+    guidance: Reader<GuidanceSample>,
+    field: Reader<FieldHeader, FieldCell>,
+    command: Reader<CommandSample>,
+    writers: Writers,
+    pub record: Record,
+}
+
+/// The data read so far.
+#[derive(Default)]
+pub struct Record {
+    /// The pose of every tick; in a long run older ticks are thinned out.
+    pub poses: Vec<PoseSample>,
+    pub pose: Option<PoseSample>,
+    guidance: VecDeque<GuidanceSample>,
+    pub command: Option<CommandSample>,
+    pub(crate) published: Published,
+    /// The newest ticks at which something held the wheels, oldest first.
+    contacts: VecDeque<u64>,
+    /// The number of the current target, and the first command that said that this target is reached.
+    pub(crate) target_number: u64,
+    pub arrival: Option<CommandSample>,
+    pub link: Option<LinkSample>,
+    pub grid: Replica<u8>,
+    pub field_known: bool,
+}
+
+impl Observer {
+    /// Read everything on `bus`, to complete `record`. `waiter` wakes for heartbeats, for the state of the link, which ends a
+    /// tick, and for fields. The other samples of a tick are read at its end, so that the supervisor takes no processor time
+    /// from the stages during the tick.
+    pub(crate) fn new(bus: &Bus, waiter: &mut Waiter, record: Record) -> Result<Self, BusError> {
+        waiter.on(bus.wakeup(&topics::HEALTH)?);
+        waiter.on(bus.wakeup(&topics::LINK)?);
+        waiter.on(bus.wakeup(&topics::FIELD)?);
+        Ok(Self {
+            health: bus.reader(&topics::HEALTH)?,
+            link: bus.reader(&topics::LINK)?,
+            pose: bus.reader(&topics::POSE)?,
+            contact: bus.reader(&topics::CONTACT)?,
+            grid: bus.reader(&topics::GRID)?,
+            guidance: bus.reader(&topics::GUIDANCE)?,
+            field: bus.reader(&topics::FIELD)?,
+            command: bus.reader(&topics::COMMAND)?,
+            writers: bus.writers().cloned().unwrap_or_default(),
+            record,
+        })
+    }
+
+    /// Read all new samples, and tell `listener` of them. Returns whether the roster changed by them.
+    pub(crate) fn read_all(
+        &mut self,
+        stages: &mut StageProcesses,
+        listener: &mut Listener,
+    ) -> Result<bool, BusError> {
+        // Only samples of the stages' own processes are read.
+        self.writers.name(roster::named(&stages.roster()));
+        let mut roster_changed = false;
+        while let Some(health) = self.health.next_sample()? {
+            roster_changed |= stages.on_health(&health);
+            if name_str(&health.stage) == processes::stages::PLANNER {
+                self.record.published.planner = (health.stamp.generation, health.stamp.tick);
+            }
+        }
+        let record = &mut self.record;
+        // The command of a tick is read before the samples it was computed from, so that these are in the record whenever
+        // the command is.
+        while let Some(command) = self.command.next_sample()? {
+            stages.on_output(topics::COMMAND.spec().writer, command.stamp.tick);
+            record.command = Some(command);
+            record.published.tick = Some(command.stamp.tick);
+            record.published.commands += 1;
+            listener(Heard::Command(&command));
+            if CommandState::from_byte(command.state) == CommandState::Arrived
+                && command.target_number == record.target_number
+            {
+                record.arrival.get_or_insert(command);
+            }
+        }
+        while let Some(guidance) = self.guidance.next_sample()? {
+            stages.on_output(topics::GUIDANCE.spec().writer, guidance.stamp.tick);
+            listener(Heard::Guidance(&guidance));
+            record.published.epoch = guidance.epoch;
+            record.push_guidance(guidance);
+        }
+        while let Some(grid) = self.grid.next_slice()? {
+            stages.on_output(topics::GRID.spec().writer, grid.header().stamp.tick);
+            let epoch = grid.header().epoch;
+            let applied = record.grid.apply(&grid.header().part, &grid);
+            if epoch > record.published.grid_epoch {
+                let same = matches!(applied, Applied::Window(window) if window.area() == 0);
+                (record.published.grid_epoch, record.published.grid_changed) = (epoch, !same);
+            }
+        }
+        while let Some(field) = self.field.next_slice()? {
+            listener(Heard::Field(&field.header().part, &field));
+            record.field_known = true;
+        }
+        while let Some(pose) = self.pose.next_sample()? {
+            stages.on_output(topics::POSE.spec().writer, pose.stamp.tick);
+            record.pose = Some(pose);
+            long_record::push(&mut record.poses, pose);
+        }
+        // Poses are computed from the link's samples, so these are read last.
+        while let Some(contact) = self.contact.next_sample()? {
+            if record.contacts.len() == MOST_CONTACTS {
+                record.contacts.pop_front();
+            }
+            record.contacts.push_back(contact.stamp.tick);
+        }
+        while let Some(link) = self.link.next_sample()? {
+            stages.on_output(topics::LINK.spec().writer, link.stamp.tick);
+            listener(Heard::Link(&link));
+            record.link = Some(link);
+        }
+        Ok(roster_changed)
+    }
+}
+
+impl Record {
+    fn push_guidance(&mut self, guidance: GuidanceSample) {
+        if self.guidance.len() == MOST_GUIDANCE {
+            self.guidance.pop_front();
+        }
+        self.guidance.push_back(guidance);
+    }
+
+    pub fn guidance_at(&self, tick: u64) -> Option<&GuidanceSample> {
+        self.guidance.iter().rev().find(|guidance| guidance.stamp.tick <= tick)
+    }
+
+    /// Whether something held the wheels after the tick `last`, up to `tick`: a slow planner may answer no tick with a contact.
+    pub(crate) fn has_contact(&self, last: Option<u64>, tick: u64) -> bool {
+        let is_new = |contact: &u64| *contact <= tick && last.is_none_or(|last| *contact > last);
+        self.contacts.iter().any(is_new)
+    }
+
+    /// The pose and the guidance of every tick after `last` that has both, oldest first.
+    pub(crate) fn ticks_since(
+        &self,
+        last: Option<u64>,
+    ) -> impl Iterator<Item = (&PoseSample, &GuidanceSample)> {
+        let first = last.map_or(0, |tick| tick + 1);
+        let new = self.poses.partition_point(|pose| pose.stamp.tick < first);
+        let guidance_of = |tick: u64| {
+            let guidance = self.guidance_at(tick);
+            guidance.filter(|guidance| guidance.stamp.tick == tick)
+        };
+        let ticks = self.poses[new..].iter();
+        ticks.filter_map(move |pose| Some((pose, guidance_of(pose.stamp.tick)?)))
+    }
+
+    pub fn newest_guidance(&self) -> Option<&GuidanceSample> {
+        self.guidance.back()
+    }
+
+    pub fn pose_at(&self, tick: u64) -> Option<&PoseSample> {
+        self.poses.iter().rev().find(|pose| pose.stamp.tick <= tick)
+    }
+
+    pub fn newest_tick(&self) -> Option<u64> {
+        let ticks = [
+            self.pose.map(|pose| pose.stamp.tick),
+            self.command.map(|command| command.stamp.tick),
+            self.link.map(|link| link.stamp.tick),
+        ];
+        ticks.into_iter().flatten().max()
+    }
+}

@@ -1,0 +1,272 @@
+//! An operator's requests to a robot, from any process: stop, resume, targets, a new generation of a stage. Each function returns when
+//! the robot's link or its supervisor has confirmed the request, or says why not.
+
+use std::{
+    io::{self, Read as _},
+    process::{Child, Stdio},
+    time::{Duration, Instant},
+};
+
+use common::{
+    bus::BusError,
+    clock::{MissionTime, monotonic_ns},
+    domain::{Domain, RobotName},
+    poll,
+    roster::{self, Roster},
+    run::Run,
+    samples::{
+        Action, Cause, LinkSample, MOST_TARGETS, RequestAnswer, RequestKind, RequestSample,
+        RosterEntry, RosterHeader, TargetPoint, name,
+    },
+    start::StageError,
+    stop_socket::{self, Answer, Request},
+    topics,
+    waiter::Waiter,
+};
+use link::stop_guard;
+use processes::process;
+use thiserror::Error;
+
+/// The patience with a roster, which is published five times a second; a frozen supervisor publishes none.
+pub const PATIENCE: Duration = Duration::from_secs(2);
+
+#[derive(Debug, Error)]
+pub enum OperatorError {
+    /// The robot does not run, or its bus cannot be used.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// The robot, its link or its supervisor refuses; `code` is for scripts.
+    #[error("{message}")]
+    Refused { code: &'static str, message: String },
+    /// The robot could not be told directly.
+    #[error(transparent)]
+    Stage(#[from] StageError),
+    #[error("cannot {0}: {1}")]
+    System(&'static str, io::Error),
+}
+
+impl OperatorError {
+    fn refused(code: &'static str, message: impl Into<String>) -> Self {
+        Self::Refused { code, message: message.into() }
+    }
+}
+
+const fn code(answer: RequestAnswer) -> &'static str {
+    match answer {
+        RequestAnswer::Taken | RequestAnswer::Unknown => "unknown-request",
+        RequestAnswer::NotRunning => "not-driving",
+        RequestAnswer::Stopped => "robot-stopped",
+        RequestAnswer::Malformed => "no-target",
+        RequestAnswer::TooMany => "too-many-targets",
+        RequestAnswer::Outside => "target-outside",
+        RequestAnswer::InHazard => "target-in-hazard",
+        RequestAnswer::NoHeading => "no-heading",
+        RequestAnswer::FixedTarget => "fixed-target",
+    }
+}
+
+/// A stop that holds although its supervisor was not told; the text says why.
+pub type Untold = Option<String>;
+
+/// The time for a process to start and to tell the supervisor.
+const TOLD_WITHIN: Duration = Duration::from_secs(4);
+
+/// The patience with a stop. A robot that obeys rests within a second: the link repeats a stop five times a second, and changes its
+/// method after a second.
+const REST_PATIENCE: Duration = Duration::from_secs(5);
+
+/// The patience with a link, which answers within milliseconds if it is scheduled.
+const LINK_ANSWERS: Duration = Duration::from_millis(200);
+
+/// Let the robot stand, and wait until it rests. The link is asked directly, without the middleware. The supervisor is told as
+/// well: mission time stops, and the stop holds for its successors. Where no link answers, the robot itself is told to stand.
+pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
+    let asked_ns = monotonic_ns();
+    let domain = Domain::of(robot.clone());
+    let link = stop_socket::Operator::connect(&domain)
+        .map_err(|error| OperatorError::System("open a socket to the link", error))?
+        .filter(|link| {
+            let answer = link.send(Request::Stop).and_then(|()| link.answer(LINK_ANSWERS));
+            matches!(answer, Ok(Some(_)))
+        });
+    let run = Run::load(&domain.run_directory());
+    if link.is_none() && run.is_err() {
+        request_stop(robot, asked_ns)?;
+        return await_rest(robot).map(|()| None);
+    }
+    let supervisor = tell_supervisor(robot, asked_ns)?;
+    let rests = match (link, run) {
+        (Some(link), _) => rests_by(&link),
+        // A link that answers nobody does not command the robot either.
+        (None, Ok(run)) => stop_guard::stand(&run, || false)?,
+        (None, Err(_)) => false,
+    };
+    let told = told(supervisor);
+    match told {
+        Err(why) if rests => Ok(Some(why.to_string())),
+        Err(why) => Err(why),
+        Ok(()) if rests => Ok(None),
+        Ok(()) => await_rest(robot).map(|()| None),
+    }
+}
+
+fn rests_by(link: &stop_socket::Operator) -> bool {
+    let began = Instant::now();
+    loop {
+        match link.answer(REST_PATIENCE.saturating_sub(began.elapsed())) {
+            Ok(Some(Answer::AtRest)) => return true,
+            Ok(Some(Answer::Heard)) => {}
+            Ok(None) | Err(_) => return false,
+        }
+    }
+}
+
+/// Tell the supervisor of a stop, in a process of its own: the files of a damaged bus can end the process that opens them.
+fn tell_supervisor(robot: &RobotName, asked_ns: u64) -> Result<Child, OperatorError> {
+    let (robot, asked) = (robot.to_string(), asked_ns.to_string());
+    let child = process::firsthand(&["stop", "--robot", &robot, "--through-supervisor", &asked])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn();
+    let system = |error| OperatorError::System("start a process that tells the supervisor", error);
+    child.map_err(system)
+}
+
+fn told(mut teller: Child) -> Result<(), OperatorError> {
+    let mut why = String::new();
+    let mut said = teller.stderr.take();
+    // The end of the process closes the pipe.
+    let ended =
+        said.as_ref().is_none_or(|said| poll::is_readable(said, TOLD_WITHIN).unwrap_or(true));
+    if !ended {
+        let _ = teller.kill();
+    }
+    if let Some(said) = &mut said {
+        let _ = said.take(4096).read_to_string(&mut why);
+    }
+    match teller.wait() {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) if why.is_empty() => {
+            Err(OperatorError::refused("no-answer", format!("it ended with {status}")))
+        }
+        _ => Err(OperatorError::refused(
+            "no-answer",
+            why.trim().trim_start_matches("firsthand: ").to_owned(),
+        )),
+    }
+}
+
+/// Wait until the link says that it stopped the robot, and the encoders say that the robot rests.
+fn await_rest(robot: &RobotName) -> Result<(), OperatorError> {
+    let bus = roster::join(&Domain::of(robot.clone()), "operator")?;
+    let mut links = bus.reader(&topics::LINK)?;
+    let mut waiter = Waiter::default();
+    waiter.on(bus.wakeup(&topics::LINK)?);
+    let began = Instant::now();
+    let mut newest = None;
+    while began.elapsed() < REST_PATIENCE {
+        newest = links.newest()?.or(newest);
+        if newest.as_ref().is_some_and(rests) {
+            return Ok(());
+        }
+        waiter.wait(topics::LINK.spec().restated_every())?;
+    }
+    let seen = match newest {
+        None => "its link publishes nothing; the robot's timed command has ended".to_owned(),
+        Some(link) if link.connected == 0 => {
+            "it does not answer; it is ordered to stand when it does".to_owned()
+        }
+        Some(link) => format!("{}: it moves", link.cause().name()),
+    };
+    let message = format!(
+        "robot {robot} is ordered to stand and was not seen at rest within {} s: {seen}; see `firsthand status`",
+        REST_PATIENCE.as_secs()
+    );
+    Err(OperatorError::refused("not-at-rest", message))
+}
+
+/// Whether the link stops the robot for the operator, or ends the mission, and the robot rests.
+fn rests(link: &LinkSample) -> bool {
+    let stopped = link.cause() == Cause::OperatorStop || link.action() == Action::End;
+    stopped && link.at_rest == 1
+}
+
+pub fn resume(robot: &RobotName) -> Result<(), OperatorError> {
+    // A stop that the supervisor was not told of holds at the link alone.
+    if let Ok(Some(link)) = stop_socket::Operator::connect(&Domain::of(robot.clone())) {
+        let _ = link.send(Request::Resume);
+    }
+    ask(robot, request(RequestKind::Resume))
+}
+
+/// Tell the supervisor alone of a stop that was asked at `asked_ns` of the monotonic clock. The stop is over if the robot was resumed
+/// since.
+pub fn request_stop(robot: &RobotName, asked_ns: u64) -> Result<(), OperatorError> {
+    ask(robot, RequestSample { asked_ns, ..request(RequestKind::Stop) })
+}
+
+pub fn restart(robot: &RobotName, stage: &str) -> Result<(), OperatorError> {
+    ask(robot, RequestSample { stage: name(stage), ..request(RequestKind::Restart) })
+}
+
+/// Send the robot to `points` one after the other: now, or if it `appends` after the targets that it has.
+pub fn send_to(
+    robot: &RobotName,
+    points: &[TargetPoint],
+    appends: bool,
+) -> Result<(), OperatorError> {
+    let kind = if appends { RequestKind::Append } else { RequestKind::Goto };
+    let mut request = request(kind);
+    if points.len() > MOST_TARGETS {
+        return Err(refused(robot, RequestAnswer::TooMany));
+    }
+    request.target_count = points.len() as u8;
+    request.targets[..points.len()].copy_from_slice(points);
+    ask(robot, request)
+}
+
+/// A request that is made now.
+fn request(kind: RequestKind) -> RequestSample {
+    RequestSample { kind: kind.into(), asked_ns: monotonic_ns(), ..RequestSample::default() }
+}
+
+fn refused(robot: &RobotName, answer: RequestAnswer) -> OperatorError {
+    let message = format!("the supervisor of robot {robot} refuses: {}", answer.text());
+    OperatorError::refused(code(answer), message)
+}
+
+/// Send a request to the supervisor, and wait until the roster has its answer.
+fn ask(robot: &RobotName, request: RequestSample) -> Result<(), OperatorError> {
+    let bus = roster::join(&Domain::of(robot.clone()), "operator")?;
+    // The roster is opened first, so that the answer is not missed.
+    let mut roster = Roster::open(&bus)?;
+    let mut requests = bus.writer(&topics::REQUESTS, 1)?;
+    let id = new_id();
+    requests.publish(0, MissionTime::default(), RequestSample { id, ..request })?;
+    let answer = find(&mut roster, robot, |header, _| {
+        (header.last_request == id).then(|| RequestAnswer::from_byte(header.answer))
+    })?;
+    match answer {
+        RequestAnswer::Taken => Ok(()),
+        answer => Err(refused(robot, answer)),
+    }
+}
+
+/// An id for a request, which no other process uses: it mixes time and process id.
+pub fn new_id() -> u64 {
+    monotonic_ns() ^ u64::from(std::process::id()) << 40 | 1
+}
+
+pub fn find<T>(
+    roster: &mut Roster,
+    robot: &RobotName,
+    find: impl Fn(&RosterHeader, &[RosterEntry]) -> Option<T>,
+) -> Result<T, OperatorError> {
+    let found = roster.find(PATIENCE, find)?;
+    found.ok_or_else(|| {
+        let message = format!(
+            "the supervisor of robot {robot} does not answer; is it frozen? (`firsthand stage thaw supervisor`)"
+        );
+        OperatorError::refused("no-answer", message)
+    })
+}

@@ -1,0 +1,113 @@
+//! The decision whether the robot may drive, and the reason if not. Pure.
+
+use common::samples::{HoldReason, Order};
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Snapshot {
+    /// Whether the robot was once ready to drive on this bus.
+    pub was_ready: bool,
+    pub all_running: bool,
+    /// Whether the link receives data from the robot.
+    pub robot_answers: bool,
+    /// Whether the planner has published a field, so that the first tick does not wait for one.
+    pub field_known: bool,
+    pub operator_stop: bool,
+    pub stage_held: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Decision {
+    /// Whether the robot was ever ready to drive. From then on a stage that is down does not change the order, because the link stops
+    /// the robot itself.
+    pub ready: bool,
+    pub reason: HoldReason,
+}
+
+impl Decision {
+    pub(crate) const STARTING: Self = Self { ready: false, reason: HoldReason::Starting };
+    pub(crate) const ENDING: Self = Self { ready: false, reason: HoldReason::Ending };
+
+    pub(crate) const fn order(self) -> Order {
+        match self.reason {
+            HoldReason::None => Order::Drive,
+            HoldReason::Ending => Order::Stop,
+            HoldReason::Starting | HoldReason::Operator | HoldReason::StageHeld => Order::Hold,
+        }
+    }
+}
+
+/// The first reason that applies decides.
+pub(crate) const fn decide(snapshot: &Snapshot) -> Decision {
+    let can_start = snapshot.all_running && snapshot.robot_answers && snapshot.field_known;
+    let ready = snapshot.was_ready || can_start;
+    let reason = if !ready {
+        HoldReason::Starting
+    } else if snapshot.operator_stop {
+        HoldReason::Operator
+    } else if snapshot.stage_held {
+        HoldReason::StageHeld
+    } else {
+        HoldReason::None
+    };
+    Decision { ready, reason }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A snapshot in which nothing holds the robot, and it is about to drive for the first time.
+    const CAN_START: Snapshot = Snapshot {
+        was_ready: false,
+        all_running: true,
+        robot_answers: true,
+        field_known: true,
+        operator_stop: false,
+        stage_held: false,
+    };
+    /// The robot has driven, and now nothing is as it should be.
+    const ALL_LOST: Snapshot = Snapshot {
+        was_ready: true,
+        all_running: false,
+        robot_answers: false,
+        field_known: false,
+        ..CAN_START
+    };
+
+    #[test]
+    fn every_rule_of_the_order_decides_its_row() {
+        #[rustfmt::skip]
+        let rows = [
+            ("drives once all is ready", CAN_START, HoldReason::None),
+            ("waits for every stage", Snapshot { all_running: false, ..CAN_START }, HoldReason::Starting),
+            ("waits for the robot", Snapshot { robot_answers: false, ..CAN_START }, HoldReason::Starting),
+            ("waits for a field", Snapshot { field_known: false, ..CAN_START }, HoldReason::Starting),
+            ("once ready stays ready", ALL_LOST, HoldReason::None),
+            ("an operator's stop holds", Snapshot { operator_stop: true, ..CAN_START }, HoldReason::Operator),
+            ("a held stage holds", Snapshot { stage_held: true, ..CAN_START }, HoldReason::StageHeld),
+            ("starting comes before an operator's stop",
+             Snapshot { field_known: false, operator_stop: true, ..CAN_START }, HoldReason::Starting),
+            ("an operator's stop comes before a held stage",
+             Snapshot { operator_stop: true, stage_held: true, ..CAN_START }, HoldReason::Operator),
+        ];
+        for (rule, snapshot, reason) in rows {
+            let ready = reason != HoldReason::Starting;
+            assert_eq!(decide(&snapshot), Decision { ready, reason }, "{rule}");
+        }
+    }
+
+    #[test]
+    fn every_reason_has_its_order() {
+        let rows = [
+            (HoldReason::None, Order::Drive),
+            (HoldReason::Starting, Order::Hold),
+            (HoldReason::Operator, Order::Hold),
+            (HoldReason::StageHeld, Order::Hold),
+            (HoldReason::Ending, Order::Stop),
+        ];
+        for (reason, order) in rows {
+            let ready = true;
+            assert_eq!(Decision { ready, reason }.order(), order, "{reason:?}");
+        }
+    }
+}

@@ -1,0 +1,184 @@
+//! The ending of a run.
+
+use common::{ground_truth::GroundTruthTick, mission::Mission, samples::PoseSample};
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+/// The distance from its target beyond which a simulated robot that reports its arrival is in the wrong place by the ground truth,
+/// metres. Other benchmarks use the same limit. A wider tolerance of the mission takes its place.
+pub const RIGHT_PLACE_M: f64 = 0.5;
+
+/// The greatest distance from its target of a robot that reports its arrival, metres.
+pub(crate) const fn allowed_m(mission: &Mission) -> f64 {
+    RIGHT_PLACE_M.max(mission.arrival_tolerance_m)
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// The robot is within the tolerance of the target: by its own pose, and in simulation also by the ground truth.
+    Reached,
+    /// The robot reports its arrival, and the ground truth contradicts it.
+    WrongPlace,
+    /// The robot reports its arrival, and by the covariance of its pose it may be farther off than the mission allows.
+    ReachedUnsure,
+    /// The robot stalled, and no recovery step was left.
+    Unreachable,
+    Timeout,
+    Collision,
+    /// The run was stopped by hand, or something failed.
+    #[default]
+    Aborted,
+    /// The robot was told to stand by every method of its protocol, and its encoders say that it moves.
+    CouldNotBeStopped,
+}
+
+impl Outcome {
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Reached => "reached",
+            Self::WrongPlace => "wrong_place",
+            Self::ReachedUnsure => "reached_unsure",
+            Self::Unreachable => "unreachable",
+            Self::Timeout => "timeout",
+            Self::Collision => "collision",
+            Self::Aborted => "aborted",
+            Self::CouldNotBeStopped => "could_not_be_stopped",
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Wheels {
+    AtRest,
+    /// The robot or its link does not answer.
+    Unknown,
+    Turning,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Ending {
+    pub outcome: Outcome,
+    pub reason: String,
+    /// The row of the failsafe table that ended the mission, by its name.
+    pub cause: Option<&'static str>,
+    /// Whether the run ended as the user asked: with the target reached or a stop by hand.
+    pub asked_for: bool,
+}
+
+impl Ending {
+    pub(crate) fn failed(outcome: Outcome, reason: impl Into<String>) -> Self {
+        Self { outcome, reason: reason.into(), cause: None, asked_for: false }
+    }
+
+    /// This ending; or the wrong place, if the robot did not reach its target by the ground truth `ended`, or came to rest elsewhere by
+    /// its own pose `at_rest`; or unsure, if the error of that pose may be larger than the mission allows.
+    pub(crate) fn checked(
+        self,
+        mission: &Mission,
+        target: DVec2,
+        ended: Option<&GroundTruthTick>,
+        at_rest: Option<&PoseSample>,
+    ) -> Self {
+        if self.outcome != Outcome::Reached {
+            return self;
+        }
+        let allowed_m = allowed_m(mission);
+        let by_truth_m = ended.map(|ended| (ended.x - target.x).hypot(ended.y - target.y));
+        let at_rest_m = at_rest.map(|pose| target.distance(pose.pose().position));
+        let too_far = |distance_m: &f64| *distance_m > allowed_m;
+        let said = &self.reason;
+        let (outcome, contradicted) = if let Some(distance_m) = by_truth_m.filter(too_far) {
+            let by_truth = format!(
+                "{said} by its own pose, {distance_m:.2} m by the ground truth: more than {allowed_m} m"
+            );
+            (Outcome::WrongPlace, by_truth)
+        } else if let Some(distance_m) = at_rest_m.filter(too_far) {
+            let rest = format!(
+                "{said}, and came to rest {distance_m:.2} m from it: more than {allowed_m} m"
+            );
+            (Outcome::WrongPlace, rest)
+        } else if let Some(pose) = at_rest.filter(|pose| !pose.is_sure(mission)) {
+            let (within_m, sure_m) = (pose.position_within_m(), mission.sure_within_m);
+            let unsure = format!(
+                "{said} by its own pose, which is known to within {within_m:.2} m (2 standard deviations): more than {sure_m} m"
+            );
+            (Outcome::ReachedUnsure, unsure)
+        } else {
+            return self;
+        };
+        Self::failed(outcome, contradicted)
+    }
+
+    /// This ending, with the encoders' answer when the stages were stopped.
+    pub(crate) fn with(self, wheels: Wheels) -> Self {
+        match wheels {
+            Wheels::AtRest => self,
+            Wheels::Unknown => {
+                Self { reason: format!("{}; nobody saw it at rest", self.reason), ..self }
+            }
+            Wheels::Turning => {
+                let reason = format!("{}; told to stand by every method, it moves", self.reason);
+                Self { cause: self.cause, ..Self::failed(Outcome::CouldNotBeStopped, reason) }
+            }
+        }
+    }
+
+    pub(crate) fn asked_for(outcome: Outcome, reason: impl Into<String>) -> Self {
+        Self { asked_for: true, ..Self::failed(outcome, reason) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    fn at(x: f64) -> GroundTruthTick {
+        GroundTruthTick { x, ..GroundTruthTick::default() }
+    }
+
+    #[test]
+    fn reached_in_simulation_is_the_word_of_the_ground_truth_too() {
+        use Outcome::{Aborted, Reached, WrongPlace};
+        let outcome = |said, set: &str, ended: Option<f64>| {
+            let text = format!("target = [3, 0]\n{set}");
+            let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+            let ended = ended.map(at);
+            let ending = Ending::asked_for(said, "0.08 m from the target");
+            let checked = ending.checked(&mission, mission.target, ended.as_ref(), None);
+            assert_eq!(checked.asked_for, checked.outcome != WrongPlace);
+            checked.outcome
+        };
+        assert_eq!(outcome(Reached, "", Some(2.6)), Reached);
+        assert_eq!(outcome(Reached, "", Some(2.4)), WrongPlace);
+        let wide = "arrival_tolerance_m = 0.8";
+        assert_eq!(outcome(Reached, wide, Some(2.3)), Reached);
+        assert_eq!(outcome(Reached, "", None), Reached, "a real robot");
+        assert_eq!(outcome(Aborted, "", Some(0.0)), Aborted);
+    }
+
+    #[test]
+    fn an_arrival_whose_pose_is_not_known_to_two_deviations_is_unsure() {
+        let outcome = |said, set: &str, [xx, xy, yy]: [f64; 3], ended: Option<f64>| {
+            let text = format!("target = [3, 0]\n{set}");
+            let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+            let covariance = [xx, xy, 0.0, yy, 0.0, 0.0];
+            let pose = PoseSample { x_m: 2.9, covariance, ..PoseSample::default() };
+            let ending = Ending::asked_for(said, "0.10 m from the target");
+            ending.checked(&mission, mission.target, ended.map(at).as_ref(), Some(&pose)).outcome
+        };
+        use Outcome::{Aborted, Reached, ReachedUnsure, WrongPlace};
+        for (deviation, want) in [(0.249_f64, Reached), (0.251, ReachedUnsure)] {
+            let line = deviation.powi(2);
+            assert_eq!(outcome(Reached, "", [0.0, 0.0, line], None), want);
+            assert_eq!(outcome(Reached, "", [line / 2.0, line / 2.0, line / 2.0], None), want);
+            assert_eq!(outcome(Reached, "", [line, 0.0, line], None), want);
+        }
+        let less = "sure_within_m = 0.3";
+        assert_eq!(outcome(Reached, less, [0.04, 0.0, 0.0], None), ReachedUnsure);
+        assert_eq!(outcome(Reached, "", [0.3, 0.0, 0.3], Some(3.0)), ReachedUnsure);
+        assert_eq!(outcome(Reached, "", [0.3, 0.0, 0.3], Some(2.0)), WrongPlace);
+        assert_eq!(outcome(Aborted, "", [9.0, 0.0, 9.0], None), Aborted);
+    }
+}

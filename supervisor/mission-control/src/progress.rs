@@ -1,0 +1,42 @@
+//! The progress of a run, as its user sees it.
+
+use std::fmt;
+
+use common::samples::{Action, Cause};
+
+use crate::observer::Record;
+
+pub struct Progress<'a> {
+    pub record: &'a Record,
+    /// Stages that run, and all stages.
+    pub running: (usize, usize),
+    pub driving: bool,
+    /// The distance from the start to the target, metres.
+    pub straight_m: f64,
+}
+
+impl fmt::Display for Progress<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (running, all) = self.running;
+        let record = self.record;
+        let link = record.link.unwrap_or_default();
+        if !self.driving && link.cause() == Cause::NotOrdered {
+            return write!(f, "starting: {running}/{all} stages alive");
+        }
+        let time = record.pose.map_or(0.0, |pose| pose.stamp.time().seconds());
+        let speed = record.pose.map_or(0.0, |pose| pose.v_m_s);
+        let distance = record.command.map_or(self.straight_m, |command| command.distance_m);
+        let events = record.newest_guidance().map_or(0, |guidance| guidance.safety_events);
+        write!(
+            f,
+            "{time:6.1} s  {distance:5.2} m to go  {speed:5.2} m/s  {events:3} safety events  {running}/{all} stages alive"
+        )?;
+        match link.action() {
+            Action::Go => Ok(()),
+            action => {
+                let cause = link.cause().name().to_uppercase();
+                write!(f, ", {cause}: the robot {}", action.effect())
+            }
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! The recovery step under way after a stall: when it is carried out, and from when on further ticks are checked. Pure.
+//!
+//! In wall-clock time nothing waits: a step is carried out at once. In lockstep its result must not depend on the machine: the newest
+//! [`TickLimitSample`] names the last tick that the link may begin, [`AHEAD`] ticks after the last one that was checked. So a stall at
+//! tick T leaves the pipeline at rest after tick T + [`AHEAD`]. The step is carried out there, and the limit rises once the planner
+//! and, after a reset, the controller have answered it.
+
+use std::time::{Duration, Instant};
+
+use common::samples::{RecoveryStep, StallSample, TickLimitSample};
+
+use crate::observer::Published;
+
+/// The number of ticks that the link may be ahead. With this number the link seldom waits, and a robot that has not moved for
+/// seconds loses little time.
+const AHEAD: u64 = 4;
+/// The longest time that a recovery step waits for its answer. It is less than the link waits for the limit, and as long as a
+/// planner may take to start.
+const ANSWERED: Duration = Duration::from_secs(3);
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Next {
+    /// No recovery step is under way, so further ticks are to be checked.
+    Check,
+    Wait,
+    Begin(RecoveryStep),
+}
+
+/// A recovery step, from the stall until it was answered.
+#[derive(Clone, Copy, Debug)]
+struct Step {
+    stall: StallSample,
+    /// The time when the step was carried out, and the samples that were published by then.
+    begun: Option<(Instant, Published)>,
+}
+
+/// The recovery step under way, and in lockstep the limit of the link.
+#[derive(Debug)]
+pub(crate) struct RecoverySteps {
+    limit: Option<TickLimitSample>,
+    step: Option<Step>,
+}
+
+impl RecoverySteps {
+    /// In lockstep the ticks from `first_tick` on are not checked yet; in wall-clock time there is none.
+    pub(crate) fn new(first_tick: Option<u64>) -> Self {
+        let limit = first_tick.map(|first_tick| TickLimitSample {
+            last_tick: first_tick + AHEAD,
+            ..TickLimitSample::default()
+        });
+        Self { limit, step: None }
+    }
+
+    /// The limit of the link; none in wall-clock time.
+    pub(crate) const fn limit(&self) -> Option<TickLimitSample> {
+        self.limit
+    }
+
+    pub(crate) fn on_checked(&mut self, tick: u64) {
+        if let Some(limit) = &mut self.limit {
+            limit.last_tick = limit.last_tick.max(tick + AHEAD);
+        }
+    }
+
+    /// Note that the robot stalled. Later ticks are not checked before the recovery step is in force.
+    pub(crate) fn on_stall(&mut self, stall: StallSample) {
+        self.on_checked(stall.stamp.tick);
+        self.step = Some(Step { stall, begun: None });
+    }
+
+    /// Whether `epoch`, the newest stall's, must not be published yet.
+    pub(crate) fn withholds(&self, epoch: u64) -> bool {
+        self.step.is_some_and(|step| {
+            let forgets = step.stall.recovery() == RecoveryStep::Reset;
+            forgets && step.stall.epoch == epoch && step.begun.is_none()
+        })
+    }
+
+    /// The next action, given the output of the stages at `now`.
+    pub(crate) fn next(&mut self, published: Published, now: Instant) -> Next {
+        let Some(step) = &mut self.step else {
+            return Next::Check;
+        };
+        let (stall, begun) = (step.stall, step.begun);
+        let Some(limit) = &mut self.limit else {
+            self.step = None;
+            return Next::Begin(stall.recovery());
+        };
+        let Some((since, before)) = begun else {
+            if published.tick.is_none_or(|tick| tick < stall.stamp.tick + AHEAD) {
+                return Next::Wait;
+            }
+            step.begun = Some((now, published));
+            return Next::Begin(stall.recovery());
+        };
+        let late = now.saturating_duration_since(since) >= ANSWERED;
+        if !late && !is_answered(&stall, &before, &published) {
+            return Next::Wait;
+        }
+        limit.holds_from_tick = published.tick.map_or(0, |tick| tick + 1);
+        limit.epoch = stall.epoch;
+        self.step = None;
+        Next::Check
+    }
+}
+
+/// Whether the stages have answered the recovery step of `stall`.
+fn is_answered(stall: &StallSample, before: &Published, now: &Published) -> bool {
+    let commanded = now.commands > before.commands;
+    match stall.recovery() {
+        // There is no pose to guide before the next tick, so a new planner has answered once it has a field.
+        RecoveryStep::Replan => {
+            now.planner.0 > before.planner.0 && now.planner.1 >= stall.stamp.tick + AHEAD
+        }
+        RecoveryStep::Reset => {
+            let guided = commanded && now.epoch >= stall.epoch;
+            now.grid_epoch >= stall.epoch && (guided || !now.grid_changed)
+        }
+        RecoveryStep::GiveUp => true,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use common::samples::Stamp;
+
+    use super::*;
+
+    fn stall(recovery: RecoveryStep) -> StallSample {
+        StallSample {
+            stamp: Stamp { tick: 10, ..Stamp::default() },
+            epoch: 1,
+            recovery: recovery.into(),
+            ..StallSample::default()
+        }
+    }
+
+    #[test]
+    fn a_recovery_step_begins_after_a_determined_tick_and_holds_from_the_next_once_it_was_answered()
+    {
+        let now = Instant::now();
+        let at_rest =
+            Published { tick: Some(14), commands: 15, planner: (1, 14), ..Published::default() };
+        let replanned = Published { planner: (2, 14), ..at_rest };
+        let reset = Published { grid_epoch: 1, grid_changed: true, ..at_rest };
+        let steered = Published { commands: 16, epoch: 1, ..reset };
+        let unchanged = Published { grid_changed: false, ..reset };
+        use RecoveryStep::{Replan, Reset};
+        #[rustfmt::skip]
+        let rows = [
+            (Replan, at_rest, false), (Replan, Published { planner: (2, 0), ..at_rest }, false), (Replan, replanned, true),
+            (Reset, at_rest, false), (Reset, reset, false), (Reset, steered, true), (Reset, unchanged, true),
+        ];
+        for (recovery, published, answered) in rows {
+            let mut lockstep = RecoverySteps::new(Some(0));
+            assert_eq!(lockstep.limit().unwrap().last_tick, 4);
+            lockstep.on_stall(stall(recovery));
+            assert_eq!(lockstep.limit().unwrap().last_tick, 14);
+            assert_eq!(lockstep.withholds(1), recovery == Reset);
+            let early = Published { tick: Some(13), ..at_rest };
+            assert_eq!(lockstep.next(early, now), Next::Wait);
+            assert_eq!(lockstep.next(at_rest, now), Next::Begin(recovery));
+            assert!(!lockstep.withholds(1));
+            let next = if answered { Next::Check } else { Next::Wait };
+            assert_eq!(lockstep.next(published, now), next, "{recovery:?} {published:?}");
+            assert_eq!(lockstep.next(published, now + ANSWERED), Next::Check);
+            let TickLimitSample { holds_from_tick, epoch, .. } = lockstep.limit().unwrap();
+            assert_eq!((holds_from_tick, epoch), (15, 1));
+        }
+    }
+
+    #[test]
+    fn in_wall_clock_time_a_recovery_step_begins_at_once_and_nothing_waits_for_its_answer() {
+        let mut steps = RecoverySteps::new(None);
+        let (now, published) = (Instant::now(), Published::default());
+        steps.on_stall(stall(RecoveryStep::Reset));
+        assert_eq!(steps.next(published, now), Next::Begin(RecoveryStep::Reset));
+        assert!(!steps.withholds(1));
+        assert_eq!((steps.next(published, now), steps.limit()), (Next::Check, None));
+    }
+}

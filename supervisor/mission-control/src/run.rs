@@ -1,0 +1,142 @@
+//! A run from start to end: the domain locked, the stages started, the mission driven, everything stopped.
+
+use std::collections::BTreeMap;
+
+use common::{
+    domain::Domain,
+    ground_truth::GroundTruthTick,
+    samples::Cause,
+    signals::{SIGHUP, SIGINT, SIGTERM, Signals},
+};
+use processes::{
+    domain::DomainLock,
+    last_resort::{self, Turns},
+};
+
+use crate::{
+    decisive::{self, Timeout},
+    error::{SupervisorError, system},
+    observer::{Listener, Record},
+    outcome::{Ending, Wheels, allowed_m},
+    progress::Progress,
+    shutdown,
+    supervisor::{Options, Supervisor},
+    target_list::{self, TargetResult},
+};
+
+pub struct Finished {
+    pub ending: Ending,
+    /// The last complete tick before the deciding event; none if no tick decided. Later ticks do not count, because their number
+    /// depends on how fast the stop was.
+    pub last_tick: Option<u64>,
+    /// The time from the first motion order to the end, seconds of the robot's clock. For a run that was resumed in wall-clock time it
+    /// begins at the start of the run.
+    pub duration_s: f64,
+    pub record: Record,
+    /// The ground truth of a simulated robot until that tick.
+    pub truth: Vec<GroundTruthTick>,
+    pub drove: bool,
+    pub restarts: BTreeMap<&'static str, u32>,
+    pub resumes: u32,
+    /// Generations of the planner started because the robot stalled.
+    pub replans: u32,
+    pub resets: u64,
+    /// All targets, in the order in which the robot was sent to them.
+    pub targets: Vec<TargetResult>,
+}
+
+/// A robot that could not be stopped. Its link goes on ordering it to stand, by each method of the protocol in turn.
+pub struct StillMoving<'a> {
+    supervisor: Supervisor<'a>,
+    signals: Signals,
+    _lock: DomainLock,
+}
+
+impl StillMoving<'_> {
+    /// Wait until the robot rests or a signal tells this process to leave it. Returns whether the robot rests.
+    pub fn watch(mut self) -> Result<bool, SupervisorError> {
+        let supervisor = &mut self.supervisor;
+        let at_rest = loop {
+            shutdown::turn(supervisor)?;
+            if shutdown::wheels(supervisor) == Wheels::AtRest {
+                break true;
+            }
+            if self.signals.came() {
+                break false;
+            }
+            supervisor.wait()?;
+        };
+        shutdown::finish(supervisor)?;
+        Ok(at_rest)
+    }
+}
+
+/// Carry out a run. `attach` is called once, when the robot's bus exists and no stage has started: consumers that start
+/// there miss no sample. `listener` hears the samples that the run reads, and `show` is called a few times a second.
+pub fn run<'a>(
+    options: &'a Options,
+    attach: &mut dyn FnMut(),
+    listener: Listener,
+    show: &mut dyn FnMut(&Progress<'_>),
+) -> Result<(Finished, Option<StillMoving<'a>>), SupervisorError> {
+    let mut signals =
+        Signals::catch(&[SIGINT, SIGTERM, SIGHUP]).map_err(system("catch signals"))?;
+    let turns = Turns::default();
+    let heard = Signals::catch(&[SIGINT, SIGTERM, SIGHUP]).map_err(system("catch signals"))?;
+    last_resort::watch(heard, turns.clone());
+    let domain = Domain::of(options.robot.clone());
+    let mut lock = DomainLock::acquire(domain, options.mission.grid_frame().area())?;
+    let mut supervisor = Supervisor::start(options, &lock, turns.clone(), attach, listener)?;
+    let ending = loop {
+        match supervisor.drive(&mut signals, show) {
+            Ok(Some(ending)) => break Ok(ending),
+            Ok(None) => supervisor = shutdown::recreate_bus(supervisor, &mut lock)?,
+            Err(error) => break Err(error),
+        }
+    };
+    // The robot is stopped first after an error, too, and then the stages in order.
+    let given_up = Some(Cause::OdometryGivenUp.name());
+    let trusts_encoders = ending.as_ref().map_or(true, |ending| ending.cause != given_up);
+    let stopped = shutdown::stop(&mut supervisor, trusts_encoders);
+    turns.end();
+    let ending = ending?;
+    let wheels = stopped?;
+    let end_by_stall = supervisor.end_by_stall();
+    let deadline = supervisor.deadline();
+    let simulator = supervisor.robot.simulator.as_ref();
+    let mut truth = simulator.map_or_else(Vec::new, |simulator| simulator.truth().to_vec());
+    let mut record = std::mem::take(&mut supervisor.bus.observer.record);
+    let mut targets = supervisor.targets.clone();
+    targets.compare(&record, &truth, allowed_m(&options.mission));
+    record.arrival.take_if(|_| !targets.is_last());
+    let decided = decisive::first(
+        ending,
+        &record,
+        &truth,
+        Timeout { deadline, by_robot: supervisor.clock.in_ticks() },
+        end_by_stall,
+    );
+    let (replans, resets) = supervisor.stall_watch.recoveries(decided.last_tick);
+    truth.truncate(decided.truth_ticks);
+    let (ended, at_rest) = (truth.last(), record.pose.as_ref());
+    let place = targets.current().position();
+    let ending = decided.ending.checked(&options.mission, place, ended, at_rest);
+    let targets = targets.results(&ending, decided.last_tick, record.arrival.as_ref(), ended);
+    let ending = target_list::of_all(ending, &targets);
+    let finished = Finished {
+        duration_s: supervisor.clock.duration_s(decided.last_tick, &record, &truth),
+        ending: ending.with(wheels),
+        last_tick: decided.last_tick,
+        record,
+        truth,
+        drove: supervisor.drove,
+        restarts: supervisor.stages.restarts().collect(),
+        resumes: supervisor.state_file.state.resumes,
+        replans,
+        resets,
+        targets,
+    };
+    let still_moving =
+        (wheels == Wheels::Turning).then_some(StillMoving { supervisor, signals, _lock: lock });
+    Ok((finished, still_moving))
+}

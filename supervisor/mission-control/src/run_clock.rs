@@ -1,0 +1,113 @@
+//! Mission time of a run, and the first tick that did not happen yet.
+
+use common::{
+    clock::{MissionClock, MissionTime, Pace, monotonic_ns},
+    ground_truth::GroundTruthTick,
+    mission::{Protocol, RobotConfig},
+    samples::PoseSample,
+};
+
+use crate::{observer::Record, recovery::RecoveredRun};
+
+/// The clock of a run, from the start of this supervisor on.
+pub(crate) struct RunClock {
+    pub clock: MissionClock,
+    /// The first tick that no earlier supervisor has seen.
+    first_tick: u64,
+    start: MissionTime,
+}
+
+impl RunClock {
+    pub(crate) fn recovered(run: &RecoveredRun) -> Self {
+        Self { clock: run.clock(), first_tick: run.first_tick, start: run.time }
+    }
+
+    /// The clock of a new run. Another pace than the wall clock's is possible only for a `simulated` robot, and for one that speaks ROS 2,
+    /// which may be simulated elsewhere.
+    pub(crate) fn begin(pace: Pace, robot: &RobotConfig, simulated: bool) -> Self {
+        let has_pace = simulated || robot.protocol() == Protocol::Ros2;
+        let clock = match pace {
+            Pace::Max if simulated => {
+                MissionClock::Ticks { period_ns: (1e9 / robot.rate_hz) as u64 }
+            }
+            _ => MissionClock::Wall {
+                epoch_ns: monotonic_ns(),
+                rate: match pace {
+                    Pace::Rate(rate) if has_pace => rate,
+                    _ => 1.0,
+                },
+            },
+        };
+        Self { clock, first_tick: 0, start: MissionTime::default() }
+    }
+
+    /// Whether mission time advances with ticks, not with the wall clock.
+    pub(crate) const fn in_ticks(&self) -> bool {
+        matches!(self.clock, MissionClock::Ticks { .. })
+    }
+
+    /// The tick that a new generation of a stage starts from: the one after `newest`, the newest tick of any sample.
+    pub(crate) fn first_tick(&self, newest: Option<u64>) -> u64 {
+        // The link publishes tick 0 before its first tick.
+        newest.map_or(0, |tick| tick + 1).max(self.first_tick)
+    }
+
+    pub(crate) fn pose_time(&self, pose: Option<&PoseSample>) -> MissionTime {
+        pose.map_or(self.start, |pose| pose.stamp.time())
+    }
+
+    /// Seconds from the first motion order until `last_tick`, or the newest tick. In lockstep the ground `truth` gives this time: the
+    /// simulated robot's time begins with the order, and also passes while the link receives no frames.
+    pub(crate) fn duration_s(
+        &self,
+        last_tick: Option<u64>,
+        record: &Record,
+        truth: &[GroundTruthTick],
+    ) -> f64 {
+        if let (true, Some(last)) = (self.in_ticks(), truth.last()) {
+            return last.time_s;
+        }
+        let pose_at = |tick| record.pose_at(tick).map(|pose| pose.stamp.time());
+        // The first command follows from tick 0.
+        let first = record.poses.first().filter(|pose| pose.stamp.tick == 0);
+        let first = first.map_or(MissionTime::default(), |pose| pose.stamp.time());
+        let last = last_tick.or(record.newest_tick()).and_then(pose_at);
+        last.map_or(0.0, |last| last.since(first).as_secs_f64())
+    }
+
+    /// Mission time now, where `truth` is the newest ground truth of a simulated robot.
+    pub(crate) fn now(
+        &self,
+        pose: Option<&PoseSample>,
+        truth: Option<&GroundTruthTick>,
+    ) -> MissionTime {
+        match self.clock {
+            MissionClock::Ticks { .. } => truth.map_or_else(
+                || self.pose_time(pose),
+                |truth| MissionTime::from_seconds(truth.time_s),
+            ),
+            // Wall-clock time passes also without a robot or a pose.
+            MissionClock::Wall { .. } => self.clock.at(0, monotonic_ns()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_robot_that_may_be_simulated_elsewhere_has_the_pace_that_is_given_and_others_that_of_the_wall()
+     {
+        let rate = |protocol, pace| {
+            let robot = RobotConfig { protocol: Some(protocol), ..RobotConfig::default() };
+            match RunClock::begin(pace, &robot, false).clock {
+                MissionClock::Wall { rate, .. } => rate,
+                MissionClock::Ticks { .. } => panic!("lockstep with a real robot"),
+            }
+        };
+        assert_eq!(rate(Protocol::Ros2, Pace::Rate(0.5)), 0.5);
+        assert_eq!(rate(Protocol::Ros2, Pace::Max), 1.0);
+        assert_eq!(rate(Protocol::Json, Pace::Rate(0.5)), 1.0);
+    }
+}

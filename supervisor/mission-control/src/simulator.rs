@@ -1,0 +1,178 @@
+//! The simulated robot as a child process, and the ground truth that it writes to its standard output.
+
+use std::{
+    fs::{self, File},
+    io::{self, Read, Write as _},
+    net::SocketAddr,
+    os::fd::{AsFd, BorrowedFd},
+    path::Path,
+    process::{ChildStdout, Stdio},
+    time::{Duration, Instant},
+};
+
+use common::{
+    clock::Pace,
+    ground_truth::{GROUND_TRUTH, GroundTruthHeader, GroundTruthTick},
+    mission::Mission,
+    poll, run,
+};
+use processes::process::{Process, firsthand};
+use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
+use thiserror::Error;
+
+use crate::long_record;
+
+const STARTUP: Duration = Duration::from_secs(5);
+const STOP_GRACE: Duration = Duration::from_millis(300);
+/// The greatest length of a line of ground truth, which has under 300 bytes; a longer one is an error.
+const LONGEST_LINE: usize = 64 * 1024;
+
+#[derive(Debug, Error)]
+pub enum SimulatorError {
+    #[error("cannot {action} the simulated robot: {source}")]
+    System { action: String, source: io::Error },
+    #[error("the simulated robot did not start: {0}")]
+    Startup(String),
+}
+
+fn system(action: impl Into<String>) -> impl FnOnce(io::Error) -> SimulatorError {
+    let action = action.into();
+    move |source| SimulatorError::System { action, source }
+}
+
+pub struct Simulator {
+    process: Process,
+    truth: GroundTruth,
+    address: SocketAddr,
+}
+
+struct GroundTruth {
+    pipe: ChildStdout,
+    /// The file of the lines of ticks, for simulated sources of fixes; none once it cannot be written.
+    file: Option<File>,
+    unfinished: Vec<u8>,
+    listening: Option<SocketAddr>,
+    ticks: Vec<GroundTruthTick>,
+}
+
+impl Simulator {
+    /// Start a simulator in the world of `mission`, overrides included, and wait until it listens. Its files are in
+    /// `directory`; it goes on from the checkpoint of an earlier one there.
+    pub fn start(directory: &Path, mission: &Mission, pace: Pace) -> Result<Self, SimulatorError> {
+        let text = toml::to_string(mission)
+            .map_err(|error| system("write the mission of")(io::Error::other(error)))?;
+        let file = directory.join("mission.toml");
+        fs::write(&file, text).map_err(system(format!("write {} for", file.display())))?;
+        let log_path = directory.join("x80-sim.log");
+        let log = File::options().create(true).append(true).open(&log_path);
+        let log = log.map_err(system(format!("write {} for", log_path.display())))?;
+        let checkpoint = run::checkpoint_file(directory, "x80-sim");
+        let mission = file.to_str().ok_or_else(|| {
+            SimulatorError::Startup("the run directory's name is not UTF-8".into())
+        })?;
+        let mut command = firsthand(&[
+            "sim",
+            mission,
+            "--pace",
+            &pace.to_string(),
+            "--ground-truth",
+            "--supervisor",
+            &std::process::id().to_string(),
+        ]);
+        command.arg("--keep").arg(checkpoint);
+        command.stdout(Stdio::piped()).stderr(log);
+        let mut process = Process::spawn(command).map_err(system("start"))?;
+        let pipe = process
+            .take_stdout()
+            .ok_or_else(|| SimulatorError::Startup("it has no output".into()))?;
+        let flags = fcntl_getfl(&pipe).map_err(|errno| system("listen to")(errno.into()))?;
+        fcntl_setfl(&pipe, flags | OFlags::NONBLOCK)
+            .map_err(|errno| system("listen to")(errno.into()))?;
+        let file = File::options().create(true).append(true).open(directory.join(GROUND_TRUTH));
+        let mut truth = GroundTruth {
+            pipe,
+            file: file.ok(),
+            unfinished: Vec::new(),
+            listening: None,
+            ticks: Vec::new(),
+        };
+        let began = Instant::now();
+        loop {
+            truth.take()?;
+            if let Some(address) = truth.listening {
+                return Ok(Self { process, truth, address });
+            }
+            if process.try_reap().map_err(system("watch"))?.is_some() || began.elapsed() > STARTUP {
+                let words = fs::read_to_string(&log_path).unwrap_or_default();
+                return Err(SimulatorError::Startup(words.trim().to_owned()));
+            }
+            let descriptors = [truth.pipe.as_fd(), process.as_fd()];
+            poll::readable(&descriptors, Some(STARTUP)).map_err(system("wait for"))?;
+        }
+    }
+
+    pub const fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// A descriptor that is readable when the process ended. Ground truth wakes nobody: it is read when the tick ends.
+    pub fn descriptor(&self) -> BorrowedFd<'_> {
+        self.process.as_fd()
+    }
+
+    /// Read the output of the simulator. Returns whether it still runs.
+    pub fn poll(&mut self) -> Result<bool, SimulatorError> {
+        self.truth.take()?;
+        Ok(self.process.try_reap().map_err(system("watch"))?.is_none())
+    }
+
+    pub fn truth(&self) -> &[GroundTruthTick] {
+        &self.truth.ticks
+    }
+
+    /// End the simulator. The ground truth stays.
+    pub fn stop(&mut self) -> Result<(), SimulatorError> {
+        self.process.end(STOP_GRACE);
+        self.truth.take()
+    }
+}
+
+impl GroundTruth {
+    fn take(&mut self) -> Result<(), SimulatorError> {
+        let mut bytes = [0; 16 * 1024];
+        loop {
+            match self.pipe.read(&mut bytes) {
+                Ok(0) => return Ok(()),
+                Ok(length) => self.unfinished.extend_from_slice(&bytes[..length]),
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(()),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(system("listen to")(error)),
+            }
+            self.take_lines()?;
+        }
+    }
+
+    fn take_lines(&mut self) -> Result<(), SimulatorError> {
+        let Some(end) = self.unfinished.iter().rposition(|&byte| byte == b'\n') else {
+            if self.unfinished.len() > LONGEST_LINE {
+                return Err(SimulatorError::Startup("it writes a line without end".into()));
+            }
+            return Ok(());
+        };
+        let rest = self.unfinished.split_off(end + 1);
+        if self.listening.is_some() {
+            // The file only reports, so the mission goes on without it.
+            self.file.take_if(|file| file.write_all(&self.unfinished).is_err());
+        }
+        for line in self.unfinished.split(|&byte| byte == b'\n') {
+            if self.listening.is_none() {
+                let header = serde_json::from_slice::<GroundTruthHeader>(line).ok();
+                self.listening = header.and_then(|header| header.listening.parse().ok());
+            } else if let Ok(tick) = serde_json::from_slice(line) {
+                long_record::push(&mut self.ticks, tick);
+            }
+        }
+        self.unfinished = rest;
+        Ok(())
+    }
+}

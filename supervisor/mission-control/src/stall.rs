@@ -1,0 +1,418 @@
+//! Whether the robot stalls, and which recovery step comes next. Pure.
+//!
+//! The paper's rule: if a robot should move and does not, the planner is at fault. Recovery steps, in order: replan from
+//! the same map; reset the sensed map and replan; give up.
+//!
+//! | cause | sign | first step |
+//! |---|---|---|
+//! | still | it neither drives nor turns | replan |
+//! | pinned | it drives or turns, and stays at its place | replan |
+//! | inside hazard | it stands in a hazard, and has driven far without leaving it | reset |
+//! | held | something holds its wheels: its motors push and its encoders stand | replan |
+//! | wandering | it has driven several times as far as its target was away; with a laser, on ground where it had been | reset |
+//! | relocated | fixes say that it is elsewhere, so the map is of another place; no limit | reset |
+//! | cut off | no way leads from its place to the target, and it has looked around | reset |
+
+use std::{collections::HashSet, f64::consts::TAU, time::Duration};
+
+use common::{
+    clock::MissionTime,
+    mission::{Body, Method, Mission, SensorKind},
+    samples::{GuidanceSample, GuidanceStatus, PoseSample, RecoveryStep, StallCause, StallSample},
+};
+use glam::{DVec2, IVec2};
+
+/// Mission time without motion that is a stall. The slowest turn on the spot begins earlier.
+const STALLED_AFTER: Duration = Duration::from_secs(3);
+/// Mission time without a way to the target that is a stall. A false echo is gone earlier.
+const CUT_OFF_AFTER: Duration = Duration::from_secs(1);
+/// Mission time for which the robot may stand while the planner computes a field. The largest field takes several seconds,
+/// and a new planner would begin again.
+const FIELD_WITHIN: Duration = Duration::from_secs(60);
+/// Turns on the spot that a robot makes first when it is cut off, with the evidential method, at half the ordered speed.
+const SCAN_TURNS: f64 = 1.2;
+/// Turns at one place, at the slower of the robot's two rates, beyond which it makes no progress.
+const TURNS_AT_A_PLACE: f64 = 2.0;
+/// The distance within which poses count as the same place, metres. For a slow robot it is less.
+const PLACE_M: f64 = 0.2;
+/// The radii of a circle around its target at which the place of a circling robot ends.
+const CIRCLES: f64 = 1.2;
+/// The distance below which a robot counts as standing, metres. For a slow robot it is less.
+const MOVED_M: f64 = 0.02;
+/// The turn below which a robot counts as not turning, radians. For a slow robot it is less.
+const TURNED_RAD: f64 = 0.1;
+/// Share of the motion at full speed that counts as motion: near its target a robot crawls.
+const SHARE: f64 = 0.05;
+/// Distance that leads out of any margin, even of several overlapping ones, metres.
+const WAY_OUT_M: f64 = 1.0;
+/// The distance within which contacts are at the same place, metres: a robot that turns about a blocked wheel stays within it.
+const HELD_WITHIN_M: f64 = 0.5;
+/// The multiple of the distance to its target after which a robot wanders, once it has driven [`WANDERS_LEAST_M`]. The way around a
+/// trap is two to three times as long.
+const WANDERS: f64 = 3.0;
+/// The least distance after which a robot wanders, metres.
+const WANDERS_LEAST_M: f64 = 12.0;
+/// The side of a square in which a robot was, metres. The map of a laser is to be trusted, and the way through a large building may be
+/// many times as long as the straight one: each square in which such a robot has not been lets it drive [`WANDERS`] times that farther.
+const SQUARE_M: f64 = 1.0;
+/// The most squares that are remembered.
+const MOST_SQUARES: usize = 10_000;
+/// Replans before the map is reset.
+const MOST_REPLANS: u32 = 2;
+/// Resets of the map before the target is unreachable.
+const MOST_RESETS: u64 = 3;
+
+pub(crate) fn words(cause: StallCause, body: &Body) -> String {
+    let cause = match cause {
+        StallCause::Still => "the robot neither drives nor turns, whatever is planned",
+        StallCause::Pinned => "the robot moves and does not get away, whatever is planned",
+        StallCause::Wandering => {
+            "the robot drives around and does not get nearer, whatever is forgotten"
+        }
+        StallCause::Held => "the wheels are held fast, whatever is planned",
+        StallCause::Relocated => "the robot is elsewhere by fixes that agree",
+        StallCause::InsideHazard => "the belief puts the robot inside hazard, again and again",
+        StallCause::CutOff => "the belief isolates the robot from the target, again and again",
+    };
+    body.ackermann().map_or_else(
+        || cause.to_owned(),
+        |car| {
+            let radius = car.least_turning_radius();
+            format!("{cause}; this car turns in no less than {radius:.2} m and does not reverse: it needs more room")
+        },
+    )
+}
+
+pub(crate) fn log(stall: &StallSample) {
+    let (cause, recovery) = (stall.cause(), stall.recovery());
+    let StallSample { stamp, x_m, y_m, epoch, replans, resets, .. } = stall;
+    tracing::warn!(
+        tick = stamp.tick,
+        x_m,
+        y_m,
+        ?cause,
+        ?recovery,
+        epoch,
+        replans,
+        resets,
+        "the robot stalls"
+    );
+}
+
+#[derive(Debug, Default)]
+pub(crate) struct StallWatch {
+    moved_m: f64,
+    turned_rad: f64,
+    place_m: f64,
+    pinned_after: Duration,
+    cut_off_after: Duration,
+    anchor: Option<Anchor>,
+    place: Option<Place>,
+    cut_off_since: Option<MissionTime>,
+    waits_since: Option<MissionTime>,
+    /// Distance travelled when the robot was first seen in a hazard, metres.
+    inside_hazard_since: Option<f64>,
+    /// Whether long ways are a reason to reset the map. The paper's method has no such rule.
+    forgets: bool,
+    /// The distance travelled at which the robot wanders, metres; none before the first tick, and after a reset.
+    wanders_at: Option<f64>,
+    /// The squares in which a robot with a laser was on the way to its target; none without a laser.
+    been: Option<HashSet<IVec2>>,
+    /// Replans at this place, since the last reset.
+    replans_here: u32,
+    replans: u32,
+    /// The place where the wheels were held, and the replans there since the last reset.
+    held_at: Option<(DVec2, u32)>,
+    epoch: u64,
+    /// Epochs without a reset of their own, and resets because the robot was relocated.
+    skipped: u64,
+    relocated: u64,
+    /// The resets before the robot was sent to its present target, without those of relocations.
+    resets_before: u64,
+    target: Option<u64>,
+    /// The relocations of the newest pose that was checked.
+    relocations: u64,
+    tick: Option<u64>,
+    stalls: Vec<StallSample>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Anchor {
+    time: MissionTime,
+    travelled: f64,
+    heading: f64,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    since: MissionTime,
+    middle: DVec2,
+    /// Least distance to the target there, metres.
+    nearest_m: f64,
+}
+
+impl StallWatch {
+    pub(crate) fn new(mission: &Mission) -> Self {
+        let seconds = STALLED_AFTER.as_secs_f64();
+        let slowest_turn = TAU / mission.turn_rad_s().min(mission.hurry().look_rad_s);
+        let at_a_place = TURNS_AT_A_PLACE * slowest_turn;
+        let car = mission.body().ackermann();
+        // A robot turns on the spot, or as it drives.
+        let on_the_spot = mission.method == Method::Evidential && car.is_none();
+        let tightest = car.map_or(0.0, |car| car.least_turning_radius());
+        let circle = tightest.max(mission.speed_m_s() / mission.turn_rad_s());
+        Self {
+            moved_m: MOVED_M.min(mission.speed_m_s() * seconds * SHARE),
+            turned_rad: TURNED_RAD.min(mission.turn_rad_s() * seconds * SHARE),
+            place_m: if on_the_spot {
+                PLACE_M.min(mission.speed_m_s() * at_a_place * SHARE)
+            } else {
+                CIRCLES * 2.0 * circle
+            },
+            pinned_after: STALLED_AFTER + Duration::from_secs_f64(at_a_place),
+            cut_off_after: if on_the_spot {
+                let turn = SCAN_TURNS * TAU / mission.hurry().look_rad_s;
+                CUT_OFF_AFTER + Duration::from_secs_f64(2.0 * turn)
+            } else {
+                CUT_OFF_AFTER
+            },
+            // A calibration drives to and fro, so its long way is no reason.
+            forgets: mission.method == Method::Evidential && mission.planner.calibration.is_none(),
+            been: (mission.used(SensorKind::Scan) > 0).then(HashSet::new),
+            ..Self::default()
+        }
+    }
+
+    pub(crate) const fn epoch(&self) -> u64 {
+        self.epoch
+    }
+
+    /// Replans and resets in this mission up to `tick`, or in all of it.
+    pub(crate) fn recoveries(&self, tick: Option<u64>) -> (u32, u64) {
+        let Some(tick) = tick else {
+            return (self.replans, self.resets());
+        };
+        let after = self.stalls.iter().find(|stall| stall.stamp.tick > tick);
+        after.map_or((self.replans, self.resets()), |stall| match stall.recovery() {
+            RecoveryStep::Replan => (stall.replans - 1, stall.resets),
+            RecoveryStep::Reset => (stall.replans, stall.resets - 1),
+            RecoveryStep::GiveUp => (stall.replans, stall.resets),
+        })
+    }
+
+    const fn resets(&self) -> u64 {
+        self.epoch - self.skipped
+    }
+
+    pub(crate) fn gave_up(&self) -> Option<&StallSample> {
+        let is_last = |stall: &&StallSample| stall.recovery() == RecoveryStep::GiveUp;
+        self.stalls.iter().find(is_last)
+    }
+
+    pub(crate) const fn tick(&self) -> Option<u64> {
+        self.tick
+    }
+
+    /// Check a tick of a robot that is ordered to drive; each tick once. `held` says that something else holds the robot: the
+    /// link's failsafe, or a stage that is down. `contact` says that something holds its wheels.
+    pub(crate) fn step(
+        &mut self,
+        pose: &PoseSample,
+        guidance: &GuidanceSample,
+        held: bool,
+        contact: bool,
+    ) -> Option<StallSample> {
+        match self.tick.replace(pose.stamp.tick) {
+            Some(tick) if tick == pose.stamp.tick => return None,
+            Some(_) => {}
+            None => self.relocations = pose.relocations,
+        }
+        // The map may be older than this supervisor.
+        self.epoch = self.epoch.max(guidance.epoch);
+        if self
+            .target
+            .replace(guidance.target_number)
+            .is_some_and(|it| it != guidance.target_number)
+        {
+            self.on_new_target(pose.stamp.tick);
+        }
+        if held {
+            self.hold(pose.stamp.tick);
+            return None;
+        }
+        let relocated = self.relocations != pose.relocations;
+        self.relocations = pose.relocations;
+        let cause = if relocated {
+            StallCause::Relocated
+        } else if contact {
+            StallCause::Held
+        } else if self.waits_for_field(pose, guidance) {
+            (self.anchor, self.place) = (None, None);
+            return None;
+        } else {
+            self.without_policy(pose, guidance)
+                .or_else(|| self.without_motion(pose, guidance))
+                .or_else(|| self.without_end(pose, guidance))?
+        };
+        let recovery = if self.may_replan(cause, pose.pose().position) {
+            self.replans += 1;
+            RecoveryStep::Replan
+        } else if relocated || self.resets() - self.relocated - self.resets_before < MOST_RESETS {
+            // In an even epoch the mapper resets the evidence near the robot, too.
+            let skips = u64::from(relocated) * ((self.epoch + 1) % 2);
+            self.relocated += u64::from(relocated);
+            self.skipped += skips;
+            self.epoch += 1 + skips;
+            self.wanders_at = None;
+            self.replans_here = 0;
+            self.held_at = None;
+            RecoveryStep::Reset
+        } else {
+            RecoveryStep::GiveUp
+        };
+        // The recovery step gets as much time as the robot had.
+        let now = pose.stamp.time();
+        if let (Some(anchor), Some(place)) = (&mut self.anchor, &mut self.place) {
+            (anchor.time, place.since) = (now, now);
+        }
+        (self.cut_off_since, self.inside_hazard_since) = (None, None);
+        self.waits_since = None;
+        let stall = StallSample {
+            stamp: pose.stamp,
+            x_m: pose.x_m,
+            y_m: pose.y_m,
+            epoch: self.epoch,
+            replans: self.replans,
+            resets: self.resets(),
+            cause: cause.into(),
+            recovery: recovery.into(),
+        };
+        self.stalls.push(stall);
+        Some(stall)
+    }
+
+    /// Whether a fresh planner is the next step against `cause`; if so, that is counted.
+    fn may_replan(&mut self, cause: StallCause, here: DVec2) -> bool {
+        let replans = match cause {
+            StallCause::Still | StallCause::Pinned => &mut self.replans_here,
+            StallCause::Held => {
+                let elsewhere = |(at, _): &mut (DVec2, u32)| at.distance(here) > HELD_WITHIN_M;
+                self.held_at.take_if(elsewhere);
+                &mut self.held_at.get_or_insert((here, 0)).1
+            }
+            StallCause::InsideHazard
+            | StallCause::CutOff
+            | StallCause::Wandering
+            | StallCause::Relocated => return false,
+        };
+        let may = *replans < MOST_REPLANS;
+        *replans += u32::from(may);
+        may
+    }
+
+    /// Note that the robot is sent elsewhere, so nothing so far is a stall on the way there.
+    fn on_new_target(&mut self, tick: u64) {
+        self.hold(tick);
+        (self.inside_hazard_since, self.wanders_at, self.held_at) = (None, None, None);
+        self.replans_here = 0;
+        self.been.iter_mut().for_each(HashSet::clear);
+        self.resets_before = self.resets() - self.relocated;
+    }
+
+    /// Note that the robot was not ordered to drive until `tick`, so nothing by then is a stall.
+    pub(crate) fn hold(&mut self, tick: u64) {
+        self.tick = Some(tick);
+        self.forget_motion();
+    }
+
+    /// Note that something held the robot until now, perhaps without a tick, so its time at its place begins anew.
+    pub(crate) const fn forget_motion(&mut self) {
+        (self.anchor, self.place) = (None, None);
+        (self.cut_off_since, self.waits_since) = (None, None);
+    }
+
+    /// Whether the robot stands because the planner computes a field, within the time for that.
+    fn waits_for_field(&mut self, pose: &PoseSample, guidance: &GuidanceSample) -> bool {
+        if GuidanceStatus::from_byte(guidance.status) != GuidanceStatus::Waiting {
+            self.waits_since = None;
+            return false;
+        }
+        let now = pose.stamp.time();
+        now.since(*self.waits_since.get_or_insert(now)) < FIELD_WITHIN
+    }
+
+    /// Whether u = 0 at the robot, in the field of the current map, for longer than a robot needs to get away.
+    fn without_policy(
+        &mut self,
+        pose: &PoseSample,
+        guidance: &GuidanceSample,
+    ) -> Option<StallCause> {
+        let (now, travelled) = (pose.stamp.time(), pose.travelled_m);
+        let status = GuidanceStatus::from_byte(guidance.status);
+        let is = |what| status == what && guidance.epoch == self.epoch;
+        if !is(GuidanceStatus::Unreachable) {
+            self.cut_off_since = None;
+        } else if now.since(*self.cut_off_since.get_or_insert(now)) >= self.cut_off_after {
+            return Some(StallCause::CutOff);
+        }
+        if !is(GuidanceStatus::WayOut) {
+            self.inside_hazard_since = None;
+        } else if travelled - *self.inside_hazard_since.get_or_insert(travelled) >= WAY_OUT_M {
+            return Some(StallCause::InsideHazard);
+        }
+        None
+    }
+
+    /// The stall of a robot that has driven for so long, since the start or the last reset, that its map must be wrong.
+    fn without_end(&mut self, pose: &PoseSample, guidance: &GuidanceSample) -> Option<StallCause> {
+        let most_m = (WANDERS * guidance.distance_m).max(WANDERS_LEAST_M);
+        let wanders_at = self.wanders_at.get_or_insert(pose.travelled_m + most_m);
+        let square = (pose.pose().position / SQUARE_M).floor().as_ivec2();
+        let is_new = |been: &mut HashSet<_>| been.len() < MOST_SQUARES && been.insert(square);
+        if self.been.as_mut().is_some_and(is_new) {
+            *wanders_at += WANDERS * SQUARE_M;
+        }
+        (self.forgets && pose.travelled_m >= *wanders_at).then_some(StallCause::Wandering)
+    }
+
+    /// The stall of a robot that has not moved or turned for a while, or moves or turns for longer at one place.
+    fn without_motion(
+        &mut self,
+        pose: &PoseSample,
+        guidance: &GuidanceSample,
+    ) -> Option<StallCause> {
+        let now = pose.stamp.time();
+        let here = Anchor { time: now, travelled: pose.travelled_m, heading: pose.heading_rad };
+        let anchor = *self.anchor.get_or_insert(here);
+        if (here.travelled - anchor.travelled).abs() >= self.moved_m
+            || (here.heading - anchor.heading).abs() >= self.turned_rad
+        {
+            self.anchor = Some(here);
+        }
+        let arrived =
+            Place { since: now, middle: pose.pose().position, nearest_m: guidance.distance_m };
+        let place = *self.place.get_or_insert(arrived);
+        if arrived.middle.distance(place.middle) >= self.place_m {
+            self.place = Some(arrived);
+            self.replans_here = 0;
+        } else if arrived.nearest_m <= place.nearest_m - self.moved_m {
+            // A robot that crawls to its target makes progress, too.
+            self.place = Some(Place { middle: place.middle, ..arrived });
+        }
+        // The planner looks around first, which has a timeout of its own.
+        if GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::Unreachable {
+            return None;
+        }
+        let since = |then: Option<MissionTime>| then.map_or(Duration::ZERO, |then| now.since(then));
+        let still = since(self.anchor.map(|anchor| anchor.time)) >= STALLED_AFTER;
+        let pinned = since(self.place.map(|place| place.since)) >= self.pinned_after;
+        match (still, pinned) {
+            (true, _) => Some(StallCause::Still),
+            (_, true) => Some(StallCause::Pinned),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,126 @@
+//! The part of the loop that looks for stalls, restarts the planner or resets the belief, and ends the mission when no
+//! recovery step is left.
+
+use std::time::Instant;
+
+use common::samples::{Cause, Order, RecoveryStep, StallSample, TickLimitSample};
+use processes::{records, stages};
+
+use crate::{
+    error::SupervisorError,
+    outcome::{Ending, Outcome},
+    recovery_step::Next,
+    stall,
+    supervisor::Supervisor,
+};
+
+impl Supervisor<'_> {
+    /// Look for stalls, and take the next recovery step. The last one ends the mission.
+    pub(crate) fn watch_for_stalls(&mut self) -> Result<Option<Ending>, SupervisorError> {
+        if self.decision.order() != Order::Drive {
+            // In lockstep mission time stands still meanwhile.
+            if !self.clock.in_ticks()
+                && let Some(pose) = &self.bus.observer.record.pose
+            {
+                self.stall_watch.hold(pose.stamp.tick);
+            }
+            return Ok(None);
+        }
+        loop {
+            let published = self.bus.observer.record.published;
+            match self.recovery_steps.next(published, Instant::now()) {
+                Next::Wait => break,
+                Next::Begin(step) => self.carry_out(step)?,
+                Next::Check => match self.next_stall() {
+                    Some(stall) => self.recovery_steps.on_stall(stall),
+                    None => {
+                        if let Some(tick) = published.tick {
+                            self.recovery_steps.on_checked(tick);
+                        }
+                        break;
+                    }
+                },
+            }
+            if let Some(ending) = self.given_up() {
+                return Ok(Some(ending));
+            }
+        }
+        self.publish_tick_limit()?;
+        Ok(None)
+    }
+
+    /// Check the ticks that are not checked yet, up to the next one at which the robot stalls.
+    fn next_stall(&mut self) -> Option<StallSample> {
+        let record = &self.bus.observer.record;
+        let in_ticks = self.clock.in_ticks();
+        // The link stops a robot whose wheels are held, and only the supervisor can free it.
+        let stopped =
+            record.link.is_none_or(|link| link.stopped() && link.cause() != Cause::WheelsHeld);
+        // In lockstep mission time stands still while something holds the robot.
+        let held = !in_ticks && (stopped || !self.stages.all_running());
+        if held {
+            self.stall_watch.forget_motion();
+        }
+        // A tick without its command may be incomplete here.
+        let newest = record.published.tick.filter(|_| in_ticks);
+        // Several ticks may have passed since the last check. Each is checked, so the result does not depend on their number.
+        let mut found = None;
+        for (pose, guidance) in record.ticks_since(self.stall_watch.tick()) {
+            if newest.is_some_and(|newest| pose.stamp.tick > newest) {
+                break;
+            }
+            let contact = record.has_contact(self.stall_watch.tick(), pose.stamp.tick);
+            if let Some(stall) = self.stall_watch.step(pose, guidance, held, contact) {
+                found = Some(stall);
+                break;
+            }
+        }
+        let stall = found?;
+        stall::log(&stall);
+        self.bus.publish_stall(stall);
+        records::append(&self.options.directory, records::STALLS, &stall);
+        Some(stall)
+    }
+
+    fn carry_out(&mut self, step: RecoveryStep) -> Result<(), SupervisorError> {
+        match step {
+            RecoveryStep::Replan => self.stages.replace(stages::PLANNER, self.first_tick()),
+            // The directive carries the new epoch.
+            RecoveryStep::Reset => self.publish_state()?,
+            RecoveryStep::GiveUp => {}
+        }
+        Ok(())
+    }
+
+    fn given_up(&self) -> Option<Ending> {
+        let stall = self.stall_watch.gave_up()?;
+        let words = stall::words(stall.cause(), &self.options.mission.body());
+        let reason = format!("target unreachable: {words}");
+        Some(Ending::failed(Outcome::Unreachable, reason))
+    }
+
+    /// Find out after the run at which tick no recovery step was left, and the mission's ending. In lockstep the number of ticks that were
+    /// checked before the end depends on the machine, so the others are checked now.
+    pub(crate) fn end_by_stall(&mut self) -> Option<(u64, Ending)> {
+        while self.clock.in_ticks()
+            && self.stall_watch.gave_up().is_none()
+            && self.next_stall().is_some()
+        {}
+        let tick = self.stall_watch.gave_up()?.stamp.tick;
+        Some((tick, self.given_up()?))
+    }
+
+    /// Publish the limit of the link, if there is one and it changed.
+    pub(crate) fn publish_tick_limit(&mut self) -> Result<(), SupervisorError> {
+        let target_number = self.targets.number();
+        let limit = self.recovery_steps.limit();
+        let limit = limit.map(|limit| TickLimitSample { target_number, ..limit });
+        if std::mem::replace(&mut self.published_limit, limit) != limit
+            && let Some(limit) = limit
+        {
+            let (tick, time) = self.published_as_of();
+            self.bus.tick_limit.publish(tick, time, limit)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,379 @@
+//! The loop of one robot's supervisor: it reads events, asks the pure functions for decisions, and carries them out.
+
+use std::{os::unix::fs::symlink, path::PathBuf};
+
+use common::{
+    address::Address,
+    clock::{MissionTime, Pace},
+    domain::{Domain, RobotName},
+    mission::Mission,
+    run::Run,
+    samples::{DirectiveSample, HoldReason, Order, RosterHeader, TickLimitSample},
+    signals::Signals,
+    topics,
+};
+use processes::{
+    cleanup::Cleanup,
+    domain::DomainLock,
+    last_resort::Turns,
+    policy::Now,
+    records,
+    service_manager::ServiceManager,
+    stage_processes::{StageProcesses, Starter},
+};
+
+use crate::{
+    bus_endpoints::BusEndpoints,
+    decisive,
+    error::{SupervisorError, system},
+    judge::{self, Arrival, Deadline, StopClock, TickProgress},
+    observer::Listener,
+    order::{self, Decision},
+    outcome::{Ending, Outcome},
+    progress::Progress,
+    recovery::{RecoveredRun, StateFile},
+    recovery_step::RecoverySteps,
+    run_clock::RunClock,
+    simulator::Simulator,
+    stall::StallWatch,
+    target_list::TargetList,
+};
+
+pub struct Options {
+    pub mission: Mission,
+    pub robot: RobotName,
+    /// Speed of mission time. A real robot's is always wall-clock time, unless it speaks ROS 2.
+    pub pace: Pace,
+    /// Directory of logs, checkpoints and results; it must exist.
+    pub directory: PathBuf,
+    pub starter: Starter,
+    /// The run to resume; without one a new run begins.
+    pub recovered: Option<RecoveredRun>,
+}
+
+pub(crate) struct Robot {
+    pub simulator: Option<Simulator>,
+    address: Address,
+}
+
+impl Robot {
+    fn start(options: &Options) -> Result<Self, SupervisorError> {
+        if let Some(address) = &options.mission.robot.address {
+            let address = address.parse::<Address<String>>()?.resolve()?;
+            return Ok(Self { simulator: None, address });
+        }
+        let simulator = Simulator::start(&options.directory, &options.mission, options.pace)?;
+        Ok(Self { address: Address::Udp(simulator.address()), simulator: Some(simulator) })
+    }
+
+    /// Read the ground truth. Returns whether a simulated robot's process still runs.
+    pub(crate) fn poll(&mut self) -> Result<bool, SupervisorError> {
+        match &mut self.simulator {
+            Some(simulator) => Ok(simulator.poll()?),
+            None => Ok(true),
+        }
+    }
+}
+
+pub(crate) struct Supervisor<'a> {
+    pub options: &'a Options,
+    // The fields are dropped in this order: the stages end before the robot.
+    pub stages: StageProcesses,
+    pub robot: Robot,
+    pub bus: BusEndpoints,
+    pub listener: Listener,
+    pub state_file: StateFile,
+    pub clock: RunClock,
+    pub decision: Decision,
+    /// The time when an operator last resumed, nanoseconds of the monotonic clock.
+    pub resumed_ns: u64,
+    pub drove: bool,
+    pub tick_progress: TickProgress,
+    pub targets: TargetList,
+    /// The time when the arrival was first seen.
+    pub arrived: Option<Now>,
+    stop_clock: StopClock,
+    pub stall_watch: StallWatch,
+    pub recovery_steps: RecoverySteps,
+    pub published_limit: Option<TickLimitSample>,
+    cleanup: Cleanup,
+    turns: Turns,
+    pub service: ServiceManager,
+}
+
+impl<'a> Supervisor<'a> {
+    /// Start the robot, write the run file, start the stages.
+    pub(crate) fn start(
+        options: &'a Options,
+        lock: &DomainLock,
+        turns: Turns,
+        attach: &mut dyn FnMut(),
+        listener: Listener,
+    ) -> Result<Self, SupervisorError> {
+        let directory = &options.directory;
+        let mission = &options.mission;
+        let mut state_file = StateFile::open(directory)?;
+        let robot = Robot::start(options)?;
+        let clock = match &options.recovered {
+            Some(run) => {
+                state_file.state.resumes += 1;
+                let (tick, seconds) = (run.first_tick, run.time.seconds());
+                tracing::warn!(tick, seconds, "the run is resumed");
+                RunClock::recovered(run)
+            }
+            None => RunClock::begin(options.pace, &mission.robot, robot.simulator.is_some()),
+        };
+        let run = Run {
+            robot: options.robot.clone(),
+            address: robot.address.clone(),
+            clock: clock.clock,
+            mission: mission.clone(),
+        };
+        run.save(directory)?;
+        let unchecked = clock.in_ticks().then(|| clock.first_tick(None));
+        let targets = state_file.state.targets.take().unwrap_or_else(|| TargetList::of(mission));
+        let mut supervisor = Self {
+            options,
+            stages: StageProcesses::new(directory.clone(), options.starter, mission),
+            robot,
+            bus: BusEndpoints::open(lock)?,
+            listener,
+            state_file,
+            clock,
+            decision: Decision::STARTING,
+            resumed_ns: 0,
+            drove: false,
+            tick_progress: TickProgress::new(Now::ZERO),
+            targets,
+            arrived: None,
+            stop_clock: StopClock::default(),
+            stall_watch: StallWatch::new(mission),
+            recovery_steps: RecoverySteps::new(unchecked),
+            published_limit: None,
+            cleanup: Cleanup::new(),
+            turns,
+            service: ServiceManager::of_environment(),
+        };
+        supervisor.bus.observer.record.target_number = supervisor.targets.number();
+        let link = Domain::of(options.robot.clone()).run_directory();
+        symlink(directory, &link).map_err(system(format!("make {}", link.display())))?;
+        attach();
+        supervisor.publish_state()?;
+        supervisor.stages.start_all(supervisor.first_tick());
+        if options.starter == Starter::External {
+            let link = Domain::of(options.robot.clone()).run_link();
+            symlink(directory, &link).map_err(system(format!("make {}", link.display())))?;
+            // Systemd starts the stages after this notification.
+            supervisor.service.ready();
+        }
+        Ok(supervisor)
+    }
+
+    /// Recreate the bus. No stage may use the old one.
+    pub(crate) fn with_new_bus(self, lock: &mut DomainLock) -> Result<Self, SupervisorError> {
+        let bus = self.bus.recreate(lock)?;
+        Ok(Self { bus, ..self })
+    }
+
+    /// Iterate until the mission ends. Returns none if the bus must be recreated.
+    pub(crate) fn drive(
+        &mut self,
+        signals: &mut Signals,
+        show: &mut dyn FnMut(&Progress<'_>),
+    ) -> Result<Option<Ending>, SupervisorError> {
+        self.bus.waiter.on_readable(&*signals)?;
+        loop {
+            if signals.came() {
+                return Ok(Some(Ending::asked_for(Outcome::Aborted, "stopped by a signal")));
+            }
+            if let Some(ending) = self.iterate()? {
+                return Ok(Some(ending));
+            }
+            if self.stages.is_start_blocked() {
+                return Ok(None);
+            }
+            if self.bus.is_due(topics::RESTATE) {
+                self.publish_state()?;
+                self.show_progress(show);
+            }
+            let any_starting = self.stages.any_starting();
+            self.cleanup.run_if_due(&self.bus.bus, any_starting);
+            self.service.feed();
+            self.wait()?;
+        }
+    }
+
+    fn iterate(&mut self) -> Result<Option<Ending>, SupervisorError> {
+        let roster_changed = self.bus.observer.read_all(&mut self.stages, &mut self.listener)?;
+        let next = self.take_arrival();
+        let first_tick = self.first_tick();
+        let asked = self.take_requests(first_tick)?;
+        let died = self.poll_processes(first_tick)?;
+        let driving = self.decision.order() == Order::Drive;
+        self.stages.check_outputs(driving, first_tick);
+        let simulator_ended = !self.robot.poll()?;
+        if self.decide_order() || roster_changed || died || asked || next {
+            self.publish_state()?;
+        }
+        match self.judge(simulator_ended) {
+            None => self.watch_for_stalls(),
+            ending => Ok(ending),
+        }
+    }
+
+    /// Reap and restart stages; log, publish and record each death once. Returns whether there was one.
+    pub(crate) fn poll_processes(&mut self, first_tick: u64) -> Result<bool, SupervisorError> {
+        let deaths = self.stages.poll(&self.bus.bus, first_tick)?;
+        for death in &deaths {
+            death.log();
+            self.bus.publish_death(death.sample());
+            records::append(&self.options.directory, records::DEATHS, death);
+        }
+        self.cleanup.on_deaths(&deaths, &self.bus.bus);
+        Ok(!deaths.is_empty())
+    }
+
+    /// Decide whether the robot may drive. Returns whether the decision changed.
+    fn decide_order(&mut self) -> bool {
+        let record = &self.bus.observer.record;
+        let decision = order::decide(&order::Snapshot {
+            was_ready: self.decision.ready,
+            all_running: self.stages.all_running(),
+            robot_answers: record.link.is_some_and(|link| link.connected == 1),
+            // A planner of the user need not publish a field.
+            field_known: record.field_known || self.options.mission.planner.executable.is_some(),
+            operator_stop: self.state_file.state.operator_stop,
+            stage_held: !self.stages.held().is_empty(),
+        });
+        if decision.ready && !self.decision.ready {
+            tracing::info!("all stages ready");
+            self.service.ready();
+        }
+        let changed = decision.reason != self.decision.reason;
+        if changed {
+            tracing::info!(reason = ?decision.reason, "order");
+            self.tick_progress = TickProgress::new(self.stages.now());
+        }
+        self.drove |= decision.order() == Order::Drive;
+        self.decision = decision;
+        changed
+    }
+
+    fn judge(&mut self, simulator_ended: bool) -> Option<Ending> {
+        let now = self.stages.now();
+        let record = &self.bus.observer.record;
+        let target = self.targets.current().position();
+        let newest_m = record.pose.map(|pose| target.distance(pose.pose().position));
+        let last = record.arrival.filter(|_| self.targets.is_last());
+        let arrival = last.map(|command| Arrival {
+            distance_m: newest_m.unwrap_or(command.distance_m),
+            since: *self.arrived.get_or_insert(now),
+        });
+        let simulator = self.robot.simulator.as_ref();
+        let truth = simulator.map_or(&[][..], Simulator::truth);
+        let collision = decisive::first_contact(truth);
+        let time = self.clock.now(record.pose.as_ref(), truth.last());
+        let stopped = self.decision.reason == HoldReason::Operator;
+        self.state_file.state.operator_stopped_s += self.stop_clock.passed_s(stopped, time);
+        judge::judge(
+            &judge::Snapshot {
+                arrival,
+                link: record.link.as_ref(),
+                simulated: simulator.is_some(),
+                simulator_ended,
+                collision_m: collision.map(|truth| [truth.x, truth.y]),
+                time,
+                deadline: self.deadline(),
+                in_ticks: self.clock.in_ticks(),
+                progress: self.tick_progress.update(record.newest_tick(), now),
+                was_ready: self.decision.ready,
+                reason: self.decision.reason,
+                held: self.stages.held(),
+                not_started: self.stages.not_started(),
+                robot: &self.options.robot,
+                address: &self.robot.address,
+            },
+            now,
+        )
+    }
+
+    pub(crate) const fn deadline(&self) -> Deadline {
+        Deadline {
+            began_s: self.targets.began_s(),
+            timeout_s: self.options.mission.timeout_s,
+            stopped_s: self.state_file.state.operator_stopped_s,
+        }
+    }
+
+    /// The tick that a new generation of a stage starts from.
+    pub(crate) fn first_tick(&self) -> u64 {
+        self.clock.first_tick(self.bus.observer.record.newest_tick())
+    }
+
+    /// The tick and the time of the supervisor's own samples.
+    pub(crate) fn published_as_of(&self) -> (u64, MissionTime) {
+        // An external stage takes its first tick from this sample, so the tick must be a new one.
+        let tick = self.first_tick().saturating_sub(1);
+        let time = self.clock.pose_time(self.bus.observer.record.pose.as_ref());
+        (tick, time)
+    }
+
+    /// Save the state, then publish the order and the roster. The roster confirms an operator's request, so the state is
+    /// saved before.
+    pub(crate) fn publish_state(&mut self) -> Result<(), SupervisorError> {
+        self.state_file.state.targets = Some(self.targets.clone());
+        if let Err(error) = self.state_file.save() {
+            // Only a supervisor that resumes this run needs the state, so the mission goes on.
+            tracing::error!(%error, "cannot save the state; a supervisor that resumes this run will not know the last requests");
+        }
+        let (tick, time) = self.published_as_of();
+        // A stage that is told to drive already knows the target.
+        self.bus.target.publish(tick, time, self.targets.sample())?;
+        // The limit is published again, before the order that starts the first tick.
+        self.published_limit = None;
+        self.publish_tick_limit()?;
+        let (order, reason) = (self.decision.order(), self.decision.reason);
+        let epoch = self.stall_watch.epoch();
+        let directive = DirectiveSample {
+            order: order.into(),
+            reason: reason.into(),
+            epoch: epoch - u64::from(self.recovery_steps.withholds(epoch)),
+            ..DirectiveSample::default()
+        };
+        let header = RosterHeader {
+            supervisor_pid: std::process::id(),
+            order: order.into(),
+            reason: reason.into(),
+            simulated: self.robot.simulator.is_some().into(),
+            ..RosterHeader::default()
+        };
+        let entries = self.stages.roster();
+        self.bus.publish_state(tick, time, directive, header, &entries)?;
+        Ok(())
+    }
+
+    fn show_progress(&mut self, show: &mut dyn FnMut(&Progress<'_>)) {
+        let progress = Progress {
+            record: &self.bus.observer.record,
+            running: self.stages.running(),
+            driving: self.decision.order() == Order::Drive,
+            straight_m: self.targets.current().position().length(),
+        };
+        show(&progress);
+        self.service.show(|| progress.to_string());
+    }
+
+    pub(crate) fn wait(&mut self) -> Result<(), SupervisorError> {
+        self.turns.count();
+        let mut descriptors = self.stages.descriptors();
+        if let Some(simulator) = &self.robot.simulator {
+            descriptors.push(simulator.descriptor());
+        }
+        let deadlines = [self.stages.time_to_deadline(), self.service.time_to_feed()];
+        let soonest = deadlines.into_iter().flatten().min();
+        let timeout = soonest.map_or(topics::RESTATE, |soonest| soonest.min(topics::RESTATE));
+        self.bus.waiter.wait_also_for(&descriptors, timeout)?;
+        self.stages.on_waited(timeout);
+        Ok(())
+    }
+}

@@ -1,0 +1,331 @@
+//! The targets of a run: the one that the robot is sent to, those after it, and the outcomes of those before. Pure.
+
+use common::{
+    ground_truth::GroundTruthTick,
+    mission::Mission,
+    samples::{
+        CommandSample, HoldReason, MOST_TARGETS, PoseSample, RequestAnswer, TargetPoint,
+        TargetSample,
+    },
+};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    decisive::truth_of,
+    observer::Record,
+    outcome::{Ending, Outcome},
+};
+
+/// The most results that are stored; the oldest are dropped.
+const MOST_RESULTS: usize = 128;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TargetOutcome {
+    Reached,
+    /// The robot reports its arrival, and the ground truth contradicts it.
+    WrongPlace,
+    /// The robot reports its arrival and is not sure of it, as in [`Outcome::ReachedUnsure`].
+    ReachedUnsure,
+    /// An operator named another target before it was reached.
+    Replaced,
+    /// The run ended on the way to the target.
+    Missed,
+    /// The run ended before the robot was sent to it.
+    NotTried,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TargetResult {
+    pub number: u64,
+    pub x_m: f64,
+    pub y_m: f64,
+    pub outcome: TargetOutcome,
+    /// Mission time at which the outcome was known; none for a target that was not tried.
+    pub at_s: Option<f64>,
+    /// The robot's distance from the target by its own pose on arrival.
+    pub distance_m: Option<f64>,
+    /// The distance by the ground truth of a simulated robot.
+    pub truth_m: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Stored {
+    result: TargetResult,
+    /// The tick of the arrival; none if the robot did not arrive.
+    tick: Option<u64>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TargetList {
+    number: u64,
+    current: TargetPoint,
+    /// The first tick in which the current target holds.
+    since_tick: u64,
+    /// Mission time at which the target became the current one, seconds.
+    began_s: f64,
+    ahead: Vec<TargetPoint>,
+    results: Vec<Stored>,
+}
+
+impl TargetList {
+    /// The targets that `mission` begins with.
+    pub(crate) fn of(mission: &Mission) -> Self {
+        let mut points = mission.waypoints().into_iter().map(TargetPoint::from);
+        Self {
+            number: 1,
+            current: points.next().unwrap_or_default(),
+            since_tick: 0,
+            began_s: 0.0,
+            ahead: points.collect(),
+            results: Vec::new(),
+        }
+    }
+
+    pub(crate) const fn number(&self) -> u64 {
+        self.number
+    }
+
+    pub(crate) const fn current(&self) -> &TargetPoint {
+        &self.current
+    }
+
+    pub(crate) const fn began_s(&self) -> f64 {
+        self.began_s
+    }
+
+    pub(crate) const fn is_last(&self) -> bool {
+        self.ahead.is_empty()
+    }
+
+    pub(crate) fn sample(&self) -> TargetSample {
+        let mut sample = TargetSample {
+            number: self.number,
+            last: self.number + self.ahead.len() as u64,
+            since_tick: self.since_tick,
+            target: self.current,
+            ..TargetSample::default()
+        };
+        for (place, point) in sample.ahead.iter_mut().zip(&self.ahead) {
+            *place = *point;
+        }
+        sample
+    }
+
+    /// Append `points`; false if there are too many.
+    pub(crate) fn append(&mut self, points: &[TargetPoint]) -> bool {
+        let fits = self.ahead.len() + points.len() < MOST_TARGETS;
+        if fits {
+            self.ahead.extend_from_slice(points);
+        }
+        fits
+    }
+
+    /// Send the robot to `points` instead, from `since_tick` at `now_s` on. `arrival` is the arrival at the current target, if that
+    /// is reached already.
+    pub(crate) fn replace(
+        &mut self,
+        points: &[TargetPoint],
+        (since_tick, now_s): (u64, f64),
+        arrival: Option<(&CommandSample, bool)>,
+    ) {
+        let skipped = self.ahead.len() as u64;
+        match arrival {
+            Some((command, is_sure)) => self.store_arrival(command, is_sure),
+            None => self.store(Stored {
+                result: TargetResult {
+                    at_s: Some(now_s),
+                    ..self.result_of(0, &self.current, TargetOutcome::Replaced)
+                },
+                tick: None,
+            }),
+        }
+        for (nth, point) in (1..).zip(std::mem::take(&mut self.ahead)) {
+            let result = self.result_of(nth, &point, TargetOutcome::Replaced);
+            self.store(Stored { result, tick: None });
+        }
+        if let Some((first, ahead)) = points.split_first() {
+            self.number += skipped + 1;
+            (self.current, self.ahead) = (*first, ahead.to_vec());
+            (self.since_tick, self.began_s) = (since_tick, now_s);
+        }
+    }
+
+    /// Send the robot, which arrived at the current target by `command` with a pose that was sure or not, to the next, from
+    /// `since_tick` on.
+    pub(crate) fn advance(&mut self, command: &CommandSample, is_sure: bool, since_tick: u64) {
+        if self.ahead.is_empty() {
+            return;
+        }
+        self.store_arrival(command, is_sure);
+        self.current = self.ahead.remove(0);
+        self.number += 1;
+        (self.since_tick, self.began_s) = (since_tick, command.stamp.time().seconds());
+    }
+
+    fn result_of(&self, nth: u64, point: &TargetPoint, outcome: TargetOutcome) -> TargetResult {
+        TargetResult {
+            number: self.number + nth,
+            x_m: point.x_m,
+            y_m: point.y_m,
+            outcome,
+            at_s: None,
+            distance_m: None,
+            truth_m: None,
+        }
+    }
+
+    fn store_arrival(&mut self, command: &CommandSample, is_sure: bool) {
+        let outcome = if is_sure { TargetOutcome::Reached } else { TargetOutcome::ReachedUnsure };
+        let result = TargetResult {
+            at_s: Some(command.stamp.time().seconds()),
+            distance_m: Some(command.distance_m),
+            ..self.result_of(0, &self.current, outcome)
+        };
+        self.store(Stored { result, tick: Some(command.stamp.tick) });
+    }
+
+    fn store(&mut self, stored: Stored) {
+        if self.results.len() == MOST_RESULTS {
+            self.results.remove(0);
+        }
+        self.results.push(stored);
+    }
+
+    /// Complete the results of arrivals by the ground truth as far as that is known. `allowed_m` is the greatest error of an
+    /// arrival.
+    pub(crate) fn compare(&mut self, record: &Record, truth: &[GroundTruthTick], allowed_m: f64) {
+        for Stored { result, tick } in &mut self.results {
+            let Some(tick) = tick.filter(|_| result.truth_m.is_none()) else {
+                continue;
+            };
+            let pose = record.pose_at(tick).filter(|pose| pose.stamp.tick == tick);
+            // The ground truth of a tick that is not over may be missing.
+            let known = truth.last().is_some_and(|last| last.heard_tick() >= tick);
+            if let Some(index) = pose.filter(|_| known).and_then(|pose| truth_of(pose, truth)) {
+                let distance_m = (truth[index].x - result.x_m).hypot(truth[index].y - result.y_m);
+                result.truth_m = Some(distance_m);
+                if distance_m > allowed_m {
+                    result.outcome = TargetOutcome::WrongPlace;
+                }
+            }
+        }
+    }
+
+    /// The results of all targets of a run that ended with `ending` after `last_tick`, at a place by the ground truth.
+    pub(crate) fn results(
+        &self,
+        ending: &Ending,
+        last_tick: Option<u64>,
+        arrival: Option<&CommandSample>,
+        ended: Option<&GroundTruthTick>,
+    ) -> Vec<TargetResult> {
+        let counts = |stored: &Stored| match (stored.tick, last_tick) {
+            (Some(tick), Some(last)) => tick <= last,
+            _ => true,
+        };
+        let mut results: Vec<_> = self.results.iter().map(|stored| stored.result).collect();
+        let over = self.results.iter().position(|stored| !counts(stored));
+        let outcome = match ending.outcome {
+            Outcome::Reached => TargetOutcome::Reached,
+            Outcome::WrongPlace => TargetOutcome::WrongPlace,
+            Outcome::ReachedUnsure => TargetOutcome::ReachedUnsure,
+            _ => TargetOutcome::Missed,
+        };
+        let mut current = self.result_of(0, &self.current, outcome);
+        if let Some(arrival) = arrival.filter(|_| outcome != TargetOutcome::Missed) {
+            current.at_s = Some(arrival.stamp.time().seconds());
+            current.distance_m = Some(arrival.distance_m);
+            current.truth_m =
+                ended.map(|ended| (ended.x - current.x_m).hypot(ended.y - current.y_m));
+        }
+        results.push(current);
+        results.extend(
+            (1..)
+                .zip(&self.ahead)
+                .map(|(nth, it)| self.result_of(nth, it, TargetOutcome::NotTried)),
+        );
+        // An event before an arrival may be seen after it.
+        if let Some(over) = over {
+            for (nth, result) in results.iter_mut().enumerate().skip(over) {
+                let outcome =
+                    if nth == over { TargetOutcome::Missed } else { TargetOutcome::NotTried };
+                *result = TargetResult {
+                    outcome,
+                    at_s: None,
+                    distance_m: None,
+                    truth_m: None,
+                    ..*result
+                };
+            }
+        }
+        results
+    }
+}
+
+/// The ending of a run whose last target ended with `ending`: a target before it that was not reached makes it worse.
+pub(crate) fn of_all(ending: Ending, results: &[TargetResult]) -> Ending {
+    if ending.outcome != Outcome::Reached {
+        return ending;
+    }
+    let is = |outcome| results.iter().find(|result| result.outcome == outcome);
+    let worse = is(TargetOutcome::WrongPlace)
+        .map(|result| (result, Outcome::WrongPlace, "was in the wrong place"))
+        .or_else(|| {
+            let unsure = is(TargetOutcome::ReachedUnsure)?;
+            Some((unsure, Outcome::ReachedUnsure, "was not sure"))
+        });
+    match worse {
+        None => ending,
+        Some((result, outcome, words)) => {
+            let reason =
+                format!("{}; the arrival at target {} {words}", ending.reason, result.number);
+            Ending::failed(outcome, reason)
+        }
+    }
+}
+
+/// Whether `pose` is sure enough for an arrival.
+pub(crate) fn is_sure(pose: Option<&PoseSample>, mission: &Mission) -> bool {
+    pose.is_none_or(|pose| pose.is_sure(mission))
+}
+
+/// The reason why the robot is not sent to `points`; none if it is.
+pub(crate) fn refusal(
+    points: Option<&[TargetPoint]>,
+    reason: HoldReason,
+    mission: &Mission,
+    record: &Record,
+) -> Option<RequestAnswer> {
+    match reason {
+        HoldReason::Starting | HoldReason::Ending => return Some(RequestAnswer::NotRunning),
+        HoldReason::Operator => return Some(RequestAnswer::Stopped),
+        HoldReason::None | HoldReason::StageHeld => {}
+    }
+    let Some(points) = points else {
+        return Some(RequestAnswer::Malformed);
+    };
+    if mission.planner.calibration.is_some() {
+        return Some(RequestAnswer::FixedTarget);
+    }
+    let Some(frame) = record.grid.frame() else {
+        return Some(RequestAnswer::NotRunning);
+    };
+    points.iter().find_map(|point| {
+        let place = point.position();
+        if !(place.is_finite() && point.heading_rad.is_finite()) {
+            return Some(RequestAnswer::Malformed);
+        }
+        if point.heading().is_some() && mission.body().steering.is_some() {
+            return Some(RequestAnswer::NoHeading);
+        }
+        let Some(cell) = frame.cell_at(place).filter(|cell| !frame.is_rim(*cell)) else {
+            return Some(RequestAnswer::Outside);
+        };
+        let state = common::grid::CellState::from_byte(record.grid.cells()[frame.index(cell)]);
+        state.is_hazard().then_some(RequestAnswer::InHazard)
+    })
+}
+
+#[cfg(test)]
+mod tests;

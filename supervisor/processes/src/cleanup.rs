@@ -1,0 +1,66 @@
+//! The cleanup of the resources of ended processes on the bus: places on topics, shared memory, files of nodes.
+
+use std::time::{Duration, Instant};
+
+use common::bus::Bus;
+
+use crate::{death::Death, stages};
+
+/// Longest time between cleanups. The end of a consumer is not notified.
+const PERIOD: Duration = Duration::from_secs(1);
+/// Delay after a stage's death: another death often follows within it.
+const DELAY: Duration = Duration::from_millis(50);
+
+pub struct Cleanup {
+    done: Instant,
+    /// Deaths since that time, and the time of the last one.
+    deaths: (usize, Instant),
+    /// Ended processes whose resources are not all freed.
+    pending: Vec<u32>,
+}
+
+impl Cleanup {
+    pub fn new() -> Self {
+        let now = Instant::now();
+        Self { done: now, deaths: (0, now), pending: Vec::new() }
+    }
+
+    /// Note that these stages died. Their successors are started already.
+    pub fn on_deaths(&mut self, deaths: &[Death], bus: &Bus) {
+        if deaths.is_empty() {
+            return;
+        }
+        self.pending.extend(deaths.iter().map(|death| death.pid));
+        self.deaths = (self.deaths.0 + deaths.len(), Instant::now());
+        if deaths.iter().any(Death::was_refused) {
+            // An ended process may still hold the place that the successor needs.
+            self.run(bus);
+        }
+    }
+
+    /// Clean up if that is due. After deaths it is due once no stage is starting, because a starting stage would wait for the
+    /// cleanup, which takes about as long as a start. It is due earlier if so many processes died that places on the bus may run
+    /// out.
+    pub fn run_if_due(&mut self, bus: &Bus, any_starting: bool) {
+        let (deaths, last) = self.deaths;
+        let quiet = deaths > 0 && last.elapsed() >= DELAY && !any_starting;
+        let many = deaths >= stages::TABLE.len();
+        if quiet || many || self.done.elapsed() >= PERIOD {
+            self.run(bus);
+        }
+    }
+
+    /// Free the resources of ended processes. Resources that cannot be freed make the bus slower, not wrong.
+    fn run(&mut self, bus: &Bus) {
+        self.done = Instant::now();
+        self.deaths.0 = 0;
+        match bus.clear_up(&self.pending) {
+            Ok(true) => self.pending.clear(),
+            Ok(false) => {}
+            Err(error) => {
+                let processes = std::mem::take(&mut self.pending);
+                tracing::warn!(%error, ?processes, "cannot free the resources of ended processes on the bus");
+            }
+        }
+    }
+}

@@ -1,0 +1,344 @@
+//! The domain of a robot, its directory and shared memory: locked by one supervisor, wiped, its bus made and held open.
+
+use std::{
+    fs::{self, DirBuilder, File, OpenOptions},
+    io,
+    os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt},
+    path::Path,
+    rc::Rc,
+    time::{Duration, Instant},
+};
+
+use common::{
+    bus::{Bus, Services},
+    domain::{Domain, SHARED_MEMORY},
+    topics,
+};
+
+use crate::{
+    descriptors,
+    domain_error::{DomainError, failed},
+    orphans,
+};
+
+/// Shared memory for the topics of small structs: twice the measured size; and for samples that a frozen recorder
+/// holds: a page or more for each piece of `inputs` of five stages, and grids.
+const SMALL_TOPICS_BYTES: u64 = (16 << 20) + (32 << 20);
+/// Shared memory for a cell of the map: a byte in `grid` and twelve in `field`, in each of the eight samples
+/// that are under way at once.
+const CELL_BYTES: u64 = 8 * 13;
+
+/// The longest time that a killed supervisor holds its lock, even on a loaded machine.
+const LAST_HOLDER_ENDS: Duration = Duration::from_secs(1);
+
+/// A domain locked by this process. Dropping it removes all files of the domain.
+pub struct DomainLock {
+    domain: Domain,
+    // The bus is dropped before the files are removed.
+    bus: Option<(Services, Rc<Bus>)>,
+    // This lock is held while the bus is made and removed, so that no stage joins meanwhile.
+    stages_lock: Option<File>,
+    // This lock keeps consumers from joining while the bus is made and removed, except one that is stuck.
+    joining_lock: Option<File>,
+    cells: usize,
+    _lock: File,
+}
+
+impl DomainLock {
+    /// Lock `domain`, remove the files of an earlier supervisor, create the services for a map of `cells` cells.
+    pub fn acquire(domain: Domain, cells: usize) -> Result<Self, DomainError> {
+        descriptors::raise_limit().map_err(|limit| DomainError::Descriptors { limit })?;
+        let lock = lock(&domain)?;
+        let mut acquired =
+            Self { domain, bus: None, stages_lock: None, joining_lock: None, cells, _lock: lock };
+        // No consumer mistakes the bus of a supervisor that was killed for the new one.
+        remove_file(&acquired.domain.middleware_config())?;
+        remove_run(&acquired.domain)?;
+        acquired.recreate_bus()?;
+        Ok(acquired)
+    }
+
+    /// Make the bus. It replaces an old one, whose endpoints must be closed before.
+    pub fn recreate_bus(&mut self) -> Result<(), DomainError> {
+        self.clear()?;
+        check_shared_memory(SHARED_MEMORY, SMALL_TOPICS_BYTES + CELL_BYTES * self.cells as u64)?;
+        let (bus, services) = Bus::make(&self.domain, "supervisor", topics::TABLE)?;
+        self.bus = Some((services, Rc::new(bus)));
+        (self.stages_lock, self.joining_lock) = (None, None);
+        Ok(())
+    }
+
+    /// Remove the bus. No stage can join until there is one again.
+    fn clear(&mut self) -> Result<(), DomainError> {
+        self.bus = None;
+        if self.stages_lock.is_none() {
+            // External stages may still be stopping, or just starting.
+            self.stages_lock = Some(orphans::wait_for(&self.domain)?);
+        }
+        if self.joining_lock.is_none() {
+            self.joining_lock = Some(orphans::wait_for_consumers(&self.domain)?);
+        }
+        wipe(&self.domain)
+    }
+
+    pub fn bus(&self) -> Option<Rc<Bus>> {
+        self.bus.as_ref().map(|(_, bus)| Rc::clone(bus))
+    }
+}
+
+impl Drop for DomainLock {
+    fn drop(&mut self) {
+        // The lock is removed last, with its directory; a process that waits for the lock then makes its own.
+        let _ = self.clear();
+        let domain = &self.domain;
+        let _ = remove_run(domain);
+        for file in [domain.stages_lock_file(), domain.joining_lock_file(), domain.lock_file()] {
+            let _ = fs::remove_file(file);
+        }
+        let _ = fs::remove_dir(self.domain.directory());
+    }
+}
+
+fn make_directory(domain: &Domain) -> Result<(), DomainError> {
+    let directory = domain.directory();
+    let mut both = directory.parent().into_iter().chain([directory]);
+    both.try_for_each(make_own_directory)
+}
+
+/// Make a directory for its owner only, in a place where another user may have made it before.
+fn make_own_directory(path: &Path) -> Result<(), DomainError> {
+    match DirBuilder::new().mode(0o700).create(path) {
+        Ok(()) => {}
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+        Err(error) => return Err(failed("make", path)(error)),
+    }
+    let found = fs::symlink_metadata(path).map_err(failed("look at", path))?;
+    if !found.is_dir() || found.uid() != rustix::process::geteuid().as_raw() {
+        return Err(DomainError::Foreign { path: path.to_path_buf() });
+    }
+    if found.mode() & 0o077 != 0 {
+        let own = fs::Permissions::from_mode(0o700);
+        fs::set_permissions(path, own).map_err(failed("close to other users", path))?;
+    }
+    Ok(())
+}
+
+/// Lock the domain; the file names the holder, for the error message of another supervisor.
+fn lock(domain: &Domain) -> Result<File, DomainError> {
+    let path = domain.lock_file();
+    let began = Instant::now();
+    loop {
+        make_directory(domain)?;
+        let opened =
+            OpenOptions::new().create(true).truncate(false).read(true).write(true).open(&path);
+        let file = match opened {
+            Ok(file) => file,
+            // The previous holder has just removed the directory.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+            Err(error) => return Err(failed("open", &path)(error)),
+        };
+        // A killed supervisor holds the lock until the kernel has removed the process.
+        let left = LAST_HOLDER_ENDS.saturating_sub(began.elapsed());
+        if !orphans::locked_within(&file, left).map_err(failed("lock", &path))? {
+            let holder = fs::read_to_string(&path).unwrap_or_default();
+            return Err(DomainError::Supervised {
+                robot: domain.robot.to_string(),
+                holder: holder.trim().to_owned(),
+            });
+        }
+        // The previous holder may have removed the file between its opening and its locking here.
+        let (ours, there) = (file.metadata(), fs::metadata(&path));
+        if let (Ok(ours), Ok(there)) = (ours, there)
+            && ours.ino() == there.ino()
+        {
+            fs::write(&path, format!("{}\n", std::process::id()))
+                .map_err(failed("write", &path))?;
+            return Ok(file);
+        }
+    }
+}
+
+fn remove_run(domain: &Domain) -> Result<(), DomainError> {
+    let files = [domain.run_link(), domain.run_directory(), domain.stop_socket()];
+    files.iter().try_for_each(|file| remove_file(file))
+}
+
+/// Remove all files of the middleware in this domain. Files of another user in shared memory are left: a new bus has
+/// random names, so nobody can have taken them.
+fn wipe(domain: &Domain) -> Result<(), DomainError> {
+    // A process cannot join a bus without a configuration.
+    remove_file(&domain.middleware_config())?;
+    let directory = domain.directory();
+    let configs = fs::read_dir(directory).map_err(failed("read", directory))?;
+    for entry in configs.flatten() {
+        let name = entry.file_name();
+        if name.as_encoded_bytes().starts_with(b"iceoryx2") {
+            remove_file(&entry.path())?;
+        }
+    }
+    let prefix = domain.shared_memory_prefix();
+    let shared = Path::new(SHARED_MEMORY);
+    let entries = fs::read_dir(shared).map_err(|error| DomainError::SharedMemory {
+        problem: format!("cannot be read: {error}"),
+        remedy: "mount a tmpfs there",
+    })?;
+    let user = rustix::process::geteuid().as_raw();
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        if !name.as_encoded_bytes().starts_with(prefix.as_bytes()) {
+            continue;
+        }
+        let path = entry.path();
+        // A consumer that leaves at the same time removes its own files.
+        let Ok(found) = entry.metadata() else {
+            continue;
+        };
+        if found.uid() != user {
+            tracing::warn!(file = %path.display(), owner = found.uid(), "a file of another user has a name of this robot; it is left alone");
+        } else if found.is_dir() {
+            remove_root(&path)?;
+        } else {
+            remove_file(&path)?;
+        }
+    }
+    Ok(())
+}
+
+/// Remove the directory of a bus. It is renamed first, because a consumer that is joining would add files meanwhile.
+fn remove_root(root: &Path) -> Result<(), DomainError> {
+    let aside = root.with_extension("old");
+    remove_directory(&aside)?;
+    match fs::rename(root, &aside) {
+        Ok(()) => remove_directory(&aside),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(failed("move", root)(error)),
+    }
+}
+
+/// Remove a file, if it exists: a consumer that leaves the old bus at the same time removes its own.
+fn remove_file(path: &Path) -> Result<(), DomainError> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(failed("remove", path)(error)),
+        _ => Ok(()),
+    }
+}
+
+fn remove_directory(path: &Path) -> Result<(), DomainError> {
+    match fs::remove_dir_all(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(failed("remove", path)(error)),
+        _ => Ok(()),
+    }
+}
+
+/// Check for space first: the use of a segment in a full file system raises SIGBUS.
+fn check_shared_memory(mount: &str, needed: u64) -> Result<(), DomainError> {
+    let space = rustix::fs::statvfs(mount).map_err(|error| DomainError::SharedMemory {
+        problem: format!("cannot be examined: {error}"),
+        remedy: "mount a tmpfs there",
+    })?;
+    let free = space.f_bavail * space.f_frsize;
+    if free < needed {
+        return Err(DomainError::SharedMemory {
+            problem: format!("has {} MiB free of the {} MiB needed", free >> 20, needed >> 20),
+            remedy: "remove what fills it, enlarge it (docker: --shm-size), or lower perimeter.cells",
+        });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{
+        sync::atomic::{AtomicBool, Ordering},
+        thread,
+    };
+
+    use common::bus::BusError;
+
+    use super::*;
+
+    /// The domain of a robot of this process, so that a killed test leaves nothing for the next.
+    fn domain(name: &str) -> Domain {
+        Domain::of(format!("{name}-{}", std::process::id()).parse().unwrap())
+    }
+
+    #[test]
+    fn a_domain_that_could_not_be_acquired_keeps_no_lock() {
+        let domain = domain("no-lock");
+        make_directory(&domain).unwrap();
+        // A directory cannot be removed as the file that should be there.
+        fs::create_dir(domain.middleware_config()).unwrap();
+        let refused = DomainLock::acquire(domain.clone(), 1).err().unwrap();
+        fs::remove_dir(domain.middleware_config()).unwrap();
+        assert!(
+            matches!(&refused, DomainError::File { path, .. } if *path == domain.middleware_config()),
+            "{refused}"
+        );
+        assert!(!domain.lock_file().exists() && !domain.stages_lock_file().exists());
+        fs::remove_dir(domain.directory()).unwrap();
+    }
+
+    #[test]
+    fn a_supervisor_is_known_whatever_other_locks_come_and_go() {
+        let domain = domain("locks");
+        let held = DomainLock::acquire(domain.clone(), 1).unwrap();
+        let files = tempfile::tempdir().unwrap();
+        let over = AtomicBool::new(false);
+        thread::scope(|scope| {
+            for churn in 0..3 {
+                let (over, folder) = (&over, files.path());
+                scope.spawn(move || {
+                    let file = |number| folder.join(format!("{churn}-{number}"));
+                    let files: Vec<_> = (0..60).map(|n| File::create(file(n)).unwrap()).collect();
+                    while !over.load(Ordering::Relaxed) {
+                        files.iter().for_each(|file| file.lock().unwrap());
+                        files.iter().for_each(|file| file.unlock().unwrap());
+                    }
+                });
+            }
+            let (began, mut missed) = (Instant::now(), 0);
+            // The list misses a lock now and then.
+            while began.elapsed() < Duration::from_secs(2) {
+                missed += u32::from(domain.supervisor().unwrap().is_none());
+            }
+            over.store(true, Ordering::Relaxed);
+            assert_eq!(missed, 0);
+        });
+        drop(held);
+        assert_eq!(domain.supervisor().unwrap(), None);
+    }
+
+    #[test]
+    fn a_consumer_that_joins_for_ever_keeps_no_bus() {
+        let domain = domain("joins");
+        let held = DomainLock::acquire(domain.clone(), 1).unwrap();
+        let joining = domain.joining().unwrap();
+        drop(held);
+        assert!(!domain.directory().exists());
+        drop(joining);
+    }
+
+    #[test]
+    fn a_consumer_that_opens_a_topic_of_a_removed_bus_is_refused_and_leaves_nothing() {
+        let domain = domain("late");
+        let held = DomainLock::acquire(domain.clone(), 1).unwrap();
+        let bus = Bus::join(&domain, "late").unwrap();
+        drop(held);
+        assert!(matches!(bus.reader(&topics::POSE), Err(BusError::NotRunning { .. })));
+        drop(bus);
+        let prefix = domain.shared_memory_prefix();
+        let left = fs::read_dir(SHARED_MEMORY).unwrap().flatten();
+        let mut left = left.filter(|it| it.file_name().to_string_lossy().starts_with(&prefix));
+        assert!(left.next().is_none());
+    }
+
+    #[test]
+    fn too_little_or_no_shared_memory_is_an_error_with_the_remedy() {
+        let full = check_shared_memory(SHARED_MEMORY, u64::MAX).unwrap_err();
+        let missing = check_shared_memory("/no/such/mount", 1).unwrap_err();
+        for (error, expected) in [(full, "--shm-size"), (missing, "mount a tmpfs")] {
+            let DomainError::SharedMemory { remedy, .. } = error else { panic!("{error}") };
+            assert!(remedy.contains(expected), "{remedy}");
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! Errors of locking a robot's domain and creating its bus.
+
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
+
+use common::{bus::BusError, domain::SHARED_MEMORY};
+use thiserror::Error;
+
+#[derive(Debug, Error)]
+pub enum DomainError {
+    #[error(
+        "robot {robot:?} is already supervised by process {holder}; stop that first, or give this one another name with --robot"
+    )]
+    Supervised { robot: String, holder: String },
+    /// Stages of an earlier supervisor still run although they were killed.
+    #[error(
+        "robot {robot:?} is held by stages that do not end even when killed: {holders}; give this one another name with --robot, or restart the machine"
+    )]
+    Orphans { robot: String, holders: String },
+    #[error("{SHARED_MEMORY} {problem}; {remedy}")]
+    SharedMemory { problem: String, remedy: &'static str },
+    #[error(
+        "a process may have {limit} descriptors here, and a supervisor needs 256; raise the limit (`ulimit -Hn`, systemd: LimitNOFILE=)"
+    )]
+    Descriptors { limit: u64 },
+    #[error("{path} belongs to another user; remove it, or run as its owner", path = path.display())]
+    Foreign { path: PathBuf },
+    #[error("cannot {action} {path}: {source}; is it writable and not full?", path = path.display())]
+    File { action: &'static str, path: PathBuf, source: io::Error },
+    #[error(transparent)]
+    Bus(#[from] BusError),
+}
+
+pub(crate) fn failed(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> DomainError {
+    let path = path.to_path_buf();
+    move |source| DomainError::File { action, path, source }
+}

@@ -1,0 +1,68 @@
+//! Time in which the supervisor ran. Deadlines of stages count only that: if the whole machine stood still, or this process
+//! was not scheduled, nobody can say that a stage was late.
+
+use std::time::{Duration, Instant};
+
+use crate::policy::Now;
+
+/// The excess over its plan beyond which a wait, or the work between two waits, does not count as observed time. On a machine that is not
+/// overloaded a wait is late by at most a hundredth of this.
+const TOLERANCE: Duration = Duration::from_millis(20);
+
+#[derive(Debug)]
+pub(crate) struct ObservedTime {
+    observed: Now,
+    until: Instant,
+}
+
+impl ObservedTime {
+    pub(crate) const fn new(now: Instant) -> Self {
+        Self { observed: Now::ZERO, until: now }
+    }
+
+    pub(crate) fn at(&self, now: Instant) -> Now {
+        self.observed + self.since(now).min(TOLERANCE)
+    }
+
+    /// Note that a wait ended at `now` which should have taken at most `planned`. If it took longer, it is unknown when the machine stood
+    /// still, so only a little of it counts. Some must count, or a supervisor that is always late would never notice anything.
+    pub(crate) fn on_waited(&mut self, planned: Duration, now: Instant) {
+        let took = self.since(now);
+        self.observed += if took <= planned + TOLERANCE { took } else { TOLERANCE };
+        self.until = now;
+    }
+
+    fn since(&self, now: Instant) -> Duration {
+        now.saturating_duration_since(self.until)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: Duration = Duration::from_millis(1);
+
+    #[test]
+    fn a_wait_counts_as_long_as_it_took() {
+        let began = Instant::now();
+        let mut time = ObservedTime::new(began);
+        for wait in 1..=10 {
+            time.on_waited(200 * MS, began + wait * 50 * MS);
+        }
+        assert_eq!(time.at(began + 500 * MS), 500 * MS);
+    }
+
+    #[test]
+    fn a_stall_of_everything_does_not_count_wherever_it_falls() {
+        let began = Instant::now();
+        let mut time = ObservedTime::new(began);
+        // The work between two waits stalls.
+        assert_eq!(time.at(began + 600 * MS), TOLERANCE);
+        // Several waits stall, so that the stages have no time to beat between them.
+        for stall in 1..=5 {
+            time.on_waited(200 * MS, began + stall * 600 * MS);
+            assert_eq!(time.at(began + stall * 600 * MS), stall * TOLERANCE);
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! A watchdog that checks whether each stage answers its inputs, because a stage may beat and yet publish nothing. Pure.
+//!
+//! A stage must publish an output for each tick that all its inputs have reached. So a stage without input is never late,
+//! and if the pipeline stands still, only the stage that stopped it is blamed: the stages behind it have no input.
+
+use std::time::Duration;
+
+use common::topics::Rate;
+
+use crate::{
+    policy::Now,
+    stages::{Stage, TABLE, find},
+};
+
+pub(crate) struct OutputWatchdog(Vec<StageOutput>);
+
+/// The newest output of one stage, and the time since which its input is unanswered.
+struct StageOutput {
+    stage: &'static Stage,
+    /// Longest time that its input may stay unanswered.
+    patience: Duration,
+    reads: Vec<&'static str>,
+    published: Option<u64>,
+    /// Ticks up to this one belong to an earlier generation.
+    excused: Option<u64>,
+    unanswered_since: Option<Now>,
+}
+
+impl OutputWatchdog {
+    pub(crate) fn new(cells: usize) -> Self {
+        let output = |stage: &'static Stage| StageOutput {
+            stage,
+            patience: stage.deadlines_on(cells).answers,
+            reads: stage
+                .wiring
+                .inputs
+                .iter()
+                .filter(|input| input.spec().rate == Rate::EachTick)
+                .map(|input| input.spec().writer)
+                .filter(|writer| find(writer).is_some())
+                .collect(),
+            published: None,
+            excused: None,
+            unanswered_since: None,
+        };
+        Self(TABLE.iter().map(output).collect())
+    }
+
+    pub(crate) fn on_output(&mut self, stage: &str, tick: u64) {
+        if let Some(output) = self.find(stage)
+            && output.published < Some(tick)
+        {
+            (output.published, output.unanswered_since) = (Some(tick), None);
+        }
+    }
+
+    /// Note that a generation of `stage` starts. Ticks under way belong to an earlier one.
+    pub(crate) fn on_start(&mut self, stage: &str) {
+        let newest = self.0.iter().filter_map(|output| output.published).max();
+        if let Some(output) = self.find(stage) {
+            (output.excused, output.unanswered_since) = (newest, None);
+        }
+    }
+
+    /// Forget unanswered inputs: the robot stands, so ticks may end within the pipeline.
+    pub(crate) fn clear_unanswered(&mut self) {
+        for output in &mut self.0 {
+            output.unanswered_since = None;
+        }
+    }
+
+    /// The first stage, in the order of the pipeline, whose input is unanswered for too long.
+    pub(crate) fn stale(&mut self, now: Now) -> Option<&'static str> {
+        let published: Vec<_> = self.0.iter().map(|it| (it.stage.name, it.published)).collect();
+        let published = |writer: &str| published.iter().find(|(name, _)| *name == writer)?.1;
+        for output in &mut self.0 {
+            let input = output.reads.iter().map(|writer| published(writer)).min();
+            if input.flatten() <= output.published.max(output.excused) {
+                output.unanswered_since = None;
+            } else {
+                output.unanswered_since.get_or_insert(now);
+            }
+        }
+        let stale = |output: &&StageOutput| {
+            let waited = output.unanswered_since.map(|since| now.saturating_sub(since));
+            waited.is_some_and(|waited| waited >= output.patience)
+        };
+        self.0.iter().find(stale).map(|output| output.stage.name)
+    }
+
+    fn find(&mut self, stage: &str) -> Option<&mut StageOutput> {
+        self.0.iter_mut().find(|it| it.stage.name == stage)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MINUTE: Duration = Duration::from_secs(60);
+
+    fn published(outputs: &[(&str, u64)]) -> OutputWatchdog {
+        let mut watchdog = OutputWatchdog::new(0);
+        for &(stage, tick) in outputs {
+            watchdog.on_output(stage, tick);
+        }
+        watchdog
+    }
+
+    /// The stage that is blamed when nothing further is published for a minute.
+    fn blamed(watchdog: &mut OutputWatchdog) -> Option<&'static str> {
+        watchdog.stale(Duration::ZERO).or_else(|| watchdog.stale(MINUTE))
+    }
+
+    #[test]
+    fn the_stage_where_a_tick_ends_is_blamed_and_nobody_behind_it() {
+        let tick = TABLE.iter().map(|stage| (stage.name, 7)).collect::<Vec<_>>();
+        for (until, _) in tick.iter().enumerate().skip(1) {
+            let outputs: Vec<_> = tick
+                .iter()
+                .enumerate()
+                .map(|(index, &(stage, tick))| (stage, tick - u64::from(index >= until)))
+                .collect();
+            assert_eq!(blamed(&mut published(&outputs)), Some(tick[until].0));
+        }
+        assert_eq!(blamed(&mut published(&tick)), None);
+    }
+
+    #[test]
+    fn a_stage_without_input_is_never_blamed() {
+        assert_eq!(blamed(&mut published(&[])), None);
+        // The map has not reached the planner, although the pose has.
+        let mut watchdog = published(&[("dead-reckoning", 9), ("planner", 0), ("controller", 0)]);
+        let blamed = blamed(&mut watchdog);
+        for stage in ["mapper", "planner", "controller"] {
+            assert_ne!(blamed, Some(stage));
+        }
+    }
+
+    #[test]
+    fn a_stage_is_blamed_when_its_time_is_over_and_not_before() {
+        for stage in TABLE.iter().filter(|stage| stage.name != "link") {
+            let mut watchdog = published(&[("link", 1), ("dead-reckoning", 1), ("mapper", 1)]);
+            watchdog.on_output("planner", 1);
+            watchdog.on_output("controller", 1);
+            for reads in OutputWatchdog::new(0).find(stage.name).unwrap().reads.clone() {
+                watchdog.on_output(reads, 2);
+            }
+            assert_eq!(watchdog.stale(MINUTE), None, "{}", stage.name);
+            let early = MINUTE + stage.deadlines.answers - Duration::from_millis(1);
+            assert_ne!(watchdog.stale(early), Some(stage.name));
+            let all_others_answered = TABLE.iter().filter(|other| other.name != stage.name);
+            for other in all_others_answered {
+                watchdog.on_output(other.name, 2);
+            }
+            let late = MINUTE + stage.deadlines.answers;
+            assert_eq!(watchdog.stale(late), Some(stage.name));
+        }
+    }
+
+    #[test]
+    fn a_stage_that_lags_but_answers_is_left_alone() {
+        let mut watchdog = OutputWatchdog::new(0);
+        for tick in 1..100 {
+            for stage in TABLE {
+                let ahead = u64::from(stage.name == "link");
+                watchdog.on_output(stage.name, tick + ahead);
+            }
+            let now = Duration::from_millis(900) * tick as u32;
+            assert_eq!(watchdog.stale(now), None);
+        }
+    }
+
+    #[test]
+    fn a_new_generation_need_not_answer_ticks_from_before_it() {
+        let mut watchdog =
+            published(&TABLE.iter().map(|stage| (stage.name, 6)).collect::<Vec<_>>());
+        watchdog.on_output("link", 7);
+        watchdog.stale(Duration::ZERO);
+        watchdog.on_start("dead-reckoning");
+        assert_eq!(blamed(&mut watchdog), None);
+        watchdog.on_output("link", 8);
+        assert_eq!(blamed(&mut watchdog), Some("dead-reckoning"));
+    }
+
+    #[test]
+    fn time_before_the_robot_drove_is_cleared() {
+        let mut watchdog = published(&[("link", 7)]);
+        watchdog.stale(Duration::ZERO);
+        watchdog.clear_unanswered();
+        assert_eq!(watchdog.stale(MINUTE), None);
+    }
+}

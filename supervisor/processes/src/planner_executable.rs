@@ -1,0 +1,108 @@
+//! Finds the planner that a mission names, before anything starts: an executable, which is checked and made absolute, or another
+//! planner that `firsthand stage NAME` starts.
+
+use std::path::{Path, PathBuf};
+
+use common::mission::Mission;
+use thiserror::Error;
+
+use crate::executable::{self, ExecutableError};
+
+/// The executable that a mission names for its planner cannot be started.
+#[derive(Debug, Error)]
+#[error(
+    "planner.executable {}: {problem}; give {}a path to an executable of a planner, a name on PATH, or leave the key out", named.display(),
+    others.iter().map(|other| format!("`{other}`, ")).collect::<String>()
+)]
+pub struct PlannerExecutableError {
+    named: PathBuf,
+    problem: ExecutableError,
+    others: &'static [&'static str],
+}
+
+/// Make the `planner.executable` of `mission` absolute, if it names one that is none of the `others`.
+///
+/// # Errors
+/// If it cannot be executed.
+pub fn resolve(
+    mission: &mut Mission,
+    others: &'static [&'static str],
+) -> Result<(), PlannerExecutableError> {
+    if let Some(named) = &mut mission.planner.executable {
+        *named = find_planner(named, others)?;
+    }
+    Ok(())
+}
+
+/// The one of `others`, the planners of `firsthand stage NAME`, that is `named`; or the absolute path of that executable.
+///
+/// # Errors
+/// If it cannot be executed.
+pub fn find_planner(
+    named: &Path,
+    others: &'static [&'static str],
+) -> Result<PathBuf, PlannerExecutableError> {
+    // Each was once an executable.
+    let name = named.to_str().map(|named| named.strip_prefix("firsthand-").unwrap_or(named));
+    if let Some(other) = others.iter().find(|other| name == Some(**other)) {
+        return Ok(other.into());
+    }
+    executable::find(named).map_err(|problem| PlannerExecutableError {
+        named: named.to_path_buf(),
+        problem,
+        others,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::{env, fs, os::unix::fs::PermissionsExt as _};
+
+    fn resolved(named: &Path) -> Result<PathBuf, String> {
+        let text = format!("target = [1, 0]\nplanner.executable = {named:?}");
+        let mut mission = Mission::parse(&text, Path::new("test.toml")).unwrap();
+        resolve(&mut mission, &["bug", "wavefront"]).map_err(|error| error.to_string())?;
+        Ok(mission.planner.executable.unwrap())
+    }
+
+    #[test]
+    fn a_path_is_taken_from_the_current_directory_and_a_name_from_path_and_both_are_made_absolute()
+    {
+        let shell = resolved(Path::new("sh")).unwrap();
+        assert!(shell.is_absolute() && shell.ends_with("sh"), "{shell:?}");
+        let here = env::current_dir().unwrap();
+        let up: PathBuf = here.components().skip(1).map(|_| "..").collect();
+        let relative = up.join(shell.strip_prefix("/").unwrap());
+        let found = resolved(&relative).unwrap();
+        assert!(found.is_absolute(), "{found:?}");
+        assert_eq!(fs::canonicalize(found).unwrap(), fs::canonicalize(shell).unwrap());
+    }
+
+    #[test]
+    fn another_planner_of_firsthand_is_found_by_its_name_and_by_that_of_its_former_executable() {
+        for (named, found) in [("bug", "bug"), ("wavefront", "wavefront"), ("firsthand-bug", "bug")]
+        {
+            assert_eq!(resolved(Path::new(named)).unwrap(), Path::new(found));
+        }
+        assert!(resolved(Path::new("./bug")).unwrap_err().contains("`bug`, `wavefront`, a path"));
+    }
+
+    #[test]
+    fn what_cannot_be_executed_is_refused_by_name_with_what_is_wrong() {
+        let folder = tempfile::tempdir().unwrap();
+        let plain = folder.path().join("plain");
+        fs::write(&plain, "").unwrap();
+        fs::set_permissions(&plain, fs::Permissions::from_mode(0o644)).unwrap();
+        for (named, problem) in [
+            (plain.as_path(), "chmod +x"),
+            (folder.path(), "is a directory"),
+            (&folder.path().join("none"), "No such file"),
+            (Path::new("no-such-planner"), "nor on PATH"),
+        ] {
+            let said = resolved(named).unwrap_err();
+            let name = named.to_str().unwrap();
+            assert!(said.contains(name) && said.contains(problem), "{said}");
+        }
+    }
+}

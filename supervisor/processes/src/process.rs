@@ -1,0 +1,216 @@
+//! A process: a child started from this very executable, or an external one that somebody else started; watched
+//! through a pidfd, signalled, and reaped if it is a child.
+
+use std::{
+    ffi::OsStr,
+    fmt, fs, io,
+    os::{
+        fd::{AsFd, BorrowedFd, OwnedFd},
+        unix::process::{CommandExt, ExitStatusExt as _},
+    },
+    path::Path,
+    process::{Child, ChildStdout, Command, ExitStatus, Stdio},
+    time::{Duration, Instant},
+};
+
+use common::{
+    bus::close_all_on_exec,
+    poll,
+    samples::{DeathCause, DeathSample},
+    stage_command,
+    start::Generation,
+};
+use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
+use serde::Serialize;
+
+/// The time within which the kernel ends a killed process, unless the process hangs in the kernel itself.
+const KILLED_WITHIN: Duration = Duration::from_millis(50);
+
+/// This very program, even if its file was replaced by a rebuild meanwhile.
+const OWN: &str = "/proc/self/exe";
+
+/// A `firsthand` subcommand in a process of its own.
+pub fn firsthand(arguments: &[&str]) -> Command {
+    let mut command = child(OWN);
+    command.arg0("firsthand").args(arguments);
+    command
+}
+
+/// A process of the stage of `generation`, a child of this one. A mission may name another `executable` for it.
+pub fn stage(executable: Option<&Path>, generation: &Generation) -> Command {
+    let (program, called) = program_of(executable, generation.stage);
+    let mut command = child(program);
+    if program == Path::new(OWN) {
+        command.arg0("firsthand");
+    }
+    command.args(stage_command::arguments(called, generation, std::process::id()));
+    command
+}
+
+/// The program of `stage`, and the name that it is called there: the mission's `executable`, if that is a path; otherwise this
+/// program, which may have another planner of that name.
+pub fn program_of<'a>(executable: Option<&'a Path>, stage: &'a str) -> (&'a Path, &'a str) {
+    match executable {
+        Some(path) if path.is_absolute() => (path, stage),
+        name => (Path::new(OWN), name.and_then(Path::to_str).unwrap_or(stage)),
+    }
+}
+
+/// A process of `program`, in a process group of its own, so that a terminal's Ctrl-C reaches the supervisor alone, which
+/// stops things in order.
+pub fn child(program: impl AsRef<OsStr>) -> Command {
+    let mut command = Command::new(program);
+    command
+        .process_group(0)
+        // The supervisor's connection to systemd is not for its children.
+        .env_remove("NOTIFY_SOCKET")
+        .env_remove("WATCHDOG_USEC")
+        .env_remove("WATCHDOG_PID")
+        .stdin(Stdio::null());
+    command
+}
+
+#[derive(Debug)]
+pub struct Process {
+    /// The child; none for an external process, which its parent reaps.
+    child: Option<Child>,
+    id: u32,
+    pidfd: OwnedFd,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ExitCause {
+    Exited(i32),
+    Signalled {
+        signal: i32,
+        core: bool,
+    },
+    /// The process was the child of another one, which alone knows the cause.
+    Unknown,
+}
+
+impl From<ExitStatus> for ExitCause {
+    fn from(status: ExitStatus) -> Self {
+        match (status.code(), status.signal()) {
+            (Some(code), _) => Self::Exited(code),
+            (None, signal) => {
+                Self::Signalled { signal: signal.unwrap_or_default(), core: status.core_dumped() }
+            }
+        }
+    }
+}
+
+impl From<&DeathSample> for ExitCause {
+    fn from(death: &DeathSample) -> Self {
+        let signal = death.code;
+        match DeathCause::from_byte(death.cause) {
+            DeathCause::Exited => Self::Exited(death.code),
+            DeathCause::Signalled => Self::Signalled { signal, core: false },
+            DeathCause::SignalledWithCore => Self::Signalled { signal, core: true },
+            DeathCause::Unknown => Self::Unknown,
+        }
+    }
+}
+
+impl fmt::Display for ExitCause {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Exited(code) => write!(to, "exit code {code}"),
+            Self::Unknown => to.write_str("ended; systemctl status says how"),
+            Self::Signalled { signal, core } => {
+                let core = if core { ", core dumped" } else { "" };
+                write!(to, "signal {signal}{core}")
+            }
+        }
+    }
+}
+
+impl Process {
+    /// Start `command`. The process inherits no descriptor but the standard ones.
+    pub fn spawn(mut command: Command) -> io::Result<Self> {
+        close_all_on_exec()?;
+        let mut child = command.spawn()?;
+        match pidfd_open(Pid::from_child(&child), PidfdFlags::empty()) {
+            Ok(pidfd) => Ok(Self { id: child.id(), child: Some(child), pidfd }),
+            Err(error) => {
+                // The process must not run without being watched.
+                let _ = child.kill();
+                let _ = child.wait();
+                Err(error.into())
+            }
+        }
+    }
+
+    /// Watch process `id`, called `name`, which somebody else started and which published a moment ago.
+    pub fn adopt(id: u32, name: &str) -> io::Result<Self> {
+        let pid = i32::try_from(id).ok().and_then(Pid::from_raw);
+        let pid = pid.ok_or(io::ErrorKind::NotFound)?;
+        let pidfd = pidfd_open(pid, PidfdFlags::empty())?;
+        // The process may have ended meanwhile, and its id may belong to another one, which must not be signalled.
+        let called = fs::read_to_string(format!("/proc/{id}/comm"))?;
+        if called.trim_end() != name {
+            return Err(io::ErrorKind::NotFound.into());
+        }
+        Ok(Self { child: None, id, pidfd })
+    }
+
+    pub const fn id(&self) -> u32 {
+        self.id
+    }
+
+    pub fn take_stdout(&mut self) -> Option<ChildStdout> {
+        self.child.as_mut()?.stdout.take()
+    }
+
+    pub fn signal(&self, signal: Signal) {
+        let _ = pidfd_send_signal(&self.pidfd, signal);
+    }
+
+    pub(crate) const fn is_child(&self) -> bool {
+        self.child.is_some()
+    }
+
+    pub fn try_reap(&mut self) -> io::Result<Option<ExitCause>> {
+        let Some(child) = &mut self.child else {
+            let gone = self.wait(Duration::ZERO)?;
+            return Ok(gone.then_some(ExitCause::Unknown));
+        };
+        Ok(child.try_wait()?.map(ExitCause::from))
+    }
+
+    fn wait(&self, patience: Duration) -> io::Result<bool> {
+        poll::is_readable(&self.pidfd, patience)
+    }
+
+    /// Send SIGTERM, and SIGKILL if the process has not ended after `grace`.
+    pub fn end(&mut self, grace: Duration) {
+        self.signal(Signal::TERM);
+        let began = Instant::now();
+        while matches!(self.try_reap(), Ok(None)) {
+            let left = grace.saturating_sub(began.elapsed());
+            if left.is_zero() {
+                self.signal(Signal::KILL);
+            }
+            let _ = self.wait(left.max(KILLED_WITHIN));
+        }
+    }
+}
+
+impl AsFd for Process {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.pidfd.as_fd()
+    }
+}
+
+impl Drop for Process {
+    /// The destructor leaves no child running after an error.
+    fn drop(&mut self) {
+        if let Some(child) = &mut self.child
+            && !matches!(child.try_wait(), Ok(Some(_)))
+        {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}

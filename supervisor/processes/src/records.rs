@@ -1,0 +1,26 @@
+//! Files of records in the run directory, one JSON object a line. A record that cannot be written is a warning in the
+//! log, and the mission goes on.
+
+use std::{
+    fs::File,
+    io::{self, Write as _},
+    path::Path,
+};
+
+use serde::Serialize;
+
+pub const DEATHS: &str = "deaths.jsonl";
+pub const STALLS: &str = "stalls.jsonl";
+
+pub fn append(directory: &Path, name: &str, record: &impl Serialize) {
+    if let Err(error) = append_line(&directory.join(name), record) {
+        tracing::warn!(name, %error, "cannot write a record");
+    }
+}
+
+fn append_line(file: &Path, record: &impl Serialize) -> io::Result<()> {
+    let mut line = serde_json::to_vec(record)?;
+    line.push(b'\n');
+    let mut file = File::options().create(true).append(true).open(file)?;
+    file.write_all(&line)
+}

@@ -1,0 +1,65 @@
+//! Notifications to systemd, if it started this process: ready, status, watchdog, stopping.
+//!
+//! If `NOTIFY_SOCKET` is not set, the functions do nothing.
+
+use std::time::{Duration, Instant};
+
+use sd_notify::NotifyState;
+
+const STATUS_EVERY: Duration = Duration::from_secs(1);
+
+pub struct ServiceManager {
+    /// Time without a notification after which systemd kills the process.
+    watchdog: Option<Duration>,
+    fed: Option<Instant>,
+    shown: Option<Instant>,
+    ready: bool,
+}
+
+impl ServiceManager {
+    pub fn of_environment() -> Self {
+        Self { watchdog: sd_notify::watchdog_enabled(), fed: None, shown: None, ready: false }
+    }
+
+    pub fn ready(&mut self) {
+        if !self.ready {
+            self.ready = true;
+            notify(&[NotifyState::Ready]);
+        }
+    }
+
+    pub fn stopping(&self) {
+        notify(&[NotifyState::Stopping, NotifyState::Status("stopping")]);
+    }
+
+    pub fn show(&mut self, status: impl FnOnce() -> String) {
+        let due = self.shown.is_none_or(|shown| shown.elapsed() >= STATUS_EVERY);
+        if due {
+            self.shown = Some(Instant::now());
+            notify(&[NotifyState::Status(&status())]);
+        }
+    }
+
+    /// Feed the watchdog if that is due. Only the loop may call this, because another thread would feed the watchdog while the
+    /// loop hangs.
+    pub fn feed(&mut self) {
+        if self.time_to_feed().is_some_and(|left| left.is_zero()) {
+            self.fed = Some(Instant::now());
+            notify(&[NotifyState::Watchdog]);
+        }
+    }
+
+    /// Time until the watchdog is to be fed: half of its time limit, as systemd recommends.
+    pub fn time_to_feed(&self) -> Option<Duration> {
+        let every = self.watchdog? / 2;
+        let since = self.fed.map(|fed| fed.elapsed());
+        Some(since.map_or(Duration::ZERO, |since| every.saturating_sub(since)))
+    }
+}
+
+/// A failed notification does not stop the robot.
+fn notify(states: &[NotifyState<'_>]) {
+    if let Err(error) = sd_notify::notify(states) {
+        tracing::debug!(%error, "systemd does not listen");
+    }
+}

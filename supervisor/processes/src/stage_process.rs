@@ -1,0 +1,251 @@
+//! A stage of a run: its policy and the process of its current generation.
+
+use std::{
+    fs::File,
+    io,
+    path::{Path, PathBuf},
+    process::Stdio,
+};
+
+use common::{
+    mission::Mission,
+    run,
+    samples::{HealthSample, HealthState, RosterEntry, StageState, name},
+    start::Generation,
+};
+use rustix::process::Signal;
+use thiserror::Error;
+
+use crate::{
+    death::{Death, Next, log_tail},
+    policy::{Event, Now, Phase, Policy},
+    process::{self, ExitCause, Process},
+    stages::Stage,
+};
+
+#[derive(Debug, Error)]
+#[error("cannot reap stage {stage}: {source}")]
+pub struct StageProcessError {
+    stage: &'static str,
+    source: io::Error,
+}
+
+/// A stage and its current generation. Times are of the owner's clock.
+pub(crate) struct StageProcess {
+    pub stage: &'static Stage,
+    /// The mission's executable for this stage, if it names one.
+    executable: Option<PathBuf>,
+    pub policy: Policy,
+    pub process: Option<Process>,
+    generation: u32,
+    started: Now,
+    beat: Option<Now>,
+    pub output: Option<Now>,
+    log_start: u64,
+    hung: Option<Now>,
+    /// Whether the last beat announced that the process stops on request.
+    pub stopping: bool,
+    /// Whether the iteration before found that the process had ended.
+    found_ended: bool,
+}
+
+impl StageProcess {
+    pub(crate) fn new(stage: &'static Stage, mission: &Mission) -> Self {
+        let cells = mission.grid_frame().area();
+        Self {
+            stage,
+            executable: stage.executable(mission).map(Path::to_path_buf),
+            policy: Policy::new(stage.deadlines_on(cells)),
+            process: None,
+            generation: 0,
+            started: Now::ZERO,
+            beat: None,
+            output: None,
+            log_start: 0,
+            hung: None,
+            stopping: false,
+            found_ended: false,
+        }
+    }
+
+    pub(crate) const fn phase(&self) -> Phase {
+        self.policy.phase()
+    }
+
+    pub(crate) const fn is_running(&self) -> bool {
+        matches!(self.phase(), Phase::Running { .. })
+    }
+
+    fn pid(&self) -> u32 {
+        self.process.as_ref().map_or(0, Process::id)
+    }
+
+    pub(crate) const fn restarts(&self) -> u32 {
+        self.generation.saturating_sub(1)
+    }
+
+    /// Watch the external process that published `health`, if it is a successor. Returns whether it is.
+    pub(crate) fn adopt(&mut self, health: &HealthSample, now: Now) -> bool {
+        // Beats of a process that ended may still arrive.
+        if self.process.is_some() || self.generation >= health.stamp.generation {
+            return false;
+        }
+        let Ok(process) = Process::adopt(health.pid, self.stage.name) else {
+            return false;
+        };
+        self.policy.step(Event::Start, now);
+        self.process = Some(process);
+        self.generation = health.stamp.generation;
+        self.started = now;
+        true
+    }
+
+    /// Take a heartbeat of this stage. Returns whether the roster is to be published.
+    pub(crate) fn on_beat(&mut self, health: &HealthSample, now: Now) -> bool {
+        if self.process.is_none() || self.pid() != health.pid {
+            return false;
+        }
+        self.beat = Some(now);
+        let was_running = self.is_running();
+        let state = HealthState::from_byte(health.state);
+        self.stopping = state == HealthState::Stopping;
+        let event = match state {
+            HealthState::Ready => Event::BeatReady,
+            HealthState::Starting | HealthState::Stopping => Event::BeatStarting,
+        };
+        self.policy.step(event, now);
+        // A process that starts waits for a roster that names it.
+        state == HealthState::Starting || !was_running && event == Event::BeatReady
+    }
+
+    /// Start the next generation, which logs to the run `directory` and answers ticks from `first_tick` on.
+    pub(crate) fn start(&mut self, directory: &Path, first_tick: u64, now: Now) {
+        let stage = self.stage.name;
+        (self.started, self.hung) = (now, None);
+        self.log_start = self.log(directory).metadata().map_or(0, |log| log.len());
+        let generation = run::next_generation(directory, stage).map_err(io::Error::other);
+        let spawned = generation.and_then(|generation| {
+            self.generation = generation;
+            self.spawn(directory, first_tick)
+        });
+        match spawned {
+            Ok(process) => self.process = Some(process),
+            // The start is tried again with growing pauses, and the other stages go on.
+            Err(error) => {
+                tracing::error!(stage, %error, "the stage cannot be started; are processes, descriptors or disk used up?");
+                self.policy.step(Event::StartFailed, now);
+            }
+        }
+    }
+
+    fn spawn(&self, directory: &Path, first_tick: u64) -> io::Result<Process> {
+        let log = self.log(directory);
+        let named =
+            |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", log.display()));
+        let log = File::options().create(true).append(true).open(&log).map_err(named)?;
+        let generation = Generation {
+            stage: self.stage.name,
+            directory: directory.to_path_buf(),
+            number: self.generation,
+            first_tick,
+        };
+        let mut command = process::stage(self.executable.as_deref(), &generation);
+        command.stdout(Stdio::null()).stderr(log);
+        Process::spawn(command)
+    }
+
+    fn log(&self, directory: &Path) -> PathBuf {
+        directory.join(format!("{}.log", self.stage.name))
+    }
+
+    pub(crate) fn signal(&mut self, signal: Signal, now: Now) {
+        if signal == Signal::ABORT {
+            self.hung = Some(now);
+        }
+        if let Some(process) = &self.process {
+            tracing::debug!(stage = self.stage.name, ?signal, "signalled");
+            process.signal(signal);
+        }
+    }
+
+    /// The cause of the end of the process, if it has ended. For an external process that did not announce its end, the result comes an
+    /// iteration later, because its last beat may have come after the beats of this iteration were read.
+    pub(crate) fn try_reap(&mut self) -> Result<Option<ExitCause>, StageProcessError> {
+        let Some(process) = &mut self.process else {
+            return Ok(None);
+        };
+        let cause = process
+            .try_reap()
+            .map_err(|source| StageProcessError { stage: self.stage.name, source })?;
+        let found_before = std::mem::replace(&mut self.found_ended, cause.is_some());
+        let is_known = process.is_child() || self.stopping || found_before;
+        Ok(cause.filter(|_| is_known))
+    }
+
+    /// Note that the process is reaped. Returns the record of the death, without the next step.
+    pub(crate) fn record_death(&mut self, cause: ExitCause, directory: &Path, now: Now) -> Death {
+        let age = |then: Now| now.saturating_sub(then).as_secs_f64();
+        let hung_after = |(hung, beat): (Now, Now)| hung.saturating_sub(beat).as_secs_f64();
+        let death = Death {
+            stage: self.stage.name,
+            pid: self.pid(),
+            generation: self.generation,
+            cause,
+            hung: self.hung.is_some(),
+            noticed_after_s: self.hung.zip(self.beat).map(hung_after),
+            beat_age_s: self.beat.map(age),
+            uptime_s: age(self.started),
+            deaths_in_window: 0,
+            next: Next::Nothing,
+            log_tail: log_tail(&self.log(directory), self.log_start),
+        };
+        (self.process, self.beat) = (None, None);
+        (self.stopping, self.found_ended) = (false, false);
+        death
+    }
+
+    /// Add the policy's decision to the record of a death.
+    pub(crate) fn record_next(&self, death: &mut Death, now: Now) {
+        death.deaths_in_window = self.policy.recent_deaths() as u32;
+        death.next = match self.phase() {
+            Phase::BackingOff { until } => {
+                Next::StartLater { after_s: until.saturating_sub(now).as_secs_f64() }
+            }
+            Phase::Held => Next::Hold,
+            Phase::Down | Phase::Stopping { .. } => Next::Nothing,
+            Phase::Starting { .. }
+            | Phase::Running { .. }
+            | Phase::Aborted { .. }
+            | Phase::Replaced { .. } => Next::StartNow,
+        };
+    }
+
+    pub(crate) fn roster_entry(&self, now: Now) -> RosterEntry {
+        let age = |then: Option<Now>| {
+            then.map_or(u64::MAX, |then| now.saturating_sub(then).as_nanos() as u64)
+        };
+        RosterEntry {
+            stage: name(self.stage.name),
+            pid: self.pid(),
+            generation: self.generation,
+            state: state(self.phase()).into(),
+            restarts: self.restarts(),
+            uptime_ns: age(self.process.as_ref().map(|_| self.started)),
+            beat_age_ns: age(self.beat),
+            output_age_ns: age(self.output),
+        }
+    }
+}
+
+const fn state(phase: Phase) -> StageState {
+    match phase {
+        Phase::Down => StageState::Down,
+        Phase::BackingOff { .. } => StageState::BackingOff,
+        Phase::Starting { .. } => StageState::Starting,
+        Phase::Running { .. } => StageState::Running,
+        Phase::Aborted { .. } | Phase::Replaced { .. } | Phase::Stopping { .. } => {
+            StageState::Stopping
+        }
+        Phase::Held => StageState::Held,
+    }
+}

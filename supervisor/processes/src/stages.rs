@@ -1,0 +1,203 @@
+//! THE table of the stages of a robot, and their deadlines. Each stage declares in its own crate the topics that it opens and the state
+//! that it persists.
+//!
+//! Start order, deadlines, `firsthand stage`, `firsthand stage list` and the tables of the documentation come from this table.
+
+use std::{path::Path, time::Duration};
+
+use common::{
+    mission::Mission,
+    replay::Begin,
+    shell::{Process, run_stage},
+    stage::{Answering, Answers, replay},
+    start::{StageError, Start},
+    wiring::Wiring,
+};
+
+pub struct Stage {
+    pub name: &'static str,
+    /// The topics that its process opens on the bus, and the state that it persists.
+    pub wiring: &'static Wiring,
+    /// Deadlines on a map without cells.
+    pub deadlines: Deadlines,
+    /// The time added to each deadline for a million cells of the map.
+    pub per_million_cells: Duration,
+    pub while_down: &'static str,
+    /// The main function of its process.
+    pub run: fn(&Start) -> Result<(), StageError>,
+    pub replay: Begin,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Deadlines {
+    /// The longest time from its start to its first beat as ready.
+    pub startup: Duration,
+    /// The longest time from beat to beat. Beats come every 150 ms, or with a tick.
+    pub heartbeat: Duration,
+    /// The longest time from a tick on its inputs to its output of that tick, or of a later one.
+    pub answers: Duration,
+}
+
+impl Stage {
+    /// A stage with the usual deadlines, whose process is `P`.
+    const fn new<P: Process>(replay: Begin, while_down: &'static str) -> Self {
+        Self {
+            name: P::WIRING.stage,
+            wiring: P::WIRING,
+            deadlines: DEADLINES,
+            per_million_cells: Duration::ZERO,
+            while_down,
+            run: run_stage::<P>,
+            replay,
+        }
+    }
+
+    /// A stage that answers one topic with another.
+    const fn answering<A: Answering>(while_down: &'static str) -> Self {
+        Self::new::<Answers<A>>(replay::<A>, while_down)
+    }
+
+    /// The executable that `mission` names for this stage; none if the stage is `firsthand`'s own.
+    pub fn executable<'mission>(&self, mission: &'mission Mission) -> Option<&'mission Path> {
+        let named = mission.planner.executable.as_deref();
+        named.filter(|_| self.name == PLANNER)
+    }
+
+    pub fn deadlines_on(&self, cells: usize) -> Deadlines {
+        let more = self.per_million_cells.mul_f64(cells as f64 * 1e-6);
+        Deadlines {
+            startup: self.deadlines.startup + more,
+            heartbeat: self.deadlines.heartbeat + more,
+            answers: self.deadlines.answers + more,
+        }
+    }
+}
+
+/// The time after which a stage that has not opened its topics is stuck, for example by incomplete services. On a loaded machine of two
+/// cores the slowest start took a tenth of it.
+const STARTUP: Duration = Duration::from_secs(3);
+/// The time of five beats. A loaded machine with more stages than cores delays a beat by 200 ms at times; with 500 ms and a build on
+/// the same machine, three healthy stages were aborted in 70 missions. The robot's stop does not depend on this: the link stops the
+/// robot when the command is stale.
+const HEARTBEAT: Duration = Duration::from_millis(750);
+/// The time for an answer; the slowest take a hundredth of it.
+const ANSWERS: Duration = Duration::from_secs(1);
+const DEADLINES: Deadlines = Deadlines { startup: STARTUP, heartbeat: HEARTBEAT, answers: ANSWERS };
+/// The planner beats between solves, and leaves ticks unanswered while it solves.
+const PLANNER_DEADLINES: Deadlines = Deadlines {
+    startup: STARTUP,
+    heartbeat: Duration::from_secs(2),
+    answers: Duration::from_secs(4),
+};
+/// The allowance of the mapper, which restores its map and publishes all of it in one iteration. At 16.8 million cells no beat was
+/// late even without it.
+const MAPPER_MILLION_CELLS: Duration = Duration::from_millis(100);
+/// The allowance of the planner: a full solve, a keyframe of the field and the backlog may fall into one iteration. At 16.8 million
+/// cells it did not beat for more than 2 s forty times in a mission, and with this allowance it was never late in a run of 97 s.
+const PLANNER_MILLION_CELLS: Duration = Duration::from_millis(400);
+
+/// The name of the stage that gives guidance: a mission may name an executable for it.
+pub const PLANNER: &str = "planner";
+
+const STOPPED: &str = "stopped by the link when the command is stale";
+
+/// Every stage, in the order of the pipeline.
+pub static TABLE: &[Stage] = &[
+    Stage::new::<link::shell::Shell>(
+        replay::<link::stage::LinkStage>,
+        "stands when its timed command ends",
+    ),
+    Stage::answering::<dead_reckoning::DeadReckoning>(STOPPED),
+    Stage {
+        per_million_cells: MAPPER_MILLION_CELLS,
+        ..Stage::new::<mapper::shell::Shell>(replay::<mapper::step::Mapper>, STOPPED)
+    },
+    Stage {
+        deadlines: PLANNER_DEADLINES,
+        per_million_cells: PLANNER_MILLION_CELLS,
+        ..Stage::new::<planner::shell::Shell>(replay::<planner::stage::PlannerStage>, STOPPED)
+    },
+    Stage::answering::<controller::Controller>(STOPPED),
+];
+
+pub fn find(name: &str) -> Option<&'static Stage> {
+    TABLE.iter().find(|stage| stage.name == name)
+}
+
+/// The error message for a name that no stage has.
+pub fn unknown(name: &str) -> String {
+    let names: Vec<_> = TABLE.iter().map(|stage| stage.name).collect();
+    let names = names.join(", ");
+    format!("no stage is called {name:?}; the stages are {names}")
+}
+
+/// The stages in start order: each after the writers of its inputs. They stop in reverse order.
+pub fn start_order() -> Vec<&'static Stage> {
+    let mut order: Vec<&'static Stage> = Vec::with_capacity(TABLE.len());
+    while order.len() < TABLE.len() {
+        let waiting: Vec<&'static Stage> = TABLE
+            .iter()
+            .filter(|stage| !order.iter().any(|placed| placed.name == stage.name))
+            .collect();
+        let next = waiting.iter().find(|stage| {
+            stage.wiring.inputs.iter().all(|input| {
+                let writer = input.spec().writer;
+                !waiting.iter().any(|other| other.name == writer)
+            })
+        });
+        // If the inputs form a circle, there is no such stage, and the others start in the table's order.
+        order.extend(next.or(waiting.first()));
+    }
+    order
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use common::topics::{self, EVERY_STAGE, OPERATOR, SUPERVISOR};
+
+    #[test]
+    fn every_input_has_a_writer_and_every_output_names_its_stage() {
+        for stage in TABLE {
+            for input in stage.wiring.inputs.iter().chain(stage.wiring.feedback) {
+                let writer = input.spec().writer;
+                assert!(
+                    [SUPERVISOR, OPERATOR].contains(&writer) || find(writer).is_some(),
+                    "{} reads {}, which nobody writes",
+                    stage.name,
+                    input.spec().name
+                );
+            }
+            for output in stage.wiring.outputs {
+                assert_eq!(output.spec().writer, stage.name, "{}", output.spec().name);
+            }
+        }
+    }
+
+    #[test]
+    fn every_topic_is_written_by_the_stage_it_names() {
+        for topic in topics::TABLE {
+            let spec = topic.spec();
+            if ![SUPERVISOR, EVERY_STAGE, OPERATOR].contains(&spec.writer) {
+                let writer = find(spec.writer).unwrap();
+                let writes =
+                    writer.wiring.outputs.iter().any(|output| output.spec().name == spec.name);
+                assert!(writes, "{} does not write {}", spec.writer, spec.name);
+            }
+        }
+    }
+
+    #[test]
+    fn a_stage_starts_after_the_writers_of_its_inputs() {
+        let names: Vec<_> = start_order().iter().map(|stage| stage.name).collect();
+        let place = |name: &str| names.iter().position(|placed| *placed == name);
+        for stage in TABLE {
+            for input in stage.wiring.inputs {
+                if let Some(writer) = place(input.spec().writer) {
+                    assert!(Some(writer) < place(stage.name), "{names:?}");
+                }
+            }
+        }
+        assert_eq!(names.len(), TABLE.len());
+    }
+}

@@ -1,0 +1,114 @@
+//! Totals of the wheels' commands and of the robot's looks, as of each of the newest ticks. Ticks after the end of the
+//! mission do not count, and may be read before the end is known.
+
+use std::collections::VecDeque;
+
+use common::samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus};
+
+/// The number of ticks whose totals are stored: that of the arrival must still be there when its command is read.
+const MOST: usize = 1024;
+
+#[derive(Clone, Debug)]
+pub(crate) struct Totals<T> {
+    newest: VecDeque<(u64, T)>,
+}
+
+impl<T> Default for Totals<T> {
+    fn default() -> Self {
+        Self { newest: VecDeque::new() }
+    }
+}
+
+impl<T: Copy + Default> Totals<T> {
+    /// Add the totals of `tick`. A tick that is given again is counted once.
+    pub(crate) fn add(&mut self, tick: u64, add: impl FnOnce(T) -> T) {
+        let (last, totals) = match self.newest.back() {
+            Some(&(last, totals)) => (Some(last), totals),
+            None => (None, T::default()),
+        };
+        if last.is_some_and(|last| tick <= last) {
+            return;
+        }
+        if self.newest.len() == MOST {
+            self.newest.pop_front();
+        }
+        self.newest.push_back((tick, add(totals)));
+    }
+
+    /// The totals of all ticks up to `tick`.
+    pub(crate) fn at(&self, tick: u64) -> T {
+        let until = self.newest.iter().rev().find(|(of, _)| *of <= tick);
+        until.map_or(T::default(), |&(_, totals)| totals)
+    }
+}
+
+/// The extremes of both wheels' commanded speeds, rad/s.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct WheelTotals {
+    extremes: Option<[f64; 2]>,
+}
+
+impl WheelTotals {
+    /// Add a command. Only driving commands count, because every mission begins and ends at rest.
+    pub(crate) fn with(self, command: &CommandSample) -> Self {
+        if CommandState::from_byte(command.state) != CommandState::Driving {
+            return self;
+        }
+        let (left, right) = (command.left_rad_s, command.right_rad_s);
+        let [least, greatest] = self.extremes.unwrap_or([f64::INFINITY, f64::NEG_INFINITY]);
+        Self { extremes: Some([least.min(left).min(right), greatest.max(left).max(right)]) }
+    }
+
+    /// Dynamic range of the wheel signals: greatest commanded speed of either wheel minus the least, rad/s.
+    pub(crate) fn range_rad_s(self) -> Option<f64> {
+        self.extremes.map(|[least, greatest]| greatest - least)
+    }
+}
+
+/// The robot's stops to look around.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct LookTotals {
+    pub looks: u64,
+    pub ticks: u64,
+    looking: bool,
+}
+
+impl LookTotals {
+    /// These totals with one more tick.
+    pub(crate) fn with(self, guidance: &GuidanceSample) -> Self {
+        let looking = GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::Look;
+        Self {
+            looks: self.looks + u64::from(looking && !self.looking),
+            ticks: self.ticks + u64::from(looking),
+            looking,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_dynamic_range_is_over_both_wheels_and_commands_that_drive_up_to_the_tick_asked_for() {
+        let mut totals = Totals::<WheelTotals>::default();
+        let commands = [
+            (CommandState::Halt, 0.0, 0.0),
+            (CommandState::Driving, 2.0, 3.0),
+            (CommandState::Driving, 1.5, 2.5),
+            (CommandState::Arrived, 0.0, 0.0),
+        ];
+        for (tick, (state, left_rad_s, right_rad_s)) in (0..).zip(commands) {
+            let command = CommandSample {
+                left_rad_s,
+                right_rad_s,
+                state: state.into(),
+                ..CommandSample::default()
+            };
+            totals.add(tick, |before| before.with(&command));
+        }
+        assert_eq!(totals.at(0).range_rad_s(), None);
+        assert_eq!(totals.at(1).range_rad_s(), Some(1.0));
+        assert_eq!(totals.at(3).range_rad_s(), Some(1.5));
+    }
+}
