@@ -35,18 +35,12 @@ fn domain(text: &str) -> Option<u16> {
 #[derive(Debug, Error)]
 pub enum AddressError {
     #[error("{address:?} {problem}; {FORMS}")]
-    Form {
-        address: String,
-        problem: &'static str,
-    },
+    Form { address: String, problem: &'static str },
     /// Not known on this machine.
     #[error(
         "the host of {address:?} cannot be found: {source}; give its number, or a name that resolves on this machine"
     )]
-    Host {
-        address: String,
-        source: std::io::Error,
-    },
+    Host { address: String, source: std::io::Error },
 }
 
 impl<Host: fmt::Display> fmt::Display for Address<Host> {

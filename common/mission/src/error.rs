@@ -7,10 +7,7 @@ pub enum MissionError {
     #[error(
         "cannot read mission {file}: {source}; give a shipped name (`firsthand missions`) or a readable TOML file"
     )]
-    Unreadable {
-        file: PathBuf,
-        source: std::io::Error,
-    },
+    Unreadable { file: PathBuf, source: std::io::Error },
     /// The text is not the TOML that a mission is written in: syntax, an unknown key, a wrong type.
     #[error("{file}:{line}: {problem}")]
     Syntax {
@@ -23,10 +20,7 @@ pub enum MissionError {
     #[error(
         "robot.calibration: {file}: {problem}; give a file that `firsthand calibrate` wrote, or leave the key out"
     )]
-    Calibration {
-        file: PathBuf,
-        problem: String,
-    },
+    Calibration { file: PathBuf, problem: String },
     #[error("{file}:{line}: {key}: {problem}; {remedy}")]
     Value {
         file: PathBuf,
