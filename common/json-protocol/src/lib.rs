@@ -44,7 +44,9 @@ pub struct Report {
 #[serde(deny_unknown_fields, rename_all = "lowercase")]
 pub enum Order {
     /// The robot was found, or has braked: it releases its brake and reports at this rate.
-    Hello { rate_hz: f64 },
+    Hello {
+        rate_hz: f64,
+    },
     /// Drive for `for_s`, then stand, unless another order came.
     Drive {
         /// Left and right, rad/s.
@@ -55,7 +57,6 @@ pub enum Order {
     },
     /// Stand by every means until the next hello.
     Brake {},
-    /// Report at once.
     Ping {},
 }
 
@@ -110,7 +111,6 @@ impl Lines {
         self.drops = false;
     }
 
-    /// Bytes of dropped lines.
     #[must_use]
     pub const fn dropped(&self) -> u64 {
         self.dropped

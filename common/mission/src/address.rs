@@ -36,7 +36,6 @@ fn domain(text: &str) -> Option<u16> {
 pub enum AddressError {
     #[error("{address:?} {problem}; {FORMS}")]
     Form { address: String, problem: &'static str },
-    /// Not known on this machine.
     #[error(
         "the host of {address:?} cannot be found: {source}; give its number, or a name that resolves on this machine"
     )]

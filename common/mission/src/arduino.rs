@@ -8,7 +8,6 @@ use serde::{Deserialize, Serialize};
 /// says 17,241 cm then.
 pub const LEAST_BAUD: u32 = 19_200;
 
-/// The settings of the board's firmware.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ArduinoBoard {

@@ -116,7 +116,7 @@ fn remarks(text: &str, origin: &Path, tree: &DeTable<'_>, mission: &Mission) -> 
     car.into_iter().chain(twice).collect()
 }
 
-/// 1-based line of byte `offset`.
+/// Lines count from 1.
 fn line_of(text: &str, offset: usize) -> usize {
     let upto = &text.as_bytes()[..offset.min(text.len())];
     1 + upto.iter().filter(|&&byte| byte == b'\n').count()

@@ -16,7 +16,6 @@ pub enum MissionError {
         line: usize,
         problem: String,
     },
-    /// The calibration cannot be used.
     #[error(
         "robot.calibration: {file}: {problem}; give a file that `firsthand calibrate` wrote, or leave the key out"
     )]
@@ -44,7 +43,7 @@ impl MissionError {
         }
     }
 
-    /// The same fault, perhaps on another line.
+    /// The fault may be on another line of `other`.
     #[must_use]
     pub fn is_same_fault(&self, other: &Self) -> bool {
         match (self, other) {

@@ -221,7 +221,6 @@ impl Piece<'_> {
     }
 }
 
-/// Metres.
 #[must_use]
 pub fn distance_to_segment(point: DVec2, from: DVec2, to: DVec2) -> f64 {
     nearest_on_segment(point, from, to).distance(point)
@@ -246,7 +245,7 @@ pub fn principal_axes([xx, xy, yy]: [f64; 3]) -> ([f64; 2], f64) {
     (variances.map(|variance| variance.max(0.0).sqrt()), 0.5 * xy.atan2(half))
 }
 
-/// Into (-pi, pi], radians.
+/// The result is in (-pi, pi], radians.
 #[must_use]
 pub fn wrap_angle(angle: f64) -> f64 {
     use std::f64::consts::{PI, TAU};

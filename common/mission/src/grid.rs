@@ -13,7 +13,6 @@ pub enum CellState {
     Free = 0,
     /// A safety event, or its margin, was mapped here.
     Sensed = 1,
-    /// A hazard of the a-priori map.
     Known = 2,
     /// The perimeter of operation; never cleared.
     Perimeter = 3,
@@ -76,7 +75,6 @@ impl Window {
         self.width as usize * self.height as usize
     }
 
-    /// The smallest window that covers both.
     #[must_use]
     pub fn including(self, cell: Cell) -> Self {
         if self.area() == 0 {
@@ -91,7 +89,6 @@ impl Window {
         }
     }
 
-    /// The smallest window that covers both.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         if other.area() == 0 {
@@ -106,16 +103,15 @@ impl Window {
 /// The N x N cells in the mission frame: (19) with the origin at the centre.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GridFrame {
-    /// N: cells along each side.
+    /// N, along each side.
     pub cells: u32,
-    /// Delta: the side of a cell.
+    /// Delta.
     pub resolution_m: f64,
     /// The centre cell, metres.
     pub centre: DVec2,
 }
 
 impl GridFrame {
-    /// Along both axes.
     #[must_use]
     pub const fn centre_index(&self) -> u32 {
         self.cells / 2
@@ -144,7 +140,7 @@ impl GridFrame {
         Some(Cell { col: index.x as u32, row: index.y as u32 })
     }
 
-    /// Metres.
+    /// The middle of `cell`, metres.
     #[must_use]
     pub fn centre_of(&self, cell: Cell) -> DVec2 {
         let centre = f64::from(self.centre_index());
@@ -152,7 +148,7 @@ impl GridFrame {
         self.centre + offset * self.resolution_m
     }
 
-    /// Where x and y are least, metres.
+    /// The corner where x and y are least, metres.
     #[must_use]
     pub fn corner_of(&self, cell: Cell) -> DVec2 {
         self.centre_of(cell) - DVec2::splat(self.resolution_m / 2.0)
@@ -210,7 +206,6 @@ impl GridFrame {
         window
     }
 
-    /// `window` lies inside the map.
     #[must_use]
     pub fn contains(&self, window: Window) -> bool {
         let fits =

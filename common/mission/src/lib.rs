@@ -70,7 +70,6 @@ pub struct Mission {
     /// The places to visit one after the other; [`Mission::target`] is then the first of them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub targets: Vec<Waypoint>,
-    /// How the robot is guided.
     #[serde(default)]
     pub method: Method,
     /// Readings of the sonar go into the map. Without them the robot knows only [`Mission::known`].
@@ -86,7 +85,6 @@ pub struct Mission {
     /// simulated robot that is farther off is in the wrong place.
     #[serde(default = "defaults::sure_within_m")]
     pub sure_within_m: f64,
-    /// Mission time.
     #[serde(default = "defaults::timeout_s")]
     pub timeout_s: f64,
     /// The seed of everything random in the simulation.
@@ -97,7 +95,6 @@ pub struct Mission {
     /// Pi: where the robot may operate, and the grid laid over it.
     #[serde(default)]
     pub perimeter: Perimeter,
-    /// The robot's body and where it answers.
     #[serde(default)]
     pub robot: RobotConfig,
     /// The front sonar of a robot without `[[robot.sensor]]`.
@@ -260,7 +257,7 @@ pub struct Hurry {
     pub stops_within_s: f64,
 }
 
-/// (14)-(17).
+/// Equations (14)-(17).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Controller {

@@ -22,7 +22,6 @@ pub struct Odometry {
     /// Standard deviation of the way lost or won, metres per square root of a metre.
     pub slip: f64,
     pub slip_sd: f64,
-    /// None without a calibration.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibrated: Option<Provenance>,
 }
@@ -41,7 +40,6 @@ pub struct Provenance {
     pub chi2_per_dof: f64,
 }
 
-/// The procedure of `firsthand calibrate`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CalibrationPlan {

@@ -46,10 +46,8 @@ pub enum Model {
 pub enum Protocol {
     #[default]
     X80,
-    /// Lines of JSON.
     Json,
     Ros2,
-    /// The protocol of ROSArduinoBridge.
     Arduino,
 }
 
@@ -94,10 +92,8 @@ pub struct RobotConfig {
     pub steering_counts_per_turn: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub counts_per_turn: Option<f64>,
-    /// The disc that contains the body.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius_m: Option<f64>,
-    /// The greatest speed of either wheel's rim.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub top_speed_m_s: Option<f64>,
     /// A car and an X80 gain speed at once.
@@ -114,7 +110,6 @@ pub struct RobotConfig {
     pub speed_trim: Option<bool>,
     /// Age at which a command no longer moves the robot.
     pub command_limit_s: f64,
-    /// Below these a battery is low.
     pub low_battery_v: BatteryLimits,
     /// The least motor current of a wheel that something holds. A wheel that does not turn as told and draws less
     /// counts as one with a dead encoder, and so does every such wheel if this is 0. The default is the simulated
@@ -183,7 +178,6 @@ impl Default for RobotConfig {
     }
 }
 
-/// Every value is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Body {
     /// r.
@@ -192,7 +186,6 @@ pub struct Body {
     pub track_m: f64,
     pub counts_per_turn: f64,
     pub radius_m: f64,
-    /// The greatest speed of either wheel's rim.
     pub top_speed_m_s: f64,
     /// How speed and turn rate may grow, m/s^2 and rad/s^2; infinite if at once. They fall at once on every robot.
     pub acceleration: [f64; 2],
@@ -251,7 +244,7 @@ impl Body {
         ))
     }
 
-    /// The rim's way per encoder count.
+    /// The way of the rim per encoder count.
     #[must_use]
     pub fn metres_per_count(&self) -> f64 {
         std::f64::consts::TAU * self.wheel_radius_m / self.counts_per_turn

@@ -11,9 +11,7 @@ use crate::sonar::Mount;
 /// Rows, and readings in a sample of `ranges`.
 pub const MOST_SENSORS: usize = 16;
 pub const MOST_BEAMS: usize = 1081;
-/// The X80 has so many.
 pub const INFRARED_RANGERS: usize = 7;
-/// The standard frame has so many.
 pub const SONARS: usize = 6;
 
 /// The two sonars beside the front one: degrees from it, and metres from the robot's centre.
@@ -76,7 +74,6 @@ impl SensorModel {
         }
     }
 
-    /// The X80's sensor of a kind.
     const fn of(kind: SensorKind) -> Self {
         match kind {
             SensorKind::Cone => Self::Dur5200,
@@ -203,7 +200,6 @@ impl Default for SonarConfig {
     }
 }
 
-/// Every value is known.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sensor {
     pub name: String,
@@ -260,20 +256,17 @@ impl Sensor {
         }
     }
 
-    /// Measured from the robot's axis.
     #[must_use]
     pub fn bearing_deg(&self) -> f64 {
         self.mount.bearing_rad.to_degrees()
     }
 }
 
-/// Whose readings the mapper uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Sensors {
     /// The cone whose bearing is the least.
     #[serde(rename = "front")]
     Front,
-    /// The front sonar and all rays.
     #[serde(rename = "front+infrared")]
     FrontInfrared,
     /// The front sonar and the cones within 60 degrees of it.

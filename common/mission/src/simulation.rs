@@ -58,7 +58,6 @@ impl Realism {
     }
 }
 
-/// Ultrasonic, looking outward.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ranger {
@@ -90,7 +89,6 @@ pub struct Thing {
 #[serde(deny_unknown_fields)]
 pub struct Block {
     pub wheels: BlockedWheels,
-    /// The time when it begins, seconds.
     #[serde(default)]
     pub from_s: f64,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -105,17 +103,14 @@ pub enum BlockedWheels {
     Both,
 }
 
-/// Where a thing is at a time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Move {
-    /// Mission time.
     pub at_s: f64,
     /// Displacement from the shape's position, metres.
     pub by: DVec2,
 }
 
-/// A written number outside its range.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct OutOfRange {
     pub(super) key: &'static str,

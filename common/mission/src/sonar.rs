@@ -26,7 +26,6 @@ impl Mount {
         Pose2 { position, heading: outward + self.turned_rad }
     }
 
-    /// Counter-clockwise from the robot's axis.
     #[must_use]
     pub fn looks_rad(&self) -> f64 {
         self.bearing_rad + self.turned_rad

@@ -112,7 +112,6 @@ impl<'a> Reader<'a> {
 pub struct Writer(Vec<u8>);
 
 impl Default for Writer {
-    /// Begins with its encapsulation.
     fn default() -> Self {
         Self(vec![0, 1, 0, 0])
     }
@@ -164,7 +163,6 @@ impl Writer {
         self.length(text.len() + 1).raw(text.as_bytes()).u8(0)
     }
 
-    /// The elements follow it.
     pub fn length(&mut self, elements: usize) -> &mut Self {
         self.u32(u32::try_from(elements).unwrap_or(u32::MAX))
     }

@@ -44,7 +44,6 @@ pub struct Quality {
     pub is_reliable: bool,
     /// A reader that joins later gets the newest messages.
     pub is_latched: bool,
-    /// Kept messages.
     pub depth: u16,
 }
 
@@ -217,7 +216,6 @@ pub struct Reader {
 }
 
 impl Reader {
-    /// None if nothing came.
     pub fn take(&self) -> Option<Message> {
         self.inner.set_waker(Some(self.bell.clone()));
         self.inner.drain_read_notifications();

@@ -40,7 +40,6 @@ impl Writer {
         self.i32(seconds).u32((ns % 1_000_000_000) as u32)
     }
 
-    /// A `std_msgs/Header`.
     pub fn header(&mut self, ns: u64, frame: &str) -> &mut Self {
         self.time(ns).text(frame)
     }

@@ -1,6 +1,5 @@
 //! A topic as DDS knows it.
 
-/// Messages, or a service's requests or replies.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Topic {
     /// The name in ROS, from the root.
@@ -21,7 +20,6 @@ impl Topic {
         Self { name: name.to_owned(), type_name, ends: ["", ""] }
     }
 
-    /// Clients' requests, and the replies.
     pub fn service(name: &str, [request, reply]: [&'static str; 2]) -> [Self; 2] {
         [
             Self { name: absolute(name), type_name: request, ends: ["rq", "Request"] },

@@ -7,9 +7,9 @@ use super::{
 
 /// The wheels are on two of the motor board's channels.
 pub const CHANNELS: usize = 6;
-/// A command does not change the channel.
+/// The value leaves a channel unchanged.
 const ALONE: i16 = i16::MIN;
-/// One client sends this instead.
+/// One client sends this value instead.
 const ALSO_ALONE: i16 = i16::MIN + 1;
 /// It comes before the time limit of a command.
 const TIME_FOLLOWS: u8 = 28;
@@ -72,7 +72,7 @@ pub enum Mode {
 pub struct Gains {
     pub kp: Option<u16>,
     pub kd: Option<u16>,
-    /// Integral, times 100.
+    /// The gain times 100.
     pub ki_x100: Option<u16>,
 }
 
@@ -90,19 +90,17 @@ pub enum Parameter {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stream {
-    /// 123.
+    /// DID 123.
     Motor,
-    /// 124.
+    /// DID 124.
     Custom,
-    /// 125.
+    /// DID 125.
     Standard,
-    /// All three.
     All,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
-    /// Send for ever.
     Start,
     Stop,
     /// Send 1 to 254 frames, and then no more.
@@ -121,7 +119,6 @@ pub enum Command {
         /// None is all channels.
         channel: Option<u8>,
     },
-    /// A request about a sensor stream.
     Stream {
         stream: Stream,
         request: Request,
@@ -140,7 +137,6 @@ impl Command {
         })
     }
 
-    /// Appends the frame to `out`.
     pub fn encode(&self, addressing: Addressing, out: &mut Vec<u8>) {
         let mut data = Vec::with_capacity(16);
         let did = match *self {

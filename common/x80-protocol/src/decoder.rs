@@ -24,9 +24,7 @@ const MOST_WORK: usize = 1 << 20;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DecoderTally {
     pub frames: u64,
-    /// Headers whose CRC was wrong.
     pub bad_crc: u64,
-    /// Bytes that belonged to no frame.
     pub noise_bytes: u64,
     /// Bytes dropped unread because more came than is held, or too many false headers.
     pub dropped_bytes: u64,
@@ -60,7 +58,6 @@ enum Candidate {
     Broken,
 }
 
-/// The bytes after a CRC.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Ending {
     /// `5E 0D`, or the `5E 13` that one client sends.

@@ -8,7 +8,6 @@ pub const PARAMETER: u8 = 7;
 pub const VELOCITY: u8 = 26;
 pub const VELOCITY_ALL: u8 = 27;
 pub const ENABLE: u8 = 30;
-/// Wheel counts and speeds.
 pub const MOTOR: u8 = 123;
 /// AD channels.
 pub const CUSTOM: u8 = 124;

@@ -3,7 +3,6 @@ use thiserror::Error;
 use super::{crc::crc8, did};
 
 pub(super) const HEADER: [u8; 2] = [0x5e, 0x02];
-/// What we send last in every frame.
 const END: [u8; 2] = [0x5e, 0x0d];
 /// Header, RID, SN, DID, LEN.
 pub(super) const BEFORE_DATA: usize = 6;
@@ -70,7 +69,6 @@ pub struct Frame<'a> {
     pub rid: u8,
     /// Everybody sends 0.
     pub sn: u8,
-    /// [`did`] names them.
     pub did: u8,
     pub data: &'a [u8],
 }
@@ -123,7 +121,6 @@ pub enum MessageError {
     UnknownDid { did: u8 },
     #[error("DID {did} came with {found} data bytes instead of {expected}; pass the frame over")]
     Length { did: u8, found: usize, expected: &'static str },
-    /// It has no meaning.
     #[error("DID {did}: {value} is no {what}; pass the frame over")]
     Value { did: u8, what: &'static str, value: u8 },
 }

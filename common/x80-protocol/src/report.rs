@@ -16,7 +16,6 @@ pub enum Report {
 }
 
 impl Report {
-    /// Appends the frame to `out`.
     pub fn encode(&self, addressing: Addressing, out: &mut Vec<u8>) {
         let write = |did, data: &[u8], out: &mut Vec<u8>| {
             let rid = addressing.host();

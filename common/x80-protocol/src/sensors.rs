@@ -18,7 +18,7 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// In the channel's positive direction.
+    /// Positive in the channel's positive direction.
     #[must_use]
     pub fn velocity(&self) -> i32 {
         let speed = i32::from(self.speed);
@@ -61,9 +61,8 @@ pub fn counts_restarted(old: [u16; 2], new: [u16; 2]) -> bool {
 /// DID 123.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MotorSensors {
-    /// AD counts of the six channels.
+    /// AD counts of the six channels, like `currents`.
     pub pots: [u16; 6],
-    /// AD counts of the six channels.
     pub currents: [u16; 6],
     /// Channels 0 and 1.
     pub encoders: [Encoder; 2],
@@ -92,7 +91,7 @@ pub struct StandardSensors {
     pub motor_battery: u16,
     /// AD counts for [`super::volts`] with 9 V full scale.
     pub servo_battery: u16,
-    /// Volts, in AD counts.
+    /// AD counts of the reference voltage.
     pub reference: u16,
 }
 

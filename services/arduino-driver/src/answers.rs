@@ -4,7 +4,6 @@ use common::mission::LEAST_BAUD;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Answer {
-    /// `OK`.
     Done,
     /// `Invalid Command`: none came, or a garbled one.
     Invalid,

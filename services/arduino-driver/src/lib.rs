@@ -43,19 +43,22 @@ const IMPLAUSIBLE: f64 = 1.5;
 
 #[derive(Clone, Debug)]
 enum Waits {
-    /// All requests are answered.
     No,
     /// The rest of the round that was asked for at poll `since`, of which these ranges came, centimetres.
-    Round { since: u64, ranges: Vec<u16> },
+    Round {
+        since: u64,
+        ranges: Vec<u16>,
+    },
     /// The baud rate, asked for at this poll; not yet if none.
-    Baud { since: Option<u64> },
+    Baud {
+        since: Option<u64>,
+    },
 }
 
 #[derive(Clone, Debug)]
 pub struct Arduino {
     pid_rate_hz: f64,
     rate_hz: f64,
-    /// A wheel's in a second.
     most_counts_s: f64,
     /// Polls: a round is complete within `overdue`, and a request is answered or lost after `lost`.
     overdue: u64,

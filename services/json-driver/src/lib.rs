@@ -25,7 +25,6 @@ pub struct Json {
     waiting: Vec<Vec<u8>>,
     readings: Readings,
     laser: Option<Laser>,
-    /// Orders that the robot has taken.
     answered: Option<u64>,
     odometry: Odometry,
     tally: WireTally,
@@ -89,7 +88,6 @@ impl Json {
         Ok(())
     }
 
-    /// Sensors of the mission with these names.
     fn rows_of(
         &self,
         ranges: &BTreeMap<String, Option<f64>>,

@@ -50,7 +50,6 @@ struct Turned {
     ahead: f64,
 }
 
-/// Gyro against odometry.
 #[derive(Clone, Copy, Debug, Default)]
 struct Compared {
     since_ns: i64,

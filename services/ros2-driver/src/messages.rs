@@ -29,7 +29,7 @@ pub struct Odometry {
     pub stamp_ns: i64,
     /// x, y and heading.
     pub pose: [f64; 3],
-    /// m/s and rad/s.
+    /// The speed ahead, m/s, and the turn rate, rad/s.
     pub twist: [f64; 2],
 }
 

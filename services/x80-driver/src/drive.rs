@@ -53,7 +53,7 @@ impl Drive {
         bytes
     }
 
-    /// Growing forward.
+    /// The counts grow forward.
     pub fn wheels(&self, sensors: &MotorSensors) -> WheelSample {
         let left = self.wheel(sensors, self.robot.left);
         let right = self.wheel(sensors, self.robot.right);
@@ -72,7 +72,6 @@ impl Drive {
         channels.map(|wheel| sensors.currents[usize::from(wheel.channel.min(1))])
     }
 
-    /// Turned so that it grows forward.
     fn wheel(&self, sensors: &MotorSensors, channel: Channel) -> Encoder {
         let encoder = sensors.encoders[usize::from(channel.channel.min(1))];
         if !channel.reversed {

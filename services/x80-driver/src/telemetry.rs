@@ -15,7 +15,6 @@ pub struct Telemetry {
 }
 
 impl Telemetry {
-    /// Keeps the currents for the next [`PowerSample`].
     pub const fn take_motor(&mut self, motor: &MotorSensors) {
         self.currents = motor.currents;
     }

@@ -12,7 +12,6 @@ use crate::motor::Motor;
 const BOOTS_S: f64 = 1.5;
 /// The motors stop by themselves so long after the last command.
 const STOPS_AFTER_MS: u16 = 2000;
-/// Bytes.
 const LONGEST: usize = 64;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,7 +70,6 @@ impl Requests {
 #[derive(Clone, Debug)]
 pub(crate) struct ArduinoWords {
     robot: RobotConfig,
-    /// Pins and channels.
     sonars: Vec<(i32, usize)>,
     /// The board counts 0 here.
     zero: [f64; 2],

@@ -16,7 +16,6 @@ use crate::{
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Car {
-    /// True diameter and wheelbase.
     drive: Ackermann,
     steering: Steering,
     driven: OnChannel,

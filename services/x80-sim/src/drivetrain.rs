@@ -23,9 +23,8 @@ pub(crate) fn grip(held: bool, physics: &WheelPhysics) -> Option<f64> {
 pub(crate) struct Drivetrain {
     channel: Wheels<usize>,
     sign: Wheels<f64>,
-    /// For a wheel of nominal diameter.
+    /// The wheel has the nominal diameter.
     metres_per_count: f64,
-    /// True over nominal.
     diameter: Wheels<f64>,
 }
 
@@ -101,7 +100,7 @@ impl Drivetrain {
         })
     }
 
-    /// As `encoders` show them, growing forward.
+    /// Counts grow forward.
     pub(crate) fn counts(&self, encoders: &[Encoder; 2]) -> Wheels<u16> {
         let counts = |channel: usize, sign: f64| {
             let position = encoders[channel].position;

@@ -127,7 +127,6 @@ fn heard(byte: u8) -> Option<f64> {
     }
 }
 
-/// Metres.
 fn infrared(standard: &StandardSensors, custom: &CustomSensors, channel: usize) -> Option<f64> {
     let ad = match channel {
         0 => standard.infrared,

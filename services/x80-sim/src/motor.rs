@@ -115,7 +115,6 @@ impl Motor {
         self.speed
     }
 
-    /// Counts since boot.
     pub fn turned(&self) -> f64 {
         self.turned
     }
@@ -149,7 +148,6 @@ impl Motor {
         }
     }
 
-    /// The wheel stands.
     pub fn halt(&mut self) {
         self.order = None;
     }
@@ -214,7 +212,6 @@ impl Motor {
         counts + jitter * dt
     }
 
-    /// The wheel has really turned by `counts`.
     pub fn turn(&mut self, counts: f64) {
         self.turned += counts;
     }

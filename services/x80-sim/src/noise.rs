@@ -18,7 +18,7 @@ pub enum Source {
 pub struct Noise(Pcg64);
 
 impl Noise {
-    /// The same stream in each run with `seed`.
+    /// Each run with `seed` has the same stream.
     pub fn new(seed: u64, source: Source) -> Self {
         Self(Pcg64::new(u128::from(seed), source as u128))
     }

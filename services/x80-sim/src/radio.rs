@@ -79,9 +79,7 @@ struct Flight<W> {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Hold {
-    /// It arrives after the next one.
     Behind,
-    /// It arrives joined to the next one.
     Joined,
 }
 
@@ -91,7 +89,6 @@ pub struct Radio<W> {
     settings: mission::Radio,
     noise: Noise,
     fading: Fading,
-    /// In order of arrival.
     in_flight: VecDeque<Flight<W>>,
     sent: u64,
     lost: u64,
@@ -225,7 +222,6 @@ impl<W: Copy + PartialEq> Radio<W> {
         Some((flight.way, flight.bytes))
     }
 
-    /// Losses until mission time `now`.
     pub fn ground_truth(&mut self, now: f64) -> GroundTruthRadio {
         GroundTruthRadio {
             out: self.fading.is_out(now, &mut self.noise),

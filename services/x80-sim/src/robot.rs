@@ -40,7 +40,6 @@ pub enum Heard {
     Ack,
     Ping,
     Motion,
-    /// Known or not.
     Other,
 }
 
@@ -52,7 +51,6 @@ pub struct Robot {
     stops_when_silent: Option<f64>,
     rate_hz: f64,
     drivetrain: Drivetrain,
-    /// None for two driven wheels.
     car: Option<Car>,
     longest_step: f64,
 
@@ -198,7 +196,7 @@ impl Robot {
         (self.tick + 1) as f64 / self.rate_hz
     }
 
-    /// Channel 0 to 5.
+    /// `channel` is 0 to 5.
     pub fn motor(&self, channel: u8) -> Option<&Motor> {
         self.motors.get(usize::from(channel))
     }
@@ -215,7 +213,6 @@ impl Robot {
         }
     }
 
-    /// Appends the immediate answer to `replies`.
     pub fn on_frame(&mut self, frame: &Frame<'_>, replies: &mut Vec<u8>) -> Heard {
         let Some(addressing) = Addressing::of_robot(frame.rid) else {
             return Heard::Foreign;
@@ -268,7 +265,6 @@ impl Robot {
         }
     }
 
-    /// Appends the immediate answer to `replies`.
     pub fn on_order(&mut self, order: &Order, replies: &mut Vec<u8>) -> Heard {
         let Some(json) = &mut self.json else {
             return Heard::Foreign;
@@ -290,7 +286,6 @@ impl Robot {
         }
     }
 
-    /// Appends the answer to `replies`.
     pub fn on_request(&mut self, request: Request, replies: &mut Vec<u8>) -> Heard {
         let Some(arduino) = &mut self.arduino else {
             return Heard::Foreign;

@@ -1,4 +1,4 @@
-//! What the next process of a simulated robot restores: its pose, and the counts of its wheels.
+//! The pose and wheel counts that a simulated robot's next process restores.
 //!
 //! A real robot stands where it came to rest when its host went away. A simulated one whose process ends with its
 //! supervisor's comes to rest at once, and its next process begins there. By then nothing is under way: no order, no
@@ -7,14 +7,12 @@
 use common::kinematics::Pose2;
 use serde::{Deserialize, Serialize};
 
-/// Bytes, encoded.
 pub(crate) const CAPACITY: usize = 256;
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SavedState {
     pub(crate) tick: u64,
     pub(crate) time_s: f64,
-    /// Mission frame.
     pub(crate) pose: Pose2,
     /// Each motor channel's counts since boot.
     pub(crate) turned: [f64; 6],

@@ -25,7 +25,7 @@ const CURRENT: (f64, f64) = (20.0, 0.2);
 /// Further current of a stalled motor, AD counts; nominal. It draws several times the current of a rolling one.
 pub(crate) const STALL_CURRENT: f64 = 1500.0;
 
-/// The multimedia board.
+/// The sensors of the multimedia board.
 #[derive(Clone, Debug)]
 pub struct Ranging {
     front: usize,
@@ -34,7 +34,6 @@ pub struct Ranging {
     silence: Silence,
     sonar_noise: Noise,
     infrared_noise: Noise,
-    /// For the next tick.
     heard: Option<[u8; 6]>,
 }
 
@@ -94,7 +93,6 @@ impl Ranging {
         self.heard.is_some()
     }
 
-    /// For the next tick, unless they have.
     pub fn listen(&mut self, world: &World, body: &Body, physics: &SonarPhysics) {
         if self.heard.is_none() {
             self.heard = Some(self.heard_now(world, body, physics));
@@ -164,7 +162,7 @@ fn ad(volts: f64, full_scale: f64) -> u16 {
     (volts / full_scale * 4095.0).round().clamp(0.0, 4095.0) as u16
 }
 
-/// Off by `error` counts.
+/// The encoder is off by `error` counts.
 pub fn encoder(motor: &Motor, error: f64) -> Encoder {
     let position = (motor.turned() + error).round();
     Encoder {

@@ -113,7 +113,7 @@ fn wait(
     Ok([came[1] || came[2], came[0]])
 }
 
-/// None is lockstep.
+/// Lockstep has none.
 #[derive(Clone, Copy, Debug)]
 struct SimClock {
     /// Machine time at mission time 0, and mission seconds a machine second.
@@ -122,7 +122,6 @@ struct SimClock {
 }
 
 impl SimClock {
-    /// Shows mission time `begin_s` now.
     fn new(pace: Pace, period_s: f64, begin_s: f64) -> Self {
         let runs = match pace {
             Pace::Max => None,
@@ -134,13 +133,12 @@ impl SimClock {
         Self { runs, period_s }
     }
 
-    /// Seconds of mission time.
     fn now(&self, machine_ns: u64) -> Option<f64> {
         let (epoch, rate) = self.runs?;
         Some(machine_ns.saturating_sub(epoch) as f64 * 1e-9 * rate)
     }
 
-    /// For ever in lockstep.
+    /// Lockstep waits for ever.
     fn wait_for(&self, due: f64, machine_ns: u64) -> Option<Duration> {
         let (_, rate) = self.runs?;
         let seconds = ((due - self.now(machine_ns)?) / rate).max(0.0);

@@ -30,7 +30,6 @@ impl Silence {
         }
     }
 
-    /// The next reading: which rangers are silent.
     pub(crate) fn step(&mut self) -> [bool; 6] {
         if self.begin > 0.0 {
             for silent in &mut self.silent {

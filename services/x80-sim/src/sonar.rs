@@ -29,7 +29,7 @@ pub const REACH_M: f64 = 2.55;
 const HIDES_M: f64 = 0.01;
 /// A reflected beam starts this far from its mirror, or it would meet the mirror again.
 const NUDGE_M: f64 = 1e-6;
-/// At 40 kHz in air.
+/// Air attenuates sound of 40 kHz so.
 const ABSORPTION_DB_PER_M: f64 = 1.3;
 const POST_RADIUS_M: f64 = 0.015;
 
@@ -152,7 +152,7 @@ struct Receiver<'a> {
     physics: &'a SonarPhysics,
     cone: Sector,
     lobe: f64,
-    /// Above the floor, metres.
+    /// Height above the floor, metres.
     height: f64,
     threshold: f64,
 }

@@ -36,9 +36,7 @@ pub(crate) struct Streams {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Due {
     pub(crate) motor: bool,
-    /// Frame 124.
     pub(crate) custom: bool,
-    /// Frame 125.
     pub(crate) standard: bool,
 }
 

@@ -30,7 +30,6 @@ pub(crate) enum Way {
 }
 
 impl Way {
-    /// Datagrams of other users may be refused.
     pub(crate) fn open(
         transport: Transport,
         address: SocketAddr,

@@ -10,7 +10,7 @@ use crate::{
     noise::{Noise, Source},
 };
 
-/// True over nominal.
+/// True values over nominal ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelErrors {
     /// Their mean is 1.

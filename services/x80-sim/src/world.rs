@@ -109,7 +109,6 @@ pub struct World {
     heights: Heights,
 }
 
-/// A thing that is not always there.
 #[derive(Clone, Debug)]
 struct Visitor {
     thing: Thing,
@@ -178,7 +177,6 @@ impl World {
 }
 
 impl World {
-    /// Solids at `height_m` no farther than `reach_m`.
     pub fn near(&self, point: DVec2, reach_m: f64, height_m: f64) -> Vec<Solid> {
         self.solids()
             .filter(|solid| solid.profile.height_gap(height_m) == 0.0)
@@ -216,7 +214,6 @@ trait Itinerary {
 }
 
 impl Itinerary for Thing {
-    /// From the place of its shape.
     fn offset_at(&self, time: f64) -> DVec2 {
         let next = self.moves.partition_point(|station| station.at_s <= time);
         let before = next.checked_sub(1).and_then(|last| self.moves.get(last));

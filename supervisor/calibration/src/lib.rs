@@ -20,5 +20,4 @@ pub mod squares;
 pub mod wall;
 mod ways;
 
-/// The stage's name in `planner.executable`.
 pub const PLANNER: &str = "calibration";

@@ -33,9 +33,7 @@ const MOST_SLIP: f64 = 0.01;
 /// A normal's standard deviation, and the number of sweeps that it is worth.
 const PRIOR_NORMAL_RAD: f64 = 0.01;
 const PRIOR_NORMALS: f64 = 4.0;
-/// Loops that check the others.
 pub const HELD_OUT: usize = 2;
-/// Those held out included.
 pub const FEWEST_LOOPS: usize = 6;
 /// The held-out loops lie within so many deviations.
 const AGREES: f64 = 3.0;
@@ -51,7 +49,7 @@ pub struct Loop {
     pub number: u32,
     /// Counter-clockwise positive.
     pub turns: f64,
-    /// Nominal, forward less backward.
+    /// Nominal ways, forward less backward.
     pub left_m: f64,
     pub right_m: f64,
     /// Both wheels together, whichever way they rolled.
@@ -123,7 +121,6 @@ pub struct Estimate {
     pub chi2_per_dof: f64,
 }
 
-/// A calibration is not written.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum Refusal {
     #[error(

@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 const WITHIN_M: [f64; 3] = [0.12, 0.06, 0.03];
 /// So many readings at either end of a leg must not be of the wall: then the arc that answers is whole.
 const MARGIN: usize = 2;
-/// Readings of a wall.
 const FEWEST: usize = 5;
 /// More readings of one leg are dropped: three times those of the slowest sweep at 7 Hz.
 const MOST: usize = 200;
@@ -63,7 +62,6 @@ impl Leg {
 /// The mean of the turns to both sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Normal {
-    /// It faces the wall.
     pub(crate) heading: f64,
     /// Middle of the first turn's arc less that of the second. The age of the ranges makes this the same in each
     /// sweep; its scatter is that of the normals.
@@ -76,7 +74,6 @@ pub(crate) struct Normal {
 pub(crate) enum NoNormal {
     /// A leg lacks an end of the arc that answers.
     Narrow,
-    /// The legs' arcs are not alike.
     Unequal,
 }
 

@@ -23,7 +23,7 @@ const TURNED_RAD: f64 = 0.03;
 const SLOW_RAD: f64 = 0.08;
 const FAST_RAD: f64 = 0.5;
 const SPEED_M_S: f64 = 0.35;
-/// A coordinate by tape.
+/// Standard deviation of a coordinate by tape.
 const TAPE_M: f64 = 0.005;
 /// The fit's problem is nearly linear.
 const STEPS: u32 = 5;
@@ -40,7 +40,7 @@ pub struct Square {
     /// 1 to the left, -1 to the right.
     turns: f64,
     ways: Ways,
-    /// 4 at the end.
+    /// The count is 4 at the end.
     corners: u32,
     turning: bool,
     from_m: f64,
@@ -90,7 +90,6 @@ impl Square {
     }
 }
 
-/// Nominal ways from counts to counts, metres.
 #[must_use]
 pub fn nominal_ways(counts: &[[u16; 2]], body: &Body) -> Vec<[f64; 2]> {
     let mut ways = Ways::default();
@@ -128,7 +127,7 @@ impl Driven {
     }
 }
 
-/// The fit for so much slip.
+/// The least squares for so much slip.
 fn fitted(
     squares: &[Driven],
     slip: f64,

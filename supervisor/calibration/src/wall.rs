@@ -48,14 +48,13 @@ const FAST_RAD: f64 = 0.5;
 const TURNED_RAD: f64 = 0.04;
 const SPEED_M_S: f64 = 0.35;
 const NEAR_M_S: f64 = 0.12;
-/// Good enough, over that of the ratio.
+/// The deviation of the track that is good enough, over that of the ratio.
 const TRACK_OVER_RATIO: f64 = 3.0;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Wall {
     plan: CalibrationPlan,
     ways: Ways,
-    /// The estimate by the loops so far.
     wheels: Wheels,
     /// The ways when the robot faced the wall.
     visit: Ways,
@@ -73,7 +72,6 @@ pub struct Wall {
     near: u32,
     silent: u32,
     sweeps: u32,
-    /// So often the sweep was made wider.
     wider: u32,
     legs: [Leg; 2],
     /// The two ways of each sweep differ so, radians.
@@ -84,15 +82,12 @@ pub struct Wall {
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 enum Phase {
-    /// Drives to the wall.
     Approach,
     Aside,
-    /// The first leg, then the second.
     Sweep(usize),
     /// The turn before the drive away from the wall.
     Turn(f64),
     Away(f64),
-    /// The half turn back to the wall.
     Back,
     Finished,
     Failed(Fault),
@@ -126,7 +121,6 @@ pub enum State {
     Failed(Fault),
 }
 
-/// The front sonar's distance.
 pub(crate) fn echo_m(reading: &RangeReading) -> Option<f64> {
     match reading.status() {
         RangeStatus::Measured => Some(reading.range_m),
@@ -166,13 +160,11 @@ impl Wall {
         &self.loops
     }
 
-    /// Radians.
     #[must_use]
     pub fn normal_sd(&self) -> f64 {
         normal_sd(&self.differences)
     }
 
-    /// A wheel's mean way so far.
     #[must_use]
     pub fn metres(&self) -> f64 {
         self.ways.rolled_m / 2.0
@@ -194,7 +186,7 @@ impl Wall {
         self.order(self.heading(body), echo_m)
     }
 
-    /// Turned since the wall was faced, radians.
+    /// The turn since the wall was faced, radians.
     fn heading(&self, body: &Body) -> f64 {
         let left = self.ways.left_m - self.visit.left_m;
         let right = self.ways.right_m - self.visit.right_m;

@@ -3,7 +3,6 @@
 use common::{mission::Body, wire::counts_between};
 use serde::{Deserialize, Serialize};
 
-/// Ways since the first counts, metres.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Ways {
     counts: Option<[u16; 2]>,

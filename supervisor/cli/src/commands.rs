@@ -154,7 +154,6 @@ pub(crate) fn error_code(error: &(dyn Error + 'static)) -> Option<&'static str> 
     }
 }
 
-/// `words` stand after the executable.
 pub(crate) fn parse<T: AsRef<OsStr>>(words: &[T]) -> Result<Command, clap::Error> {
     let executable = OsString::from("firsthand");
     let words =

@@ -46,7 +46,6 @@ pub fn answer_shell(whole: fn() -> Command, pages: fn() -> Vec<String>) {
     CompleteEnv::with_factory(|| with_candidates(whole(), pages)).var(VARIABLE).complete();
 }
 
-/// Candidates for the values of its arguments.
 fn with_candidates(command: Command, pages: fn() -> Vec<String>) -> Command {
     command
         // Only `stage` asks for these, because no other command takes a word that is no subcommand.

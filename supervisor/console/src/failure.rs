@@ -19,7 +19,6 @@ use super::{missions::LookupError, output::write_stderr};
 /// A sentence that names the input and the remedy.
 pub type Failure = Box<dyn Error>;
 
-/// The command line itself gives the code.
 #[derive(Debug, Error)]
 #[error("{message}")]
 pub struct Refused {

@@ -1,4 +1,4 @@
-//! What the command lines of all executables share.
+//! The common part of all executables' command lines.
 //!
 //! | module | holds |
 //! |---|---|

@@ -127,7 +127,6 @@ fn assign(mut table: toml::Table, assignments: &[String]) -> Result<String, Look
     })
 }
 
-/// `layer` over `base`, table by table.
 fn merge(base: &mut toml::Table, layer: toml::Table) {
     for (key, value) in layer {
         match (base.get_mut(&key), value) {

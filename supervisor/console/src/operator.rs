@@ -57,7 +57,6 @@ pub fn send(robot: &RobotName, stage: &str, signal: Signal) -> Result<(), Failur
     Ok(())
 }
 
-/// The roster names it.
 fn pid_of(domain: &Domain, stage: &str) -> Result<Option<u32>, Failure> {
     let bus = roster::join(domain, "operator")?;
     Ok(operator::find(&mut Roster::open(&bus)?, &domain.robot, |_, entries| {

@@ -13,12 +13,10 @@ pub fn print_text(text: &str) -> io::Result<()> {
     unless_closed(stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()))
 }
 
-/// Text, or one line of JSON.
 pub fn print(value: &(impl Display + Serialize), json: bool) -> io::Result<()> {
     print_text(&if json { serde_json::to_string(value)? + "\n" } else { value.to_string() })
 }
 
-/// One line of JSON each.
 pub fn json_lines<T: Serialize>(values: &[T]) -> serde_json::Result<String> {
     let lines = values.iter().map(serde_json::to_string);
     lines.map(|line| Ok(line? + "\n")).collect()

@@ -27,9 +27,7 @@ pub struct TopicRates {
     spec: &'static Spec,
     /// Newest samples, by process, because a topic may have many writers.
     writers: BTreeMap<u32, Newest>,
-    /// Arrival of the last sample.
     at: Option<Instant>,
-    /// The counts begin here.
     since: Instant,
     counts: Counts,
 }
@@ -53,7 +51,6 @@ struct Counts {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     pub topic: &'static str,
-    /// A second is the machine clock's.
     pub rate_hz: f64,
     /// The gap between two samples of one process, or since the last sample; none before the first.
     pub longest_gap_s: Option<f64>,

@@ -43,7 +43,6 @@ pub enum Outcome {
     },
 }
 
-/// The runs are in no order.
 pub fn list(runs: &Path) -> Vec<RunDirectory> {
     #[derive(Deserialize)]
     struct Mission {
@@ -106,13 +105,12 @@ impl RunDirectory {
         its.is_some() && its == fs::canonicalize(&self.directory).ok()
     }
 
-    /// Bytes on the disk.
     pub fn size(&self) -> u64 {
         size(&self.directory, MOST_LEVELS)
     }
 }
 
-/// Counted levels; a run directory has one.
+/// Deeper levels are not counted; a run directory has one.
 const MOST_LEVELS: u32 = 8;
 
 fn size(directory: &Path, levels: u32) -> u64 {

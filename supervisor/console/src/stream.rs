@@ -19,7 +19,6 @@ pub const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 const NICE: i32 = 5;
 
-/// Stages get the processor before this process.
 pub fn let_stages_go_first() {
     // If the kernel refuses, the processes share the processor.
     let _ = rustix::process::nice(NICE);

@@ -28,11 +28,7 @@ pub enum MapError {
     #[error("{}: {cols} x {rows} cells; a map has 1 to {MAX_SIDE} on each side, so crop or scale it", file.display())]
     Size { file: PathBuf, cols: u64, rows: u64 },
     #[error("{}: {problem}", file.display())]
-    Malformed {
-        file: PathBuf,
-        /// The message has place and remedy.
-        problem: String,
-    },
+    Malformed { file: PathBuf, problem: String },
 }
 
 impl MapError {

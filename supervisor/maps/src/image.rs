@@ -29,7 +29,7 @@ pub(super) struct Lightness {
 }
 
 impl Default for Lightness {
-    /// The map_saver writes these.
+    /// The map_saver writes these thresholds.
     fn default() -> Self {
         Self { negate: false, free_thresh: 0.196, occupied_thresh: 0.65 }
     }
@@ -57,7 +57,6 @@ pub(super) fn load(file: &Path, lightness: Lightness) -> Result<Map, MapError> {
     Ok(Map::new(cols, pixels.len() / cols, pixels.into_iter()))
 }
 
-/// At least one.
 pub(super) fn pixels(file: &Path, lightness: Lightness) -> Result<Free, MapError> {
     let mut reader = BufReader::new(open(file, LONGEST)?);
     let start =

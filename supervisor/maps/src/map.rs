@@ -9,7 +9,7 @@ pub const MOST_BOXES: usize = 20_000;
 pub struct Map {
     pub cols: usize,
     pub rows: usize,
-    /// Not free, and the whole rim.
+    /// The whole rim is blocked, too.
     pub blocked: Vec<bool>,
 }
 

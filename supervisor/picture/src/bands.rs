@@ -47,7 +47,6 @@ pub(super) struct Levels {
 }
 
 impl Levels {
-    /// The number of levels above `log2_u`.
     pub(super) fn band(&self, log2_u: f32) -> u32 {
         // The cast saturates: there is no level above the target's own.
         ((-f64::from(log2_u) / self.step) as u32).min(self.count)
@@ -142,8 +141,8 @@ impl<'a> Bands<'a> {
     }
 }
 
-/// The inner ones continue the bands to the edge of the plot, the outer ones have no value, so that every level set
-/// closes.
+/// Inner samples around the map continue the bands to the edge of the plot, outer ones have no value, so that every
+/// level set closes.
 const AROUND: usize = 2;
 
 /// log2 u at the middles of square blocks of cells, and [`AROUND`] them.
@@ -151,7 +150,6 @@ struct Samples {
     /// Samples, those around the map included.
     across: usize,
     down: usize,
-    /// Cells.
     block: usize,
     /// Row-major, all finite.
     values: Vec<f64>,

@@ -62,7 +62,6 @@ impl BelievedHazard {
     }
 }
 
-/// Blocks are squares of `side` cells.
 pub(super) struct Blocks<'a, Kind> {
     pub(super) lattice: &'a Lattice,
     pub(super) side: usize,

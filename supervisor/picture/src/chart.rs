@@ -32,7 +32,6 @@ pub struct Chart {
     pub description: String,
     /// Quantity and unit.
     pub x: String,
-    /// Quantity and unit.
     pub y: String,
     /// Later series are drawn above the first ones.
     pub series: Vec<Series>,
@@ -91,7 +90,6 @@ fn style(mark: Mark) -> String {
     }
 }
 
-/// `points` are on the sheet.
 fn drawn(mark: Mark, points: impl Iterator<Item = DVec2>) -> String {
     let mut path = Path::default();
     for at in points.filter(|at| at.is_finite()) {

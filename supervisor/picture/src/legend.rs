@@ -193,10 +193,8 @@ fn guidance_symbol(at: DVec2) -> String {
         + &head.element(&format!("fill=\"{colour}\""))
 }
 
-/// The height with its words.
 const COLOUR_BAR: f64 = 80.0;
 
-/// The bands, with values between them.
 fn colour_bar(levels: Levels, left: f64, y: f64) -> String {
     const LENGTH: f64 = 216.0;
     let bands = levels.count + 1;

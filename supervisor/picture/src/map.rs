@@ -18,9 +18,7 @@ use super::{
 const LARGEST: usize = 2368;
 /// A map with fewer cells a side is drawn smaller: on a large sheet its lines would be lost.
 const SMALL: usize = 100;
-/// Longest side, pixels.
 const SMALL_SIDE: usize = 1200;
-/// A margin around the map, pixels.
 const FRAME: f64 = 16.0;
 
 const WALL: &str = "#1d2430";

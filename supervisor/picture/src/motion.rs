@@ -62,7 +62,6 @@ impl<'a> Motion<'a> {
         self.covariance.is_some() && self.has_belief()
     }
 
-    /// None if no bodies are drawn.
     pub(super) fn period_s(&self) -> Option<f64> {
         self.every.map(|(seconds, _)| seconds)
     }

@@ -30,13 +30,10 @@ pub(super) mod ink {
     pub(crate) const WORLD: &str = "#27313b";
     pub(crate) const TRUTH: &str = "#0b0f14";
     pub(crate) const BELIEVED: &str = "#d1126f";
-    /// Target, and success.
     pub(crate) const TARGET: &str = "#087f4b";
-    /// Anything but success.
     pub(crate) const FAILURE: &str = "#c0271c";
 }
 
-/// The mission frame over the plot.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct View {
     /// Least x and y, metres.
@@ -64,7 +61,6 @@ impl View {
         self.side_m
     }
 
-    /// `point` is in metres.
     pub(super) fn place(&self, point: DVec2) -> DVec2 {
         let from_low = (point - self.low) * self.px(1.0);
         DVec2::new(PLOT_LEFT + from_low.x, PLOT_TOP + PLOT_SIDE - from_low.y)
@@ -190,7 +186,6 @@ impl Path {
         self.pen = None;
     }
 
-    /// Its sides are along the sheet's.
     pub(super) fn rectangle(&mut self, corner: DVec2, size: DVec2) {
         let (x, y, width, height) = (Px(corner.x), Px(corner.y), Px(size.x), Px(size.y));
         let back = Px(-size.x);

@@ -8,7 +8,6 @@ use super::page::{Path, Px, escape, ink, round_up};
 const WIDTH: f64 = 620.0;
 const LEFT: f64 = 70.0;
 const RIGHT: f64 = WIDTH - 20.0;
-/// Px.
 const TEXT: f64 = 14.0;
 /// A character is about as wide.
 const CHARACTER: f64 = 8.6;
@@ -49,7 +48,6 @@ impl Range {
         if part.is_finite() { part.clamp(0.0, 1.0) } else { f64::NAN }
     }
 
-    /// Places and labels.
     fn ticks(&self) -> Vec<(f64, String)> {
         let digits = (-self.step.log10().floor()).clamp(0.0, 9.0) as usize;
         let first = (self.low / self.step - 1e-6).ceil();
@@ -99,7 +97,6 @@ impl Plot {
         DVec2::new(LEFT + x * (RIGHT - LEFT), self.top + (1.0 - y) * self.height)
     }
 
-    /// The file with `drawn` between axes.
     pub(super) fn svg(
         &self,
         x: (&Range, &str),

@@ -24,7 +24,6 @@ pub struct Scene<'a> {
 pub struct Facts<'a> {
     /// A word: reached, unreachable, timeout, ...
     pub outcome: &'a str,
-    /// The wanted outcome.
     pub reached: bool,
     pub mission_time_s: f64,
     pub path_length_m: f64,

@@ -141,7 +141,6 @@ fn evenly_spaced(lattice: &Lattice, cells: &[FieldCell], spacing: f64) -> Vec<Ve
 struct Tracer<'a> {
     lattice: &'a Lattice,
     cells: &'a [FieldCell],
-    /// Distance between lines, in cells.
     spacing: f64,
     /// Square bins of one spacing.
     drawn: Vec<Vec<DVec2>>,

@@ -24,7 +24,6 @@ pub(super) enum Outline {
 }
 
 impl Outline {
-    /// The order of drawing.
     pub(super) const ALL: [Self; 4] = [Self::Full, Self::Partial, Self::Glass, Self::Soft];
 
     fn of(profile: Profile) -> Self {

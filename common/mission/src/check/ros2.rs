@@ -1,7 +1,6 @@
 use super::objection::{Objection, objection};
 use crate::{Mission, Protocol, SensorKind, address::Address};
 
-/// Bytes.
 const LONGEST_TOPIC: usize = 200;
 
 pub(super) fn check(mission: &Mission) -> Result<(), Objection> {

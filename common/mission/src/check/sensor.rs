@@ -7,7 +7,6 @@ use crate::{
 };
 
 const KEY: &str = "robot.sensor";
-/// Bytes.
 const LONGEST_NAME: usize = 23;
 
 pub(super) fn check(mission: &Mission) -> Result<(), Objection> {

@@ -41,7 +41,7 @@ impl Ackermann {
         self.wheelbase / self.steering_limit.tan()
     }
 
-    /// (3).
+    /// The map (3).
     #[must_use]
     pub fn twist(&self, input: SteeredWheel) -> Twist {
         let v = self.wheel_radius * input.wheel;

@@ -4,7 +4,6 @@ use super::{
     pose::Twist,
 };
 
-/// G of (2) or of (3).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Drive {
     Differential(DifferentialDrive),

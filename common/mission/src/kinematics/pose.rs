@@ -11,7 +11,6 @@ pub struct Pose2 {
     pub heading: f64,
 }
 
-/// v and omega of (1).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Twist {
     /// m/s.

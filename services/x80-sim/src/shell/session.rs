@@ -41,11 +41,9 @@ pub(super) struct Session {
     /// Time waits for commands.
     lock_step: bool,
     way: Way,
-    /// None is perfect.
     radio: Option<Radio<Leg>>,
     /// Source of the last valid frame of the host that is served: all streams go there.
     peer: Option<Source>,
-    /// The last valid frame of that host.
     heard: Instant,
     /// Frames of other hosts ignored since the last warning.
     strangers: u64,
@@ -61,7 +59,6 @@ struct SourceDecoder {
     words: Words,
 }
 
-/// The protocol that the robot speaks.
 enum Words {
     X80(Decoder),
     Json(Lines),
@@ -148,7 +145,6 @@ impl Session {
         self.save()
     }
 
-    /// Readable when bytes have come.
     pub(super) fn readable(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>) {
         self.way.readable()
     }

@@ -1,6 +1,5 @@
 use std::net::SocketAddr;
 
-/// The sender of received bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Source {
     Peer(SocketAddr),

@@ -66,7 +66,6 @@ impl Tcp {
         std::mem::take(&mut self.opened)
     }
 
-    /// None when it is closed.
     pub(super) fn connected(&mut self) -> io::Result<Option<Source>> {
         self.accept()?;
         let open = self.connection.as_ref();

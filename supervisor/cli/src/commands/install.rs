@@ -55,7 +55,6 @@ static PARTS: [Part; 7] = [
 
 const PACKAGED: &str = "/usr/bin/firsthand";
 
-/// They remain for the user.
 const THEN: &str = "systemd-sysusers && systemctl daemon-reload
 then, when /etc/firsthand/mission.toml is the robot's mission:
   systemctl enable --now firsthand          # the supervisor starts the stages, or

@@ -55,7 +55,6 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     Ok(print_round(&mut logs, &mut stream)?)
 }
 
-/// The present run's, or else the newest's.
 fn newest(arguments: &Arguments) -> Option<PathBuf> {
     let robot = &arguments.robot;
     Robot::find(robot.clone()).run.or_else(|| {
@@ -78,7 +77,6 @@ fn opened(arguments: &Arguments, directory: &Path) -> Result<Logs, Failure> {
     Ok(Logs::of(directory, stage))
 }
 
-/// One run after the other.
 fn follow(arguments: &Arguments, stream: &mut Stream) -> Result<(), Failure> {
     // The log of a stage may not be there yet.
     if let Some(stage) = arguments.stage.as_deref()
@@ -130,5 +128,4 @@ fn print_round(logs: &mut Logs, stream: &mut Stream) -> std::io::Result<()> {
 }
 
 const OTHERS: [&str; 2] = ["supervisor", "x80-sim"];
-/// Bytes of lines that are written together.
 const PRINTED_AT_ONCE: usize = 64 << 10;

@@ -302,7 +302,6 @@ fn may_be_removed(arguments: &Arguments, options: &Options, finished: &Finished)
 
 /// Without a supervisor for longer the robot may have been moved.
 const RESUMED_WITHIN_S: f64 = 60.0;
-/// `--resume-last` did not start.
 const CUT_OFF: u8 = 7;
 
 fn exit_code(summary: &Summary, ending: &Ending) -> ExitCode {
@@ -328,7 +327,7 @@ struct Console {
     title: String,
 }
 
-/// Lines that cannot be rewritten.
+/// The time between lines that cannot be rewritten.
 const LINE_EVERY: Duration = Duration::from_secs(5);
 
 impl Console {

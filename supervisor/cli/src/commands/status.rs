@@ -50,9 +50,7 @@ struct Status<'a> {
     order: &'static str,
     tick: u64,
     mission_time_s: f64,
-    /// None if it is not published.
     target: Option<TargetStatus>,
-    /// None if no link publishes.
     link: Option<LinkStatus>,
     /// None if the robot does not report it.
     power: Option<PowerStatus>,

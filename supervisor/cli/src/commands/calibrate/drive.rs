@@ -17,7 +17,7 @@ use console::{
 
 use crate::commands::run::recorder::RunRecorder;
 
-/// Lines that cannot be rewritten.
+/// The time between lines that cannot be rewritten.
 const LINE_EVERY: Duration = Duration::from_secs(5);
 
 #[derive(Clone, Copy)]
@@ -27,13 +27,11 @@ pub(super) struct Setting<'a> {
     pub(super) runs: &'a Path,
 }
 
-/// The procedure came to its end.
 pub(super) struct Carried {
     pub(super) directory: PathBuf,
     pub(super) seconds: f64,
-    /// Encoders in each tick.
     pub(super) counts: Vec<[u16; 2]>,
-    /// Simulated robot's end, metres.
+    /// The end of a simulated robot, metres.
     pub(super) truth: Option<DVec2>,
 }
 

@@ -12,7 +12,6 @@ use glam::DVec2;
 
 use console::{failure::Failure, output::write_stderr};
 
-/// Bytes.
 const LONGEST_LINE: u64 = 200;
 const FARTHEST_M: f64 = 10.0;
 /// The time between looks for a signal while somebody measures.
@@ -33,7 +32,6 @@ impl Ends {
         Ok(Self::File(BufReader::new(opened)))
     }
 
-    /// The robot stands on its mark.
     pub(super) fn await_robot(
         &mut self,
         title: &str,

@@ -20,9 +20,7 @@ pub(super) struct Found {
     pub(super) method: &'static str,
     pub(super) before: Odometry,
     pub(super) estimate: Estimate,
-    /// A wheel's mean way.
     pub(super) metres: f64,
-    /// Mission time.
     pub(super) seconds: f64,
     pub(super) residuals: Vec<Residual>,
     pub(super) directory: PathBuf,

@@ -12,11 +12,10 @@ const LONGEST_LINE: u64 = 64 << 10;
 /// A time like 2026-11-21T06:04:22.729158Z.
 const TIME: usize = 27;
 
-/// They may still be written.
 #[derive(Debug)]
 pub(crate) struct Logs {
     directory: PathBuf,
-    /// None for all.
+    /// `None` reads all.
     process: Option<String>,
     logs: Vec<Log>,
 }
@@ -50,7 +49,6 @@ impl std::fmt::Display for Line {
 }
 
 impl Logs {
-    /// None for all processes.
     pub(crate) fn of(directory: &Path, process: Option<&str>) -> Self {
         Self {
             directory: directory.to_path_buf(),
@@ -90,7 +88,6 @@ impl Logs {
         self.logs.iter_mut().try_for_each(Log::advance)
     }
 
-    /// None at the end of the round.
     pub(crate) fn next_line(&mut self) -> io::Result<Option<Line>> {
         let with_line = self.logs.iter_mut().filter(|log| log.head.is_some());
         let time = |log: &&mut Log| log.head.as_ref().map(|line| line.time.clone());

@@ -13,7 +13,6 @@ use crate::commands::record::DiskBudget;
 struct Patience {
     /// A recorder that attaches later misses the beginning.
     attached: Duration,
-    /// The recorder has written its last chunks.
     ended: Duration,
 }
 

@@ -111,7 +111,6 @@ fn request_fault(
     }
 }
 
-/// `--help` shows it.
 fn table() -> String {
     let mut text = String::from("Faults:\n");
     for fault in &faults::TABLE {

@@ -20,7 +20,6 @@ use crate::companions::{self, LABORATORY};
 
 use console::{failure::Failure, operator};
 
-/// `words` are its name and options.
 pub(super) fn run(words: &[OsString]) -> Result<(), Failure> {
     let (name, options) = words.split_first().ok_or("name a stage")?;
     let name = name.to_string_lossy();
