@@ -1,7 +1,8 @@
 //! The protocol of robots that speak lines of JSON, over datagrams, a connection or a serial line.
 //!
-//! Every message is one JSON object in one line, at most [`LONGEST_LINE`] bytes with its line feed. A datagram may carry several lines.
-//! Angles are in radians, distances in metres, times in seconds; left is positive. The robot speaks [`Report`]s and hears [`Order`]s.
+//! A message is one JSON object in a line of at most [`LONGEST_LINE`] bytes. A datagram may carry several lines.
+//! Angles are in radians, distances in metres, times in seconds; left is positive. The robot speaks [`Report`]s and
+//! hears [`Order`]s.
 
 use std::collections::BTreeMap;
 
@@ -10,61 +11,55 @@ use serde::{Deserialize, Serialize};
 /// The greatest length of a line, bytes: a scan of 1,080 beams has 8 kB.
 pub const LONGEST_LINE: usize = 32_768;
 
-/// A report of the robot. Each field is optional.
+/// Each field is optional.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Report {
-    /// The number of orders that the robot has taken since it started. Each order is answered by a report that counts it, at once.
+    /// Orders taken since the robot started. Each order is answered at once by a report that counts it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub heard: Option<u64>,
-    /// The angles by which the left and the right wheel have turned since the robot started. A tick begins with them.
+    /// Angles by which the wheels have turned since the robot started. A tick begins with them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wheels: Option<[f64; 2]>,
-    /// The speeds of the wheels, rad/s.
+    /// Rad/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speeds: Option<[f64; 2]>,
-    /// The pose by the robot's own odometry, sent instead of `wheels`: x, y and heading.
+    /// The robot's own odometry, sent instead of `wheels`: x, y and heading.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub odometry: Option<[f64; 3]>,
-    /// Whether something holds the left and the right wheel: their motors draw the current of a stall.
+    /// Something holds the wheel: its motor draws the current of a stall.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held: Option<[bool; 2]>,
-    /// The readings of ranging sensors by the names of the mission's rows; null for nothing in reach.
+    /// Readings by the names of the mission's rows; null for nothing in reach.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub ranges: BTreeMap<String, Option<f64>>,
-    /// The beams of the laser, counter-clockwise; null for nothing in reach, less than 0 for no reading.
+    /// Beams counter-clockwise; null for nothing in reach, less than 0 for no reading.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scan: Option<Vec<Option<f32>>>,
-    /// The voltage of the battery.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub battery_v: Option<f64>,
 }
 
-/// An order to the robot.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "lowercase")]
 pub enum Order {
-    /// The link has found the robot, or the robot has braked. The robot releases its brake and reports at this rate.
+    /// The robot was found, or has braked: it releases its brake and reports at this rate.
     Hello {
-        /// Reports a second.
         rate_hz: f64,
     },
-    /// Drive for a time, then stand, unless another order came.
+    /// Drive for `for_s`, then stand, unless another order came.
     Drive {
-        /// The speeds of the left and the right wheel, rad/s.
+        /// Left and right, rad/s.
         wheels: [f64; 2],
-        /// The speed ahead, m/s, and the turn rate, rad/s, that `wheels` give.
+        /// What `wheels` give: speed ahead, m/s, and turn rate, rad/s.
         twist: [f64; 2],
-        /// The time after which the robot stands.
         for_s: f64,
     },
     /// Stand by every means until the next hello.
     Brake {},
-    /// Report at once.
     Ping {},
 }
 
-/// Encode a message as one line.
 #[must_use]
 pub fn line(message: &impl Serialize) -> Vec<u8> {
     // A struct of numbers and names always serialises.
@@ -73,22 +68,22 @@ pub fn line(message: &impl Serialize) -> Vec<u8> {
     line
 }
 
-/// The message of a line, or why the line is no message.
+/// Says why a line is no message.
 pub fn parse<'a, M: Deserialize<'a>>(line: &'a [u8]) -> Result<M, String> {
     serde_json::from_slice(line).map_err(|error| error.to_string())
 }
 
-/// Splits bytes into lines. Empty lines and lines that are too long are dropped.
+/// Empty lines and lines that are too long are dropped.
 #[derive(Clone, Debug, Default)]
 pub struct Lines {
     held: Vec<u8>,
-    /// Whether the rest of a line that is too long is still to come.
+    /// The rest of a line that is too long is still to come.
     drops: bool,
     dropped: u64,
 }
 
 impl Lines {
-    /// Take bytes. Returns the lines that they complete, without their line feeds.
+    /// Returns the lines that `bytes` complete, without their line feeds.
     pub fn push(&mut self, bytes: &[u8]) -> Vec<Vec<u8>> {
         let mut complete = Vec::new();
         let mut pieces = bytes.split(|byte| *byte == b'\n').peekable();
@@ -109,14 +104,13 @@ impl Lines {
         complete
     }
 
-    /// Forget the beginning of a line, because its rest does not follow.
+    /// The rest of a line that has begun does not follow.
     pub fn reset(&mut self) {
         self.dropped += self.held.len() as u64;
         self.held.clear();
         self.drops = false;
     }
 
-    /// The bytes of lines that were dropped.
     #[must_use]
     pub const fn dropped(&self) -> u64 {
         self.dropped

@@ -1,4 +1,4 @@
-//! A robot's address: where it answers and over which transport, as a mission writes it and as its link opens it.
+//! Where a robot answers and over which transport.
 
 use std::{
     fmt,
@@ -10,10 +10,9 @@ use std::{
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use thiserror::Error;
 
-/// The valid forms of an address, for the remedy in errors.
 pub const FORMS: &str = "give \"host:port\", \"udp://host:port\", \"tcp://host:port\", \"serial:///dev/ttyUSB0\" or \"ros2:DOMAIN\"";
 
-/// The address and the transport of a robot. `Host` is text in a mission and a number once it is resolved.
+/// `Host` is text in a mission and a number once it is resolved.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Address<Host = SocketAddr> {
     /// Datagrams, the default: `host:port` or `udp://host:port`.
@@ -29,31 +28,18 @@ pub enum Address<Host = SocketAddr> {
 /// The greatest domain: the ports of a greater one do not exist.
 const LAST_DOMAIN: u16 = 232;
 
-/// The domain that `text` is.
 fn domain(text: &str) -> Option<u16> {
     text.parse().ok().filter(|domain| *domain <= LAST_DOMAIN)
 }
 
-/// The text is not an address, or its host cannot be found.
 #[derive(Debug, Error)]
 pub enum AddressError {
-    /// The text is not written as an address.
     #[error("{address:?} {problem}; {FORMS}")]
-    Form {
-        /// The address in the mission.
-        address: String,
-        problem: &'static str,
-    },
-    /// The host is not known on this machine.
+    Form { address: String, problem: &'static str },
     #[error(
         "the host of {address:?} cannot be found: {source}; give its number, or a name that resolves on this machine"
     )]
-    Host {
-        /// The address in the mission.
-        address: String,
-        /// The resolver's error.
-        source: std::io::Error,
-    },
+    Host { address: String, source: std::io::Error },
 }
 
 impl<Host: fmt::Display> fmt::Display for Address<Host> {
@@ -108,7 +94,7 @@ impl FromStr for Address<String> {
 }
 
 impl Address<String> {
-    /// Ask the resolver for the host's number, which may take seconds.
+    /// Ask the resolver for the host's number, which may take seconds; fails for a host that it does not know.
     pub fn resolve(&self) -> Result<Address, AddressError> {
         let number = |host: &String| {
             let unknown = |source| AddressError::Host { address: self.to_string(), source };
@@ -127,7 +113,7 @@ impl Address<String> {
     }
 }
 
-/// The domain that `ROS_DOMAIN_ID` names; 0 without it.
+/// The domain that `ROS_DOMAIN_ID` names, 0 without it; fails if it is no domain.
 pub fn domain_of_environment() -> Result<u16, AddressError> {
     let Some(text) = std::env::var_os("ROS_DOMAIN_ID").filter(|text| !text.is_empty()) else {
         return Ok(0);

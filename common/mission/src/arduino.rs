@@ -4,15 +4,14 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// The least baud rate. The driver knows the number that says the rate by its size: a board waits for an echo for a second at most, and
+/// The driver knows the number that says the rate by its size: a board waits for an echo for a second at most, and
 /// says 17,241 cm then.
 pub const LEAST_BAUD: u32 = 19_200;
 
-/// The settings that the board's firmware was built with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ArduinoBoard {
-    /// The speed of its serial line, bits a second.
+    /// Bits a second.
     pub baud: u32,
     /// The rate of the speed loop. Speeds are said in encoder counts from one run of the loop to the next.
     pub pid_rate_hz: f64,
@@ -27,7 +26,6 @@ impl Default for ArduinoBoard {
 }
 
 impl ArduinoBoard {
-    /// Whether the mission says nothing of the board.
     pub(crate) fn is_default(&self) -> bool {
         *self == Self::default()
     }

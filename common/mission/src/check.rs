@@ -38,30 +38,23 @@ fn read_bounded(path: &Path) -> io::Result<String> {
     Ok(text)
 }
 
-/// The longest mission, seconds: a day.
 const MAX_TIMEOUT_S: f64 = 86_400.0;
 
 impl Mission {
-    /// Parse and validate `text`; `origin` names it in errors.
-    ///
     /// # Errors
-    /// A [`MissionError`] that says line, key, what is wrong and the remedy.
+    /// The line, the key, what is wrong and the remedy; `origin` names the file.
     pub fn parse(text: &str, origin: &Path) -> Result<Self, MissionError> {
         parse(text, origin)
     }
 
-    /// [`Mission::parse`] on a file.
-    ///
     /// # Errors
     /// As [`Mission::parse`], and when the file cannot be read.
     pub fn load(path: &Path) -> Result<Self, MissionError> {
         Self::parse(&Self::read(path)?, path)
     }
 
-    /// The text of a mission file, not parsed yet.
-    ///
     /// # Errors
-    /// When it cannot be read, or is far too long for a mission.
+    /// When the file cannot be read, or is far too long for a mission.
     pub fn read(path: &Path) -> Result<String, MissionError> {
         read_bounded(path)
             .map_err(|source| MissionError::Unreadable { file: PathBuf::from(path), source })
@@ -103,7 +96,6 @@ fn parse(text: &str, origin: &Path) -> Result<Mission, MissionError> {
     }
 }
 
-/// Remarks about requests that this robot cannot fulfil.
 fn remarks(text: &str, origin: &Path, tree: &DeTable<'_>, mission: &Mission) -> Vec<String> {
     let file = origin.display();
     let line = |key| line_of(text, span_of(tree, key));
@@ -124,7 +116,7 @@ fn remarks(text: &str, origin: &Path, tree: &DeTable<'_>, mission: &Mission) -> 
     car.into_iter().chain(twice).collect()
 }
 
-/// 1-based line of byte `offset`.
+/// Lines count from 1.
 fn line_of(text: &str, offset: usize) -> usize {
     let upto = &text.as_bytes()[..offset.min(text.len())];
     1 + upto.iter().filter(|&&byte| byte == b'\n').count()
@@ -259,7 +251,6 @@ impl Checker {
     }
 }
 
-/// The key that names the mission's targets.
 const fn key_of_target(mission: &Mission) -> &'static str {
     if mission.targets.is_empty() { "target" } else { "targets" }
 }

@@ -1,46 +1,30 @@
-//! Errors of a mission file.
-
 use std::path::PathBuf;
 
 use thiserror::Error;
 
-/// A mission was refused.
 #[derive(Debug, Error)]
 pub enum MissionError {
-    /// The file cannot be read.
     #[error(
         "cannot read mission {file}: {source}; give a shipped name (`firsthand missions`) or a readable TOML file"
     )]
-    Unreadable {
-        file: PathBuf,
-        /// The system's error.
-        source: std::io::Error,
-    },
+    Unreadable { file: PathBuf, source: std::io::Error },
     /// The text is not the TOML that a mission is written in: syntax, an unknown key, a wrong type.
     #[error("{file}:{line}: {problem}")]
     Syntax {
         file: PathBuf,
         /// 1-based line.
         line: usize,
-        /// The parser's error.
         problem: String,
     },
-    /// The calibration that the mission names cannot be used.
     #[error(
         "robot.calibration: {file}: {problem}; give a file that `firsthand calibrate` wrote, or leave the key out"
     )]
-    Calibration {
-        /// The file of the calibration.
-        file: PathBuf,
-        problem: String,
-    },
-    /// A value is invalid.
+    Calibration { file: PathBuf, problem: String },
     #[error("{file}:{line}: {key}: {problem}; {remedy}")]
     Value {
         file: PathBuf,
         /// 1-based line of the key, or of the table that should hold it.
         line: usize,
-        /// The key, dotted.
         key: String,
         problem: String,
         remedy: String,
@@ -48,7 +32,7 @@ pub enum MissionError {
 }
 
 impl MissionError {
-    /// The message without file and line, for a value that is not from the file.
+    /// Without file and line, for a value that is not from the file.
     #[must_use]
     pub fn without_place(&self) -> String {
         match self {
@@ -59,7 +43,7 @@ impl MissionError {
         }
     }
 
-    /// Whether `other` is the same fault, perhaps on another line.
+    /// The fault may be on another line of `other`.
     #[must_use]
     pub fn is_same_fault(&self, other: &Self) -> bool {
         match (self, other) {

@@ -1,44 +1,40 @@
-//! The shapes a mission is written in: what stands in a world, and what is known of it beforehand.
+//! The shapes of a world and of what is known of it beforehand.
 //!
 //! Metres, in the mission frame (origin where the robot starts).
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-/// The effect of a shape's surface on the beam of a laser.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Light {
-    /// The surface scatters the beam: a laser detects it from any side.
+    /// Scatters the beam: a laser detects it from any side.
     #[default]
     Matt,
-    /// The beam passes, except near the normal, where the pane reflects it back into the laser.
+    /// Lets the beam pass, except near the normal, where the pane reflects it back into the laser.
     Glass,
-    /// The surface scatters a tenth of the light: a laser detects it from near.
+    /// Scatters a tenth of the light: a laser detects it from near.
     Black,
 }
 
-/// The heights between which a shape extends, the share of sound that it reflects, and its effect on light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Profile {
-    /// The lowest height above the floor, metres.
     pub bottom_m: f64,
-    /// The highest height, metres; infinite for a shape that is higher than any robot.
+    /// Infinite for a shape that is higher than any robot.
     pub top_m: f64,
-    /// Amplitude of the echo over that of a hard thing of the same form; 1 is hard.
+    /// Amplitude over that of a hard thing of the same form.
     pub echo: f64,
-    /// The effect on the beam of a laser.
     pub light: Light,
 }
 
 impl Profile {
-    /// Vertical distance from `height_m` to the shape's nearest part, metres; 0 if the shape extends to that height.
+    /// Vertical distance to the shape's nearest part, metres; 0 if the shape extends to that height.
     #[must_use]
     pub fn height_gap(&self, height_m: f64) -> f64 {
         (self.bottom_m - height_m).max(height_m - self.top_m).max(0.0)
     }
 
-    /// Whether any of it is between two heights, metres.
+    /// Any of it is between two heights, metres.
     #[must_use]
     pub fn is_between(&self, lower_m: f64, upper_m: f64) -> bool {
         self.bottom_m < upper_m && self.top_m > lower_m
@@ -56,22 +52,20 @@ macro_rules! shape {
         #[serde(deny_unknown_fields)]
         pub struct $name {
             $($(#[$doc])* pub $field: $type,)*
-            /// The lowest height above the floor, metres; by default the shape stands on the floor.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub bottom_m: Option<f64>,
-            /// The highest height, metres; by default the shape is higher than the robot.
+            /// By default the shape is higher than the robot.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub top_m: Option<f64>,
-            /// Amplitude of the echo over that of a hard thing; by default the shape is hard.
+            /// By default the shape is hard.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub echo: Option<f64>,
-            /// The effect on the beam of a laser; by default the shape is matt.
+            /// By default the shape is matt.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub light: Option<Light>,
         }
 
         impl $name {
-            /// The heights, the echo and the effect on light.
             #[must_use]
             pub fn profile(&self) -> Profile {
                 Profile {
@@ -88,9 +82,7 @@ macro_rules! shape {
 shape! {
     /// A cable drum, a post, the leg of a table or chair (a radius of 0.01 to 0.015 m): a disc.
     Drum {
-        /// Centre, metres.
         at: DVec2,
-        /// Radius, metres.
         radius_m: f64,
     }
 }
@@ -98,7 +90,6 @@ shape! {
 shape! {
     /// A wall: a polyline without thickness.
     Wall {
-        /// Corners in order, metres; at least two.
         points: Vec<DVec2>,
     }
 }
@@ -106,25 +97,24 @@ shape! {
 shape! {
     /// A crate, desk or cabinet: a rectangle.
     Box2 {
-        /// Centre, metres.
         at: DVec2,
-        /// Full extent along its own two axes, metres.
+        /// Along its own two axes.
         size_m: DVec2,
-        /// Counter-clockwise turn of its first axis, degrees.
+        /// Counter-clockwise.
         #[serde(default)]
         angle_deg: f64,
     }
 }
 
 impl Wall {
-    /// The straight edges, as (from, to).
+    /// Each edge is (from, to).
     pub fn edges(&self) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
         self.points.windows(2).map(|pair| (pair[0], pair[1]))
     }
 }
 
 impl Box2 {
-    /// The four corners, counter-clockwise.
+    /// Counter-clockwise.
     #[must_use]
     pub fn corners(&self) -> [DVec2; 4] {
         let axis = DVec2::from_angle(self.angle_deg.to_radians());
@@ -133,50 +123,44 @@ impl Box2 {
             .map(|(a, b)| self.at + axis.rotate(half * DVec2::new(a, b)))
     }
 
-    /// The four edges, as (from, to).
+    /// Each edge is (from, to).
     pub fn edges(&self) -> impl Iterator<Item = (DVec2, DVec2)> + use<> {
         let corners = self.corners();
         (0..4).map(move |side| (corners[side], corners[(side + 1) % 4]))
     }
 }
 
-/// Things that stand somewhere.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Shapes {
-    /// Discs.
     #[serde(rename = "drum")]
     pub drums: Vec<Drum>,
-    /// Polylines.
     #[serde(rename = "wall")]
     pub walls: Vec<Wall>,
-    /// Rectangles.
     #[serde(rename = "box")]
     pub boxes: Vec<Box2>,
 }
 
 impl Shapes {
-    /// Whether nothing stands here.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.drums.is_empty() && self.walls.is_empty() && self.boxes.is_empty()
     }
 
-    /// Every straight edge of walls and boxes, as (from, to).
+    /// Each edge of walls and boxes is (from, to).
     pub fn edges(&self) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
         let walls = self.walls.iter().flat_map(Wall::edges);
         let boxes = self.boxes.iter().flat_map(Box2::edges);
         walls.chain(boxes)
     }
 
-    /// Everything that stands here, one by one.
     pub fn pieces(&self) -> impl Iterator<Item = Piece<'_>> + '_ {
         let edges = self.walls.iter().flat_map(Wall::edges);
         let walls = edges.map(|(from, to)| Piece::Edge(from, to));
         self.drums.iter().map(Piece::Drum).chain(walls).chain(self.boxes.iter().map(Piece::Box))
     }
 
-    /// The shapes that have a part between two heights, metres. A body between these heights can touch them.
+    /// The shapes with a part between two heights, metres: a body between them can touch these.
     #[must_use]
     pub fn between(&self, lower_m: f64, upper_m: f64) -> Self {
         let mut shapes = self.clone();
@@ -187,27 +171,23 @@ impl Shapes {
         shapes
     }
 
-    /// Distance from `point` to the nearest surface, metres; negative inside a drum or a box,
-    /// infinite where nothing stands.
+    /// Distance to the nearest surface, metres; negative inside a drum or a box, infinite where nothing stands.
     #[must_use]
     pub fn clearance(&self, point: DVec2) -> f64 {
         self.pieces().map(|piece| piece.clearance(point)).fold(f64::INFINITY, f64::min)
     }
 }
 
-/// A single shape: a drum, a straight edge of a wall, or a box.
+/// A drum, a straight edge of a wall, or a box.
 #[derive(Clone, Copy, Debug)]
 pub enum Piece<'a> {
-    /// A disc.
     Drum(&'a Drum),
-    /// A straight edge.
     Edge(DVec2, DVec2),
-    /// A rectangle.
     Box(&'a Box2),
 }
 
 impl Piece<'_> {
-    /// Distance from `point` to its surface, metres; negative inside.
+    /// Distance to its surface, metres; negative inside.
     #[must_use]
     pub fn clearance(&self, point: DVec2) -> f64 {
         match self {
@@ -221,7 +201,7 @@ impl Piece<'_> {
         }
     }
 
-    /// The two corners, least and greatest, of an upright rectangle that contains it, metres.
+    /// The least and the greatest corner of an upright rectangle around it, metres.
     #[must_use]
     pub fn bounds(&self) -> (DVec2, DVec2) {
         match self {
@@ -241,13 +221,11 @@ impl Piece<'_> {
     }
 }
 
-/// Distance from `point` to the segment `from`..`to`, metres.
 #[must_use]
 pub fn distance_to_segment(point: DVec2, from: DVec2, to: DVec2) -> f64 {
     nearest_on_segment(point, from, to).distance(point)
 }
 
-/// The point of the segment `from`..`to` nearest to `point`.
 #[must_use]
 pub fn nearest_on_segment(point: DVec2, from: DVec2, to: DVec2) -> DVec2 {
     let along = to - from;
@@ -258,8 +236,8 @@ pub fn nearest_on_segment(point: DVec2, from: DVec2, to: DVec2) -> DVec2 {
     from + along * ((point - from).dot(along) / length_squared).clamp(0.0, 1.0)
 }
 
-/// The axes of the covariance `[xx, xy, yy]` of a place: the standard deviations along the longer and the shorter one, and the angle of
-/// the longer one from x, radians.
+/// The standard deviations along the longer and the shorter axis of the covariance `[xx, xy, yy]` of a place, and the
+/// angle of the longer one from x, radians.
 #[must_use]
 pub fn principal_axes([xx, xy, yy]: [f64; 3]) -> ([f64; 2], f64) {
     let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
@@ -267,7 +245,7 @@ pub fn principal_axes([xx, xy, yy]: [f64; 3]) -> ([f64; 2], f64) {
     (variances.map(|variance| variance.max(0.0).sqrt()), 0.5 * xy.atan2(half))
 }
 
-/// `angle` brought into (-pi, pi], radians.
+/// The result is in (-pi, pi], radians.
 #[must_use]
 pub fn wrap_angle(angle: f64) -> f64 {
     use std::f64::consts::{PI, TAU};

@@ -1,11 +1,11 @@
-//! Cells and metres: the state of a cell, windows of cells, and the position of the cells in the mission frame.
+//! Cells and metres: states, windows, and the cells' position in the mission frame.
 
 use std::borrow::Cow;
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-/// The estimated state of a cell, by (18), (19) and the a-priori map.
+/// A cell by (18), (19) and the a-priori map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum CellState {
@@ -13,30 +13,28 @@ pub enum CellState {
     Free = 0,
     /// A safety event, or its margin, was mapped here.
     Sensed = 1,
-    /// Hazard from the a-priori map of the mission.
     Known = 2,
     /// The perimeter of operation; never cleared.
     Perimeter = 3,
-    /// Possibly safe, and the sonar looked there: only the evidential method tells it from [`Free`](Self::Free).
+    /// Possibly safe, and the sonar looked there; only the evidential method tells it from [`Free`](Self::Free).
     Scanned = 4,
-    /// Hazard because the body would touch something sensed nearby; the sonar looked there and saw nothing.
+    /// Scanned and empty, but the body would touch something sensed nearby: a hazard.
     Margin = 5,
 }
 
 impl CellState {
-    /// Whether the harmonic field is 0 here.
+    /// The harmonic field is 0 here.
     #[must_use]
     pub const fn is_hazard(self) -> bool {
         !matches!(self, Self::Free | Self::Scanned)
     }
 
-    /// Whether the sonar looked here.
     #[must_use]
     pub const fn is_scanned(self) -> bool {
         matches!(self, Self::Scanned | Self::Margin)
     }
 
-    /// The state for a byte of the `grid` topic; an unknown byte counts as a hazard.
+    /// A byte of the `grid` topic; an unknown one counts as a hazard.
     #[must_use]
     pub const fn from_byte(byte: u8) -> Self {
         match byte {
@@ -50,41 +48,33 @@ impl CellState {
     }
 }
 
-/// The fewest cells along a side: fewer leave no room between the perimeter's two sides.
+/// Fewer leave no room between the perimeter's two sides.
 pub const MIN_CELLS: u32 = 10;
-/// The most cells along a side: 4096 x 4096 is the largest field that is solved.
+/// 4096 x 4096 is the largest field that is solved.
 pub const MAX_CELLS: u32 = 4096;
 
-/// A cell: `col` grows with x, `row` grows with y.
+/// `col` grows with x, `row` with y.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Cell {
-    /// Index along x.
     pub col: u32,
-    /// Index along y.
     pub row: u32,
 }
 
-/// A rectangle of cells; empty when either extent is 0.
+/// Empty when either extent is 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Window {
-    /// First column.
     pub col: u32,
-    /// First row.
     pub row: u32,
-    /// Columns.
     pub width: u32,
-    /// Rows.
     pub height: u32,
 }
 
 impl Window {
-    /// Cells it covers.
     #[must_use]
     pub const fn area(&self) -> usize {
         self.width as usize * self.height as usize
     }
 
-    /// The smallest window that covers `self` and `cell`.
     #[must_use]
     pub fn including(self, cell: Cell) -> Self {
         if self.area() == 0 {
@@ -99,7 +89,6 @@ impl Window {
         }
     }
 
-    /// The smallest window that covers `self` and `other`.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         if other.area() == 0 {
@@ -111,37 +100,35 @@ impl Window {
     }
 }
 
-/// The position of the N x N cells of the map in the mission frame: (19) with the origin at the centre.
+/// The N x N cells in the mission frame: (19) with the origin at the centre.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GridFrame {
-    /// N: cells along each side.
+    /// N, along each side.
     pub cells: u32,
-    /// Delta: the side of a cell, metres.
+    /// Delta.
     pub resolution_m: f64,
-    /// The position of the centre cell in the mission frame, metres.
+    /// The centre cell, metres.
     pub centre: DVec2,
 }
 
 impl GridFrame {
-    /// The index of the cell at the centre, along both axes.
     #[must_use]
     pub const fn centre_index(&self) -> u32 {
         self.cells / 2
     }
 
-    /// Number of cells, N x N.
     #[must_use]
     pub const fn area(&self) -> usize {
         self.cells as usize * self.cells as usize
     }
 
-    /// `point` (metres) in cell units: cell centres lie at whole numbers.
+    /// Metres to cell units: cell centres lie at whole numbers.
     #[must_use]
     pub fn to_cells(&self, point: DVec2) -> DVec2 {
         (point - self.centre) / self.resolution_m + DVec2::splat(f64::from(self.centre_index()))
     }
 
-    /// The cell `point` falls in, [x / Delta] of (19); none outside the map.
+    /// [x / Delta] of (19); none outside the map.
     #[must_use]
     pub fn cell_at(&self, point: DVec2) -> Option<Cell> {
         let index = self.to_cells(point).round();
@@ -153,7 +140,7 @@ impl GridFrame {
         Some(Cell { col: index.x as u32, row: index.y as u32 })
     }
 
-    /// The middle of `cell` in the mission frame, metres.
+    /// The middle of `cell`, metres.
     #[must_use]
     pub fn centre_of(&self, cell: Cell) -> DVec2 {
         let centre = f64::from(self.centre_index());
@@ -161,32 +148,31 @@ impl GridFrame {
         self.centre + offset * self.resolution_m
     }
 
-    /// The corner of `cell` where x and y are least, metres.
+    /// The corner where x and y are least, metres.
     #[must_use]
     pub fn corner_of(&self, cell: Cell) -> DVec2 {
         self.centre_of(cell) - DVec2::splat(self.resolution_m / 2.0)
     }
 
-    /// Position of `cell` in a row-major slice of the whole map.
+    /// The index in a row-major slice of the whole map.
     #[must_use]
     pub const fn index(&self, cell: Cell) -> usize {
         cell.row as usize * self.cells as usize + cell.col as usize
     }
 
-    /// Whether `cell` is on the perimeter, (18).
+    /// The cell is on the perimeter, (18).
     #[must_use]
     pub const fn is_rim(&self, cell: Cell) -> bool {
         let last = self.cells - 1;
         cell.col == 0 || cell.row == 0 || cell.col >= last || cell.row >= last
     }
 
-    /// The window of the whole map.
     #[must_use]
     pub const fn whole(&self) -> Window {
         Window { col: 0, row: 0, width: self.cells, height: self.cells }
     }
 
-    /// The cells of `window` out of a row-major slice of the whole map, in order.
+    /// The cells of `window` in a row-major slice of the whole map.
     pub fn cells_of<'map, T: Copy>(&self, window: Window, map: &'map [T]) -> Cow<'map, [T]> {
         if window == self.whole() {
             return Cow::Borrowed(map);
@@ -206,7 +192,7 @@ impl GridFrame {
         let mut window = Window::default();
         let rows = old.chunks_exact(side).zip(new.chunks_exact(side));
         for (row, (old, new)) in rows.enumerate() {
-            // Most rows are equal, and comparing a whole row at once is several times as fast.
+            // Comparing a whole row at once is several times as fast, and most are equal.
             if old == new {
                 continue;
             }
@@ -220,7 +206,6 @@ impl GridFrame {
         window
     }
 
-    /// Whether `window` lies inside the map.
     #[must_use]
     pub fn contains(&self, window: Window) -> bool {
         let fits =

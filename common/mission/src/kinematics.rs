@@ -1,5 +1,5 @@
-//! The rigid motion of the robot, (1), and the two maps G between what is driven and the body, (2), (3), with
-//! their inverses, (17).
+//! The rigid motion of the robot, (1), the maps G from what is driven to the body, (2), (3), and their inverses,
+//! (17).
 
 mod ackermann;
 mod differential;
@@ -11,10 +11,9 @@ pub use differential::{DifferentialDrive, WheelSpeeds};
 pub use drive::Drive;
 pub use pose::{Pose2, Twist};
 
-/// Below this speed, m/s, a wheel may stick in the dead band of its loop (20 counts/s after a gain of 0.78, 11 mm/s). So no
-/// robot is ordered to go slower, and a lower speed limit means stand.
+/// Below this speed, m/s, a wheel may stick in the dead band of its loop (20 counts/s after a gain of 0.78, 11 mm/s).
+/// No robot is ordered to go slower: a lower limit means stand.
 pub const LEAST_SPEED_M_S: f64 = 0.04;
 
-/// Cosine of the greatest angle, 11 degrees, at which a robot faces its way: it does not turn on the spot, and where it may not
-/// go on it stands.
+/// Within 11 degrees a robot faces its way: it does not turn on the spot, and where it may not go on it stands.
 pub const FACES_COSINE: f64 = 0.98;

@@ -3,18 +3,17 @@
 //! Metres, seconds, radians inside; degrees where a person writes them (`_deg`). All positions are in
 //! the mission frame: its origin is where the robot starts and, unless `start.heading_deg` says
 //! otherwise, its x-axis is the robot's own.
-
 //!
 //! | module | holds |
 //! |---|---|
-//! | `check` | reading it: syntax, keys, ranges |
+//! | `check` | reading: syntax, keys, ranges |
 //! | `robot`, `simulation` | its two largest parts |
-//! | [`geometry`], [`grid`] | shapes; cells and metres, windows of cells |
-//! | [`kinematics`] | equations (1)-(3) and their inverses |
-//! | `odometry` | how the wheels differ from nominal ones, and the calibration file |
-//! | `sensor`, [`sonar`] | the table of the ranging sensors, and how one is mounted, (19) |
-//! | [`address`] | where a robot answers, and over which transport |
-//! | `arduino`, `ros2` | the board of a robot with an Arduino; the topics of one that speaks ROS 2 |
+//! | [`geometry`], [`grid`] | shapes; cells |
+//! | [`kinematics`] | (1)-(3) and their inverses |
+//! | `odometry` | the wheels' errors, the calibration file |
+//! | `sensor`, [`sonar`] | the table of ranging sensors; their mounting, (19) |
+//! | [`address`] | a robot's address |
+//! | `arduino`, `ros2` | the board of a robot with an Arduino; topics of ROS 2 |
 
 pub mod address;
 mod arduino;
@@ -55,96 +54,85 @@ use crate::{
     kinematics::Pose2,
 };
 
-/// A mission as it is written. Every key but `target` has a default.
+/// Every key but `target` has a default.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mission {
-    /// The name of the mission; by default the file's name.
+    /// The default is the file's name.
     #[serde(default)]
     pub name: String,
     /// One line for `firsthand missions`.
     #[serde(default)]
     pub description: String,
-    /// X_T: where to go first, metres.
+    /// X_T, metres.
     #[serde(default = "defaults::no_target")]
     pub target: DVec2,
-    /// The places to visit one after the other, in place of [`Mission::target`], which is then the first of them.
+    /// The places to visit one after the other; [`Mission::target`] is then the first of them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub targets: Vec<Waypoint>,
-    /// The method by which the robot is guided.
     #[serde(default)]
     pub method: Method,
-    /// Whether readings of the sonar go into the map. Without them the robot knows only [`Mission::known`].
+    /// Readings of the sonar go into the map. Without them the robot knows only [`Mission::known`].
     #[serde(default = "defaults::sensing")]
     pub sensing: bool,
-    /// The sensors whose readings go into the map; by default [`Mission::sensor_set`].
+    /// The rows that are mapped; by default [`Mission::sensor_set`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensors: Option<Sensors>,
-    /// The distance within which the target counts as reached, metres.
+    /// Within this the target counts as reached.
     #[serde(default = "defaults::arrival_tolerance_m")]
     pub arrival_tolerance_m: f64,
-    /// An arrival is unsure if two standard deviations of the position's error exceed this along the worst axis, metres. A simulated
-    /// robot that is farther off is in the wrong place.
+    /// An arrival is unsure if two standard deviations of the position's error exceed this along the worst axis. A
+    /// simulated robot that is farther off is in the wrong place.
     #[serde(default = "defaults::sure_within_m")]
     pub sure_within_m: f64,
-    /// Mission time after which the mission is given up, seconds.
     #[serde(default = "defaults::timeout_s")]
     pub timeout_s: f64,
-    /// Seed of everything random in the simulation.
+    /// The seed of everything random in the simulation.
     #[serde(default = "defaults::seed")]
     pub seed: u64,
-    /// The robot's heading at the start.
     #[serde(default)]
     pub start: Start,
     /// Pi: where the robot may operate, and the grid laid over it.
     #[serde(default)]
     pub perimeter: Perimeter,
-    /// The robot's body and where it answers.
     #[serde(default)]
     pub robot: RobotConfig,
-    /// The front ultrasonic sensor of a robot without `[[robot.sensor]]`.
+    /// The front sonar of a robot without `[[robot.sensor]]`.
     #[serde(default)]
     pub sonar: SonarConfig,
-    /// The values of dead reckoning, which turns wheel counts into the pose.
     #[serde(default)]
     pub dead_reckoning: DeadReckoning,
-    /// The values of the mapper, which turns ranges into hazard cells.
     #[serde(default)]
     pub mapper: Mapper,
-    /// The values of the planner, which turns hazard cells into guidance.
     #[serde(default)]
     pub planner: Planner,
-    /// The values of the controller, which turns guidance into wheel speeds.
     #[serde(default)]
     pub controller: Controller,
-    /// A map of the ROS map_server whose occupied cells become boxes of [`Mission::known`] before a run starts. A relative name is taken
+    /// A map of the ROS map_server whose occupied cells become boxes of [`Mission::known`]. A relative name is taken
     /// from the current directory.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub map: Option<PathBuf>,
-    /// The hazards that the map holds before the robot starts.
+    /// Hazards that the map holds before the robot starts.
     #[serde(default, skip_serializing_if = "Shapes::is_empty")]
     pub known: Shapes,
-    /// The shapes that really exist. Only the simulator reads them.
+    /// Shapes that really exist; only the simulator reads them.
     #[serde(default, skip_serializing_if = "Shapes::is_empty")]
     pub world: Shapes,
-    /// The behaviour of the simulated robot.
     #[serde(default)]
     pub simulation: Simulation,
-    /// Remarks about a valid file, one line each: keys or values that have a new name now, and requests that the robot cannot fulfil.
+    /// One line each on a valid file: keys or values with a new name, and requests that the robot cannot fulfil.
     #[serde(skip)]
     pub remarks: Vec<String>,
 }
 
-/// The greatest number of targets in a list.
 pub const MOST_TARGETS: usize = 16;
 
-/// A place of a list of targets: `[x, y]`, or `[x, y, heading]`.
+/// `[x, y]`, or `[x, y, heading]`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
 pub struct Waypoint {
-    /// Metres.
     pub at: DVec2,
-    /// The heading to turn to there, degrees counter-clockwise from x; none for any.
+    /// The heading to turn to there, counter-clockwise from x; none for any.
     pub heading_deg: Option<f64>,
 }
 
@@ -166,24 +154,22 @@ impl From<Waypoint> for Vec<f64> {
     }
 }
 
-/// The method by which the robot is guided to its target.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
-    /// The robot looks before it drives: evidence for and against hazards, scanned ground, a speed that fits
-    /// what is known of the way ahead.
+    /// Looks before it drives: evidence for and against hazards, scanned ground, a speed that fits what is known of
+    /// the way ahead.
     #[default]
     Evidential,
-    /// The paper's method: every hit is a hazard with its margin, (19), the map only grows, (10), and the robot drives in the direction
+    /// Every hit is a hazard with its margin, (19), the map only grows, (10), and the robot drives in the direction
     /// of the field, (15), (16).
     Paper,
 }
 
-/// The robot's heading at the start.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Start {
-    /// Heading in the mission frame, degrees counter-clockwise from x.
+    /// Counter-clockwise from x of the mission frame.
     pub heading_deg: f64,
 }
 
@@ -191,31 +177,30 @@ pub struct Start {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Perimeter {
-    /// D: side of the square, metres.
+    /// D.
     pub width_m: f64,
-    /// N, the number of cells along each side. By default a cell has 0.05 m, a quarter of the X80's body, for a robot that looks first
-    /// ([`Mission::looks_first`]), and 0.1 m for others: see [`Mission::grid_frame`].
+    /// N along each side. By default a cell has 0.05 m, a quarter of the X80's body, for a robot that looks first
+    /// ([`Mission::looks_first`]), else 0.1 m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cells: Option<u32>,
-    /// Centre of the square, metres.
+    /// Metres.
     pub centre: DVec2,
 }
 
 impl Perimeter {
-    /// The most cells a side of a grid unless the mission says otherwise: the planner follows such a grid at the robot's rate with time to
+    /// Per side, unless the mission says otherwise: the planner follows such a grid at the robot's rate with time to
     /// spare.
     const DEFAULT_MOST_CELLS: f64 = 512.0;
 }
 
-/// The values of dead reckoning, except those of the wheels, which are in [`Odometry`].
+/// All but the wheels' values, which are in [`Odometry`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DeadReckoning {
-    /// The integration rule.
     pub integration: Integration,
 }
 
-/// The rule that integrates (20) into (21).
+/// Integrates (20) into (21).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Integration {
@@ -226,86 +211,78 @@ pub enum Integration {
     Euler,
 }
 
-/// The values of the mapper.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Mapper {
-    /// The paper's method: how far around a hit cells are marked with it, metres:
-    /// [`Mission::margin_cells`] is Im of (19).
+    /// Paper: cells this far around a hit are marked with it; [`Mission::margin_cells`] is Im of (19).
     pub margin_m: f64,
-    /// The evidential method: the distance left free between the body and a hit, metres.
+    /// Evidential: left free between the body and a hit.
     pub clearance_m: f64,
-    /// Hits farther than this are no safety event yet, metres; by default [`Mission::map_within_m`].
+    /// Hits farther than this are no safety event yet; by default [`Mission::map_within_m`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub map_within_m: Option<f64>,
 }
 
-/// The planner's executable, and the values of its field.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Planner {
-    /// The evidential method: the time in which the robot must be able to stop before it meets what it believes in or has not scanned,
-    /// seconds; by default that of [`Mission::hurry`]. The sonar's period, the radio's delay and the wheels' lag add up to 0.36 s.
+    /// Evidential: the robot must be able to stop within this before it meets what it believes in or has not scanned;
+    /// by default that of [`Mission::hurry`]. The sonar's period, the radio's delay and the wheels' lag add up to
+    /// 0.36 s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stops_within_s: Option<f64>,
-    /// Screening length, metres: lambda of laplacian u = u / lambda^2. Without
-    /// it the paper's method has no screening, which is exactly (11), and the evidential one takes
-    /// [`Planner::EVIDENTIAL_SCREENING_M`].
+    /// Lambda of laplacian u = u / lambda^2. Without it the paper's method has no screening, exactly (11), and the
+    /// evidential one takes [`Planner::EVIDENTIAL_SCREENING_M`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub screening_m: Option<f64>,
-    /// The executable of the planner stage, in place of `firsthand`'s own; it is given the command line of
-    /// `common::stage_command`. A run file has it absolute.
+    /// A planner in place of `firsthand`'s own; it is given the command line of `common::stage_command`. A run file
+    /// has it absolute.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub executable: Option<PathBuf>,
-    /// The values of the planner `calibration`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration: Option<CalibrationPlan>,
 }
 
 impl Planner {
-    /// The screening length of the evidential method by default. It is so short that the field still leads to a gap that an echo narrows.
+    /// So short that the field still leads to a gap that an echo narrows.
     pub const EVIDENTIAL_SCREENING_M: f64 = 0.35;
 }
 
-/// The values that decide how fast a robot of the evidential method may be, every one known.
+/// How fast a robot of the evidential method may be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hurry {
-    /// See [`Controller::full_speed_within_deg`].
     pub full_speed_within_deg: f64,
-    /// See [`Controller::turns_beyond_deg`].
     pub turns_beyond_deg: f64,
-    /// See [`Controller::look_rad_s`].
     pub look_rad_s: f64,
-    /// See [`Planner::stops_within_s`].
     pub stops_within_s: f64,
 }
 
-/// The values of the controller, (14)-(17).
+/// Equations (14)-(17).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Controller {
-    /// vd: the greatest tangential speed asked for, m/s; by default [`Mission::speed_m_s`].
+    /// vd; by default [`Mission::speed_m_s`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speed_m_s: Option<f64>,
-    /// wd: the greatest turn rate asked for, rad/s; by default [`Mission::turn_rad_s`].
+    /// wd; by default [`Mission::turn_rad_s`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub turn_rad_s: Option<f64>,
-    /// The evidential method drives at full speed while the robot faces its way within this angle, degrees; by default that of
+    /// Evidential: at full speed while the robot faces its way within this angle; by default that of
     /// [`Mission::hurry`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub full_speed_within_deg: Option<f64>,
-    /// The evidential method turns on the spot while the way lies farther than this to a side, degrees. At smaller angles the speed falls
+    /// Evidential: turn on the spot while the way lies farther than this to a side; at smaller angles the speed falls
     /// with the cosine. By default that of [`Mission::hurry`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub turns_beyond_deg: Option<f64>,
-    /// The greatest turn rate on the spot of the evidential method, rad/s; by default that of [`Mission::hurry`].
+    /// Evidential: on the spot, at most; by default that of [`Mission::hurry`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub look_rad_s: Option<f64>,
-    /// Rc: where slowing down before the target begins, metres.
+    /// Rc: slowing down begins this far from the target.
     pub slow_radius_m: f64,
     /// |eta_c| below which an antipodal robot keeps its turning side.
     pub dead_zone: f64,
-    /// Whether (16) modulates the speed by alignment; without it the speed is constant up to Rc.
+    /// (16) modulates the speed by alignment; without it the speed is constant up to Rc.
     pub modulated: bool,
 }
 
@@ -358,7 +335,6 @@ impl Default for Controller {
 }
 
 impl Mission {
-    /// The places to visit, one after the other.
     #[must_use]
     pub fn waypoints(&self) -> Vec<Waypoint> {
         match self.targets.is_empty() {
@@ -367,7 +343,6 @@ impl Mission {
         }
     }
 
-    /// Delta = D / N and where the cells lie.
     #[must_use]
     pub fn grid_frame(&self) -> GridFrame {
         let Perimeter { width_m, centre, .. } = self.perimeter;
@@ -379,16 +354,15 @@ impl Mission {
         GridFrame { cells, resolution_m: width_m / f64::from(cells), centre }
     }
 
-    /// Im of (19): the least number of cells around a hit's own that covers the margin, however fine the
-    /// grid is.
+    /// Im of (19): the least number of cells around a hit's own that covers the margin.
     #[must_use]
     pub fn margin_cells(&self) -> u32 {
-        // The hit's own cell covers half a cell; a rounding error adds no cell.
+        // The hit's own cell covers half a cell, and a rounding error adds no cell.
         let cells = self.mapper.margin_m / self.grid_frame().resolution_m - 0.5;
         (cells - 1e-6).ceil().max(0.0) as u32
     }
 
-    /// Whether the robot turns to look before it drives in a direction. It does so with the evidential method if it senses, can turn on
+    /// The robot turns to look before it drives in a direction: with the evidential method if it senses, can turn on
     /// the spot, and has no other planner. It can then stop within scanned ground, so its defaults are faster.
     #[must_use]
     pub fn looks_first(&self) -> bool {
@@ -398,8 +372,8 @@ impl Mission {
             && self.body().ackermann().is_none()
     }
 
-    /// vd, m/s: `controller.speed_m_s`, or by default 0.5 for a robot that looks first, 0.7 with infrared rangers, the body's top speed
-    /// with a laser; else the paper's 0.25.
+    /// vd: `controller.speed_m_s`, or by default 0.5 for a robot that looks first, 0.7 with infrared rangers, the
+    /// body's top speed with a laser; else the paper's 0.25.
     #[must_use]
     pub fn speed_m_s(&self) -> f64 {
         self.controller.speed_m_s.unwrap_or_else(|| match self.looks_first() {
@@ -410,14 +384,14 @@ impl Mission {
         })
     }
 
-    /// The number of sensors of that kind that the mission uses.
+    /// The number of used sensors of that kind.
     #[must_use]
     pub fn used(&self, kind: SensorKind) -> usize {
         self.sensor_table().iter().filter(|sensor| sensor.used && sensor.kind == kind).count()
     }
 
-    /// The set of sensors that the mapper uses: `sensors`, or by default all that the robot has with the evidential method, and the front
-    /// sonar alone with the paper's method or on a car.
+    /// `sensors`, or by default all of them with the evidential method, and the front sonar alone with the paper's
+    /// method or on a car.
     #[must_use]
     pub fn sensor_set(&self) -> Sensors {
         self.sensors.unwrap_or(match (self.method, self.robot.model) {
@@ -426,7 +400,7 @@ impl Mission {
         })
     }
 
-    /// The robot's ranging sensors. A reading names its sensor by the row of this table.
+    /// A reading names its sensor by the row of this table.
     #[must_use]
     pub fn sensor_table(&self) -> Vec<Sensor> {
         let RobotConfig { sensors, rate_hz, .. } = &self.robot;
@@ -444,28 +418,27 @@ impl Mission {
         sensor::table(&rows, *rate_hz, &self.sonar, self.sensor_set())
     }
 
-    /// The row of the laser in [`Mission::sensor_table`], and the laser; none of a robot without one.
+    /// The laser, and its row in [`Mission::sensor_table`].
     #[must_use]
     pub fn laser(&self) -> Option<(usize, Sensor)> {
         let mut rows = self.sensor_table().into_iter().enumerate();
         rows.find(|(_, sensor)| sensor.kind == SensorKind::Scan)
     }
 
-    /// The row of the front sonar in [`Mission::sensor_table`].
+    /// The front sonar's row in [`Mission::sensor_table`].
     #[must_use]
     pub fn front_row(&self) -> usize {
         sensor::front(&self.sensor_table(), &self.sonar).unwrap_or_default()
     }
 
-    /// The front sonar.
     #[must_use]
     pub fn front_sonar(&self) -> Sensor {
         self.sensor_table().swap_remove(self.front_row())
     }
 
-    /// The speeds of the evidential method, by its keys. A robot whose infrared rangers end at surfaces of any angle may hurry. One that
-    /// has sonars alone turns at 1.2 rad/s, so that a cone of 15 degrees to either side covers each direction three times at 7 Hz: with
-    /// 2.0 rad/s three times as many robots touched something, most of them the ends of loose walls.
+    /// A robot whose infrared rangers end at surfaces of any angle may hurry. One with sonars alone turns at 1.2
+    /// rad/s, so that a cone of 15 degrees to either side covers each direction three times at 7 Hz: with 2.0 rad/s
+    /// three times as many robots touched something, most of them the ends of loose walls.
     #[must_use]
     pub fn hurry(&self) -> Hurry {
         let uses = |kind| self.looks_first() && self.used(kind) > 0;
@@ -482,29 +455,29 @@ impl Mission {
         }
     }
 
-    /// wd, rad/s: `controller.turn_rad_s`, or by default 2.4 for a robot that looks first, else the paper's 0.8.
+    /// wd: `controller.turn_rad_s`, or by default 2.4 for a robot that looks first, else the paper's 0.8.
     #[must_use]
     pub fn turn_rad_s(&self) -> f64 {
         let default = if self.looks_first() { 2.4 } else { 0.8 };
         self.controller.turn_rad_s.unwrap_or(default)
     }
 
-    /// Whether the link makes good that the wheels turn slower than commanded: `robot.speed_trim`, by default if the robot looks first.
+    /// The link makes good that the wheels turn slower than commanded: `robot.speed_trim`, by default if the robot
+    /// looks first.
     #[must_use]
     pub fn speed_trim(&self) -> bool {
         self.robot.speed_trim.unwrap_or_else(|| self.looks_first())
     }
 
-    /// The greatest distance of mapped hits, metres: `mapper.map_within_m`, by default 0.6 for a robot that looks first and 1.0 for
-    /// others. Farther out the arc of an echo is wider than the gaps that it would close.
+    /// `mapper.map_within_m`, by default 0.6 for a robot that looks first and 1.0 for others. Farther out the arc of
+    /// an echo is wider than the gaps that it would close.
     #[must_use]
     pub fn map_within_m(&self) -> f64 {
         let default = if self.looks_first() { 0.6 } else { 1.0 };
         self.mapper.map_within_m.unwrap_or(default)
     }
 
-    /// The screening length of the field, metres: `planner.screening_m`, or by default that of the method; none for no screening, which is
-    /// exactly (11).
+    /// `planner.screening_m`, or by default that of the method; none is exactly (11).
     #[must_use]
     pub fn screening_length_m(&self) -> Option<f64> {
         let default = match self.method {
@@ -518,19 +491,17 @@ impl Mission {
         self.planner.screening_m.or(default)
     }
 
-    /// The pose at mission time 0.
     #[must_use]
     pub fn start_pose(&self) -> Pose2 {
         Pose2 { position: DVec2::ZERO, heading: self.start.heading_deg.to_radians() }
     }
 
-    /// The shapes of the world that the robot's body can touch. The others are above or below it.
+    /// Shapes of the world that the body can touch; the others are above or below it.
     #[must_use]
     pub fn obstacles(&self) -> Shapes {
         self.simulation.physics().heights.touched(&self.world)
     }
 
-    /// The body of the robot: its model with what the mission overrides.
     #[must_use]
     pub fn body(&self) -> Body {
         self.robot.body()

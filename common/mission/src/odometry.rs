@@ -1,71 +1,62 @@
-//! How the wheels of a robot differ from its nominal body, as far as is known, and the file in which a calibration says so.
+//! How the wheels differ from those of the nominal body, and the calibration file that says so.
 
 use serde::{Deserialize, Serialize};
 
-/// The wheels as dead reckoning takes them, each value with its standard deviation. With s = `distance_scale` and
-/// rho = `diameter_ratio` the left wheel rolls 2 s / (1 + rho) times its nominal way and the right one 2 s rho / (1 + rho) times. The
-/// track on the ground is `track_scale` times the nominal one.
+/// Each value with its standard deviation. With s = `distance_scale` and rho = `diameter_ratio` the left wheel rolls
+/// 2 s / (1 + rho) times its nominal way and the right one 2 s rho / (1 + rho) times. The track on the ground is
+/// `track_scale` times the nominal one.
 ///
 /// The defaults are those of a robot that nobody has calibrated.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Odometry {
-    /// Diameter of the right wheel over that of the left one.
+    /// Right over left.
     pub diameter_ratio: f64,
     pub diameter_ratio_sd: f64,
-    /// Track on the ground over the nominal one.
+    /// The track on the ground over the nominal one.
     pub track_scale: f64,
     pub track_scale_sd: f64,
-    /// Mean diameter of the wheels over the nominal one.
+    /// Mean diameter over the nominal one.
     pub distance_scale: f64,
     pub distance_scale_sd: f64,
-    /// Standard deviation of the way that a wheel loses or wins by slip, metres per square root of a metre.
+    /// Standard deviation of the way lost or won, metres per square root of a metre.
     pub slip: f64,
     pub slip_sd: f64,
-    /// Where the values come from; none without a calibration.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibrated: Option<Provenance>,
 }
 
-/// Where calibrated values come from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Provenance {
-    /// The day, year-month-day, UTC.
+    /// Year-month-day, UTC.
     pub date: String,
-    /// The name of the robot.
     pub robot: String,
     /// `wall` or `squares`.
     pub method: String,
-    /// Metres that the wheels rolled, on average of both.
+    /// The way that the wheels rolled, on average.
     pub metres: f64,
-    /// The sum of the squared residuals over their variances, per degree of freedom.
+    /// Squared residuals over their variances.
     pub chi2_per_dof: f64,
 }
 
-/// The procedure of `firsthand calibrate`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CalibrationPlan {
     pub procedure: Procedure,
-    /// The standard deviation of the ratio of the diameters at which it may stop.
+    /// Standard deviation of the ratio of the diameters at which it may stop.
     pub ratio_sd: f64,
-    /// The most loops.
     pub loops: u32,
-    /// The way from the wall, or the side of the square, metres.
+    /// The way from the wall, or the side of the square.
     pub drive_m: f64,
 }
 
-/// The way that is driven.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Procedure {
-    /// Loops before a wall.
     #[default]
     Wall,
-    /// One square to the left.
     LeftSquare,
-    /// One square to the right.
     RightSquare,
 }
 
@@ -92,14 +83,14 @@ impl Default for Odometry {
 }
 
 impl Odometry {
-    /// Ways of the left and the right wheel over their nominal ones.
+    /// The ways of the left and the right wheel over the nominal ones.
     #[must_use]
     pub fn wheel_scales(&self) -> [f64; 2] {
         let both = 2.0 * self.distance_scale / (1.0 + self.diameter_ratio);
         [both, both * self.diameter_ratio]
     }
 
-    /// The values with the range of each, and the names of their keys in a mission.
+    /// Each value with its key in a mission and its range.
     pub(crate) fn ranges(&self) -> [(&'static str, f64, std::ops::RangeInclusive<f64>); 8] {
         [
             ("robot.odometry.diameter_ratio", self.diameter_ratio, 0.8..=1.25),
@@ -114,7 +105,7 @@ impl Odometry {
     }
 }
 
-/// A calibration file: the table `[robot.odometry]` as a mission has it, with its provenance.
+/// The table `[robot.odometry]` as a mission has it, with its provenance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration {
@@ -133,16 +124,12 @@ impl Calibration {
         Self { robot: Calibrated { odometry } }
     }
 
-    /// The text of the file.
-    ///
     /// # Errors
     /// If a value cannot be written as TOML.
     pub fn to_text(&self) -> Result<String, toml::ser::Error> {
         toml::to_string(self)
     }
 
-    /// The values in the text of a file.
-    ///
     /// # Errors
     /// The sentence that says what is wrong.
     pub fn parse(text: &str) -> Result<Odometry, String> {

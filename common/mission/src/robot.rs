@@ -11,14 +11,13 @@ use crate::{
 };
 use serde::{Deserialize, Serialize};
 
-/// Kind of robot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Model {
-    /// The X80: 1200 counts a wheel turn.
+    /// 1200 counts a wheel turn.
     #[default]
     X80,
-    /// The X80SV and X80Pro: 756 counts a wheel turn.
+    /// 756 counts a wheel turn.
     X80sv,
     /// Clearpath's Jackal, four wheels, of which those of a side turn together; a disc around its corners. Source: its data sheet, and the
     /// `jackal_control` package, also of its accelerations.
@@ -32,9 +31,9 @@ pub enum Model {
     /// Clearpath's TurtleBot 4, a Create 3 with a laser that is turned to its left. Source of the laser's place: `turtlebot4_description`.
     #[serde(rename = "turtlebot4")]
     TurtleBot4,
-    /// iRobot's Create 3. Source: `create3_sim`, its control parameters, also of its accelerations, and its documentation of
-    /// `safety_override`: by default it drives no faster than 0.306 m/s and hardly backwards. It has no laser of its own; without rows of
-    /// sensors one is taken to stand in its middle.
+    /// iRobot's Create 3. Source: the control parameters of `create3_sim`, and its documentation of
+    /// `safety_override`: by default it drives no faster than 0.306 m/s and hardly backwards. It has no laser of its
+    /// own; without rows of sensors one is taken to stand in its middle.
     Create3,
     /// Yujin's Kobuki. Source: its user guide; its accelerations are those of its ROS velocity smoother.
     Kobuki,
@@ -42,119 +41,101 @@ pub enum Model {
     Car,
 }
 
-/// The protocol that a robot speaks: the link has a driver for each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Protocol {
-    /// The frames of the X80.
     #[default]
     X80,
-    /// Lines of JSON.
     Json,
-    /// Topics of ROS 2.
     Ros2,
-    /// The requests and answers of ROSArduinoBridge.
     Arduino,
 }
 
-/// A channel of the motor board: a wheel's, or that of a car's steering.
+/// A channel of the motor board: a wheel, or a car's steering.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Channel {
-    /// 0 or 1: which of the two encoder channels.
+    /// Which of the two encoder channels, 0 or 1.
     pub channel: u8,
-    /// Whether forward is the negative direction of this channel.
+    /// Forward is the negative direction of this channel.
     pub reversed: bool,
 }
 
-/// The robot as a mission writes it: a model, and only what differs from it.
+/// A model, and only what differs from it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RobotConfig {
     /// The preset of all values that are not written.
     pub model: Model,
-    /// The robot's protocol; by default that of its model: [`RobotConfig::protocol`].
+    /// The default is the model's: [`RobotConfig::protocol`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub protocol: Option<Protocol>,
-    /// The address of a real robot, in one of the forms of [`crate::address::Address`]. Without it a simulated robot is started.
+    /// Written as [`crate::address::Address`]. Without it a simulated robot is started.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub address: Option<String>,
-    /// Ticks a second the robot's sensors come at.
     pub rate_hz: f64,
-    /// r of (2), metres.
+    /// r of (2).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wheel_radius_m: Option<f64>,
-    /// W of (2): the track, metres; a car does not use it.
+    /// W of (2); a car does not use it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub track_m: Option<f64>,
-    /// L of (3), metres; of a car only, like the other keys of its steering.
+    /// L of (3); of a car only, like the other keys of its steering.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wheelbase_m: Option<f64>,
-    /// The most it steers to either side, degrees.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub steering_limit_deg: Option<f64>,
-    /// The rate of its steering, degrees a second.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub steering_rate_deg_s: Option<f64>,
-    /// Encoder counts of a whole turn of the steering; 0 counts are straight ahead.
+    /// Counts of a whole turn of the steering; 0 is straight ahead.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub steering_counts_per_turn: Option<f64>,
-    /// Encoder counts of one wheel turn.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub counts_per_turn: Option<f64>,
-    /// Radius of the disc that contains the body, metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius_m: Option<f64>,
-    /// The most either wheel's rim can do, m/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub top_speed_m_s: Option<f64>,
-    /// The most that its speed may grow, m/s^2; a car's and an X80's may grow at once.
+    /// A car and an X80 gain speed at once.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub acceleration_m_s2: Option<f64>,
-    /// The most that its turn rate may grow, rad/s^2; a car's and an X80's may grow at once.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub turn_acceleration_rad_s2: Option<f64>,
-    /// The left wheel's channel; that of a car's driven axle.
+    /// A car's: the driven axle.
     pub left: Channel,
-    /// The right wheel's channel; that of a car's steering, positive to the left.
+    /// A car's: the steering, positive to the left.
     pub right: Channel,
-    /// Whether the link makes good that the wheels turn slower than commanded; without it what [`crate::Mission::speed_trim`] says.
+    /// The link makes good that the wheels turn slower than commanded; without it [`crate::Mission::speed_trim`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speed_trim: Option<bool>,
-    /// Age at which a command no longer moves the robot, seconds.
+    /// Age at which a command no longer moves the robot.
     pub command_limit_s: f64,
-    /// The voltages below which a battery is low.
     pub low_battery_v: BatteryLimits,
-    /// The least motor current of a wheel that something holds, AD counts. A wheel that does not turn as told and draws less counts as one
-    /// with a dead encoder, and so does every such wheel if this is 0. The default is the simulated robot's, because no X80 was measured.
+    /// The least motor current of a wheel that something holds. A wheel that does not turn as told and draws less
+    /// counts as one with a dead encoder, and so does every such wheel if this is 0. The default is the simulated
+    /// robot's, because no X80 was measured.
     pub held_current_ad: u16,
-    /// The file of a calibration, whose values replace `odometry` before a run starts: see [`crate::Mission::with_calibration`].
+    /// Its values replace `odometry` before a run starts: [`crate::Mission::with_calibration`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration: Option<PathBuf>,
-    /// The differences between its wheels and the nominal ones.
     pub odometry: Odometry,
-    /// The board of a robot that speaks as ROSArduinoBridge does.
     #[serde(skip_serializing_if = "ArduinoBoard::is_default")]
     pub arduino: ArduinoBoard,
-    /// The topics of a robot that speaks ROS 2.
     #[serde(skip_serializing_if = "Ros2Topics::is_default")]
     pub ros2: Ros2Topics,
-    /// The ranging sensors that it has, at most [`crate::MOST_SENSORS`]. Without rows they are those of the X80.
+    /// At most [`crate::MOST_SENSORS`] rows; without any those of the X80.
     #[serde(rename = "sensor", skip_serializing_if = "Vec::is_empty")]
     pub sensors: Vec<SensorRow>,
 }
 
-/// The voltages below which the batteries are low, volts. A battery with the limit 0 is never low. The X80's packs have six NiMH cells,
-/// 7.2 V: at 1.1 V a cell nine tenths of the charge are used, and the rest lasts for minutes. With a low board or motor battery the
-/// robot drives at half speed. If one of them is below 10/11 of its limit for 2 s, which is 1.0 V a cell, the mission ends.
+/// Volts. A battery with the limit 0 is never low. The X80's packs have six NiMH cells, 7.2 V: at 1.1 V a cell nine
+/// tenths of the charge are used, and the rest lasts for minutes. With a low board or motor battery the robot drives
+/// at half speed. If one of them is below 10/11 of its limit for 2 s, which is 1.0 V a cell, the mission ends.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct BatteryLimits {
-    /// The limit of the boards' battery.
     pub board: f64,
-    /// The limit of the motors' battery.
     pub motor: f64,
-    /// The limit of the servos' battery.
     pub servo: f64,
 }
 
@@ -197,57 +178,48 @@ impl Default for RobotConfig {
     }
 }
 
-/// The body, every value known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Body {
-    /// r, metres.
+    /// r.
     pub wheel_radius_m: f64,
-    /// W, metres.
+    /// W.
     pub track_m: f64,
-    /// Encoder counts of one wheel turn.
     pub counts_per_turn: f64,
-    /// Radius of the disc that contains it, metres.
     pub radius_m: f64,
-    /// The most either wheel's rim can do, m/s.
     pub top_speed_m_s: f64,
-    /// The most that speed and turn rate may grow, m/s^2 and rad/s^2; infinite if at once. They fall at once on every robot.
+    /// How speed and turn rate may grow, m/s^2 and rad/s^2; infinite if at once. They fall at once on every robot.
     pub acceleration: [f64; 2],
-    /// The steering of a car; none for a robot with two driven wheels.
+    /// None for a robot with two driven wheels.
     pub steering: Option<Steering>,
 }
 
-/// The steering of a car.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Steering {
-    /// L, metres.
+    /// L.
     pub wheelbase_m: f64,
-    /// The most it steers to either side, radians.
     pub limit_rad: f64,
-    /// The rate of the steering, rad/s.
     pub rate_rad_s: f64,
-    /// Encoder counts of a whole turn of the steering.
     pub counts_per_turn: f64,
 }
 
 impl Steering {
-    /// The steering angle at an encoder that stands at `counts`, radians.
+    /// Radians, at an encoder that stands at `counts`.
     #[must_use]
     pub fn angle(&self, counts: f64) -> f64 {
         counts * std::f64::consts::TAU / self.counts_per_turn
     }
 
-    /// The encoder's counts at the steering `angle`, radians; per second where it is a rate.
+    /// Counts at the steering `angle`, radians; per second where it is a rate.
     #[must_use]
     pub fn counts(&self, angle: f64) -> f64 {
         angle * self.counts_per_turn / std::f64::consts::TAU
     }
 }
 
-/// A car that is commanded to turn at a lower speed drives at this speed, m/s.
+/// The speed of a car that is commanded to turn at a lower one.
 const CREEP_M_S: f64 = 0.1;
 
 impl Body {
-    /// G of (2) or (3).
     #[must_use]
     pub fn drive(&self) -> Drive {
         let top = self.top_speed_m_s / self.wheel_radius_m;
@@ -259,7 +231,7 @@ impl Body {
         }
     }
 
-    /// G of (3); none of a robot with two driven wheels.
+    /// None for a robot with two driven wheels.
     #[must_use]
     pub fn ackermann(&self) -> Option<Ackermann> {
         let steering = self.steering?;
@@ -272,14 +244,14 @@ impl Body {
         ))
     }
 
-    /// Metres the rim moves per encoder count.
+    /// The way of the rim per encoder count.
     #[must_use]
     pub fn metres_per_count(&self) -> f64 {
         std::f64::consts::TAU * self.wheel_radius_m / self.counts_per_turn
     }
 }
 
-/// The body of a robot that reports the angles of its wheels; one count is 0.1 degrees.
+/// A robot that reports the angles of its wheels; one count is 0.1 degrees.
 const fn differential(
     wheel_radius_m: f64,
     track_m: f64,
@@ -298,11 +270,10 @@ const fn differential(
     }
 }
 
-/// The accelerations of the X80 and the car, because no source gives any.
+/// Accelerations of the X80 and the car, because no source gives any.
 const AT_ONCE: [f64; 2] = [f64::INFINITY; 2];
 
 impl Model {
-    /// Whether the robot is an X80, or has an X80's boards.
     #[must_use]
     pub const fn is_x80(self) -> bool {
         matches!(self, Self::X80 | Self::X80sv | Self::Car)
@@ -338,7 +309,7 @@ impl Model {
                 differential(0.035_75, 0.233, 0.175, 0.306, [0.9, 7.725])
             }
             Self::Kobuki => differential(0.0352, 0.23, 0.1758, 0.7, [1.0, 2.0]),
-            // Nominal. The pose is the middle of the rear axle: the disc around it covers a body that reaches 0.22 m ahead of
+            // Nominal. The pose is the middle of the rear axle; the disc covers a body that reaches 0.22 m ahead of
             // it and 0.09 m to either side. It turns in 0.31 m.
             Self::Car => Body {
                 wheel_radius_m: 0.04,
@@ -359,7 +330,6 @@ impl Model {
 }
 
 impl RobotConfig {
-    /// The robot's protocol.
     #[must_use]
     pub fn protocol(&self) -> Protocol {
         self.protocol.unwrap_or(match self.model.is_x80() {
@@ -368,7 +338,6 @@ impl RobotConfig {
         })
     }
 
-    /// The model's body with the overrides in place.
     #[must_use]
     pub fn body(&self) -> Body {
         let preset = self.model.body();

@@ -4,24 +4,24 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// The names of the topics, by default those that ROS robots have. A relative name is taken from the root.
+/// The defaults are the names that ROS robots have. A relative name is taken from the root.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Ros2Topics {
-    /// The robot's odometry, `nav_msgs/Odometry`.
+    /// `nav_msgs/Odometry`.
     pub odom: String,
-    /// The beams of its laser, `sensor_msgs/LaserScan`.
+    /// `sensor_msgs/LaserScan`.
     pub scan: String,
-    /// The robot's velocity commands, `geometry_msgs/Twist`.
+    /// `geometry_msgs/Twist`.
     pub cmd_vel: String,
-    /// Whether velocity commands are `geometry_msgs/TwistStamped` instead.
+    /// Commands are `geometry_msgs/TwistStamped` instead.
     pub stamped: bool,
-    /// The battery, `sensor_msgs/BatteryState`.
+    /// `sensor_msgs/BatteryState`.
     pub battery: String,
-    /// The gyro, `sensor_msgs/Imu`; none by default.
+    /// `sensor_msgs/Imu`; none by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub imu: Option<String>,
-    /// The topics of its sonars and infrared rangers, `sensor_msgs/Range`, by the names of their rows.
+    /// `sensor_msgs/Range` of sonars and infrared rangers, by the names of their rows.
     pub ranges: BTreeMap<String, String>,
 }
 
@@ -40,7 +40,6 @@ impl Default for Ros2Topics {
 }
 
 impl Ros2Topics {
-    /// Whether the mission names no topics.
     pub(crate) fn is_default(&self) -> bool {
         *self == Self::default()
     }

@@ -1,31 +1,28 @@
-//! THE table of the robot's ranging sensors: the kind of each, where it looks, and the channel that gives its readings. Link, mapper
-//! and simulator read it, and a reading names its sensor by the row.
+//! THE table of the robot's ranging sensors. Link, mapper and simulator read it, and a reading names its sensor by
+//! the row.
 //!
-//! A mission writes rows as `[[robot.sensor]]`. Without them the table is that of the X80: the front sonar as `[sonar]` says, the two
-//! beside it, and the ring of seven infrared rangers. The key `sensors` says which rows the mapper uses.
+//! A mission writes rows as `[[robot.sensor]]`. Without them the table is that of the X80: the front sonar as
+//! `[sonar]` says, the two beside it, and seven infrared rangers. The key `sensors` says which rows the mapper uses.
 
 use serde::{Deserialize, Serialize};
 
 use crate::sonar::Mount;
 
-/// The greatest number of rows, and of the readings in a sample of `ranges`.
+/// Rows, and readings in a sample of `ranges`.
 pub const MOST_SENSORS: usize = 16;
-/// The greatest number of beams of a laser.
 pub const MOST_BEAMS: usize = 1081;
-/// Infrared rangers of the X80.
 pub const INFRARED_RANGERS: usize = 7;
-/// Sonars of the standard frame.
 pub const SONARS: usize = 6;
 
-/// Bearing of the two sonars beside the front one, degrees from it, and their distance from the robot's centre, metres.
+/// The two sonars beside the front one: degrees from it, and metres from the robot's centre.
 const SIDE_BEARING_DEG: f64 = 45.0;
 const SIDE_FORWARD_M: f64 = 0.194;
-/// Sonars within this of the front one's bearing belong to the set "three-front", degrees.
+/// Sonars within this of the front one's bearing belong to the set "three-front".
 const BESIDE_FRONT_DEG: f64 = 60.0;
 
-/// The bearing of each infrared ranger from the robot's axis, degrees counter-clockwise, and its distance from the robot's centre as a
-/// share of the body's radius. The order is that of the frames, on which two independent drivers agree: from left to right in front,
-/// then right, rear, left. The rangers at the sides of an X80 are 121 mm from the centre, the others at the rim.
+/// Bearing from the robot's axis, degrees counter-clockwise, and distance from the centre as a share of the body's
+/// radius, in the order of the frames, on which two independent drivers agree: from left to right in front, then
+/// right, rear, left. The rangers at the sides of an X80 are 121 mm from the centre, the others at the rim.
 const RING: [(f64, f64); INFRARED_RANGERS] = [
     (33.75, 1.0),
     (11.25, 1.0),
@@ -36,7 +33,7 @@ const RING: [(f64, f64); INFRARED_RANGERS] = [
     (90.0, 0.121 / 0.19),
 ];
 
-/// The meaning of a reading for the ground before the sensor.
+/// The meaning of a reading for the ground ahead.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SensorKind {
@@ -48,7 +45,7 @@ pub enum SensorKind {
     Scan,
 }
 
-/// The product whose readings the mapper's model describes.
+/// The product, for the mapper's model of its readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SensorModel {
@@ -68,7 +65,6 @@ pub enum SensorModel {
 }
 
 impl SensorModel {
-    /// The kind of its readings.
     #[must_use]
     pub const fn kind(self) -> SensorKind {
         match self {
@@ -78,7 +74,6 @@ impl SensorModel {
         }
     }
 
-    /// The model of the X80's sensor of a kind.
     const fn of(kind: SensorKind) -> Self {
         match kind {
             SensorKind::Cone => Self::Dur5200,
@@ -87,7 +82,7 @@ impl SensorModel {
         }
     }
 
-    /// The angle in which it detects, degrees; 0 of a ray.
+    /// A ray has 0.
     #[must_use]
     pub const fn field_of_view_deg(self) -> f64 {
         match self {
@@ -98,7 +93,6 @@ impl SensorModel {
         }
     }
 
-    /// The greatest range that it gives, metres.
     #[must_use]
     pub const fn reach_m(self) -> f64 {
         match self {
@@ -110,15 +104,14 @@ impl SensorModel {
         }
     }
 
-    /// The greatest range at which a laser detects a black surface, which reflects a tenth of the light, metres. The specification of the
-    /// UST-10LX gives 4 m, and 10 m for white. The others are given the same share of their reach, which is nominal: Slamtec gives it for
-    /// its RPLIDAR A3 (black 10 m, white 25 m).
+    /// Reach at a black surface, which reflects a tenth of the light. The specification of the UST-10LX gives 4 m, and
+    /// 10 m for white. The others are given the same share of their reach, which is nominal: Slamtec gives it for its
+    /// RPLIDAR A3 (black 10 m, white 25 m).
     #[must_use]
     pub const fn black_reach_m(self) -> f64 {
         0.4 * self.reach_m()
     }
 
-    /// The least range that it gives, metres.
     #[must_use]
     pub const fn least_m(self) -> f64 {
         match self {
@@ -129,7 +122,7 @@ impl SensorModel {
         }
     }
 
-    /// The number of its beams; 1 of a sensor that is no laser.
+    /// A sensor that is no laser has 1.
     #[must_use]
     pub const fn beams(self) -> usize {
         match self {
@@ -139,8 +132,9 @@ impl SensorModel {
         }
     }
 
-    /// The standard deviation of a beam's range: metres, and a share of the range. The manuals give 15 mm up to half a metre and 5 %
-    /// beyond for the LDS-02, less than 1 % for the A1, 40 mm at most for the UST-10LX: these are taken as two deviations.
+    /// Standard deviation of a range: metres, and a share of it. The manuals give 15 mm up to half a metre and 5 %
+    /// beyond for the LDS-02, less than 1 % for the A1, 40 mm at most for the UST-10LX: these are taken as two
+    /// deviations.
     #[must_use]
     pub const fn beam_noise(self) -> (f64, f64) {
         match self {
@@ -152,37 +146,34 @@ impl SensorModel {
     }
 }
 
-/// A sensor as a mission writes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorRow {
     /// The name in logs and reasons.
     pub name: String,
-    /// The kind of its readings.
     pub kind: SensorKind,
-    /// The channel of the robot that gives it: of a cone the sonar's index in the standard frame, 0 to 5; of a ray the infrared ranger, 0
-    /// to 6.
+    /// A cone's is the sonar's index in the standard frame, 0 to 5, a ray's the infrared ranger, 0 to 6.
     pub channel: u8,
-    /// The distance from the robot's centre along its bearing, metres.
+    /// Distance from the robot's centre along its bearing.
     pub forward_m: f64,
-    /// delta of (19): its bearing from the robot's axis, degrees counter-clockwise.
+    /// delta of (19), from the robot's axis counter-clockwise.
     pub bearing_deg: f64,
-    /// The angle from the bearing to the middle beam of a laser, degrees counter-clockwise. By default it looks outward.
+    /// Angle from the bearing to a laser's middle beam, counter-clockwise; 0 looks outward.
     #[serde(default, skip_serializing_if = "is_outward")]
     pub turned_deg: f64,
-    /// The angle in which it detects, degrees; of a cone or a laser. By default that of its model.
+    /// The default is the model's; a ray has none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field_of_view_deg: Option<f64>,
-    /// The greatest range that is used, metres. By default that of its model.
+    /// The default is the model's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reach_m: Option<f64>,
-    /// The number of beams of a laser, evenly over its field of view; by default that of its model.
+    /// A laser's, evenly over its field of view; the default is the model's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beams: Option<u16>,
-    /// Readings a second, where it measures less often than the frames come. Readings between are not used.
+    /// Where it measures less often than the frames come. Readings between are not used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
-    /// The product. By default that of the X80.
+    /// The default is the X80's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<SensorModel>,
 }
@@ -191,15 +182,15 @@ fn is_outward(turned_deg: &f64) -> bool {
     *turned_deg == 0.0
 }
 
-/// The front ultrasonic sensor of a robot without `[[robot.sensor]]`: which one it is and how it is mounted.
+/// The front sonar of a robot without `[[robot.sensor]]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SonarConfig {
     /// The index among the six of the standard frame.
     pub index: u8,
-    /// The distance from the robot's centre along its bearing, metres (the paper writes W/2).
+    /// Distance from the robot's centre along its bearing; the paper writes W/2.
     pub forward_m: f64,
-    /// delta of (19): its bearing from the robot's axis, degrees.
+    /// delta of (19), from the robot's axis.
     pub bearing_deg: f64,
 }
 
@@ -209,28 +200,19 @@ impl Default for SonarConfig {
     }
 }
 
-/// A sensor, every value known.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sensor {
-    /// The name in logs and reasons.
     pub name: String,
-    /// The kind of its readings.
     pub kind: SensorKind,
-    /// The channel of the robot that gives it.
     pub channel: u8,
-    /// The mounting.
     pub mount: Mount,
-    /// The angle in which it detects, degrees; 0 of a ray.
+    /// A ray has 0.
     pub field_of_view_deg: f64,
-    /// The greatest range that is used, metres.
     pub reach_m: f64,
-    /// The number of its beams; 1 of a sensor that is no laser.
+    /// A sensor that is no laser has 1.
     pub beams: usize,
-    /// The number of ticks from one measurement to the next.
     pub every_ticks: u64,
-    /// The product.
     pub model: SensorModel,
-    /// Whether the mission uses its readings.
     pub used: bool,
 }
 
@@ -255,17 +237,17 @@ impl Sensor {
         }
     }
 
-    /// The bearing of a laser's first beam from the sensor's own, and the angle from beam to beam, radians counter-clockwise.
+    /// Bearing of the first beam from the sensor's own, and the angle from beam to beam, radians counter-clockwise.
     #[must_use]
     pub fn fan(&self) -> (f64, f64) {
         let wide = self.field_of_view_deg.to_radians();
-        // The first and the last beam of a whole turn would be the same.
+        // The first and last beam of a whole turn would coincide.
         let steps = if wide >= std::f64::consts::TAU - 1e-9 { self.beams } else { self.beams - 1 };
         (-wide / 2.0, wide / steps.max(1) as f64)
     }
 
-    /// The angle from the robot's axis to the direction that the robot turns to a place when it looks there, radians. For a laser that
-    /// sees all around it is the bearing, because such a laser is never turned.
+    /// Angle from the robot's axis to where it turns to look at a place. For a laser that sees all around it is the
+    /// bearing: such a laser is never turned.
     #[must_use]
     pub fn faces_rad(&self) -> f64 {
         match self.field_of_view_deg >= 360.0 {
@@ -274,34 +256,29 @@ impl Sensor {
         }
     }
 
-    /// The bearing from the robot's axis, degrees.
     #[must_use]
     pub fn bearing_deg(&self) -> f64 {
         self.mount.bearing_rad.to_degrees()
     }
 }
 
-/// A set of sensors: the rows whose readings the mapper uses as evidence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Sensors {
-    /// The front sonar: the cone whose bearing is the least.
+    /// The cone whose bearing is the least.
     #[serde(rename = "front")]
     Front,
-    /// The front sonar and all rays.
     #[serde(rename = "front+infrared")]
     FrontInfrared,
     /// The front sonar and the cones within 60 degrees of it.
     #[serde(rename = "three-front")]
     ThreeFront,
-    /// The laser alone.
     #[serde(rename = "laser")]
     Laser,
-    /// All that the robot has.
     #[serde(rename = "all")]
     All,
 }
 
-/// The sensors of `rows` on a robot whose frames come at `rate_hz`, with those of `set` marked as used.
+/// The sensors on a robot with frames at `rate_hz`; those of `set` are marked as used.
 pub(crate) fn table(
     rows: &[SensorRow],
     rate_hz: f64,
@@ -329,8 +306,8 @@ pub(crate) fn table(
     table
 }
 
-/// The row of the front sonar. Without rows of the mission it is the first, wherever `[sonar]` says that it looks. A robot without sonars
-/// has instead the sensor that looks most nearly there.
+/// Without rows of the mission it is the first, wherever `[sonar]` says that it looks. A robot without sonars has
+/// instead the sensor that looks most nearly there.
 pub(crate) fn front(table: &[Sensor], sonar: &SonarConfig) -> Option<usize> {
     let ahead = |sensor: &Sensor| (sensor.bearing_deg() - sonar.bearing_deg).abs();
     let any_cone = table.iter().any(|sensor| sensor.kind == SensorKind::Cone);
@@ -339,7 +316,7 @@ pub(crate) fn front(table: &[Sensor], sonar: &SonarConfig) -> Option<usize> {
     candidates.min_by(|(_, a), (_, b)| ahead(a).total_cmp(&ahead(b))).map(|(index, _)| index)
 }
 
-/// The one row of a robot whose only sensor is a laser, turned by `turned_deg` degrees.
+/// A robot whose only sensor is a laser.
 pub(crate) fn laser(model: SensorModel, forward_m: f64, turned_deg: f64) -> Vec<SensorRow> {
     vec![SensorRow {
         name: "laser".to_owned(),
@@ -356,7 +333,7 @@ pub(crate) fn laser(model: SensorModel, forward_m: f64, turned_deg: f64) -> Vec<
     }]
 }
 
-/// The rows of an X80 with a body of `radius_m` metres. The car has its boards and sensors.
+/// The car has the same boards and sensors.
 pub(crate) fn x80(radius_m: f64, sonar: &SonarConfig) -> Vec<SensorRow> {
     let row = |name: String, kind, channel, forward_m, bearing_deg| SensorRow {
         name,

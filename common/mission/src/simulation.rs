@@ -1,65 +1,53 @@
-//! The behaviour of the simulated robot: its sensors, wheels and radio, and the obstacles that move around it.
+//! The simulated robot's sensors, wheels and radio, and the obstacles that move around it.
 //!
-//! Every number has three presets. `realism = "laboratory"` is ideal: rough surfaces, a prompt speed loop, a perfect radio. `"measured"`,
-//! the default, has the values of real robots, `"harsh"` wheels that slip five times as much. A key in a mission overrides its preset. The
-//! guide's page of the simulated robot has the source of each value.
+//! Every number has three presets. `realism = "laboratory"` is ideal: rough surfaces, a prompt speed loop, a perfect
+//! radio. `"measured"`, the default, has the values of real robots, `"harsh"` wheels that slip five times as much; a
+//! key in a mission overrides its preset. The guide has the source of each value.
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::Shapes;
 
-/// The simulated X80 as a mission writes it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Simulation {
     /// The preset of every key that is not written.
     pub realism: Realism,
-    /// Whether the robot ignores the time limit of commands, as one real robot is said to.
+    /// One real robot is said to ignore the time limit of commands.
     pub ignores_time: bool,
-    /// The silence of the host after which the motors stop, seconds. By default they never do.
+    /// The host's silence after which the motors stop; by default they never do.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stops_when_silent_s: Option<f64>,
-    /// The ultrasonic rangers' physics.
     pub sonar: SonarKeys,
-    /// The infrared rangers' physics.
     pub infrared: InfraredKeys,
-    /// The wheels' speed loops.
     pub wheels: WheelKeys,
-    /// The heights of the body and its sensors.
     pub heights: HeightKeys,
-    /// The batteries.
     pub battery: BatteryKeys,
-    /// The radio between host and robot.
     pub radio: RadioKeys,
-    /// Further ultrasonic rangers, besides the front one and the two at its sides.
+    /// Besides the front one and the two at its sides.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub ring: Vec<Ranger>,
-    /// Things that appear, vanish or move.
     #[serde(rename = "thing", skip_serializing_if = "Vec::is_empty")]
     pub things: Vec<Thing>,
-    /// Wheels that are blocked for a while.
     #[serde(rename = "block", skip_serializing_if = "Vec::is_empty")]
     pub blocks: Vec<Block>,
 }
 
-/// The preset of the simulated robot's errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Realism {
-    /// A good day in the laboratory.
     Laboratory,
-    /// The errors were measured on real robots. The radio is perfect unless the mission says otherwise.
+    /// Errors as measured on real robots. The radio is perfect unless the mission says otherwise.
     #[default]
     Measured,
-    /// Wheels slip more than those of any log that was found, each robot's in the same direction.
+    /// More slip than in any log that was found, each robot's in the same direction.
     Harsh,
 }
 
 impl Realism {
     pub const ALL: [Self; 3] = [Self::Laboratory, Self::Measured, Self::Harsh];
 
-    /// The name in a mission.
     #[must_use]
     pub const fn as_str(self) -> &'static str {
         match self {
@@ -70,72 +58,59 @@ impl Realism {
     }
 }
 
-/// A further ultrasonic ranger, mounted looking outward.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ranger {
     /// The index among the six of the standard frame.
     pub index: u8,
-    /// The distance from the robot's centre, metres.
     pub forward_m: f64,
-    /// The bearing from the robot's axis, degrees counter-clockwise.
+    /// Counter-clockwise from the robot's axis.
     pub bearing_deg: f64,
 }
 
-/// Something that is not always there, or not always in the same place.
+/// Not always there, or not always in the same place.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Thing {
-    /// The shape, at its position before any move.
     pub shape: Shapes,
-    /// The time when it appears, seconds. It appears later if the robot is in its place.
+    /// It appears later if the robot is in its place.
     #[serde(default)]
     pub from_s: f64,
-    /// The time when it disappears, seconds; by default never.
+    /// None is never.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub until_s: Option<f64>,
-    /// The positions in order of time. The thing moves in a straight line between them.
+    /// Positions in order of time, with straight lines between them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub moves: Vec<Move>,
 }
 
-/// Something that keeps wheels from turning for a while, for example a cable around an axle.
+/// Keeps wheels from turning for a while, for example a cable around an axle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Block {
-    /// The wheels.
     pub wheels: BlockedWheels,
-    /// The time when it begins, seconds.
     #[serde(default)]
     pub from_s: f64,
-    /// The time when it ends, seconds; by default never.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub until_s: Option<f64>,
 }
 
-/// The wheels that a [`Block`] blocks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum BlockedWheels {
-    /// The left one.
     Left,
-    /// The right one.
     Right,
-    /// Both.
     Both,
 }
 
-/// The position of a moving shape at a time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Move {
-    /// Mission time, seconds.
     pub at_s: f64,
-    /// The displacement from the position of the shape, metres.
+    /// Displacement from the shape's position, metres.
     pub by: DVec2,
 }
 
-/// A written number outside its range.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct OutOfRange {
     pub(super) key: &'static str,
@@ -159,7 +134,6 @@ macro_rules! section {
         }
 
         impl $settled {
-            /// The values of a preset.
             #[must_use]
             pub const fn preset(realism: Realism) -> Self {
                 match realism {
@@ -169,7 +143,7 @@ macro_rules! section {
                 }
             }
 
-            /// The keys, and the values of the three presets.
+            /// Each key with its laboratory, measured and harsh value.
             const PRESETS: &[(&str, [f64; 3])] = &[
                 $((concat!($table, ".", stringify!($key)), [$laboratory, $measured, $harsh]),)*
             ];
@@ -197,7 +171,6 @@ macro_rules! section {
         }
 
         impl $written {
-            /// The written values, and the preset for the others.
             #[must_use]
             pub fn over(&self, realism: Realism) -> $settled {
                 let preset = $settled::preset(realism);
@@ -357,32 +330,23 @@ section! {
 }
 
 impl Heights {
-    /// The shapes that the body can touch.
     #[must_use]
     pub fn touched(&self, shapes: &Shapes) -> Shapes {
         shapes.between(self.ground_clearance_m, self.body_top_m)
     }
 }
 
-/// The simulated X80, every value known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Physics {
-    /// The physics of the ultrasonic rangers.
     pub sonar: SonarPhysics,
-    /// The physics of the infrared rangers.
     pub infrared: InfraredPhysics,
-    /// The physics of the wheels.
     pub wheels: WheelPhysics,
-    /// The heights of the body and its sensors.
     pub heights: Heights,
-    /// The physics of the batteries.
     pub battery: BatteryPhysics,
-    /// The physics of the radio.
     pub radio: Radio,
 }
 
 impl Simulation {
-    /// The written values, and the preset for the others.
     #[must_use]
     pub fn physics(&self) -> Physics {
         Physics {
@@ -395,7 +359,7 @@ impl Simulation {
         }
     }
 
-    /// Each key, and its value with laboratory, measured and harsh realism.
+    /// Each key's value with laboratory, measured and harsh realism.
     pub fn presets() -> impl Iterator<Item = (&'static str, [f64; 3])> {
         let sections = [
             SonarPhysics::PRESETS,

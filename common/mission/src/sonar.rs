@@ -1,4 +1,4 @@
-//! THE mounting of a ranging sensor, (19): its position and direction on the robot, for simulator and mapper.
+//! THE mounting of a ranging sensor, (19), for simulator and mapper.
 //!
 //! (19) puts a hit at distance S + W/2 from the robot's centre along theta + delta. So the ranger is on that line: at
 //! bearing delta from the robot's axis, W/2 from the centre, looking outward. A laser may be turned from that line.
@@ -7,19 +7,18 @@ use glam::DVec2;
 
 use crate::kinematics::Pose2;
 
-/// The mounting of a ranger that looks outward, or of a laser that is turned from there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mount {
-    /// Distance from the robot's centre along the bearing, metres; the paper writes W/2.
+    /// Distance from the robot's centre along the bearing; the paper writes W/2.
     pub forward_m: f64,
-    /// delta: bearing from the robot's axis, radians counter-clockwise.
+    /// delta: from the robot's axis, counter-clockwise.
     pub bearing_rad: f64,
-    /// The angle from the bearing to where it looks, radians counter-clockwise; 0 of one that looks outward.
+    /// Angle from the bearing to where it looks, counter-clockwise; 0 is outward.
     pub turned_rad: f64,
 }
 
 impl Mount {
-    /// The pose of the ranger of a robot at `robot`. The heading is the direction of the beam, or of the middle one.
+    /// The heading is the direction of the beam, or of the middle one.
     #[must_use]
     pub fn on(&self, robot: Pose2) -> Pose2 {
         let outward = robot.heading + self.bearing_rad;
@@ -27,13 +26,12 @@ impl Mount {
         Pose2 { position, heading: outward + self.turned_rad }
     }
 
-    /// The angle from the robot's axis to where it looks, radians counter-clockwise.
     #[must_use]
     pub fn looks_rad(&self) -> f64 {
         self.bearing_rad + self.turned_rad
     }
 
-    /// The hit of (19), metres: the point that a ranger on a robot at `robot` hears `range_m` away on its axis.
+    /// (19), metres: the point `range_m` away on the axis of a ranger on `robot`.
     #[must_use]
     pub fn hit(&self, robot: Pose2, range_m: f64) -> DVec2 {
         let ranger = self.on(robot);

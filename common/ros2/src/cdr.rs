@@ -1,38 +1,33 @@
-//! The encoding of messages: CDR as the OMG's RTPS carries it, plain and of version 1, of either byte order. Each read checks its bounds,
-//! and no length from the wire is trusted.
+//! Messages as CDR, as the OMG's RTPS carries it: plain and of version 1, of either byte order. Each read checks its
+//! bounds, and no length from the wire is trusted.
 
 use thiserror::Error;
 
-/// The longest text of a message, bytes; ROS uses them for the names of frames.
+/// Bytes; ROS uses texts for the names of frames.
 const LONGEST_TEXT: usize = 256;
-/// The bytes before the message that name its encoding.
+/// The bytes before the message name its encoding.
 pub(crate) const ENCAPSULATION: usize = 4;
 
-/// The bytes are not the message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum Malformed {
-    /// The bytes have another encoding.
     #[error("encoding {0:#06x} instead of plain CDR; set the robot's middleware to XCDR1")]
     Encoding(u16),
-    /// The bytes end early.
     #[error("it ends early; is the topic of this type?")]
     Short,
-    /// A text or a list is too long.
     #[error("{0} elements in a list, and {1} are the most; is the topic of this type?")]
     Long(u32, usize),
 }
 
-/// Reads one message.
 #[derive(Clone, Debug)]
 pub struct Reader<'a> {
-    /// The message, from which its alignment counts.
+    /// Alignment counts from its start.
     bytes: &'a [u8],
     at: usize,
     is_big: bool,
 }
 
 impl<'a> Reader<'a> {
-    /// A reader of the message in `payload`, which begins with its encapsulation.
+    /// `payload` begins with its encapsulation; fails if that names another encoding.
     pub fn new(payload: &'a [u8]) -> Result<Self, Malformed> {
         let (header, bytes) = payload.split_at_checked(ENCAPSULATION).ok_or(Malformed::Short)?;
         match [header[0], header[1]] {
@@ -41,7 +36,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The next `N` bytes, most significant first, after padding to a multiple of `N`.
+    /// Most significant first, after padding to a multiple of `N`.
     fn primitive<const N: usize>(&mut self) -> Result<[u8; N], Malformed> {
         let start = self.at.next_multiple_of(N);
         let bytes = self.bytes.get(start..).and_then(<[u8]>::first_chunk::<N>);
@@ -81,13 +76,13 @@ impl<'a> Reader<'a> {
         Ok(numbers)
     }
 
-    /// A list of at most `most` numbers.
+    /// Fails if the bytes end early, or the list has more than `most` numbers.
     pub fn list(&mut self, most: usize) -> Result<Vec<f32>, Malformed> {
         let length = self.length(most)?;
         (0..length).map(|_| self.f32()).collect()
     }
 
-    /// The next `count` bytes as they are.
+    /// Fails if there are fewer bytes.
     pub fn raw(&mut self, count: usize) -> Result<&'a [u8], Malformed> {
         let bytes = self.bytes.get(self.at..).and_then(|rest| rest.get(..count));
         let bytes = bytes.ok_or(Malformed::Short)?;
@@ -95,7 +90,8 @@ impl<'a> Reader<'a> {
         Ok(bytes)
     }
 
-    /// A text without the zero byte that ends it; what is not UTF-8 is left out.
+    /// Without the zero byte that ends it, and without what is not UTF-8. Fails if the bytes end early, or the text
+    /// is too long.
     pub fn text(&mut self) -> Result<&'a str, Malformed> {
         let length = self.length(LONGEST_TEXT)?;
         let text = self.raw(length)?.split(|byte| *byte == 0).next().unwrap_or_default();
@@ -111,12 +107,11 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Writes one message, the least significant byte first.
+/// The least significant byte comes first.
 #[derive(Clone, Debug)]
 pub struct Writer(Vec<u8>);
 
 impl Default for Writer {
-    /// An empty message, after its encapsulation.
     fn default() -> Self {
         Self(vec![0, 1, 0, 0])
     }
@@ -158,23 +153,20 @@ impl Writer {
         numbers.iter().fold(self, |writer, number| writer.f64(*number))
     }
 
-    /// Bytes whose number the receiver knows.
     pub fn raw(&mut self, bytes: &[u8]) -> &mut Self {
         self.0.extend(bytes);
         self
     }
 
-    /// A text; a zero byte ends it.
+    /// A zero byte ends it.
     pub fn text(&mut self, text: &str) -> &mut Self {
         self.length(text.len() + 1).raw(text.as_bytes()).u8(0)
     }
 
-    /// The length of a list, which its elements follow.
     pub fn length(&mut self, elements: usize) -> &mut Self {
         self.u32(u32::try_from(elements).unwrap_or(u32::MAX))
     }
 
-    /// A list, of which `write` writes each element.
     pub fn list<T>(
         &mut self,
         elements: impl IntoIterator<Item = T, IntoIter: ExactSizeIterator>,
@@ -188,7 +180,7 @@ impl Writer {
         self
     }
 
-    /// The message with its encapsulation. Nothing more can be written to it.
+    /// Nothing more can be written to the message.
     pub fn take(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.0)
     }

@@ -1,4 +1,4 @@
-//! A participant of a DDS domain. Messages are payloads with their encapsulation, not decoded.
+//! A participant of a DDS domain. Messages are payloads, not decoded.
 //!
 //! The library's threads ring the participant's descriptor; no call here waits.
 
@@ -29,24 +29,21 @@ use rustix::{
 
 use crate::{cdr::ENCAPSULATION, topic::Topic};
 
-/// The longest message that is received, bytes. A longer one is cut, and its decoder refuses it.
+/// A longer message is cut, and its decoder refuses it.
 const LONGEST: usize = 65_535;
-/// The most messages that are skipped at a time because they cannot be decoded.
+/// Messages skipped at a time because they cannot be decoded.
 const MOST_BROKEN: usize = 16;
 
-/// A message as DDS delivers it.
 type Payload = Vec<u8>;
-/// The number that DDS knows a participant, a reader or a writer by.
+/// DDS knows a participant, a reader or a writer by it.
 pub type Gid = [u8; 16];
 
-/// The quality of service that a reader demands, or a writer offers.
 #[derive(Clone, Copy, Debug)]
 pub struct Quality {
-    /// Whether lost messages are sent again.
+    /// Lost messages are sent again.
     pub is_reliable: bool,
-    /// Whether a reader that joins later gets the newest messages.
+    /// A reader that joins later gets the newest messages.
     pub is_latched: bool,
-    /// The most messages that are kept.
     pub depth: u16,
 }
 
@@ -68,7 +65,6 @@ impl Quality {
     }
 }
 
-/// Takes payloads as they are.
 #[derive(Clone, Copy)]
 struct Raw;
 
@@ -118,7 +114,6 @@ impl SerializerAdapter<Payload> for Raw {
     }
 }
 
-/// Makes a descriptor readable.
 struct Bell(OwnedFd);
 
 impl Wake for Bell {
@@ -128,7 +123,6 @@ impl Wake for Bell {
     }
 }
 
-/// A participant of a domain.
 pub struct Participant {
     inner: DomainParticipant,
     only: Option<Ipv4Addr>,
@@ -137,8 +131,8 @@ pub struct Participant {
 }
 
 impl Participant {
-    /// Join `domain` by the network interface with the address `only`, or else by all interfaces; by this machine's own alone if the
-    /// environment says so as it does for ROS.
+    /// Join by the network interface with the address `only`, or else by all; by this machine's own alone if the
+    /// environment says so as it does for ROS. Fails if DDS cannot start.
     pub fn join(domain: u16, only: Option<Ipv4Addr>) -> io::Result<Self> {
         let inner = joined(domain, only)?;
         let rung = eventfd(0, EventfdFlags::NONBLOCK | EventfdFlags::CLOEXEC)?;
@@ -146,14 +140,14 @@ impl Participant {
         Ok(Self { inner, only, rung, bell })
     }
 
-    /// Join the domain anew with the same descriptor. The readers and writers made before are of no use any more. The library's threads end
-    /// when a call of theirs is interrupted, as it is when the process is stopped and continued, and nothing says so.
+    /// Join anew with the same descriptor; earlier readers and writers are of no use any more. Fails if DDS cannot
+    /// start. The library's threads end when a call of theirs is interrupted, as it is when the process is stopped
+    /// and continued, and nothing says so.
     pub fn rejoin(&mut self) -> io::Result<()> {
         self.inner = joined(self.inner.domain_id(), self.only)?;
         Ok(())
     }
 
-    /// A reader of `topic`.
     pub fn reader(&self, topic: &Topic, quality: Quality) -> io::Result<Reader> {
         let policies = quality.policies();
         let subscriber = self.inner.create_subscriber(&policies).map_err(io::Error::other)?;
@@ -165,7 +159,6 @@ impl Participant {
         Ok(Reader { inner: reader, bell: self.bell.clone() })
     }
 
-    /// A writer of `topic`.
     pub fn writer(&self, topic: &Topic, quality: Quality) -> io::Result<Writer> {
         let policies = quality.policies();
         let publisher = self.inner.create_publisher(&policies).map_err(io::Error::other)?;
@@ -180,54 +173,49 @@ impl Participant {
         topic.map_err(io::Error::other)
     }
 
-    /// Make the descriptor unreadable until something comes. Ask the readers after this call: the descriptor becomes readable again for
-    /// messages that come after a reader had none.
+    /// Ask the readers after this call: the descriptor becomes readable again for messages that come after a reader
+    /// had none.
     pub fn unring(&self) {
         let _ = read(&self.rung, &mut [0_u8; 8]);
     }
 
-    /// The number of this participant.
     pub fn gid(&self) -> Gid {
         self.inner.guid().to_bytes()
     }
 }
 
-/// The header that Cyclone DDS puts before a request: the client's number and that of the request, 8 bytes each. The reply repeats it.
+/// Cyclone DDS puts it before a request: the client's number and that of the request, 8 bytes each. The reply repeats
+/// it.
 const CYCLONE_HEADER: usize = 16;
 
-/// The sender of a request. Fast DDS names it beside the message, as the standard has it, Cyclone DDS in the message.
+/// Fast DDS names the sender beside the message, as the standard has it, Cyclone DDS in the message.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Request {
     identity: SampleIdentity,
-    /// The header of the request and of its reply; empty for Fast DDS.
+    /// Repeated in the reply; empty for Fast DDS.
     header: Vec<u8>,
 }
 
 impl Request {
-    /// The payload of a request without the header.
     pub fn without_header(&self, payload: &[u8]) -> Payload {
         let (encapsulation, rest) = payload.split_at(payload.len().min(ENCAPSULATION));
         [encapsulation, rest.get(self.header.len()..).unwrap_or_default()].concat()
     }
 }
 
-/// A message and its sender.
 #[derive(Clone, Debug)]
 pub struct Message {
     pub payload: Payload,
-    /// The number of the writer.
     pub from: Gid,
     pub request: Request,
 }
 
-/// Reads a topic.
 pub struct Reader {
     inner: SimpleDataReader<Payload, Raw>,
     bell: Waker,
 }
 
 impl Reader {
-    /// The next message, if one has come.
     pub fn take(&self) -> Option<Message> {
         self.inner.set_waker(Some(self.bell.clone()));
         self.inner.drain_read_notifications();
@@ -247,7 +235,7 @@ impl Reader {
         Some(Message { payload: message.sample, from, request })
     }
 
-    /// The messages that have come. A writer that floods the topic makes them endless.
+    /// A writer that floods the topic makes them endless.
     pub fn messages(&self) -> impl Iterator<Item = Message> {
         std::iter::from_fn(|| self.take())
     }
@@ -257,16 +245,14 @@ impl Reader {
     }
 }
 
-/// Writes to a topic.
 pub struct Writer(DataWriter<Payload, Raw>);
 
 impl Writer {
-    /// Send a payload. Returns whether the library took it; it takes none while it is busy.
+    /// Returns whether the library took it; it takes none while it is busy.
     pub fn write(&self, payload: Payload) -> bool {
         self.0.write(payload, None).is_ok()
     }
 
-    /// Reply to a request.
     pub fn reply(&self, to: &Request, payload: &[u8]) -> bool {
         let options = WriteOptionsBuilder::new().related_sample_identity(to.identity).build();
         let (encapsulation, rest) = payload.split_at(payload.len().min(ENCAPSULATION));
@@ -279,7 +265,7 @@ impl Writer {
     }
 }
 
-/// A participant of `domain`, by the interface with the address `only` if there is one.
+/// Joins by the interface with the address `only` if there is one.
 fn joined(domain: u16, only: Option<Ipv4Addr>) -> io::Result<DomainParticipant> {
     let mut builder = DomainParticipantBuilder::new(domain);
     if let Some(only) = only.or_else(|| is_local().then_some(Ipv4Addr::LOCALHOST)) {
@@ -288,7 +274,7 @@ fn joined(domain: u16, only: Option<Ipv4Addr>) -> io::Result<DomainParticipant> 
     builder.build().map_err(io::Error::other)
 }
 
-/// Whether the environment keeps ROS on this machine.
+/// The environment keeps ROS on this machine.
 fn is_local() -> bool {
     let is = |name: &str, value: &str| env::var(name).is_ok_and(|set| set == value);
     is("ROS_LOCALHOST_ONLY", "1") || is("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")

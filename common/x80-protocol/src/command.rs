@@ -1,5 +1,3 @@
-//! Host to robot.
-
 mod parse;
 
 use super::{
@@ -7,16 +5,15 @@ use super::{
     frame::{Addressing, Frame, SystemSignal},
 };
 
-/// Channels of the motor board. The wheels are on two of them.
+/// The wheels are on two of the motor board's channels.
 pub const CHANNELS: usize = 6;
-/// The value for a channel that a command does not change.
+/// The value leaves a channel unchanged.
 const ALONE: i16 = i16::MIN;
-/// The value that one client sends for such a channel.
+/// One client sends this value instead.
 const ALSO_ALONE: i16 = i16::MIN + 1;
-/// The byte before the time limit of a command.
+/// It comes before the time limit of a command.
 const TIME_FOLLOWS: u8 = 28;
 
-/// The quantity that a motion command sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Counts, cyclic 0..32767 with an encoder as feedback.
@@ -27,21 +24,15 @@ pub enum Quantity {
     Velocity,
 }
 
-/// The channels that a motion command sets, and their values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Targets {
-    /// A single channel, 0 to 5.
-    One {
-        channel: u8,
-        /// The target.
-        value: i16,
-    },
-    /// Every channel that is not left alone.
+    /// Channel 0 to 5.
+    One { channel: u8, value: i16 },
+    /// `None` leaves a channel alone.
     All([Option<i16>; CHANNELS]),
 }
 
 impl Targets {
-    /// The target of `channel`; none if the command leaves it alone.
     #[must_use]
     pub fn of(&self, channel: u8) -> Option<i16> {
         match self {
@@ -51,120 +42,92 @@ impl Targets {
     }
 }
 
-/// A motion command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Motion {
-    /// The quantity that it sets.
     pub quantity: Quantity,
-    /// The channels and their values.
     pub targets: Targets,
-    /// The time after which the motion ends, milliseconds; none if it does not end. Not all robots respect it.
+    /// The motion ends after it. Not all robots respect it.
     pub limit_ms: Option<u16>,
 }
 
-/// The sensor from which a channel's loop gets its feedback.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Feedback {
-    /// A single potentiometer.
     #[default]
     OnePot,
-    /// Two potentiometers.
     TwoPots,
-    /// The wheel's encoder.
     Encoder,
 }
 
-/// The quantity that a channel's loop controls.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
-    /// The pulse width, without a loop.
+    /// Pulse width, without a loop.
     #[default]
     Pwm,
     Position,
     Velocity,
 }
 
-/// PID gains, as many as a command brings.
+/// A command brings up to three PID gains.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Gains {
-    /// Proportional.
     pub kp: Option<u16>,
-    /// Derivative.
     pub kd: Option<u16>,
-    /// Integral, times 100.
+    /// The gain times 100.
     pub ki_x100: Option<u16>,
 }
 
-/// A parameter of one channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Parameter {
-    /// Gains of the position loop.
     PositionPid(Gains),
-    /// Gains of the velocity loop.
     VelocityPid(Gains),
-    /// The sensor that gives the loop's feedback.
     Feedback(Feedback),
-    /// The quantity that the loop controls.
     Mode(Mode),
-    /// Polarity, bumper protection and other parameters, which are accepted and ignored.
+    /// Polarity, bumper protection and others, which are accepted and ignored.
     Other {
-        /// The number of the parameter.
         sub: u8,
     },
 }
 
-/// A sensor stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stream {
-    /// 123.
+    /// DID 123.
     Motor,
-    /// 124.
+    /// DID 124.
     Custom,
-    /// 125.
+    /// DID 125.
     Standard,
-    /// All three.
     All,
 }
 
-/// A request about a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
-    /// Send for ever.
     Start,
-    /// Send no more.
     Stop,
-    /// Send so many frames, 1 to 254, and then no more.
+    /// Send 1 to 254 frames, and then no more.
     Count(u8),
 }
 
-/// Host to robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
-    /// Move.
     Motion(Motion),
-    /// Set a parameter of a channel.
     Parameter {
-        /// 0 to 5.
         channel: u8,
-        /// The parameter and its value.
         parameter: Parameter,
     },
-    /// Let motors run, or suspend them.
     Enable {
-        /// Whether they may run.
         on: bool,
-        /// The channel; none for all channels.
+        /// None is all channels.
         channel: Option<u8>,
     },
-    /// Start or stop a sensor stream.
-    Stream { stream: Stream, request: Request },
-    /// Ping or acknowledge.
+    Stream {
+        stream: Stream,
+        request: Request,
+    },
     System(SystemSignal),
 }
 
 impl Command {
-    /// Velocities of channels 0 and 1, counts per second, for `limit_ms` if it is given. The other channels are left
-    /// alone.
+    /// Channels 0 and 1, counts per second; the others are left alone.
     #[must_use]
     pub fn velocity(wheels: [Option<i16>; 2], limit_ms: impl Into<Option<u16>>) -> Self {
         Self::Motion(Motion {
@@ -174,7 +137,6 @@ impl Command {
         })
     }
 
-    /// Append the frame of this command to `out`.
     pub fn encode(&self, addressing: Addressing, out: &mut Vec<u8>) {
         let mut data = Vec::with_capacity(16);
         let did = match *self {

@@ -1,8 +1,8 @@
-//! The decoder turns bytes into frames. The bytes may come in any pieces, with noise between frames and with wrong CRCs.
+//! Bytes to frames. The bytes may come in any pieces, with noise between frames and with wrong CRCs.
 //!
-//! A frame is found by its header, LEN and CRC. Its end bytes are checked only where CRC-8 alone is too weak: one noisy header in
-//! 256 passes the CRC, and the good frames after it would count as its data. So a frame with wrong end bytes is accepted only if no
-//! frame with right end bytes begins inside it.
+//! A frame is found by its header, LEN and CRC. Its end bytes are checked only where CRC-8 alone is too weak: one
+//! noisy header in 256 passes the CRC, and the good frames after it would count as its data. So a frame with wrong
+//! end bytes is accepted only if no frame with right end bytes begins inside it.
 
 use std::cell::Cell;
 
@@ -11,55 +11,53 @@ use super::{
     frame::{BEFORE_DATA, Frame, HEADER, MAX_FRAME_BYTES},
 };
 
-/// Bytes held at most: the largest datagram, and a frame begun in the one before.
+/// The largest datagram, and a frame begun in the one before.
 const CAPACITY: usize = 65_536 + MAX_FRAME_BYTES;
-/// No known message is longer. A header that claims more is likely noise, so it does not hold back the complete frames behind it while the
-/// rest of its own is missing.
+/// No known message is longer: a header that claims more is likely noise, and does not hold back the complete frames
+/// behind it while the rest of its own is missing.
 const LONGEST_PLAUSIBLE: usize = 64;
 
-/// The bytes whose CRC is computed after one push at most. Sound frames need as many as they have; a flood of false headers would need
-/// a thousand times as many, and hold up whoever decodes.
+/// Bytes whose CRC is computed after one push. Sound frames need as many as they have; a flood of false headers would
+/// need a thousand times as many, and hold up whoever decodes.
 const MOST_WORK: usize = 1 << 20;
 
-/// Counts of what the bytes so far were.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DecoderTally {
-    /// Frames given out.
     pub frames: u64,
-    /// Headers whose CRC was wrong.
     pub bad_crc: u64,
-    /// Bytes that belonged to no frame.
     pub noise_bytes: u64,
     /// Bytes dropped unread because more came than is held, or too many false headers.
     pub dropped_bytes: u64,
 }
 
-/// A streaming decoder: [`Decoder::push`] what came, then take every [`Decoder::next_frame`].
+/// [`Decoder::push`] what came, then take every [`Decoder::next_frame`].
 ///
-/// It holds at most 64 KiB and a frame. If a push exceeds that, the oldest bytes are dropped; if false headers take too long, all are. An
-/// incomplete frame waits for its rest, and so do the bytes after a false header until its claimed length has come.
-/// has come, and then what follows it is found.
+/// It holds at most 64 KiB and a frame. If a push exceeds that, the oldest bytes are dropped; if false headers take
+/// too long, all are. An incomplete frame waits for its rest, and so do the bytes after a false header until its
+/// claimed length has come.
 #[derive(Clone, Debug, Default)]
 pub struct Decoder {
     buffer: Vec<u8>,
     start: usize,
     tally: DecoderTally,
-    /// Bytes whose CRC was computed since the last push.
+    /// They had their CRC computed since the last push.
     work: Cell<usize>,
 }
 
-/// The bytes at a header.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Candidate {
-    /// A frame with LEN data bytes and a right CRC; `end` is the offset after the CRC.
-    Sound { end: usize, ending: Ending },
-    /// The beginning of a frame whose rest has not come. Its header announces `len` bytes of data.
-    Half { len: usize },
-    /// The CRC is wrong.
+    /// The CRC of LEN data bytes is right; `end` is the offset after it.
+    Sound {
+        end: usize,
+        ending: Ending,
+    },
+    /// The rest has not come; the header announces `len` bytes of data.
+    Half {
+        len: usize,
+    },
     Broken,
 }
 
-/// The bytes after a CRC.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Ending {
     /// `5E 0D`, or the `5E 13` that one client sends.
@@ -70,7 +68,6 @@ enum Ending {
 }
 
 impl Decoder {
-    /// Take the bytes that came.
     pub fn push(&mut self, bytes: &[u8]) {
         self.buffer.drain(..self.start);
         self.start = 0;
@@ -148,12 +145,11 @@ impl Decoder {
         })
     }
 
-    /// Forget the held bytes, because the next bytes do not continue them. They count as noise.
+    /// The next bytes do not continue the held ones, which count as noise.
     pub fn reset(&mut self) {
         self.skip(self.buffer.len() - self.start);
     }
 
-    /// Counts of what the bytes so far were.
     #[must_use]
     pub fn tally(&self) -> DecoderTally {
         self.tally
@@ -171,7 +167,7 @@ fn header_in(bytes: &[u8]) -> Option<usize> {
     whole.or_else(|| bytes.last().is_some_and(|&last| last == HEADER[0]).then(|| bytes.len() - 1))
 }
 
-/// Judge what stands at the start of `bytes`, which is a header or the beginning of one.
+/// `bytes` starts with a header or the beginning of one.
 fn candidate(bytes: &[u8], work: &Cell<usize>) -> Candidate {
     let Some(&len) = bytes.get(BEFORE_DATA - 1) else {
         return Candidate::Half { len: 0 };
@@ -199,13 +195,13 @@ fn is_end(bytes: &[u8]) -> Ending {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Inside {
     Nothing,
-    /// A sound frame with right end bytes, at this offset.
+    /// A sound frame begins at this offset.
     Frame(usize),
-    /// A header, or the first byte of one, of an incomplete frame.
+    /// The frame is incomplete.
     Unknown,
 }
 
-/// Search for a frame that begins after the start of `bytes` and before `end`.
+/// Searches after the start of `bytes` and before `end`.
 fn inside(bytes: &[u8], end: usize, work: &Cell<usize>) -> Inside {
     let mut found = Inside::Nothing;
     for at in 1..end.min(bytes.len()) {

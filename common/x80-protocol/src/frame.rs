@@ -1,19 +1,15 @@
-//! A frame and its addressing.
-
 use thiserror::Error;
 
 use super::{crc::crc8, did};
 
-/// First two bytes of every frame.
 pub(super) const HEADER: [u8; 2] = [0x5e, 0x02];
-/// Last two bytes of every frame we send.
 const END: [u8; 2] = [0x5e, 0x0d];
-/// Bytes before the data: header, RID, SN, DID, LEN.
+/// Header, RID, SN, DID, LEN.
 pub(super) const BEFORE_DATA: usize = 6;
-/// The longest frame there can be: 255 data bytes with all that surrounds them.
+/// 255 data bytes with all that surrounds them.
 pub const MAX_FRAME_BYTES: usize = BEFORE_DATA + 255 + 1 + END.len();
 
-/// The numbering of robot and host on the wire. A receiver answers in the form in which it was addressed.
+/// How robot and host are numbered. A receiver answers as it was addressed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Addressing {
     /// Host 00, motion board 01, multimedia board 08: most robots.
@@ -24,7 +20,6 @@ pub enum Addressing {
 }
 
 impl Addressing {
-    /// The RID that addresses the robot.
     #[must_use]
     pub const fn robot(self) -> u8 {
         match self {
@@ -33,7 +28,6 @@ impl Addressing {
         }
     }
 
-    /// The RID that addresses the host.
     #[must_use]
     pub const fn host(self) -> u8 {
         match self {
@@ -42,7 +36,7 @@ impl Addressing {
         }
     }
 
-    /// The form of a frame addressed to a robot; none if `rid` is not a robot's.
+    /// None if `rid` is not a robot's.
     #[must_use]
     pub const fn of_robot(rid: u8) -> Option<Self> {
         match rid {
@@ -52,13 +46,13 @@ impl Addressing {
         }
     }
 
-    /// Whether `rid` is the multimedia board's: it acknowledges, and neither moves nor measures.
+    /// The multimedia board acknowledges, and neither moves nor measures.
     #[must_use]
     pub const fn is_multimedia(rid: u8) -> bool {
         rid == 0x08
     }
 
-    /// The form of a frame addressed to a host; none if `rid` is not a host's.
+    /// None if `rid` is not a host's.
     #[must_use]
     pub const fn of_host(rid: u8) -> Option<Self> {
         match rid {
@@ -69,21 +63,18 @@ impl Addressing {
     }
 }
 
-/// A frame whose CRC was right, or one about to be sent.
+/// Its CRC was right, or it is about to be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame<'a> {
-    /// The addressed device.
     pub rid: u8,
-    /// Serial number; everybody sends 0.
+    /// Everybody sends 0.
     pub sn: u8,
-    /// The meaning of the data: [`did`].
     pub did: u8,
-    /// The data, at most 255 bytes.
     pub data: &'a [u8],
 }
 
 impl Frame<'_> {
-    /// Append the bytes of this frame to `out`. Data beyond 255 bytes are cut off: LEN is one byte.
+    /// Cuts data beyond 255 bytes off: LEN is one byte.
     pub fn encode(&self, out: &mut Vec<u8>) {
         let data = &self.data[..self.data.len().min(255)];
         out.extend_from_slice(&HEADER);
@@ -96,12 +87,12 @@ impl Frame<'_> {
     }
 }
 
-/// The signals that both sides send with DID 255.
+/// Both sides send them with DID 255.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SystemSignal {
-    /// 0: are you there?
+    /// Code 0.
     Ping,
-    /// 1: your frame has come. Acknowledging these would never end.
+    /// Code 1. Acknowledging these would never end.
     Ack,
 }
 
@@ -123,30 +114,15 @@ impl SystemSignal {
     }
 }
 
-/// A frame with a right CRC is not a known message. The receiver can continue after any of these errors.
+/// The CRC was right. A receiver can continue after any of these errors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum MessageError {
-    /// The DID is not in the table.
     #[error("no message has DID {did}; pass the frame over, or add the DID to the wire module")]
     UnknownDid { did: u8 },
-    /// The frame carries too few data, or a number of bytes that no form of its message has.
     #[error("DID {did} came with {found} data bytes instead of {expected}; pass the frame over")]
-    Length {
-        did: u8,
-        /// LEN as it came.
-        found: usize,
-        /// The lengths that are known.
-        expected: &'static str,
-    },
-    /// A byte of the frame has no meaning.
+    Length { did: u8, found: usize, expected: &'static str },
     #[error("DID {did}: {value} is no {what}; pass the frame over")]
-    Value {
-        did: u8,
-        /// The expected value of the byte.
-        what: &'static str,
-        /// The byte.
-        value: u8,
-    },
+    Value { did: u8, what: &'static str, value: u8 },
 }
 
 pub(super) const fn length(did: u8, data: &[u8], expected: &'static str) -> MessageError {

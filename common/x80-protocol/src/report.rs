@@ -1,26 +1,21 @@
-//! Robot to host.
-
 use super::{
     did,
     frame::{Addressing, Frame, MessageError, SystemSignal},
     sensors::{CustomSensors, MotorSensors, StandardSensors},
 };
 
-/// Robot to host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Report {
-    /// 123: wheels.
+    /// DID 123.
     Motor(MotorSensors),
-    /// 124: AD channels.
+    /// DID 124.
     Custom(CustomSensors),
-    /// 125: ultrasonic and the rest.
+    /// DID 125.
     Standard(StandardSensors),
-    /// Ping or acknowledge.
     System(SystemSignal),
 }
 
 impl Report {
-    /// Append the frame of this report to `out`.
     pub fn encode(&self, addressing: Addressing, out: &mut Vec<u8>) {
         let write = |did, data: &[u8], out: &mut Vec<u8>| {
             let rid = addressing.host();
@@ -35,10 +30,8 @@ impl Report {
         }
     }
 
-    /// The report in a frame.
-    ///
     /// # Errors
-    /// When the frame has a right CRC but is no report: unknown DID, too short, a byte that means nothing.
+    /// The DID is unknown, the frame too short, or a byte has no meaning.
     pub fn parse(frame: &Frame<'_>) -> Result<Self, MessageError> {
         match frame.did {
             did::MOTOR => MotorSensors::from_bytes(frame.data).map(Self::Motor),

@@ -5,37 +5,34 @@ use super::{
     frame::{MessageError, length},
 };
 
-/// Encoder counts run 0..32767 and begin again.
+/// Counts run 0..32767 and begin again.
 pub const COUNT_CYCLE: u16 = 32_768;
 
-/// The encoder of a wheel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Encoder {
-    /// Counts, cyclic below [`COUNT_CYCLE`]; growing in the channel's positive direction.
+    /// Cyclic below [`COUNT_CYCLE`], growing in the channel's positive direction.
     pub position: u16,
-    /// Counts per second, without sign.
     pub speed: u16,
-    /// Whether the wheel turns in the channel's positive direction.
+    /// The wheel turns in the channel's positive direction.
     pub positive: bool,
 }
 
 impl Encoder {
-    /// Counts per second in the channel's positive direction.
+    /// Positive in the channel's positive direction.
     #[must_use]
     pub fn velocity(&self) -> i32 {
         let speed = i32::from(self.speed);
         if self.positive { speed } else { -speed }
     }
 
-    /// Counts turned since `earlier` was reported, in the channel's positive direction: the shorter way
-    /// round the cycle.
+    /// The shorter way round the cycle, in the channel's positive direction.
     #[must_use]
     pub fn counts_since(&self, earlier: &Self) -> i32 {
         counts_between(earlier.position, self.position)
     }
 }
 
-/// Counts from `old` to `new`, both below [`COUNT_CYCLE`]: the shorter way round the cycle.
+/// The shorter way round the cycle, both below [`COUNT_CYCLE`].
 #[must_use]
 pub fn counts_between(old: u16, new: u16) -> i32 {
     let cycle = i32::from(COUNT_CYCLE);
@@ -43,14 +40,14 @@ pub fn counts_between(old: u16, new: u16) -> i32 {
     if ahead >= cycle / 2 { ahead - cycle } else { ahead }
 }
 
-/// The counts of a robot that has just booted are this near to 0, because it stands.
+/// A robot that has just booted stands.
 const BOOTED_WITHIN: i32 = 4;
-/// A step that is no longer than this counts as motion. It is 14 mm for an X80.
+/// A step no longer than this counts as motion; 14 mm for an X80.
 const NOT_WORTH_TELLING: i32 = 32;
 
-/// Whether the counts of both wheels indicate that the robot booted between `old` and `new`: the new counts are near the start value
-/// of a booted robot, and the old ones are not. A robot that drove back to its start gives the same counts, so a caller that received
-/// frames in between needs further evidence.
+/// The robot probably booted between `old` and `new`: the new counts are near the start value of a booted robot, and
+/// the old ones are not. A robot that drove back to its start gives the same counts, so a caller that received frames
+/// in between needs further evidence.
 #[must_use]
 pub fn counts_restarted(old: [u16; 2], new: [u16; 2]) -> bool {
     let at_start = new.iter().all(|&count| counts_between(0, count).abs() <= BOOTED_WITHIN);
@@ -64,47 +61,45 @@ pub fn counts_restarted(old: [u16; 2], new: [u16; 2]) -> bool {
 /// DID 123.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MotorSensors {
-    /// Potentiometers of the six channels, AD counts.
+    /// AD counts of the six channels, like `currents`.
     pub pots: [u16; 6],
-    /// Currents of the six channels, AD counts.
     pub currents: [u16; 6],
-    /// Encoders of channels 0 and 1.
+    /// Channels 0 and 1.
     pub encoders: [Encoder; 2],
 }
 
 /// DID 125.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StandardSensors {
-    /// The six ultrasonic rangers, each an [`super::Echo`].
+    /// Each is an [`super::Echo`].
     pub ultrasonic: [u8; 6],
-    /// Two human sensors, wakeup and motion each, AD counts.
+    /// Two sensors, wakeup and motion each, AD counts.
     pub human: [u16; 4],
-    /// Tilt along x and y, AD counts.
+    /// X and y, AD counts.
     pub tilt: [u16; 2],
-    /// Motor driver temperatures, AD counts.
+    /// Motor drivers, AD counts.
     pub overheat: [u16; 2],
-    /// Board temperature, AD counts.
+    /// Board, AD counts.
     pub temperature: u16,
-    /// The first infrared ranger, AD counts for [`super::infrared_m`].
+    /// The first ranger's AD counts for [`super::infrared_m`].
     pub infrared: u16,
-    /// The code a remote control sent last.
+    /// A remote control sent it last.
     pub infrared_code: [u8; 4],
-    /// Board battery, AD counts for [`super::volts`] with 9 V full scale.
+    /// AD counts for [`super::volts`] with 9 V full scale.
     pub board_battery: u16,
-    /// Motor battery, AD counts for [`super::volts`] with 24 V full scale.
+    /// AD counts for [`super::volts`] with 24 V full scale.
     pub motor_battery: u16,
-    /// Servo battery, AD counts for [`super::volts`] with 9 V full scale.
+    /// AD counts for [`super::volts`] with 9 V full scale.
     pub servo_battery: u16,
-    /// Reference voltage, AD counts.
+    /// AD counts of the reference voltage.
     pub reference: u16,
 }
 
 /// DID 124.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CustomSensors {
-    /// Eight AD channels; infrared rangers 2 to 7 are on channels 2 to 7.
+    /// Infrared rangers 2 to 7 are on channels 2 to 7.
     pub ad: [u16; 8],
-    /// Eight digital lines.
     pub io: u8,
 }
 
@@ -112,7 +107,7 @@ const MOTOR_BYTES: usize = 33;
 const STANDARD_BYTES: usize = 40;
 const CUSTOM_BYTES: usize = 17;
 
-/// Little-endian words out of data whose length has been checked; missing ones read 0.
+/// Little-endian; missing ones read 0, because the length was checked.
 struct Words<'a>(&'a [u8]);
 
 impl Words<'_> {

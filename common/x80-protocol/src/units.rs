@@ -1,20 +1,19 @@
-//! Bytes and AD counts in metres and volts.
+//! Bytes and AD counts to metres and volts, and back.
 
 use std::ops::RangeInclusive;
 
-/// The meaning of an ultrasonic byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Echo {
-    /// 1..4: something 4 cm away or nearer.
+    /// Bytes 1..4: 4 cm or nearer.
     Touching,
-    /// 5..254: something at so many centimetres.
+    /// Bytes 5..254, centimetres.
     At(u8),
-    /// 255: nothing within 2.55 m.
+    /// Byte 255: nothing within 2.55 m.
     Nothing,
 }
 
 impl Echo {
-    /// The echo of `byte`; none for 0, which is no reading.
+    /// None for 0, which is no reading.
     #[must_use]
     pub const fn from_byte(byte: u8) -> Option<Self> {
         match byte {
@@ -25,13 +24,13 @@ impl Echo {
         }
     }
 
-    /// The byte that says that something is `range` metres away: whole centimetres, 4 to 255.
+    /// Whole centimetres, 4 to 255.
     #[must_use]
     pub fn byte_at(range: f64) -> u8 {
         (range * 100.0).round().clamp(4.0, 255.0) as u8
     }
 
-    /// The range in metres, 0.04 when touching; none for nothing.
+    /// 0.04 when touching; none for nothing.
     #[must_use]
     pub fn metres(self) -> Option<f64> {
         match self {
@@ -42,14 +41,13 @@ impl Echo {
     }
 }
 
-/// Nearest and farthest range of an infrared ranger, metres.
 const INFRARED_M: (f64, f64) = (0.09, 0.81);
 
-/// Counts of an infrared ranger that is powered and connected, 0.2 V to 3.0 V: the least where it sees nothing, the most at the peak of
-/// its curve. Other counts come from a ranger that is dead or saturated.
+/// A powered and connected ranger gives 0.2 V to 3.0 V: the least where it sees nothing, the most at the peak of its
+/// curve. Other counts come from a ranger that is dead or saturated.
 pub const INFRARED_LIVE_AD: RangeInclusive<u16> = 268..=4_060;
 
-/// The range an infrared ranger means by `ad`, metres, clamped to 0.09..0.81; 0.81 is also nothing.
+/// Metres, clamped to 0.09..0.81; 0.81 is also nothing.
 #[must_use]
 pub fn infrared_m(ad: u16) -> f64 {
     let volts_over = f64::from(ad) * 3.0 / 4028.0 - 0.17;
@@ -59,33 +57,31 @@ pub fn infrared_m(ad: u16) -> f64 {
     (0.216 / volts_over).clamp(INFRARED_M.0, INFRARED_M.1)
 }
 
-/// The AD counts an infrared ranger gives `range` metres from something.
+/// The inverse of [`infrared_m`].
 #[must_use]
 pub fn infrared_ad(range: f64) -> u16 {
     let range = range.clamp(INFRARED_M.0, INFRARED_M.1);
     ((0.216 / range + 0.17) * 4028.0 / 3.0).round() as u16
 }
 
-/// Full scale of the board's and the servos' battery, volts, for [`volts`].
+/// Board and servos, for [`volts`].
 pub const LOGIC_SCALE_V: f64 = 9.0;
-/// Full scale of the motors' battery, volts, for [`volts`].
+/// Motors, for [`volts`].
 pub const MOTOR_SCALE_V: f64 = 24.0;
 
-/// Volts of a battery whose `ad` counts reach 4095 at `full_scale` volts (9 for board and servo, 24 for
-/// the motors).
+/// `ad` counts reach 4095 at `full_scale` volts.
 #[must_use]
 pub fn volts(ad: u16, full_scale: f64) -> f64 {
     f64::from(ad) / 4095.0 * full_scale
 }
 
-/// Degrees Celsius of the board's temperature sensor, as the vendor's manual gives the formula.
+/// The vendor's manual gives the formula.
 #[must_use]
 pub fn board_celsius(ad: u16) -> f64 {
     (f64::from(ad) - 1256.0) / 34.8
 }
 
-/// Degrees Celsius of a motor driver, as the vendor's manual gives the formula for its overheat sensors;
-/// at least one project doubts it.
+/// The vendor's manual gives the formula for its overheat sensors; at least one project doubts it.
 #[must_use]
 pub fn driver_celsius(ad: u16) -> f64 {
     100.0 - (f64::from(ad) - 980.0) / 11.6

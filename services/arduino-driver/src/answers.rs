@@ -2,23 +2,21 @@
 
 use common::mission::LEAST_BAUD;
 
-/// An answer of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Answer {
-    /// `OK`: a command was carried out.
     Done,
-    /// `Invalid Command`: the board got no command, or a garbled one.
+    /// `Invalid Command`: none came, or a garbled one.
     Invalid,
-    /// Two numbers: the encoder counts of the left and the right wheel. No other request is answered so.
+    /// Two numbers, left and right. No other request is answered so.
     Counts([i32; 2]),
-    /// A number that is a baud rate, because it is greater than any range.
+    /// Greater than any range.
     Baud,
-    /// A smaller number, which is a range if a sonar was asked: centimetres.
+    /// A smaller number, a range if a sonar was asked.
     Centimetres(u16),
 }
 
 impl Answer {
-    /// The answer in `line`, which has no line feed; or why the line is none.
+    /// Says why `line`, which has no line feed, is none.
     pub(crate) fn parse(line: &[u8]) -> Result<Self, String> {
         let none = || format!("{:?} is no answer of the board", String::from_utf8_lossy(line));
         let line = line.strip_suffix(b"\r").unwrap_or(line);

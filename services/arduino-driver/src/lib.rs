@@ -1,21 +1,24 @@
-//! The driver of robots whose Arduino speaks the protocol of ROSArduinoBridge: requests of one letter, each ended by a carriage return,
-//! and answers in lines, in the order of the requests.
+//! ROSArduinoBridge: requests of one letter, each ended by a carriage return, and answers in lines, in the order of
+//! the requests.
 //!
-//! The board says nothing unasked. At each poll the driver asks it for a round: the range of each sonar, `p PIN`, and then the encoder
-//! counts, `e`, with which a tick begins. Answers carry no name and bytes may be lost, so these rules keep an answer from being taken
-//! for that of another request:
+//! The board says nothing unasked. At each poll the driver asks it for a round: the range of each sonar, `p PIN`, and
+//! then the encoder counts, `e`, with which a tick begins. Answers carry no name and bytes may be lost, so these
+//! rules keep an answer from being taken for that of another request:
 //!
-//! 1. A round is asked for when nothing before it is unanswered. Its ranges count only when as many came as were asked for, and then
+//! 1. A round is asked for when nothing before it is unanswered. Its ranges count only when as many came as were
+//!    asked for, and then
 //!    its counts: the form of counts is no other answer's.
-//! 2. A line that does not fit, and a round that is not complete within `robot.command_limit_s`, drops the round. The driver then asks
+//! 2. A line that does not fit, and a round that is not complete within `robot.command_limit_s`, drops the round. The
+//!    driver then asks
 //!    for the baud rate alone, `b`, and drops all that is said until a number comes that is greater than any range.
-//! 3. That number is the answer to the only `b` that is unanswered: another is asked for after [`LATEST_S`] only. Answers come in the
+//! 3. That number is the answer to the only `b` that is unanswered: another is asked for after [`LATEST_S`] only.
+//!    Answers come in the
 //!    order of requests, so what was asked before it is answered or lost, and rule 1 holds again.
 //!
-//! The rules suppose that answers come in order, and within [`LATEST_S`] or not at all. Rule 2 bounds how old counts are. A digit that
-//! arrives as another digit is not noticed, because the protocol has no check sum: counts then jump, which the link judges, and a range
-//! is wrong once. Velocity commands are answered by `OK`, which is dropped wherever it comes: counts that come in time show that the
-//! commands before them came in time.
+//! The rules suppose that answers come in order, and within [`LATEST_S`] or not at all. A digit that arrives as
+//! another digit is not noticed, because the protocol has no check sum: counts then jump, which the link judges, and
+//! a range is wrong once. Velocity commands are answered by `OK`, which is dropped wherever it comes: counts that
+//! come in time show that the commands before them came in time.
 
 mod answers;
 
@@ -31,50 +34,50 @@ use common::{
 
 use self::answers::Answer;
 
-/// The most lines that wait to be heard; more are dropped. A round has at most seven.
+/// More lines that wait are dropped. A round has at most seven.
 const MOST_WAITING: usize = 64;
-/// The time within which the board answers, seconds: it waits for an echo for one second at most.
+/// The board waits for an echo for one second at most.
 const LATEST_S: f64 = 2.0;
-/// The greatest speed of a wheel, as a multiple of its top speed.
+/// A greater multiple of a wheel's top speed is no speed.
 const IMPLAUSIBLE: f64 = 1.5;
 
-/// The answer that the driver waits for.
 #[derive(Clone, Debug)]
 enum Waits {
-    /// None, because all requests are answered.
     No,
-    /// The rest of the round that was asked for at this poll, of which these ranges came, centimetres.
-    Round { since: u64, ranges: Vec<u16> },
-    /// The baud rate, which was asked for at this poll; not yet if none.
-    Baud { since: Option<u64> },
+    /// The rest of the round that was asked for at poll `since`, of which these ranges came, centimetres.
+    Round {
+        since: u64,
+        ranges: Vec<u16>,
+    },
+    /// The baud rate, asked for at this poll; not yet if none.
+    Baud {
+        since: Option<u64>,
+    },
 }
 
-/// A robot whose Arduino speaks the protocol of ROSArduinoBridge.
 #[derive(Clone, Debug)]
 pub struct Arduino {
     pid_rate_hz: f64,
     rate_hz: f64,
-    /// The most counts of a wheel in a second.
     most_counts_s: f64,
-    /// A round is complete within `overdue` polls, and a request is answered or lost after `lost`.
+    /// Polls: a round is complete within `overdue`, and a request is answered or lost after `lost`.
     overdue: u64,
     lost: u64,
-    /// The pin and the row of each sonar, in the order in which they are asked.
+    /// Pin and row, in the order in which they are asked.
     sonars: Vec<(u8, usize)>,
     lines: Lines,
     waiting: Vec<Vec<u8>>,
     readings: Readings,
     waits: Waits,
     polls: u64,
-    /// The newest counts, the poll at which they were asked for, and the speeds from the counts before to them, counts/s.
+    /// The newest counts, the poll at which they were asked for, and the speeds up to them, counts/s.
     counts: Option<([i32; 2], u64, [i32; 2])>,
-    /// Why the newest round was dropped, until the link hears it.
+    /// The link has not heard yet why the newest round was dropped.
     dropped: Option<String>,
     tally: WireTally,
 }
 
 impl Arduino {
-    /// The driver of `mission`'s robot.
     pub fn new(mission: &Mission) -> Self {
         let (robot, body) = (&mission.robot, mission.body());
         let readings = Readings::new(mission);
@@ -98,7 +101,7 @@ impl Arduino {
         }
     }
 
-    /// Take an answer, or say why it does not fit.
+    /// Says why an answer does not fit.
     fn take(&mut self, line: &[u8], heard: &mut Heard) -> Result<(), String> {
         let answer = Answer::parse(line)?;
         // While the driver waits for the baud rate, only that shows that the board understands it.
@@ -132,10 +135,10 @@ impl Arduino {
         Ok(())
     }
 
-    /// The motion at these counts, which were asked for at this poll.
+    /// The motion at counts that were asked for at poll `since`.
     ///
-    /// The driver knows the time between two rounds by the rate of its polls. The speeds are those of the interval before: the link
-    /// judges counts by the speeds that come with them, and counts that jumped must not vouch for themselves.
+    /// Speeds are those of the interval before, whose length the rate of the polls gives: the link judges counts by
+    /// the speeds that come with them, and counts that jumped must not vouch for themselves.
     fn motion(&mut self, counts: [i32; 2], since: u64) -> Motion {
         let (speeds, newest) = self.counts.map_or(([0; 2], [0; 2]), |(then, at, speeds)| {
             let gap_s = since.saturating_sub(at).max(1) as f64 / self.rate_hz;
@@ -161,7 +164,7 @@ impl Arduino {
         Motion { wheels, currents: [0; 2] }
     }
 
-    /// Drop the round, and start again with a request whose answer is unmistakable.
+    /// Start again with a request whose answer is unmistakable.
     fn begin_anew(&mut self) {
         if !matches!(self.waits, Waits::Baud { .. }) {
             self.waits = Waits::Baud { since: None };

@@ -1,4 +1,4 @@
-//! The driver of robots that speak lines of JSON: [`common::json_wire`] describes the protocol.
+//! Robots that speak lines of JSON: [`common::json_wire`] is the protocol.
 
 use std::{collections::BTreeMap, time::Duration};
 
@@ -14,10 +14,9 @@ use common::{
     samples::{PowerSample, RangeReading},
 };
 
-/// The most orders that count as answered by one report.
+/// Orders that count as answered by one report.
 const MOST_ANSWERED: usize = 64;
 
-/// A robot that speaks lines of JSON.
 #[derive(Clone, Debug)]
 pub struct Json {
     body: Body,
@@ -25,16 +24,13 @@ pub struct Json {
     lines: Lines,
     waiting: Vec<Vec<u8>>,
     readings: Readings,
-    /// The laser; none without one.
     laser: Option<Laser>,
-    /// The number of orders that the robot has taken.
     answered: Option<u64>,
     odometry: Odometry,
     tally: WireTally,
 }
 
 impl Json {
-    /// The driver of `mission`'s robot.
     pub fn new(mission: &Mission) -> Self {
         Self {
             laser: Laser::new(mission),
@@ -49,7 +45,7 @@ impl Json {
         }
     }
 
-    /// Take a report. A refused report has no effect, and the error says why.
+    /// A refused report has no effect; the error says why.
     fn take(&mut self, report: &Report, heard: &mut Heard) -> Result<(), String> {
         let rows = self.rows_of(&report.ranges)?;
         let scan = report.scan.as_deref().map(|scan| self.beams_of(scan)).transpose()?;
@@ -92,7 +88,6 @@ impl Json {
         Ok(())
     }
 
-    /// The rows of the mission's sensors with these names.
     fn rows_of(
         &self,
         ranges: &BTreeMap<String, Option<f64>>,
@@ -108,7 +103,7 @@ impl Json {
         ranges.iter().map(row).collect()
     }
 
-    /// The beams of the laser as the topic `scan` has them.
+    /// Beams as the topic `scan` has them.
     fn beams_of(&self, beams: &[Option<f32>]) -> Result<Vec<f32>, String> {
         let Some(laser) = &self.laser else {
             return Err("a scan, and the mission has no laser: add a row of kind scan".to_owned());

@@ -1,38 +1,37 @@
-//! A robot's gyro: from messages of its IMU to the turn of each tick.
+//! From messages of an IMU to the turn of each tick.
 //!
-//! Turn rates are integrated by the stamps of their messages. A tick begins with odometry, whose stamp lies between two messages of the
-//! IMU, so the turn goes on at the newest rate until there. The next message corrects the error of that, because each turn is the
-//! difference of two angles.
+//! Turn rates are integrated by the stamps of their messages. A tick begins with odometry, whose stamp lies between
+//! two messages of the IMU, so the turn goes on at the newest rate until there. The next message corrects the error
+//! of that, because each turn is the difference of two angles.
 
 use common::{driver::Turn, geometry::wrap_angle};
 
 use crate::messages::{Imu, ImuTurn, NO_GROWTH, is_repeated};
 
-/// The greatest time between messages, and between odometry and the newest message, with which the turn is known, nanoseconds.
+/// The turn is known if messages, and odometry and the newest message, are no farther apart.
 const LONGEST_GAP_NS: i64 = 100_000_000;
-/// The noise of a turn whose message states less or none, rad per square root of a second. Nominal: several times that of the gyros in
-/// robots, such as the BMI160's 0.007 degrees.
+/// Noise of a turn whose message states less or none, rad per square root of a second. Nominal: several times that of
+/// the gyros in robots, such as the BMI160's 0.007 degrees.
 const NOISE: f64 = 5e-4;
-/// The most that the turn rate may change between the newest message and the tick, rad/s^2. Nominal.
+/// The turn rate changes no faster from the newest message to the tick, rad/s^2. Nominal.
 const CHANGES_BY: f64 = 5.0;
-/// The turn, radians, after which gyro and odometry are compared. It takes at most [`COMPARED_NS`], in which no bias adds up to that, and
-/// both agree within [`AGREES_WITHIN`]: wheels slip in turns, but not more.
+/// Gyro and odometry are compared after such a turn. It takes at most [`COMPARED_NS`], in which no bias adds up to
+/// that, and both agree within [`AGREES_WITHIN`]: wheels slip in turns, but not more.
 const COMPARED_RAD: f64 = 0.2;
 const COMPARED_NS: i64 = 10_000_000_000;
 const AGREES_WITHIN: f64 = 2.0;
 
-/// The gyro of a robot.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Gyro {
     newest: Option<Newest>,
-    /// The turn up to the newest message, radians, and its variance.
+    /// The turn up to the newest message, with its variance.
     turned: Turned,
     /// The turn up to the odometry of the newest tick, if the gyro has given it.
     now: Option<Turned>,
-    /// The last turn that a tick was given, from which the next one goes on; none if something is missing since.
+    /// The last turn that a tick was given; none if something is missing since.
     told: Option<Turned>,
     sequence: u64,
-    /// Whether no message is near the newest odometry, as was reported.
+    /// It was reported that no message is near the newest odometry.
     is_missed: bool,
     compared: Compared,
 }
@@ -40,7 +39,6 @@ pub(crate) struct Gyro {
 #[derive(Clone, Copy, Debug)]
 struct Newest {
     imu: Imu,
-    /// The turn rate, rad/s.
     rate: f64,
 }
 
@@ -48,22 +46,20 @@ struct Newest {
 struct Turned {
     angle: f64,
     variance: f64,
-    /// The variance of the part after the newest message.
+    /// Variance of the part after the newest message.
     ahead: f64,
 }
 
-/// The comparison with odometry.
 #[derive(Clone, Copy, Debug, Default)]
 struct Compared {
     since_ns: i64,
-    /// The turns since then by odometry and by the gyro, radians.
+    /// Turns since then by odometry and by the gyro, radians.
     turned: [f64; 2],
-    /// Whether they agreed the last time.
     agrees: bool,
 }
 
 impl Gyro {
-    /// Take a message. The error says why it is refused.
+    /// The error says why a message is refused.
     pub(crate) fn take(&mut self, imu: Imu) -> Result<(), String> {
         if self.newest.is_some_and(|newest| is_repeated(newest.imu.stamp_ns, imu.stamp_ns)) {
             return Err(NO_GROWTH.to_owned());
@@ -86,8 +82,8 @@ impl Gyro {
         Ok(())
     }
 
-    /// Odometry with this stamp begins a tick, and says that the robot turned by `by_odometry` since the tick before. Returns a new fault
-    /// of the gyro, if there is one.
+    /// Odometry with this stamp begins a tick; by it the robot turned by `by_odometry` since the tick before. Returns
+    /// a new fault of the gyro.
     pub(crate) fn odometry(&mut self, stamp_ns: i64, by_odometry: f64) -> Option<String> {
         let newest = self.newest?;
         let since_ns = stamp_ns - newest.imu.stamp_ns;
@@ -112,7 +108,7 @@ impl Gyro {
         self.compared.take(stamp_ns, [by_odometry, now.angle - before?.angle])
     }
 
-    /// The turn for the tick. After a gap it only says where the next one begins.
+    /// After a gap the turn only says where the next one begins.
     pub(crate) fn for_tick(&mut self) -> Option<Turn> {
         let now = self.now.filter(|_| self.compared.agrees);
         let before = std::mem::replace(&mut self.told, now);
@@ -124,7 +120,8 @@ impl Gyro {
     }
 }
 
-/// The turn from one message to the next, radians, its rate and its variance; none if they are too far apart, or of different kinds.
+/// The turn between two messages, radians, its rate and its variance; none if they are too far apart, or of different
+/// kinds.
 fn turn(before: &Imu, now: &Imu) -> Option<(f64, f64, f64)> {
     let gap_ns = now.stamp_ns - before.stamp_ns;
     if !(1..=LONGEST_GAP_NS).contains(&gap_ns) {
@@ -146,7 +143,7 @@ fn turn(before: &Imu, now: &Imu) -> Option<(f64, f64, f64)> {
 }
 
 impl Compared {
-    /// Take turns by odometry and by the gyro up to `now_ns`. Returns their difference if they agreed or were not compared before.
+    /// Turns up to `now_ns`. Returns their difference if they agreed or were not compared before.
     fn take(&mut self, now_ns: i64, turns: [f64; 2]) -> Option<String> {
         if !(0..COMPARED_NS).contains(&(now_ns - self.since_ns)) {
             (self.since_ns, self.turned) = (now_ns, [0.0; 2]);

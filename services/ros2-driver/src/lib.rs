@@ -1,13 +1,13 @@
-//! The driver of robots that speak ROS 2: messages of topics in, their meaning out; `cmd_vel` for the robot.
+//! The driver of robots that speak ROS 2, which knows no middleware.
 //!
-//! The driver knows no middleware. A piece of the wire is one message: a byte, the row of its topic in [`Topics`], and its payload as DDS
-//! delivered it; before the payload of another's command stands the number of its writer. The robot is sent a payload for the topic of
-//! commands.
+//! A piece of the wire is one message: a byte, the row of its topic in [`Topics`], and its payload as DDS delivered
+//! it; before the payload of another's command stands the number of its writer. The robot is sent a payload for the
+//! topic of commands.
 //!
 //! | module | holds |
 //! |---|---|
 //! | [`topics`] | THE table of topics |
-//! | [`messages`] | the messages, as far as the driver needs them |
+//! | [`messages`] | what the driver needs of them |
 //! | `gyro` | the turn of each tick by the robot's IMU |
 
 mod gyro;
@@ -37,16 +37,15 @@ use self::{
     topics::{Content, Topics},
 };
 
-/// The most messages that wait to be heard; more are dropped.
+/// More messages that wait are dropped.
 const MOST_WAITING: usize = 64;
-/// The time within which a link is started again, seconds. Nobody knows how far the robot drove meanwhile.
+/// A link is started again within this. Nobody knows how far the robot drove meanwhile.
 const UNSEEN_S: f64 = 5.0;
-/// The greatest difference between the bearings of a laser's row and of its scans, as a share of the angle between beams.
+/// Bearings of a laser's row and of its scans differ at most by this share of the angle between beams.
 const SAME_BEARING: f64 = 0.5;
-/// The share by which the angle from beam to beam may differ.
+/// The angle between beams may differ by this share.
 const SAME_STEP: f64 = 0.01;
 
-/// A robot that speaks ROS 2.
 #[derive(Clone, Debug)]
 pub struct Ros2 {
     body: Body,
@@ -55,19 +54,17 @@ pub struct Ros2 {
     topics: Topics,
     waiting: Vec<Vec<u8>>,
     readings: Readings,
-    /// The laser; none without one.
     laser: Option<Laser>,
     odometry: odometry::Odometry,
     gyro: Gyro,
-    /// The heading by the odometry of the newest tick, radians.
+    /// The odometry of the newest tick gives it, radians.
     heading: Option<f64>,
-    /// The stamp of the newest odometry, and of that with which the newest tick began, nanoseconds.
+    /// Stamps of the newest odometry, and of that with which the newest tick began.
     stamps_ns: Option<[i64; 2]>,
     tally: WireTally,
 }
 
 impl Ros2 {
-    /// The driver of `mission`'s robot.
     pub fn new(mission: &Mission) -> Self {
         Self {
             body: mission.body(),
@@ -85,7 +82,7 @@ impl Ros2 {
         }
     }
 
-    /// Take a message. A refused message has no effect, and the error says why.
+    /// A refused message has no effect; the error says why.
     fn take(&mut self, piece: &[u8], heard: &mut Heard) -> Result<(), String> {
         let row_of =
             |(row, payload): (&u8, _)| Some((self.topics.heard.get(usize::from(*row))?, payload));
@@ -202,7 +199,7 @@ impl Ros2 {
     }
 }
 
-/// Whether each beam of `scan` is that of the laser's row.
+/// Each beam of `scan` is that of the laser's row.
 fn is_same_fan(scan: &Scan, sensor: &Sensor) -> bool {
     let ((first, step), (its_first, its_step)) = (scan.fan, sensor.fan());
     scan.ranges.len() == sensor.beams
@@ -210,18 +207,18 @@ fn is_same_fan(scan: &Scan, sensor: &Sensor) -> bool {
         && (step - its_step).abs() <= SAME_STEP * its_step
 }
 
-/// Whether the beams are a whole circle; the last one may be the first again.
+/// A whole circle, in which the last beam may be the first again.
 fn is_circle(beams: usize, step: f64) -> bool {
     (beams as f64 * step.abs() - TAU).abs() <= 1.5 * step.abs()
 }
 
-/// Whether the laser's row is a whole circle with at most twice the beams of `scan`.
+/// The row is a whole circle with at most twice the beams of `scan`.
 fn is_whole(sensor: &Sensor, scan: &Scan) -> bool {
     sensor.field_of_view_deg >= 360.0 && scan.ranges.len() * 2 >= sensor.beams
 }
 
-/// The beams of a whole circle as those of the laser's row: each goes to the nearest of the row, the shortest of several counts, and a
-/// beam of the row that gets none has no reading.
+/// Each beam of a whole circle goes to the nearest of the row; the shortest of several counts, and a beam of the row
+/// that gets none has no reading.
 fn turned_to(sensor: &Sensor, fan: (f64, f64), came: impl Iterator<Item = f32>) -> Vec<f32> {
     let ((first, step), (its_first, its_step)) = (fan, sensor.fan());
     let mut beams = vec![f32::NAN; sensor.beams];
@@ -235,7 +232,6 @@ fn turned_to(sensor: &Sensor, fan: (f64, f64), came: impl Iterator<Item = f32>) 
     beams
 }
 
-/// The error that the beams of `scan` are not those of the laser's row.
 fn other_fan(scan: &Scan, sensor: &Sensor) -> String {
     let fan = |(first, step): (f64, f64), beams| {
         let (first, step) = (first.to_degrees(), step.to_degrees());

@@ -1,4 +1,4 @@
-//! The messages, as far as the driver needs them. Fields that a newer release of ROS appends are ignored.
+//! Messages, as far as the driver needs them. Fields that a newer release of ROS appends are ignored.
 
 use common::mission::MOST_BEAMS;
 use ros2::{
@@ -6,39 +6,35 @@ use ros2::{
     parts::heading,
 };
 
-/// The count of numbers in the covariance of a pose or a twist.
 const COVARIANCE: usize = 36;
 
-/// The count of numbers in the covariance of a rotation or a turn rate; the first is [`NOT_STATED`] if the quantity is not stated.
+/// A rotation's or a turn rate's; the first number is [`NOT_STATED`] if the quantity is not stated.
 const COVARIANCE_3: usize = 9;
 const NOT_STATED: f64 = -1.0;
-/// The greatest turn rate of a robot, rad/s.
 const FASTEST_TURN: f64 = 50.0;
 
-/// The step back of a stamp beyond which the robot's clock was set anew, nanoseconds.
+/// A stamp that goes back farther says that the robot's clock was set anew.
 const SET_ANEW_NS: i64 = 1_000_000_000;
-/// The reason why a message with a repeated stamp is refused.
 pub const NO_GROWTH: &str =
     "a stamp that does not grow; let one node alone publish it, and stamp each";
 
-/// Whether a message with this stamp came before, by the newest one: it is no newer, and no clock was set anew.
+/// A stamp no newer than the newest, unless a clock was set anew.
 pub fn is_repeated(newest_ns: i64, stamp_ns: i64) -> bool {
     (newest_ns - SET_ANEW_NS..=newest_ns).contains(&stamp_ns)
 }
 
-/// `nav_msgs/Odometry`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Odometry {
-    /// The stamp by the robot's clock, nanoseconds.
+    /// The robot's clock gives it.
     pub stamp_ns: i64,
-    /// x, y and heading, metres and radians.
+    /// x, y and heading.
     pub pose: [f64; 3],
-    /// The speed ahead and the turn rate, m/s and rad/s.
+    /// The speed ahead, m/s, and the turn rate, rad/s.
     pub twist: [f64; 2],
 }
 
 impl Odometry {
-    /// The odometry of `payload`. The error says why there is none.
+    /// The error says why there is none.
     pub fn read(payload: &[u8]) -> Result<Self, String> {
         let odometry = Self::decode(payload).map_err(|error| error.to_string())?;
         if odometry.pose[2].is_nan() {
@@ -50,7 +46,7 @@ impl Odometry {
         Ok(odometry)
     }
 
-    /// The numbers of `payload`. A heading that is no rotation is no number.
+    /// A heading that is no rotation is no number.
     fn decode(payload: &[u8]) -> Result<Self, Malformed> {
         let mut reader = Reader::new(payload)?;
         let (stamp_ns, _frame) = reader.header()?;
@@ -63,25 +59,22 @@ impl Odometry {
     }
 }
 
-/// `sensor_msgs/Imu`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Imu {
-    /// The stamp by the robot's clock, nanoseconds.
     pub stamp_ns: i64,
     pub turn: ImuTurn,
 }
 
-/// The turn by the message of an IMU.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ImuTurn {
-    /// The turn rate, rad/s, and the variance of its error, rad^2/s^2, if that is stated.
+    /// Rad/s, and the variance of its error if that is stated.
     Rate(f64, Option<f64>),
-    /// The heading, radians.
+    /// Radians.
     Heading(f64),
 }
 
 impl Imu {
-    /// The turn of `payload`; the turn rate if it is stated, else the orientation. The error says why there is none.
+    /// The turn rate if it is stated, else the orientation. The error says why there is none.
     pub fn read(payload: &[u8]) -> Result<Self, String> {
         let (stamp_ns, heading, rate) = Self::decode(payload).map_err(|error| error.to_string())?;
         let turn = match (rate, heading) {
@@ -105,7 +98,8 @@ impl Imu {
         Ok(Self { stamp_ns, turn })
     }
 
-    /// Stamp, heading, and turn rate with its variance, as far as they are stated. A heading that is no rotation is no number.
+    /// Stamp, heading, and turn rate with its variance, as far as they are stated. A heading that is no rotation is
+    /// no number.
     #[expect(clippy::type_complexity, reason = "it is taken apart at once")]
     fn decode(payload: &[u8]) -> Result<(i64, Option<f64>, Option<(f64, f64)>), Malformed> {
         let mut reader = Reader::new(payload)?;
@@ -119,19 +113,18 @@ impl Imu {
     }
 }
 
-/// `sensor_msgs/LaserScan`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scan {
-    /// The bearing of the first beam and the angle from beam to beam, radians counter-clockwise.
+    /// Bearing of the first beam, and the angle from beam to beam, radians counter-clockwise.
     pub fan: (f64, f64),
-    /// The least and the greatest range, metres; other ranges are none.
+    /// Other ranges are none.
     pub least_m: f32,
     pub most_m: f32,
     pub ranges: Vec<f32>,
 }
 
 impl Scan {
-    /// The scan of `payload`.
+    /// Fails if `payload` is no `sensor_msgs/LaserScan`.
     pub fn read(payload: &[u8]) -> Result<Self, Malformed> {
         let mut reader = Reader::new(payload)?;
         reader.header()?;
@@ -143,7 +136,7 @@ impl Scan {
     }
 }
 
-/// The range of a `sensor_msgs/Range`, metres: infinite for nothing, no number for no reading.
+/// Metres of a `sensor_msgs/Range`: infinite for nothing, no number for no reading. Fails if `payload` is none.
 pub fn read_range(payload: &[u8]) -> Result<f64, Malformed> {
     let mut reader = Reader::new(payload)?;
     reader.header()?;
@@ -159,14 +152,15 @@ pub fn read_range(payload: &[u8]) -> Result<f64, Malformed> {
     })
 }
 
-/// The voltage of a `sensor_msgs/BatteryState`; no number if it is not measured.
+/// No number if a `sensor_msgs/BatteryState` does not measure it. Fails if `payload` is none.
 pub fn read_voltage(payload: &[u8]) -> Result<f32, Malformed> {
     let mut reader = Reader::new(payload)?;
     reader.header()?;
     reader.f32()
 }
 
-/// Whether a `geometry_msgs/Twist` or, if `stamped`, a `TwistStamped` is to move a robot. A speed that is no number counts as motion.
+/// The `geometry_msgs/Twist` or, if `stamped`, `TwistStamped` moves a robot. A speed that is no number counts as
+/// motion. Fails if `payload` is none.
 pub fn read_moves(payload: &[u8], stamped: bool) -> Result<bool, Malformed> {
     let mut reader = Reader::new(payload)?;
     if stamped {
@@ -175,8 +169,8 @@ pub fn read_moves(payload: &[u8], stamped: bool) -> Result<bool, Malformed> {
     Ok(reader.f64s::<6>()? != [0.0; 6])
 }
 
-/// A `geometry_msgs/Twist` or, if `stamped`, a `TwistStamped`. Its stamp is 0, which receivers take for their own time: the driver has
-/// no clock, and a stop must never be too old.
+/// The stamp is 0, which receivers take for their own time: the driver has no clock, and a stop must never be too
+/// old.
 pub fn write_twist(ahead: f64, turn: f64, stamped: bool) -> Vec<u8> {
     let mut writer = Writer::default();
     if stamped {

@@ -1,32 +1,28 @@
-//! THE table of a robot's topics: those that the link subscribes to, and those to which it writes.
+//! THE table of a robot's topics that the link reads and writes.
 
 use common::mission::Mission;
 use ros2::topic::Topic;
 
-/// The meaning of a topic that is heard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
     Odometry,
     Scan,
     Battery,
-    /// The range of the sensor in this row of the mission.
+    /// The sensor in this row of the mission.
     Range(usize),
     Imu,
-    /// A command from another than the link. The number of its writer stands before the payload.
+    /// Another sender's. The number of its writer stands before the payload.
     Command,
 }
 
-/// The topics of a robot.
 #[derive(Clone, Debug)]
 pub struct Topics {
-    /// The topic of the robot's commands.
     pub command: Topic,
-    /// The topics that the link reads. A piece of the wire begins with the row of its topic here.
+    /// A piece of the wire begins with the row of its topic here.
     pub heard: Vec<(Content, Topic)>,
 }
 
 impl Topics {
-    /// The topics of the robot of `mission`.
     pub fn of(mission: &Mission) -> Self {
         let topics = &mission.robot.ros2;
         let command = match topics.stamped {

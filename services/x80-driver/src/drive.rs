@@ -1,4 +1,4 @@
-//! The two wheels of the robot, or a car's driven wheel and steering: counts of motor frames in, timed commands out, each with the
+//! Two wheels, or a car's driven wheel and steering: counts of motor frames in, timed commands out, each with the
 //! channels and signs of the mission.
 
 use std::time::Duration;
@@ -12,25 +12,23 @@ use common::{
     },
 };
 
-/// The greatest speed of a command, counts/s: -32768 and -32767 mean that the channel is not changed.
+/// Counts/s: -32768 and -32767 mean that the channel is not changed.
 const FASTEST: i16 = 32_766;
 
-/// The pulse width at which a wheel does not turn.
+/// A wheel does not turn at this pulse width.
 const PWM_STANDS: i16 = 16_384;
 
-/// Converts between samples and the robot's frames for its wheels.
 #[derive(Clone, Debug)]
 pub struct Drive {
     robot: RobotConfig,
 }
 
 impl Drive {
-    /// The drive of `mission`'s robot.
     pub fn new(mission: &Mission) -> Self {
         Self { robot: mission.robot.clone() }
     }
 
-    /// Commands for encoders as feedback, velocity mode, enabled motors and running streams.
+    /// Encoders as feedback, velocity mode, enabled motors and running streams.
     pub fn greeting(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
         let mut say = |command: Command| command.encode(Addressing::default(), &mut bytes);
@@ -46,7 +44,6 @@ impl Drive {
         bytes
     }
 
-    /// Commands for running streams.
     pub fn streams(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
         for stream in [Stream::Motor, Stream::Custom, Stream::Standard] {
@@ -56,7 +53,7 @@ impl Drive {
         bytes
     }
 
-    /// The counts of a motor frame, growing forward.
+    /// The counts grow forward.
     pub fn wheels(&self, sensors: &MotorSensors) -> WheelSample {
         let left = self.wheel(sensors, self.robot.left);
         let right = self.wheel(sensors, self.robot.right);
@@ -69,13 +66,12 @@ impl Drive {
         }
     }
 
-    /// The motor currents of the left and the right wheel, AD counts.
+    /// Left and right, AD counts.
     pub fn currents(&self, sensors: &MotorSensors) -> [u16; 2] {
         let channels = [self.robot.left, self.robot.right];
         channels.map(|wheel| sensors.currents[usize::from(wheel.channel.min(1))])
     }
 
-    /// A channel's encoder, turned so that it grows forward.
     fn wheel(&self, sensors: &MotorSensors, channel: Channel) -> Encoder {
         let encoder = sensors.encoders[usize::from(channel.channel.min(1))];
         if !channel.reversed {
@@ -88,7 +84,7 @@ impl Drive {
         }
     }
 
-    /// A velocity command with a time limit. A robot that respects the limit stops by itself when the link has ended.
+    /// A robot that respects the limit stops by itself when the link has ended.
     pub fn velocity(&self, [left, right]: [i16; 2], limit: Duration) -> Vec<u8> {
         let mut channels = [None; 2];
         for (channel, counts) in [(self.robot.left, left), (self.robot.right, right)] {
@@ -100,13 +96,12 @@ impl Drive {
         encoded(Command::velocity(channels, limit_ms))
     }
 
-    /// Commands that disable the motors of both wheels.
     pub fn disable(&self) -> Vec<u8> {
         let channels = [self.robot.left.channel, self.robot.right.channel].map(Some);
         channels.map(|channel| encoded(Command::Enable { on: false, channel })).concat()
     }
 
-    /// A command that gives both wheels the pulse width at which they do not turn.
+    /// Both wheels get the pulse width at which they do not turn.
     pub fn still_pulses(&self) -> Vec<u8> {
         let mut targets = [None; CHANNELS];
         for wheel in [self.robot.left.channel, self.robot.right.channel] {
@@ -120,7 +115,6 @@ impl Drive {
     }
 }
 
-/// The frame of a command.
 pub fn encoded(command: Command) -> Vec<u8> {
     let mut bytes = Vec::new();
     command.encode(Addressing::default(), &mut bytes);

@@ -1,10 +1,10 @@
-//! The driver of the X80: it speaks the robot's protocol.
+//! The X80's driver.
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`drive`] | the wheels: counts of motor frames in, timed commands out |
-//! | `rangers` | the readings of a tick that go into the map |
-//! | [`telemetry`] | batteries and the other sensors, in the units of the topics |
+//! | [`drive`] | motor frames in, timed commands out |
+//! | `rangers` | the readings of a tick |
+//! | [`telemetry`] | other sensors, in the units of the topics |
 
 pub mod drive;
 mod rangers;
@@ -25,7 +25,6 @@ use self::{
     telemetry::Telemetry,
 };
 
-/// The X80's protocol.
 #[derive(Clone, Debug)]
 pub struct X80 {
     drive: Drive,
@@ -35,7 +34,6 @@ pub struct X80 {
 }
 
 impl X80 {
-    /// The driver of `mission`'s robot.
     pub fn new(mission: &Mission) -> Self {
         Self {
             drive: Drive::new(mission),

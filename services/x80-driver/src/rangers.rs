@@ -1,4 +1,4 @@
-//! The readings of the ranging sensors for the next tick, collected from several frames.
+//! Ranging readings for the next tick, collected from several frames.
 
 use common::{
     driver::Readings,
@@ -7,7 +7,6 @@ use common::{
     wire::{CustomSensors, Echo, INFRARED_LIVE_AD, StandardSensors, infrared_m},
 };
 
-/// The readings of an X80's sonars and infrared rangers.
 #[derive(Clone, Debug)]
 pub(crate) struct Rangers {
     pub(crate) readings: Readings,
@@ -25,7 +24,7 @@ impl Rangers {
         self.take(SensorKind::Cone, |channel| standard.ultrasonic.get(channel).copied().map(heard));
     }
 
-    /// Take a custom frame. Returns no sample until a standard frame has brought the first ranger's reading.
+    /// None until a standard frame has brought the first ranger's reading.
     pub(crate) fn take_custom(&mut self, custom: &CustomSensors) -> Option<InfraredSample> {
         let [_, _, second, third, fourth, fifth, sixth, seventh] = custom.ad;
         let first = self.first_infrared?;
@@ -52,7 +51,6 @@ impl Rangers {
     }
 }
 
-/// The reading of a sonar byte.
 fn heard(byte: u8) -> RangeReading {
     let echo = Echo::from_byte(byte);
     let status = match echo {
@@ -65,7 +63,6 @@ fn heard(byte: u8) -> RangeReading {
     RangeReading { range_m, raw: byte.into(), status: status.into(), ..RangeReading::default() }
 }
 
-/// The reading of an infrared ranger's counts.
 fn seen(ad: u16) -> RangeReading {
     let range_m = infrared_m(ad);
     let (status, range_m) = match INFRARED_LIVE_AD.contains(&ad) {

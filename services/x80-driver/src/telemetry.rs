@@ -1,4 +1,4 @@
-//! The sensors that no tick needs, in the units of the topics: batteries, motor currents and others.
+//! Sensors that no tick needs, in the units of the topics.
 
 use common::{
     samples::{PowerSample, SurroundingsSample},
@@ -8,19 +8,17 @@ use common::{
     },
 };
 
-/// The values of earlier frames that the next sample needs.
+/// Values of earlier frames for the next sample.
 #[derive(Clone, Debug, Default)]
 pub struct Telemetry {
     currents: [u16; 6],
 }
 
 impl Telemetry {
-    /// Take the currents of a motor frame for the next [`PowerSample`].
     pub const fn take_motor(&mut self, motor: &MotorSensors) {
         self.currents = motor.currents;
     }
 
-    /// The batteries of a standard frame, and the newest motor currents.
     pub fn power(&self, standard: &StandardSensors) -> PowerSample {
         PowerSample {
             board_v: volts(standard.board_battery, LOGIC_SCALE_V),
@@ -33,7 +31,6 @@ impl Telemetry {
     }
 }
 
-/// The other sensors of a standard frame.
 pub fn surroundings(standard: &StandardSensors) -> SurroundingsSample {
     let [alarm_1, motion_1, alarm_2, motion_2] = standard.human;
     SurroundingsSample {

@@ -1,5 +1,5 @@
-//! The protocol of ROSArduinoBridge for a simulated robot: requests become commands of the boards of a simulated X80, and their
-//! readings become answers. A sonar says its reading of the newest tick.
+//! The protocol of ROSArduinoBridge: requests become commands of a simulated X80's boards, and their readings become
+//! answers. A sonar says its reading of the newest tick.
 
 use common::{
     mission::{Mission, RobotConfig},
@@ -8,32 +8,28 @@ use common::{
 
 use crate::motor::Motor;
 
-/// The time for which a board that restarts hears nothing, seconds: its boot loader waits for a program.
+/// A board that restarts hears nothing for so long: its boot loader waits for a program.
 const BOOTS_S: f64 = 1.5;
-/// The time after the last command at which the motors stop by themselves, milliseconds.
+/// The motors stop by themselves so long after the last command.
 const STOPS_AFTER_MS: u16 = 2000;
-/// The longest request, bytes.
 const LONGEST: usize = 64;
 
-/// A request of the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
     /// `e`: the encoder counts.
     Counts,
     /// `r`: count from 0.
     Reset,
-    /// `m`: the speeds of the left and the right wheel, counts in a run of the speed loop.
+    /// `m`: left and right, counts in a run of the speed loop.
     Speeds([i32; 2]),
-    /// `p`: the range of the sonar on this pin.
+    /// `p`: the sonar on this pin.
     Range(i32),
-    /// `b`: the baud rate.
     Baud,
-    /// Another request.
     Unknown,
 }
 
 impl Request {
-    /// The request of `line`, without its carriage return. A number that is missing or none is 0, as in the firmware.
+    /// `line` has no carriage return. A number that is missing or none is 0, as in the firmware.
     fn parse(line: &[u8]) -> Self {
         let text = String::from_utf8_lossy(line);
         let mut words = text.split(' ');
@@ -51,14 +47,13 @@ impl Request {
     }
 }
 
-/// Splits bytes into requests.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Requests {
     held: Vec<u8>,
 }
 
 impl Requests {
-    /// Take bytes. Returns the requests that they complete.
+    /// Returns the requests that `bytes` complete.
     pub(crate) fn push(&mut self, bytes: &[u8]) -> Vec<Request> {
         let mut complete = Vec::new();
         for byte in bytes {
@@ -72,15 +67,13 @@ impl Requests {
     }
 }
 
-/// Converts between requests and the boards.
 #[derive(Clone, Debug)]
 pub(crate) struct ArduinoWords {
     robot: RobotConfig,
-    /// The pins of the sonars and their channels.
     sonars: Vec<(i32, usize)>,
-    /// The counts at which the board counts 0.
+    /// The board counts 0 here.
     zero: [f64; 2],
-    /// The mission time until which the board boots, seconds; none when it has booted.
+    /// Mission time, seconds; none when it has booted.
     boots_until: Option<f64>,
 }
 
@@ -98,12 +91,11 @@ impl ArduinoWords {
         }
     }
 
-    /// Boot at mission time `now`.
     pub(crate) fn boot(&mut self, now: f64) {
         self.boots_until = Some(now + BOOTS_S);
     }
 
-    /// Whether the board hears at mission time `now`. When it has booted, it counts from 0.
+    /// A board that has booted counts from 0.
     pub(crate) fn hears(&mut self, now: f64, motors: &[Motor; 6]) -> bool {
         if self.boots_until.is_some_and(|until| now < until) {
             return false;
@@ -114,7 +106,7 @@ impl ArduinoWords {
         true
     }
 
-    /// The answer to a request, and the command of the boards to which it is converted.
+    /// Returns the answer, and the command of the boards that the request is converted to.
     pub(crate) fn answer(
         &mut self,
         request: Request,
@@ -147,7 +139,7 @@ impl ArduinoWords {
         (text + "\r\n", command)
     }
 
-    /// The command that turns the wheels at these speeds, counts in a run of the speed loop.
+    /// Counts in a run of the speed loop.
     fn velocity(&self, speeds: [i32; 2]) -> Command {
         let mut channels = [None; 2];
         for (wheel, speed) in [self.robot.left, self.robot.right].into_iter().zip(speeds) {
@@ -160,13 +152,13 @@ impl ArduinoWords {
         Command::velocity(channels, STOPS_AFTER_MS)
     }
 
-    /// The counts of the left and the right wheel, as the board says them.
+    /// As the board says them, left and right.
     pub(crate) fn counts(&self, motors: &[Motor; 6]) -> [i32; 2] {
         let turned = self.turned(motors);
         [0, 1].map(|wheel| (turned[wheel] - self.zero[wheel]).round() as i64 as i32)
     }
 
-    /// The counts that the wheels have turned since the start, forward positive.
+    /// Since the start, forward positive.
     fn turned(&self, motors: &[Motor; 6]) -> [f64; 2] {
         [self.robot.left, self.robot.right].map(|wheel| {
             let counts = motors[usize::from(wheel.channel.min(1))].turned();

@@ -8,28 +8,23 @@ use glam::DVec2;
 
 use crate::world::World;
 
-/// A number for each wheel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wheels<T> {
-    /// The left wheel's.
     pub left: T,
-    /// The right wheel's.
     pub right: T,
 }
 
 impl<T> Wheels<T> {
-    /// Apply `change` to both.
     pub fn map<U>(self, mut change: impl FnMut(T) -> U) -> Wheels<U> {
         Wheels { left: change(self.left), right: change(self.right) }
     }
 }
 
-/// The distance from which on a body touches nothing any more, metres.
+/// From this distance on a body touches nothing any more.
 const RELEASE_M: f64 = 0.005;
-/// The most times that the body is pushed out of a thing; corners take two.
+/// It is pushed out of a thing at most so often; corners take two.
 const PUSHES: usize = 4;
 
-/// The disc, its pose and what it has touched.
 #[derive(Clone, Debug)]
 pub struct Body {
     drive: DifferentialDrive,
@@ -43,7 +38,7 @@ pub struct Body {
 }
 
 impl Body {
-    /// The body of `mission`'s robot at its start in `world`, its track `track_scale` times the nominal one.
+    /// The true track is `track_scale` times the nominal one.
     pub fn new(mission: &Mission, world: &World, track_scale: f64) -> Self {
         let body = mission.body();
         let track = body.track_m * track_scale;
@@ -61,7 +56,6 @@ impl Body {
         }
     }
 
-    /// Restore its pose and how often it had touched something.
     pub fn put(&mut self, pose: Pose2, contacts: u64, world: &World) {
         self.pose = pose;
         self.contacts = contacts;
@@ -70,33 +64,31 @@ impl Body {
         self.touching = self.clearance <= RELEASE_M;
     }
 
-    /// The pose.
     pub fn pose(&self) -> Pose2 {
         self.pose
     }
 
-    /// The radius, metres.
     pub fn radius(&self) -> f64 {
         self.radius
     }
 
-    /// The true track, metres; W is the nominal one.
+    /// True track, metres; W is the nominal one.
     pub fn track(&self) -> f64 {
         self.track
     }
 
-    /// Times it has touched something; a contact counts once, however long it lasts.
+    /// A contact counts once, however long it lasts.
     pub fn contacts(&self) -> u64 {
         self.contacts
     }
 
-    /// Distance from its surface to the nearest thing, metres, at its last place.
+    /// Metres from its surface to the nearest thing at its last place.
     pub fn clearance(&self) -> f64 {
         self.clearance
     }
 
-    /// Move as the wheels ask, in metres of ground, and no farther than `world` lets the body: it slides along the thing that it
-    /// touches, or halts. Returns the ground that went by under either wheel, metres.
+    /// Move as the wheels ask, metres of ground, and no farther than `world` lets the body: it slides along the thing
+    /// it touches, or halts. Returns the ground that went by under either wheel.
     pub fn roll(&mut self, asked: Wheels<f64>, world: &World) -> Wheels<f64> {
         let turned = asked.map(|metres| metres / self.wheel_radius);
         let step = self.drive.twist(WheelSpeeds { right: turned.right, left: turned.left });
@@ -107,8 +99,8 @@ impl Body {
         Wheels { left: arc - half_turn, right: arc + half_turn }
     }
 
-    /// Move by the arc and turn of `step` (metres, radians) until something of `world` is in the way. If the body touched something,
-    /// returns the distance that it moved ahead, metres.
+    /// Move by `step` (metres, radians) until something is in the way. Returns the distance it moved ahead, metres,
+    /// if it touched something.
     pub fn go(&mut self, step: Twist, world: &World) -> Option<f64> {
         let before = self.pose;
         self.pose = before.along_arc(step.v, step.omega);
@@ -120,8 +112,8 @@ impl Body {
         touched.then(|| (self.pose.position - before.position).dot(middle))
     }
 
-    /// Push the body out of everything it penetrates, or put it back to `before` if that fails. Returns whether it penetrated
-    /// anything.
+    /// Push the body out of what it penetrates, or put it back to `before` if that fails. Returns whether it
+    /// penetrated anything.
     fn leave_things(&mut self, before: DVec2, world: &World) -> bool {
         for push in 0..PUSHES {
             let position = self.pose.position;
@@ -136,7 +128,7 @@ impl Body {
             let Some(outward) = surface.outward(position) else {
                 break;
             };
-            // Without the margin, rounding errors would let the body count as penetrating for ever.
+            // Without the margin, rounding would let the body penetrate for ever.
             self.pose.position += outward * (1e-9 - gap);
         }
         self.clearance = world.clearance(self.pose.position) - self.radius;

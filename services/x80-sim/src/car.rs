@@ -1,4 +1,4 @@
-//! A car between the channels of the motor board and the ground: one channel drives it, another steers.
+//! A car between motor board and ground: one channel drives it, another steers.
 
 use common::{
     kinematics::{Ackermann, SteeredWheel, Twist},
@@ -14,20 +14,16 @@ use crate::{
     world::World,
 };
 
-/// The motion of a car by its motors.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Car {
-    /// The true diameter and wheelbase.
     drive: Ackermann,
     steering: Steering,
     driven: OnChannel,
     steered: OnChannel,
-    /// Metres per count of the true wheel.
     wheel_radius_m: f64,
     counts_per_radian: f64,
 }
 
-/// The channel of a motor, and its sign.
 #[derive(Clone, Copy, Debug)]
 struct OnChannel {
     channel: usize,
@@ -45,8 +41,8 @@ impl From<Channel> for OnChannel {
 }
 
 impl Car {
-    /// The car of `mission`, with the driven wheel and the wheelbase off by the `errors` of a left wheel and of a track;
-    /// none if the robot is no car.
+    /// Driven wheel and wheelbase are off by the `errors` of a left wheel and of a track; none if the robot is no
+    /// car.
     pub(crate) fn new(mission: &Mission, errors: &WheelErrors) -> Option<Self> {
         let body = mission.body();
         let steering = body.steering?;
@@ -67,23 +63,20 @@ impl Car {
         })
     }
 
-    /// Whether the motor of `channel` steers.
     pub(crate) const fn steers_by(&self, channel: usize) -> bool {
         self.steered.channel == channel
     }
 
-    /// Top speed of the steering's motor, counts per second.
+    /// Counts per second.
     pub(crate) fn top_steering_counts(&self) -> f64 {
         self.steering.counts(self.steering.rate_rad_s)
     }
 
-    /// Angle of the steering, radians.
     fn angle(&self, motors: &[Motor; 6]) -> f64 {
         let OnChannel { channel, sign } = self.steered;
         self.steering.angle(sign * motors[channel].turned())
     }
 
-    /// The motion by the speeds of its motors.
     pub(crate) fn twist(&self, motors: &[Motor; 6]) -> Twist {
         let OnChannel { channel, sign } = self.driven;
         self.drive.twist(SteeredWheel {
@@ -123,7 +116,7 @@ impl Car {
         }
     }
 
-    /// Turn the steering as its motor asks, up to the stop.
+    /// The steering turns as its motor asks, up to the stop.
     fn steer(&self, motor: &mut Motor, now: f64, dt: f64, noise: &mut Noise) {
         let limit = self.steering.counts(self.steering.limit_rad);
         let asked = motor.step(now, dt, noise);

@@ -1,4 +1,4 @@
-//! The drivetrain between the motor board and the ground: the channel, the direction and the real diameter of each wheel.
+//! Channel, direction and real diameter of each wheel.
 
 use common::{
     mission::{Mission, WheelPhysics},
@@ -7,31 +7,29 @@ use common::{
 
 use crate::{body::Wheels, motor::Motor, noise::Noise};
 
-/// The distance over the ground when a rim rolls `metres` and slips.
+/// Metres over the ground for a rim that rolls `metres` and slips.
 pub(crate) fn slipped(metres: f64, physics: &WheelPhysics, noise: &mut Noise) -> f64 {
     let lost = noise.normal(physics.slip_noise * metres.abs().sqrt());
     metres * (1.0 - physics.slip_share) + lost
 }
 
-/// The share by which wheels go with the ground while their body is `held`: the rest slips at the contact. A wheel that nothing holds
-/// turns as asked, even if it slips.
+/// The share that a `held` body's wheels go with the ground: the rest slips at the contact. A wheel that nothing
+/// holds turns as asked, even if it slips.
 pub(crate) fn grip(held: bool, physics: &WheelPhysics) -> Option<f64> {
     held.then_some(1.0 - physics.contact_slip)
 }
 
-/// The wheels of the robot and their motors.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Drivetrain {
     channel: Wheels<usize>,
     sign: Wheels<f64>,
-    /// Metres per count of a wheel of nominal diameter.
+    /// The wheel has the nominal diameter.
     metres_per_count: f64,
-    /// True diameters over the nominal one.
     diameter: Wheels<f64>,
 }
 
 impl Drivetrain {
-    /// The drivetrain of `mission`'s robot, its wheels `diameter` times the nominal one.
+    /// The wheels are `diameter` times the nominal one.
     pub(crate) fn new(mission: &Mission, diameter: Wheels<f64>) -> Self {
         let wheels = Wheels { left: mission.robot.left, right: mission.robot.right };
         Self {
@@ -43,7 +41,7 @@ impl Drivetrain {
         }
     }
 
-    /// The distances that the speed loops ask for from mission time `now` for `dt` seconds, metres of nominal wheels.
+    /// Metres of nominal wheels that the speed loops ask for from mission time `now` for `dt` seconds.
     pub(crate) fn step(
         &self,
         motors: &mut [Motor; 6],
@@ -61,13 +59,13 @@ impl Drivetrain {
         }
     }
 
-    /// The distances of the real rims when nominal wheels would roll `metres`.
+    /// The way of the real rims when nominal wheels would roll `metres`.
     pub(crate) fn rims(&self, metres: Wheels<f64>) -> Wheels<f64> {
         Wheels { left: metres.left * self.diameter.left, right: metres.right * self.diameter.right }
     }
 
-    /// The wheels have turned in `dt` seconds: a wheel that is held by the share `grip` with the ground, which went by `went` metres,
-    /// and by the rest as it was `asked`.
+    /// In `dt` seconds a wheel that is held by the share `grip` with the ground, which went by `went` metres, and by
+    /// the rest as it was `asked`.
     pub(crate) fn turn(
         &self,
         motors: &mut [Motor; 6],
@@ -92,7 +90,7 @@ impl Drivetrain {
         turn(self.channel.right, self.sign.right, asked.right, went.right / right, grip.right);
     }
 
-    /// Speeds of the rims, m/s, forward positive.
+    /// m/s, forward positive.
     pub(crate) fn rim_speeds(&self, motors: &[Motor; 6]) -> Wheels<f64> {
         let speed =
             |channel: usize, sign: f64| sign * motors[channel].speed() * self.metres_per_count;
@@ -102,7 +100,7 @@ impl Drivetrain {
         })
     }
 
-    /// Counts of the wheels as `encoders` show them, growing forward.
+    /// Counts grow forward.
     pub(crate) fn counts(&self, encoders: &[Encoder; 2]) -> Wheels<u16> {
         let counts = |channel: usize, sign: f64| {
             let position = encoders[channel].position;

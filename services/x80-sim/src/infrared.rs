@@ -9,10 +9,10 @@ use common::{
 
 use crate::{noise::Noise, world::World};
 
-/// The reading of a ranger without an obstacle in reach, as a distance, metres.
+/// A ranger without an obstacle in reach reads this.
 const NOTHING_M: f64 = 0.81;
 
-/// Readings of the rangers that are mounted on a robot at `pose`, AD counts; 0 for other rangers.
+/// AD counts of the rangers that are mounted on a robot at `pose`; 0 for others.
 pub fn read(
     world: &World,
     pose: Pose2,

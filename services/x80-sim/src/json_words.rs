@@ -1,5 +1,5 @@
-//! The protocol of lines of JSON for a simulated robot: orders become commands of the boards of a simulated X80, and their
-//! readings become reports.
+//! Lines of JSON for a simulated robot: orders become commands of a simulated X80's boards, and their readings become
+//! reports.
 
 use std::f64::consts::TAU;
 
@@ -14,13 +14,11 @@ use common::{
 
 use crate::{motor::Motor, sensors::STALL_CURRENT};
 
-/// Converts between messages and the boards.
 #[derive(Clone, Debug)]
 pub(crate) struct JsonWords {
     robot: RobotConfig,
     counts_per_radian: f64,
     table: Vec<Sensor>,
-    /// The orders that were taken.
     heard: u64,
 }
 
@@ -34,7 +32,7 @@ impl JsonWords {
         }
     }
 
-    /// The commands of the boards for an order. The order counts as taken.
+    /// The order counts as taken.
     pub(crate) fn commands(&mut self, order: &Order) -> Vec<Command> {
         self.heard += 1;
         let wheels = [self.robot.left, self.robot.right];
@@ -66,12 +64,10 @@ impl JsonWords {
         }
     }
 
-    /// The answer to an order.
     pub(crate) fn acknowledgement(&self) -> Vec<u8> {
         line(&Report { heard: Some(self.heard), ..Report::default() })
     }
 
-    /// The report of a tick.
     pub(crate) fn report(
         &self,
         (standard, custom, motor): (&StandardSensors, &CustomSensors, &MotorSensors),
@@ -114,7 +110,7 @@ impl JsonWords {
     }
 }
 
-/// The turn of a channel by its encoder, which counts in a circle, and by the motor, which does not.
+/// The encoder counts in a circle, the motor does not.
 fn turned(sensors: &MotorSensors, motors: &[Motor; 6], channel: usize) -> f64 {
     let cycle = f64::from(common::wire::COUNT_CYCLE);
     let (read, true_counts) =
@@ -122,7 +118,7 @@ fn turned(sensors: &MotorSensors, motors: &[Motor; 6], channel: usize) -> f64 {
     read + ((true_counts - read) / cycle).round() * cycle
 }
 
-/// The range of a sonar byte, metres; negative for no reading, none for nothing.
+/// Metres of a sonar byte; negative for no reading, none for nothing.
 fn heard(byte: u8) -> Option<f64> {
     match Echo::from_byte(byte) {
         None => Some(-1.0),
@@ -131,7 +127,6 @@ fn heard(byte: u8) -> Option<f64> {
     }
 }
 
-/// The range of an infrared ranger, metres.
 fn infrared(standard: &StandardSensors, custom: &CustomSensors, channel: usize) -> Option<f64> {
     let ad = match channel {
         0 => standard.infrared,

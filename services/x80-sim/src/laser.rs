@@ -1,8 +1,8 @@
 //! A laser: each beam ends at the first thing that stands at its height and is no pane of glass at a slant.
 //!
-//! A beam that ends at a black surface too far away brings nothing back. The sensor cannot tell that from an empty room, so the reading
-//! is "nothing in reach", as drivers publish it: infinity by ROS's REP 117 ("no return") and in Slamtec's `rplidar_ros`. A beam through
-//! glass with nothing behind gives the same reading.
+//! A beam that ends at a black surface too far away brings nothing back, so the reading is "nothing in reach", as
+//! drivers publish it: infinity by ROS's REP 117 ("no return") and in Slamtec's `rplidar_ros`. A beam through glass
+//! with nothing behind gives the same reading.
 
 use common::{
     geometry::Light,
@@ -16,7 +16,7 @@ use crate::{
     world::{Solid, World},
 };
 
-/// Beams that give no reading, of a thousand: the edges of things, and the sun. Nominal.
+/// Beams without a reading, at the edges of things and in the sun. Nominal.
 const LOST_OF_1000: f64 = 2.0;
 
 /// Greatest angle to its normal at which a pane of glass gives a reading, degrees. Nominal: L. Tibebu et al., "LiDAR-based glass
@@ -24,7 +24,6 @@ const LOST_OF_1000: f64 = 2.0;
 /// perpendicular to the glass, and it falls fast beside that.
 const GLASS_LIMIT_DEG: f64 = 5.0;
 
-/// The laser of a robot.
 #[derive(Clone, Debug)]
 pub(crate) struct Laser {
     sensor: Sensor,
@@ -32,18 +31,17 @@ pub(crate) struct Laser {
 }
 
 impl Laser {
-    /// The laser of `mission`'s robot, whose noise follows from `seed`; none without one.
+    /// None without a laser; the noise follows from `seed`.
     pub(crate) fn new(mission: &Mission, seed: u64) -> Option<Self> {
         let (_, sensor) = mission.laser()?;
         Some(Self { sensor, noise: Noise::new(seed, Source::Laser) })
     }
 
-    /// The number of ticks from one measurement to the next.
     pub(crate) const fn every_ticks(&self) -> u64 {
         self.sensor.every_ticks
     }
 
-    /// The ranges of its beams on a robot at `pose`, metres: none for nothing in reach, less than 0 for no reading.
+    /// Metres: none for nothing in reach, less than 0 for no reading.
     pub(crate) fn scan(&mut self, world: &World, pose: Pose2) -> Vec<Option<f32>> {
         let mount = self.sensor.mount.on(pose);
         let height_m = world.heights().infrared_m;
@@ -72,8 +70,8 @@ impl Laser {
     }
 }
 
-/// The range at which a beam from `origin` in the unit direction `along` ends at `solid`, metres, and the solid's effect on light; none
-/// if the beam passes.
+/// The range at which a beam from `origin` in the unit direction `along` ends at `solid`, metres, and the solid's
+/// effect on light; none if it passes.
 fn end(solid: &Solid, origin: DVec2, along: DVec2) -> Option<(f64, Light)> {
     let (range, light) = (solid.surface.hit(origin, along)?, solid.profile.light);
     let is_slanted = || {

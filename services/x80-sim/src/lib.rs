@@ -4,20 +4,20 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`world`] | what stands around the robot, and what comes and goes |
-//! | [`body`] | a disc on two wheels or on a car's, and what it touches |
-//! | [`wheel_errors`] | how far its wheels are from what the mission says |
+//! | [`world`] | what stands around the robot |
+//! | [`body`] | a disc on wheels, and what it touches |
+//! | [`wheel_errors`] | the wheels' differences from the mission |
 //! | [`motor`] | one channel: modes, timed commands, the speed loop |
-//! | [`sonar`], [`infrared`], `laser`, [`sensors`] | the readings of the sensors, as the frames carry them |
-//! | `json_words` | the words of a robot that speaks lines of JSON |
-//! | [`arduino_words`] | the words of a robot with an Arduino |
-//! | [`noise`] | seeded randomness, one stream for each source |
-//! | [`robot`] | all of it as a pure state machine: frames in, time forward, frames out |
+//! | [`sonar`], [`infrared`], `laser`, [`sensors`] | readings, as the frames carry them |
+//! | `json_words` | lines of JSON |
+//! | [`arduino_words`] | an Arduino's requests and answers |
+//! | [`noise`] | seeded, one stream for each source |
+//! | [`robot`] | the pure state machine: frames in, time forward, frames out |
 //! | [`radio`] | outages, losses, delays between host and robot |
-//! | [`saved_state`] | the state of a robot that the next process restores |
+//! | [`saved_state`] | what the next process restores |
 //! | [`shell`] | the process: transport, pace, ground truth |
 //!
-//! The caller steps a robot; only [`shell`] and its transports know sockets and clocks:
+//! Only [`shell`] and its transports know sockets and clocks:
 //!
 //! ```
 //! use std::path::Path;

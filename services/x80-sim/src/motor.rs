@@ -1,5 +1,5 @@
-//! A channel of the motor board and the speed loop of its wheel. All values are in the channel's own positive direction, in encoder
-//! counts and counts per second.
+//! A channel of the motor board and the speed loop of its wheel. Values are encoder counts and counts per second in
+//! the channel's positive direction.
 
 use std::collections::VecDeque;
 
@@ -10,37 +10,33 @@ use common::{
 
 use crate::noise::Noise;
 
-/// Pulse width at which a wheel stands.
+/// A wheel stands at this pulse width.
 const PWM_STOP: f64 = 16_383.5;
-/// The distance from [`PWM_STOP`] within which pulse widths turn no wheel: a client that drives by them adds as much.
+/// Pulse widths this near to [`PWM_STOP`] turn no wheel: a client that drives by them adds as much.
 const PWM_DEAD_BAND: f64 = 8000.0;
-/// Speed per count of position error, 1/s: a position is reached in about a second.
+/// 1/s: a position is reached in about a second.
 const POSITION_GAIN: f64 = 4.0;
-/// The distance within which a wheel has reached its position, counts.
+/// A wheel has reached its position within this, counts.
 const POSITION_REACHED: f64 = 0.5;
-/// The speed below which friction holds a wheel that is ordered to stand, counts per second (2 mm/s); the dead band of starting is
+/// Friction holds a wheel below it that is ordered to stand, counts per second (2 mm/s); the dead band of starting is
 /// friction too, where it is wider.
 const STANDSTILL: f64 = 5.0;
-/// The share of the stall torque at which a tyre slips: half the robot's weight of 34 N with a friction of 0.6, over the 26 N of a
-/// stalled motor at the rim.
+/// The share of the stall torque at which a tyre slips: half the robot's weight of 34 N with a friction of 0.6, over
+/// the 26 N of a stalled motor at the rim.
 const SLIPS_AT: f64 = 0.4;
-/// The greatest number of delayed changes of the target. At a change every 5 ms this is more than the longest delay needs. A host that
-/// sends faster overwrites the newest one.
+/// Delayed changes of the target. At a change every 5 ms this is more than the longest delay needs. A host that sends
+/// faster overwrites the newest one.
 const MOST_PENDING: usize = 1024;
 
-/// PID gains of one loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PidGains {
-    /// Proportional.
     pub kp: u16,
-    /// Derivative.
     pub kd: u16,
     /// Integral, times 100.
     pub ki_x100: u16,
 }
 
 impl PidGains {
-    /// The gains that a board boots with.
     const BOOT: Self = Self { kp: 50, kd: 5, ki_x100: 0 };
 
     fn set(&mut self, gains: Gains) {
@@ -50,11 +46,10 @@ impl PidGains {
     }
 }
 
-/// A channel: its order and the counts of its wheel.
 #[derive(Clone, Debug)]
 pub struct Motor {
     physics: WheelPhysics,
-    /// Top speed of the wheel, counts per second.
+    /// Counts per second.
     top_speed: f64,
     enabled: bool,
     mode: Mode,
@@ -62,26 +57,23 @@ pub struct Motor {
     position_pid: PidGains,
     velocity_pid: PidGains,
     order: Option<Order>,
-    /// Changes of the target and their times, before the delay.
+    /// With their times, before the delay.
     pending: VecDeque<(f64, f64)>,
-    /// The target that the loop follows.
     target: f64,
     speed: f64,
     turned: f64,
     load: f64,
 }
 
-/// A motion command that still holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Order {
     quantity: Quantity,
     value: i16,
-    /// Mission time at which the order ends.
     until: Option<f64>,
 }
 
 impl Motor {
-    /// A channel as it boots: suspended, PWM mode, one potentiometer as feedback.
+    /// A booted channel is suspended, in PWM mode, with one potentiometer as feedback.
     pub fn new(physics: WheelPhysics, top_speed: f64) -> Self {
         Self {
             physics,
@@ -100,33 +92,29 @@ impl Motor {
         }
     }
 
-    /// Whether the motor may run.
     pub fn enabled(&self) -> bool {
         self.enabled
     }
 
-    /// The quantity that its loop controls.
     pub fn mode(&self) -> Mode {
         self.mode
     }
 
-    /// The sensor that its loop uses as feedback.
     pub fn feedback(&self) -> Feedback {
         self.feedback
     }
 
-    /// Gains of the position loop and of the velocity loop. They are stored and reported; the simulated loop is the measured one with
-    /// any gains.
+    /// Position and velocity loop. They are stored and reported; the simulated loop is the measured one with any
+    /// gains.
     pub fn gains(&self) -> (PidGains, PidGains) {
         (self.position_pid, self.velocity_pid)
     }
 
-    /// The speed, counts per second.
+    /// Counts per second.
     pub fn speed(&self) -> f64 {
         self.speed
     }
 
-    /// The counts since boot.
     pub fn turned(&self) -> f64 {
         self.turned
     }
@@ -136,12 +124,12 @@ impl Motor {
         self.load
     }
 
-    /// Restore the counts of an earlier process; the wheel stands.
+    /// The wheel stands at the counts of an earlier process.
     pub(crate) fn restore(&mut self, turned: f64) {
         self.turned = turned;
     }
 
-    /// Carry out a motion command until mission time `until`. The command sets the mode and lets the motor run.
+    /// Sets the mode and lets the motor run until mission time `until`.
     pub fn order(&mut self, quantity: Quantity, value: i16, until: Option<f64>) {
         self.enabled = true;
         self.mode = match quantity {
@@ -152,7 +140,7 @@ impl Motor {
         self.order = Some(Order { quantity, value, until });
     }
 
-    /// Enable or suspend the motor. A suspended motor forgets its order.
+    /// A suspended motor forgets its order.
     pub fn enable(&mut self, on: bool) {
         self.enabled = on;
         if !on {
@@ -160,12 +148,10 @@ impl Motor {
         }
     }
 
-    /// Forget the order, so that the wheel stands.
     pub fn halt(&mut self) {
         self.order = None;
     }
 
-    /// Set a parameter.
     pub fn configure(&mut self, parameter: Parameter) {
         match parameter {
             Parameter::PositionPid(gains) => self.position_pid.set(gains),
@@ -181,12 +167,12 @@ impl Motor {
         }
     }
 
-    /// The mission time at which the order ends: no step may reach across it.
+    /// Mission time that no step may reach across.
     pub fn ends_at(&self) -> Option<f64> {
         self.order.and_then(|order| order.until)
     }
 
-    /// Follow the order from mission time `now` for `dt` seconds. Returns the counts that the loop asks of the wheel.
+    /// From mission time `now` for `dt` seconds. Returns the counts that the loop asks of the wheel.
     pub fn step(&mut self, now: f64, dt: f64, noise: &mut Noise) -> f64 {
         self.load = 0.0;
         if self.ends_at().is_some_and(|end| now >= end) {
@@ -226,13 +212,13 @@ impl Motor {
         counts + jitter * dt
     }
 
-    /// Note that the wheel has really turned by `counts`.
     pub fn turn(&mut self, counts: f64) {
         self.turned += counts;
     }
 
-    /// Note that the ground lets the wheel go at `speed` counts per second only. `grip` is the share of its own speed that the wheel
-    /// loses by that, 0 if it slips freely. A push adds no speed. Its loop raises the torque until the wheel stalls or slips.
+    /// The ground lets the wheel go at `speed` counts per second only. `grip` is the share of its own speed that the
+    /// wheel loses by that, 0 if it slips freely. A push adds no speed. Its loop raises the torque until the wheel
+    /// stalls or slips.
     pub fn hold(&mut self, speed: f64, grip: f64) {
         let held = speed.clamp(self.speed.min(0.0), self.speed.max(0.0));
         if self.target != 0.0 {
@@ -242,7 +228,7 @@ impl Motor {
         self.speed = held * grip + self.speed * (1.0 - grip);
     }
 
-    /// The speed that the order asks for at mission time `now`, gain, dead band and limit applied.
+    /// Counts per second at mission time `now`, with gain, dead band and limit.
     fn wanted(&self, now: f64) -> f64 {
         let Some(order) = self.order.filter(|_| self.enabled) else {
             return 0.0;

@@ -1,43 +1,34 @@
-//! Random numbers: one stream for each source of noise, so that turning one off leaves the others as
-//! they were.
+//! Random numbers, one stream for each source of noise, so that turning one off leaves the others as they were.
 
 use rand_pcg::{Pcg64, rand_core::Rng};
 
-/// The source of noise that a stream is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// Ultrasonic rangers.
     Sonar = 1,
-    /// Infrared rangers.
     Infrared = 2,
-    /// Speed loops and slip.
     Wheels = 3,
-    /// Reported counts.
     Counts = 4,
     Radio = 5,
-    /// Diameters and track of the wheels.
     WheelErrors = 6,
-    /// Runs of silence of the ultrasonic rangers.
     Silence = 7,
     Laser = 8,
 }
 
-/// A seeded stream of random numbers.
 #[derive(Clone, Debug)]
 pub struct Noise(Pcg64);
 
 impl Noise {
-    /// The stream of `source` in the run with `seed`.
+    /// Each run with `seed` has the same stream.
     pub fn new(seed: u64, source: Source) -> Self {
         Self(Pcg64::new(u128::from(seed), source as u128))
     }
 
-    /// A number that is uniform in [0, 1).
+    /// In [0, 1).
     pub fn uniform(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// A normal number with mean 0 and standard deviation `sd`; nothing is drawn for 0.
+    /// Mean 0, standard deviation `sd`; nothing is drawn for 0.
     pub fn normal(&mut self, sd: f64) -> f64 {
         if sd <= 0.0 {
             return 0.0;
@@ -48,7 +39,7 @@ impl Noise {
         sd * radius * angle.cos()
     }
 
-    /// An exponential number with `mean`; nothing is drawn for 0.
+    /// Nothing is drawn for a `mean` of 0.
     pub fn exponential(&mut self, mean: f64) -> f64 {
         if mean <= 0.0 {
             return 0.0;
@@ -56,7 +47,7 @@ impl Noise {
         -mean * (1.0 - self.uniform()).ln()
     }
 
-    /// True in `share` of the cases; nothing is drawn for 0.
+    /// Nothing is drawn for 0.
     pub fn chance(&mut self, share: f64) -> bool {
         share > 0.0 && self.uniform() < share
     }

@@ -1,6 +1,6 @@
 //! The radio between host and robot: outages, delays, losses, and datagrams that are reordered, joined or cut.
 //!
-//! All of this is drawn from one seeded stream, so a run can be repeated; the losses are written to the ground truth.
+//! One seeded stream decides all of this, so a run can be repeated; the losses go to the ground truth.
 
 use std::collections::VecDeque;
 
@@ -8,12 +8,12 @@ use common::{ground_truth::GroundTruthRadio, mission};
 
 use crate::noise::{Noise, Source};
 
-/// The greatest number of datagrams under way; further ones are lost.
+/// Further datagrams are lost.
 const MOST_IN_FLIGHT: usize = 1024;
-/// The longest time that a datagram waits for the next one, to go behind it or with it, seconds.
+/// A datagram waits so long for the next one, to go behind it or with it.
 const LONGEST_HOLD_S: f64 = 0.5;
 
-/// A radio that is good and out in turns, each for an exponentially distributed time.
+/// Good and out in turns, each for an exponentially distributed time.
 #[derive(Clone, Debug)]
 struct Fading {
     mean_good: f64,
@@ -47,7 +47,7 @@ impl Fading {
         fading
     }
 
-    /// Whether the radio is out at mission time `now`, which must not go back.
+    /// `now` is mission time and must not go back.
     fn is_out(&mut self, now: f64, noise: &mut Noise) -> bool {
         while now >= self.until {
             self.out = !self.out;
@@ -69,7 +69,6 @@ impl Fading {
     }
 }
 
-/// A datagram under way.
 #[derive(Clone, Debug)]
 struct Flight<W> {
     due: f64,
@@ -78,22 +77,18 @@ struct Flight<W> {
     held: Option<Hold>,
 }
 
-/// The event that a datagram waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Hold {
-    /// The datagram arrives after the next one.
     Behind,
-    /// The datagram arrives joined to the next one.
     Joined,
 }
 
-/// The radio. `W` is the direction of a datagram and its peer.
+/// `W` is the direction of a datagram and its peer.
 #[derive(Clone, Debug)]
 pub struct Radio<W> {
     settings: mission::Radio,
     noise: Noise,
     fading: Fading,
-    /// Datagrams in order of arrival.
     in_flight: VecDeque<Flight<W>>,
     sent: u64,
     lost: u64,
@@ -101,7 +96,6 @@ pub struct Radio<W> {
 }
 
 impl<W: Copy + PartialEq> Radio<W> {
-    /// The radio of the run with `seed`.
     pub fn new(settings: mission::Radio, seed: u64) -> Self {
         let mut noise = Noise::new(seed, Source::Radio);
         Self {
@@ -115,7 +109,6 @@ impl<W: Copy + PartialEq> Radio<W> {
         }
     }
 
-    /// Whether the radio has no effect on datagrams.
     pub fn is_perfect(&self) -> bool {
         let radio = &self.settings;
         [
@@ -132,7 +125,7 @@ impl<W: Copy + PartialEq> Radio<W> {
         .all(|share| *share == 0.0)
     }
 
-    /// Whether a datagram sent at mission time `now` is lost. The datagram counts as sent.
+    /// Counts a datagram sent at mission time `now`, and says whether it is lost.
     pub fn loses(&mut self, now: f64) -> bool {
         self.sent += 1;
         let out = self.fading.is_out(now, &mut self.noise);
@@ -141,19 +134,17 @@ impl<W: Copy + PartialEq> Radio<W> {
         lost
     }
 
-    /// Whether the frames of a tick, sent at mission time `now`, are lost: then no host learns of the tick.
+    /// Then no host learns of the tick.
     pub fn loses_tick(&mut self, now: f64) -> bool {
         let lost = self.loses(now);
         self.missed_ticks += u64::from(lost);
         lost
     }
 
-    /// The delay of a datagram, seconds.
     pub fn delay(&mut self) -> f64 {
         self.settings.delay_s + self.noise.exponential(self.settings.jitter_s)
     }
 
-    /// Cut `bytes` in two where the radio does.
     pub fn split(&mut self, bytes: Vec<u8>) -> (Vec<u8>, Vec<u8>) {
         let mut first = bytes;
         if first.len() < 2 || !self.noise.chance(self.settings.split_share) {
@@ -164,7 +155,6 @@ impl<W: Copy + PartialEq> Radio<W> {
         (first, second)
     }
 
-    /// Send `bytes` on their `way` at mission time `now`.
     pub fn send(&mut self, now: f64, way: W, bytes: &[u8]) {
         if self.loses(now) {
             return;
@@ -223,18 +213,15 @@ impl<W: Copy + PartialEq> Radio<W> {
         self.in_flight.insert(at, flight);
     }
 
-    /// The mission time when the next datagram arrives.
     pub fn next_due(&self) -> Option<f64> {
         self.in_flight.front().map(|flight| flight.due)
     }
 
-    /// The next datagram that has arrived by mission time `now`.
     pub fn arrived(&mut self, now: f64) -> Option<(W, Vec<u8>)> {
         let flight = self.in_flight.pop_front_if(|flight| flight.due <= now)?;
         Some((flight.way, flight.bytes))
     }
 
-    /// The losses until mission time `now`.
     pub fn ground_truth(&mut self, now: f64) -> GroundTruthRadio {
         GroundTruthRadio {
             out: self.fading.is_out(now, &mut self.noise),

@@ -27,28 +27,22 @@ use crate::{
     world::World,
 };
 
-/// The longest step of the body, seconds.
 const STEP_S: f64 = 0.005;
 
-/// The longest time that a robot drives on at the end of its process if its last command does not expire, seconds.
+/// A robot drives on so long at the end of its process if its last command does not expire.
 const COMES_TO_REST_S: f64 = 3.0;
 
-/// The meaning of a frame from the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heard {
-    /// The frame is not addressed to a robot.
+    /// It is not addressed to a robot.
     Foreign,
-    /// An acknowledgement: nothing is answered to it.
+    /// Nothing is answered to it.
     Ack,
-    /// A ping.
     Ping,
-    /// A motion command.
     Motion,
-    /// Another frame, known or not.
     Other,
 }
 
-/// A simulated X80 and the world around it.
 #[derive(Clone, Debug)]
 pub struct Robot {
     physics: Physics,
@@ -57,7 +51,6 @@ pub struct Robot {
     stops_when_silent: Option<f64>,
     rate_hz: f64,
     drivetrain: Drivetrain,
-    /// The car; `None` for a robot with two driven wheels.
     car: Option<Car>,
     longest_step: f64,
 
@@ -72,7 +65,6 @@ pub struct Robot {
     time: f64,
     tick: u64,
     heard_at: f64,
-    /// The time when the last motion command came.
     ordered_at: f64,
     stopping_time: f64,
     addressing: Addressing,
@@ -80,22 +72,19 @@ pub struct Robot {
     standard: StandardSensors,
     custom: CustomSensors,
     motor: MotorSensors,
-    /// The words of a robot that speaks lines of JSON; none for an X80.
+    /// None for an X80.
     json: Option<JsonWords>,
-    /// The words of a robot with an Arduino.
     arduino: Option<ArduinoWords>,
     laser: Option<Laser>,
-    /// The beams of this tick.
     scan: Vec<Option<f32>>,
 }
 
 impl Robot {
-    /// The robot of `mission`, booted and standing at the start. Its sensors hold their readings of tick 0.
+    /// Booted and standing at the start, with the readings of tick 0.
     pub fn new(mission: &Mission) -> Self {
         Self::with_noise(mission, mission.seed)
     }
 
-    /// The robot of `mission` with the noise of `seed`.
     fn with_noise(mission: &Mission, seed: u64) -> Self {
         let mut physics = mission.simulation.physics();
         let size = mission.body();
@@ -146,7 +135,7 @@ impl Robot {
         robot
     }
 
-    /// The robot of `mission` at the place where an earlier process left it. It is in the state of a booted robot except for its counts.
+    /// Where an earlier process left it. Except for its counts it is in the state of a booted robot.
     pub fn restored(mission: &Mission, saved: &SavedState) -> Self {
         // With the same seed the noise of the first readings would be repeated.
         let seed = mission.seed.wrapping_add(saved.tick + 1);
@@ -167,7 +156,6 @@ impl Robot {
         robot
     }
 
-    /// The state that the next process restores.
     pub fn saved_state(&self) -> SavedState {
         SavedState {
             tick: self.tick,
@@ -180,7 +168,7 @@ impl Robot {
         }
     }
 
-    /// Let the robot come to rest as without further commands; a robot that would never rest is halted.
+    /// A robot that would never rest is halted.
     pub fn come_to_rest(&mut self) {
         let latest = self.time + COMES_TO_REST_S;
         while self.time < latest && self.is_moving() {
@@ -196,27 +184,23 @@ impl Robot {
         ordered || self.rims() != Wheels::default()
     }
 
-    /// Mission time, seconds.
     pub fn time_s(&self) -> f64 {
         self.time
     }
 
-    /// The time from tick to tick, seconds.
     pub fn period_s(&self) -> f64 {
         1.0 / self.rate_hz
     }
 
-    /// Mission time of the next tick, seconds.
     pub fn next_tick_s(&self) -> f64 {
         (self.tick + 1) as f64 / self.rate_hz
     }
 
-    /// A channel of the motor board, 0 to 5.
+    /// `channel` is 0 to 5.
     pub fn motor(&self, channel: u8) -> Option<&Motor> {
         self.motors.get(usize::from(channel))
     }
 
-    /// The meaning of `frame`, before it is executed.
     pub fn kind(frame: &Frame<'_>) -> Heard {
         if Addressing::of_robot(frame.rid).is_none() {
             return Heard::Foreign;
@@ -229,7 +213,6 @@ impl Robot {
         }
     }
 
-    /// Take a frame from the host and append the immediate answer to `replies`.
     pub fn on_frame(&mut self, frame: &Frame<'_>, replies: &mut Vec<u8>) -> Heard {
         let Some(addressing) = Addressing::of_robot(frame.rid) else {
             return Heard::Foreign;
@@ -282,7 +265,6 @@ impl Robot {
         }
     }
 
-    /// Take an order of a host that speaks lines of JSON, and append the immediate answer to `replies`.
     pub fn on_order(&mut self, order: &Order, replies: &mut Vec<u8>) -> Heard {
         let Some(json) = &mut self.json else {
             return Heard::Foreign;
@@ -296,7 +278,6 @@ impl Robot {
         Self::kind_of(order)
     }
 
-    /// The meaning of an order, before it is executed.
     pub const fn kind_of(order: &Order) -> Heard {
         match order {
             Order::Drive { .. } => Heard::Motion,
@@ -305,7 +286,6 @@ impl Robot {
         }
     }
 
-    /// Take a request of a host that speaks to an Arduino, and append the answer to `replies`.
     pub fn on_request(&mut self, request: Request, replies: &mut Vec<u8>) -> Heard {
         let Some(arduino) = &mut self.arduino else {
             return Heard::Foreign;
@@ -319,7 +299,6 @@ impl Robot {
         Self::kind_of_request(request)
     }
 
-    /// The meaning of a request, before it is carried out.
     pub const fn kind_of_request(request: Request) -> Heard {
         match request {
             Request::Speeds(_) => Heard::Motion,
@@ -327,7 +306,7 @@ impl Robot {
         }
     }
 
-    /// A host opened the line, on which an Arduino boots.
+    /// An Arduino boots when a host opens the line.
     pub fn on_opened(&mut self) {
         if let Some(arduino) = &mut self.arduino {
             self.motors.iter_mut().for_each(Motor::halt);
@@ -335,14 +314,14 @@ impl Robot {
         }
     }
 
-    /// The time at which the ultrasonic rangers listen for the next tick, if that is before the tick and still to come.
+    /// The ultrasonic rangers listen for the next tick then, if that is before the tick and still to come.
     fn listens_at(&self) -> Option<f64> {
         let age = self.physics.sonar.age_s;
         (age > 0.0 && !self.ranging.has_listened()).then(|| self.next_tick_s() - age)
     }
 
-    /// Let mission time pass until `end`, seconds, in short steps, none of which reaches across the end
-    /// of a timed command or the moment of a range. An end in the past does nothing.
+    /// Seconds, in short steps, none of which reaches across the end of a timed command or the moment of a range. An
+    /// end in the past does nothing.
     pub fn advance_to(&mut self, end: f64) {
         while self.time < end {
             if self.listens_at().is_some_and(|moment| moment <= self.time) {
@@ -365,7 +344,6 @@ impl Robot {
         }
     }
 
-    /// A short step of `dt` seconds.
     fn step(&mut self, dt: f64) {
         let silent = self.stops_when_silent.is_some_and(|limit| self.time >= self.heard_at + limit);
         if silent {
@@ -404,7 +382,7 @@ impl Robot {
         }
     }
 
-    /// For each wheel, whether something in it or around it blocks it now.
+    /// Something in the wheel or around it blocks it now.
     fn blocked_wheels(&self) -> Wheels<bool> {
         let blocks = |wheel: &Block| {
             self.time >= wheel.from_s && wheel.until_s.is_none_or(|until| self.time < until)
@@ -417,7 +395,6 @@ impl Robot {
         now
     }
 
-    /// Speeds of the rims, m/s, forward positive.
     fn rims(&self) -> Wheels<f64> {
         match &self.car {
             Some(car) => {
@@ -428,7 +405,6 @@ impl Robot {
         }
     }
 
-    /// The motion by the speeds of its motors.
     fn twist(&self) -> Twist {
         if let Some(car) = &self.car {
             return car.twist(&self.motors);
@@ -437,14 +413,13 @@ impl Robot {
         Twist { v: (left + right) / 2.0, omega: (right - left) / self.body.track() }
     }
 
-    /// Let mission time pass until the next tick and measure there.
     pub fn advance_to_next_tick(&mut self) {
         self.advance_to(self.next_tick_s());
         self.tick += 1;
         self.measure();
     }
 
-    /// Take the readings of this tick. Noise of sensors is drawn only here.
+    /// Noise of sensors is drawn only here.
     fn measure(&mut self) {
         let noise = self.physics.wheels.count_noise;
         for (channel, encoder) in self.motor.encoders.iter_mut().enumerate() {
@@ -464,14 +439,14 @@ impl Robot {
         }
     }
 
-    /// Append the frames of this tick to `out`, one of every stream that runs, the motor frame last. They count against the frames that
-    /// a host has asked for.
+    /// Append one frame of every stream that runs, the motor frame last. They count against the frames that a host
+    /// has asked for.
     pub fn stream(&mut self, out: &mut Vec<u8>) {
         let due = self.streams.take();
         self.write(due, out);
     }
 
-    /// Append the frames of this tick once more, without counting them.
+    /// Appends them once more, without counting them.
     pub fn repeat(&self, out: &mut Vec<u8>) {
         self.write(self.streams.running(), out);
     }
@@ -497,7 +472,7 @@ impl Robot {
         }
     }
 
-    /// The ground truth at this tick. The least clearance is reset.
+    /// Resets the least clearance.
     pub fn ground_truth(&mut self) -> GroundTruthTick {
         let pose = self.body.pose();
         let Twist { v, omega } = self.twist();

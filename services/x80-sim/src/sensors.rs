@@ -16,16 +16,16 @@ use crate::{
     world::World,
 };
 
-/// Reading of a sensor in ordinary surroundings, AD counts.
+/// Ordinary surroundings, AD counts.
 pub const MIDDLE: u16 = 2048;
-/// Supply of the AD converters, AD counts: drivers convert with it.
+/// Drivers convert with this supply of the AD converters, AD counts.
 const REFERENCE: u16 = 2048;
-/// Motor current of a standing motor, and for each count per second, AD counts; nominal.
+/// A standing motor's current, and the current for each count per second, AD counts; nominal.
 const CURRENT: (f64, f64) = (20.0, 0.2);
-/// Further current of a stalled motor, AD counts; nominal. A stalled motor draws several times the current of a rolling one.
+/// Further current of a stalled motor, AD counts; nominal. It draws several times the current of a rolling one.
 pub(crate) const STALL_CURRENT: f64 = 1500.0;
 
-/// The ultrasonic and infrared rangers and the rest of the multimedia board.
+/// The sensors of the multimedia board.
 #[derive(Clone, Debug)]
 pub struct Ranging {
     front: usize,
@@ -34,12 +34,11 @@ pub struct Ranging {
     silence: Silence,
     sonar_noise: Noise,
     infrared_noise: Noise,
-    /// Readings of the ultrasonic rangers for the next tick.
     heard: Option<[u8; 6]>,
 }
 
 impl Ranging {
-    /// The rangers of `mission`'s robot, and the sonars that `simulation.ring` adds. Their noise follows from `seed`.
+    /// Includes the sonars that `simulation.ring` adds. The noise follows from `seed`.
     pub fn new(mission: &Mission, seed: u64) -> Self {
         let (table, front) = (mission.sensor_table(), mission.front_sonar());
         let (mut mounts, mut infrared) = ([None; SONARS], [None; INFRARED_RANGERS]);
@@ -78,27 +77,22 @@ impl Ranging {
         }
     }
 
-    /// The front ranger's byte.
     pub fn front(&self, sensors: &StandardSensors) -> u8 {
         sensors.ultrasonic[self.front]
     }
 
-    /// For each ultrasonic ranger, whether it is silent.
     pub fn silent(&self) -> [bool; 6] {
         self.silence.silent()
     }
 
-    /// Restore which ultrasonic rangers are silent.
     pub(crate) fn restore(&mut self, silent: [bool; 6]) {
         self.silence.restore(silent);
     }
 
-    /// Whether the ultrasonic rangers have listened for the next tick.
     pub fn has_listened(&self) -> bool {
         self.heard.is_some()
     }
 
-    /// Let the ultrasonic rangers listen for the next tick, unless they have.
     pub fn listen(&mut self, world: &World, body: &Body, physics: &SonarPhysics) {
         if self.heard.is_none() {
             self.heard = Some(self.heard_now(world, body, physics));
@@ -126,8 +120,7 @@ impl Ranging {
         ranges.map(|range| sonar::byte(range, physics, noise))
     }
 
-    /// The standard and the custom frame at mission time `time`, seconds. Ultrasonic rangers that have not listened yet
-    /// do so now.
+    /// At mission time `time`, seconds. Ultrasonic rangers that have not listened yet do so now.
     pub fn measure(
         &mut self,
         world: &World,
@@ -169,7 +162,7 @@ fn ad(volts: f64, full_scale: f64) -> u16 {
     (volts / full_scale * 4095.0).round().clamp(0.0, 4095.0) as u16
 }
 
-/// The reported encoder of `motor`, which is off by `error` counts.
+/// The encoder is off by `error` counts.
 pub fn encoder(motor: &Motor, error: f64) -> Encoder {
     let position = (motor.turned() + error).round();
     Encoder {
@@ -179,7 +172,7 @@ pub fn encoder(motor: &Motor, error: f64) -> Encoder {
     }
 }
 
-/// Currents of the motors, AD counts.
+/// AD counts.
 pub fn currents(motors: &[Motor; 6]) -> [u16; 6] {
     std::array::from_fn(|channel| {
         let motor = &motors[channel];

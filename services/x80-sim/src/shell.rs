@@ -1,4 +1,4 @@
-//! The process around the robot: a socket, a pace and the ground truth. The rest is in [`crate::robot`].
+//! The process around [`crate::robot`]: a socket, a pace and the ground truth.
 
 mod session;
 
@@ -26,36 +26,33 @@ use crate::{
     transport::{Transport, Way},
 };
 
-/// The greatest number of datagrams that are taken before the time and the stop signal are checked again.
+/// More datagrams are taken only after the time and the stop signal are checked.
 const MOST_AT_ONCE: usize = 64;
 
-/// The options of a simulated robot.
 pub struct SimOptions {
-    /// The mission, seed and all.
     pub mission: Mission,
-    /// The pace of mission time. At [`Pace::Max`] it stands still until a motion command comes; then the body moves one period under
-    /// that command and the frames of the next tick are sent. A ping is answered with the frames of this tick once more. The same
-    /// commands give the same bytes.
+    /// At [`Pace::Max`] it stands still until a motion command comes; then the body moves one period under that
+    /// command and the frames of the next tick are sent. A ping is answered with the frames of this tick once more.
+    /// The same commands give the same bytes.
     ///
-    /// At [`Pace::Rate`] mission time follows the machine's clock and frames are sent unasked. While the process is not scheduled for
-    /// more than a period, mission time waits for it.
+    /// At [`Pace::Rate`] mission time follows the machine's clock and frames are sent unasked. While the process is
+    /// not scheduled for more than a period, mission time waits for it.
     pub pace: Pace,
-    /// The address to listen on; port 0 takes a free one. A pseudo-terminal gets its path from the system.
+    /// Port 0 takes a free one. A pseudo-terminal gets its path from the system.
     pub listen: SocketAddr,
-    /// The transport to listen by.
     pub transport: Transport,
-    /// Whether datagrams are taken only from processes of this user on this machine.
+    /// Datagrams of other users or machines are refused.
     pub own_user_only: bool,
-    /// The file in which the robot's state is saved, and from which it goes on; none saves nothing.
+    /// The robot's state is saved here, and goes on from here.
     pub keep: Option<PathBuf>,
-    /// The file of the ground truth: a [`common::ground_truth::GroundTruthHeader`], then a
-    /// [`common::ground_truth::GroundTruthTick`] each tick, one JSON object a line, each
-    /// in one write. The robot waits for a reader that is slow; when it is gone, the robot goes on
-    /// without.
+    /// A [`common::ground_truth::GroundTruthHeader`], then a [`common::ground_truth::GroundTruthTick`] each tick, one
+    /// JSON object a line, each in one write. The robot waits for a reader that is slow; when it is gone, the robot
+    /// goes on without.
     pub ground_truth: Option<Box<dyn Write + Send>>,
 }
 
-/// Run a simulated robot until `stop` becomes readable (or its other end is closed).
+/// Run until `stop` becomes readable (or its other end is closed). Fails when it cannot listen, the transport fails,
+/// or its state cannot be saved.
 pub fn run(options: SimOptions, stop: impl AsFd) -> Result<(), SimError> {
     let SimOptions { mission, pace, listen, transport, own_user_only, keep, ground_truth } =
         options;
@@ -97,14 +94,14 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result<(), SimError> {
     }
 }
 
-/// Wait until nobody else has `file`, which is made if it does not exist.
+/// Waits until nobody else has `file`, which it makes.
 fn lock(file: &Path) -> io::Result<File> {
     let file = File::options().create(true).append(true).open(file)?;
     file.lock()?;
     Ok(file)
 }
 
-/// Wait for bytes, the stop or the timeout. Returns which of the first two came.
+/// Returns whether bytes and whether the stop came.
 fn wait(
     session: &Session,
     stop: &impl AsFd,
@@ -116,7 +113,7 @@ fn wait(
     Ok([came[1] || came[2], came[0]])
 }
 
-/// Mission time by the machine's clock; it is `None` in lockstep.
+/// Lockstep has none.
 #[derive(Clone, Copy, Debug)]
 struct SimClock {
     /// Machine time at mission time 0, and mission seconds a machine second.
@@ -125,7 +122,6 @@ struct SimClock {
 }
 
 impl SimClock {
-    /// A clock that shows mission time `begin_s` now.
     fn new(pace: Pace, period_s: f64, begin_s: f64) -> Self {
         let runs = match pace {
             Pace::Max => None,
@@ -137,21 +133,20 @@ impl SimClock {
         Self { runs, period_s }
     }
 
-    /// Mission time at machine time `machine_ns`, seconds.
     fn now(&self, machine_ns: u64) -> Option<f64> {
         let (epoch, rate) = self.runs?;
         Some(machine_ns.saturating_sub(epoch) as f64 * 1e-9 * rate)
     }
 
-    /// The time to wait for mission time `due`; for ever in lockstep.
+    /// Lockstep waits for ever.
     fn wait_for(&self, due: f64, machine_ns: u64) -> Option<Duration> {
         let (_, rate) = self.runs?;
         let seconds = ((due - self.now(machine_ns)?) / rate).max(0.0);
         Some(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX))
     }
 
-    /// If mission time is more than a period behind at machine time `machine_ns`, shift it so that the next tick `due` is not late. A
-    /// robot whose process was not scheduled must not make up for the lost time.
+    /// Shift mission time if it is more than a period behind, so that the next tick `due` is not late: a robot whose
+    /// process was not scheduled must not make up for the lost time.
     fn forgive(&mut self, due: f64, machine_ns: u64) {
         let owed = self.now(machine_ns).map_or(0.0, |now| now - due);
         if let Some((epoch, rate)) = &mut self.runs

@@ -8,16 +8,16 @@ use crate::noise::{Noise, Source};
 /// channel", 1960).
 #[derive(Clone, Debug)]
 pub(crate) struct Silence {
-    /// Probability that a silent ranger hears again at the next reading.
+    /// A silent ranger hears again at the next reading with this probability.
     end: f64,
-    /// Probability that a hearing ranger falls silent.
+    /// A hearing ranger falls silent with this probability.
     begin: f64,
     silent: [bool; 6],
     noise: Noise,
 }
 
 impl Silence {
-    /// The chain for readings by `physics` that are `period_s` apart. No random number is drawn if the share is 0.
+    /// Readings are `period_s` apart. No random number is drawn if the share is 0.
     pub(crate) fn new(physics: &SonarPhysics, period_s: f64, seed: u64) -> Self {
         let share = physics.silence_share;
         let end = (period_s / physics.silence_mean_s).min(1.0);
@@ -30,7 +30,6 @@ impl Silence {
         }
     }
 
-    /// Advance to the next reading. Returns for each ranger whether it is silent.
     pub(crate) fn step(&mut self) -> [bool; 6] {
         if self.begin > 0.0 {
             for silent in &mut self.silent {
@@ -41,12 +40,10 @@ impl Silence {
         self.silent
     }
 
-    /// For each ranger, whether it was silent at the last reading.
     pub(crate) fn silent(&self) -> [bool; 6] {
         self.silent
     }
 
-    /// Restore which rangers are silent.
     pub(crate) fn restore(&mut self, silent: [bool; 6]) {
         self.silent = silent;
     }

@@ -24,32 +24,28 @@ use crate::{
     world::{Solid, Surface, World},
 };
 
-/// The farthest range a ranger gives, metres.
 pub const REACH_M: f64 = 2.55;
-/// The distance before an echo within which a surface does not hide it, metres.
+/// A surface no farther than this before an echo does not hide it.
 const HIDES_M: f64 = 0.01;
-/// The distance from its mirror at which a reflected beam starts, or it would meet the mirror again, metres.
+/// A reflected beam starts this far from its mirror, or it would meet the mirror again.
 const NUDGE_M: f64 = 1e-6;
-/// Attenuation of sound at 40 kHz in air, dB per metre.
+/// Air attenuates sound of 40 kHz so.
 const ABSORPTION_DB_PER_M: f64 = 1.3;
-/// Radius of the post whose reach is known, metres.
 const POST_RADIUS_M: f64 = 0.015;
 
-/// A place that an echo may come from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Candidate {
     range: f64,
-    /// The range as seen from above, metres.
+    /// Seen from above, metres.
     level_range: f64,
     /// Unit vector from the ranger, from above.
     along: DVec2,
-    /// Whether the echo is often lost, because it is near a limit or comes from an edge.
+    /// Often lost, because it is near a limit or comes from an edge.
     weak: bool,
-    /// Share of pings that the place answers.
     share: f64,
 }
 
-/// A sector in front of a ranger. The cosine and sine of its half angle are what geometry needs.
+/// A sector in front of a ranger, by the cosine and sine of its half angle.
 #[derive(Clone, Copy, Debug)]
 struct Sector {
     origin: DVec2,
@@ -66,7 +62,7 @@ impl Sector {
         off_axis(self.axis, direction) <= self.half + 1e-12
     }
 
-    /// The point of the face `from`..`to` in this sector that is nearest to its apex, from the apex.
+    /// Nearest to the sector's apex, from the apex, of the face `from`..`to`.
     fn nearest(&self, from: DVec2, to: DVec2) -> Option<DVec2> {
         let surface = Surface::Face { from, to };
         let foot = common::geometry::nearest_on_segment(self.origin, from, to);
@@ -87,8 +83,7 @@ fn off_axis(axis: DVec2, direction: DVec2) -> f64 {
     axis.perp_dot(direction).atan2(axis.dot(direction)).abs()
 }
 
-/// The range that a ranger at `pose` hears on a robot whose centre is at `centre`: metres, infinite for nothing, without
-/// noise.
+/// Metres that a ranger at `pose` hears on a robot at `centre`, without noise; infinite for nothing.
 pub fn listen(
     world: &World,
     centre: DVec2,
@@ -127,7 +122,6 @@ pub fn listen(
     range
 }
 
-/// The byte for a `range` with its noise.
 pub fn byte(range: f64, physics: &SonarPhysics, noise: &mut Noise) -> u8 {
     if range > REACH_M {
         return Echo::byte_at(f64::INFINITY);
@@ -135,7 +129,7 @@ pub fn byte(range: f64, physics: &SonarPhysics, noise: &mut Noise) -> u8 {
     Echo::byte_at(range + noise.normal(physics.noise_m + physics.noise_per_m * range))
 }
 
-/// The axis of the beam after its reflection by a wall that does not answer itself, onto a wall that is square to it.
+/// The beam's axis after its reflection by a wall that does not answer itself, onto a wall that is square to it.
 fn bounced(world: &World, pose: Pose2, physics: &SonarPhysics, noise: &mut Noise) -> Option<f64> {
     if !noise.chance(physics.multipath_share) {
         return None;
@@ -154,14 +148,12 @@ fn bounced(world: &World, pose: Pose2, physics: &SonarPhysics, noise: &mut Noise
     (square && range <= REACH_M).then_some(range)
 }
 
-/// A ranger's receiver, turned one way.
 struct Receiver<'a> {
     physics: &'a SonarPhysics,
     cone: Sector,
     lobe: f64,
-    /// The height above the floor, metres.
+    /// Height above the floor, metres.
     height: f64,
-    /// The least amplitude that is detected.
     threshold: f64,
 }
 
@@ -177,8 +169,7 @@ impl<'a> Receiver<'a> {
         }
     }
 
-    /// The greatest distance at which an echo from this far off the axis is detected, metres. It is full in the cone and decreases
-    /// outside.
+    /// The greatest distance of an echo this far off the axis, metres: full in the cone, less outside.
     fn reach(&self, off: f64) -> f64 {
         let cone = self.cone.half;
         if off <= cone + 1e-12 {
@@ -190,7 +181,7 @@ impl<'a> Receiver<'a> {
         }
     }
 
-    /// Up to two places of `solid` that may answer.
+    /// At most two places may answer.
     fn candidates(&self, solid: &Solid) -> [Option<Candidate>; 2] {
         let (found, radius) = match solid.surface {
             Surface::Drum { at, radius } => ([self.drum(at, radius), None], Some(radius)),
@@ -204,7 +195,7 @@ impl<'a> Receiver<'a> {
         })
     }
 
-    /// `candidate`, if its nearest part is `gap` metres above or below the ranger.
+    /// The nearest part of `candidate` is `gap` metres above or below the ranger.
     fn off_level(&self, candidate: Candidate, gap: f64) -> Option<Candidate> {
         if gap == 0.0 {
             return Some(candidate);
@@ -223,7 +214,7 @@ impl<'a> Receiver<'a> {
         })
     }
 
-    /// Whether every surface answers wherever the cone meets it.
+    /// Every surface answers wherever the cone meets it.
     fn is_rough(&self) -> bool {
         self.physics.wall_limit_deg.to_radians() >= FRAC_PI_2
     }
@@ -284,7 +275,7 @@ impl<'a> Receiver<'a> {
     }
 }
 
-/// Amplitude of the echo of a hard plane at `range` metres, or of a cylinder of `radius`.
+/// A hard plane at `range` metres, or a cylinder of `radius`.
 fn amplitude(range: f64, radius: Option<f64>) -> f64 {
     let spread = radius.map_or(1.0, |radius| (radius / (radius + range)).sqrt());
     spread * 10_f64.powf(-2.0 * ABSORPTION_DB_PER_M * range / 20.0) / range

@@ -1,8 +1,7 @@
-//! The sensor streams that run, and the number of frames that each has left.
+//! The sensor streams that run, and the frames that each has left.
 
 use common::wire::{Request, Stream};
 
-/// The duration of a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Run {
     ForEver,
@@ -26,7 +25,7 @@ impl Run {
     }
 }
 
-/// The three streams; all run from boot.
+/// All three run from boot.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Streams {
     motor: Run,
@@ -34,14 +33,10 @@ pub(crate) struct Streams {
     standard: Run,
 }
 
-/// The frames that are due.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Due {
-    /// Frame 123.
     pub(crate) motor: bool,
-    /// Frame 124.
     pub(crate) custom: bool,
-    /// Frame 125.
     pub(crate) standard: bool,
 }
 
@@ -52,7 +47,6 @@ impl Default for Streams {
 }
 
 impl Streams {
-    /// Start, stop or count a stream.
     pub(crate) fn request(&mut self, stream: Stream, request: Request) {
         let run = match request {
             Request::Start => Run::ForEver,
@@ -74,12 +68,11 @@ impl Streams {
         }
     }
 
-    /// The streams that run. One frame of each counts as sent.
+    /// One frame of each counts as sent.
     pub(crate) fn take(&mut self) -> Due {
         Due { motor: self.motor.take(), custom: self.custom.take(), standard: self.standard.take() }
     }
 
-    /// The streams that run.
     pub(crate) const fn running(&self) -> Due {
         Due { motor: self.motor.runs(), custom: self.custom.runs(), standard: self.standard.runs() }
     }

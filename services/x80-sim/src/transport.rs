@@ -1,4 +1,4 @@
-//! The transport of bytes to the robot: datagrams, a connection or a serial line.
+//! Bytes to the robot: datagrams, a connection or a serial line.
 
 mod owner;
 mod pty;
@@ -11,19 +11,17 @@ use std::{io, net::SocketAddr, os::fd::BorrowedFd};
 pub(crate) use self::source::Source;
 use crate::error::SimError;
 
-/// The transport of bytes to the robot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Transport {
-    /// Datagrams.
     #[default]
     Udp,
-    /// A connection, one host at a time.
+    /// One host at a time.
     Tcp,
     /// A pseudo-terminal, opened by its path like a serial port.
     Pty,
 }
 
-/// An open transport. Bytes that cannot be sent are lost.
+/// Bytes that cannot be sent are lost.
 #[derive(Debug)]
 pub(crate) enum Way {
     Udp(udp::Udp),
@@ -32,7 +30,6 @@ pub(crate) enum Way {
 }
 
 impl Way {
-    /// Open `transport`, at `address` if it needs one. Datagrams of other users may be refused.
     pub(crate) fn open(
         transport: Transport,
         address: SocketAddr,
@@ -46,7 +43,7 @@ impl Way {
         }
     }
 
-    /// The peer that exists before it sends anything: a connected host, or the other end of the line.
+    /// A peer that exists before it sends anything: a connected host, or the other end of the line.
     pub(crate) fn connected(&mut self) -> Result<Option<Source>, SimError> {
         let connected = match self {
             Self::Udp(_) => Ok(None),
@@ -56,7 +53,7 @@ impl Way {
         connected.map_err(|source| SimError::Lost { address: self.address(), source })
     }
 
-    /// The address of the transport: `address:port`, or the path of the line.
+    /// `address:port`, or the path of the line.
     pub(crate) fn address(&self) -> String {
         match self {
             Self::Udp(udp) => udp.address().to_string(),
@@ -65,7 +62,7 @@ impl Way {
         }
     }
 
-    /// File descriptors that become readable when bytes have come; the second only if there are two.
+    /// Readable when bytes have come; the second only if there are two.
     pub(crate) fn readable(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>) {
         match self {
             Self::Udp(udp) => (udp.readable(), None),
@@ -74,8 +71,8 @@ impl Way {
         }
     }
 
-    /// Whether a host opened the line or the connection on which the newest bytes came, and they are the first. A line that a host closed
-    /// so that DTR stays high does not count as opened again.
+    /// The newest bytes are the first on a line or connection that a host opened. A line that a host closed so that
+    /// DTR stays high does not count as opened again.
     pub(crate) fn take_opened(&mut self) -> bool {
         match self {
             Self::Udp(_) => false,
@@ -84,7 +81,6 @@ impl Way {
         }
     }
 
-    /// The next bytes, if any have come.
     pub(crate) fn receive<'b>(
         &mut self,
         buffer: &'b mut [u8],
@@ -101,7 +97,6 @@ impl Way {
         }
     }
 
-    /// Send `bytes` to `to`, if that is still there.
     pub(crate) fn send(&mut self, to: Source, bytes: &[u8]) {
         let sent = match (self, to) {
             (Self::Udp(udp), Source::Peer(peer)) => udp.send(peer, bytes),

@@ -1,7 +1,7 @@
-//! Systematic errors of the wheels: their differences from the mission.
+//! Systematic errors of the wheels.
 //!
-//! The errors belong to the robot, not to the moment: they are drawn once from the seed of the mission, with a stream of
-//! their own, and are the same in each process of a run.
+//! The errors belong to the robot, not to the moment: they are drawn once from the seed of the mission, with a stream
+//! of their own, and are the same in each process of a run.
 
 use common::mission::Mission;
 
@@ -10,19 +10,17 @@ use crate::{
     noise::{Noise, Source},
 };
 
-/// True sizes over nominal ones.
+/// True values over nominal ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelErrors {
-    /// Diameters; their mean is 1.
+    /// Their mean is 1.
     pub diameter: Wheels<f64>,
-    /// Track.
     pub track: f64,
-    /// Share of the rolled way that slips away; below 0 it is won.
+    /// Slips away of the rolled way; below 0 it is won.
     pub slip_share: f64,
 }
 
 impl WheelErrors {
-    /// The errors of `mission`'s robot.
     pub fn of(mission: &Mission) -> Self {
         let physics = mission.simulation.physics().wheels;
         let mut noise = Noise::new(mission.seed, Source::WheelErrors);

@@ -6,30 +6,24 @@ use common::{
 };
 use glam::DVec2;
 
-/// The distance from a surface within which a sensor touches it, metres.
+/// A sensor this near to a surface touches it.
 const TOUCHES_M: f64 = 1e-3;
 
-/// A surface, seen from above.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Surface {
-    /// A disc.
     Drum {
-        /// Centre, metres.
         at: DVec2,
-        /// Radius, metres.
         radius: f64,
     },
     /// A straight face of a wall or a box.
     Face {
-        /// One end, metres.
         from: DVec2,
-        /// The other end, metres.
         to: DVec2,
     },
 }
 
 impl Surface {
-    /// Distance from `point` to this surface, metres; negative inside a drum.
+    /// Metres; negative inside a drum.
     pub fn distance(&self, point: DVec2) -> f64 {
         match *self {
             Self::Drum { at, radius } => at.distance(point) - radius,
@@ -37,7 +31,7 @@ impl Surface {
         }
     }
 
-    /// The direction from this surface straight out to `point`; a point on it has none.
+    /// Straight out; a point on the surface has none.
     pub fn outward(&self, point: DVec2) -> Option<DVec2> {
         let from = match *self {
             Self::Drum { at, .. } => at,
@@ -46,7 +40,7 @@ impl Surface {
         (point - from).try_normalize()
     }
 
-    /// Distance along the ray from `origin` in the unit direction `along` to this surface, metres.
+    /// Metres along the ray from `origin` in the unit direction `along`.
     pub fn hit(&self, origin: DVec2, along: DVec2) -> Option<f64> {
         match *self {
             Self::Drum { at, radius } => {
@@ -73,7 +67,7 @@ impl Surface {
         }
     }
 
-    /// Cosine of the angle between the unit direction `along` and the normal of this surface at `point`, which is on it.
+    /// The angle is between the unit direction `along` and the normal at `point`, which is on the surface.
     pub fn incidence_cos(&self, point: DVec2, along: DVec2) -> f64 {
         let normal = match *self {
             Self::Drum { at, .. } => point - at,
@@ -90,12 +84,9 @@ impl Surface {
     }
 }
 
-/// A surface with its heights, its echo and its effect on light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solid {
-    /// The outline from above.
     pub surface: Surface,
-    /// The heights, the echo and the effect on light.
     pub profile: Profile,
 }
 
@@ -111,7 +102,6 @@ fn solids_of(shapes: &Shapes) -> Vec<Solid> {
     drums.chain(walls).chain(shapes.boxes.iter().flat_map(boxes)).collect()
 }
 
-/// Everything that stands, at one time.
 #[derive(Clone, Debug)]
 pub struct World {
     standing: Vec<Solid>,
@@ -119,19 +109,16 @@ pub struct World {
     heights: Heights,
 }
 
-/// A thing that is not always there.
 #[derive(Clone, Debug)]
 struct Visitor {
     thing: Thing,
-    /// The row in the mission.
     solids: Vec<Solid>,
-    /// The present place.
     offset: DVec2,
     present: bool,
 }
 
 impl World {
-    /// The world of `mission` at time 0, with the robot at the start.
+    /// At time 0, with the robot at the start.
     pub fn new(mission: &Mission) -> Self {
         let visitor = |thing: &Thing| Visitor {
             solids: solids_of(&thing.shape),
@@ -148,8 +135,8 @@ impl World {
         world
     }
 
-    /// Let obstacles appear, disappear and move until `time`, seconds. An obstacle that would appear inside the robot, a disc of `radius`
-    /// at `centre`, appears when its place is free.
+    /// Obstacles appear, disappear and move until `time`, seconds. One that would appear inside the robot, a disc of
+    /// `radius` at `centre`, appears when its place is free.
     pub fn advance(&mut self, time: f64, centre: DVec2, radius: f64) {
         for visitor in &mut self.things {
             visitor.offset = visitor.thing.offset_at(time);
@@ -159,18 +146,15 @@ impl World {
         }
     }
 
-    /// Heights of the body and its sensors.
     pub fn heights(&self) -> &Heights {
         &self.heights
     }
 
-    /// Everything that is there now.
     pub fn solids(&self) -> impl Iterator<Item = Solid> + '_ {
         let visiting = self.things.iter().filter(|visitor| visitor.present);
         self.standing.iter().copied().chain(visiting.flat_map(Visitor::now))
     }
 
-    /// Every surface that the body can touch.
     pub fn touchable(&self) -> impl Iterator<Item = Surface> + '_ {
         let Heights { ground_clearance_m, body_top_m, .. } = self.heights;
         self.solids()
@@ -178,13 +162,12 @@ impl World {
             .map(|solid| solid.surface)
     }
 
-    /// Distance from `point` to the nearest surface that the body can touch, metres; infinite where nothing stands.
+    /// Metres to the nearest surface that the body can touch; infinite where nothing stands.
     pub fn clearance(&self, point: DVec2) -> f64 {
         self.touchable().map(|surface| surface.distance(point)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Distance along the level ray at `height_m` from `origin` in the unit direction `along` to the first surface,
-    /// metres, and that surface.
+    /// Metres along the level ray at `height_m` from `origin` in the unit direction `along`, and that surface.
     pub fn first_hit(&self, origin: DVec2, along: DVec2, height_m: f64) -> Option<(f64, Surface)> {
         self.solids()
             .filter(|solid| solid.profile.height_gap(height_m) == 0.0)
@@ -194,7 +177,6 @@ impl World {
 }
 
 impl World {
-    /// The solids at `height_m` no farther than `reach_m` from `point`.
     pub fn near(&self, point: DVec2, reach_m: f64, height_m: f64) -> Vec<Solid> {
         self.solids()
             .filter(|solid| solid.profile.height_gap(height_m) == 0.0)
@@ -202,8 +184,8 @@ impl World {
             .collect()
     }
 
-    /// Whether a surface at `height_m` stands between two points, or within [`TOUCHES_M`] of the second: a thing that the body touches
-    /// may stand between a sensor at its edge and its centre.
+    /// A surface at `height_m` stands between the points, or within [`TOUCHES_M`] of the second: a thing that the
+    /// body touches may stand between a sensor at its edge and its centre.
     pub fn is_between(&self, from: DVec2, to: DVec2, height_m: f64) -> bool {
         let Some(along) = (to - from).try_normalize() else {
             return false;
@@ -232,7 +214,6 @@ trait Itinerary {
 }
 
 impl Itinerary for Thing {
-    /// Displacement of the thing at `time` from the place of its shape.
     fn offset_at(&self, time: f64) -> DVec2 {
         let next = self.moves.partition_point(|station| station.at_s <= time);
         let before = next.checked_sub(1).and_then(|last| self.moves.get(last));

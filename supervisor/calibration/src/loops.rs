@@ -19,46 +19,44 @@ use nalgebra::{Cholesky, DMatrix, DVector, Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// The prior: standard deviations of the ratio and of the track, about 1.
+/// Standard deviations about 1.
 const PRIOR_RATIO: f64 = 0.01;
 const PRIOR_TRACK: f64 = 0.02;
-/// The prior of slip: its median, metres per square root of a metre, and the deviation of its logarithm.
+/// Median, metres per square root of a metre, and the deviation of the logarithm.
 const PRIOR_SLIP: f64 = 0.002;
 const PRIOR_LN_SLIP: f64 = 1.2;
-/// The values of slip that are considered: from the least to the greatest by equal factors.
+/// Considered values, from the least to the greatest by equal factors.
 const SLIPS: u32 = 60;
 const LEAST_SLIP: f64 = 0.0001;
-/// The greatest slip of a floor that can be driven on.
+/// A floor with more cannot be driven on.
 const MOST_SLIP: f64 = 0.01;
-/// The prior of a normal's standard deviation, radians, and the number of sweeps that it is worth.
+/// A normal's standard deviation, and the number of sweeps that it is worth.
 const PRIOR_NORMAL_RAD: f64 = 0.01;
 const PRIOR_NORMALS: f64 = 4.0;
-/// The loops that are held out to check the others.
 pub const HELD_OUT: usize = 2;
-/// The fewest loops of a calibration, those held out included.
 pub const FEWEST_LOOPS: usize = 6;
-/// Deviations within which the loops that are held out must lie.
+/// The held-out loops lie within so many deviations.
 const AGREES: f64 = 3.0;
-/// The deviations of a residual beyond which it is an accident; two such residuals are a fault of the floor or the robot.
+/// A residual of more deviations is an accident; two such residuals are a fault of the floor or the robot.
 const ACCIDENT: f64 = 5.0;
-/// The greatest chi^2 per degree of freedom.
+/// Per degree of freedom.
 const MOST_CHI2: f64 = 4.0;
 
-/// A loop, from one visit to the wall to the next.
+/// From one visit to the wall to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Loop {
-    /// The number of the loop among all; those next to each other share a normal.
+    /// Among all: loops next to each other share a normal.
     pub number: u32,
-    /// Whole turns, counter-clockwise positive.
+    /// Counter-clockwise positive.
     pub turns: f64,
-    /// Nominal ways of the wheels, forward less backward, metres.
+    /// Nominal ways, forward less backward.
     pub left_m: f64,
     pub right_m: f64,
-    /// The way of both wheels together, whichever way they rolled, metres.
+    /// Both wheels together, whichever way they rolled.
     pub rolled_m: f64,
 }
 
-/// The standard deviation of a normal, radians, from the differences between the two ways of each sweep.
+/// Radians, from the differences between the two ways of each sweep.
 #[must_use]
 pub fn normal_sd(differences: &[f64]) -> f64 {
     let n = differences.len() as f64;
@@ -69,7 +67,6 @@ pub fn normal_sd(differences: &[f64]) -> f64 {
     ((sum + PRIOR_NORMALS * PRIOR_NORMAL_RAD.powi(2)) / (freedom + PRIOR_NORMALS)).sqrt()
 }
 
-/// Wheels that are not nominal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Wheels {
     /// (rho - 1) / (rho + 1).
@@ -85,14 +82,14 @@ impl Wheels {
         Self { e, track }
     }
 
-    /// The turn of a robot whose wheels went these nominal ways, radians.
+    /// The turn for these nominal ways, radians.
     #[must_use]
     pub fn turned(self, left_m: f64, right_m: f64, track_m: f64) -> f64 {
         (right_m - left_m + self.e * (right_m + left_m)) / (track_m * self.track)
     }
 }
 
-/// Mean and standard deviation of slip, by the logarithm of its likelihood.
+/// Mean and standard deviation, by the logarithm of the likelihood.
 pub(crate) fn posterior_of_slip(ln_likelihood: impl Fn(f64) -> f64) -> (f64, f64) {
     let step = (MOST_SLIP / LEAST_SLIP).ln() / f64::from(SLIPS - 1);
     let slips = (0..SLIPS).map(|index| LEAST_SLIP * (step * f64::from(index)).exp());
@@ -112,7 +109,6 @@ pub(crate) fn posterior_of_slip(ln_likelihood: impl Fn(f64) -> f64) -> (f64, f64
     (mean, (square - mean * mean).max(0.0).sqrt())
 }
 
-/// The wheels by some loops.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
     /// (rho - 1) / (rho + 1) and tau.
@@ -120,12 +116,11 @@ pub struct Estimate {
     covariance: Matrix2<f64>,
     pub slip: f64,
     pub slip_sd: f64,
-    /// The residual of each loop, in units of its standard deviation.
+    /// In units of its standard deviation, per loop.
     pub residuals: Vec<f64>,
     pub chi2_per_dof: f64,
 }
 
-/// A calibration that is not written.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum Refusal {
     #[error(
@@ -150,11 +145,10 @@ pub enum Refusal {
     Singular,
 }
 
-/// The data of the fit: a row for each loop.
 struct Rows {
     design: DMatrix<f64>,
     values: DVector<f64>,
-    /// The variance by slip for q = 1, and the covariance by the normals.
+    /// Variance by slip for q = 1, and covariance by the normals.
     by_slip: DMatrix<f64>,
     by_normals: DMatrix<f64>,
 }
@@ -196,10 +190,10 @@ pub(crate) fn prior() -> (Vector2<f64>, Matrix2<f64>) {
 }
 
 impl Estimate {
-    /// The wheels by `loops`, of a robot with the nominal track `track_m`.
+    /// `track_m` is nominal.
     ///
     /// # Errors
-    /// If the numbers are not finite.
+    /// The numbers are not finite.
     pub fn of(loops: &[Loop], normal_sd: f64, track_m: f64) -> Result<Self, Refusal> {
         let rows = Rows::of(loops, normal_sd, track_m);
         let (mean, covariance) = prior();
@@ -242,8 +236,8 @@ impl Estimate {
         values.copied().all(f64::is_finite)
     }
 
-    /// The distance of an end by tape from the prediction by these wheels, in standard deviations of a coordinate. `by` gives the end by
-    /// wheels, and its variance by slip of 1.
+    /// The end by tape from the prediction by these wheels, in standard deviations of a coordinate. `by` gives the
+    /// end by wheels, and its variance by slip of 1.
     pub(crate) fn deviations_of_end(
         &self,
         by: impl Fn(Wheels) -> (DVec2, f64),
@@ -266,7 +260,7 @@ impl Estimate {
         (end.distance_squared(here) / 2.0 / variance).sqrt()
     }
 
-    /// rho: diameter of the right wheel over that of the left one.
+    /// rho: right over left.
     #[must_use]
     pub fn ratio(&self) -> f64 {
         (1.0 + self.values.x) / (1.0 - self.values.x)
@@ -277,7 +271,7 @@ impl Estimate {
         2.0 * self.covariance[(0, 0)].max(0.0).sqrt() / (1.0 - self.values.x).powi(2)
     }
 
-    /// tau: track on the ground over the nominal one.
+    /// tau: on the ground over nominal.
     #[must_use]
     pub fn track(&self) -> f64 {
         self.values.y
@@ -293,7 +287,7 @@ impl Estimate {
         Wheels { e: self.values.x, track: self.values.y }
     }
 
-    /// The difference of `held_out` from the prediction of this estimate, in standard deviations of the prediction.
+    /// The distance from the prediction, in its standard deviations.
     fn deviations(&self, held_out: &Loop, normal_sd: f64, track_m: f64) -> f64 {
         let rows = Rows::of(&[*held_out], normal_sd, track_m);
         let square = self.slip * self.slip + self.slip_sd * self.slip_sd;
@@ -302,7 +296,7 @@ impl Estimate {
         off / (rows.noise(square.sqrt())[(0, 0)] + by_values).sqrt()
     }
 
-    /// The values for `[robot.odometry]`, without their provenance. The loops do not tell the distance, which stays as it was.
+    /// Values for `[robot.odometry]`, without provenance. The loops do not tell the distance, which stays as it was.
     #[must_use]
     pub fn odometry(&self, before: &Odometry) -> Odometry {
         Odometry {
@@ -319,11 +313,11 @@ impl Estimate {
     }
 }
 
-/// The wheels by `loops`, and the loops that were used, if they agree: at most one is an accident, which is left out, and two that are
-/// held out lie where the others predict.
+/// The wheels and the loops that were used, if they agree: at most one is an accident, which is left out, and two
+/// that are held out lie where the others predict.
 ///
 /// # Errors
-/// The reason why nothing may be written.
+/// Says why nothing may be written.
 pub fn checked(
     loops: &[Loop],
     normal_sd: f64,

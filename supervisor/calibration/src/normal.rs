@@ -2,24 +2,22 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The distances from the median range within which an echo is of the wall, metres. A rough wall answers over the whole sweep; the next of
-/// these limits leaves its ends out.
+/// An echo this near to the median range is of the wall. A rough wall answers over the whole sweep; the next of these
+/// limits leaves its ends out.
 const WITHIN_M: [f64; 3] = [0.12, 0.06, 0.03];
-/// The readings at either end of a leg that must not be of the wall: then the arc that answers is whole.
+/// So many readings at either end of a leg must not be of the wall: then the arc that answers is whole.
 const MARGIN: usize = 2;
-/// The fewest readings of a wall.
 const FEWEST: usize = 5;
-/// The most readings of one leg, of which more are dropped: three times those of the slowest sweep at 7 Hz.
+/// More readings of one leg are dropped: three times those of the slowest sweep at 7 Hz.
 const MOST: usize = 200;
-/// The difference between the arcs of both legs at which one of them was cut short, by a run of silence or by a thing beside the wall,
-/// radians.
+/// If both legs' arcs differ more, one was cut short, by a run of silence or by a thing beside the wall.
 const UNEQUAL_RAD: f64 = 0.12;
 
-/// The readings of a turn to one side, in the order of time: heading and range, metres, NaN without an echo.
+/// A turn to one side, in the order of time: heading and range, metres, NaN without an echo.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Leg(Vec<(f64, f64)>);
 
-/// The headings at which the wall begins and ends to answer, radians.
+/// Headings at which the wall begins and ends to answer, radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Arc {
     first: f64,
@@ -61,28 +59,25 @@ impl Leg {
     }
 }
 
-/// The normal by the turns to both sides.
+/// The mean of the turns to both sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Normal {
-    /// The heading that faces the wall, radians.
     pub(crate) heading: f64,
-    /// The middle of the first turn's arc less that of the second one. The age of the ranges makes this the same in each sweep; its scatter
-    /// is that of the normals.
+    /// Middle of the first turn's arc less that of the second. The age of the ranges makes this the same in each
+    /// sweep; its scatter is that of the normals.
     pub(crate) difference: f64,
-    /// The distance of the wall from the sonar, metres.
+    /// The wall's distance from the sonar.
     pub(crate) range_m: f64,
 }
 
-/// A sweep that gives no normal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NoNormal {
-    /// A leg has not both ends of the arc that answers.
+    /// A leg lacks an end of the arc that answers.
     Narrow,
-    /// The arcs of both legs are not alike.
     Unequal,
 }
 
-/// The normal, if both legs saw the whole arc that answers.
+/// Both legs must have seen the whole arc that answers.
 pub(crate) fn normal(legs: &[Leg; 2]) -> Result<Normal, NoNormal> {
     let [Some(there), Some(back)] = [legs[0].arc(), legs[1].arc()] else {
         return Err(NoNormal::Narrow);

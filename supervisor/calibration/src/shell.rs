@@ -25,12 +25,11 @@ use crate::{
     wall::{Order, Wall, echo_m},
 };
 
-/// Room for the encoded state, bytes: two legs of 200 readings, and 64 loops.
+/// Encoded: two legs of 200 readings, and 64 loops.
 pub(crate) const STATE_BYTES: usize = 16 << 10;
-/// Poses that wait for the readings of their tick.
+/// They wait for the readings of their tick.
 const MOST_POSES: usize = 64;
 
-/// The procedure that is under way.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Drive {
     Wall(Box<Wall>),
@@ -38,11 +37,11 @@ pub enum Drive {
 }
 
 impl Drive {
-    /// The procedure of the run in `directory` at its end, as the stage saved it in its last tick. A recording may lack ticks, because no
-    /// stage waits for a recorder.
+    /// The procedure at the end of the run in `directory`, as saved in its last tick: a recording may lack ticks,
+    /// because no stage waits for a recorder.
     ///
     /// # Errors
-    /// If the checkpoint cannot be read.
+    /// The checkpoint cannot be read.
     pub fn of_run(directory: &Path) -> Result<Option<Self>, CheckpointError> {
         let file = run::checkpoint_file(directory, Shell::WIRING.stage);
         Ok(Checkpoint::open(&file, STATE_BYTES)?.1)
@@ -67,16 +66,15 @@ impl Drive {
 pub struct Shell {
     pose: Reader<PoseSample>,
     ranges: Reader<RangesHeader, RangeReading>,
-    /// The row of the front sonar.
     front: usize,
     guidance: Writer<GuidanceSample>,
     saved: Saved,
     body: Body,
-    /// The place where the robot faces the wall.
+    /// The robot faces the wall there.
     target: TargetSample,
     drive: Drive,
     poses: VecDeque<PoseSample>,
-    /// The newest tick with readings, and the echo of the front sonar, metres.
+    /// The newest tick with readings, and the front sonar's echo, metres.
     newest: Option<(u64, Option<f64>)>,
     answered: Option<GuidanceSample>,
     progress: Progress,

@@ -1,8 +1,9 @@
-//! Ratio and track from squares whose ends were measured by tape. Pure.
+//! Ratio and track from squares whose ends were measured by tape.
 //!
-//! The squares are those of J. Borenstein and L. Feng, "Measurement and correction of systematic odometry errors in mobile robots",
-//! IEEE Trans. Robotics and Automation 12(6), 1996: some to the left and as many to the right, each from the same mark. In place of
-//! their formulae the ways of the wheels are integrated again with other values, until the ends are those of the tape.
+//! The squares are those of J. Borenstein and L. Feng, "Measurement and correction of systematic odometry errors in
+//! mobile robots", IEEE Trans. Robotics and Automation 12(6), 1996: some to the left and as many to the right, each
+//! from the same mark. In place of their formulae the ways of the wheels are integrated again with other values,
+//! until the ends are those of the tape.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -17,30 +18,29 @@ use crate::{
     ways::Ways,
 };
 
-/// The rest of a corner at which it counts as turned, radians; the order is at most this far ahead.
+/// A corner with so little rest counts as turned; the order is at most this far ahead.
 const TURNED_RAD: f64 = 0.03;
 const SLOW_RAD: f64 = 0.08;
 const FAST_RAD: f64 = 0.5;
 const SPEED_M_S: f64 = 0.35;
-/// Standard deviation of a coordinate measured by tape, metres.
+/// Standard deviation of a coordinate by tape.
 const TAPE_M: f64 = 0.005;
-/// Steps of the fit, whose problem is nearly linear.
+/// The fit's problem is nearly linear.
 const STEPS: u32 = 5;
-/// The change of a value by which its effect is found.
+/// A value's effect is found by this change.
 const NUDGE: f64 = 1e-4;
-/// Deviations within which the pair that is held out must lie, per coordinate.
+/// The limit for the pair that is held out, per coordinate.
 const AGREES: f64 = 3.0;
-/// The fewest squares, half of them to the left.
+/// Half of them are to the left.
 pub const FEWEST_SQUARES: usize = 6;
 
-/// The drive along one square.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Square {
     side_m: f64,
     /// 1 to the left, -1 to the right.
     turns: f64,
     ways: Ways,
-    /// Corners turned so far; 4 at the end.
+    /// The count is 4 at the end.
     corners: u32,
     turning: bool,
     from_m: f64,
@@ -59,7 +59,6 @@ impl Square {
         if self.corners >= 4 { State::Finished } else { State::Running }
     }
 
-    /// The order for a tick with these counts.
     pub fn step(&mut self, counts: [u16; 2], body: &Body) -> Order {
         self.ways.step(counts, body);
         let heading =
@@ -91,7 +90,6 @@ impl Square {
     }
 }
 
-/// The nominal ways of both wheels from counts to counts, metres.
 #[must_use]
 pub fn nominal_ways(counts: &[[u16; 2]], body: &Body) -> Vec<[f64; 2]> {
     let mut ways = Ways::default();
@@ -103,7 +101,7 @@ pub fn nominal_ways(counts: &[[u16; 2]], body: &Body) -> Vec<[f64; 2]> {
     counts.iter().map(step).collect()
 }
 
-/// A square that was driven: the nominal ways of both wheels in each tick, metres, and its end by tape, in the frame of its start.
+/// Nominal ways of both wheels in each tick, metres, and the end by tape, in the frame of its start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Driven {
     pub ways: Vec<[f64; 2]>,
@@ -111,7 +109,7 @@ pub struct Driven {
 }
 
 impl Driven {
-    /// The end by these wheels, and the variance of a coordinate by slip of 1 m per square root of a metre, m^2.
+    /// The end, and the variance of a coordinate by slip of 1 m per square root of a metre, m^2.
     fn by(&self, wheels: Wheels, track_m: f64) -> (DVec2, f64) {
         let mut pose = Pose2::default();
         let mut poses = Vec::with_capacity(self.ways.len());
@@ -129,7 +127,7 @@ impl Driven {
     }
 }
 
-/// The wheels by the squares, with so much slip.
+/// The least squares for so much slip.
 fn fitted(
     squares: &[Driven],
     slip: f64,
@@ -194,10 +192,10 @@ fn estimate(squares: &[Driven], track_m: f64) -> Result<Estimate, Refusal> {
     found.is_finite().then_some(found).ok_or(Refusal::Singular)
 }
 
-/// The wheels by `squares`, if the last pair lies where the others say.
+/// The last pair must lie where the others say.
 ///
 /// # Errors
-/// The reason why nothing may be written.
+/// Says why nothing may be written.
 pub fn checked(squares: &[Driven], track_m: f64) -> Result<Estimate, Refusal> {
     if squares.len() < FEWEST_SQUARES {
         return Err(Refusal::TooFewSquares { found: squares.len() });

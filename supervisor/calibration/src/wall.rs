@@ -1,7 +1,8 @@
-//! The procedure before a wall: sweep, turn, drive away, turn, come back, sweep again. A step for each tick, pure.
+//! The procedure before a wall: sweep, turn, drive away, turn, come back, sweep again. Pure.
 //!
-//! Headings are measured from the last normal, with the wheels as the loops so far have them. The first two loops have a single turn,
-//! because nothing is known of the track yet; later ones have as many as the robot can make and still find the wall.
+//! Headings are measured from the last normal, with the wheels as the loops so far have them. The first two loops
+//! have a single turn, because nothing is known of the track yet; later ones have as many as the robot can make and
+//! still find the wall.
 
 use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
@@ -17,95 +18,81 @@ use crate::{
     ways::Ways,
 };
 
-/// The range at which a drive to the wall ends, metres, and that at which it goes slowly.
+/// The range at which a drive to the wall ends, and that at which it goes slowly.
 const STOP_M: f64 = 0.42;
 const NEAR_M: f64 = 0.7;
-/// The free distance ahead below which a drive away from the wall ends, metres.
+/// Less free distance ahead ends a drive away from the wall.
 const AHEAD_M: f64 = 0.5;
-/// The longest first drive to the wall, metres, and the readings without an echo at which it ends before.
+/// The longest first drive to the wall, and the readings without an echo at which it ends before.
 const APPROACH_M: f64 = 2.0;
 const SILENT: u32 = 7;
-/// The number of near echoes in a row that count: a single one may be false.
+/// Near echoes in a row; a single one may be false.
 const NEAR: u32 = 2;
-/// The shortest drive away from which a loop gains knowledge, metres.
+/// A loop gains knowledge from a drive away this long.
 const SHORTEST_M: f64 = 0.5;
-/// The distance beyond its limit at which a drive back has missed the wall's echo, metres.
+/// A drive back this far beyond its limit has missed the wall's echo.
 const BEYOND_M: f64 = 0.15;
-/// Half the angle of a sweep. If a sweep was too narrow, because the robot turned by less or more than it reckoned, the next one is
+/// Half a sweep. If that was too narrow, because the robot turned by less or more than it reckoned, the next one is
 /// wider by a third, up to the greatest share.
 const SWEEP_RAD: f64 = FRAC_PI_4;
 const WIDER: f64 = 1.0 / 3.0;
 const MOST_WIDER: u32 = 2;
-/// Sweeps of one visit.
 const SWEEPS: u32 = 5;
-/// Whole turns of a loop before the half one: the first number of them after which the heading is known this well, radians.
 const TURNS: [f64; 2] = [3.0, 1.0];
 const HEADING_SD_RAD: f64 = 0.13;
-/// The angle by which the ordered direction is ahead of the robot, radians, in a sweep and at most in another turn. The controller
-/// turns on the spot by a rate in proportion to the angle that is left, at least 0.25 rad/s.
+/// The ordered direction is so far ahead of the robot, in a sweep and at most in another turn. The controller turns
+/// on the spot by a rate in proportion to the angle that is left, at least 0.25 rad/s.
 const SLOW_RAD: f64 = 0.08;
 const FAST_RAD: f64 = 0.5;
-/// The rest of a turn at which it is over, radians.
+/// A turn with this rest is over.
 const TURNED_RAD: f64 = 0.04;
-/// Speeds, m/s.
 const SPEED_M_S: f64 = 0.35;
 const NEAR_M_S: f64 = 0.12;
 /// The deviation of the track that is good enough, over that of the ratio.
 const TRACK_OVER_RATIO: f64 = 3.0;
 
-/// The state of a calibration before a wall.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Wall {
     plan: CalibrationPlan,
     ways: Ways,
-    /// The wheels by the loops so far.
     wheels: Wheels,
     /// The ways when the robot faced the wall.
     visit: Ways,
-    /// Whether the wall was faced by a measured normal: at first it is where the robot started.
+    /// The wall was faced by a measured normal: at first it is where the robot started.
     is_measured: bool,
-    /// The heading of the wall that is expected next, radians.
     facing: f64,
     phase: Phase,
-    /// The way of the middle between the wheels at the start of this phase, metres.
+    /// The middle between the wheels at the start of this phase.
     phase_from_m: f64,
-    /// The way of the middle at the start of the drive away, the length of that drive with its end, and the range at which the
-    /// robot swept before it, metres.
+    /// The middle's way at the start of the drive away, the drive's length, and the range of the sweep before it.
     away_from_m: f64,
     away_m: f64,
     swept_m: f64,
-    /// Readings in a row that are at the limit of this phase, and readings without an echo.
+    /// Readings in a row at the limit of this phase, and without an echo.
     near: u32,
     silent: u32,
     sweeps: u32,
-    /// The number of times that the sweep was made wider.
     wider: u32,
     legs: [Leg; 2],
-    /// Differences between the two ways of each sweep, radians.
+    /// The two ways of each sweep differ so, radians.
     differences: Vec<f64>,
     loops: Vec<Loop>,
-    /// Visits so far.
     visits: u32,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 enum Phase {
-    /// The robot drives to the wall.
     Approach,
-    /// The robot turns to the beginning of the sweep.
     Aside,
-    /// The sweep: the first leg, then the second.
     Sweep(usize),
-    /// The robot turns, before it drives away from the wall.
+    /// The turn before the drive away from the wall.
     Turn(f64),
     Away(f64),
-    /// The half turn back to the wall.
     Back,
     Finished,
     Failed(Fault),
 }
 
-/// A procedure that cannot go on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 pub enum Fault {
     #[error(
@@ -116,19 +103,17 @@ pub enum Fault {
     NoRoom,
 }
 
-/// The order of one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Order {
     pub status: GuidanceStatus,
-    /// The angle from the robot's axis to the direction, counter-clockwise, radians.
+    /// The angle from the robot's axis to the direction, counter-clockwise.
     pub aside_rad: f64,
     pub speed_limit_m_s: f64,
-    /// The robot's place and heading before the wall: the origin is where it faces the wall, and the wall is ahead on the x-axis.
+    /// The robot's place and heading: the origin is where it faces the wall, which is ahead on the x-axis.
     pub x_m: f64,
     pub heading_rad: f64,
 }
 
-/// The end of a procedure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum State {
     Running,
@@ -136,7 +121,6 @@ pub enum State {
     Failed(Fault),
 }
 
-/// The distance that a reading of the front sonar gives, metres.
 pub(crate) fn echo_m(reading: &RangeReading) -> Option<f64> {
     match reading.status() {
         RangeStatus::Measured => Some(reading.range_m),
@@ -176,13 +160,11 @@ impl Wall {
         &self.loops
     }
 
-    /// The standard deviation of a normal, radians.
     #[must_use]
     pub fn normal_sd(&self) -> f64 {
         normal_sd(&self.differences)
     }
 
-    /// The mean way of a wheel so far, metres.
     #[must_use]
     pub fn metres(&self) -> f64 {
         self.ways.rolled_m / 2.0
@@ -197,7 +179,6 @@ impl Wall {
         }
     }
 
-    /// The order for a tick with these counts and this echo.
     pub fn step(&mut self, counts: [u16; 2], echo_m: Option<f64>, body: &Body) -> Order {
         self.ways.step(counts, body);
         let heading = self.heading(body);
@@ -276,7 +257,7 @@ impl Wall {
         }
     }
 
-    /// The sweep is over, at the `nominal` heading: the loop is complete if the wall was found.
+    /// The sweep ends at the `nominal` heading; the loop is complete if the wall was found.
     fn end_sweep(&mut self, nominal: f64, body: &Body) {
         self.sweeps += 1;
         let normal = match normal(&self.legs) {
@@ -320,12 +301,11 @@ impl Wall {
         self.enter(Phase::Turn(side * (TAU * turns + PI)));
     }
 
-    /// Half the angle of this sweep.
     fn half_rad(&self) -> f64 {
         SWEEP_RAD * (1.0 + WIDER * f64::from(self.wider))
     }
 
-    /// The whole turns of the next loop: none until both sides were tried once.
+    /// None until both sides were tried once.
     fn turns(&self, estimate: Option<&Estimate>, body: &Body) -> f64 {
         let Some(estimate) = estimate.filter(|_| self.loops.len() >= 2) else {
             return 0.0;

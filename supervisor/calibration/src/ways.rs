@@ -3,13 +3,12 @@
 use common::{mission::Body, wire::counts_between};
 use serde::{Deserialize, Serialize};
 
-/// The ways that wheels of nominal size have rolled since the first counts, metres.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Ways {
     counts: Option<[u16; 2]>,
     pub(crate) left_m: f64,
     pub(crate) right_m: f64,
-    /// The sum of both ways, each counted forward whichever way the wheel rolled.
+    /// The sum of both, each counted forward whichever way the wheel rolled.
     pub(crate) rolled_m: f64,
 }
 

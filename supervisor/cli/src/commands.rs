@@ -41,8 +41,8 @@ use console::{
 
 use crate::companions;
 
-/// Declares the subcommands by groups: the name of each and the module that has its `Arguments` and its `main`, whose further
-/// arguments stand in parentheses. Behind `@` stand the companions of the group.
+/// Groups of subcommands: a name, and the module with its `Arguments` and its `main`, whose further arguments stand
+/// in parentheses. Companions stand behind `@`.
 macro_rules! commands {
     ($($heading:literal {
         $($name:ident $module:ident $(($whole:ident))?,)*
@@ -141,12 +141,12 @@ const EXIT_CODES: &str = "Exit codes of run:
 
 An error message ends with a code in brackets, which scripts can match.";
 
-/// The command line of the executable, for help, completions and the manual page.
+/// Help, completions and the manual page come from it.
 pub(crate) fn command_line() -> clap::Command {
     Arguments::command().subcommands(companions::TABLE.iter().map(companions::Companion::command))
 }
 
-/// The code of `error`, if only this executable has such errors.
+/// Only errors that no other executable has get a code here.
 pub(crate) fn error_code(error: &(dyn Error + 'static)) -> Option<&'static str> {
     match error.downcast_ref()? {
         ReportError::Recording(error) => failure::code_of_recording(error),
@@ -154,7 +154,6 @@ pub(crate) fn error_code(error: &(dyn Error + 'static)) -> Option<&'static str> 
     }
 }
 
-/// The subcommand that `words` name, which stand after the executable.
 pub(crate) fn parse<T: AsRef<OsStr>>(words: &[T]) -> Result<Command, clap::Error> {
     let executable = OsString::from("firsthand");
     let words =
@@ -164,7 +163,7 @@ pub(crate) fn parse<T: AsRef<OsStr>>(words: &[T]) -> Result<Command, clap::Error
 }
 
 impl Command {
-    /// The least level of the log on standard error; none if the command sees to its log itself.
+    /// None if the command sees to its log itself.
     pub(crate) fn log_level(&self) -> Option<&'static str> {
         match self {
             Self::Run(_) | Self::Calibrate(_) => None,
@@ -175,7 +174,7 @@ impl Command {
     }
 }
 
-/// The subcommands by groups, each with the beginning of its help.
+/// Each stands with the beginning of its help.
 fn listed() -> String {
     let all = Command::augment_subcommands(clap::Command::new(""));
     let all = all.subcommands(companions::TABLE.iter().map(companions::Companion::command));

@@ -1,4 +1,4 @@
-//! The subcommands that are executables of their own beside this one, started as git starts its own: `firsthand page` becomes
+//! Subcommands that are executables beside this one, started as git starts its own: `firsthand page` becomes
 //! `firsthand-page`.
 
 use std::{
@@ -16,11 +16,10 @@ use console::{
 };
 use processes::executable;
 
-/// A subcommand of another executable.
 pub(crate) struct Companion {
     pub(crate) name: &'static str,
     executable: &'static str,
-    /// Whether the executable has further subcommands and is told this one's name.
+    /// The executable has further subcommands and is told this one's name.
     is_one_of_many: bool,
     pub(crate) about: &'static str,
 }
@@ -33,10 +32,10 @@ const fn laboratory(name: &'static str, about: &'static str) -> Companion {
     Companion { name, executable: LABORATORY, is_one_of_many: true, about }
 }
 
-/// The executable that measures robots and contains the planners to compare with.
+/// It measures robots and contains the planners to compare with.
 pub(crate) const LABORATORY: &str = "firsthand-lab";
 
-/// THE table of companions. The package, completions, help and the manual page know them from here.
+/// THE table: the package, completions, help and the manual page know them from here.
 pub(crate) static TABLE: [Companion; 8] = [
     viewer(
         "top",
@@ -59,13 +58,12 @@ pub(crate) static TABLE: [Companion; 8] = [
     laboratory("bench", "Measure ticks; send random signals to a robot's processes"),
 ];
 
-/// The companion that is `named`.
 pub(crate) fn find(named: &OsStr) -> Option<&'static Companion> {
     TABLE.iter().find(|companion| named == companion.name)
 }
 
-/// Become the companion that the words after `firsthand` name, or that they ask help for. None if they name none, else the error of
-/// an executable that is not there or does not start.
+/// `words` after `firsthand` name a companion or ask for its help. None if they name none, else the error of an
+/// executable that does not start.
 pub(crate) fn execute(words: &[OsString]) -> Option<Result<ExitCode, Failure>> {
     let (first, rest) = words.split_first()?;
     let (companion, options) = match find(first) {
@@ -79,8 +77,7 @@ pub(crate) fn execute(words: &[OsString]) -> Option<Result<ExitCode, Failure>> {
     Some(Err(companion.become_executable(options)))
 }
 
-/// If a shell asks for completions of a companion's words, become the companion, which answers. `words` are those of this process:
-/// the executable, `--`, and the line that is completed.
+/// A companion answers a shell itself. `words` are the executable, `--`, and the line that is completed.
 pub(crate) fn answer_shell(words: &[OsString]) {
     let Some(companion) = words.get(3).and_then(|word| find(word)) else { return };
     if env::var_os(VARIABLE).is_none() || words.len() < 5 {
@@ -98,13 +95,13 @@ pub(crate) fn answer_shell(words: &[OsString]) {
 }
 
 impl Companion {
-    /// Become its executable with these options. Returns why that is impossible.
+    /// Returns why that is impossible.
     fn become_executable(&self, options: Vec<OsString>) -> Failure {
         let name = self.is_one_of_many.then(|| self.name.into());
         become_executable(self.executable, name.into_iter().chain(options))
     }
 
-    /// Its place in the command line, for help, completions and the manual page.
+    /// Help, completions and the manual page show it.
     pub(crate) fn command(&self) -> clap::Command {
         let words = Arg::new("words")
             .num_args(0..)
@@ -114,7 +111,7 @@ impl Companion {
     }
 }
 
-/// Become the executable `named`, which is beside this one or on PATH. Returns why that is impossible.
+/// The executable is beside this one or on PATH. Returns why that is impossible.
 pub(crate) fn become_executable(named: &str, words: impl Iterator<Item = OsString>) -> Failure {
     match executable::find(Path::new(named)) {
         Ok(found) => {

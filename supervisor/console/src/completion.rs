@@ -25,11 +25,11 @@ pub struct Arguments {
     shell: String,
 }
 
-/// The environment variable by which the script of a shell asks.
+/// The script of a shell asks by it.
 pub const VARIABLE: &str = "FIRSTHAND_COMPLETE";
-/// The environment variable in which bash and zsh give the number of the word that is completed.
+/// Bash and zsh give the number of the completed word in it.
 pub const INDEX: &str = "_CLAP_COMPLETE_INDEX";
-/// The executable, which the shell finds on PATH.
+/// The shell finds it on PATH.
 const EXECUTABLE: &str = "firsthand";
 
 pub fn main(arguments: &Arguments) -> Result<(), Failure> {
@@ -40,12 +40,12 @@ pub fn main(arguments: &Arguments) -> Result<(), Failure> {
     Ok(print_text(&String::from_utf8_lossy(&script))?)
 }
 
-/// If a shell asks, answer and end the process. `whole` is the command line of the executable, `pages` those of the guide.
+/// Answers a shell that asks, and ends the process. `whole` is the executable's command line, `pages` those of the
+/// guide.
 pub fn answer_shell(whole: fn() -> Command, pages: fn() -> Vec<String>) {
     CompleteEnv::with_factory(|| with_candidates(whole(), pages)).var(VARIABLE).complete();
 }
 
-/// `command` with candidates for the values of its arguments.
 fn with_candidates(command: Command, pages: fn() -> Vec<String>) -> Command {
     command
         // Only `stage` asks for these, because no other command takes a word that is no subcommand.
@@ -57,7 +57,7 @@ fn with_candidates(command: Command, pages: fn() -> Vec<String>) -> Command {
         .mut_subcommands(|subcommand| with_candidates(subcommand, pages))
 }
 
-/// The completer of an argument that names a robot, a stage, a topic, a mission, or a page of the guide.
+/// A robot, a stage, a topic, a mission, or a page of the guide.
 fn completer(argument: &Arg, pages: fn() -> Vec<String>) -> Option<ArgValueCompleter> {
     let robot = ValueParser::new(|name: &str| name.parse::<RobotName>()).type_id();
     if argument.get_value_parser().type_id() == robot {

@@ -1,4 +1,4 @@
-//! The main function of an executable beside `firsthand`: a viewer, or the laboratory.
+//! The main function of a viewer, or of the laboratory.
 
 use std::{error::Error, process::ExitCode};
 
@@ -10,8 +10,8 @@ use crate::{
     logging,
 };
 
-/// Answer a shell that asks for completions; or parse the command line, log to standard error from `log_level` on, and `execute`.
-/// An error is reported with its code, or with that which `own_code` knows of errors that only this executable has.
+/// Answer a shell that asks for completions; or parse the command line, log to standard error from `log_level` on,
+/// and `execute`. `own_code` knows the codes of errors that only this executable has.
 pub fn run<A: Parser>(
     log_level: &str,
     execute: fn(&A) -> Result<ExitCode, Failure>,

@@ -16,10 +16,9 @@ use thiserror::Error;
 
 use super::{missions::LookupError, output::write_stderr};
 
-/// One sentence that names the input and the remedy.
+/// A sentence that names the input and the remedy.
 pub type Failure = Box<dyn Error>;
 
-/// A failure with a code that the command line itself gives.
 #[derive(Debug, Error)]
 #[error("{message}")]
 pub struct Refused {
@@ -34,8 +33,8 @@ impl Refused {
     }
 }
 
-/// The exit code of an executable whose subcommand gave `result`. An error is reported on standard error, with its code: the one
-/// that `own_code` knows, of errors that only this executable has, or else that of [`code`].
+/// Reports an error on standard error, with its code: `own_code` knows those of errors that only this executable has,
+/// [`code`] the others.
 pub fn report(
     result: Result<ExitCode, Failure>,
     own_code: fn(&(dyn Error + 'static)) -> Option<&'static str>,
@@ -52,10 +51,9 @@ pub fn report(
     })
 }
 
-/// The exit code of an invalid mission file: a service manager need not retry.
+/// A service manager need not retry.
 const INVALID_MISSION: u8 = 78;
 
-/// The exit code of a subcommand that failed with `error`.
 fn exit_code(error: &(dyn Error + 'static)) -> ExitCode {
     match code(error) {
         Some("mission" | "unknown-mission" | "planner-executable" | "address") => {
@@ -68,7 +66,7 @@ fn exit_code(error: &(dyn Error + 'static)) -> ExitCode {
     }
 }
 
-/// The code of `error`; none if no script could react to the error in particular.
+/// None stands for errors to which no script could react in particular.
 pub fn code(error: &(dyn Error + 'static)) -> Option<&'static str> {
     let code = error.downcast_ref().map(|refused: &Refused| refused.code);
     code.or_else(|| error.downcast_ref().and_then(of_supervisor))
@@ -149,8 +147,7 @@ fn of_lookup(error: &LookupError) -> &'static str {
     }
 }
 
-/// A remark to the message of `error`: a robot that does not run for this user may run for another one, whose bus nobody else
-/// can join.
+/// A robot that does not run for this user may run for another one, whose bus nobody else can join.
 fn remark(error: &(dyn Error + 'static)) -> Option<String> {
     let operator = error.downcast_ref().and_then(|error| match error {
         OperatorError::Bus(error) => Some(error),
@@ -163,7 +160,7 @@ fn remark(error: &(dyn Error + 'static)) -> Option<String> {
     Some(format!("a robot {robot:?} runs here for user {user}: `sudo -u '#{user}' firsthand ...`"))
 }
 
-/// The users who have files of a robot of that name in `shared` memory: the names of files begin with the number of the user.
+/// Users with files of that robot in `shared` memory: file names begin with the user's number.
 fn users<'a>(shared: &Path, robot: &'a str) -> impl Iterator<Item = u32> + use<'a> {
     let entries = fs::read_dir(shared).into_iter().flatten().flatten();
     entries.filter_map(move |entry| {

@@ -1,9 +1,9 @@
-//! An item of a Markdown list, wrapped.
+//! A wrapped item of a Markdown list.
 
-/// Columns that a line of a list has, unless a code span alone is longer.
+/// A line's columns, unless a code span alone is longer.
 const WIDTH: usize = 120;
 
-/// `text` as an item of a Markdown list. No line ends within a code span.
+/// No line ends within a code span.
 pub fn item(text: &str) -> String {
     let mut item = String::from("-");
     let mut column = 1;

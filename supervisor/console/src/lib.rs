@@ -1,22 +1,19 @@
-//! What the command lines of all executables share.
+//! The common part of all executables' command lines.
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`output`] | text and JSON on standard output, messages on standard error |
-//! | [`executable`] | the main function of an executable beside `firsthand` |
+//! | [`output`], [`stream`] | standard output, once or going on |
+//! | [`executable`] | the main function beside `firsthand`'s |
 //! | [`completion`] | completions of shells |
 //! | [`failure`] | why a subcommand failed, and its exit code |
-//! | [`stream`] | standard output of a command that goes on |
-//! | [`table`], [`item`] | tables of text; items of Markdown lists |
-//! | [`progress_line`] | progress on standard error |
-//! | [`waiting`] | sentences about a robot that is waited for |
+//! | [`table`], [`item`] | text tables; Markdown items |
+//! | [`progress_line`], [`waiting`] | progress, and a robot that is waited for |
 //! | [`words`] | states, ages and sizes in words |
-//! | [`missions`] | missions that ship and mission files, with assignments |
-//! | [`robots`] | the robots of this machine |
-//! | [`runs`] | the directories of runs |
-//! | [`operator`] | requests and signals to the processes of a robot |
+//! | [`missions`] | shipped missions and files, with assignments |
+//! | [`robots`], [`runs`] | this machine's robots and runs |
+//! | [`operator`] | requests and signals to a robot's processes |
 //! | [`rates`] | how often topics are published, against the table |
-//! | [`logging`] | logs to standard error, to a file, to the journal |
+//! | [`logging`] | logs to standard error, a file, the journal |
 
 pub mod completion;
 pub mod executable;

@@ -25,8 +25,8 @@ use tracing_subscriber::{
 
 type AnyLayer = Box<dyn Layer<Registry> + Send + Sync>;
 
-/// Whether standard error goes to the journal. `JOURNAL_STREAM` says which file the journal reads, and children
-/// inherit it even if their standard error is redirected, so the file is compared.
+/// `JOURNAL_STREAM` says which file the journal reads, and children inherit it even if their standard error is
+/// redirected, so the file is compared.
 pub fn to_journal() -> bool {
     let Some(journal) = std::env::var_os("JOURNAL_STREAM") else {
         return false;
@@ -38,12 +38,12 @@ pub fn to_journal() -> bool {
     journal.to_str() == Some(&format!("{}:{}", found.dev(), found.ino()))
 }
 
-/// Log to standard error as FIRSTHAND_LOG says, or else everything from level `default` up.
+/// FIRSTHAND_LOG says what is logged, or else everything from level `default` up.
 pub fn to_stderr(default: &str) {
     start(vec![stderr_layer()], default);
 }
 
-/// Log to the end of `file`, and to the journal if there is one.
+/// Appends to `file`, and to the journal if there is one. Fails if the file cannot be opened.
 pub fn to_file(file: &Path, default: &str) -> io::Result<()> {
     let log = Mutex::new(File::options().create(true).append(true).open(file)?);
     let mut layers: Vec<AnyLayer> =
@@ -105,8 +105,8 @@ fn priority(level: Level) -> &'static str {
 }
 
 impl Write for Entry {
-    /// Each call writes one event. Each of its lines is an entry of the journal and gets the priority. All lines are written at
-    /// once, so that lines of two processes do not mix.
+    /// Each line of an event is an entry of the journal and gets the priority. All are written at once, so that lines
+    /// of two processes do not mix.
     fn write(&mut self, event: &[u8]) -> io::Result<usize> {
         let mut entry = Vec::with_capacity(event.len() + self.priority.len());
         for line in event.split_inclusive(|&byte| byte == b'\n') {

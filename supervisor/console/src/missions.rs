@@ -41,13 +41,13 @@ pub fn shipped(name: &str) -> Option<&'static str> {
     found.map(|(_, text)| *text)
 }
 
-/// The shipped mission `name`, or the one in the file `name`, with `KEY=VALUE` assignments on top and the values of its calibration
-/// in place.
+/// The shipped mission or the file `name`, with `KEY=VALUE` assignments on top and the values of its calibration in
+/// place. Fails if there is none or it is invalid.
 pub fn load(name: &str, assignments: &[String]) -> Result<Mission, LookupError> {
     complete(as_assigned(name, assignments)?)
 }
 
-/// `mission` with the content of the files that it names.
+/// Puts the content of the files that it names in place. Fails if one cannot be read.
 pub fn complete(mission: Mission) -> Result<Mission, LookupError> {
     Ok(maps::with_prior_map(mission.with_calibration()?)?)
 }
@@ -66,7 +66,7 @@ fn as_assigned(name: &str, assignments: &[String]) -> Result<Mission, LookupErro
     as_parsed(&text, &origin, assignments)
 }
 
-/// The mission in `text`, called `origin`, with `KEY=VALUE` assignments on top.
+/// `origin` names `text`. Fails if it or an assignment is invalid.
 pub fn parsed(text: &str, origin: &str, assignments: &[String]) -> Result<Mission, LookupError> {
     complete(as_parsed(text, origin, assignments)?)
 }
@@ -91,7 +91,7 @@ fn as_parsed(text: &str, name: &str, assignments: &[String]) -> Result<Mission, 
     })
 }
 
-/// The recorded `mission` with `KEY=VALUE` assignments on top; none if there are no assignments.
+/// None if there are no assignments. Fails if one is invalid.
 pub fn with(mission: &Mission, assignments: &[String]) -> Result<Option<Mission>, LookupError> {
     if assignments.is_empty() {
         return Ok(None);
@@ -107,7 +107,6 @@ pub fn with(mission: &Mission, assignments: &[String]) -> Result<Option<Mission>
     complete(mission.map_err(|error| failed(error.without_place()))?).map(Some)
 }
 
-/// The text of `table` with all assignments.
 fn assign(mut table: toml::Table, assignments: &[String]) -> Result<String, LookupError> {
     for assignment in assignments {
         let failed = |problem: &str| LookupError::Assignment {
@@ -128,7 +127,6 @@ fn assign(mut table: toml::Table, assignments: &[String]) -> Result<String, Look
     })
 }
 
-/// Put `layer` over `base`, table by table.
 fn merge(base: &mut toml::Table, layer: toml::Table) {
     for (key, value) in layer {
         match (base.get_mut(&key), value) {

@@ -17,7 +17,7 @@ use super::{
     output::write_stderr,
 };
 
-/// Let the robot stand, and wait until it rests.
+/// Waits until the robot rests. Fails if it does not.
 pub fn stand(robot: &RobotName) -> Result<(), Failure> {
     if let Some(why) = operator::stand(robot)? {
         write_stderr(&format!("firsthand: the robot rests; its supervisor was not told: {why}\n"));
@@ -25,7 +25,7 @@ pub fn stand(robot: &RobotName) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The name of a stage of the table.
+/// Fails if the table has no such stage.
 pub fn known(stage: &str) -> Result<&'static str, Failure> {
     Ok(known_stage(stage)?.name)
 }
@@ -34,7 +34,7 @@ pub fn known_stage(stage: &str) -> Result<&'static Stage, Refused> {
     stages::find(stage).ok_or_else(|| Refused::new("unknown-stage", stages::unknown(stage)))
 }
 
-/// Send a signal to the process of `stage`, or to the supervisor, only if that process holds the lock of its robot.
+/// Only if that process holds the lock of its robot; else fails.
 pub fn send(robot: &RobotName, stage: &str, signal: Signal) -> Result<(), Failure> {
     let domain = Domain::of(robot.clone());
     // A frozen supervisor publishes nothing.
@@ -57,7 +57,6 @@ pub fn send(robot: &RobotName, stage: &str, signal: Signal) -> Result<(), Failur
     Ok(())
 }
 
-/// The process that the roster names for `stage`.
 fn pid_of(domain: &Domain, stage: &str) -> Result<Option<u32>, Failure> {
     let bus = roster::join(domain, "operator")?;
     Ok(operator::find(&mut Roster::open(&bus)?, &domain.robot, |_, entries| {

@@ -7,30 +7,28 @@ use std::{
 
 use serde::Serialize;
 
-/// Write `text` to standard output at once. A reader that has read enough is no failure (`firsthand help tables | head`).
+/// Written at once. A reader that has read enough is no failure (`firsthand help tables | head`).
 pub fn print_text(text: &str) -> io::Result<()> {
     let mut stdout = io::stdout();
     unless_closed(stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()))
 }
 
-/// Print `value` as text, or as one line of JSON.
 pub fn print(value: &(impl Display + Serialize), json: bool) -> io::Result<()> {
     print_text(&if json { serde_json::to_string(value)? + "\n" } else { value.to_string() })
 }
 
-/// Each of `values` as one line of JSON.
 pub fn json_lines<T: Serialize>(values: &[T]) -> serde_json::Result<String> {
     let lines = values.iter().map(serde_json::to_string);
     lines.map(|line| Ok(line? + "\n")).collect()
 }
 
-/// Write to standard error; a closed reader does not end the work under way.
+/// A closed reader does not end the work under way.
 pub fn write_stderr(text: &str) {
     let mut stderr = io::stderr();
     let _ = stderr.write_all(text.as_bytes()).and_then(|()| stderr.flush());
 }
 
-/// `written`, but a pipe whose reader has ended, or a terminal that was closed, is no failure.
+/// A pipe whose reader has ended, or a terminal that was closed, is no failure.
 pub(crate) fn unless_closed(written: io::Result<()>) -> io::Result<()> {
     match written {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
@@ -39,7 +37,7 @@ pub(crate) fn unless_closed(written: io::Result<()>) -> io::Result<()> {
     }
 }
 
-/// The error of writing to a terminal that was closed.
+/// Writing to a closed terminal gives this error.
 const CLOSED_TERMINAL: i32 = rustix::io::Errno::IO.raw_os_error();
 
 #[cfg(test)]

@@ -9,13 +9,12 @@ use super::output::write_stderr;
 
 pub struct ProgressLine {
     rewrites: bool,
-    /// Time between lines that cannot be rewritten.
     every: Duration,
     shown: Option<Instant>,
 }
 
 impl ProgressLine {
-    /// A progress that shows nothing yet. Lines that cannot be rewritten are shown once in each `every`.
+    /// Lines that cannot be rewritten are shown once in each `every`.
     pub fn new(every: Duration) -> Self {
         Self { rewrites: io::stderr().is_terminal(), every, shown: None }
     }
@@ -24,12 +23,12 @@ impl ProgressLine {
         self.shown.is_none_or(|shown| self.rewrites || shown.elapsed() >= self.every)
     }
 
-    /// Note that a line is due now. Returns whether it is the first.
+    /// A line is due now. Returns whether it is the first.
     pub fn begin(&mut self) -> bool {
         self.shown.replace(Instant::now()).is_none()
     }
 
-    /// Show `line`. If it cannot be rewritten, it is shown only if it `may_stay`.
+    /// A line that cannot be rewritten is shown only if it `may_stay`.
     pub fn show(&self, line: &str, may_stay: bool) {
         if self.rewrites {
             let line = cut(line, columns());
@@ -46,14 +45,13 @@ impl ProgressLine {
     }
 }
 
-/// Columns of the terminal; 0 if it does not say.
+/// 0 if the terminal does not say.
 fn columns() -> usize {
     let size = rustix::termios::tcgetwinsize(io::stderr());
     size.map_or(0, |size| size.ws_col.into())
 }
 
-/// The beginning of `line` that fits into `columns` but the last; all of it for 0 columns. A line that the terminal wraps
-/// cannot be rewritten.
+/// The last column stays free; 0 columns show all. A line that the terminal wraps cannot be rewritten.
 fn cut(line: &str, columns: usize) -> &str {
     let shown = columns.checked_sub(1).unwrap_or(usize::MAX);
     let end = line.char_indices().nth(shown);

@@ -1,4 +1,4 @@
-//! The rates and gaps of topics, compared with the table of topics.
+//! Rates and gaps of topics, against the table.
 
 use std::{
     collections::BTreeMap,
@@ -19,17 +19,15 @@ use super::{
     words::age,
 };
 
-/// The number of its intervals after which a topic is late: its writer looks at the clock only once in each turn of its loop.
+/// A topic is late after so many intervals: its writer looks at the clock only once in each turn of its loop.
 const LATE: u32 = 2;
 
 #[derive(Debug)]
 pub struct TopicRates {
     spec: &'static Spec,
-    /// The newest sample of each process, because a topic may have many writers.
+    /// Newest samples, by process, because a topic may have many writers.
     writers: BTreeMap<u32, Newest>,
-    /// The arrival of the last sample.
     at: Option<Instant>,
-    /// The beginning of the counts.
     since: Instant,
     counts: Counts,
 }
@@ -53,33 +51,29 @@ struct Counts {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     pub topic: &'static str,
-    /// Samples a second of the machine's clock.
     pub rate_hz: f64,
-    /// The longest time between two samples of one process, or since the last sample; none before the first.
+    /// The gap between two samples of one process, or since the last sample; none before the first.
     pub longest_gap_s: Option<f64>,
     /// Time since the last sample; none before the first.
     pub age_s: Option<f64>,
-    /// Samples that were overwritten before this reader took them.
+    /// Overwritten before this reader took them.
     pub lost: u64,
     /// Ticks from the first sample to the last.
     pub ticks: u64,
-    /// Ticks without a sample; none if the table does not promise a sample in each tick.
+    /// Ticks without a sample; none if the table does not promise one in each tick.
     pub missing_ticks: Option<u64>,
-    /// Whether a gap was more than twice as long as the table promises; none if it promises nothing.
+    /// A gap was more than twice as long as the table promises; none if it promises nothing.
     pub late: Option<bool>,
-    /// The rate by the table.
     #[serde(skip)]
     rate: Rate,
 }
 
 impl TopicRates {
-    /// The rates of the topic of `spec` before any sample.
     pub fn new(spec: &'static Spec, now: Instant) -> Self {
         Self { spec, writers: BTreeMap::new(), at: None, since: now, counts: Counts::default() }
     }
 
-    /// Take a sample of `author` that came at `now`. The first sample of each process is not counted, because it may be old: a topic
-    /// stores one for new readers.
+    /// The first sample of each process is not counted, because it may be old: a topic stores one for new readers.
     pub fn add(&mut self, author: Author, stamp: Stamp, now: Instant) {
         self.at = Some(now);
         let newest = Newest { at: now, stamp };
@@ -102,7 +96,7 @@ impl TopicRates {
         counts.longest_gap = counts.longest_gap.max(gap);
     }
 
-    /// The report at `now`; counting begins again.
+    /// Counting begins again.
     pub fn report(&mut self, now: Instant) -> Report {
         let counts = std::mem::take(&mut self.counts);
         let over = now.saturating_duration_since(self.since).as_secs_f64();
@@ -127,7 +121,6 @@ impl TopicRates {
     }
 }
 
-/// Whether `gap` is longer than `rate` allows.
 fn is_late(rate: Rate, gap: Duration) -> bool {
     matches!(rate, Rate::OnChange { again_after, .. } if gap > LATE * again_after)
 }

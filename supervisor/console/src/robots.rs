@@ -1,5 +1,3 @@
-//! The robots of this machine.
-
 use std::{
     fs,
     os::unix::fs::MetadataExt as _,
@@ -8,29 +6,28 @@ use std::{
 
 use common::{domain::Domain, domain::RobotName};
 
-/// The supervisor's log, in the directory of its run.
+/// The supervisor's, in the directory of its run.
 pub const SUPERVISOR_LOG: &str = "supervisor.log";
-/// The beginning of the name of each user's directory, before the user's number.
+/// The user's number follows it in the name of each user's directory.
 const USER_DIRECTORY: &str = "firsthand-";
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Robot {
     pub name: RobotName,
-    /// The process of its supervisor; none if the supervisor was killed.
+    /// Its process; none if the supervisor was killed.
     pub supervisor: Option<u32>,
-    /// The directory of its run; none if the system does not say.
+    /// The run's directory; none if the system does not say.
     pub run: Option<PathBuf>,
 }
 
 impl Robot {
-    /// The robot `name` as it is now.
     pub fn find(name: RobotName) -> Self {
         let supervisor = Domain::of(name.clone()).supervisor().ok().flatten();
         Self { name, supervisor, run: supervisor.and_then(run_directory) }
     }
 }
 
-/// The robots of this user that run, or whose supervisor was killed, by name.
+/// This user's robots that run, or whose supervisor was killed, by name.
 pub fn own() -> Vec<Robot> {
     // The name does not matter, because all robots of a user are in one directory.
     let Ok(any) = "any".parse() else {
@@ -46,7 +43,7 @@ pub fn own() -> Vec<Robot> {
     robots
 }
 
-/// Numbers of other users who have, or had, robots on this machine. Only these users can list them.
+/// Users who have, or had, robots on this machine. Only they can list them.
 pub fn other_users() -> Vec<u32> {
     let own = rustix::process::geteuid().as_raw();
     users_in(Path::new("/tmp"), own)
@@ -66,7 +63,7 @@ fn users_in(directory: &Path, own: u32) -> Vec<u32> {
     users
 }
 
-/// The directory of the run of the process `supervisor`, which has its log open there.
+/// The process `supervisor` has its log open there.
 fn run_directory(supervisor: u32) -> Option<PathBuf> {
     let opened = fs::read_dir(format!("/proc/{supervisor}/fd")).ok()?;
     let files = opened.flatten().filter_map(|entry| fs::read_link(entry.path()).ok());

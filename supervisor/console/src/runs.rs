@@ -1,4 +1,4 @@
-//! The runs of a directory: each is a directory with a run file. They are made, found and removed.
+//! Runs: each is a directory with a run file.
 
 use std::{
     fs, io,
@@ -17,9 +17,9 @@ use super::{
     robots::Robot,
 };
 
-/// The file that marks a run that was cut off and reported.
+/// It marks a run that was cut off and reported.
 const CUT_OFF: &str = "cut-off";
-/// The greatest size of a summary, which takes 2 kB; a larger file is not read.
+/// A summary takes 2 kB; a larger file is not read.
 const LARGEST_SUMMARY: u64 = 1 << 20;
 
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -27,23 +27,22 @@ pub struct RunDirectory {
     pub began: SystemTime,
     pub directory: PathBuf,
     pub robot: RobotName,
-    /// The name of the mission; none if another version wrote the run file.
+    /// None if another version wrote the run file.
     pub mission: Option<String>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     Running,
-    /// The supervisor was killed, or the machine was switched off.
+    /// The supervisor was killed, or the machine switched off.
     CutOff,
     Ended {
-        /// The outcome, such as `reached`.
+        /// A word such as `reached`.
         outcome: String,
         mission_time_s: Option<f64>,
     },
 }
 
-/// The runs in directories below `runs`, in no order.
 pub fn list(runs: &Path) -> Vec<RunDirectory> {
     #[derive(Deserialize)]
     struct Mission {
@@ -71,7 +70,7 @@ pub fn list(runs: &Path) -> Vec<RunDirectory> {
 }
 
 impl RunDirectory {
-    /// Whether nobody continues the run: it has a summary, or was reported as cut off.
+    /// Nobody continues the run: it has a summary, or was reported as cut off.
     pub fn has_ended(&self) -> bool {
         self.has(SUMMARY) || self.has(CUT_OFF)
     }
@@ -106,13 +105,12 @@ impl RunDirectory {
         its.is_some() && its == fs::canonicalize(&self.directory).ok()
     }
 
-    /// The size on the disk, bytes.
     pub fn size(&self) -> u64 {
         size(&self.directory, MOST_LEVELS)
     }
 }
 
-/// The most levels of directories that are counted; a run directory has one.
+/// Deeper levels are not counted; a run directory has one.
 const MOST_LEVELS: u32 = 8;
 
 fn size(directory: &Path, levels: u32) -> u64 {
@@ -127,7 +125,7 @@ fn size(directory: &Path, levels: u32) -> u64 {
     sizes.fold(0, u64::saturating_add)
 }
 
-/// The requested directory. It is refused if it holds an earlier run.
+/// Fails if the directory holds an earlier run.
 pub fn own(directory: &Path) -> Result<PathBuf, Failure> {
     fs::create_dir_all(directory).map_err(|error| {
         format!("cannot make {}: {error}; give another --out", directory.display())
@@ -142,7 +140,7 @@ pub fn own(directory: &Path) -> Result<PathBuf, Failure> {
     Ok(fs::canonicalize(directory)?)
 }
 
-/// `NAME-NNN` below `runs`, with the number after the highest one there.
+/// `NAME-NNN`, after the highest number there. Fails if it cannot be made.
 pub fn numbered(runs: &Path, name: &str) -> Result<PathBuf, Failure> {
     fs::create_dir_all(runs).map_err(|error| {
         format!("cannot make {}: {error}; say where with --out", runs.display())
@@ -170,8 +168,8 @@ fn highest_number(runs: &Path, name: &str) -> u64 {
     entries.filter_map(number).max().unwrap_or_default()
 }
 
-/// Remove the directories of all but the newest `keep` runs of `robot` that have ended. If one cannot be removed, it stays and
-/// the mission starts all the same.
+/// All but the newest `keep` runs of `robot` that have ended are removed. If one cannot be removed, it stays and the
+/// mission starts all the same.
 pub fn prune(runs: &Path, robot: &RobotName, keep: usize) {
     let mut ended = runs_of(robot, runs);
     ended.retain(RunDirectory::has_ended);
@@ -191,15 +189,15 @@ fn runs_of(robot: &RobotName, runs: &Path) -> Vec<RunDirectory> {
     runs
 }
 
-/// The newest run of `robot` below `runs` that was cut off and not reported yet: it has no summary, because its supervisor was
-/// killed or the machine was switched off.
+/// The newest run of `robot` that was cut off and not reported yet: it has no summary. Fails if `runs` cannot be
+/// read.
 pub fn cut_off(runs: &Path, robot: &RobotName) -> io::Result<Option<PathBuf>> {
     let runs = runs_of(robot, runs).into_iter();
     let newest = runs.filter(|run| !run.has_ended()).max();
     newest.map(|run| fs::canonicalize(run.directory)).transpose()
 }
 
-/// Mark that a run was reported as cut off, so that the next start begins a new one.
+/// The next start then begins a new run. Fails if the mark cannot be written.
 pub fn mark_cut_off(directory: &Path) -> io::Result<()> {
     fs::write(directory.join(CUT_OFF), "")
 }

@@ -12,14 +12,13 @@ use common::{
 
 use super::output::unless_closed;
 
-/// The bytes that a writable pipe takes at once (pipe(7)).
+/// A writable pipe takes them at once (pipe(7)).
 const CHUNK: usize = 4096;
-/// The interval at which a command that waits looks whether it must end.
+/// A waiting command looks so often whether it must end.
 pub const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 const NICE: i32 = 5;
 
-/// Give the stages of robots the processor before this process.
 pub fn let_stages_go_first() {
     // If the kernel refuses, the processes share the processor.
     let _ = rustix::process::nice(NICE);
@@ -32,7 +31,7 @@ pub struct Stream {
 }
 
 impl Stream {
-    /// From now on a signal lets the command leave the bus before it ends, and stages get the processor first.
+    /// From now on a signal lets the command leave the bus before it ends. Fails if signals cannot be caught.
     pub fn open() -> io::Result<Self> {
         let_stages_go_first();
         Ok(Self { signals: Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?, ended: false })
@@ -43,7 +42,7 @@ impl Stream {
         self.ended
     }
 
-    /// Write `text`; the rest of it is dropped if the command must end.
+    /// The rest is dropped if the command must end. Fails if standard output does.
     pub fn write(&mut self, text: &str) -> io::Result<()> {
         let mut stdout = io::stdout();
         for chunk in text.as_bytes().chunks(CHUNK) {

@@ -1,6 +1,6 @@
-//! Tables of text, in which each column is as wide as its widest cell.
+//! Text tables; each column is as wide as its widest cell.
 
-/// The side on which a column is filled with blanks.
+/// The side that is filled with blanks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Align {
     Left,

@@ -1,10 +1,9 @@
-//! Messages on standard error about a robot that a command waits for, one each time.
+//! Messages about a robot that a command waits for, one each time.
 
 use common::domain::RobotName;
 
 use super::output::write_stderr;
 
-/// Whether the robot is there, and whether its absence was reported.
 #[derive(Default)]
 pub struct Waiting {
     connected: bool,
@@ -34,7 +33,7 @@ impl Waiting {
     }
 }
 
-/// The rest of a sentence about a robot that was not there yet.
+/// The robot was not there yet.
 pub const NOT_RUNNING: &str = "is not running here; waiting for it";
-/// The rest of a sentence about a robot that was there.
+/// The robot was there.
 pub const ENDED: &str = "has ended its run; waiting for it";

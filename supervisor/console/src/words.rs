@@ -2,7 +2,6 @@
 
 use common::samples::{HoldReason, Order, StageState};
 
-/// The order of the supervisor, with its reason.
 pub const fn order(order: Order, reason: HoldReason) -> &'static str {
     match order {
         Order::Hold => match reason {
@@ -26,12 +25,12 @@ pub const fn state(state: StageState) -> &'static str {
     }
 }
 
-/// Seconds; `u64::MAX` nanoseconds stand for never.
+/// `u64::MAX` stands for never.
 pub fn seconds(nanoseconds: u64) -> Option<f64> {
     (nanoseconds != u64::MAX).then_some(nanoseconds as f64 * 1e-9)
 }
 
-/// An age in the unit that fits; none is never.
+/// The unit fits; none is never.
 pub fn age(seconds: Option<f64>) -> String {
     match seconds {
         None => "never".to_owned(),

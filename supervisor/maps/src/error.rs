@@ -1,5 +1,3 @@
-//! Errors of maps.
-
 use std::{
     io,
     path::{Path, PathBuf},
@@ -10,14 +8,14 @@ use thiserror::Error;
 
 use super::map::MOST_BOXES;
 
-/// Errors of maps. Every message begins with the file.
+/// Every message begins with the file.
 #[derive(Debug, Error)]
 pub enum MapError {
     #[error("{}: {cause}; give a map file that can be read", file.display())]
     Unreadable { file: PathBuf, cause: io::Error },
     #[error("{}: {cause}; give the name of a map to write", file.display())]
     Unwritable { file: PathBuf, cause: io::Error },
-    /// The path leads to a directory, a pipe or a device.
+    /// A directory, a pipe or a device.
     #[error("{}: not a regular file; give a map file", file.display())]
     NotAFile { file: PathBuf },
     #[error(
@@ -25,17 +23,12 @@ pub enum MapError {
         file.display()
     )]
     UnknownFormat { file: PathBuf },
-    /// The file is longer than any map of its format.
     #[error("{}: {bytes} bytes, a file of this kind has at most {most}; check that it is one", file.display())]
     TooLong { file: PathBuf, bytes: u64, most: u64 },
     #[error("{}: {cols} x {rows} cells; a map has 1 to {MAX_SIDE} on each side, so crop or scale it", file.display())]
     Size { file: PathBuf, cols: u64, rows: u64 },
     #[error("{}: {problem}", file.display())]
-    Malformed {
-        file: PathBuf,
-        /// The problem, its place and the remedy.
-        problem: String,
-    },
+    Malformed { file: PathBuf, problem: String },
 }
 
 impl MapError {

@@ -1,4 +1,4 @@
-//! Reads map files with limits of length and of cells.
+//! Map files with limits of length and of cells.
 
 use std::{
     fs::{self, File},
@@ -10,7 +10,7 @@ use harmonic::MAX_SIDE;
 
 use crate::error::MapError;
 
-/// Open a regular file of at most `most` bytes. Other files may never end.
+/// Files that are not regular may never end.
 pub(crate) fn open(file: &Path, most: u64) -> Result<File, MapError> {
     let unreadable = |cause| MapError::Unreadable { file: file.to_owned(), cause };
     // The check comes before opening, because opening a pipe waits for its other end.
@@ -24,7 +24,6 @@ pub(crate) fn open(file: &Path, most: u64) -> Result<File, MapError> {
     File::open(file).map_err(unreadable)
 }
 
-/// The content of a file of at most `most` bytes.
 pub(crate) fn read(file: &Path, most: u64) -> Result<Vec<u8>, MapError> {
     let mut bytes = Vec::new();
     open(file, most)?
@@ -34,7 +33,7 @@ pub(crate) fn read(file: &Path, most: u64) -> Result<Vec<u8>, MapError> {
     Ok(bytes)
 }
 
-/// Refuse a map that is empty or too large.
+/// An empty map is refused, too.
 pub(crate) fn check_size(file: &Path, cols: u64, rows: u64) -> Result<(), MapError> {
     let sides = 1..=MAX_SIDE as u64;
     if sides.contains(&cols) && sides.contains(&rows) {

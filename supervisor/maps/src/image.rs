@@ -14,29 +14,29 @@ use crate::{
     map::Map,
 };
 
-/// The largest map in 16 bits a channel, four channels, with room for the words of a Netpbm in ASCII.
+/// 16 bits a channel, four channels, with room for the words of a Netpbm in ASCII.
 const LONGEST: u64 = (MAX_SIDE as u64).pow(2) * 8 + (1 << 20);
 
-/// The rule by which pixels are free, as in the trinary mode of the ROS map_server.
+/// The trinary mode of the ROS map_server.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lightness {
-    /// Whether dark means free.
+    /// Dark means free.
     pub(super) negate: bool,
-    /// The darkness, 0 to 1, below which a pixel is free.
+    /// A pixel is free below this darkness, 0 to 1.
     pub(super) free_thresh: f64,
-    /// The darkness above which a pixel is occupied.
+    /// A pixel is occupied above this darkness.
     pub(super) occupied_thresh: f64,
 }
 
 impl Default for Lightness {
-    /// The thresholds the map_server's own map_saver writes.
+    /// The map_saver writes these thresholds.
     fn default() -> Self {
         Self { negate: false, free_thresh: 0.196, occupied_thresh: 0.65 }
     }
 }
 
 impl Lightness {
-    /// Whether a pixel of this brightness, 0 to 1, is free.
+    /// Brightness is 0 to 1.
     fn is_free(self, brightness: f64) -> bool {
         let darkness = if self.negate { brightness } else { 1.0 - brightness };
         darkness < self.free_thresh && darkness <= self.occupied_thresh
@@ -45,19 +45,18 @@ impl Lightness {
 
 type Cause = Box<dyn Error>;
 
-/// The free pixels, row by row.
+/// Row by row.
 pub(super) struct Free {
     pub(super) cols: usize,
     pub(super) pixels: Vec<bool>,
 }
 
-/// The map in an image; each pixel is a cell.
+/// Each pixel is a cell.
 pub(super) fn load(file: &Path, lightness: Lightness) -> Result<Map, MapError> {
     let Free { cols, pixels } = pixels(file, lightness)?;
     Ok(Map::new(cols, pixels.len() / cols, pixels.into_iter()))
 }
 
-/// The pixels of an image, which has at least one.
 pub(super) fn pixels(file: &Path, lightness: Lightness) -> Result<Free, MapError> {
     let mut reader = BufReader::new(open(file, LONGEST)?);
     let start =
@@ -86,7 +85,7 @@ pub(super) fn pixels(file: &Path, lightness: Lightness) -> Result<Free, MapError
     })
 }
 
-/// A Netpbm image of greys (kinds 2 and 5) or colours (3 and 6), in ASCII (2 and 3) or binary.
+/// Greys (kinds 2 and 5) or colours (3 and 6), in ASCII (2 and 3) or binary.
 fn netpbm(
     reader: impl BufRead,
     kind: u8,
@@ -122,7 +121,7 @@ fn byte(bytes: &mut impl Iterator<Item = io::Result<u8>>) -> Result<u8, Cause> {
     Ok(bytes.next().ok_or("it ends early")??)
 }
 
-/// The next number of a Netpbm image and the one space after it; comments before it are skipped.
+/// Skips comments before the number, and the one space after it.
 fn number(bytes: &mut impl Iterator<Item = io::Result<u8>>) -> Result<u32, Cause> {
     let mut number: Option<u32> = None;
     loop {

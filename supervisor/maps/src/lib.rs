@@ -2,14 +2,14 @@
 //!
 //! | module | reads |
 //! |---|---|
-//! | `ros` | a ROS map_server YAML and the image it names |
-//! | `image` | a PGM (any Netpbm) or PNG image |
-//! | `prior` | a ROS map as hazards that a mission knows; it also writes one of what a robot believed |
+//! | `ros` | a map_server YAML and its image |
+//! | `image` | any Netpbm, or PNG |
+//! | `prior` | a ROS map as known hazards; writes a robot's belief as one |
 //! | `moving_ai` | the `.map` grids of the MovingAI benchmarks |
 //!
 //! [`load`] chooses a reader by the file's name; [`load_placed`] reads a ROS map with its place in metres.
 //!
-//! Files are not trusted: sizes are checked before memory is allocated, and errors name the file, the cause and the remedy.
+//! Sizes are checked before memory is allocated; errors name file, cause and remedy.
 
 mod error;
 mod file;
@@ -26,7 +26,10 @@ pub use map::{MOST_BOXES, Map, PlacedMap};
 pub use prior::{save_believed, with_prior_map};
 pub use ros::load_placed;
 
-/// The map in `file`. The ending of the file's name gives the format.
+/// The ending of the file's name gives the format.
+///
+/// # Errors
+/// The file cannot be read, or is no map of that format.
 pub fn load(file: &Path) -> Result<Map, MapError> {
     let extension = file.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     match extension.as_deref() {

@@ -1,31 +1,28 @@
-//! A map of free and blocked cells.
-
 use common::geometry::Box2;
 use glam::DVec2;
 
-/// The most boxes of a map from which a mission is made: a mission file with so many has 2 MB.
+/// A mission file with so many has 2 MB.
 pub const MOST_BOXES: usize = 20_000;
 
-/// A map of cells, row-major, row 0 at the top.
+/// Row-major, row 0 at the top.
 #[derive(Debug)]
 pub struct Map {
     pub cols: usize,
     pub rows: usize,
-    /// The cells that are not free, and the whole rim.
+    /// The whole rim is blocked, too.
     pub blocked: Vec<bool>,
 }
 
 #[derive(Debug)]
 pub struct PlacedMap {
     pub map: Map,
-    /// Side of a cell, metres.
     pub cell_m: f64,
-    /// The corner of the map where x and y are least, metres.
+    /// The corner where x and y are least.
     pub corner_m: [f64; 2],
 }
 
 impl Map {
-    /// A map of `free` cells. Its rim is blocked, like the perimeter of a mission.
+    /// The rim is blocked, like the perimeter of a mission.
     pub(crate) fn new(cols: usize, rows: usize, free: impl Iterator<Item = bool>) -> Self {
         let mut blocked: Vec<bool> = free.map(|free| !free).collect();
         for (row, line) in blocked.chunks_mut(cols.max(1)).enumerate() {
@@ -41,7 +38,7 @@ impl Map {
         Self { cols, rows, blocked }
     }
 
-    /// The free cell nearest to (`col`, `row`), as column and row; none if no cell is free.
+    /// Column and row; none if no cell is free.
     pub fn nearest_free(&self, col: usize, row: usize) -> Option<(usize, usize)> {
         let free = self.blocked.iter().enumerate().filter(|cell| !cell.1);
         free.map(|(at, _)| (at % self.cols, at / self.cols)).min_by_key(|cell| {
@@ -53,14 +50,14 @@ impl Map {
 }
 
 impl PlacedMap {
-    /// The place `cols` cells from the left edge and `rows` from the top one, metres.
+    /// Metres, `cols` cells from the left edge and `rows` from the top one.
     pub fn place(&self, cols: f64, rows: f64) -> DVec2 {
         let up = self.map.rows as f64 - rows;
         DVec2::from(self.corner_m) + DVec2::new(cols, up) * self.cell_m
     }
 
-    /// Boxes that cover the cells `wanted` and none but `solid` ones: each grows to the right as far as cells are solid, and down while
-    /// that covers more. The iterator makes each box when it is asked for.
+    /// Boxes that cover the cells `wanted` and none but `solid` ones: each grows to the right as far as cells are
+    /// solid, and down while that covers more. They are made as they are asked for.
     pub fn boxes(&self, solid: &[bool], mut wanted: Vec<bool>) -> impl Iterator<Item = Box2> {
         let Map { cols, rows, .. } = self.map;
         (0..wanted.len()).filter_map(move |first| {

@@ -12,7 +12,7 @@ use crate::{
     map::Map,
 };
 
-/// Most bytes: the largest map with two characters at the end of every line, and its header.
+/// The largest map with two characters at the end of every line, and its header.
 const LONGEST: u64 = MAX_SIDE as u64 * (MAX_SIDE as u64 + 2) + 4096;
 
 pub(super) fn load(file: &Path) -> Result<Map, MapError> {
@@ -59,7 +59,7 @@ fn parse(file: &Path, bytes: &[u8]) -> Result<Map, MapError> {
     Ok(Map::new(cols, rows, free.into_iter()))
 }
 
-/// Read the header. Returns columns and rows; the following lines are the cells.
+/// Returns columns and rows; the following lines are the cells.
 fn header<'a>(
     file: &Path,
     lines: &mut impl Iterator<Item = &'a [u8]>,
@@ -90,8 +90,7 @@ fn header<'a>(
     }
 }
 
-/// Whether a robot can be in the cell: on plain ground and swamp, not out of bounds, in trees or water. None for another
-/// character.
+/// A robot can be on plain ground and swamp, not out of bounds, in trees or water. None for another character.
 fn is_free(cell: u8) -> Option<bool> {
     match cell {
         b'.' | b'G' | b'S' => Some(true),

@@ -1,4 +1,4 @@
-//! A ROS map as hazards that a mission knows before it starts, and the belief of a robot at the end of one as such a map.
+//! A ROS map as known hazards, and a robot's belief as such a map.
 
 use std::path::Path;
 
@@ -10,17 +10,17 @@ use common::{
 
 use crate::{MOST_BOXES, MapError, PlacedMap, ros};
 
-/// The distance outside of the perimeter beyond which cells concern no robot inside, metres.
+/// Cells farther outside of the perimeter concern no robot inside.
 const BEYOND_M: f64 = 1.0;
 
 const OCCUPIED: u8 = 0;
 const UNKNOWN: u8 = 205;
 const FREE: u8 = 254;
 
-/// `mission` with the occupied cells of its map among the shapes that it knows: a run does not depend on the file any more.
+/// Adds the occupied cells of the map to the known shapes: a run does not depend on the file any more.
 ///
 /// # Errors
-/// If the file is no map, or its occupied cells are too many boxes.
+/// The file is no map, or its occupied cells are too many boxes.
 pub fn with_prior_map(mut mission: Mission) -> Result<Mission, MapError> {
     if let Some(file) = mission.map.take() {
         let boxes = known(&file, &ros::load_occupied(&file)?, &mission.grid_frame())?;
@@ -29,7 +29,7 @@ pub fn with_prior_map(mut mission: Mission) -> Result<Mission, MapError> {
     Ok(mission)
 }
 
-/// Boxes that cover the occupied cells of `placed` in the perimeter `frame` and no other cell.
+/// They cover the occupied cells in the perimeter `frame` and no other cell.
 fn known(file: &Path, placed: &PlacedMap, frame: &GridFrame) -> Result<Vec<Box2>, MapError> {
     let within = f64::from(frame.cells) * frame.resolution_m / 2.0 + BEYOND_M;
     let map = &placed.map;
@@ -44,13 +44,13 @@ fn known(file: &Path, placed: &PlacedMap, frame: &GridFrame) -> Result<Vec<Box2>
     if boxes.len() > MOST_BOXES { Err(MapError::too_many_boxes(file)) } else { Ok(boxes) }
 }
 
-/// Write the belief in `cells` of `frame`, one [`CellState`] byte each, to the YAML `file` and an image beside it.
+/// Writes `cells`, one [`CellState`] byte each, to the YAML `file` and an image beside it.
 ///
-/// Hazards of the grid reach as far around a surface as the body does. The map has the surfaces: cells with nothing but hazard within
-/// that reach, so that a mission which starts from the map has the same hazards again.
+/// Hazards of the grid reach as far around a surface as the body does. The map has the surfaces: cells with nothing
+/// but hazard within that reach, so that a mission which starts from the map has the same hazards again.
 ///
 /// # Errors
-/// If a file cannot be written.
+/// A file cannot be written.
 pub fn save_believed(
     file: &Path,
     mission: &Mission,
@@ -63,7 +63,7 @@ pub fn save_believed(
         let byte = is_inside.then(|| cells.get((row * side + col) as usize)).flatten();
         byte.map_or(CellState::Perimeter, |byte| CellState::from_byte(*byte))
     };
-    // A surface fills its cell in the map. Half a cell is taken off, because the believed surface may lie anywhere in its cell.
+    // Half a cell is taken off, because the believed surface may lie anywhere in its cell.
     let reach = mapper::step::hazard_reach_m(mission) / frame.resolution_m - 0.5;
     let around = (reach + 0.5).ceil() as i64;
     let beyond = |cells: i64| (cells.abs() as f64 - 0.5).max(0.0);

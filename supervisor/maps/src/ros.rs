@@ -1,4 +1,4 @@
-//! Map files of the ROS map_server: a YAML file that names an image and its thresholds.
+//! Map files of the ROS map_server: YAML that names an image and its thresholds.
 //!
 //! [`load`] does not read resolution and origin, because a field is solved in cells. [`load_placed`] does.
 
@@ -18,30 +18,30 @@ use crate::{
     map::{Map, PlacedMap},
 };
 
-/// Most bytes of a map file, which has a dozen short lines.
+/// A map file has a dozen short lines.
 const LONGEST: u64 = 64 << 10;
-/// Range of a cell's side, metres.
 const CELL_M: RangeInclusive<f64> = 0.005..=1.0;
-/// Largest distance from the origin, metres.
 const FARTHEST_M: f64 = 1e6;
 
-/// The keys of a map file whose value is a scalar or a list of scalars. The file may have keys of other programs.
+/// Keys with a scalar or a list of scalars. Other programs' keys may be among them.
 struct Keys<'a> {
     file: &'a Path,
     values: HashMap<String, Vec<String>>,
 }
 
-/// The map a YAML describes.
 pub(super) fn load(file: &Path) -> Result<Map, MapError> {
     image_of(file, &text(file)?)
 }
 
-/// The map that the YAML `file` of the ROS map_server describes, with its place.
+/// The map of a map_server's YAML, with its place.
+///
+/// # Errors
+/// The YAML or its image cannot be read, or is no map.
 pub fn load_placed(file: &Path) -> Result<PlacedMap, MapError> {
     placed(file, image_of)
 }
 
-/// [`load_placed`], with only those cells blocked that the map says are occupied.
+/// Only cells that the map says are occupied are blocked.
 pub(super) fn load_occupied(file: &Path) -> Result<PlacedMap, MapError> {
     placed(file, |file, text| {
         let (image, lightness) = named_image(file, text)?;
@@ -88,13 +88,12 @@ fn text(file: &Path) -> Result<String, MapError> {
         .map_err(|_| MapError::malformed(file, "not UTF-8 text; give the YAML of a map_server map"))
 }
 
-/// The image that the YAML `text` of `file` names.
 fn image_of(file: &Path, text: &str) -> Result<Map, MapError> {
     let (image, lightness) = named_image(file, text)?;
     image::load(&image, lightness)
 }
 
-/// The name of that image, and the rule by which its pixels are free.
+/// The image, and the rule by which its pixels are free.
 fn named_image(file: &Path, text: &str) -> Result<(PathBuf, Lightness), MapError> {
     let keys = Keys::parse(file, text)?;
     let image = keys.scalar("image")?.ok_or_else(|| keys.missing("image: FILE"))?;
@@ -103,17 +102,17 @@ fn named_image(file: &Path, text: &str) -> Result<(PathBuf, Lightness), MapError
     Ok((folder.join(image), keys.lightness()?))
 }
 
-/// A map to write: cells, row-major, row 0 at the top.
+/// Row-major, row 0 at the top.
 pub(super) struct Saved {
     pub(super) cols: usize,
-    /// The pixels: 0 for occupied, 254 for free, 205 for unknown, as the map_saver writes them.
+    /// 0 is occupied, 254 free, 205 unknown, as the map_saver writes them.
     pub(super) pixels: Vec<u8>,
     pub(super) cell_m: f64,
-    /// The corner where x and y are least, metres.
+    /// The corner where x and y are least.
     pub(super) corner_m: [f64; 2],
 }
 
-/// Write `map` to the YAML `file` and to an image of the same name beside it.
+/// Writes the YAML `file` and an image of the same name beside it.
 pub(super) fn save(file: &Path, map: &Saved) -> Result<(), MapError> {
     let unwritable = |cause| MapError::Unwritable { file: file.to_owned(), cause };
     let image = file.with_extension("pgm");
@@ -131,8 +130,7 @@ pub(super) fn save(file: &Path, map: &Saved) -> Result<(), MapError> {
 }
 
 impl<'a> Keys<'a> {
-    /// The keys of the YAML `text`. It is read event by event, and aliases are refused, so that no text needs more memory than it has
-    /// bytes.
+    /// The YAML is read event by event, and aliases are refused, so that no text needs more memory than it has bytes.
     fn parse(file: &'a Path, text: &str) -> Result<Self, MapError> {
         let refused =
             |problem: &str| MapError::malformed(file, format!("not a map_server map: {problem}"));
@@ -173,7 +171,7 @@ impl<'a> Keys<'a> {
         MapError::malformed(self.file, problem)
     }
 
-    /// The scalar of `key`; none where the file has no such key.
+    /// None where the file has no such key.
     fn scalar(&self, key: &str) -> Result<Option<&str>, MapError> {
         match self.values.get(key).map(Vec::as_slice) {
             None => Ok(None),

@@ -9,22 +9,19 @@ use super::{
     page::{Path, round_up},
 };
 
-/// The style of the bands.
 #[derive(Debug)]
 pub(super) struct Style {
-    /// The most bytes of this layer: an irregular field is drawn coarser, not larger.
+    /// Bytes of this layer: an irregular field is drawn coarser, not larger.
     pub(super) budget: usize,
-    /// The most samples along the longer side: more would be finer than the bands are wide.
+    /// Samples along the longer side: more would be finer than the bands are wide.
     pub(super) finest: usize,
-    /// The approximate number of bands.
     pub(super) bands: f64,
     /// Colours from the target outwards.
     pub(super) ramp: &'static [[f64; 3]],
-    /// Attributes of the level sets.
     pub(super) stroke: &'static str,
 }
 
-/// The bands behind a mission: pale, as many as the eye can distinguish.
+/// Pale, with as many bands as the eye can distinguish.
 pub(super) const MISSION: Style = Style {
     budget: 130_000,
     finest: 160,
@@ -39,28 +36,23 @@ pub(super) const MISSION: Style = Style {
     stroke: "stroke=\"#fff\" stroke-width=\"0.9\" stroke-opacity=\"0.75\"",
 };
 
-/// Share of the map that may lie below the last level: close to hazards u has no floor.
+/// This share of the map may lie below the last level: close to hazards u has no floor.
 const BELOW: f64 = 0.02;
 
-/// The levels: -step, -2 step, ..., -count step of log2 u.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Levels {
-    /// Step between levels, in log2 u.
     pub(super) step: f64,
-    /// The number of levels.
     pub(super) count: u32,
-    /// Colours from the target outwards, at least two.
     ramp: &'static [[f64; 3]],
 }
 
 impl Levels {
-    /// The number of levels above `log2_u`.
     pub(super) fn band(&self, log2_u: f32) -> u32 {
         // The cast saturates: there is no level above the target's own.
         ((-f64::from(log2_u) / self.step) as u32).min(self.count)
     }
 
-    /// The colour of the band below `nth` levels: 0 holds the target, `count` is the last.
+    /// 0 holds the target, `count` is the last.
     pub(super) fn colour(&self, nth: u32) -> String {
         let along = f64::from(nth) / f64::from(self.count.max(1)) * (self.ramp.len() - 1) as f64;
         let from = (along as usize).min(self.ramp.len() - 2);
@@ -73,7 +65,6 @@ impl Levels {
     }
 }
 
-/// log2 u of a field, sampled.
 pub(super) struct Bands<'a> {
     lattice: Lattice,
     cells: &'a [FieldCell],
@@ -82,7 +73,7 @@ pub(super) struct Bands<'a> {
 }
 
 impl<'a> Bands<'a> {
-    /// The bands of a field; none if the target can be reached from nowhere.
+    /// None if the target can be reached from nowhere.
     pub(super) fn of(
         lattice: &Lattice,
         cells: &'a [FieldCell],
@@ -112,7 +103,6 @@ impl<'a> Bands<'a> {
         })
     }
 
-    /// The levels.
     pub(super) const fn levels(&self) -> Levels {
         self.levels
     }
@@ -128,7 +118,7 @@ impl<'a> Bands<'a> {
         }
     }
 
-    /// The areas above each level, the lowest first, from at most `finest` samples a side.
+    /// The lowest level comes first; `finest` samples a side at most.
     fn areas(&self, finest: usize) -> Vec<Path> {
         let samples = Samples::of(&self.lattice, self.cells, finest, self.levels);
         (1..=self.levels.count + 1)
@@ -137,7 +127,7 @@ impl<'a> Bands<'a> {
             .collect()
     }
 
-    /// `areas`, each over the one that contains it.
+    /// Each area is drawn over the one that contains it.
     fn paint(&self, areas: &[Path]) -> String {
         let painted: String = (0..=self.levels.count)
             .rev()
@@ -151,23 +141,21 @@ impl<'a> Bands<'a> {
     }
 }
 
-/// Samples around the map: the inner ones continue the bands to the edge of the plot, the outer ones have no value, so that every
+/// Inner samples around the map continue the bands to the edge of the plot, outer ones have no value, so that every
 /// level set closes.
 const AROUND: usize = 2;
 
 /// log2 u at the middles of square blocks of cells, and [`AROUND`] them.
 struct Samples {
-    /// Samples along a row, those around the map included.
+    /// Samples, those around the map included.
     across: usize,
-    /// Samples along a column, likewise.
     down: usize,
-    /// Cells along the side of a block.
     block: usize,
     /// Row-major, all finite.
     values: Vec<f64>,
 }
 
-/// A side that a level set crosses: from a sample to the next one along x or y.
+/// A level set crosses it, from a sample to the next one along x or y.
 #[derive(Clone, Copy)]
 enum Side {
     Below,
@@ -211,7 +199,6 @@ impl Samples {
         Self { across, down, block, values }
     }
 
-    /// The area where log2 u is above `level`.
     fn above(&self, lattice: &Lattice, level: f64) -> Path {
         // Marching squares: each crossing has a next one such that the area is on the left.
         let mut next = vec![usize::MAX; 2 * self.values.len()];
@@ -237,7 +224,7 @@ impl Samples {
         path
     }
 
-    /// The passages of a level set through the square whose lower left sample is (col, row).
+    /// The square's lower left sample is (col, row).
     fn passages(&self, col: usize, row: usize, level: f64) -> &'static [(Side, Side)] {
         use Side::{Above, Below, Left, Right};
         let at = row * self.across + col;
@@ -266,7 +253,7 @@ impl Samples {
         PASSAGES[inside]
     }
 
-    /// The index of a side: even ones lead from their sample along x, odd ones along y.
+    /// Even indices lead from their sample along x, odd ones along y.
     fn crossing(&self, col: usize, row: usize, side: Side) -> usize {
         let at = row * self.across + col;
         match side {
@@ -277,7 +264,6 @@ impl Samples {
         }
     }
 
-    /// The point on the sheet where `level` crosses that side.
     fn position(&self, lattice: &Lattice, crossing: usize, level: f64) -> DVec2 {
         let from = crossing / 2;
         let (col, row) = (from % self.across, from / self.across);
@@ -297,8 +283,8 @@ impl Samples {
     }
 }
 
-/// The sum of all samples around a sample without a value. With it the bands continue below the hazard cells, which are drawn over
-/// them, instead of following every step of their outline.
+/// With this sum for a sample without a value the bands continue below the hazard cells, which are drawn over them,
+/// instead of following every step of their outline.
 fn sum_around(sums: &[(f64, u32)], across: usize, at: usize) -> (f64, u32) {
     let (col, row) = (at % across, at / across);
     (row - 1..=row + 1)

@@ -8,10 +8,9 @@ use super::{
     page::{Path, ink},
 };
 
-/// The most bytes of this layer: an irregular belief is drawn coarser, not larger.
+/// Bytes of this layer: an irregular belief is drawn coarser, not larger.
 const BUDGET: usize = 90_000;
 
-/// The hazard cells of a belief, as areas of the sheet.
 pub(super) struct BelievedHazard {
     sensed: Path,
     known: Path,
@@ -19,7 +18,7 @@ pub(super) struct BelievedHazard {
 }
 
 impl BelievedHazard {
-    /// The hazard in `cells`, one byte a cell of `lattice`, row-major.
+    /// `cells` has one byte a cell, row-major.
     pub(super) fn of(lattice: &Lattice, cells: &[u8]) -> Self {
         let mut block = 1;
         loop {
@@ -44,17 +43,14 @@ impl BelievedHazard {
         self.sensed.len() + self.known.len() + self.perimeter.len()
     }
 
-    /// Whether a sensor marked anything.
     pub(super) const fn has_sensed(&self) -> bool {
         !self.sensed.is_empty()
     }
 
-    /// Whether anything was known beforehand.
     pub(super) const fn has_known(&self) -> bool {
         !self.known.is_empty()
     }
 
-    /// Whether the perimeter is marked.
     pub(super) const fn has_perimeter(&self) -> bool {
         !self.perimeter.is_empty()
     }
@@ -66,16 +62,14 @@ impl BelievedHazard {
     }
 }
 
-/// Cells of several kinds in square blocks of `side` cells.
 pub(super) struct Blocks<'a, Kind> {
     pub(super) lattice: &'a Lattice,
-    /// Cells along the side of a block.
     pub(super) side: usize,
-    /// The kind of each block, row-major.
+    /// Row-major.
     pub(super) kinds: Vec<Kind>,
 }
 
-/// The state of each block: hazard if any of its cells is, of the most frequent kind of hazard.
+/// A block is hazard if any of its cells is, of the most frequent kind of hazard.
 fn coarsened(lattice: &Lattice, cells: &[u8], block: usize) -> Vec<CellState> {
     let across = lattice.cols.div_ceil(block);
     let mut tally = vec![[0_u32; 6]; across * lattice.rows.div_ceil(block)];
@@ -103,7 +97,7 @@ fn coarsened(lattice: &Lattice, cells: &[u8], block: usize) -> Vec<CellState> {
 }
 
 impl<Kind: Copy + PartialEq> Blocks<'_, Kind> {
-    /// The area of one kind: runs along x, joined along y where they are equal.
+    /// Runs along x are joined along y where they are equal.
     pub(super) fn area(&self, kind: Kind) -> Path {
         let across = self.lattice.cols.div_ceil(self.side);
         let mut path = Path::default();
@@ -143,7 +137,7 @@ struct Run {
     since: usize,
 }
 
-/// The runs of `kind` in one row, as (from, until).
+/// Each run is (from, until).
 fn runs<Kind: Copy + PartialEq>(line: &[Kind], kind: Kind) -> Vec<(usize, usize)> {
     let mut found: Vec<(usize, usize)> = Vec::new();
     for (col, &found_kind) in line.iter().enumerate() {
@@ -158,7 +152,7 @@ fn runs<Kind: Copy + PartialEq>(line: &[Kind], kind: Kind) -> Vec<(usize, usize)
     found
 }
 
-/// The runs that are open after `row`, and those that ended before it.
+/// Runs that are open after `row`, and those that ended before it.
 fn continued(open: Vec<Run>, row_runs: Vec<(usize, usize)>, row: usize) -> (Vec<Run>, Vec<Run>) {
     let grown: Vec<Run> = row_runs
         .into_iter()

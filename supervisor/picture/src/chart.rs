@@ -1,4 +1,4 @@
-//! A chart: values against each other, with axes, units and a legend. Series differ in their marks, not in colour alone.
+//! Values against each other. Series differ in their marks, not in colour alone.
 
 use glam::DVec2;
 
@@ -7,47 +7,37 @@ use super::{
     plot::{Entry, Plot, Range},
 };
 
-/// Height of the plot.
 const HEIGHT: f64 = 230.0;
-/// The most points of one series that are drawn; from more, the least and the greatest of each stretch are.
+/// From more points, the least and the greatest of each stretch are drawn.
 const MOST_POINTS: usize = 2400;
 
-/// The style of a series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mark {
-    /// A disc at each point.
     Discs,
-    /// A cross at each point.
     Crosses,
 }
 
-/// A series of values.
 #[derive(Clone, Debug)]
 pub struct Series {
-    /// Name for the legend.
     pub name: String,
-    /// The style of the points.
     pub mark: Mark,
-    /// x and y, in the units of the axes, in the order of x.
+    /// Points in the units of the axes, in the order of x.
     pub points: Vec<[f64; 2]>,
 }
 
 #[derive(Clone, Debug)]
 pub struct Chart {
-    /// The title above the chart.
     pub title: String,
-    /// A description in a sentence, for people who cannot see it.
+    /// A sentence for people who cannot see it.
     pub description: String,
-    /// The quantity and unit along the foot.
+    /// Quantity and unit.
     pub x: String,
-    /// The quantity and unit along the left side.
     pub y: String,
-    /// The series; the first ones are drawn below the others.
+    /// Later series are drawn above the first ones.
     pub series: Vec<Series>,
 }
 
 impl Chart {
-    /// The text of an SVG file.
     pub fn svg(&self) -> String {
         let along = |axis: usize| {
             let points = self.series.iter().flat_map(|series| &series.points);
@@ -76,7 +66,7 @@ impl Chart {
     }
 }
 
-/// The least and the greatest value of each interval, so that no peak is lost.
+/// Least and greatest of each interval, so that no peak is lost.
 fn reduced(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
     if points.len() <= MOST_POINTS {
         return points.to_vec();
@@ -100,7 +90,6 @@ fn style(mark: Mark) -> String {
     }
 }
 
-/// `points` on the sheet, by `mark`.
 fn drawn(mark: Mark, points: impl Iterator<Item = DVec2>) -> String {
     let mut path = Path::default();
     for at in points.filter(|at| at.is_finite()) {
@@ -112,7 +101,6 @@ fn drawn(mark: Mark, points: impl Iterator<Item = DVec2>) -> String {
     path.element(&style(mark))
 }
 
-/// Add a cross of two strokes.
 fn add_cross(path: &mut Path, at: DVec2, reach: f64) {
     for side in [DVec2::new(1.0, 1.0), DVec2::new(1.0, -1.0)] {
         path.move_to(at - side * reach);

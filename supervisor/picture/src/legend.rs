@@ -12,23 +12,20 @@ use super::{
     world::Outline,
 };
 
-/// The symbols that are drawn and need an explanation.
 pub(super) struct Legend<'a> {
     pub(super) view: &'a View,
     pub(super) levels: Option<Levels>,
     pub(super) guidance: bool,
-    /// Whether the target cannot be reached from some free cells of the map.
+    /// The target cannot be reached from some free cells of the map.
     pub(super) isolated: bool,
     pub(super) hazard: Option<&'a BelievedHazard>,
     pub(super) world: &'a Shapes,
     pub(super) motion: &'a Motion<'a>,
 }
 
-/// Left edge of the legend.
 const COLUMN: f64 = PLOT_LEFT + PLOT_SIDE + 30.0;
-/// Distance between rows.
 const ROW: f64 = 25.0;
-/// The middle of the symbols, and the start of their text, from the left edge of a column.
+/// Middle of the symbols, and start of their text, from the left edge of a column.
 const SYMBOL: f64 = 19.0;
 const WORDS: f64 = 50.0;
 
@@ -41,7 +38,6 @@ impl Legend<'_> {
         column.text + &self.scale_bar()
     }
 
-    /// Rows about the field.
     pub(super) fn field_rows(&self, column: &mut Column) {
         if self.guidance {
             column.heading("Field of that belief");
@@ -67,7 +63,6 @@ impl Legend<'_> {
         }
     }
 
-    /// Rows about the robot.
     pub(super) fn motion_rows(&self, column: &mut Column) {
         column.heading("Motion");
         let line = |style: String| {
@@ -108,7 +103,6 @@ impl Legend<'_> {
         column.row("target, tolerance", |at| motion::target(at, 9.5));
     }
 
-    /// Rows about the hazards of the map and the real obstacles.
     pub(super) fn hazard_rows(&self, column: &mut Column) {
         let cell = |colour: &'static str| move |at: DVec2| patch(at, &format!("fill=\"{colour}\""));
         if let Some(hazard) = self.hazard {
@@ -131,7 +125,7 @@ impl Legend<'_> {
         }
     }
 
-    /// A bar of a round length, a sixth to a third of the plot, in the lower corner.
+    /// A round length, a sixth to a third of the plot, in the lower corner.
     fn scale_bar(&self) -> String {
         let length = round_up(self.view.side_m() / 8.0);
         let (y, right) = (PLOT_TOP + PLOT_SIDE - 4.0, COLUMN + self.view.px(length));
@@ -149,16 +143,13 @@ impl Legend<'_> {
     }
 }
 
-/// A column of rows that grows downwards.
 pub(super) struct Column {
     x: f64,
     pub(super) y: f64,
-    /// The rows so far.
     pub(super) text: String,
 }
 
 impl Column {
-    /// An empty column.
     pub(super) const fn at(corner: DVec2) -> Self {
         Self { x: corner.x, y: corner.y, text: String::new() }
     }
@@ -202,10 +193,8 @@ fn guidance_symbol(at: DVec2) -> String {
         + &head.element(&format!("fill=\"{colour}\""))
 }
 
-/// Height of the colour bar with its words.
 const COLOUR_BAR: f64 = 80.0;
 
-/// The bands with the values between them.
 fn colour_bar(levels: Levels, left: f64, y: f64) -> String {
     const LENGTH: f64 = 216.0;
     let bands = levels.count + 1;

@@ -1,20 +1,20 @@
 //! The picture of a run, an SVG file without references to others, and the picture of a field on a map.
 //!
-//! The layers from the bottom of the page to its top are in the mission frame (metres, y up):
+//! Layers from the bottom to the top, in the mission frame (metres, y up):
 //!
 //! | module | draws |
 //! |---|---|
-//! | `bands` | log2 u of the final belief, in bands between level sets |
+//! | `bands` | log2 u of the final belief |
 //! | `streamlines` | lines of the guidance field E |
-//! | `cells` | the hazard cells of the map |
+//! | `cells` | hazard cells of the map |
 //! | `world` | the real obstacles |
-//! | `motion` | trajectories, the robot at regular times, start, target |
-//! | `margin`, `legend` | title, axes, captions; the meaning of the symbols |
-//! | `page`, `lattice` | the page, and the position of cells on it |
+//! | `motion` | trajectories, bodies, start, target |
+//! | `margin`, `legend` | title, axes, captions; symbols |
+//! | `page`, `lattice` | the page, and cells on it |
 //! | [`Scene`] | the data of a picture |
 //!
-//! `map` draws the field of a bare map with the same bands and lines, and `raster` converts it to PNG. `chart` draws values
-//! against each other; `plot` is its frame.
+//! `map` draws the field of a bare map with the same bands and lines, and `raster` converts it to PNG. `chart` draws
+//! values against each other; `plot` is its frame.
 //!
 //! A picture shows what is known at the end of a run, however it ended: every layer but the frame may be missing, and
 //! every input gives a valid file.
@@ -58,7 +58,7 @@ use self::{
     page::{PLOT_LEFT, PLOT_SIDE, PLOT_TOP, View, ink},
 };
 
-/// Whether the target cannot be reached from a free cell of the map.
+/// The target cannot be reached from a free cell of the map.
 fn has_isolated_cells(
     grid: Option<(GridFrame, &[u8])>,
     field: Option<(GridFrame, &[FieldCell])>,
@@ -73,7 +73,6 @@ fn has_isolated_cells(
         })
 }
 
-/// `scene` as the text of an SVG file.
 pub fn svg(scene: &Scene<'_>) -> String {
     drawn(scene, |view, plot, legend| {
         [
@@ -89,7 +88,7 @@ pub fn svg(scene: &Scene<'_>) -> String {
     })
 }
 
-/// The plot of `scene` and its explanations, put together by `sheet`.
+/// `sheet` puts the plot and its explanations together.
 fn drawn(scene: &Scene<'_>, sheet: impl FnOnce(&View, String, &Legend<'_>) -> String) -> String {
     let view = View::of(&scene.mission.grid_frame());
     let field = scene.field.filter(|(frame, cells)| cells.len() == frame.area());

@@ -1,7 +1,7 @@
-//! The field of a bare map: level sets of log u, lines of the guidance, walls, cells cut off, the target.
+//! The field of a bare map.
 //!
-//! Unlike the picture of a mission, this is drawn for conversion to pixels, large and without text. Cells become squares
-//! of whole pixels if there is room for that.
+//! Unlike the picture of a mission, this is drawn for conversion to pixels, large and without text. Cells become
+//! squares of whole pixels if there is room for that.
 
 use common::samples::FieldCell;
 use glam::DVec2;
@@ -14,13 +14,11 @@ use super::{
     streamlines,
 };
 
-/// Longest side of a drawn map, pixels.
+/// Longest side, pixels.
 const LARGEST: usize = 2368;
-/// The cells along the longer side below which a map is drawn smaller: on a large sheet its lines would be lost.
+/// A map with fewer cells a side is drawn smaller: on a large sheet its lines would be lost.
 const SMALL: usize = 100;
-/// Longest side of such a small map, pixels.
 const SMALL_SIDE: usize = 1200;
-/// Margin around the map, pixels.
 const FRAME: f64 = 16.0;
 
 const WALL: &str = "#1d2430";
@@ -52,19 +50,17 @@ const LINES: streamlines::Style = streamlines::Style {
     stroke: (1.0, 0.6, 0.8),
 };
 
-/// A field, row-major, the first row at the top.
+/// Row-major, the first row at the top.
 pub struct FieldOnMap<'a> {
     /// Columns and rows.
     pub size: (usize, usize),
-    /// The blocked cells.
     pub blocked: &'a [bool],
-    /// The field: E along columns and rows, log2 u negative infinity where blocked or cut off.
+    /// E along columns and rows, log2 u negative infinity where blocked or cut off.
     pub cells: &'a [FieldCell],
-    /// Column and row of the target.
+    /// Column and row.
     pub target: (usize, usize),
 }
 
-/// The appearance of a cell.
 #[derive(Clone, Copy, Eq, PartialEq)]
 enum Kind {
     Reachable,
@@ -72,7 +68,7 @@ enum Kind {
     Blocked,
 }
 
-/// The picture as the text of an SVG file whose units are pixels.
+/// SVG whose units are pixels.
 pub fn map_svg(map: &FieldOnMap<'_>) -> String {
     let lattice = Lattice::of_image(map.size, DVec2::splat(FRAME), cell_size(map.size));
     let bands = Bands::of(&lattice, map.cells, &BANDS);
@@ -108,7 +104,7 @@ pub fn map_svg(map: &FieldOnMap<'_>) -> String {
 const HATCH: &str = "<pattern id=\"hatch\" width=\"8\" height=\"8\" patternUnits=\"userSpaceOnUse\" \
      patternTransform=\"rotate(45)\"><path d=\"M0 0V8\" stroke=\"#8b9199\" stroke-width=\"3\"/></pattern>";
 
-/// Pixels along the side of a cell: a whole number, or the reciprocal of one, so that the squares are sharp.
+/// A whole number of pixels, or the reciprocal of one, so that the squares are sharp.
 fn cell_size((cols, rows): (usize, usize)) -> f64 {
     let longest = cols.max(rows).max(1);
     let room = if longest < SMALL { SMALL_SIDE } else { LARGEST };
@@ -148,10 +144,10 @@ fn flat_cells(map: &FieldOnMap<'_>, lattice: &Lattice, levels: Levels) -> String
         .collect()
 }
 
-/// The greatest change of log2 u between cells this near to each other that no wall separates.
+/// Change of log2 u between cells this near to each other that no wall separates.
 const OPEN: f64 = 8.0;
 
-/// Whether a reachable cell and one across a blocked neighbour lie more than two bands apart, because of the wall.
+/// A reachable cell and one across a blocked neighbour lie more than two bands apart, because of the wall.
 fn is_beside_thin_wall(map: &FieldOnMap<'_>, at: usize, step: f64) -> bool {
     let own = map.cells[at].log2_u;
     let apart = OPEN.max(2.0 * step);
@@ -163,7 +159,7 @@ fn is_beside_thin_wall(map: &FieldOnMap<'_>, at: usize, step: f64) -> bool {
             .any(|across| across.is_finite() && f64::from((across - own).abs()) > apart)
 }
 
-/// The cells of the 3 x 3 around one that lie on the map.
+/// The 3 x 3 cells that lie on the map.
 fn around((cols, rows): (usize, usize), at: usize) -> impl Iterator<Item = usize> {
     let (col, row) = (at % cols, at / cols);
     let columns = col.saturating_sub(1)..(col + 2).min(cols);
@@ -171,7 +167,6 @@ fn around((cols, rows): (usize, usize), at: usize) -> impl Iterator<Item = usize
         .flat_map(move |row| columns.clone().map(move |col| row * cols + col))
 }
 
-/// The target as a large bull's eye.
 fn target(lattice: &Lattice, (col, row): (usize, usize)) -> String {
     let at = lattice.place(DVec2::new(col as f64, row as f64));
     let (x, y) = (Px(at.x), Px(at.y));

@@ -13,11 +13,9 @@ pub(super) const FONT: &str = "system-ui, -apple-system, 'Segoe UI', Roboto, 'He
      'DejaVu Sans', sans-serif";
 /// Characters of 12 px that surely fit across the sheet.
 const ACROSS: usize = 150;
-/// The most captions that are drawn.
 const MOST_CAPTIONS: usize = 8;
 /// The distance from the plot to the first caption.
 const BELOW: f64 = 58.0;
-/// Distance between lines of captions.
 const LINE: f64 = 18.0;
 
 /// The start of the file: size, description, definitions.
@@ -134,7 +132,6 @@ fn definitions() -> String {
     )
 }
 
-/// The lines below the plot.
 pub(super) fn captions(scene: &Scene<'_>) -> String {
     let top = PLOT_TOP + PLOT_SIDE + BELOW + 6.0;
     (0..)

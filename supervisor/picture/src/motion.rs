@@ -1,4 +1,4 @@
-//! The robot: its true and its estimated trajectory, its body at regular times, start, target, end.
+//! Trajectories, the robot's body at regular times, start, target, end.
 
 use common::{geometry::principal_axes, kinematics::Pose2, mission::Mission};
 use glam::DVec2;
@@ -8,28 +8,25 @@ use super::{
     scene::Scene,
 };
 
-/// The most poses of one trajectory that are drawn: a day at 7 Hz still makes a small file.
+/// Poses drawn of one trajectory: a day at 7 Hz still makes a small file.
 const MOST_POSES: usize = 4000;
-/// The approximate number of bodies along the way.
 const BODIES: f64 = 16.0;
-/// The number of standard deviations within which 95 % of a normal distribution in a plane are: the root of -2 ln 0.05.
+/// Within so many standard deviations 95 % of a normal distribution in a plane are: the root of -2 ln 0.05.
 const WITHIN_95: f64 = 2.4477;
-/// The most bodies, whatever the times are.
+/// Bodies, whatever the times are.
 const MOST_BODIES: usize = 200;
 
-/// The robot in its world.
 pub(super) struct Motion<'a> {
     mission: &'a Mission,
     believed: &'a [Pose2],
     covariance: Option<[f64; 3]>,
     truth: &'a [Pose2],
     targets: &'a [DVec2],
-    /// Mission time between two bodies, seconds, and the poses from one to the next.
+    /// Mission time between two bodies, and poses from one to the next.
     every: Option<(f64, f64)>,
 }
 
 impl<'a> Motion<'a> {
-    /// The motion in `scene`.
     pub(super) fn of(scene: &Scene<'a>) -> Self {
         let mut motion = Self {
             mission: scene.mission,
@@ -48,27 +45,23 @@ impl<'a> Motion<'a> {
         motion
     }
 
-    /// The true trajectory, or the estimated one if the true one is unknown.
+    /// The estimated one if the true one is unknown.
     fn way(&self) -> &'a [Pose2] {
         if self.truth.is_empty() { self.believed } else { self.truth }
     }
 
-    /// Whether the true trajectory is known.
     pub(super) const fn has_truth(&self) -> bool {
         !self.truth.is_empty()
     }
 
-    /// Whether there is an estimated trajectory.
     pub(super) const fn has_belief(&self) -> bool {
         !self.believed.is_empty()
     }
 
-    /// Whether the covariance of the estimated end is known.
     pub(super) const fn has_covariance(&self) -> bool {
         self.covariance.is_some() && self.has_belief()
     }
 
-    /// Mission time between two bodies, seconds, if any are drawn.
     pub(super) fn period_s(&self) -> Option<f64> {
         self.every.map(|(seconds, _)| seconds)
     }
@@ -112,7 +105,7 @@ impl<'a> Motion<'a> {
         outlines.element(BODY)
     }
 
-    /// The ellipse about the estimated end in which the robot's centre is with 95 %.
+    /// The robot's centre is in this ellipse with 95 %.
     fn region(&self, view: &View) -> String {
         let (Some(covariance), Some(end)) = (self.covariance, self.believed.last()) else {
             return String::new();
@@ -136,7 +129,7 @@ impl<'a> Motion<'a> {
         )
     }
 
-    /// The end of the run: the true body filled, the estimated one dashed.
+    /// The true body is filled, the estimated one dashed.
     fn end(&self, view: &View, radius: f64) -> String {
         let body = |pose: Option<&Pose2>, style: &str| {
             let mut path = Path::default();
@@ -154,16 +147,13 @@ impl<'a> Motion<'a> {
     }
 }
 
-/// Attributes of the bodies along the way.
 pub(super) const BODY: &str = "fill=\"#fff\" fill-opacity=\"0.45\" stroke=\"#0b0f14\" \
      stroke-width=\"1\" stroke-opacity=\"0.75\"";
 
-/// Attributes of the body at the end.
 pub(super) fn final_body() -> String {
     format!("fill=\"{0}\" fill-opacity=\"0.35\" stroke=\"{0}\" stroke-width=\"1.8\"", ink::TRUTH)
 }
 
-/// Attributes of the body at the estimated end.
 fn believed_end() -> String {
     format!(
         "fill=\"none\" stroke=\"{}\" stroke-width=\"1.4\" stroke-dasharray=\"3 2.4\"",
@@ -171,7 +161,6 @@ fn believed_end() -> String {
     )
 }
 
-/// Attributes of the region about the estimated end.
 pub(super) fn region_style() -> String {
     format!(
         "fill=\"{0}\" fill-opacity=\"0.08\" stroke=\"{0}\" stroke-width=\"1.1\" stroke-dasharray=\"1.5 2.5\"",
@@ -179,12 +168,10 @@ pub(super) fn region_style() -> String {
     )
 }
 
-/// Attributes of the true trajectory.
 pub(super) fn truth_line() -> String {
     line_style(ink::TRUTH, "2.2", "none")
 }
 
-/// Attributes of the estimated trajectory.
 pub(super) fn believed_line() -> String {
     line_style(ink::BELIEVED, "2", "7 4.5")
 }
@@ -196,7 +183,7 @@ fn line_style(colour: &str, width: &str, dashes: &str) -> String {
     )
 }
 
-/// A white line below a line, which separates it from field and hatch.
+/// A white line below separates a line from field and hatch.
 fn halo(line: &Path) -> String {
     line.element(
         "fill=\"none\" stroke=\"#fff\" stroke-width=\"5.5\" stroke-opacity=\"0.75\" \
@@ -215,7 +202,7 @@ fn is_shown(view: &View, pose: &Pose2) -> bool {
     view.shows(pose.position, 0.0) && pose.heading.is_finite()
 }
 
-/// A disc with a tick from its centre to its rim along the heading.
+/// A disc with a tick along the heading.
 pub(super) fn add_body(path: &mut Path, at: DVec2, radius: f64, heading: f64) {
     path.circle(at, radius);
     // The sheet's y axis points downwards.
@@ -236,7 +223,6 @@ pub(super) fn target(at: DVec2, tolerance: f64) -> String {
     )
 }
 
-/// A square at the start of the run.
 pub(super) fn start_mark(at: DVec2) -> String {
     format!(
         "<rect x=\"{}\" y=\"{}\" width=\"9\" height=\"9\" fill=\"#fff\" stroke=\"{}\" \
@@ -247,7 +233,7 @@ pub(super) fn start_mark(at: DVec2) -> String {
     )
 }
 
-/// The least period people count in that is not below `least` seconds.
+/// A round period of at least `least` seconds.
 fn whole_period(least: f64) -> f64 {
     const PERIODS: [f64; 12] = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0];
     PERIODS

@@ -1,64 +1,48 @@
-//! The sheet: the place of the mission frame on it, and the format of numbers, lines and text.
+//! The sheet: the mission frame on it, and the format of numbers, lines and text.
 
 use std::fmt::{self, Display, Write};
 
 use common::grid::GridFrame;
 use glam::DVec2;
 
-/// Width of the sheet. Lengths on the sheet are in SVG's user units, "px".
+/// Lengths on the sheet are in SVG's user units, "px".
 pub(super) const WIDTH: f64 = 1150.0;
-/// Left edge of the plot.
 pub(super) const PLOT_LEFT: f64 = 62.0;
-/// Top edge of the plot.
 pub(super) const PLOT_TOP: f64 = 92.0;
-/// Side of the plot, pixels. The plot is a square, because the perimeter of a mission is one.
+/// The plot is a square, because the perimeter of a mission is one.
 pub(super) const PLOT_SIDE: f64 = 800.0;
 
-/// Lines are cut at this distance outside the plot, and not only hidden, so that a far pose gives no far coordinates.
+/// Lines are cut so far outside the plot, and not only hidden, so that a far pose gives no far coordinates.
 const OVERHANG: f64 = 20.0;
-/// Steps of a line shorter than this cannot be seen.
+/// Shorter steps of a line cannot be seen.
 const FINEST: f64 = 0.6;
 
-/// The colours, in one place so that they stay distinct. Hue tells belief (orange, violet) from motion (black, magenta);
-/// the field stays pale below both.
+/// Hue tells belief (orange, violet) from motion (black, magenta); the field stays pale below both.
 pub(super) mod ink {
-    /// Text and the plot's frame.
     pub(crate) const TEXT: &str = "#1f2933";
-    /// Text of less weight.
     pub(crate) const QUIET: &str = "#5b6773";
-    /// Cells without a path to the target or without a field.
+    /// Cells without a path to the target, or without a field.
     pub(crate) const NOWHERE: &str = "#eceef0";
-    /// Lines of E.
     pub(crate) const GUIDANCE: &str = "#3f5f86";
-    /// Cells a sensor marked.
     pub(crate) const SENSED: &str = "#f0923b";
-    /// Cells the a-priori map marked.
     pub(crate) const KNOWN: &str = "#8f78c4";
-    /// Cells of the perimeter.
     pub(crate) const PERIMETER: &str = "#9aa5b1";
-    /// Real shapes.
     pub(crate) const WORLD: &str = "#27313b";
-    /// The true trajectory.
     pub(crate) const TRUTH: &str = "#0b0f14";
-    /// The estimated trajectory.
     pub(crate) const BELIEVED: &str = "#d1126f";
-    /// Target, and success.
     pub(crate) const TARGET: &str = "#087f4b";
-    /// Anything but success.
     pub(crate) const FAILURE: &str = "#c0271c";
 }
 
-/// The mission frame laid over the plot.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct View {
-    /// The corner of least x and y, metres.
+    /// Least x and y, metres.
     low: DVec2,
-    /// Side of the plot, metres.
     side_m: f64,
 }
 
 impl View {
-    /// The whole of `frame`, rim cells included.
+    /// Rim cells included.
     pub(super) fn of(frame: &GridFrame) -> Self {
         let side_m = f64::from(frame.cells) * frame.resolution_m;
         let low = metres(frame, DVec2::splat(-0.5));
@@ -69,35 +53,32 @@ impl View {
         Self { low: DVec2::splat(-0.5), side_m: 1.0 }
     }
 
-    /// The corner of least x and y, metres.
     pub(super) const fn low(&self) -> DVec2 {
         self.low
     }
 
-    /// Side of the plot, metres.
     pub(super) const fn side_m(&self) -> f64 {
         self.side_m
     }
 
-    /// The place of `point` (metres) on the sheet.
     pub(super) fn place(&self, point: DVec2) -> DVec2 {
         let from_low = (point - self.low) * self.px(1.0);
         DVec2::new(PLOT_LEFT + from_low.x, PLOT_TOP + PLOT_SIDE - from_low.y)
     }
 
-    /// `metres` as a length on the sheet.
+    /// A length on the sheet.
     pub(super) fn px(&self, metres: f64) -> f64 {
         metres * PLOT_SIDE / self.side_m
     }
 
-    /// Whether any of a disc (metres) is on the plot; false for NaN.
+    /// Any of a disc (metres) is on the plot; false for NaN.
     pub(super) fn shows(&self, centre: DVec2, radius_m: f64) -> bool {
         let reach = radius_m + self.side_m / 2.0;
         let from_middle = (centre - self.low - DVec2::splat(self.side_m / 2.0)).abs();
         from_middle.cmple(DVec2::splat(reach)).all()
     }
 
-    /// The line through `points` (metres), cut at the plot and broken where one is not finite.
+    /// A line through metres, cut at the plot and broken where a point is not finite.
     pub(super) fn line(&self, points: impl IntoIterator<Item = DVec2>) -> Path {
         let mut path = Path::default();
         let mut last: Option<DVec2> = None;
@@ -124,13 +105,13 @@ impl View {
     }
 }
 
-/// A place given in cells (cell centres at whole numbers), in metres.
+/// `cells` has cell centres at whole numbers.
 pub(super) fn metres(frame: &GridFrame, cells: DVec2) -> DVec2 {
     let centre = DVec2::splat(f64::from(frame.centre_index()));
     frame.centre + (cells - centre) * frame.resolution_m
 }
 
-/// The part of `from`..`to` that is on the plot or little beside it, by Liang and Barsky's clipping.
+/// Liang and Barsky's clipping to the plot and a little beside it.
 fn cut(from: DVec2, to: DVec2) -> Option<(DVec2, DVec2)> {
     let low = DVec2::new(PLOT_LEFT, PLOT_TOP) - OVERHANG;
     let high = low + PLOT_SIDE + 2.0 * OVERHANG;
@@ -153,7 +134,7 @@ fn cut(from: DVec2, to: DVec2) -> Option<(DVec2, DVec2)> {
     (enter <= leave && ends.0.is_finite() && ends.1.is_finite()).then_some(ends)
 }
 
-/// A coordinate in the file: a tenth is finer than any screen, and a value that is no number is left out.
+/// A tenth is finer than any screen, and a value that is no number is left out.
 pub(super) struct Px(pub(super) f64);
 
 impl Display for Px {
@@ -173,12 +154,10 @@ pub(super) struct Path {
 }
 
 impl Path {
-    /// Whether nothing was drawn.
     pub(super) const fn is_empty(&self) -> bool {
         self.data.is_empty()
     }
 
-    /// The bytes that the path takes.
     pub(super) const fn len(&self) -> usize {
         self.data.len()
     }
@@ -188,19 +167,17 @@ impl Path {
         self.push('M', to);
     }
 
-    /// Draw a straight line to `to`.
     pub(super) fn line_to(&mut self, to: DVec2) {
         self.push('L', to);
     }
 
-    /// Set the pen down at `to` unless it is there.
+    /// Sets the pen down at `to` unless it is there.
     pub(super) fn join(&mut self, to: DVec2) {
         if self.pen != Some(to) {
             self.move_to(to);
         }
     }
 
-    /// A closed polygon.
     pub(super) fn polygon(&mut self, corners: impl IntoIterator<Item = DVec2>) {
         for (nth, corner) in corners.into_iter().enumerate() {
             self.push(if nth == 0 { 'M' } else { 'L' }, corner);
@@ -209,7 +186,6 @@ impl Path {
         self.pen = None;
     }
 
-    /// A rectangle with sides along the sheet's.
     pub(super) fn rectangle(&mut self, corner: DVec2, size: DVec2) {
         let (x, y, width, height) = (Px(corner.x), Px(corner.y), Px(size.x), Px(size.y));
         let back = Px(-size.x);
@@ -234,7 +210,7 @@ impl Path {
         let _ = self.data.write_fmt(text);
     }
 
-    /// The element, with `style` as its further attributes; nothing if nothing was drawn.
+    /// `style` are further attributes; nothing if nothing was drawn.
     pub(super) fn element(&self, style: &str) -> String {
         if self.is_empty() {
             return String::new();
@@ -243,7 +219,7 @@ impl Path {
     }
 }
 
-/// `text` as XML character data of at most `limit` characters.
+/// XML character data of at most `limit` characters.
 pub fn escape(text: &str, limit: usize) -> String {
     let mut escaped = String::new();
     for (nth, character) in text.chars().enumerate() {
@@ -265,7 +241,7 @@ pub fn escape(text: &str, limit: usize) -> String {
     escaped
 }
 
-/// The least of 1, 2, 5, 10, 20, ... (and their fractions) that is not below `least`.
+/// 1, 2, 5, 10, 20, ... and their fractions; not below `least`.
 pub(super) fn round_up(least: f64) -> f64 {
     if !(least.is_finite() && least > 0.0) {
         return 1.0;

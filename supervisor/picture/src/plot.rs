@@ -1,30 +1,24 @@
-//! The common parts of charts: a sheet of fixed width, ranges with round ticks, axes with units, a legend.
+//! A chart's sheet of fixed width, ranges with round ticks, axes, legend.
 
 use glam::DVec2;
 
 use super::page::{Path, Px, escape, ink, round_up};
 
-/// Width of the sheet: its text is readable on a telephone, and as large as the text in a column of print.
+/// Text is readable on a telephone, and as large as the text in a column of print.
 const WIDTH: f64 = 620.0;
-/// Left edge of the plot.
 const LEFT: f64 = 70.0;
-/// Right edge of the plot.
 const RIGHT: f64 = WIDTH - 20.0;
-/// Text, px.
 const TEXT: f64 = 14.0;
-/// The approximate width of a character of the text.
+/// A character is about as wide.
 const CHARACTER: f64 = 8.6;
-/// Distance between rows of the legend.
 const ROW: f64 = 21.0;
-/// Room of a symbol of the legend, and from one entry to the next.
+/// Room of a symbol, and from one entry to the next.
 const SYMBOL: f64 = 38.0;
 const APART: f64 = 24.0;
-/// The space below the plot.
 const BELOW: f64 = 52.0;
-/// Characters that surely fit across the sheet.
+/// They surely fit across the sheet.
 const ACROSS: usize = 70;
 
-/// The range of an axis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Range {
     low: f64,
@@ -33,7 +27,7 @@ pub(super) struct Range {
 }
 
 impl Range {
-    /// Round numbers around `values`; 0 to 1 around none.
+    /// Round numbers; 0 to 1 around none.
     pub(super) fn around(values: impl Iterator<Item = f64>) -> Self {
         let finite = values.filter(|value| value.is_finite());
         let bounds = finite.fold(None, |bounds: Option<(f64, f64)>, value| {
@@ -48,13 +42,12 @@ impl Range {
         Self { low, high, step }
     }
 
-    /// The place of `value`: 0 at the low end, 1 at the high one; NaN if it has none.
+    /// 0 at the low end, 1 at the high one; NaN if it has no place.
     pub(super) fn part(&self, value: f64) -> f64 {
         let part = (value - self.low) / (self.high - self.low);
         if part.is_finite() { part.clamp(0.0, 1.0) } else { f64::NAN }
     }
 
-    /// Places and labels of the ticks.
     fn ticks(&self) -> Vec<(f64, String)> {
         let digits = (-self.step.log10().floor()).clamp(0.0, 9.0) as usize;
         let first = (self.low / self.step - 1e-6).ceil();
@@ -69,10 +62,9 @@ impl Range {
     }
 }
 
-/// An entry of a legend: what draws its symbol about a place, and its words.
+/// A function draws the symbol about a place; its words stand beside it.
 pub(super) type Entry = (Box<dyn Fn(DVec2) -> String>, String);
 
-/// The sheet of a chart.
 pub(super) struct Plot {
     title: String,
     top: f64,
@@ -81,7 +73,7 @@ pub(super) struct Plot {
 }
 
 impl Plot {
-    /// A sheet with a plot `height` high, below `title` and the entries of its legend.
+    /// The plot is `height` high, below `title` and the legend.
     pub(super) fn new(title: &str, height: f64, entries: &[Entry]) -> Self {
         let mut at = DVec2::new(LEFT, 48.0);
         let mut legend = String::new();
@@ -100,12 +92,11 @@ impl Plot {
         Self { title: title.to_owned(), top: at.y + below, height, legend }
     }
 
-    /// The point on the sheet at these shares of both ranges.
+    /// Shares of both ranges.
     pub(super) fn place(&self, x: f64, y: f64) -> DVec2 {
         DVec2::new(LEFT + x * (RIGHT - LEFT), self.top + (1.0 - y) * self.height)
     }
 
-    /// The file with `drawn` between axes.
     pub(super) fn svg(
         &self,
         x: (&Range, &str),

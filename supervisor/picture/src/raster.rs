@@ -1,28 +1,23 @@
-//! A drawing as pixels. It must contain no text, because no fonts are loaded.
+//! A drawing as pixels must contain no text, because no fonts are loaded.
 
 use resvg::{tiny_skia::Pixmap, usvg};
 use thiserror::Error;
 
-/// A drawing that did not become pixels, which is a fault of the program with any map.
+/// A fault of the program with any map.
 #[derive(Debug, Error)]
 pub enum RasterError {
-    /// The drawing is no SVG.
     #[error("the picture could not be read back: {0}; report this map")]
     Drawing(#[from] usvg::Error),
-    /// A pixmap of that size cannot be allocated.
     #[error("no picture of {width} x {height} pixels can be made; report this map")]
-    Size {
-        /// Pixels in a row.
-        width: u32,
-        /// Rows.
-        height: u32,
-    },
-    /// The PNG could not be written.
+    Size { width: u32, height: u32 },
     #[error("the picture could not be encoded: {0}; report this map")]
     Encoding(String),
 }
 
-/// `svg` as the bytes of a PNG file, with a pixel for each unit.
+/// A PNG file with a pixel for each unit.
+///
+/// # Errors
+/// `svg` is no SVG, or no pixmap of its size can be allocated.
 pub fn png(svg: &str) -> Result<Vec<u8>, RasterError> {
     let tree = usvg::Tree::from_str(svg, &usvg::Options::default())?;
     let size = tree.size().to_int_size();

@@ -1,5 +1,5 @@
-//! Lines of the guidance field E, evenly spaced whatever the grid: B. Jobard, W. Lefer, "Creating
-//! evenly-spaced streamlines of arbitrary density" (1997).
+//! Evenly spaced lines of E, whatever the grid: B. Jobard, W. Lefer, "Creating evenly-spaced streamlines of arbitrary
+//! density" (1997).
 
 use common::samples::FieldCell;
 use glam::DVec2;
@@ -9,22 +9,19 @@ use super::{
     page::{Path, ink},
 };
 
-/// The style of the lines.
 #[derive(Debug)]
 pub(super) struct Style {
-    /// The most bytes of the lines: an irregular field is drawn sparser, not larger.
+    /// Bytes of the lines: an irregular field is drawn sparser, not larger.
     pub(super) budget: usize,
     /// The distance from a line to the beginning of the next one, on the sheet.
     pub(super) spacing: f64,
-    /// The least spacing, in cells: between two cells the field has no further details.
+    /// The field has no further details between two cells.
     pub(super) least_cells: f64,
-    /// Colour of lines and arrowheads.
     pub(super) colour: &'static str,
-    /// Width of the lines, on the sheet, and the opacity of lines and arrowheads.
+    /// Width on the sheet, and opacity of lines and arrowheads.
     pub(super) stroke: (f64, f64, f64),
 }
 
-/// The lines of a mission.
 pub(super) const MISSION: Style = Style {
     budget: 100_000,
     spacing: 23.0,
@@ -33,15 +30,14 @@ pub(super) const MISSION: Style = Style {
     stroke: (0.8, 0.6, 0.75),
 };
 
-/// The distance to another line at which a line ends, in spacings.
+/// A line ends this near to another, in spacings.
 const MERGED: f64 = 0.5;
-/// The length below which lines are left out, in spacings.
+/// Shorter lines are left out, in spacings.
 const SHORTEST: f64 = 1.4;
-/// Distance between arrowheads along a line, in spacings.
+/// Arrowheads along a line, in spacings.
 const ARROWS_APART: f64 = 6.0;
-/// The cosine of the turn up to which a line is straight.
+/// Cosine of the turn up to which a line is straight.
 const STRAIGHT: f64 = 0.9985;
-/// Half the width and half the length of an arrowhead, on the sheet.
 const ARROWHEAD: (f64, f64) = (2.3, 3.4);
 
 pub(super) fn layer(lattice: &Lattice, cells: &[FieldCell], style: &Style) -> String {
@@ -57,7 +53,7 @@ pub(super) fn layer(lattice: &Lattice, cells: &[FieldCell], style: &Style) -> St
     }
 }
 
-/// Lines `spacing` apart, with arrowheads as they are at the `usual` spacing.
+/// The arrowheads are as at the `usual` spacing.
 fn drawn(lattice: &Lattice, cells: &[FieldCell], usual: f64, spacing: f64) -> (Path, Path) {
     let (mut lines, mut arrowheads) = (Path::default(), Path::default());
     for line in evenly_spaced(lattice, cells, spacing) {
@@ -76,7 +72,7 @@ fn paint(lines: &Path, arrowheads: &Path, style: &Style) -> String {
     )) + &arrowheads.element(&format!("fill=\"{colour}\" fill-opacity=\"{head_opacity}\""))
 }
 
-/// Draw a line with points only where it bends, and its arrowheads.
+/// Points only where the line bends, and arrowheads.
 fn draw(line: &[DVec2], spacing: f64, lines: &mut Path, arrowheads: &mut Path) {
     let Some((&first, rest)) = line.split_first() else {
         return;
@@ -106,14 +102,13 @@ fn draw(line: &[DVec2], spacing: f64, lines: &mut Path, arrowheads: &mut Path) {
     }
 }
 
-/// The corners of an arrowhead at `at` along `heading`.
 pub(super) fn arrowhead(at: DVec2, heading: DVec2) -> [DVec2; 3] {
     let (width, length) = ARROWHEAD;
     let (ahead, aside) = (heading * length, heading.perp() * width);
     [at + ahead, at - ahead + aside, at - ahead - aside]
 }
 
-/// The lines, in cells (cell centres at whole numbers), each along E.
+/// Lines in cells (centres at whole numbers), each along E.
 fn evenly_spaced(lattice: &Lattice, cells: &[FieldCell], spacing: f64) -> Vec<Vec<DVec2>> {
     let bins = [lattice.width, lattice.height].map(|side| (side / spacing) as usize + 2);
     let mut tracer = Tracer {
@@ -146,16 +141,15 @@ fn evenly_spaced(lattice: &Lattice, cells: &[FieldCell], spacing: f64) -> Vec<Ve
 struct Tracer<'a> {
     lattice: &'a Lattice,
     cells: &'a [FieldCell],
-    /// The distance between two lines, in cells.
     spacing: f64,
-    /// Points of the lines so far, in square bins of one spacing.
+    /// Square bins of one spacing.
     drawn: Vec<Vec<DVec2>>,
     /// Bins along a row and along a column.
     bins: [usize; 2],
 }
 
 impl Tracer<'_> {
-    /// E between the cell centres, a unit vector; none in a hazard and where there is no guidance.
+    /// A unit vector; none in a hazard and without guidance.
     fn direction(&self, at: DVec2) -> Option<DVec2> {
         let e_at = |col: f64, row: f64| {
             let last = |cells: usize| cells.saturating_sub(1) as f64;
@@ -181,7 +175,7 @@ impl Tracer<'_> {
         below.lerp(above, part.y).try_normalize()
     }
 
-    /// The line through `seed`, if there is room for one that is long enough; it counts as drawn.
+    /// None without room for a line that is long enough; it counts as drawn.
     fn line_through(&mut self, seed: DVec2) -> Option<Vec<DVec2>> {
         if self.is_crowded(seed, 0.98) || self.direction(seed).is_none() {
             return None;
@@ -209,7 +203,7 @@ impl Tracer<'_> {
         Some(line)
     }
 
-    /// Follow E, or its reverse, from `seed` until there is no guidance or another line is near.
+    /// E, or its reverse, until there is no guidance or another line is near.
     fn followed(&self, seed: DVec2, sense: f64) -> Vec<DVec2> {
         // A step is shorter than a cell, so that it cannot skip a wall of one cell.
         let step = (0.2 * self.spacing).min(0.9) * sense;
@@ -239,7 +233,7 @@ impl Tracer<'_> {
         }
     }
 
-    /// Seeds one spacing beside a line, on both sides.
+    /// One spacing beside a line, on both sides.
     fn beside(&self, line: &[DVec2]) -> Vec<DVec2> {
         line.iter()
             .step_by(4)
@@ -254,7 +248,7 @@ impl Tracer<'_> {
         (bin.x as usize, bin.y as usize)
     }
 
-    /// Whether a line lies nearer to `at` than `share` of the spacing.
+    /// A line lies nearer than `share` of the spacing.
     fn is_crowded(&self, at: DVec2, share: f64) -> bool {
         let (col, row) = self.bin(at);
         let limit = share * self.spacing;

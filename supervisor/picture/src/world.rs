@@ -1,4 +1,4 @@
-//! The real shapes over the robot's map: dark outlines and a hatch, so that both are visible.
+//! Real shapes over the robot's map, in dark outlines and a hatch so that both are visible.
 //!
 //! Shapes that do not reach from the floor to above the robot have dashed outlines, shapes of glass dash-dotted ones,
 //! shapes that absorb sound dotted ones.
@@ -7,26 +7,23 @@ use common::geometry::{Light, Profile, Shapes};
 
 use super::page::{Path, View, ink};
 
-/// The hatch, to be named in `<defs>`.
 pub(super) const HATCH: &str = "<pattern id=\"hatch\" width=\"6\" height=\"6\" \
      patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">\
      <path d=\"M0 0V6\" stroke=\"#27313b\" stroke-width=\"2.2\" stroke-opacity=\"0.6\"/></pattern>";
 
-/// The outline of an obstacle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outline {
-    /// The obstacle is hard, from the floor to above the robot.
+    /// Hard, from the floor to above the robot.
     Full,
-    /// The obstacle is lower than that, or above the floor.
+    /// Lower than that, or above the floor.
     Partial,
-    /// The obstacle is as high as the robot, and of glass.
+    /// Glass, as high as the robot.
     Glass,
-    /// The obstacle is as high as the robot, but absorbs sound.
+    /// Absorbs sound, as high as the robot.
     Soft,
 }
 
 impl Outline {
-    /// All outlines, in the order in which they are drawn.
     pub(super) const ALL: [Self; 4] = [Self::Full, Self::Partial, Self::Glass, Self::Soft];
 
     fn of(profile: Profile) -> Self {
@@ -41,7 +38,6 @@ impl Outline {
         }
     }
 
-    /// Whether anything in `world` has this outline.
     pub(super) fn is_in(self, world: &Shapes) -> bool {
         let drums = world.drums.iter().map(|drum| drum.profile());
         let walls = world.walls.iter().map(|wall| wall.profile());
@@ -49,7 +45,6 @@ impl Outline {
         drums.chain(walls).chain(boxes).any(|profile| Self::of(profile) == self)
     }
 
-    /// The text of the outline in the legend.
     pub(super) const fn name(self) -> &'static str {
         match self {
             Self::Full => "drum, box, wall",
@@ -68,7 +63,6 @@ impl Outline {
         }
     }
 
-    /// Attributes of everything solid.
     pub(super) fn solid(self) -> String {
         format!(
             "fill=\"url(#hatch)\" stroke=\"{}\" stroke-width=\"1.6\" stroke-linejoin=\"round\"{}",
@@ -94,7 +88,6 @@ pub(super) fn layer(view: &View, world: &Shapes) -> String {
     outlines.map(|outline| outlined(view, world, outline)).collect()
 }
 
-/// Everything of `world` that has this outline.
 fn outlined(view: &View, world: &Shapes, outline: Outline) -> String {
     let mut bodies = Path::default();
     let has_it = |profile| Outline::of(profile) == outline;

@@ -1,10 +1,8 @@
-//! The part of a mission that is for a robot with an Arduino.
-
 use super::objection::{Objection, objection, within};
 use crate::{LEAST_BAUD, Mission, Protocol, SensorKind};
 
-/// The greatest speed of a rim that is one count from one run of the speed loop to the next, m/s. A robot that cannot be told to turn
-/// its wheels slower than that turns past its target.
+/// One count from one run of the speed loop to the next may be at most this speed of a rim, m/s: a robot that cannot
+/// turn its wheels slower turns past its target.
 const GREATEST_STEP_M_S: f64 = 0.1;
 
 pub(super) fn check(mission: &Mission) -> Result<(), Objection> {

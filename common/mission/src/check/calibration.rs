@@ -12,8 +12,8 @@ fn read(path: &Path) -> Result<Odometry, MissionError> {
 }
 
 impl Mission {
-    /// The mission with the values of its calibration file in place of the name of that file: a run does not depend on the file
-    /// any more. A relative name is taken from the current directory.
+    /// Put the values of the calibration file in place of its name, so that a run does not depend on the file. A
+    /// relative name is taken from the current directory.
     ///
     /// # Errors
     /// If the file cannot be read, or is no calibration.

@@ -1,5 +1,3 @@
-//! Errors of a value in a mission.
-
 /// An invalid value, before its line in the file is known.
 pub(super) struct Objection {
     pub(super) key: &'static str,
@@ -7,7 +5,6 @@ pub(super) struct Objection {
     pub(super) remedy: String,
 }
 
-/// The error of an invalid value of `key`.
 pub(super) fn objection(
     key: &'static str,
     problem: impl Into<String>,

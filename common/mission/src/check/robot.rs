@@ -1,5 +1,3 @@
-//! The robot's part of a mission.
-
 use x80_protocol::MOTOR_SCALE_V;
 
 use super::objection::{Objection, objection, within};

@@ -1,9 +1,6 @@
-//! The ROS 2 part of a mission.
-
 use super::objection::{Objection, objection};
 use crate::{Mission, Protocol, SensorKind, address::Address};
 
-/// The longest name of a topic, bytes.
 const LONGEST_TOPIC: usize = 200;
 
 pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
@@ -51,7 +48,7 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     Ok(())
 }
 
-/// Whether ROS takes `name` for the name of a topic.
+/// ROS takes `name` for the name of a topic.
 fn is_topic(name: &str) -> bool {
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
     let token = |token: &str| {

@@ -1,4 +1,4 @@
-//! The ranging sensors of a mission: its rows, and the set that it uses.
+//! The sensor rows, and the set that a mission uses.
 
 use super::objection::{Objection, objection, within};
 use crate::{
@@ -7,7 +7,6 @@ use crate::{
 };
 
 const KEY: &str = "robot.sensor";
-/// The longest name of a sensor, bytes.
 const LONGEST_NAME: usize = 23;
 
 pub(super) fn check(mission: &Mission) -> Result<(), Objection> {

@@ -1,11 +1,8 @@
-//! The shapes of a mission.
-
 use super::{Checker, Objection, objection, within};
 use crate::geometry::{Profile, Shapes};
 
 /// More shapes than this in a file are a mistake.
 const MAX_POINTS: usize = 100_000;
-/// The greatest height of a shape, metres.
 const HIGHEST_M: f64 = 1000.0;
 
 impl Checker {

@@ -1,13 +1,9 @@
-//! The simulation's part of a mission.
-
 use super::{Checker, MAX_TIMEOUT_S, Objection, objection, within};
 use crate::simulation::{Block, OutOfRange, Ranger, Simulation, Thing};
 
-/// More things that come and go than this are a mistake.
+/// More than these are a mistake.
 const MAX_THINGS: usize = 1000;
-/// More blocks of wheels than this are a mistake.
 const MAX_BLOCKS: usize = 100;
-/// More stations on one thing's way than this are a mistake.
 const MAX_MOVES: usize = 1000;
 
 impl Checker {

@@ -2,7 +2,7 @@
 
 use super::pose::Twist;
 
-/// G of (3): a car-like robot, driven by the wheels of one axle and steered by those of the other.
+/// G of (3): driven by the wheels of one axle, steered by those of the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ackermann {
     wheel_radius: f64,
@@ -12,19 +12,18 @@ pub struct Ackermann {
     creep: f64,
 }
 
-/// U of a car-like robot.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SteeredWheel {
-    /// omega_h: speed of the driven wheel, rad/s.
+    /// omega_h, rad/s.
     pub wheel: f64,
-    /// phi: steering angle, radians, positive to the left.
+    /// phi, radians, positive to the left.
     pub steering: f64,
 }
 
 impl Ackermann {
-    /// The drive of a car whose driven wheels of `wheel_radius` r (metres) turn at most at `top_wheel_speed` rad/s, with
-    /// a `wheelbase` L (metres) from the driven axle to the steered one, that steers at most by `steering_limit` radians,
-    /// below pi/2. All positive. It creeps at `creep` m/s at most where a turn is asked for without the speed for it.
+    /// The radius r and the `wheelbase` L from the driven axle to the steered one in metres, the top speed in rad/s,
+    /// the limit in radians, below pi/2. All positive. It creeps at `creep` m/s at most where a turn is asked for
+    /// without the speed for it.
     #[must_use]
     pub const fn new(
         wheel_radius: f64,
@@ -36,21 +35,21 @@ impl Ackermann {
         Self { wheel_radius, wheelbase, steering_limit, top_wheel_speed, creep }
     }
 
-    /// Radius of the tightest circle that the middle of the driven axle can go, metres.
+    /// The circle of the middle of the driven axle, metres.
     #[must_use]
     pub fn least_turning_radius(&self) -> f64 {
         self.wheelbase / self.steering_limit.tan()
     }
 
-    /// (3): driven wheel and steering to the body's twist.
+    /// The map (3).
     #[must_use]
     pub fn twist(&self, input: SteeredWheel) -> Twist {
         let v = self.wheel_radius * input.wheel;
         Twist { v, omega: input.steering.tan() / self.wheelbase * v }
     }
 
-    /// (17): omega_h = v/r, phi = atan(L omega / v), clipped to the limit. A car cannot turn on the spot: it creeps
-    /// forward where v would leave the turn impossible. A wheel at its limit keeps the steering, and so the curvature.
+    /// (17): omega_h = v/r, phi = atan(L omega / v), clipped. A car cannot turn on the spot: it creeps forward where
+    /// v would leave the turn impossible. A wheel at its limit keeps the steering, and so the curvature.
     #[must_use]
     pub fn wheel(&self, twist: Twist) -> SteeredWheel {
         let needed = twist.omega.abs() * self.least_turning_radius();

@@ -4,7 +4,6 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::pose::Twist;
 
-/// G of (2): a differential drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DifferentialDrive {
     g: Matrix2<f64>,
@@ -12,7 +11,7 @@ pub struct DifferentialDrive {
     rim_limit: f64,
 }
 
-/// Wheel speeds, rad/s.
+/// rad/s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WheelSpeeds {
     /// omega_R.
@@ -22,8 +21,7 @@ pub struct WheelSpeeds {
 }
 
 impl DifferentialDrive {
-    /// The drive of a robot with wheels of `radius` r and a `track` W (metres), whose wheels turn at
-    /// most at `top_wheel_speed` rad/s. All positive.
+    /// The `radius` r and the `track` W in metres, the top speed in rad/s; all positive.
     #[must_use]
     pub fn new(radius: f64, track: f64, top_wheel_speed: f64) -> Self {
         let (half, over) = (radius / 2.0, radius / track);
@@ -39,15 +37,14 @@ impl DifferentialDrive {
         }
     }
 
-    /// (2): wheel speeds to the body's twist. The map is linear, so wheel angles give (arc, turn).
+    /// (2). The map is linear, so wheel angles give (arc, turn).
     #[must_use]
     pub fn twist(&self, wheels: WheelSpeeds) -> Twist {
         let body = self.g * Vector2::new(wheels.right, wheels.left);
         Twist { v: body.x, omega: body.y }
     }
 
-    /// (17): the wheel speeds that give `twist`; both scaled by one factor when a wheel would exceed
-    /// its limit, so that the curvature stays.
+    /// (17); both are scaled by one factor when a wheel would exceed its limit, so that the curvature stays.
     #[must_use]
     pub fn wheels(&self, twist: Twist) -> WheelSpeeds {
         let wheels = self.inverse * Vector2::new(twist.v, twist.omega);

@@ -1,23 +1,18 @@
-//! The drive of either kind of robot.
-
 use super::{
     ackermann::{Ackermann, SteeredWheel},
     differential::{DifferentialDrive, WheelSpeeds},
     pose::Twist,
 };
 
-/// G of (2) or of (3).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Drive {
-    /// (2): two driven wheels.
     Differential(DifferentialDrive),
-    /// (3): a driven wheel and a steering angle.
     Ackermann(Ackermann),
 }
 
 impl Drive {
-    /// (17): the inputs that give `twist`, as far as the drive can: left and right wheel, rad/s; for a car the driven
-    /// wheel, rad/s, and the steering angle, radians, positive to the left.
+    /// (17), as far as the drive can: left and right wheel, rad/s; for a car the driven wheel, rad/s, and the
+    /// steering angle, radians, positive to the left.
     #[must_use]
     pub fn inputs(&self, twist: Twist) -> [f64; 2] {
         match self {

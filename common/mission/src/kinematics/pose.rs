@@ -1,10 +1,8 @@
-//! The rigid motion of the robot, (1).
-
 use glam::DVec2;
 use nalgebra::{Rotation2, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// The position of the robot's centre and its heading in the mission frame.
+/// The robot's centre in the mission frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pose2 {
     /// Metres.
@@ -13,34 +11,31 @@ pub struct Pose2 {
     pub heading: f64,
 }
 
-/// v and omega of (1).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Twist {
-    /// v: tangential speed, m/s.
+    /// m/s.
     pub v: f64,
-    /// omega: turn rate, rad/s.
+    /// rad/s.
     pub omega: f64,
 }
 
 impl Pose2 {
-    /// The unit vector ahead.
     #[must_use]
     pub fn axis(&self) -> DVec2 {
         DVec2::from_angle(self.heading)
     }
 
-    /// The pose after `arc` metres along a circle while turning by `turn` radians: (1) integrated
-    /// exactly for constant v and omega.
+    /// (1) integrated exactly for constant v and omega: `arc` metres along a circle while turning by `turn` radians.
     #[must_use]
     pub fn along_arc(&self, arc: f64, turn: f64) -> Self {
-        // sin(h)/h, stable through h = 0: the chord of the arc over its length.
+        // sin(h)/h, the chord over its arc, stable through h = 0.
         let half = turn / 2.0;
         let chord = if half.abs() < 1e-6 { 1.0 - half * half / 6.0 } else { half.sin() / half };
         let step = Rotation2::new(self.heading + half) * Vector2::new(arc * chord, 0.0);
         Self { position: self.position + DVec2::new(step.x, step.y), heading: self.heading + turn }
     }
 
-    /// One forward Euler step of (21): along the heading held before the turn.
+    /// One forward Euler step of (21), along the heading held before the turn.
     #[must_use]
     pub fn along_euler(&self, arc: f64, turn: f64) -> Self {
         let step = Rotation2::new(self.heading) * Vector2::new(arc, 0.0);

@@ -10,10 +10,8 @@ use crate::{
 };
 
 impl Command {
-    /// Parse a command.
-    ///
     /// # Errors
-    /// The frame is not a command although its CRC is right: its DID is unknown, its length is wrong, or a byte has no meaning.
+    /// The DID is unknown, the length is wrong, or a byte has no meaning.
     pub fn parse(frame: &Frame<'_>) -> Result<Self, MessageError> {
         command(frame)
     }

@@ -24,48 +24,41 @@ use crate::{
     transport::{Source, Way},
 };
 
-/// The most ticks without an answer in lockstep, before it waits for a ping: the longest outage at the highest rate.
+/// Ticks without an answer in lockstep, before it waits for a ping: the longest outage at the highest rate.
 const MOST_UNHEARD: usize = 120_000;
 
-/// The silence, by the machine's clock, after which a host has gone and another may take the robot.
+/// After this silence, by the machine's clock, a host has gone and another may take the robot.
 const HOST_SILENT: Duration = Duration::from_secs(2);
 
-/// Direction of a datagram through the radio.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Leg {
     ToRobot(Source),
     ToHost(Source),
 }
 
-/// A robot and its host.
 pub(super) struct Session {
     robot: Robot,
-    /// Whether time waits for commands.
+    /// Time waits for commands.
     lock_step: bool,
     way: Way,
-    /// The radio; `None` for a perfect one.
     radio: Option<Radio<Leg>>,
-    /// The source of the last valid frame of the host that is served: all streams go there.
+    /// Source of the last valid frame of the host that is served: all streams go there.
     peer: Option<Source>,
-    /// The time of the last valid frame of that host.
     heard: Instant,
-    /// Frames of other hosts that were ignored since the last warning.
+    /// Frames of other hosts ignored since the last warning.
     strangers: u64,
-    /// Decoders of the peer and of one other source: half a frame of one must not garble the frames of the other.
+    /// The peer's, and one other source's: half a frame of one must not garble the other's.
     decoders: Vec<SourceDecoder>,
     protocol: Protocol,
     ground_truth: Option<Box<dyn Write + Send>>,
-    /// The file of the robot's state.
     checkpoint: Option<Checkpoint>,
 }
 
-/// Bytes from one source.
 struct SourceDecoder {
     source: Source,
     words: Words,
 }
 
-/// Decodes the protocol that the robot speaks.
 enum Words {
     X80(Decoder),
     Json(Lines),
@@ -83,7 +76,6 @@ impl Words {
     }
 }
 
-/// A message of a host.
 #[derive(Clone, Copy, Debug)]
 enum Said<'a> {
     Frame(&'a Frame<'a>),
@@ -110,7 +102,7 @@ impl Said<'_> {
 }
 
 impl Session {
-    /// A session at the robot's first tick, which is written to the ground truth.
+    /// The robot is at its first tick, which is written to the ground truth.
     pub(super) fn new(
         mission: &Mission,
         robot: Robot,
@@ -140,7 +132,6 @@ impl Session {
         Ok(session)
     }
 
-    /// Save the robot's state.
     fn save(&mut self) -> Result<(), SimError> {
         if let Some(checkpoint) = &mut self.checkpoint {
             checkpoint.save(&self.robot.saved_state())?;
@@ -148,29 +139,27 @@ impl Session {
         Ok(())
     }
 
-    /// Let the robot come to rest, because the process ends, and with it all commands.
+    /// The process ends, and with it all commands: the robot comes to rest.
     pub(super) fn end(mut self) -> Result<(), SimError> {
         self.robot.come_to_rest();
         self.save()
     }
 
-    /// File descriptors that become readable when bytes have come.
     pub(super) fn readable(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>) {
         self.way.readable()
     }
 
-    /// Mission time of the next tick, seconds.
     pub(super) fn next_tick_s(&self) -> f64 {
         self.robot.next_tick_s()
     }
 
-    /// Mission time at which something happens by itself next, seconds.
+    /// Mission time of what happens by itself next, seconds.
     pub(super) fn next_due_s(&self) -> f64 {
         let flight = self.radio.as_ref().and_then(Radio::next_due);
         flight.map_or(self.next_tick_s(), |due| due.min(self.next_tick_s()))
     }
 
-    /// Take up to `most` pieces of the bytes that have come; `now` is mission time by a clock, if there is one.
+    /// Takes at most `most` pieces of what has come; `now` is mission time by a clock, if there is one.
     pub(super) fn listen(
         &mut self,
         buffer: &mut [u8],
@@ -198,7 +187,7 @@ impl Session {
         Ok(())
     }
 
-    /// Let everything happen that is due by mission time `now`, in order.
+    /// Lets all that is due by mission time `now` happen, in order.
     pub(super) fn pass(&mut self, now: f64) -> Result<(), SimError> {
         // A delay of more than a period is not made up for, because the shell lets the clock wait.
         let now = now.min(self.next_tick_s() + self.robot.period_s());
@@ -219,7 +208,7 @@ impl Session {
         Ok(())
     }
 
-    /// Pass mission time to the next tick, write the ground truth of it, and send its frames.
+    /// To the next tick: its ground truth is written and its frames sent.
     fn tick(&mut self) -> Result<(), SimError> {
         let frames = self.measured()?;
         self.peer()?;
@@ -227,8 +216,8 @@ impl Session {
         Ok(())
     }
 
-    /// A tick in lockstep. If the radio loses its frames, the host sends no next command, so mission time passes by itself until the
-    /// radio delivers frames again.
+    /// In lockstep. If the radio loses its frames, the host sends no next command, so mission time passes by itself
+    /// until the radio delivers again.
     fn tick_until_heard(&mut self) -> Result<(), SimError> {
         for _ in 0..MOST_UNHEARD {
             let frames = self.measured()?;
@@ -247,7 +236,7 @@ impl Session {
         Ok(())
     }
 
-    /// The frames of the next tick, its ground truth written and its state saved.
+    /// The frames of the next tick; its ground truth is written, its state saved.
     fn measured(&mut self) -> Result<Vec<u8>, SimError> {
         self.robot.advance_to_next_tick();
         self.write_tick();
@@ -341,7 +330,7 @@ impl Session {
         Ok(())
     }
 
-    /// The peer; a host that is connected and has sent nothing yet is the peer.
+    /// A host that is connected and has sent nothing yet is the peer.
     fn peer(&mut self) -> Result<Option<Source>, SimError> {
         if let Some(connected) = self.way.connected()? {
             self.peer = Some(connected);
@@ -349,7 +338,7 @@ impl Session {
         Ok(self.peer)
     }
 
-    /// Whether `source` belongs to the host that sent first, or to any host after that host's silence.
+    /// The host that sent first, or any after that host's silence.
     fn serves(&mut self, source: Source) -> bool {
         let silent = self.heard.elapsed() >= HOST_SILENT;
         let serves = silent || self.peer.is_none_or(|peer| peer.is_same_host(source));
@@ -364,7 +353,6 @@ impl Session {
         serves
     }
 
-    /// Send to the peer over the radio.
     fn send(&mut self, bytes: &[u8]) {
         let now = self.robot.time_s();
         match (&mut self.radio, self.peer) {
@@ -375,7 +363,7 @@ impl Session {
         }
     }
 
-    /// Send to the peer the bytes that the radio has let through.
+    /// The bytes that the radio has let through.
     fn deliver(&mut self, bytes: &[u8]) {
         if let Some(peer) = self.peer.filter(|_| !bytes.is_empty()) {
             self.way.send(peer, bytes);
@@ -389,7 +377,7 @@ impl Session {
         self.write(&ground_truth);
     }
 
-    /// Write a line of ground truth. After its reader has closed the pipe, no further lines are written.
+    /// After the reader has closed the pipe, nothing is written.
     fn write(&mut self, record: &impl Serialize) {
         let Some(ground_truth) = &mut self.ground_truth else {
             return;

@@ -1,4 +1,4 @@
-//! The user whose process sends datagrams on this machine, by the system's table of sockets.
+//! The user whose process sends datagrams, by the system's table of sockets.
 
 use std::{
     collections::VecDeque,
@@ -7,12 +7,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// The time after which a sender's port may be another user's.
+/// A sender's port may be another user's later.
 const ASKED_AGAIN: Duration = Duration::from_millis(500);
-/// The most senders that are remembered.
 const MOST_SENDERS: usize = 16;
 
-/// Admits senders of this user only.
+/// Admits senders of this user on this machine only.
 #[derive(Debug, Default)]
 pub(super) struct OwnUser {
     senders: VecDeque<(SocketAddr, Instant, bool)>,
@@ -20,7 +19,6 @@ pub(super) struct OwnUser {
 }
 
 impl OwnUser {
-    /// Whether `sender` is a process of this user on this machine.
     pub(super) fn admits(&mut self, sender: SocketAddr) -> bool {
         self.senders.retain(|(_, asked, _)| asked.elapsed() < ASKED_AGAIN);
         if let Some((_, _, own)) = self.senders.iter().find(|(known, ..)| *known == sender) {
@@ -37,7 +35,7 @@ impl OwnUser {
     }
 }
 
-/// Whether all sockets of the sender's port are this user's. A system that hides its sockets shows none of another user.
+/// All sockets of the sender's port are this user's. A system that hides its sockets shows none of another user.
 fn is_own(sender: SocketAddr) -> bool {
     let table = if sender.is_ipv4() { "/proc/net/udp" } else { "/proc/net/udp6" };
     let Ok(table) = fs::read_to_string(table) else {

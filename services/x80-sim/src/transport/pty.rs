@@ -14,8 +14,8 @@ use rustix::{
 
 use super::source::Source;
 
-/// The speed to which the robot sets the line. A host sets the speed that it needs when it opens the line, which shows the
-/// robot that it did.
+/// The robot sets the line to this speed; a host sets its own when it opens the line, which shows the robot that it
+/// did.
 const NOBODYS_BAUD: u32 = 50;
 
 #[derive(Debug)]
@@ -23,7 +23,7 @@ pub(crate) struct Pty {
     robot: OwnedFd,
     /// The host's end is held open: while nobody holds it, reading the robot's end is an error.
     host: OwnedFd,
-    /// Whether DTR falls when the host closes the line, by the host's own setting (HUPCL), so that it rises when the next
+    /// DTR falls when the host closes the line, by the host's own setting (HUPCL), so that it rises when the next
     /// host opens it.
     hangs_up: bool,
     opened: bool,

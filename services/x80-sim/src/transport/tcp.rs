@@ -13,9 +13,9 @@ pub(crate) struct Tcp {
     listener: TcpListener,
     address: SocketAddr,
     connection: Option<TcpStream>,
-    /// The number of connections accepted so far, which is that of the open one.
+    /// Connections so far; the newest is the open one.
     accepted: u64,
-    /// Whether [`Tcp::take_opened`] has not yet returned the newest connection.
+    /// [`Tcp::take_opened`] has not yet returned the newest connection.
     opened: bool,
 }
 
@@ -66,7 +66,6 @@ impl Tcp {
         std::mem::take(&mut self.opened)
     }
 
-    /// The newest connection, while it is open.
     pub(super) fn connected(&mut self) -> io::Result<Option<Source>> {
         self.accept()?;
         let open = self.connection.as_ref();

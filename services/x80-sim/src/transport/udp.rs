@@ -1,5 +1,3 @@
-//! Datagrams.
-
 use std::{
     io::{self, ErrorKind},
     net::{SocketAddr, UdpSocket},
@@ -12,7 +10,7 @@ use super::{owner::OwnUser, source::Source};
 pub(crate) struct Udp {
     socket: UdpSocket,
     address: SocketAddr,
-    /// The check of senders; none if every sender is admitted.
+    /// None admits every sender.
     own_user: Option<OwnUser>,
 }
 

@@ -77,11 +77,11 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Mission time for one loop and for one square, seconds, with room for sweeps that are repeated.
+/// One loop or one square, with room for repeated sweeps.
 const LOOP_S: f64 = 180.0;
 const SQUARE_S: f64 = 120.0;
 
-/// The simulated robot, a metre before a wall. The target is beside the place where the robot sweeps: only the planner ends the run.
+/// A metre before a wall. The target is beside the place where the robot sweeps: only the planner ends the run.
 const SIMULATED: &str = "target = [0.3, 0]\nsimulation.realism = 'measured'";
 const WALL: &str = "[[wall]]\npoints = [[1.0, -2.5], [1.0, 2.5]]";
 
@@ -104,14 +104,14 @@ impl Arguments {
         Setting { robot: &self.robot, pace: self.pace, runs: &self.runs }
     }
 
-    /// The log of all runs of this calibration.
+    /// One log for all runs of a calibration.
     fn log(&self) -> Result<PathBuf, Failure> {
         std::fs::create_dir_all(&self.runs)
             .map_err(|error| format!("cannot make {}: {error}", self.runs.display()))?;
         Ok(self.runs.join("calibration.log"))
     }
 
-    /// The mission of a run with this plan: the robot of the named mission, and nothing else of it.
+    /// The robot of the named mission, and nothing else of it.
     fn mission(&self, plan: CalibrationPlan) -> Result<Mission, Failure> {
         let named = match &self.mission {
             Some(name) => missions::load(name, &self.set)?,
@@ -188,7 +188,7 @@ fn by_wall(arguments: &Arguments, plan: CalibrationPlan) -> Result<Found, Failur
     Ok(Found { robot, method: "wall", before, estimate, metres, seconds, residuals, directory })
 }
 
-/// Give the simulated robot of a square noise of its own, and the wheels that it has in all squares.
+/// A square has noise of its own, and the wheels of all squares.
 fn noise_of_its_own(mission: &mut Mission, number: u32) {
     let errors = x80_sim::wheel_errors::WheelErrors::of(mission);
     let wheels = &mut mission.simulation.wheels;

@@ -1,5 +1,3 @@
-//! `firsthand check FILE`.
-
 use std::path::PathBuf;
 
 use clap::Args;

@@ -1,5 +1,3 @@
-//! `firsthand return`.
-
 use clap::Args;
 use common::{domain::RobotName, samples::TargetPoint};
 use mission_control::operator;

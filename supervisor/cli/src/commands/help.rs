@@ -17,9 +17,9 @@ pub(crate) struct Arguments {
 }
 
 struct Page {
-    /// The name of its file in `supervisor/guide/`, without `.md`. In small letters it is the name of the page.
+    /// A file in `supervisor/guide/`, without `.md`; in small letters, the page's name.
     file: &'static str,
-    /// Markdown; the first line is its title.
+    /// The first line is the title.
     text: &'static str,
 }
 
@@ -32,7 +32,7 @@ macro_rules! guide {
     };
 }
 
-/// Every page, in the order to read them. None has the name of a subcommand.
+/// The order is that of reading. None has the name of a subcommand.
 static GUIDE: &[Page] = guide! {
     "method",
     "mission-file",
@@ -68,7 +68,7 @@ pub(crate) fn page_names() -> Vec<String> {
     GUIDE.iter().map(Page::name).collect()
 }
 
-/// The pages, one a line, for the help of the whole command line.
+/// One a line, for the help of the whole command line.
 pub(crate) fn pages() -> String {
     let mut list = String::from("Guide (firsthand help PAGE):\n");
     for page in GUIDE {
@@ -78,7 +78,6 @@ pub(crate) fn pages() -> String {
     list
 }
 
-/// `whole` is the command line of the executable.
 pub(crate) fn main(arguments: &Arguments, mut whole: Command) -> Result<(), Failure> {
     if let [name] = &arguments.page[..]
         && let Some(page) = page(name)
@@ -101,15 +100,14 @@ pub(crate) fn main(arguments: &Arguments, mut whole: Command) -> Result<(), Fail
     Ok(())
 }
 
-/// Columns of the terminal to which text is wrapped; none where standard output is no terminal: another program gets the Markdown
-/// as it is.
+/// None where standard output is no terminal: another program gets the Markdown as it is.
 fn terminal_width() -> Option<usize> {
     let stdout = io::stdout();
     let size = stdout.is_terminal().then(|| rustix::termios::tcgetwinsize(&stdout).ok())??;
     (size.ws_col > 0).then_some(size.ws_col.into())
 }
 
-/// Markdown whose sentences fit in `width` columns. Rows of tables and code stay as they are.
+/// Rows of tables and code stay as they are.
 fn wrapped(markdown: &str, width: usize) -> String {
     let mut text = String::new();
     let mut is_code = false;

@@ -29,7 +29,7 @@ pub(crate) struct Arguments {
 struct Part {
     path: &'static str,
     text: &'static str,
-    /// Whether users may change the file; such a file is not overwritten.
+    /// Users may change it; such a file is not overwritten.
     configuration: bool,
 }
 
@@ -53,10 +53,8 @@ static PARTS: [Part; 7] = [
     part!("etc/firsthand/mission.toml", "mission.toml", true),
 ];
 
-/// The path of the executable in the package.
 const PACKAGED: &str = "/usr/bin/firsthand";
 
-/// The commands that remain for the user.
 const THEN: &str = "systemd-sysusers && systemctl daemon-reload
 then, when /etc/firsthand/mission.toml is the robot's mission:
   systemctl enable --now firsthand          # the supervisor starts the stages, or
@@ -98,7 +96,6 @@ fn put(file: &Path, text: &str) -> Result<(), InstallError> {
     written.map_err(|source| InstallError { file: file.to_path_buf(), source })
 }
 
-/// The commands, with the units that they concern.
 fn remaining() -> String {
     let units = stages::TABLE.iter().map(|stage| format!("\n    firsthand-stage@{}", stage.name));
     format!("{THEN}{}", units.collect::<String>())

@@ -55,7 +55,6 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     Ok(print_round(&mut logs, &mut stream)?)
 }
 
-/// The directory of the robot's present run, or else of its newest.
 fn newest(arguments: &Arguments) -> Option<PathBuf> {
     let robot = &arguments.robot;
     Robot::find(robot.clone()).run.or_else(|| {
@@ -65,7 +64,7 @@ fn newest(arguments: &Arguments) -> Option<PathBuf> {
     })
 }
 
-/// The logs in `directory`, which must have the requested one.
+/// `directory` must have the requested log.
 fn opened(arguments: &Arguments, directory: &Path) -> Result<Logs, Failure> {
     let stage = arguments.stage.as_deref();
     let unreadable = |error| format!("cannot read logs in {}: {error}", directory.display());
@@ -78,7 +77,6 @@ fn opened(arguments: &Arguments, directory: &Path) -> Result<Logs, Failure> {
     Ok(Logs::of(directory, stage))
 }
 
-/// Print the logs of the robot's runs, one run after the other.
 fn follow(arguments: &Arguments, stream: &mut Stream) -> Result<(), Failure> {
     // The log of a stage may not be there yet.
     if let Some(stage) = arguments.stage.as_deref()
@@ -129,7 +127,5 @@ fn print_round(logs: &mut Logs, stream: &mut Stream) -> std::io::Result<()> {
     stream.write(&text)
 }
 
-/// The processes of a run that are no stages.
 const OTHERS: [&str; 2] = ["supervisor", "x80-sim"];
-/// Lines are written together until they have this many bytes.
 const PRINTED_AT_ONCE: usize = 64 << 10;

@@ -1,4 +1,4 @@
-//! `firsthand man`: the manual page, from the tables that the command line is parsed with.
+//! The manual page, from the tables that the command line is parsed with.
 
 use std::io;
 
@@ -16,7 +16,7 @@ pub(crate) fn main(_: &Arguments, whole: Command) -> Result<(), Failure> {
     Ok(print_text(&String::from_utf8_lossy(&page(whole)?))?)
 }
 
-/// The page: the whole command line, and a section for each subcommand.
+/// The whole command line, and a section for each subcommand.
 fn page(mut whole: Command) -> io::Result<Vec<u8>> {
     // Usage lines name the whole command only once it is built.
     whole.build();
@@ -36,7 +36,7 @@ fn page(mut whole: Command) -> io::Result<Vec<u8>> {
     Ok(page)
 }
 
-/// Add the sections of the subcommands of `command`, and of theirs; `names` are the words before them.
+/// Subcommands, and theirs; `names` are the words before them.
 fn add_subcommands(command: &Command, names: &str, page: &mut Vec<u8>) -> io::Result<()> {
     for subcommand in command.get_subcommands().filter(|it| !it.is_hide_set()) {
         let names = format!("{names}{}", subcommand.get_name().to_uppercase());

@@ -42,7 +42,7 @@ pub(crate) struct Arguments {
     supervisor: Option<u32>,
 }
 
-/// The bytes that recordings may take.
+/// Bytes that all recordings together may take.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DiskBudget(pub(crate) u64);
 

@@ -1,5 +1,3 @@
-//! `firsthand resume`.
-
 use clap::Args;
 use common::domain::RobotName;
 

@@ -103,7 +103,7 @@ impl Default for Arguments {
     }
 }
 
-/// The run to carry out; none if an earlier run was cut off too long ago, which is reported.
+/// None if an earlier run was cut off too long ago, which is reported.
 fn options(arguments: &Arguments) -> Result<Option<Options>, Failure> {
     if let Some(directory) = &arguments.resume {
         let found = fs::canonicalize(directory).map_err(|error| {
@@ -167,7 +167,6 @@ fn starter(arguments: &Arguments) -> Starter {
     if arguments.watch_only { Starter::External } else { Starter::Supervisor }
 }
 
-/// The mission with all that is set on the command line.
 fn mission(arguments: &Arguments) -> Result<Mission, Failure> {
     let mut mission = missions::load(&arguments.mission, &arguments.set)?;
     refuse_unspoken(&mission)?;
@@ -184,7 +183,7 @@ fn mission(arguments: &Arguments) -> Result<Mission, Failure> {
     Ok(mission)
 }
 
-/// Refuse a mission whose robot speaks ROS 2 if this executable does not.
+/// Refuses a robot of ROS 2 if this executable does not speak it.
 pub(super) fn refuse_unspoken(mission: &Mission) -> Result<(), Refused> {
     if mission.robot.protocol() != Protocol::Ros2 || SPEAKS_ROS2 {
         return Ok(());
@@ -268,7 +267,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(exit_code(&summary, &finished.ending))
 }
 
-/// Start the log in the run directory, reserve room for the summary, and report the remarks of the mission.
+/// Begins the log in the run directory, reserves room for the summary, and reports the mission's remarks.
 fn prepare(options: &Options) -> Result<SummaryFile, Failure> {
     let directory = &options.directory;
     let log = directory.join(SUPERVISOR_LOG);
@@ -286,7 +285,7 @@ fn prepare(options: &Options) -> Result<SummaryFile, Failure> {
     Ok(SummaryFile::reserve(directory, needed)?)
 }
 
-/// Report a failure of summary, picture or report. The exit code of the mission stays.
+/// The exit code of the mission stays.
 fn complain(reported: Result<(), String>) {
     if let Err(problem) = reported {
         tracing::error!("{problem}");
@@ -294,16 +293,15 @@ fn complain(reported: Result<(), String>) {
     }
 }
 
-/// Whether the run directory may be removed: this start created it, its robot never drove, and no stage died. Otherwise a robot
-/// that is switched off would fill the disk, start by start.
+/// This start created the directory, its robot never drove, and no stage died. Otherwise a robot that is switched off
+/// would fill the disk, start by start.
 fn may_be_removed(arguments: &Arguments, options: &Options, finished: &Finished) -> bool {
     let made_here = arguments.out.is_none() && options.recovered.is_none();
     made_here && !finished.drove && finished.restarts.values().all(|&restarts| restarts == 0)
 }
 
-/// The longest time without a supervisor after which a run is resumed: later the robot may have been moved.
+/// Without a supervisor for longer the robot may have been moved.
 const RESUMED_WITHIN_S: f64 = 60.0;
-/// The exit code of `--resume-last` if it does not start.
 const CUT_OFF: u8 = 7;
 
 fn exit_code(summary: &Summary, ending: &Ending) -> ExitCode {
@@ -322,14 +320,14 @@ fn exit_code(summary: &Summary, ending: &Ending) -> ExitCode {
     })
 }
 
-/// Progress on standard error; the journal gets none, because the status of the service has it.
+/// The journal gets no progress, because the status of the service has it.
 struct Console {
     line: ProgressLine,
     silent: bool,
     title: String,
 }
 
-/// Time between lines that cannot be rewritten.
+/// The time between lines that cannot be rewritten.
 const LINE_EVERY: Duration = Duration::from_secs(5);
 
 impl Console {

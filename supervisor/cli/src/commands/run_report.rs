@@ -14,7 +14,7 @@ use mission_control::{
 use picture::{Facts, Scene};
 use summary::{Hearer, Summary};
 
-/// The name of a result and its file.
+/// Name and file, or why there is none.
 pub(crate) type Written = Result<(&'static str, PathBuf), String>;
 
 pub(crate) fn report(options: &Options) -> Written {

@@ -63,7 +63,7 @@ struct Listed<'a> {
     mission: Option<&'a str>,
     outcome: String,
     mission_time_s: Option<f64>,
-    /// Seconds since 1970, UTC.
+    /// Since 1970, UTC.
     began_s: f64,
     size_bytes: u64,
 }

@@ -64,7 +64,6 @@ struct StageProcess {
 }
 
 impl Arguments {
-    /// Whether this process is a stage.
     pub(crate) const fn is_process(&self) -> bool {
         matches!(self.command, Some(Command::Process(_)))
     }

@@ -50,11 +50,9 @@ struct Status<'a> {
     order: &'static str,
     tick: u64,
     mission_time_s: f64,
-    /// The target; none if it is not published.
     target: Option<TargetStatus>,
-    /// The link; none if no link publishes.
     link: Option<LinkStatus>,
-    /// The power; none if the robot does not report it.
+    /// None if the robot does not report it.
     power: Option<PowerStatus>,
     stages: Vec<StageStatus<'a>>,
 }
@@ -62,7 +60,6 @@ struct Status<'a> {
 #[derive(Serialize)]
 struct TargetStatus {
     number: u64,
-    /// The number of the last target of the list.
     last: u64,
     x_m: f64,
     y_m: f64,
@@ -71,13 +68,12 @@ struct TargetStatus {
 #[derive(Serialize)]
 struct LinkStatus {
     connected: bool,
-    /// Whether the link stops the robot.
     stopped: bool,
-    /// The effect of the failsafe: the robot goes, stands or the like.
+    /// The failsafe's effect: the robot goes, stands or the like.
     robot: &'static str,
-    /// The cause of the effect; none while the robot goes.
+    /// None while the robot goes.
     cause: Option<&'static str>,
-    /// Whether no wheel turns by the encoders.
+    /// No wheel turns by the encoders.
     at_rest: bool,
     /// Time without an answer of the robot; none while it answers.
     lost_s: Option<f64>,
@@ -114,7 +110,7 @@ struct StageStatus<'a> {
 
 /// The roster is published five times a second.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// The link publishes ten times a second, and a robot reports its batteries several times a second.
+/// The link publishes ten times a second, batteries come several times a second.
 const LINK_PATIENCE: Duration = Duration::from_millis(400);
 
 pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {

@@ -1,5 +1,3 @@
-//! `firsthand stop`.
-
 use clap::Args;
 use common::domain::{Domain, RobotName};
 

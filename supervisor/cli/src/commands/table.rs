@@ -41,7 +41,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     })?)
 }
 
-/// The text that a page of the guide shows behind `<!-- table NAME SECTION -->`; none of an unknown name.
+/// A page of the guide shows it behind `<!-- table NAME SECTION -->`; none of an unknown name.
 #[cfg(test)]
 pub(crate) fn shown(name: &str, section: Option<&str>) -> Option<String> {
     match name {

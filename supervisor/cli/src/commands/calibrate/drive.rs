@@ -1,5 +1,3 @@
-//! A run of a calibration.
-
 use std::{
     path::{Path, PathBuf},
     time::Duration,
@@ -19,30 +17,25 @@ use console::{
 
 use crate::commands::run::recorder::RunRecorder;
 
-/// Time between lines that cannot be rewritten.
+/// The time between lines that cannot be rewritten.
 const LINE_EVERY: Duration = Duration::from_secs(5);
 
-/// The data that all runs of a calibration share.
 #[derive(Clone, Copy)]
 pub(super) struct Setting<'a> {
     pub(super) robot: &'a RobotName,
     pub(super) pace: Pace,
-    /// The directory in which the directories of runs are.
     pub(super) runs: &'a Path,
 }
 
-/// A run that came to the end of its procedure.
 pub(super) struct Carried {
     pub(super) directory: PathBuf,
-    /// Mission time, seconds.
     pub(super) seconds: f64,
-    /// The encoders in each tick.
     pub(super) counts: Vec<[u16; 2]>,
-    /// The true place of a simulated robot in the end, metres.
+    /// The end of a simulated robot, metres.
     pub(super) truth: Option<DVec2>,
 }
 
-/// Carry out `mission` to the end of its procedure.
+/// Fails if the procedure does not come to its end.
 pub(super) fn carry_out(
     setting: Setting<'_>,
     mission: Mission,

@@ -12,14 +12,11 @@ use glam::DVec2;
 
 use console::{failure::Failure, output::write_stderr};
 
-/// The longest line, bytes.
 const LONGEST_LINE: u64 = 200;
-/// The farthest end, metres.
 const FARTHEST_M: f64 = 10.0;
 /// The time between looks for a signal while somebody measures.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 
-/// The source of the ends.
 pub(super) enum Ends {
     Typed,
     File(BufReader<File>),
@@ -35,7 +32,6 @@ impl Ends {
         Ok(Self::File(BufReader::new(opened)))
     }
 
-    /// Wait until the robot stands on its mark.
     pub(super) fn await_robot(
         &mut self,
         title: &str,
@@ -48,7 +44,7 @@ impl Ends {
         Ok(())
     }
 
-    /// The end of the square that was driven. A line that is no end is asked for again.
+    /// A line that is no end is asked for again.
     pub(super) fn next(&mut self, title: &str, signals: &mut Signals) -> Result<DVec2, Failure> {
         loop {
             if matches!(self, Self::Typed) {
@@ -92,7 +88,7 @@ impl Ends {
     }
 }
 
-/// Two numbers in a line, metres.
+/// Two numbers, metres.
 fn end(line: &str) -> Option<DVec2> {
     let separated = line.replace(',', " ");
     let mut words = separated.split_whitespace().map(str::parse::<f64>);

@@ -1,4 +1,4 @@
-//! The result of a calibration: its file, its picture and its lines.
+//! A calibration's file, picture and lines.
 
 use std::{
     fs,
@@ -18,19 +18,15 @@ use console::{failure::Failure, output::print_text};
 pub(super) struct Found {
     pub(super) robot: String,
     pub(super) method: &'static str,
-    /// The values that were used before.
     pub(super) before: Odometry,
     pub(super) estimate: Estimate,
-    /// The mean way of a wheel, metres.
     pub(super) metres: f64,
-    /// Mission time, seconds.
     pub(super) seconds: f64,
     pub(super) residuals: Vec<Residual>,
-    /// The directory of the run, or of the last one.
     pub(super) directory: PathBuf,
 }
 
-/// The difference of a loop or a square from the estimate.
+/// A loop or a square against the estimate.
 pub(super) struct Residual {
     pub(super) number: u32,
     pub(super) to_the_left: bool,
@@ -38,7 +34,7 @@ pub(super) struct Residual {
 }
 
 impl Found {
-    /// Write the file at once, so that a kill leaves the old file or the new one.
+    /// A kill leaves the old file or the new one.
     pub(super) fn write(&self, file: &Path) -> Result<(), Failure> {
         let mut odometry = self.estimate.odometry(&self.before);
         odometry.calibrated = Some(Provenance {
@@ -98,7 +94,7 @@ impl Found {
         Ok(print_text(&text)?)
     }
 
-    /// The picture of the residuals, beside the recording of the run.
+    /// The residuals, beside the recording of the run.
     fn picture(&self) -> Result<PathBuf, Failure> {
         let file = self.directory.join("calibration.svg");
         fs::write(&file, self.svg()).map_err(FileError::of("write", &file))?;
@@ -128,14 +124,14 @@ impl Found {
     }
 }
 
-/// The day, UTC, year-month-day.
+/// UTC, year-month-day.
 fn today() -> String {
     let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
     let days = now.map_or(0, |since| since.as_secs() / 86_400);
     date(i64::try_from(days).unwrap_or_default())
 }
 
-/// The date of a day since 1970, by H. Hinnant's algorithm `civil_from_days`.
+/// `days` since 1970, by H. Hinnant's algorithm `civil_from_days`.
 fn date(days: i64) -> String {
     let shifted = days + 719_468;
     let era = shifted.div_euclid(146_097);

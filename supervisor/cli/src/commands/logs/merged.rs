@@ -1,4 +1,4 @@
-//! The logs of a run: one file a process, merged by the time that begins each line.
+//! One file a process, merged by the time that begins each line.
 
 use std::{
     fs::{self, File},
@@ -7,16 +7,15 @@ use std::{
 };
 
 const LOG: &str = "log";
-/// The greatest length of a line, because a process may write lines of any length; a longer one is cut.
+/// A longer line is cut, because a process may write lines of any length.
 const LONGEST_LINE: u64 = 64 << 10;
-/// The length of a time like 2026-11-21T06:04:22.729158Z.
+/// A time like 2026-11-21T06:04:22.729158Z.
 const TIME: usize = 27;
 
-/// The logs of a run, which may still be written.
 #[derive(Debug)]
 pub(crate) struct Logs {
     directory: PathBuf,
-    /// The only process whose log is read; none for all.
+    /// `None` reads all.
     process: Option<String>,
     logs: Vec<Log>,
 }
@@ -25,21 +24,19 @@ pub(crate) struct Logs {
 struct Log {
     process: String,
     file: BufReader<File>,
-    /// The length at the beginning of this round.
     end: u64,
     position: u64,
-    /// The beginning of a line whose end is not written yet.
+    /// A line whose end is not written yet.
     unfinished: Vec<u8>,
     head: Option<Line>,
-    /// The time of the last line that began with a time.
     time: String,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Line {
-    /// The time in UTC as the process wrote it. A line without a time has the time of the line before.
+    /// UTC, as the process wrote it. A line without a time has that of the line before.
     pub(crate) time: String,
-    /// The process: a stage, `supervisor`, `x80-sim`.
+    /// A stage, `supervisor`, `x80-sim`.
     pub(crate) process: String,
     pub(crate) text: String,
 }
@@ -52,7 +49,6 @@ impl std::fmt::Display for Line {
 }
 
 impl Logs {
-    /// The logs in `directory`, or only the log of `process`.
     pub(crate) fn of(directory: &Path, process: Option<&str>) -> Self {
         Self {
             directory: directory.to_path_buf(),
@@ -61,7 +57,6 @@ impl Logs {
         }
     }
 
-    /// The processes that have a log in `directory`, sorted.
     pub(crate) fn processes(directory: &Path) -> io::Result<Vec<String>> {
         let mut processes = Vec::new();
         for entry in fs::read_dir(directory)? {
@@ -77,7 +72,7 @@ impl Logs {
         Ok(processes)
     }
 
-    /// Begin a round: [`Logs::next_line`] reads what the logs hold now. Later lines belong to the next round.
+    /// A round begins: [`Logs::next_line`] reads what the logs hold now. Later lines belong to the next round.
     pub(crate) fn look(&mut self) -> io::Result<()> {
         for process in Self::processes(&self.directory)? {
             let wanted = self.process.as_ref().is_none_or(|only| *only == process);
@@ -93,7 +88,6 @@ impl Logs {
         self.logs.iter_mut().try_for_each(Log::advance)
     }
 
-    /// The next line of this round by time; none at its end.
     pub(crate) fn next_line(&mut self) -> io::Result<Option<Line>> {
         let with_line = self.logs.iter_mut().filter(|log| log.head.is_some());
         let time = |log: &&mut Log| log.head.as_ref().map(|line| line.time.clone());

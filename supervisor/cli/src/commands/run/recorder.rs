@@ -1,4 +1,4 @@
-//! The recorder that `firsthand run` starts: a consumer in a process of its own. The mission goes on without it too.
+//! The recorder of a run: a consumer in a process of its own, without which the mission goes on.
 
 use std::{fs::File, process::Stdio, time::Duration};
 
@@ -8,12 +8,11 @@ use processes::process::{Process, firsthand};
 
 use crate::commands::record::DiskBudget;
 
-/// How long a run waits for its recorder, which takes milliseconds for either, and seconds beside 30 busy processes a core.
+/// Waiting for the recorder takes milliseconds for either, and seconds beside 30 busy processes a core.
 #[derive(Clone, Copy)]
 struct Patience {
-    /// Until it is attached, or it misses the beginning.
+    /// A recorder that attaches later misses the beginning.
     attached: Duration,
-    /// Until its last chunks are written.
     ended: Duration,
 }
 
@@ -34,8 +33,7 @@ pub(crate) struct RunRecorder {
 }
 
 impl RunRecorder {
-    /// Start a recorder with this budget for its files, and wait until it is attached. None if it cannot be started, which is
-    /// logged.
+    /// Waits until the recorder is attached. None if it cannot be started, which is logged.
     pub(crate) fn start(options: &Options, budget: Option<DiskBudget>) -> Option<Self> {
         match Self::spawn(options, budget) {
             Ok(recorder) => Some(recorder),
@@ -73,7 +71,7 @@ impl RunRecorder {
         Ok(Self { process, patience })
     }
 
-    /// Let the recorder write the rest at the end of the run.
+    /// It writes the rest at the end of the run.
     pub(crate) fn end(mut self) {
         self.process.end(self.patience.ended);
     }

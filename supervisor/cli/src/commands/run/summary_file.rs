@@ -1,4 +1,4 @@
-//! The file of a run's summary. Its room is reserved when the run starts, so that a full disk cannot prevent it.
+//! A summary's room is reserved when the run starts, so that a full disk cannot prevent it.
 
 use std::{
     fs::{self, File},
@@ -14,16 +14,16 @@ use rustix::{
 
 use console::failure::Refused;
 
-/// The name of the file until it is complete. A file that is called [`SUMMARY`] is complete, and means that the run has ended.
+/// [`SUMMARY`] is complete, and means that the run has ended.
 const UNFINISHED: &str = "summary.json.unfinished";
-/// Room for a summary, which takes 2 kB.
+/// A summary takes 2 kB.
 const ROOM: u64 = 16 << 10;
-/// Room for logs, checkpoints and the beginning of a recording.
+/// Logs, checkpoints and the beginning of a recording.
 const RUN_ROOM: u64 = 2 << 20;
-/// Room for a cell of the map in the mapper's checkpoint.
+/// A cell in the mapper's checkpoint.
 const CELL_ROOM: u64 = 16;
 
-/// The room that the files of a new run need, with a map of so many `cells`.
+/// A new run needs it, with a map of so many `cells`.
 pub(crate) const fn room_of_run(cells: usize) -> u64 {
     RUN_ROOM + CELL_ROOM * cells as u64
 }
@@ -34,7 +34,7 @@ pub(crate) struct SummaryFile {
 }
 
 impl SummaryFile {
-    /// Reserve the file's room in the run `directory`, where `needed` bytes more must be free.
+    /// Fails unless `needed` bytes more are free in `directory`.
     pub(crate) fn reserve(directory: &Path, needed: u64) -> Result<Self, Refused> {
         let path = directory.join(UNFINISHED);
         // A resumed run has its room.

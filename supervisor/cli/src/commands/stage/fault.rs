@@ -37,7 +37,7 @@ pub(super) struct Arguments {
     break_a_real_robot: bool,
 }
 
-/// The error for a fault of a real robot without the operator's consent.
+/// A fault of a real robot needs the operator's consent.
 fn real_robot(robot: &RobotName) -> Refused {
     let message = format!(
         "robot {robot} is a real one, and a fault may drive it into things; to do it all the same, clear its surroundings \
@@ -84,7 +84,7 @@ pub(super) fn main(arguments: &Arguments) -> Result<(), Failure> {
     Err(refused.into())
 }
 
-/// Publish the request. The next heartbeats of the stage have its answer; none if it does not answer.
+/// The next heartbeats of the stage have the answer; none if it does not answer.
 fn request_fault(
     bus: &Bus,
     stage: &str,
@@ -111,7 +111,6 @@ fn request_fault(
     }
 }
 
-/// The table of faults for `--help`.
 fn table() -> String {
     let mut text = String::from("Faults:\n");
     for fault in &faults::TABLE {

@@ -1,4 +1,4 @@
-//! `firsthand stage NAME`: the process of one stage, started by the supervisor, by systemd or by a person.
+//! One stage's process, started by the supervisor, by systemd or by a person.
 
 use std::{ffi::OsString, os::unix::process::CommandExt as _, path::Path, process::Command};
 
@@ -20,7 +20,6 @@ use crate::companions::{self, LABORATORY};
 
 use console::{failure::Failure, operator};
 
-/// Be the stage that `words` name: its name, and its options.
 pub(super) fn run(words: &[OsString]) -> Result<(), Failure> {
     let (name, options) = words.split_first().ok_or("name a stage")?;
     let name = name.to_string_lossy();
@@ -48,10 +47,9 @@ pub(super) fn run(words: &[OsString]) -> Result<(), Failure> {
     Ok((stage.run)(&start)?)
 }
 
-/// The planners that take the place of `firsthand`'s own: two to compare with, and the one of `firsthand calibrate`.
+/// In place of `firsthand`'s own planner: two to compare with, and the one of `firsthand calibrate`.
 pub(crate) const OTHER_PLANNERS: &[&str] = &["wavefront", "bug", calibration::PLANNER];
 
-/// Become the executable that `mission` names for `stage`, if it names one.
 fn become_executable(
     stage: &Stage,
     mission: &Mission,

@@ -21,7 +21,7 @@ use console::{
     words,
 };
 
-/// The patience with a roster, which is published five times a second.
+/// A roster is published five times a second.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 #[derive(Serialize)]
@@ -34,7 +34,6 @@ struct Listed {
     run: Option<PathBuf>,
 }
 
-/// Print the robots that run on this machine for this user.
 pub(super) fn print(json: bool) -> Result<(), Failure> {
     let listed: Vec<_> = robots::own().into_iter().map(listed).collect();
     if json {
@@ -76,7 +75,7 @@ fn listed(robot: Robot) -> Listed {
     }
 }
 
-/// The order of the supervisor, the mission time, and whether the robot is a simulated one.
+/// The supervisor's order, mission time, and whether the robot is simulated.
 type RosterFacts = (&'static str, Option<f64>, Option<bool>);
 
 fn roster(robot: &Robot) -> Result<Option<RosterFacts>, BusError> {

@@ -25,7 +25,7 @@ static FILES: &[(&str, &str)] = stored! {
     "field" in "results/field.csv",
 };
 
-/// Rows of the file called `name`, of some sections (`a,b`) or of all, as Markdown; none where there is no such file or section.
+/// Rows of some sections (`a,b`) or of all; none where there is no such file or section.
 pub(crate) fn markdown(name: &str, section: Option<&str>) -> Option<String> {
     let (_, text) = FILES.iter().find(|(file, _)| *file == name)?;
     let mut reader = csv::Reader::from_reader(text.as_bytes());
@@ -71,7 +71,7 @@ fn capability(row: &[String]) -> String {
     item(&format!("{verdict}: {said}"))
 }
 
-/// A figure, and below it the command that prints it.
+/// Below it stands the command that prints it.
 fn figure(row: &[String]) -> String {
     let [what, realism, n, figure, command] = row else {
         return String::new();
@@ -93,7 +93,7 @@ fn table<'a>(header: impl Iterator<Item = &'a str>, rows: &[Vec<String>]) -> Str
     table
 }
 
-/// The rows of capabilities: text, verdict, names of tests.
+/// Text, verdict, names of tests.
 #[cfg(test)]
 pub(crate) fn capabilities() -> Vec<[String; 3]> {
     let (_, text) = FILES[0];

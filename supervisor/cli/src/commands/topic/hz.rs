@@ -37,7 +37,7 @@ pub(super) struct Arguments {
 
 const REPORT_EVERY: Duration = Duration::from_secs(1);
 
-/// The readers of a bus, and the rates of what they read.
+/// Readers, and the rates of what they read.
 struct Readers(Vec<(Box<dyn AnyReader>, TopicRates)>);
 
 impl Readers {

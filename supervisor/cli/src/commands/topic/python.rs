@@ -7,7 +7,7 @@ use common::{
     topics,
 };
 
-/// The module: the structs of all topics, whose layouts are checked when it is loaded, and a follower.
+/// The structs of all topics, whose layouts are checked when the module is loaded, and a follower.
 pub(super) fn module() -> String {
     let mut module = include_str!("topics.py").to_owned();
     let (mut known, mut table) = (BTreeSet::new(), String::new());
@@ -28,7 +28,7 @@ pub(super) fn module() -> String {
     module
 }
 
-/// Declare the class of a struct after those of its fields, each once.
+/// The classes of its fields come before it, each once.
 fn declare(kind: &Kind, known: &mut BTreeSet<&'static str>, module: &mut String) {
     let structure = match kind {
         Kind::Number(_) => return,
@@ -59,7 +59,7 @@ fn declare(kind: &Kind, known: &mut BTreeSet<&'static str>, module: &mut String)
     module.push_str("\n\n");
 }
 
-/// The name of a struct without the name of the project.
+/// The class lacks the name of the project.
 fn class(structure: &Structure) -> &'static str {
     let name = structure.name;
     name.rsplit_once('.').map_or(name, |(_, name)| name)

@@ -9,13 +9,12 @@ use serde::{
     ser::{SerializeMap as _, SerializeSeq as _},
 };
 
-/// The name of a slice's elements, beside the fields of their header.
+/// The name stands beside the fields of the header.
 const ELEMENTS: &str = "elements";
-/// The number of elements of an array that text shows, unless all are asked for.
+/// Elements of an array in text, unless all are asked for.
 const SHOWN: usize = 16;
 
-/// A sample as text, one field a line. The fields of a struct stand below its name. Arrays of more than 16 elements are cut,
-/// unless `whole`.
+/// The fields of a struct stand below its name. Arrays of more than 16 elements are cut, unless `whole`.
 pub(super) fn text(fields: &Fields, whole: bool) -> String {
     let most = if whole { usize::MAX } else { SHOWN };
     let mut text = String::new();
@@ -25,15 +24,14 @@ pub(super) fn text(fields: &Fields, whole: bool) -> String {
     text
 }
 
-/// A sample as a JSON object, whole. A number that is not finite is null.
+/// A whole sample. A number that is not finite is null.
 pub(super) fn json(fields: Fields) -> serde_json::Result<String> {
     serde_json::to_string(&Json(&Value::Struct(fields)))
 }
 
-/// The names and values of a sample's fields.
 pub(super) type Fields = Vec<(&'static str, Value)>;
 
-/// The fields of the header, and the elements of the slice if there is one.
+/// Header, and the elements of the slice if there is one.
 pub(super) fn fields(header: Value, elements: Option<Vec<Value>>) -> Fields {
     let mut fields = match header {
         Value::Struct(fields) => fields,
