@@ -25,6 +25,7 @@ use crate::{
     order::{self, Decision},
     outcome::{Ending, Outcome},
     policy::Now,
+    process,
     progress::Progress,
     records,
     recovery::{RecoveredRun, StateFile},
@@ -60,7 +61,12 @@ impl Robot {
             let address = address.parse::<Address<String>>()?.resolve()?;
             return Ok(Self { simulator: None, address });
         }
-        let simulator = Simulator::start(&options.directory, &options.mission, options.pace)?;
+        let simulator = Simulator::start(
+            process::firsthand(&[]),
+            &options.directory,
+            &options.mission,
+            options.pace,
+        )?;
         Ok(Self { address: Address::Udp(simulator.address()), simulator: Some(simulator) })
     }
 

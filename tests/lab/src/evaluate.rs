@@ -1,33 +1,31 @@
 //! `firsthand evaluate`: how often a robot arrives, on many worlds, judged by the ground truth.
 
 use std::{
-    fs,
     num::NonZero,
     path::{Path, PathBuf},
 };
 
 use clap::Args;
-use common::{
-    file::FileError,
-    mission::{Mission, Model},
-};
-use evaluation::{
-    directory::{self, PAGE_FILE},
-    report::{self, Report},
-    results::Results,
-    runner::{self, NoiseSeeds, Plan},
-    setting::{HARMONIC, Setting},
-    trial::BodySize,
-    worlds::{self, Ends, Worlds},
+use common::mission::{Mission, Model};
+use console::{
+    failure::Failure,
+    output::{print_text, write_stderr},
 };
 use glam::DVec2;
 use serde_json::json;
 use supervisor::planner_executable;
 
-use crate::mission_progress::{MissionProgress, jobs};
-use console::{
-    failure::Failure,
-    output::{print_text, write_stderr},
+use crate::{
+    missions::{
+        directory,
+        report::{self, Report},
+        results::Results,
+        runner::{self, NoiseSeeds, Plan, processors},
+        setting::{HARMONIC, Setting},
+        statistics::Estimate,
+        trial::BodySize,
+    },
+    worlds::{self, Ends, Worlds},
 };
 
 /// Run missions on many worlds and count successes by the ground truth, with 95 % intervals, a picture and a page of every failure.
@@ -113,7 +111,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
         settings,
         repeats: arguments.repeats,
         noise: NoiseSeeds::Derived(arguments.seed),
-        jobs: jobs(arguments.jobs),
+        jobs: processors(arguments.jobs),
         pictured_seed: None,
         calibrates: arguments.calibrate,
         directory,
@@ -124,13 +122,9 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
         found.unsolvable
     ));
     let mut results = Results::open(&plan.directory)?;
-    let mut console = MissionProgress::new("");
-    runner::run(&plan, &mut results, &mut |progress| console.show(progress))?;
-    console.end();
+    runner::run(&plan, &mut results, "")?;
     results.sort()?;
-    let page = plan.directory.join(PAGE_FILE);
-    fs::write(&page, report::html(&plan, &results, &described))
-        .map_err(FileError::of("write", &page))?;
+    let page = directory::save_page(&plan.directory, &report::html(&plan, &results, &described))?;
     let report = Report::new(&plan, results.rows.rows());
     let text = if arguments.json {
         format!("{}\n", as_json(&report)?)
@@ -274,7 +268,7 @@ fn as_json(report: &Report) -> Result<serde_json::Value, serde_json::Error> {
     let others: Vec<_> = totals
         .zip(&report.comparisons)
         .map(|(totals, comparison)| {
-            let interval = |of: evaluation::statistics::Estimate| [of.value, of.low, of.high];
+            let interval = |of: Estimate| [of.value, of.low, of.high];
             Ok(json!({
                 "totals": serde_json::to_value(totals)?,
                 "pairs": comparison.pairs,

@@ -12,7 +12,7 @@ use std::{
 
 use clap::Args;
 use common::{process_status::kibibytes, samples::FieldCell};
-use evaluation::statistics::median;
+use crate::missions::statistics::median;
 use harmonic::{Cancellation, Cell, Domain, Field, Phase, Screening, Settings, SolveError, Solver};
 use maps::Map;
 use npyz::WriterBuilder as _;

@@ -1,0 +1,84 @@
+//! A mission whose ticks are measured.
+
+use std::{
+    process::{Output, Stdio},
+    sync::mpsc::{RecvTimeoutError, channel},
+    thread,
+    time::Duration,
+};
+
+use common::{clock::Pace, domain::RobotName};
+use supervisor::summary::Quantiles;
+
+use super::{
+    consumers,
+    options::Arguments,
+    process_set::{ProcessSet, Used},
+};
+use crate::{
+    error::{self, BenchError, system},
+    robot::firsthand,
+};
+
+#[derive(Debug)]
+pub(super) struct Ticks {
+    pub(super) count: u64,
+    pub(super) p50_us: f64,
+    pub(super) p99_us: f64,
+    pub(super) max_us: f64,
+    /// Resources of its processes; none for a short mission.
+    pub(super) used: Option<Used>,
+}
+
+/// Pause between measurements of its processes.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
+
+pub(super) fn measure(
+    arguments: &Arguments,
+    robot: &RobotName,
+    pace: Pace,
+) -> Result<Ticks, BenchError> {
+    let directory = tempfile::Builder::new().prefix("firsthand-latency-").tempdir();
+    let directory = directory.map_err(system("make a directory for the mission"))?;
+    let mut command = firsthand(&["run", &arguments.mission, "--json"]);
+    command
+        .args(["--pace", &pace.to_string(), "--robot", &robot.to_string(), "--out"])
+        .arg(directory.path());
+    if arguments.no_record {
+        command.arg("--no-record");
+    }
+    for setting in &arguments.set {
+        command.args(["--set", setting]);
+    }
+    // The consumers wait for the bus, and follow it. They do not belong to the mission's processes.
+    let _consumers = consumers::start(robot, arguments.consumers)?;
+    let run = command
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .map_err(system("start the mission"))?;
+    let mut processes = ProcessSet::of(run.id());
+    let (ended, end) = channel();
+    let waiting = thread::spawn(move || ended.send(run.wait_with_output()));
+    let output = loop {
+        match end.recv_timeout(LOOK_EVERY) {
+            Ok(output) => break output.map_err(system("wait for the mission"))?,
+            Err(RecvTimeoutError::Timeout) => processes.look(),
+            Err(RecvTimeoutError::Disconnected) => return Err(BenchError::Nothing),
+        }
+    };
+    // The thread has ended, because it has sent its result.
+    let _ = waiting.join();
+    ticks(&output, processes.used())
+}
+
+/// The tick latencies of the mission's summary.
+fn ticks(output: &Output, used: Option<Used>) -> Result<Ticks, BenchError> {
+    let summary = error::summary(&output.stdout, &output.stderr)?;
+    let Quantiles { p50: Some(p50_us), p99: Some(p99_us), max: Some(max_us) } =
+        summary.tick_latency_us
+    else {
+        return Err(BenchError::Nothing);
+    };
+    Ok(Ticks { count: summary.ticks, p50_us, p99_us, max_us, used })
+}
