@@ -194,8 +194,7 @@ fn every_run_leaves_a_picture_a_summary_and_logs() {
     let (summary, directory) = Run::start("picture", "open-room", &[]).arrives_in();
     let directory = directory.path().join("run");
     let picture = std::fs::read_to_string(directory.join("picture.svg")).unwrap();
-    // The conversion parses the picture.
-    picture::png(&picture).unwrap();
+    assert!(picture.starts_with("<svg") && picture.ends_with("</svg>\n"));
     let written = support::records(&directory.join("summary.json"));
     assert_eq!(written, [summary]);
     for process in support::STAGES.iter().copied().chain(["x80-sim"]) {

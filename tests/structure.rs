@@ -191,16 +191,12 @@ fn what_watches_a_robot_contains_no_pictures_no_file_formats_and_no_chance() {
         assert!(names.contains("common"), "{tree}");
         for tool in [
             "png",
-            "zip",
-            "resvg",
             "serde-saphyr",
-            "npyz",
             "rand",
             "rand_pcg",
+            "firsthand-lab",
             "ratatui",
-            "bench",
             "picture",
-            "evaluation",
             "x80-sim",
             "page",
             "tokio",

@@ -44,12 +44,8 @@ impl Outputs {
         longest: usize,
     ) -> Result<Self, StageError> {
         let inputs = InputLog::begin(context, start)?;
-        let mut process = Process {
-            writers: Vec::new(),
-            inputs,
-            saved: context.take_saved(),
-            noted: false,
-        };
+        let mut process =
+            Process { writers: Vec::new(), inputs, saved: context.take_saved(), noted: false };
         process.open(context, longest, false)?;
         Ok(Self { at: Progress::default(), to: Destination::Process(Box::new(process)) })
     }

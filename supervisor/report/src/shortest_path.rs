@@ -4,6 +4,8 @@
 //! path, and straight lines shorten it. The result is at most some percent longer than the shortest path; a gap counts as open
 //! if it is wider than the body by a cell.
 
+use std::hash::Hash;
+
 use common::geometry::{Piece, Shapes};
 use glam::{DVec2, IVec2};
 use pathfinding::prelude::astar;
@@ -34,18 +36,35 @@ pub fn shortest_path(shapes: &Shapes, start: DVec2, target: DVec2, radius: f64) 
     if !grid.is_free(from) || !grid.is_free(to) {
         return ShortestPath::None;
     }
-    let found =
-        astar(&from, |&cell| grid.neighbours(cell), |&cell| octile(cell, to), |&cell| cell == to);
-    found.map_or(ShortestPath::None, |(cells, _)| {
+    let apart = |cell: IVec2| (cell - to).abs().as_uvec2().to_array();
+    let found = over_neighbours(from, to, apart, |cell, step| grid.neighbour(cell, step));
+    found.map_or(ShortestPath::None, |cells| {
         ShortestPath::Found(grid.straightened(&cells, start, target))
     })
 }
 
-/// The least remaining cost on a grid with diagonals.
-fn octile(from: IVec2, to: IVec2) -> u32 {
-    let away = (from - to).abs();
-    let (less, more) = (away.min_element() as u32, away.max_element() as u32);
-    less * DIAGONAL + (more - less) * STRAIGHT
+/// The shortest path over eight neighbours from `start` to `goal`, both included. `apart` gives the columns and rows from a cell to the
+/// goal, `neighbour` the free cell that is so many columns and rows away.
+pub fn over_neighbours<C: Copy + Eq + Hash>(
+    start: C,
+    goal: C,
+    apart: impl Fn(C) -> [u32; 2],
+    neighbour: impl Fn(C, [i32; 2]) -> Option<C>,
+) -> Option<Vec<C>> {
+    let octile = |&cell: &C| {
+        let [cols, rows] = apart(cell);
+        cols.min(rows) * DIAGONAL + cols.abs_diff(rows) * STRAIGHT
+    };
+    let steps = (-1..=1).flat_map(|rows| (-1..=1).map(move |cols| [cols, rows]));
+    let steps: Vec<_> = steps.filter(|step| *step != [0, 0]).collect();
+    let neighbours = |&cell: &C| {
+        let next = |&step: &[i32; 2]| {
+            let length = if step.contains(&0) { STRAIGHT } else { DIAGONAL };
+            Some((neighbour(cell, step)?, length))
+        };
+        steps.iter().filter_map(next).collect::<Vec<_>>()
+    };
+    astar(&start, neighbours, octile, |&cell| cell == goal).map(|(path, _)| path)
 }
 
 struct Grid {
@@ -111,18 +130,11 @@ impl Grid {
         inside && !self.blocked[self.index(cell)]
     }
 
-    /// Free neighbours with their distance. A diagonal step cuts no corner of a blocked cell.
-    fn neighbours(&self, cell: IVec2) -> impl Iterator<Item = (IVec2, u32)> + '_ {
-        let steps = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| IVec2::new(dx, dy)));
-        steps.filter_map(move |step| {
-            let next = cell + step;
-            let sides = [IVec2::new(step.x, 0), IVec2::new(0, step.y)];
-            let open = step != IVec2::ZERO
-                && self.is_free(next)
-                && sides.iter().all(|&side| self.is_free(cell + side));
-            let length = if step.x == 0 || step.y == 0 { STRAIGHT } else { DIAGONAL };
-            open.then_some((next, length))
-        })
+    /// The free cell at this step from `cell`. A diagonal step cuts no corner of a blocked cell.
+    fn neighbour(&self, cell: IVec2, [cols, rows]: [i32; 2]) -> Option<IVec2> {
+        let next = cell + IVec2::new(cols, rows);
+        let through = [next, cell + IVec2::new(cols, 0), cell + IVec2::new(0, rows)];
+        through.into_iter().all(|cell| self.is_free(cell)).then_some(next)
     }
 
     /// Length of the path over `cells` after shortening it by straight lines, metres.

@@ -12,7 +12,7 @@ use console::{
     output::{print_text, write_stderr},
 };
 use glam::DVec2;
-use serde_json::json;
+use serde_json::{Value, json};
 use supervisor::planner_executable;
 
 use crate::{
@@ -23,6 +23,7 @@ use crate::{
         runner::{self, NoiseSeeds, Plan, processors},
         setting::{HARMONIC, Setting},
         statistics::Estimate,
+        totals::Totals,
         trial::BodySize,
     },
     worlds::{self, Ends, Worlds},
@@ -31,7 +32,7 @@ use crate::{
 /// Run missions on many worlds and count successes by the ground truth, with 95 % intervals, a picture and a page of every failure.
 /// Worlds and noise follow from the seed.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// rooms, doors, rotated-rooms, rotated-doors, traps, corridors, straight-corridors, furnished, glazed, moving-cylinders; a mission file, a ROS map (.yaml), a BARN .world or
     /// cylinders.csv; a folder of such files.
     #[arg(long, default_value = "rooms")]
@@ -95,7 +96,7 @@ pub(crate) struct Arguments {
 /// Free ground on both sides of the body in the narrowest way of a world, metres.
 const MARGIN_M: f64 = 0.05;
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result<(), Failure> {
     let settings = settings(arguments)?;
     let described = described(arguments, &settings);
     let directory = directory::claim(&arguments.out, &described, arguments.resume)?;
@@ -127,7 +128,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     let page = directory::save_page(&plan.directory, &report::html(&plan, &results, &described))?;
     let report = Report::new(&plan, results.rows.rows());
     let text = if arguments.json {
-        format!("{}\n", as_json(&report)?)
+        format!("{}\n", object(&report))
     } else {
         format!("{report}rows and pictures: {}\n", page.display())
     };
@@ -154,7 +155,6 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
         .ok_or_else(|| format!("give {N} numbers with commas between them"))
 }
 
-/// The command that gives these rows.
 fn described(arguments: &Arguments, settings: &[Setting]) -> String {
     let worlds = &arguments.worlds;
     let count = arguments.count.map_or(String::new(), |count| format!(" --count {count}"));
@@ -259,27 +259,24 @@ fn body(robot: &str, set: &[String]) -> Result<BodySize, Failure> {
     Ok(BodySize { radius_m: mission.body().radius_m, margin_m: MARGIN_M })
 }
 
-fn as_json(report: &Report) -> Result<serde_json::Value, serde_json::Error> {
-    let mut totals = report.totals.iter();
-    let mut object = match totals.next() {
-        Some(first) => serde_json::to_value(first)?,
-        None => json!({}),
-    };
-    let others: Vec<_> = totals
+fn object(report: &Report) -> Value {
+    let mut objects = report.totals.iter().map(Totals::object);
+    let mut object = objects.next().unwrap_or_default();
+    let interval = |of: Estimate| [of.value, of.low, of.high];
+    let others: Vec<Value> = objects
         .zip(&report.comparisons)
         .map(|(totals, comparison)| {
-            let interval = |of: Estimate| [of.value, of.low, of.high];
-            Ok(json!({
-                "totals": serde_json::to_value(totals)?,
+            json!({
+                "totals": totals,
                 "pairs": comparison.pairs,
                 "success_change": interval(comparison.success),
                 "collision_change": interval(comparison.collision),
                 "time_ratio": comparison.time_ratio,
-            }))
+            })
         })
-        .collect::<Result<_, serde_json::Error>>()?;
+        .collect();
     if !others.is_empty() {
         object["versus"] = others.into();
     }
-    Ok(object)
+    object
 }

@@ -26,7 +26,7 @@ use report::Report;
 
 /// Repeat the paper's experiments with its method and with the default one, and compare the results with those of the paper.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// Missions of each experiment and method, with noise seeds from 1 on.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=10_000))]
     seeds: u64,
@@ -63,7 +63,7 @@ const METHODS: [(&str, &[&str]); 2] = [
 ];
 const PAPER: &str = "paper";
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result<(), Failure> {
     let chosen = table::named(&arguments.only)?;
     let names: Vec<_> = chosen.iter().map(|it| it.name).collect();
     let realism = &arguments.realism;
@@ -84,11 +84,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
         let plan = Plan {
             calibrates: false,
             trials: its.map(|it| it.trial()).collect::<Result<_, _>>()?,
-            settings: vec![Setting {
-                name: method.to_owned(),
-                planner: HARMONIC.to_owned(),
-                set,
-            }],
+            settings: vec![Setting { name: method.to_owned(), planner: HARMONIC.to_owned(), set }],
             repeats: arguments.seeds,
             noise: NoiseSeeds::Counted(FIRST_SEED),
             pictured_seed: Some(FIRST_SEED),

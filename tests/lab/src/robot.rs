@@ -1,6 +1,8 @@
 //! The executable `firsthand`, which the laboratory starts, and the processes of this machine.
 
 use std::{
+    ffi::OsStr,
+    fmt::Display,
     fs,
     path::{Path, PathBuf},
     process::Command,
@@ -13,7 +15,7 @@ use supervisor::{executable, process};
 ///
 /// # Errors
 /// It is at neither place.
-pub(crate) fn path() -> Result<PathBuf, Refused> {
+pub fn path() -> Result<PathBuf, Refused> {
     executable::find(Path::new("firsthand")).map_err(|problem| {
         let build = "build it with `cargo build --release`";
         Refused::new("not-built", format!("firsthand: {problem}; {build}"))
@@ -21,19 +23,30 @@ pub(crate) fn path() -> Result<PathBuf, Refused> {
 }
 
 /// A subcommand of `firsthand` in a process of its own. It does not start if there is no `firsthand`, see [`path`].
-pub(crate) fn firsthand(arguments: &[&str]) -> Command {
+pub fn firsthand(arguments: &[&str]) -> Command {
     let mut command = process::child(path().unwrap_or_default());
     command.args(arguments);
     command
 }
 
-/// The ids of all processes of this machine.
-pub(crate) fn processes() -> impl Iterator<Item = u32> {
+/// `firsthand run` or `firsthand calibrate` of `robot` in `mission`, with assignments, which prints its result as JSON.
+pub fn mission(
+    subcommand: &str,
+    mission: impl AsRef<OsStr>,
+    robot: impl Display,
+    set: &[String],
+) -> Command {
+    let mut command = firsthand(&[subcommand, "--json", "--robot", &robot.to_string()]);
+    command.arg(mission).args(set.iter().flat_map(|assignment| ["--set", assignment]));
+    command
+}
+
+pub fn processes() -> impl Iterator<Item = u32> {
     let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
     entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok())
 }
 
 /// The command line of `process`, a zero byte after each word; empty if it has ended.
-pub(crate) fn command_line(process: u32) -> Vec<u8> {
+pub fn command_line(process: u32) -> Vec<u8> {
     fs::read(format!("/proc/{process}/cmdline")).unwrap_or_default()
 }

@@ -17,12 +17,14 @@ use common::{
     samples::{FixSample, PoseSample, TurnSample, name},
     topics,
 };
-use rand_pcg::{Pcg64, rand_core::Rng as _};
 use supervisor::simulator::GROUND_TRUTH;
 
-use console::{failure::Failure, output::print_text};
+use console::output::print_text;
 
-use crate::error::{BenchError, system};
+use crate::{
+    error::{Failure, system},
+    random::Random,
+};
 
 /// Publish what a camera and a gyro would measure of a simulated robot, until its run ends.
 #[derive(Debug, Args)]
@@ -54,20 +56,18 @@ const GYRO_SCALE: f64 = 1.005;
 /// Poses and ticks of the ground truth that wait for each other, at most.
 const WAITING: usize = 64;
 
-/// The samples that were published.
 #[derive(Clone, Copy, Debug, Default)]
 struct Published {
     fixes: u64,
     turns: u64,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result<(), Failure> {
     let Published { fixes, turns } = publish(arguments)?;
     Ok(print_text(&format!("published {fixes} fixes and {turns} turns\n"))?)
 }
 
-/// Publish until the robot's run ends.
-fn publish(arguments: &Arguments) -> Result<Published, BenchError> {
+fn publish(arguments: &Arguments) -> Result<Published, Failure> {
     let open = |bus: &Bus| Ok((bus.reader(&topics::POSE)?, Writers::open(bus)?));
     let mut robot =
         Follower::new(Domain::of(arguments.robot.clone()), "sources", &topics::POSE, open);
@@ -95,14 +95,13 @@ impl Writers {
 
 struct Source<'a> {
     arguments: &'a Arguments,
-    chance: Pcg64,
+    chance: Random,
     file: Option<BufReader<File>>,
     /// The beginning of an incomplete line.
     line: String,
     truth: VecDeque<GroundTruthTick>,
     poses: VecDeque<PoseSample>,
     next_fix_s: f64,
-    /// Time and heading at the newest turn.
     turned: Option<(f64, f64)>,
     published: Published,
 }
@@ -111,7 +110,7 @@ impl<'a> Source<'a> {
     fn new(arguments: &'a Arguments) -> Self {
         Self {
             arguments,
-            chance: Pcg64::new(u128::from(arguments.seed), 23),
+            chance: Random::new(arguments.seed, 23),
             file: None,
             line: String::new(),
             truth: VecDeque::new(),
@@ -122,12 +121,11 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Publish the measurements at the new poses.
     fn take(
         &mut self,
         poses: &mut Reader<PoseSample>,
         writers: &mut Writers,
-    ) -> Result<(), BenchError> {
+    ) -> Result<(), Failure> {
         while let Some(pose) = poses.take()? {
             self.poses.push_back(pose);
         }
@@ -176,14 +174,14 @@ impl<'a> Source<'a> {
         pose: &PoseSample,
         truth: &GroundTruthTick,
         writers: &mut Writers,
-    ) -> Result<(), BenchError> {
+    ) -> Result<(), Failure> {
         let Arguments { fixes, fix_error, jumps, gyro, .. } = *self.arguments;
         let (tick, time) = (pose.stamp.tick, pose.stamp.time());
         let now_s = time.seconds();
         if fixes > 0.0 && now_s >= self.next_fix_s {
             self.next_fix_s = now_s + 1.0 / fixes;
-            let direction = std::f64::consts::TAU * self.even();
-            let off = if self.even() < jumps { 1.0 } else { 0.0 };
+            let direction = std::f64::consts::TAU * self.chance.share();
+            let off = if self.chance.share() < jumps { 1.0 } else { 0.0 };
             let variance = fix_error * fix_error;
             let fix = FixSample {
                 capture_ns: time.0,
@@ -217,13 +215,8 @@ impl<'a> Source<'a> {
         Ok(())
     }
 
-    /// A number that is evenly distributed between 0 and 1.
-    fn even(&mut self) -> f64 {
-        (self.chance.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// A number that is nearly normally distributed with the deviation 1: the sum of twelve even ones.
+    /// A number that is nearly normally distributed with the deviation 1: the sum of twelve uniform ones.
     fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.even()).sum::<f64>() - 6.0
+        (0..12).map(|_| self.chance.share()).sum::<f64>() - 6.0
     }
 }

@@ -27,8 +27,8 @@ use plain_hops::Carrier;
 pub use options::Arguments;
 pub use report::Report;
 
-use crate::error::BenchError;
-use console::{failure::Failure, missions, output::print};
+use crate::error::{Failure, NOTHING};
+use console::{missions, output::print};
 use regime::Regime;
 
 /// Trips of a round that follow each other without a pause.
@@ -37,7 +37,7 @@ const TRIPS: u64 = 2000;
 const PACED_TRIPS: u64 = 50;
 
 /// Measure, or be one of the processes that a measurement starts.
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result<(), Failure> {
     let robot = match &arguments.robot {
         Some(robot) => robot.clone(),
         None => format!("latency{}", std::process::id()).parse()?,
@@ -58,11 +58,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// Measure missions of `robot` and hops, in turn, in each regime that is asked for. The mission has `rate_hz` ticks in a mission second.
-fn measure(
-    arguments: &Arguments,
-    robot: &RobotName,
-    rate_hz: f64,
-) -> Result<Vec<Report>, BenchError> {
+fn measure(arguments: &Arguments, robot: &RobotName, rate_hz: f64) -> Result<Vec<Report>, Failure> {
     let _busy = busy::start(arguments.busy)?;
     let regimes = Regime::all(arguments.rate, arguments.pace, rate_hz);
     regimes.into_iter().map(|regime| measure_in(regime, arguments, robot, rate_hz)).collect()
@@ -73,7 +69,7 @@ fn measure_in(
     arguments: &Arguments,
     robot: &RobotName,
     rate_hz: f64,
-) -> Result<Report, BenchError> {
+) -> Result<Report, Failure> {
     let trips = match regime {
         Regime::BackToBack => TRIPS,
         Regime::Rate { .. } => PACED_TRIPS,
@@ -92,5 +88,5 @@ fn measure_in(
         }
         rounds.push(mission::measure(arguments, robot, regime.pace(rate_hz))?);
     }
-    Report::new(regime, &hops, &rounds).ok_or(BenchError::Nothing)
+    Report::new(regime, &hops, &rounds).ok_or_else(|| NOTHING.into())
 }

@@ -9,15 +9,17 @@ mod floor;
 mod found;
 mod furnished;
 mod moving;
-mod random;
 mod rooms;
 mod traps;
 
 use std::{convert::Infallible, fmt, path::PathBuf, str::FromStr};
 
-use self::{corridors::Bends, files::Asked, random::Random, rooms::Doors};
+use self::{corridors::Bends, files::Asked, rooms::Doors};
 pub use self::{ends::Ends, error::WorldError, found::Found};
-use crate::missions::trial::{BodySize, Rules, Scene};
+use crate::{
+    missions::trial::{BodySize, Rules, Scene},
+    random::Random,
+};
 
 /// Failed draws in a row after which a kind of world is taken for unsolvable.
 const MOST_FAILURES: u64 = 10_000;
@@ -29,7 +31,6 @@ pub enum Worlds {
     Path(PathBuf),
 }
 
-/// A kind of world that is drawn.
 #[derive(Debug)]
 pub struct Kind {
     /// The stream of random numbers.
@@ -104,7 +105,7 @@ fn draw_until(count: usize, seed: u64, kind: &Kind, body: &BodySize) -> Result<F
     let mut drawn = 0;
     while found.trials.len() < count && drawn < MOST_FAILURES + count as u64 {
         let number = found.trials.len();
-        let scene = draw(&mut Random::new(seed, *stream, drawn), number);
+        let scene = draw(&mut Random::of_world(seed, *stream, drawn), number);
         drawn += 1;
         let world = format!("{name}-{seed}-{number:04}");
         found.add(world, &scene, rules(), body)?;

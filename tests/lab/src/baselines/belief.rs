@@ -9,7 +9,6 @@ use glam::DVec2;
 /// Step along a line of sight, as a share of a cell.
 const SIGHT_STEP: f64 = 0.1;
 
-/// A planner's copy of the `grid`.
 #[derive(Clone, Debug, Default)]
 pub struct Belief {
     grid: Replica<u8>,
@@ -20,7 +19,6 @@ pub struct Belief {
 #[derive(Clone, Copy, Debug)]
 pub struct Map<'a> {
     pub frame: GridFrame,
-    /// The epoch, which increases when the map is reset.
     pub epoch: u64,
     cells: &'a [u8],
 }
@@ -35,7 +33,6 @@ impl Belief {
         followed
     }
 
-    /// The header of the newest sample that was applied.
     pub const fn header(&self) -> &GridHeader {
         &self.header
     }
@@ -55,7 +52,6 @@ impl Map<'_> {
         byte.flatten().is_some_and(|byte| !CellState::from_byte(byte).is_hazard())
     }
 
-    /// The cell at `point` (metres), if it is free.
     pub fn free_cell_at(&self, point: DVec2) -> Option<Cell> {
         self.frame.cell_at(point).filter(|&cell| self.is_free(cell))
     }

@@ -27,14 +27,12 @@ const ON_LINE_M: f64 = 0.05;
 /// The most cells of a boundary that are searched ahead.
 const MOST_CELLS: usize = 256;
 
-/// The planner of Bug2.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Bug {
     /// The epoch of the map. With a new epoch all state is reset.
     epoch: u64,
     /// Start of the line to the target, metres; none before the first pose.
     line_from: Option<DVec2>,
-    /// The hazard that the robot circumvents.
     following: Option<Following>,
     /// Whether the robot came back to the place where it met the hazard.
     enclosed: bool,
@@ -45,7 +43,6 @@ pub struct Bug {
 struct Following {
     /// The place where the robot met the hazard, metres.
     hit: DVec2,
-    /// The robot's place on the boundary.
     place: Place,
     /// Whether the robot has left the place where it met the hazard.
     was_away: bool,
@@ -81,7 +78,6 @@ impl Planner for Bug {
     }
 }
 
-/// The straight line to the target.
 #[derive(Clone, Copy, Debug)]
 struct Straight<'a> {
     map: &'a Map<'a>,
@@ -109,7 +105,6 @@ impl Straight<'_> {
         Some(Following { hit, place, was_away: false })
     }
 
-    /// Whether the robot leaves the hazard here.
     fn is_resumed(&self, here: DVec2, following: &Following) -> bool {
         let cell = self.map.frame.resolution_m;
         let along = (self.target - self.line_from).normalize_or(DVec2::X);

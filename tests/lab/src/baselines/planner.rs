@@ -20,16 +20,12 @@ pub trait Planner: Default + Debug + Serialize + DeserializeOwned {
     fn way(&mut self, map: &Map<'_>, here: DVec2, target: DVec2) -> Way;
 }
 
-/// The direction at a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Way {
-    /// There is no map yet.
     Unknown,
-    /// Go straight to this point, metres.
     To(DVec2),
     /// The robot stands in a hazard: go slowly and straight to this point, metres.
     Out(DVec2),
-    /// There is no path.
     None,
 }
 
@@ -40,7 +36,6 @@ impl Way {
     }
 }
 
-/// A planner on a copy of the map.
 #[derive(Debug)]
 pub struct Baseline<P> {
     /// The target of the robot; none before the supervisor has published one.
@@ -73,7 +68,6 @@ impl<P: Planner> Baseline<P> {
         }
     }
 
-    /// The guidance for the pose of `sample`.
     pub fn guidance(&mut self, sample: &PoseSample) -> GuidanceSample {
         let here = sample.pose().position;
         let way = match (self.belief.map(), &self.target) {

@@ -15,7 +15,6 @@ use crate::baselines::planner::{Baseline, Planner};
 /// Room for the encoded state, bytes: Bug2's is under 150.
 const STATE_BYTES: usize = 256;
 
-/// The process of the planner `P`.
 #[derive(Debug)]
 pub struct Shell<P> {
     grid: SliceReader<GridHeader, u8>,
@@ -25,7 +24,6 @@ pub struct Shell<P> {
     saved: Saved,
     baseline: Baseline<P>,
     latest_pose: Option<PoseSample>,
-    /// The tick last answered.
     answered: Option<u64>,
     progress: Progress,
 }

@@ -2,21 +2,21 @@
 
 use std::ffi::OsString;
 
+use crate::baselines::{bug::Bug, shell::Shell, wavefront::Wavefront};
 use clap::Args;
 use common::{shell::run_stage, stage_command};
 use console::failure::{Failure, Refused};
-use crate::baselines::{bug::Bug, shell::Shell, wavefront::Wavefront};
 use supervisor::stages::PLANNER;
 
 /// Be a planner to compare with: wavefront or bug.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     name: String,
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     options: Vec<OsString>,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result<(), Failure> {
     let run = match &*arguments.name {
         "wavefront" => run_stage::<Shell<Wavefront>>,
         "bug" => run_stage::<Shell<Bug>>,

@@ -14,7 +14,7 @@ use super::planner::{Baseline, Planner};
 
 /// The header and the cells of a map drawn row by row, the first one with the greatest y: `#` is hazard. Cells of
 /// 0.1 m, the middle one at (0, 0).
-pub(crate) fn drawn(rows: &[&str]) -> (GridHeader, Vec<u8>) {
+pub fn drawn(rows: &[&str]) -> (GridHeader, Vec<u8>) {
     let frame = GridFrame { cells: rows.len() as u32, resolution_m: 0.1, centre: DVec2::ZERO };
     let letters = rows.iter().rev().flat_map(|row| row.bytes());
     let state = |letter| match letter {
@@ -25,14 +25,12 @@ pub(crate) fn drawn(rows: &[&str]) -> (GridHeader, Vec<u8>) {
     (header, letters.map(state).collect())
 }
 
-/// A mission to (x, y) metres.
-pub(crate) fn mission([x, y]: [f64; 2]) -> Mission {
+pub fn mission([x, y]: [f64; 2]) -> Mission {
     let text = format!("target = [{x:?}, {y:?}]");
     Mission::parse(&text, Path::new("test.toml")).unwrap()
 }
 
-/// A planner that is sent to (x, y) metres.
-pub(crate) fn sent<P: Planner>(target: [f64; 2]) -> Baseline<P> {
+pub fn sent<P: Planner>(target: [f64; 2]) -> Baseline<P> {
     let mission = mission(target);
     let mut baseline = Baseline::new(&mission);
     baseline.send_to(TargetSample::first(&mission));
@@ -40,6 +38,6 @@ pub(crate) fn sent<P: Planner>(target: [f64; 2]) -> Baseline<P> {
 }
 
 /// A robot at (x, y) metres that faces along x.
-pub(crate) fn pose([x_m, y_m]: [f64; 2]) -> PoseSample {
+pub fn pose([x_m, y_m]: [f64; 2]) -> PoseSample {
     PoseSample { x_m, y_m, ..PoseSample::default() }
 }

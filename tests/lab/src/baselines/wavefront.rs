@@ -3,7 +3,7 @@
 
 use common::grid::Cell;
 use glam::DVec2;
-use pathfinding::prelude::astar;
+use report::shortest_path::over_neighbours;
 use serde::{Deserialize, Serialize};
 
 use crate::baselines::{
@@ -13,9 +13,6 @@ use crate::baselines::{
 
 /// The greatest distance to the point of its path for which the robot heads, metres.
 const AIM_M: f64 = 0.6;
-/// A* counts in thousandths of a cell.
-const STRAIGHT: u64 = 1000;
-const DIAGONAL: u64 = 1414;
 
 /// The planner of shortest paths. It plans from the map alone.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -48,23 +45,8 @@ fn aim(map: &Map<'_>, here: DVec2, target: DVec2, path: &[Cell]) -> DVec2 {
 
 /// The cells of the shortest path between two free cells, both of them included.
 fn shortest_path(map: &Map<'_>, start: Cell, goal: Cell) -> Option<Vec<Cell>> {
-    let octile = |cell: &Cell| {
-        let (cols, rows) = (cell.col.abs_diff(goal.col), cell.row.abs_diff(goal.row));
-        let (less, more) = (u64::from(cols.min(rows)), u64::from(cols.max(rows)));
-        less * DIAGONAL + (more - less) * STRAIGHT
-    };
-    let successors = |&cell: &Cell| {
-        let steps = (-1..=1).flat_map(|rows| (-1..=1).map(move |cols| [cols, rows]));
-        steps.filter_map(move |step| {
-            let length = match step {
-                [0, 0] => return None,
-                [0, _] | [_, 0] => STRAIGHT,
-                _ => DIAGONAL,
-            };
-            Some((map.neighbour(cell, step)?, length))
-        })
-    };
-    astar(&start, successors, octile, |&cell| cell == goal).map(|(path, _)| path)
+    let apart = |cell: Cell| [cell.col.abs_diff(goal.col), cell.row.abs_diff(goal.row)];
+    over_neighbours(start, goal, apart, |cell, step| map.neighbour(cell, step))
 }
 
 #[cfg(test)]

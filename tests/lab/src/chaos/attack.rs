@@ -31,7 +31,7 @@ use crate::chaos::{
     signals::Row,
     subscriptions::{POLL, Subscriptions},
 };
-use crate::error::{BenchError, system};
+use crate::error::{Failure, system};
 
 /// The generation that stands for the samples of a supervisor, whose successor has a bus of its own.
 const NEWEST: u32 = u32::MAX;
@@ -40,9 +40,8 @@ const NEWEST: u32 = u32::MAX;
 const MOST_HITS: usize = HOLD_AFTER - 4;
 
 #[derive(Default)]
-pub(crate) struct Attack {
+pub struct Attack {
     seed: u64,
-    /// Mission time of the newest wheel sample.
     time: Option<MissionTime>,
     consumers: Consumers,
     entries: Vec<RosterEntry>,
@@ -55,7 +54,6 @@ pub(crate) struct Attack {
     measured: Vec<Row>,
     /// Generations that were frozen alone. The supervisor may abort these as hung.
     frozen: Vec<(&'static str, u32)>,
-    /// Recent hits of stages and their times.
     hits: Vec<(&'static str, Instant)>,
     pose: Option<PoseSample>,
     /// The supervisor's resources when its robot began to drive, and at the last check.
@@ -63,18 +61,18 @@ pub(crate) struct Attack {
 }
 
 impl Attack {
-    pub(crate) fn new(seed: u64, consumers: Consumers) -> Self {
+    pub fn new(seed: u64, consumers: Consumers) -> Self {
         Self { seed, consumers, ..Self::default() }
     }
 
     /// Attack one generation of the supervisor, `child`, until it ends, for at most `patience`.
-    pub(crate) fn run(
+    pub fn run(
         &mut self,
         series: &mut Series<'_>,
         child: &mut Process,
         mut robot: Option<&mut Simulator>,
         patience: Duration,
-    ) -> Result<(), BenchError> {
+    ) -> Result<(), Failure> {
         let began = Instant::now();
         self.supervisor_hit = false;
         self.driving = false;
@@ -125,7 +123,7 @@ impl Attack {
         &mut self,
         series: &mut Series<'_>,
         robot: Option<&Simulator>,
-    ) -> Result<(), BenchError> {
+    ) -> Result<(), Failure> {
         for mut row in std::mem::take(&mut self.measured) {
             row.pose_error_m = robot.and_then(|robot| self.pose_error(robot.truth()));
             series.keep(&row)?;
@@ -134,11 +132,11 @@ impl Attack {
     }
 
     /// Note that the mission is over, and end all measurements.
-    pub(crate) fn end(
+    pub fn end(
         &mut self,
         series: &mut Series<'_>,
         robot: Option<&Simulator>,
-    ) -> Result<(), BenchError> {
+    ) -> Result<(), Failure> {
         self.consumers.end();
         let pending = self.pending.drain(..);
         self.measured.extend(pending.map(|recovery| recovery.row));
@@ -152,18 +150,18 @@ impl Attack {
     }
 
     /// The recordings of the run's recorder that was hit, and those of other recorders.
-    pub(crate) fn hit_recordings(&self) -> (&[PathBuf], Vec<PathBuf>) {
+    pub fn hit_recordings(&self) -> (&[PathBuf], Vec<PathBuf>) {
         let consumers = &self.consumers;
         (consumers.hit_recordings(), consumers.other_recordings())
     }
 
     /// Whether the supervisor was hit and has no working successor yet.
-    pub(crate) fn supervisor_is_down(&self) -> bool {
+    pub fn supervisor_is_down(&self) -> bool {
         self.pending.iter().any(|recovery| recovery.stage == SUPERVISOR)
     }
 
     /// Stages that the supervisor aborted as hung, by the `deaths` of the run, although they were not frozen alone.
-    pub(crate) fn healthy_aborted(&self, deaths: &[Value]) -> Vec<String> {
+    pub fn healthy_aborted(&self, deaths: &[Value]) -> Vec<String> {
         let frozen = |death: &Value| {
             self.frozen.iter().any(|(stage, generation)| {
                 death["stage"] == *stage && death["generation"] == *generation
@@ -177,7 +175,7 @@ impl Attack {
     }
 
     /// Distance from the last published pose to the ground truth of its tick, metres; none without both.
-    pub(crate) fn pose_error(&self, truth: &[GroundTruthTick]) -> Option<f64> {
+    pub fn pose_error(&self, truth: &[GroundTruthTick]) -> Option<f64> {
         let pose = self.pose?;
         let tick = truth.iter().rev().find(|tick| tick.is_of(&pose))?;
         Some(tick.pose_error_m(&pose))
@@ -188,7 +186,7 @@ impl Attack {
         &mut self,
         subscriptions: &mut Subscriptions,
         report: &mut Report,
-    ) -> Result<(), BenchError> {
+    ) -> Result<(), Failure> {
         while let Some(death) = subscriptions.deaths.take()? {
             let (stage, generation) = (name_str(&death.stage), death.generation);
             let mut pending = self.pending.iter_mut();
@@ -295,7 +293,7 @@ impl Attack {
     }
 
     /// Hit a consumer, the supervisor, or a running stage without a pending recovery.
-    fn hit(&mut self, series: &mut Series<'_>) -> Result<(), BenchError> {
+    fn hit(&mut self, series: &mut Series<'_>) -> Result<(), Failure> {
         let Series { options, schedule, report, .. } = series;
         if let Some((index, kind, pause)) =
             schedule.consumer(self.consumers.len(), options.asked.only_consumers)
@@ -363,7 +361,6 @@ impl Attack {
         times.min().unwrap_or(Duration::MAX)
     }
 
-    /// Hit the successors that are due in their start-up.
     fn hit_starting(&mut self, report: &mut Report) {
         for recovery in &mut self.pending {
             recovery.schedule_startup_hit(&self.entries);

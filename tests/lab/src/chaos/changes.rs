@@ -11,14 +11,13 @@ use std::{
 };
 
 use common::{domain::RobotName, ground_truth::GroundTruthTick, mission::Mission};
-use rand_pcg::{Pcg64, rand_core::Rng};
 use serde::Serialize;
 use supervisor::{
     summary::Summary,
     target_list::{TargetOutcome, TargetResult},
 };
 
-use crate::robot::firsthand;
+use crate::{random::Random, robot::firsthand};
 
 /// Changes of the targets of one mission.
 const MOST_CHANGES: usize = 6;
@@ -31,9 +30,8 @@ const CLEARANCE_M: f64 = 0.45;
 /// The greatest distance by the ground truth of a robot from a target that it reached, metres.
 const REACHED_WITHIN_M: f64 = 0.5;
 
-/// Results of all missions.
 #[derive(Debug, Default, Serialize)]
-pub(crate) struct Changes {
+pub struct Changes {
     asked: u64,
     /// Requests that the supervisor confirmed.
     taken: u64,
@@ -47,7 +45,7 @@ pub(crate) struct Changes {
 }
 
 /// Sends a robot elsewhere until it is told to stop.
-pub(crate) struct Operator {
+pub struct Operator {
     stop: Sender<()>,
     thread: JoinHandle<Sent>,
 }
@@ -55,12 +53,11 @@ pub(crate) struct Operator {
 #[derive(Debug, Default)]
 struct Sent {
     counts: [u64; 4],
-    /// The confirmed targets.
     taken: Vec<[f64; 2]>,
 }
 
 impl Operator {
-    pub(crate) fn start(robot: RobotName, mission: &Mission, seed: u64) -> Self {
+    pub fn start(robot: RobotName, mission: &Mission, seed: u64) -> Self {
         let (stop, stopped) = channel();
         let mission = mission.clone();
         let thread = std::thread::spawn(move || send(&robot, &mission, seed, &stopped));
@@ -74,19 +71,18 @@ impl Operator {
 }
 
 fn send(robot: &RobotName, mission: &Mission, seed: u64, stopped: &Receiver<()>) -> Sent {
-    let mut random = Pcg64::new(u128::from(seed), 11);
-    let mut uniform = move || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+    let mut random = Random::new(seed, 11);
     let mut sent = Sent::default();
     while sent.taken.len() < 2 * MOST_CHANGES && sent.counts[1] < MOST_CHANGES as u64 {
-        let pause = Duration::from_secs_f64(PAUSE_S[0] + uniform() * (PAUSE_S[1] - PAUSE_S[0]));
+        let pause = Duration::from_secs_f64(random.within(PAUSE_S[0], PAUSE_S[1]));
         if stopped.recv_timeout(pause) != Err(RecvTimeoutError::Timeout) {
             break;
         }
-        let places: Vec<_> =
-            (0..1 + usize::from(uniform() < 0.4)).map(|_| place(mission, &mut uniform)).collect();
+        let count = 1 + usize::from(random.share() < 0.4);
+        let places: Vec<_> = (0..count).map(|_| place(mission, &mut random)).collect();
         let words: Vec<_> = places.iter().flatten().map(f64::to_string).collect();
         let mut command = firsthand(&["goto", "--robot", &robot.to_string()]);
-        if uniform() < 0.5 {
+        if random.share() < 0.5 {
             command.arg("--append");
         }
         let output = command.args(words).stdin(Stdio::null()).output();
@@ -111,11 +107,11 @@ fn send(robot: &RobotName, mission: &Mission, seed: u64, stopped: &Receiver<()>)
 }
 
 /// A random place at which the robot can stand, in whole centimetres.
-fn place(mission: &Mission, uniform: &mut impl FnMut() -> f64) -> [f64; 2] {
+fn place(mission: &Mission, random: &mut Random) -> [f64; 2] {
     let (world, frame) = (mission.obstacles(), mission.grid_frame());
     let clear_m = mission.body().radius_m + CLEARANCE_M;
     for _ in 0..1000 {
-        let (angle, far) = (TAU * uniform(), WITHIN_M * uniform().sqrt());
+        let (angle, far) = (TAU * random.share(), WITHIN_M * random.share().sqrt());
         let at = glam::DVec2::from_angle(angle) * far;
         let at = (at * 100.0).round() / 100.0;
         let to_rim = frame.resolution_m * f64::from(frame.cells) / 2.0
@@ -130,7 +126,7 @@ fn place(mission: &Mission, uniform: &mut impl FnMut() -> f64) -> [f64; 2] {
 impl Changes {
     /// Count the mission `seed` with the changes of `operator`. Returns whether every target was reached in truth or its outcome
     /// reported.
-    pub(crate) fn add(
+    pub fn add(
         &mut self,
         seed: u64,
         operator: Operator,
@@ -169,7 +165,7 @@ impl Changes {
         self.wrong.len() == before
     }
 
-    pub(crate) const fn is_right(&self) -> bool {
+    pub const fn is_right(&self) -> bool {
         self.wrong.is_empty()
     }
 }

@@ -8,16 +8,12 @@ use std::{
 };
 
 use common::domain::RobotName;
-use supervisor::{
-    executable::{self, ExecutableError},
-    process::firsthand,
-};
-use thiserror::Error;
+use supervisor::{executable, process};
 
 use crate::{chaos::terminal, robot};
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Consumer {
+pub enum Consumer {
     /// The recorder that the run itself starts. It is not restarted within its run.
     RunRecorder,
     /// Another `firsthand record`.
@@ -39,55 +35,36 @@ pub struct GivenConsumer {
     arguments: Vec<String>,
 }
 
-/// A user's consumer that cannot be started.
-#[derive(Debug, Error)]
-#[error(
-    "the consumer {command:?} cannot be started: {problem}; give a program, by its path or by a name on PATH, and its arguments, \
-     in quotes where they contain spaces (no shell reads them)"
-)]
-pub struct ConsumerError {
-    command: String,
-    problem: ConsumerProblem,
-}
-
-#[derive(Debug, Error)]
-enum ConsumerProblem {
-    #[error("there is nothing in it")]
-    Nothing,
-    #[error("it ends within quotes or after a backslash")]
-    Unfinished,
-    /// No program takes such a word.
-    #[error("it contains a zero byte")]
-    Zero,
-    #[error("{program}: {problem}")]
-    Program { program: String, problem: ExecutableError },
-}
-
 impl FromStr for GivenConsumer {
-    type Err = ConsumerError;
+    type Err = String;
 
-    fn from_str(command: &str) -> Result<Self, Self::Err> {
+    fn from_str(command: &str) -> Result<Self, String> {
         let found = || {
+            // No program takes such a word.
             if command.contains('\0') {
-                return Err(ConsumerProblem::Zero);
+                return Err("it contains a zero byte".to_owned());
             }
-            let words = shlex::split(command).ok_or(ConsumerProblem::Unfinished)?;
+            let words =
+                shlex::split(command).ok_or("it ends within quotes or after a backslash")?;
             let mut words = words.into_iter();
-            let program = words.next().ok_or(ConsumerProblem::Nothing)?;
-            match executable::find(Path::new(&program)) {
-                Ok(path) => Ok((path, words.collect())),
-                Err(problem) => Err(ConsumerProblem::Program { program, problem }),
-            }
+            let program = words.next().ok_or("there is nothing in it")?;
+            let found = executable::find(Path::new(&program));
+            let found = found.map_err(|problem| format!("{program}: {problem}"))?;
+            Ok((found, words.collect()))
         };
-        let (program, arguments) =
-            found().map_err(|problem| ConsumerError { command: command.to_owned(), problem })?;
+        let (program, arguments) = found().map_err(|problem: String| {
+            format!(
+                "the consumer {command:?} cannot be started: {problem}; give a program, by its path or by a name on PATH, and its \
+                 arguments, in quotes where they contain spaces (no shell reads them)"
+            )
+        })?;
         Ok(Self { command: command.to_owned(), program, arguments })
     }
 }
 
 impl Consumer {
     /// The consumers of `firsthand`. Without terminals `hz` replaces `top`.
-    pub(crate) fn own() -> Vec<Self> {
+    pub fn own() -> Vec<Self> {
         let shows = match terminal::open() {
             Ok(_) => Self::Top,
             Err(_) => Self::Hz,
@@ -95,7 +72,7 @@ impl Consumer {
         vec![Self::RunRecorder, Self::Record, shows, Self::Logs]
     }
 
-    pub(crate) fn name(&self) -> &str {
+    pub fn name(&self) -> &str {
         match self {
             Self::RunRecorder => "run's recorder",
             Self::Record => "record",
@@ -108,7 +85,7 @@ impl Consumer {
 
     /// The command that starts the consumer for `robot`; a recorder writes into `recording`. None for the run's own
     /// recorder.
-    pub(crate) fn command(&self, robot: &RobotName, recording: &Path) -> Option<Command> {
+    pub fn command(&self, robot: &RobotName, recording: &Path) -> Option<Command> {
         let own = |arguments: &[&str]| {
             let mut words: Vec<OsString> = vec![robot::path().unwrap_or_default().into()];
             words.extend(arguments.iter().map(OsString::from));
@@ -132,7 +109,8 @@ impl Consumer {
             }
         };
         // The subcommand executes the program, and ends with its parent.
-        let mut command = firsthand(&["bench", "consumer", &std::process::id().to_string()]);
+        let mut command =
+            process::firsthand(&["bench", "consumer", &std::process::id().to_string()]);
         command.args(words);
         Some(command)
     }
@@ -144,21 +122,19 @@ mod tests {
 
     #[test]
     fn a_command_without_a_program_is_refused_with_what_is_wrong_and_the_remedy() {
-        for command in ["no-such-logger x80", "./no/such/logger", "/tmp x"] {
+        for (command, problem) in [
+            ("no-such-logger x80", "no-such-logger: "),
+            ("./no/such/logger", "./no/such/logger: "),
+            ("/tmp x", "/tmp: "),
+            ("sh 'x", "ends within quotes"),
+            ("sh \"x\\", "ends within quotes"),
+            ("sh \\", "ends within quotes"),
+            (" \t", "nothing in it"),
+            ("sh\0x", "zero byte"),
+        ] {
             let error = command.parse::<GivenConsumer>().unwrap_err();
-            assert_eq!(error.command, command);
-            let ConsumerProblem::Program { program, .. } = &error.problem else {
-                panic!("{error}")
-            };
-            assert_eq!(command.split(' ').next(), Some(&**program));
+            assert!(error.contains(problem) && error.contains("give a program"), "{error}");
         }
-        let problem = |command: &str| command.parse::<GivenConsumer>().unwrap_err().problem;
-        for unfinished in ["sh 'x", "sh \"x\\", "sh \\"] {
-            let problem = problem(unfinished);
-            assert!(matches!(problem, ConsumerProblem::Unfinished), "{problem}");
-        }
-        assert!(matches!(problem(" \t"), ConsumerProblem::Nothing));
-        assert!(matches!(problem("sh\0x"), ConsumerProblem::Zero));
     }
 
     #[test]

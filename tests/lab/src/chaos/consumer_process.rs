@@ -14,7 +14,7 @@ use console::failure::Failure;
 /// Become a program that ends with the process PARENT.
 #[derive(Debug, Args)]
 #[command(hide = true)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// The parent.
     parent: u32,
     /// The program and its arguments.
@@ -22,7 +22,7 @@ pub(crate) struct Arguments {
     words: Vec<OsString>,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     // The kernel signals the end of the parent to this process also after it executes another program.
     become_child("consumer", arguments.parent)?;
     let Some((program, words)) = arguments.words.split_first() else {

@@ -15,22 +15,20 @@ use rustix::process::{Pid, Signal, kill_process_group};
 use supervisor::process::Process;
 
 use crate::chaos::{consumer::Consumer, kind::Kind, options::Options, report::Report, terminal};
-use crate::error::{BenchError, system};
+use crate::error::{Failure, system};
 
 /// The time for a consumer to end. A recorder writes its last chunk within milliseconds; a user's program may take longer.
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
-/// Bytes of a consumer's last output that are read.
 const LONGEST_LINE: u64 = 500;
 
 #[derive(Default)]
-pub(crate) struct Consumers {
+pub struct Consumers {
     all: Vec<Running>,
     setting: Option<Setting>,
     /// Recordings of the run's own recorder that was hit.
     hit_recordings: Vec<PathBuf>,
 }
 
-/// Arguments of every consumer.
 struct Setting {
     robot: RobotName,
     /// Directory of recordings and of the consumers' standard error.
@@ -46,19 +44,19 @@ struct Running {
     said: PathBuf,
 }
 
-pub(crate) struct Hit {
-    pub(crate) name: String,
+pub struct Hit {
+    pub name: String,
     /// The number of starts in this mission; none for the run's recorder.
-    pub(crate) generation: Option<u32>,
+    pub generation: Option<u32>,
 }
 
 impl Consumers {
     /// Start all. Their files go into the new `directory`.
-    pub(crate) fn start(
+    pub fn start(
         options: &Options,
         directory: PathBuf,
         report: &mut Report,
-    ) -> Result<Self, BenchError> {
+    ) -> Result<Self, Failure> {
         let consumers = options.consumers();
         if consumers.is_empty() {
             return Ok(Self::default());
@@ -80,16 +78,15 @@ impl Consumers {
         Ok(Self { all, setting: Some(setting), hit_recordings: Vec::new() })
     }
 
-    pub(crate) fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         self.all.len()
     }
 
-    /// Recordings of the run's recorder that was hit.
-    pub(crate) fn hit_recordings(&self) -> &[PathBuf] {
+    pub fn hit_recordings(&self) -> &[PathBuf] {
         &self.hit_recordings
     }
 
-    pub(crate) fn other_recordings(&self) -> Vec<PathBuf> {
+    pub fn other_recordings(&self) -> Vec<PathBuf> {
         let directory = self.setting.as_ref().map(|setting| &setting.directory);
         let entries = directory.and_then(|directory| fs::read_dir(directory).ok());
         let files = entries.into_iter().flatten().flatten();
@@ -101,7 +98,7 @@ impl Consumers {
     }
 
     /// Thaw the frozen consumers whose pause is over; count those that ended by themselves.
-    pub(crate) fn maintain(&mut self, report: &mut Report) -> Result<(), BenchError> {
+    pub fn maintain(&mut self, report: &mut Report) -> Result<(), Failure> {
         for running in &mut self.all {
             if running.frozen_until.is_some_and(|until| Instant::now() >= until) {
                 running.thaw();
@@ -126,14 +123,14 @@ impl Consumers {
 
     /// Hit the consumer at `index`: kill and restart it, or freeze it for `pause`. Returns none if no signal was sent, because
     /// it is frozen already, or had ended by itself and is restarted. `supervisor` is the run's process.
-    pub(crate) fn hit(
+    pub fn hit(
         &mut self,
         index: usize,
         kind: Kind,
         pause: Duration,
         supervisor: u32,
         report: &mut Report,
-    ) -> Result<Option<Hit>, BenchError> {
+    ) -> Result<Option<Hit>, Failure> {
         let (Some(running), Some(setting)) = (self.all.get_mut(index), &self.setting) else {
             return Ok(None);
         };
@@ -172,7 +169,7 @@ impl Consumers {
     }
 
     /// Note that the mission is over, and let all consumers write their files and end.
-    pub(crate) fn end(&mut self) {
+    pub fn end(&mut self) {
         for running in &mut self.all {
             running.thaw();
             if let Some(process) = &running.process {
@@ -189,7 +186,7 @@ impl Consumers {
 
 impl Running {
     /// Start or restart the consumer, unless it is the run's own recorder.
-    fn start(&mut self, setting: &Setting, report: &mut Report) -> Result<(), BenchError> {
+    fn start(&mut self, setting: &Setting, report: &mut Report) -> Result<(), Failure> {
         let Setting { robot, directory } = setting;
         let recording = directory.join(format!("record-{}.mcap", self.starts + 1));
         let Some(mut command) = self.consumer.command(robot, &recording) else {
@@ -227,7 +224,6 @@ impl Running {
     }
 }
 
-/// The last line of a consumer's standard error.
 fn last_line(said: &Path) -> Option<String> {
     let mut file = File::open(said).ok()?;
     let length = file.metadata().ok()?.len();

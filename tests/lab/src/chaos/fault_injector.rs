@@ -3,16 +3,14 @@
 use std::{collections::VecDeque, time::Duration};
 
 use common::{mission::Protocol, wire::COUNT_CYCLE};
-use rand_pcg::{Pcg64, rand_core::Rng};
 
 use self::words::{Effect, Readings, Said, Wheels, Words};
-use crate::chaos::robot_fault::RobotFault;
+use crate::{chaos::robot_fault::RobotFault, random::Random};
 
 mod words;
 
 const LATE: Duration = Duration::from_secs(2);
 const LATE_FROM_BOOT: Duration = Duration::from_millis(500);
-/// Age of an old message that is repeated.
 const OLD: Duration = Duration::from_secs(3);
 const AGAIN_EVERY: Duration = Duration::from_secs(2);
 /// Period of slow messages: three a second.
@@ -22,30 +20,26 @@ const MOST_KEPT: usize = 1024;
 
 /// Bytes for the host, and their time.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Late {
+pub struct Late {
     /// Time on the clock of the incoming bytes.
-    pub(crate) at: Duration,
-    pub(crate) bytes: Vec<u8>,
+    pub at: Duration,
+    pub bytes: Vec<u8>,
 }
 
 /// Passes bytes unchanged until its fault begins.
 #[derive(Debug)]
-pub(crate) struct FaultInjector {
+pub struct FaultInjector {
     fault: RobotFault,
     faulty: bool,
-    chance: Pcg64,
-    /// The encoder of a fault of one encoder.
+    chance: Random,
     channel: usize,
     words: Words,
-    /// The newest message with wheels before the fault.
     base: Option<Said>,
-    /// The newest readings before the fault.
     readings: Readings,
     /// Messages with wheels of the last seconds, oldest first.
     kept: VecDeque<Late>,
     next_again: Duration,
     next_slow: [Duration; 256],
-    /// The last command that moved the wheels.
     moving: Option<Vec<u8>>,
     /// Whether the newest command of a speed moves the wheels.
     pushes: bool,
@@ -54,9 +48,9 @@ pub(crate) struct FaultInjector {
 }
 
 impl FaultInjector {
-    pub(crate) fn new(fault: RobotFault, protocol: Protocol, seed: u64) -> Self {
-        let mut chance = Pcg64::new(u128::from(seed), 13);
-        let channel = (chance.next_u64() % 2) as usize;
+    pub fn new(fault: RobotFault, protocol: Protocol, seed: u64) -> Self {
+        let mut chance = Random::new(seed, 13);
+        let channel = (chance.bits() % 2) as usize;
         Self {
             fault,
             faulty: false,
@@ -74,12 +68,12 @@ impl FaultInjector {
         }
     }
 
-    pub(crate) const fn begin(&mut self) {
+    pub const fn begin(&mut self) {
         self.faulty = true;
     }
 
     /// Convert bytes that the robot sent at `now` into those for the host.
-    pub(crate) fn report(&mut self, bytes: &[u8], now: Duration) -> Vec<Late> {
+    pub fn report(&mut self, bytes: &[u8], now: Duration) -> Vec<Late> {
         let (mut out, mut more) = (Vec::new(), Vec::new());
         for said in self.words.said(bytes) {
             if said.wheels(&said).is_some() {
@@ -112,7 +106,7 @@ impl FaultInjector {
     }
 
     /// Convert bytes of the host into those for the robot. `moves` is called for each command that moves the wheels.
-    pub(crate) fn order(&mut self, bytes: &[u8], moves: &mut dyn FnMut()) -> Vec<u8> {
+    pub fn order(&mut self, bytes: &[u8], moves: &mut dyn FnMut()) -> Vec<u8> {
         let mut out = Vec::new();
         for ordered in self.words.ordered(bytes) {
             let mut bytes = ordered.bytes;
@@ -222,7 +216,7 @@ impl FaultInjector {
             }
             RobotFault::CountsRandom => {
                 for wheel in [0, 1] {
-                    let chance = self.chance.next_u64();
+                    let chance = self.chance.bits();
                     let speed = f64::from((chance >> 16) as u16 % 1000);
                     told.counts[wheel] = f64::from(chance as u16 % COUNT_CYCLE);
                     told.speeds[wheel] = if chance >> 32 & 1 == 1 { speed } else { -speed };

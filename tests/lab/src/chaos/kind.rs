@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum Kind {
+pub enum Kind {
     Kill,
     /// SIGKILL in the first milliseconds of a generation.
     KillAtStart,
@@ -20,7 +20,7 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    pub(crate) const fn signal(self) -> Signal {
+    pub const fn signal(self) -> Signal {
         match self {
             Self::Kill | Self::KillAtStart => Signal::KILL,
             Self::Crash => Signal::ABORT,
@@ -29,7 +29,7 @@ impl Kind {
         }
     }
 
-    pub(crate) const fn as_str(self) -> &'static str {
+    pub const fn as_str(self) -> &'static str {
         match self {
             Self::Kill => "killed",
             Self::KillAtStart => "killed at start",

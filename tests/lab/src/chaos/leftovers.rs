@@ -14,11 +14,10 @@ use crate::robot::{command_line, processes};
 
 /// Longest time that a stop guard goes on after a mission.
 const GUARDS_END: Duration = Duration::from_secs(10);
-/// Pause between checks of the processes.
 const LOOK: Duration = Duration::from_millis(10);
 
 /// Files and shared memory of `robot`, and processes with files in `directory`, that still exist: paths and command lines.
-pub(crate) fn find(robot: &RobotName, directory: &Path) -> Vec<String> {
+pub fn find(robot: &RobotName, directory: &Path) -> Vec<String> {
     let domain = Domain::of(robot.clone());
     let prefix = domain.shared_memory_prefix();
     let entries = fs::read_dir(SHARED_MEMORY).into_iter().flatten().flatten();

@@ -16,41 +16,31 @@ use crate::chaos::{
     series::Series,
 };
 use crate::{
-    error::{self, BenchError, system},
-    robot::firsthand,
+    error::{self, Failure, system},
+    robot::{self, firsthand},
 };
-use supervisor::{
-    DEATHS,
-    process::Process,
-    simulator::Simulator,
-    summary::Summary,
-};
+use supervisor::{DEATHS, process::Process, simulator::Simulator, summary::Summary};
 
 /// The time after which a mission is stopped. In wall-clock time a mission takes half a minute.
 const PATIENCE: Duration = Duration::from_secs(600);
 
-pub(crate) fn command(
+pub fn command(
     options: &Options,
     seed: u64,
     pace: &str,
     out: &Path,
     records: bool,
-) -> Result<Command, BenchError> {
-    let mut command = firsthand(&["run", &options.asked.mission, "--json", "--pace", pace]);
-    command.args(["--robot", &options.asked.robot.to_string()]);
-    command.args(["--seed", &seed.to_string(), "--out"]);
-    command.arg(out);
+) -> Result<Command, Failure> {
+    let Options { asked, set, .. } = options;
+    let mut command = robot::mission("run", &asked.mission, &asked.robot, set);
+    command.args(["--pace", pace, "--seed", &seed.to_string(), "--out"]).arg(out);
     if !records {
         command.arg("--no-record");
-    }
-    for setting in &options.set {
-        command.args(["--set", setting]);
     }
     child(command, out)
 }
 
-/// Resume the run whose supervisor was hit.
-fn resume(directory: &Path, records: bool) -> Result<Command, BenchError> {
+fn resume(directory: &Path, records: bool) -> Result<Command, Failure> {
     let mut command = firsthand(&["run", "--json", "--resume"]);
     command.arg(directory);
     if !records {
@@ -61,7 +51,7 @@ fn resume(directory: &Path, records: bool) -> Result<Command, BenchError> {
 
 /// Make `command` a child that ends with this process. Its standard output is piped; its standard error goes to a file
 /// beside the run's directory.
-fn child(mut command: Command, directory: &Path) -> Result<Command, BenchError> {
+fn child(mut command: Command, directory: &Path) -> Result<Command, Failure> {
     let stderr = directory.with_extension("stderr");
     let stderr = File::options().create(true).append(true).open(stderr);
     let stderr = stderr.map_err(system("write a mission's standard error"))?;
@@ -71,7 +61,7 @@ fn child(mut command: Command, directory: &Path) -> Result<Command, BenchError> 
 }
 
 /// The summary of the mission without an attack, to compare with. If ticks are compared, it runs at the same pace.
-pub(crate) fn undisturbed(options: &Options, seed: u64) -> Result<Summary, BenchError> {
+pub fn undisturbed(options: &Options, seed: u64) -> Result<Summary, Failure> {
     let directory = options.directory.join("undisturbed");
     let pace = if options.asked.only_consumers { options.pace } else { Pace::Max };
     let output = command(options, seed, &pace.to_string(), &directory, false)?
@@ -82,11 +72,7 @@ pub(crate) fn undisturbed(options: &Options, seed: u64) -> Result<Summary, Bench
 }
 
 /// Attack the mission, and report. Its files stay if something was wrong.
-pub(crate) fn attack(
-    series: &mut Series<'_>,
-    seed: u64,
-    undisturbed: &Summary,
-) -> Result<(), BenchError> {
+pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Result<(), Failure> {
     let options = series.options;
     let before = series.report.kills();
     let files = options.directory.join(format!("seed-{seed}"));
@@ -185,12 +171,12 @@ fn pose_allowance_m(mission: &Mission, kills: u32, summary: &Summary) -> f64 {
 }
 
 /// Start a robot that does not end with its supervisor.
-pub(crate) fn robot(
+pub fn robot(
     options: &Options,
     seed: u64,
     directory: &Path,
     ignores_time: bool,
-) -> Result<Simulator, BenchError> {
+) -> Result<Simulator, Failure> {
     fs::create_dir(directory).map_err(system("make a directory"))?;
     let mut mission = Mission { seed, ..options.loaded.clone() };
     mission.simulation.ignores_time |= ignores_time;
@@ -203,7 +189,7 @@ fn one_supervisor(
     start: Command,
     robot: Option<&mut Simulator>,
     attack: &mut Attack,
-) -> Result<Vec<u8>, BenchError> {
+) -> Result<Vec<u8>, Failure> {
     let mut child = Process::spawn(start).map_err(system("start a mission"))?;
     let summary = read_stdout(&mut child);
     let attacked = attack.run(series, &mut child, robot, PATIENCE);
@@ -213,7 +199,7 @@ fn one_supervisor(
 }
 
 /// Read the standard output to the end in a thread, because a long summary would fill the pipe.
-pub(crate) fn read_stdout(child: &mut Process) -> JoinHandle<Vec<u8>> {
+pub fn read_stdout(child: &mut Process) -> JoinHandle<Vec<u8>> {
     let stdout = child.take_stdout();
     std::thread::spawn(move || {
         let mut text = Vec::new();

@@ -1,13 +1,17 @@
 //! The mission that is attacked, and the kinds of attack.
 
-use std::path::PathBuf;
+use std::{env, fs, path::PathBuf, process};
 
 use clap::Args;
-use common::{clock::Pace, domain::RobotName, mission::Mission};
+use common::{clock::Pace, domain::RobotName, file::FileError, mission::Mission};
+use console::missions;
 
-use crate::chaos::{
-    consumer::{Consumer, GivenConsumer},
-    robot_fault::{RobotFault, TABLE},
+use crate::{
+    chaos::{
+        consumer::{Consumer, GivenConsumer},
+        robot_fault::{RobotFault, TABLE},
+    },
+    error::Failure,
 };
 
 /// Send random signals to random stages at random times, mission after mission, and report.
@@ -95,20 +99,55 @@ fn parse_faults(names: &str) -> Result<Faults, String> {
 pub struct Options {
     pub asked: Arguments,
     pub loaded: Mission,
-    /// The overrides of the mission, `KEY=VALUE`.
     pub set: Vec<String>,
-    /// The missions' pace, on the wall clock.
     pub pace: Pace,
     /// Parent of the run directories. It is emptied after each mission.
     pub directory: PathBuf,
 }
 
+const LONG_TIMEOUT: &str = "timeout_s=1800";
+
 impl Options {
-    pub(crate) fn records(&self) -> bool {
+    /// The options of missions, which run in a new directory.
+    ///
+    /// # Errors
+    /// The mission cannot be loaded, or is none for chaos; options contradict each other.
+    pub fn of(asked: &Arguments) -> Result<Self, Failure> {
+        let asked = asked.clone();
+        let mut set = asked.set.clone();
+        if asked.freeze_all {
+            // The robot's clock goes on while its processes are frozen. A --set of the user comes later and wins.
+            set.insert(0, LONG_TIMEOUT.to_owned());
+        }
+        let loaded = missions::load(&asked.mission, &set)?;
+        let faulty = asked.robot_faults.is_some();
+        if (asked.include_supervisor || faulty) && loaded.robot.address.is_some() {
+            return Err("chaos brings its own robot; leave robot.address out".into());
+        }
+        if faulty && loaded.body().steering.is_some() {
+            return Err(
+                "robot faults are of a robot with two driven wheels; leave robot.model = 'car' out"
+                    .into(),
+            );
+        }
+        if asked.only_consumers && !asked.include_consumers && asked.consumer.is_empty() {
+            return Err("--only-consumers hits nothing; give --include-consumers, or --consumer and your command, too".into());
+        }
+        if asked.pace == Pace::Max {
+            return Err("chaos needs a wall clock; give --pace R, 4 for four times as fast".into());
+        }
+        let real_time = asked.include_supervisor || faulty;
+        let pace = if real_time { Pace::Rate(1.0) } else { asked.pace };
+        let directory = env::temp_dir().join(format!("firsthand-chaos-{}", process::id()));
+        fs::create_dir(&directory).map_err(FileError::of("make", &directory))?;
+        Ok(Self { asked, loaded, set, pace, directory })
+    }
+
+    pub fn records(&self) -> bool {
         self.asked.replay || self.asked.include_consumers
     }
 
-    pub(crate) fn consumers(&self) -> Vec<Consumer> {
+    pub fn consumers(&self) -> Vec<Consumer> {
         let own = if self.asked.include_consumers { Consumer::own() } else { Vec::new() };
         let given = self.asked.consumer.iter().cloned().map(Consumer::Given);
         own.into_iter().chain(given).collect()

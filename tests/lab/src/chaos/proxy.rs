@@ -18,14 +18,13 @@ use crate::chaos::{
     fault_injector::{FaultInjector, Late},
     robot_fault::RobotFault,
 };
-use crate::error::{BenchError, system};
+use crate::error::{Failure, system};
 
 /// Longest wait until the thread sees that the fault begins or the proxy ends.
 const LOOK: Duration = Duration::from_millis(10);
 /// Most datagrams that are held: those of two seconds at a hundred times the usual rate.
 const MOST_HELD: usize = 16_384;
 
-/// The state that the thread shares with its owner.
 #[derive(Debug, Default)]
 struct Shared {
     faulty: AtomicBool,
@@ -34,7 +33,7 @@ struct Shared {
 }
 
 #[derive(Debug)]
-pub(crate) struct Proxy {
+pub struct Proxy {
     address: SocketAddr,
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
@@ -42,12 +41,12 @@ pub(crate) struct Proxy {
 
 impl Proxy {
     /// Start a proxy between the robot at `robot` and the host that sends first.
-    pub(crate) fn start(
+    pub fn start(
         robot: SocketAddr,
         fault: RobotFault,
         protocol: Protocol,
         seed: u64,
-    ) -> Result<Self, BenchError> {
+    ) -> Result<Self, Failure> {
         let (front, back) = sockets(robot).map_err(system("open the proxy's sockets"))?;
         let address = front.local_addr().map_err(system("name the proxy"))?;
         let shared = Arc::new(Shared::default());
@@ -69,16 +68,16 @@ impl Proxy {
         Ok(Self { address, shared, thread: Some(thread) })
     }
 
-    pub(crate) const fn address(&self) -> SocketAddr {
+    pub const fn address(&self) -> SocketAddr {
         self.address
     }
 
-    pub(crate) fn begin_fault(&self) {
+    pub fn begin_fault(&self) {
         self.shared.faulty.store(true, Ordering::Relaxed);
     }
 
     /// The time when the host last ordered a wheel to turn.
-    pub(crate) fn last_moving(&self) -> Option<Instant> {
+    pub fn last_moving(&self) -> Option<Instant> {
         let last = self.shared.last_moving.lock();
         *last.unwrap_or_else(PoisonError::into_inner)
     }

@@ -10,17 +10,17 @@ use crate::chaos::{
     signals::{Row, ms_since},
 };
 
-pub(crate) struct PendingRecovery {
-    pub(crate) stage: &'static str,
-    pub(crate) generation: u32,
-    pub(crate) at: Instant,
+pub struct PendingRecovery {
+    pub stage: &'static str,
+    pub generation: u32,
+    pub at: Instant,
     startup_hit: StartupHit,
-    pub(crate) row: Row,
+    pub row: Row,
 }
 
 /// The hit of a successor in its first milliseconds, if any.
 #[derive(Clone, Copy)]
-pub(crate) enum StartupHit {
+pub enum StartupHit {
     None,
     /// The successor is to be hit this long after its start.
     After(Duration),
@@ -33,25 +33,20 @@ pub(crate) enum StartupHit {
 }
 
 impl PendingRecovery {
-    pub(crate) fn new(
-        stage: &'static str,
-        generation: u32,
-        startup_hit: StartupHit,
-        row: Row,
-    ) -> Self {
+    pub fn new(stage: &'static str, generation: u32, startup_hit: StartupHit, row: Row) -> Self {
         Self { stage, generation, at: Instant::now(), startup_hit, row }
     }
 
-    pub(crate) fn noticed(&mut self) {
+    pub fn noticed(&mut self) {
         self.row.noticed_ms.get_or_insert_with(|| ms_since(self.at));
     }
 
-    pub(crate) fn rests(&mut self) {
+    pub fn rests(&mut self) {
         self.row.rest_ms.get_or_insert_with(|| ms_since(self.at));
     }
 
     /// Note a sign of the successor: a ready beat, or a sample of a tick. Returns whether the measurement is complete.
-    pub(crate) fn sign(&mut self, beat: bool, recovery: &mut Recovery) -> bool {
+    pub fn sign(&mut self, beat: bool, recovery: &mut Recovery) -> bool {
         let took_ns = self.at.elapsed().as_nanos() as u64;
         let frozen = self.row.kind == Kind::Freeze;
         if self.row.ready_ms.is_none() {
@@ -73,7 +68,7 @@ impl PendingRecovery {
     }
 
     /// If the successor is to be hit in its start-up and is among `entries`, set the time of the hit.
-    pub(crate) fn schedule_startup_hit(&mut self, entries: &[RosterEntry]) {
+    pub fn schedule_startup_hit(&mut self, entries: &[RosterEntry]) {
         let successor = entries.iter().find(|entry| {
             name_str(&entry.stage) == self.stage
                 && entry.generation > self.generation
@@ -90,7 +85,7 @@ impl PendingRecovery {
     }
 
     /// Time until the successor is to be hit in its start-up.
-    pub(crate) fn time_to_startup_hit(&self) -> Option<Duration> {
+    pub fn time_to_startup_hit(&self) -> Option<Duration> {
         match self.startup_hit {
             StartupHit::At { when, .. } => Some(when.saturating_duration_since(Instant::now())),
             StartupHit::None | StartupHit::After(_) => None,
@@ -98,7 +93,7 @@ impl PendingRecovery {
     }
 
     /// Process and generation of the successor, once, when its hit is due.
-    pub(crate) fn take_due_startup_hit(&mut self) -> Option<(u32, u32)> {
+    pub fn take_due_startup_hit(&mut self) -> Option<(u32, u32)> {
         match self.startup_hit {
             StartupHit::At { when, process, generation } if Instant::now() >= when => {
                 self.startup_hit = StartupHit::None;

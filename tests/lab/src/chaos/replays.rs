@@ -27,9 +27,8 @@ struct Partial {
     not_replayed: u64,
 }
 
-/// Results of the recordings of all missions.
 #[derive(Debug, Default, Serialize)]
-pub(crate) struct Replays {
+pub struct Replays {
     recordings: u64,
     /// Generations whose outputs are equal to the bit.
     equal: u64,
@@ -43,14 +42,13 @@ pub(crate) struct Replays {
 }
 
 impl Replays {
-    /// Whether every generation of every recording is equal.
-    pub(crate) const fn all_equal(&self) -> bool {
+    pub const fn all_equal(&self) -> bool {
         self.wrong.is_empty()
     }
 
     /// Replay the recordings of the mission in `directory`. Returns whether all is bit-equal. Recordings among `hit` and
     /// `others` are replayed only as far as they go.
-    pub(crate) fn add(
+    pub fn add(
         &mut self,
         seed: u64,
         directory: &Path,

@@ -12,9 +12,8 @@ use crate::chaos::{
 use supervisor::{outcome::Outcome, stages::TABLE};
 
 /// The name for supervisor and stages together.
-pub(crate) const EVERYTHING: &str = "everything";
+pub const EVERYTHING: &str = "everything";
 
-/// Leftovers that are listed by name.
 const NAMED: usize = 20;
 
 /// The result of all missions under attack. Times in milliseconds.
@@ -27,9 +26,7 @@ pub struct Report {
     wrong: Vec<String>,
     /// Stages that the supervisor aborted as hung although no signal had frozen them, or one had frozen all processes.
     healthy_aborted: u64,
-    /// Signals by stage and kind.
     kills: BTreeMap<&'static str, BTreeMap<Kind, u32>>,
-    /// Signals to consumers, by their names.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     consumers: BTreeMap<String, ConsumerCounts>,
     #[serde(serialize_with = "recoveries")]
@@ -46,22 +43,19 @@ pub struct Report {
     left_behind: Vec<String>,
     /// Largest growth of a supervisor's resources from its robot's departure to its end.
     supervisor_growth: Resources,
-    /// Results of replaying the missions' recordings.
     #[serde(skip_serializing_if = "Option::is_none")]
     replays: Option<Replays>,
-    /// The results of changed targets.
     #[serde(skip_serializing_if = "Option::is_none")]
     targets: Option<Changes>,
     /// Ticks with and without consumers, if nothing else is hit.
     #[serde(skip_serializing_if = "Option::is_none")]
     tick_latencies: Option<TickLatencies>,
-    pub(crate) took_s: f64,
+    pub took_s: f64,
 }
 
 #[derive(Debug, Default, Serialize)]
-pub(crate) struct ConsumerCounts {
+pub struct ConsumerCounts {
     pub killed: u32,
-    /// Times the consumer was frozen for a moment.
     pub frozen: u32,
     pub started: u32,
     /// Times the consumer ended without a signal of chaos.
@@ -87,7 +81,7 @@ impl fmt::Display for ConsumerCounts {
 
 /// Times from the signal to the successor.
 #[derive(Debug, Default)]
-pub(crate) struct Recovery {
+pub struct Recovery {
     /// The time to the first ready beat, after kills: a death is noticed at once.
     pub ready: Histogram,
     /// The time to the first ready beat, after freezes, which are noticed by missing beats.
@@ -121,20 +115,19 @@ impl Report {
         self.kills() + to_consumers
     }
 
-    pub(crate) fn consumer(&mut self, name: &str) -> &mut ConsumerCounts {
+    pub fn consumer(&mut self, name: &str) -> &mut ConsumerCounts {
         self.consumers.entry(name.to_owned()).or_default()
     }
 
-    /// Signals sent to stages and supervisor.
-    pub(crate) fn kills(&self) -> u32 {
+    pub fn kills(&self) -> u32 {
         self.kills.values().flat_map(BTreeMap::values).sum()
     }
 
-    pub(crate) fn hit(&mut self, stage: &'static str, kind: Kind) {
+    pub fn hit(&mut self, stage: &'static str, kind: Kind) {
         *self.kills.entry(stage).or_default().entry(kind).or_default() += 1;
     }
 
-    pub(crate) fn recovery(&mut self, stage: &'static str) -> &mut Recovery {
+    pub fn recovery(&mut self, stage: &'static str) -> &mut Recovery {
         self.recovery_ms.entry(stage).or_default()
     }
 
@@ -170,15 +163,15 @@ impl Report {
         self.wrong.len() == before
     }
 
-    pub(crate) fn replays(&mut self) -> &mut Replays {
+    pub fn replays(&mut self) -> &mut Replays {
         self.replays.get_or_insert_default()
     }
 
-    pub(crate) fn targets(&mut self) -> &mut Changes {
+    pub fn targets(&mut self) -> &mut Changes {
         self.targets.get_or_insert_default()
     }
 
-    pub(crate) fn tick_latencies(&mut self) -> &mut TickLatencies {
+    pub fn tick_latencies(&mut self) -> &mut TickLatencies {
         self.tick_latencies.get_or_insert_default()
     }
 
@@ -196,8 +189,7 @@ impl Report {
         self.wrong.is_empty() && replayed && told
     }
 
-    /// Count leftovers of the last mission.
-    pub(crate) fn left_behind(&mut self, found: Vec<String>) {
+    pub fn left_behind(&mut self, found: Vec<String>) {
         self.leftovers += found.len();
         let missing = NAMED.saturating_sub(self.left_behind.len());
         let missions = self.missions;
@@ -206,13 +198,11 @@ impl Report {
         self.left_behind.extend(named);
     }
 
-    /// Whether every mission was right and left nothing behind.
     pub fn is_clean(&self) -> bool {
         self.is_right() && self.leftovers == 0
     }
 }
 
-/// Quantiles, milliseconds.
 #[derive(Serialize)]
 struct Quantiles {
     p50: Option<f64>,

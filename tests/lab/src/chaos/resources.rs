@@ -14,7 +14,7 @@ pub struct Resources {
 
 impl Resources {
     /// The resources of process `pid`; none if it has ended.
-    pub(crate) fn of(pid: u32) -> Option<Self> {
+    pub fn of(pid: u32) -> Option<Self> {
         let descriptors = fs::read_dir(format!("/proc/{pid}/fd")).ok()?.count() as i64;
         // Pages of shared memory belong to the bus and do not count.
         let memory_kib = process_status::kibibytes(&pid.to_string(), "RssAnon")? as i64;

@@ -13,34 +13,30 @@ use common::{
     domain::Domain,
     follower::{Event, Follower},
     ground_truth::GroundTruthTick,
-    mission::Mission,
     samples::LinkSample,
     topics,
 };
-use rand_pcg::{Pcg64, rand_core::Rng};
+use console::output::write_stderr;
 use rustix::process::{Pid, Signal, kill_process};
 use supervisor::{
-    outcome::RIGHT_PLACE_M,
-    process::Process,
-    simulator::Simulator,
-    summary::Summary,
+    outcome::RIGHT_PLACE_M, process::Process, simulator::Simulator, summary::Summary,
 };
 
 use crate::chaos::{
     mission,
-    options::Options,
+    options::{Faults, Options},
     proxy::Proxy,
     robot_fault::RobotFault,
     stop_time_table::{Entry, StopTimeTable},
 };
 use crate::{
-    error::{BenchError, system},
+    error::{Failure, system},
+    random::Random,
     robot::{command_line, firsthand, processes},
 };
 
 /// Time from the robot's departure to its fault, seconds: the least, and the width of the random range.
 const FAULT_AFTER_S: (f64, f64) = (1.0, 4.0);
-/// Distance after which a robot has departed, metres.
 const DEPARTED_M: f64 = 0.1;
 /// The time for which a faulty robot is watched: several times as long as it may move.
 const WATCHED: Duration = Duration::from_secs(10);
@@ -48,38 +44,42 @@ const WATCHED: Duration = Duration::from_secs(10);
 const WATCHED_ON_ITS_WAY: Duration = Duration::from_secs(90);
 const DEPARTS_WITHIN: Duration = Duration::from_secs(60);
 const END_GRACE: Duration = Duration::from_secs(5);
-/// Pause between checks of the robot.
 const LOOK: Duration = Duration::from_millis(10);
 
-/// The faults, and the missions of each.
-pub struct FaultOptions {
-    /// The mission, the robot and the first seed; the other options are not used.
-    pub base: Options,
-    pub faults: Vec<RobotFault>,
-}
-
-pub fn run_robot_faults(
-    options: &FaultOptions,
-    show: &mut dyn FnMut(&StopTimeTable),
-) -> Result<StopTimeTable, BenchError> {
+/// Run missions of each fault that is asked for and that a robot of this protocol can have.
+pub fn run(options: &Options) -> Result<StopTimeTable, Failure> {
+    let asked = &options.asked;
+    let protocol = options.loaded.robot.protocol();
+    let faults = asked.robot_faults.iter().flat_map(|Faults(faults)| faults.iter().copied());
+    let (faults, left_out): (Vec<_>, Vec<_>) =
+        faults.partition(|fault| fault.has_meaning(protocol));
+    if !left_out.is_empty() {
+        let names: Vec<_> = left_out.iter().map(|fault| fault.row().name).collect();
+        let left_out = format!("no faults of this robot's protocol: {}", names.join(", "));
+        if faults.is_empty() {
+            return Err(left_out.into());
+        }
+        write_stderr(&format!("left out, {left_out}\n"));
+    }
+    let all = faults.len() as u64 * u64::from(asked.missions);
     let mut table = StopTimeTable::default();
-    for &fault in &options.faults {
-        for number in 0..u64::from(options.base.asked.missions) {
-            let seed = options.base.asked.seed + number;
-            let files = directory(&options.base, fault, seed);
+    for fault in faults {
+        for number in 0..u64::from(asked.missions) {
+            let seed = asked.seed + number;
+            let files = directory(options, fault, seed);
             fs::create_dir(&files).map_err(system("make a directory"))?;
-            let entry = one(&options.base, fault, seed, &files)?;
+            let entry = one(options, fault, seed, &files)?;
             if entry.is_kept() {
                 fs::remove_dir_all(&files).map_err(system("remove its directory"))?;
             }
             table.entries.push(entry);
-            show(&table);
+            write_stderr(&format!("{} of {all} missions\n", table.entries.len()));
         }
     }
     Ok(table)
 }
 
-fn one(options: &Options, fault: RobotFault, seed: u64, files: &Path) -> Result<Entry, BenchError> {
+fn one(options: &Options, fault: RobotFault, seed: u64, files: &Path) -> Result<Entry, Failure> {
     let mut robot = mission::robot(options, seed, &files.join("robot"), fault.is_kill())?;
     let protocol = options.loaded.robot.protocol();
     let proxy = Proxy::start(robot.address(), fault, protocol, seed)?;
@@ -101,7 +101,7 @@ fn start(
     seed: u64,
     robot: SocketAddr,
     directory: &Path,
-) -> Result<Process, BenchError> {
+) -> Result<Process, Failure> {
     let mut start = mission::command(options, seed, "1", directory, false)?;
     start.args(["--set", &format!("robot.address='udp://{robot}'")]);
     Process::spawn(start).map_err(system("start a mission"))
@@ -111,7 +111,6 @@ fn start(
 struct Observed {
     /// The time when the fault began, and the newest tick of the ground truth then.
     fault_began: Option<(Instant, usize)>,
-    /// The last command that moved a wheel.
     last_moving: Option<Instant>,
     ended: Option<Instant>,
     /// Whether the mission ended by itself before the fault.
@@ -133,11 +132,10 @@ impl Observed {
         child: &mut Process,
         robot: &mut Simulator,
         proxy: &Proxy,
-    ) -> Result<(), BenchError> {
+    ) -> Result<(), Failure> {
         let began = Instant::now();
         let (least, more) = FAULT_AFTER_S;
-        let chance = Pcg64::new(u128::from(seed), 17 + fault as u128).next_u64() >> 11;
-        let fault_after_s = least + more * chance as f64 / (1_u64 << 53) as f64;
+        let fault_after_s = least + more * Random::new(seed, 17 + fault as u128).share();
         let (mut departed, mut stop) = (None, None);
         // The process leaves the bus of the mission before, which that mission may have left behind.
         let robot_domain = Domain::of(options.asked.robot.clone());
@@ -187,7 +185,6 @@ impl Observed {
         Ok(())
     }
 
-    /// Read the robot's new ground truth.
     fn take(&mut self, truth: &[GroundTruthTick]) {
         let now = Instant::now();
         for tick in truth.get(self.ticks..).unwrap_or_default() {
@@ -201,7 +198,7 @@ impl Observed {
         self.ticks = truth.len();
     }
 
-    fn hear(&mut self, link: &mut Reader<LinkSample>) -> Result<(), BenchError> {
+    fn hear(&mut self, link: &mut Reader<LinkSample>) -> Result<(), Failure> {
         while let Some(sample) = link.take()? {
             self.link = Some(sample);
         }
@@ -271,12 +268,10 @@ impl Observed {
     }
 }
 
-/// Whether both wheels are at rest.
 fn is_at_rest(tick: &GroundTruthTick, track_m: f64) -> bool {
     tick.v.abs() + tick.omega.abs() * track_m / 2.0 < GroundTruthTick::AT_REST_M_S
 }
 
-/// The directory of a mission's files.
 fn directory(options: &Options, fault: RobotFault, seed: u64) -> PathBuf {
     options.directory.join(format!("{}-{seed}", fault.row().name))
 }
@@ -307,22 +302,8 @@ fn kill(fault: RobotFault, supervisor: &Process, directory: &Path) {
     }
 }
 
-/// Start an operator's stop.
-fn operator_stop(options: &Options) -> Result<Process, BenchError> {
+fn operator_stop(options: &Options) -> Result<Process, Failure> {
     let mut command = firsthand(&["stop", "--robot", &options.asked.robot.to_string()]);
     command.stdout(Stdio::null()).stderr(Stdio::null());
     Process::spawn(command).map_err(system("stop the robot"))
-}
-
-/// Check that the mission uses a simulated robot in wall-clock time.
-pub fn check(mission: &Mission) -> Result<(), &'static str> {
-    if mission.robot.address.is_some() {
-        return Err("chaos brings its own robot; leave robot.address out");
-    }
-    if mission.body().steering.is_some() {
-        return Err(
-            "robot faults are of a robot with two driven wheels; leave robot.model = 'car' out",
-        );
-    }
-    Ok(())
 }

@@ -2,10 +2,9 @@
 
 use std::{ops::Range, time::Duration};
 
-use rand_pcg::{Pcg64, rand_core::Rng};
 use supervisor::stages::TABLE;
 
-use crate::chaos::kind::Kind;
+use crate::{chaos::kind::Kind, random::Random};
 
 /// Mean time between two signals. Each stage gets one every two to three seconds, and is stable before.
 const MEAN_PAUSE: Duration = Duration::from_millis(500);
@@ -27,75 +26,64 @@ const FREEZE_ALL_SHARE: f64 = 0.5;
 /// long.
 const FREEZE_S: Range<f64> = 0.3..1.5;
 
-/// A seeded sequence of decisions.
 #[derive(Debug)]
-pub(crate) struct Schedule(Pcg64);
+pub struct Schedule(Random);
 
 impl Schedule {
-    pub(crate) fn new(seed: u64) -> Self {
-        Self(Pcg64::new(u128::from(seed), 7))
-    }
-
-    /// A number that is uniform in [0, 1).
-    fn uniform(&mut self) -> f64 {
-        (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+    pub fn new(seed: u64) -> Self {
+        Self(Random::new(seed, 7))
     }
 
     /// Time to the next signal, exponentially distributed.
-    pub(crate) fn pause(&mut self) -> Duration {
-        MEAN_PAUSE.mul_f64(-(1.0 - self.uniform()).ln())
+    pub fn pause(&mut self) -> Duration {
+        MEAN_PAUSE.mul_f64(-(1.0 - self.0.share()).ln())
     }
 
-    pub(crate) fn stage(&mut self) -> &'static str {
-        let index = (self.uniform() * TABLE.len() as f64) as usize;
-        TABLE[index.min(TABLE.len() - 1)].name
+    pub fn stage(&mut self) -> &'static str {
+        TABLE[self.0.below(TABLE.len())].name
     }
 
-    pub(crate) fn supervisor(&mut self) -> bool {
-        self.uniform() < SUPERVISOR_SHARE
+    pub fn supervisor(&mut self) -> bool {
+        self.0.share() < SUPERVISOR_SHARE
     }
 
     /// The hit of the supervisor. SIGTERM would end the run, and only systemd notices a frozen supervisor.
-    pub(crate) fn supervisor_kind(&mut self) -> Kind {
-        match self.uniform() {
+    pub fn supervisor_kind(&mut self) -> Kind {
+        match self.0.share() {
             ..0.8 => Kind::Kill,
             _ => Kind::Crash,
         }
     }
 
     /// The time to freeze everything, if it is to be frozen instead of a stage.
-    pub(crate) fn freeze_all(&mut self) -> Option<Duration> {
-        let frozen = self.uniform() < FREEZE_ALL_SHARE;
+    pub fn freeze_all(&mut self) -> Option<Duration> {
+        let frozen = self.0.share() < FREEZE_ALL_SHARE;
         frozen.then(|| self.freeze())
     }
 
     /// The time for which everything or a consumer is frozen.
     fn freeze(&mut self) -> Duration {
         let Range { start, end } = FREEZE_S;
-        Duration::from_secs_f64(start + (end - start) * self.uniform())
+        Duration::from_secs_f64(self.0.within(start, end))
     }
 
     /// The consumer to hit instead of a stage or the supervisor, `always` or sometimes; and the time for which it is frozen, or
     /// none to kill it.
-    pub(crate) fn consumer(
-        &mut self,
-        count: usize,
-        always: bool,
-    ) -> Option<(usize, Kind, Duration)> {
+    pub fn consumer(&mut self, count: usize, always: bool) -> Option<(usize, Kind, Duration)> {
         // Without consumers the sequence of decisions is the same as before there were any.
-        if count == 0 || self.uniform() >= CONSUMER_SHARE && !always {
+        if count == 0 || self.0.share() >= CONSUMER_SHARE && !always {
             return None;
         }
-        let index = (self.uniform() * count as f64) as usize;
-        let kind = match self.uniform() {
+        let index = self.0.below(count);
+        let kind = match self.0.share() {
             ..0.7 => Kind::Kill,
             _ => Kind::Freeze,
         };
-        Some((index.min(count - 1), kind, self.freeze()))
+        Some((index, kind, self.freeze()))
     }
 
-    pub(crate) fn kind(&mut self) -> Kind {
-        match self.uniform() {
+    pub fn kind(&mut self) -> Kind {
+        match self.0.share() {
             ..0.6 => Kind::Kill,
             ..0.75 => Kind::Crash,
             ..0.9 => Kind::Terminate,
@@ -104,9 +92,9 @@ impl Schedule {
     }
 
     /// The time after its start at which to hit the successor too, if it is to be hit.
-    pub(crate) fn startup_hit(&mut self) -> Option<Duration> {
+    pub fn startup_hit(&mut self) -> Option<Duration> {
         // This converts the share of all signals to a share of those that can be followed by one.
-        let hit = self.uniform() < STARTUP_SHARE / (1.0 - STARTUP_SHARE);
-        hit.then(|| STARTUP.mul_f64(self.uniform()))
+        let hit = self.0.share() < STARTUP_SHARE / (1.0 - STARTUP_SHARE);
+        hit.then(|| STARTUP.mul_f64(self.0.share()))
     }
 }

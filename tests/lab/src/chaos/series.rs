@@ -6,18 +6,18 @@ use crate::chaos::{
     schedule::Schedule,
     signals::{Row, SignalsFile},
 };
-use crate::error::BenchError;
+use crate::error::Failure;
 
-pub(crate) struct Series<'a> {
-    pub(crate) options: &'a Options,
-    pub(crate) schedule: Schedule,
-    pub(crate) report: Report,
+pub struct Series<'a> {
+    pub options: &'a Options,
+    pub schedule: Schedule,
+    pub report: Report,
     /// The table of signals; none if no results are written.
-    pub(crate) signals: Option<SignalsFile>,
+    pub signals: Option<SignalsFile>,
 }
 
 impl<'a> Series<'a> {
-    pub(crate) fn new(options: &'a Options) -> Result<Self, BenchError> {
+    pub fn new(options: &'a Options) -> Result<Self, Failure> {
         let out = options.asked.out.as_deref();
         Ok(Self {
             options,
@@ -27,15 +27,14 @@ impl<'a> Series<'a> {
         })
     }
 
-    /// Write the row of a signal.
-    pub(crate) fn keep(&mut self, row: &Row) -> Result<(), BenchError> {
+    pub fn keep(&mut self, row: &Row) -> Result<(), Failure> {
         match &mut self.signals {
             Some(file) => Ok(file.add(row)?),
             None => Ok(()),
         }
     }
 
-    pub(crate) fn is_over(&self) -> bool {
+    pub fn is_over(&self) -> bool {
         self.report.signals() >= self.options.asked.kills
     }
 }

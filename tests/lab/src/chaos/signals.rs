@@ -13,39 +13,37 @@ use serde::{Deserialize, Serialize};
 
 use crate::chaos::kind::Kind;
 
-/// The file's name in the directory of results.
 pub const FILE_NAME: &str = "signals.csv";
 
 /// A signal. A value that was not measured is an empty cell.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Row {
-    /// The mission's seed.
-    pub(crate) mission: u64,
+pub struct Row {
+    pub mission: u64,
     /// Mission time of the newest wheel sample that was read before the signal, seconds.
-    pub(crate) time_s: Option<f64>,
+    pub time_s: Option<f64>,
     /// The stage, `supervisor`, `everything`, or the consumer's name.
-    pub(crate) stage: String,
-    pub(crate) kind: Kind,
+    pub stage: String,
+    pub kind: Kind,
     /// The generation; for a consumer the number of its starts in that mission. None for the supervisor, for everything and for the
     /// run's own recorder.
-    pub(crate) generation: Option<u32>,
+    pub generation: Option<u32>,
     /// Whether the process was to be hit in its first milliseconds.
-    pub(crate) start_up: bool,
+    pub start_up: bool,
     /// The time from the signal until the supervisor's record of the death was read, milliseconds. Only for stages.
-    pub(crate) noticed_ms: Option<f64>,
+    pub noticed_ms: Option<f64>,
     /// The time from the signal until the successor's first sign of work was read, milliseconds. For stages and the supervisor.
-    pub(crate) ready_ms: Option<f64>,
+    pub ready_ms: Option<f64>,
     /// The time from the signal until the successor's first sample of a tick was read, milliseconds. For stages and the supervisor.
-    pub(crate) first_output_ms: Option<f64>,
+    pub first_output_ms: Option<f64>,
     /// The time from the signal until the first sample in which no wheel turned, milliseconds; none if the first output was earlier.
-    pub(crate) rest_ms: Option<f64>,
+    pub rest_ms: Option<f64>,
     /// The distance from the newest pose to the true one when the row was written, metres. It is known only if the robot is a process
     /// of its own, whose ground truth is read during the mission.
-    pub(crate) pose_error_m: Option<f64>,
+    pub pose_error_m: Option<f64>,
 }
 
 impl Row {
-    pub(crate) fn new(
+    pub fn new(
         mission: u64,
         time_s: Option<f64>,
         stage: &str,
@@ -69,19 +67,18 @@ impl Row {
 }
 
 /// Milliseconds since `at`, to the microsecond.
-pub(crate) fn ms_since(at: Instant) -> f64 {
+pub fn ms_since(at: Instant) -> f64 {
     (at.elapsed().as_secs_f64() * 1e6).round() / 1e3
 }
 
 #[derive(Debug)]
-pub(crate) struct SignalsFile {
+pub struct SignalsFile {
     path: PathBuf,
     writer: csv::Writer<File>,
 }
 
 impl SignalsFile {
-    /// Make `directory` and the file in it.
-    pub(crate) fn create(directory: &Path) -> Result<Self, FileError> {
+    pub fn create(directory: &Path) -> Result<Self, FileError> {
         let path = directory.join(FILE_NAME);
         fs::create_dir_all(directory).map_err(FileError::of("make the directory of", &path))?;
         let file = File::create_new(&path).map_err(|error| {
@@ -96,7 +93,7 @@ impl SignalsFile {
         Ok(Self { path, writer: csv::Writer::from_writer(file) })
     }
 
-    pub(crate) fn add(&mut self, row: &Row) -> Result<(), FileError> {
+    pub fn add(&mut self, row: &Row) -> Result<(), FileError> {
         let written = self.writer.serialize(row);
         written.map_err(FileError::of("write", &self.path))?;
         self.writer.flush().map_err(FileError::of("write", &self.path))

@@ -21,7 +21,6 @@ pub struct Entry {
     pub rest_s: Option<f64>,
     /// Time from the fault to the end of the watch, seconds.
     pub watched_s: f64,
-    /// Touches after the fault.
     pub collisions: u64,
     /// The outcome of the mission; `goes on` if it had none when the watch ended.
     pub outcome: String,
@@ -30,7 +29,6 @@ pub struct Entry {
 }
 
 impl Entry {
-    /// Whether the robot did as promised.
     pub fn is_kept(&self) -> bool {
         let promise = self.fault.row().promise;
         let unharmed = self.fault_began && self.collisions == 0 && self.outcome != "wrong_place";
@@ -46,12 +44,10 @@ impl Entry {
 
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct StopTimeTable {
-    /// The entries, in the order of the missions.
     pub entries: Vec<Entry>,
 }
 
 impl StopTimeTable {
-    /// Whether every robot did as promised.
     pub fn is_kept(&self) -> bool {
         self.entries.iter().all(Entry::is_kept)
     }
@@ -98,7 +94,6 @@ impl fmt::Display for StopTimeTable {
     }
 }
 
-/// Names of the faults with this promise.
 fn names(promise: Promise) -> String {
     let table = crate::chaos::robot_fault::TABLE.iter();
     let names: Vec<_> = table.filter(|row| row.promise == promise).map(|row| row.name).collect();

@@ -10,25 +10,25 @@ use common::{
     topics,
 };
 
-use crate::{chaos::options::Options, error::BenchError};
+use crate::{chaos::options::Options, error::Failure};
 
 /// Wait for the bus between checks of the processes.
-pub(crate) const POLL: Duration = Duration::from_millis(50);
+pub const POLL: Duration = Duration::from_millis(50);
 
 /// The attacker's readers on the bus of one generation of the supervisor.
-pub(crate) struct Subscriptions {
-    pub(crate) roster: Roster,
-    pub(crate) deaths: Reader<DeathSample>,
-    pub(crate) health: Reader<HealthSample>,
-    pub(crate) wheels: Reader<WheelSample>,
-    pub(crate) pose: Reader<PoseSample>,
+pub struct Subscriptions {
+    pub roster: Roster,
+    pub deaths: Reader<DeathSample>,
+    pub health: Reader<HealthSample>,
+    pub wheels: Reader<WheelSample>,
+    pub pose: Reader<PoseSample>,
     /// The other outputs of a tick, each with its writer.
-    pub(crate) outputs: Vec<(&'static str, Box<dyn AnyReader>)>,
+    pub outputs: Vec<(&'static str, Box<dyn AnyReader>)>,
 }
 
 impl Subscriptions {
     /// Join the bus. None if the bus is not of `supervisor`: a killed supervisor leaves its bus, and its successor removes it.
-    pub(crate) fn join(options: &Options, supervisor: u32) -> Result<Option<Self>, BenchError> {
+    pub fn join(options: &Options, supervisor: u32) -> Result<Option<Self>, Failure> {
         let bus = Bus::join(&Domain::of(options.asked.robot.clone()), "chaos")?;
         let mut roster = Roster::open(&bus)?;
         roster.waiter.on(bus.wakeup(&topics::DEATHS)?);

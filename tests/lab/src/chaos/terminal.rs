@@ -15,7 +15,7 @@ use rustix::{
 const SIZE: Winsize = Winsize { ws_row: 24, ws_col: 80, ws_xpixel: 0, ws_ypixel: 0 };
 
 /// Both ends of a terminal: the first reads the text that a program writes to the second.
-pub(crate) fn open() -> io::Result<(File, File)> {
+pub fn open() -> io::Result<(File, File)> {
     let reads: OwnedFd = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
     grantpt(&reads)?;
     unlockpt(&reads)?;
@@ -31,7 +31,7 @@ pub(crate) fn open() -> io::Result<(File, File)> {
 }
 
 /// Read and drop the program's output in a thread, until the program ends.
-pub(crate) fn read_all(mut reads: File) {
+pub fn read_all(mut reads: File) {
     std::thread::spawn(move || {
         let mut some = [0; 4096];
         while reads.read(&mut some).is_ok_and(|count| count > 0) {}

@@ -9,14 +9,14 @@ use crate::missions::statistics::quantile;
 
 /// Median and 99 % quantile of the ticks of each mission, microseconds.
 #[derive(Debug, Default, Serialize)]
-pub(crate) struct TickLatencies {
+pub struct TickLatencies {
     with_us: Vec<[f64; 2]>,
     without_us: Vec<[f64; 2]>,
 }
 
 impl TickLatencies {
     /// Add the summaries of a mission without consumers and with them.
-    pub(crate) fn add(&mut self, without: &Summary, with: &Summary) {
+    pub fn add(&mut self, without: &Summary, with: &Summary) {
         let of = |summary: &Summary| {
             let Quantiles { p50, p99, .. } = summary.tick_latency_us;
             Some([p50?, p99?])

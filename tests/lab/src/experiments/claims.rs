@@ -16,9 +16,9 @@ use crate::{
 };
 
 /// A figure of missions that arrived: its key, its title, its digits and its value of a mission.
-pub(super) type Figure = (&'static str, &'static str, usize, fn(&Row) -> Option<f64>);
+pub type Figure = (&'static str, &'static str, usize, fn(&Row) -> Option<f64>);
 
-pub(super) const FIGURES: [Figure; 7] = [
+pub const FIGURES: [Figure; 7] = [
     (TIME, "time, s", 1, |row| Some(row.time_s)),
     (PATH, "path, m", 2, |row| Some(row.path_m)),
     (K, "K", 2, |row| Some(row.k)),
@@ -35,17 +35,16 @@ const SAFETY_EVENTS: &str = "safety_events";
 const SONAR_UNAVAILABLE: &str = "sonar_unavailable";
 const WHEEL_RANGE: &str = "wheel_range_rad_s";
 
-/// The missions of one experiment by one method.
 #[derive(Debug)]
-pub(super) struct Findings<'a> {
-    pub(super) experiment: &'static Experiment,
-    pub(super) method: &'static str,
-    pub(super) rows: Vec<&'a Row>,
+pub struct Findings<'a> {
+    pub experiment: &'static Experiment,
+    pub method: &'static str,
+    pub rows: Vec<&'a Row>,
 }
 
 impl<'a> Findings<'a> {
     /// Those among `rows`; none if there is none.
-    pub(super) fn among(
+    pub fn among(
         rows: &'a [Row],
         experiment: &'static Experiment,
         method: &'static str,
@@ -55,12 +54,12 @@ impl<'a> Findings<'a> {
         (!rows.is_empty()).then_some(Self { experiment, method, rows })
     }
 
-    pub(super) fn count(&self, outcome: Outcome) -> usize {
+    pub fn count(&self, outcome: Outcome) -> usize {
         self.rows.iter().filter(|row| row.outcome == outcome).count()
     }
 
     /// The quartiles of a figure over the missions that arrived; none if none did.
-    pub(super) fn spread(&self, value: fn(&Row) -> Option<f64>) -> Option<Spread> {
+    pub fn spread(&self, value: fn(&Row) -> Option<f64>) -> Option<Spread> {
         let arrived = self.rows.iter().filter(|row| row.outcome == Outcome::Success);
         Spread::of(arrived.filter_map(|row| value(row)))
     }
@@ -109,17 +108,15 @@ static CLAIMS: [Claim; 15] = [
 
 /// A claim of the paper, and the figure of one method.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(super) struct Expectation {
-    pub(super) experiment: &'static str,
-    pub(super) method: &'static str,
-    /// The claim as a condition.
-    pub(super) claim: &'static str,
-    pub(super) found: f64,
-    pub(super) holds: bool,
+pub struct Expectation {
+    pub experiment: &'static str,
+    pub method: &'static str,
+    pub claim: &'static str,
+    pub found: f64,
+    pub holds: bool,
 }
 
-/// Every claim whose figures are known.
-pub(super) fn expectations(rows: &[Row]) -> Vec<Expectation> {
+pub fn expectations(rows: &[Row]) -> Vec<Expectation> {
     let by = |(method, _): (&'static str, _)| {
         CLAIMS.iter().filter_map(move |(experiment, claim, about, range)| {
             let found = about.value(experiment, method, rows)?;

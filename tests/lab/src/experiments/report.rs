@@ -12,7 +12,7 @@ use crate::{
         table::Experiment,
     },
     missions::{
-        page::{END, escaped, head},
+        page::{END, escaped, figure, head},
         row::{Outcome, Row},
         runner::picture,
         statistics::{Spread, share},
@@ -38,7 +38,6 @@ fn shown(spread: Option<Spread>, digits: usize) -> String {
     format!("{median:.digits$} ({low:.digits$}-{high:.digits$})")
 }
 
-/// The titles of the columns.
 fn titles() -> [&'static str; COLUMNS] {
     let first = ["experiment", "method", "arrived", "touched", "wrong place", "other", "paper, s"];
     std::array::from_fn(|column| match column.checked_sub(first.len()) {
@@ -55,7 +54,6 @@ impl Findings<'_> {
         [touched, wrong_place, self.rows.len() - arrived - touched - wrong_place]
     }
 
-    /// The cell of every column.
     fn cells(&self) -> [String; COLUMNS] {
         let [touched, wrong_place, others] = self.failures();
         let time = self.experiment.reported_time_s;
@@ -156,15 +154,9 @@ impl<'a> Report<'a> {
                 |row: &&Row| row.seed == pictured_seed || row.outcome != Outcome::Success;
             let its = self.rows.iter().filter(|row| row.world == *name);
             for row in its.filter(is_shown) {
-                let file = picture(row);
-                let file = escaped(&file.to_string_lossy());
-                let _ = writeln!(
-                    page,
-                    "<figure><figcaption>{}, seed {}: {}</figcaption><img loading=\"lazy\" src=\"{file}\" alt=\"{file}\"></figure>",
-                    row.setting,
-                    row.seed,
-                    row.outcome.as_str()
-                );
+                let caption =
+                    format!("{}, seed {}: {}", row.setting, row.seed, row.outcome.as_str());
+                page.push_str(&figure(&caption, Some(&picture(row)), None));
             }
         }
         page.push_str(END);

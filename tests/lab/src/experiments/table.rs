@@ -21,9 +21,7 @@ pub struct Experiment {
     /// The number in the paper, and the variant.
     pub name: &'static str,
     pub title: &'static str,
-    /// The paper's report of the experiment.
     pub reported: &'static str,
-    /// The paper's time, seconds.
     pub reported_time_s: Option<f64>,
     /// The shipped mission that the experiment changes.
     mission: &'static str,
@@ -143,7 +141,7 @@ pub static TABLE: [Experiment; 9] = [
 ];
 
 impl Experiment {
-    pub(super) fn is_run_by(&self, method: &str) -> bool {
+    pub fn is_run_by(&self, method: &str) -> bool {
         method == PAPER || !self.of_paper_only
     }
 

@@ -13,7 +13,6 @@ use crate::missions::{
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Latency {
     pub world: String,
-    /// Seed of the simulation's noise.
     pub seed: u64,
     pub setting: String,
     /// A tick, from the datagram in to the datagram out.
@@ -26,8 +25,7 @@ pub struct Latency {
 }
 
 impl Latency {
-    /// The latencies of the mission of `row`, from its `summary`.
-    pub(crate) fn new(row: &Row, summary: &Summary) -> Self {
+    pub fn new(row: &Row, summary: &Summary) -> Self {
         let (world, seed, setting) = row.key();
         let Summary { tick_latency_us: tick, full_solve_us: full, .. } = summary;
         Self {
@@ -51,10 +49,9 @@ impl Record for Latency {
 }
 
 /// A line of the page: a duration's name, and the medians over the missions of median, 99 % and longest, microseconds.
-pub(crate) type Line = (&'static str, [Option<f64>; 3]);
+pub type Line = (&'static str, [Option<f64>; 3]);
 
-/// The medians over all missions of `setting`.
-pub(crate) fn medians(setting: &str, latencies: &[Latency]) -> [Line; 2] {
+pub fn medians(setting: &str, latencies: &[Latency]) -> [Line; 2] {
     type Column = fn(&Latency) -> Option<f64>;
     let over = |column: Column| {
         let its = latencies.iter().filter(|it| it.setting == setting);

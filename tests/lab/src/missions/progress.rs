@@ -8,7 +8,7 @@ use console::progress_line::ProgressLine;
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
 /// A line that ends when it is dropped.
-pub(super) struct Progress<'a> {
+pub struct Progress<'a> {
     title: &'a str,
     began: Instant,
     line: ProgressLine,
@@ -19,13 +19,12 @@ pub(super) struct Progress<'a> {
 }
 
 impl<'a> Progress<'a> {
-    pub(super) fn new(title: &'a str, ended: usize, all: usize) -> Self {
+    pub fn new(title: &'a str, ended: usize, all: usize) -> Self {
         let line = ProgressLine::new(LINE_EVERY);
         Self { title, began: Instant::now(), line, ended, ended_now: 0, all }
     }
 
-    /// Count a mission that ended.
-    pub(super) fn count(&mut self) {
+    pub fn count(&mut self) {
         self.ended += 1;
         self.ended_now += 1;
         if !self.line.is_due() {

@@ -1,10 +1,13 @@
 //! The page of an evaluation: totals, paired differences, every failure with its picture and its own page.
 
-use std::fmt::{self, Write as _};
+use std::{
+    fmt::{self, Write as _},
+    path::Path,
+};
 
 use crate::missions::{
     latency::{self, Latency},
-    page::{END, escaped, head},
+    page::{END, escaped, figure, head},
     results::Results,
     row::{Outcome, Row},
     runner::{self, Plan},
@@ -14,7 +17,6 @@ use crate::missions::{
 /// The totals of every setting, and the differences of each from the first.
 #[derive(Clone, Debug)]
 pub struct Report {
-    /// The totals in the order of the settings.
     pub totals: Vec<Totals>,
     /// The comparisons of each setting but the first with the first.
     pub comparisons: Vec<Comparison>,
@@ -36,10 +38,8 @@ impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for totals in &self.totals {
             writeln!(f, "{}: {} missions", totals.setting, totals.count)?;
-            for outcome in Outcome::ALL {
-                if let Some(share) = totals.share(outcome)
-                    && (share.value > 0.0 || outcome == Outcome::Collision)
-                {
+            for (outcome, share) in Outcome::ALL.into_iter().zip(totals.shares) {
+                if share.value > 0.0 || outcome == Outcome::Collision {
                     writeln!(f, "  {:<12} {share}", outcome.as_str())?;
                 }
             }
@@ -51,26 +51,7 @@ impl fmt::Display for Report {
     }
 }
 
-impl Totals {
-    /// Name, value and digits of the figures besides the shares.
-    fn metrics(&self) -> impl Iterator<Item = (&'static str, f64, usize)> {
-        let metrics = [
-            ("median time, s", self.median_time_s, 1),
-            ("median K", self.median_k, 2),
-            ("SPL", self.spl, 3),
-            ("BARN score", self.barn_score, 3),
-            ("median least clearance, m", self.median_clearance_m, 3),
-            ("median p_o", self.median_p_o, 3),
-            ("median f_ps, m2", self.median_f_ps_m2, 4),
-            ("median f_vs, m/s2", self.median_f_vs_m_s2, 3),
-            ("median share of looking", self.median_look_share, 3),
-        ];
-        let known = |(name, value, digits): (_, Option<f64>, _)| Some((name, value?, digits));
-        metrics.into_iter().filter_map(known)
-    }
-}
-
-/// The page; pictures are beside it, as [`Plan::picture`] says. `command` reproduces the results.
+/// The page; pictures are beside it, as [`runner::picture`] says. `command` reproduces the results.
 pub fn html(plan: &Plan, results: &Results, command: &str) -> String {
     let rows = results.rows.rows();
     let report = Report::new(plan, rows);
@@ -86,9 +67,7 @@ pub fn html(plan: &Plan, results: &Results, command: &str) -> String {
     page.push_str("<th>metrics of the successes</th></tr>\n");
     for totals in &report.totals {
         let _ = write!(page, "<tr><td>{}</td><td>{}</td>", escaped(&totals.setting), totals.count);
-        for outcome in Outcome::ALL {
-            let share = totals.share(outcome);
-            let share = share.map_or(String::new(), |share| share.to_string());
+        for share in totals.shares {
             let _ = write!(page, "<td>{share}</td>");
         }
         let metrics: Vec<String> = totals
@@ -109,26 +88,15 @@ pub fn html(plan: &Plan, results: &Results, command: &str) -> String {
         }
         let _ = writeln!(page, "<h2>{} ({})</h2>", outcome.as_str(), failures.len());
         for row in failures {
-            let _ = write!(
-                page,
-                "<figure><figcaption>{}, seed {}, {}: {}</figcaption>",
-                escaped(&row.world),
-                row.seed,
-                escaped(&row.setting),
-                escaped(&row.reason)
-            );
-            let picture = plan.picture(row);
-            if let (true, Some(name)) = (picture.exists(), picture.file_name()) {
-                let name = escaped(&name.to_string_lossy());
-                let _ =
-                    write!(page, "<img loading=\"lazy\" src=\"failures/{name}\" alt=\"{name}\">");
-            }
+            let picture = runner::picture(row);
             let own_page = runner::page(&picture);
-            if let (true, Some(name)) = (own_page.exists(), own_page.file_name()) {
-                let name = escaped(&name.to_string_lossy());
-                let _ = write!(page, "<a href=\"failures/{name}\">its page</a>");
-            }
-            page.push_str("</figure>\n");
+            let is_there = |file: &&Path| plan.directory.join(file).exists();
+            let Row { world, seed, setting, reason, .. } = row;
+            page.push_str(&figure(
+                &format!("{world}, seed {seed}, {setting}: {reason}"),
+                Some(&*picture).filter(is_there),
+                Some(&*own_page).filter(is_there),
+            ));
         }
     }
     page.push_str(END);

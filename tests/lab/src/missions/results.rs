@@ -6,7 +6,6 @@ use common::file::FileError;
 
 use crate::missions::{latency::Latency, row::Row, table::Table};
 
-/// Name of the file of rows.
 const ROWS_FILE: &str = "rows.csv";
 /// Name of the file of latencies. The rows are the same in every run, latencies are not.
 const LATENCIES_FILE: &str = "latencies.csv";

@@ -57,13 +57,10 @@ pub struct Row {
     pub setting: String,
     pub planner: String,
     pub outcome: Outcome,
-    /// The reason in the run's summary.
     pub reason: String,
-    /// Time since the clock started.
     pub time_s: f64,
     /// Distance driven by the ground truth.
     pub path_m: f64,
-    /// Straight distance from start to target.
     pub straight_m: f64,
     /// Length of the body's shortest path.
     pub shortest_m: f64,
@@ -73,7 +70,6 @@ pub struct Row {
     pub spl: f64,
     /// BARN score; none without an optimal time.
     pub barn_score: Option<f64>,
-    /// Least true clearance.
     pub min_clearance_m: Option<f64>,
     /// MRPB's metrics, see [`Summary`]: share of the time near something, path smoothness, velocity smoothness.
     pub p_o: Option<f64>,
@@ -83,16 +79,13 @@ pub struct Row {
     pub pose_error_m: Option<f64>,
     /// The expected root mean square of that error, by the covariance of the last pose.
     pub pose_error_expected_m: Option<f64>,
-    /// True distance to the target at the end.
     pub true_distance_m: Option<f64>,
-    /// Echoes that were mapped.
     pub safety_events: u64,
     /// Share of the ticks in which the sonar gave no distance.
     pub sonar_unavailable_share: Option<f64>,
     /// Dynamic range of the wheel signals: the greatest commanded speed of either wheel less the least one, rad/s.
     pub wheel_range_rad_s: Option<f64>,
     pub looks: u64,
-    /// Mission time spent looking.
     pub look_s: f64,
     pub replans: u64,
     pub resets: u64,
@@ -169,7 +162,6 @@ impl Record for Row {
     }
 }
 
-/// The outcome by the ground truth.
 fn outcome(summary: &Summary, success_within_m: f64) -> Outcome {
     let there = summary.true_distance_m.is_some_and(|distance| distance <= success_within_m);
     match summary.outcome {

@@ -5,7 +5,7 @@ use std::{
     fs, io,
     num::NonZero,
     path::{Path, PathBuf},
-    process::{Command, Stdio},
+    process::Stdio,
     sync::{Mutex, mpsc::channel},
     thread,
 };
@@ -24,7 +24,7 @@ use crate::{
         table::Record as _,
         trial::Trial,
     },
-    robot::firsthand,
+    robot,
 };
 
 /// A run's picture and its page, in its directory.
@@ -34,14 +34,12 @@ const PAGE: &str = "report/report.html";
 #[derive(Clone, Debug)]
 pub struct Plan {
     pub trials: Vec<Trial>,
-    /// The settings; each runs on every world.
     pub settings: Vec<Setting>,
     /// Missions on each world for each setting, with different noise.
     pub repeats: u64,
     pub noise: NoiseSeeds,
     /// The noise seed whose missions get pictures even if they did not fail.
     pub pictured_seed: Option<u64>,
-    /// Missions in parallel.
     pub jobs: usize,
     /// Whether the robot of each mission is calibrated before, as its owner would do it. If that fails the mission runs without.
     pub calibrates: bool,
@@ -93,15 +91,9 @@ struct Job<'a> {
 }
 
 impl Plan {
-    /// The path of a trial's mission file.
     fn mission_file(&self, trial: &Trial) -> PathBuf {
         let name = format!("{}.toml", trial.world);
         self.directory.join("worlds").join(name)
-    }
-
-    /// The path of a mission's picture, if it was kept.
-    pub fn picture(&self, row: &Row) -> PathBuf {
-        self.directory.join(picture(row))
     }
 
     fn keeps_picture(&self, row: &Row) -> bool {
@@ -121,7 +113,7 @@ impl Plan {
 }
 
 /// Missions at once: the requested number, or one for each processor.
-pub(crate) fn processors(asked_for: Option<NonZero<usize>>) -> usize {
+pub fn processors(asked_for: Option<NonZero<usize>>) -> usize {
     asked_for.map_or_else(|| thread::available_parallelism().map_or(1, NonZero::get), NonZero::get)
 }
 
@@ -211,23 +203,17 @@ fn mission(
     let own = std::process::id();
     let directory = plan.directory.join(format!("run-{worker}"));
     let robot = format!("evaluate{own}-{worker}");
-    let with_keys = |command: &mut Command| {
-        command.arg(plan.mission_file(trial)).args([
-            "--robot",
-            &robot,
-            "--seed",
-            &seed.to_string(),
-        ]);
-        for assignment in &setting.set {
-            command.args(["--set", assignment]);
-        }
+    let firsthand = |subcommand: &str| {
+        let file = plan.mission_file(trial);
+        let mut command = robot::mission(subcommand, file, &robot, &setting.set);
+        command.args(["--seed", &seed.to_string()]);
+        command
     };
     let calibration = plan.directory.join(format!("calibration-{worker}"));
     let mut calibrated = None;
     if plan.calibrates {
         let file = calibration.join("calibration.toml");
-        let mut calibrate = firsthand(&["calibrate", "--json"]);
-        with_keys(&mut calibrate);
+        let mut calibrate = firsthand("calibrate");
         calibrate.arg("--runs").arg(&calibration).arg("--out").arg(&file);
         let ended = calibrate.stdout(Stdio::null()).stderr(Stdio::null()).status();
         if ended.map_err(RunnerError::Start)?.success() {
@@ -236,8 +222,7 @@ fn mission(
         }
     }
     let run = |options: &[&str]| {
-        let mut command = firsthand(&["run", "--json"]);
-        with_keys(&mut command);
+        let mut command = firsthand("run");
         command.args(options).args(["--parent", &own.to_string()]);
         command.args(calibrated.iter().flat_map(|key| ["--set", key]));
         command.arg("--out").arg(&directory).output().map_err(RunnerError::Start)
@@ -255,15 +240,16 @@ fn mission(
             (Row::aborted(trial, *seed, setting, reason), None)
         }
     };
+    let kept = plan.directory.join(picture(&row));
     if plan.keeps_picture(&row) {
         // A mission that could not start has no picture.
-        let _ = fs::rename(directory.join(PICTURE), plan.picture(&row));
+        let _ = fs::rename(directory.join(PICTURE), &kept);
     }
     if !matches!(row.outcome, Outcome::Success | Outcome::Aborted) {
         // The mission can be run again, to the bit, and recordings of all missions would take too much room.
         let _ = fs::remove_dir_all(&directory);
         run(&[])?;
-        let _ = fs::rename(directory.join(PAGE), page(&plan.picture(&row)));
+        let _ = fs::rename(directory.join(PAGE), page(&kept));
     }
     let _ = fs::remove_dir_all(&directory);
     let _ = fs::remove_dir_all(&calibration);

@@ -9,6 +9,5 @@ pub struct Setting {
     pub name: String,
     /// The planner: [`HARMONIC`], or the executable in its place.
     pub planner: String,
-    /// KEY=VALUE assignments over the mission.
     pub set: Vec<String>,
 }

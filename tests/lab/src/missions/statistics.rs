@@ -38,7 +38,7 @@ pub fn paired_difference(gained: usize, lost: usize, n: usize) -> Estimate {
 }
 
 /// The value that `share` of all values do not exceed; none without values.
-pub(crate) fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
+pub fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
     let mut values: Vec<f64> = values.into_iter().collect();
     values.sort_by(f64::total_cmp);
     let last = values.len().checked_sub(1)?;
@@ -49,7 +49,6 @@ pub fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     Some(Spread::of(values)?.median)
 }
 
-/// The quartiles of some values.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Spread {
     pub low: f64,

@@ -1,7 +1,6 @@
 //! A CSV file with a row for each mission: appended as missions end, sorted when all have ended.
 
 use std::{
-    collections::BTreeSet,
     fs::File,
     path::{Path, PathBuf},
 };
@@ -12,9 +11,7 @@ use serde::{Serialize, de::DeserializeOwned};
 /// World, noise seed and setting, which identify a mission.
 pub type Key = (String, u64, String);
 
-/// A row of a table.
 pub trait Record: Serialize + DeserializeOwned {
-    /// The key of the row's mission.
     fn key(&self) -> Key;
 }
 
@@ -42,11 +39,6 @@ impl<R: Record> Table<R> {
         &self.rows
     }
 
-    /// The missions with a row.
-    pub fn keys(&self) -> BTreeSet<Key> {
-        self.rows.iter().map(R::key).collect()
-    }
-
     pub fn add(&mut self, row: R) -> Result<(), FileError> {
         let opened = File::options().append(true).open(&self.file);
         let opened = opened.map_err(FileError::of("append to", &self.file))?;
@@ -66,7 +58,6 @@ impl<R: Record> Table<R> {
         self.save()
     }
 
-    /// Replace the file by one with all rows.
     fn save(&self) -> Result<(), FileError> {
         let write = || -> Result<(), csv::Error> {
             let mut writer = csv::Writer::from_writer(Vec::new());

@@ -2,82 +2,78 @@
 
 use std::{collections::BTreeMap, fmt};
 
-use serde::Serialize;
+use serde_json::{Value, json};
 
 use crate::missions::{
     row::{Outcome, Row},
     statistics::{Estimate, mean, median, paired_difference, share},
 };
 
-/// The totals of one setting. Rates are shares of all missions; medians are over the successes.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Totals {
     pub setting: String,
     pub count: usize,
-    pub success: f64,
-    pub collision: f64,
-    pub timeout: f64,
-    /// Share that reported an arrival in a wrong place.
-    pub wrong_place: f64,
-    /// Share that gave up although a path exists.
-    pub unreachable: f64,
-    pub aborted: f64,
-    /// Median time of the successes, mission seconds.
-    pub median_time_s: Option<f64>,
-    /// Median K of the successes.
-    pub median_k: Option<f64>,
-    pub spl: Option<f64>,
-    /// Mean BARN score of all; none if it does not apply.
-    pub barn_score: Option<f64>,
-    /// Median of the least clearance of the successes, metres.
-    pub median_clearance_m: Option<f64>,
-    /// Medians of MRPB's metrics over the successes.
-    pub median_p_o: Option<f64>,
-    pub median_f_ps_m2: Option<f64>,
-    pub median_f_vs_m_s2: Option<f64>,
-    /// Median share of the time spent looking.
-    pub median_look_share: Option<f64>,
-    #[serde(skip)]
-    shares: BTreeMap<Outcome, Estimate>,
+    /// Shares of all missions, in the order of [`Outcome::ALL`].
+    pub shares: [Estimate; Outcome::ALL.len()],
+    metrics: [Option<f64>; METRICS.len()],
 }
+
+/// A metric beside the shares: key, name, digits, the missions it is of, and its value of one.
+type Metric = (&'static str, &'static str, usize, Missions, fn(&Row) -> Option<f64>);
+
+enum Missions {
+    /// The median of the successes.
+    Successes,
+    /// The mean of all.
+    All,
+}
+
+const METRICS: [Metric; 9] = [
+    ("median_time_s", "median time, s", 1, Missions::Successes, |row| Some(row.time_s)),
+    ("median_k", "median K", 2, Missions::Successes, |row| Some(row.k)),
+    ("spl", "SPL", 3, Missions::All, |row| Some(row.spl)),
+    ("barn_score", "BARN score", 3, Missions::All, |row| row.barn_score),
+    ("median_clearance_m", "median least clearance, m", 3, Missions::Successes, |row| {
+        row.min_clearance_m
+    }),
+    ("median_p_o", "median p_o", 3, Missions::Successes, |row| row.p_o),
+    ("median_f_ps_m2", "median f_ps, m2", 4, Missions::Successes, |row| row.f_ps_m2),
+    ("median_f_vs_m_s2", "median f_vs, m/s2", 3, Missions::Successes, |row| row.f_vs_m_s2),
+    ("median_look_share", "median share of looking", 3, Missions::Successes, |row| {
+        Some(row.look_s / row.time_s.max(1e-9))
+    }),
+];
 
 impl Totals {
     pub fn of(setting: &str, rows: &[Row]) -> Self {
         let rows: Vec<&Row> = rows.iter().filter(|row| row.setting == setting).collect();
-        let successes = || {
-            let rows = rows.iter().copied();
-            rows.filter(|row| row.outcome == Outcome::Success)
-        };
-        let estimate = |outcome: Outcome| {
-            let hits = rows.iter().filter(|row| row.outcome == outcome).count();
-            (outcome, share(hits, rows.len()))
-        };
-        let shares: BTreeMap<_, _> = Outcome::ALL.into_iter().map(estimate).collect();
-        let rate = |outcome| shares.get(&outcome).map_or(0.0, |estimate| estimate.value);
+        let ended = |outcome| rows.iter().filter(move |row| row.outcome == outcome);
         Self {
             setting: setting.to_owned(),
             count: rows.len(),
-            success: rate(Outcome::Success),
-            collision: rate(Outcome::Collision),
-            timeout: rate(Outcome::Timeout),
-            wrong_place: rate(Outcome::WrongPlace),
-            unreachable: rate(Outcome::Unreachable),
-            aborted: rate(Outcome::Aborted),
-            median_time_s: median(successes().map(|row| row.time_s)),
-            median_k: median(successes().map(|row| row.k)),
-            spl: mean(rows.iter().map(|row| row.spl)),
-            barn_score: mean(rows.iter().filter_map(|row| row.barn_score)),
-            median_clearance_m: median(successes().filter_map(|row| row.min_clearance_m)),
-            median_p_o: median(successes().filter_map(|row| row.p_o)),
-            median_f_ps_m2: median(successes().filter_map(|row| row.f_ps_m2)),
-            median_f_vs_m_s2: median(successes().filter_map(|row| row.f_vs_m_s2)),
-            median_look_share: median(successes().map(|row| row.look_s / row.time_s.max(1e-9))),
-            shares,
+            shares: Outcome::ALL.map(|outcome| share(ended(outcome).count(), rows.len())),
+            metrics: METRICS.map(|(_, _, _, of, value)| match of {
+                Missions::Successes => median(ended(Outcome::Success).filter_map(|row| value(row))),
+                Missions::All => mean(rows.iter().filter_map(|row| value(row))),
+            }),
         }
     }
 
-    pub fn share(&self, outcome: Outcome) -> Option<Estimate> {
-        self.shares.get(&outcome).copied()
+    pub fn object(&self) -> Value {
+        let mut object = json!({ "setting": self.setting, "count": self.count });
+        for (outcome, share) in Outcome::ALL.iter().zip(&self.shares) {
+            object[outcome.as_str()] = share.value.into();
+        }
+        for ((key, ..), value) in METRICS.iter().zip(self.metrics) {
+            object[*key] = value.into();
+        }
+        object
+    }
+
+    /// Name, value and digits of the metrics that are known.
+    pub fn metrics(&self) -> impl Iterator<Item = (&'static str, f64, usize)> {
+        let known = METRICS.iter().zip(self.metrics);
+        known.filter_map(|((_, name, digits, ..), value)| Some((*name, value?, *digits)))
     }
 }
 
@@ -86,7 +82,6 @@ impl Totals {
 pub struct Comparison {
     pub from: String,
     pub to: String,
-    /// Missions that both settings have.
     pub pairs: usize,
     pub success: Estimate,
     pub collision: Estimate,

@@ -26,7 +26,6 @@ pub struct Rules {
     pub clock_after_departure: bool,
     /// Time after the clock's start within which an arrival is a success, seconds; none if the mission's timeout limits it.
     pub most_s: Option<f64>,
-    /// Whether missions get a BARN score.
     pub scored: bool,
     /// Time of the reference path at 2 m/s, seconds, for the score; none if the shortest path of the body takes its place.
     pub optimal_time_s: Option<f64>,
@@ -47,7 +46,6 @@ impl Default for Rules {
 /// A world with a start and a target, in the frame of the world it comes from.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// The shapes that stand in the world, metres.
     pub shapes: Shapes,
     /// The things that move in the world; the shortest path does not regard them.
     pub things: Vec<Thing>,
@@ -104,7 +102,6 @@ impl Trial {
 /// The body for which a world must be solvable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodySize {
-    /// Radius of the robot, metres.
     pub radius_m: f64,
     /// Free ground that must be left on both sides, metres.
     pub margin_m: f64,

@@ -7,13 +7,13 @@ use thread_priority::{
     ThreadSchedulePolicy, set_thread_priority_and_policy, thread_native_id,
 };
 
-use crate::error::{BenchError, system};
+use crate::error::{Failure, system};
 
 /// Niceness 0 on the scale of [`ThreadPriority::Crossplatform`], which 99 gives the most.
 const NICENESS_0: u8 = 48;
 
 /// Start `number` of them. They end when they are dropped.
-pub(super) fn start(number: u32) -> Result<Vec<Process>, BenchError> {
+pub fn start(number: u32) -> Result<Vec<Process>, Failure> {
     let own = std::process::id().to_string();
     let spinning = |_| {
         let command = firsthand(&["bench", "tick", "--spin", "--supervisor", &own]);
@@ -23,7 +23,7 @@ pub(super) fn start(number: u32) -> Result<Vec<Process>, BenchError> {
 }
 
 /// Compute without end, with the ordinary priority, whatever the parent has.
-pub fn run(supervisor: u32) -> Result<(), BenchError> {
+pub fn run(supervisor: u32) -> Result<(), Failure> {
     become_child("busy", supervisor)?;
     if let Ok(value) = ThreadPriorityValue::try_from(NICENESS_0) {
         let policy = ThreadSchedulePolicy::Normal(Normal::Other);

@@ -11,13 +11,13 @@ use common::{
 };
 use supervisor::process::{Process, firsthand};
 
-use crate::error::{BenchError, system};
+use crate::error::{Failure, system};
 
 /// How often a consumer looks whether it is asked to stop.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 /// Start `number` consumers of `robot`. They end when they are dropped.
-pub(super) fn start(robot: &RobotName, number: u32) -> Result<Vec<Process>, BenchError> {
+pub fn start(robot: &RobotName, number: u32) -> Result<Vec<Process>, Failure> {
     let own = std::process::id().to_string();
     let consumer = |_| {
         let mut command = firsthand(&["bench", "tick", "--consumer", "--supervisor", &own]);
@@ -27,8 +27,7 @@ pub(super) fn start(robot: &RobotName, number: u32) -> Result<Vec<Process>, Benc
     (0..number).map(consumer).collect()
 }
 
-/// Run a consumer, until it is asked to stop.
-pub fn run(robot: &RobotName, supervisor: u32) -> Result<(), BenchError> {
+pub fn run(robot: &RobotName, supervisor: u32) -> Result<(), Failure> {
     let mut terminated = Signals::catch(&[SIGTERM]).map_err(system("catch SIGTERM"))?;
     become_child("consumer", supervisor)?;
     let domain = Domain::of(robot.clone());

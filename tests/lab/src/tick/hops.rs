@@ -21,16 +21,16 @@ use supervisor::{
     process::{Process, firsthand},
 };
 
-use crate::error::{BenchError, LOST, system};
+use crate::error::{Failure, LOST, LOST_SAMPLE, system};
 
 /// Cells of the smallest map. No forwarder reads it.
 const CELLS: usize = 64;
 /// The forwarders, by the stage that each stands for.
-pub(super) const PLACES: [&str; 4] = ["dead-reckoning", "mapper", "planner", "controller"];
+pub const PLACES: [&str; 4] = ["dead-reckoning", "mapper", "planner", "controller"];
 /// Pause between samples to forwarders that may not have started yet.
 const SEND_AGAIN: Duration = Duration::from_millis(20);
 /// Trips before the measurement, which map all memory.
-pub(super) const WARM_UP: u64 = 200;
+pub const WARM_UP: u64 = 200;
 
 /// Send `trips` samples around the forwarders, one every `period`, or back to back; those that warm up are always back to
 /// back.
@@ -38,9 +38,9 @@ pub fn measure(
     robot: &RobotName,
     trips: u64,
     period: Option<Duration>,
-) -> Result<Histogram, BenchError> {
+) -> Result<Histogram, Failure> {
     let lock = DomainLock::acquire(Domain::of(robot.clone()), CELLS)?;
-    let bus = lock.bus().ok_or(BenchError::Lost)?;
+    let bus = lock.bus().ok_or(LOST_SAMPLE)?;
     let mut start = bus.writer(&topics::WHEELS, 1)?;
     let mut end = bus.reader(&topics::COMMAND)?;
     let mut waiter = Waiter::default();
@@ -65,7 +65,7 @@ pub fn measure(
         let mut arrived = false;
         while !arrived {
             if began.elapsed() >= LOST {
-                return Err(BenchError::Lost);
+                return Err(LOST_SAMPLE.into());
             }
             // During the warm-up a forwarder may be missing; then the sample is sent again.
             if sent_ns == 0 || trip < WARM_UP {
@@ -92,7 +92,7 @@ pub fn measure(
 }
 
 /// Run the forwarder that stands for the stage `place`.
-pub fn run_forwarder(robot: &RobotName, place: &str, supervisor: u32) -> Result<(), BenchError> {
+pub fn run_forwarder(robot: &RobotName, place: &str, supervisor: u32) -> Result<(), Failure> {
     let mut terminated = Signals::catch(&[SIGTERM]).map_err(system("catch SIGTERM"))?;
     become_child(place, supervisor)?;
     let domain = Domain::of(robot.clone());
@@ -124,7 +124,7 @@ macro_rules! forward {
     }};
 }
 
-fn forwarder(bus: &Bus, place: &str, waiter: &mut Waiter) -> Result<Forward, BenchError> {
+fn forwarder(bus: &Bus, place: &str, waiter: &mut Waiter) -> Result<Forward, Failure> {
     let now = MissionTime::default();
     let (wakes, forward): (&dyn AnyTopic, Forward) = match PLACES
         .iter()
@@ -164,7 +164,7 @@ fn forwarder(bus: &Bus, place: &str, waiter: &mut Waiter) -> Result<Forward, Ben
                 |sample, to| { to.publish(sample.stamp.tick, now, CommandSample::default()) }
             ),
         ),
-        None => return Err(BenchError::Place(place.to_owned())),
+        None => return Err(format!("no forwarder stands for {place:?}").into()),
     };
     waiter.on(bus.wakeup(wakes)?);
     Ok(forward)

@@ -16,39 +16,29 @@ use super::{
     process_set::{ProcessSet, Used},
 };
 use crate::{
-    error::{self, BenchError, system},
-    robot::firsthand,
+    error::{self, Failure, system},
+    robot,
 };
 
 #[derive(Debug)]
-pub(super) struct Ticks {
-    pub(super) count: u64,
-    pub(super) p50_us: f64,
-    pub(super) p99_us: f64,
-    pub(super) max_us: f64,
+pub struct Ticks {
+    pub count: u64,
+    pub p50_us: f64,
+    pub p99_us: f64,
+    pub max_us: f64,
     /// Resources of its processes; none for a short mission.
-    pub(super) used: Option<Used>,
+    pub used: Option<Used>,
 }
 
-/// Pause between measurements of its processes.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
-pub(super) fn measure(
-    arguments: &Arguments,
-    robot: &RobotName,
-    pace: Pace,
-) -> Result<Ticks, BenchError> {
+pub fn measure(arguments: &Arguments, robot: &RobotName, pace: Pace) -> Result<Ticks, Failure> {
     let directory = tempfile::Builder::new().prefix("firsthand-latency-").tempdir();
     let directory = directory.map_err(system("make a directory for the mission"))?;
-    let mut command = firsthand(&["run", &arguments.mission, "--json"]);
-    command
-        .args(["--pace", &pace.to_string(), "--robot", &robot.to_string(), "--out"])
-        .arg(directory.path());
+    let mut command = robot::mission("run", &arguments.mission, robot, &arguments.set);
+    command.args(["--pace", &pace.to_string(), "--out"]).arg(directory.path());
     if arguments.no_record {
         command.arg("--no-record");
-    }
-    for setting in &arguments.set {
-        command.args(["--set", setting]);
     }
     // The consumers wait for the bus, and follow it. They do not belong to the mission's processes.
     let _consumers = consumers::start(robot, arguments.consumers)?;
@@ -64,7 +54,7 @@ pub(super) fn measure(
         match end.recv_timeout(LOOK_EVERY) {
             Ok(output) => break output.map_err(system("wait for the mission"))?,
             Err(RecvTimeoutError::Timeout) => processes.look(),
-            Err(RecvTimeoutError::Disconnected) => return Err(BenchError::Nothing),
+            Err(RecvTimeoutError::Disconnected) => return Err(error::NOTHING.into()),
         }
     };
     // The thread has ended, because it has sent its result.
@@ -72,13 +62,12 @@ pub(super) fn measure(
     ticks(&output, processes.used())
 }
 
-/// The tick latencies of the mission's summary.
-fn ticks(output: &Output, used: Option<Used>) -> Result<Ticks, BenchError> {
+fn ticks(output: &Output, used: Option<Used>) -> Result<Ticks, Failure> {
     let summary = error::summary(&output.stdout, &output.stderr)?;
     let Quantiles { p50: Some(p50_us), p99: Some(p99_us), max: Some(max_us) } =
         summary.tick_latency_us
     else {
-        return Err(BenchError::Nothing);
+        return Err(error::NOTHING.into());
     };
     Ok(Ticks { count: summary.ticks, p50_us, p99_us, max_us, used })
 }

@@ -16,7 +16,7 @@ use rustix::event::{EventfdFlags, eventfd};
 use supervisor::process::{Process, firsthand};
 
 use super::hops::{PLACES, WARM_UP};
-use crate::error::{BenchError, LOST, system};
+use crate::error::{Failure, LOST, LOST_SAMPLE, system};
 
 /// The bytes of a sample; an eventfd takes no more.
 const SAMPLE: [u8; 8] = 1_u64.to_ne_bytes();
@@ -24,9 +24,8 @@ const SAMPLE: [u8; 8] = 1_u64.to_ne_bytes();
 /// The forwarder's place on the command line.
 pub const PLAIN: &str = "plain";
 
-/// What carries a hop.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Carrier {
+pub enum Carrier {
     /// Wakes, and carries no data: that would be in shared memory.
     Eventfd,
     UnixDatagram,
@@ -49,11 +48,11 @@ impl Carrier {
 }
 
 /// Send `trips` samples around the forwarders, one every `period`, or back to back.
-pub(super) fn measure(
+pub fn measure(
     carrier: Carrier,
     trips: u64,
     period: Option<Duration>,
-) -> Result<Histogram, BenchError> {
+) -> Result<Histogram, Failure> {
     let hop = || carrier.hop().map_err(system("open a hop"));
     let own = std::process::id().to_string();
     let (mut from, start) = hop()?;
@@ -73,7 +72,7 @@ pub(super) fn measure(
         let (began, began_ns) = (Instant::now(), monotonic_ns());
         start.write_all(&SAMPLE).map_err(system("send a sample"))?;
         if !poll::is_readable(end.as_fd(), LOST).map_err(system("wait for a sample"))? {
-            return Err(BenchError::Lost);
+            return Err(LOST_SAMPLE.into());
         }
         end.read_exact(&mut SAMPLE.clone()).map_err(system("read a sample"))?;
         if trip >= WARM_UP {
@@ -88,7 +87,7 @@ pub(super) fn measure(
 }
 
 /// Forward what comes in on standard input to standard output, until the parent ends this process.
-pub fn run_forwarder(supervisor: u32) -> Result<(), BenchError> {
+pub fn run_forwarder(supervisor: u32) -> Result<(), Failure> {
     become_child(PLAIN, supervisor)?;
     let own = |end: io::Result<OwnedFd>| end.map(File::from).map_err(system("open a hop"));
     let mut from = own(io::stdin().as_fd().try_clone_to_owned())?;

@@ -9,18 +9,17 @@ use std::{
 use common::process_status;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Used {
+pub struct Used {
     /// Voluntary context switches of all threads in a second: each wait ends with a wakeup.
-    pub(super) wakeups_per_s: f64,
+    pub wakeups_per_s: f64,
     /// Share of one core, 1 for all of it.
-    pub(super) cpu_share: f64,
+    pub cpu_share: f64,
     /// Proportional memory, MiB: each shared page is divided among the processes that map it.
-    pub(super) pss_mib: f64,
+    pub pss_mib: f64,
 }
 
-/// A process and its descendants.
 #[derive(Debug)]
-pub(super) struct ProcessSet {
+pub struct ProcessSet {
     root: u32,
     first: Option<Counts>,
     last: Option<Counts>,
@@ -40,12 +39,12 @@ struct Count {
 }
 
 impl ProcessSet {
-    pub(super) const fn of(root: u32) -> Self {
+    pub const fn of(root: u32) -> Self {
         Self { root, first: None, last: None, pss_kib: 0 }
     }
 
     /// Count now. Counting begins anew whenever a process has started, and stops when the first has ended.
-    pub(super) fn look(&mut self) {
+    pub fn look(&mut self) {
         let all = descendants(self.root);
         let processes: BTreeMap<_, _> =
             all.iter().filter_map(|&process| Some((process, Count::of(process)?))).collect();
@@ -64,7 +63,7 @@ impl ProcessSet {
     }
 
     /// The resources between the first look and the last; none without two looks.
-    pub(super) fn used(&self) -> Option<Used> {
+    pub fn used(&self) -> Option<Used> {
         let (first, last) = (self.first.as_ref()?, self.last.as_ref()?);
         let over = (last.at - first.at).as_secs_f64();
         let (mut waits, mut cpu) = (0, Duration::ZERO);

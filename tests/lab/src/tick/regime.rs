@@ -4,20 +4,16 @@ use std::{fmt, time::Duration};
 
 use common::clock::Pace;
 
-/// How ticks follow each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Regime {
+pub enum Regime {
     BackToBack,
-    Rate {
-        /// Ticks a second.
-        hz: f64,
-    },
+    Rate { hz: f64 },
 }
 
 impl Regime {
     /// The regimes to measure a mission in that has `rate_hz` ticks in a mission second: the one that is asked for, or back to back
     /// and at the robot's rate.
-    pub(crate) fn all(asked_hz: Option<f64>, pace: Option<Pace>, rate_hz: f64) -> Vec<Self> {
+    pub fn all(asked_hz: Option<f64>, pace: Option<Pace>, rate_hz: f64) -> Vec<Self> {
         match (asked_hz, pace) {
             (Some(hz), _) => vec![Self::Rate { hz }],
             (None, Some(Pace::Max)) => vec![Self::BackToBack],
@@ -27,7 +23,7 @@ impl Regime {
     }
 
     /// The pace that gives a mission with `rate_hz` ticks in a mission second this regime.
-    pub(crate) fn pace(self, rate_hz: f64) -> Pace {
+    pub fn pace(self, rate_hz: f64) -> Pace {
         match self {
             Self::BackToBack => Pace::Max,
             Self::Rate { hz } => Pace::Rate(hz / rate_hz),
@@ -35,7 +31,7 @@ impl Regime {
     }
 
     /// Time from tick to tick; none if they follow at once.
-    pub(crate) fn period(self) -> Option<Duration> {
+    pub fn period(self) -> Option<Duration> {
         match self {
             Self::BackToBack => None,
             Self::Rate { hz } => Some(Duration::from_secs_f64(1.0 / hz)),
@@ -53,7 +49,7 @@ impl fmt::Display for Regime {
 }
 
 /// Ticks a second, as the command line gives them.
-pub(crate) fn parse_hz(text: &str) -> Result<f64, String> {
+pub fn parse_hz(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(hz) if (SLOWEST_HZ..=FASTEST_HZ).contains(&hz) => Ok(hz),
         _ => Err(format!("{text} is no rate; give ticks a second, {SLOWEST_HZ} to {FASTEST_HZ}")),

@@ -27,16 +27,13 @@ const HOPS: [&str; 3] = [
 ];
 const TICK: &str = "a tick, datagram in to datagram out";
 
-/// The result in one regime.
 #[derive(Debug, Serialize)]
 pub struct Report {
-    /// How ticks and hops followed each other.
     regime: String,
     /// The hops, those on the bus last, and then the tick.
     times: Vec<Times>,
     /// Ratio of the medians, tick to bare hops on the bus.
     ratio: f64,
-    /// Ratio at 99 %.
     ratio_p99: f64,
     /// Resources of all processes of the mission and the simulated robot; none for a mission of a second or two.
     wakeups_per_s: Option<f64>,
@@ -46,11 +43,7 @@ pub struct Report {
 
 impl Report {
     /// None without measurements. The medians of the rounds' quantiles count, because the load of a shared machine changes.
-    pub(super) fn new(
-        regime: Regime,
-        hops: &[Histogram; HOPS.len()],
-        rounds: &[Ticks],
-    ) -> Option<Self> {
+    pub fn new(regime: Regime, hops: &[Histogram; HOPS.len()], rounds: &[Ticks]) -> Option<Self> {
         let middle = |of: fn(&Ticks) -> f64| quantile(rounds.iter().map(of), 0.5);
         let times = HOPS.iter().zip(hops).map(|(of, hops)| {
             Some(Times {

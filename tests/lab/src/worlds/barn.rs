@@ -26,14 +26,12 @@ const SUCCESS_WITHIN_M: f64 = 1.0;
 /// The walls left and right and the wall behind the start, metres; the far side is open.
 const SIDES_M: [f64; 2] = [-4.425, -0.075];
 const BEHIND_M: f64 = 0.075;
-/// The end of the side walls, metres.
 const SIDES_END_M: f64 = 9.6;
 /// Most bytes of a file. A world file has some hundred kilobytes, the table of all worlds one megabyte.
 const LONGEST: u64 = 64 << 20;
 /// Seconds allowed from the clock's start.
 const MOST_S: f64 = 100.0;
 
-/// One row of the table of cylinders.
 #[derive(Deserialize)]
 struct Cylinder {
     world: u32,
@@ -49,11 +47,10 @@ struct IndexRow {
     optimal_time_s: f64,
 }
 
-/// A world's name, shapes and rules.
-pub(super) type Found = (String, Scene, Rules);
+pub type Found = (String, Scene, Rules);
 
 /// Every world of a table of cylinders, in the order of their numbers.
-pub(super) fn table(file: &Path) -> Result<Vec<Found>, WorldError> {
+pub fn table(file: &Path) -> Result<Vec<Found>, WorldError> {
     let mut cylinders: BTreeMap<u32, Vec<Drum>> = BTreeMap::new();
     for row in rows::<Cylinder>(file)? {
         cylinders.entry(row.world).or_default().push(Drum {
@@ -76,7 +73,7 @@ pub(super) fn table(file: &Path) -> Result<Vec<Found>, WorldError> {
     Ok(cylinders.into_iter().map(world).collect())
 }
 
-pub(super) fn gazebo(file: &Path) -> Result<Found, WorldError> {
+pub fn gazebo(file: &Path) -> Result<Found, WorldError> {
     let mut text = String::new();
     open(file)?.take(LONGEST).read_to_string(&mut text).map_err(WorldError::unreadable(file))?;
     let drums = cylinders(&text).ok_or_else(|| {
@@ -137,7 +134,7 @@ fn scene(drums: Vec<Drum>) -> Scene {
     }
 }
 
-pub(super) fn rules(optimal_time_s: Option<f64>) -> Rules {
+pub fn rules(optimal_time_s: Option<f64>) -> Rules {
     Rules {
         success_within_m: SUCCESS_WITHIN_M,
         clock_after_departure: true,

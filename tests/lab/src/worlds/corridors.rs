@@ -5,19 +5,17 @@ use std::f64::consts::PI;
 use common::geometry::{Shapes, Wall};
 use glam::DVec2;
 
-use super::random::Random;
-use crate::missions::trial::Scene;
+use crate::{missions::trial::Scene, random::Random};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Bends {
+pub enum Bends {
     /// The corridor is straight, along x, and empty.
     None,
     /// The corridor has two to four legs, each at an angle of up to 50 degrees with the one before.
     Oblique,
 }
 
-/// A corridor with closed ends.
-pub(super) fn draw(random: &mut Random, bends: Bends) -> Scene {
+pub fn draw(random: &mut Random, bends: Bends) -> Scene {
     let (width, axis) = match bends {
         Bends::None => {
             let length = random.within(4.0, 8.0);
@@ -46,7 +44,6 @@ pub(super) fn draw(random: &mut Random, bends: Bends) -> Scene {
     }
 }
 
-/// The middle line of a corridor with bends.
 fn oblique(random: &mut Random) -> Vec<DVec2> {
     let mut axis = vec![DVec2::ZERO];
     let (mut at, mut angle) = (DVec2::ZERO, random.within(-PI, PI));

@@ -27,7 +27,7 @@ pub struct Ends {
 }
 
 /// The tests of a `config.txt`, in its order.
-pub(super) fn read(file: &Path) -> Result<Vec<Ends>, WorldError> {
+pub fn read(file: &Path) -> Result<Vec<Ends>, WorldError> {
     // The check comes before opening, because opening a pipe waits for its other end.
     if !file.is_file() {
         return Err(WorldError::malformed(file, "not a regular file; give MRPB's tests"));

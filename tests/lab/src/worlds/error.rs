@@ -35,12 +35,12 @@ pub enum WorldError {
 }
 
 impl WorldError {
-    pub(super) fn unreadable(file: &Path) -> impl Fn(io::Error) -> Self {
+    pub fn unreadable(file: &Path) -> impl Fn(io::Error) -> Self {
         let file = file.to_path_buf();
         move |source| Self::Unreadable { file: file.clone(), source }
     }
 
-    pub(super) fn malformed(file: &Path, problem: impl Into<String>) -> Self {
+    pub fn malformed(file: &Path, problem: impl Into<String>) -> Self {
         Self::Malformed { file: file.to_path_buf(), problem: problem.into() }
     }
 }

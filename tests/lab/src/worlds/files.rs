@@ -14,9 +14,11 @@ use super::{
     error::WorldError,
     floor::Floor,
     found::Found,
+};
+use crate::{
+    missions::trial::{BodySize, Rules, Scene, Trial},
     random::Random,
 };
-use crate::missions::trial::{BodySize, Rules, Scene, Trial};
 
 /// Starts and targets drawn on a map without any, if no number is asked for.
 const DRAWN: usize = 10;
@@ -26,18 +28,16 @@ const DRAWN_KIND: u64 = 7;
 const TESTS_FILE: &str = "config.txt";
 
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Asked {
+pub struct Asked {
     /// Number of worlds; without it all, and ten on each map without tests.
     pub count: Option<usize>,
-    /// Seed of drawn starts and targets.
     pub seed: u64,
-    /// Start and target on every map.
     pub ends: Option<Ends>,
 }
 
 /// The worlds of a file, or of all world files in a folder and its subfolders, sorted by name; the requested number, evenly
 /// spread.
-pub(super) fn read(path: &Path, asked: Asked, body: &BodySize) -> Result<Found, WorldError> {
+pub fn read(path: &Path, asked: Asked, body: &BodySize) -> Result<Found, WorldError> {
     let files = if path.is_dir() {
         files_of(path).map_err(WorldError::unreadable(path))?
     } else {
@@ -46,7 +46,7 @@ pub(super) fn read(path: &Path, asked: Asked, body: &BodySize) -> Result<Found, 
     let mut found = Found::default();
     let mut maps = 0;
     for file in &files {
-        match Kind::of(file) {
+        match kind_of(file) {
             Some(Kind::Mission) => add_mission(&mut found, file, body)?,
             Some(Kind::Gazebo) => add_barn(&mut found, vec![barn::gazebo(file)?], body)?,
             Some(Kind::Cylinders) => add_barn(&mut found, barn::table(file)?, body)?,
@@ -91,7 +91,7 @@ fn files_of(folder: &Path) -> io::Result<Vec<PathBuf>> {
             files.push(path);
         }
     }
-    files.retain(|file| Kind::of(file).is_some() && !file.is_dir());
+    files.retain(|file| kind_of(file).is_some() && !file.is_dir());
     files.sort();
     Ok(files)
 }
@@ -106,7 +106,6 @@ fn add_mission(found: &mut Found, file: &Path, body: &BodySize) -> Result<(), Wo
     Ok(())
 }
 
-/// BARN's worlds, by the rules of the challenge.
 fn add_barn(
     found: &mut Found,
     worlds: Vec<(String, Scene, Rules)>,
@@ -133,7 +132,7 @@ fn add_map(
         None if tests.exists() => ends::read(&tests)?,
         None => {
             let count = asked.count.unwrap_or(DRAWN) as u64;
-            let streams = (0..count).map(|number| Random::new(asked.seed, DRAWN_KIND, number));
+            let streams = (0..count).map(|number| Random::of_world(asked.seed, DRAWN_KIND, number));
             floor.draw(streams, body.swept_m())
         }
     };
@@ -172,21 +171,19 @@ enum Kind {
     Map,
 }
 
-impl Kind {
-    fn of(file: &Path) -> Option<Self> {
-        let name = file.file_name()?.to_string_lossy();
-        if name.ends_with(".toml") {
-            Some(Self::Mission)
-        } else if name.ends_with(".world") {
-            Some(Self::Gazebo)
-        } else if name.ends_with("cylinders.csv") || name.ends_with(".csv.gz") {
-            Some(Self::Cylinders)
-        } else if name.ends_with(".yaml") || name.ends_with(".yml") {
-            Some(Self::Map)
-        } else {
-            None
-        }
-    }
+/// The kinds of files, by the ends of their names.
+const KINDS: [(&str, Kind); 6] = [
+    (".toml", Kind::Mission),
+    (".world", Kind::Gazebo),
+    ("cylinders.csv", Kind::Cylinders),
+    (".csv.gz", Kind::Cylinders),
+    (".yaml", Kind::Map),
+    (".yml", Kind::Map),
+];
+
+fn kind_of(file: &Path) -> Option<Kind> {
+    let name = file.file_name()?.to_string_lossy();
+    KINDS.iter().find(|(end, _)| name.ends_with(end)).map(|(_, kind)| *kind)
 }
 
 #[cfg(test)]

@@ -8,7 +8,8 @@ use common::geometry::{Box2, Shapes};
 use glam::DVec2;
 use maps::{MOST_BOXES, MapError, PlacedMap};
 
-use super::{ends::Ends, error::WorldError, random::Random};
+use super::{ends::Ends, error::WorldError};
+use crate::random::Random;
 
 /// Longest side of a map, metres: that of the check whether it can be crossed.
 const LARGEST_M: f64 = 95.0;
@@ -18,13 +19,12 @@ const DRAWN_M: [f64; 2] = [3.0, 15.0];
 const MOST_STARTS: usize = 50;
 
 #[derive(Debug)]
-pub(super) struct Floor {
+pub struct Floor {
     map: PlacedMap,
 }
 
 impl Floor {
-    /// The map of a YAML file.
-    pub(super) fn load(file: &Path) -> Result<Self, WorldError> {
+    pub fn load(file: &Path) -> Result<Self, WorldError> {
         let map = maps::load_placed(file)?;
         let side_m = map.map.cols.max(map.map.rows) as f64 * map.cell_m;
         if side_m > LARGEST_M {
@@ -38,7 +38,7 @@ impl Floor {
     }
 
     /// The shapes around the ground that is connected to `start`, metres.
-    pub(super) fn shapes(&self, file: &Path, start: DVec2) -> Result<Shapes, WorldError> {
+    pub fn shapes(&self, file: &Path, start: DVec2) -> Result<Shapes, WorldError> {
         let free: Vec<bool> = self.map.map.blocked.iter().map(|it| !it).collect();
         let reached = self.connected(&free, self.cell(start));
         let mut wanted = vec![false; reached.len()];
@@ -55,7 +55,7 @@ impl Floor {
 
     /// For each stream of random numbers a start, and a target 3 to 15 m away that a body which needs `swept_m` around
     /// its centre can reach; fewer if there is hardly any.
-    pub(super) fn draw(&self, streams: impl Iterator<Item = Random>, swept_m: f64) -> Vec<Ends> {
+    pub fn draw(&self, streams: impl Iterator<Item = Random>, swept_m: f64) -> Vec<Ends> {
         let roomy = self.roomy(swept_m);
         let places: Vec<usize> = (0..roomy.len()).filter(|&at| roomy[at]).collect();
         // If one draw finds nothing, the next hardly would.
@@ -94,7 +94,6 @@ impl Floor {
         inside.then_some((row * size.x + away.x) as usize)
     }
 
-    /// The middle of a cell, metres.
     fn centre(&self, cell: usize) -> DVec2 {
         let (col, row) = (cell % self.map.map.cols, cell / self.map.map.cols);
         self.map.place(col as f64 + 0.5, row as f64 + 0.5)
@@ -207,7 +206,7 @@ mod tests {
             [1, 0, 0, 0, 1, 0, 1].map(|solid: usize| format!("#{}#", long[solid])).to_vec();
         let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
         let floor = floor(&rows);
-        let draw = |seed| floor.draw([Random::new(seed, 7, 0)].into_iter(), 0.24)[0];
+        let draw = |seed| floor.draw([Random::of_world(seed, 7, 0)].into_iter(), 0.24)[0];
         assert_eq!(draw(1), draw(1));
         assert_ne!(draw(1), draw(2));
         for seed in 0..20 {

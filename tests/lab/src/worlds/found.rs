@@ -14,7 +14,7 @@ pub struct Found {
 
 impl Found {
     /// Add the trial `world` in `scene`; if the body cannot cross the world, count it as left out.
-    pub(super) fn add(
+    pub fn add(
         &mut self,
         world: String,
         scene: &Scene,
@@ -26,16 +26,14 @@ impl Found {
         Ok(())
     }
 
-    /// Add `trial`, or count one that was left out.
-    pub(super) fn add_solvable(&mut self, trial: Option<Trial>) {
+    pub fn add_solvable(&mut self, trial: Option<Trial>) {
         match trial {
             Some(trial) => self.trials.push(trial),
             None => self.unsolvable += 1,
         }
     }
 
-    /// Reduce the trials to `count`, evenly spread.
-    pub(super) fn spread(&mut self, count: usize) {
+    pub fn spread(&mut self, count: usize) {
         let all = self.trials.len();
         if count < all {
             let mut index = 0;

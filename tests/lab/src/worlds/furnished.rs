@@ -6,8 +6,8 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use common::geometry::{Box2, Drum, Shapes, Wall};
 use glam::DVec2;
 
-use super::{random::Random, rooms::closed};
-use crate::missions::trial::Scene;
+use super::rooms::closed;
+use crate::{missions::trial::Scene, random::Random};
 
 /// Things per square metre of floor: sparse, usual, dense.
 const DENSITIES: [f64; 3] = [0.10, 0.16, 0.22];
@@ -19,7 +19,7 @@ const SOFT: f64 = 0.1;
 const BEHIND_CURTAIN_M: f64 = 0.12;
 
 /// Room `number`. The number selects the density.
-pub(super) fn draw(random: &mut Random, number: usize) -> Scene {
+pub fn draw(random: &mut Random, number: usize) -> Scene {
     let distance = random.within(4.0, 7.0);
     let half_width = random.within(2.0, 3.0);
     let target = DVec2::new(distance, random.within(-0.5, 0.5) * half_width);
@@ -150,8 +150,9 @@ mod tests {
 
     #[test]
     fn rooms_have_legs_tops_over_and_in_the_body_low_things_and_soft_ones() {
-        let scenes: Vec<Scene> =
-            (0..30).map(|number| draw(&mut Random::new(1, 6, number), number as usize)).collect();
+        let scenes: Vec<Scene> = (0..30)
+            .map(|number| draw(&mut Random::of_world(1, 6, number), number as usize))
+            .collect();
         let boxes: Vec<&Box2> = scenes.iter().flat_map(|it| &it.shapes.boxes).collect();
         let count = |is: &dyn Fn(&Box2) -> bool| boxes.iter().filter(|it| is(it)).count();
         let (sonar_m, body_top_m) = (0.18, 0.255);

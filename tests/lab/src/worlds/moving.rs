@@ -19,8 +19,11 @@ use common::{
 };
 use glam::DVec2;
 
-use super::{barn, random::Random};
-use crate::missions::trial::{Rules, Scene};
+use super::barn;
+use crate::{
+    missions::trial::{Rules, Scene},
+    random::Random,
+};
 
 const START: DVec2 = DVec2::new(11.0, 0.0);
 const GOAL: DVec2 = DVec2::new(-9.0, 0.0);
@@ -36,11 +39,8 @@ const MOVES_S: f64 = 130.0;
 /// The difficulty of a world; each range includes its ends.
 struct Difficulty {
     cylinders: [usize; 2],
-    /// Orders of the polynomials.
     orders: [usize; 2],
-    /// Least and greatest speed, m/s.
     speed_m_s: [f64; 2],
-    /// Standard deviation of a cylinder's speed, m/s.
     deviation_m_s: [f64; 2],
 }
 
@@ -67,12 +67,12 @@ const DIFFICULTIES: [Difficulty; 3] = [
 ];
 
 /// The rules of the challenge. Its score is left out, because it has no reference path for these worlds.
-pub(super) fn rules() -> Rules {
+pub fn rules() -> Rules {
     Rules { scored: false, ..barn::rules(None) }
 }
 
 /// Hall `number`. The number selects the difficulty.
-pub(super) fn draw(random: &mut Random, number: usize) -> Scene {
+pub fn draw(random: &mut Random, number: usize) -> Scene {
     let difficulty = &DIFFICULTIES[number % DIFFICULTIES.len()];
     let wall = |at: DVec2, size_m: DVec2| Box2 { at, size_m, ..Box2::default() };
     let along = DVec2::new(2.0 * HALF_M, WALL_M);
@@ -168,7 +168,7 @@ mod tests {
     fn cylinders_start_clear_of_the_robot_and_move_in_the_hall_at_the_speeds_of_their_difficulty_all_the_time()
      {
         for number in 0..30 {
-            let scene = draw(&mut Random::new(1, 11, number), number as usize);
+            let scene = draw(&mut Random::of_world(1, 11, number), number as usize);
             let Difficulty { cylinders, speed_m_s: [least, most], .. } =
                 DIFFICULTIES[number as usize % 3];
             assert!((cylinders[0]..=cylinders[1]).contains(&scene.things.len()));

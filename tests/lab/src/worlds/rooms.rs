@@ -7,21 +7,18 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use common::geometry::{Box2, Drum, Light, Shapes, Wall};
 use glam::DVec2;
 
-use super::random::Random;
-use crate::missions::trial::Scene;
+use crate::{missions::trial::Scene, random::Random};
 
 /// Things per square metre of floor: sparse, usual, dense.
 const DENSITIES: [f64; 3] = [0.10, 0.18, 0.26];
 /// Free distance around start and target, metres.
 const KEPT_FREE_M: f64 = 0.5;
-/// Share of rooms with a partition.
 const DOOR_SHARE: f64 = 1.0 / 3.0;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Doors {
+pub enum Doors {
     /// One room in three has a partition with a door.
     Some,
-    /// All rooms have a partition with a door.
     All,
 }
 
@@ -29,12 +26,12 @@ pub(super) enum Doors {
 const MOST_OBLIQUE_DEG: f64 = 35.0;
 
 /// Room `number`. The number selects the density.
-pub(super) fn draw(random: &mut Random, number: usize, doors: Doors) -> Scene {
+pub fn draw(random: &mut Random, number: usize, doors: Doors) -> Scene {
     room(random, number, doors, false)
 }
 
 /// Room `number` with an oblique partition, rotated against the grid.
-pub(super) fn rotated(random: &mut Random, number: usize, doors: Doors) -> Scene {
+pub fn rotated(random: &mut Random, number: usize, doors: Doors) -> Scene {
     let mut scene = room(random, number, doors, true);
     let angle = random.within(-PI, PI);
     let turn = |at: &mut DVec2| *at = DVec2::from_angle(angle).rotate(*at);
@@ -52,7 +49,7 @@ pub(super) fn rotated(random: &mut Random, number: usize, doors: Doors) -> Scene
 
 /// Room `number` with a partition. It and the loose walls are of glass; one box in three is of glass, a display cabinet, and one is black;
 /// one drum in three is black.
-pub(super) fn glazed(random: &mut Random, number: usize) -> Scene {
+pub fn glazed(random: &mut Random, number: usize) -> Scene {
     let mut scene = room(random, number, Doors::All, false);
     let Shapes { drums, boxes, walls } = &mut scene.shapes;
     // The first wall encloses the room.
@@ -96,8 +93,7 @@ fn room(random: &mut Random, number: usize, doors: Doors, oblique: bool) -> Scen
     Scene { shapes, things: Vec::new(), start: DVec2::ZERO, heading, target }
 }
 
-/// A closed rectangle of walls.
-pub(super) fn closed(least: DVec2, greatest: DVec2) -> Wall {
+pub fn closed(least: DVec2, greatest: DVec2) -> Wall {
     let corners =
         [least, DVec2::new(greatest.x, least.y), greatest, DVec2::new(least.x, greatest.y), least];
     Wall { points: corners.to_vec(), ..Wall::default() }
@@ -151,7 +147,8 @@ mod tests {
     fn glazed_rooms_have_glass_inside_their_walls_and_some_black_things() {
         let (mut cabinets, mut black) = (0, 0);
         for number in 0..20 {
-            let Shapes { drums, boxes, walls } = glazed(&mut Random::new(1, 10, number), 1).shapes;
+            let Shapes { drums, boxes, walls } =
+                glazed(&mut Random::of_world(1, 10, number), 1).shapes;
             assert_eq!(walls[0].light, None);
             assert!(
                 walls.len() > 2 && walls[1..].iter().all(|wall| wall.light == Some(Light::Glass))

@@ -3,8 +3,7 @@
 use common::geometry::{Drum, Shapes, Wall};
 use glam::DVec2;
 
-use super::random::Random;
-use crate::missions::trial::Scene;
+use crate::{missions::trial::Scene, random::Random};
 
 /// Distance from the start to the bottom of the U, metres.
 const BOTTOM_M: f64 = 2.4;
@@ -13,13 +12,13 @@ const DRUM_SPACING_M: f64 = 0.36;
 const DRUM_RADIUS_M: f64 = 0.17;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Sides {
+pub enum Sides {
     Walls,
     Drums,
 }
 
 /// Trap `number`. The number selects the sides and the robot's heading, in steps of 45 degrees.
-pub(super) fn draw(random: &mut Random, number: usize) -> Scene {
+pub fn draw(random: &mut Random, number: usize) -> Scene {
     let sides = [Sides::Walls, Sides::Drums][number % 2];
     let heading_deg = 45.0 * (number / 2 % 8) as f64;
     let depth = random.within(0.8, 1.6);

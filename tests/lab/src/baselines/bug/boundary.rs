@@ -13,11 +13,9 @@ const LEFT: usize = 1;
 const BACK: usize = 2;
 const RIGHT: usize = 3;
 
-/// A place on the boundary of a hazard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Place {
-    /// A free cell beside the hazard.
-    pub(super) cell: Cell,
+pub struct Place {
+    pub cell: Cell,
     /// The direction in which the cell was entered: a number of quarters of a turn from x. The hazard is on the right of
     /// it, or behind on the right.
     heading: u8,
@@ -26,7 +24,7 @@ pub(super) struct Place {
 impl Place {
     /// The place at `cell` from which the boundary is followed most nearly in `direction`; none where no hazard is beside
     /// the cell.
-    pub(super) fn at(map: &Map<'_>, cell: Cell, direction: DVec2) -> Option<Self> {
+    pub fn at(map: &Map<'_>, cell: Cell, direction: DVec2) -> Option<Self> {
         let along = |place: &Self| unit(place.heading.into()).dot(direction);
         (0..4)
             .map(|heading| Self { cell, heading })
@@ -35,7 +33,7 @@ impl Place {
     }
 
     /// Whether the place still is a free cell with the hazard where it should be.
-    pub(super) fn is_on(&self, map: &Map<'_>) -> bool {
+    pub fn is_on(&self, map: &Map<'_>) -> bool {
         let hazard = |cols, rows| {
             let col = self.cell.col.checked_add_signed(cols);
             let cell = col.zip(self.cell.row.checked_add_signed(rows));
@@ -47,7 +45,7 @@ impl Place {
     }
 
     /// The next place: the cell on the right if that is free, else ahead, on the left, behind; none in a closed cell.
-    pub(super) fn next(&self, map: &Map<'_>) -> Option<Self> {
+    pub fn next(&self, map: &Map<'_>) -> Option<Self> {
         [RIGHT, 0, LEFT, BACK].into_iter().find_map(|turn| {
             let cell = map.neighbour(self.cell, self.turned(turn))?;
             let heading = (usize::from(self.heading) + turn) % DIRECTIONS.len();

@@ -16,7 +16,6 @@ fn wall() -> Vec<String> {
     (0..25).map(row).collect()
 }
 
-/// A closed ring around the robot.
 fn ring() -> Vec<String> {
     let row = |row: i32| {
         let column = |col: i32| {
@@ -47,12 +46,10 @@ impl Drive {
         drive
     }
 
-    /// Give the planner the map.
     fn see(&mut self) {
         assert!(self.bug.follow(&self.header, &self.cells));
     }
 
-    /// The planner's answer for the robot's place.
     fn guidance(&mut self) -> GuidanceSample {
         self.bug.guidance(&pose(self.at.into()))
     }

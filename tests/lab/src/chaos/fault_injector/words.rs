@@ -14,8 +14,8 @@ use common::{
 use crate::chaos::robot_fault::RobotFault;
 
 /// The stuck echo of a sonar, centimetres, and the stuck range of a robot that speaks lines of JSON, metres.
-pub(super) const STUCK_CM: u8 = 8;
-pub(super) const STUCK_M: f64 = 0.3;
+pub const STUCK_CM: u8 = 8;
+pub const STUCK_M: f64 = 0.3;
 /// The frozen echo of a sonar that has heard nothing yet, centimetres.
 const FROZEN_CM: u8 = 150;
 const NOTHING: u8 = 255;
@@ -30,13 +30,13 @@ const COUNT_RAD: f64 = TAU / 1200.0;
 
 /// Converts bytes to the messages of one protocol.
 #[derive(Debug)]
-pub(super) enum Words {
+pub enum Words {
     X80 { robot: Decoder, host: Decoder },
     Json { robot: Lines, host: Lines },
 }
 
 impl Words {
-    pub(super) fn of(protocol: Protocol) -> Self {
+    pub fn of(protocol: Protocol) -> Self {
         match protocol {
             Protocol::X80 => Self::X80 { robot: Decoder::default(), host: Decoder::default() },
             // The other protocols have no fault that is injected on a wire.
@@ -46,8 +46,7 @@ impl Words {
         }
     }
 
-    /// The messages of the robot in these bytes.
-    pub(super) fn said(&mut self, bytes: &[u8]) -> Vec<Said> {
+    pub fn said(&mut self, bytes: &[u8]) -> Vec<Said> {
         match self {
             Self::X80 { robot, .. } => frames(robot, bytes, |frame| {
                 let Frame { rid, did, data, .. } = *frame;
@@ -60,8 +59,7 @@ impl Words {
         }
     }
 
-    /// The orders of the host in these bytes.
-    pub(super) fn ordered(&mut self, bytes: &[u8]) -> Vec<Ordered> {
+    pub fn ordered(&mut self, bytes: &[u8]) -> Vec<Ordered> {
         match self {
             Self::X80 { host, .. } => frames(host, bytes, Ordered::of_frame),
             Self::Json { host, .. } => host.push(bytes).into_iter().map(Ordered::of_line).collect(),
@@ -78,23 +76,22 @@ fn frames<T>(decoder: &mut Decoder, bytes: &[u8], of: impl Fn(&Frame<'_>) -> T) 
     all
 }
 
-/// A message of the robot.
 #[derive(Clone, Debug)]
-pub(super) enum Said {
+pub enum Said {
     Frame { rid: u8, did: u8, data: Vec<u8> },
     Line(json_wire::Report),
 }
 
 /// The left and the right wheel, or the two channels of an X80: counts and counts/s.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Wheels {
-    pub(super) counts: [f64; 2],
-    pub(super) speeds: [f64; 2],
+pub struct Wheels {
+    pub counts: [f64; 2],
+    pub speeds: [f64; 2],
 }
 
 /// The newest readings of a robot that are distances.
 #[derive(Debug)]
-pub(super) struct Readings {
+pub struct Readings {
     ultrasonic: [u8; ULTRASONIC],
     ranges: BTreeMap<String, Option<f64>>,
     scan: Option<Vec<Option<f32>>>,
@@ -107,7 +104,7 @@ impl Default for Readings {
 }
 
 impl Readings {
-    pub(super) fn take(&mut self, said: &Said) {
+    pub fn take(&mut self, said: &Said) {
         match said {
             Said::Frame { did: did::STANDARD, data, .. } => {
                 for (newest, &byte) in self.ultrasonic.iter_mut().zip(data) {
@@ -126,7 +123,7 @@ impl Readings {
 }
 
 impl Said {
-    pub(super) fn bytes(&self) -> Vec<u8> {
+    pub fn bytes(&self) -> Vec<u8> {
         match self {
             Self::Frame { rid, did, data } => {
                 let mut bytes = Vec::new();
@@ -138,7 +135,7 @@ impl Said {
     }
 
     /// The sensor stream to which the message belongs; none for an answer.
-    pub(super) fn stream(&self) -> Option<u8> {
+    pub fn stream(&self) -> Option<u8> {
         match self {
             Self::Frame { did, .. } => {
                 Some(*did).filter(|did| matches!(*did, did::MOTOR | did::CUSTOM | did::STANDARD))
@@ -159,7 +156,7 @@ impl Said {
     }
 
     /// The wheels of the message, counted on from those of `base`.
-    pub(super) fn wheels(&self, base: &Self) -> Option<Wheels> {
+    pub fn wheels(&self, base: &Self) -> Option<Wheels> {
         if let Self::Line(report) = self {
             let counts = |angles: [f64; 2]| angles.map(|angle| angle / COUNT_RAD);
             let speeds = counts(report.speeds.unwrap_or_default());
@@ -177,7 +174,7 @@ impl Said {
     }
 
     /// The message with other `wheels`; `held` if something holds both.
-    pub(super) fn with_wheels(mut self, wheels: &Wheels, held: bool) -> Vec<u8> {
+    pub fn with_wheels(mut self, wheels: &Wheels, held: bool) -> Vec<u8> {
         if let Some(mut sensors) = self.motor() {
             for (channel, encoder) in sensors.encoders.iter_mut().enumerate() {
                 let speed = wheels.speeds[channel];
@@ -199,7 +196,7 @@ impl Said {
     }
 
     /// The message with data that are all `byte`, if it has wheels; in lines of JSON the wheels are 0.
-    pub(super) fn with_data(mut self, byte: u8) -> Vec<u8> {
+    pub fn with_data(mut self, byte: u8) -> Vec<u8> {
         match &mut self {
             Self::Frame { did: did::MOTOR, data, .. } => data.fill(byte),
             Self::Frame { .. } => {}
@@ -212,7 +209,7 @@ impl Said {
     }
 
     /// The message with the readings of `fault`, whose robot read `newest` before; none if no readings come.
-    pub(super) fn with_readings(mut self, fault: RobotFault, newest: &Readings) -> Vec<u8> {
+    pub fn with_readings(mut self, fault: RobotFault, newest: &Readings) -> Vec<u8> {
         match &mut self {
             Self::Frame { did: did::STANDARD, data, .. } => {
                 let told = match fault {
@@ -263,15 +260,14 @@ fn report(said: &Said, sensors: MotorSensors) -> Vec<u8> {
     bytes
 }
 
-/// An order of the host.
 #[derive(Clone, Debug)]
-pub(super) struct Ordered {
-    pub(super) bytes: Vec<u8>,
-    pub(super) effect: Effect,
+pub struct Ordered {
+    pub bytes: Vec<u8>,
+    pub effect: Effect,
 }
 
 #[derive(Clone, Debug)]
-pub(super) enum Effect {
+pub enum Effect {
     /// The wheels turn; these bytes in place of the order make them stand.
     Moves {
         stand: Vec<u8>,
