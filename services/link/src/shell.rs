@@ -9,7 +9,6 @@ use common::{
     domain::Domain,
     driver::Memory,
     latency::Histogram,
-    latency_budget::{Answers, LatencyBudget},
     samples::{
         Action, Cause, CommandSample, DirectiveSample, HoldReason, LinkSample, Order,
         TickLimitSample,
@@ -63,7 +62,6 @@ pub struct Shell {
     latency: Histogram,
     latency_ns: u64,
     stated_ns: u64,
-    budget: LatencyBudget,
 }
 
 impl Process for Shell {
@@ -131,7 +129,6 @@ impl Process for Shell {
             latency: Histogram::default(),
             latency_ns: 0,
             stated_ns: 0,
-            budget: context.budget.clone(),
         };
         if shell.marked {
             shell.take(Event::Operator(Request::Stop), monotonic_ns())?;
@@ -157,8 +154,6 @@ impl Process for Shell {
         }
         let began_ns = monotonic_ns();
         loop {
-            // A tick begins with its datagram.
-            self.budget.awake();
             let now_ns = monotonic_ns();
             if now_ns - began_ns > MOST_LISTENING_NS {
                 break;
@@ -309,8 +304,6 @@ impl Shell {
                     if let Some(memory) = self.runner.stage.link.driver_memory() {
                         self.saved.save(&memory)?;
                     }
-                    let tick = self.runner.out.at.tick;
-                    self.budget.published(tick, Answers::Feedback);
                     self.latency_ns = monotonic_ns().saturating_sub(began_ns);
                     self.latency.record(self.latency_ns);
                     self.state()?;

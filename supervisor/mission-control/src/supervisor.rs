@@ -62,7 +62,12 @@ impl Robot {
             let address = address.parse::<Address<String>>()?.resolve()?;
             return Ok(Self { simulator: None, address });
         }
-        let simulator = Simulator::start(&options.directory, &options.mission, options.pace)?;
+        let simulator = Simulator::start(
+            processes::process::firsthand(&[]),
+            &options.directory,
+            &options.mission,
+            options.pace,
+        )?;
         Ok(Self { address: Address::Udp(simulator.address()), simulator: Some(simulator) })
     }
 

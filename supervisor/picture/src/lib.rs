@@ -13,8 +13,8 @@
 //! | `page`, `lattice` | the page, and cells on it |
 //! | [`Scene`] | the data of a picture |
 //!
-//! `map` draws the field of a bare map with the same bands and lines, and `raster` converts it to PNG. `chart` draws
-//! values against each other; `plot` is its frame.
+//! `map` draws the field of a bare map with the same bands and lines. `chart` draws values against each other; `plot` is its
+//! frame.
 //!
 //! A picture shows what is known at the end of a run, however it ended: every layer but the frame may be missing, and
 //! every input gives a valid file.
@@ -29,7 +29,6 @@ mod margin;
 mod motion;
 mod page;
 mod plot;
-mod raster;
 mod scene;
 mod streamlines;
 #[cfg(test)]
@@ -45,7 +44,6 @@ pub use self::{
     chart::{Chart, Mark, Series},
     map::{FieldOnMap, map_svg},
     page::escape,
-    raster::png,
     scene::{Facts, Scene},
 };
 
