@@ -2,7 +2,7 @@
 
 use std::{
     io::{BufRead as _, BufReader},
-    process::{Child, Command, Stdio},
+    process::{Child, Stdio},
 };
 
 use rustix::process::Signal;
@@ -23,12 +23,7 @@ struct Page {
 
 impl Page {
     fn start(robot: &str, listen: &str) -> Self {
-        Self::start_with(robot, listen, &[])
-    }
-
-    fn start_with(robot: &str, listen: &str, arguments: &[&str]) -> Self {
         let mut child = firsthand(&["page", "--robot", robot, "--listen", listen])
-            .args(arguments)
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
@@ -61,11 +56,6 @@ impl Drop for Page {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
-}
-
-/// Whether a program of that name is installed.
-fn has(program: &str) -> bool {
-    Command::new(program).arg("version").output().is_ok()
 }
 
 const IS_LOST: &str = "document.body.classList.contains('lost')";
@@ -229,53 +219,14 @@ fn a_page_of_dark_colours_is_printed_in_light_ones() {
 }
 
 #[test]
-fn a_page_for_others_than_this_machine_needs_keys() {
+fn a_page_for_others_than_this_machine_is_refused_because_it_does_not_encrypt() {
     let listen = ["page", "--robot", "page-far", "--listen"];
-    refused(&[&listen[..], &["0.0.0.0:0"]].concat(), "not-loopback", &["0.0.0.0", "--tls-cert"]);
+    refused(
+        &[&listen[..], &["0.0.0.0:0"]].concat(),
+        "not-loopback",
+        &["0.0.0.0", "--behind-proxy"],
+    );
     refused(&[&listen[..], &["here"]].concat(), "usage", &["--listen"]);
-}
-
-#[test]
-fn an_encrypted_page_is_served_under_the_name_of_its_certificate_alone() {
-    if !has("openssl") || !has("curl") {
-        return not_run("an encrypted page", "openssl and curl are missing");
-    }
-    let directory = tempfile::tempdir().unwrap();
-    let path = |name: &str| directory.path().join(name).to_str().unwrap().to_owned();
-    let (certificate, key) = (path("certificate.pem"), path("key.pem"));
-    let made = Command::new("openssl")
-        .args(["req", "-x509", "-nodes", "-newkey", "ec", "-days", "2", "-subj", "/CN=localhost"])
-        .args([
-            "-pkeyopt",
-            "ec_paramgen_curve:prime256v1",
-            "-addext",
-            "subjectAltName=DNS:localhost",
-        ])
-        .args(["-keyout", &key, "-out", &certificate])
-        .output();
-    assert!(made.unwrap().status.success());
-    let keys = ["--tls-cert", &certificate, "--tls-key", &key];
-    let page = Page::start_with("page-tls", "127.0.0.1:0", &keys);
-    let port = page.watch.strip_prefix("https://127.0.0.1:").unwrap().split('/').next().unwrap();
-    let status = |scheme: &str, host: &str| {
-        let url = format!("{scheme}://localhost:{port}/");
-        let asked = Command::new("curl")
-            .args([
-                "--silent",
-                "--max-time",
-                "10",
-                "--cacert",
-                &certificate,
-                "--output",
-                "/dev/null",
-            ])
-            .args(["--write-out", "%{http_code}", "--header", &format!("Host: {host}"), &url])
-            .output();
-        String::from_utf8(asked.unwrap().stdout).unwrap()
-    };
-    assert_eq!(status("https", &format!("localhost:{port}")), "200");
-    assert_eq!(status("https", "evil.example"), "421");
-    assert_eq!(status("http", &format!("localhost:{port}")), "000", "without encryption");
 }
 
 #[test]

@@ -65,8 +65,3 @@ pub use bus::{self, bus_instance, clock, domain, lock_holders, poll, waiter};
 pub use json_protocol as json_wire;
 pub use mission::{self, address, geometry, kinematics, sonar};
 pub use x80_protocol as wire;
-
-/// The guide's Rust is compiled with the doc tests.
-#[cfg(doctest)]
-#[doc = include_str!("../../supervisor/guide/attach.md")]
-pub struct Attach;

@@ -1,7 +1,7 @@
 //! The files of the page, embedded.
 
 /// A file that the live page serves: its path, its type, its text.
-pub(crate) type Asset = (&'static str, &'static str, &'static str);
+pub type Asset = (&'static str, &'static str, &'static str);
 
 const HTML: &str = "text/html; charset=utf-8";
 const CSS: &str = "text/css; charset=utf-8";
@@ -11,7 +11,7 @@ const TEXT: &str = "text/plain; charset=utf-8";
 macro_rules! web {
     ($($path:literal $file:literal $kind:ident,)*) => {
         /// All files of the page.
-        pub(crate) const ALL: &[Asset] =
+        pub const ALL: &[Asset] =
             &[$(($path, $kind, include_str!(concat!("../web/", $file)))),*];
     };
 }

@@ -27,15 +27,14 @@ const MOST_A_SIDE: usize = 256;
 
 /// The content of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Shown {
+pub enum Shown {
     Map = 1,
     Field = 2,
-    #[cfg_attr(not(feature = "live"), allow(dead_code))]
     Preview = 3,
 }
 
 /// The map of `cells` at mission time `time_s`.
-pub(crate) fn map(frame: GridFrame, cells: &[u8], time_s: f64) -> Vec<u8> {
+pub fn map(frame: GridFrame, cells: &[u8], time_s: f64) -> Vec<u8> {
     let header = Header {
         shown: Shown::Map,
         cells: frame.cells as usize,
@@ -48,7 +47,7 @@ pub(crate) fn map(frame: GridFrame, cells: &[u8], time_s: f64) -> Vec<u8> {
 }
 
 /// The field of `cells` to `target` at mission time `time_s`.
-pub(crate) fn field(
+pub fn field(
     shown: Shown,
     frame: GridFrame,
     cells: &[FieldCell],

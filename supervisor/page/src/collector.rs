@@ -1,28 +1,22 @@
-//! Samples of a robot as the page shows them: rows of its charts, states, events, maps and fields. The live page and the recorded one
+//! Samples of a robot as the page shows them: rows of its charts, states, maps and fields. The live page and the recorded one
 //! both come from here.
 
 use std::collections::{BTreeMap, VecDeque};
 
 use common::{
-    bus::{Layout, decode_sample, decode_slice},
-    grid::{Applied, Replica},
     ground_truth::GroundTruthTick,
     mission::Mission,
     process_usage::Usage,
     samples::{
-        CommandSample, FieldCell, FieldHeader, GridHeader, GuidanceSample, GuidanceStatus,
-        HoldReason, LinkSample, Order, PoseSample, PowerSample, RangeReading, RangeStatus,
-        RangesHeader, RosterEntry, RosterHeader, StageState, TargetSample, WheelSample, name_str,
+        CommandSample, GridHeader, GuidanceSample, HoldReason, LinkSample, Order, PoseSample,
+        RangeReading, RangeStatus, RosterEntry, RosterHeader, StageState, WheelSample, name_str,
     },
-    topics::{self, AnyTopic},
 };
 use glam::DVec2;
+use robot_state::{RobotState, Sample, guidance_in_words, words};
 use serde_json::{Value, json};
 
-use crate::{
-    blob::{self, Shown},
-    events::{Event, Events, words},
-};
+use crate::blob;
 
 /// The columns of a row before those of the sensors.
 pub(crate) const COLUMNS: [&str; 24] = [
@@ -80,19 +74,9 @@ pub struct Collector {
     pose_tick: u64,
     /// The samples of the newest row.
     newest: Tick,
-    power: Option<PowerSample>,
-    link: LinkSample,
-    roster: RosterHeader,
-    stages: Vec<RosterEntry>,
+    /// The newest samples, and the events in them.
+    pub state: RobotState,
     usage: Vec<Usage>,
-    grid: Replica<u8>,
-    grid_header: GridHeader,
-    field: Replica<FieldCell>,
-    field_target: DVec2,
-    target: DVec2,
-    events: Events,
-    /// The targets after the current one.
-    ahead: Vec<DVec2>,
     /// The ground truth from the tick of the newest row on, as far as it was read.
     truths: VecDeque<GroundTruthTick>,
     /// The facts that decided the newest state, and their time.
@@ -102,26 +86,6 @@ pub struct Collector {
 }
 
 impl Collector {
-    /// The topics whose messages are shown, besides the field.
-    pub const TOPICS: [&dyn AnyTopic; 15] = [
-        &topics::POSE,
-        &topics::RANGES,
-        &topics::WHEELS,
-        &topics::COMMAND,
-        &topics::GUIDANCE,
-        &topics::TARGET,
-        &topics::POWER,
-        &topics::GRID,
-        &topics::ROSTER,
-        &topics::DEATHS,
-        &topics::DIRECTIVE,
-        &topics::STALLS,
-        &topics::REQUESTS,
-        &topics::FAULTS,
-        // The link ends a tick, so it is read last.
-        &topics::LINK,
-    ];
-
     pub fn new(mission: &Mission) -> Self {
         Self {
             mission: mission.clone(),
@@ -131,18 +95,8 @@ impl Collector {
                 ranges: Some(vec![None; mission.sensor_table().len()]),
                 ..Tick::default()
             },
-            power: None,
-            link: LinkSample::default(),
-            roster: RosterHeader::default(),
-            stages: Vec::new(),
+            state: RobotState::of_mission(mission),
             usage: Vec::new(),
-            grid: Replica::default(),
-            grid_header: GridHeader::default(),
-            field: Replica::default(),
-            field_target: mission.target,
-            target: mission.target,
-            ahead: Vec::new(),
-            events: Events::default(),
             truths: VecDeque::new(),
             state_of: None,
             map_of: None,
@@ -150,57 +104,22 @@ impl Collector {
         }
     }
 
-    /// Take the message `data` of `topic`. None if it does not match its topic; other topics are ignored.
-    pub fn take(&mut self, topic: &str, data: &[u8]) -> Option<()> {
-        fn sample<P: Layout>(data: &[u8]) -> Option<P> {
-            decode_sample(data)
+    pub fn apply(&mut self, sample: &Sample) {
+        self.state.apply(sample);
+        match sample {
+            Sample::Pose(pose) => {
+                self.pose_tick = pose.stamp.tick;
+                self.tick(pose.stamp.tick).pose = Some(*pose);
+            }
+            Sample::Ranges(header, readings) => self.ranges(header.stamp.tick, readings),
+            Sample::Wheels(wheels) => self.wheels(wheels),
+            Sample::Command(command) => self.tick(command.stamp.tick).command = Some(*command),
+            Sample::Guidance(guidance) => {
+                self.tick(guidance.stamp.tick).guidance = Some(*guidance);
+            }
+            Sample::Link(link) => self.tick(link.stamp.tick).latency_ns = Some(link.latency_ns),
+            _ => {}
         }
-        let is = |known: &dyn AnyTopic| topic == known.spec().name;
-        if is(&topics::POSE) {
-            self.pose(sample(data)?);
-        } else if is(&topics::RANGES) {
-            let (header, readings) = decode_slice::<RangesHeader, RangeReading>(data)?;
-            self.ranges(header.stamp.tick, &readings);
-        } else if is(&topics::WHEELS) {
-            self.wheels(&sample(data)?);
-        } else if is(&topics::COMMAND) {
-            self.command(sample(data)?);
-        } else if is(&topics::GUIDANCE) {
-            let guidance: GuidanceSample = sample(data)?;
-            self.tick(guidance.stamp.tick).guidance = Some(guidance);
-        } else if is(&topics::TARGET) {
-            self.sent(&sample(data)?);
-        } else if is(&topics::POWER) {
-            self.power = Some(sample(data)?);
-        } else if is(&topics::LINK) {
-            self.link(sample(data)?);
-        } else if is(&topics::GRID) {
-            let (header, cells) = decode_slice::<GridHeader, u8>(data)?;
-            self.grid(&header, &cells);
-        } else if is(&topics::FIELD) {
-            let (header, cells) = decode_slice::<FieldHeader, FieldCell>(data)?;
-            self.field(&header, &cells);
-        } else if is(&topics::ROSTER) {
-            let (header, entries) = decode_slice::<RosterHeader, RosterEntry>(data)?;
-            self.roster(header, &entries);
-        } else if is(&topics::DEATHS) {
-            self.events.death(&sample(data)?);
-        } else if is(&topics::DIRECTIVE) {
-            self.events.directive(&sample(data)?);
-        } else if is(&topics::STALLS) {
-            self.events.stall(&sample(data)?);
-        } else if is(&topics::REQUESTS) {
-            self.events.request(&sample(data)?);
-        } else if is(&topics::FAULTS) {
-            self.events.fault(&sample(data)?);
-        }
-        Some(())
-    }
-
-    fn pose(&mut self, pose: PoseSample) {
-        self.events.now_s = self.events.now_s.max(pose.stamp.time().seconds());
-        self.pose_tick = pose.stamp.tick;
-        self.tick(pose.stamp.tick).pose = Some(pose);
     }
 
     fn tick(&mut self, number: u64) -> &mut Tick {
@@ -231,41 +150,6 @@ impl Collector {
             Some(speeds.map(|speed| f64::from(speed) * per_count));
     }
 
-    fn command(&mut self, command: CommandSample) {
-        self.events.command(&command);
-        self.tick(command.stamp.tick).command = Some(command);
-    }
-
-    fn grid(&mut self, header: &GridHeader, cells: &[u8]) {
-        if self.grid.apply(&header.part, cells) != Applied::Missed {
-            self.grid_header = *header;
-        }
-    }
-
-    pub(crate) fn field(&mut self, header: &FieldHeader, cells: &[FieldCell]) {
-        if self.field.apply(&header.part, cells) != Applied::Missed {
-            self.field_target = DVec2::new(header.target_x_m, header.target_y_m);
-        }
-    }
-
-    fn sent(&mut self, target: &TargetSample) {
-        self.events.target(target);
-        self.target = target.target.position();
-        self.ahead = target.ahead().iter().map(|point| point.position()).collect();
-    }
-
-    fn roster(&mut self, header: RosterHeader, entries: &[RosterEntry]) {
-        self.events.roster(entries);
-        self.roster = header;
-        self.stages = entries.to_vec();
-    }
-
-    fn link(&mut self, link: LinkSample) {
-        self.events.link(&link);
-        self.tick(link.stamp.tick).latency_ns = Some(link.latency_ns);
-        self.link = link;
-    }
-
     /// The row of `tick`. Values that did not come in it are as before.
     fn row(&mut self, tick: Tick) -> Option<Value> {
         let pose = &tick.pose?;
@@ -287,7 +171,7 @@ impl Collector {
         self.truths.drain(..of_pose.unwrap_or_default());
         let truth = of_pose.and_then(|_| self.truths.front());
         let truth = truth.map_or([f64::NAN; 3], |truth| [truth.x, truth.y, truth.heading]);
-        let volts = self.power.map_or([f64::NAN; 2], |power| [power.board_v, power.motor_v]);
+        let volts = self.state.power.map_or([f64::NAN; 2], |power| [power.board_v, power.motor_v]);
         let values = [
             pose.stamp.time().seconds(),
             pose.x_m,
@@ -331,15 +215,10 @@ impl Collector {
         self.truths.len() < MOST_TRUTHS
     }
 
-    /// Take a line of the log of `process`.
-    pub fn log(&mut self, process: &str, line: &str) {
-        self.events.log(process, line);
-    }
-
     /// The processes of the stages, and the supervisor's.
     pub fn processes(&self) -> Vec<u32> {
-        let stages = self.stages.iter().map(|entry| entry.pid);
-        stages.chain([self.roster.supervisor_pid]).collect()
+        let stages = self.state.stages.iter().map(|entry| entry.pid);
+        stages.chain([self.roster().supervisor_pid]).collect()
     }
 
     /// Take the usage of these processes, in the order of [`Self::processes`].
@@ -349,7 +228,7 @@ impl Collector {
 
     /// The rows of the ticks that have ended since the last time: a sample of the link ends a tick.
     pub fn take_rows(&mut self) -> Vec<Value> {
-        let last = self.link.stamp.tick.min(self.pose_tick);
+        let last = self.link().stamp.tick.min(self.pose_tick);
         let mut rows = Vec::new();
         while let Some(first) = self.ticks.first_entry().filter(|first| *first.key() <= last) {
             let tick = first.remove();
@@ -358,75 +237,63 @@ impl Collector {
         rows
     }
 
-    /// The events since the last time.
-    pub fn take_events(&mut self) -> Vec<Event> {
-        self.events.take()
+    fn roster(&self) -> RosterHeader {
+        self.state.supervisor.unwrap_or_default()
     }
 
-    /// The mission time of the newest pose, seconds.
-    pub fn now_s(&self) -> f64 {
-        self.events.now_s
+    fn link(&self) -> LinkSample {
+        self.state.link.unwrap_or_default()
     }
 
     /// The map as a message, if it has changed since the last time.
     pub fn take_map(&mut self) -> Option<Vec<u8>> {
-        let frame = self.grid.frame()?;
-        let version = self.grid.version();
-        let changed = self.map_of.replace(version) != Some(version);
-        changed.then(|| blob::map(frame, self.grid.cells(), self.now_s()))
+        let map = &self.state.map;
+        let changed = self.map_of.replace(map.version()) != Some(map.version());
+        let frame = map.frame().filter(|_| changed)?;
+        Some(blob::map(frame, map.cells(), self.state.now_s()))
     }
 
     /// The field as a message, if it has changed since the last time.
     pub fn take_field(&mut self) -> Option<Vec<u8>> {
-        let frame = self.field.frame()?;
-        let version = self.field.version();
-        let changed = self.field_of.replace(version) != Some(version);
-        let cells = self.field.cells();
-        changed.then(|| blob::field(Shown::Field, frame, cells, self.field_target, self.now_s()))
+        let (field, header) = (&self.state.field, &self.state.field_header);
+        let changed = self.field_of.replace(field.version()) != Some(field.version());
+        let frame = field.frame().filter(|_| changed)?;
+        let target = DVec2::new(header.target_x_m, header.target_y_m);
+        Some(blob::field(blob::Shown::Field, frame, field.cells(), target, self.state.now_s()))
     }
 
     /// The map, for a planner; none before the first keyframe.
     pub fn belief(&self) -> Option<(GridHeader, &[u8])> {
-        let frame = self.grid.frame()?;
-        let part = common::grid::Part::whole(frame, self.grid.version());
-        Some((GridHeader { part, ..self.grid_header }, self.grid.cells()))
+        let map = &self.state.map;
+        let part = common::grid::Part::whole(map.frame()?, map.version());
+        Some((GridHeader { part, ..self.state.map_header }, map.cells()))
     }
 
     /// The target of the robot, metres.
-    pub const fn target(&self) -> DVec2 {
-        self.target
+    pub fn target(&self) -> DVec2 {
+        self.state.target.map_or(self.mission.target, |sent| sent.target.position())
     }
 
     pub fn mission(&self) -> &Mission {
         &self.mission
     }
 
-    /// Whether the link stops the robot for an operator, and the link's action in words.
-    #[cfg(feature = "live")]
-    pub(crate) fn link_says(&self) -> (bool, String) {
-        let (action, cause) = (self.link.action().effect(), self.link.cause());
-        let why = if self.link.stopped() { format!(": {}", cause.name()) } else { String::new() };
-        (
-            cause == common::samples::Cause::OperatorStop,
-            format!("the link says that the robot {action}{why}"),
-        )
-    }
-
     /// The state of the robot's processes, if it has changed since the last time; if only ages differ, once a second.
     pub fn take_state(&mut self) -> Option<Value> {
-        if self.stages.is_empty() {
+        if self.state.stages.is_empty() {
             return None;
         }
         let flags = |entry: &RosterEntry| [u64::from(entry.pid), u64::from(entry.state)];
-        let mut key: Vec<u64> = self.stages.iter().flat_map(flags).collect();
-        let LinkSample { action, cause, connected, at_rest, .. } = self.link;
-        let RosterHeader { order, reason, .. } = self.roster;
-        let kind = self.events.kind(&self.link);
+        let mut key: Vec<u64> = self.state.stages.iter().flat_map(flags).collect();
+        let LinkSample { action, cause, connected, at_rest, .. } = self.link();
+        let RosterHeader { order, reason, .. } = self.roster();
+        let kind = self.state.failsafe();
         key.extend(
             [action, cause, at_rest, order, reason, self.status(), kind as u8].map(u64::from),
         );
-        key.extend([u64::from(connected), self.events.target, self.ahead.len() as u64]);
-        let now = self.now_s();
+        let target = self.state.target.map_or(0, |sent| sent.number);
+        key.extend([u64::from(connected), target, self.state.targets().count() as u64]);
+        let now = self.state.now_s();
         if let Some((before, at)) = &self.state_of
             && *before == key
             && now < at + STATE_AGAIN_S
@@ -434,16 +301,17 @@ impl Collector {
             return None;
         }
         self.state_of = Some((key, now));
-        Some(self.state())
+        Some(self.state_json())
     }
 
     fn status(&self) -> u8 {
         self.newest.guidance.map_or(0, |guidance| guidance.status)
     }
 
-    fn state(&self) -> Value {
+    fn state_json(&self) -> Value {
         let usage = |at: usize| self.usage.get(at).copied().unwrap_or_default();
-        let stages = self.stages.iter().enumerate().map(|(at, entry)| {
+        let (link, roster) = (self.link(), self.roster());
+        let stages = self.state.stages.iter().enumerate().map(|(at, entry)| {
             json!({
                 "name": name_str(&entry.stage),
                 "state": words(StageState::from_byte(entry.state)),
@@ -456,26 +324,26 @@ impl Collector {
                 "memory": usage(at).memory_bytes,
             })
         });
-        let own = usage(self.stages.len());
-        let targets = [self.target].into_iter().chain(self.ahead.iter().copied());
+        let own = usage(self.state.stages.len());
+        let targets = self.state.targets().map(|at| [at.x_m, at.y_m]);
         json!({
-            "t": rounded(self.now_s()),
-            "order": words(Order::from_byte(self.roster.order)),
-            "reason": match HoldReason::from_byte(self.roster.reason) {
+            "t": rounded(self.state.now_s()),
+            "order": words(Order::from_byte(roster.order)),
+            "reason": match HoldReason::from_byte(roster.reason) {
                 HoldReason::None => String::new(),
                 reason => words(reason),
             },
-            "connected": self.link.connected == 1,
-            "at_rest": self.link.at_rest == 1,
-            "stopped": self.link.stopped(),
-            "kind": self.events.kind(&self.link),
-            "action": self.link.action().effect(),
-            "cause": self.link.cause().name(),
-            "guidance": words(GuidanceStatus::from_byte(self.status())),
-            "targets": targets.map(|at| [at.x, at.y]).collect::<Vec<_>>(),
+            "connected": link.connected == 1,
+            "at_rest": link.at_rest == 1,
+            "stopped": link.stopped(),
+            "kind": self.state.failsafe(),
+            "action": link.action().effect(),
+            "cause": link.cause().name(),
+            "guidance": guidance_in_words(self.status()),
+            "targets": targets.collect::<Vec<_>>(),
             "stages": stages.collect::<Vec<_>>(),
             "supervisor": {
-                "pid": self.roster.supervisor_pid,
+                "pid": roster.supervisor_pid,
                 "cpu": own.cpu.map_or(Value::Null, rounded),
                 "memory": own.memory_bytes,
             },

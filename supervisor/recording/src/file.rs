@@ -19,7 +19,11 @@ use mcap::{
     records::{MessageHeader, Metadata},
 };
 
-use crate::{error::RecordingError, schema, viewers};
+use crate::{
+    error::RecordingError,
+    schema,
+    viewers::{self, Channel},
+};
 
 /// The bytes at which a chunk is written, unless it is written after [`CHUNK_EVERY`].
 const CHUNK_BYTES: u64 = 1 << 19;
@@ -41,7 +45,7 @@ pub(crate) struct RecordingFile {
 }
 
 /// The time, nanoseconds since 1970.
-pub(crate) fn now_ns() -> u64 {
+pub fn now_ns() -> u64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     since.map_or(0, |since| since.as_nanos() as u64)
 }
@@ -87,9 +91,8 @@ impl RecordingFile {
             recording.add(spec.name, &name, "ros2msg", text.as_bytes(), "cdr", &about)?;
         }
         let none = BTreeMap::new();
-        for (topic, schema, encoding) in viewers::channels(mission) {
-            let foxglove::Schema { name, encoding: language, data } = schema;
-            recording.add(&topic, &name, &language, &data, &encoding, &none)?;
+        for Channel { topic, schema, descriptors } in viewers::channels(mission) {
+            recording.add(&topic, schema, "protobuf", descriptors, "protobuf", &none)?;
         }
         recording.add(LOST, "firsthand.Recorder", "jsonschema", LOST_SCHEMA, "json", &none)?;
         recording.metadata(about)?;

@@ -43,37 +43,33 @@
 //! | module | holds |
 //! |---|---|
 //! | [`schema`] | the schema of a topic, made from its layout |
-//! | [`downsampled`] | a bounded number of samples |
 //! | `budget` | the disk budget of a recorder's files |
 //! | `file` | writing the file |
-//! | [`live`] | the channels of a recording, live (feature `live`) |
 //! | `log_files` | lines that the processes of a run append to their logs |
 //! | `places` | the names of recordings |
 //! | `losses` | samples that the recorder missed |
 //! | [`recorder`] | the recorder |
 //! | [`reader`] | reading the file |
-//! | [`replay`] | recordings replayed to the bit (feature `replay`) |
-//! | `viewers` | messages for viewers |
+//! | [`replay`] | recordings replayed to the bit |
+//! | [`viewers`], `protobuf` | messages for viewers, and their encoding |
 //! | `error` | errors |
 
 mod budget;
-pub mod downsampled;
 mod error;
 mod file;
-#[cfg(feature = "live")]
-pub mod live;
 pub mod log_files;
 mod losses;
 mod places;
+mod protobuf;
 pub mod reader;
 pub mod recorder;
-#[cfg(feature = "replay")]
 pub mod replay;
 pub mod schema;
-mod viewers;
+pub mod viewers;
 
 pub use self::{
     error::RecordingError,
+    file::now_ns,
     places::{next_place, parts},
     reader::{End, Message, Recording, Sample, SliceSample},
     recorder::{Options, record},

@@ -11,11 +11,43 @@ use std::{
 /// Most bytes that are read of one log at once.
 const AT_ONCE: usize = 1 << 16;
 
+/// Reads the lines that are appended to a file.
+#[derive(Debug, Default)]
+pub struct Tail {
+    read: u64,
+    /// The incomplete last line.
+    partial: Vec<u8>,
+}
+
+impl Tail {
+    /// The new whole lines of `file`, of which at most 64 KiB are read at once. Without the file there are none.
+    pub fn lines(&mut self, file: &Path) -> String {
+        let mut bytes = vec![0; AT_ONCE];
+        let read = File::open(file).and_then(|file| file.read_at(&mut bytes, self.read));
+        let length = read.unwrap_or_default();
+        self.read += length as u64;
+        self.partial.extend_from_slice(&bytes[..length]);
+        let whole = self.partial.iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);
+        // A line without an end is given in parts.
+        let is_endless = whole == 0 && self.partial.len() > AT_ONCE;
+        let given = if is_endless { self.partial.len() } else { whole };
+        let lines: Vec<u8> = self.partial.drain(..given).collect();
+        String::from_utf8_lossy(&lines).into_owned()
+    }
+
+    /// Leave out what `file` contains but its last `most` bytes, if it is not read so far yet.
+    pub fn skip(&mut self, file: &Path, most: u64) {
+        let from = file.metadata().map_or(0, |file| file.len()).saturating_sub(most);
+        if self.read < from {
+            *self = Self { read: from, partial: Vec::new() };
+        }
+    }
+}
+
 #[derive(Debug)]
 pub struct LogFiles {
     directory: PathBuf,
-    /// The position in each log, and its incomplete last line.
-    read: HashMap<PathBuf, (u64, Vec<u8>)>,
+    read: HashMap<PathBuf, Tail>,
 }
 
 impl LogFiles {
@@ -24,8 +56,7 @@ impl LogFiles {
         let mut files = Self { directory: directory.to_path_buf(), read: HashMap::new() };
         if !from_the_beginning {
             for file in files.files() {
-                let length = file.metadata().map_or(0, |file| file.len());
-                files.read.insert(file, (length, Vec::new()));
+                files.read.entry(file.clone()).or_default().skip(&file, 0);
             }
         }
         files
@@ -41,22 +72,7 @@ impl LogFiles {
     pub fn take(&mut self, each: &mut dyn FnMut(&str, &str)) {
         for file in self.files() {
             let process = file.file_stem().map(|name| name.to_string_lossy().into_owned());
-            let (at, partial) = self.read.entry(file.clone()).or_default();
-            let Ok(log) = File::open(&file) else {
-                continue;
-            };
-            let mut bytes = vec![0; AT_ONCE];
-            let Ok(length) = log.read_at(&mut bytes, *at) else {
-                continue;
-            };
-            *at += length as u64;
-            partial.extend_from_slice(&bytes[..length]);
-            let whole = partial.iter().rposition(|&byte| byte == b'\n');
-            let Some(whole) = whole.or((partial.len() > AT_ONCE).then(|| partial.len() - 1)) else {
-                continue;
-            };
-            let lines: Vec<u8> = partial.drain(..=whole).collect();
-            for line in String::from_utf8_lossy(&lines).lines() {
+            for line in self.read.entry(file.clone()).or_default().lines(&file).lines() {
                 each(process.as_deref().unwrap_or_default(), line);
             }
         }

@@ -264,13 +264,11 @@ impl CurrentRun {
                 }
                 file.sample(spec, &stamp, &self.message)?;
                 let mut written = Ok(());
-                // A message that does not match its topic is not drawn.
-                let _ =
-                    self.drawn.take(spec.name, &self.message, now_ns(), &mut |topic, message| {
-                        if written.is_ok() {
-                            written = file.message(topic, message);
-                        }
-                    });
+                self.drawn.message(spec.name, &self.message, now_ns(), &mut |topic, message| {
+                    if written.is_ok() {
+                        written = file.message(topic, message);
+                    }
+                });
                 written?;
             }
         }

@@ -1,35 +1,27 @@
 //! Messages that Foxglove and Lichtblick draw, in Foxglove's schemas as Protobuf (<https://docs.foxglove.dev/docs/sdk/schemas>).
-//! Recordings and the live server have the same.
+//! Recordings and the live server have the same. The schemas in `foxglove/` are those of Foxglove's SDK 0.30.3 (MIT licence); tests
+//! of `firsthand-foxglove`, which contains the SDK, compare them and decode the messages with it.
 
 use std::collections::BTreeMap;
 
 use common::{
-    bus::{decode_sample, decode_slice},
-    grid::{Cell, CellState, GridFrame, Replica},
+    grid::{Cell, CellState, GridFrame},
     kinematics::Pose2,
     mission::{Mission, Sensor, SensorKind},
-    samples::{
-        GridHeader, PoseSample, RangeReading, RangeStatus, RangesHeader, ScanHeader, TargetSample,
-    },
-    topics,
+    samples::{GridHeader, PoseSample, RangeReading, RangeStatus, RangesHeader, ScanHeader},
+    topics::{self, AnyTopic},
 };
-use foxglove::{
-    Decode as _, Encode, Schema,
-    messages::{
-        Color, CylinderPrimitive, FrameTransform, FrameTransforms, Grid, LaserScan, LinePrimitive,
-        Log, Odometry, PackedElementField, Point3, Pose, PoseInFrame, Quaternion, SceneEntity,
-        SceneUpdate, Timestamp, Vector2, Vector3, packed_element_field::NumericType,
-    },
-};
+use robot_state::{RobotState, Sample};
 
-use crate::downsampled::Downsampled;
+use crate::protobuf::{Message, text_in};
 
 const TRANSFORMS: &str = "foxglove/transforms";
 const POSE: &str = "foxglove/pose";
 const ODOMETRY: &str = "foxglove/odometry";
 const GRID: &str = "foxglove/grid";
 const SCENE: &str = "foxglove/scene";
-pub(crate) const LOG: &str = "log";
+/// The channel of log lines.
+pub const LOG: &str = "log";
 
 /// The mission's frame.
 const MAP: &str = "map";
@@ -37,130 +29,109 @@ const MAP: &str = "map";
 const BASE: &str = "base";
 /// Mission time between scenes and between maps, nanoseconds.
 const EVERY_NS: u64 = 1_000_000_000;
-/// The most points of the trajectory that are drawn. From a longer one every second, fourth, ... point is drawn.
-const TRAJECTORY: usize = 1000;
 /// The most cells a side of a drawn map; in a larger one a cell stands for several.
 const MOST_A_SIDE: usize = 1024;
 /// The bytes of a drawn cell and their names. `state` is a [`CellState`]; viewers use the other four as its colour by default.
 const CELL: [&str; 5] = ["state", "red", "green", "blue", "alpha"];
 
-/// A channel for viewers: topic, schema, encoding of its messages.
-pub(crate) type Channel = (String, Schema, String);
-/// Takes a message: topic and content.
-pub(crate) type Sink<'a> = &'a mut dyn FnMut(&str, &[u8]);
+/// The topics that are drawn.
+static DRAWN: [&dyn AnyTopic; 5] =
+    [&topics::POSE, &topics::RANGES, &topics::SCAN, &topics::GRID, &topics::TARGET];
 
-pub(crate) fn channels(mission: Option<&Mission>) -> Vec<Channel> {
-    fn channel<M: Encode>(topic: impl Into<String>) -> Option<Channel> {
-        Some((topic.into(), M::get_schema()?, M::get_message_encoding()))
-    }
+/// A channel for viewers, whose messages are in the encoding `protobuf`, and the schema too.
+#[derive(Clone, Debug)]
+pub struct Channel {
+    pub topic: String,
+    /// The name of its schema, such as `foxglove.Grid`.
+    pub schema: &'static str,
+    /// The schema, a `FileDescriptorSet`.
+    pub descriptors: &'static [u8],
+}
+
+/// Takes a message: topic and content.
+pub type Sink<'a> = &'a mut dyn FnMut(&str, &[u8]);
+
+macro_rules! channel {
+    ($topic:expr, $name:literal) => {
+        Channel {
+            topic: $topic.to_owned(),
+            schema: concat!("foxglove.", $name),
+            descriptors: include_bytes!(concat!("../foxglove/", $name, ".bin")),
+        }
+    };
+}
+
+/// The channels for the drawings of `mission`.
+pub fn channels(mission: Option<&Mission>) -> Vec<Channel> {
     let fixed = [
-        channel::<FrameTransforms>(TRANSFORMS),
-        channel::<PoseInFrame>(POSE),
-        channel::<Odometry>(ODOMETRY),
-        channel::<Grid>(GRID),
-        channel::<SceneUpdate>(SCENE),
-        channel::<Log>(LOG),
+        channel!(TRANSFORMS, "FrameTransforms"),
+        channel!(POSE, "PoseInFrame"),
+        channel!(ODOMETRY, "Odometry"),
+        channel!(GRID, "Grid"),
+        channel!(SCENE, "SceneUpdate"),
+        channel!(LOG, "Log"),
     ];
     let sensors = mission.map(Mission::sensor_table).unwrap_or_default();
     let used = sensors.iter().filter(|sensor| sensor.used);
-    let scans = used.map(|sensor| channel::<LaserScan>(scan_topic(sensor)));
-    fixed.into_iter().chain(scans).flatten().collect()
+    fixed.into_iter().chain(used.map(|sensor| channel!(scan_topic(sensor), "LaserScan"))).collect()
 }
 
 fn scan_topic(sensor: &Sensor) -> String {
     format!("foxglove/scan/{}", sensor.name)
 }
 
-fn send(sink: Sink<'_>, topic: &str, message: &impl Encode) {
-    let mut bytes = Vec::with_capacity(message.encoded_len().unwrap_or_default());
-    // A Vec has room for any message.
-    if message.encode(&mut bytes).is_ok() {
-        sink(topic, &bytes);
-    }
-}
-
 /// The drawings of a run for viewers.
-pub(crate) struct Drawn {
+pub struct Drawn {
     mission: Option<Mission>,
     sensors: Vec<Sensor>,
-    grid: Replica<u8>,
+    state: RobotState,
     grid_ns: Option<u64>,
     scene_ns: Option<u64>,
-    pose: PoseSample,
-    target: Option<TargetSample>,
-    trajectory: Downsampled<Point3, TRAJECTORY>,
 }
 
 impl Drawn {
-    pub(crate) fn new(mission: Option<Mission>) -> Self {
+    /// A run before its first sample.
+    pub fn new(mission: Option<Mission>) -> Self {
         Self {
             sensors: mission.as_ref().map(Mission::sensor_table).unwrap_or_default(),
-            target: mission.as_ref().map(TargetSample::first),
+            state: mission.as_ref().map(RobotState::of_mission).unwrap_or_default(),
             mission,
-            grid: Replica::default(),
             grid_ns: None,
             scene_ns: None,
-            pose: PoseSample::default(),
-            trajectory: Downsampled::default(),
         }
     }
 
     /// Give `sink` the drawings of a `message` of `topic` that was read at `now_ns` since 1970. Viewers play messages by that time,
-    /// which is not mission time in lockstep. None if the message does not match its topic; other topics are not drawn.
-    pub(crate) fn take(
-        &mut self,
-        topic: &str,
-        message: &[u8],
-        now_ns: u64,
-        sink: Sink<'_>,
-    ) -> Option<()> {
-        if topic == topics::POSE.spec().name {
-            self.pose(&decode_sample(message)?, now_ns, sink);
-        } else if topic == topics::RANGES.spec().name {
-            let (header, readings) = decode_slice(message)?;
-            self.ranges(&header, &readings, now_ns, sink);
-        } else if topic == topics::SCAN.spec().name {
-            let (header, beams) = decode_slice::<ScanHeader, f32>(message)?;
-            if let Some(sensor) = self.sensors.get(usize::try_from(header.sensor).ok()?) {
-                send(sink, &scan_topic(sensor), &beams_of(sensor, &header, &beams, time(now_ns)));
-            }
-        } else if topic == topics::GRID.spec().name {
-            let (header, cells) = decode_slice(message)?;
-            self.grid(&header, &cells, now_ns, sink);
-        } else if topic == topics::TARGET.spec().name {
-            self.target = Some(decode_sample(message)?);
-        }
-        Some(())
-    }
-
-    fn pose(&mut self, sample: &PoseSample, now_ns: u64, sink: Sink<'_>) {
-        self.pose = *sample;
-        self.trajectory.push(point(sample.x_m, sample.y_m));
-        let timestamp = time(now_ns);
-        let pose = pose(sample.pose());
-        let odometry = Odometry {
-            timestamp,
-            frame_id: MAP.to_owned(),
-            body_frame_id: BASE.to_owned(),
-            pose,
-            linear_velocity: Some(Vector3 { x: sample.v_m_s, y: 0.0, z: 0.0 }),
-            angular_velocity: Some(Vector3 { x: 0.0, y: 0.0, z: sample.omega_rad_s }),
-            pose_covariance: sample.covariance_6x6().to_vec(),
-            velocity_covariance: vec![0.0; 36],
-            ..Odometry::default()
+    /// which is not mission time in lockstep. A message that does not match its topic, or of another topic, is not drawn.
+    pub fn message(&mut self, topic: &str, message: &[u8], now_ns: u64, sink: Sink<'_>) {
+        let is_drawn = DRAWN.iter().any(|drawn| drawn.spec().name == topic);
+        let Some(sample) = is_drawn.then(|| Sample::decoded(topic, message)).flatten() else {
+            return;
         };
-        let transforms = vec![transform(timestamp, MAP, BASE, sample.pose())];
-        send(sink, TRANSFORMS, &FrameTransforms { transforms });
-        send(sink, POSE, &PoseInFrame { timestamp, frame_id: MAP.to_owned(), pose });
-        send(sink, ODOMETRY, &odometry);
+        self.state.apply(&sample);
+        let time = time(now_ns);
+        match &sample {
+            Sample::Pose(pose) => draw_pose(pose, &time, sink),
+            Sample::Ranges(header, readings) => self.ranges(header, readings, &time, sink),
+            Sample::Scan(header, beams) => {
+                let sensor = usize::try_from(header.sensor).ok();
+                if let Some(sensor) = sensor.and_then(|row| self.sensors.get(row)) {
+                    sink(&scan_topic(sensor), beams_of(sensor, header, beams, &time).bytes());
+                }
+            }
+            Sample::Grid(header, _) => self.grid(header, &time, sink),
+            _ => {}
+        }
+        // Nobody reads them here.
+        self.state.take_events();
     }
 
-    fn grid(&mut self, header: &GridHeader, cells: &[u8], now_ns: u64, sink: Sink<'_>) {
-        let _ = self.grid.apply(&header.part, cells);
-        if let Some(frame) = self.grid.frame()
+    fn grid(&mut self, header: &GridHeader, time: &Message, sink: Sink<'_>) {
+        let map = &self.state.map;
+        if let Some(frame) = map.frame()
             && is_due(&mut self.grid_ns, header.stamp.stamp_ns)
         {
-            send(sink, GRID, &grid(frame, self.grid.cells(), time(now_ns)));
+            sink(GRID, grid(frame, map.cells(), time).bytes());
         }
     }
 
@@ -168,17 +139,16 @@ impl Drawn {
         &mut self,
         header: &RangesHeader,
         readings: &[RangeReading],
-        now_ns: u64,
+        time: &Message,
         sink: Sink<'_>,
     ) {
-        let timestamp = time(now_ns);
         if is_due(&mut self.scene_ns, header.stamp.stamp_ns) {
             let mount = |sensor: &Sensor| {
-                transform(timestamp, BASE, &sensor.name, sensor.mount.on(Pose2::default()))
+                transform(time, BASE, &sensor.name, sensor.mount.on(Pose2::default()))
             };
-            let transforms = self.sensors.iter().map(mount).collect();
-            send(sink, TRANSFORMS, &FrameTransforms { transforms });
-            send(sink, SCENE, &self.scene(timestamp));
+            let transforms = Message::default().parts(1, self.sensors.iter().map(mount));
+            sink(TRANSFORMS, transforms.bytes());
+            sink(SCENE, self.scene(time).bytes());
         }
         for reading in readings {
             let sensor = self.sensors.get(usize::from(reading.sensor));
@@ -187,55 +157,59 @@ impl Drawn {
                 && sensor.kind != SensorKind::Scan
                 && reading.status() != RangeStatus::Absent
             {
-                send(sink, &scan_topic(sensor), &scan(sensor, reading, timestamp));
+                sink(&scan_topic(sensor), scan(sensor, reading, time).bytes());
             }
         }
     }
 
-    /// The trajectory, the targets, the body, and its place within two standard deviations.
-    fn scene(&self, timestamp: Option<Timestamp>) -> SceneUpdate {
-        let entity = |id: &str, frame: &str| SceneEntity {
-            timestamp,
-            frame_id: frame.to_owned(),
-            id: id.to_owned(),
-            frame_locked: true,
-            ..SceneEntity::default()
-        };
-        let trajectory = LinePrimitive {
-            pose: pose(Pose2::default()),
-            thickness: 1.5,
-            scale_invariant: true,
-            points: self.trajectory.items().to_vec(),
-            color: color([0.0, 0.3, 0.8, 1.0]),
-            ..LinePrimitive::default()
-        };
-        let mut entities =
-            vec![SceneEntity { lines: vec![trajectory], ..entity("trajectory", MAP) }];
-        let (sigmas, axis) = self.pose.position_axes();
-        let heading = axis - self.pose.heading_rad;
-        let mut discs = vec![disc(
-            Pose2 { heading, ..Pose2::default() },
-            sigmas.map(|sigma| 4.0 * sigma),
-            [0.6, 0.2, 0.8, 0.4],
-        )];
+    /// A `SceneUpdate`: the trajectory, the targets, the body, and its place within two standard deviations.
+    fn scene(&self, time: &Message) -> Message {
+        // A `SceneEntity` that moves with its frame.
+        let entity =
+            |id: &str, frame: &str| framed(time, frame).text(3, id).integer(5, true.into());
+        // A `LinePrimitive` through all points.
+        let trajectory = Message::default()
+            .part(2, &pose(Pose2::default()))
+            .number(3, 1.5)
+            .integer(4, true.into())
+            .parts(5, self.state.way.iter().map(|at| vector([at.x, at.y, 0.0])))
+            .part(6, &vector([0.0, 0.3, 0.8, 1.0]));
+        let believed = self.state.pose.unwrap_or_default();
+        let (sigmas, axis) = believed.position_axes();
+        let ellipse = Pose2 { heading: axis - believed.heading_rad, ..Pose2::default() };
+        let mut discs = vec![disc(ellipse, sigmas.map(|sigma| 4.0 * sigma), [0.6, 0.2, 0.8, 0.4])];
+        let mut entities = vec![entity("trajectory", MAP).part(11, &trajectory)];
         if let Some(mission) = &self.mission {
             let body = 2.0 * mission.body().radius_m;
             discs.push(disc(Pose2::default(), [body; 2], [0.2, 0.4, 0.9, 0.5]));
             let reached = 2.0 * mission.arrival_tolerance_m;
-            let targets = self.target.iter();
-            let targets =
-                targets.flat_map(|sent| [&sent.target].into_iter().chain(sent.ahead())).map(|at| {
-                    let at = Pose2 { position: at.position(), heading: 0.0 };
-                    disc(at, [reached; 2], [0.1, 0.7, 0.2, 0.6])
-                });
-            entities.push(SceneEntity { cylinders: targets.collect(), ..entity("targets", MAP) });
+            let targets = self.state.targets().map(|at| {
+                let at = Pose2 { position: at.position(), heading: 0.0 };
+                disc(at, [reached; 2], [0.1, 0.7, 0.2, 0.6])
+            });
+            entities.push(entity("targets", MAP).parts(10, targets));
         }
-        entities.push(SceneEntity { cylinders: discs, ..entity("robot", BASE) });
-        SceneUpdate { entities, ..SceneUpdate::default() }
+        entities.push(entity("robot", BASE).parts(10, discs));
+        Message::default().parts(2, entities)
     }
 }
 
-fn grid(frame: GridFrame, cells: &[u8], timestamp: Option<Timestamp>) -> Grid {
+fn draw_pose(sample: &PoseSample, time: &Message, sink: Sink<'_>) {
+    let at = sample.pose();
+    let odometry = framed(time, MAP)
+        .text(3, BASE)
+        .part(4, &pose(at))
+        .part(5, &vector([sample.v_m_s, 0.0, 0.0]))
+        .part(6, &vector([0.0, 0.0, sample.omega_rad_s]))
+        .numbers(7, sample.covariance_6x6().into_iter())
+        .numbers(8, [0.0; 36].into_iter());
+    sink(TRANSFORMS, Message::default().part(1, &transform(time, MAP, BASE, at)).bytes());
+    sink(POSE, framed(time, MAP).part(3, &pose(at)).bytes());
+    sink(ODOMETRY, odometry.bytes());
+}
+
+/// A `Grid`.
+fn grid(frame: GridFrame, cells: &[u8], time: &Message) -> Message {
     let side = frame.cells as usize;
     let each = side.div_ceil(MOST_A_SIDE).max(1);
     let drawn = side.div_ceil(each);
@@ -254,22 +228,19 @@ fn grid(frame: GridFrame, cells: &[u8], timestamp: Option<Timestamp>) -> Grid {
         }
     }
     let cell_m = frame.resolution_m * each as f64;
-    let field = |(offset, name): (u32, &str)| PackedElementField {
-        name: name.to_owned(),
-        offset,
-        r#type: NumericType::Uint8.into(),
+    const UINT8: u64 = 1;
+    let field = |(offset, name): (u32, &str)| {
+        Message::default().text(1, name).fixed(2, offset).integer(3, UINT8)
     };
-    Grid {
-        timestamp,
-        frame_id: MAP.to_owned(),
-        pose: pose(Pose2 { position: frame.corner_of(Cell { col: 0, row: 0 }), heading: 0.0 }),
-        column_count: drawn as u32,
-        cell_size: Some(Vector2 { x: cell_m, y: cell_m }),
-        row_stride: (drawn * CELL.len()) as u32,
-        cell_stride: CELL.len() as u32,
-        fields: (0..).zip(CELL).map(field).collect(),
-        data: data.into(),
-    }
+    let corner = Pose2 { position: frame.corner_of(Cell { col: 0, row: 0 }), heading: 0.0 };
+    framed(time, MAP)
+        .part(3, &pose(corner))
+        .fixed(4, drawn as u32)
+        .part(5, &Message::default().number(1, cell_m).number(2, cell_m))
+        .fixed(6, (drawn * CELL.len()) as u32)
+        .fixed(7, CELL.len() as u32)
+        .parts(8, (0..).zip(CELL).map(field))
+        .data(9, &data)
 }
 
 /// The colour of a state: red, green, blue, alpha.
@@ -284,8 +255,8 @@ const fn paint(state: CellState) -> [u8; 4] {
     }
 }
 
-/// A sonar's echo comes from the whole arc; a ray's from its end. A reading without an echo has no points.
-fn scan(sensor: &Sensor, reading: &RangeReading, timestamp: Option<Timestamp>) -> LaserScan {
+/// A `LaserScan`. A sonar's echo comes from the whole arc; a ray's from its end. A reading without an echo has no points.
+fn scan(sensor: &Sensor, reading: &RangeReading, time: &Message) -> Message {
     let half = sensor.field_of_view_deg.to_radians() / 2.0;
     // Viewers divide by the number of angles between points, so a ray has two of them.
     let points = match (reading.status(), sensor.kind) {
@@ -293,49 +264,45 @@ fn scan(sensor: &Sensor, reading: &RangeReading, timestamp: Option<Timestamp>) -
         (RangeStatus::Measured, SensorKind::Ray) => 2,
         _ => 0,
     };
-    LaserScan {
-        timestamp,
-        frame_id: sensor.name.clone(),
-        pose: pose(Pose2::default()),
-        start_angle: -half,
-        end_angle: half,
-        ranges: vec![reading.range_m; points],
-        intensities: Vec::new(),
-    }
+    laser_scan(sensor, [-half, half], (0..points).map(|_| reading.range_m), time)
 }
 
 /// The beams of a laser; those without an end have the range infinity, as viewers expect it.
-fn beams_of(
-    sensor: &Sensor,
-    header: &ScanHeader,
-    beams: &[f32],
-    timestamp: Option<Timestamp>,
-) -> LaserScan {
-    let start_angle = header.first_rad - sensor.mount.looks_rad();
-    LaserScan {
-        timestamp,
-        frame_id: sensor.name.clone(),
-        pose: pose(Pose2::default()),
-        start_angle,
-        end_angle: start_angle + header.step_rad * beams.len().saturating_sub(1) as f64,
-        ranges: beams.iter().copied().map(f64::from).collect(),
-        intensities: Vec::new(),
-    }
+fn beams_of(sensor: &Sensor, header: &ScanHeader, beams: &[f32], time: &Message) -> Message {
+    let first = header.first_rad - sensor.mount.looks_rad();
+    let last = first + header.step_rad * beams.len().saturating_sub(1) as f64;
+    laser_scan(sensor, [first, last], beams.iter().copied().map(f64::from), time)
 }
 
-pub(crate) fn log(process: &str, line: &str, now_ns: u64, sink: Sink<'_>) {
-    let log = Log {
-        timestamp: time(now_ns),
-        level: level(line),
-        message: line.to_owned(),
-        name: process.to_owned(),
-        ..Log::default()
-    };
-    send(sink, LOG, &log);
+fn laser_scan(
+    sensor: &Sensor,
+    [first, last]: [f64; 2],
+    ranges: impl Iterator<Item = f64>,
+    time: &Message,
+) -> Message {
+    framed(time, &sensor.name)
+        .part(3, &pose(Pose2::default()))
+        .number(4, first)
+        .number(5, last)
+        .numbers(6, ranges)
 }
+
+/// Give `sink` a line of the log of `process`, read at `now_ns` since 1970.
+pub fn log(process: &str, line: &str, now_ns: u64, sink: Sink<'_>) {
+    let log = Message::default()
+        .part(1, &time(now_ns))
+        .integer(2, level(line))
+        .text(LOG_MESSAGE, line)
+        .text(LOG_NAME, process);
+    sink(LOG, log.bytes());
+}
+
+/// The numbers of these fields of a `Log`.
+const LOG_MESSAGE: u64 = 3;
+const LOG_NAME: u64 = 4;
 
 /// The number of a line's level in Foxglove's schema. Lines without a level say why a process ended, so they are errors.
-fn level(line: &str) -> i32 {
+fn level(line: &str) -> u64 {
     let levels = ["DEBUG", "INFO", "WARN", "ERROR"];
     let named = (1..)
         .zip(levels)
@@ -351,7 +318,7 @@ pub fn log_line(message: &[u8]) -> Option<(String, String)> {
         let mut text = |key| fields.remove(key)?.as_str().map(str::to_owned);
         return Some((text("name")?, text("message")?));
     }
-    Log::decode(message).ok().map(|log| (log.name, log.message))
+    Some((text_in(message, LOG_NAME)?, text_in(message, LOG_MESSAGE)?))
 }
 
 fn is_due(last: &mut Option<u64>, now: u64) -> bool {
@@ -362,48 +329,48 @@ fn is_due(last: &mut Option<u64>, now: u64) -> bool {
     due
 }
 
-fn time(ns: u64) -> Option<Timestamp> {
-    let seconds = u32::try_from(ns / 1_000_000_000).ok()?;
-    Timestamp::new_checked(seconds, (ns % 1_000_000_000) as u32)
+/// A `Timestamp`.
+fn time(ns: u64) -> Message {
+    Message::default().integer(1, ns / 1_000_000_000).integer(2, ns % 1_000_000_000)
 }
 
-fn transform(timestamp: Option<Timestamp>, parent: &str, child: &str, at: Pose2) -> FrameTransform {
-    FrameTransform {
-        timestamp,
-        parent_frame_id: parent.to_owned(),
-        child_frame_id: child.to_owned(),
-        translation: Some(Vector3 { x: at.position.x, y: at.position.y, z: 0.0 }),
-        rotation: Some(rotation(at.heading)),
-    }
+/// The beginning of most messages: the time and the frame.
+fn framed(time: &Message, frame: &str) -> Message {
+    Message::default().part(1, time).text(2, frame)
 }
 
-fn pose(at: Pose2) -> Option<Pose> {
-    let position = Some(Vector3 { x: at.position.x, y: at.position.y, z: 0.0 });
-    Some(Pose { position, orientation: Some(rotation(at.heading)) })
+/// A `FrameTransform`.
+fn transform(time: &Message, parent: &str, child: &str, at: Pose2) -> Message {
+    framed(time, parent)
+        .text(3, child)
+        .part(4, &vector([at.position.x, at.position.y, 0.0]))
+        .part(5, &rotation(at.heading))
 }
 
-fn rotation(heading: f64) -> Quaternion {
+fn pose(at: Pose2) -> Message {
+    let position = vector([at.position.x, at.position.y, 0.0]);
+    Message::default().part(1, &position).part(2, &rotation(at.heading))
+}
+
+/// A `Quaternion`.
+fn rotation(heading: f64) -> Message {
     let (z, w) = (heading / 2.0).sin_cos();
-    Quaternion { x: 0.0, y: 0.0, z, w }
+    Message::default().number(3, z).number(4, w)
 }
 
-const fn point(x: f64, y: f64) -> Point3 {
-    Point3 { x, y, z: 0.0 }
+/// A `Vector3`, a `Point3` or a `Color`.
+fn vector<const PARTS: usize>(parts: [f64; PARTS]) -> Message {
+    (1..).zip(parts).fold(Message::default(), |vector, (field, part)| vector.number(field, part))
 }
 
-const fn color([r, g, b, a]: [f64; 4]) -> Option<Color> {
-    Some(Color { r, g, b, a })
-}
-
-/// A flat ellipse of these widths.
-fn disc(at: Pose2, [x, y]: [f64; 2], painted: [f64; 4]) -> CylinderPrimitive {
-    CylinderPrimitive {
-        pose: pose(at),
-        size: Some(Vector3 { x, y, z: 0.01 }),
-        bottom_scale: 1.0,
-        top_scale: 1.0,
-        color: color(painted),
-    }
+/// A flat ellipse of these widths, a `CylinderPrimitive`.
+fn disc(at: Pose2, [x, y]: [f64; 2], painted: [f64; 4]) -> Message {
+    Message::default()
+        .part(1, &pose(at))
+        .part(2, &vector([x, y, 0.01]))
+        .number(3, 1.0)
+        .number(4, 1.0)
+        .part(5, &vector(painted))
 }
 
 #[cfg(test)]
@@ -420,7 +387,7 @@ mod tests {
             panic!("{sent:?}");
         };
         assert_eq!(topic, LOG);
-        assert_eq!(Log::decode(&message[..]).unwrap().level, 3);
+        assert_eq!(level("12.5  WARN missed a grid version"), 3);
         assert_eq!(level("mapper: cannot open"), 4);
         let line = ("mapper".to_owned(), "12.5  WARN missed a grid version".to_owned());
         assert_eq!(log_line(message).as_ref(), Some(&line));
@@ -435,13 +402,11 @@ mod tests {
         let frame = GridFrame { cells: 2500, resolution_m: 0.1, centre: Pose2::default().position };
         let mut cells = vec![CellState::Scanned as u8; frame.area()];
         cells[2499 * 2500 + 2499] = CellState::Known as u8;
-        let drawn = grid(frame, &cells, None);
-        assert_eq!(drawn.column_count, 834);
-        assert_eq!(drawn.data.len(), 834 * 834 * CELL.len());
-        let states: Vec<u8> = drawn.data.iter().step_by(CELL.len()).copied().collect();
+        let drawn = grid(frame, &cells, &Message::default());
+        let data = &drawn.bytes()[drawn.bytes().len() - 834 * 834 * CELL.len()..];
+        let states: Vec<u8> = data.iter().step_by(CELL.len()).copied().collect();
         let hazards: Vec<usize> =
             (0..states.len()).filter(|&at| states[at] == CellState::Known as u8).collect();
         assert_eq!(hazards, [834 * 834 - 1]);
-        assert!((drawn.cell_size.unwrap().x - 0.3).abs() < 1e-9);
     }
 }

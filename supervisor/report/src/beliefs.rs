@@ -7,8 +7,9 @@ use common::{
     step::Step as _,
 };
 use glam::DVec2;
+use page::blob;
 use planner::step::{Input, Planner};
-use recording::downsampled::drop_every_second;
+use robot_state::drop_every_second;
 
 /// Most maps. When there are more, every second one is dropped, and half as many are taken from then on.
 const MOST: usize = 8;
@@ -38,7 +39,8 @@ impl Belief {
             planner.step(input, MissionTime::default()).ok()?;
         }
         let cells = planner.snapshot()?.cells();
-        Some(page::field(self.header.part.frame(), &cells, self.target, self.time_s))
+        let frame = self.header.part.frame();
+        Some(blob::field(blob::Shown::Field, frame, &cells, self.target, self.time_s))
     }
 }
 

@@ -8,13 +8,12 @@ use std::{
 
 use common::ground_truth::GROUND_TRUTH;
 use common::{
-    bus::{Layout, decode_sample, decode_slice},
     mission::{Mission, SensorKind},
-    samples::{RangeReading, RangesHeader},
-    topics::{self, AnyTopic},
+    samples::RangeReading,
 };
-use page::{Collector, Kind, Recorded};
+use page::{Collector, Recorded};
 use recording::{End, Message, Recording};
+use robot_state::{Kind, Sample, TOPICS};
 use serde_json::{Map, Value, json};
 
 use crate::{
@@ -108,8 +107,8 @@ impl Content {
         if lost > 0 {
             self.remarks.push(format!("The recorder of {name} lost {lost} samples."));
         }
-        let mut wanted = Collector::TOPICS.map(|topic| topic.spec().name).to_vec();
-        wanted.extend([topics::FIELD.spec().name, LOG]);
+        let topics = TOPICS.iter().map(|topic| topic.spec().name);
+        let wanted: Vec<_> = topics.chain([LOG]).collect();
         for message in recording.messages(&wanted)? {
             let message = message?;
             if self.take(&message).is_none() {
@@ -125,52 +124,50 @@ impl Content {
 
     /// Take a message. None if the message does not match its topic.
     fn take(&mut self, message: &Message) -> Option<()> {
-        fn sample<P: Layout>(message: &Message) -> Option<P> {
-            decode_sample(&message.data)
-        }
-        let is = |topic: &dyn AnyTopic| *message.topic == *topic.spec().name;
         if *message.topic == *LOG {
             let (process, line) = recording::log_line(&message.data)?;
-            self.collector.log(&process, &line);
+            self.collector.state.log(&process, &line);
             return Some(());
         }
+        let sample = Sample::decoded(&message.topic, &message.data)?;
         // Ground truth that is not of this tick waits in the collector.
-        if is(&topics::POSE) {
+        if let Sample::Pose(_) = sample {
             while let Some(Ok(line)) = self.truth.as_mut().and_then(Iterator::next) {
                 if !self.collector.truth(&line) {
                     break;
                 }
             }
         }
-        self.collector.take(&message.topic, &message.data)?;
-        if is(&topics::POSE) {
-            self.measured.pose(&sample(message)?, &self.mission);
-        } else if is(&topics::RANGES) {
-            let (_, readings) = decode_slice::<RangesHeader, RangeReading>(&message.data)?;
-            let front = |reading: &&RangeReading| Some(usize::from(reading.sensor)) == self.front;
-            if let Some(reading) = readings.iter().find(front) {
-                self.measured.range(reading, &self.mission);
+        self.collector.apply(&sample);
+        match &sample {
+            Sample::Pose(pose) => self.measured.pose(pose, &self.mission),
+            Sample::Ranges(_, readings) => {
+                let front =
+                    |reading: &&RangeReading| Some(usize::from(reading.sensor)) == self.front;
+                if let Some(reading) = readings.iter().find(front) {
+                    self.measured.range(reading, &self.mission);
+                }
             }
-        } else if is(&topics::COMMAND) {
-            self.measured.command(&sample(message)?);
-        } else if is(&topics::GUIDANCE) {
-            self.measured.guidance(&sample(message)?);
-        } else if is(&topics::LINK) {
-            self.measured.link(&sample(message)?);
-            self.add();
-        } else if is(&topics::GRID) {
-            self.add_map();
-        } else if is(&topics::FIELD) {
-            let field = self.collector.take_field();
-            self.has_fields |= field.is_some();
-            field.iter().for_each(|field| self.page.blob(field));
+            Sample::Command(command) => self.measured.command(command),
+            Sample::Guidance(guidance) => self.measured.guidance(guidance),
+            Sample::Link(link) => {
+                self.measured.link(link);
+                self.add();
+            }
+            Sample::Grid(..) => self.add_map(),
+            Sample::Field(..) => {
+                let field = self.collector.take_field();
+                self.has_fields |= field.is_some();
+                field.iter().for_each(|field| self.page.blob(field));
+            }
+            _ => {}
         }
         Some(())
     }
 
     /// Add to the page the new content of the collector.
     fn add(&mut self) {
-        let (rows, events) = (self.collector.take_rows(), self.collector.take_events());
+        let (rows, events) = (self.collector.take_rows(), self.collector.state.take_events());
         let state = self.collector.take_state();
         if self.added >= MOST {
             return;
@@ -183,7 +180,7 @@ impl Content {
     }
 
     fn add_map(&mut self) {
-        let now_s = self.collector.now_s();
+        let now_s = self.collector.state.now_s();
         if now_s < self.map_at_s + MAP_EVERY_S || self.maps == MOST_MAPS {
             return;
         }
@@ -206,7 +203,7 @@ impl Content {
         if !self.has_fields {
             if let Some((header, cells)) = self.collector.belief() {
                 let target = self.collector.target();
-                self.beliefs.end(self.collector.now_s(), target, &header, cells);
+                self.beliefs.end(self.collector.state.now_s(), target, &header, cells);
             }
             for field in self.beliefs.fields(&self.mission) {
                 self.page.blob(&field);

@@ -3,7 +3,7 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::Args;
-use common::clock::{MissionTime, Pace};
+use common::clock::MissionTime;
 use console::{failure::Failure, operator, output::print};
 use recording::{
     Recording,
@@ -20,9 +20,6 @@ pub(crate) struct Arguments {
     /// Only these stages, with commas between.
     #[arg(long, value_name = "STAGES", value_delimiter = ',')]
     stage: Vec<String>,
-    /// `max`, or R times mission time.
-    #[arg(long, default_value = "max")]
-    pace: Pace,
     /// Compare from this mission time on, seconds.
     #[arg(long, value_name = "S", default_value = "0")]
     from: f64,
@@ -39,7 +36,6 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let options = Options {
         stages: arguments.stage.clone(),
         from: MissionTime::from_seconds(arguments.from),
-        pace: arguments.pace,
         run: None,
     };
     let report = replay::replay(&recording, &options)?;

@@ -10,13 +10,15 @@ use std::{
 use clap::Args;
 use common::{
     domain::{Domain, RobotName},
-    roster::{self, Roster},
+    roster,
     samples::{
         Action, HoldReason, LinkSample, Order, PowerSample, RosterEntry, StageState, TargetSample,
         name_str,
     },
-    topics,
+    topics::{self, AnyTopic},
+    waiter::Waiter,
 };
+use robot_state::{Feed, RobotState};
 use serde::Serialize;
 
 use console::{
@@ -50,9 +52,11 @@ struct Status<'a> {
     order: &'static str,
     tick: u64,
     mission_time_s: f64,
+    /// The target; none if it is not published.
     target: Option<TargetStatus>,
+    /// The link; none if no link publishes.
     link: Option<LinkStatus>,
-    /// None if the robot does not report it.
+    /// The power; none if the robot does not report it.
     power: Option<PowerStatus>,
     stages: Vec<StageStatus<'a>>,
 }
@@ -60,6 +64,7 @@ struct Status<'a> {
 #[derive(Serialize)]
 struct TargetStatus {
     number: u64,
+    /// The number of the last target of the list.
     last: u64,
     x_m: f64,
     y_m: f64,
@@ -68,12 +73,13 @@ struct TargetStatus {
 #[derive(Serialize)]
 struct LinkStatus {
     connected: bool,
+    /// Whether the link stops the robot.
     stopped: bool,
-    /// The failsafe's effect: the robot goes, stands or the like.
+    /// The effect of the failsafe: the robot goes, stands or the like.
     robot: &'static str,
-    /// None while the robot goes.
+    /// The cause of the effect; none while the robot goes.
     cause: Option<&'static str>,
-    /// No wheel turns by the encoders.
+    /// Whether no wheel turns by the encoders.
     at_rest: bool,
     /// Time without an answer of the robot; none while it answers.
     lost_s: Option<f64>,
@@ -110,7 +116,7 @@ struct StageStatus<'a> {
 
 /// The roster is published five times a second.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// The link publishes ten times a second, batteries come several times a second.
+/// The link publishes ten times a second, and a robot reports its batteries several times a second.
 const LINK_PATIENCE: Duration = Duration::from_millis(400);
 
 pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
@@ -119,24 +125,26 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
 
 fn print_one(arguments: &Arguments) -> Result<(), Failure> {
     let bus = roster::join(&Domain::of(arguments.robot.clone()), "status")?;
-    let mut roster = Roster::open(&bus)?;
-    let mut links = bus.reader(&topics::LINK)?;
-    let mut powers = bus.reader(&topics::POWER)?;
-    let mut targets = bus.reader(&topics::TARGET)?;
-    roster.waiter.on(bus.wakeup(&topics::LINK)?);
-    roster.waiter.on(bus.wakeup(&topics::POWER)?);
+    // The supervisor publishes the target before its roster.
+    let wanted: [&dyn AnyTopic; 4] =
+        [&topics::ROSTER, &topics::LINK, &topics::POWER, &topics::TARGET];
+    let mut feed = Feed::open(&bus, &wanted)?;
+    let mut waiter = Waiter::default();
+    for topic in [&topics::ROSTER as &dyn AnyTopic, &topics::LINK, &topics::POWER] {
+        waiter.on(bus.wakeup(topic)?);
+    }
     let began = Instant::now();
-    let (mut entries, mut link, mut power) = (None, None, None);
-    let entries = loop {
-        entries = roster.samples.next_slice()?.or(entries);
-        link = links.newest()?.or(link);
-        power = powers.newest()?.or(power);
-        let lost = link.is_some_and(|link| link.connected == 0);
-        let all = link.is_some() && (power.is_some() || lost);
-        if (all || began.elapsed() >= LINK_PATIENCE)
-            && let Some(entries) = entries.take()
+    let mut robot = RobotState::default();
+    let header = loop {
+        feed.read(&mut |sample| {
+            robot.apply(&sample);
+        })?;
+        let lost = robot.link.is_some_and(|link| link.connected == 0);
+        let all = robot.link.is_some() && (robot.power.is_some() || lost);
+        if let Some(header) = robot.supervisor
+            && (all || began.elapsed() >= LINK_PATIENCE)
         {
-            break entries;
+            break header;
         }
         if began.elapsed() >= PATIENCE {
             return Err(format!(
@@ -145,26 +153,23 @@ fn print_one(arguments: &Arguments) -> Result<(), Failure> {
             )
             .into());
         }
-        roster.waiter.wait(LINK_PATIENCE)?;
+        waiter.wait(LINK_PATIENCE)?;
     };
-    // The supervisor publishes the target before its roster.
-    let target = targets.newest()?;
-    let header = entries.header();
     let status = Status {
         robot: &arguments.robot,
         supervisor_pid: header.supervisor_pid,
         order: order(Order::from_byte(header.order), HoldReason::from_byte(header.reason)),
         tick: header.stamp.tick,
         mission_time_s: header.stamp.time().seconds(),
-        target: target.map(|TargetSample { number, last, target, .. }| TargetStatus {
+        target: robot.target.map(|TargetSample { number, last, target, .. }| TargetStatus {
             number,
             last,
             x_m: target.x_m,
             y_m: target.y_m,
         }),
-        link: link.as_ref().map(link_status),
-        power: power.as_ref().map(power_status),
-        stages: entries.iter().map(stage_status).collect(),
+        link: robot.link.as_ref().map(link_status),
+        power: robot.power.as_ref().map(power_status),
+        stages: robot.stages.iter().map(stage_status).collect(),
     };
     Ok(print(&status, arguments.json)?)
 }

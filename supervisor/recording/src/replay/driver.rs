@@ -1,14 +1,10 @@
 //! Replays a recording in one pass over the file, all generations side by side.
 
-use std::{
-    collections::BTreeMap,
-    thread,
-    time::{Duration, Instant},
-};
+use std::collections::BTreeMap;
 
 use common::{
     bus::decode_slice,
-    clock::{MissionTime, Pace},
+    clock::MissionTime,
     run::Run,
     samples::{DeathSample, HealthSample, HealthState, InputsHeader, name_str},
     topics,
@@ -20,26 +16,19 @@ use crate::{
     replay::{
         generation::{Generation, Setting},
         report::Report,
-        samples::{stamp_of, time_of},
+        samples::stamp_of,
     },
 };
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Options {
     /// The stages, by their names; all without names.
     pub stages: Vec<String>,
     /// The mission time from which on outputs are compared. Earlier ticks are computed, too, because the state follows
     /// from them.
     pub from: MissionTime,
-    pub pace: Pace,
     /// A run to replay in place of the recorded one, to try another mission with the same inputs.
     pub run: Option<Run>,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { stages: Vec::new(), from: MissionTime::default(), pace: Pace::Max, run: None }
-    }
 }
 
 /// Topics that the link's process computes outside its step. They are not compared.
@@ -75,13 +64,8 @@ pub fn replay(recording: &Recording, options: &Options) -> Result<Report, Record
         report.stages.entry(stage.name).or_default();
     }
     let mut generations = Generations { chosen, all: BTreeMap::new() };
-    let began = Instant::now();
     for message in recording.messages(&wanted)? {
-        let message = message?;
-        if let Pace::Rate(rate) = options.pace {
-            wait_for(&message, rate, began);
-        }
-        generations.take(&setting, message).map_err(|topic| RecordingError::Message {
+        generations.take(&setting, message?).map_err(|topic| RecordingError::Message {
             file: recording.path.to_path_buf(),
             topic: topic.to_owned(),
         })?;
@@ -93,13 +77,6 @@ pub fn replay(recording: &Recording, options: &Options) -> Result<Report, Record
         }
     }
     Ok(report)
-}
-
-/// Wait until the mission time of `message` has come.
-fn wait_for(message: &Message, rate: f64, began: Instant) {
-    let due =
-        Duration::try_from_secs_f64(time_of(&message.data).seconds() / rate).unwrap_or_default();
-    thread::sleep(due.saturating_sub(began.elapsed()));
 }
 
 struct Generations {

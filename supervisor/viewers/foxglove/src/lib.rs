@@ -1,14 +1,21 @@
 //! `firsthand foxglove`: the robot in Foxglove or Lichtblick.
+//!
+//! | module | holds |
+//! |---|---|
+//! | `live` | the channels of a recording ([`recording::viewers`]), live |
+
+mod live;
+#[cfg(test)]
+mod tests;
 
 use std::{net::SocketAddr, process::ExitCode};
 
+use self::live::{Live, LiveError};
 use clap::Parser;
 use common::{
     domain::{Domain, RobotName},
     signals::{SIGHUP, SIGINT, SIGTERM, Signals},
 };
-use recording::live::{Live, LiveError};
-
 use console::{executable, failure::Failure, output::print_text, stream::let_stages_go_first};
 
 /// Serve a robot to Foxglove or Lichtblick, live: what a recording has, by a websocket.
@@ -26,7 +33,7 @@ pub struct Arguments {
     listen: SocketAddr,
 }
 
-/// The main function of the executable.
+/// Run the executable.
 pub fn main() -> ExitCode {
     // A client could fill the log with its own errors.
     executable::run("error,foxglove=off", serve, |error| {

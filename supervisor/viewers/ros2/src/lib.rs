@@ -1,8 +1,31 @@
-//! `firsthand ros2`: the robot in ROS 2.
+//! `firsthand ros2`: the topics of a robot for RViz and other nodes of ROS 2, and the requests that nodes may make. It is a consumer,
+//! which anyone may kill.
+//!
+//! | module | holds |
+//! |---|---|
+//! | `topics` | THE table of topics |
+//! | `shown` | samples of the robot's bus to messages, pure |
+//! | `asked` | messages that ask for something to what they ask, pure |
+//! | `action` | the server of the action `navigate_to_pose`, pure |
+//! | `messages` | the messages that are written |
+//! | `bridge` | the bridge itself |
+//! | `endpoints` | its readers and writers, and the node that `ros2 node list` shows |
+//! | `orders` | what was asked is done, without holding up the bridge |
+
+mod action;
+mod asked;
+mod bridge;
+mod endpoints;
+mod messages;
+mod orders;
+mod shown;
+#[cfg(test)]
+mod tests;
+mod topics;
 
 use std::{net::Ipv4Addr, process::ExitCode};
 
-use clap::{Parser, ValueEnum};
+use clap::Parser;
 use common::{
     address::domain_of_environment,
     domain::RobotName,
@@ -12,9 +35,10 @@ use common::{
 use console::{
     executable, failure::Failure, item::item, output::print_text, stream::let_stages_go_first,
 };
-use ros2_bridge::{
+
+use self::{
     bridge::{Options, serve},
-    topics::{Accept as Accepted, Spec, TABLE},
+    topics::{Accept, Spec, TABLE},
 };
 
 /// Show a robot in ROS 2: to RViz, to other nodes, to other machines. `--topics` lists its topics.
@@ -44,16 +68,6 @@ pub struct Arguments {
     accept: Vec<Accept>,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Accept {
-    /// Send the robot to targets: `goal_pose` and the action `navigate_to_pose`.
-    Goals,
-    /// Say where it is: `initialpose`.
-    Pose,
-    /// Let it stand and go on: `stop`.
-    Stop,
-}
-
 /// A namespace of ROS: names of letters, digits and `_` between slashes.
 fn namespace(text: &str) -> Result<String, String> {
     let is_letter = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
@@ -66,7 +80,7 @@ fn namespace(text: &str) -> Result<String, String> {
     }
 }
 
-/// The main function of the executable.
+/// Run the executable.
 pub fn main() -> ExitCode {
     // Refused requests of other nodes are logged.
     executable::run("warn,rustdds=off", show, |_| None)
@@ -92,17 +106,12 @@ fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     let_stages_go_first();
     let mut signals = Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?;
-    let accepted = arguments.accept.iter().map(|accept| match accept {
-        Accept::Goals => Accepted::Goals,
-        Accept::Pose => Accepted::Pose,
-        Accept::Stop => Accepted::Stop,
-    });
     let options = Options {
         robot: arguments.robot.clone(),
         domain: arguments.domain.map_or_else(domain_of_environment, Ok)?,
         interface: arguments.interface,
         namespace: arguments.namespace.clone(),
-        accepted: accepted.collect(),
+        accepted: arguments.accept.clone(),
     };
     serve(&options, &mut || signals.came())?;
     Ok(ExitCode::SUCCESS)

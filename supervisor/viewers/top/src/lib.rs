@@ -6,7 +6,6 @@
 //! | `feed` | brings it up to date from the bus |
 //! | `screen`, `map` | draw it |
 //! | `action` | what the keys do |
-//! | `words` | guidance, deaths and stalls in words |
 
 mod action;
 mod feed;
@@ -15,7 +14,6 @@ mod screen;
 #[cfg(test)]
 mod tests;
 mod view;
-mod words;
 
 use std::{
     io::{self, IsTerminal as _},
@@ -37,7 +35,7 @@ use thiserror::Error;
 
 use self::{
     action::{Key, Operator},
-    feed::Feed,
+    feed::ScreenFeed,
     view::View,
 };
 use console::{
@@ -109,9 +107,9 @@ fn run(
     terminal: &mut DefaultTerminal,
 ) -> Result<(), TopError> {
     let domain = Domain::of(robot.clone());
-    let mut follower = Follower::new(domain, "top", &topics::POSE, Feed::open)
+    let mut follower = Follower::new(domain, "top", &topics::POSE, ScreenFeed::open)
         .also_on([&topics::ROSTER as _, &topics::LINK as _]);
-    let mut view = View::of(robot.clone());
+    let mut view = View::new(robot.clone());
     let mut operator = Operator::new(robot);
     let mut drawn = None::<Instant>;
     // Keys are read here, because the reader of the terminal's library never ends if the terminal was closed.
@@ -121,7 +119,7 @@ fn run(
             Event::Connected => view.on_connected(),
             Event::Disconnected => view.connected = false,
             Event::Nothing => {}
-            Event::Samples(feed) => feed.take(&mut view)?,
+            Event::Samples(feed) => feed.update(&mut view)?,
         }
         let mut changed = false;
         while poll::is_readable(io::stdin(), Duration::ZERO)? {
@@ -137,10 +135,8 @@ fn run(
             changed = true;
             match key {
                 Key::Quit => return Ok(()),
-                Key::Up => view.chosen = view.chosen.saturating_sub(1),
-                Key::Down => {
-                    view.chosen = (view.chosen + 1).min(view.stages.len().saturating_sub(1));
-                }
+                Key::Up => view.choose(-1),
+                Key::Down => view.choose(1),
                 Key::Act(action) => view.message = operator.ask(action, view.chosen_stage()),
             }
         }

@@ -10,7 +10,7 @@ use ratatui::{
     text::{Line, Span},
 };
 
-use super::view::View;
+use robot_state::RobotState;
 
 /// Directions from east on, counter-clockwise, 45 degrees each.
 const FIELD: [char; 8] = ['→', '↗', '↑', '↖', '←', '↙', '↓', '↘'];
@@ -98,29 +98,29 @@ impl Scale {
     }
 }
 
-/// The map of `view` in at most `width` by `height` letters; none before the first grid.
-pub(super) fn lines(view: &View, width: u16, height: u16) -> Option<Vec<Line<'static>>> {
-    let frame = view.grid.frame()?;
+/// The map of a robot in at most `width` by `height` letters; none before the first grid.
+pub(super) fn lines(state: &RobotState, width: u16, height: u16) -> Option<Vec<Line<'static>>> {
+    let frame = state.map.frame()?;
     let side = usize::from(width).min(2 * usize::from(height)) & !1;
     if side == 0 {
         return None;
     }
     let scale = Scale { frame, side, step: f64::from(frame.cells) / side as f64 };
     let mut letters: Vec<Vec<(char, Style)>> = (0..side / 2)
-        .map(|line| (0..side).map(|col| letter(view, &scale, col, line)).collect())
+        .map(|line| (0..side).map(|col| letter(state, &scale, col, line)).collect())
         .collect();
     let mut put = |point: DVec2, letter: char, style: Style| {
         if let Some((col, row)) = scale.square(point) {
             letters[row / 2][col] = (letter, style);
         }
     };
-    for &point in &view.way {
+    for &point in &state.way {
         put(point, WAY, WAY_STYLE);
     }
-    for &target in &view.targets {
-        put(target, TARGET, TARGET_STYLE);
+    for target in state.targets() {
+        put(target.position(), TARGET, TARGET_STYLE);
     }
-    if let Some(pose) = view.pose {
+    if let Some(pose) = state.pose {
         put(pose.pose().position, robot(pose.heading_rad), ROBOT_STYLE);
     }
     let line = |letters: Vec<(char, Style)>| {
@@ -142,9 +142,9 @@ fn octant(angle: f64) -> usize {
 }
 
 /// Two squares of the map, one above the other, and the field there.
-fn letter(view: &View, scale: &Scale, col: usize, line: usize) -> (char, Style) {
+fn letter(state: &RobotState, scale: &Scale, col: usize, line: usize) -> (char, Style) {
     let square = |row: usize| {
-        let (cells, side) = (view.grid.cells(), scale.frame.cells as usize);
+        let (cells, side) = (state.map.cells(), scale.frame.cells as usize);
         let rows = scale.cells(scale.side - 1 - row);
         let cols = scale.cells(col);
         let of_rows = rows.flat_map(|row| &cells[row * side + cols.start..row * side + cols.end]);
@@ -161,24 +161,24 @@ fn letter(view: &View, scale: &Scale, col: usize, line: usize) -> (char, Style) 
         (Some(one), None) => ('▀', Style::new().fg(one).bg(ground(below))),
         (None, Some(other)) => ('▄', Style::new().fg(other).bg(ground(above))),
         (None, None) => {
-            let arrow = field(view, scale, col, line);
+            let arrow = field(state, scale, col, line);
             (arrow.unwrap_or(' '), FIELD_STYLE.bg(ground(above.max(below))))
         }
     }
 }
 
 /// The field's direction in the middle of a letter; none if it is not drawn there, or the field has none.
-fn field(view: &View, scale: &Scale, col: usize, line: usize) -> Option<char> {
+fn field(state: &RobotState, scale: &Scale, col: usize, line: usize) -> Option<char> {
     let (every_col, every_line) = FIELD_EVERY;
     let drawn = col % every_col == every_col / 2 && line % every_line == every_line / 2;
-    if !drawn || view.field.frame() != Some(scale.frame) {
+    if !drawn || state.field.frame() != Some(scale.frame) {
         return None;
     }
     let cell = Cell {
         col: scale.cells(col).start as u32,
         row: scale.cells(scale.side - 1 - 2 * line).start as u32,
     };
-    let policy = view.field.cells().get(scale.frame.index(cell))?;
+    let policy = state.field.cells().get(scale.frame.index(cell))?;
     let (ex, ey) = (f64::from(policy.ex), f64::from(policy.ey));
     (ex != 0.0 || ey != 0.0).then(|| FIELD[octant(ey.atan2(ex))])
 }

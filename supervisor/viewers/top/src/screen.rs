@@ -1,7 +1,7 @@
 use common::{
     latency::Histogram,
     process_usage::Usage,
-    samples::{Action, HoldReason, LinkSample, Order, StageState, name_str},
+    samples::{Action, HoldReason, LinkSample, Order, RosterEntry, StageState, name_str},
 };
 use ratatui::{
     Frame,
@@ -11,16 +11,12 @@ use ratatui::{
     widgets::{Paragraph, Row, Table, TableState, Wrap},
 };
 
-use super::{
-    action::KEYS,
-    map,
-    view::{Stage, View},
-    words as top_words,
-};
+use super::{action::KEYS, map, view::View};
 use console::{
     waiting,
     words::{self, age},
 };
+use robot_state::{RobotState, guidance_in_words};
 
 /// Columns of the table of stages.
 const TABLE_WIDTH: u16 = 80;
@@ -40,7 +36,7 @@ pub(super) fn draw(view: &View, frame: &mut Frame<'_>) {
     ])
     .areas(frame.area());
     frame.render_widget(Paragraph::new(heading(view)), title);
-    let table_height = view.stages.len() as u16 + 3;
+    let table_height = view.state.stages.len() as u16 + 3;
     if body.width >= WIDE {
         let [left, _, right] = Layout::horizontal([
             Constraint::Length(TABLE_WIDTH),
@@ -82,7 +78,7 @@ fn message_height(message: &str, width: u16) -> u16 {
 
 fn heading(view: &View) -> Line<'static> {
     let robot = format!("robot {}", view.robot);
-    let Some(supervisor) = view.supervisor else {
+    let Some(supervisor) = view.state.supervisor else {
         let state = if view.connected { "is here" } else { waiting::NOT_RUNNING };
         return Line::from(vec![Span::styled(robot, TITLE), Span::raw(format!(" {state}"))]);
     };
@@ -108,11 +104,17 @@ fn keys_line() -> Line<'static> {
 
 fn table(view: &View, frame: &mut Frame<'_>, area: Rect) {
     let right = |text: String, width: usize| format!("{text:>width$}");
-    let mut rows: Vec<_> = view.stages.iter().map(|stage| stage_row(view, stage)).collect();
-    if let Some(supervisor) = view.supervisor {
+    let mut rows: Vec<_> = view
+        .state
+        .stages
+        .iter()
+        .enumerate()
+        .map(|(at, entry)| stage_row(view, at, entry))
+        .collect();
+    if let Some(supervisor) = view.state.supervisor {
         let pid = supervisor.supervisor_pid.to_string();
         let state = if view.connected { "running" } else { "ended" };
-        let usage = view.supervisor_usage;
+        let usage = usage(view, view.state.stages.len());
         let blank = String::new;
         rows.push(Cells {
             texts: [
@@ -148,7 +150,7 @@ fn table(view: &View, frame: &mut Frame<'_>, area: Rect) {
         .column_spacing(1)
         .highlight_symbol("> ")
         .row_highlight_style(Style::new().add_modifier(Modifier::REVERSED));
-    let chosen = (!view.stages.is_empty()).then_some(view.chosen);
+    let chosen = (!view.state.stages.is_empty()).then_some(view.chosen);
     let mut state = TableState::default().with_selected(chosen);
     frame.render_stateful_widget(table, area, &mut state);
 }
@@ -158,8 +160,12 @@ struct Cells {
     style: Style,
 }
 
-fn stage_row(view: &View, stage: &Stage) -> Cells {
-    let entry = &stage.entry;
+/// The usage of a process: of the stage in this row, or behind them of the supervisor.
+fn usage(view: &View, at: usize) -> Usage {
+    view.usage.get(at).copied().unwrap_or_default()
+}
+
+fn stage_row(view: &View, at: usize, entry: &RosterEntry) -> Cells {
     let state = StageState::from_byte(entry.state);
     let runs = view.connected && entry.pid != 0;
     Cells {
@@ -169,10 +175,10 @@ fn stage_row(view: &View, stage: &Stage) -> Cells {
             if runs { entry.pid.to_string() } else { "-".to_owned() },
             entry.generation.to_string(),
             entry.restarts.to_string(),
-            stage.rate_hz.map_or("-".to_owned(), rate),
+            view.rates_hz.get(at).copied().flatten().map_or("-".to_owned(), rate),
             age(words::seconds(entry.beat_age_ns)),
-            cpu(stage.usage),
-            memory(stage.usage),
+            cpu(usage(view, at)),
+            memory(usage(view, at)),
         ],
         style: match state {
             StageState::Running => Style::new(),
@@ -195,57 +201,60 @@ fn memory(usage: Usage) -> String {
 }
 
 fn draw_map(view: &View, frame: &mut Frame<'_>, area: Rect) {
-    let lines = map::lines(view, area.width, area.height);
+    let lines = map::lines(&view.state, area.width, area.height);
     let map = lines.unwrap_or_else(|| vec![Line::styled("no map yet", DIM)]);
     frame.render_widget(Paragraph::new(map), area);
 }
 
 fn details(view: &View, frame: &mut Frame<'_>, area: Rect) {
-    let mut lines = numbers(view);
+    let mut lines = numbers(&view.state);
     let legend = legend();
     // The events get the room between the numbers and the legend at the foot.
     let room = usize::from(area.height).saturating_sub(lines.len() + legend.len() + 1);
     lines.push(Line::default());
-    lines.extend(view.events.iter().take(room).map(|event| Line::raw(event.clone())));
+    let events = view.events.iter().take(room);
+    lines.extend(
+        events.map(|event| Line::raw(format!("{}: {}, {:.1} s", event.of, event.text, event.t))),
+    );
     let [above, foot] =
         Layout::vertical([Constraint::Min(0), Constraint::Length(legend.len() as u16)]).areas(area);
     frame.render_widget(Paragraph::new(lines), above);
     frame.render_widget(Paragraph::new(legend), foot);
 }
 
-fn numbers(view: &View) -> Vec<Line<'static>> {
+fn numbers(state: &RobotState) -> Vec<Line<'static>> {
     let mut lines = Vec::new();
     let mut line = |name: &str, text: String, style: Style| {
         let name = Span::styled(format!("{name:<10}"), DIM);
         lines.push(Line::from(vec![name, Span::styled(text, style)]));
     };
     let plain = Style::new();
-    if let Some(pose) = view.pose {
+    if let Some(pose) = state.pose {
         let heading = pose.heading_rad.to_degrees().rem_euclid(360.0);
         let within_m = pose.position_within_m();
         let place = format!("{:.2}, {:.2} ±{within_m:.2} m, {heading:.0}°", pose.x_m, pose.y_m);
         line("pose", place, plain);
         line("speed", format!("{:.2} m/s, {:.2} rad/s", pose.v_m_s, pose.omega_rad_s), plain);
-        if let Some(command) = view.command {
+        if let Some(command) = state.command {
             let (left, driven) = (command.distance_m, pose.travelled_m);
             line("to go", format!("{left:.2} m; driven {driven:.2} m"), plain);
         }
     }
-    if let Some(guidance) = view.guidance {
+    if let Some(guidance) = state.guidance {
         let limit = guidance.speed_limit_m_s;
         let limit =
             if limit.is_finite() { format!(", at most {limit:.2} m/s") } else { String::new() };
-        line("guidance", format!("{}{limit}", top_words::guidance(guidance.status)), plain);
+        line("guidance", format!("{}{limit}", guidance_in_words(guidance.status)), plain);
         let (events, full) = (guidance.safety_events, guidance.full_solves);
         line("map", format!("{events} safety events"), plain);
         line("solves", format!("{full} full"), plain);
     }
-    if let Some(link) = &view.link {
+    if let Some(link) = &state.link {
         let (text, style) = robot_words(link);
         line("robot", text, style);
         line("latency", latency(link), plain);
     }
-    if let Some(power) = view.power {
+    if let Some(power) = state.power {
         let (board, motor, servo) = (power.board_v, power.motor_v, power.servo_v);
         let style = if power.is_low() { BAD } else { plain };
         line("battery", format!("board {board:.1}, motors {motor:.1}, servos {servo:.1} V"), style);

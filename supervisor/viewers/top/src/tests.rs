@@ -8,19 +8,22 @@ use common::{
     process_usage::Usage,
     samples::{
         CommandSample, DeathSample, FieldCell, GuidanceSample, GuidanceStatus, LinkSample, Order,
-        PoseSample, PowerSample, RosterEntry, RosterHeader, StageState, Stamp, name,
+        PoseSample, PowerSample, RosterEntry, RosterHeader, StageState, Stamp, TargetPoint,
+        TargetSample, name,
     },
 };
 use glam::DVec2;
 use ratatui::{Terminal, backend::TestBackend};
 
-use super::{action::KEYS, screen, view::View, words};
+use robot_state::Sample;
+
+use super::{action::KEYS, screen, view::View};
 
 const STAGES: [&str; 5] = ["link", "dead-reckoning", "mapper", "planner", "controller"];
 
 /// A robot in the middle of a mission: a wall to the east of it, the field to the north, where the target is.
 fn view() -> View {
-    let mut view = View::of("robot-of-16-char".parse().unwrap());
+    let mut view = View::new("robot-of-16-char".parse().unwrap());
     view.on_connected();
     let stamp = Stamp { tick: 8641, stamp_ns: 1_234_500_000_000, generation: 1, sequence: 9 };
     let header = RosterHeader {
@@ -42,13 +45,11 @@ fn view() -> View {
         beat_age_ns: 599_900_000_000,
         output_age_ns: 0,
     });
-    view.on_roster(header, &entries);
+    view.apply(&Sample::Roster(header, entries.to_vec()));
     let usage = Usage { cpu: Some(1.99), memory_bytes: Some(999_900_000) };
-    view.supervisor_usage = usage;
-    for stage in &mut view.stages {
-        (stage.rate_hz, stage.usage) = (Some(1234.4), usage);
-    }
-    view.stages[3].entry.state = StageState::BackingOff.into();
+    view.usage = vec![usage; STAGES.len() + 1];
+    view.rates_hz = vec![Some(1234.4); STAGES.len()];
+    view.state.stages[3].state = StageState::BackingOff.into();
     let frame = GridFrame { cells: 100, resolution_m: 0.1, centre: DVec2::ZERO };
     let mut grid = vec![CellState::Free as u8; frame.area()];
     let mut field = vec![FieldCell { ex: 0.0, ey: 1.0, log2_u: -1.0 }; frame.area()];
@@ -65,30 +66,32 @@ fn view() -> View {
             field[row * 100 + col].ey = 0.0;
         }
     }
-    view.grid.apply(&Part::whole(frame, 3), &grid);
-    view.field.apply(&Part::whole(frame, 3), &field);
-    view.targets = vec![DVec2::new(0.0, 4.0)];
+    view.state.map.apply(&Part::whole(frame, 3), &grid);
+    view.state.field.apply(&Part::whole(frame, 3), &field);
+    let target = TargetPoint::at(DVec2::new(0.0, 4.0));
+    view.state.target = Some(TargetSample { target, ..TargetSample::default() });
     for y in -40..0 {
-        view.on_pose(PoseSample {
+        view.apply(&Sample::Pose(PoseSample {
             stamp,
             y_m: f64::from(y) * 0.1,
             heading_rad: FRAC_PI_2,
             travelled_m: 123.45,
             covariance: [0.0036, 0.0, 0.0, 0.0009, 0.0, 0.0],
             ..PoseSample::default()
-        });
+        }));
     }
-    view.command = Some(CommandSample { distance_m: 4.1, ..CommandSample::default() });
-    view.guidance = Some(GuidanceSample {
+    view.state.command = Some(CommandSample { distance_m: 4.1, ..CommandSample::default() });
+    view.state.guidance = Some(GuidanceSample {
         status: GuidanceStatus::Unreachable.into(),
         speed_limit_m_s: 0.5,
         full_solves: 1000,
         ..GuidanceSample::default()
     });
-    view.link = Some(LinkSample { connected: 1, action: 2, cause: 12, ..LinkSample::default() });
-    view.power = Some(PowerSample::default());
+    view.state.link =
+        Some(LinkSample { connected: 1, action: 2, cause: 12, ..LinkSample::default() });
+    view.state.power = Some(PowerSample::default());
     for generation in 0..60 {
-        view.on_event(words::death(&DeathSample {
+        view.apply(&Sample::Death(DeathSample {
             stamp,
             stage: name("dead-reckoning"),
             generation,
@@ -153,7 +156,7 @@ fn every_stage_with_all_its_columns_is_on_the_smallest_and_on_a_large_screen() {
             "no way to the target, at most 0.50 m/s",
             "1000 full",
             "stands: odometry implausible",
-            "dead-reckoning 59: hung, signal 9",
+            "dead-reckoning: generation 59 died (hung, signal 9)",
             "█ perimeter",
         ] {
             assert!(whole.contains(text), "{width} columns: {text:?} in\n{whole}");
@@ -203,7 +206,7 @@ fn a_long_message_is_shown_whole() {
 
 #[test]
 fn a_screen_of_any_size_is_drawn_and_one_without_a_robot_says_so() {
-    let empty = View::of("x80".parse().unwrap());
+    let empty = View::new("x80".parse().unwrap());
     let lines = screen(&empty, 80, 24);
     assert_eq!(lines[0], "robot x80 is not running here; waiting for it");
     assert!(lines.join("\n").contains("no map yet"));

@@ -2,22 +2,9 @@
 
 use std::collections::VecDeque;
 
-use common::{
-    domain::RobotName,
-    grid::Replica,
-    process_usage::Usage,
-    samples::{
-        CommandSample, FieldCell, GuidanceSample, LinkSample, PoseSample, PowerSample, RosterEntry,
-        RosterHeader, name_str,
-    },
-};
-use glam::DVec2;
-use recording::downsampled::drop_every_second;
+use common::{domain::RobotName, process_usage::Usage, samples::name_str};
+use robot_state::{Event, RobotState, Sample};
 
-/// The longest way, in points. If it is longer, every second point is dropped.
-const MOST_POINTS: usize = 4000;
-/// The distance between two points of the way, metres.
-const POINT_EVERY_M: f64 = 0.05;
 const MOST_EVENTS: usize = 50;
 
 #[derive(Debug)]
@@ -25,55 +12,29 @@ pub(super) struct View {
     pub(super) robot: RobotName,
     /// Whether a run of the robot goes on.
     pub(super) connected: bool,
-    /// The supervisor; none before its first roster.
-    pub(super) supervisor: Option<RosterHeader>,
-    pub(super) supervisor_usage: Usage,
-    pub(super) stages: Vec<Stage>,
+    pub(super) state: RobotState,
+    /// The usage of each stage's process, and of the supervisor's behind them; empty before it was looked at.
+    pub(super) usage: Vec<Usage>,
+    /// Samples a second on the first output of each stage; none before they were counted.
+    pub(super) rates_hz: Vec<Option<f64>>,
     /// The row of the stage that the keys concern.
     pub(super) chosen: usize,
-    pub(super) pose: Option<PoseSample>,
-    pub(super) guidance: Option<GuidanceSample>,
-    pub(super) command: Option<CommandSample>,
-    pub(super) link: Option<LinkSample>,
-    pub(super) power: Option<PowerSample>,
-    pub(super) grid: Replica<u8>,
-    pub(super) field: Replica<FieldCell>,
-    /// The target and those after it, metres in the mission frame.
-    pub(super) targets: Vec<DVec2>,
-    /// The believed way of the robot, metres in the mission frame.
-    pub(super) way: Vec<DVec2>,
-    /// Deaths and stalls, the newest first.
-    pub(super) events: VecDeque<String>,
+    /// Deaths and stalls, the newest first. What the failsafe does has a line of its own.
+    pub(super) events: VecDeque<Event>,
     /// The result of the last key.
     pub(super) message: String,
 }
 
-#[derive(Clone, Debug)]
-pub(super) struct Stage {
-    pub(super) entry: RosterEntry,
-    /// Samples a second on its first output; none before they were counted.
-    pub(super) rate_hz: Option<f64>,
-    pub(super) usage: Usage,
-}
-
 impl View {
-    pub(super) fn of(robot: RobotName) -> Self {
+    /// The view before `robot` was seen.
+    pub(super) fn new(robot: RobotName) -> Self {
         Self {
             robot,
             connected: false,
-            supervisor: None,
-            supervisor_usage: Usage::default(),
-            stages: Vec::new(),
+            state: RobotState::default(),
+            usage: Vec::new(),
+            rates_hz: Vec::new(),
             chosen: 0,
-            pose: None,
-            guidance: None,
-            command: None,
-            link: None,
-            power: None,
-            grid: Replica::default(),
-            field: Replica::default(),
-            targets: Vec::new(),
-            way: Vec::new(),
             events: VecDeque::new(),
             message: String::new(),
         }
@@ -82,43 +43,38 @@ impl View {
     /// Note that a run of the robot began, and drop the data of the last run.
     pub(super) fn on_connected(&mut self) {
         let chosen = self.chosen;
-        *self = Self::of(self.robot.clone());
+        *self = Self::new(self.robot.clone());
         (self.connected, self.chosen) = (true, chosen);
     }
 
     /// The name of the chosen stage; none before the first roster.
     pub(super) fn chosen_stage(&self) -> Option<&str> {
-        let stage = self.stages.get(self.chosen);
-        stage.map(|stage| name_str(&stage.entry.stage))
+        let stage = self.state.stages.get(self.chosen);
+        stage.map(|entry| name_str(&entry.stage))
     }
 
-    pub(super) fn on_pose(&mut self, pose: PoseSample) {
-        let position = pose.pose().position;
-        let last = self.way.last();
-        if last.is_none_or(|last| last.distance(position) >= POINT_EVERY_M) {
-            if self.way.len() == MOST_POINTS {
-                drop_every_second(&mut self.way);
+    /// Choose the stage that is `down` rows below the chosen one.
+    pub(super) fn choose(&mut self, down: isize) {
+        let last = self.state.stages.len().saturating_sub(1);
+        self.chosen = self.chosen.saturating_add_signed(down).min(last);
+    }
+
+    /// The processes of the stages, and the supervisor's.
+    pub(super) fn processes(&self) -> Vec<u32> {
+        let supervisor = self.state.supervisor.map_or(0, |header| header.supervisor_pid);
+        self.state.stages.iter().map(|entry| entry.pid).chain([supervisor]).collect()
+    }
+
+    pub(super) fn apply(&mut self, sample: &Sample) {
+        self.state.apply(sample);
+        if let Sample::Roster(..) = sample {
+            self.choose(0);
+        }
+        for event in self.state.take_events() {
+            if event.is_recovery() {
+                self.events.push_front(event);
             }
-            self.way.push(position);
         }
-        self.pose = Some(pose);
-    }
-
-    pub(super) fn on_roster(&mut self, header: RosterHeader, entries: &[RosterEntry]) {
-        self.supervisor = Some(header);
-        self.stages.resize_with(entries.len(), || Stage {
-            entry: RosterEntry::default(),
-            rate_hz: None,
-            usage: Usage::default(),
-        });
-        for (stage, entry) in self.stages.iter_mut().zip(entries) {
-            stage.entry = *entry;
-        }
-        self.chosen = self.chosen.min(entries.len().saturating_sub(1));
-    }
-
-    pub(super) fn on_event(&mut self, event: String) {
-        self.events.push_front(event);
         self.events.truncate(MOST_EVENTS);
     }
 }

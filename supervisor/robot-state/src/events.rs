@@ -1,17 +1,23 @@
 //! Deaths, recoveries, orders and log lines as one list.
 
-use std::fmt::Debug;
+use std::collections::VecDeque;
 
 use common::samples::{
-    Action, Cause, CommandSample, CommandState, DeathSample, DirectiveSample, FaultKind,
-    FaultSample, HoldReason, LinkSample, Order, RequestKind, RequestSample, RosterEntry,
-    StageState, StallSample, TargetSample, name_str,
+    Cause, CommandSample, CommandState, DeathSample, DirectiveSample, FaultKind, FaultSample,
+    HoldReason, LinkSample, Order, RequestKind, RequestSample, RosterEntry, StageState,
+    StallSample, TargetSample, name_str,
 };
-use processes::process::ExitCause;
 use serde::Serialize;
+
+use crate::{
+    sample::Sample,
+    words::{death_in_words, failsafe_in_words, words},
+};
 
 /// Most letters of a text.
 const LONGEST: usize = 300;
+/// Most events that wait to be taken.
+const MOST_WAITING: usize = 20_000;
 
 /// A line of the list.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -22,6 +28,13 @@ pub struct Event {
     pub of: String,
     pub kind: Kind,
     pub text: String,
+}
+
+impl Event {
+    /// Whether a process died or the robot stalled: what a supervisor recovers from.
+    pub fn is_recovery(&self) -> bool {
+        self.kind == Kind::Bad && self.of != FAILSAFE
+    }
 }
 
 /// The importance of an event.
@@ -36,14 +49,16 @@ pub enum Kind {
     Log,
 }
 
+const FAILSAFE: &str = "failsafe";
+
 /// Finds the events in samples, in their order.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Events {
-    found: Vec<Event>,
+    waiting: VecDeque<Event>,
     failsafe: Option<(u8, u8)>,
     directive: Option<(u8, u8)>,
     /// The number of the current target, of the last of the list, and of the one that was reached.
-    pub(crate) target: u64,
+    target: u64,
     last: u64,
     arrived: u64,
     /// The generation of each stage that was seen to run.
@@ -53,9 +68,8 @@ pub(crate) struct Events {
 }
 
 impl Events {
-    /// Take the events since the last time.
-    pub(crate) fn take(&mut self) -> Vec<Event> {
-        std::mem::take(&mut self.found)
+    pub(crate) fn drain(&mut self) -> Vec<Event> {
+        self.waiting.drain(..).collect()
     }
 
     fn add(&mut self, of: &str, kind: Kind, text: impl Into<String>) {
@@ -64,21 +78,40 @@ impl Events {
             text.truncate(cut);
             text.push('…');
         }
-        self.found.push(Event { t: self.now_s, of: of.to_owned(), kind, text });
+        if self.waiting.len() == MOST_WAITING {
+            self.waiting.pop_front();
+        }
+        self.waiting.push_back(Event { t: self.now_s, of: of.to_owned(), kind, text });
     }
 
-    pub(crate) fn death(&mut self, death: &DeathSample) {
+    pub(crate) fn sample(&mut self, sample: &Sample) {
+        match sample {
+            Sample::Pose(pose) => self.now_s = self.now_s.max(pose.stamp.time().seconds()),
+            Sample::Command(command) => self.command(command),
+            Sample::Target(target) => self.target(target),
+            Sample::Roster(_, entries) => self.roster(entries),
+            Sample::Death(death) => self.death(death),
+            Sample::Directive(directive) => self.directive(directive),
+            Sample::Stall(stall) => self.stall(stall),
+            Sample::Request(request) => self.request(request),
+            Sample::Fault(fault) => self.fault(fault),
+            Sample::Link(link) => self.link(link),
+            _ => {}
+        }
+    }
+
+    fn death(&mut self, death: &DeathSample) {
         let hung = if death.hung == 1 { "hung, " } else { "" };
         let log_tail = match death.log_tail.text().trim() {
             "" => String::new(),
             tail => format!("; its log ends: {tail}"),
         };
-        let (generation, cause) = (death.generation, ExitCause::from(death));
+        let (generation, cause) = (death.generation, death_in_words(death));
         let text = format!("generation {generation} died ({hung}{cause}){log_tail}");
         self.add(name_str(&death.stage), Kind::Bad, text);
     }
 
-    pub(crate) fn roster(&mut self, entries: &[RosterEntry]) {
+    fn roster(&mut self, entries: &[RosterEntry]) {
         for entry in entries {
             if StageState::from_byte(entry.state) != StageState::Running {
                 continue;
@@ -94,18 +127,11 @@ impl Events {
         }
     }
 
-    pub(crate) fn link(&mut self, link: &LinkSample) {
+    fn link(&mut self, link: &LinkSample) {
         let now = (link.action, link.cause);
-        if self.failsafe.replace(now) == Some(now) {
-            return;
+        if self.failsafe.replace(now) != Some(now) {
+            self.add(FAILSAFE, self.kind(link), failsafe_in_words(link));
         }
-        let kind = self.kind(link);
-        let text = match (link.action(), link.cause()) {
-            (action, Cause::None) => format!("the robot {}", action.effect()),
-            (Action::Go, cause) => cause.name().to_owned(),
-            (action, cause) => format!("the robot {}: {}", action.effect(), cause.name()),
-        };
-        self.add("failsafe", kind, text);
     }
 
     /// The importance of the state of `link`.
@@ -118,7 +144,7 @@ impl Events {
         }
     }
 
-    pub(crate) fn directive(&mut self, directive: &DirectiveSample) {
+    fn directive(&mut self, directive: &DirectiveSample) {
         let now = (directive.order, directive.reason);
         if self.directive.replace(now) == Some(now) {
             return;
@@ -131,12 +157,12 @@ impl Events {
         self.add("supervisor", Kind::Note, text);
     }
 
-    pub(crate) fn stall(&mut self, stall: &StallSample) {
+    fn stall(&mut self, stall: &StallSample) {
         let (cause, recovery) = (words(stall.cause()), words(stall.recovery()));
         self.add("stalls", Kind::Bad, format!("no progress ({cause}): {recovery}"));
     }
 
-    pub(crate) fn request(&mut self, request: &RequestSample) {
+    fn request(&mut self, request: &RequestSample) {
         let targets = request.targets().unwrap_or_default().iter();
         let targets: String =
             targets.map(|at| format!("({:.2}, {:.2}) ", at.x_m, at.y_m)).collect();
@@ -145,12 +171,12 @@ impl Events {
         self.add("operator", Kind::Note, text.trim_end());
     }
 
-    pub(crate) fn fault(&mut self, fault: &FaultSample) {
+    fn fault(&mut self, fault: &FaultSample) {
         let kind = words(FaultKind::from_byte(fault.kind));
         self.add("operator", Kind::Note, format!("fault {kind} in {}", name_str(&fault.stage)));
     }
 
-    pub(crate) fn target(&mut self, target: &TargetSample) {
+    fn target(&mut self, target: &TargetSample) {
         self.last = target.last;
         if std::mem::replace(&mut self.target, target.number) == target.number {
             return;
@@ -160,7 +186,7 @@ impl Events {
         self.add("supervisor", Kind::Note, text);
     }
 
-    pub(crate) fn command(&mut self, command: &CommandSample) {
+    fn command(&mut self, command: &CommandSample) {
         let arrived = CommandState::from_byte(command.state) == CommandState::Arrived;
         if arrived && self.arrived != command.target_number {
             self.arrived = command.target_number;
@@ -174,53 +200,42 @@ impl Events {
     }
 }
 
-/// The name of a variant in words: `CommandStale` as `command stale`.
-pub(crate) fn words(of: impl Debug) -> String {
-    let mut words = String::new();
-    for letter in format!("{of:?}").chars() {
-        if letter.is_uppercase() && !words.is_empty() {
-            words.push(' ');
-        }
-        words.extend(letter.to_lowercase());
-    }
-    words
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use common::samples::{DeathCause, name};
+    use common::samples::{DeathCause, RosterHeader, name};
 
     #[test]
     fn a_death_and_the_successor_that_runs_are_told_once_each() {
-        let mut events = Events { now_s: 3.0, ..Events::default() };
+        let mut events = Events::default();
         let mut entry = RosterEntry {
             stage: name("planner"),
             generation: 1,
             state: StageState::Running.into(),
             ..RosterEntry::default()
         };
-        events.roster(&[entry]);
-        events.death(&DeathSample {
+        let roster = |entry| Sample::Roster(RosterHeader::default(), vec![entry]);
+        events.sample(&roster(entry));
+        events.sample(&Sample::Death(DeathSample {
             stage: name("planner"),
             generation: 1,
             cause: DeathCause::Signalled.into(),
             code: 9,
             ..DeathSample::default()
-        });
+        }));
         entry.generation = 2;
-        events.roster(&[entry]);
-        events.roster(&[entry]);
-        let told: Vec<_> = events.take().into_iter().map(|event| event.text).collect();
+        events.sample(&roster(entry));
+        events.sample(&roster(entry));
+        let told: Vec<_> = events.drain().into_iter().map(|event| event.text).collect();
         let died = "generation 1 died (signal 9)";
         assert_eq!(told, ["generation 1 runs", died, "generation 2 runs"]);
-        assert!(events.take().is_empty());
+        assert!(events.drain().is_empty());
     }
 
     #[test]
     fn a_long_line_of_a_log_is_cut_between_letters() {
         let mut events = Events::default();
         events.log("mapper", &"ö".repeat(1000));
-        assert_eq!(events.take()[0].text.chars().count(), LONGEST + 1);
+        assert_eq!(events.drain()[0].text.chars().count(), LONGEST + 1);
     }
 }

@@ -15,32 +15,32 @@ use crate::{
 };
 
 /// The id that a client gave its goal.
-pub type Uuid = [u8; 16];
+pub(crate) type Uuid = [u8; 16];
 
 /// The services and topics of the action, and their types in DDS.
-pub const SEND_GOAL: (&str, [&str; 2]) = (
+pub(crate) const SEND_GOAL: (&str, [&str; 2]) = (
     "navigate_to_pose/_action/send_goal",
     [
         "nav2_msgs::action::dds_::NavigateToPose_SendGoal_Request_",
         "nav2_msgs::action::dds_::NavigateToPose_SendGoal_Response_",
     ],
 );
-pub const CANCEL_GOAL: (&str, [&str; 2]) = (
+pub(crate) const CANCEL_GOAL: (&str, [&str; 2]) = (
     "navigate_to_pose/_action/cancel_goal",
     ["action_msgs::srv::dds_::CancelGoal_Request_", "action_msgs::srv::dds_::CancelGoal_Response_"],
 );
-pub const GET_RESULT: (&str, [&str; 2]) = (
+pub(crate) const GET_RESULT: (&str, [&str; 2]) = (
     "navigate_to_pose/_action/get_result",
     [
         "nav2_msgs::action::dds_::NavigateToPose_GetResult_Request_",
         "nav2_msgs::action::dds_::NavigateToPose_GetResult_Response_",
     ],
 );
-pub const FEEDBACK: (&str, &str) = (
+pub(crate) const FEEDBACK: (&str, &str) = (
     "navigate_to_pose/_action/feedback",
     "nav2_msgs::action::dds_::NavigateToPose_FeedbackMessage_",
 );
-pub const STATUS: (&str, &str) =
+pub(crate) const STATUS: (&str, &str) =
     ("navigate_to_pose/_action/status", "action_msgs::msg::dds_::GoalStatusArray_");
 
 /// The most goals that are remembered; older ones are forgotten.
@@ -48,7 +48,7 @@ const MOST_GOALS: usize = 16;
 
 /// A `action_msgs/GoalStatus`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Status {
+pub(crate) enum Status {
     Executing = 2,
     Canceling = 3,
     Succeeded = 4,
@@ -58,7 +58,7 @@ pub enum Status {
 
 impl Status {
     /// Whether the status is final.
-    pub const fn is_final(self) -> bool {
+    pub(crate) const fn is_final(self) -> bool {
         matches!(self, Self::Succeeded | Self::Canceled | Self::Aborted)
     }
 }
@@ -87,7 +87,7 @@ struct Goal {
 
 /// The server's goals.
 #[derive(Debug, Default)]
-pub struct Server {
+pub(crate) struct Server {
     goals: VecDeque<Goal>,
     /// The number of the newest target.
     newest_target: u64,
@@ -97,31 +97,31 @@ pub struct Server {
 
 /// A goal that a client sends.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sent {
-    pub id: Uuid,
-    pub point: TargetPoint,
+pub(crate) struct Sent {
+    pub(crate) id: Uuid,
+    pub(crate) point: TargetPoint,
 }
 
 impl Server {
     /// The goal that a client sends. The error says why the payload is none.
-    pub fn read_goal(payload: &[u8]) -> Result<Sent, String> {
+    pub(crate) fn read_goal(payload: &[u8]) -> Result<Sent, String> {
         let mut reader = Reader::new(payload).map_err(malformed)?;
         let id = uuid(&mut reader)?;
         Ok(Sent { id, point: goal_of(&mut reader)? })
     }
 
     /// The reply to a goal, at `now_ns` since 1970.
-    pub fn goal_reply(is_accepted: bool, now_ns: u64) -> Vec<u8> {
+    pub(crate) fn goal_reply(is_accepted: bool, now_ns: u64) -> Vec<u8> {
         Writer::default().u8(is_accepted.into()).time(now_ns).take()
     }
 
     /// The number of the newest target, which the target of a goal that is sent now follows.
-    pub const fn newest_target(&self) -> u64 {
+    pub(crate) const fn newest_target(&self) -> u64 {
         self.newest_target
     }
 
     /// Take a goal that the supervisor accepted; its target comes after the one with the number `after`.
-    pub fn accept(&mut self, sent: Sent, after: u64, now_ns: u64) {
+    pub(crate) fn accept(&mut self, sent: Sent, after: u64, now_ns: u64) {
         self.end(Status::Aborted);
         if self.goals.len() == MOST_GOALS {
             self.goals.pop_front();
@@ -133,7 +133,7 @@ impl Server {
     }
 
     /// Let the goal that is not over end with `status`.
-    pub fn end(&mut self, status: Status) {
+    pub(crate) fn end(&mut self, status: Status) {
         for goal in self.goals.iter_mut().filter(|goal| !goal.status.is_final()) {
             goal.status = status;
             self.is_changed = true;
@@ -141,11 +141,11 @@ impl Server {
     }
 
     /// Forget the numbers of targets, because another run counts them from 1.
-    pub fn forget_targets(&mut self) {
+    pub(crate) fn forget_targets(&mut self) {
         self.newest_target = 0;
     }
 
-    pub fn target(&mut self, target: &TargetSample) {
+    pub(crate) fn target(&mut self, target: &TargetSample) {
         self.newest_target = target.number;
         let Some(goal) = self.goals.back_mut().filter(|goal| !goal.status.is_final()) else {
             return;
@@ -161,7 +161,7 @@ impl Server {
         }
     }
 
-    pub fn command(&mut self, command: &CommandSample) {
+    pub(crate) fn command(&mut self, command: &CommandSample) {
         let has_arrived = CommandState::from_byte(command.state) == CommandState::Arrived;
         let goal = self.goals.back().filter(|goal| goal.number == Some(command.target_number));
         if has_arrived && goal.is_some_and(|goal| goal.status == Status::Executing) {
@@ -170,7 +170,7 @@ impl Server {
     }
 
     /// Take a request to cancel. Returns the reply, and whether the robot is to stand because of it.
-    pub fn cancel(&mut self, payload: &[u8]) -> Result<(Vec<u8>, bool), String> {
+    pub(crate) fn cancel(&mut self, payload: &[u8]) -> Result<(Vec<u8>, bool), String> {
         let mut reader = Reader::new(payload).map_err(malformed)?;
         let (id, until_ns) = (uuid(&mut reader)?, reader.time().map_err(malformed)?);
         let is_any = id == Uuid::default();
@@ -201,12 +201,12 @@ impl Server {
     }
 
     /// The goal of which a client asks for the result.
-    pub fn read_result(payload: &[u8]) -> Result<Uuid, String> {
+    pub(crate) fn read_result(payload: &[u8]) -> Result<Uuid, String> {
         uuid(&mut Reader::new(payload).map_err(malformed)?)
     }
 
     /// The result of a goal; none while it is not over. An unknown goal has the state 0.
-    pub fn result(&self, id: Uuid) -> Option<Vec<u8>> {
+    pub(crate) fn result(&self, id: Uuid) -> Option<Vec<u8>> {
         let goal = self.goals.iter().find(|goal| goal.id == id);
         if goal.is_some_and(|goal| !goal.status.is_final()) {
             return None;
@@ -217,7 +217,7 @@ impl Server {
     }
 
     /// The states of all goals, if they have changed.
-    pub fn take_status(&mut self) -> Option<Vec<u8>> {
+    pub(crate) fn take_status(&mut self) -> Option<Vec<u8>> {
         let status = |writer: &mut Writer, goal: &Goal| {
             writer.raw(&goal.id).time(goal.at_ns).u8(goal.status as u8);
         };
@@ -226,7 +226,12 @@ impl Server {
     }
 
     /// The progress of the robot with its goal; none without a goal.
-    pub fn feedback(&self, pose: &PoseSample, recoveries: u64, now_ns: u64) -> Option<Vec<u8>> {
+    pub(crate) fn feedback(
+        &self,
+        pose: &PoseSample,
+        recoveries: u64,
+        now_ns: u64,
+    ) -> Option<Vec<u8>> {
         let goal = self.goals.back().filter(|goal| !goal.status.is_final())?;
         let at = pose.pose();
         let left_m = at.position.distance(goal.point.position());

@@ -1,9 +1,11 @@
 //! THE table of the topics that the bridge publishes and takes. Writers and readers are made from it, and the guide's list is
 //! printed from it.
 
+use clap::ValueEnum;
+
 /// The content of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Id {
+pub(crate) enum Id {
     Tf,
     TfStatic,
     Pose,
@@ -23,37 +25,37 @@ pub enum Id {
 }
 
 /// The requests of others, each of which the user must permit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Accept {
-    /// Send the robot elsewhere: `goal_pose` and the action `navigate_to_pose`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+pub(crate) enum Accept {
+    /// Send the robot to targets: `goal_pose` and the action `navigate_to_pose`.
     Goals,
-    /// Say where the robot is.
+    /// Say where it is: `initialpose`.
     Pose,
-    /// Let the robot stand, and go on.
+    /// Let it stand and go on: `stop`.
     Stop,
 }
 
 /// A row of the table.
 #[derive(Clone, Copy, Debug)]
-pub struct Spec {
-    pub id: Id,
+pub(crate) struct Spec {
+    pub(crate) id: Id,
     /// The name, relative to the bridge's namespace.
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     /// The package and the name of its type.
-    pub message: [&'static str; 2],
+    pub(crate) message: [&'static str; 2],
     /// The name of its type in DDS.
-    pub type_name: &'static str,
+    pub(crate) type_name: &'static str,
     /// Whether a reader that joins later gets the newest message.
-    pub is_latched: bool,
+    pub(crate) is_latched: bool,
     /// The permission for it; none for a topic that the bridge publishes.
-    pub accepted_by: Option<Accept>,
-    pub meaning: &'static str,
+    pub(crate) accepted_by: Option<Accept>,
+    pub(crate) meaning: &'static str,
 }
 
 macro_rules! table {
     ($($id:expr => $name:literal, $package:ident / $message:ident, $latched:literal, $accept:expr, $meaning:literal;)*) => {
         /// Every topic.
-        pub const TABLE: &[Spec] = &[$(Spec {
+        pub(crate) const TABLE: &[Spec] = &[$(Spec {
             id: $id,
             name: $name,
             message: [stringify!($package), stringify!($message)],
@@ -99,7 +101,7 @@ table! {
 }
 
 /// The row of `id`.
-pub fn spec(id: Id) -> Option<&'static Spec> {
+pub(crate) fn spec(id: Id) -> Option<&'static Spec> {
     let id = if let Id::Range(_) = id { Id::Range(0) } else { id };
     TABLE.iter().find(|spec| spec.id == id)
 }

@@ -1,7 +1,7 @@
 //! Connections and requests. Each connection takes a bounded amount of memory for a bounded time, whatever its client
 //! does.
 
-use std::{convert::Infallible, io, net::TcpListener, path::Path, sync::Arc, time::Duration};
+use std::{convert::Infallible, io, net::TcpListener, sync::Arc, time::Duration};
 
 use axum::{
     body::Body,
@@ -11,32 +11,16 @@ use axum::{
 };
 use hyper::{body::Incoming, server::conn::http1, service::service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
-use tokio::{
-    io::{AsyncRead, AsyncWrite},
-    sync::Semaphore,
-    time::timeout,
-};
-use tokio_rustls::{
-    TlsAcceptor,
-    rustls::{
-        ServerConfig,
-        crypto::ring,
-        pki_types::{CertificateDer, PrivateKeyDer, pem::PemObject as _},
-    },
-};
+use page::assets;
+use tokio::{net::TcpStream, sync::Semaphore, time::timeout};
 
-use super::{
-    context::Context,
-    options::{Options, PageError},
-    session,
-};
-use crate::assets;
+use crate::{context::Context, session};
 
 /// Most connections at a time; more are closed at once.
 const MOST_CONNECTIONS: usize = 64;
 /// Most websockets at a time.
 const MOST_SESSIONS: usize = 16;
-/// The time for the handshake of a connection, and for its request.
+/// The time for the request of a connection.
 const REQUEST_WITHIN: Duration = Duration::from_secs(3);
 /// The time within which a connection that does not become a websocket ends.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(10);
@@ -47,29 +31,8 @@ const MOST_MESSAGE_BYTES: usize = 4 << 10;
 /// The path of the websocket.
 const LIVE: &str = "/live";
 
-/// The keys of `options`; none if the page is not encrypted.
-pub(super) fn tls(options: &Options) -> Result<Option<TlsAcceptor>, PageError> {
-    let Some((certificates, key)) = &options.tls else {
-        return Ok(None);
-    };
-    let problem = |file: &Path| {
-        let file = file.to_path_buf();
-        move |problem: String| PageError::Tls { file, problem }
-    };
-    let chain = CertificateDer::pem_file_iter(certificates)
-        .and_then(Iterator::collect::<Result<Vec<_>, _>>)
-        .map_err(|error| problem(certificates)(error.to_string()))?;
-    let its_key =
-        PrivateKeyDer::from_pem_file(key).map_err(|error| problem(key)(error.to_string()))?;
-    let config = ServerConfig::builder_with_provider(Arc::new(ring::default_provider()))
-        .with_safe_default_protocol_versions()
-        .and_then(|config| config.with_no_client_auth().with_single_cert(chain, its_key))
-        .map_err(|error| problem(certificates)(error.to_string()))?;
-    Ok(Some(TlsAcceptor::from(Arc::new(config))))
-}
-
 /// Serve connections until the result is dropped.
-pub(super) async fn serve(context: Arc<Context>, listener: TcpListener, tls: Option<TlsAcceptor>) {
+pub(crate) async fn serve(context: Arc<Context>, listener: TcpListener) {
     let Ok(listener) = tokio::net::TcpListener::from_std(listener) else {
         tracing::error!("the system refuses to watch the socket of the page");
         return;
@@ -85,16 +48,10 @@ pub(super) async fn serve(context: Arc<Context>, listener: TcpListener, tls: Opt
         let Ok(permit) = connections.clone().try_acquire_owned() else {
             continue;
         };
-        let (context, sessions, tls) = (context.clone(), sessions.clone(), tls.clone());
+        let (context, sessions) = (context.clone(), sessions.clone());
         tokio::spawn(async move {
             // The failure of a connection concerns only its client.
-            let _ = match tls {
-                None => connection(&context, stream, &sessions).await,
-                Some(tls) => match timeout(REQUEST_WITHIN, tls.accept(stream)).await {
-                    Ok(Ok(stream)) => connection(&context, stream, &sessions).await,
-                    _ => Ok(()),
-                },
-            };
+            let _ = connection(&context, stream, &sessions).await;
             drop(permit);
         });
     }
@@ -103,7 +60,7 @@ pub(super) async fn serve(context: Arc<Context>, listener: TcpListener, tls: Opt
 /// Answer one request, or begin a session.
 async fn connection(
     context: &Arc<Context>,
-    stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static,
+    stream: TcpStream,
     sessions: &Arc<Semaphore>,
 ) -> io::Result<()> {
     let service = service_fn(|request: hyper::Request<Incoming>| {

@@ -10,7 +10,10 @@ use std::{
 
 use serde_json::{Value, json};
 
-use super::{Options, Page, PageError, orders::Operator};
+use crate::{
+    orders::Operator,
+    serving::{Options, Page, PageError},
+};
 
 /// An operator that notes what it is asked for.
 #[derive(Default)]
@@ -45,12 +48,7 @@ impl Operator for Noted {
 }
 
 fn options(listen: &str) -> Options {
-    Options {
-        robot: "page-test".parse().unwrap(),
-        listen: listen.parse().unwrap(),
-        hosts: Vec::new(),
-        tls: None,
-    }
+    Options { robot: "page-test".parse().unwrap(), listen: listen.parse().unwrap(), proxy: None }
 }
 
 fn page() -> (Page, Arc<Noted>) {
@@ -246,7 +244,7 @@ fn a_foreign_origin_and_a_websocket_or_a_change_without_one_are_forbidden() {
 #[test]
 fn every_file_forbids_scripts_of_others_and_none_has_a_token() {
     let (page, _) = page();
-    for (path, kind, _) in crate::assets::ALL {
+    for (path, kind, _) in page::assets::ALL {
         let answer = ask(&page, &[&format!("GET {path} HTTP/1.1"), &host(&page)]);
         assert_eq!(status(&answer), "200", "{path}");
         let head = answer.to_lowercase();
@@ -389,10 +387,15 @@ fn a_page_that_cannot_be_served_says_why() {
     let (first, _) = page();
     let taken = refused(&options(&first.address.to_string()));
     assert!(matches!(taken, PageError::Listen { .. }), "{taken}");
-    let directory = tempfile::tempdir().unwrap();
-    let file = directory.path().join("none.pem");
-    let mut encrypted = options("127.0.0.1:0");
-    encrypted.tls = Some((file.clone(), file));
-    let none = refused(&encrypted);
-    assert!(matches!(none, PageError::Tls { .. }), "{none}");
+}
+
+#[test]
+fn behind_a_proxy_a_page_is_served_under_its_name_alone() {
+    let proxy = Some("robot.example".to_owned());
+    let options = Options { proxy, ..options("127.0.0.1:0") };
+    let page = Page::open(&options, Arc::new(Noted::default())).unwrap();
+    let answer = ask(&page, &["GET / HTTP/1.1", "Host: robot.example"]);
+    assert_eq!(status(&answer), "200");
+    assert!(answer.contains("connect-src wss://robot.example;"), "{answer}");
+    assert_eq!(status(&ask(&page, &["GET / HTTP/1.1", &host(&page)])), "421");
 }

@@ -7,20 +7,16 @@ use std::{
 };
 
 use common::{
-    bus::{Bus, BusError, Reader, Writer},
+    bus::{Bus, BusError, Writer},
     domain::{Domain, RobotName},
     follower::{Event, Follower},
     kinematics::Pose2,
-    run::Run,
-    samples::{
-        CommandSample, DeathSample, FieldCell, FieldHeader, FixSample, GridHeader, LinkSample,
-        PoseSample, PowerSample, RangeReading, RangesHeader, RequestKind, RequestSample,
-        RosterEntry, RosterHeader, ScanHeader, StallSample, TargetPoint, TargetSample, name,
-    },
+    samples::{FixSample, RequestKind, TargetPoint, name},
     signals::{SIGCONT, Signals},
     topics,
 };
 use glam::DVec2;
+use robot_state::{Feed, Sample, TOPICS, newest_run};
 use ros2::participant::{Message, Request};
 use thiserror::Error;
 
@@ -52,21 +48,21 @@ const TELL_EVERY: Duration = Duration::from_secs(1);
 
 /// The options of the bridge.
 #[derive(Clone, Debug)]
-pub struct Options {
-    pub robot: RobotName,
+pub(crate) struct Options {
+    pub(crate) robot: RobotName,
     /// The domain of DDS.
-    pub domain: u16,
+    pub(crate) domain: u16,
     /// The address of the network interface; all of them without it.
-    pub interface: Option<Ipv4Addr>,
+    pub(crate) interface: Option<Ipv4Addr>,
     /// The namespace of the topics.
-    pub namespace: String,
+    pub(crate) namespace: String,
     /// The requests of others that are permitted.
-    pub accepted: Vec<Accept>,
+    pub(crate) accepted: Vec<Accept>,
 }
 
 /// The bridge cannot be opened.
 #[derive(Debug, Error)]
-pub enum BridgeError {
+pub(crate) enum BridgeError {
     #[error(
         "cannot join domain {domain} of ROS 2: {source}; is the address of --interface one of this machine?"
     )]
@@ -75,42 +71,18 @@ pub enum BridgeError {
     System(io::Error),
 }
 
-/// The readers of a robot's bus.
-struct Readers {
-    pose: Reader<PoseSample>,
-    ranges: Reader<RangesHeader, RangeReading>,
-    scan: Reader<ScanHeader, f32>,
-    target: Reader<TargetSample>,
-    grid: Reader<GridHeader, u8>,
-    field: Reader<FieldHeader, FieldCell>,
-    command: Reader<CommandSample>,
-    power: Reader<PowerSample>,
-    roster: Reader<RosterHeader, RosterEntry>,
-    deaths: Reader<DeathSample>,
-    stalls: Reader<StallSample>,
-    requests: Reader<RequestSample>,
-    link: Reader<LinkSample>,
+/// The bus of a robot.
+struct RobotBus {
+    feed: Feed,
     /// The writer of fixes; none if nobody may say where the robot is.
     fixes: Option<Writer<FixSample>>,
 }
 
-impl Readers {
+impl RobotBus {
     fn open(bus: &Bus, accepted: &[Accept]) -> Result<Self, BusError> {
         let is_placed = accepted.contains(&Accept::Pose);
         Ok(Self {
-            pose: bus.reader(&topics::POSE)?,
-            ranges: bus.reader(&topics::RANGES)?,
-            scan: bus.reader(&topics::SCAN)?,
-            target: bus.reader(&topics::TARGET)?,
-            grid: bus.reader(&topics::GRID)?,
-            field: bus.reader(&topics::FIELD)?,
-            command: bus.reader(&topics::COMMAND)?,
-            power: bus.reader(&topics::POWER)?,
-            roster: bus.reader(&topics::ROSTER)?,
-            deaths: bus.reader(&topics::DEATHS)?,
-            stalls: bus.reader(&topics::STALLS)?,
-            requests: bus.reader(&topics::REQUESTS)?,
-            link: bus.reader(&topics::LINK)?,
+            feed: Feed::open(bus, TOPICS)?,
             fixes: is_placed.then(|| bus.writer(&topics::FIX, 1)).transpose()?,
         })
     }
@@ -134,7 +106,6 @@ struct Bridge {
     goals: Server,
     /// Clients that wait for the result of a goal.
     results: Vec<(Request, Uuid)>,
-    recoveries: u64,
     feedback_at: Instant,
     placed: Option<Placed>,
     /// The number of stops that were asked for since the robot was ordered to stand for a canceled goal, that order included. None if the
@@ -144,7 +115,7 @@ struct Bridge {
 }
 
 /// Bridge a robot, from run to run, until `ended` returns true.
-pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), BridgeError> {
+pub(crate) fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), BridgeError> {
     let Options { robot, domain, interface, namespace, accepted } = options;
     let join = || {
         Endpoints::open(*domain, *interface, namespace, accepted)
@@ -158,14 +129,13 @@ pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), B
         shown: None,
         goals: Server::default(),
         results: Vec::new(),
-        recoveries: 0,
         feedback_at: Instant::now(),
         placed: None,
         stands_for_cancel: None,
         told_at: None,
     };
     let robot_domain = Domain::of(robot.clone());
-    let open = |bus: &Bus| Readers::open(bus, accepted);
+    let open = |bus: &Bus| RobotBus::open(bus, accepted);
     let follow = || Follower::new(robot_domain.clone(), "ros2", &topics::LINK, open);
     let mut follower = follow();
     while !ended() {
@@ -176,9 +146,9 @@ pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), B
             follower = follow();
         }
         let taken = match follower.wait(LOOK_EVERY) {
-            Ok(Event::Samples(readers)) => {
+            Ok(Event::Samples(bus)) => {
                 bridge.begin(&robot_domain);
-                bridge.take(readers)
+                bridge.take_samples(bus)
             }
             Ok(Event::Disconnected) => {
                 bridge.end();
@@ -212,9 +182,7 @@ impl Bridge {
         if self.shown.is_some() {
             return;
         }
-        // The link leads to another directory when the next run begins.
-        let directory = domain.run_directory().canonicalize();
-        let Some(run) = directory.ok().and_then(|directory| Run::load(&directory).ok()) else {
+        let Some((_, run)) = newest_run(domain) else {
             return;
         };
         let shown = Shown::new(self.robot.to_string(), run.mission);
@@ -230,62 +198,29 @@ impl Bridge {
         self.goals.end(Status::Aborted);
         self.goals.forget_targets();
         (self.shown, self.placed, self.stands_for_cancel) = (None, None, None);
-        self.recoveries = 0;
     }
 
     /// Take all samples that were published on the robot's bus.
-    fn take(&mut self, readers: &mut Readers) -> Result<(), BusError> {
-        let Self { endpoints, shown, goals, .. } = self;
+    fn take_samples(&mut self, bus: &mut RobotBus) -> Result<(), BusError> {
+        let Self { endpoints, shown, goals, stands_for_cancel, .. } = self;
         let Some(shown) = shown else {
             return Ok(());
         };
         let now_ns = now_ns();
-        let sink = &mut |id: Id, payload: Vec<u8>| endpoints.publish(id, payload);
-        while let Some(pose) = readers.pose.next_sample()? {
-            shown.pose(&pose, now_ns, sink);
-        }
-        while let Some(ranges) = readers.ranges.next_slice()? {
-            shown.ranges(&ranges, now_ns, sink);
-        }
-        while let Some(scan) = readers.scan.next_slice()? {
-            shown.scan(scan.header(), &scan, now_ns, sink);
-        }
-        while let Some(target) = readers.target.next_sample()? {
-            shown.target(&target);
-            goals.target(&target);
-        }
-        while let Some(command) = readers.command.next_sample()? {
-            goals.command(&command);
-        }
-        while let Some(grid) = readers.grid.next_slice()? {
-            shown.grid(grid.header(), &grid, now_ns, sink);
-        }
-        while let Some(field) = readers.field.next_slice()? {
-            shown.field(field.header(), &field, now_ns, sink);
-        }
-        while let Some(power) = readers.power.next_sample()? {
-            shown.power(&power, now_ns, sink);
-        }
-        while let Some(roster) = readers.roster.next_slice()? {
-            shown.roster(&roster);
-        }
-        while let Some(death) = readers.deaths.next_sample()? {
-            shown.death(&death);
-        }
-        while readers.stalls.next_sample()?.is_some() {
-            self.recoveries += 1;
-        }
-        while let Some(request) = readers.requests.next_sample()? {
-            if RequestKind::from_byte(request.kind) == RequestKind::Stop
-                && let Some(stops) = &mut self.stands_for_cancel
-            {
-                *stops += 1;
+        bus.feed.read(&mut |sample| {
+            match &sample {
+                Sample::Target(target) => goals.target(target),
+                Sample::Command(command) => goals.command(command),
+                Sample::Request(request)
+                    if RequestKind::from_byte(request.kind) == RequestKind::Stop =>
+                {
+                    *stands_for_cancel = stands_for_cancel.map(|stops| stops + 1);
+                }
+                _ => {}
             }
-        }
-        while let Some(link) = readers.link.next_sample()? {
-            shown.link(&link);
-        }
-        readers.fixes.as_mut().map_or(Ok(()), |fixes| self.place(fixes))
+            shown.sample(&sample, now_ns, &mut |id, payload| endpoints.publish(id, payload));
+        })?;
+        bus.fixes.as_mut().map_or(Ok(()), |fixes| self.place(fixes))
     }
 
     /// Publish the place that a node named, moved by the robot's way since then.
@@ -434,7 +369,7 @@ impl Bridge {
         shown.tick(now_ns, &mut |id, payload| endpoints.publish(id, payload));
         if self.feedback_at.elapsed() >= FEEDBACK_EVERY {
             self.feedback_at = Instant::now();
-            let feedback = self.goals.feedback(shown.newest_pose(), self.recoveries, now_ns);
+            let feedback = self.goals.feedback(&shown.newest_pose(), shown.state.stalls, now_ns);
             if let Some(feedback) = feedback {
                 self.endpoints.feedback(feedback);
             }

@@ -15,7 +15,7 @@ use tokio::{
     time::{MissedTickBehavior, interval, timeout},
 };
 
-use super::{
+use crate::{
     access::Role,
     context::Context,
     orders::{Asked, Order},
@@ -53,7 +53,7 @@ struct Hello {
 
 type Sender = SplitSink<WebSocket, Message>;
 
-pub(super) async fn run(mut socket: WebSocket, context: &Arc<Context>) {
+pub(crate) async fn run(mut socket: WebSocket, context: &Arc<Context>) {
     let first = timeout(TOKEN_WITHIN, socket.recv()).await;
     let role = match &first {
         Ok(Some(Ok(Message::Text(text)))) => {

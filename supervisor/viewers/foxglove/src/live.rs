@@ -16,21 +16,19 @@ use common::{
     domain::{Domain, RobotName},
     follower::{Event, Follower},
     mission::Mission,
-    run::Run,
     topics::{self, AnyTopic},
 };
 use foxglove::{
     ChannelBuilder, Context, FoxgloveError, RawChannel, Schema, WebSocketServer,
     WebSocketServerHandle,
 };
-use thiserror::Error;
-
-use crate::{
-    file::now_ns,
+use recording::{
     log_files::LogFiles,
-    schema,
-    viewers::{self, Drawn},
+    now_ns, schema,
+    viewers::{self, Channel, Drawn},
 };
+use robot_state::newest_run;
+use thiserror::Error;
 
 /// The interval at which a run that has ended or begun, or the end of this process, is noticed when nothing is published.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
@@ -43,14 +41,14 @@ const MOST_WAITING: usize = 512;
 /// A server that cannot be started.
 #[derive(Debug, Error)]
 #[error("cannot listen on {address}: {source}; choose another port with --listen")]
-pub struct LiveError {
+pub(crate) struct LiveError {
     address: SocketAddr,
     source: FoxgloveError,
 }
 
 /// A server for viewers.
 #[derive(Debug)]
-pub struct Live {
+pub(crate) struct Live {
     context: Arc<Context>,
     server: WebSocketServerHandle,
 }
@@ -73,7 +71,7 @@ struct Serving {
 
 impl Live {
     /// Listen from now on.
-    pub fn open(robot: &RobotName, address: SocketAddr) -> Result<Self, LiveError> {
+    pub(crate) fn open(robot: &RobotName, address: SocketAddr) -> Result<Self, LiveError> {
         let context = Context::new();
         let server = WebSocketServer::new()
             .name(robot.to_string())
@@ -86,12 +84,12 @@ impl Live {
     }
 
     /// The port on which it listens.
-    pub fn port(&self) -> u16 {
+    pub(crate) fn port(&self) -> u16 {
         self.server.port()
     }
 
     /// Serve the robot of `domain`, from run to run, until `ended` returns true.
-    pub fn serve(&self, domain: &Domain, ended: &mut dyn FnMut() -> bool) {
+    pub(crate) fn serve(&self, domain: &Domain, ended: &mut dyn FnMut() -> bool) {
         let open = |bus: &Bus| -> Result<Readers, BusError> {
             served().map(|topic| Ok((topic.spec().name, topic.recorder_reader(bus)?))).collect()
         };
@@ -105,7 +103,7 @@ impl Live {
                 }
                 Ok(Event::Samples(readers)) => {
                     serving = serving.or_else(|| self.begin(domain));
-                    serving.as_mut().map_or(Ok(()), |serving| serving.take(readers))
+                    serving.as_mut().map_or(Ok(()), |serving| serving.take_samples(readers))
                 }
                 Ok(Event::Disconnected | Event::Nothing) => Ok(()),
                 Err(error) => Err(error),
@@ -122,14 +120,12 @@ impl Live {
 
     /// The run of `domain`; none if its run file cannot be read.
     fn begin(&self, domain: &Domain) -> Option<Serving> {
-        // The link leads to another directory when the next run begins.
-        let directory = domain.run_directory().canonicalize().ok()?;
-        let mission = Run::load(&directory).ok()?.mission;
+        let (directory, run) = newest_run(domain)?;
         // Viewers forget the run before.
         self.server.clear_session(None);
         Some(Serving {
-            channels: self.channels(&mission),
-            drawn: Drawn::new(Some(mission)),
+            channels: self.channels(&run.mission),
+            drawn: Drawn::new(Some(run.mission)),
             logs: LogFiles::follow(&directory, true),
             logs_read: Instant::now(),
         })
@@ -140,10 +136,13 @@ impl Live {
         let topics = served().map(|topic| {
             let schema::Schema { name, text } = schema::of(topic);
             let schema = Schema::new(name, "ros2msg", text.into_bytes());
-            (topic.spec().name.to_owned(), schema, "cdr".to_owned())
+            (topic.spec().name.to_owned(), schema, "cdr")
         });
-        let all = topics.chain(viewers::channels(Some(mission)));
-        let built = all.filter_map(|(topic, schema, encoding)| {
+        let drawn = viewers::channels(Some(mission)).into_iter();
+        let drawn = drawn.map(|Channel { topic, schema, descriptors }| {
+            (topic, Schema::new(schema, "protobuf", descriptors), "protobuf")
+        });
+        let built = topics.chain(drawn).filter_map(|(topic, schema, encoding)| {
             let channel = ChannelBuilder::new(&topic).context(&self.context).schema(schema);
             Some((topic, channel.message_encoding(encoding).build_raw().ok()?))
         });
@@ -152,7 +151,7 @@ impl Live {
 }
 
 impl Serving {
-    fn take(&mut self, readers: &mut Readers) -> Result<(), BusError> {
+    fn take_samples(&mut self, readers: &mut Readers) -> Result<(), BusError> {
         let Self { channels, drawn, .. } = self;
         let mut send = |topic: &str, message: &[u8]| {
             if let Some(channel) = channels.get(topic) {
@@ -163,8 +162,7 @@ impl Serving {
         for (topic, reader) in readers {
             while reader.next_message(&mut message)?.is_some() {
                 send(topic, &message);
-                // A message that does not match its topic is not drawn.
-                let _ = drawn.take(topic, &message, now_ns(), &mut send);
+                drawn.message(topic, &message, now_ns(), &mut send);
             }
         }
         Ok(())

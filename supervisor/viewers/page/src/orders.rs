@@ -2,14 +2,14 @@
 
 use serde::Deserialize;
 
-use super::access::Role;
+use crate::access::Role;
 
 /// Most targets in one order.
 const MOST_TARGETS: usize = 16;
 
 /// Carries out orders, and waits until each is confirmed. The result is the confirmation, or the reason why it was not
 /// carried out.
-pub trait Operator: Send + Sync + 'static {
+pub(crate) trait Operator: Send + Sync + 'static {
     /// Let the robot stand.
     fn stop(&self) -> Result<String, String>;
     /// Let a stopped robot go on.

@@ -1,9 +1,6 @@
 //! The thread that reads the bus. It waits as any consumer does, and goes on when runs end and begin.
 
 use std::{
-    fs::File,
-    io,
-    os::unix::fs::FileExt as _,
     path::PathBuf,
     thread,
     time::{Duration, Instant},
@@ -12,26 +9,23 @@ use std::{
 use axum::body::Bytes;
 use common::ground_truth::GROUND_TRUTH;
 use common::{
-    bus::{AnyReader, Bus, BusError, Reader},
+    bus::Bus,
     clock::MissionTime,
     domain::Domain,
     follower::{Event, Follower},
     process_usage::Processes,
-    run::Run,
-    samples::{FieldCell, FieldHeader, TargetPoint, TargetSample},
+    samples::{Cause, TargetPoint, TargetSample},
     step::Step as _,
     topics,
 };
 use glam::DVec2;
 use planner::step::{Input, Planner};
-use recording::log_files::LogFiles;
+use recording::log_files::{LogFiles, Tail};
 
-use super::shared::Shared;
-use crate::{
-    about::about,
-    blob::{self, Shown},
-    collector::Collector,
-};
+use page::{Collector, about, blob};
+use robot_state::{Feed, TOPICS, failsafe_in_words, newest_run};
+
+use crate::shared::Shared;
 
 /// The interval at which a run that has ended or begun, or the end of this process, is noticed when nothing is published.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
@@ -41,47 +35,9 @@ const LOGS_EVERY: Duration = Duration::from_millis(500);
 /// The time after which a bus that cannot be used is tried again.
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
 /// Most bytes of the ground truth that are read at once; the bytes behind them are skipped.
-const TRUTH_AT_ONCE: usize = 1 << 16;
+const TRUTH_AT_ONCE: u64 = 1 << 16;
 /// The most cells of a map for which a field is computed to a target that is only looked at.
 const PREVIEW_MOST_CELLS: usize = 512 * 512;
-
-struct Readers {
-    /// The readers of [`Collector::TOPICS`].
-    messages: Vec<(&'static str, Box<dyn AnyReader>)>,
-    /// The reader of the field, which is read only while somebody watches.
-    field: Reader<FieldHeader, FieldCell>,
-}
-
-impl Readers {
-    fn open(bus: &Bus) -> Result<Self, BusError> {
-        let names = Collector::TOPICS.map(|topic| topic.spec().name);
-        let found = names.into_iter().filter_map(|name| {
-            let mut all = topics::TABLE.iter();
-            all.find(|topic| topic.spec().name == name).map(|topic| (name, topic))
-        });
-        let messages = found.map(|(name, topic)| Ok((name, topic.recorder_reader(bus)?)));
-        Ok(Self {
-            messages: messages.collect::<Result<_, BusError>>()?,
-            field: bus.reader(&topics::FIELD)?,
-        })
-    }
-
-    fn take(&mut self, collector: &mut Collector, watched: bool) -> Result<(), BusError> {
-        let mut message = Vec::new();
-        for (topic, reader) in &mut self.messages {
-            while reader.next_message(&mut message)?.is_some() {
-                // A message that does not match its topic is not shown.
-                let _ = collector.take(topic, &message);
-            }
-        }
-        while let Some(field) = self.field.next_slice()? {
-            if watched {
-                collector.field(field.header(), &field);
-            }
-        }
-        Ok(())
-    }
-}
 
 /// The data of one run.
 struct Reading {
@@ -89,23 +45,22 @@ struct Reading {
     processes: Processes,
     logs: LogFiles,
     logs_read: Instant,
-    truth: Truth,
+    /// What a simulated robot writes about itself.
+    truth: (PathBuf, Tail),
     packed: Option<Instant>,
 }
 
 impl Reading {
     /// The run of `domain`; none if its run file cannot be read.
     fn begin(domain: &Domain, shared: &Shared) -> Option<Self> {
-        // The link leads to another directory when the next run begins.
-        let directory = domain.run_directory().canonicalize().ok()?;
-        let run = Run::load(&directory).ok()?;
+        let (directory, run) = newest_run(domain)?;
         shared.lock().begin(&about(&run), run.mission.robot.address.is_none());
         Some(Self {
             collector: Collector::new(&run.mission),
             processes: Processes::default(),
             logs: LogFiles::follow(&directory, true),
             logs_read: Instant::now(),
-            truth: Truth { file: directory.join(GROUND_TRUTH), read: 0, partial: Vec::new() },
+            truth: (directory.join(GROUND_TRUTH), Tail::default()),
             packed: None,
         })
     }
@@ -115,11 +70,11 @@ impl Reading {
         let Self { collector, processes, logs, logs_read, packed, .. } = self;
         if logs_read.elapsed() >= LOGS_EVERY {
             *logs_read = Instant::now();
-            logs.take(&mut |process, line| collector.log(process, line));
+            logs.take(&mut |process, line| collector.state.log(process, line));
         }
         let usage = processes.look(&collector.processes(), Instant::now());
         collector.used(usage);
-        let (rows, events) = (collector.take_rows(), collector.take_events());
+        let (rows, events) = (collector.take_rows(), collector.state.take_events());
         let state = collector.take_state();
         let is_due = packed.is_none_or(|packed| packed.elapsed() >= PACK_EVERY);
         let (mut map, mut field) = (None, None);
@@ -132,7 +87,10 @@ impl Reading {
         let wanted = shared.lock().wanted.take();
         let preview = wanted.and_then(|target| preview(collector, DVec2::from(target)));
         let mut shown = shared.lock();
-        shown.link = collector.link_says();
+        if let Some(link) = &collector.state.link {
+            let says = format!("the link says: {}", failsafe_in_words(link));
+            shown.link = (link.cause() == Cause::OperatorStop, says);
+        }
         rows.iter().for_each(|row| shown.row(row));
         for event in events {
             shown.event(&serde_json::json!(event));
@@ -170,41 +128,13 @@ fn preview(collector: &Collector, target: DVec2) -> Option<Vec<u8>> {
         planner.step(input, MissionTime::default()).ok()?;
     }
     let cells = planner.snapshot()?.cells();
-    Some(blob::field(Shown::Preview, frame, &cells, target, collector.now_s()))
-}
-
-/// The lines that a simulated robot writes about itself.
-struct Truth {
-    file: PathBuf,
-    read: u64,
-    partial: Vec<u8>,
-}
-
-impl Truth {
-    /// Take the newest lines; without the file there are none.
-    fn take(&mut self, collector: &mut Collector) -> io::Result<()> {
-        let file = File::open(&self.file)?;
-        let length = file.metadata()?.len();
-        let skipped = length.saturating_sub(TRUTH_AT_ONCE as u64);
-        if self.read < skipped {
-            (self.read, self.partial) = (skipped, Vec::new());
-        }
-        let mut bytes = vec![0; length.saturating_sub(self.read) as usize];
-        let count = file.read_at(&mut bytes, self.read)?;
-        self.read += count as u64;
-        self.partial.extend_from_slice(&bytes[..count]);
-        let whole = self.partial.iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);
-        let lines: Vec<u8> = self.partial.drain(..whole).collect();
-        for line in String::from_utf8_lossy(&lines).lines() {
-            collector.truth(line);
-        }
-        Ok(())
-    }
+    Some(blob::field(blob::Shown::Preview, frame, &cells, target, collector.state.now_s()))
 }
 
 /// Show the robot of `domain` in `shared`, from run to run, until `ended` returns true.
-pub(super) fn follow(domain: &Domain, shared: &Shared, ended: &mut dyn FnMut() -> bool) {
-    let mut follower = Follower::new(domain.clone(), "page", &topics::LINK, Readers::open)
+pub(crate) fn follow(domain: &Domain, shared: &Shared, ended: &mut dyn FnMut() -> bool) {
+    let open = |bus: &Bus| Feed::open(bus, TOPICS);
+    let mut follower = Follower::new(domain.clone(), "page", &topics::LINK, open)
         .also_on([&topics::ROSTER as _, &topics::DEATHS as _]);
     let mut reading = None;
     while !ended() {
@@ -218,13 +148,16 @@ pub(super) fn follow(domain: &Domain, shared: &Shared, ended: &mut dyn FnMut() -
                 Ok(())
             }
             Ok(Event::Nothing) => Ok(()),
-            Ok(Event::Samples(readers)) => {
+            Ok(Event::Samples(feed)) => {
                 reading = reading.or_else(|| Reading::begin(domain, shared));
                 match &mut reading {
                     Some(Reading { collector, truth, .. }) => {
-                        // A robot that is not simulated writes no ground truth.
-                        let _ = truth.take(collector);
-                        readers.take(collector, shared.is_watched())
+                        let (file, tail) = truth;
+                        tail.skip(file, TRUTH_AT_ONCE);
+                        tail.lines(file).lines().for_each(|line| {
+                            collector.truth(line);
+                        });
+                        feed.read(&mut |sample| collector.apply(&sample))
                     }
                     None => Ok(()),
                 }

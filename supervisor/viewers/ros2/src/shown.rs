@@ -1,19 +1,16 @@
 //! The messages that show a robot: samples of its bus in, messages out. Pure.
 
-use std::collections::BTreeMap;
-
 use common::{
-    grid::{Applied, Cell, CellState, GridFrame, Replica},
+    grid::{Cell, CellState, GridFrame},
     kinematics::Pose2,
     mission::{Mission, Sensor, SensorKind},
     samples::{
-        Action, Cause, DeathSample, FieldCell, FieldHeader, GridHeader, LinkSample, PoseSample,
-        PowerSample, RangeReading, RangeStatus, RosterEntry, ScanHeader, StageState, TargetSample,
-        name_str,
+        Action, Cause, FieldCell, FieldHeader, GridHeader, PoseSample, RangeReading, RangeStatus,
+        RosterEntry, ScanHeader, StageState, TargetPoint, name_str,
     },
 };
 use glam::DVec2;
-use processes::process::ExitCause;
+use robot_state::{RobotState, Sample, death_in_words, failsafe_in_words};
 use ros2::parts::Pose;
 
 use crate::{
@@ -36,49 +33,36 @@ const STEPS_A_CELL: usize = 8;
 const POSE_EVERY: usize = 4;
 
 /// Takes a message: its topic and its payload.
-pub type Sink<'a> = &'a mut dyn FnMut(Id, Vec<u8>);
+pub(crate) type Sink<'a> = &'a mut dyn FnMut(Id, Vec<u8>);
 
 /// A robot as the messages show it.
 #[derive(Debug)]
-pub struct Shown {
+pub(crate) struct Shown {
     robot: String,
     mission: Mission,
     sensors: Vec<Sensor>,
-    pose: PoseSample,
-    target: TargetSample,
-    grid: Replica<u8>,
+    /// The newest samples.
+    pub(crate) state: RobotState,
     /// The version of the last whole map that was published, and its time.
     map: Option<(u64, u64)>,
-    field: Replica<FieldCell>,
-    link: LinkSample,
-    power: Option<PowerSample>,
-    stages: Vec<RosterEntry>,
-    deaths: BTreeMap<String, String>,
     diagnosed: Option<(Vec<Status>, u64)>,
 }
 
 impl Shown {
     /// A robot before any sample of it has been read.
-    pub fn new(robot: String, mission: Mission) -> Self {
+    pub(crate) fn new(robot: String, mission: Mission) -> Self {
         Self {
             robot,
             sensors: mission.sensor_table(),
-            target: TargetSample::first(&mission),
+            state: RobotState::of_mission(&mission),
             mission,
-            pose: PoseSample::default(),
-            grid: Replica::default(),
             map: None,
-            field: Replica::default(),
-            link: LinkSample::default(),
-            power: None,
-            stages: Vec::new(),
-            deaths: BTreeMap::new(),
             diagnosed: None,
         }
     }
 
     /// The topics of the sensors that the mission uses.
-    pub fn sensor_topics(&self) -> impl Iterator<Item = (Id, &str)> {
+    pub(crate) fn sensor_topics(&self) -> impl Iterator<Item = (Id, &str)> {
         let used = self.sensors.iter().enumerate().filter(|(_, sensor)| sensor.used);
         used.map(|(row, sensor)| match sensor.kind {
             SensorKind::Scan => (Id::Scan, ""),
@@ -87,7 +71,7 @@ impl Shown {
     }
 
     /// The mounting of the sensors.
-    pub fn mounting(&self, now_ns: u64, sink: Sink<'_>) {
+    pub(crate) fn mounting(&self, now_ns: u64, sink: Sink<'_>) {
         let used = self.sensors.iter().filter(|sensor| sensor.used);
         let mounts = used
             .map(|sensor| (BASE, sensor.name.as_str(), plane(sensor.mount.on(Pose2::default()))));
@@ -95,12 +79,29 @@ impl Shown {
     }
 
     /// The newest pose.
-    pub const fn newest_pose(&self) -> &PoseSample {
-        &self.pose
+    pub(crate) fn newest_pose(&self) -> PoseSample {
+        self.state.pose.unwrap_or_default()
     }
 
-    pub fn pose(&mut self, sample: &PoseSample, now_ns: u64, sink: Sink<'_>) {
-        self.pose = *sample;
+    /// Take a sample, and publish what is shown of it at once.
+    pub(crate) fn sample(&mut self, sample: &Sample, now_ns: u64, sink: Sink<'_>) {
+        if !self.state.apply(sample) {
+            return;
+        }
+        match sample {
+            Sample::Pose(pose) => self.pose(pose, now_ns, sink),
+            Sample::Ranges(_, readings) => self.ranges(readings, now_ns, sink),
+            Sample::Scan(header, beams) => self.scan(header, beams, now_ns, sink),
+            Sample::Grid(header, cells) => self.grid(header, cells, now_ns, sink),
+            Sample::Field(header, _) => self.field(header, now_ns, sink),
+            Sample::Power(power) => {
+                sink(Id::Battery, messages::battery(Header(now_ns, BASE), power.motor_v));
+            }
+            _ => {}
+        }
+    }
+
+    fn pose(&self, sample: &PoseSample, now_ns: u64, sink: Sink<'_>) {
         let pose = plane(sample.pose());
         let origin = sample.map_from_odom;
         let odom = seen_from(origin, pose);
@@ -111,7 +112,7 @@ impl Shown {
         sink(Id::Odom, messages::odometry(Header(now_ns, ODOM), BASE, odom, speeds));
     }
 
-    pub fn ranges(&self, readings: &[RangeReading], now_ns: u64, sink: Sink<'_>) {
+    fn ranges(&self, readings: &[RangeReading], now_ns: u64, sink: Sink<'_>) {
         for reading in readings {
             let row = usize::from(reading.sensor);
             let Some(sensor) = self.sensors.get(row).filter(|sensor| sensor.used) else {
@@ -132,7 +133,7 @@ impl Shown {
         }
     }
 
-    pub fn scan(&self, header: &ScanHeader, beams: &[f32], now_ns: u64, sink: Sink<'_>) {
+    fn scan(&self, header: &ScanHeader, beams: &[f32], now_ns: u64, sink: Sink<'_>) {
         let row = usize::try_from(header.sensor).unwrap_or(usize::MAX);
         if let Some(sensor) = self.sensors.get(row) {
             let period_s = sensor.every_ticks as f64 / self.mission.robot.rate_hz;
@@ -143,37 +144,29 @@ impl Shown {
         }
     }
 
-    pub fn target(&mut self, target: &TargetSample) {
-        self.target = *target;
-    }
-
-    pub fn grid(&mut self, header: &GridHeader, cells: &[u8], now_ns: u64, sink: Sink<'_>) {
+    fn grid(&self, header: &GridHeader, cells: &[u8], now_ns: u64, sink: Sink<'_>) {
         let window = header.part.window();
-        let applied = self.grid.apply(&header.part, cells);
-        if applied == Applied::Missed || window.area() == 0 {
-            return;
-        }
-        let header = Header(now_ns, MAP);
-        let is_whole = self.grid.frame().is_some_and(|frame| frame.whole() == window);
-        if self.map.is_some() && !is_whole {
+        let is_whole = header.part.frame().whole() == window;
+        if self.map.is_some() && !is_whole && window.area() > 0 {
             let occupied: Vec<u8> = cells.iter().copied().map(occupancy).collect();
             let (first, size) = ([window.col, window.row], [window.width, window.height]);
+            let header = Header(now_ns, MAP);
             sink(Id::MapUpdates, messages::map_update(header, first, size, &occupied));
         }
     }
 
     /// Publish the whole map if it has changed and is due.
     fn map(&mut self, now_ns: u64, sink: Sink<'_>) {
-        let version = self.grid.version();
+        let version = self.state.map.version();
         let is_due = self.map.is_none_or(|(published, at_ns)| {
             published != version && now_ns.saturating_sub(at_ns) >= EVERY_NS
         });
-        if let Some(frame) = self.grid.frame()
+        if let Some(frame) = self.state.map.frame()
             && is_due
         {
             self.map = Some((version, now_ns));
             let corner = frame.corner_of(Cell { col: 0, row: 0 }).to_array();
-            let occupied: Vec<u8> = self.grid.cells().iter().copied().map(occupancy).collect();
+            let occupied: Vec<u8> = self.state.map.cells().iter().copied().map(occupancy).collect();
             let header = Header(now_ns, MAP);
             sink(
                 Id::Map,
@@ -182,31 +175,21 @@ impl Shown {
         }
     }
 
-    pub fn field(
-        &mut self,
-        header: &FieldHeader,
-        cells: &[FieldCell],
-        now_ns: u64,
-        sink: Sink<'_>,
-    ) {
-        if self.field.apply(&header.part, cells) == Applied::Missed {
-            return;
-        }
-        let Some(frame) = self.field.frame() else {
+    fn field(&self, header: &FieldHeader, now_ns: u64, sink: Sink<'_>) {
+        let Some(frame) = self.state.field.frame() else {
             return;
         };
         let to = DVec2::new(header.target_x_m, header.target_y_m);
         let header = Header(now_ns, MAP);
-        let way = way(frame, self.field.cells(), self.pose.pose().position, to);
-        sink(Id::Path, messages::path(header, &way));
-        let drawn = [vec![directions(frame, self.field.cells())], self.targets()].concat();
+        let (cells, from) = (self.state.field.cells(), self.newest_pose().pose().position);
+        sink(Id::Path, messages::path(header, &way(frame, cells, from, to)));
+        let drawn = [vec![directions(frame, cells)], self.targets()].concat();
         sink(Id::Field, messages::markers(header, &drawn));
     }
 
     fn targets(&self) -> Vec<Marker> {
         let across = 2.0 * self.mission.arrival_tolerance_m;
-        let targets = [&self.target.target].into_iter().chain(self.target.ahead());
-        let target = |(id, target): (i32, &common::samples::TargetPoint)| Marker {
+        let target = |(id, target): (i32, &TargetPoint)| Marker {
             namespace: "targets",
             id,
             shape: Shape::Cylinder,
@@ -215,29 +198,11 @@ impl Shown {
             color: [0.1, 0.7, 0.2, 0.6],
             points: Vec::new(),
         };
-        (0..).zip(targets).map(target).collect()
-    }
-
-    pub fn link(&mut self, link: &LinkSample) {
-        self.link = *link;
-    }
-
-    pub fn power(&mut self, power: &PowerSample, now_ns: u64, sink: Sink<'_>) {
-        self.power = Some(*power);
-        sink(Id::Battery, messages::battery(Header(now_ns, BASE), power.motor_v));
-    }
-
-    pub fn roster(&mut self, stages: &[RosterEntry]) {
-        self.stages = stages.to_vec();
-    }
-
-    pub fn death(&mut self, death: &DeathSample) {
-        let how = format!("generation {}: {}", death.generation, ExitCause::from(death));
-        self.deaths.insert(name_str(&death.stage).to_owned(), how);
+        (0..).zip(self.state.targets()).map(target).collect()
     }
 
     /// Publish the messages that depend on time: the map, and diagnostics if they have changed or are due.
-    pub fn tick(&mut self, now_ns: u64, sink: Sink<'_>) {
+    pub(crate) fn tick(&mut self, now_ns: u64, sink: Sink<'_>) {
         self.map(now_ns, sink);
         let statuses = self.statuses();
         let is_due = self.diagnosed.as_ref().is_none_or(|(before, at_ns)| {
@@ -254,7 +219,7 @@ impl Shown {
     }
 
     fn statuses(&self) -> Vec<Status> {
-        let link = &self.link;
+        let link = self.state.link.unwrap_or_default();
         let level = match (link.action(), link.cause()) {
             (_, Cause::None | Cause::NotOrdered | Cause::MissionOver | Cause::OperatorStop) => {
                 Level::Ok
@@ -262,7 +227,7 @@ impl Shown {
             (Action::Go | Action::Slow, _) => Level::Warn,
             (Action::Stop | Action::End, _) => Level::Error,
         };
-        let message = format!("the robot {}: {}", link.action().effect(), link.cause().name());
+        let message = failsafe_in_words(&link);
         let values = vec![
             ("connected", (link.connected == 1).to_string()),
             ("at rest", (link.at_rest == 1).to_string()),
@@ -271,8 +236,8 @@ impl Shown {
         ];
         let mut statuses =
             vec![Status { level, name: "firsthand: failsafe".to_owned(), message, values }];
-        statuses.extend(self.stages.iter().map(|entry| self.stage(entry)));
-        if let Some(power) = &self.power {
+        statuses.extend(self.state.stages.iter().map(|entry| self.stage(entry)));
+        if let Some(power) = &self.state.power {
             let level = if power.is_low() { Level::Warn } else { Level::Ok };
             let message = if power.is_low() { "low" } else { "not low" }.to_owned();
             let volts = |volts: f64| format!("{volts:.2}");
@@ -285,6 +250,11 @@ impl Shown {
 
     fn stage(&self, entry: &RosterEntry) -> Status {
         let name = name_str(&entry.stage);
+        let death = self
+            .state
+            .deaths
+            .get(name)
+            .map(|death| format!("generation {}: {}", death.generation, death_in_words(death)));
         let (level, state) = match StageState::from_byte(entry.state) {
             StageState::Running => (Level::Ok, "runs"),
             StageState::Starting => (Level::Warn, "starts"),
@@ -299,7 +269,7 @@ impl Shown {
             ("generation", entry.generation.to_string()),
             ("restarts", entry.restarts.to_string()),
             ("pid", entry.pid.to_string()),
-            ("last death", self.deaths.get(name).cloned().unwrap_or_default()),
+            ("last death", death.unwrap_or_default()),
         ];
         Status { level, name: format!("firsthand: {name}"), message: state.to_owned(), values }
     }

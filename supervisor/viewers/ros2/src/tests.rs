@@ -14,6 +14,7 @@ use common::{
     },
 };
 use glam::DVec2;
+use robot_state::Sample;
 use ros2::cdr::{Reader, Writer};
 
 use crate::{
@@ -179,7 +180,7 @@ fn odometry_and_its_origin_make_up_the_pose() {
         map_from_odom: [0.5, -0.5, 0.25],
         ..PoseSample::default()
     };
-    let sent = published(|sink| shown().pose(&pose, 0, sink));
+    let sent = published(|sink| shown().sample(&Sample::Pose(pose), 0, sink));
     assert_eq!(sent.iter().map(|(id, _)| *id).collect::<Vec<_>>(), [Id::Tf, Id::Pose, Id::Odom]);
     let mut reader = Reader::new(&sent[2].1).unwrap();
     reader.time().unwrap();
@@ -195,7 +196,7 @@ fn the_frame_of_a_laser_is_where_it_is_mounted_and_its_beams_are_told_in_that_fr
     let text = "target = [4, 0]\nrobot.model = 'turtlebot4'";
     let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
     let (row, laser) = mission.laser().unwrap();
-    let shown = Shown::new("tb4".to_owned(), mission);
+    let mut shown = Shown::new("tb4".to_owned(), mission);
     let sent = published(|sink| shown.mounting(0, sink));
     let mut reader = Reader::new(&sent[0].1).unwrap();
     assert_eq!(reader.u32().unwrap(), 1);
@@ -206,7 +207,7 @@ fn the_frame_of_a_laser_is_where_it_is_mounted_and_its_beams_are_told_in_that_fr
     // The first of 360 beams looks to the right of the robot, which is behind the laser.
     let header = ScanHeader::of(row, &laser);
     assert!((header.first_rad + FRAC_PI_2).abs() < 1e-12);
-    let sent = published(|sink| shown.scan(&header, &[1.0; 360], 0, sink));
+    let sent = published(|sink| shown.sample(&Sample::Scan(header, vec![1.0; 360]), 0, sink));
     let mut reader = Reader::new(&sent[0].1).unwrap();
     reader.header().unwrap();
     assert!((reader.f32().unwrap() + PI as f32).abs() < 1e-6);
@@ -222,7 +223,7 @@ fn a_map_is_published_whole_and_then_by_what_changes_and_says_what_nobody_looked
     );
     let mut shown = shown();
     let whole = GridHeader { part: Part::whole(frame, 1), ..GridHeader::default() };
-    assert!(published(|sink| shown.grid(&whole, &cells, 0, sink)).is_empty());
+    assert!(published(|sink| shown.sample(&Sample::Grid(whole, cells), 0, sink)).is_empty());
     let [(Id::Map, map), (Id::Diagnostics, _)] = &published(|sink| shown.tick(0, sink))[..] else {
         panic!("no map");
     };
@@ -230,9 +231,8 @@ fn a_map_is_published_whole_and_then_by_what_changes_and_says_what_nobody_looked
     assert_eq!(occupied[..6], [0, 99, 100, 100, 255, 255]);
     let window = common::grid::Window { col: 3, row: 4, width: 2, height: 1 };
     let part = GridHeader { part: Part::of(frame, window, 2), ..GridHeader::default() };
-    let scanned = [CellState::Scanned as u8; 2];
-    let [(Id::MapUpdates, update)] = &published(|sink| shown.grid(&part, &scanned, 1, sink))[..]
-    else {
+    let scanned = Sample::Grid(part, vec![CellState::Scanned as u8; 2]);
+    let [(Id::MapUpdates, update)] = &published(|sink| shown.sample(&scanned, 1, sink))[..] else {
         panic!("no update");
     };
     assert_eq!(update[update.len() - 2..], [0, 0]);
@@ -251,7 +251,8 @@ fn a_path_leads_along_the_field_and_ends_where_there_is_no_direction() {
         let target_x_m = 0.5;
         let header =
             FieldHeader { part: Part::whole(frame, 1), target_x_m, ..FieldHeader::default() };
-        let sent = published(|sink| shown.field(&header, cells, 0, sink));
+        let field = Sample::Field(header, cells.to_vec());
+        let sent = published(|sink| shown.sample(&field, 0, sink));
         let mut reader = Reader::new(&sent[0].1).unwrap();
         reader.time().unwrap();
         reader.text().unwrap();

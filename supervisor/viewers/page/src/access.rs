@@ -1,15 +1,18 @@
 //! The access to a page: the names that it answers to, and the two tokens.
 //!
-//! On a loopback address everybody on the machine may watch and stop the robot. On another address that needs a token. Orders besides
-//! the stop need the token to drive on each address.
+//! On this machine everybody may watch and stop the robot. Behind a proxy, which others reach, that needs a token. Orders besides the
+//! stop need the token to drive in both cases.
 
-use std::{fmt, fs::File, io::Read as _, net::SocketAddr};
-
-use super::options::PageError;
+use std::{
+    fmt,
+    fs::File,
+    io::{self, Read as _},
+    net::SocketAddr,
+};
 
 /// The rights of a browser.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Role {
+pub(crate) enum Role {
     /// The browser may watch and stop the robot.
     Watch,
     /// The browser may do everything.
@@ -18,10 +21,10 @@ pub enum Role {
 
 /// A secret that gives rights to its owner. It is printed once, at the start.
 #[derive(Clone)]
-pub struct Token(String);
+pub(crate) struct Token(String);
 
 impl Token {
-    fn new() -> std::io::Result<Self> {
+    fn new() -> io::Result<Self> {
         let mut bytes = [0; 16];
         File::open("/dev/urandom")?.read_exact(&mut bytes)?;
         Ok(Self(bytes.iter().map(|byte| format!("{byte:02x}")).collect()))
@@ -35,7 +38,7 @@ impl Token {
     }
 
     /// The text of the token, to be shown to the operator alone.
-    pub fn reveal(&self) -> &str {
+    pub(crate) fn reveal(&self) -> &str {
         &self.0
     }
 }
@@ -49,49 +52,33 @@ impl fmt::Debug for Token {
 
 /// The rules of one page.
 #[derive(Debug)]
-pub struct Access {
+pub(crate) struct Access {
     /// `http` or `https`.
     scheme: &'static str,
     /// The hosts that a request may name.
     hosts: Vec<String>,
-    is_loopback: bool,
-    pub watch: Token,
-    pub drive: Token,
+    pub(crate) watch: Token,
+    pub(crate) drive: Token,
 }
 
 impl Access {
-    /// The rules at `address`, to which `names` lead, too.
-    pub(crate) fn new(
-        address: SocketAddr,
-        names: &[String],
-        encrypted: bool,
-    ) -> Result<Self, PageError> {
-        let is_loopback = address.ip().is_loopback();
-        if !is_loopback && !encrypted {
-            return Err(PageError::NotLoopback(address));
-        }
-        let mut hosts: Vec<String> = Vec::new();
-        let (scheme, default_port) = if encrypted { ("https", 443) } else { ("http", 80) };
-        let own = (!address.ip().is_unspecified()).then(|| match address {
-            SocketAddr::V4(address) => address.ip().to_string(),
-            SocketAddr::V6(address) => format!("[{}]", address.ip()),
-        });
-        let local = is_loopback.then(|| "localhost".to_owned());
-        for name in names.iter().cloned().chain(own).chain(local) {
-            hosts.push(format!("{name}:{}", address.port()));
-            if address.port() == default_port {
-                hosts.push(name);
-            }
-        }
-        if hosts.is_empty() {
-            return Err(PageError::NoName(address));
-        }
-        let (watch, drive) = (Token::new()?, Token::new()?);
-        Ok(Self { scheme, hosts, is_loopback, watch, drive })
+    /// The rules at `address`, or behind the proxy that browsers know by the name `proxy`.
+    ///
+    /// # Errors
+    /// When the system gives no random bytes for tokens.
+    pub(crate) fn new(address: SocketAddr, proxy: Option<&str>) -> io::Result<Self> {
+        let hosts = match (proxy, address.port()) {
+            (Some(name), _) => vec![name.to_owned()],
+            // Browsers leave the usual port out.
+            (None, 80) => vec![address.ip().to_string(), "localhost".to_owned()],
+            (None, port) => vec![address.to_string(), format!("localhost:{port}")],
+        };
+        let scheme = if proxy.is_some() { "https" } else { "http" };
+        Ok(Self { scheme, hosts, watch: Token::new()?, drive: Token::new()? })
     }
 
     /// The address of the page for a person.
-    pub fn url(&self) -> String {
+    pub(crate) fn url(&self) -> String {
         let host = self.hosts.first().map(String::as_str).unwrap_or_default();
         format!("{}://{host}/", self.scheme)
     }
@@ -116,7 +103,7 @@ impl Access {
     pub(crate) fn role(&self, token: &str) -> Option<Role> {
         if self.drive.is(token) {
             Some(Role::Drive)
-        } else if self.watch.is(token) || self.is_loopback && token.is_empty() {
+        } else if self.watch.is(token) || self.scheme == "http" && token.is_empty() {
             Some(Role::Watch)
         } else {
             None
@@ -124,29 +111,30 @@ impl Access {
     }
 }
 
+/// A name in an address, with a port if it is not the usual one. It stands in headers, so it has no other letters.
+///
+/// # Errors
+/// When `text` is something else.
+pub(crate) fn host_name(text: &str) -> Result<String, String> {
+    let is_letter = |letter: char| letter.is_ascii_alphanumeric() || "-.:[]".contains(letter);
+    if !text.is_empty() && text.chars().all(is_letter) {
+        Ok(text.to_ascii_lowercase())
+    } else {
+        Err("no name of a host; give it as in robot.example or robot.example:8443".to_owned())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn access(address: &str, names: &[&str], encrypted: bool) -> Result<Access, PageError> {
-        let names: Vec<_> = names.iter().map(|name| (*name).to_owned()).collect();
-        Access::new(address.parse().unwrap(), &names, encrypted)
-    }
-
-    #[test]
-    fn another_address_than_loopback_needs_encryption_and_a_name() {
-        for address in ["192.168.0.7:8080", "0.0.0.0:8080", "[::]:8080", "[fe80::1]:8080"] {
-            let refused = access(address, &[], false);
-            assert!(matches!(refused, Err(PageError::NotLoopback(_))), "{address}");
-        }
-        assert!(matches!(access("0.0.0.0:8080", &[], true), Err(PageError::NoName(_))));
-        assert!(access("0.0.0.0:8080", &["robot.local"], true).is_ok());
-        assert!(access("[::1]:8080", &[], false).is_ok());
+    fn access(proxy: Option<&str>) -> Access {
+        Access::new("127.0.0.1:8080".parse().unwrap(), proxy).unwrap()
     }
 
     #[test]
     fn only_the_names_of_the_page_and_its_own_origin_are_accepted() {
-        let own = access("127.0.0.1:8080", &[], false).unwrap();
+        let own = access(None);
         assert!(own.host("127.0.0.1:8080").is_some() && own.host("localhost:8080").is_some());
         for host in ["127.0.0.1", "localhost:80", "evil.example:8080", "127.0.0.1:8080.evil", ""] {
             assert!(own.host(host).is_none(), "{host}");
@@ -165,16 +153,29 @@ mod tests {
     }
 
     #[test]
-    fn a_token_opens_what_it_is_for_and_no_token_only_watches_on_loopback() {
-        let own = access("127.0.0.1:8080", &[], false).unwrap();
+    fn behind_a_proxy_only_its_name_counts_and_nobody_watches_without_a_token() {
+        let far = access(Some("robot.example"));
+        assert_eq!((far.url(), far.role("")), ("https://robot.example/".to_owned(), None));
+        assert!(far.host("127.0.0.1:8080").is_none());
+        let host = far.host("robot.example").unwrap();
+        assert!(far.is_own_origin("https://robot.example", host));
+        assert!(!far.is_own_origin("http://robot.example", host));
+        assert_eq!(far.websocket(host), "wss://robot.example");
+        for name in ["", "robot.example/x", "a;script-src *", "a b", "a\"b"] {
+            assert!(host_name(name).is_err(), "{name}");
+        }
+        assert_eq!(host_name("Robot.example:8443").unwrap(), "robot.example:8443");
+    }
+
+    #[test]
+    fn a_token_opens_what_it_is_for_and_no_token_only_watches() {
+        let own = access(None);
         assert_eq!(own.role(""), Some(Role::Watch));
         assert_eq!(own.role(own.watch.reveal()), Some(Role::Watch));
         assert_eq!(own.role(own.drive.reveal()), Some(Role::Drive));
-        let earlier = access("127.0.0.1:8080", &[], false).unwrap();
+        let earlier = access(None);
         assert_eq!(own.role(earlier.drive.reveal()), None, "a token of an earlier page");
         assert_eq!(own.role(&own.drive.reveal()[1..]), None);
-        let far = access("192.168.0.7:8080", &[], true).unwrap();
-        assert_eq!(far.role(""), None);
-        assert!(!format!("{far:?}").contains(far.drive.reveal()));
+        assert!(!format!("{own:?}").contains(own.drive.reveal()));
     }
 }

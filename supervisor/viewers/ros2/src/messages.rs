@@ -10,7 +10,7 @@ const COVARIANCE: usize = 36;
 
 /// The time of a message, nanoseconds since 1970, and its frame.
 #[derive(Clone, Copy, Debug)]
-pub struct Header<'a>(pub u64, pub &'a str);
+pub(crate) struct Header<'a>(pub u64, pub &'a str);
 
 /// The beginning of a message with this header.
 fn begin(Header(ns, frame): Header<'_>) -> Writer {
@@ -20,7 +20,7 @@ fn begin(Header(ns, frame): Header<'_>) -> Writer {
 }
 
 /// A `tf2_msgs/TFMessage` of frames and the frames in them.
-pub fn transforms(ns: u64, transforms: &[(&str, &str, Pose)]) -> Vec<u8> {
+pub(crate) fn transforms(ns: u64, transforms: &[(&str, &str, Pose)]) -> Vec<u8> {
     let mut writer = Writer::default();
     let transform = |writer: &mut Writer, &(parent, child, pose): &(&str, &str, Pose)| {
         writer.header(ns, parent).text(child).pose(pose);
@@ -29,19 +29,24 @@ pub fn transforms(ns: u64, transforms: &[(&str, &str, Pose)]) -> Vec<u8> {
 }
 
 /// A `geometry_msgs/PoseWithCovarianceStamped`.
-pub fn pose(header: Header<'_>, pose: Pose, covariance: &[f64; COVARIANCE]) -> Vec<u8> {
+pub(crate) fn pose(header: Header<'_>, pose: Pose, covariance: &[f64; COVARIANCE]) -> Vec<u8> {
     begin(header).pose(pose).f64s(covariance).take()
 }
 
 /// A `nav_msgs/Odometry` that states no covariance.
-pub fn odometry(header: Header<'_>, child: &str, pose: Pose, [v, omega]: [f64; 2]) -> Vec<u8> {
+pub(crate) fn odometry(
+    header: Header<'_>,
+    child: &str,
+    pose: Pose,
+    [v, omega]: [f64; 2],
+) -> Vec<u8> {
     let unknown = [0.0; COVARIANCE];
     let twist = [v, 0.0, 0.0, 0.0, 0.0, omega];
     begin(header).text(child).pose(pose).f64s(&unknown).f64s(&twist).f64s(&unknown).take()
 }
 
 /// A `nav_msgs/OccupancyGrid` of square cells; `corner` is the corner of the first cell, and its rows go along x.
-pub fn map(
+pub(crate) fn map(
     header: Header<'_>,
     resolution: f64,
     [width, height]: [u32; 2],
@@ -55,7 +60,7 @@ pub fn map(
 }
 
 /// A `map_msgs/OccupancyGridUpdate` of a window whose first cell is this one.
-pub fn map_update(
+pub(crate) fn map_update(
     header: Header<'_>,
     [col, row]: [u32; 2],
     [width, height]: [u32; 2],
@@ -66,19 +71,19 @@ pub fn map_update(
 }
 
 /// A `nav_msgs/Path`.
-pub fn path(header: Header<'_>, poses: &[Pose]) -> Vec<u8> {
+pub(crate) fn path(header: Header<'_>, poses: &[Pose]) -> Vec<u8> {
     let stamped = |writer: &mut Writer, pose: &Pose| pose_stamped(writer, header, *pose);
     begin(header).list(poses, stamped).take()
 }
 
 /// A `geometry_msgs/PoseStamped` as a part of a message.
-pub fn pose_stamped(writer: &mut Writer, Header(ns, frame): Header<'_>, pose: Pose) {
+pub(crate) fn pose_stamped(writer: &mut Writer, Header(ns, frame): Header<'_>, pose: Pose) {
     writer.header(ns, frame).pose(pose);
 }
 
 /// The shapes of markers that are used.
 #[derive(Clone, Copy, Debug)]
-pub enum Shape {
+pub(crate) enum Shape {
     Cylinder = 3,
     /// Lines, each between two points.
     Lines = 5,
@@ -86,23 +91,23 @@ pub enum Shape {
 
 /// A `visualization_msgs/Marker`.
 #[derive(Clone, Debug)]
-pub struct Marker {
-    pub namespace: &'static str,
-    pub id: i32,
-    pub shape: Shape,
-    pub pose: Pose,
+pub(crate) struct Marker {
+    pub(crate) namespace: &'static str,
+    pub(crate) id: i32,
+    pub(crate) shape: Shape,
+    pub(crate) pose: Pose,
     /// The size along x, y and z; lines have their width in the first.
-    pub scale: [f64; 3],
+    pub(crate) scale: [f64; 3],
     /// The colour: red, green, blue, alpha.
-    pub color: [f32; 4],
-    pub points: Vec<[f64; 2]>,
+    pub(crate) color: [f32; 4],
+    pub(crate) points: Vec<[f64; 2]>,
 }
 
 /// The action that removes all markers that were sent before.
 const DELETE_ALL: i32 = 3;
 
 /// A `visualization_msgs/MarkerArray` that replaces the one before.
-pub fn markers(header: Header<'_>, markers: &[Marker]) -> Vec<u8> {
+pub(crate) fn markers(header: Header<'_>, markers: &[Marker]) -> Vec<u8> {
     let nothing = Marker {
         namespace: "",
         id: 0,
@@ -139,7 +144,7 @@ fn marker(writer: &mut Writer, Header(ns, frame): Header<'_>, marker: &Marker, a
 }
 
 /// A `sensor_msgs/LaserScan`.
-pub fn scan(
+pub(crate) fn scan(
     header: Header<'_>,
     [first, step]: [f64; 2],
     [least, most]: [f64; 2],
@@ -159,7 +164,7 @@ pub fn scan(
 }
 
 /// A `sensor_msgs/Range` of a sonar, or of an infrared ranger.
-pub fn range(
+pub(crate) fn range(
     header: Header<'_>,
     is_sonar: bool,
     field_of_view: f64,
@@ -176,7 +181,7 @@ pub fn range(
 }
 
 /// A `sensor_msgs/BatteryState` that states the voltage only.
-pub fn battery(header: Header<'_>, volts: f64) -> Vec<u8> {
+pub(crate) fn battery(header: Header<'_>, volts: f64) -> Vec<u8> {
     let mut writer = begin(header);
     writer.f32(volts as f32);
     for _temperature_current_charge_capacity_design_percentage in 0..6 {
@@ -188,25 +193,24 @@ pub fn battery(header: Header<'_>, volts: f64) -> Vec<u8> {
 
 /// The severity of a `diagnostic_msgs/DiagnosticStatus`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Level {
+pub(crate) enum Level {
     #[default]
     Ok = 0,
     Warn = 1,
     Error = 2,
-    Stale = 3,
 }
 
 /// A `diagnostic_msgs/DiagnosticStatus`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Status {
-    pub level: Level,
-    pub name: String,
-    pub message: String,
-    pub values: Vec<(&'static str, String)>,
+pub(crate) struct Status {
+    pub(crate) level: Level,
+    pub(crate) name: String,
+    pub(crate) message: String,
+    pub(crate) values: Vec<(&'static str, String)>,
 }
 
 /// A `diagnostic_msgs/DiagnosticArray` of this robot.
-pub fn diagnostics(header: Header<'_>, robot: &str, statuses: &[Status]) -> Vec<u8> {
+pub(crate) fn diagnostics(header: Header<'_>, robot: &str, statuses: &[Status]) -> Vec<u8> {
     let status = |writer: &mut Writer, status: &Status| {
         writer.u8(status.level as u8).text(&status.name).text(&status.message).text(robot);
         writer.list(&status.values, |writer, (key, value)| {

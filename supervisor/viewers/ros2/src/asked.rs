@@ -9,14 +9,14 @@ use crate::shown::MAP;
 
 /// The robot's place by a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
-    pub pose: Pose2,
+pub(crate) struct Place {
+    pub(crate) pose: Pose2,
     /// Covariance of x, y and heading: xx, xy, x theta, yy, y theta, theta theta.
-    pub covariance: [f64; 6],
+    pub(crate) covariance: [f64; 6],
 }
 
 /// The target of a `geometry_msgs/PoseStamped`.
-pub fn goal(payload: &[u8]) -> Result<TargetPoint, String> {
+pub(crate) fn goal(payload: &[u8]) -> Result<TargetPoint, String> {
     goal_of(&mut Reader::new(payload).map_err(malformed)?)
 }
 
@@ -27,7 +27,7 @@ pub(crate) fn goal_of(reader: &mut Reader<'_>) -> Result<TargetPoint, String> {
 }
 
 /// The place of a `geometry_msgs/PoseWithCovarianceStamped`.
-pub fn place(payload: &[u8]) -> Result<Place, String> {
+pub(crate) fn place(payload: &[u8]) -> Result<Place, String> {
     let mut reader = Reader::new(payload).map_err(malformed)?;
     let pose = pose_in_map(&mut reader)?;
     let all: [f64; 36] = reader.f64s().map_err(malformed)?;
@@ -35,7 +35,7 @@ pub fn place(payload: &[u8]) -> Result<Place, String> {
 }
 
 /// The value of a `std_msgs/Bool`.
-pub fn flag(payload: &[u8]) -> Result<bool, String> {
+pub(crate) fn flag(payload: &[u8]) -> Result<bool, String> {
     let value = Reader::new(payload).and_then(|mut reader| reader.u8());
     value.map(|value| value != 0).map_err(malformed)
 }

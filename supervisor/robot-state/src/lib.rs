@@ -1,0 +1,42 @@
+//! What a robot is doing, as one value. Dashboards, bridges and reports draw from it; each lists here what it reads, and nothing else of
+//! the bus.
+//!
+//! A [`Feed`] reads [`Sample`]s from a robot's bus; [`Sample::decoded`] reads them from a recording. [`RobotState::apply`] takes either.
+//!
+//! The guide's page `attach.md` has a dashboard, which is compiled with the doc tests of this crate.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `sample` | THE table of what is read, and the feed |
+//! | `state` | the value |
+//! | `events` | deaths, stalls, orders, the failsafe and log lines as one list |
+//! | `words` | states and causes in words |
+
+mod events;
+mod sample;
+mod state;
+mod words;
+
+use std::path::PathBuf;
+
+use common::{domain::Domain, run::Run};
+
+pub use self::{
+    events::{Event, Kind},
+    sample::{Feed, Sample, TOPICS},
+    state::{RobotState, drop_every_second},
+    words::{death_in_words, failsafe_in_words, guidance_in_words, words},
+};
+
+/// The newest run of the robot of `domain` and its directory; none if its run file is missing, as it is before the first samples.
+pub fn newest_run(domain: &Domain) -> Option<(PathBuf, Run)> {
+    // The link leads to another directory when the next run begins.
+    let directory = domain.run_directory().canonicalize().ok()?;
+    let run = Run::load(&directory).ok()?;
+    Some((directory, run))
+}
+
+/// The guide's Rust is compiled with the doc tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../guide/attach.md")]
+pub struct Attach;

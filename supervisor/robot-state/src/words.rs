@@ -1,0 +1,49 @@
+//! States and causes in words.
+
+use std::fmt::Debug;
+
+use common::samples::{Action, Cause, DeathCause, DeathSample, GuidanceStatus, LinkSample};
+
+/// The name of a variant in words: `CommandStale` as `command stale`.
+pub fn words(variant: impl Debug) -> String {
+    let mut words = String::new();
+    for letter in format!("{variant:?}").chars() {
+        if letter.is_uppercase() && !words.is_empty() {
+            words.push(' ');
+        }
+        words.extend(letter.to_lowercase());
+    }
+    words
+}
+
+/// The status of the planner, a [`GuidanceStatus`].
+pub const fn guidance_in_words(status: u8) -> &'static str {
+    match GuidanceStatus::from_byte(status) {
+        GuidanceStatus::Waiting => "waits for a field",
+        GuidanceStatus::Along => "along the field",
+        GuidanceStatus::AtTarget => "beside the target",
+        GuidanceStatus::WayOut => "out of a hazard",
+        GuidanceStatus::Unreachable => "no way to the target",
+        GuidanceStatus::Look => "turn and look",
+    }
+}
+
+/// How a stage's process ended.
+pub fn death_in_words(death: &DeathSample) -> String {
+    let code = death.code;
+    match DeathCause::from_byte(death.cause) {
+        DeathCause::Exited => format!("exit code {code}"),
+        DeathCause::Signalled => format!("signal {code}"),
+        DeathCause::SignalledWithCore => format!("signal {code}, core dumped"),
+        DeathCause::Unknown => "ended; systemctl status says how".to_owned(),
+    }
+}
+
+/// What the link's failsafe does with the robot, and why.
+pub fn failsafe_in_words(link: &LinkSample) -> String {
+    match (link.action(), link.cause()) {
+        (action, Cause::None) => format!("the robot {}", action.effect()),
+        (Action::Go, cause) => cause.name().to_owned(),
+        (action, cause) => format!("the robot {}: {}", action.effect(), cause.name()),
+    }
+}

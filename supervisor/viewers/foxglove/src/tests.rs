@@ -1,0 +1,130 @@
+//! Tests of the messages for viewers, decoded by Foxglove's SDK.
+#![allow(clippy::unwrap_used)]
+
+use std::{collections::BTreeMap, f64::consts::FRAC_PI_2, path::Path};
+
+use common::{
+    bus::{encode_sample, encode_slice},
+    grid::{CellState, Part},
+    mission::Mission,
+    samples::{GridHeader, PoseSample, RangeReading, RangeStatus, RangesHeader},
+};
+use foxglove::{
+    Decode, Encode, Schema,
+    messages::{
+        FrameTransforms, Grid, LaserScan, Log, Odometry, PoseInFrame, SceneUpdate,
+        packed_element_field::NumericType,
+    },
+};
+use recording::viewers::{self, Drawn};
+
+/// The topics of messages and the messages.
+type Sent = BTreeMap<String, Vec<u8>>;
+
+fn mission() -> Mission {
+    Mission::parse("target = [4, 0]", Path::new("m.toml")).unwrap()
+}
+
+/// What viewers are sent of a robot that stands at (1, 2) and sees something at 0.5 m.
+fn sent() -> Sent {
+    let mut sent = Sent::new();
+    let mut sink = |topic: &str, message: &[u8]| {
+        sent.insert(topic.to_owned(), message.to_vec());
+    };
+    let mission = mission();
+    let mut drawn = Drawn::new(Some(mission.clone()));
+    let mut message = Vec::new();
+    let pose = PoseSample {
+        x_m: 1.0,
+        y_m: 2.0,
+        heading_rad: FRAC_PI_2,
+        v_m_s: 0.5,
+        covariance: [0.04, 0.0, 0.0, 0.01, 0.0, 0.0],
+        ..PoseSample::default()
+    };
+    encode_sample(&pose, &mut message);
+    drawn.message("pose", &message, 7_000_000_009, &mut sink);
+    let reading = RangeReading {
+        range_m: 0.5,
+        status: RangeStatus::Measured.into(),
+        ..RangeReading::default()
+    };
+    let mut slice = |topic: &str, encode: &mut dyn FnMut(&mut Vec<u8>)| {
+        message.clear();
+        encode(&mut message);
+        drawn.message(topic, &message, 7_000_000_009, &mut sink);
+    };
+    slice("ranges", &mut |to| encode_slice(&RangesHeader::default(), &[reading], to));
+    let frame = mission.grid_frame();
+    let header = GridHeader { part: Part::whole(frame, 1), ..GridHeader::default() };
+    let cells = vec![CellState::Sensed as u8; frame.area()];
+    slice("grid", &mut |to| encode_slice(&header, &cells, to));
+    viewers::log("mapper", "12.5  WARN missed a grid version", 7_000_000_009, &mut sink);
+    sent
+}
+
+fn decoded<M: Decode>(sent: &Sent, topic: &str) -> M {
+    M::decode(&sent[topic][..]).unwrap()
+}
+
+#[test]
+fn schemas_are_those_of_the_sdk() {
+    let known = [
+        FrameTransforms::get_schema(),
+        PoseInFrame::get_schema(),
+        Odometry::get_schema(),
+        Grid::get_schema(),
+        SceneUpdate::get_schema(),
+        Log::get_schema(),
+        LaserScan::get_schema(),
+    ];
+    let known: Vec<Schema> = known.into_iter().flatten().collect();
+    for channel in viewers::channels(Some(&mission())) {
+        let schema = known.iter().find(|schema| schema.name == channel.schema).unwrap();
+        assert_eq!((&*schema.encoding, &*schema.data), ("protobuf", channel.descriptors));
+    }
+}
+
+#[test]
+fn messages_have_what_viewers_draw() {
+    let sent = sent();
+    let pose: PoseInFrame = decoded(&sent, "foxglove/pose");
+    let stamp = pose.timestamp.unwrap();
+    assert_eq!((stamp.sec(), stamp.nsec(), &*pose.frame_id), (7, 9, "map"));
+    let (at, turned) =
+        (pose.pose.unwrap().position.unwrap(), pose.pose.unwrap().orientation.unwrap());
+    assert_eq!((at.x, at.y, at.z), (1.0, 2.0, 0.0));
+    assert!((2.0 * turned.z.atan2(turned.w) - FRAC_PI_2).abs() < 1e-12);
+    let odometry: Odometry = decoded(&sent, "foxglove/odometry");
+    assert_eq!((odometry.pose_covariance.len(), odometry.pose_covariance[0]), (36, 0.04));
+    assert_eq!(
+        (odometry.velocity_covariance.len(), odometry.linear_velocity.unwrap().x),
+        (36, 0.5)
+    );
+    assert_eq!(odometry.body_frame_id, "base");
+    let mounts: FrameTransforms = decoded(&sent, "foxglove/transforms");
+    let sensors: Vec<_> = mission().sensor_table().into_iter().map(|sensor| sensor.name).collect();
+    let frames = mounts.transforms.iter().map(|mount| mount.child_frame_id.clone());
+    assert_eq!(frames.collect::<Vec<_>>(), sensors);
+    let scan: LaserScan = decoded(&sent, &format!("foxglove/scan/{}", sensors[0]));
+    assert_eq!((scan.ranges, scan.frame_id), (vec![0.5; 9], sensors[0].clone()));
+    assert!(scan.end_angle > 0.0 && scan.start_angle == -scan.end_angle);
+    let grid: Grid = decoded(&sent, "foxglove/grid");
+    assert_eq!(grid.data.len() as u32, grid.column_count * grid.row_stride);
+    assert_eq!((grid.cell_stride, &grid.data[..5]), (5, &[1, 225, 120, 20, 255][..]));
+    let fields = grid.fields.iter().map(|field| (&*field.name, field.offset, field.r#type));
+    let uint8 = NumericType::Uint8 as i32;
+    let names = ["state", "red", "green", "blue", "alpha"];
+    let wanted = (0..).zip(names).map(|(offset, name)| (name, offset, uint8));
+    assert_eq!(fields.collect::<Vec<_>>(), wanted.collect::<Vec<_>>());
+    let scene: SceneUpdate = decoded(&sent, "foxglove/scene");
+    let ids: Vec<_> = scene.entities.iter().map(|entity| &*entity.id).collect();
+    assert_eq!(ids, ["trajectory", "targets", "robot"]);
+    assert_eq!(scene.entities[0].lines[0].points[0].y, 2.0);
+    assert_eq!(scene.entities[1].cylinders[0].pose.unwrap().position.unwrap().x, 4.0);
+    assert_eq!(scene.entities[2].cylinders[0].size.unwrap().x, 0.8);
+    assert_eq!(scene.entities[2].cylinders[0].color.unwrap().a, 0.4);
+    let log: Log = decoded(&sent, "log");
+    assert_eq!((log.level, &*log.name), (3, "mapper"));
+    assert_eq!(log.message, "12.5  WARN missed a grid version");
+}
