@@ -12,17 +12,15 @@ use std::{
 use axum::body::Bytes;
 use common::{
     bus::{AnyReader, Bus, BusError, Reader},
-    clock::MissionTime,
     domain::Domain,
     follower::{Event, Follower},
     process_usage::Processes,
     run::Run,
     samples::{FieldCell, FieldHeader, TargetPoint, TargetSample},
-    step::Step as _,
     topics,
 };
 use glam::DVec2;
-use planner::step::{Input, Planner};
+use planner::step::Planner;
 use recording::log_files::LogFiles;
 use supervisor::simulator::GROUND_TRUTH;
 
@@ -166,9 +164,8 @@ fn preview(collector: &Collector, target: DVec2) -> Option<Vec<u8>> {
         target: TargetPoint::at(target),
         ..TargetSample::default()
     };
-    for input in [Input::Target(&sent), Input::Grid { header: &header, cells }] {
-        planner.step(input, MissionTime::default()).ok()?;
-    }
+    planner.take_target(&sent).ok()?;
+    planner.take_grid(&header, cells).ok()?;
     let cells = planner.snapshot()?.cells();
     Some(blob::field(Shown::Preview, frame, &cells, target, collector.now_s()))
 }
