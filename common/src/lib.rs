@@ -27,7 +27,6 @@
 //! | [`shell`] | the process shell every stage runs in |
 //! | [`target`] | the target, as a stage follows it |
 //! | [`driver`] | what the link needs of a robot's protocol |
-//! | [`step`] | what a stage computes: the trait of every stage's pure step |
 //! | [`inputs`], [`replay`] | the inputs of every step, published; their replay |
 //! | [`outputs`], [`stage`] | where a stage's outputs go; its runner: process and replay of every stage, once |
 
@@ -55,7 +54,6 @@ pub mod signals;
 pub mod stage;
 pub mod stage_command;
 pub mod start;
-pub mod step;
 pub mod stop_socket;
 pub mod target;
 pub mod topics;

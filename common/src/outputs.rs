@@ -13,7 +13,6 @@ use crate::{
     shell::{Context, Progress},
     start::StageError,
     topics::Rate,
-    wiring::{Access, WiringError},
 };
 
 /// Takes what a stage publishes and persists.
@@ -30,22 +29,43 @@ enum Destination {
 
 struct Process {
     writers: Vec<(&'static str, Box<dyn AnyWriter>)>,
-    inputs: InputLog,
+    /// None for a process whose inputs are not recorded.
+    inputs: Option<InputLog>,
     saved: Saved,
     /// An input was noted, and nothing published since.
     noted: bool,
 }
 
 impl Outputs {
+    /// The outputs of a process whose inputs are not recorded, so that it cannot be replayed. It publishes no slices.
+    ///
+    /// # Errors
+    /// When an output cannot be opened.
+    pub fn without_inputs(context: &mut Context) -> Result<Self, StageError> {
+        Self::of_process(context, None, 0)
+    }
+
     /// The outputs of the process of `context`, which starts from `start`. A slice has at most `longest` elements.
-    pub(crate) fn of_process(
+    pub(crate) fn with_inputs(
         context: &mut Context,
         start: &impl Serialize,
         longest: usize,
     ) -> Result<Self, StageError> {
         let inputs = InputLog::begin(context, start)?;
-        let mut process =
-            Process { writers: Vec::new(), inputs, saved: context.take_saved(), noted: false };
+        Self::of_process(context, Some(inputs), longest)
+    }
+
+    fn of_process(
+        context: &mut Context,
+        inputs: Option<InputLog>,
+        longest: usize,
+    ) -> Result<Self, StageError> {
+        let mut process = Process {
+            writers: Vec::new(),
+            inputs,
+            saved: std::mem::take(&mut context.saved),
+            noted: false,
+        };
         process.open(context, longest, false)?;
         Ok(Self { at: Progress::default(), to: Destination::Process(Box::new(process)) })
     }
@@ -80,7 +100,9 @@ impl Outputs {
     /// The step is about to take `input`.
     pub(crate) fn note(&mut self, input: &impl Serialize) -> Result<(), StageError> {
         if let Destination::Process(process) = &mut self.to {
-            process.inputs.note(input, self.at)?;
+            if let Some(inputs) = &mut process.inputs {
+                inputs.note(input, self.at)?;
+            }
             process.noted = true;
         }
         Ok(())
@@ -192,9 +214,8 @@ impl Process {
         longest: usize,
         late: bool,
     ) -> Result<(), StageError> {
-        for topic in context.opened.wiring.outputs {
+        for topic in context.wiring.outputs {
             if (topic.spec().rate == Rate::EachFrame) == late {
-                context.opened.add(Access::Write, topic.spec().name)?;
                 let number = context.generation.number;
                 let writer = topic.any_writer(&context.bus, number, longest)?;
                 self.writers.push((topic.spec().name, writer));
@@ -211,12 +232,12 @@ impl Process {
         let mut writers = self.writers.iter_mut();
         let writer = writers.find(|(topic, _)| *topic == name);
         let writer = writer.and_then(|(_, writer)| (&mut **writer as &mut dyn Any).downcast_mut());
-        writer.ok_or(WiringError::NotListed(Access::Write, name).into())
+        writer.ok_or(StageError::NoOutput(name))
     }
 
     fn publish_inputs(&mut self, at: Progress) -> Result<(), StageError> {
-        if self.noted {
-            self.inputs.publish(at)?;
+        if let Some(inputs) = self.inputs.as_mut().filter(|_| self.noted) {
+            inputs.publish(at)?;
             self.noted = false;
         }
         Ok(())

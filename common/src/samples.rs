@@ -73,6 +73,11 @@ macro_rules! wire_enum {
                 }
             }
         }
+        impl From<u8> for $name {
+            fn from(byte: u8) -> Self {
+                Self::from_byte(byte)
+            }
+        }
         impl From<$name> for u8 {
             fn from(value: $name) -> u8 {
                 value as u8

@@ -1,7 +1,7 @@
 //! The process shell every stage runs in: take the place in the run, open the topics, wait, take a turn, publish
 //! heartbeats, stop on a signal.
 //!
-//! A [`Process`] declares in its [`Wiring`] what it opens, and opens it through its [`Context`].
+//! A [`Process`] declares its topics, which the shell opens for it.
 
 use std::{
     env, fmt,
@@ -15,7 +15,7 @@ use std::{
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::{
-    bus::{Bus, Payload, Reader, Stamp, Stamped, Topic, Writer, Writers},
+    bus::{Bus, Stamp, Writer, Writers},
     checkpoint::Checkpoint,
     clock::{MissionClock, MissionTime},
     external,
@@ -31,7 +31,7 @@ use crate::{
     start::{self, Generation, Joined, Start, system},
     topics,
     waiter::Waiter,
-    wiring::{Access, Opened, Persists, Wiring},
+    wiring::{Persists, Readers, Topics, Wiring},
 };
 
 pub use crate::start::StageError;
@@ -48,43 +48,23 @@ pub struct Context {
     pub(crate) bus: Bus,
     /// Opened, and not handed to the process's outputs yet.
     pub(crate) saved: Saved,
-    pub(crate) opened: Opened,
+    pub(crate) wiring: &'static Wiring,
 }
 
 impl Context {
-    /// Read a topic of the wiring.
-    pub fn reader<H: Stamped, E: Payload>(
-        &mut self,
-        topic: &Topic<H, E>,
-    ) -> Result<Reader<H, E>, StageError> {
-        self.opened.add(Access::Read, topic.spec().name)?;
-        Ok(self.bus.reader(topic)?)
-    }
-
     /// The processes whose samples the readers return.
     pub fn writers(&self) -> Option<Writers> {
         self.bus.writers().cloned()
     }
 
-    /// Write a topic of the wiring.
-    pub fn writer<H: Stamped>(&mut self, topic: &Topic<H>) -> Result<Writer<H>, StageError> {
-        self.opened.add(Access::Write, topic.spec().name)?;
-        Ok(self.bus.writer(topic, self.generation.number)?)
-    }
-
     /// Open the checkpoint, and give the state that the stage's last process saved.
     pub fn saved_state<T: DeserializeOwned>(&mut self) -> Result<Option<T>, StageError> {
-        let Persists::State(bytes) = self.opened.wiring.persists else {
+        let Persists::State(bytes) = self.wiring.persists else {
             return Ok(None);
         };
         let (checkpoint, state) = Checkpoint::open(&self.checkpoint_file(), bytes)?;
         self.saved = Saved::State(checkpoint);
         Ok(state)
-    }
-
-    /// The open checkpoint, for a process without a [`Runner`](crate::stage::Runner).
-    pub fn take_saved(&mut self) -> Saved {
-        std::mem::take(&mut self.saved)
     }
 
     /// Open the journal of a state of at most `bytes`, and give what the stage's last process saved.
@@ -121,10 +101,32 @@ impl Progress {
 
 /// A stage wired to its topics. An error ends the process, and the supervisor restarts the stage.
 pub trait Process: Sized {
-    const WIRING: &'static Wiring;
+    /// [`Wiring::stage`].
+    const NAME: &'static str;
+    /// [`Wiring::wakes`].
+    const WAKES: Topics;
+    /// [`Wiring::outputs`].
+    const OUTPUTS: Topics;
+    /// [`Wiring::persists`].
+    const PERSISTS: Persists = Persists::Nothing;
+    /// The readers of the topics that it reads.
+    type Readers: Readers;
 
-    /// Open the topics, restore the checkpoint.
-    fn open(context: &mut Context) -> Result<Self, StageError>;
+    /// The declaration of the process.
+    const WIRING: &'static Wiring = &Wiring {
+        stage: Self::NAME,
+        inputs: Self::Readers::INPUTS,
+        feedback: Self::Readers::FEEDBACK,
+        wakes: Self::WAKES,
+        outputs: Self::OUTPUTS,
+        persists: Self::PERSISTS,
+    };
+
+    /// Restore the checkpoint, and open the outputs and whatever else is not a reader.
+    ///
+    /// # Errors
+    /// When one of them cannot be opened.
+    fn open(context: &mut Context, readers: Self::Readers) -> Result<Self, StageError>;
 
     /// Take what came, step, publish. Called whenever something may have come, and for each heartbeat.
     fn turn(&mut self) -> Result<Progress, StageError>;
@@ -211,18 +213,13 @@ pub fn run_stage<P: Process>(start: &Start) -> Result<(), StageError> {
     heartbeat.beat(HealthState::Starting, Progress::default())?;
     roster.admit_named(&bus)?;
     let number = generation.number;
-    let mut context = Context {
-        generation,
-        run,
-        bus,
-        waiter,
-        saved: Saved::default(),
-        opened: Opened::none_of(P::WIRING),
-    };
+    let mut context =
+        Context { generation, run, bus, waiter, saved: Saved::default(), wiring: P::WIRING };
     for topic in P::WIRING.wakes {
         context.waiter.on(context.bus.wakeup(*topic)?);
     }
-    let mut process = P::open(&mut context)?;
+    let readers = P::Readers::open_readers(&context.bus)?;
+    let mut process = P::open(&mut context, readers)?;
     tracing::info!(generation = number, "ready");
     let worked = work(&mut process, &mut heartbeat, &mut context, &mut stop);
     // After an error, too, the stage is stopped in order: the link then stops the robot.
@@ -258,7 +255,6 @@ fn work(
     }
     heartbeat.beat(HealthState::Ready, progress)?;
     process.after_ready(context)?;
-    context.opened.check_all()?;
     let simulated = context.run.mission.robot.address.is_none();
     let mut faults = Requests::open(&context.bus, context.generation.stage, simulated)?;
     let mut busy = true;

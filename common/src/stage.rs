@@ -1,17 +1,42 @@
 //! A stage and its runner: what is common to the process and the replay of every stage, once.
 //!
-//! A [`Stage`] takes entries and gives outputs. Its process reads topics and makes entries of what came; a replay reads the
-//! same entries from a recording. Both hand them to [`Stage::take`], so a replay computes what the process published.
+//! A [`Stage`] takes entries and gives outputs. Its process (a [`Process`]) reads topics and makes entries of what came; a replay
+//! reads the same entries from a recording. Both hand them to [`Stage::take_entry`], so a replay computes what the process published.
 //!
-//! A stage that answers each sample of one topic with a sample of another is an [`Answering`] step, and nothing else. It may take
-//! what came on further topics with the sample.
+//! A stage that answers each sample of one topic with a sample of another is [`Answering`], and nothing else. It may take what came
+//! on further topics with the sample.
+//!
+//! # What a stage may depend on
+//! A stage is pure: it has no shared memory, socket, file, thread or clock. A test, a fuzzer or a replay drives it as its process
+//! does, and it cannot tell which of them it is called by. It depends on three things, and nothing else:
+//! - the mission, given once to [`Stage::new`];
+//! - the state given to [`Stage::begin`], which an earlier process of the stage may have saved;
+//! - its entries, in their order, each with the mission time it belongs to.
+//!
+//! So the same mission, state and entries give the same outputs to the bit, on any machine. Whatever else a stage
+//! needs is made an entry: a reading of the machine's clock (the link's), the result of a computation on another
+//! thread (the planner's background solve), a random seed (the mission's).
+//!
+//! # The stages
+//!
+//! | stage | entry | output | state |
+//! |---|---|---|---|
+//! | `link` | datagram, open or closed wire, command, directive, passing time | datagrams, samples, decisions | next tick |
+//! | `dead-reckoning` | wheel counts | pose | pose and the counts it was computed at |
+//! | `mapper` | pose with range, reset, fault | the window of the grid that changed | the whole belief |
+//! | `planner` | grid part, pose, solved job, fault | guidance, job for the background solver | none: the next keyframe has all |
+//! | `controller` | guidance | command | none |
+//!
+//! # A stage of your own
+//! The guide's page `add-a-stage.md` adds one, an odometer.
 
 use std::fmt::Debug;
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use thiserror::Error;
 
 use crate::{
-    bus::{Layout, Reader, Stamped, Topic},
+    bus::{Bus, BusError, Layout, Reader, Stamped, Topic},
     clock::MissionTime,
     inputs,
     mission::Mission,
@@ -19,15 +44,15 @@ use crate::{
     replay::{Beginning, Output, Replay, ReplayError, entry},
     shell::{Context, Process, Progress},
     start::StageError,
-    step::{ForeignState, Step},
-    wiring::{Persists, Topics, Wiring},
+    wiring::{Persists, Readers, Topics},
 };
 
-/// A stage around its step. A process and a replay run the same one.
+/// What a stage computes. A process and a replay run the same one.
 pub trait Stage: Sized + 'static {
     /// The state that a generation starts from.
     type Start: Serialize + DeserializeOwned;
-    /// The input of one call of the step. A recording holds it in this encoding.
+    /// What the stage takes at once: a sample of a topic, or an enum where it takes more than one kind. It may borrow from shared
+    /// memory for the length of the call. A recording holds it in this encoding.
     type Entry<'a>: Serialize + Deserialize<'a> + Debug;
     /// The result of an entry for the process, besides the outputs.
     type Outcome;
@@ -38,11 +63,18 @@ pub trait Stage: Sized + 'static {
     /// Open the file that the stage persists its state in, and give the state that its process starts from.
     fn start(&self, context: &mut Context) -> Result<Self::Start, StageError>;
 
-    /// Go on from `start`.
+    /// Go on from `start`. Called at most once, before the first entry.
+    ///
+    /// # Errors
+    /// When the state cannot be of this mission. Then the stage stays as [`Stage::new`] created it.
     fn begin(&mut self, start: Self::Start) -> Result<(), ForeignState>;
 
-    /// Step with `entry`, persist and publish. Sets [`Outputs::at`] if the entry says of which tick it is.
-    fn take(
+    /// Compute, persist and publish what follows from `entry`. Sets [`Outputs::at`] if the entry says of which tick it is. An entry
+    /// that was taken before (a tick that is given again) must not count twice.
+    ///
+    /// # Errors
+    /// When an output cannot be published or the state cannot be saved.
+    fn take_entry(
         &mut self,
         entry: Self::Entry<'_>,
         out: &mut Outputs,
@@ -60,6 +92,11 @@ pub trait Stage: Sized + 'static {
     }
 }
 
+/// A state that was saved by a stage of another mission.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+#[error("the saved state is of another mission; the stage starts without it")]
+pub struct ForeignState;
+
 /// The stage in its process.
 pub struct Runner<S> {
     pub stage: S,
@@ -75,7 +112,7 @@ impl<S: Stage> Runner<S> {
     ) -> Result<Self, StageError> {
         let mut stage = S::new(&context.run.mission);
         let start = stage.start(context)?;
-        let out = Outputs::of_process(context, &start, longest(&stage))?;
+        let out = Outputs::with_inputs(context, &start, longest(&stage))?;
         if let Err(foreign) = stage.begin(start) {
             tracing::warn!("{foreign}");
         }
@@ -88,9 +125,12 @@ impl<S: Stage> Runner<S> {
     }
 
     /// Note `entry` for a replay, and let the stage take it.
-    pub fn take(&mut self, entry: S::Entry<'_>) -> Result<S::Outcome, StageError> {
+    ///
+    /// # Errors
+    /// As [`Stage::take_entry`].
+    pub fn take_entry(&mut self, entry: S::Entry<'_>) -> Result<S::Outcome, StageError> {
         self.out.note(&entry)?;
-        self.stage.take(entry, &mut self.out)
+        self.stage.take_entry(entry, &mut self.out)
     }
 
     /// Publish outputs that no stage waits for.
@@ -120,7 +160,7 @@ pub fn replay<S: Stage>(beginning: Beginning<'_>) -> Result<Box<dyn Replay>, Rep
 impl<S: Stage> Replay for Generation<S> {
     fn take(&mut self, body: &[u8]) -> Result<Vec<Output>, ReplayError> {
         let Self { stage, out } = self;
-        let taken = stage.take(entry(body)?, out);
+        let taken = stage.take_entry(entry(body)?, out);
         taken
             .and_then(|_| stage.publish_rest(out))
             .map_err(|error| ReplayError::Stage(error.to_string()))?;
@@ -133,7 +173,10 @@ impl<S: Stage> Replay for Generation<S> {
 }
 
 /// A stage that answers each sample of one topic with a sample of another.
-pub trait Answering: Step<State: Clone + Debug> + 'static {
+pub trait Answering: Sized + 'static {
+    /// The state that must survive the process, because it cannot be recomputed from the topics that a new process reads; `()`
+    /// if there is none.
+    type State: Serialize + DeserializeOwned + Clone + Debug;
     type In: Stamped;
     type Out: Stamped;
     /// The samples of further topics that it takes with a sample of its input; `()` for none.
@@ -145,7 +188,16 @@ pub trait Answering: Step<State: Clone + Debug> + 'static {
     /// Whether the stage skips samples that are not the newest.
     const NEWEST_ONLY: bool = false;
 
-    /// Take one sample.
+    /// The stage at the start of `mission`, before any input.
+    fn new(mission: &Mission) -> Self;
+
+    /// The state to save after an answer.
+    fn state(&self) -> &Self::State;
+
+    /// [`Stage::begin`] from the state that an earlier process of the same mission saved.
+    fn restore(&mut self, state: Self::State) -> Result<(), ForeignState>;
+
+    /// Answer a sample at its mission time `now`.
     fn answer(
         &mut self,
         input: &Self::In,
@@ -157,24 +209,19 @@ pub trait Answering: Step<State: Clone + Debug> + 'static {
 /// The samples of further topics that came before a sample of an [`Answering`] stage's input. They wake nobody, and the entry
 /// contains them, so a replay takes them with the same sample.
 pub trait Further: Serialize + DeserializeOwned + Debug + 'static {
-    const TOPICS: Topics;
-    type Readers;
-
-    fn open(context: &mut Context) -> Result<Self::Readers, StageError>;
+    type Readers: Readers;
 
     /// Take what came, and no more than a bounded number of samples.
-    fn take(readers: &mut Self::Readers) -> Result<Self, StageError>;
+    ///
+    /// # Errors
+    /// As [`Reader::next_slice`].
+    fn take_samples(readers: &mut Self::Readers) -> Result<Self, BusError>;
 }
 
 impl Further for () {
-    const TOPICS: Topics = &[];
     type Readers = ();
 
-    fn open(_: &mut Context) -> Result<(), StageError> {
-        Ok(())
-    }
-
-    fn take((): &mut ()) -> Result<(), StageError> {
+    fn take_samples((): &mut ()) -> Result<(), BusError> {
         Ok(())
     }
 }
@@ -206,7 +253,7 @@ impl<A: Answering> Stage for A {
     type Outcome = Option<&'static str>;
 
     fn new(mission: &Mission) -> Self {
-        Step::new(mission)
+        Answering::new(mission)
     }
 
     fn start(&self, context: &mut Context) -> Result<Self::Start, StageError> {
@@ -221,7 +268,7 @@ impl<A: Answering> Stage for A {
         start.map_or(Ok(()), |state| self.restore(state))
     }
 
-    fn take(
+    fn take_entry(
         &mut self,
         Sample(input, further): Sample<A::In, A::Further>,
         out: &mut Outputs,
@@ -240,51 +287,56 @@ impl<A: Answering> Stage for A {
 
     fn describe(Sample(input, further): &Sample<A::In, A::Further>) -> String {
         let name = A::INPUT.spec().name;
-        match A::Further::TOPICS.is_empty() {
+        match <A::Further as Further>::Readers::FEEDBACK.is_empty() {
             true => format!("{name} {input:?}"),
             false => format!("{name} {input:?} with {further:?}"),
         }
     }
 }
 
+/// The readers of an [`Answering`] stage: of its input, and of further topics, which are all feedback.
+pub struct Questions<A: Answering>(Reader<A::In>, <A::Further as Further>::Readers);
+
+impl<A: Answering> Readers for Questions<A> {
+    const INPUTS: Topics = &[A::INPUT];
+    const FEEDBACK: Topics = <A::Further as Further>::Readers::FEEDBACK;
+
+    fn open_readers(bus: &Bus) -> Result<Self, BusError> {
+        Ok(Self(bus.reader(A::INPUT)?, Readers::open_readers(bus)?))
+    }
+}
+
 /// The process of an [`Answering`] stage.
 pub struct Answers<A: Answering> {
     runner: Runner<A>,
-    input: Reader<A::In>,
-    further: <A::Further as Further>::Readers,
+    readers: Questions<A>,
 }
 
 impl<A: Answering> Process for Answers<A> {
-    const WIRING: &'static Wiring = &Wiring {
-        inputs: &[A::INPUT],
-        feedback: A::Further::TOPICS,
-        wakes: &[A::INPUT],
-        outputs: &[A::OUTPUT],
-        persists: A::PERSISTS,
-        ..Wiring::of(A::NAME)
-    };
+    const NAME: &'static str = A::NAME;
+    const WAKES: Topics = &[A::INPUT];
+    const OUTPUTS: Topics = &[A::OUTPUT];
+    const PERSISTS: Persists = A::PERSISTS;
+    type Readers = Questions<A>;
 
-    fn open(context: &mut Context) -> Result<Self, StageError> {
-        Ok(Self {
-            runner: Runner::open(context, |_| 0)?,
-            input: context.reader(A::INPUT)?,
-            further: A::Further::open(context)?,
-        })
+    fn open(context: &mut Context, readers: Questions<A>) -> Result<Self, StageError> {
+        Ok(Self { runner: Runner::open(context, |_| 0)?, readers })
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {
+        let Questions(input, further) = &mut self.readers;
         loop {
             let next = match A::NEWEST_ONLY {
-                true => self.input.newest()?,
-                false => self.input.next_sample()?,
+                true => input.newest()?,
+                false => input.next_sample()?,
             };
-            let Some(input) = next else {
+            let Some(sample) = next else {
                 return Ok(self.runner.out.at);
             };
-            let further = A::Further::take(&mut self.further)?;
-            self.runner.out.at = Progress::of(input.stamp());
-            if let Some(warning) = self.runner.take(Sample(input, further))? {
-                tracing::warn!(tick = input.stamp().tick, "{warning}");
+            let further = A::Further::take_samples(further)?;
+            self.runner.out.at = Progress::of(sample.stamp());
+            if let Some(warning) = self.runner.take_entry(Sample(sample, further))? {
+                tracing::warn!(tick = sample.stamp().tick, "{warning}");
             }
         }
     }

@@ -9,7 +9,6 @@ use crate::{
     checkpoint::CheckpointError,
     domain::{Domain, RobotName},
     run::{Run, RunError},
-    wiring::WiringError,
 };
 
 /// One of a stage's processes in a run: each start of a stage is a generation.
@@ -60,9 +59,9 @@ pub enum StageError {
     /// The stage's checkpoint.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
-    /// The process opens something else than its wiring lists.
-    #[error(transparent)]
-    Wiring(#[from] WiringError),
+    /// The stage publishes on a topic that is not among its outputs.
+    #[error("topic {0} is not among the outputs of the stage; list it there")]
+    NoOutput(&'static str),
     /// An error that only this stage has.
     #[error("{0}")]
     Other(String),

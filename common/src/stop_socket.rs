@@ -17,15 +17,17 @@ use std::{
     time::{Duration, Instant},
 };
 
+use serde::{Deserialize, Serialize};
+
 use crate::{clock::monotonic_ns, domain::Domain, poll};
 
-/// A request of an operator to the link.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// A request of an operator to the link. Recordings hold the number of the variant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Request {
-    /// The robot stands until an operator resumes.
-    Stop,
     /// The stop is over.
     Resume,
+    /// The robot stands until an operator resumes.
+    Stop,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,8 +1,6 @@
 //! The target, as a stage follows it on topic `target`.
 
-use crate::{
-    bus::Reader, samples::TargetSample, shell::Context, start::StageError, topics::TARGET,
-};
+use crate::{bus::Reader, samples::TargetSample, start::StageError};
 
 /// Reads topic `target`.
 #[derive(Debug)]
@@ -18,12 +16,13 @@ struct Taken {
     number: Option<u64>,
 }
 
-impl TargetReader {
-    pub fn open(context: &mut Context) -> Result<Self, StageError> {
-        let samples = context.reader(&TARGET)?;
-        Ok(Self { samples, newest: None, taken: Taken::default() })
+impl From<Reader<TargetSample>> for TargetReader {
+    fn from(samples: Reader<TargetSample>) -> Self {
+        Self { samples, newest: None, taken: Taken::default() }
     }
+}
 
+impl TargetReader {
     /// The target that holds in `tick`, if it is not the one that was returned last.
     pub fn next(&mut self, tick: u64) -> Result<Option<TargetSample>, StageError> {
         self.newest = self.samples.newest()?.or(self.newest);

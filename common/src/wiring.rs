@@ -1,12 +1,8 @@
 //! The declaration of what a stage's process opens on the bus and what it persists. The table of stages refers to it, and the
-//! process opens through it: a topic that is not listed is refused, and one that is listed and not opened ends the process.
-
-use std::fmt;
-
-use thiserror::Error;
+//! process opens what it declares: [`readers`](crate::readers) names a topic, its reader and the field that holds it in one line.
 
 use crate::{
-    bus::AnyTopic,
+    bus::{AnyTopic, Bus, BusError},
     topics::{FAULTS, HEALTH, INPUTS, ROSTER},
 };
 
@@ -45,119 +41,50 @@ pub enum Persists {
     Journal,
 }
 
-/// How a process opens a topic.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Access {
-    Read,
-    Write,
+/// The readers of a stage's process.
+pub trait Readers: Sized {
+    /// [`Wiring::inputs`].
+    const INPUTS: Topics = &[];
+    /// [`Wiring::feedback`].
+    const FEEDBACK: Topics = &[];
+
+    /// Opens a reader of each topic of both lists.
+    ///
+    /// # Errors
+    /// As [`Bus::reader`].
+    fn open_readers(bus: &Bus) -> Result<Self, BusError>;
 }
 
-impl fmt::Display for Access {
-    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        to.write_str(match self {
-            Self::Read => "reading",
-            Self::Write => "writing",
-        })
-    }
-}
-
-impl Wiring {
-    /// A stage that opens and persists nothing: declarations start from it.
-    pub const fn of(stage: &'static str) -> Self {
-        Self {
-            stage,
-            inputs: &[],
-            feedback: &[],
-            wakes: &[],
-            outputs: &[],
-            persists: Persists::Nothing,
-        }
-    }
-
-    /// The names of the topics that it opens for `access`.
-    pub fn listed(&self, access: Access) -> impl Iterator<Item = &'static str> {
-        let (first, second): (Topics, Topics) = match access {
-            Access::Read => (self.inputs, self.feedback),
-            Access::Write => (self.outputs, &[]),
-        };
-        first.iter().chain(second).map(|topic| topic.spec().name)
-    }
-}
-
-/// The topics of its wiring that a process has opened.
-pub(crate) struct Opened {
-    pub(crate) wiring: &'static Wiring,
-    topics: Vec<(Access, &'static str)>,
-}
-
-/// A process opens something else than its wiring lists.
-#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
-pub enum WiringError {
-    /// The process opens a topic that is not listed.
-    #[error("topic {1} is opened for {0} and not in the wiring of the stage; list it there")]
-    NotListed(Access, &'static str),
-    /// The process has not opened a topic that is listed.
-    #[error("topic {1} is in the wiring of the stage for {0} and not opened; remove it there")]
-    NotOpened(Access, &'static str),
-}
-
-impl Opened {
-    pub(crate) const fn none_of(wiring: &'static Wiring) -> Self {
-        Self { wiring, topics: Vec::new() }
-    }
-
-    /// Note that `topic` is opened, if it is listed.
-    pub(crate) fn add(&mut self, access: Access, topic: &'static str) -> Result<(), WiringError> {
-        if !self.wiring.listed(access).any(|listed| listed == topic) {
-            return Err(WiringError::NotListed(access, topic));
-        }
-        self.topics.push((access, topic));
+/// No readers.
+impl Readers for () {
+    fn open_readers(_: &Bus) -> Result<Self, BusError> {
         Ok(())
     }
+}
 
-    /// An error where a listed topic is not opened.
-    pub(crate) fn check_all(&self) -> Result<(), WiringError> {
-        for access in [Access::Read, Access::Write] {
-            let mut listed = self.wiring.listed(access);
-            if let Some(topic) = listed.find(|topic| !self.topics.contains(&(access, topic))) {
-                return Err(WiringError::NotOpened(access, topic));
+/// A struct of readers, or of what is made from one, each with its topic.
+#[macro_export]
+macro_rules! readers {
+    ($(#[$meta:meta])* $vis:vis struct $name:ident {
+        $(inputs { $($input:ident: $input_reader:ty = $input_topic:path,)* })?
+        $(feedback { $($feedback:ident: $feedback_reader:ty = $feedback_topic:path,)* })?
+    }) => {
+        $(#[$meta])*
+        $vis struct $name {
+            $($($input: $input_reader,)*)?
+            $($($feedback: $feedback_reader,)*)?
+        }
+
+        impl $crate::wiring::Readers for $name {
+            $(const INPUTS: $crate::wiring::Topics = &[$(&$input_topic),*];)?
+            $(const FEEDBACK: $crate::wiring::Topics = &[$(&$feedback_topic),*];)?
+
+            fn open_readers(bus: &$crate::bus::Bus) -> Result<Self, $crate::bus::BusError> {
+                Ok(Self {
+                    $($($input: bus.reader(&$input_topic)?.into(),)*)?
+                    $($($feedback: bus.reader(&$feedback_topic)?.into(),)*)?
+                })
             }
         }
-        Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::topics::{COMMAND, GUIDANCE, POSE};
-
-    static WIRING: Wiring = Wiring {
-        inputs: &[&GUIDANCE],
-        feedback: &[&POSE],
-        outputs: &[&COMMAND],
-        ..Wiring::of("test")
     };
-
-    #[test]
-    fn a_topic_that_is_not_listed_is_refused() {
-        let mut opened = Opened::none_of(&WIRING);
-        assert_eq!(opened.add(Access::Read, "guidance"), Ok(()));
-        let refused = opened.add(Access::Write, "guidance");
-        assert_eq!(refused, Err(WiringError::NotListed(Access::Write, "guidance")));
-        let refused = opened.add(Access::Read, "ranges");
-        assert_eq!(refused, Err(WiringError::NotListed(Access::Read, "ranges")));
-    }
-
-    #[test]
-    fn a_listed_topic_that_is_not_opened_is_found() {
-        let mut opened = Opened::none_of(&WIRING);
-        for (access, topic) in
-            [(Access::Read, "guidance"), (Access::Write, "command"), (Access::Read, "pose")]
-        {
-            assert!(opened.check_all().is_err(), "before {topic}");
-            opened.add(access, topic).unwrap();
-        }
-        assert_eq!(opened.check_all(), Ok(()));
-    }
 }

@@ -47,6 +47,8 @@ payloads! {
 
 wire_enum! {
     /// The supervisor's order to the robot.
+    #[derive(Serialize, Deserialize)]
+    #[serde(from = "u8", into = "u8")]
     Order, unknown = Stop {
         /// Stand still; do not start ticks.
         Hold = 0,
@@ -97,6 +99,8 @@ wire_enum! {
 
 wire_enum! {
     /// Why the robot is not ordered to drive.
+    #[derive(Serialize, Deserialize)]
+    #[serde(from = "u8", into = "u8")]
     HoldReason, unknown = Starting {
         /// A stage is not ready, the robot does not answer, or there is no field yet.
         Starting = 0,

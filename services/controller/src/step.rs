@@ -3,12 +3,14 @@
 mod car;
 
 use common::{
+    bus::Topic,
     clock::MissionTime,
     geometry::wrap_angle,
     kinematics::{Drive, FACES_COSINE, LEAST_SPEED_M_S, Twist},
     mission::{Method, Mission},
     samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus},
-    step::{ForeignState, Step},
+    stage::{Answer, Answering, ForeignState},
+    topics::{COMMAND, GUIDANCE},
 };
 use glam::DVec2;
 
@@ -76,9 +78,14 @@ pub struct Controller {
     arrival: (u64, Arrival),
 }
 
-impl Step for Controller {
-    type Input<'a> = &'a GuidanceSample;
-    type Output = CommandSample;
+impl Answering for Controller {
+    type In = GuidanceSample;
+    type Out = CommandSample;
+    type Further = ();
+    const NAME: &'static str = "controller";
+    const INPUT: &'static Topic<GuidanceSample> = &GUIDANCE;
+    const OUTPUT: &'static Topic<CommandSample> = &COMMAND;
+    const NEWEST_ONLY: bool = true;
     /// No state survives the process: a robot at its target is there for the next controller too, or drives the last centimetre again.
     type State = ();
 
@@ -114,8 +121,19 @@ impl Step for Controller {
         Ok(())
     }
 
+    fn answer(
+        &mut self,
+        guidance: &GuidanceSample,
+        (): &(),
+        _: MissionTime,
+    ) -> Answer<CommandSample> {
+        self.command(guidance).into()
+    }
+}
+
+impl Controller {
     /// The command under `guidance`, for the pose it was computed for.
-    fn step(&mut self, guidance: &GuidanceSample, _: MissionTime) -> CommandSample {
+    pub fn command(&mut self, guidance: &GuidanceSample) -> CommandSample {
         let pose = guidance.pose();
         let distance = pose.position.distance(guidance.target.position());
         let command = CommandSample {
@@ -161,9 +179,7 @@ impl Step for Controller {
             ..command
         }
     }
-}
 
-impl Controller {
     /// How far the robot has come. It never goes back: a robot at rest on the edge of the circle does not start again because of one
     /// count. A robot beside a target in a hazard has arrived, too, if the planner says that it is as near as it can be.
     fn arrival(&mut self, guidance: &GuidanceSample, distance: f64) -> Arrival {

@@ -2,12 +2,15 @@
 //! integral that nothing can recompute, so its state is in the checkpoint.
 
 use common::{
+    bus::Topic,
     clock::MissionTime,
     kinematics::{Drive, Pose2, SteeredWheel, Twist, WheelSpeeds},
     mission::{Body, Mission},
-    samples::{FixRefusal, FixSample, PoseSample, TurnSample, WheelSample},
-    step::{ForeignState, Step},
+    samples::{FixRefusal, FixSample, PoseSample, WheelSample},
+    stage::{Answer, Answering, ForeignState},
+    topics::{POSE, WHEELS},
     wire::{counts_between, counts_restarted},
+    wiring::Persists,
 };
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -17,9 +20,12 @@ use crate::{
     filter::{Filter, Fix, History, Motions, Refused},
     gyro::Gyro,
     relocation::Contradictions,
+    sources::Sources,
     tick::Tick,
 };
 
+/// Room for the encoded state, bytes: with 64 ticks and 64 fixes it is under 14,000.
+pub const STATE_BYTES: usize = 16_384;
 /// Counts are rejected if a wheel seems to turn faster than this multiple of its top speed. A robot that slides or is pushed stays
 /// below it; a counter that restarted is nearly always above it.
 const PLAUSIBLE: f64 = 2.0;
@@ -59,14 +65,6 @@ impl State {
     pub fn newest(&self) -> Option<(u64, MissionTime)> {
         self.last.map(|last| (last.tick, last.time))
     }
-}
-
-/// A tick's wheels, and what came from sources outside since the tick before.
-#[derive(Clone, Copy, Debug)]
-pub struct Input<'a> {
-    pub wheels: &'a WheelSample,
-    pub fixes: &'a [FixSample],
-    pub turns: &'a [TurnSample],
 }
 
 /// The wheel sample that the pose was computed from, and the speeds by it.
@@ -110,10 +108,15 @@ pub struct DeadReckoning {
     state: State,
 }
 
-impl Step for DeadReckoning {
-    type Input<'a> = Input<'a>;
-    type Output = Reckoned;
+impl Answering for DeadReckoning {
     type State = State;
+    type In = WheelSample;
+    type Out = PoseSample;
+    type Further = Sources;
+    const NAME: &'static str = "dead-reckoning";
+    const INPUT: &'static Topic<WheelSample> = &WHEELS;
+    const OUTPUT: &'static Topic<PoseSample> = &POSE;
+    const PERSISTS: Persists = Persists::State(STATE_BYTES);
 
     fn new(mission: &Mission) -> Self {
         let odometry = &mission.robot.odometry;
@@ -155,8 +158,31 @@ impl Step for DeadReckoning {
         Ok(())
     }
 
+    fn answer(
+        &mut self,
+        wheels: &WheelSample,
+        sources: &Sources,
+        now: MissionTime,
+    ) -> Answer<PoseSample> {
+        let first = self.state.newest().is_none();
+        let Reckoned { pose, rejected, relocated, refused } = self.reckon(wheels, sources, now);
+        let warning = match refused {
+            _ if rejected => Some("the encoder counts restarted or jumped; the pose stays"),
+            _ if relocated => Some("fixes that agree contradict the pose; the pose is theirs now"),
+            refused => refused.map(FixRefusal::words),
+        };
+        Answer { sample: pose, saves_first: first || rejected || relocated, warning }
+    }
+}
+
+impl DeadReckoning {
     /// Integrate up to one wheel sample. A tick given twice gives the same pose twice.
-    fn step(&mut self, Input { wheels, fixes, turns }: Input<'_>, now: MissionTime) -> Reckoned {
+    pub fn reckon(
+        &mut self,
+        wheels: &WheelSample,
+        Sources { fixes, turns }: &Sources,
+        now: MissionTime,
+    ) -> Reckoned {
         let mut motion = Twist::default();
         let (mut rejected, mut elapsed) = (false, 0.0);
         let mut tick = Tick { time: now, ..Tick::default() };
@@ -208,9 +234,7 @@ impl Step for DeadReckoning {
         });
         Reckoned { pose: self.sample(), rejected, relocated, refused }
     }
-}
 
-impl DeadReckoning {
     /// Take a fix, unless it is refused.
     fn take_fix(&mut self, sample: &FixSample) -> Taken {
         let state = &mut self.state;

@@ -9,17 +9,19 @@ use common::{
     domain::Domain,
     driver::Memory,
     latency::Histogram,
+    readers,
     samples::{
         Action, Cause, CommandSample, DirectiveSample, HoldReason, LinkSample, Order,
         TickLimitSample,
     },
-    saved::Saved,
     shell::{Context, Process, Progress, StageError},
     stage::Runner,
-    step::Step as _,
     stop_socket::{Identity, Request, StopMark, StopSocket},
-    topics,
-    wiring::{Persists, Wiring},
+    topics::{
+        COMMAND, CONTACT, DIRECTIVE, IMU_TURN, INFRARED, LINK, POWER, RANGES, SCAN, SURROUNDINGS,
+        TICK_LIMIT, WHEELS, WIRE,
+    },
+    wiring::{Persists, Topics},
 };
 
 use crate::{
@@ -27,7 +29,7 @@ use crate::{
         Decision,
         battery::{BatteryChange, Charge},
     },
-    stage::{Entry, LinkStage, Taken, WIRE_PIECE},
+    stage::{Entry, LinkStage, WIRE_PIECE},
     step::{Effect, Event},
     stop_guard::StopGuard,
     transport::Transport,
@@ -41,16 +43,24 @@ const MOST_LISTENING_NS: u64 = 20_000_000;
 
 const MEMORY_BYTES: usize = 64;
 
+readers! {
+    pub struct Inputs {
+        inputs {
+            directive: Reader<DirectiveSample> = DIRECTIVE,
+            tick_limit: Reader<TickLimitSample> = TICK_LIMIT,
+        }
+        feedback {
+            command: Reader<CommandSample> = COMMAND,
+        }
+    }
+}
+
 /// The link process.
 pub struct Shell {
     transport: Transport,
-    command: Reader<CommandSample>,
+    inputs: Inputs,
     writers: Option<Writers>,
-    directive: Reader<DirectiveSample>,
-    tick_limit: Reader<TickLimitSample>,
     runner: Runner<LinkStage>,
-    /// What the next link's driver must know.
-    saved: Saved,
     /// None where it could not be made, which the log says.
     stop_socket: Option<StopSocket>,
     stop_mark: StopMark,
@@ -65,27 +75,24 @@ pub struct Shell {
 }
 
 impl Process for Shell {
-    const WIRING: &'static Wiring = &Wiring {
-        inputs: &[&topics::DIRECTIVE, &topics::TICK_LIMIT],
-        feedback: &[&topics::COMMAND],
-        wakes: &[&topics::COMMAND, &topics::DIRECTIVE, &topics::TICK_LIMIT],
-        outputs: &[
-            &topics::CONTACT,
-            &topics::SCAN,
-            &topics::IMU_TURN,
-            &topics::RANGES,
-            &topics::WHEELS,
-            &topics::LINK,
-            &topics::INFRARED,
-            &topics::POWER,
-            &topics::SURROUNDINGS,
-            &topics::WIRE,
-        ],
-        persists: Persists::State(MEMORY_BYTES),
-        ..Wiring::of("link")
-    };
+    const NAME: &'static str = "link";
+    const WAKES: Topics = &[&COMMAND, &DIRECTIVE, &TICK_LIMIT];
+    const OUTPUTS: Topics = &[
+        &CONTACT,
+        &SCAN,
+        &IMU_TURN,
+        &RANGES,
+        &WHEELS,
+        &LINK,
+        &INFRARED,
+        &POWER,
+        &SURROUNDINGS,
+        &WIRE,
+    ];
+    const PERSISTS: Persists = Persists::State(MEMORY_BYTES);
+    type Readers = Inputs;
 
-    fn open(context: &mut Context) -> Result<Self, StageError> {
+    fn open(context: &mut Context, inputs: Inputs) -> Result<Self, StageError> {
         // The socket is there before the guard, which knows this link by it.
         let domain = Domain::of(context.run.robot.clone());
         let stop_socket = StopSocket::bind(&domain)
@@ -106,20 +113,17 @@ impl Process for Shell {
         if let Some(socket) = &stop_socket {
             context.waiter.on_readable(socket)?;
         }
+        // What an earlier link's driver must know.
         let memory: Option<Memory> = context.saved_state()?;
-        let saved = context.take_saved();
         let mut runner = Runner::open(context, |_: &LinkStage| WIRE_PIECE)?;
         if let Some(memory) = memory {
-            runner.take(Entry::Remember(memory))?;
+            runner.take_entry(Entry::Remember(memory))?;
         }
         let mut shell = Self {
             transport,
-            command: context.reader(&topics::COMMAND)?,
+            inputs,
             writers: context.writers(),
-            directive: context.reader(&topics::DIRECTIVE)?,
-            tick_limit: context.reader(&topics::TICK_LIMIT)?,
             runner,
-            saved,
             stop_socket,
             marked: stop_mark.is_set(),
             stop_mark,
@@ -139,18 +143,18 @@ impl Process for Shell {
     fn turn(&mut self) -> Result<Progress, StageError> {
         self.take_operators_requests()?;
         self.maintain()?;
-        if let Some(directive) = self.directive.newest()? {
+        if let Some(directive) = self.inputs.directive.newest()? {
             let order = Order::from_byte(directive.order);
             let reason = HoldReason::from_byte(directive.reason);
             self.take(Event::Order(order, reason), monotonic_ns())?;
         }
         // The limit is read after the order, because the supervisor publishes the first limit before the order.
-        if let Some(limit) = self.tick_limit.newest()? {
+        if let Some(limit) = self.inputs.tick_limit.newest()? {
             let TickLimitSample { last_tick, target_number, .. } = limit;
             self.take(Event::TickLimit { last_tick, target_number }, monotonic_ns())?;
         }
-        while let Some(command) = self.command.next_sample()? {
-            self.take(Event::Command(&command), monotonic_ns())?;
+        while let Some(command) = self.inputs.command.next_sample()? {
+            self.take(Event::Command(command), monotonic_ns())?;
         }
         let began_ns = monotonic_ns();
         loop {
@@ -162,15 +166,14 @@ impl Process for Shell {
                 break;
             };
             let now = self.clock.at(self.runner.stage.link.state().next_tick, now_ns);
-            let entry = Entry::Step(Taken::Datagram(bytes), now_ns, now);
-            let effects = self.runner.take(entry)?;
+            let entry = Entry::Step(Event::Datagram(bytes), now_ns, now);
+            let effects = self.runner.take_entry(entry)?;
             self.carry_out(effects)?;
         }
         self.maintain()?;
         self.take(Event::Quiet, monotonic_ns())?;
         self.answer_operators();
-        if monotonic_ns() - self.stated_ns >= topics::LINK.spec().restated_every().as_nanos() as u64
-        {
+        if monotonic_ns() - self.stated_ns >= LINK.spec().restated_every().as_nanos() as u64 {
             self.state()?;
         }
         self.runner.publish_rest()?;
@@ -201,13 +204,13 @@ impl Process for Shell {
 
     fn idle(&mut self) -> Result<(), StageError> {
         if self.has_idle_work() {
-            self.runner.take(Entry::Telemetry)?;
+            self.runner.take_entry(Entry::Telemetry)?;
         }
         Ok(())
     }
 
     fn stop(&mut self) -> Result<(), StageError> {
-        let effects = self.runner.take(Entry::Stop(monotonic_ns()))?;
+        let effects = self.runner.take_entry(Entry::Stop(monotonic_ns()))?;
         self.carry_out(effects)?;
         self.runner.publish_rest()?;
         tracing::info!("stop sent to the robot");
@@ -291,8 +294,7 @@ impl Shell {
     fn take(&mut self, event: Event<'_>, machine_ns: u64) -> Result<(), StageError> {
         let next_tick = self.runner.stage.link.state().next_tick;
         let now = self.clock.at(next_tick, machine_ns);
-        let entry = Entry::Step(Taken::of(&event), machine_ns, now);
-        let effects = self.runner.take(entry)?;
+        let effects = self.runner.take_entry(Entry::Step(event, machine_ns, now))?;
         self.carry_out(effects)
     }
 
@@ -302,7 +304,7 @@ impl Shell {
                 Effect::Send(bytes) => self.transport.send(&bytes)?,
                 Effect::Answered { began_ns } => {
                     if let Some(memory) = self.runner.stage.link.driver_memory() {
-                        self.saved.save(&memory)?;
+                        self.runner.out.save(&memory)?;
                     }
                     self.latency_ns = monotonic_ns().saturating_sub(began_ns);
                     self.latency.record(self.latency_ns);
@@ -411,6 +413,6 @@ impl Shell {
             latency_histogram: *self.latency.counts(),
             ..LinkSample::default()
         };
-        self.runner.out.publish(&topics::LINK, sample)
+        self.runner.out.publish(&LINK, sample)
     }
 }

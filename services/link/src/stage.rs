@@ -3,23 +3,20 @@
 use common::{
     clock::{MissionClock, MissionTime, Pace},
     driver::Memory,
-    inputs,
     mission::Mission,
     outputs::Outputs,
     samples::{
-        CommandSample, Direction, HoldReason, InfraredSample, Order, PowerSample, RangesHeader,
-        ScanHeader, SurroundingsSample, WireHeader,
+        Direction, InfraredSample, PowerSample, RangesHeader, ScanHeader, SurroundingsSample,
+        WireHeader,
     },
     shell::{Context, Progress},
-    stage::Stage,
+    stage::{ForeignState, Stage},
     start::StageError,
-    step::{ForeignState, Step as _},
-    stop_socket::Request,
     topics::{CONTACT, IMU_TURN, INFRARED, POWER, RANGES, SCAN, SURROUNDINGS, WHEELS, WIRE},
 };
 use serde::{Deserialize, Serialize};
 
-use crate::step::{Effect, Event, Input, Link, State};
+use crate::step::{Effect, Event, Link, State};
 
 /// The most bytes of a `wire` sample; longer data take several.
 pub(crate) const WIRE_PIECE: usize = 2048;
@@ -28,66 +25,13 @@ pub(crate) const WIRE_PIECE: usize = 2048;
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Entry<'a> {
     /// The step takes an event at this reading of the monotonic clock, nanoseconds, and this mission time.
-    Step(#[serde(borrow)] Taken<'a>, u64, MissionTime),
+    Step(#[serde(borrow)] Event<'a>, u64, MissionTime),
     /// The newest telemetry is published.
     Telemetry,
     /// The reading of the monotonic clock, nanoseconds.
     Stop(u64),
     /// The driver's state of the link before.
     Remember(Memory),
-}
-
-/// An [`Event`] as a recording stores it.
-#[derive(Debug, Serialize, Deserialize)]
-pub enum Taken<'a> {
-    /// [`Event::Datagram`].
-    Datagram(#[serde(with = "serde_bytes")] &'a [u8]),
-    /// [`Event::Wire`].
-    Wire(bool),
-    /// [`Event::Command`].
-    Command(#[serde(with = "inputs::sample")] CommandSample),
-    /// [`Event::Order`] with the order and the reason as bytes.
-    Order(u8, u8),
-    /// [`Event::TickLimit`].
-    TickLimit(u64, u64),
-    /// [`Event::Quiet`].
-    Quiet,
-    /// As [`Event::Operator`]: whether to stop.
-    Operator(bool),
-}
-
-impl<'a> Taken<'a> {
-    /// The recorded form of `event`.
-    pub(crate) fn of(event: &Event<'a>) -> Self {
-        match *event {
-            Event::Datagram(bytes) => Self::Datagram(bytes),
-            Event::Wire(open) => Self::Wire(open),
-            Event::Command(command) => Self::Command(*command),
-            Event::Order(order, reason) => Self::Order(order.into(), reason.into()),
-            Event::TickLimit { last_tick, target_number } => {
-                Self::TickLimit(last_tick, target_number)
-            }
-            Event::Quiet => Self::Quiet,
-            Event::Operator(request) => Self::Operator(request == Request::Stop),
-        }
-    }
-
-    fn event(&self) -> Event<'_> {
-        match self {
-            Self::Datagram(bytes) => Event::Datagram(bytes),
-            Self::Wire(open) => Event::Wire(*open),
-            Self::Command(command) => Event::Command(command),
-            Self::Order(order, reason) => {
-                Event::Order(Order::from_byte(*order), HoldReason::from_byte(*reason))
-            }
-            Self::TickLimit(last_tick, target_number) => {
-                Event::TickLimit { last_tick: *last_tick, target_number: *target_number }
-            }
-            Self::Quiet => Event::Quiet,
-            Self::Operator(true) => Event::Operator(Request::Stop),
-            Self::Operator(false) => Event::Operator(Request::Resume),
-        }
-    }
 }
 
 /// The step, and the samples that are published later, when no stage of the pipeline waits for the link.
@@ -190,17 +134,21 @@ impl Stage for LinkStage {
     }
 
     fn begin(&mut self, start: State) -> Result<(), ForeignState> {
-        self.link.restore(start)
+        self.link.restore(start);
+        Ok(())
     }
 
-    fn take(&mut self, entry: Entry<'_>, out: &mut Outputs) -> Result<Vec<Effect>, StageError> {
+    fn take_entry(
+        &mut self,
+        entry: Entry<'_>,
+        out: &mut Outputs,
+    ) -> Result<Vec<Effect>, StageError> {
         let (effects, machine_ns) = match entry {
-            Entry::Step(taken, machine_ns, now) => {
-                if let Taken::Datagram(bytes) = taken {
+            Entry::Step(event, machine_ns, now) => {
+                if let Event::Datagram(bytes) = event {
                     self.carry(out.at, bytes, machine_ns, Direction::Received);
                 }
-                let event = taken.event();
-                (self.link.step(Input { event, machine_ns }, now), machine_ns)
+                (self.link.step(event, machine_ns, now), machine_ns)
             }
             Entry::Telemetry => {
                 self.publish_telemetry(out)?;

@@ -19,7 +19,6 @@ use common::{
         Action, Cause, CommandSample, CommandState, ContactSample, HoldReason, Order, RangeReading,
         TurnSample, WheelSample,
     },
-    step::{ForeignState, Step},
     stop_socket::Request,
 };
 
@@ -37,7 +36,7 @@ use crate::{
     wheel_speeds::WheelSpeeds,
 };
 
-pub use event::{Effect, Event, Input, State, Tally};
+pub use event::{Effect, Event, State, Tally};
 
 /// The pause of pings to a robot whose next motor frame is missing.
 const PING_EVERY: Duration = Duration::from_millis(200);
@@ -106,13 +105,9 @@ pub struct Link {
     refused_ns: Option<u64>,
 }
 
-impl Step for Link {
-    type Input<'a> = Input<'a>;
-    type Output = Vec<Effect>;
-    type State = State;
-
+impl Link {
     /// A link in lockstep before tick 0.
-    fn new(mission: &Mission) -> Self {
+    pub fn new(mission: &Mission) -> Self {
         Self {
             state: State::default(),
             now: MissionTime::default(),
@@ -144,27 +139,28 @@ impl Step for Link {
         }
     }
 
-    fn state(&self) -> &State {
+    /// The pace, and the number of the next tick.
+    pub const fn state(&self) -> &State {
         &self.state
     }
 
-    fn restore(&mut self, state: State) -> Result<(), ForeignState> {
+    /// Go on from `state`.
+    pub fn restore(&mut self, state: State) {
         self.state = state;
         self.observe(Observation::Pace(state.pace), 0);
-        Ok(())
     }
 
-    fn step(&mut self, input: Input<'_>, now: MissionTime) -> Vec<Effect> {
-        let now_ns = input.machine_ns;
+    /// Take an event at mission time `now` and `now_ns` of the monotonic clock, which the deadlines of the wire use.
+    pub fn step(&mut self, event: Event<'_>, now_ns: u64, now: MissionTime) -> Vec<Effect> {
         self.now = now;
         let mut effects = Vec::new();
-        match input.event {
+        match event {
             Event::Datagram(bytes) => {
                 self.driver.push(bytes);
                 self.take_heard(now_ns, &mut effects);
             }
             Event::Wire(open) => self.take_wire(open, now_ns, &mut effects),
-            Event::Command(command) => self.take_command(command, now_ns, &mut effects),
+            Event::Command(command) => self.take_command(&command, now_ns, &mut effects),
             Event::Order(order, reason) => self.take_order(order, reason, now_ns, &mut effects),
             Event::Operator(Request::Stop) => self.observe(Observation::Stopped, now_ns),
             Event::Operator(Request::Resume) => self.observe(Observation::Resumed, now_ns),
@@ -183,9 +179,7 @@ impl Step for Link {
         }
         effects
     }
-}
 
-impl Link {
     /// Whether the robot answers.
     pub fn connected(&self) -> bool {
         self.monitors().presence.connected()

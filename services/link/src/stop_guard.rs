@@ -23,13 +23,12 @@ use common::{
     run::Run,
     samples::{HoldReason, Order},
     shell::StageError,
-    step::Step as _,
     stop_socket::Identity,
 };
 use rustix::process::setsid;
 
 use crate::{
-    step::{Effect, Event, Input, Link, State},
+    step::{Effect, Event, Link, State},
     transport::Transport,
 };
 
@@ -97,16 +96,14 @@ pub fn stand(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bool, StageEr
     let is_gone = || run.mission.robot.address.is_none() && !is_taken(&run.address);
     let mut transport = Transport::open(&run.address, &run.mission)?;
     let mut link = Link::new(&run.mission);
-    // A pace is never a foreign state.
-    let _ = link.restore(State { pace: Pace::Rate(rate), next_tick: 0 });
+    link.restore(State { pace: Pace::Rate(rate), next_tick: 0 });
     let began_ns = monotonic_ns();
     let mut heard_ns = began_ns;
     loop {
         let now_ns = monotonic_ns();
         let mut effects = Vec::new();
         let mut take = |event: Event<'_>| {
-            let input = Input { event, machine_ns: now_ns };
-            effects.extend(link.step(input, run.clock.at(0, now_ns)));
+            effects.extend(link.step(event, now_ns, run.clock.at(0, now_ns)));
         };
         take(Event::Order(Order::Stop, HoldReason::Ending));
         if let Some(open) = transport.maintain(now_ns)? {

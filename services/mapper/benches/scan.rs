@@ -7,7 +7,6 @@ use common::{
     clock::MissionTime,
     mission::{Mission, MissionError},
     samples::{PoseSample, Stamp},
-    step::Step as _,
 };
 use mapper::step::{Input, Mapper};
 

@@ -3,7 +3,7 @@
 use common::{
     grid::{Cell, CellState, Window},
     mission::Mission,
-    step::ForeignState,
+    stage::ForeignState,
 };
 use glam::DVec2;
 use serde::{Deserialize, Serialize};

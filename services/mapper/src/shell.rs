@@ -7,6 +7,7 @@ use common::{
     bus::Reader,
     clock::MissionTime,
     mission::{MOST_BEAMS, MOST_SENSORS},
+    readers,
     samples::{
         ContactSample, DirectiveSample, FaultKind, PoseSample, RangeReading, RangesHeader,
         ScanHeader,
@@ -14,10 +15,9 @@ use common::{
     shell::{Context, Process, Progress},
     stage::Runner,
     start::StageError,
-    step::Step as _,
     target::TargetReader,
     topics::{CONTACT, DIRECTIVE, GRID, HEALTH, POSE, RANGES, SCAN, SCAN_FIX, TARGET},
-    wiring::{Persists, Wiring},
+    wiring::{Persists, Topics},
 };
 
 use crate::{
@@ -28,15 +28,23 @@ use crate::{
 /// Mission time after which the whole map is published again.
 const KEYFRAME_EVERY: Duration = Duration::from_secs(1);
 
+readers! {
+    pub struct Inputs {
+        inputs {
+            ranges: Reader<RangesHeader, RangeReading> = RANGES,
+            scan: Reader<ScanHeader, f32> = SCAN,
+            contact: Reader<ContactSample> = CONTACT,
+            pose: Reader<PoseSample> = POSE,
+            directive: Reader<DirectiveSample> = DIRECTIVE,
+            target: TargetReader = TARGET,
+        }
+    }
+}
+
 /// The mapper process.
 pub struct Shell {
-    pose: Reader<PoseSample>,
-    ranges: Reader<RangesHeader, RangeReading>,
-    contact: Reader<ContactSample>,
-    directive: Reader<DirectiveSample>,
-    target: TargetReader,
+    inputs: Inputs,
     runner: Runner<Mapper>,
-    scan: Reader<ScanHeader, f32>,
     /// The newest scan, and its tick.
     latest_scan: Option<(u64, Vec<f32>)>,
     /// The newest readings that are used, and their tick.
@@ -46,29 +54,22 @@ pub struct Shell {
 }
 
 impl Process for Shell {
-    const WIRING: &'static Wiring = &Wiring {
-        inputs: &[&RANGES, &SCAN, &CONTACT, &POSE, &DIRECTIVE, &TARGET],
-        // A planner that becomes ready is a new reader of the grid.
-        wakes: &[&POSE, &DIRECTIVE, &HEALTH],
-        outputs: &[&GRID, &SCAN_FIX],
-        persists: Persists::Journal,
-        ..Wiring::of("mapper")
-    };
+    const NAME: &'static str = "mapper";
+    // A planner that becomes ready is a new reader of the grid.
+    const WAKES: Topics = &[&POSE, &DIRECTIVE, &HEALTH];
+    const OUTPUTS: Topics = &[&GRID, &SCAN_FIX];
+    const PERSISTS: Persists = Persists::Journal;
+    type Readers = Inputs;
 
-    fn open(context: &mut Context) -> Result<Self, StageError> {
+    fn open(context: &mut Context, inputs: Inputs) -> Result<Self, StageError> {
         let runner = Runner::open(context, |mapper: &Mapper| mapper.frame().area())?;
         let version = runner.stage.state().version();
         if version > 1 {
             tracing::info!(version, "the belief is restored");
         }
         Ok(Self {
-            pose: context.reader(&POSE)?,
-            ranges: context.reader(&RANGES)?,
-            scan: context.reader(&SCAN)?,
+            inputs,
             latest_scan: None,
-            contact: context.reader(&CONTACT)?,
-            directive: context.reader(&DIRECTIVE)?,
-            target: TargetReader::open(context)?,
             runner,
             latest_ranges: None,
             latest_contact: None,
@@ -77,16 +78,17 @@ impl Process for Shell {
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {
-        while let Some(pose) = self.pose.next_sample()? {
+        while let Some(pose) = self.inputs.pose.next_sample()? {
             let ranges = self.ranges_of(pose.stamp.tick)?;
             self.runner.out.at = Progress::of(&pose.stamp);
             let scan = self.scan_of(pose.stamp.tick)?;
             let contact = self.contact_of(pose.stamp.tick)?;
-            let target = self.target.next(pose.stamp.tick)?.map(|sample| sample.target.position());
+            let target =
+                self.inputs.target.next(pose.stamp.tick)?.map(|sample| sample.target.position());
             let target = target.filter(|target| *target != self.runner.stage.target());
             self.step(Input::Tick { pose, ranges, scan, contact, target })?;
         }
-        if let Some(DirectiveSample { epoch, .. }) = self.directive.newest()?
+        if let Some(DirectiveSample { epoch, .. }) = self.inputs.directive.newest()?
             && self.step(Input::Reset { epoch })?
         {
             tracing::warn!(epoch, "the sensed belief is reset");
@@ -125,7 +127,7 @@ impl Shell {
     }
 
     fn take(&mut self, entry: Entry) -> Result<bool, StageError> {
-        let published = self.runner.take(entry)?;
+        let published = self.runner.take_entry(entry)?;
         if published.is_some_and(|part| part.is_keyframe()) {
             self.last_keyframe = Some(self.runner.out.at.time);
         }
@@ -135,7 +137,7 @@ impl Shell {
     /// The readings of `tick`; earlier ones are dropped, later ones wait for their pose.
     fn ranges_of(&mut self, tick: u64) -> Result<Vec<RangeReading>, StageError> {
         while self.latest_ranges.as_ref().is_none_or(|(latest, _)| *latest < tick) {
-            let Some(slice) = self.ranges.next_slice()? else {
+            let Some(slice) = self.inputs.ranges.next_slice()? else {
                 break;
             };
             let readings = slice.iter().take(MOST_SENSORS).copied();
@@ -149,7 +151,7 @@ impl Shell {
     /// The scan of `tick`; none if the laser gave none, or the mission uses none.
     fn scan_of(&mut self, tick: u64) -> Result<Vec<f32>, StageError> {
         while self.latest_scan.as_ref().is_none_or(|(latest, _)| *latest < tick) {
-            let Some(slice) = self.scan.next_slice()? else {
+            let Some(slice) = self.inputs.scan.next_slice()? else {
                 break;
             };
             let used = self.runner.stage.uses_row(slice.header().sensor);
@@ -164,7 +166,7 @@ impl Shell {
     /// The contact of `tick`; most ticks have none.
     fn contact_of(&mut self, tick: u64) -> Result<Option<ContactSample>, StageError> {
         while self.latest_contact.is_none_or(|contact| contact.stamp.tick < tick) {
-            match self.contact.next_sample()? {
+            match self.inputs.contact.next_sample()? {
                 Some(contact) => self.latest_contact = Some(contact),
                 None => break,
             }

@@ -5,9 +5,8 @@ use common::{
     mission::Mission,
     outputs::Outputs,
     shell::{Context, Progress},
-    stage::Stage,
+    stage::{ForeignState, Stage},
     start::StageError,
-    step::{ForeignState, Step as _},
     topics::{GRID, SCAN_FIX},
 };
 use serde::{Deserialize, Serialize};
@@ -39,7 +38,7 @@ impl Stage for Mapper {
     type Outcome = Option<Part>;
 
     fn new(mission: &Mission) -> Self {
-        common::step::Step::new(mission)
+        Self::new(mission)
     }
 
     fn start(&self, context: &mut Context) -> Result<Start, StageError> {
@@ -57,7 +56,7 @@ impl Stage for Mapper {
         restored
     }
 
-    fn take(&mut self, entry: Entry, out: &mut Outputs) -> Result<Option<Part>, StageError> {
+    fn take_entry(&mut self, entry: Entry, out: &mut Outputs) -> Result<Option<Part>, StageError> {
         let change = match entry {
             Entry::Step(input, at) => {
                 out.at = at;

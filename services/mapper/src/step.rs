@@ -10,7 +10,7 @@ use common::{
     kinematics::Pose2,
     mission::{MOST_BEAMS, Method, Mission},
     samples::{ContactSample, FaultKind, FixSample, GridHeader, PoseSample, RangeReading, name},
-    step::{ForeignState, Step},
+    stage::ForeignState,
 };
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -129,13 +129,9 @@ pub struct Mapper {
     belief: Belief,
 }
 
-impl Step for Mapper {
-    type Input<'a> = Input;
-    type Output = Change;
-    type State = Belief;
-
+impl Mapper {
     /// A map with the perimeter, (18), and the shapes that the mission knows beforehand.
-    fn new(mission: &Mission) -> Self {
+    pub fn new(mission: &Mission) -> Self {
         let frame = mission.grid_frame();
         let margin = mission.margin_cells();
         let evidential = Evidential::new(mission);
@@ -175,11 +171,16 @@ impl Step for Mapper {
         mapper
     }
 
-    fn state(&self) -> &Belief {
+    /// What the next process must know.
+    pub const fn state(&self) -> &Belief {
         &self.belief
     }
 
-    fn restore(&mut self, mut belief: Belief) -> Result<(), ForeignState> {
+    /// Go on from the belief of an earlier process.
+    ///
+    /// # Errors
+    /// When the belief is of another mission. Then the map stays as it is.
+    pub fn restore(&mut self, mut belief: Belief) -> Result<(), ForeignState> {
         match (&self.belief.sensed, &mut belief.sensed) {
             (Sensed::Hits, Sensed::Hits) => {}
             (Sensed::Evidence(_), Sensed::Evidence(map)) => self.evidential.complete(map)?,
@@ -193,7 +194,8 @@ impl Step for Mapper {
         Ok(())
     }
 
-    fn step(&mut self, input: Input, now: MissionTime) -> Change {
+    /// Take `input` at mission time `now`.
+    pub fn step(&mut self, input: Input, now: MissionTime) -> Change {
         self.fix = None;
         match input {
             Input::Tick { pose, ranges, scan, contact, target } => {
@@ -215,9 +217,7 @@ impl Step for Mapper {
             }
         }
     }
-}
 
-impl Mapper {
     /// Whether the mission uses the sensor of this row.
     pub fn uses_row(&self, row: u64) -> bool {
         self.rows.uses_row(row)

@@ -5,13 +5,14 @@ use std::borrow::Cow;
 use common::{
     bus::Reader,
     clock::MissionClock,
+    readers,
     samples::{FaultKind, GridHeader, PoseSample},
     shell::{Context, Process, Progress},
     stage::Runner,
     start::StageError,
     target::TargetReader,
     topics::{FIELD, GRID, GUIDANCE, POSE, TARGET},
-    wiring::Wiring,
+    wiring::Topics,
 };
 
 use crate::{
@@ -21,11 +22,19 @@ use crate::{
     step::{Solved, Work},
 };
 
+readers! {
+    pub struct Inputs {
+        inputs {
+            pose: Reader<PoseSample> = POSE,
+            grid: Reader<GridHeader, u8> = GRID,
+            target: TargetReader = TARGET,
+        }
+    }
+}
+
 /// The planner process.
 pub struct Shell {
-    grid: Reader<GridHeader, u8>,
-    pose: Reader<PoseSample>,
-    target: TargetReader,
+    inputs: Inputs,
     /// Without a target no grid counts as followed.
     has_target: bool,
     runner: Runner<PlannerStage>,
@@ -41,14 +50,12 @@ pub struct Shell {
 }
 
 impl Process for Shell {
-    const WIRING: &'static Wiring = &Wiring {
-        inputs: &[&POSE, &GRID, &TARGET],
-        wakes: &[&GRID],
-        outputs: &[&GUIDANCE, &FIELD],
-        ..Wiring::of("planner")
-    };
+    const NAME: &'static str = "planner";
+    const WAKES: Topics = &[&GRID];
+    const OUTPUTS: Topics = &[&GUIDANCE, &FIELD];
+    type Readers = Inputs;
 
-    fn open(context: &mut Context) -> Result<Self, StageError> {
+    fn open(context: &mut Context, inputs: Inputs) -> Result<Self, StageError> {
         let no_thread = |error| StageError::Other(format!("cannot start a thread: {error}"));
         let background = BackgroundSolver::start().map_err(no_thread)?;
         // In lockstep a result is waited for when it is due.
@@ -61,9 +68,7 @@ impl Process for Shell {
         let cells = context.run.mission.grid_frame().area();
         Ok(Self {
             runner: Runner::open(context, |_| cells)?,
-            grid: context.reader(&GRID)?,
-            pose: context.reader(&POSE)?,
-            target: TargetReader::open(context)?,
+            inputs,
             has_target: false,
             background,
             field,
@@ -129,7 +134,7 @@ impl Shell {
     }
 
     fn take_at(&mut self, taken: Taken<'_>, at: Progress) -> Result<Work, StageError> {
-        let work = self.runner.take(Entry { taken, at })?;
+        let work = self.runner.take_entry(Entry { taken, at })?;
         let work = work.map_err(|error| StageError::Other(format!("no field: {error}")))?;
         self.field_changed |= work.changed();
         if matches!(work, Work::Solved | Work::SwappedIn) {
@@ -170,7 +175,7 @@ impl Shell {
     }
 
     fn take_target(&mut self, tick: u64) -> Result<(), StageError> {
-        if let Some(target) = self.target.next(tick)? {
+        if let Some(target) = self.inputs.target.next(tick)? {
             self.has_target = true;
             let work = self.take(Taken::Target(target))?;
             tracing::info!(number = target.number, target = ?target.target, ?work, "target");
@@ -181,7 +186,7 @@ impl Shell {
     /// Returns whether an answer is due.
     fn follow_grid(&mut self) -> Result<bool, StageError> {
         let mut asked = false;
-        while let Some(grid) = self.grid.next_slice()? {
+        while let Some(grid) = self.inputs.grid.next_slice()? {
             let GridHeader { stamp, part, .. } = *grid.header();
             self.take_target(stamp.tick)?;
             let work = self.take(Taken::Grid((*grid.header(), Cow::Borrowed(&grid))))?;
@@ -198,7 +203,7 @@ impl Shell {
 
     /// The tick's pose was published before the grid.
     fn answer(&mut self) -> Result<(), StageError> {
-        self.latest_pose = self.pose.newest()?.or(self.latest_pose);
+        self.latest_pose = self.inputs.pose.newest()?.or(self.latest_pose);
         // A keyframe for new readers may belong to a tick that is over.
         let tick = self.runner.out.at.tick;
         if let Some(pose) = self.latest_pose.filter(|pose| pose.stamp.tick == tick) {

@@ -9,9 +9,8 @@ use common::{
     outputs::Outputs,
     samples::{FaultKind, FieldHeader, GridHeader, GuidanceSample, PoseSample, TargetSample},
     shell::{Context, Progress},
-    stage::Stage,
+    stage::{ForeignState, Stage},
     start::StageError,
-    step::{ForeignState, Step as _},
     topics::{FIELD, GUIDANCE},
 };
 use glam::DVec2;
@@ -21,7 +20,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     background_solver::Worker,
     field_publisher::Policy,
-    step::{Input, Job, Planner, Snapshot, Solved, Work},
+    step::{Job, Planner, Snapshot, Solved, Work},
 };
 
 /// An action of the planner, and its tick.
@@ -32,7 +31,7 @@ pub struct Entry<'a> {
     pub(crate) at: Progress,
 }
 
-/// An action of the planner.
+/// An action of the planner: what its step takes.
 #[derive(Debug, Serialize, Deserialize)]
 #[allow(clippy::large_enum_variant, reason = "there is one at a time, on the stack")]
 pub(crate) enum Taken<'a> {
@@ -95,49 +94,51 @@ impl Stage for PlannerStage {
         Ok(())
     }
 
-    fn take(&mut self, entry: Entry<'_>, out: &mut Outputs) -> Result<Self::Outcome, StageError> {
-        let Entry { taken, at } = entry;
+    fn take_entry(
+        &mut self,
+        Entry { taken, at }: Entry<'_>,
+        out: &mut Outputs,
+    ) -> Result<Self::Outcome, StageError> {
         let began = Instant::now();
+        let planner = &mut self.planner;
         let outcome = match taken {
-            Taken::Grid((header, cells)) => {
-                self.planner.step(Input::Grid { header: &header, cells: &cells }, at.time)
-            }
+            Taken::Grid((header, cells)) => planner.take_grid(&header, &cells),
             Taken::Pose { pose, full_solve_ns } => {
                 out.at = at;
-                let outcome = self.planner.step(Input::Pose(&pose), at.time);
-                if let Ok(Some(guidance)) = outcome.as_ref().map(|outcome| outcome.guidance) {
+                let answered = planner.answer(&pose);
+                if let Ok((_, guidance)) = answered {
                     out.publish(&GUIDANCE, GuidanceSample { full_solve_ns, ..guidance })?;
                 }
-                outcome
+                answered.map(|(work, _)| work)
             }
-            Taken::Idle => self.planner.step(Input::Idle, at.time),
-            Taken::Target(target) => self.planner.step(Input::Target(&target), at.time),
+            Taken::Idle => planner.end_tick().map(|(work, job)| {
+                self.jobs.extend(job);
+                work
+            }),
+            Taken::Target(target) => planner.take_target(&target),
             Taken::Solved(number) => {
                 let solved = self.result_of(number);
                 let took_ns = solved.took_ns;
-                let outcome = self.planner.step(Input::Solved(solved), at.time);
-                if outcome.as_ref().is_ok_and(|outcome| outcome.work == Work::SwappedIn) {
+                let outcome = self.planner.swap_in(solved);
+                if outcome == Ok(Work::SwappedIn) {
                     self.full_solve_ns = took_ns;
                 }
                 outcome
             }
-            Taken::Fault(fault, robot) => self.planner.step(Input::Fault { fault, robot }, at.time),
+            Taken::Fault(fault, robot) => Ok(planner.corrupt(fault, robot)),
             Taken::Field(part) => {
                 self.publish_field(part, at, out)?;
                 return Ok(Ok(Work::None));
             }
             Taken::Policy => {
-                self.snapshot = self.planner.snapshot();
+                self.snapshot = planner.snapshot();
                 return Ok(Ok(Work::None));
             }
         };
-        Ok(outcome.map(|outcome| {
-            if outcome.work == Work::Solved {
-                self.full_solve_ns = began.elapsed().as_nanos() as u64;
-            }
-            self.jobs.extend(outcome.job);
-            outcome.work
-        }))
+        if outcome == Ok(Work::Solved) {
+            self.full_solve_ns = began.elapsed().as_nanos() as u64;
+        }
+        Ok(outcome)
     }
 
     fn describe(Entry { taken, at }: &Entry<'_>) -> String {

@@ -1,12 +1,11 @@
 //! The stage, pure: it follows the `grid`, keeps a field of it and answers a pose with guidance.
 
-mod input;
 mod live;
+mod output;
 
 use std::sync::Arc;
 
 use common::{
-    clock::MissionTime,
     grid::{Applied, GridFrame, Replica, Window},
     kinematics::Pose2,
     mission::{Method, Mission},
@@ -14,7 +13,6 @@ use common::{
         FaultKind, FieldHeader, GridHeader, GuidanceSample, GuidanceStatus, PoseSample,
         TargetSample,
     },
-    step::{ForeignState, Step},
 };
 use glam::DVec2;
 use harmonic::{Cancellation, Cell, Domain, Screening, Settings, SolveError, Solver};
@@ -26,7 +24,7 @@ use crate::fault::lead_astray;
 use crate::view::field_cell;
 use live::{Live, Robot, is_hazard};
 
-pub use input::{Input, Job, Outcome, Snapshot, Solved, Work};
+pub use output::{Job, Snapshot, Solved, Work};
 
 /// Speed out of a hazard that the robot stands in, m/s: something is near.
 const WAY_OUT_M_S: f64 = 0.08;
@@ -61,14 +59,9 @@ pub struct Planner {
     full_solves: u64,
 }
 
-impl Step for Planner {
-    type Input<'a> = Input<'a>;
-    type Output = Result<Outcome, SolveError>;
-    /// The planner persists nothing: the mapper publishes a keyframe for each new planner.
-    type State = ();
-
-    /// It knows nothing until the first keyframe.
-    fn new(mission: &Mission) -> Self {
+impl Planner {
+    /// It knows nothing until the first keyframe. It persists nothing: the mapper publishes a keyframe for each new planner.
+    pub fn new(mission: &Mission) -> Self {
         Self {
             target: None,
             tolerance_m: mission.arrival_tolerance_m,
@@ -91,31 +84,11 @@ impl Step for Planner {
         }
     }
 
-    fn state(&self) -> &() {
-        &()
-    }
-
-    fn restore(&mut self, (): ()) -> Result<(), ForeignState> {
-        Ok(())
-    }
-
+    /// Follow a sample of `grid` with the cells of its window.
+    ///
     /// # Errors
-    /// When there is no field: the target is outside the map, or the map is no map.
-    fn step(&mut self, input: Input<'_>, _: MissionTime) -> Result<Outcome, SolveError> {
-        Ok(match input {
-            Input::Grid { header, cells } => self.take_grid(header, cells)?.into(),
-            Input::Target(target) => self.take_target(target)?.into(),
-            Input::Pose(pose) => self.answer(pose)?,
-            Input::Idle if self.is_solved_here() => self.solve_newest()?.into(),
-            Input::Idle => Outcome { job: self.begin_job(), ..Outcome::default() },
-            Input::Solved(solved) => self.swap_in(solved)?.into(),
-            Input::Fault { fault, robot } => self.corrupt(fault, robot).into(),
-        })
-    }
-}
-
-impl Planner {
-    fn take_grid(&mut self, header: &GridHeader, cells: &[u8]) -> Result<Work, SolveError> {
+    /// Here and below, when there is no field: the target is outside the map, or the map is no map.
+    pub fn take_grid(&mut self, header: &GridHeader, cells: &[u8]) -> Result<Work, SolveError> {
         let before = self.grid.version();
         let work = match self.grid.apply(&header.part, cells) {
             Applied::Missed => return Ok(Work::Missed),
@@ -128,7 +101,7 @@ impl Planner {
     }
 
     /// The robot is sent elsewhere. A target that is not inside the perimeter is ignored.
-    fn take_target(&mut self, target: &TargetSample) -> Result<Work, SolveError> {
+    pub fn take_target(&mut self, target: &TargetSample) -> Result<Work, SolveError> {
         let before = self.target.map(|before| before.target.position());
         let Some(frame) = self.grid.frame() else {
             self.target = Some(*target);
@@ -187,6 +160,14 @@ impl Planner {
         Ok(if changed { Work::Stale } else { Work::None })
     }
 
+    /// The guidance of the tick was given: the newest map is solved, or a background solve is to begin.
+    pub fn end_tick(&mut self) -> Result<(Work, Option<Job>), SolveError> {
+        match self.is_solved_here() {
+            true => Ok((self.solve_newest()?, None)),
+            false => Ok((Work::None, self.begin_job())),
+        }
+    }
+
     /// Whether the field is of an older map than the newest, and the newest is solved by the step itself.
     fn is_solved_here(&self) -> bool {
         self.live.as_ref().is_some_and(|live| live.is_small() && !live.is_current())
@@ -238,7 +219,7 @@ impl Planner {
     }
 
     /// Take the result of a job. The result of a job that nobody waits for changes nothing.
-    fn swap_in(&mut self, solved: Solved) -> Result<Work, SolveError> {
+    pub fn swap_in(&mut self, solved: Solved) -> Result<Work, SolveError> {
         let awaited = self.live.as_mut().filter(|it| it.awaits(solved.number));
         let Some(live) = awaited else {
             return Ok(Work::None);
@@ -249,7 +230,7 @@ impl Planner {
     }
 
     /// Inject the fault, if it is the planner's and there is a field.
-    fn corrupt(&mut self, fault: FaultKind, robot: DVec2) -> Work {
+    pub fn corrupt(&mut self, fault: FaultKind, robot: DVec2) -> Work {
         match (fault, &mut self.live) {
             (FaultKind::CorruptField, Some(live)) => {
                 let at = live.frame.to_cells(robot);
@@ -265,7 +246,7 @@ impl Planner {
     }
 
     /// The guidance for a robot at that pose. A small map is solved first if its field must not be followed there.
-    fn answer(&mut self, sample: &PoseSample) -> Result<Outcome, SolveError> {
+    pub fn answer(&mut self, sample: &PoseSample) -> Result<(Work, GuidanceSample), SolveError> {
         let pose = sample.pose();
         let mut work = Work::None;
         let mut followed = self.follow_field(&pose);
@@ -273,8 +254,7 @@ impl Planner {
             work = self.solve_newest()?;
             followed = self.follow_field(&pose);
         }
-        let guidance = Some(self.guide(sample, followed));
-        Ok(Outcome { work, guidance, job: None })
+        Ok((work, self.guide(sample, followed)))
     }
 
     /// None where the field must not be followed.

@@ -3,19 +3,19 @@
 use std::{collections::VecDeque, path::Path};
 
 use common::{
-    bus::{Reader, Writer},
+    bus::Reader,
     checkpoint::{Checkpoint, CheckpointError},
     kinematics::Pose2,
     mission::{Body, CalibrationPlan, Procedure},
-    run,
+    outputs::Outputs,
+    readers, run,
     samples::{
         GridHeader, GuidanceSample, GuidanceStatus, PoseSample, RangeReading, RangesHeader,
         TargetSample,
     },
-    saved::Saved,
     shell::{Context, Process, Progress, StageError},
     topics::{GUIDANCE, POSE, RANGES},
-    wiring::{Persists, Wiring},
+    wiring::{Persists, Topics},
 };
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -43,7 +43,7 @@ impl Drive {
     /// # Errors
     /// The checkpoint cannot be read.
     pub fn of_run(directory: &Path) -> Result<Option<Self>, CheckpointError> {
-        let file = run::checkpoint_file(directory, Shell::WIRING.stage);
+        let file = run::checkpoint_file(directory, Shell::NAME);
         Ok(Checkpoint::open(&file, STATE_BYTES)?.1)
     }
 
@@ -63,12 +63,19 @@ impl Drive {
     }
 }
 
+readers! {
+    pub struct Inputs {
+        inputs {
+            pose: Reader<PoseSample> = POSE,
+            ranges: Reader<RangesHeader, RangeReading> = RANGES,
+        }
+    }
+}
+
 pub struct Shell {
-    pose: Reader<PoseSample>,
-    ranges: Reader<RangesHeader, RangeReading>,
+    inputs: Inputs,
     front: usize,
-    guidance: Writer<GuidanceSample>,
-    saved: Saved,
+    out: Outputs,
     body: Body,
     /// The robot faces the wall there.
     target: TargetSample,
@@ -81,15 +88,13 @@ pub struct Shell {
 }
 
 impl Process for Shell {
-    const WIRING: &'static Wiring = &Wiring {
-        inputs: &[&POSE, &RANGES],
-        wakes: &[&POSE, &RANGES],
-        outputs: &[&GUIDANCE],
-        persists: Persists::State(STATE_BYTES),
-        ..Wiring::of("planner")
-    };
+    const NAME: &'static str = "planner";
+    const WAKES: Topics = &[&POSE, &RANGES];
+    const OUTPUTS: Topics = &[&GUIDANCE];
+    const PERSISTS: Persists = Persists::State(STATE_BYTES);
+    type Readers = Inputs;
 
-    fn open(context: &mut Context) -> Result<Self, StageError> {
+    fn open(context: &mut Context, inputs: Inputs) -> Result<Self, StageError> {
         let mission = &context.run.mission;
         let plan = mission.planner.calibration.clone().unwrap_or_default();
         let (body, front) = (mission.body(), mission.front_row());
@@ -100,11 +105,9 @@ impl Process for Shell {
             tracing::info!("restored");
         }
         Ok(Self {
-            pose: context.reader(&POSE)?,
-            ranges: context.reader(&RANGES)?,
+            inputs,
             front,
-            guidance: context.writer(&GUIDANCE)?,
-            saved: context.take_saved(),
+            out: Outputs::without_inputs(context)?,
             body,
             target,
             drive,
@@ -116,7 +119,7 @@ impl Process for Shell {
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {
-        while let Some(pose) = self.pose.next_sample()? {
+        while let Some(pose) = self.inputs.pose.next_sample()? {
             self.progress = Progress::of(&pose.stamp);
             self.poses.push_back(pose);
             if self.poses.len() > MOST_POSES {
@@ -124,7 +127,8 @@ impl Process for Shell {
                 // A tick that is given again gets its answer again.
                 if let Some(answered) = self.answered.filter(|it| it.pose_ns == pose.stamp.stamp_ns)
                 {
-                    self.guidance.publish(pose.stamp.tick, pose.stamp.time(), answered)?;
+                    self.out.at = self.progress;
+                    self.out.publish(&GUIDANCE, answered)?;
                     continue;
                 }
             }
@@ -132,7 +136,7 @@ impl Process for Shell {
         while let Some(pose) = self.poses.front().copied() {
             // Pose and readings of a tick come in any order.
             while self.newest.is_none_or(|(tick, _)| tick < pose.stamp.tick) {
-                let Some(ranges) = self.ranges.next_slice()? else {
+                let Some(ranges) = self.inputs.ranges.next_slice()? else {
                     return Ok(self.progress);
                 };
                 let front = ranges.iter().find(|it| usize::from(it.sensor) == self.front);
@@ -149,7 +153,7 @@ impl Process for Shell {
 impl Shell {
     fn answer(&mut self, pose: &PoseSample, echo_m: Option<f64>) -> Result<(), StageError> {
         let order = self.drive.step([pose.left_counts, pose.right_counts], echo_m, &self.body);
-        self.saved.save(&self.drive)?;
+        self.out.save(&self.drive)?;
         let heading_rad = order.heading_rad;
         let at = Pose2 { position: DVec2::ZERO, heading: heading_rad + order.aside_rad };
         let direction = match order.status {
@@ -169,7 +173,7 @@ impl Shell {
             ..GuidanceSample::for_pose(pose, &GridHeader::default(), &self.target)
         };
         self.answered = Some(guidance);
-        self.guidance.publish(pose.stamp.tick, pose.stamp.time(), guidance)?;
-        Ok(())
+        self.out.at = Progress::of(&pose.stamp);
+        self.out.publish(&GUIDANCE, guidance)
     }
 }

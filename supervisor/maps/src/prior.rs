@@ -97,7 +97,6 @@ pub fn save_believed(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use common::step::Step as _;
     use glam::DVec2;
 
     fn mission(text: &str) -> Mission {

@@ -1,14 +1,12 @@
 //! The map at a few moments of a run, and the field of each. Fields are computed, because recordings contain none by default.
 
 use common::{
-    clock::MissionTime,
     mission::Mission,
     samples::{GridHeader, TargetPoint, TargetSample},
-    step::Step as _,
 };
 use glam::DVec2;
 use page::blob;
-use planner::step::{Input, Planner};
+use planner::step::Planner;
 use robot_state::drop_every_second;
 
 /// Most maps. When there are more, every second one is dropped, and half as many are taken from then on.
@@ -34,10 +32,8 @@ impl Belief {
         let mut planner = Planner::new(mission);
         let target = TargetPoint::at(self.target);
         let sent = TargetSample { number: 1, last: 1, target, ..TargetSample::default() };
-        let grid = Input::Grid { header: &self.header, cells: &self.cells };
-        for input in [Input::Target(&sent), grid] {
-            planner.step(input, MissionTime::default()).ok()?;
-        }
+        planner.take_target(&sent).ok()?;
+        planner.take_grid(&self.header, &self.cells).ok()?;
         let cells = planner.snapshot()?.cells();
         let frame = self.header.part.frame();
         Some(blob::field(blob::Shown::Field, frame, &cells, self.target, self.time_s))

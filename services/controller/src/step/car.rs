@@ -40,11 +40,10 @@ mod tests {
     use std::path::Path;
 
     use common::{
-        clock::MissionTime,
         kinematics::SteeredWheel,
         mission::Mission,
         samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus, TargetPoint},
-        step::Step as _,
+        stage::Answering as _,
     };
 
     use crate::step::Controller;
@@ -70,7 +69,7 @@ mod tests {
             target: TargetPoint::at(mission.target),
             ..GuidanceSample::default()
         };
-        Controller::new(mission).step(&guidance, MissionTime(0))
+        Controller::new(mission).command(&guidance)
     }
 
     fn drives(command: &CommandSample) -> bool {

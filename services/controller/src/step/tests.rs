@@ -28,7 +28,7 @@ impl At for Controller {
             heading_rad: pose.heading,
             ..*guidance
         };
-        self.step(&guidance, MissionTime(0))
+        self.command(&guidance)
     }
 }
 

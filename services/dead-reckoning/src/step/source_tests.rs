@@ -4,8 +4,7 @@ use super::{
     tests::{Take, reckoning_of},
     *,
 };
-use crate::STATE_BYTES;
-use common::samples::Stamp;
+use common::samples::{Stamp, TurnSample};
 use glam::dvec2;
 
 const TICK_NS: u64 = 100_000_000;

@@ -1,5 +1,8 @@
 use super::*;
-use common::{samples::Stamp, wire::COUNT_CYCLE};
+use common::{
+    samples::{Stamp, TurnSample},
+    wire::COUNT_CYCLE,
+};
 use std::{f64::consts::PI, path::Path};
 
 fn reckoning(extra: &str) -> DeadReckoning {
@@ -43,7 +46,8 @@ impl Take for DeadReckoning {
         fixes: &[FixSample],
         turns: &[TurnSample],
     ) -> Reckoned {
-        self.step(Input { wheels, fixes, turns }, wheels.stamp.time())
+        let sources = Sources { fixes: fixes.to_vec(), turns: turns.to_vec() };
+        self.reckon(wheels, &sources, wheels.stamp.time())
     }
 
     fn take(&mut self, wheels: &WheelSample) -> PoseSample {

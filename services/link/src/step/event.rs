@@ -2,13 +2,13 @@
 
 use common::{
     clock::{MissionTime, Pace},
+    inputs,
     samples::{
         CommandSample, ContactSample, HoldReason, InfraredSample, Order, PowerSample, RangeReading,
         SurroundingsSample, TurnSample, WheelSample,
     },
     stop_socket::Request,
 };
-
 use serde::{Deserialize, Serialize};
 
 use crate::failsafe::{Decision, battery::BatteryChange};
@@ -28,31 +28,23 @@ impl Default for State {
     }
 }
 
-/// An event and its time by the machine's clock, which the deadlines of the wire use.
-#[derive(Clone, Copy, Debug)]
-pub struct Input<'a> {
-    pub event: Event<'a>,
-    /// Reading of the monotonic clock, nanoseconds.
-    pub machine_ns: u64,
-}
-
-/// An event that the link takes.
-#[derive(Clone, Copy, Debug)]
+/// An event that the link takes. Recordings hold it in this encoding.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub enum Event<'a> {
     /// Bytes from the robot.
-    Datagram(&'a [u8]),
+    Datagram(#[serde(with = "serde_bytes")] &'a [u8]),
     /// Whether the wire is open now. A wire counts as open until the first such event. A wire of datagrams is always open.
     Wire(bool),
     /// A command from the controller.
-    Command(&'a CommandSample),
+    Command(#[serde(with = "inputs::sample")] CommandSample),
     /// The supervisor's directive: an order, and the reason for not driving.
     Order(Order, HoldReason),
-    /// An operator's request at the link.
-    Operator(Request),
     /// The supervisor's limit in lockstep: the last tick that may begin, and the number of the current target.
     TickLimit { last_tick: u64, target_number: u64 },
     /// Time passed without input.
     Quiet,
+    /// An operator's request at the link.
+    Operator(Request),
 }
 
 #[derive(Clone, Debug, PartialEq)]

@@ -22,7 +22,7 @@ use common::{
 use glam::DVec2;
 use harmonic::{Cell, Change, Domain, Field, Guidance};
 
-use super::input::Job;
+use super::output::Job;
 use crate::view::{View, field_cell};
 
 /// Maps of at most this many cells (512 a side) are solved by the step, before the answer or after it; larger ones in the background.

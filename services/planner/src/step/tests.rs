@@ -19,7 +19,7 @@ fn mission_of(cells: u32) -> Mission {
 
 impl Planner {
     fn ask(&mut self, pose: &PoseSample) -> GuidanceSample {
-        self.answer(pose).unwrap().guidance.unwrap()
+        self.answer(pose).unwrap().1
     }
 }
 
@@ -110,8 +110,7 @@ fn a_wall_that_appears_elsewhere_is_solved_for_after_the_tick() {
     assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::Stale);
     let after = planner.ask(&at(-1.5, 0.0));
     assert_eq!((after.ex, after.ey, after.full_solves), (before.ex, before.ey, 1));
-    let over =
-        |planner: &mut Planner| planner.step(Input::Idle, MissionTime::default()).unwrap().work;
+    let over = |planner: &mut Planner| planner.end_tick().unwrap().0;
     assert_eq!(over(&mut planner), Work::Solved);
     assert_eq!(over(&mut planner), Work::None, "once");
     let guidance = planner.ask(&at(-1.5, 0.0));

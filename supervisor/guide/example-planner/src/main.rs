@@ -3,68 +3,72 @@
 use std::process::ExitCode;
 
 use common::{
-    bus::{Reader, Writer},
+    bus::Reader,
     grid::{Applied, CellState, Replica},
+    outputs::Outputs,
+    readers,
     samples::{GridHeader, GuidanceSample, GuidanceStatus, PoseSample, TargetSample},
     shell::{self, Context, Process, Progress, StageError},
     target::TargetReader,
     topics::{GRID, GUIDANCE, POSE, TARGET},
-    wiring::Wiring,
+    wiring::Topics,
 };
 use glam::DVec2;
 
 /// So far ahead the map must be free, metres.
 const AHEAD_M: f64 = 0.5;
 
+readers! {
+    struct Inputs {
+        inputs {
+            pose: Reader<PoseSample> = POSE,
+            grid: Reader<GridHeader, u8> = GRID,
+            target: TargetReader = TARGET,
+        }
+    }
+}
+
 struct Planner {
-    grid: Reader<GridHeader, u8>,
-    pose: Reader<PoseSample>,
-    guidance: Writer<GuidanceSample>,
-    followed: TargetReader,
+    inputs: Inputs,
+    out: Outputs,
     target: TargetSample,
     map: Replica<u8>,
     latest: Option<PoseSample>,
-    progress: Progress,
 }
 
 impl Process for Planner {
-    const WIRING: &'static Wiring = &Wiring {
-        inputs: &[&POSE, &GRID, &TARGET],
-        wakes: &[&GRID],
-        outputs: &[&GUIDANCE],
-        ..Wiring::of("planner")
-    };
+    const NAME: &'static str = "planner";
+    const WAKES: Topics = &[&GRID];
+    const OUTPUTS: Topics = &[&GUIDANCE];
+    type Readers = Inputs;
 
-    fn open(context: &mut Context) -> Result<Self, StageError> {
+    fn open(context: &mut Context, inputs: Inputs) -> Result<Self, StageError> {
         Ok(Self {
-            grid: context.reader(&GRID)?,
-            pose: context.reader(&POSE)?,
-            guidance: context.writer(&GUIDANCE)?,
-            followed: TargetReader::open(context)?,
+            inputs,
+            out: Outputs::without_inputs(context)?,
             target: TargetSample::default(),
             map: Replica::default(),
             latest: None,
-            progress: Progress::default(),
         })
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {
-        while let Some(grid) = self.grid.next_slice()? {
+        while let Some(grid) = self.inputs.grid.next_slice()? {
             let header = *grid.header();
             if self.map.apply(&header.part, &grid) == Applied::Missed {
                 continue; // The mapper publishes the whole map again within a second.
             }
-            let (tick, time) = (header.stamp.tick, header.stamp.time());
-            self.progress = Progress { tick, time };
+            self.out.at = Progress::of(&header.stamp);
+            let tick = header.stamp.tick;
             // The pose of a tick is published before its grid.
-            self.latest = self.pose.newest()?.or(self.latest);
-            self.target = self.followed.next(tick)?.unwrap_or(self.target);
+            self.latest = self.inputs.pose.newest()?.or(self.latest);
+            self.target = self.inputs.target.next(tick)?.unwrap_or(self.target);
             if let Some(pose) = self.latest.take_if(|pose| pose.stamp.tick == tick) {
                 let guidance = self.guide(&pose, &header);
-                self.guidance.publish(tick, time, guidance)?;
+                self.out.publish(&GUIDANCE, guidance)?;
             }
         }
-        Ok(self.progress)
+        Ok(self.out.at)
     }
 }
 

@@ -5,8 +5,7 @@ use common::{
     clock::MissionTime,
     mission::Mission,
     samples::PoseSample,
-    stage::{Answer, Answering},
-    step::{ForeignState, Step},
+    stage::{Answer, Answering, ForeignState},
     topics::POSE,
     wiring::Persists,
 };
@@ -22,10 +21,15 @@ pub struct Odometer(State);
 
 type State = (Option<(u64, MissionTime, [f64; 2])>, f64, f64);
 
-impl Step for Odometer {
-    type Input<'a> = &'a PoseSample;
-    type Output = DistanceSample;
+impl Answering for Odometer {
     type State = State;
+    type In = PoseSample;
+    type Out = DistanceSample;
+    type Further = ();
+    const NAME: &'static str = "odometer";
+    const INPUT: &'static Topic<PoseSample> = &POSE;
+    const OUTPUT: &'static Topic<DistanceSample> = &DISTANCE;
+    const PERSISTS: Persists = Persists::State(128);
 
     fn new(_: &Mission) -> Self {
         Self::default()
@@ -40,7 +44,7 @@ impl Step for Odometer {
         Ok(())
     }
 
-    fn step(&mut self, pose: &PoseSample, now: MissionTime) -> DistanceSample {
+    fn answer(&mut self, pose: &PoseSample, (): &(), now: MissionTime) -> Answer<DistanceSample> {
         let (last, driven_m, moving_s) = &mut self.0;
         let here = [pose.x_m, pose.y_m];
         // A tick that is given again adds nothing.
@@ -51,21 +55,7 @@ impl Step for Odometer {
             *moving_s += if way_m > STANDS_M_S * elapsed_s { elapsed_s } else { 0.0 };
         }
         *last = Some((pose.stamp.tick, now, here));
-        DistanceSample { driven_m: *driven_m, moving_s: *moving_s, ..Default::default() }
-    }
-}
-
-impl Answering for Odometer {
-    type In = PoseSample;
-    type Out = DistanceSample;
-    type Further = ();
-    const NAME: &'static str = "odometer";
-    const INPUT: &'static Topic<PoseSample> = &POSE;
-    const OUTPUT: &'static Topic<DistanceSample> = &DISTANCE;
-    const PERSISTS: Persists = Persists::State(128);
-
-    fn answer(&mut self, pose: &PoseSample, (): &(), now: MissionTime) -> Answer<DistanceSample> {
-        self.step(pose, now).into()
+        DistanceSample { driven_m: *driven_m, moving_s: *moving_s, ..Default::default() }.into()
     }
 }
 
@@ -78,7 +68,7 @@ mod tests {
     fn step(odometer: &mut Odometer, tick: u64, x_m: f64) -> (f64, f64) {
         let stamp = Stamp { tick, stamp_ns: tick * 500_000_000, ..Stamp::default() };
         let pose = PoseSample { stamp, x_m, ..PoseSample::default() };
-        let sums = odometer.step(&pose, stamp.time());
+        let sums = odometer.answer(&pose, &(), stamp.time()).sample;
         (sums.driven_m, sums.moving_s)
     }
 

@@ -10,16 +10,14 @@ use axum::body::Bytes;
 use common::ground_truth::GROUND_TRUTH;
 use common::{
     bus::Bus,
-    clock::MissionTime,
     domain::Domain,
     follower::{Event, Follower},
     process_usage::Processes,
     samples::{Cause, TargetPoint, TargetSample},
-    step::Step as _,
     topics,
 };
 use glam::DVec2;
-use planner::step::{Input, Planner};
+use planner::step::Planner;
 use recording::log_files::{LogFiles, Tail};
 
 use page::{Collector, about, blob};
@@ -124,9 +122,8 @@ fn preview(collector: &Collector, target: DVec2) -> Option<Vec<u8>> {
         target: TargetPoint::at(target),
         ..TargetSample::default()
     };
-    for input in [Input::Target(&sent), Input::Grid { header: &header, cells }] {
-        planner.step(input, MissionTime::default()).ok()?;
-    }
+    planner.take_target(&sent).ok()?;
+    planner.take_grid(&header, cells).ok()?;
     let cells = planner.snapshot()?.cells();
     Some(blob::field(blob::Shown::Preview, frame, &cells, target, collector.state.now_s()))
 }

@@ -31,7 +31,7 @@ struct Scene {
 impl Scene {
     fn at(pace: Pace) -> Self {
         let mut link = Link::new(&mission());
-        link.restore(State { pace, next_tick: 0 }).unwrap();
+        link.restore(State { pace, next_tick: 0 });
         let rate = if let Pace::Rate(rate) = pace { rate } else { 1.0 };
         Self {
             link,
@@ -61,7 +61,7 @@ impl Scene {
             Pace::Max => self.link.state().next_tick * POLL_MS * MS,
             Pace::Rate(_) => (machine_ns as f64 * self.rate) as u64,
         };
-        for effect in self.link.step(Input { event, machine_ns }, MissionTime(now)) {
+        for effect in self.link.step(event, machine_ns, MissionTime(now)) {
             match effect {
                 Effect::Send(bytes) if !bytes.is_empty() => {
                     let said = String::from_utf8(bytes).unwrap();
@@ -107,7 +107,7 @@ impl Scene {
                 self.event(Event::Datagram(answer.as_bytes()));
                 if let Some(&tick) = self.ticks.get(ticks) {
                     let now_ns = (self.ms as f64 * self.rate) as u64 * MS;
-                    self.event(Event::Command(&command(tick, now_ns, 2.0, 2.0)));
+                    self.event(Event::Command(command(tick, now_ns, 2.0, 2.0)));
                 }
             }
             self.event(Event::Quiet);

@@ -19,7 +19,7 @@ fn tick(link: &mut Link, number: u64, now_ns: u64) -> Vec<Effect> {
 
 fn tick_by(link: &mut Link, now_ns: u64, frames: &[u8], command: &CommandSample) -> Vec<Effect> {
     let mut effects = link.at(Event::Datagram(frames), now_ns);
-    effects.extend(link.at(Event::Command(command), now_ns + MS));
+    effects.extend(link.at(Event::Command(*command), now_ns + MS));
     effects
 }
 
@@ -69,11 +69,11 @@ fn a_supervisor_that_says_nothing_stops_the_robot_and_its_next_directive_lets_it
 fn in_lockstep_a_hold_lets_no_command_pass_and_the_run_goes_on_where_it_was() {
     let mut link = driving(in_ticks());
     link.at(Event::Datagram(&datagram(255, 0, 0)), 1);
-    link.at(Event::Command(&command(0, 0, TURN, TURN)), 2);
+    link.at(Event::Command(command(0, 0, TURN, TURN)), 2);
     let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 3);
     assert_eq!(ticks(&effects)[0].0, 1);
     let frozen = 2001 * MS;
-    let effects = link.at(Event::Command(&command(1, PERIOD_NS, TURN, TURN)), frozen);
+    let effects = link.at(Event::Command(command(1, PERIOD_NS, TURN, TURN)), frozen);
     assert_eq!(decided(&effects), [(Action::Stop, Cause::SupervisorSilent)]);
     assert_eq!(sent(&effects), [], "each command would be a tick");
     let directive = Event::Order(Order::Drive, HoldReason::None);
@@ -81,7 +81,7 @@ fn in_lockstep_a_hold_lets_no_command_pass_and_the_run_goes_on_where_it_was() {
     let effects = link.at(Event::Quiet, frozen + 100 * MS);
     assert_eq!(ticks(&effects)[0].0, 1, "the same tick again");
     let answer = command(1, PERIOD_NS, TURN, TURN);
-    let effects = link.at(Event::Command(&answer), frozen + 101 * MS);
+    let effects = link.at(Event::Command(answer), frozen + 101 * MS);
     assert_eq!(velocities(&effects), [[Some(-1200), Some(1200)]]);
 }
 
@@ -184,7 +184,7 @@ fn in_lockstep_no_tick_follows_an_arrival_before_there_is_another_target() {
     assert!(given(&link.at(Event::Datagram(&frames), MS)));
     let state = CommandState::Arrived.into();
     let arrived = CommandSample { state, target_number: 1, ..command(0, 0, 0.0, 0.0) };
-    link.at(Event::Command(&arrived), 2 * MS);
+    link.at(Event::Command(arrived), 2 * MS);
     assert!(!given(&link.at(Event::Datagram(&frames), 3 * MS)));
     assert!(!given(&link.at(limit(12), 4 * MS)), "it is the same target");
     let next = Event::TickLimit { last_tick: 12, target_number: 2 };

@@ -6,7 +6,7 @@ use super::*;
 fn in_lockstep_no_command_is_sent_again() {
     let mut link = driving(in_ticks());
     link.at(Event::Datagram(&datagram(255, 0, 0)), 1);
-    link.at(Event::Command(&command(0, 0, 1.0, 1.0)), 2);
+    link.at(Event::Command(command(0, 0, 1.0, 1.0)), 2);
     for now in (0..90).step_by(10) {
         assert_eq!(timed(&link.at(Event::Quiet, now * MS)), []);
     }
@@ -31,7 +31,7 @@ fn in_lockstep_nothing_follows_the_arrival() {
     let mut link = driving(in_ticks());
     link.at(Event::Datagram(&datagram(255, 0, 0)), 1);
     let arrived = CommandSample { state: CommandState::Arrived.into(), ..command(0, 0, 0.0, 0.0) };
-    assert_eq!(velocities(&link.at(Event::Command(&arrived), 2)), [[Some(0), Some(0)]]);
+    assert_eq!(velocities(&link.at(Event::Command(arrived), 2)), [[Some(0), Some(0)]]);
     assert!(ticks(&link.at(Event::Datagram(&datagram(255, 0, 0)), 3)).is_empty());
 }
 
@@ -45,7 +45,7 @@ fn in_lockstep_the_order_asks_for_tick_0_and_each_command_for_the_next() {
     for tick in 0..3 {
         let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 2);
         assert_eq!(ticks(&effects)[0].0, tick);
-        let effects = link.at(Event::Command(&command(tick, tick * PERIOD_NS, 1.0, 1.0)), 3);
+        let effects = link.at(Event::Command(command(tick, tick * PERIOD_NS, 1.0, 1.0)), 3);
         assert_eq!(velocities(&effects).len(), 1);
     }
 }
@@ -67,9 +67,9 @@ fn in_lockstep_an_unanswered_tick_is_given_again_and_answered_once() {
     assert_eq!(ticks(&link.at(Event::Quiet, 99 * MS)), []);
     let again = ticks(&link.at(Event::Quiet, 100 * MS));
     assert_eq!(again, first, "the same tick, to the bit");
-    let effects = link.at(Event::Command(&command(0, 0, 1.0, 1.0)), 101 * MS);
+    let effects = link.at(Event::Command(command(0, 0, 1.0, 1.0)), 101 * MS);
     assert_eq!(velocities(&effects).len(), 1);
-    let effects = link.at(Event::Command(&command(0, 0, 1.0, 1.0)), 102 * MS);
+    let effects = link.at(Event::Command(command(0, 0, 1.0, 1.0)), 102 * MS);
     let second = velocities(&effects);
     assert!(second.is_empty(), "a tick given twice is answered once");
 }

@@ -19,7 +19,7 @@ fn drive(
         let now = number * PERIOD_NS;
         let mut effects = link.at(Event::Order(Order::Drive, HoldReason::None), now);
         effects.extend(link.at(Event::Datagram(&frames(number)), now));
-        effects.extend(link.at(Event::Command(&command(number, now, TURN, TURN)), now + MS));
+        effects.extend(link.at(Event::Command(command(number, now, TURN, TURN)), now + MS));
         let decisions = decided(&effects).into_iter();
         all.extend(decisions.map(|(action, cause)| (now / MS, action, cause)));
     }
@@ -112,7 +112,7 @@ fn a_robot_that_rolls_on_when_it_is_to_stand_is_told_by_every_method_in_turn() {
     let now = 36 * PERIOD_NS;
     link.at(Event::Order(Order::Drive, HoldReason::None), now);
     link.at(Event::Datagram(&datagram(255, 2320, 29_680)), now);
-    let go = sent(&link.at(Event::Command(&command(0, now, TURN, TURN)), now));
+    let go = sent(&link.at(Event::Command(command(0, now, TURN, TURN)), now));
     assert!(go.iter().any(|it| matches!(it, Command::Enable { on: true, .. })), "{go:?}");
     assert!(matches!(go.last(), Some(Command::Motion(_))), "{go:?}");
 }
@@ -194,7 +194,7 @@ fn a_robot_that_was_lost_and_acknowledges_what_was_sent_long_ago_is_not_driven()
         }
         let mut effects = link.at(Event::Order(Order::Drive, HoldReason::None), now);
         effects.extend(link.at(Event::Datagram(&datagram), now));
-        effects.extend(link.at(Event::Command(&command(number, now, TURN, TURN)), now + MS));
+        effects.extend(link.at(Event::Command(command(number, now, TURN, TURN)), now + MS));
         causes.extend(decided(&effects).into_iter().map(|(_, cause)| cause));
         if velocities(&effects).iter().any(|velocity| *velocity != STAND) {
             moving.push(number);
@@ -217,7 +217,7 @@ fn wheels_that_reach_four_fifths_of_their_command_are_told_more_until_they_turn_
         let counts = |turned: f64| turned.rem_euclid(COUNT_CYCLE.into()) as u16;
         link.at(Event::Order(Order::Drive, HoldReason::None), now);
         link.at(Event::Datagram(&datagram(255, counts(-turned), counts(turned))), now);
-        let effects = link.at(Event::Command(&command(number, now, half, half)), now + MS);
+        let effects = link.at(Event::Command(command(number, now, half, half)), now + MS);
         told = velocities(&effects)[0][1].unwrap().into();
     }
     assert!((0.8 * told - 600.0).abs() < 10.0, "{told}");
@@ -229,7 +229,7 @@ fn on_the_wall_clock_a_second_command_for_a_tick_reaches_the_robot_too() {
     link.at(Event::Datagram(&datagram(255, 0, 0)), PERIOD_NS);
     for speed in [TURN / 4.0, TURN / 2.0] {
         let answer = command(0, PERIOD_NS, speed, speed);
-        let told = velocities(&link.at(Event::Command(&answer), PERIOD_NS + MS));
+        let told = velocities(&link.at(Event::Command(answer), PERIOD_NS + MS));
         assert_eq!(told[0][1], Some((speed / TURN * 1200.0) as i16));
     }
     assert_eq!(link.tally().commands, 2);

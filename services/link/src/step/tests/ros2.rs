@@ -46,7 +46,7 @@ impl Scene {
     /// A robot that drives straight ahead at 0.15 m/s.
     fn driving() -> Self {
         let mut link = Link::new(&mission());
-        link.restore(State { pace: Pace::Rate(1.0), next_tick: 0 }).unwrap();
+        link.restore(State { pace: Pace::Rate(1.0), next_tick: 0 });
         let mut scene = Self {
             link,
             topics: Topics::of(&mission()),
@@ -81,8 +81,7 @@ impl Scene {
 
     fn event(&mut self, event: Event<'_>) {
         let machine_ns = self.ms * MS;
-        let input = Input { event, machine_ns };
-        let effects = self.link.step(input, MissionTime(machine_ns));
+        let effects = self.link.step(event, machine_ns, MissionTime(machine_ns));
         for effect in effects {
             match effect {
                 Effect::Send(bytes) if !bytes.is_empty() => {
@@ -156,7 +155,7 @@ impl Scene {
             let speed = 0.15 / 0.033;
             let [left, right] = self.shares.map(|share| share * speed);
             let command = command(self.tick, self.ms * MS, left, right);
-            self.event(Event::Command(&command));
+            self.event(Event::Command(command));
             self.event(Event::Quiet);
         }
     }

@@ -1,58 +1,13 @@
-//! Inputs and outputs of the planner's step, and the field at one moment, from which the policy of every cell is computed while the
+//! What the planner's step gives, and the field at one moment, from which the policy of every cell is computed while the
 //! planner goes on.
 
 use std::sync::Arc;
 
 use common::{
     grid::GridFrame,
-    samples::{
-        FaultKind, FieldCell, FieldHeader, GridHeader, GuidanceSample, PoseSample, TargetSample,
-    },
+    samples::{FieldCell, FieldHeader},
 };
-use glam::DVec2;
 use harmonic::{Domain, Field, SolveError};
-
-/// An input of the planner.
-#[derive(Debug)]
-pub enum Input<'a> {
-    /// A sample of `grid`.
-    Grid {
-        header: &'a GridHeader,
-        /// The cells of its window.
-        cells: &'a [u8],
-    },
-    /// The target to which the robot is sent from now on.
-    Target(&'a TargetSample),
-    /// The pose of the tick, which is answered with guidance.
-    Pose(&'a PoseSample),
-    /// The guidance of the tick was given: the newest map may be solved, or a background solve begin.
-    Idle,
-    /// The result of a job.
-    Solved(Solved),
-    /// A fault is injected.
-    Fault {
-        fault: FaultKind,
-        /// Where the robot is, metres.
-        robot: DVec2,
-    },
-}
-
-/// The consequences of an input.
-#[derive(Debug, Default)]
-pub struct Outcome {
-    /// The effect of the input on the field.
-    pub work: Work,
-    /// The answer to a pose.
-    pub guidance: Option<GuidanceSample>,
-    /// The job that the background solver has to begin.
-    pub job: Option<Job>,
-}
-
-impl From<Work> for Outcome {
-    fn from(work: Work) -> Self {
-        Self { work, ..Self::default() }
-    }
-}
 
 /// The effect of an input on the field.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,0 +1,55 @@
+//! The samples of sources outside that a tick takes with its wheels.
+
+use common::{
+    bus::{BusError, Reader, Stamped},
+    readers,
+    samples::{FixSample, TurnSample},
+    stage::Further,
+    topics::{FIX, IMU_TURN, SCAN_FIX, TURN},
+};
+use serde::{Deserialize, Serialize};
+
+/// The most samples of a topic that are taken with a tick. Others are taken with the next one.
+const MOST_FIXES: usize = 16;
+const MOST_TURNS: usize = 128;
+
+/// The samples of sources outside that came since the tick before.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Sources {
+    pub fixes: Vec<FixSample>,
+    pub turns: Vec<TurnSample>,
+}
+
+readers! {
+    pub struct SourceReaders {
+        feedback {
+            fixes: Reader<FixSample> = FIX,
+            scan_fixes: Reader<FixSample> = SCAN_FIX,
+            turns: Reader<TurnSample> = TURN,
+            imu_turns: Reader<TurnSample> = IMU_TURN,
+        }
+    }
+}
+
+impl Further for Sources {
+    type Readers = SourceReaders;
+
+    fn take_samples(readers: &mut SourceReaders) -> Result<Self, BusError> {
+        let mut fixes = some(&mut readers.fixes, MOST_FIXES)?;
+        fixes.extend(some(&mut readers.scan_fixes, MOST_FIXES)?);
+        let outside = some(&mut readers.turns, MOST_TURNS)?;
+        let own = some(&mut readers.imu_turns, MOST_TURNS)?;
+        // The sequences of two gyros do not continue each other.
+        Ok(Self { fixes, turns: if own.is_empty() { outside } else { own } })
+    }
+}
+
+fn some<H: Stamped>(reader: &mut Reader<H>, most: usize) -> Result<Vec<H>, BusError> {
+    let mut taken = Vec::new();
+    while taken.len() < most
+        && let Some(sample) = reader.next_sample()?
+    {
+        taken.push(sample);
+    }
+    Ok(taken)
+}
