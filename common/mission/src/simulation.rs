@@ -72,6 +72,7 @@ pub struct Ranger {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Thing {
+    /// The thing before any move.
     pub shape: Shapes,
     /// It appears later if the robot is in its place.
     #[serde(default)]

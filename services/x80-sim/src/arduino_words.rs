@@ -106,7 +106,7 @@ impl ArduinoWords {
         true
     }
 
-    /// Returns the answer, and the command of the boards that the request is converted to.
+    /// Returns the answer, and the command that the request becomes.
     pub(crate) fn answer(
         &mut self,
         request: Request,

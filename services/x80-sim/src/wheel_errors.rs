@@ -1,7 +1,7 @@
 //! Systematic errors of the wheels.
 //!
-//! The errors belong to the robot, not to the moment: they are drawn once from the seed of the mission, with a stream
-//! of their own, and are the same in each process of a run.
+//! They belong to the robot, not to the moment: drawn once from the mission's seed, with a stream of their own, they
+//! are the same in each process of a run.
 
 use common::mission::Mission;
 

@@ -1,4 +1,4 @@
-//! `firsthand map save RUN`: the belief of a robot, as a map of the ROS map_server.
+//! A robot's belief as a map of the ROS map_server.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! `firsthand replay F.mcap`: every generation of a recording is computed again and compared to the bit.
+//! Every generation of a recording is computed again and compared to the bit.
 
 use std::{path::PathBuf, process::ExitCode};
 

@@ -1,4 +1,4 @@
-//! `firsthand status`: the stages of a robot, its link and its batteries; or all robots.
+//! Stages, link and batteries of a robot; or all robots.
 
 mod all;
 
