@@ -1,5 +1,3 @@
-//! A robot's belief as a map of the ROS map_server.
-
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};

@@ -1,5 +1,3 @@
-//! Stages, link and batteries of a robot; or all robots.
-
 mod all;
 
 use std::{
