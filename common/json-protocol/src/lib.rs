@@ -104,7 +104,7 @@ impl Lines {
         complete
     }
 
-    /// The rest of a line that has begun does not follow.
+    /// Forget the beginning of a line, because its rest does not follow.
     pub fn reset(&mut self) {
         self.dropped += self.held.len() as u64;
         self.held.clear();

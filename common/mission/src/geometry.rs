@@ -98,7 +98,7 @@ shape! {
     /// A crate, desk or cabinet: a rectangle.
     Box2 {
         at: DVec2,
-        /// Along its own two axes.
+        /// The extent along its own two axes.
         size_m: DVec2,
         /// Counter-clockwise.
         #[serde(default)]

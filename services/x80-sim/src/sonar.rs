@@ -37,11 +37,11 @@ const POST_RADIUS_M: f64 = 0.015;
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Candidate {
     range: f64,
-    /// Seen from above, metres.
+    /// The range seen from above, metres.
     level_range: f64,
     /// Unit vector from the ranger, from above.
     along: DVec2,
-    /// Often lost, because it is near a limit or comes from an edge.
+    /// The echo is often lost, because it is near a limit or comes from an edge.
     weak: bool,
     share: f64,
 }

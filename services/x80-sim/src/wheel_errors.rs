@@ -16,7 +16,7 @@ pub struct WheelErrors {
     /// Their mean is 1.
     pub diameter: Wheels<f64>,
     pub track: f64,
-    /// Slips away of the rolled way; below 0 it is won.
+    /// Share of the rolled way that slips away; below 0 it is won.
     pub slip_share: f64,
 }
 

@@ -118,7 +118,7 @@ struct Visitor {
 }
 
 impl World {
-    /// At time 0, with the robot at the start.
+    /// The world at time 0, with the robot at the start.
     pub fn new(mission: &Mission) -> Self {
         let visitor = |thing: &Thing| Visitor {
             solids: solids_of(&thing.shape),
