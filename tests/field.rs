@@ -52,45 +52,43 @@ fn assert_refuses(map: &Path, arguments: &[&str], code: &str, names: &[&str]) {
     refused(&[&field, arguments].concat(), code, names);
 }
 
-/// The bytes of an array in an .npz whose members are stored: after its name, its own header and 20 x 24 x 16 bytes.
-fn array(npz: &[u8], name: &str, bytes_each: usize) -> Vec<u8> {
-    let find = |from: usize, what: &[u8]| {
-        let at = npz[from..].windows(what.len()).position(|window| window == what);
-        from + at.unwrap_or_else(|| panic!("no {what:?} in the archive"))
-    };
-    let magic = find(find(0, format!("{name}.npy").as_bytes()), b"\x93NUMPY");
-    let header = usize::from(u16::from_le_bytes([npz[magic + 8], npz[magic + 9]]));
-    let text = String::from_utf8_lossy(&npz[magic + 10..magic + 10 + header]).into_owned();
-    assert!(text.contains("(16, 24"), "{name} has the header {text}");
-    assert!(text.contains("'fortran_order': False"), "{text}");
-    let data = magic + 10 + header;
-    npz[data..data + 24 * 16 * bytes_each].to_vec()
+/// The values of a field that was written for NumPy: mantissa and exponent of u, ex and ey of each of 24 x 16 cells.
+fn values(file: &Path) -> Vec<(f64, i32, f32, f32)> {
+    let bytes = std::fs::read(file).unwrap();
+    assert!(bytes.starts_with(b"\x93NUMPY\x01\x00"));
+    let begin = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    assert_eq!(begin % 64, 0);
+    let header = str::from_utf8(&bytes[10..begin]).unwrap().trim_end();
+    let types = "[('mantissa', '<f8'), ('exponent', '<i4'), ('ex', '<f4'), ('ey', '<f4')]";
+    let text = format!("{{'descr': {types}, 'fortran_order': False, 'shape': (16, 24)}}");
+    assert_eq!(header, text);
+    assert_eq!(bytes[begin - 1], b'\n');
+    let cells = bytes[begin..].chunks(20);
+    assert_eq!(cells.len(), 24 * 16);
+    let four = |cell: &[u8], at: usize| -> [u8; 4] { cell[at..at + 4].try_into().unwrap() };
+    cells
+        .map(|cell| {
+            (
+                f64::from_le_bytes(cell[..8].try_into().unwrap()),
+                i32::from_le_bytes(four(cell, 8)),
+                f32::from_le_bytes(four(cell, 12)),
+                f32::from_le_bytes(four(cell, 16)),
+            )
+        })
+        .collect()
 }
 
 /// u and guidance of the rooms in the file, (u, ex, ey) a cell.
 fn solved(screening: &[&str]) -> Vec<(f64, f64, f64)> {
     let directory = tempfile::tempdir().unwrap();
-    let out = directory.path().join("rooms.npz");
+    let out = directory.path().join("rooms.npy");
     let mut arguments = vec!["--target-cell", "3,12", "--out", out.to_str().unwrap()];
     arguments.extend(screening);
     report(&write_map(directory.path()), &arguments);
-    let npz = std::fs::read(out).unwrap();
-    let mantissas = array(&npz, "mantissa", 8);
-    let exponents = array(&npz, "exponent", 4);
-    let (ex, ey) = (array(&npz, "ex", 4), array(&npz, "ey", 4));
-    let four =
-        |bytes: &[u8], at: usize| -> [u8; 4] { bytes[4 * at..4 * at + 4].try_into().unwrap() };
-    (0..24 * 16)
-        .map(|at| {
-            let mantissa = f64::from_le_bytes(mantissas[8 * at..8 * at + 8].try_into().unwrap());
-            let exponent = i32::from_le_bytes(four(&exponents, at));
-            (
-                mantissa * f64::from(exponent).exp2(),
-                f64::from(f32::from_le_bytes(four(&ex, at))),
-                f64::from(f32::from_le_bytes(four(&ey, at))),
-            )
-        })
-        .collect()
+    let cell = |(mantissa, exponent, ex, ey): (f64, i32, f32, f32)| {
+        (mantissa * f64::from(exponent).exp2(), ex.into(), ey.into())
+    };
+    values(&out).into_iter().map(cell).collect()
 }
 
 const TARGET: usize = 12 * 24 + 3;
@@ -163,28 +161,26 @@ fn every_format_of_one_map_gives_one_field() {
         "image: rooms.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
     )
     .unwrap();
-    let archives = [write_map(directory.path()), image, yaml].map(|map| {
-        let out = directory.path().join("out.npz");
+    let [first, image, yaml] = [write_map(directory.path()), image, yaml].map(|map| {
+        let out = directory.path().join("out.npy");
         report(&map, &["--target-cell", "3,12", "--out", out.to_str().unwrap()]);
-        let npz = std::fs::read(&out).unwrap();
-        ["mantissa", "exponent", "ex", "ey"].map(|name| array(&npz, name, 4))
+        values(&out)
     });
-    assert_eq!(archives[0], archives[1]);
-    assert_eq!(archives[0], archives[2]);
+    assert_eq!(first, image);
+    assert_eq!(first, yaml);
 }
 
 #[test]
-fn the_picture_is_a_png_of_a_size_to_look_at() {
+fn the_picture_is_of_a_size_to_look_at() {
     let directory = tempfile::tempdir().unwrap();
-    let picture = directory.path().join("rooms.png");
+    let picture = directory.path().join("rooms.svg");
     report(
         &write_map(directory.path()),
         &["--target-cell", "3,12", "--picture", picture.to_str().unwrap()],
     );
-    let bytes = std::fs::read(picture).unwrap();
-    assert!(bytes.starts_with(b"\x89PNG\r\n\x1a\n"));
-    let width = u32::from_be_bytes(bytes[16..20].try_into().unwrap());
-    assert!((900..=2500).contains(&width), "{width} pixels wide");
+    let svg = std::fs::read_to_string(picture).unwrap();
+    let width = svg.split("width=\"").nth(1).unwrap().split('"').next().unwrap();
+    assert!((900..=2500).contains(&width.parse::<u32>().unwrap()), "{width} pixels wide");
 }
 
 #[test]
@@ -219,7 +215,7 @@ fn a_file_that_is_no_map_or_cannot_be_written_is_named() {
         assert_refuses(&file, &["--target-cell", "1,1"], "", &[name]);
     }
     let map = write_map(directory.path());
-    let out = directory.path().join("no/such/folder.npz");
+    let out = directory.path().join("no/such/folder.npy");
     let out = ["--target-cell", "3,12", "--out", out.to_str().unwrap()];
-    assert_refuses(&map, &out, "", &["folder.npz"]);
+    assert_refuses(&map, &out, "", &["folder.npy"]);
 }

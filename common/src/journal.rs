@@ -1,13 +1,12 @@
-//! A large state that outlives a SIGKILL: a snapshot now and then, and the changes since.
+//! A large state that outlives a SIGKILL: a snapshot now and then, and the entries since.
 //!
-//! The state is the fold of its entries. An entry is appended when it happens, which takes the time of a
-//! small write however large the state is; a new process restores the snapshot and folds the later entries into it.
+//! The state is the fold of its entries. To append one is a small write however large the state is; a new process folds those after the
+//! snapshot into it.
 //!
-//! An entry is `number | length | crc32 | body`, little-endian. A kill in the middle of an append leaves a torn tail, which is cut off. A
-//! kill between a snapshot and the emptying of the journal leaves entries that the snapshot holds already, as their numbers show.
+//! An entry is `number | length | crc32 | body`, little-endian. A kill during an append leaves a torn tail, which is cut off. A kill
+//! between a snapshot and the emptying of the journal leaves entries that the snapshot holds, as their numbers show.
 //!
-//! Room is reserved at opening, for a disk that is full later. The journal is emptied by an end mark at its beginning, not by
-//! shortening it, which would give the room away.
+//! Room is reserved at opening, for a full disk. An end mark empties the journal, because shortening it would give the room away.
 
 use std::{
     fs::{File, OpenOptions},
@@ -19,57 +18,49 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::checkpoint::{Checkpoint, CheckpointError, failed, reserve};
 
-/// Entries after which a snapshot is due at the soonest and at the latest.
+/// The fewest and the most entries after which a snapshot is due.
 const SNAPSHOT_AFTER: (u64, u64) = (8, 128);
-/// Bytes of the state for each further entry before a snapshot. Writing so many bytes takes about as long as folding an entry, and a new
-/// process folds all entries before it is ready.
+/// Bytes of the state for each further entry before a snapshot: to write them takes about as long as to fold an entry, as a new process
+/// must before it is ready.
 const BYTES_FOR_AN_ENTRY: u64 = 20_480;
 /// number u64, length u32, crc32 u32.
 const HEADER: usize = 16;
-/// The end mark, after the last entry. No header is all zeros, for the checksum of zeros is not 0.
+/// It follows the last entry. No header is all zeros, for the checksum of zeros is not 0.
 const END: [u8; HEADER] = [0; HEADER];
-/// The greatest length of an entry, bytes.
 const LONGEST: usize = 8192;
-/// Room that is reserved for each entry until the next snapshot, bytes: an entry of the mapper takes 250, and 4,500 with a scan of a laser.
+/// Room for each entry until the next snapshot, bytes: an entry of the mapper takes 250, and 4,500 with a laser scan.
 const ENTRY_ROOM: u64 = 4_608;
 /// Bytes of a snapshot besides the state.
 const NUMBER: usize = 10;
 
-/// The snapshot and the journal of one stage.
 #[derive(Debug)]
 pub struct Journal {
     snapshots: Checkpoint,
     file: File,
     path: PathBuf,
-    /// Where the next entry goes.
     end: u64,
-    /// The next entry's number.
     number: u64,
-    /// The number of the first entry that the snapshot does not hold.
+    /// The first entry that the snapshot does not hold.
     first: u64,
-    /// Entries after which a snapshot is due.
     snapshot_after: u64,
 }
 
-/// The state that an earlier process saved.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Restored<S, E> {
-    /// The last snapshot.
     pub state: Option<S>,
-    /// The entries after it, oldest first.
+    /// Oldest first.
     pub entries: Vec<E>,
 }
 
 #[derive(Serialize, Deserialize)]
 struct Snapshot<S> {
-    /// The number of the first entry it does not hold.
     next: u64,
     state: S,
 }
 
 impl Journal {
-    /// Open, or create, the snapshot at `path` for encoded states of at most `capacity` bytes, and the
-    /// journal beside it.
+    /// Open, or create, the snapshot at `path` for encoded states of at most `capacity` bytes, and the journal beside it. Fails like
+    /// [`Checkpoint::open`].
     pub fn open<S: DeserializeOwned, E: DeserializeOwned>(
         path: &Path,
         capacity: usize,
@@ -95,13 +86,13 @@ impl Journal {
         Ok((journal, Restored { state, entries }))
     }
 
-    /// The entries after the snapshot; whatever follows the last whole one is cut off.
+    /// Cuts off what follows the last whole entry.
     fn read<E: DeserializeOwned>(&mut self) -> Result<Vec<E>, CheckpointError> {
         let bytes = std::fs::read(&self.path).map_err(failed("read", &self.path))?;
         let mut entries = Vec::new();
         let mut rest = &bytes[..];
         while let Some((number, body, after)) = entry(rest) {
-            // The snapshot holds the entries with lower numbers. After a gap nothing can be folded.
+            // The snapshot holds lower numbers. After a gap nothing can be folded.
             if number == self.number {
                 let Ok(entry) = postcard::from_bytes(body) else {
                     break;
@@ -114,20 +105,19 @@ impl Journal {
             rest = after;
         }
         self.end = (bytes.len() - rest.len()) as u64;
-        // A whole tail is left alone: the file system may have to wait for the disk.
+        // A whole tail is left alone: cutting it may wait for the disk.
         if !rest.is_empty() && !rest.starts_with(&END) {
             self.cut()?;
         }
         Ok(entries)
     }
 
-    /// Write the end mark after the last entry.
     fn cut(&self) -> Result<(), CheckpointError> {
         let cut = self.file.write_all_at(&END, self.end);
         cut.map_err(failed("write", &self.path))
     }
 
-    /// Append an entry.
+    /// Fails when the entry cannot be encoded or written, or is too long.
     pub fn append<E: Serialize>(&mut self, entry: &E) -> Result<(), CheckpointError> {
         let header = vec![0; HEADER];
         let mut bytes = postcard::to_extend(entry, header)
@@ -152,13 +142,12 @@ impl Journal {
         Ok(())
     }
 
-    /// Whether there are so many entries since the last snapshot that one is due. Saving it takes the time of
-    /// writing the whole state: do it when nobody waits.
+    /// Whether a snapshot is due. It takes the time of writing the whole state: do it when nobody waits.
     pub const fn is_long(&self) -> bool {
         self.number - self.first >= self.snapshot_after
     }
 
-    /// Save `state`, into which every entry so far is folded, and empty the journal.
+    /// Save `state`, into which every entry is folded, and empty the journal. Fails when either cannot be written.
     pub fn snapshot<S: Serialize>(&mut self, state: &S) -> Result<(), CheckpointError> {
         self.snapshots.save(&Snapshot { next: self.number, state })?;
         self.first = self.number;
@@ -172,7 +161,7 @@ fn snapshot_after(capacity: usize) -> u64 {
     (capacity as u64 / BYTES_FOR_AN_ENTRY).clamp(soonest, latest)
 }
 
-/// The first entry of `bytes`: its number, its body, and what comes after. None when it is not whole.
+/// The number and body of the first entry, and the bytes after it. None when it is not whole.
 fn entry(bytes: &[u8]) -> Option<(u64, &[u8], &[u8])> {
     let number = u64::from_le_bytes(bytes.get(..8)?.try_into().ok()?);
     let length = u32::from_le_bytes(bytes.get(8..12)?.try_into().ok()?) as usize;
@@ -184,7 +173,7 @@ fn entry(bytes: &[u8]) -> Option<(u64, &[u8], &[u8])> {
     (checksum(whole) == crc).then(|| (number, &whole[HEADER..], after))
 }
 
-/// The checksum of an entry: it covers everything but itself.
+/// Covers the entry but for the checksum itself.
 fn checksum(bytes: &[u8]) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
     hasher.update(&bytes[..12]);

@@ -1,11 +1,10 @@
-//! A histogram of latencies that fits in a sample: eight buckets an octave from 1 microsecond, so a
-//! quantile read from it is right within 9 percent.
+//! A histogram of latencies that fits in a sample: eight buckets an octave from 1 microsecond, so a quantile is right within 9 percent.
 
-/// Number of buckets: 24 octaves, up to 16 s.
+/// 24 octaves, up to 16 s.
 pub const BUCKETS: usize = 192;
 const PER_OCTAVE: f64 = 8.0;
 
-/// The count of each bucket: bucket k counts latencies from 2^(k/8) microseconds.
+/// Bucket k counts latencies from 2^(k/8) microseconds.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Histogram {
     counts: [u32; BUCKETS],
@@ -19,7 +18,6 @@ impl Default for Histogram {
 }
 
 impl Histogram {
-    /// Count one latency.
     pub fn record(&mut self, latency_ns: u64) {
         let microseconds = (latency_ns as f64 / 1e3).max(1.0);
         let bucket = (microseconds.log2() * PER_OCTAVE) as usize;
@@ -28,22 +26,19 @@ impl Histogram {
         self.max_ns = self.max_ns.max(latency_ns);
     }
 
-    /// The counts, as samples carry them.
     pub const fn counts(&self) -> &[u32; BUCKETS] {
         &self.counts
     }
 
-    /// The longest counted, nanoseconds.
     pub const fn max_ns(&self) -> u64 {
         self.max_ns
     }
 
-    /// The number of latencies that were counted.
     pub fn total(&self) -> u64 {
         self.counts.iter().map(|&count| u64::from(count)).sum()
     }
 
-    /// Add the counts of another histogram, for example of another generation of its writer.
+    /// Add, for example, the counts of another generation of the writer.
     pub fn add(&mut self, counts: &[u32; BUCKETS], max_ns: u64) {
         for (own, other) in self.counts.iter_mut().zip(counts) {
             *own = own.saturating_add(*other);
@@ -51,8 +46,7 @@ impl Histogram {
         self.max_ns = self.max_ns.max(max_ns);
     }
 
-    /// The upper end of the bucket that holds the `share` quantile, microseconds, never above the longest; none if nothing was
-    /// counted.
+    /// The upper end of the bucket of the `share` quantile, never above the longest latency; none if nothing was counted.
     pub fn quantile_us(&self, share: f64) -> Option<f64> {
         let total = self.total();
         if total == 0 {

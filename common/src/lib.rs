@@ -10,7 +10,6 @@
 //! |---|---|
 //! | [`grid`] | cells and metres; parts and versions of a map |
 //! | [`latency`] | a histogram that fits in a sample |
-//! | [`latency_budget`] | what a stage's process does with its part of a tick |
 //! | [`ground_truth`] | what a simulated robot writes about itself |
 //! | [`signals`] | signals as something to wait for |
 //! | [`checkpoint`], [`journal`] | state that outlives a SIGKILL: small, and large with few changes |
@@ -43,7 +42,6 @@ pub mod ground_truth;
 pub mod inputs;
 pub mod journal;
 pub mod latency;
-pub mod latency_budget;
 pub mod outputs;
 pub mod process_status;
 pub mod process_usage;

@@ -8,7 +8,6 @@ use crate::{
     bus::{AnyWriter, Payload, Stamped, Topic, Writer},
     checkpoint::CheckpointError,
     inputs::InputLog,
-    latency_budget::{Answers, Item, LatencyBudget},
     replay::Output,
     saved::Saved,
     shell::{Context, Progress},
@@ -33,9 +32,6 @@ struct Process {
     writers: Vec<(&'static str, Box<dyn AnyWriter>)>,
     inputs: InputLog,
     saved: Saved,
-    budget: LatencyBudget,
-    /// The topic that answers a tick: the last of the outputs that are published each tick.
-    answer: Option<&'static str>,
     /// An input was noted, and nothing published since.
     noted: bool,
 }
@@ -48,14 +44,8 @@ impl Outputs {
         longest: usize,
     ) -> Result<Self, StageError> {
         let inputs = InputLog::begin(context, start)?;
-        let mut process = Process {
-            writers: Vec::new(),
-            inputs,
-            saved: context.take_saved(),
-            budget: context.budget.clone(),
-            answer: context.opened.wiring.answer(),
-            noted: false,
-        };
+        let mut process =
+            Process { writers: Vec::new(), inputs, saved: context.take_saved(), noted: false };
         process.open(context, longest, false)?;
         Ok(Self { at: Progress::default(), to: Destination::Process(Box::new(process)) })
     }
@@ -90,21 +80,10 @@ impl Outputs {
     /// The step is about to take `input`.
     pub(crate) fn note(&mut self, input: &impl Serialize) -> Result<(), StageError> {
         if let Destination::Process(process) = &mut self.to {
-            process.budget.end(Item::Read);
             process.inputs.note(input, self.at)?;
-            process.budget.end(Item::Persist);
             process.noted = true;
         }
         Ok(())
-    }
-
-    /// The step has taken what was noted.
-    pub(crate) fn stepped(&mut self) {
-        if let Destination::Process(process) = &mut self.to
-            && process.noted
-        {
-            process.budget.end(Item::Step);
-        }
     }
 
     /// Publish the inputs that were noted, before anything follows from them that is not a sample.
@@ -153,9 +132,6 @@ impl Outputs {
             Destination::Process(process) => {
                 process.publish_inputs(at)?;
                 process.writer(topic)?.publish_quietly(tick, time, header, slice)?;
-                if process.answer == Some(topic.spec().name) {
-                    process.budget.published(tick, Answers::Inputs);
-                }
             }
         }
         Ok(())
@@ -186,18 +162,10 @@ impl Outputs {
         &mut self,
         save: impl FnOnce(&mut Saved) -> Result<(), CheckpointError>,
     ) -> Result<(), StageError> {
-        let Destination::Process(process) = &mut self.to else {
-            return Ok(());
-        };
-        // No tick waits for what is saved after its answer.
-        if process.noted {
-            process.budget.end(Item::Step);
+        match &mut self.to {
+            Destination::Process(process) => Ok(save(&mut process.saved)?),
+            Destination::Replay { .. } => Ok(()),
         }
-        save(&mut process.saved)?;
-        if process.noted {
-            process.budget.end(Item::Persist);
-        }
-        Ok(())
     }
 
     /// Whether a snapshot is due, with which the stage's journal begins anew.
@@ -248,9 +216,7 @@ impl Process {
 
     fn publish_inputs(&mut self, at: Progress) -> Result<(), StageError> {
         if self.noted {
-            self.budget.end(Item::Step);
             self.inputs.publish(at)?;
-            self.budget.end(Item::Persist);
             self.noted = false;
         }
         Ok(())

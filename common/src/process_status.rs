@@ -1,10 +1,10 @@
-//! Facts of a process that the kernel tells in `/proc/PID`; none if the process has ended.
+//! Facts in `/proc/PID`; none if the process has ended.
 
 use std::{fs, time::Duration};
 
 use rustix::param::clock_ticks_per_second;
 
-/// The value of `field` in the status of process `process`, a number or `self`.
+/// A field of the status of process `process`, a number or `self`.
 pub fn field(process: &str, field: &str) -> Option<String> {
     let status = fs::read_to_string(format!("/proc/{process}/status")).ok()?;
     let mut lines = status.lines().filter_map(|line| line.split_once(':'));
@@ -12,15 +12,15 @@ pub fn field(process: &str, field: &str) -> Option<String> {
     Some(value.trim().to_owned())
 }
 
-/// The kibibytes in `field`, such as `VmRSS`.
+/// A field in kibibytes, such as `VmRSS`.
 pub fn kibibytes(process: &str, field: &str) -> Option<u64> {
     self::field(process, field)?.strip_suffix(" kB")?.trim().parse().ok()
 }
 
-/// Processor time of all threads of the process, in the kernel and outside.
+/// User and system time of all threads.
 pub fn processor_time(process: u32) -> Option<Duration> {
     let stat = fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
-    // The name in parentheses may have any letters. Numbers follow after the state.
+    // The name in parentheses may have any letters; numbers follow.
     let (_, numbers) = stat.rsplit_once(") ")?;
     let mut times = numbers.split_ascii_whitespace().skip(11);
     let mut time = || times.next()?.parse::<u64>().ok();

@@ -9,23 +9,23 @@ use crate::process_status::{kibibytes, processor_time};
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Usage {
-    /// Share of one processor since the last look, from 0 to 1; none at the first look.
+    /// Share of one processor since the last look, 0 to 1; none at the first.
     pub cpu: Option<f64>,
-    /// Resident memory with shared memory, bytes; none if the process has ended.
+    /// Resident memory with shared memory; none if the process has ended.
     pub memory_bytes: Option<u64>,
 }
 
 #[derive(Debug, Default)]
 pub struct Processes {
-    /// For each process the time of the last look, its processor time then, and the result.
+    /// Time of the last look, processor time then, and its result.
     seen: BTreeMap<u32, (Instant, Duration, Usage)>,
 }
 
-/// The kernel counts processor time in hundredths of a second, so shares need a longer time.
+/// The kernel counts hundredths of a second, so shares need a longer time.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
 impl Processes {
-    /// The usage of each of `processes` at `now`, in their order. Shares are over a second at least.
+    /// The usage of each process at `now`. Shares are over a second at least.
     pub fn look(&mut self, processes: &[u32], now: Instant) -> Vec<Usage> {
         self.seen.retain(|process, _| processes.contains(process));
         processes.iter().map(|&process| self.one(process, now)).collect()

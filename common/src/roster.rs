@@ -13,7 +13,6 @@ use crate::{
 /// The supervisor answers the first heartbeat of a process with a roster. On a loaded machine that takes a while.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Reads the topic `roster`.
 #[derive(Debug)]
 pub struct Roster {
     /// The rosters, as they are published.
@@ -22,7 +21,6 @@ pub struct Roster {
     pub waiter: Waiter,
 }
 
-/// The processes that a roster names, by their stages.
 pub fn named(entries: &[RosterEntry]) -> impl Iterator<Item = (String, Author)> {
     let running = entries.iter().filter(|entry| entry.pid != 0);
     running.map(|entry| {
@@ -31,7 +29,8 @@ pub fn named(entries: &[RosterEntry]) -> impl Iterator<Item = (String, Author)> 
     })
 }
 
-/// Join a robot's bus as a consumer, whose readers return only samples of the supervisor and of the processes that rosters name.
+/// Join a robot's bus as a consumer, whose readers return only samples of the supervisor and of the processes that rosters name. Fails when
+/// the bus is not there or cannot be used.
 pub fn join(domain: &Domain, name: &str) -> Result<Bus, BusError> {
     let bus = Bus::join_as_consumer(domain, name)?;
     if let Some(writers) = bus.writers() {
@@ -53,7 +52,7 @@ fn names(mut rosters: Reader<RosterHeader, RosterEntry>) -> Names {
 }
 
 impl Roster {
-    /// Read the roster on `bus`.
+    /// Fails when the topic cannot be read.
     pub fn open(bus: &Bus) -> Result<Self, BusError> {
         let mut waiter = Waiter::default();
         waiter.on(bus.wakeup(&topics::ROSTER)?);
@@ -79,7 +78,7 @@ impl Roster {
         Ok(())
     }
 
-    /// The first result of `find` in a roster; none if there is no result for `patience`.
+    /// The first result of `find` in a roster; none after `patience`. Fails when the topic cannot be read.
     pub fn find<T>(
         &mut self,
         patience: Duration,

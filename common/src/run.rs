@@ -1,5 +1,4 @@
-//! The run file, with which the supervisor tells the stages of a run what to do: TOML, in the run directory. Beside it is the
-//! count of each stage's generations.
+//! The run file, TOML in the run directory, tells the stages of a run what to do. Beside it is the count of each stage's generations.
 
 use std::{
     fs::{self, File},
@@ -14,34 +13,26 @@ use crate::{
     address::Address, clock::MissionClock, domain::RobotName, file::replace, mission::Mission,
 };
 
-/// The file's name in the run directory.
 pub const FILE_NAME: &str = "run.toml";
 
-/// A run, as its stages need to know it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Run {
-    /// The robot whose bus the stages join.
     pub robot: RobotName,
-    /// Where the robot answers, and over which transport.
     pub address: Address,
-    /// The clock that stamps samples.
     pub clock: MissionClock,
     pub mission: Mission,
 }
 
-/// A run file that cannot be used.
 #[derive(Debug, Error)]
 pub enum RunError {
-    /// The file system refused.
     #[error("cannot {action} {file}: {source}; is the run directory there and writable?")]
     File { action: &'static str, file: PathBuf, source: io::Error },
-    /// The text is not a run file.
     #[error("{file} is not a run file: {problem}; start the stage through `firsthand run`")]
     Content { file: PathBuf, problem: String },
 }
 
 impl Run {
-    /// Write it into `directory`.
+    /// Fails when the file cannot be written.
     pub fn save(&self, directory: &Path) -> Result<(), RunError> {
         let file = directory.join(FILE_NAME);
         let text = toml::to_string(self).map_err(|error| RunError::Content {
@@ -51,7 +42,7 @@ impl Run {
         replace(&file, &text).map_err(|source| RunError::File { action: "write", file, source })
     }
 
-    /// Read it back from `directory`.
+    /// Fails when the file cannot be read or is no run file.
     pub fn load(directory: &Path) -> Result<Self, RunError> {
         let file = directory.join(FILE_NAME);
         let text = fs::read_to_string(&file).map_err(|source| RunError::File {
@@ -64,11 +55,9 @@ impl Run {
     }
 }
 
-/// The number of a new generation of `stage` in the run of `directory`: 1 for the first, and counted on when a new
-/// supervisor resumes the run, since readers drop samples of older generations.
-///
-/// The file has a line for each generation. An append is atomic here, and a slow disk does not delay it as it would delay the
-/// replacement of a file.
+/// The number of a new generation of `stage`, from 1. It counts on in a resumed run, because readers drop samples of older generations.
+/// Each generation appends a line, which is atomic, and a slow disk delays it less than replacing a file. Fails when the file cannot be
+/// read or written.
 pub fn next_generation(directory: &Path, stage: &str) -> Result<u32, RunError> {
     let file = directory.join(format!("{stage}.generations"));
     let count = || {
@@ -84,7 +73,6 @@ pub fn next_generation(directory: &Path, stage: &str) -> Result<u32, RunError> {
     })
 }
 
-/// Where a process of the run in `directory` saves the state that its successor restores.
 pub fn checkpoint_file(directory: &Path, process: &str) -> PathBuf {
     directory.join(format!("{process}.checkpoint"))
 }

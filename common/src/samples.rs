@@ -1,20 +1,16 @@
-//! The payloads of the topics, as they lie in shared memory: `repr(C)`, no pointers, units in every name
-//! or doc. Each has a `type_name` other languages can give; size and name are checked at attach.
+//! The payloads of [`crate::topics`] in shared memory: `repr(C)`, no pointers, units in every name or doc. Size and `type_name`, for
+//! other languages, are checked at attach.
 //!
-//! Why `unsafe` is allowed here: deriving `ZeroCopySend` writes an `unsafe impl` that promises a
-//! self-contained type of uniform layout. All fields below are plain numbers and arrays of them in
-//! `repr(C)` structs, so the promise holds; nothing else in the module is unsafe.
+//! `unsafe` is allowed because deriving `ZeroCopySend` writes an `unsafe impl`, which promises a self-contained type of uniform layout:
+//! all fields are plain numbers, and arrays of them, in `repr(C)` structs.
 //!
-//! Any bit pattern may arrive from another process: states travel as bytes and are read through
-//! `from_byte`, never as Rust enums.
-//!
-//! `robot`, `navigation`, `localisation` and `supervision` hold them; this module holds what they have in common.
+//! Another process may write any bit pattern: states are bytes, read through `from_byte`.
 #![allow(unsafe_code)]
 
 pub use bus::{Stamp, Stamped};
 
-/// Payloads of topics, each a name for other languages and its fields. They are `repr(C)`, begin with a
-/// [`Stamp`], and need nothing else to be written, read, shown and recorded; `ZeroCopySend` must be in scope.
+/// Payloads of topics: each has a name for other languages, begins with a [`Stamp`], and needs nothing else to be written, read, shown
+/// and recorded. `ZeroCopySend` must be in scope.
 #[macro_export]
 macro_rules! payloads {
     ($($(#[$meta:meta])* $type_name:literal $name:ident { $($(#[$doc:meta])* $field:ident: $kind:ty,)* })*) => {$(
@@ -69,7 +65,7 @@ macro_rules! wire_enum {
         #[repr(u8)]
         pub enum $name { $($(#[$doc])* $variant = $byte),* }
         impl $name {
-            /// The value a byte stands for; an unknown byte is read as the safe one.
+            /// An unknown byte is read as the safe value.
             pub const fn from_byte(byte: u8) -> Self {
                 match byte {
                     $($byte => Self::$variant,)*
@@ -85,7 +81,7 @@ macro_rules! wire_enum {
     };
 }
 
-// These modules use the macros above, so they come after them.
+// These modules use the macros above.
 mod localisation;
 mod navigation;
 mod robot;
@@ -93,7 +89,7 @@ mod supervision;
 
 pub use self::{localisation::*, navigation::*, robot::*, supervision::*};
 
-// Their defaults cannot be derived, so they are not written with `payloads`.
+// Their defaults cannot be derived, so `payloads` does not write them.
 stamped!(GridHeader, LinkSample);
 
 #[cfg(test)]

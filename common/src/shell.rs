@@ -21,7 +21,6 @@ use crate::{
     external,
     faults::{Asked, Requests},
     journal::{Journal, Restored},
-    latency_budget::{self, LatencyBudget},
     poll,
     roster::Roster,
     run::{self, Run},
@@ -46,8 +45,6 @@ pub struct Context {
     pub run: Run,
     /// Wakes the process. Besides the topics of its wiring, a process can add descriptors.
     pub waiter: Waiter,
-    /// The stage tells it when the items of a tick end.
-    pub budget: LatencyBudget,
     pub(crate) bus: Bus,
     /// Opened, and not handed to the process's outputs yet.
     pub(crate) saved: Saved,
@@ -219,7 +216,6 @@ pub fn run_stage<P: Process>(start: &Start) -> Result<(), StageError> {
         run,
         bus,
         waiter,
-        budget: LatencyBudget::from_environment(),
         saved: Saved::default(),
         opened: Opened::none_of(P::WIRING),
     };
@@ -231,11 +227,6 @@ pub fn run_stage<P: Process>(start: &Start) -> Result<(), StageError> {
     let worked = work(&mut process, &mut heartbeat, &mut context, &mut stop);
     // After an error, too, the stage is stopped in order: the link then stops the robot.
     let stopped = process.stop();
-    let Generation { stage, directory, .. } = &context.generation;
-    let file = latency_budget::file(directory, stage, number);
-    if let Err(error) = context.budget.save(&file) {
-        tracing::warn!("cannot save the times of ticks in {}: {error}", file.display());
-    }
     tracing::info!("stopped");
     worked.and(stopped)
 }
@@ -279,9 +270,7 @@ fn work(
             .into_iter()
             .flatten()
             .fold(heartbeat.time_to_beat(), Duration::min);
-        context.budget.waits();
         let came = context.waiter.wait(patience)?;
-        context.budget.awake();
         progress = process.turn()?;
         if ticks_follow_at_once || busy && !came {
             process.idle()?;

@@ -1,5 +1,4 @@
-//! Signals as something to wait for: a descriptor that becomes readable, so that none is ever missed
-//! between looking and waiting.
+//! Signals as a descriptor that becomes readable, so that none is missed between looking and waiting.
 
 use std::{
     ffi::c_int,
@@ -14,15 +13,13 @@ pub use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGTERM};
 
 use crate::process_status;
 
-/// Signals caught by this process.
 #[derive(Debug)]
 pub struct Signals {
     pipe: UnixStream,
 }
 
 impl Signals {
-    /// Catch `signals` from now on. SIGHUP stays ignored where whoever started the process
-    /// had it ignored, as `nohup` does.
+    /// Catch `signals` from now on, except a SIGHUP that is ignored already, as under `nohup`. Fails when the system refuses a handler.
     pub fn catch(signals: &[c_int]) -> io::Result<Self> {
         let (pipe, written_by_handler) = UnixStream::pair()?;
         pipe.set_nonblocking(true)?;
@@ -41,7 +38,7 @@ impl Signals {
     }
 }
 
-/// Whether whoever started this process had it ignore `signal`.
+/// The process that started this one may have had `signal` ignored.
 fn is_ignored(signal: c_int) -> bool {
     let mask = process_status::field("self", "SigIgn")
         .and_then(|mask| u64::from_str_radix(&mask, 16).ok());
@@ -54,7 +51,7 @@ impl AsFd for Signals {
     }
 }
 
-/// End this process at once, whatever its other threads wait for.
+/// Whatever its other threads wait for.
 pub fn exit_at_once(code: u8) -> ! {
     signal_hook::low_level::exit(code.into())
 }

@@ -1,5 +1,5 @@
-//! The operator's stop without middleware: a datagram socket of the link in the robot's directory, which only its owner may
-//! enter. It works when the files of the bus are damaged, the disk is full, or the supervisor stands still.
+//! The operator's stop without middleware: the link's datagram socket in the robot's directory, which only its owner may enter. It works
+//! with a damaged bus, a full disk, or a supervisor that hangs.
 //!
 //! A datagram is one byte: [`Request`] to the link, [`Answer`] from it.
 
@@ -28,12 +28,9 @@ pub enum Request {
     Resume,
 }
 
-/// An answer of the link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// The link obeys.
     Heard,
-    /// The encoders say that the robot rests.
     AtRest,
 }
 
@@ -42,10 +39,9 @@ const RESUME: u8 = b'r';
 const HEARD: u8 = b'h';
 const AT_REST: u8 = b'a';
 
-/// The most operators that the link answers at once; it obeys the requests of further ones, too.
+/// The most operators that the link answers at once; it obeys others too.
 const MOST_ASKING: usize = 16;
 
-/// The link's end of the socket.
 #[derive(Debug)]
 pub struct StopSocket {
     socket: UnixDatagram,
@@ -53,7 +49,7 @@ pub struct StopSocket {
 }
 
 impl StopSocket {
-    /// The socket of the robot of `domain`, in the place of that of an earlier link.
+    /// Bind the robot's socket in place of an earlier link's. Fails when the system refuses.
     pub fn bind(domain: &Domain) -> io::Result<Self> {
         let path = domain.stop_socket();
         remove(&path)?;
@@ -62,11 +58,11 @@ impl StopSocket {
         Ok(Self { socket, asking: Vec::new() })
     }
 
-    /// The next request; none when all were taken.
+    /// None when all were taken.
     pub fn take(&mut self) -> Option<Request> {
         let mut byte = [0];
         loop {
-            // Whatever is wrong with the socket, the robot drives on as it was ordered.
+            // Whatever is wrong with the socket, the robot drives on as ordered.
             let (length, from) = self.socket.recv_from(&mut byte).ok()?;
             let request = match (length, byte) {
                 (1, [STOP]) => Request::Stop,
@@ -81,7 +77,6 @@ impl StopSocket {
         }
     }
 
-    /// Tell those who asked for a stop that the robot rests.
     pub fn tell_at_rest(&mut self) {
         for operator in std::mem::take(&mut self.asking) {
             self.answer(&operator, AT_REST);
@@ -100,16 +95,15 @@ impl AsFd for StopSocket {
     }
 }
 
-/// The operator's end of the socket.
 #[derive(Debug)]
 pub struct Operator {
     socket: UnixDatagram,
 }
 
 impl Operator {
-    /// A connection to the link of the robot of `domain`; none if no link runs.
+    /// None if no link runs. Fails when the system refuses a socket.
     pub fn connect(domain: &Domain) -> io::Result<Option<Self>> {
-        // An abstract name leaves no file behind.
+        // An abstract name leaves no file.
         let name = format!("firsthand-operator-{}-{}", std::process::id(), monotonic_ns());
         let socket = UnixDatagram::bind_addr(&SocketAddr::from_abstract_name(name)?)?;
         match socket.connect(domain.stop_socket()) {
@@ -121,7 +115,7 @@ impl Operator {
         }
     }
 
-    /// Send `request`.
+    /// Fails when the link is gone.
     pub fn send(&self, request: Request) -> io::Result<()> {
         let byte = match request {
             Request::Stop => STOP,
@@ -130,7 +124,7 @@ impl Operator {
         self.socket.send(&[byte]).map(drop)
     }
 
-    /// The next answer within `patience`.
+    /// Waits up to `patience`. Fails when the link is gone.
     pub fn answer(&self, patience: Duration) -> io::Result<Option<Answer>> {
         let began = Instant::now();
         loop {
@@ -149,12 +143,11 @@ impl Operator {
     }
 }
 
-/// Tells the socket of one link from that of its successor: inode and time of its creation. Empty for a link without one.
+/// Inode and creation time of a link's socket tell it from its successor's; empty without a link.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Identity(pub String);
 
 impl Identity {
-    /// The identity of the socket in the robot's directory now.
     pub fn now(domain: &Domain) -> Self {
         let found = fs::symlink_metadata(domain.stop_socket());
         Self(found.map_or_else(
@@ -163,32 +156,30 @@ impl Identity {
         ))
     }
 
-    /// Whether a link runs whose socket is not this one.
+    /// Whether another link's socket is there.
     pub fn is_succeeded(&self, domain: &Domain) -> bool {
         Self::now(domain) != *self && matches!(Operator::connect(domain), Ok(Some(_)))
     }
 }
 
-/// A mark in a run's directory that an operator's stop holds, so that a link that is started again obeys it, too.
+/// An operator's stop leaves this mark in a run's directory, so that a new link obeys it too.
 #[derive(Debug)]
 pub struct StopMark {
     path: PathBuf,
 }
 
 impl StopMark {
-    /// The mark of the run in `directory`.
     #[must_use]
     pub fn of(directory: &Path) -> Self {
         Self { path: directory.join("operator-stop") }
     }
 
-    /// Whether the mark is there.
     #[must_use]
     pub fn is_set(&self) -> bool {
         self.path.exists()
     }
 
-    /// Set or remove the mark.
+    /// Fails when the directory cannot be written.
     pub fn set(&self, stopped: bool) -> io::Result<()> {
         if stopped {
             return fs::File::create(&self.path).map(drop);
@@ -197,7 +188,6 @@ impl StopMark {
     }
 }
 
-/// Remove a file, if it exists.
 fn remove(path: &Path) -> io::Result<()> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),

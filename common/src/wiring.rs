@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::{
     bus::AnyTopic,
-    topics::{FAULTS, HEALTH, INPUTS, ROSTER, Rate},
+    topics::{FAULTS, HEALTH, INPUTS, ROSTER},
 };
 
 /// Rows of the table of topics.
@@ -72,18 +72,6 @@ impl Wiring {
             outputs: &[],
             persists: Persists::Nothing,
         }
-    }
-
-    /// Whether a tick goes through the stage twice, because its feedback wakes it.
-    pub fn is_passed_twice(&self) -> bool {
-        let wakes = |name| self.wakes.iter().any(|topic| topic.spec().name == name);
-        self.feedback.iter().any(|topic| wakes(topic.spec().name))
-    }
-
-    /// The topic that answers a tick.
-    pub(crate) fn answer(&self) -> Option<&'static str> {
-        let mut specs = self.outputs.iter().rev().map(|topic| topic.spec());
-        specs.find(|spec| spec.rate == Rate::EachTick).map(|spec| spec.name)
     }
 
     /// The names of the topics that it opens for `access`.

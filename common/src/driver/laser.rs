@@ -1,4 +1,4 @@
-//! The laser of a robot: its newest beams, and whether it is stuck or blind.
+//! The laser of a robot, which may be stuck or blind.
 
 use super::{Readings, odometry::drive};
 use crate::{
@@ -7,32 +7,28 @@ use crate::{
     samples::{RangeReading, RangeStatus},
 };
 
-/// A laser whose scans are the same to the bit while a wheel turns so far is stuck, radians.
+/// A laser is stuck if its scans stay the same to the bit while a wheel turns this far, radians.
 const STUCK_RAD: f64 = 1.0;
-/// A laser whose beams all see nothing is blind if, in the scan before, more than one beam in so many ended within half its reach.
-/// Nothing that fills so much of its view is out of reach a moment later.
+/// A laser whose beams all see nothing is blind if, in the scan before, more than one beam in so many ended within half its reach:
+/// nothing that fills so much of its view leaves it in a moment.
 const BLIND_ONE_IN: usize = 20;
 
-/// The laser of a mission.
 #[derive(Clone, Debug)]
 pub struct Laser {
     body: Body,
     row: usize,
     sensor: Sensor,
-    /// The newest scan that differs from the one before, and the angles of the wheels then.
+    /// The newest scan that differed from the one before, and the wheels' angles then.
     newest_scan: (Vec<f32>, [f64; 2]),
-    /// The beams that ended near in the newest scan that saw anything, and the angles of the wheels then.
+    /// The beams that ended near in the newest scan that saw anything, and the wheels' angles then.
     near: (usize, [f64; 2]),
-    /// Whether the laser is blind, until it sees anything.
     is_blind: bool,
-    /// The angles of the wheels.
     turned: [f64; 2],
     /// The beams since the last tick.
     scan: Vec<f32>,
 }
 
 impl Laser {
-    /// The laser of `mission`; none without one.
     pub fn new(mission: &Mission) -> Option<Self> {
         let (row, sensor) = mission.laser()?;
         Some(Self {
@@ -47,12 +43,10 @@ impl Laser {
         })
     }
 
-    /// The laser's row of the mission.
     pub const fn sensor(&self) -> &Sensor {
         &self.sensor
     }
 
-    /// Note the angles by which the left and the right wheel have turned.
     pub const fn turned(&mut self, turned: [f64; 2]) {
         self.turned = turned;
     }
@@ -67,13 +61,12 @@ impl Laser {
         }
     }
 
-    /// The beams since the last tick.
     pub fn for_tick(&mut self) -> Vec<f32> {
         std::mem::take(&mut self.scan)
     }
 
-    /// Take the beams as [`Laser::beam`] gives them. The nearest beam counts as the reading of the laser's row. None does if the laser
-    /// is blind, or if its scan stays the same although the wheels have turned.
+    /// Takes beams as [`Laser::beam`] gives them. The nearest counts as the reading of the laser's row; none does if the laser is blind
+    /// or stuck.
     pub fn take(&mut self, beams: Vec<f32>, readings: &mut Readings) {
         let (newest, turned_then) = &self.newest_scan;
         let [bits_then, bits_now] =
@@ -99,7 +92,6 @@ impl Laser {
         }
     }
 
-    /// Note whether a laser with these beams is blind.
     fn look_for_blindness(&mut self, beams: &[f32]) {
         if beams.iter().any(|beam| beam.is_finite()) {
             let near_m = self.sensor.reach_m as f32 / 2.0;
@@ -109,7 +101,7 @@ impl Laser {
             let (near, turned_then) = self.near;
             let [left, right] = [0, 1].map(|wheel| self.turned[wheel] - turned_then[wheel]);
             let turn = drive(&self.body).twist(WheelSpeeds { right, left }).omega;
-            // A turn takes things out of a view that is no whole circle.
+            // A turn removes things from a view that is no whole circle.
             let is_circle = self.sensor.field_of_view_deg >= 360.0;
             let lost = if is_circle { 0.0 } else { turn.abs() / self.sensor.fan().1 };
             self.is_blind |= near > beams.len() / BLIND_ONE_IN + lost.ceil() as usize;

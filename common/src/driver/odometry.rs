@@ -1,4 +1,4 @@
-//! The way of a robot as angles of its wheels, for drivers of robots that say their pose.
+//! The way of a robot that says its pose, as angles of its wheels.
 
 use std::f64::consts::TAU;
 
@@ -13,22 +13,22 @@ use crate::{
     wire::COUNT_CYCLE,
 };
 
-/// The farthest that odometry can say a robot is away, metres, or has turned, radians.
+/// The farthest place or heading that odometry can say, metres or radians.
 const FARTHEST: f64 = 1e6;
-/// The farthest that a wheel can roll, as a multiple of its way at top speed.
+/// The farthest that a wheel can roll over its way at top speed.
 const IMPLAUSIBLE: f64 = 1.5;
-/// The greatest time between a pose and its stamp, seconds.
+/// The most time between a pose and its stamp, seconds.
 const JITTER_S: f64 = 0.1;
-/// The greatest error of a pose from one to the next, metres.
+/// The most error from one pose to the next, metres.
 const SLACK_M: f64 = 0.01;
-/// The silence after which a robot may have started again, seconds. Its odometry then says a pose within `NEAR_START` of 0, metres and
-/// radians.
+/// A robot that was silent for longer may have started again, seconds. Its odometry then says a pose within `NEAR_START` of 0, metres
+/// and radians.
 const STARTS_IN_S: f64 = 1.0;
 const NEAR_START: f64 = 0.05;
-/// The current of a wheel that is held, AD counts: the greatest value of an X80's converter.
+/// The current of a held wheel, AD counts: the maximum of an X80's converter.
 const HELD_AD: u16 = 4095;
 
-/// The angles by which wheels would have turned on the way of a robot that says its pose.
+/// The angles by which wheels would have turned on the way.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Odometry {
     last: Option<Pose2>,
@@ -36,33 +36,32 @@ pub struct Odometry {
 }
 
 impl Odometry {
-    /// The newest pose and the angles of the wheels there; none before the first.
+    /// The newest pose and the wheels' angles there; none before the first.
     pub fn memory(&self) -> Option<Memory> {
         let Pose2 { position, heading } = self.last?;
         let [left, right] = self.turned;
         Some([position.x, position.y, heading, left, right])
     }
 
-    /// Go on from the pose and the angles in `memory`.
     pub const fn remember(&mut self, [x, y, heading, left, right]: Memory) {
         self.last = Some(Pose2 { position: DVec2::new(x, y), heading });
         self.turned = [left, right];
     }
 
-    /// The angles of the left and the right wheel of a robot that is at `x`, `y` with this heading by its odometry. Sideways slip is left
-    /// out, because wheels do not show it. None if the numbers are too great to be a way.
+    /// The angles of the left and right wheel at this pose. Sideways slip, which wheels do not show, is left out. None if the numbers
+    /// are too great.
     pub fn turned(&mut self, pose: [f64; 3], body: &Body) -> Option<[f64; 2]> {
         let now = pose_at(pose)?;
         let [arc, turn, _] = self.way(now);
         self.last = Some(now);
-        // (17) is linear: an arc and a turn give the angles of the wheels.
+        // (17) is linear, so the arc and the turn give the wheels' angles.
         let WheelSpeeds { right, left } = drive(body).wheels(Twist { v: arc, omega: turn });
         self.turned = [self.turned[0] + left, self.turned[1] + right];
         Some(self.turned)
     }
 
-    /// Whether the way from the newest pose to this one is a jump: longer than this body can go in `gap_s` seconds, sideways, or a new
-    /// start of the odometry. Then go on from the pose: the way to it counts as no motion.
+    /// Whether the way from the newest pose is a jump: longer than this body goes in `gap_s` seconds, sideways, or a new start of the
+    /// odometry. A jump counts as no motion.
     pub fn takes_jump(&mut self, pose: [f64; 3], gap_s: f64, body: &Body) -> bool {
         let Some(now) = pose_at(pose) else {
             return false;
@@ -79,7 +78,7 @@ impl Odometry {
         jumps
     }
 
-    /// The way from the newest pose to `now`: the arc, metres, the turn, radians, and the sideways slip, metres; all 0 before the first.
+    /// The arc, metres, the turn, radians, and the sideways slip, metres, to `now`; all 0 before the first pose.
     fn way(&self, now: Pose2) -> [f64; 3] {
         let Some(last) = self.last else {
             return [0.0; 3];
@@ -88,33 +87,31 @@ impl Odometry {
         let middle = DVec2::from_angle(last.heading + turn / 2.0);
         let went = now.position - last.position;
         let chord = went.dot(middle);
-        // The chord of an arc is shorter than the arc by this.
+        // The chord of an arc is shorter than the arc.
         let half = turn / 2.0;
         let arc = if half.abs() < 1e-9 { chord } else { chord * half / half.sin() };
         [arc, turn, went.perp_dot(middle)]
     }
 }
 
-/// The pose of these numbers; none if they are too great to be one.
+/// None if the numbers are too great for a pose.
 fn pose_at([x, y, heading]: [f64; 3]) -> Option<Pose2> {
     let position = DVec2::new(x, y);
     let is_near = position.length() <= FARTHEST && heading.abs() <= FARTHEST;
     is_near.then_some(Pose2 { position, heading })
 }
 
-/// Whether a robot that has just started may say this pose.
 fn is_start(pose: Pose2) -> bool {
     pose.position.length() <= NEAR_START && wrap_angle(pose.heading).abs() <= NEAR_START
 }
 
-/// The drive of a body whose wheels have no limit.
+/// The drive of wheels without a speed limit.
 #[must_use]
 pub fn drive(body: &Body) -> DifferentialDrive {
     DifferentialDrive::new(body.wheel_radius_m, body.track_m, f64::INFINITY)
 }
 
-/// The motion of a robot whose left and right wheel have turned by these angles and turn at these speeds, radians and rad/s; `held` says
-/// whether something holds each.
+/// The motion of left and right wheels at these angles and speeds, radians and rad/s; `held` by something each or not.
 #[must_use]
 pub fn motion(body: &Body, turned: [f64; 2], speeds: [f64; 2], held: [bool; 2]) -> Motion {
     let counts = |angle: f64| angle * body.counts_per_turn / TAU;
@@ -129,19 +126,19 @@ pub fn motion(body: &Body, turned: [f64; 2], speeds: [f64; 2], held: [bool; 2]) 
             right_counts_per_s,
             ..WheelSample::default()
         },
-        // A wheel that is held draws all that its motor can.
+        // A held wheel draws all that its motor can.
         currents: held.map(|held| if held { HELD_AD } else { 0 }),
     }
 }
 
-/// The speed ahead, m/s, and the turn rate, rad/s, of a body whose left and right wheel turn at these speeds, counts/s.
+/// `counts` are wheel speeds, counts/s.
 #[must_use]
 pub fn twist(body: &Body, counts: [i16; 2]) -> Twist {
     let [left, right] = wheel_speeds(body, counts);
     drive(body).twist(WheelSpeeds { right, left })
 }
 
-/// The speeds of the left and the right wheel, rad/s, that are these counts/s.
+/// Converts counts/s to rad/s.
 #[must_use]
 pub fn wheel_speeds(body: &Body, counts: [i16; 2]) -> [f64; 2] {
     counts.map(|counts| f64::from(counts) * TAU / body.counts_per_turn)

@@ -1,8 +1,4 @@
-//! The part of a map's version that a sample carries.
-//!
-//! Why `unsafe` is allowed here: a [`Part`] lies in shared memory, and deriving `ZeroCopySend` writes an `unsafe impl`
-//! that promises a self-contained type of uniform layout. Its fields are plain numbers in a `repr(C)` struct, so the
-//! promise holds; nothing else here is unsafe.
+//! The part of a map's version that a sample carries. `unsafe` is allowed for the reason that [`crate::samples`] gives.
 #![allow(unsafe_code)]
 
 use glam::DVec2;
@@ -10,31 +6,25 @@ use glam::DVec2;
 use bus::{ZeroCopySend, layouts};
 use mission::grid::{GridFrame, Window};
 
-/// The frame of a map and the part of a version that a sample carries, in the headers of `grid` and `field`.
+/// A map's frame, and the window of one version, in the headers of `grid` and `field`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.Part")]
 #[repr(C)]
 pub struct Part {
-    /// The version the map has with these cells. Consecutive versions differ in one window; an empty one says that nothing
-    /// changed since this version.
+    /// The version of the map with these cells. Consecutive versions differ in one window; an empty one means no change.
     pub version: u64,
     /// N: the map is N x N cells.
     pub cells: u32,
-    /// First column of the window.
     pub col: u32,
-    /// First row of the window.
     pub row: u32,
-    /// Columns of the window.
     pub width: u32,
-    /// Rows of the window.
     pub height: u32,
     /// 1: the window is the whole map. Otherwise it changes the version before.
     pub keyframe: u32,
     /// Delta: side of a cell, metres.
     pub resolution_m: f64,
-    /// X of cell (N/2, N/2), metres.
+    /// Centre of cell (N/2, N/2), metres.
     pub centre_x_m: f64,
-    /// Y of cell (N/2, N/2), metres.
     pub centre_y_m: f64,
 }
 
@@ -43,7 +33,7 @@ layouts! {
 }
 
 impl Part {
-    /// `window` of version `version` of a map that lies as `frame` says.
+    /// A window of the map in `frame`.
     pub const fn of(frame: GridFrame, window: Window, version: u64) -> Self {
         Self {
             version,
@@ -59,12 +49,11 @@ impl Part {
         }
     }
 
-    /// All of version `version` of a map that lies as `frame` says: a keyframe.
+    /// The whole map in `frame`: a keyframe.
     pub const fn whole(frame: GridFrame, version: u64) -> Self {
         Self { keyframe: 1, ..Self::of(frame, frame.whole(), version) }
     }
 
-    /// The frame of the map.
     pub const fn frame(&self) -> GridFrame {
         GridFrame {
             cells: self.cells,
@@ -73,12 +62,10 @@ impl Part {
         }
     }
 
-    /// The cells that the sample carries, row-major.
     pub const fn window(&self) -> Window {
         Window { col: self.col, row: self.row, width: self.width, height: self.height }
     }
 
-    /// Whether the sample carries the whole map.
     pub const fn is_keyframe(&self) -> bool {
         self.keyframe == 1
     }

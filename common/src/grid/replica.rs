@@ -1,17 +1,14 @@
-//! A follower's copy of a map that is published in keyframes and windows.
-
 use mission::grid::{Cell, GridFrame, MAX_CELLS, Window};
 
 use super::part::Part;
 
-/// The effect of a part on the copy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Applied {
-    /// The whole map came, and nothing was held before to compare it with.
+    /// A first keyframe came: there was nothing to compare it with.
     Whole,
-    /// The window changed; nothing, if it is empty.
+    /// The window changed; an empty one is no change.
     Window(Window),
-    /// A version is missing, or the cells do not fit: the map is as it was, wait for a keyframe.
+    /// A version is missing, or the cells do not fit: the map stays; wait for a keyframe.
     Missed,
 }
 
@@ -23,22 +20,22 @@ pub struct Replica<T> {
 }
 
 impl<T: Copy + PartialEq> Replica<T> {
-    /// The frame, once a keyframe has come.
+    /// None before the first keyframe.
     pub fn frame(&self) -> Option<GridFrame> {
         self.state.map(|(frame, _)| frame)
     }
 
-    /// The version held; 0 before the first keyframe.
+    /// 0 before the first keyframe.
     pub fn version(&self) -> u64 {
         self.state.map_or(0, |(_, version)| version)
     }
 
-    /// All cells, row-major; empty before the first keyframe.
+    /// Row-major; empty before the first keyframe.
     pub fn cells(&self) -> &[T] {
         &self.cells
     }
 
-    /// Follow one part, whose cells are `cells`.
+    /// Follow one part with these cells.
     pub fn apply(&mut self, part: &Part, cells: &[T]) -> Applied {
         let (frame, window, version) = (part.frame(), part.window(), part.version);
         let sane = (1..=MAX_CELLS).contains(&frame.cells);
@@ -49,8 +46,8 @@ impl<T: Copy + PartialEq> Replica<T> {
             if window != frame.whole() {
                 return Applied::Missed;
             }
-            // A keyframe for late joiners must not look like more than what changed, or a consumer that
-            // attaches would change what the others compute.
+            // A keyframe for late joiners counts as what changed since: otherwise a consumer that attaches would change what the others
+            // compute.
             let known = self.state.is_some_and(|(held, _)| held == frame);
             let changed = known.then(|| frame.changed_window(&self.cells, cells));
             self.cells.clear();
@@ -61,7 +58,7 @@ impl<T: Copy + PartialEq> Replica<T> {
         let Some((held_frame, held)) = self.state else {
             return Applied::Missed;
         };
-        // Only a change makes a new version: if an empty part has one, the changed part was missed.
+        // Only a change makes a new version: a new one without cells means that a part was missed.
         let follows =
             if window.area() == 0 { version == held } else { held.checked_add(1) == Some(version) };
         if held_frame != frame || !follows {

@@ -12,12 +12,11 @@ use crate::{
 };
 
 payloads! {
-    /// Topic `pose`: where dead reckoning believes the robot is, by its wheels and by what came on `fix` and `turn`.
+    /// The pose follows from the wheels, and from what came on `fix` and `turn`.
     #[derive(Serialize, Deserialize)]
     "firsthand.Pose" PoseSample {
         /// Metres in the mission frame.
         x_m: f64,
-        /// Metres in the mission frame.
         y_m: f64,
         /// theta, radians counter-clockwise from x; not wrapped.
         heading_rad: f64,
@@ -25,37 +24,31 @@ payloads! {
         v_m_s: f64,
         /// omega over the last tick, rad/s.
         omega_rad_s: f64,
-        /// Length of the way so far, metres.
         travelled_m: f64,
-        /// Covariance of the error of (x, y, theta): xx, xy, x theta, yy, y theta, theta theta; m^2, m rad, rad^2. It covers
-        /// the errors of the wheels, as `[robot.odometry]` of the mission states them, and motions lost with their counts.
+        /// Covariance of the error of (x, y, theta): xx, xy, x theta, yy, y theta, theta theta; m^2, m rad, rad^2. It covers the wheels'
+        /// errors by the mission's `[robot.odometry]`, and motions lost with their counts.
         covariance: [f64; 6],
-        /// The encoder counts it was computed at.
+        /// The encoder counts at this pose.
         left_counts: u16,
-        /// The encoder counts it was computed at.
         right_counts: u16,
-        /// The pose of the frame of odometry in the mission frame: x, y, theta; metres, radians. Odometry is this pose without what
-        /// was corrected by fixes and gyro, and continuous (map from odom of REP 105).
+        /// The pose of the odometry frame in the mission frame (map from odom of REP 105): x, y, theta; metres, radians. Odometry is
+        /// this pose without the corrections by fixes and gyro, and continuous.
         map_from_odom: [f64; 3],
-        /// How often fixes that agreed among themselves contradicted the pose, which then became theirs. The map is reset each time.
+        /// Times that fixes which agree contradicted the pose, and it became theirs; each resets the map.
         relocations: u64,
-        /// The number of fixes that were used.
         fixes: u64,
-        /// The number of fixes that were refused.
         fixes_refused: u64,
-        /// Why the newest fix was refused: a [`FixRefusal`](super::FixRefusal).
+        /// The reason of the newest refusal: a [`FixRefusal`](super::FixRefusal).
         refusal: u8,
     }
 }
 
 impl PoseSample {
-    /// Position and heading.
     pub const fn pose(&self) -> Pose2 {
         Pose2 { position: DVec2::new(self.x_m, self.y_m), heading: self.heading_rad }
     }
 
-    /// The covariance as messages of ROS have it, by rows: of x, y, z and the rotations about them, of which only x, y and the last
-    /// are estimated.
+    /// The 6x6 covariance of ROS messages, by rows: x, y, z and the rotations about them; only x, y and the last are estimated.
     pub fn covariance_6x6(&self) -> [f64; 36] {
         let [xx, xy, xt, yy, yt, tt] = self.covariance;
         let mut whole = [0.0; 36];
@@ -67,7 +60,6 @@ impl PoseSample {
         whole
     }
 
-    /// Root of the mean square of the position's error, as the covariance has it, metres.
     pub fn position_rms_m(&self) -> f64 {
         let [xx, _, _, yy, ..] = self.covariance;
         (xx + yy).max(0.0).sqrt()
@@ -79,74 +71,66 @@ impl PoseSample {
         2.0 * worst
     }
 
-    /// The [`principal_axes`] of the position's error.
     pub fn position_axes(&self) -> ([f64; 2], f64) {
         let [xx, xy, _, yy, ..] = self.covariance;
         principal_axes([xx, xy, yy])
     }
 
-    /// Whether the position is known well enough for an arrival: within `sure_within_m` of the mission, by two standard deviations.
+    /// Whether the position is sure enough for an arrival: two standard deviations are within the mission's `sure_within_m`.
     pub fn is_sure(&self, mission: &Mission) -> bool {
         self.position_within_m() <= mission.sure_within_m
     }
 
-    /// Speeds over the last tick.
     pub const fn twist(&self) -> Twist {
         Twist { v: self.v_m_s, omega: self.omega_rad_s }
     }
 }
 
-/// The most readings of sonars in a `grid` sample: those of 128 ticks of three sonars.
+/// The most sonar readings in a `grid` sample: 128 ticks of three sonars.
 pub const CLEAR_BEAMS: usize = 3 * 128;
 
-/// One reading as evidence of free ground. A reading of the sonar says that nothing square to the beam stands nearer than
-/// `clear_m`.
+/// One reading as evidence of free ground: for a sonar, nothing square to the beam stands nearer than `clear_m`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ZeroCopySend)]
 #[type_name("firsthand.ClearBeam")]
 #[repr(C)]
 pub struct ClearBeam {
-    /// The sensor, metres in the mission frame.
+    /// The sensor's place, metres in the mission frame.
     pub x_m: f32,
-    /// The sensor, metres in the mission frame.
     pub y_m: f32,
-    /// The direction in which the sensor looked, radians counter-clockwise from x.
+    /// The direction of the sensor, radians counter-clockwise from x.
     pub bearing_rad: f32,
-    /// The distance within which nothing answered, metres.
     pub clear_m: f32,
 }
 
-/// The most rays of infrared rangers in a `grid` sample: those of 32 ticks.
+/// The most infrared rays in a `grid` sample: 32 ticks.
 pub const CLEAR_RAYS: usize = 32 * INFRARED_RANGERS;
 
-/// Topic `grid`, header; the slice is one [`crate::grid::CellState`] byte a cell of the window.
+/// The slice is one [`crate::grid::CellState`] byte a cell of the window.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.GridHeader")]
 #[repr(C)]
 pub struct GridHeader {
     pub stamp: Stamp,
     pub part: Part,
-    /// Range samples that put a hazard on the map so far.
+    /// Range samples that have put a hazard on the map.
     pub safety_events: u64,
-    /// The belief's epoch: grows when the sensed belief was reset.
+    /// Each reset of the sensed belief begins another epoch.
     pub epoch: u64,
-    /// The number of readings in `clear_beams`; 0 by the paper's method.
+    /// 0 by the paper's method.
     pub clear_beam_count: u64,
-    /// The newest readings, oldest first.
+    /// The newest sonar readings, oldest first.
     pub clear_beams: [ClearBeam; CLEAR_BEAMS],
-    /// The number of readings in `clear_rays`; 0 without infrared rangers in the evidence.
+    /// 0 without infrared rangers in the evidence.
     pub clear_ray_count: u64,
-    /// The newest readings of the infrared rangers, oldest first: nothing stands on the ray nearer than `clear_m`, at whatever
-    /// angle.
+    /// The newest infrared readings, oldest first: nothing stands on the ray nearer than `clear_m`, at any angle.
     pub clear_rays: [ClearBeam; CLEAR_RAYS],
 }
 
 impl GridHeader {
-    /// The newest readings, oldest first.
     pub fn clear_beams(&self) -> &[ClearBeam] {
         counted(&self.clear_beams, self.clear_beam_count)
     }
 
-    /// The newest readings of the infrared rangers, oldest first.
     pub fn clear_rays(&self) -> &[ClearBeam] {
         counted(&self.clear_rays, self.clear_ray_count)
     }
@@ -167,7 +151,7 @@ impl Default for GridHeader {
     }
 }
 
-/// The first `count` of `beams`. The count comes from shared memory and may be anything.
+/// The first `count` of `beams`; the count comes from shared memory and may be any number.
 fn counted(beams: &[ClearBeam], count: u64) -> &[ClearBeam] {
     let count = usize::try_from(count).unwrap_or(beams.len());
     &beams[..count.min(beams.len())]
@@ -178,36 +162,32 @@ wire_enum! {
     GuidanceStatus, unknown = Waiting {
         /// No field yet.
         Waiting = 0,
-        /// Go along (ex, ey).
         Along = 1,
-        /// The robot has arrived beside the target, which is not free itself: no free place is nearer.
+        /// Arrived beside the target, which is not free itself: no free place is nearer.
         AtTarget = 2,
         /// The robot stands in a hazard cell: (ex, ey) leads to the nearest free one.
         WayOut = 3,
-        /// The belief isolates the robot from the target; (ex, ey), unless 0, is where to look meanwhile.
+        /// The belief cuts the robot off from the target; (ex, ey), unless 0, says where to look meanwhile.
         Unreachable = 4,
-        /// Nobody has looked where the way leads: turn on the spot until the robot faces (ex, ey).
+        /// Nobody has looked where the way leads: turn on the spot to face (ex, ey).
         Look = 5,
     }
 }
 
-/// A place where a robot is sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ZeroCopySend)]
 #[type_name("firsthand.TargetPoint")]
 #[repr(C)]
 pub struct TargetPoint {
     /// X_T, metres in the mission frame.
     pub x_m: f64,
-    /// X_T, metres in the mission frame.
     pub y_m: f64,
-    /// The heading to turn to there, radians counter-clockwise from x.
+    /// Radians counter-clockwise from x.
     pub heading_rad: f64,
-    /// 1: the robot has arrived when it also faces `heading_rad`. 0: any heading will do.
+    /// 1: an arrival needs `heading_rad` too.
     pub has_heading: u8,
 }
 
 impl TargetPoint {
-    /// A place, at any heading.
     pub fn at(place: DVec2) -> Self {
         Self { x_m: place.x, y_m: place.y, ..Self::default() }
     }
@@ -216,7 +196,6 @@ impl TargetPoint {
         DVec2::new(self.x_m, self.y_m)
     }
 
-    /// The heading to turn to there, radians.
     pub fn heading(&self) -> Option<f64> {
         (self.has_heading == 1).then_some(self.heading_rad)
     }
@@ -235,27 +214,23 @@ impl From<Waypoint> for TargetPoint {
 }
 
 payloads! {
-    /// Topic `target`: where the robot is sent.
     "firsthand.Target" TargetSample {
-        /// The number of this target in the run, from 1. A target that replaces another has a number of its own.
+        /// Counted from 1 in the run. A target that replaces another has a number of its own.
         number: u64,
-        /// The number of the last target of the list.
         last: u64,
-        /// The first tick in which it holds. A stage that knows no other target takes it at once.
+        /// The first tick in which it holds. A stage without another target takes it at once.
         since_tick: u64,
         target: TargetPoint,
-        /// The targets after this one. The first `last - number` count.
+        /// The targets after this one; the first `last - number` count.
         ahead: [TargetPoint; MOST_TARGETS],
     }
 }
 
 impl TargetSample {
-    /// The first target of `mission`.
     pub fn first(mission: &Mission) -> Self {
         Self { number: 1, last: 1, target: TargetPoint::at(mission.target), ..Self::default() }
     }
 
-    /// The targets after this one.
     pub fn ahead(&self) -> &[TargetPoint] {
         let count = usize::try_from(self.last.saturating_sub(self.number)).unwrap_or(MOST_TARGETS);
         &self.ahead[..count.min(MOST_TARGETS)]
@@ -263,44 +238,36 @@ impl TargetSample {
 }
 
 payloads! {
-    /// Topic `guidance`: E of (11) at the robot's pose.
+    /// E of (11) at the robot's pose.
     "firsthand.Guidance" GuidanceSample {
-        /// Ex: unit vector, 0 where there is none.
+        /// (ex, ey): unit vector, 0 where there is none.
         ex: f64,
-        /// Ey.
         ey: f64,
         /// dst of (14): straight to the target, metres.
         distance_m: f64,
-        /// The most tangential speed that the map of the way ahead allows, m/s; infinite for no limit.
+        /// The most tangential speed by the map of the way ahead, m/s; infinite for no limit.
         speed_limit_m_s: f64,
         /// A [`GuidanceStatus`].
         status: u8,
-        /// Mission time of the pose it was computed for, nanoseconds.
+        /// Mission time of the pose, nanoseconds.
         pose_ns: u64,
-        /// X of that pose, metres in the mission frame.
+        /// The pose: metres in the mission frame, radians counter-clockwise from x, not wrapped.
         x_m: f64,
-        /// Y of that pose, metres in the mission frame.
         y_m: f64,
-        /// Heading of that pose, radians counter-clockwise from x; not wrapped.
         heading_rad: f64,
-        /// The version of `grid` it was computed from.
+        /// The version of `grid`; its safety events and epoch follow.
         grid_version: u64,
-        /// Safety events of that version.
         safety_events: u64,
-        /// Belief epoch of that version.
         epoch: u64,
-        /// Full solves in this generation of the planner.
         full_solves: u64,
-        /// Wall-clock of the last full solve, nanoseconds.
         full_solve_ns: u64,
-        /// The number of the target that it leads to; 0 for none.
+        /// 0 for none.
         target_number: u64,
         target: TargetPoint,
     }
 }
 
 impl GuidanceSample {
-    /// No direction yet, for the pose `pose` by the belief `belief`; `target` is where the robot is sent.
     pub fn for_pose(pose: &PoseSample, belief: &GridHeader, target: &TargetSample) -> Self {
         Self {
             target_number: target.number,
@@ -316,48 +283,41 @@ impl GuidanceSample {
         }
     }
 
-    /// The pose it was computed for.
     pub const fn pose(&self) -> Pose2 {
         Pose2 { position: DVec2::new(self.x_m, self.y_m), heading: self.heading_rad }
     }
 }
 
 payloads! {
-    /// Topic `field`, header; the slice is one [`FieldCell`] a cell of the window.
+    /// The slice is one [`FieldCell`] a cell of the window.
     "firsthand.FieldHeader" FieldHeader {
         part: Part,
-        /// The version of `grid` it was computed from.
+        /// The version of `grid`.
         grid_version: u64,
-        /// X_T, metres.
         target_x_m: f64,
-        /// X_T, metres.
         target_y_m: f64,
-        /// Verification: the worst componentwise relative residual of the last full solve.
+        /// The worst componentwise relative residual of the last full solve, a verification.
         worst_residual: f64,
-        /// Verification: free cells from which the target can be reached.
+        /// Free cells that can reach the target, a verification.
         reachable: u64,
     }
 }
 
-/// The policy at one cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.FieldCell")]
 #[repr(C)]
 pub struct FieldCell {
-    /// Ex at the cell's centre: unit vector, 0 where there is no guidance.
+    /// (ex, ey) at the cell's centre: unit vector, 0 where there is no guidance.
     pub ex: f32,
-    /// Ey.
     pub ey: f32,
     /// log2 u; -inf on hazards and where the target cannot be reached.
     pub log2_u: f32,
 }
 
 wire_enum! {
-    /// The reason for a command.
     CommandState, unknown = Halt {
         /// No guidance to follow: stand.
         Halt = 0,
-        /// Following the guidance.
         Driving = 1,
         /// The target is reached: stand until there is another.
         Arrived = 2,
@@ -365,7 +325,7 @@ wire_enum! {
 }
 
 payloads! {
-    /// Topic `command`: U of (17).
+    /// U of (17).
     "firsthand.Command" CommandSample {
         /// omega_L, rad/s; omega_h of a car's driven wheel.
         left_rad_s: f64,
@@ -377,12 +337,12 @@ payloads! {
         omega_rad_s: f64,
         /// dst of (14), metres.
         distance_m: f64,
-        /// Mission time of the oldest pose it was computed from, the guidance's among them, nanoseconds. The link lets no old
-        /// command move the robot, whatever its stamp says.
+        /// Mission time of the oldest pose behind it, the guidance's among them, nanoseconds. The link refuses an old one, whatever the
+        /// stamp says.
         pose_ns: u64,
-        /// Mission time of the guidance it follows, nanoseconds. The link checks its age, too.
+        /// Mission time of the guidance, nanoseconds; the link checks its age too.
         guidance_ns: u64,
-        /// The number of the target that it leads to, or that is reached.
+        /// The target that it leads to, or that is reached.
         target_number: u64,
         /// A [`CommandState`].
         state: u8,

@@ -6,21 +6,17 @@ use super::navigation::{MOST_TARGETS, TargetPoint};
 use crate::bus::{ZeroCopySend, layouts};
 
 wire_enum! {
-    /// The state of a stage's process.
     HealthState, unknown = Starting {
         /// Opening its topics, or waiting for what it cannot work without.
         Starting = 0,
-        /// Working, or ready to.
         Ready = 1,
-        /// Stopping, on request or for a reason of its own.
         Stopping = 2,
     }
 }
 
-/// A short name in shared memory: UTF-8, padded with zeros.
 pub type Name = [u8; 24];
 
-/// `text` as a [`Name`], cut at 24 bytes.
+/// `text` as UTF-8, cut at 24 bytes and padded with zeros.
 pub fn name(text: &str) -> Name {
     let mut name = [0; 24];
     for (slot, byte) in name.iter_mut().zip(text.bytes()) {
@@ -36,18 +32,15 @@ pub fn name_str(name: &Name) -> &str {
 }
 
 payloads! {
-    /// Topic `health`: the heartbeat of every stage, published from inside its work loop.
     "firsthand.Health" HealthSample {
         stage: Name,
-        /// The process of the stage.
         pid: u32,
         /// A [`HealthState`].
         state: u8,
-        /// Iterations of the work loop.
         turns: u64,
         /// The newest fault request to this generation; 0 for none.
         last_fault: u64,
-        /// The answer to that request: a [`FaultAnswer`].
+        /// A [`FaultAnswer`].
         fault_answer: u8,
     }
 }
@@ -57,54 +50,47 @@ wire_enum! {
     Order, unknown = Stop {
         /// Stand still; do not start ticks.
         Hold = 0,
-        /// Go to the target.
         Drive = 1,
-        /// Stand still for good: the mission ends.
+        /// Stand still; the mission ends.
         Stop = 2,
     }
 }
 
 payloads! {
-    /// Topic `directive`: the supervisor's order to all stages.
     "firsthand.Directive" DirectiveSample {
-        /// The belief's epoch: a mapper that holds a lower one resets the sensed belief.
+        /// The belief's epoch: a mapper with a lower one resets the sensed belief.
         epoch: u64,
         /// An [`Order`].
         order: u8,
-        /// Why the robot is not to drive: a [`HoldReason`].
+        /// A [`HoldReason`].
         reason: u8,
     }
 }
 
 payloads! {
-    /// Topic `tick_limit`: in lockstep, how far the link may go ahead of the supervisor, so that a recovery step against a stall
-    /// holds from a tick that does not depend on the machine.
+    /// The link may go so far ahead of the supervisor in lockstep, so that a recovery step against a stall begins at a tick that no
+    /// machine's speed changes.
     "firsthand.TickLimit" TickLimitSample {
-        /// The last tick that the link may begin.
         last_tick: u64,
-        /// The first tick in which the newest recovery step holds; 0 for none.
+        /// The first tick of the newest recovery step; 0 for none.
         holds_from_tick: u64,
         /// The belief's epoch from that tick on.
         epoch: u64,
-        /// The number of the current target: no tick follows an arrival before the next target is published.
+        /// The current target: no tick follows an arrival before the next target is published.
         target_number: u64,
     }
 }
 
 wire_enum! {
-    /// The state of a stage, as the supervisor sees it.
     StageState, unknown = Down {
-        /// No process; one will be started.
         Down = 0,
-        /// Started, not ready yet.
         Starting = 1,
-        /// The stage sends heartbeats.
         Running = 2,
-        /// The stage died too often, and waits before the next start.
+        /// It died too often, and waits before the next start.
         BackingOff = 3,
-        /// The process was asked to stop, or aborted because it hung.
+        /// It was asked to stop, or aborted because it hung.
         Stopping = 4,
-        /// The stage died far too often: only an operator starts it again.
+        /// It died far too often: only an operator starts it again.
         Held = 5,
     }
 }
@@ -112,88 +98,75 @@ wire_enum! {
 wire_enum! {
     /// Why the robot is not ordered to drive.
     HoldReason, unknown = Starting {
-        /// Not all stages are ready, or the robot does not answer, or there is no field yet.
+        /// A stage is not ready, the robot does not answer, or there is no field yet.
         Starting = 0,
-        /// The robot may drive.
         None = 1,
-        /// An operator said stop, and has not said resume.
+        /// It lasts until the operator says resume.
         Operator = 2,
-        /// A stage is held.
         StageHeld = 3,
-        /// The mission ends.
         Ending = 4,
     }
 }
 
 payloads! {
-    /// Topic `roster`, header; the slice is one [`RosterEntry`] a stage.
+    /// The slice is one [`RosterEntry`] a stage.
     "firsthand.RosterHeader" RosterHeader {
-        /// The supervisor's process.
         supervisor_pid: u32,
         /// The current [`Order`].
         order: u8,
         /// A [`HoldReason`].
         reason: u8,
-        /// 1: the robot is a simulated one.
         simulated: u8,
-        /// The request that was answered last; 0 for none.
+        /// The newest answered request; 0 for none.
         last_request: u64,
-        /// The answer to that request: a [`RequestAnswer`].
+        /// A [`RequestAnswer`].
         answer: u8,
     }
 }
 
-/// One stage, as the supervisor sees it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.RosterEntry")]
 #[repr(C)]
 pub struct RosterEntry {
     pub stage: Name,
-    /// The process of the stage; 0 for none.
+    /// 0 for none.
     pub pid: u32,
-    /// The generation.
     pub generation: u32,
     /// A [`StageState`].
     pub state: u8,
-    /// Times the stage was started again.
     pub restarts: u32,
-    /// Age of its process, nanoseconds.
     pub uptime_ns: u64,
-    /// Age of its last heartbeat, nanoseconds; u64::MAX for none yet.
+    /// Age of its last heartbeat; u64::MAX for none yet.
     pub beat_age_ns: u64,
-    /// Age of its last output on any topic, nanoseconds; u64::MAX for none yet.
+    /// Age of its last output on any topic; u64::MAX for none yet.
     pub output_age_ns: u64,
 }
 
 wire_enum! {
-    /// How a stage's process ended.
     DeathCause, unknown = Exited {
-        /// The process ended by itself; `code` is its exit code.
+        /// `code` is the exit code.
         Exited = 0,
-        /// A signal ended the process; `code` is the signal's number.
+        /// `code` is the signal's number.
         Signalled = 1,
-        /// A signal ended the process, which left a core; `code` is the signal's number.
+        /// A core was dumped; `code` is the signal's number.
         SignalledWithCore = 2,
-        /// The cause is not known, because the process was not the supervisor's child.
+        /// The process was not the supervisor's child.
         Unknown = 3,
     }
 }
 
 wire_enum! {
-    /// The supervisor's action after a death.
     NextStep, unknown = Nothing {
-        /// Nothing: the run ends.
+        /// The run ends.
         Nothing = 0,
-        /// A successor is started at once.
         StartNow = 1,
-        /// A successor is started after `next_after_ns`.
         StartLater = 2,
-        /// The stage died too often: only an operator starts it again.
+        /// Only an operator starts it again.
         Hold = 3,
     }
 }
 
-/// Text in shared memory: UTF-8, filled up with zeros.
+/// Text in shared memory: UTF-8, padded with zeros.
 #[derive(Clone, Copy, PartialEq, Eq, ZeroCopySend)]
 #[type_name("firsthand.Words")]
 #[repr(C)]
@@ -231,42 +204,34 @@ impl Words {
 }
 
 payloads! {
-    /// Topic `deaths`: a stage's process ended.
     "firsthand.Death" DeathSample {
         stage: Name,
-        /// The process of the stage.
         pid: u32,
-        /// The generation.
         generation: u32,
-        /// Age of its last heartbeat, nanoseconds; u64::MAX if it never beat.
+        /// Age of its last heartbeat; u64::MAX for none.
         beat_age_ns: u64,
-        /// Age of its process, nanoseconds.
         uptime_ns: u64,
-        /// Pause before its successor, nanoseconds.
+        /// Pause before its successor.
         next_after_ns: u64,
-        /// Exit code or signal number.
         code: i32,
-        /// Deaths of this stage within the last ten seconds, this one among them.
+        /// Counted over the last ten seconds, this one included.
         deaths_in_window: u32,
         /// A [`DeathCause`].
         cause: u8,
         /// A [`NextStep`].
         next: u8,
-        /// 1: the process hung, or was never ready, and the supervisor ended it.
+        /// 1: the supervisor ended it, because it hung or was never ready.
         hung: u8,
-        /// The end of its log.
         log_tail: Words,
     }
 }
 
 wire_enum! {
-    /// A measure against a stall.
     #[derive(Serialize)]
     #[serde(rename_all = "snake_case")]
     RecoveryStep, unknown = GiveUp {
-        /// A new generation of the planner, which solves the full field.
+        /// A new generation of the planner solves the full field.
         Replan = 0,
-        /// The sensed map is reset.
         Reset = 1,
         /// The mission ends: the target is unreachable.
         GiveUp = 2,
@@ -274,54 +239,49 @@ wire_enum! {
 }
 
 wire_enum! {
-    /// Why a robot that should get on does not.
     #[derive(Serialize)]
     #[serde(rename_all = "snake_case")]
     StallCause, unknown = Still {
-        /// The robot neither drives nor turns.
+        /// It neither drives nor turns.
         Still = 0,
-        /// The robot moves, but does not leave its place.
+        /// It moves, but does not leave its place.
         Pinned = 1,
-        /// The robot is in hazard, u = 0, and drives without coming out.
+        /// The robot drives in hazard, u = 0, and does not come out.
         InsideHazard = 2,
-        /// The robot is where the belief has no way to the target, u = 0.
+        /// The belief has no way to the target, u = 0.
         CutOff = 3,
-        /// Something holds the robot's wheels.
         Held = 4,
-        /// The robot drives far and comes no nearer to its target.
+        /// It drives far and comes no nearer to its target.
         Wandering = 5,
-        /// Fixes that agree say that the robot is elsewhere.
+        /// Fixes that agree say that it is elsewhere.
         Relocated = 6,
     }
 }
 
 payloads! {
-    /// Topic `stalls`: the robot should get on and does not. Serialized it is a line of `stalls.jsonl`.
+    /// It is serialized as a line of `stalls.jsonl`.
     "firsthand.Stall" StallSample {
-        /// Where the robot believes it is, metres.
+        /// The believed place, metres.
         x_m: f64,
-        /// Where the robot believes it is, metres.
         y_m: f64,
-        /// The belief's epoch from now on.
+        /// It holds from now on.
         epoch: u64,
-        /// Generations of the planner started for a stall so far in this mission, this one among them.
+        /// Planner generations for a stall in this mission, this one included.
         replans: u32,
-        /// Resets of the sensed map so far in this mission, this one among them.
+        /// Resets of the sensed map in this mission, this one included.
         resets: u64,
         /// A [`StallCause`].
         cause: u8,
-        /// The measure against the stall: a [`RecoveryStep`].
+        /// A [`RecoveryStep`].
         recovery: u8,
     }
 }
 
 impl StallSample {
-    /// The cause of the stall.
     pub const fn cause(&self) -> StallCause {
         StallCause::from_byte(self.cause)
     }
 
-    /// The measure against the stall.
     pub const fn recovery(&self) -> RecoveryStep {
         RecoveryStep::from_byte(self.recovery)
     }
@@ -344,19 +304,15 @@ impl Serialize for StallSample {
 }
 
 wire_enum! {
-    /// A request of an operator to the supervisor.
     RequestKind, unknown = Nothing {
-        /// Nothing.
         Nothing = 0,
-        /// A new generation of a stage; one that is held is released.
+        /// A new generation of a stage; a held one is released.
         Restart = 1,
-        /// The robot is to stand.
         Stop = 2,
-        /// The robot is to go on.
         Resume = 3,
-        /// The robot is to go to these targets, and no longer to those that it has.
+        /// The targets replace those that the robot has.
         Goto = 4,
-        /// The robot is to go to these targets after those that it has.
+        /// The targets follow those that the robot has.
         Append = 5,
     }
 }
@@ -364,48 +320,36 @@ wire_enum! {
 wire_enum! {
     /// The supervisor's answer to a request. Each text completes "the supervisor refuses: ".
     RequestAnswer, unknown = Unknown, text = text {
-        /// The request is carried out.
         Taken = 0 "it is not refused",
-        /// No such request.
         Unknown = 1 "it knows no such request; are both of the same version?",
-        /// The mission does not run.
         NotRunning = 2 "the mission has not begun, or ends; wait until `firsthand status` says driving",
-        /// An operator stopped the robot.
         Stopped = 3 "an operator stopped the robot; `firsthand resume` first",
-        /// No list of targets.
         Malformed = 4 "a target is no place; give 1 to 16 places of finite numbers, metres",
-        /// Too many targets.
         TooMany = 5 "a list has at most 16 targets; wait until some are reached",
-        /// A target is not inside the perimeter.
         Outside = 6 "a target is outside the perimeter, or on its rim; name a place inside",
-        /// A target is in a believed hazard.
         InHazard = 7 "a target is in a believed hazard; name a free place (`firsthand top` shows them)",
-        /// A car does not turn on the spot.
         NoHeading = 8 "a car does not turn on the spot, so its targets have no heading; leave it out",
-        /// The planner goes where it calibrates.
         FixedTarget = 9 "a calibration drives where it must; wait until it ends",
     }
 }
 
 payloads! {
-    /// Topic `requests`: an operator's requests to the supervisor.
     "firsthand.Request" RequestSample {
-        /// Identifies the request: the roster's `last_request` says that it was taken. Never 0.
+        /// The roster's `last_request` names it when it is answered. Never 0.
         id: u64,
-        /// When the operator asked, nanoseconds of the machine's monotonic clock.
+        /// The machine's monotonic clock.
         asked_ns: u64,
-        /// The stage that the request is about; empty for none.
+        /// Empty for none.
         stage: Name,
         /// A [`RequestKind`].
         kind: u8,
-        /// The number of targets in `targets`.
         target_count: u8,
         targets: [TargetPoint; MOST_TARGETS],
     }
 }
 
 impl RequestSample {
-    /// The targets; none if their number cannot be.
+    /// The targets; none if there are none, or more than fit.
     pub fn targets(&self) -> Option<&[TargetPoint]> {
         self.targets.get(..usize::from(self.target_count)).filter(|targets| !targets.is_empty())
     }
@@ -415,15 +359,13 @@ wire_enum! {
     /// A fault that can be injected into a running stage; [`crate::faults::TABLE`] says where and how.
     #[derive(Serialize, Deserialize)]
     FaultKind, unknown = Nothing {
-        /// Nothing.
         Nothing = 0,
-        /// An iteration of the work loop that does not end.
+        /// An iteration of the work loop does not end.
         Spin = 1,
-        /// A current field whose ways all lead to where the robot is.
+        /// A current field whose ways all lead to the robot.
         CorruptField = 2,
         /// No direction, as where the gradient is zero.
         Saddle = 3,
-        /// Hazard believed wherever the robot is.
         HazardAroundRobot = 4,
         /// A closed wall believed around the target, also after a reset.
         CutOff = 5,
@@ -433,36 +375,30 @@ wire_enum! {
 }
 
 wire_enum! {
-    /// A stage's answer to a fault request.
     FaultAnswer, unknown = Refused {
-        /// No fault was requested.
         None = 0,
-        /// The fault is injected.
         Taken = 1,
-        /// Not done: the robot is a real one, and the request does not say `although_real`.
+        /// The robot is real, and the request does not say `although_real`.
         Refused = 2,
-        /// Not done: the stage has no such fault, or nothing yet to break.
+        /// The stage has no such fault, or nothing yet to break.
         Impossible = 3,
     }
 }
 
 payloads! {
-    /// Topic `faults`: requests to inject a fault into a stage.
     "firsthand.Fault" FaultSample {
-        /// Identifies the request: the stage's `last_fault` in `health` says that it was answered. Never 0.
+        /// The stage's `last_fault` in `health` names it when it is answered. Never 0.
         id: u64,
-        /// The stage that the request is for.
         stage: Name,
         /// A [`FaultKind`].
         kind: u8,
-        /// 1: the fault is to be injected although the robot is a real one.
+        /// 1: inject the fault into a real robot too.
         although_real: u8,
     }
 }
 
 payloads! {
-    /// Topic `inputs`, header; the slice is a piece of the entries that [`crate::inputs`] describes. Pieces of a generation follow
-    /// each other by their sequence.
+    /// The slice is a piece of the entries of [`crate::inputs`]. A generation's pieces follow by sequence.
     "firsthand.InputsHeader" InputsHeader {
         stage: Name,
     }

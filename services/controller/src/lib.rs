@@ -1,6 +1,4 @@
-//! The velocity synchroniser: guidance to wheel speeds, equations (14)-(17).
-//!
-//! [`step`] has the controller, pure: one `guidance` sample to one `command`.
+//! The velocity synchroniser: guidance to wheel speeds, equations (14)-(17). [`step`] is the pure controller.
 
 pub mod step;
 

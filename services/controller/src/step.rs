@@ -12,56 +12,50 @@ use common::{
 };
 use glam::DVec2;
 
-/// Least turn rate on the spot, rad/s: below it the wheels stick.
+/// The wheels stick below it.
 const LEAST_TURN_RAD_S: f64 = 0.25;
-/// Turn rate on the spot per angle that is left, 1/s.
+/// Turn rate on the spot per remaining angle, 1/s.
 const TURN_GAIN: f64 = 3.0;
 
-/// A robot farther than this from its target has not arrived beside it, whatever the planner says, metres.
+/// Farther away a robot has not arrived beside its target, whatever the planner says, metres.
 const MOST_OFF_TARGET_M: f64 = 0.5;
 
-/// A robot that is to face a heading faces it within this angle.
 const FACES_WITHIN_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
 
-/// The alignment of the robot with the guidance: (14), with the heading in place of the measured velocity. The velocity has no
-/// direction at rest, where every mission starts.
+/// (14), with the heading in place of the measured velocity, which has no direction at rest, where every mission starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Alignment {
     /// eta_d: cosine of the angle to the guidance.
     pub cosine: f64,
-    /// eta_c: sine of that angle, positive when the guidance lies to the left. The printed sign turns away.
+    /// eta_c: its sine, positive when the guidance lies to the left. The printed sign turns away.
     pub sine: f64,
 }
 
 impl Alignment {
-    /// (14) for a robot facing `axis` under the unit vector `guidance`.
     pub fn of(axis: DVec2, guidance: DVec2) -> Self {
         Self { cosine: axis.dot(guidance), sine: axis.perp_dot(guidance) }
     }
 }
 
-/// The speed as a function of the alignment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum SpeedLaw {
-    /// The paper's (16): the robot drives while it turns.
+    /// (16): the robot drives while it turns.
     Paper,
-    /// The evidential method's: the robot turns on the spot until it faces its way, then drives no faster than guidance allows.
+    /// The robot turns on the spot until it faces its way, then drives no faster than guidance allows.
     Evidential,
-    /// A car's, by either method: the paper's, no faster than guidance allows. A car does not turn on the spot.
+    /// The paper's law by either method, no faster than guidance allows: a car does not turn on the spot.
     Car,
 }
 
-/// How far the robot has come to its target.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Arrival {
     #[default]
     OnTheWay,
-    /// The robot is there, and turns to the heading that is asked for.
+    /// The robot is there, and turns to the wanted heading.
     Turning,
     Arrived,
 }
 
-/// The controller of (15)-(17).
 #[derive(Clone, Debug)]
 pub struct Controller {
     drive: Drive,
@@ -69,18 +63,16 @@ pub struct Controller {
     speed: f64,
     turn: f64,
     look: f64,
-    /// Cosines of the angles to the guidance within which the evidential method drives at full speed, and beyond which it turns on the
-    /// spot.
+    /// Cosines of the angles within which the evidential method drives at full speed, and beyond which it turns on the spot.
     full_speed: f64,
     turns: f64,
     slow_radius: f64,
     dead_zone: f64,
-    /// Whether alignment slows the robot by the paper's law.
     modulated: bool,
     law: SpeedLaw,
-    /// The direction in which an antipodal robot turns: 1 to the left, -1 to the right.
+    /// The turn of an antipodal robot: 1 left, -1 right.
     side: f64,
-    /// The number of the newest target, and how far the robot has come to it.
+    /// The newest target's number, and the progress to it.
     arrival: (u64, Arrival),
 }
 
@@ -146,7 +138,7 @@ impl Step for Controller {
                     (GuidanceStatus::from_byte(guidance.status), direction)
                 }
             };
-        // Samples may hold anything, so only a unit vector is followed.
+        // Samples may hold anything: only a unit vector is followed.
         let unit = (direction.length() - 1.0).abs() < 1e-3;
         let is_sent = guidance.target_number != 0;
         let sane = is_sent && unit && distance.is_finite() && pose.heading.is_finite();
@@ -194,7 +186,7 @@ impl Controller {
         *arrival
     }
 
-    /// The motion under guidance of that status; none to stand.
+    /// None to stand.
     fn motion(
         &mut self,
         status: GuidanceStatus,
@@ -206,7 +198,7 @@ impl Controller {
             |controller: &mut Self| Twist { v: 0.0, omega: controller.turn_to(alignment) };
         match (status, self.law) {
             (_, SpeedLaw::Car) => self.car_motion(status, alignment, distance, limit),
-            // The paper's method gives no direction where the target is unreachable.
+            // The paper's method gives no direction to an unreachable target.
             (GuidanceStatus::Look, _) | (GuidanceStatus::Unreachable, SpeedLaw::Evidential) => {
                 Some(on_the_spot(self))
             }
@@ -218,7 +210,7 @@ impl Controller {
             (GuidanceStatus::Along | GuidanceStatus::WayOut, SpeedLaw::Evidential) => {
                 let v = self.cautious(alignment, distance, limit);
                 if v == 0.0 {
-                    // A robot that may go nowhere only turns. Where it must get out, the planner's limit is above 0.
+                    // A robot without a limit above 0 only turns; the planner allows speed where it must get out.
                     let faces = alignment.cosine > FACES_COSINE;
                     return (!faces).then(|| on_the_spot(self));
                 }
@@ -229,7 +221,7 @@ impl Controller {
         }
     }
 
-    /// The turn rate wc of (15). Near the exact antipode the side does not change, because noise would change the sign often.
+    /// wc of (15). Near the antipode the side stays, because noise would change the sign often.
     fn angular(&mut self, alignment: Alignment) -> f64 {
         let Alignment { cosine, sine } = alignment;
         if cosine > 0.0 {
@@ -241,7 +233,7 @@ impl Controller {
         self.turn * self.side
     }
 
-    /// The evidential method's wc on the spot: the robot turns to the guidance and no farther, and never so slowly that the wheels stick.
+    /// The evidential wc on the spot: to the guidance and no farther, and never so slowly that the wheels stick.
     fn turn_to(&mut self, alignment: Alignment) -> f64 {
         let angle = alignment.sine.atan2(alignment.cosine).abs();
         let side = self.angular(alignment).signum();
@@ -249,14 +241,13 @@ impl Controller {
         side * (TURN_GAIN * angle).clamp(least, self.look)
     }
 
-    /// The evidential method's vc: none before the robot nearly faces the guidance, never more than `limit`, and never so little that the
-    /// wheels stick.
+    /// The evidential vc: none before the robot nearly faces the guidance, at most `limit`, and never so little that the wheels stick.
     fn cautious(&self, alignment: Alignment, distance: f64, limit: f64) -> f64 {
         let sharp = ((alignment.cosine - self.turns) / (self.full_speed - self.turns)).min(1.0);
         let slow = (distance / self.slow_radius).min(1.0);
         let wanted = self.speed * sharp.max(0.0) * slow;
         let least = LEAST_SPEED_M_S.min(self.speed);
-        // This form makes a limit that is no number stand.
+        // A limit that is no number means stand.
         if sharp <= 0.0 {
             0.0
         } else if limit >= least {
@@ -266,7 +257,7 @@ impl Controller {
         }
     }
 
-    /// (16): vc. Slowing down for the target multiplies the speed that alignment allows; as a case of its own, as printed, it would
+    /// vc of (16). The slowdown for the target multiplies the speed that alignment allows; as a case of its own, as printed, it would
     /// override that speed.
     fn tangential(&self, alignment: Alignment, omega: f64, distance: f64) -> f64 {
         let aligned = if !self.modulated {

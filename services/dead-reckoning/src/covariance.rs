@@ -1,10 +1,10 @@
 //! The covariance of the pose's error, propagated with the motion to first order.
 //!
-//! The error has seven parts: x, y, theta, three errors of the robot that stay the same for a mission, of the ratio of
-//! the wheels' diameters, of the track and of the mean diameter (J. Borenstein, L. Feng, IEEE Trans. Robotics and Automation
-//! 12(6), 1996), and the bias of a gyro. Each wheel slips besides, independently, by a variance that grows with the way it rolls
-//! (K. S. Chong, L. Kleeman, "Accurate odometry and error modelling for a mobile robot", ICRA 1997). A car has the driven wheel's
-//! slip and, nominally, the same share of its curvature in place of the ratio of the wheels.
+//! The error has seven parts: x, y, theta; three constant errors of a mission, of the ratio of the wheels' diameters, of the track and
+//! of the mean diameter (J. Borenstein, L. Feng, IEEE Trans. Robotics and Automation 12(6), 1996); and a gyro's bias. Each wheel also
+//! slips independently, by a variance that grows with its way (K. S. Chong, L. Kleeman, "Accurate odometry and error modelling for a
+//! mobile robot", ICRA 1997). A car has the driven wheel's slip and, nominally, the same share of its curvature in place of the wheels'
+//! ratio.
 
 use common::{
     kinematics::{Pose2, Twist},
@@ -13,36 +13,32 @@ use common::{
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
-/// The parts of the error: x, y, theta, ratio of the diameters, track, distance, bias of a gyro; m, rad, shares, rad/s.
+/// x, y, theta, ratio of the diameters, track, distance, bias of a gyro; m, rad, shares, rad/s.
 pub(crate) const PARTS: usize = 7;
-/// The index of the bias.
 pub(crate) const BIAS: usize = 6;
 
 pub(crate) type Error = SVector<f64, PARTS>;
 type Matrix = SMatrix<f64, PARTS, PARTS>;
 
-/// Covariance of the error.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Covariance(pub(crate) Matrix);
 
-/// Standard deviation of a gyro's bias before it is learned at rest, rad/s: 0.1 degrees a second. A source that is off by more removes
-/// it itself. With a greater one a robot that never rests takes unequal wheels for bias.
+/// Standard deviation of a gyro's bias before it is learned at rest, rad/s: 0.1 degrees a second. A worse source removes its bias
+/// itself. With a greater value a robot that never rests takes unequal wheels for bias.
 const BIAS_RAD_S: f64 = 0.002;
 /// Growth of the bias's deviation, rad/s per square root of a second.
 const BIAS_WALK: f64 = 2e-5;
 
-/// The errors that the motions of a robot add to the covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ErrorModel {
-    /// Variance of a wheel's slip, m^2 per metre rolled.
+    /// Variance, m^2 per metre rolled.
     slip: f64,
-    /// Variances of the three systematic errors.
     systematic: [f64; 3],
     track_m: f64,
     steers: bool,
 }
 
-/// The effect of a motion on the error: the factor of the error before, and the covariance that the motion adds.
+/// The factor of the error before a motion, and the covariance that it adds.
 pub(crate) struct Transition {
     pub(crate) carried: Matrix,
     pub(crate) noise: Matrix,
@@ -62,7 +58,7 @@ impl ErrorModel {
         }
     }
 
-    /// The covariance at the start, where the pose is exact because it defines the mission frame.
+    /// The start defines the mission frame, so its pose is exact.
     pub(crate) fn start(&self) -> Covariance {
         let [ratio, track, distance] = self.systematic;
         Covariance(Matrix::from_diagonal(&Error::from([
@@ -76,8 +72,7 @@ impl ErrorModel {
         ])))
     }
 
-    /// The arc and turn of wheels that are off by `shares` (of ratio, track and distance), where `by_counts` are the arc and turn of
-    /// wheels as they are known.
+    /// The arc and turn of wheels off by `shares` (ratio, track, distance), from those of nominal wheels.
     pub(crate) fn corrected(&self, by_counts: Twist, shares: [f64; 3]) -> Twist {
         let [ratio, track, distance] = shares;
         let (v, omega) = (by_counts.v * (1.0 + distance), by_counts.omega * (1.0 + distance));
@@ -90,11 +85,11 @@ impl ErrorModel {
         }
     }
 
-    /// The effect of the arc `moved.v` and the turn `moved.omega`, metres and radians, that were integrated from `pose` in `seconds`.
+    /// The effect of an arc and a turn, metres and radians, integrated from `pose` in `seconds`.
     pub(crate) fn transition(&self, pose: Pose2, moved: Twist, seconds: f64) -> Transition {
         let Twist { v: arc, omega: turn } = moved;
         let axis = Pose2 { heading: pose.heading + turn / 2.0, ..pose }.axis();
-        // The error of the pose by an error of arc and turn; that of the turn acts half way through the arc.
+        // The pose's error by one of arc and turn; the turn's acts half way through the arc.
         let effect = |arc_error: f64, turn_error: f64| {
             let aside = 0.5 * arc * turn_error;
             Error::from([
@@ -116,7 +111,7 @@ impl ErrorModel {
             let slips = [along * (self.slip * arc.abs()).sqrt(), Error::zeros()];
             (effect(0.0, turn), Error::zeros(), slips)
         } else {
-            // Each wheel rolls the arc, more or less half the track times the turn.
+            // Each wheel rolls the arc, plus or minus half the track times the turn.
             let [left, right] = [arc - turn * half_track, arc + turn * half_track];
             let slip = |rolled: f64| (self.slip * rolled.abs()).sqrt();
             let slips = [
@@ -134,10 +129,10 @@ impl ErrorModel {
         Transition { carried, noise }
     }
 
-    /// The covariance that is added by a motion that nobody measured: each wheel rolled any way up to `farthest` metres, forward or
-    /// back. The robot may have gone as far aside as ahead, because it may have turned first.
+    /// The covariance of a motion that nobody measured: each wheel rolled up to `farthest` metres either way. The robot may have turned
+    /// first, so aside counts like ahead.
     pub(crate) fn lost(&self, farthest: f64) -> Matrix {
-        // Each way is evenly distributed. A car turns less than two wheels that roll freely, so this holds for a car too.
+        // Evenly distributed. It holds for a car, which turns less than free wheels.
         let wheel = farthest * farthest / 3.0;
         let place = wheel / 2.0;
         let heading = 2.0 * wheel / (self.track_m * self.track_m);
@@ -146,7 +141,7 @@ impl ErrorModel {
 }
 
 impl Covariance {
-    /// The entries of x, y and theta: xx, xy, x theta, yy, y theta, theta theta; m^2, m rad, rad^2.
+    /// xx, xy, x theta, yy, y theta, theta theta; m^2, m rad, rad^2.
     pub(crate) fn of_pose(&self) -> [f64; 6] {
         [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|entry| self.0[entry])
     }

@@ -1,8 +1,7 @@
-//! The error-state filter: the pose, the errors of the wheels and a gyro's bias, by the wheels, by fixes and by a gyro.
+//! The error-state filter of the pose, the wheels' errors and a gyro's bias, by wheels, fixes and gyro.
 //!
-//! [`Filter`] is the estimate at one tick. [`History`] has the estimate of 2 s ago and the ticks and fixes since then. A fix of an
-//! earlier time is taken at that time, and the present estimate is computed again from the old one. So the result is the same as
-//! if the fix had come at once, and a tick costs no more than those 2 s.
+//! [`Filter`] is the estimate at one tick. [`History`] has the estimate of 2 s ago and the ticks and fixes since. A late fix is taken at
+//! its own time and the present estimate computed again, as if it had come at once; a tick costs no more than those 2 s.
 
 use std::{collections::VecDeque, fmt, time::Duration};
 
@@ -22,25 +21,22 @@ use crate::{
     tick::Tick,
 };
 
-/// The age from which on a fix is refused.
+/// An older fix is refused.
 const OLDEST: Duration = Duration::from_secs(2);
-/// The most ticks of a history. At a high rate they span less than [`OLDEST`].
+/// They span less than [`OLDEST`] at a high rate.
 const MOST_TICKS: usize = 64;
-/// The most fixes of a history.
 const MOST_FIXES: usize = 64;
-/// The squared Mahalanobis distance beyond which a fix is refused: one in a thousand good ones, for 2 and 3 degrees of freedom.
+/// Squared Mahalanobis distance beyond which a fix is refused: one good one in a thousand, for 2 and 3 degrees of freedom.
 pub(crate) const GATES: [f64; 2] = [13.8, 16.3];
-/// The least variance that a fix may state, m^2: that of 5 mm.
+/// The least stated variance, m^2: 5 mm.
 const LEAST_VARIANCE: f64 = 25e-6;
-/// The least variance of its heading, rad^2: that of a tenth of a degree.
+/// The least variance of the heading, rad^2: a tenth of a degree.
 const LEAST_HEADING_VARIANCE: f64 = 3e-6;
-/// The share by which a gyro's scale is taken to be off.
+/// The gyro's assumed scale error, a share.
 const GYRO_SCALE: f64 = 0.005;
 
-/// The parts of the error, and one more.
 const JOINT: usize = PARTS + 1;
 
-/// The motions that a filter takes, and their errors.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Motions {
     pub(crate) errors: ErrorModel,
@@ -48,7 +44,6 @@ pub(crate) struct Motions {
 }
 
 impl Motions {
-    /// The pose after the arc and the turn of `moved`.
     pub(crate) fn along(&self, pose: Pose2, moved: Twist) -> Pose2 {
         match self.integration {
             Integration::Arc => pose.along_arc(moved.v, moved.omega),
@@ -57,14 +52,13 @@ impl Motions {
     }
 }
 
-/// A fix that was checked.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Fix {
     pub(crate) time: MissionTime,
     pub(crate) position: DVec2,
     pub(crate) heading: Option<f64>,
     pub(crate) covariance: [f64; 6],
-    /// Variances of the error that the fix shares with the other fixes of its source: of x as of y, and of the heading.
+    /// Variances that all fixes of the source share: of x as of y, and of the heading.
     pub(crate) shared: [f64; 2],
 }
 
@@ -86,7 +80,7 @@ impl TryFrom<&FixSample> for Fix {
             covariance: if heading.is_some() { covariance } else { [xx, xy, 0.0, yy, 0.0, 0.0] },
             shared: if heading.is_some() { shared } else { [shared[0], 0.0] },
         };
-        // A matrix is positive where less than its least eigenvalue can be taken from its diagonal.
+        // Positive: less than the least eigenvalue can be taken from the diagonal.
         let least = SVector::from([LEAST_VARIANCE, LEAST_VARIANCE, LEAST_HEADING_VARIANCE]);
         let spare = fix.noise() - SMatrix::from_diagonal(&(least * (1.0 - 1e-9)));
         let positive = match heading {
@@ -103,24 +97,21 @@ impl Fix {
         SMatrix::from([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])
     }
 
-    /// The mean of the variances of x and y, m^2.
     pub(crate) fn variance(&self) -> f64 {
         0.5 * (self.covariance[0] + self.covariance[3])
     }
 }
 
-/// The difference of two headings, from -pi to pi.
+/// The result is from -pi to pi.
 pub(crate) fn wrapped(turn: f64) -> f64 {
     turn - (turn / std::f64::consts::TAU).round() * std::f64::consts::TAU
 }
 
-/// The estimate at one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Filter {
     pub(crate) pose: Pose2,
-    /// The shares by which the ratio of the diameters, the track and the distance are off.
+    /// Errors of the diameters' ratio, the track and the distance.
     shares: [f64; 3],
-    /// The bias of the gyro, rad/s.
     bias: f64,
     pub(crate) covariance: Covariance,
 }
@@ -130,12 +121,11 @@ impl Filter {
         Self { pose, shares: [0.0; 3], bias: 0.0, covariance }
     }
 
-    /// Arc and turn of `tick` with the errors of the wheels as they are known.
+    /// Arc and turn with the wheels' known errors.
     pub(crate) fn moved(&self, motions: &Motions, tick: &Tick) -> Twist {
         motions.errors.corrected(tick.moved(), self.shares)
     }
 
-    /// Go on by the motion of `tick`.
     fn advance(&mut self, motions: &Motions, tick: &Tick) {
         let moved = self.moved(motions, tick);
         let Transition { carried, noise } =
@@ -145,7 +135,7 @@ impl Filter {
         self.pose = motions.along(self.pose, moved);
         self.covariance = Covariance(carried * before * carried.transpose() + noise);
         if let Some(gyro) = tick.gyro {
-            // The gyro measures the difference of two headings, so the earlier heading is one more part of the error here.
+            // A gyro measures the difference of two headings, so the earlier heading is one more part of the error.
             let mut both = SMatrix::<f64, JOINT, PARTS>::zeros();
             both.fixed_view_mut::<PARTS, PARTS>(0, 0).copy_from(&carried);
             both[(PARTS, 2)] = 1.0;
@@ -165,7 +155,7 @@ impl Filter {
         }
     }
 
-    /// The pose at the time of `fix`, which was measured in the time of `tick`, at which this estimate is, or soon after.
+    /// The pose at the time of `fix`, measured during `tick` of this estimate or soon after.
     fn at(&self, motions: &Motions, tick: &Tick, fix: &Fix) -> Pose2 {
         let ago = tick.time.0 as f64 - fix.time.0 as f64;
         let share = if tick.seconds > 0.0 { ago * 1e-9 / tick.seconds } else { 0.0 };
@@ -174,7 +164,7 @@ impl Filter {
         self.pose.along_arc(-moved.v * share, -moved.omega * share)
     }
 
-    /// Take `fix`, which was measured at the pose `there`. Returns whether it agrees with the estimate.
+    /// Use a fix measured at `there`. Returns whether it agrees.
     fn take(&mut self, fix: &Fix, there: Pose2) -> bool {
         let lever = self.pose.position - there.position;
         let mut seen = SMatrix::<f64, 3, PARTS>::identity();
@@ -213,7 +203,7 @@ impl Filter {
         self.bias += error[BIAS];
     }
 
-    /// The estimate at `pose`, whose position and heading have these variances, with the same errors of wheels and gyro.
+    /// The estimate moved to `pose` with these variances; wheel and gyro errors stay.
     pub(crate) fn moved_to(mut self, pose: Pose2, position: f64, heading: f64) -> Self {
         let covariance = &mut self.covariance.0;
         for (part, variance) in [position, position, heading].into_iter().enumerate() {
@@ -225,8 +215,8 @@ impl Filter {
     }
 }
 
-/// The update of a Kalman filter, in Joseph's form: the error of the estimate, and the covariance afterwards. None if `residual`,
-/// of the part `seen` of the error with `noise`, is beyond `gate`.
+/// A Kalman update in Joseph's form: the correction, and the covariance afterwards. None if `residual`, of the part `seen` with `noise`,
+/// is beyond `gate`.
 fn update<const N: usize, const M: usize>(
     covariance: &SMatrix<f64, N, N>,
     seen: &SMatrix<f64, M, N>,
@@ -248,13 +238,12 @@ where
     Some((gain * residual, (after + after.transpose()) * 0.5))
 }
 
-/// The estimate of the newest tick, and the ticks and fixes from which it follows.
 #[derive(Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct History {
-    /// The estimate of the tick before those of `ticks`.
+    /// The estimate before `ticks`.
     base: Filter,
     ticks: VecDeque<Tick>,
-    /// The fixes that were used, each with the time of the tick at which it is taken, in the order of these times.
+    /// The used fixes by the times of their ticks.
     fixes: VecDeque<(MissionTime, Fix)>,
     newest: Filter,
 }
@@ -277,14 +266,12 @@ impl History {
         &self.newest
     }
 
-    /// Begin again from `estimate` at the newest tick.
     pub(crate) fn restart(&mut self, estimate: Filter) {
         let last = self.ticks.back().map(|tick| Tick { time: tick.time, ..Tick::default() });
         *self = Self::new(estimate);
         self.ticks.extend(last);
     }
 
-    /// Go on by `tick`.
     pub(crate) fn advance(&mut self, motions: &Motions, tick: Tick) {
         self.ticks.push_back(tick);
         self.newest.advance(motions, &tick);
@@ -299,7 +286,7 @@ impl History {
         }
     }
 
-    /// Take the increments of a gyro that came, after those in `gyro`.
+    /// Take a gyro's increments after those in `gyro`.
     pub(crate) fn turn(
         &mut self,
         motions: &Motions,
@@ -315,7 +302,7 @@ impl History {
         }
     }
 
-    /// The estimate of the newest tick, computed again from the oldest one. `at` sees each tick, by its place, and its estimate.
+    /// Compute the newest estimate again from the oldest. `at` sees each tick, by its place, and its estimate.
     fn again(
         &self,
         motions: &Motions,
@@ -327,7 +314,7 @@ impl History {
             estimate.advance(motions, tick);
             while let Some((_, fix)) = fixes.next_if(|(at, _)| *at <= tick.time) {
                 let there = estimate.at(motions, tick, fix);
-                // A fix that was used and contradicts those that came later is left out.
+                // A used fix that contradicts later ones is left out.
                 estimate.take(fix, there);
             }
             at(place, tick, &mut estimate)?;
@@ -335,7 +322,7 @@ impl History {
         Ok(estimate)
     }
 
-    /// Take `fix`. A fix that is too far off is refused, with the pose at its time.
+    /// A fix that is too far off is refused with the pose at its time.
     pub(crate) fn take(&mut self, motions: &Motions, fix: Fix) -> Result<(), Refused> {
         let not = |why| Err(Refused { why, there: None });
         let (Some(first), Some(last)) = (self.ticks.front(), self.ticks.back()) else {
@@ -367,7 +354,7 @@ impl History {
     }
 }
 
-/// A fix was refused; with the pose at its time if the fix contradicts that pose.
+/// It has the pose at the fix's time if the fix contradicts it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Refused {
     pub(crate) why: FixRefusal,

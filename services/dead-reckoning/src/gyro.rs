@@ -1,4 +1,4 @@
-//! The turns of ticks by a gyro, from increments that end at times of their own and may come late.
+//! The turns of ticks by a gyro, whose increments end at their own times and may come late.
 
 use std::collections::VecDeque;
 
@@ -7,26 +7,25 @@ use serde::{Deserialize, Serialize};
 
 use crate::tick::{GyroTurn, Tick};
 
-/// The share of a divided increment by which the division is taken to be off. One tick gains what the other loses, so the errors do
-/// not add up.
+/// The error of a divided increment, a share. One tick gains what the other loses, so errors do not add up.
 const UNEVEN: f64 = 0.1;
 
-/// The increments that belong to no whole tick yet.
+/// Increments that belong to no whole tick yet.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Gyro {
-    /// The number and the end of the newest increment.
+    /// The newest increment's number and end.
     sequence: u64,
     end: MissionTime,
-    /// The time at which `turn` begins: the end of a tick, or of the first increment after missing ones.
+    /// The start of `turn`: the end of a tick, or of the first increment after missing ones.
     since: MissionTime,
-    /// The turn from `since` to the end of the newest increment, and its variance, radians and rad^2.
+    /// Turn from `since` to the newest increment's end, and its variance; radians, rad^2.
     turn: f64,
     variance: f64,
 }
 
 impl Gyro {
-    /// Take an increment after those in `gyro`, and give the ticks that it completes their turns. Returns whether there are any.
-    /// An increment over the end of a tick is divided at that time as if the robot turned evenly.
+    /// Take an increment and give the ticks that it completes their turns; returns whether there are any. An increment over a tick's end
+    /// is divided as if the robot turned evenly.
     pub(crate) fn take(
         gyro: &mut Option<Self>,
         increment: &TurnSample,
@@ -54,7 +53,7 @@ impl Gyro {
             let divided = UNEVEN * share * (1.0 - share) * turn_rad;
             let turn = rest.turn + part * turn_rad;
             let variance = rest.variance + part * variance_rad2 + divided * divided;
-            // A turn that began before the tick includes ticks that have left the history.
+            // A turn that began earlier includes ticks that have left the history.
             if (seconds(rest.since, tick.time) - tick.seconds).abs() < 1e-6 && tick.seconds > 0.0 {
                 tick.gyro = Some(GyroTurn { turn, variance });
                 completed = true;

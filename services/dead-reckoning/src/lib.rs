@@ -9,12 +9,11 @@
 //! | `gyro` | the turn of a tick from a gyro's increments |
 //! | `relocation` | whether fixes that contradict the pose agree among themselves |
 //!
-//! The state is saved after the pose is published, so that the tick does not wait for the file. A process that is killed in between
-//! has published a pose that its saved state does not contain. That is safe: the counts are cumulative, and the link's last sample
-//! stays on the bus, so the successor computes the same pose again from the state before. If the next tick has come by then, the
-//! successor takes the way of both ticks as one arc, which differs by a millimetre or two. At the first tick, and when the robot
-//! restarted its counts, the state before does not fit the counts, so the new state is saved first. If all processes are killed at
-//! such a tick, a resumed run counts the tick again.
+//! The state is saved after the pose is published, so that the tick does not wait for the file. A process killed in between has
+//! published a pose that its saved state lacks. That is safe: counts are cumulative and the link's last sample stays on the bus, so the
+//! successor computes the same pose from the state before. If the next tick has come, it takes both ticks' way as one arc, a millimetre
+//! or two off. At the first tick, and when the robot restarted its counts, the older state does not fit the counts, so the new one is
+//! saved first; if all processes are killed then, a resumed run counts the tick again.
 
 mod covariance;
 mod filter;

@@ -1,4 +1,4 @@
-//! Fixes that contradict the pose and agree among themselves: the robot is elsewhere, for example because it was carried.
+//! Fixes that contradict the pose and agree: the robot is elsewhere, for example because it was carried.
 
 use std::{collections::VecDeque, time::Duration};
 
@@ -8,24 +8,22 @@ use serde::{Deserialize, Serialize};
 
 use crate::filter::{Filter, Fix, GATES, wrapped};
 
-/// The number of fixes that have to agree.
 const AGREE: usize = 10;
-/// The least time between two of these fixes: all take 3 s.
+/// Ten such fixes take 3 s.
 const APART: Duration = Duration::from_millis(334);
-/// The variance of the way between two of these fixes by the wheels, m^2.
+/// Variance of the way between two fixes by the wheels, m^2.
 const WHEELS: f64 = 4e-4;
-/// The heading follows from the way of the robot among the fixes if its deviation is below this, radians.
+/// The robot's way among the fixes gives the heading if its deviation is lower, radians.
 const KNOWN_RAD: f64 = 0.2;
-/// The variance of the heading otherwise, rad^2.
+/// The heading's variance otherwise, rad^2.
 const UNKNOWN: f64 = 1.0;
 
-/// The fixes that were refused because they contradict the pose, since one was used: each with the pose at its time.
+/// Refused fixes since one was used, each with the pose at its time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Contradictions(VecDeque<(Pose2, Fix)>);
 
 impl Contradictions {
-    /// Add `fix`, measured where the pose was `there`. Returns the estimate elsewhere, in place of `estimate`, if the newest
-    /// fixes agree.
+    /// Add `fix`, measured at the pose `there`. Returns the estimate elsewhere if the newest fixes agree.
     pub(crate) fn add(&mut self, there: Pose2, fix: &Fix, estimate: &Filter) -> Option<Filter> {
         let time = |(_, fix): &(Pose2, Fix)| fix.time;
         let last = self.0.back().map_or(MissionTime(0), time);
@@ -41,8 +39,8 @@ impl Contradictions {
         Some(elsewhere)
     }
 
-    /// The rigid motion that takes the poses to the fixes with the least squared distance, applied to `estimate`. None if a fix is
-    /// then beyond its gate.
+    /// `estimate` moved by the rigid motion that brings the poses nearest to the fixes (least squares). None if a fix is then beyond its
+    /// gate.
     fn agreed(&self, estimate: &Filter) -> Option<Filter> {
         let share = 1.0 / self.0.len() as f64;
         let mean = |of: fn(&Pose2, &Fix) -> DVec2| {
@@ -66,7 +64,7 @@ impl Contradictions {
         Some(estimate.moved_to(pose, position, heading))
     }
 
-    /// The turn of the rigid motion, and its variance.
+    /// The rigid motion's turn, and its variance.
     fn turned(&self, from: DVec2, to: DVec2, variance: f64) -> (f64, f64) {
         let turns = self.0.iter().filter_map(|(pose, fix)| {
             Some((wrapped(fix.heading? - pose.heading), fix.covariance[5]))

@@ -1,5 +1,5 @@
-//! The step from counts to pose, for two wheels, (20), or for a car's driven wheel and steering, (3), corrected by fixes and a gyro
-//! where sources publish them. The pose is an integral that nothing can recompute, so its state is in the checkpoint.
+//! Counts to pose, for two wheels, (20), or for a car's driven wheel and steering, (3), corrected by fixes and a gyro. The pose is an
+//! integral that nothing can recompute, so its state is in the checkpoint.
 
 use common::{
     clock::MissionTime,
@@ -23,27 +23,25 @@ use crate::{
 /// Counts are rejected if a wheel seems to turn faster than this multiple of its top speed. A robot that slides or is pushed stays
 /// below it; a counter that restarted is nearly always above it.
 const PLAUSIBLE: f64 = 2.0;
-/// The time, seconds, in which counts are never rejected: timestamps jitter by about a tick.
+/// Counts are never rejected within this time, seconds: timestamps jitter by about a tick.
 const SLACK_S: f64 = 0.3;
 
-/// The least share of a tick over which a speed is an average: frames that come bunched give no speed of their own.
+/// The least share of a tick for a speed: bunched frames give none of their own.
 const LEAST_SHARE_OF_A_TICK: f64 = 0.5;
 
-/// The time for which a wheel still turns after its last command is over, seconds: delay and lag of its speed loop.
+/// A wheel still turns so long after its last command, seconds: delay and lag of its speed loop.
 const COASTS_S: f64 = 0.2;
 
-/// The least time in which a robot is switched off and on and answers, seconds; a killed link is back in 0.1 s.
+/// The least time to switch a robot off and on, seconds; a killed link is back in 0.1 s.
 const BOOTS_IN_S: f64 = 2.0;
 
-/// The most that the pose moves to the estimate in a tick, metres and radians: the map around the robot must not tear.
+/// The pose's largest correction in a tick, metres and radians: the map around the robot must not tear.
 const MOST_CORRECTION: (f64, f64) = (0.02, std::f64::consts::PI / 180.0);
 
-/// The state that survives the process: the pose, and the counts it was computed at.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State {
-    /// The published pose, which follows the estimate without jumps.
+    /// It follows the estimate without jumps.
     pose: Pose2,
-    /// The pose in the frame of odometry.
     odometry: Pose2,
     history: History,
     travelled: f64,
@@ -57,7 +55,7 @@ pub struct State {
 }
 
 impl State {
-    /// Tick and mission time of the newest wheel sample in the state; none before the first.
+    /// The newest wheel sample's; none before the first.
     pub fn newest(&self) -> Option<(u64, MissionTime)> {
         self.last.map(|last| (last.tick, last.time))
     }
@@ -78,37 +76,34 @@ struct Last {
     time: MissionTime,
     left: u16,
     right: u16,
-    /// The generation of the link that gave the sample, and the robot's restarts that this link knew of.
+    /// The link's generation, and the robot's restarts that it knew of.
     generation: u32,
     restarts: u32,
     v: f64,
     omega: f64,
 }
 
-/// The result of one wheel sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reckoned {
     pub pose: PoseSample,
-    /// The counts jumped farther than wheels can turn, or the robot restarted its counters: the pose stays, and its covariance grows
-    /// by how far the robot can have gone.
+    /// The counts jumped farther than wheels turn, or the robot restarted them: the pose stays, and its covariance grows by how far the
+    /// robot can have gone.
     pub rejected: bool,
-    /// Whether fixes that agree among themselves contradicted the pose, which became theirs.
+    /// Fixes that agree contradicted the pose, which became theirs.
     pub relocated: bool,
-    /// Why a fix was refused, unless the one before was refused for the same reason.
+    /// Unless the fix before was refused for the same reason.
     pub refused: Option<FixRefusal>,
 }
 
-/// The integrator of (20) and (21).
+/// (20) and (21).
 #[derive(Clone, Debug)]
 pub struct DeadReckoning {
     drive: Drive,
-    /// The body with the track as it is known.
     body: Body,
-    /// Ways of the left and the right wheel over their nominal ones.
+    /// Ways of the left and right wheel over the nominal ones.
     wheel_scales: [f64; 2],
     distance_scale: f64,
     motions: Motions,
-    /// The period of the ticks, seconds.
     period_s: f64,
     /// The longest time that wheels turn after the last tick, seconds.
     turns_on_s: f64,
@@ -239,7 +234,7 @@ impl DeadReckoning {
         Taken::Refused(why)
     }
 
-    /// Move the pose to the estimate: all the way if the robot was relocated.
+    /// All the way if the robot was relocated.
     fn follow(&mut self, relocated: bool) {
         let estimate = self.state.history.newest().pose;
         let pose = &mut self.state.pose;
@@ -256,7 +251,7 @@ impl DeadReckoning {
         };
     }
 
-    /// Arc and turn since `last`, metres and radians; none if the counts cannot have come from turning wheels.
+    /// Metres and radians; none if the counts cannot come from turning wheels.
     fn moved(&self, last: Last, wheels: &WheelSample, elapsed: f64) -> Option<Twist> {
         let (left, right) = (
             counts_between(last.left, wheels.left_counts),
@@ -277,7 +272,7 @@ impl DeadReckoning {
                 drive.twist(WheelSpeeds { left: wheel * left_scale, right })
             }
             Drive::Ackermann(drive) => {
-                // The mean of the two angles is taken as the steering on the way.
+                // The mean of the two angles stands for the steering on the way.
                 let middle = f64::from(counts_between(0, last.right)) + f64::from(right) / 2.0;
                 let angle = self.body.steering.map(|steering| steering.angle(middle));
                 let wheel = wheel * self.distance_scale;
@@ -286,7 +281,7 @@ impl DeadReckoning {
         })
     }
 
-    /// Speed and turn rate of a motion, m/s and rad/s, limited to the speed of the body along the same curve.
+    /// m/s and rad/s, limited to the body's speed along the same curve.
     fn speeds(&self, moved: Twist, elapsed: f64) -> Twist {
         let time = elapsed.max(LEAST_SHARE_OF_A_TICK * self.period_s);
         let (v, omega) = (moved.v / time, moved.omega / time);
@@ -304,7 +299,7 @@ impl DeadReckoning {
         let (left_counts, right_counts, v, omega) =
             last.map_or((0, 0, 0.0, 0.0), |last| (last.left, last.right, last.v, last.omega));
         let estimate = history.newest();
-        // The error of this pose is that of the estimate, plus the way to the estimate.
+        // This pose's error is the estimate's, plus the way to the estimate.
         let [x, y] = (estimate.pose.position - position).to_array();
         let turn = estimate.pose.heading - heading;
         let way = [x * x, x * y, x * turn, y * y, y * turn, turn * turn];
@@ -332,7 +327,6 @@ impl DeadReckoning {
     }
 }
 
-/// The result of a fix.
 #[derive(Clone, Copy, PartialEq)]
 enum Taken {
     Used,
@@ -340,13 +334,13 @@ enum Taken {
     Relocated,
 }
 
-/// Whether the robot restarted its counts after `last`. The link sees that in the frames between; only a restart between two
-/// generations of the link must be read off the counts themselves.
+/// Whether the robot restarted its counts after `last`. The link sees that between frames; only a restart between two links must be read
+/// off the counts.
 fn restarted(last: Last, wheels: &WheelSample, elapsed: f64) -> bool {
     if last.generation == wheels.stamp.generation {
         return last.restarts != wheels.restarts;
     }
-    // A robot that turns back through its start while the link is killed gives the same counts, but sooner.
+    // A robot that turned back through its start gives the same counts, but sooner.
     elapsed >= BOOTS_IN_S
         && counts_restarted([last.left, last.right], [wheels.left_counts, wheels.right_counts])
 }

@@ -1,8 +1,8 @@
-//! Pauses between attempts. Each is twice as long as the one before, up to a longest one.
+//! Pauses between attempts, each twice the one before, up to a longest one.
 
 use std::time::Duration;
 
-/// Attempts at an operation that may never succeed: their number, and the time of the next one.
+/// Attempts at an operation that may never succeed.
 #[derive(Clone, Debug)]
 pub struct Backoff {
     first: Duration,
@@ -13,34 +13,31 @@ pub struct Backoff {
 }
 
 impl Backoff {
-    /// The first attempt is due at once, the second after the pause `first`. No pause is longer than `longest`.
+    /// The first attempt is due at once, the second after `first`. No pause is longer than `longest`.
     pub const fn new(first: Duration, longest: Duration) -> Self {
         Self { first, longest, pause: first, attempts: 0, next_ns: None }
     }
 
-    /// Whether an attempt is due at `now_ns` of the monotonic clock.
     pub fn is_due(&self, now_ns: u64) -> bool {
         self.next_ns.is_none_or(|next| now_ns >= next)
     }
 
-    /// Note that an attempt was made.
     pub fn attempted(&mut self, now_ns: u64) {
         self.attempts += 1;
         self.next_ns = Some(now_ns.saturating_add(self.pause.as_nanos() as u64));
         self.pause = (self.pause * 2).min(self.longest);
     }
 
-    /// Start from the shortest pause again, after an attempt that succeeded.
+    /// The shortest pause comes again after a success.
     pub const fn reset(&mut self) {
         *self = Self::new(self.first, self.longest);
     }
 
-    /// Attempts since the last success.
     pub const fn attempts(&self) -> u64 {
         self.attempts
     }
 
-    /// Nanoseconds until the next attempt; 0 when it is due.
+    /// Nanoseconds; 0 when an attempt is due.
     pub fn wait_ns(&self, now_ns: u64) -> u64 {
         self.next_ns.map_or(0, |next| next.saturating_sub(now_ns))
     }

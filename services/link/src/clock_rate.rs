@@ -1,29 +1,28 @@
-//! Whether the clock of a robot goes as fast as mission time: if not, the robot seems to drive slower or faster than it does. The clock
-//! of a simulator is slow on a machine that is too slow for it, and fast if nothing holds it back.
+//! Whether a robot's clock goes as fast as mission time: otherwise it seems to drive slower or faster than it does. A simulator's clock
+//! is slow on a weak machine, and fast if nothing holds it back.
 
 use common::clock::MissionTime;
 
-/// The time of a comparison of the clocks, nanoseconds. One may be wrong, because a process was frozen, so two count.
+/// A comparison lasts so long, nanoseconds. A frozen process spoils one, so two count.
 const OVER_NS: u64 = 5_000_000_000;
-/// The share within which the clocks go equally fast.
+/// Within this share the clocks go equally fast.
 const SHARE: f64 = 0.1;
-/// The step of a stamp beyond which the robot's clock was set anew, nanoseconds.
+/// A stamp that steps farther means that the robot's clock was set, nanoseconds.
 const SET_ANEW_NS: i64 = 1_000_000_000;
 
-/// The comparison of a robot's clock with mission time.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct ClockRate {
     newest_ns: i64,
-    /// The stamp and mission time from which they are compared.
+    /// The stamp and mission time where the comparison began.
     since: Option<(i64, MissionTime)>,
-    /// Seconds of the robot in a second of mission time, in the last comparison; none before the first.
+    /// Robot seconds in a second of mission time, by the last comparison.
     before: Option<f64>,
     told: Option<f64>,
 }
 
 impl ClockRate {
-    /// Take a stamp of the robot that came at `now`. Returns the seconds of the robot in a second of mission time if they are not as many
-    /// and were not returned before.
+    /// Take a stamp that came at `now`. Returns the robot's seconds in a second of mission time if they differ and were not returned
+    /// before.
     pub(crate) fn take(&mut self, stamp_ns: i64, now: MissionTime) -> Option<f64> {
         let passed_ns = stamp_ns.saturating_sub(std::mem::replace(&mut self.newest_ns, stamp_ns));
         let is_set_anew = !(0..=SET_ANEW_NS).contains(&passed_ns);

@@ -9,7 +9,6 @@ use json_driver::Json;
 use ros2_driver::Ros2;
 use x80_driver::X80;
 
-/// The driver of `mission`'s robot.
 pub fn of(mission: &Mission) -> Box<dyn Driver> {
     match mission.robot.protocol() {
         Protocol::X80 => Box::new(X80::new(mission)),

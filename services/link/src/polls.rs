@@ -1,10 +1,9 @@
-//! The times at which a robot is polled that says nothing unasked.
+//! The times of polls of a robot that says nothing unasked.
 
 use std::time::Duration;
 
 use common::{clock::MissionTime, mission::Mission};
 
-/// The next poll, and the period.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Polls {
     period_ns: u64,
@@ -12,18 +11,17 @@ pub(crate) struct Polls {
 }
 
 impl Polls {
-    /// The polls of `mission`'s robot; the first is due at once.
+    /// The first is due at once.
     pub(crate) fn new(mission: &Mission) -> Self {
         Self { period_ns: (1e9 / mission.robot.rate_hz) as u64, next: MissionTime::default() }
     }
 
-    /// The mission time from `now` until the next poll.
+    /// The result is mission time.
     pub(crate) fn until_next(&self, now: MissionTime) -> Duration {
         self.next.since(now)
     }
 
-    /// Take the poll that is due at `now`, if one is. A late poll does not delay the next, and missed polls are not made up
-    /// for.
+    /// Take a poll due at `now`. A late one does not delay the next; missed ones are not made up for.
     pub(crate) fn take_due(&mut self, now: MissionTime) -> bool {
         let is_due = self.until_next(now).is_zero();
         if is_due {

@@ -1,5 +1,5 @@
-//! The process of the link. It reads the wire, `command`, `directive` and `tick_limit`, and writes the wire, `ranges`, `wheels`,
-//! `link` and telemetry.
+//! The link's process: it reads the wire, `command`, `directive` and `tick_limit`, and writes the wire, `ranges`, `wheels`, `link` and
+//! telemetry.
 
 use std::{io, time::Duration};
 
@@ -9,7 +9,6 @@ use common::{
     domain::Domain,
     driver::Memory,
     latency::Histogram,
-    latency_budget::{Answers, LatencyBudget},
     samples::{
         Action, Cause, CommandSample, DirectiveSample, HoldReason, LinkSample, Order,
         TickLimitSample,
@@ -34,13 +33,12 @@ use crate::{
     transport::Transport,
 };
 
-/// Without input the link checks its deadlines so often, which is a fifth of the shortest of them.
+/// Interval of the checks without input: a fifth of the shortest deadline.
 const LOOKS_AGAIN: Duration = Duration::from_millis(20);
 
-/// A robot that floods the link delays its heartbeat by no more than this, and a datagram. The rest is taken in the next turn.
+/// A flood delays the heartbeat by no more than this, and a datagram; the rest waits for the next turn.
 const MOST_LISTENING_NS: u64 = 20_000_000;
 
-/// The bytes of a [`Memory`].
 const MEMORY_BYTES: usize = 64;
 
 /// The link process.
@@ -56,17 +54,14 @@ pub struct Shell {
     /// None where it could not be made, which the log says.
     stop_socket: Option<StopSocket>,
     stop_mark: StopMark,
-    /// Whether the mark is set, as far as this link knows.
     marked: bool,
-    /// None in lockstep, where a robot waits for commands, and where it could not be started, which the log says.
+    /// None in lockstep, where a robot waits for commands, and where it could not be started, as the log says.
     guard: Option<StopGuard>,
-    /// Whether the topics of telemetry are open.
     has_telemetry: bool,
     clock: MissionClock,
     latency: Histogram,
     latency_ns: u64,
     stated_ns: u64,
-    budget: LatencyBudget,
 }
 
 impl Process for Shell {
@@ -134,7 +129,6 @@ impl Process for Shell {
             latency: Histogram::default(),
             latency_ns: 0,
             stated_ns: 0,
-            budget: context.budget.clone(),
         };
         if shell.marked {
             shell.take(Event::Operator(Request::Stop), monotonic_ns())?;
@@ -160,8 +154,6 @@ impl Process for Shell {
         }
         let began_ns = monotonic_ns();
         loop {
-            // A tick begins with its datagram.
-            self.budget.awake();
             let now_ns = monotonic_ns();
             if now_ns - began_ns > MOST_LISTENING_NS {
                 break;
@@ -194,7 +186,7 @@ impl Process for Shell {
         self.has_telemetry && self.runner.stage.has_telemetry()
     }
 
-    /// The link is called without input to repeat commands, to run the failsafe and to poll the robot.
+    /// Called without input, the link repeats commands, runs the failsafe and polls the robot.
     fn looks_again_after(&self) -> Option<Duration> {
         let link = &self.runner.stage.link;
         let until_poll = match self.clock {
@@ -230,7 +222,6 @@ impl Process for Shell {
     }
 }
 
-/// Log that the link goes on without `what`.
 fn without(what: &'static str) -> impl Fn(&io::Error) {
     move |error| tracing::error!(%error, "the link goes on without its {what}")
 }
@@ -253,7 +244,7 @@ fn log_battery(change: &BatteryChange) {
 fn log_decision(before: Decision, now: Decision) {
     let robot = now.action.effect();
     let cause = now.cause.name();
-    // The end of a mission is no fault, so it is not logged as a warning.
+    // The end of a mission is no fault, and no warning.
     if now.action > before.action && now.cause != Cause::MissionOver {
         tracing::warn!(robot, cause, "failsafe");
     } else {
@@ -270,7 +261,7 @@ impl Shell {
         Ok(())
     }
 
-    /// Tell operators that the robot rests, and leave the mark of a stop for the next link.
+    /// Tell operators that the robot rests, and keep the mark of a stop for the next link.
     fn answer_operators(&mut self) {
         let link = &self.runner.stage.link;
         if link.decision().stops()
@@ -288,7 +279,7 @@ impl Shell {
         }
     }
 
-    /// Reopen a closed wire, and tell the link when the wire opens or closes.
+    /// Reopen a closed wire, and tell the link of its changes.
     fn maintain(&mut self) -> Result<(), StageError> {
         let now_ns = monotonic_ns();
         if let Some(open) = self.transport.maintain(now_ns)? {
@@ -305,7 +296,6 @@ impl Shell {
         self.carry_out(effects)
     }
 
-    /// Carry out the effects that need the process.
     fn carry_out(&mut self, effects: Vec<Effect>) -> Result<(), StageError> {
         for effect in effects {
             match effect {
@@ -314,8 +304,6 @@ impl Shell {
                     if let Some(memory) = self.runner.stage.link.driver_memory() {
                         self.saved.save(&memory)?;
                     }
-                    let tick = self.runner.out.at.tick;
-                    self.budget.published(tick, Answers::Feedback);
                     self.latency_ns = monotonic_ns().saturating_sub(began_ns);
                     self.latency.record(self.latency_ns);
                     self.state()?;
@@ -328,7 +316,7 @@ impl Shell {
                 }
                 Effect::Decided { before, now } => {
                     log_decision(before, now);
-                    // A robot that goes on slowly has a fault of which nothing was said while a worse one held it.
+                    // A slow robot has a fault of which nothing was said while a worse one held it.
                     if (now.action >= before.action || now.action == Action::Slow)
                         && let Some(explanation) =
                             self.runner.stage.link.explain(now.cause, monotonic_ns())
@@ -374,7 +362,7 @@ impl Shell {
                     tracing::info!("the robot is asked for its streams again");
                 }
                 Effect::Battery(change) => log_battery(&change),
-                // The stage has already published these effects.
+                // The stage has already published these.
                 Effect::Tick { .. }
                 | Effect::Infrared(_)
                 | Effect::Power(_)
@@ -384,7 +372,6 @@ impl Shell {
         Ok(())
     }
 
-    /// Publish the state of the link and its wire.
     fn state(&mut self) -> Result<(), StageError> {
         let now_ns = monotonic_ns();
         self.stated_ns = now_ns;
@@ -392,7 +379,7 @@ impl Shell {
         let wire = link.wire_tally();
         let tally = link.tally();
         let absence = link.absence(now_ns);
-        // If the wire is closed, these are the attempts to open it; otherwise the pings.
+        // Attempts to open a closed wire; otherwise pings.
         let (attempts, next_attempt_ns) = match self.transport.attempts(now_ns) {
             Some(openings) => (openings.made, openings.next_ns),
             None => (absence.pings, absence.next_ping_ns),

@@ -1,56 +1,53 @@
-//! The speed trim: makes good that the wheels turn slower than commanded.
+//! The speed trim makes good that wheels turn slower than commanded.
 //!
-//! The speed loops of real X80s reach 0.75 to 0.8 of a commanded speed, and no part of the robot makes good the rest. The link knows what
-//! it commanded and what the encoders counted. It estimates the share that the wheels reach, and divides the commands by it. Both wheels
-//! have one estimate, so that commands keep their curve.
+//! The speed loops of real X80s reach 0.75 to 0.8 of a commanded speed, and nothing in the robot makes good the rest. The link knows
+//! what it commanded and what the encoders counted, estimates the share that the wheels reach, and divides commands by it. Both wheels
+//! share one estimate, so commands keep their curve.
 
 use common::{samples::WheelSample, wire::counts_between};
 
-/// The number of agreeing commands after which a wheel has its steady speed: its delay and its lag take 0.15 s, a period at 7 Hz.
+/// Agreeing commands until a wheel's speed is steady: its delay and lag take 0.15 s, a period at 7 Hz.
 const STEADY: usize = 3;
-/// Commands agree if the least of them is at least this share of the greatest.
+/// Commands agree if the least is at least this share of the greatest.
 const AGREE: f64 = 0.8;
-/// Slower commands give no evidence, counts/s: the dead band and the noise of the speed loop are too large a part of them.
+/// Slower commands give no evidence, counts/s: dead band and noise are too large a part of them.
 const LEAST_COUNTS_S: f64 = 250.0;
-/// The weight of one interval in the estimate.
 const WEIGHT: f64 = 0.1;
-/// The shares outside of which a wheel slips, is held, or has a faulty encoder: those are no evidence about its speed loop.
+/// Outside these shares a wheel slips, is held, or has a faulty encoder, which says nothing of its speed loop.
 const SHARES: std::ops::RangeInclusive<f64> = 0.6..=1.15;
-/// The least share that is made good.
+/// No lower share is made good.
 const LEAST_SHARE: f64 = 0.7;
 
-/// The estimate of the share of a commanded speed that the wheels reach.
 #[derive(Clone, Debug)]
 pub(crate) struct SpeedTrim {
-    /// The number of channels that drive: a car's second one steers.
+    /// Driving channels: a car's second one steers.
     wheels: usize,
-    /// The newest commands, oldest first, counts/s.
+    /// Oldest first, counts/s.
     told: [[f64; 2]; STEADY],
-    /// The counts of the newest tick, and its mission time, seconds.
+    /// The newest tick's counts, and mission time, seconds.
     tick: Option<([u16; 2], f64)>,
     longest_gap_s: f64,
     share: f64,
 }
 
 impl SpeedTrim {
-    /// The trim of a robot that ticks every `period_s` seconds.
     pub(crate) const fn new(wheels: usize, period_s: f64) -> Self {
         let told = [[0.0; 2]; STEADY];
         Self { wheels, told, tick: None, longest_gap_s: 2.0 * period_s, share: 1.0 }
     }
 
-    /// The estimated share, at most 1.
+    /// It is at most 1.
     pub(crate) const fn share(&self) -> f64 {
         self.share
     }
 
-    /// Take a command as it was sent, counts/s.
+    /// `counts` were sent, counts/s.
     pub(crate) fn told(&mut self, counts: [i16; 2]) {
         self.told.rotate_left(1);
         self.told[STEADY - 1] = counts.map(f64::from);
     }
 
-    /// Take the encoders of a tick at `time_s`.
+    /// A tick's encoders at `time_s`.
     pub(crate) fn rolled(&mut self, wheels: &WheelSample, time_s: f64) {
         let counts = [wheels.left_counts, wheels.right_counts];
         let Some((before, then_s)) = self.tick.replace((counts, time_s)) else {

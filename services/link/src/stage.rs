@@ -1,5 +1,4 @@
-//! The link as a stage: the entries of a recording, and the samples that it publishes, which include telemetry and the bytes of the
-//! wire.
+//! The link as a stage: what it records and publishes, telemetry and the wire's bytes included.
 
 use common::{
     clock::{MissionClock, MissionTime, Pace},
@@ -22,19 +21,19 @@ use serde::{Deserialize, Serialize};
 
 use crate::step::{Effect, Event, Input, Link, State};
 
-/// The most bytes of a sample of `wire`. Longer data are published in several samples.
+/// The most bytes of a `wire` sample; longer data take several.
 pub(crate) const WIRE_PIECE: usize = 2048;
 
-/// An entry of a recording, from which the link can be replayed. A generation starts from a [`State`].
+/// A generation starts from a [`State`].
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Entry<'a> {
     /// The step takes an event at this reading of the monotonic clock, nanoseconds, and this mission time.
     Step(#[serde(borrow)] Taken<'a>, u64, MissionTime),
     /// The newest telemetry is published.
     Telemetry,
-    /// The stage stops at this reading of the monotonic clock, nanoseconds.
+    /// The reading of the monotonic clock, nanoseconds.
     Stop(u64),
-    /// The stage goes on from the state of the driver of the link before it.
+    /// The driver's state of the link before.
     Remember(Memory),
 }
 
@@ -95,17 +94,16 @@ impl<'a> Taken<'a> {
 #[derive(Debug)]
 pub struct LinkStage {
     pub(crate) link: Link,
-    /// The header of scans; none if the robot has no laser.
+    /// None without a laser.
     laser: Option<ScanHeader>,
     infrared: Option<InfraredSample>,
     power: Option<PowerSample>,
     surroundings: Option<SurroundingsSample>,
-    /// The bytes received and sent that are not published yet, oldest first.
+    /// Unpublished bytes, oldest first.
     wire: Vec<(Progress, WireHeader, Vec<u8>)>,
 }
 
 impl LinkStage {
-    /// Whether telemetry waits to be published.
     pub(crate) const fn has_telemetry(&self) -> bool {
         self.infrared.is_some() || self.power.is_some() || self.surroundings.is_some()
     }
@@ -116,7 +114,7 @@ impl LinkStage {
         self.wire.push((at, header, bytes.to_vec()));
     }
 
-    /// Publish the sample of an effect. Returns the effect if the process has to carry it out.
+    /// Publish an effect's sample. Returns the effect if the process has to carry it out.
     fn carry_out(
         &mut self,
         effect: Effect,
@@ -167,7 +165,7 @@ impl LinkStage {
 impl Stage for LinkStage {
     type Start = State;
     type Entry<'a> = Entry<'a>;
-    /// The effects that the process has to carry out, in order.
+    /// The process carries them out in order.
     type Outcome = Vec<Effect>;
 
     fn new(mission: &Mission) -> Self {
@@ -227,7 +225,7 @@ impl Stage for LinkStage {
         Ok(left)
     }
 
-    /// Publish the bytes of the wire.
+    /// The bytes of the wire.
     fn publish_rest(&mut self, out: &mut Outputs) -> Result<(), StageError> {
         let now = out.at;
         for (at, header, bytes) in self.wire.drain(..) {

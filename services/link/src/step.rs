@@ -1,8 +1,8 @@
-//! The pure step of the link: events and their times in, samples and bytes for the robot out.
+//! The link's pure step: events and their times in, samples and bytes out.
 //!
-//! A tick starts with a motor frame and the newest readings, and ends with the command computed from them. In lockstep (a
-//! simulated robot at `--pace max`) the robot waits for that command, so the link repeats a tick that gets none because a stage
-//! ended. On the wall clock the robot does not wait, so an unanswered tick is dropped when the next one starts.
+//! A tick starts with a motor frame and the newest readings, and ends with the command computed from them. In lockstep (a simulated
+//! robot at `--pace max`) the robot waits for that command, so the link repeats a tick that a stage's end left without one. On the wall
+//! clock an unanswered tick is dropped when the next starts.
 
 mod event;
 mod poll;
@@ -39,22 +39,20 @@ use crate::{
 
 pub use event::{Effect, Event, Input, State, Tally};
 
-/// The pause between pings to a robot whose next motor frame is missing.
+/// The pause of pings to a robot whose next motor frame is missing.
 const PING_EVERY: Duration = Duration::from_millis(200);
-/// An open tick without a command is repeated after this time, which is ten times the longest tick measured.
+/// Ten times the longest tick measured.
 const REPEAT_AFTER: Duration = Duration::from_millis(100);
-/// The longest time that a tick waits in lockstep until the supervisor's limit allows it. This is longer than the planner of a stalled
-/// robot may take to restart. If the supervisor is silent, the failsafe stops the robot earlier.
+/// A tick waits so long in lockstep for the supervisor's limit: longer than the planner of a stalled robot may take to restart. If the
+/// supervisor is silent, the failsafe stops the robot earlier.
 pub const LIMIT_WAITED: Duration = Duration::from_secs(5);
-/// The least time limit of a command. The wire carries whole milliseconds, and for most robots 0 means no limit.
+/// The least time limit of a command: the wire carries whole milliseconds, and 0 mostly means no limit.
 const LEAST_LEFT: Duration = Duration::from_millis(1);
-/// The number of times that a new stop is sent, because datagrams may be lost.
+/// A new stop is sent so often, because datagrams may be lost.
 pub const STOPS: u32 = 3;
-/// The time after which the link repeats a stop. All stops may be lost while the radio fades, and the robot may ignore the time limit of
-/// its last command.
+/// A stop is repeated after this: a fading radio may lose all stops, and the robot may ignore the limit of its last command.
 const STOP_AGAIN: Duration = Duration::from_millis(200);
 
-/// A tick that waits for its command.
 #[derive(Clone, Debug)]
 struct OpenTick {
     ranges: Vec<RangeReading>,
@@ -63,55 +61,48 @@ struct OpenTick {
     wheels: WheelSample,
     contact: Option<ContactSample>,
     began_ns: u64,
-    /// The time when the tick was published; `None` while it waits for the supervisor's limit.
+    /// When it was published; `None` while it waits for the supervisor's limit.
     given_ns: Option<u64>,
 }
 
-/// A command that was sent and will be repeated once, because a datagram may be lost.
+/// A sent command, repeated once because a datagram may be lost.
 #[derive(Clone, Copy, Debug)]
 struct Repeat {
     counts: [i16; 2],
-    /// Mission time of the tick from which the command was computed.
     stamp: MissionTime,
-    /// Mission time of the repetition, half a period after the tick.
+    /// Half a period after the tick.
     due: MissionTime,
 }
 
-/// The link to one robot, in the protocol of its driver.
 #[derive(Debug)]
 pub struct Link {
     state: State,
-    /// The mission time of the present event.
     now: MissionTime,
     driver: Box<dyn Driver>,
     polls: Polls,
     speeds: WheelSpeeds,
     clock_rate: ClockRate,
-    /// The time limit of a command.
     limit: Duration,
     half_period_ns: u64,
     failsafe: Failsafe,
     restart: RestartWatch,
     pinged_ns: Option<u64>,
-    /// The trim; none if the mission wants commands sent as they are.
+    /// None if the mission wants commands sent as they are.
     trim: Option<SpeedTrim>,
-    /// The encoders of the newest tick.
     wheels: WheelSample,
-    /// Mission time of the newest tick.
     time: MissionTime,
     open: Option<OpenTick>,
-    /// In lockstep, the last tick that may begin; `None` if there is no limit.
+    /// The last tick that may begin in lockstep; `None` for no limit.
     last_tick: Option<u64>,
-    /// In lockstep, the number of the current target.
+    /// It is set in lockstep.
     target_number: u64,
     newest_command: Option<CommandSample>,
     repeat: Option<Repeat>,
     decision: Decision,
     stop_sent_ns: Option<u64>,
-    /// In lockstep, the motor frames that the robot still has to send, one for each command and each ping since the order.
+    /// Motor frames still to come in lockstep: one for each command and ping since the order.
     due: u32,
     tally: Tally,
-    /// The time at which a refused message was last logged.
     refused_ns: Option<u64>,
 }
 
@@ -200,27 +191,23 @@ impl Link {
         self.monitors().presence.connected()
     }
 
-    /// The failsafe's present decision.
     pub const fn decision(&self) -> Decision {
         self.decision
     }
 
-    /// The counts of what came from the robot.
     pub fn wire_tally(&self) -> WireTally {
         self.driver.tally()
     }
 
-    /// The counts of the link.
     pub const fn tally(&self) -> Tally {
         self.tally
     }
 
-    /// The number of times that the robot restarted its counts.
     pub const fn restarts(&self) -> u32 {
         self.restart.restarts()
     }
 
-    /// Whether the encoders say that no wheel turns. In lockstep a held robot counts as at rest, because mission time stands still.
+    /// The encoders say so. A held robot counts as at rest in lockstep, because mission time stands still.
     pub fn is_at_rest(&self) -> bool {
         if self.in_ticks() {
             self.decision.stops()
@@ -229,48 +216,40 @@ impl Link {
         }
     }
 
-    /// An explanation of `cause` with the observed values, and a remedy.
     pub fn explain(&self, cause: Cause, now_ns: u64) -> Option<String> {
         self.failsafe.explain(cause, self.moment(now_ns))
     }
 
-    /// The robot's absence at `now_ns` of the monotonic clock.
     pub fn absence(&self, now_ns: u64) -> Absence {
         self.monitors().presence.absence(now_ns)
     }
 
-    /// The number of times that the robot was lost.
     pub fn losses(&self) -> u64 {
         self.monitors().presence.losses()
     }
 
-    /// Whether the robot has ever answered.
     pub fn was_heard(&self) -> bool {
         self.connected() || self.losses() > 0
     }
 
-    /// Whether the encoders are implausible.
     pub fn distrusts_encoders(&self) -> bool {
         let causes = [Cause::OdometryImplausible, Cause::OdometryGivenUp];
         causes.into_iter().any(|cause| self.failsafe.applied(cause))
     }
 
-    /// The state that the next link's driver needs; none if the robot itself counts.
+    /// None if the robot itself counts.
     pub(crate) fn driver_memory(&self) -> Option<Memory> {
         self.driver.memory()
     }
 
-    /// Go on from the state of an earlier link's driver.
     pub(crate) fn remember(&mut self, memory: &Memory) {
         self.driver.remember(memory);
     }
 
-    /// Whether an operator stopped the robot at its link.
     pub const fn is_stopped_by_operator(&self) -> bool {
         self.monitors().orders.stopped_here()
     }
 
-    /// The stops that are sent when the stage ends.
     pub fn final_stops(&self) -> Vec<Vec<u8>> {
         (0..STOPS).map(|_| self.velocity_0()).collect()
     }
@@ -291,7 +270,7 @@ impl Link {
         self.monitors().orders.drive()
     }
 
-    /// Whether ticks continue while an operator holds the robot, which may be carried meanwhile. In lockstep mission time stands still.
+    /// An operator holds the robot while ticks continue, so it may be carried. In lockstep mission time stands still.
     fn held_by_operator(&self) -> bool {
         !self.in_ticks() && self.monitors().orders.by_operator()
     }
@@ -300,7 +279,7 @@ impl Link {
         self.state.pace == Pace::Max
     }
 
-    /// Whether the newest command says that the current target is reached. In lockstep no tick follows it before there is another target.
+    /// Whether the newest command says that the target is reached. In lockstep no tick follows before another target.
     fn arrived(&self) -> bool {
         self.newest_command.is_some_and(|command| {
             CommandState::from_byte(command.state) == CommandState::Arrived
@@ -313,7 +292,7 @@ impl Link {
             return;
         }
         if self.in_ticks() {
-            // When several answers are due, only the last shows the robot's present state.
+            // The last of several due answers shows the robot's present state.
             self.due = self.due.saturating_sub(1);
             if self.open.is_some() || self.due > 0 {
                 return;
@@ -352,7 +331,6 @@ impl Link {
         Effect::Tick { tick, time, ranges, scan, turn, wheels, contact }
     }
 
-    /// The number of the open tick.
     fn open_number(&self) -> u64 {
         if self.in_ticks() { self.state.next_tick } else { self.state.next_tick - 1 }
     }
@@ -364,7 +342,7 @@ impl Link {
         }
         let answers = self.open.is_some() && command.stamp.tick == self.open_number();
         if self.in_ticks() && !answers {
-            // This is a second answer to a tick that was repeated.
+            // A repeated tick was answered twice.
             return;
         }
         self.newest_command = Some(*command);
@@ -423,7 +401,7 @@ impl Link {
         }
     }
 
-    /// Publish the open tick if the supervisor's limit allows it. In lockstep, publish it again if it stays unanswered.
+    /// Publish the open tick if the limit allows; in lockstep, again if it stays unanswered.
     fn give_tick(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         let Some(mut open) = self.open.take() else {
             return;
@@ -436,7 +414,6 @@ impl Link {
         self.open = Some(open);
     }
 
-    /// Whether the open tick is to be published now.
     fn is_due(&mut self, open: &mut OpenTick, now_ns: u64, effects: &mut Vec<Effect>) -> bool {
         let (tick, in_ticks) = (self.open_number(), self.in_ticks());
         match open.given_ns {
@@ -458,8 +435,8 @@ impl Link {
         true
     }
 
-    /// Send the newest command once more, halfway to the next tick. Its time limit is the rest of the first one, so the robot stops no
-    /// later. In lockstep commands are not repeated: the robot answers each with a frame, so a loss is noticed.
+    /// Send the newest command once more, halfway to the next tick, with the rest of its time limit, so the robot stops no later. Not in
+    /// lockstep: the robot answers each command with a frame, so a loss is noticed.
     fn repeat_command(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         if self.in_ticks() {
             return;
@@ -479,7 +456,7 @@ impl Link {
     }
 }
 
-/// Whether `span` has passed since `since_ns`; true if that is `None`.
+/// True if `since_ns` is `None`.
 fn passed(since_ns: Option<u64>, now_ns: u64, span: Duration) -> bool {
     since_ns.is_none_or(|since| now_ns.saturating_sub(since) >= span.as_nanos() as u64)
 }

@@ -1,8 +1,8 @@
-//! The stop guard: a process that stops the robot when its link ended and nobody saw the robot at rest.
+//! The stop guard: a process that stops the robot when its link ended and nobody saw it rest.
 //!
-//! The link starts the guard and holds the writing end of a pipe, which the kernel closes with the link, however that ends. The
-//! guard is in a session of its own: signals to the link, to the supervisor or to their process groups do not reach it. It
-//! speaks to the robot itself, by the same [`Link`] as the link's process, and leaves when the robot rests or another link runs.
+//! The link starts it and holds the writing end of a pipe, which the kernel closes with the link, however that ends. The guard's own
+//! session keeps it from signals to the link, the supervisor or their process groups. It speaks to the robot by the same [`Link`], and
+//! leaves when the robot rests or another link runs.
 
 use std::{
     io,
@@ -33,24 +33,22 @@ use crate::{
     transport::Transport,
 };
 
-/// The word after `firsthand stage` in the guard's command line.
+/// Follows `firsthand stage` in the command line.
 pub const NAME: &str = "stop-guard";
 
-/// The interval at which the guard looks at the clock.
 const LOOKS_AGAIN: Duration = Duration::from_millis(20);
-/// The silence after which a robot is out of reach.
+/// A robot that is silent for longer is out of reach.
 const SILENT: Duration = Duration::from_secs(10);
-/// The time after which a robot that says that it moves, in spite of all stops, may have wrong encoders.
+/// A robot that says that it moves, in spite of all stops, for longer may have wrong encoders.
 const TOLD_IN_VAIN: Duration = Duration::from_secs(60);
 
-/// The link's end of the pipe to the guard.
 #[derive(Debug)]
 pub(crate) struct StopGuard {
     pipe: io::PipeWriter,
 }
 
 impl StopGuard {
-    /// Start the guard of the link with this socket, in the run in `directory`.
+    /// Fails when the process cannot be started.
     pub(crate) fn start(directory: &Path, link: &Identity) -> io::Result<Self> {
         close_all_on_exec()?;
         let (ended, pipe) = io::pipe()?;
@@ -67,12 +65,12 @@ impl StopGuard {
 
     /// The robot rests, so the guard is not needed.
     pub(crate) fn release(mut self) {
-        // A guard that was killed needs no release.
+        // A killed guard needs no release.
         let _ = self.pipe.write_all(b"r");
     }
 }
 
-/// Be the guard of the link with this socket, in the run in `directory`. Standard input ends with the link.
+/// Be the guard of the link with this socket; standard input ends with the link. Fails when the run file or the wire cannot be used.
 pub fn run(directory: &Path, link: &Identity) -> Result<(), StageError> {
     // The link's session may belong to a terminal, or end with the link.
     let _ = setsid();
@@ -88,8 +86,8 @@ pub fn run(directory: &Path, link: &Identity) -> Result<(), StageError> {
     Ok(())
 }
 
-/// Tell the robot of `run` to stand, by each method of the protocol in turn, until its encoders say that it rests. Returns
-/// whether they do: not if the robot is out of reach or does not stop, or if `leave` returns true.
+/// Tell the robot to stand, by each method of the protocol in turn, until its encoders say that it rests. Returns false if the robot is
+/// out of reach or does not stop, or `leave` returns true. Fails when the wire cannot be used.
 pub fn stand(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bool, StageError> {
     let MissionClock::Wall { rate, .. } = run.clock else {
         // In lockstep a robot waits for commands.
@@ -139,7 +137,7 @@ pub fn stand(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bool, StageEr
     }
 }
 
-/// Whether a process of this machine receives datagrams at `address`.
+/// Whether a process of this machine receives datagrams there.
 fn is_taken(address: &Address) -> bool {
     match address {
         Address::Udp(address) => UdpSocket::bind(address).is_err(),

@@ -1,13 +1,5 @@
-//! The transport of bytes to the robot: datagrams, a connection or a serial line. No call blocks. Bytes that cannot be sent now are lost.
-//!
-//! | module | holds |
-//! |---|---|
-//! | `udp` | datagrams from the robot's address only |
-//! | `stream` | the common part of a connection and a serial line: it is reopened after each loss and sends no partial frame |
-//! | `tcp` | a connection |
-//! | `serial` | a serial line |
-//! | `dds` | topics of ROS 2, with the feature `ros2` |
-//! | `counts` | the counts of a transport |
+//! The bytes to and from the robot: datagrams (`udp`), a connection (`tcp`) or a serial line (`serial`), which a `stream` reopens after
+//! each loss, or topics of ROS 2 (`dds`, with the feature `ros2`). No call blocks. Bytes that cannot be sent now are lost.
 
 mod counts;
 #[cfg(feature = "ros2")]
@@ -30,15 +22,13 @@ pub use self::counts::{Attempts, Tally};
 use self::dds::Dds;
 use self::{serial::Serial, stream::Stream, tcp::Tcp, udp::Udp};
 
-/// The wire cannot be opened or used, and the cause is this machine rather than the robot.
+/// The wire cannot be opened or used because of this machine, not the robot.
 #[derive(Debug, Error)]
 #[error(
     "no wire to the robot at {address}: {source}; raise the limit of open files (`ulimit -n`) or free ports, then start it again"
 )]
 pub struct TransportError {
-    /// The robot's address.
     pub address: Address,
-    /// The system's error.
     pub source: io::Error,
 }
 
@@ -48,12 +38,11 @@ impl From<TransportError> for StageError {
     }
 }
 
-/// A wire to one robot.
 #[derive(Debug)]
 pub struct Transport {
     address: Address,
     wire: Wire,
-    /// The last reported state: whether the wire was open.
+    /// The last reported openness.
     reported: Option<bool>,
     buffer: Box<[u8]>,
 }
@@ -68,7 +57,7 @@ enum Wire {
 }
 
 impl Transport {
-    /// A wire to the robot of `mission` at `address`. [`Transport::maintain`] opens a connection or a serial line.
+    /// [`Transport::maintain`] opens a connection or serial line. Fails when this machine cannot.
     pub fn open(address: &Address, mission: &Mission) -> Result<Self, TransportError> {
         let wire = match address {
             Address::Udp(robot) => Udp::open(*robot).map(Wire::Udp),
@@ -80,13 +69,14 @@ impl Transport {
             wire: wire.map_err(|source| TransportError { address: address.clone(), source })?,
             address: address.clone(),
             reported: None,
-            // The buffer holds the largest datagram.
+            // The largest datagram.
             buffer: vec![0; 65_536].into_boxed_slice(),
         })
     }
 
-    /// Reopen a closed wire if that is due at `now_ns` of the monotonic clock, and send the rest of a message. Returns whether the wire is
-    /// open if that changed since the last report. If it closed and opened again, both changes are reported one after the other.
+    /// Reopen a closed wire if due at `now_ns` of the monotonic clock, and send the rest of a message. Returns whether the wire is open
+    /// if that changed since the last report; a close and a reopening are reported one after the other. Fails when this machine is the
+    /// cause.
     pub fn maintain(&mut self, now_ns: u64) -> Result<Option<bool>, TransportError> {
         let closed_unreported = self.reported == Some(true) && !self.is_open();
         if !closed_unreported {
@@ -107,7 +97,6 @@ impl Transport {
         Ok(open)
     }
 
-    /// Whether the wire is open.
     pub const fn is_open(&self) -> bool {
         match &self.wire {
             Wire::Udp(_) => true,
@@ -118,7 +107,7 @@ impl Transport {
         }
     }
 
-    /// The next bytes from the robot; none when all were taken.
+    /// None when all were taken. Fails when this machine is the cause.
     pub fn receive(&mut self, now_ns: u64) -> Result<Option<&[u8]>, TransportError> {
         let received = match &mut self.wire {
             Wire::Udp(udp) => udp.receive(&mut self.buffer),
@@ -133,7 +122,7 @@ impl Transport {
         }
     }
 
-    /// Send a message, which has one frame or more; an empty message is not sent.
+    /// A message of one frame or more; an empty one is not sent. Fails when this machine is the cause.
     pub fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
         if bytes.is_empty() {
             return Ok(());
@@ -151,7 +140,6 @@ impl Transport {
         sent.map_err(|source| self.broken(source))
     }
 
-    /// The counts so far.
     pub const fn tally(&self) -> Tally {
         match &self.wire {
             Wire::Udp(udp) => udp.tally(),
@@ -162,7 +150,7 @@ impl Transport {
         }
     }
 
-    /// The attempts to open the wire, at `now_ns` of the monotonic clock; none while it is open.
+    /// None while the wire is open.
     pub fn attempts(&self, now_ns: u64) -> Option<Attempts> {
         match &self.wire {
             Wire::Udp(_) => None,
@@ -178,7 +166,7 @@ impl Transport {
     }
 }
 
-/// Whether this executable speaks ROS 2.
+/// Whether this executable can.
 pub const SPEAKS_ROS2: bool = cfg!(feature = "ros2");
 
 #[cfg(feature = "ros2")]
@@ -191,7 +179,7 @@ fn ros2(_: u16, _: &Mission) -> io::Result<Wire> {
     Err(io::Error::other("this executable speaks no ROS 2: build it with `--features ros2`"))
 }
 
-/// The descriptor is readable when the wire needs attention. It stays the same when the wire is reopened.
+/// Readable when the wire needs attention; the same after a reopening.
 impl AsFd for Transport {
     fn as_fd(&self) -> BorrowedFd<'_> {
         match &self.wire {

@@ -1,5 +1,5 @@
-//! The speeds of a command in counts of the encoders, which grow no faster than the body's accelerations allow. Speeds fall at once: the
-//! robot stops as fast as it can.
+//! Commands in encoder counts. Speeds grow no faster than the body's accelerations allow, and fall at once: the robot stops as fast as
+//! it can.
 
 use common::{
     kinematics::{DifferentialDrive, Twist, WheelSpeeds as Wheels},
@@ -8,16 +8,14 @@ use common::{
     wire::counts_between,
 };
 
-/// The share of the remaining angle that the steering turns in a tick. It is below 1 so that the delay of the speed loop does not
-/// make the steering oscillate.
+/// Share of the remaining angle that the steering turns in a tick: below 1, because the speed loop's delay would make it oscillate.
 const STEERING_GAIN: f64 = 0.6;
 
-/// Converts the speeds of commands to counts/s of one robot.
 #[derive(Clone, Debug)]
 pub(crate) struct WheelSpeeds {
     body: Body,
     rate_hz: f64,
-    /// The speeds of the robot's newest command, counts/s.
+    /// The robot's newest command, counts/s.
     told: [i16; 2],
 }
 
@@ -26,14 +24,12 @@ impl WheelSpeeds {
         Self { body: mission.body(), rate_hz: mission.robot.rate_hz, told: [0; 2] }
     }
 
-    /// Note that the robot was sent these speeds, counts/s.
     pub(crate) const fn told(&mut self, counts: [i16; 2]) {
         self.told = counts;
     }
 
-    /// The speeds of the two wheels, or of a car's wheel and steering, for `command` at `share` of its speed, counts/s; `wheels` are the
-    /// newest encoder counts. A car's steering has a speed loop like a wheel's and is driven towards its angle, so its motion ends with
-    /// a timed command too.
+    /// Speeds of the two wheels, or of a car's wheel and steering, for `command` at `share` of its speed, counts/s; `wheels` are the
+    /// newest counts. Steering is driven towards its angle by a speed loop like a wheel's, so a timed command ends its motion too.
     pub(crate) fn of(&self, command: &CommandSample, share: f64, wheels: &WheelSample) -> [i16; 2] {
         let Some(steering) = self.body.steering else {
             let wanted = [command.left_rad_s, command.right_rad_s].map(|speed| share * speed);
@@ -47,7 +43,7 @@ impl WheelSpeeds {
         [driven, whole(rate)]
     }
 
-    /// The speeds of the wheels, rad/s, that the robot reaches in a tick on the way to the `wanted` ones.
+    /// The wheel speeds, rad/s, that a tick reaches on the way to the `wanted` ones.
     fn reachable(&self, wanted: [f64; 2]) -> [f64; 2] {
         let Body { wheel_radius_m, track_m, acceleration, .. } = self.body;
         if acceleration == [f64::INFINITY; 2] {
@@ -62,7 +58,7 @@ impl WheelSpeeds {
             now.clamp(-most, most)
         };
         let omega = grown(now.omega, then.omega, acceleration[1]);
-        // The robot slows down so that it keeps its curve, which is free.
+        // Slowing down so that the curve stays, which is free.
         let turned = if omega == now.omega { 1.0 } else { (omega / now.omega).abs() };
         let v = grown(now.v * turned, then.v, acceleration[0]);
         let Wheels { right, left } = drive.wheels(Twist { v, omega });
@@ -73,14 +69,14 @@ impl WheelSpeeds {
         self.body.counts_per_turn / std::f64::consts::TAU
     }
 
-    /// Convert rad/s to counts/s, limited to the wheel's top speed; NaN gives 0.
+    /// Converts rad/s, limited to the wheel's top speed; NaN gives 0.
     fn counts_per_second(&self, speed: f64) -> i16 {
         let top = self.body.top_speed_m_s / self.body.metres_per_count();
         whole((speed * self.counts_per_radian()).clamp(-top, top))
     }
 }
 
-/// Round to whole counts/s; NaN gives 0.
+/// NaN gives 0.
 fn whole(counts: f64) -> i16 {
     counts.round() as i16
 }

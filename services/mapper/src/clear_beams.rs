@@ -1,8 +1,8 @@
 //! The newest readings as evidence of free ground.
 //!
-//! A smooth surface answers only a beam along its normal. A beam without an echo therefore excludes only surfaces square to it, and the
-//! evidence grid, which stores no directions, cannot hold that. So the newest readings are kept: the planner compares each surface that
-//! the body could touch with them. The rays of infrared rangers are kept separately, because a ray ends at a surface of any angle.
+//! A smooth surface answers only a beam along its normal, so a silent beam excludes only surfaces square to it, which the evidence grid,
+//! without directions, cannot hold. So the planner compares each surface that the body could touch with the newest readings. Infrared
+//! rays, kept apart, end at a surface of any angle.
 
 use common::samples::{CLEAR_BEAMS, CLEAR_RAYS, ClearBeam, GridHeader};
 use glam::DVec2;
@@ -13,17 +13,16 @@ use crate::{
     sonar_model::SonarModel,
 };
 
-/// Readings for each sonar.
 const OF_ONE_SONAR: usize = CLEAR_BEAMS / 3;
 
-/// Readings, oldest first: at most [`OF_ONE_SONAR`] for each sonar and [`CLEAR_RAYS`] of infrared rangers.
+/// Oldest first: at most [`OF_ONE_SONAR`] a sonar, and [`CLEAR_RAYS`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ClearBeams {
     beams: Vec<Dated>,
     rays: Vec<Dated>,
 }
 
-/// A reading with the distance that the wheels had rolled when it was taken.
+/// A reading, and the way of the wheels at its time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Dated {
     beam: ClearBeam,
@@ -31,10 +30,9 @@ struct Dated {
 }
 
 impl ClearBeams {
-    /// Size of the largest saved state, bytes.
     pub(crate) const SAVED_BYTES: usize = (CLEAR_BEAMS + CLEAR_RAYS) * size_of::<Dated>();
 
-    /// Take a reading of one of `sonars` sonars after the wheels have rolled `rolled_m` metres, and drop the readings that are too old.
+    /// Add a reading after `rolled_m` metres of the wheels, and drop those too old.
     pub(crate) fn take(&mut self, sonars: usize, reading: &Reading, rolled_m: f64) {
         let sonar = &reading.sonar;
         let clear_m = reading.echo.map_or(f64::INFINITY, |range| range - sonar.ahead_of_echo_m);
@@ -43,7 +41,7 @@ impl ClearBeams {
         append(&mut self.beams, (OF_ONE_SONAR * sonars).min(CLEAR_BEAMS), sonar, newest);
     }
 
-    /// Take a reading of an infrared ranger, as [`ClearBeams::take`] does of the sonar.
+    /// Does for an infrared ranger as [`ClearBeams::take`].
     pub(crate) fn take_ray(&mut self, sonar: &SonarModel, ray: &Ray, rolled_m: f64) {
         let beam = clear_beam(ray.origin, ray.axis, ray.seen.clear_m);
         let newest = Dated { beam, rolled_m };
@@ -55,7 +53,6 @@ impl ClearBeams {
         self.rays.clear();
     }
 
-    /// Put the readings into the header of a `grid` sample.
     pub(crate) fn fill(&self, header: &mut GridHeader) {
         header.clear_beam_count = self.beams.len() as u64;
         for (to, dated) in header.clear_beams.iter_mut().zip(&self.beams) {
@@ -77,7 +74,7 @@ fn clear_beam(origin: DVec2, axis: DVec2, clear_m: f64) -> ClearBeam {
     }
 }
 
-/// Append `newest`, and drop readings that are too old and those beyond the newest `most`.
+/// Append `newest`, and drop readings too old or beyond the newest `most`.
 fn append(readings: &mut Vec<Dated>, most: usize, sonar: &SonarModel, newest: Dated) {
     let oldest_m = newest.rolled_m - sonar.clear_for_m;
     readings.retain(|dated| dated.rolled_m > oldest_m);

@@ -1,22 +1,20 @@
-//! The occupancy evidence grid of the evidential method: evidence for and against an obstacle in every cell.
+//! The occupancy evidence grid of the evidential method.
 //!
-//! The size of its cells follows the resolution of the sonar and not the grid of the map, because the evidence must not depend on the
-//! resolution of the field. Every cell has the weight of the evidence for an obstacle, the direction of the beam with the last echo,
-//! and whether the sonar ever scanned the cell.
+//! Its cells follow the sonar's resolution, because the evidence must not depend on the field's. A cell has the weight of the evidence
+//! for an obstacle, the direction of the last echo's beam, and whether it was scanned.
 //!
-//! An echo says that an obstacle stands somewhere on an arc, and that the ground before the arc is free. Every cell of the
-//! arc therefore gains weight, most in the middle, and every cell before it along the axis loses weight. Where the arc
-//! meets a cell that is well known to be occupied, that cell explains the echo and the rest of the arc learns nothing;
-//! otherwise every wall would grow at each end.
+//! An echo comes from somewhere on an arc: cells of the arc gain weight, most in the middle, and cells before it along the axis lose
+//! weight. A well known occupied cell on the arc explains the echo, and the rest learns nothing; otherwise every wall would grow at each
+//! end.
 //!
-//! The ray of an infrared ranger is as thin as a cell and ends at a surface of any angle. The cells that it passed are free,
-//! the cell where it ends is occupied, and the absence of an echo is no evidence against that.
+//! An infrared ray is as thin as a cell and ends at a surface of any angle: passed cells are free, the last one is occupied, and silence
+//! is no evidence against that.
 //!
-//! Beside a laser there are two grids, its own and one of the other rangers, and a cell of either is hazard: a laser that looks over or
-//! through a thing is no evidence against it. If the laser sees a thing at the range of an echo, the echo is put where that thing is. So a
-//! pane of glass that the laser sees only squarely stays by its echoes.
+//! A laser that looks over or through a thing is no evidence against it, so beside it the other rangers have a grid of their own, and a
+//! cell of either is hazard. An echo whose range the laser confirms is put where the laser sees the thing. So glass that the laser sees
+//! only squarely stays by its echoes.
 //!
-//! No ranger is evidence against a thing that the body touched, because all of them may look over it.
+//! No ranger is evidence against a thing that the body touched: all may look over it.
 
 use std::f64::consts::TAU;
 
@@ -33,49 +31,45 @@ use crate::{
     sonar_model::SonarModel,
 };
 
-/// The value of a cell that was scanned just now. It falls by one for every [`step_m`] that the wheels roll.
+/// Scanned just now. The value falls by one for every [`step_m`] of the wheels.
 const SCANNED: u8 = u8::MAX;
 
-/// Flag of a cell: an obstacle stands in it.
+/// Flag: an obstacle stands in the cell.
 const OCCUPIED: u8 = 1;
-/// Flag of a cell: an infrared ranger saw the obstacle, which the sonar may not hear.
+/// Flag: an infrared ranger saw the obstacle, which the sonar may not hear.
 const SEEN: u8 = 2;
-/// Flag of a cell: the body touched the obstacle, which no ranger may see.
+/// Flag: the body touched the obstacle, which no ranger may see.
 const TOUCHED: u8 = 4;
 
-/// The angle beyond which a cell that the axis of a beam crosses does not belong to the beam, radians: such a cell is beside the sensor.
+/// A cell crossed by the axis beyond this angle is beside the sensor and not of the beam, radians.
 const WIDEST_SLACK_RAD: f64 = 1.0;
 
-/// The greatest difference between the ranges of an echo and of the thing that a laser sees there, metres: the noise of both, and a cell.
+/// The greatest difference of range between an echo and the laser's thing, metres: the noise of both, and a cell.
 const SAME_RANGE_M: f64 = 0.10;
-/// The angle off its axis at which the lobe of a sonar still hears near things, radians.
+/// Off its axis, where a sonar's lobe still hears near things, radians.
 const LOBE_RAD: f64 = 28.0 * TAU / 360.0;
 
-/// Distance that the wheels roll until scanned ground is one step less certain, metres.
+/// Way of the wheels until scanned ground is one step less certain, metres.
 pub(crate) fn step_m(sonar: &SonarModel) -> f64 {
     sonar.scanned_for_m / f64::from(SCANNED - sonar.pointed_enough)
 }
 
-/// A cell that became occupied or free.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Flip {
-    /// The cell of the lattice.
     pub(crate) cell: Cell,
-    /// Whether it is occupied now.
     pub(crate) occupied: bool,
 }
 
-/// The evidence of every cell; row-major, one byte a cell and layer.
+/// Row-major, one byte a cell and layer.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct EvidenceGrid {
     /// Weights of the [`SonarModel`], offset by 128.
     #[serde(with = "serde_bytes")]
     weight: Vec<u8>,
-    /// Direction of the beam with the last echo, 256ths of a turn.
+    /// Direction of the last echo's beam, 256ths of a turn.
     #[serde(with = "serde_bytes")]
     side: Vec<u8>,
-    /// A cell with a value from [`SCANNED`] down to [`SonarModel::pointed_enough`] is scanned. A lower value is the number of times that
-    /// the sonar was pointed at the cell without a result.
+    /// Scanned from [`SCANNED`] down to [`SonarModel::pointed_enough`]; below that, how often the sonar was pointed at the cell in vain.
     #[serde(with = "serde_bytes")]
     looks: Vec<u8>,
     /// The flags [`OCCUPIED`], [`SEEN`] and [`TOUCHED`].
@@ -83,8 +77,7 @@ pub(crate) struct EvidenceGrid {
     occupied: Vec<u8>,
 }
 
-/// The lattice over a mission's perimeter and `beyond_m` metres further: an obstacle just outside can be touched by a
-/// body whose centre is inside.
+/// The lattice over the perimeter and `beyond_m` metres further: a body whose centre is inside can touch an obstacle just outside.
 pub(crate) fn lattice(sonar: &SonarModel, mission: &Mission, beyond_m: f64) -> GridFrame {
     let width = mission.perimeter.width_m;
     let cells = (width / sonar.resolution_m).ceil().min(f64::from(MAX_CELLS));
@@ -98,7 +91,6 @@ pub(crate) fn lattice(sonar: &SonarModel, mission: &Mission, beyond_m: f64) -> G
 }
 
 impl EvidenceGrid {
-    /// A grid without evidence.
     pub(crate) fn none(lattice: &GridFrame) -> Self {
         let cells = lattice.area();
         Self {
@@ -109,14 +101,13 @@ impl EvidenceGrid {
         }
     }
 
-    /// Whether the grid has the size of this lattice.
     pub(crate) fn fits(&self, lattice: &GridFrame) -> bool {
         [&self.weight, &self.side, &self.looks, &self.occupied]
             .iter()
             .all(|layer| layer.len() == lattice.area())
     }
 
-    /// Whether the sonar scanned a cell, or can learn nothing more of it.
+    /// The sonar may also be unable to learn more of the cell.
     pub(crate) fn is_scanned(&self, sonar: &SonarModel, index: usize) -> bool {
         self.looks[index] >= sonar.pointed_enough
     }
@@ -125,8 +116,7 @@ impl EvidenceGrid {
         self.occupied[index] & OCCUPIED != 0
     }
 
-    /// Lower the certainty of scanned cells by `steps`, because the wheels have rolled on. Returns the window of the cells
-    /// that are no longer scanned.
+    /// Lower the certainty of scanned cells by `steps` of the wheels. Returns the window of cells no longer scanned.
     pub(crate) fn grow_stale(
         &mut self,
         sonar: &SonarModel,
@@ -135,7 +125,7 @@ impl EvidenceGrid {
     ) -> Window {
         let mut window = Window::default();
         let enough = sonar.pointed_enough;
-        // The passes over a row have no branches, so that the compiler vectorises them.
+        // Passes over a row have no branches, so the compiler vectorises them.
         let is_over = |looks: u8| looks >= enough && looks.saturating_sub(steps) < enough;
         let rows = self.looks.chunks_exact_mut(lattice.cells as usize);
         for (row, looks) in (0..).zip(rows) {
@@ -155,9 +145,8 @@ impl EvidenceGrid {
         window
     }
 
-    /// Take one reading, which counts as evidence up to `reach` metres, of a robot at `robot` with a body of `radius` metres. If a laser
-    /// has `seen` its cause, only cells that are occupied there get the echo. Appends flipped cells to `flips` and returns the window of
-    /// the cells that became scanned.
+    /// Take one reading, evidence up to `reach` metres, of a robot at `robot` with a body of `radius` metres. If a laser has `seen` its
+    /// cause, only cells occupied there get the echo. Appends flipped cells to `flips` and returns the window of newly scanned ones.
     pub(crate) fn take(
         &mut self,
         sonar: &SonarModel,
@@ -184,12 +173,12 @@ impl EvidenceGrid {
 
         let mut arc = Vec::new();
         let mut explained = false;
-        // All cells that matter below lie within `near`, or in the triangle of the widest cone.
+        // All cells that matter lie within `near`, or in the triangle of the widest cone.
         let (end, aside) = (far * beam.axis, far * outside * beam.axis.perp());
         let corners = [DVec2::splat(near), DVec2::splat(-near), end + aside, end - aside];
         let least = corners.into_iter().fold(DVec2::ZERO, DVec2::min);
         let greatest = corners.into_iter().fold(DVec2::ZERO, DVec2::max);
-        // The tangents of the model's angles stand for the angles, because an arc tangent for each cell would take most of a tick.
+        // Tangents stand for the angles: an arc tangent a cell would take most of a tick.
         let [scanned, pointed, against, at_edge, twice, arc_edge, explains, widest_slack] = [
             sonar.scanned,
             sonar.pointed,
@@ -205,12 +194,11 @@ impl EvidenceGrid {
             let offset = lattice.centre_of(cell) - beam.origin;
             let range = offset.length();
             let (across, along) = (beam.axis.perp_dot(offset).abs(), beam.axis.dot(offset));
-            // Most of the cells are excluded here.
             if range > far || range > near && across > along * outside {
                 continue;
             }
             let is_within = |tangent: f64| across <= along * tangent;
-            // Near the sensor the cone is narrower than a cell, so a cell that the axis crosses is within every angle.
+            // Near the sensor the cone is narrower than a cell, so a crossed cell is within every angle.
             let is_crossed = across <= half_diagonal && is_within(widest_slack);
             let index = lattice.index(cell);
             if range <= known_to && (is_crossed || is_within(scanned)) {
@@ -252,7 +240,7 @@ impl EvidenceGrid {
                 continue;
             }
             let more = sonar.hit + (sonar.hit_at_edge - sonar.hit) * off.min(1.0);
-            // A cell that was free for long must not need as long to become occupied.
+            // A cell that was long free must not need as long to become occupied.
             let weight = self.weight_of(index).max(-sonar.pass) + more as i8;
             self.side[index] = came_from;
             self.set(sonar, lattice, cell, weight, flips);
@@ -260,7 +248,7 @@ impl EvidenceGrid {
         window.union(self.stand(sonar, lattice, (robot, radius), flips))
     }
 
-    /// Whether a thing in an occupied cell may have given the echo of `beam`.
+    /// Whether an occupied cell may have given the echo.
     pub(crate) fn explains(&self, lattice: &GridFrame, beam: &Reading) -> bool {
         let Some(echo) = beam.echo else {
             return false;
@@ -274,8 +262,7 @@ impl EvidenceGrid {
         })
     }
 
-    /// Note that a robot with a body of `radius` metres stands at `robot`. No obstacle stands there, and no sensor can scan the ground that
-    /// touches the robot.
+    /// A robot with a body of `radius` metres stands here: no obstacle does, and no sensor can scan the ground that it touches.
     pub(crate) fn stand(
         &mut self,
         sonar: &SonarModel,
@@ -303,7 +290,7 @@ impl EvidenceGrid {
         window
     }
 
-    /// Take one reading of an infrared ranger, as [`EvidenceGrid::take`] takes one of the sonar.
+    /// Does for an infrared ranger as [`EvidenceGrid::take`].
     pub(crate) fn take_ray(
         &mut self,
         sonar: &SonarModel,
@@ -354,8 +341,8 @@ impl EvidenceGrid {
         window
     }
 
-    /// Change the weight of a cell that a laser saw by `change`; positive means that an obstacle stands in it. A cell that was seen is
-    /// scanned. Returns whether the cell looks different now.
+    /// Change the weight of a cell that a laser saw, which is then scanned; positive is for an obstacle. Returns whether the cell looks
+    /// different.
     pub(crate) fn weigh_seen(
         &mut self,
         sonar: &SonarModel,
@@ -369,7 +356,6 @@ impl EvidenceGrid {
         let was_scanned = self.is_scanned(sonar, index);
         self.looks[index] = SCANNED;
         if was_scanned && change <= 0 && (change == 0 || weight == sonar.least) {
-            // Most cells return here.
             return false;
         }
         if change > 0 {
@@ -381,7 +367,7 @@ impl EvidenceGrid {
         !was_scanned || was_occupied != self.is_occupied(index)
     }
 
-    /// Note that something touches a body of `radius` metres: an obstacle stands in every cell at its rim in the arc of `touch`.
+    /// An obstacle stands in every cell at the body's rim in the arc of `touch`.
     pub(crate) fn touch(
         &mut self,
         sonar: &SonarModel,
@@ -406,7 +392,7 @@ impl EvidenceGrid {
         window
     }
 
-    /// Reset all evidence except echoes from within `keep` metres of `robot`.
+    /// Keeps echoes from within `keep` metres of `robot`.
     pub(crate) fn reset(
         &mut self,
         sonar: &SonarModel,
@@ -453,12 +439,10 @@ impl EvidenceGrid {
     }
 }
 
-/// The cells inside the map that lie in a square of `reach` metres around `centre`.
 fn around(frame: &GridFrame, centre: DVec2, reach: f64) -> impl Iterator<Item = Cell> + use<> {
     between(frame, centre - reach, centre + reach)
 }
 
-/// The cells inside the map that lie in a rectangle or in the rim around it.
 fn between(frame: &GridFrame, least: DVec2, greatest: DVec2) -> impl Iterator<Item = Cell> + use<> {
     let last = f64::from(frame.cells) - 1.0;
     let inside = |corner: DVec2| corner.clamp(DVec2::ZERO, DVec2::splat(last));
@@ -469,12 +453,12 @@ fn between(frame: &GridFrame, least: DVec2, greatest: DVec2) -> impl Iterator<It
         .flat_map(move |row| columns.clone().map(move |col| Cell { col, row }))
 }
 
-/// Direction of `axis`, 256ths of a turn.
+/// 256ths of a turn.
 fn side_of(axis: DVec2) -> u8 {
     (axis.to_angle() / TAU * 256.0).rem_euclid(256.0) as u8
 }
 
-/// Angle between two directions of [`side_of`], radians.
+/// The angle between two of [`side_of`], radians.
 fn apart(a: u8, b: u8) -> f64 {
     let steps = a.wrapping_sub(b);
     f64::from(steps.min(steps.wrapping_neg())) * TAU / 256.0

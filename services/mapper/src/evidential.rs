@@ -1,4 +1,4 @@
-//! The evidential method's map: evidence turned into hazard and scanned ground.
+//! The evidential map: evidence turned into hazard and scanned ground.
 
 use common::{
     grid::{Cell, CellState, Window},
@@ -20,35 +20,29 @@ use crate::{
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct EvidenceMap {
     evidence: EvidenceGrid,
-    /// The evidence of sonars and infrared rangers about things that a laser beside them looks over or through; none without both.
+    /// Evidence of sonars and infrared rangers beside a laser, which looks over or through things; none without both.
     unseen: Option<Box<EvidenceGrid>>,
     pub(crate) beams: ClearBeams,
-    /// The inflation is not saved, because it is recomputed from the evidence.
+    /// Recomputed from the evidence, so not saved.
     #[serde(skip)]
     inflation: Inflation,
 }
 
-/// The effect of a reading.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Observed {
-    /// The cells of the grid that may look different now.
     pub(crate) window: Window,
-    /// Whether a free cell became occupied.
     pub(crate) safety_event: bool,
 }
 
-/// Converts evidence to states of the grid's cells, for one mission.
 #[derive(Clone, Debug)]
 pub(crate) struct Evidential {
     sonar: SonarModel,
     geometry: Geometry,
-    /// The column of the lattice under the middle of each column of the grid; rows have the same, as both are square and have one centre.
+    /// The lattice's column under the middle of each of the grid's; rows are the same, as both are square with one centre.
     under: Vec<Option<u32>>,
     radius: f64,
     map_within: f64,
-    /// Number of sonars that are used.
     sonars: usize,
-    /// Whether sonars or infrared rangers are used beside a laser.
     beside_laser: bool,
 }
 
@@ -73,12 +67,11 @@ impl Evidential {
         }
     }
 
-    /// Distance up to which a surface blocks the cells around it, metres.
+    /// A surface blocks cells within this, metres.
     pub(crate) const fn reach(&self) -> f64 {
         self.geometry.reach
     }
 
-    /// A map without evidence, with which a mission starts.
     pub(crate) fn empty(&self) -> EvidenceMap {
         let evidence = EvidenceGrid::none(&self.geometry.lattice);
         EvidenceMap {
@@ -89,13 +82,12 @@ impl Evidential {
         }
     }
 
-    /// Size of a saved map, bytes.
     pub(crate) const fn saved_bytes(&self) -> usize {
         let grids = if self.beside_laser { 2 } else { 1 };
         4 * grids * self.geometry.lattice.area() + ClearBeams::SAVED_BYTES + 128
     }
 
-    /// Complete a saved map. A map of another mission is refused.
+    /// Fails for the map of another mission.
     pub(crate) fn complete(&self, map: &mut EvidenceMap) -> Result<(), ForeignState> {
         let lattice = self.geometry.lattice;
         if map.unseen.is_some() != self.beside_laser {
@@ -119,8 +111,7 @@ impl Evidential {
         Ok(())
     }
 
-    /// Take the readings of the sonars and the rays of the infrared rangers of a robot at `robot` whose wheels have rolled `rolled_m`
-    /// metres.
+    /// Take readings of a robot at `robot` whose wheels have rolled `rolled_m` metres.
     pub(crate) fn take(
         &self,
         map: &mut EvidenceMap,
@@ -137,7 +128,7 @@ impl Evidential {
             Some(unseen) => (unseen.as_mut(), Some(&map.evidence)),
             None => (&mut map.evidence, None),
         };
-        // Rays come first, because the things that they show explain echoes.
+        // Rays first: what they show explains echoes.
         for ray in rays {
             map.beams.take_ray(&self.sonar, &ray, rolled_m);
             let seen = grid.take_ray(&self.sonar, lattice, &ray, body, &mut flips);
@@ -154,7 +145,6 @@ impl Evidential {
         Observed { window, safety_event: flips.iter().any(|flip| flip.occupied) }
     }
 
-    /// Take a scan of a laser on a robot at `robot`.
     pub(crate) fn take_scan(&self, map: &mut EvidenceMap, robot: DVec2, fan: &Fan<'_>) -> Observed {
         let mut flips = Vec::new();
         let lattice = &self.geometry.lattice;
@@ -164,7 +154,7 @@ impl Evidential {
         Observed { window, safety_event: flips.iter().any(|flip| flip.occupied) }
     }
 
-    /// Note that something touches the body. Returns the window of the grid that may look different now.
+    /// Returns the window that may look different now.
     pub(crate) fn touch(&self, map: &mut EvidenceMap, touch: &Touch) -> Window {
         let mut flips = Vec::new();
         let lattice = &self.geometry.lattice;
@@ -172,7 +162,7 @@ impl Evidential {
         self.follow(map, touched, &flips)
     }
 
-    /// Inflate the flipped cells. Returns the window of the grid that may look different now, with that `touched` on the lattice.
+    /// Inflate the flipped cells. Returns the grid's window that may look different, `touched` on the lattice included.
     fn follow(&self, map: &mut EvidenceMap, touched: Window, flips: &[Flip]) -> Window {
         let mut window = self.on_grid(touched);
         for flip in flips {
@@ -181,8 +171,7 @@ impl Evidential {
         window
     }
 
-    /// Let scanned ground grow stale as the wheels roll from `before` to `now`, metres since the start. Returns the window of
-    /// the grid that may have changed.
+    /// Age scanned ground as the wheels roll between these ways, metres. Returns the window that may have changed.
     pub(crate) fn roll(&self, map: &mut EvidenceMap, before: f64, now: f64) -> Window {
         let step_m = step_m(&self.sonar);
         let steps = (now / step_m).floor() - (before / step_m).floor();
@@ -193,7 +182,7 @@ impl Evidential {
         self.on_grid(map.evidence.grow_stale(&self.sonar, lattice, steps as u8))
     }
 
-    /// Reset all evidence that is not near the robot. Every second reset drops the near evidence too, since that may be wrong.
+    /// Drop all evidence that is not near the robot; every second reset drops that too, since it may be wrong.
     pub(crate) fn reset(&self, map: &mut EvidenceMap, robot: DVec2, epoch: u64) {
         let keep = if epoch % 2 == 1 { self.sonar.near_m } else { 0.0 };
         let mut flips = Vec::new();
@@ -207,7 +196,7 @@ impl Evidential {
         }
     }
 
-    /// The state, by the evidence, of a cell of the grid that is neither known nor perimeter.
+    /// The evidence decides, of a cell neither known nor perimeter.
     pub(crate) fn state(&self, map: &EvidenceMap, cell: Cell, is_target: bool) -> CellState {
         let Geometry { lattice, grid, .. } = self.geometry;
         let hazard = map.inflation.is_hazard(grid.index(cell)) && !is_target;
@@ -222,7 +211,6 @@ impl Evidential {
         }
     }
 
-    /// The window of the grid that covers `window` of the lattice.
     fn on_grid(&self, window: Window) -> Window {
         if window.area() == 0 {
             return window;
@@ -233,7 +221,7 @@ impl Evidential {
             let point = lattice.centre_of(Cell { col, row });
             grid.to_cells(point).clamp(DVec2::ZERO, last)
         };
-        // A cell of the lattice has an effect up to half of it, and half a cell of the grid, beyond its centre.
+        // A lattice cell acts up to half of it, and half a grid cell, beyond its centre.
         let more = 0.5 * lattice.resolution_m / grid.resolution_m + 0.5;
         let from = (corner(window.col, window.row) - more).floor().max(DVec2::ZERO);
         let to = corner(window.col + window.width - 1, window.row + window.height - 1) + more;

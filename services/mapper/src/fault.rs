@@ -1,26 +1,25 @@
-//! Hazard that an injected fault puts into the belief.
+//! The hazard of an injected fault.
 
 use common::samples::FaultKind;
 use glam::DVec2;
 
-/// Radius of the hazard around the robot, metres.
+/// Around the robot, metres.
 const AROUND_M: f64 = 0.5;
-/// Distance from the target to the wall that encloses it, metres.
+/// Distance of the wall that encloses the target, metres.
 const WALL_M: f64 = 0.5;
-/// Thickness of the wall, cells: no step to a neighbouring cell crosses it.
+/// No step to a neighbouring cell crosses the wall.
 const WALL_CELLS: f64 = 1.5;
 
-/// An area that a fault makes hazard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Area {
-    /// The disc of [`AROUND_M`] around this point.
+    /// Its radius is [`AROUND_M`].
     Disc(DVec2),
-    /// The closed wall at [`WALL_M`] from this point.
+    /// Its distance from this point is [`WALL_M`].
     Wall(DVec2),
 }
 
 impl Area {
-    /// Whether the area covers a cell of width `side` with its centre at `at`, metres.
+    /// Whether it covers a cell of width `side`, centred at `at`, metres.
     pub(crate) fn covers(self, at: DVec2, side: f64) -> bool {
         match self {
             Self::Disc(middle) => at.distance(middle) <= AROUND_M,
@@ -31,7 +30,6 @@ impl Area {
     }
 }
 
-/// The area that `fault` makes hazard for a robot at `robot` on its way to `target`.
 pub(crate) fn hazard(fault: FaultKind, robot: DVec2, target: DVec2) -> Option<Area> {
     match fault {
         FaultKind::HazardAroundRobot => Some(Area::Disc(robot)),
@@ -40,7 +38,7 @@ pub(crate) fn hazard(fault: FaultKind, robot: DVec2, target: DVec2) -> Option<Ar
     }
 }
 
-/// The part of `fault` that is left after a reset of the sensed belief.
+/// A fault may outlast a reset of the sensed belief.
 pub(crate) fn after_reset(fault: FaultKind) -> FaultKind {
     match fault {
         FaultKind::CutOff => fault,

@@ -1,22 +1,21 @@
-//! Cells that the body's centre must not enter: those within reach of an occupied cell.
+//! Cells within reach of an occupied cell, which the body's centre must not enter.
 
 use common::grid::{Cell, GridFrame, Window};
 use glam::DVec2;
 
 use crate::evidence_grid::Flip;
 
-/// The two grids of an inflation, and its reach.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Geometry {
-    /// The cells of the evidence grid, which are occupied or free.
+    /// The evidence grid.
     pub(crate) lattice: GridFrame,
-    /// The cells of the map, which they block.
+    /// The map whose cells are blocked.
     pub(crate) grid: GridFrame,
-    /// Distance up to which an occupied cell blocks, centre to centre, metres.
+    /// An occupied cell blocks up to here, centre to centre, metres.
     pub(crate) reach: f64,
 }
 
-/// The number of occupied lattice cells within reach of each cell of the grid, row-major.
+/// Occupied lattice cells within reach of each grid cell, row-major.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Inflation {
     count: Vec<u16>,
@@ -31,7 +30,7 @@ impl Inflation {
         self.count[index] > 0
     }
 
-    /// Follow one flip. Returns the window of the grid within its reach.
+    /// Returns the grid's window within reach.
     pub(crate) fn follow(&mut self, geometry: &Geometry, flip: Flip) -> Window {
         let Geometry { lattice, grid, reach } = *geometry;
         let centre = lattice.centre_of(flip.cell);

@@ -1,40 +1,38 @@
-//! The infrared model: the meaning of a ranger's voltage for the cells along its ray.
+//! The infrared model: a ranger's voltage as evidence along its ray.
 //!
-//! A ranger triangulates: it sees a small spot straight ahead, 10 to 80 cm away, at any angle of the surface. Its voltage
-//! grows with 1 / range, so the noise of the AD converter becomes a noise of the range that grows with its square. Nearer than
-//! 10 cm the voltage falls again: such a reading says that an obstacle is near, but not how near. A ranger does not see glass
-//! and surfaces that do not reflect infrared; the sonar hears those.
+//! A ranger triangulates a small spot straight ahead, 10 to 80 cm away, at any angle of the surface. Its voltage grows with 1 / range,
+//! so the AD converter's noise becomes one of the range that grows with the square. Nearer than 10 cm the voltage falls again: the
+//! obstacle is near, but not how near. A ranger sees no glass and no surface that reflects no infrared; the sonar hears those.
 
 use common::{
     samples::{RangeReading, RangeStatus},
     wire::infrared_ad,
 };
 
-/// A reading nearer than this may come from an obstacle that is nearer still, metres.
+/// The obstacle may be nearer than a reading below this, metres.
 const UNAMBIGUOUS_M: f64 = 0.10;
-/// A reading farther than this is not a hit, metres: a ranger that sees nothing can give it.
+/// Farther readings are no hits, metres: a ranger that sees nothing can give them.
 const HIT_WITHIN_M: f64 = 0.70;
-/// Standard deviation of a reading, AD counts. Nominal: three times that of the AD converter alone.
+/// Standard deviation, AD counts. Nominal: three times that of the AD converter alone.
 const NOISE_AD: f64 = 15.0;
-/// A ray is free up to this many standard deviations before the reading.
+/// A ray is free up to so many before the reading.
 const SURE_DEVIATIONS: f64 = 2.0;
-/// Error of the formula on a single ranger, metres; the free length of a ray is shorter by this.
+/// The formula's error on a single ranger, metres; it shortens a ray's free length.
 const FORMULA_M: f64 = 0.02;
 
-/// Half the width of the ground that a ray scans, metres: the spot of a ranger is some centimetres wide, and the next ray
-/// of a moving robot meets an obstacle beside it. Nominal.
+/// Half the width that a ray scans, metres: the spot is some centimetres wide, and the next ray of a moving robot meets an obstacle
+/// beside it. Nominal.
 pub(crate) const SCANNED_ASIDE_M: f64 = 0.04;
 
-/// The meaning of a reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Seen {
-    /// Free length of the ray, metres from the ranger; at most 0.72.
+    /// Metres from the ranger; at most 0.72.
     pub(crate) clear_m: f64,
-    /// Range of an obstacle, metres from the ranger.
+    /// An obstacle, metres from the ranger.
     pub(crate) hit_m: Option<f64>,
 }
 
-/// The meaning of a reading of a ranger whose ranges are used up to `reach_m`; none where the ranger may be dead or saturated.
+/// Ranges are used up to `reach_m`; none where the ranger may be dead or saturated.
 pub(crate) fn seen(reading: &RangeReading, reach_m: f64) -> Option<Seen> {
     let range_m = match reading.status() {
         RangeStatus::Measured if reading.range_m > 0.0 => reading.range_m,
@@ -51,9 +49,8 @@ pub(crate) fn seen(reading: &RangeReading, reach_m: f64) -> Option<Seen> {
     })
 }
 
-/// Standard deviation of a range, metres.
 fn deviation_m(range_m: f64) -> f64 {
-    // Counts are a / range + b; `a` follows from the formula at two ranges.
+    // Counts are a / range + b; the formula at two ranges gives `a`.
     let (near, far) = (f64::from(infrared_ad(0.2)), f64::from(infrared_ad(0.4)));
     let counts_metres = (near - far) / (1.0 / 0.2 - 1.0 / 0.4);
     NOISE_AD * range_m * range_m / counts_metres

@@ -1,14 +1,13 @@
-//! The laser model: the meaning of a scan for the cells along its beams.
+//! The laser model: a scan as evidence along its beams.
 //!
-//! A beam is thinner than a cell and ends at a surface of any angle, so the cells that it passed are free and the cell in which it ends
-//! is occupied. A beam without a reading says nothing of the cells along it.
+//! A beam is thinner than a cell and ends at a surface of any angle: passed cells are free, the last one is occupied. A beam without a
+//! reading says nothing.
 //!
-//! Many beams cross one cell near the laser, so a scan counts once for each cell. Where a fifth of them end and the others pass, the cell
-//! is occupied: a post, or the edge of a thing, fills a part of its cell. If fewer end there, they are noise of a surface behind it,
-//! which must not close a gap.
+//! Many beams cross a cell near the laser, so a scan counts once for a cell. It is occupied where a fifth of the beams end and the
+//! others pass: a post, or a thing's edge, fills part of it. Fewer ends are noise of a surface behind, which must not close a gap.
 //!
-//! Where beams are no farther apart than a cell is wide, they are not followed one by one: the cells that they passed lie in the polygon
-//! of their ends, which is filled row by row. Farther away each beam is followed, and so is a beam beside one without a reading.
+//! Where beams are no farther apart than a cell, the passed cells are the polygon of their ends, filled row by row. Farther away, and
+//! beside a beam without a reading, beams are followed one by one.
 
 use std::ops::Range;
 
@@ -21,49 +20,46 @@ use crate::{
     sonar_model::SonarModel,
 };
 
-/// Weight of a cell in which beams end. One scan makes a free cell occupied.
+/// Weight of beams that end in a cell. One scan makes a free cell occupied.
 const HIT: i8 = 6;
-/// Weight taken off a cell that beams passed and in which none ended. Two scans free a cell that many others filled.
+/// Weight of beams that all pass a cell. Two scans free a cell that many filled.
 const PASS: i8 = 6;
 
-/// The distance behind a cell, metres, up to which the end of a passing beam is no evidence against a thing in the cell: along a wall at
-/// a slant most beams pass a part of it before they end in the next one.
+/// A beam that ends this near behind a cell is no evidence against a thing in it, metres: along a slanted wall most beams pass a part of
+/// it before they end in the next.
 const NEAR_END_M: f64 = 0.25;
-/// The farthest that a robot can be from its map, cells.
+/// A robot's greatest distance from its map, cells.
 const FARTHEST: f64 = 1e6;
 
-/// The most beams that pass for each one that ends in an occupied cell.
+/// The most passing beams for each that ends in an occupied cell.
 const PASS_FOR_ONE_THAT_ENDS: u32 = 4;
 
-/// Marks of a cell in a scan: a beam ended in it, a beam passed it, a beam passed it and ended far behind.
+/// Marks of a cell: a beam ended in it, passed it, passed it and ended far behind.
 const ENDED: u8 = 1;
 const PASSED: u8 = 2;
 const PASSED_FAR: u8 = 4;
 
-/// A beam of a scan on the lattice.
 #[derive(Clone, Copy, Debug)]
 struct Beam {
-    /// The direction of the beam, a unit vector.
+    /// Unit vector.
     along: DVec2,
-    /// The length of the beam, cells; 0 without a reading.
+    /// Cells; 0 without a reading.
     range: f64,
-    /// Whether the beam ended at that length.
     ends: bool,
 }
 
-/// A scan of a laser on the lattice, whose cells have sides of 1.
+/// Cells of the lattice have sides of 1.
 struct Scan<'a> {
     fan: &'a Fan<'a>,
     lattice: &'a GridFrame,
     origin: DVec2,
     beams: Vec<Beam>,
-    /// The marks of the lattice's cells, row-major.
+    /// Row-major.
     marks: Vec<u8>,
 }
 
 impl EvidenceGrid {
-    /// Take a scan of a laser on a robot at `robot` with a body of `radius` metres. Appends the cells that flipped to `flips` and returns
-    /// the window of all cells that changed.
+    /// Take a scan of a robot with a body of `radius` metres. Appends flipped cells to `flips` and returns the window of changed ones.
     pub(crate) fn take_scan(
         &mut self,
         sonar: &SonarModel,
@@ -104,11 +100,11 @@ impl EvidenceGrid {
 }
 
 impl<'a> Scan<'a> {
-    /// The scan; none if the pose, which comes from shared memory, is no place.
+    /// None if the pose, from shared memory, is no place.
     fn new(lattice: &'a GridFrame, fan: &'a Fan<'a>) -> Option<Self> {
         let origin = lattice.to_cells(fan.origin);
         let beam = |(along, range_m): (DVec2, f64)| {
-            // A comparison with what is no number is false.
+            // A comparison with NaN is false.
             let reads = range_m >= 0.0;
             let range = if reads { range_m.min(fan.reach_m) / lattice.resolution_m } else { 0.0 };
             Beam { along, range, ends: reads && range_m <= fan.reach_m }
@@ -122,9 +118,9 @@ impl<'a> Scan<'a> {
         })
     }
 
-    /// Mark the cells that beams passed and left at least `near` cells before their ends.
+    /// Mark cells that beams left at least `near` cells before their ends.
     fn pass(&mut self, near: f64, mark: u8) {
-        // Beyond this range there may be a cell between two beams.
+        // A cell may lie between two beams beyond this range.
         let close = self.fan.step_rad.recip();
         let corner = |beam: &Beam| self.origin + (beam.range - near).clamp(0.0, close) * beam.along;
         let mut corners: Vec<_> = self.beams.iter().map(corner).collect();
@@ -153,7 +149,6 @@ impl<'a> Scan<'a> {
         }
     }
 
-    /// Mark the cells in which beams ended.
     fn end(&mut self) {
         for beam in self.beams.iter().filter(|beam| beam.ends) {
             let end = self.origin + beam.range * beam.along;
@@ -163,7 +158,7 @@ impl<'a> Scan<'a> {
         }
     }
 
-    /// Whether enough of the beams that reach a cell end in it.
+    /// The share of its beams that end in it decides.
     fn is_thing(&self, cell: Cell) -> bool {
         let offset = DVec2::new(cell.col.into(), cell.row.into()) - self.origin;
         let away = offset.length();
@@ -198,7 +193,7 @@ impl<'a> Scan<'a> {
     }
 }
 
-/// The cells of a lattice of `side` times `side` whose centres lie in the polygon of these corners: gives rows with their columns.
+/// Gives the rows, with columns, of cells in a lattice of `side` times `side` whose centres lie in this polygon.
 fn fill(side: u32, corners: &[DVec2], mut span: impl FnMut(u32, Range<u32>)) {
     let last = f64::from(side) - 1.0;
     let mut crossings = vec![Vec::new(); side as usize];
@@ -206,7 +201,7 @@ fn fill(side: u32, corners: &[DVec2], mut span: impl FnMut(u32, Range<u32>)) {
     for (from, to) in before.zip(corners) {
         let (least, greatest) = (from.y.min(to.y), from.y.max(to.y));
         let slope = (to.x - from.x) / (to.y - from.y);
-        // If two edges meet on the centre of a row, one of them crosses it.
+        // One of two edges that meet on a row's centre crosses it.
         let (first, end) = ((least.floor() + 1.0).max(0.0), greatest.floor().min(last) + 1.0);
         for (row, crossings) in
             crossings.iter_mut().enumerate().take(end as usize).skip(first as usize)
@@ -225,19 +220,18 @@ fn fill(side: u32, corners: &[DVec2], mut span: impl FnMut(u32, Range<u32>)) {
     }
 }
 
-/// The cells of the lattice along a beam, each once, in the order in which the beam crosses the grid's lines.
+/// The cells along a beam, each once, in the order of the grid's lines that it crosses.
 struct Along {
     cell: IVec2,
     step: IVec2,
-    /// Ranges at which the next line of a column and of a row is crossed, and from line to line, in cells.
+    /// Ranges of the next line of a column and of a row, and from line to line, in cells.
     next: DVec2,
     each: DVec2,
 }
 
 impl Along {
-    /// The cells from `origin`, in cells of the lattice, in the unit direction `along`.
     fn new(origin: DVec2, along: DVec2) -> Self {
-        // The centre of a cell has whole coordinates.
+        // Centres of cells have whole coordinates.
         let cell = (origin + 0.5).floor();
         let ahead = |origin: f64, cell: f64, along: f64| {
             let line = if along > 0.0 { cell + 0.5 } else { cell - 0.5 };
@@ -251,7 +245,6 @@ impl Along {
         }
     }
 
-    /// The range at which the present cell ends, in cells.
     fn ends(&self) -> f64 {
         self.next.min_element()
     }
@@ -267,7 +260,7 @@ impl Along {
     }
 }
 
-/// Whether a beam outside of the lattice goes farther away from it.
+/// Whether a beam outside of the lattice goes away from it.
 fn left_behind(cell: IVec2, step: IVec2, side: i32) -> bool {
     let beyond = |at: i32, step: i32| at < 0 && step <= 0 || at >= side && step >= 0;
     beyond(cell.x, step.x) || beyond(cell.y, step.y)

@@ -1,18 +1,8 @@
 //! The on-demand safety map: range samples to hazard cells, equations (8)-(10), (18), (19).
 //!
-//! | module | holds |
-//! |---|---|
-//! | [`step`] | the mapper itself, pure: poses with ranges in, the window of the grid that changed out |
-//! | `sonar_model` | every number of the sonar's inverse model |
-//! | `infrared_model` | every number of the infrared rangers' model |
-//! | `evidence_grid` | the occupancy evidence grid: evidence for and against every cell, and where the sonar looked |
-//! | `reading` | the rows of the sensors: their readings, where they were taken |
-//! | `clear_beams` | the newest readings as evidence of free ground, for the planner |
-//! | `inflation` | occupied cells grown by the robot's body |
-//! | `evidential` | evidence and inflation together: the evidential method's state of a cell |
-//! | `fault` | hazard of injected faults |
-//! | [`stage`] | what a recording holds of it, what it publishes and persists |
-//! | [`shell`] | its process: reads the topics `pose`, `ranges` and `directive`, publishes keyframes |
+//! [`step`] is the pure mapper, [`stage`] records and publishes it, [`shell`] is its process. `reading` puts readings into the mission
+//! frame, the models say what they mean for cells, `evidence_grid` sums that up, `inflation` grows occupied cells by the body, and
+//! `evidential` joins both. `scan_match` gives poses by the laser.
 
 mod clear_beams;
 mod evidence_grid;

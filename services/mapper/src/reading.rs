@@ -1,4 +1,4 @@
-//! Readings of the ranging sensors in the mission's frame, by the rows of the mission's sensors.
+//! Readings in the mission's frame, by the mission's rows of sensors.
 
 use std::f64::consts::PI;
 
@@ -15,14 +15,13 @@ use crate::{
     sonar_model::SonarModel,
 };
 
-/// The range at which the reading "4 cm or nearer" is mapped, metres.
+/// The reading "4 cm or nearer" is mapped here, metres.
 const CONTACT_M: f64 = 0.04;
 
-/// The robot's sensors, with the model of each that is used.
 #[derive(Clone, Debug)]
 pub(crate) struct Rows {
     rows: Vec<Option<Row>>,
-    /// The bearing of the laser's first beam from its own and the angle from beam to beam, and its row; none if it is not used.
+    /// The bearing of the first beam from the laser's own, the angle from beam to beam, and the row; none if unused.
     laser: Option<((f64, f64), Row)>,
     front: u8,
 }
@@ -32,7 +31,7 @@ struct Row {
     mount: Mount,
     reach_m: f64,
     kind: SensorKind,
-    /// The model of a cone; none for other kinds.
+    /// None for other kinds.
     cone: Option<SonarModel>,
 }
 
@@ -53,18 +52,16 @@ impl Rows {
         }
     }
 
-    /// Number of cones that are used.
     pub(crate) fn cones(&self) -> usize {
         self.rows.iter().flatten().filter(|row| row.cone.is_some()).count()
     }
 
-    /// Whether the mission uses a laser and a sensor of another kind.
     pub(crate) fn are_beside_laser(&self) -> bool {
         let is_other = |row: &Row| row.kind != SensorKind::Scan;
         self.laser.is_some() && self.rows.iter().flatten().any(is_other)
     }
 
-    /// The row of a reading; none if the mission does not use it. The sample comes from shared memory and may hold anything.
+    /// None if the mission does not use it. The sample, from shared memory, may hold anything.
     fn of(&self, reading: &RangeReading) -> Option<Row> {
         *self.rows.get(usize::from(reading.sensor))?
     }
@@ -73,7 +70,7 @@ impl Rows {
         usize::try_from(row).is_ok_and(|row| self.rows.get(row).is_some_and(Option::is_some))
     }
 
-    /// The beams of the laser on a robot at `robot`; none if there are none.
+    /// None without beams.
     pub(crate) fn scan<'a>(&self, robot: Pose2, beams: &'a [f32]) -> Option<Fan<'a>> {
         let ((first, step_rad), row) = self.laser.filter(|_| !beams.is_empty())?;
         let mount = row.mount.on(robot);
@@ -85,7 +82,7 @@ impl Rows {
         self.uses_row(reading.sensor.into())
     }
 
-    /// The hit of (19), metres, with its distance S: the place where the front sonar of a robot at `robot` hears something.
+    /// The hit of (19) by the front sonar, with its distance S, metres.
     pub(crate) fn front_hit(
         &self,
         robot: Pose2,
@@ -96,7 +93,6 @@ impl Rows {
         Some((distance, self.of(reading)?.mount.hit(robot, distance)))
     }
 
-    /// The readings of the cones on a robot at `robot`, in the order of `readings`.
     pub(crate) fn beams(
         &self,
         robot: Pose2,
@@ -114,7 +110,7 @@ impl Rows {
         })
     }
 
-    /// The readings of the live rays on a robot at `robot`, in the order of `readings`.
+    /// Dead rays give none.
     pub(crate) fn rays(
         &self,
         robot: Pose2,
@@ -138,45 +134,40 @@ fn safety_distance(reading: &RangeReading) -> Option<f64> {
     }
 }
 
-/// A reading of a sonar in the mission's frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reading {
-    /// Position of the sensor, metres.
+    /// The sensor's place, metres in the mission frame.
     pub(crate) origin: DVec2,
-    /// Direction of the beam, a unit vector.
+    /// Unit vector.
     pub(crate) axis: DVec2,
-    /// Range of the echo, metres; none where nothing answered.
+    /// Metres; none where nothing answered.
     pub(crate) echo: Option<f64>,
-    /// The model of the sensor.
     pub(crate) sonar: SonarModel,
 }
 
-/// A reading of an infrared ranger in the mission's frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ray {
-    /// Position of the ranger, metres.
+    /// The ranger's place, metres in the mission frame.
     pub(crate) origin: DVec2,
-    /// Direction of the ray, a unit vector.
+    /// Unit vector.
     pub(crate) axis: DVec2,
     pub(crate) seen: Seen,
 }
 
-/// A scan of a laser in the mission's frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fan<'a> {
-    /// Position of the laser, metres.
+    /// The laser's place, metres in the mission frame.
     pub(crate) origin: DVec2,
-    /// Bearing of the first beam, and the angle from beam to beam, radians.
+    /// Bearing of the first beam, and the angle from beam to beam.
     pub(crate) first_rad: f64,
     pub(crate) step_rad: f64,
-    /// The range up to which the laser sees, metres.
     pub(crate) reach_m: f64,
-    /// The ranges, metres: infinite for nothing in reach, not a number for no reading.
+    /// Metres: infinite for nothing in reach, not a number for no reading.
     pub(crate) beams: &'a [f32],
 }
 
 impl Fan<'_> {
-    /// The beams: the direction of each, a unit vector, and its range.
+    /// Direction, a unit vector, and range of each beam.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (DVec2, f64)> + '_ {
         let step = DVec2::from_angle(self.step_rad);
         let first = DVec2::from_angle(self.first_rad);
@@ -185,20 +176,19 @@ impl Fan<'_> {
     }
 }
 
-/// Something that touches the body, in the mission's frame.
+/// A touch of the body, in the mission's frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Touch {
-    /// Position of the body's centre, metres.
+    /// The body's centre, metres.
     pub(crate) robot: DVec2,
-    /// Direction of the middle of the arc in which the body is touched, a unit vector.
+    /// Middle of the touched arc, a unit vector.
     pub(crate) axis: DVec2,
-    /// Half the angle of the arc, radians.
+    /// Half the arc, radians.
     pub(crate) half_width: f64,
 }
 
 impl Touch {
-    /// The contact of a robot at `pose`; none if it is not known where the body is touched. The sample comes from shared memory and
-    /// may hold anything.
+    /// None if it is not known where the body is touched. The sample, from shared memory, may hold anything.
     pub(crate) fn of(pose: Pose2, contact: &ContactSample) -> Option<Self> {
         let &ContactSample { bearing_rad, half_width_rad, .. } = contact;
         let usable = bearing_rad.is_finite() && half_width_rad > 0.0 && half_width_rad <= PI;

@@ -1,13 +1,12 @@
-//! The scan matcher: the pose of the robot by its laser.
+//! The scan matcher: the robot's pose by its laser.
 //!
-//! A scan is laid over a reference scan, so that its points come to lie on the lines through the reference's points (point-to-line
-//! matching, Censi 2008). The reference is an earlier scan at the pose that was matched then; it is replaced when the robot has gone on so
-//! far that it sees other things. The search begins at the pose of dead reckoning, which also holds the robot in directions in which no
-//! line does, as along a corridor.
+//! A scan is laid so that its points lie on lines through the points of a reference scan (point-to-line matching, Censi 2008): an
+//! earlier one at its matched pose, replaced when the robot has gone so far that it sees other things. The search begins at dead
+//! reckoning's pose, which also holds the robot in directions without lines, as along a corridor.
 //!
-//! The result is a fix for dead reckoning, whose filter knows the errors of the wheels and takes the errors of fixes for independent. The
-//! errors of matches are alike for a while, so the fixes of [`SHARED_S`] are given the weight of one. They all share the error of their
-//! reference, and so of all references before: a fix states that error, because no number of fixes averages it out.
+//! The result is a fix for dead reckoning, whose filter takes fixes' errors for independent. Errors of matches are alike for a while, so
+//! the fixes of [`SHARED_S`] weigh like one. All share the error of their reference, and so of all references before; a fix states it,
+//! because no number of fixes averages it out.
 
 use common::{
     geometry::principal_axes,
@@ -20,68 +19,66 @@ use serde::{Deserialize, Serialize};
 
 use crate::reading::{Fan, Rows};
 
-/// The deviation of a point from its line, metres: the noise of a laser, and of the line.
+/// Deviation of a point from its line, metres: the noise of a laser, and of the line.
 const POINT_M: f64 = 0.02;
-/// The deviation of the pose at which the search begins: metres and radians.
+/// Deviation of the first pose: metres and radians.
 const PRIOR: [f64; 2] = [0.10, 0.05];
-/// The greatest distance of a point from its line, metres: in the first round, and in the last ones.
+/// A point's greatest distance from its line, metres: in the first round, and in the last ones.
 const GATES_M: [f64; 2] = [0.30, 0.08];
 const ROUNDS: usize = 6;
-/// The change of the pose after which a round is the last one, metres and radians.
+/// A smaller change of the pose ends the rounds, metres and radians.
 const SETTLED: f64 = 1e-4;
-/// The number of points of each scan that are matched, about.
+/// Matched points of each scan, about.
 const POINTS: usize = 240;
-/// Half the length over which a line is laid through points, metres.
+/// Half the length of a line through points, metres.
 const LINE_M: f64 = 0.06;
-/// The distance from its neighbours beyond which a point is the edge of a thing, metres.
+/// A point farther from its neighbours is an edge, metres.
 const EDGE_M: f64 = 0.20;
 /// The greatest distance of points from their line, root mean square, metres.
 const STRAIGHT_M: f64 = 0.03;
-/// The angle from a point's bearing, to either side, within which its lines are sought, radians.
+/// Lines of a point are sought within this angle of its bearing, radians.
 const BESIDE_RAD: f64 = 0.08;
-/// The least number of points on lines in a match.
+/// Points on lines that a match needs.
 const LEAST_POINTS: usize = 10;
-/// The way, metres, and the turn, radians, after which the reference is replaced. It is also replaced if a smaller share of the points
-/// finds a line.
+/// The way, metres, and turn, radians, after which the reference is replaced; also if a smaller share of the points finds a line.
 const REPLACED_AFTER: (f64, f64) = (2.0, std::f64::consts::FRAC_PI_3);
 const LEAST_SHARE: f64 = 0.6;
-/// The deviation that a new reference adds to all after it, besides that of its match: metres and radians. An error of its heading turns
-/// all later poses. With these values, the poses of a Kobuki are 0.03 to 0.38 m off after 31 to 49 m in an office, and expected to be 0.16
-/// to 0.33 m off.
+/// The deviation that a new reference adds to all after it, besides its match's: metres and radians. An error of its heading turns all
+/// later poses. With these values, a Kobuki's poses are 0.03 to 0.38 m off after 31 to 49 m in an office, and expected to be 0.16 to
+/// 0.33 m off.
 const OF_REFERENCE: [f64; 2] = [0.005, 0.001];
-/// The most fixes a second; more would leave no room for those of others.
+/// More would leave no room for the fixes of others.
 const MOST_FIXES_HZ: f64 = 20.0;
-/// The time for which the errors of matches are alike, seconds.
+/// Errors of matches are alike for so long, seconds.
 const SHARED_S: f64 = 5.0;
 /// The least deviation of a match: metres and radians.
 const LEAST: [f64; 2] = [0.005, 0.002];
 
-/// A scan at a pose that is held to be known.
+/// A scan at a pose taken as known.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Reference {
     pose: Pose2,
     beams: Vec<f32>,
-    /// The covariance of its pose: of x, y and heading, m^2, m rad, rad^2.
+    /// x, y and heading; m^2, m rad, rad^2.
     covariance: DMat3,
-    /// The lines through its points, by beams; not saved, because they can be computed again.
+    /// Lines by beams; not saved, because they can be computed again.
     #[serde(skip)]
     lines: Vec<Option<Line>>,
 }
 
-/// A line through points of a scan, in the mission's frame.
+/// Its frame is the mission's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Line {
     point: DVec2,
-    /// The direction across the line, a unit vector.
+    /// Across the line, a unit vector.
     normal: DVec2,
 }
 
-/// Matches the scans of one mission's laser.
 #[derive(Clone, Debug)]
 pub(crate) struct ScanMatcher {
-    /// The number of ticks from one published match to the next.
+    /// Published matches are so far apart.
     every_ticks: u64,
-    /// The number of matches that share their errors.
+    /// Matches that share their errors.
     shared: f64,
 }
 
@@ -94,13 +91,12 @@ impl ScanMatcher {
         Self { every_ticks, shared: (SHARED_S * fixes_hz).max(1.0) }
     }
 
-    /// Whether the match of `tick` is published.
     pub(crate) const fn publishes(&self, tick: u64) -> bool {
         tick.is_multiple_of(self.every_ticks)
     }
 
-    /// Match `beams`, taken by a robot whose pose is `reckoned` by dead reckoning, with the reference, which is replaced if necessary.
-    /// Gives the robot's pose by the match with its covariance; none if too little of the reference is seen.
+    /// Match `beams`, taken at `reckoned` by dead reckoning, with the reference, replaced if necessary. None if too little of the
+    /// reference is seen.
     pub(crate) fn step(
         &self,
         rows: &Rows,
@@ -115,7 +111,6 @@ impl ScanMatcher {
             return None;
         };
         if held.lines.is_empty() {
-            // The reference was saved without its lines.
             let saved = std::mem::take(&mut held.beams);
             let fan = rows.scan(held.pose, &saved)?;
             *held = Reference::new(&fan, held.pose, held.covariance);
@@ -151,7 +146,6 @@ impl ScanMatcher {
         let went = pose.position.distance(held.pose.position);
         let turned = (pose.heading - held.pose.heading).abs();
         if went > REPLACED_AFTER.0 || turned > REPLACED_AFTER.1 || share < LEAST_SHARE {
-            // Without a match, the pose is that of dead reckoning.
             let covariance = match found {
                 Some(_) => of_reference + matched + variances(OF_REFERENCE),
                 None => covariance_of(reckoned),
@@ -170,15 +164,15 @@ impl Reference {
         Self { pose, beams: fan.beams.to_vec(), covariance, lines }
     }
 
-    /// The covariance of a pose at `there` that is known exactly from this one.
+    /// The covariance at `there`, known exactly from this pose.
     fn carried_to(&self, there: DVec2) -> DMat3 {
         let arm = (there - self.pose.position).perp();
         let carried = DMat3::from_cols(DVec3::X, DVec3::Y, DVec3::new(arm.x, arm.y, 1.0));
         carried * self.covariance * carried.transpose()
     }
 
-    /// The pose at which the points of `fan` lie best on the lines, with its covariance and the share of the points that found a line.
-    /// `fan` is the scan at the pose `start`, and `seen_from` is the same scan at the reference's pose.
+    /// The pose that lays the points of `fan` best on the lines, its covariance, and the share of points that found a line. `fan` is the
+    /// scan at `start`, `seen_from` at the reference's pose.
     fn matched(
         &self,
         fan: &Fan<'_>,
@@ -187,7 +181,6 @@ impl Reference {
     ) -> Option<(Pose2, DMat3, f64)> {
         let seen: Vec<_> = points_of(fan).into_iter().flatten().collect();
         let every = seen.len().div_ceil(POINTS).max(1);
-        // These points are in the robot's frame.
         let back = DVec2::from_angle(-start.heading);
         let points = seen.iter().step_by(every).map(|point| back.rotate(point - start.position));
         let points: Vec<_> = points.collect();
@@ -222,7 +215,7 @@ impl Reference {
                 break;
             }
         }
-        // In directions of which the scan says nothing, the covariance is that of a guess.
+        // The covariance of a guess, in directions of which the scan says nothing.
         let guess = DVec3::new(1.0, 1.0, 1.0);
         let covariance = (information + DMat3::from_diagonal(guess)).inverse();
         let usable =
@@ -230,14 +223,14 @@ impl Reference {
         usable.then(|| (pose, covariance, found as f64 / points.len().max(1) as f64))
     }
 
-    /// The line nearest to `at` within `gate` metres, among those near its bearing from the reference.
+    /// The nearest line within `gate` metres, among those near the point's bearing from the reference.
     fn line_near(&self, seen_from: &Fan<'_>, at: DVec2, gate: f64) -> Option<Line> {
         let way = at - seen_from.origin;
         let bearing = (way.to_angle() - seen_from.first_rad).rem_euclid(std::f64::consts::TAU);
         let beam = (bearing / seen_from.step_rad).round() as i32;
         let beside = (BESIDE_RAD.max(gate / way.length().max(gate)) / seen_from.step_rad).ceil();
         let beside = beside as i32;
-        // Not each beam of a scan of 1,081 beams is needed.
+        // A scan of 1,081 beams has more than are needed.
         let stride = (beside / 6).max(1);
         let whole_turn = (std::f64::consts::TAU / seen_from.step_rad).round().max(1.0) as i32;
         let near = |line: &Line| line.point.distance_squared(at);
@@ -252,7 +245,7 @@ impl Reference {
 }
 
 impl Line {
-    /// The line through the points around `beam`; none where they are too few, an edge, or not on a line.
+    /// Through the points around `beam`; none where they are too few, an edge, or off a line.
     fn through(points: &[Option<DVec2>], fan: &Fan<'_>, beam: usize) -> Option<Self> {
         let point = points[beam]?;
         let spacing = point.distance(fan.origin) * fan.step_rad;
@@ -282,12 +275,12 @@ fn covariance_of(pose: &PoseSample) -> DMat3 {
     DMat3::from_cols(DVec3::new(xx, xy, xt), DVec3::new(xy, yy, yt), DVec3::new(xt, yt, tt))
 }
 
-/// The covariance of a pose with these deviations of its place, metres, and of its heading, radians.
+/// Deviations of the place, metres, and of the heading, radians.
 fn variances([place, heading]: [f64; 2]) -> DMat3 {
     DMat3::from_diagonal(DVec3::new(place, place, heading).map(|deviation| deviation * deviation))
 }
 
-/// The points at which the beams of `fan` end; none for a beam without an end.
+/// None for a beam without an end.
 fn points_of(fan: &Fan<'_>) -> Vec<Option<DVec2>> {
     let ends = |(along, range): (DVec2, f64)| {
         (range >= 0.0 && range <= fan.reach_m).then(|| fan.origin + range * along)

@@ -120,7 +120,6 @@ impl Shell {
         self.take(Entry::Step(input, self.runner.out.at))
     }
 
-    /// Publish the whole map although nothing changed.
     fn publish_again(&mut self) -> Result<(), StageError> {
         self.take(Entry::Again(self.runner.out.at)).map(drop)
     }

@@ -1,10 +1,10 @@
-//! The sonar model: the meaning of an echo, and of its absence, for the cells around.
+//! The sonar model: an echo, or none, as evidence for the cells around.
 //!
-//! The X80's front sonar is one ultrasonic ranger: one byte of centimetres a frame, "nothing" included, from a cone of
-//! about 15 degrees to either side. Every number of the evidential method's sensor model stands here.
+//! The X80's front sonar is one ultrasonic ranger: one byte of centimetres a frame, "nothing" included, from a cone of about 15 degrees
+//! to either side.
 //!
-//! Angles are radians off the sonar's axis, to one side. Weights are integers in quarters of the echo that is heard in
-//! the middle of its arc; positive weights are evidence for an obstacle, negative ones for free ground.
+//! Angles are radians off the axis, to one side. Weights are integers in quarters of an echo heard in the middle of its arc; positive is
+//! for an obstacle, negative for free ground.
 
 use std::f64::consts::TAU;
 
@@ -12,83 +12,78 @@ use common::mission::{Sensor, SensorModel};
 
 const DEGREE: f64 = TAU / 360.0;
 
-/// The inverse sensor model of the evidence grid, with the bounds and the ageing of evidence. [`SonarModel::default`] is the
-/// X80's.
+/// The evidence grid's inverse sensor model. The default is the X80's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SonarModel {
-    /// Side of a cell of the evidence grid, metres. A third of the cone's width where a hit starts to matter: as fine as
-    /// the sonar resolves, and no finer.
+    /// Side of a cell, metres: a third of the cone's width where a hit starts to matter, as fine as the sonar resolves.
     pub(crate) resolution_m: f64,
 
-    /// Half the angle over which an echo is spread, and the widest angle of the model. The cone's 15 degrees, rounded up.
+    /// Half the angle of an echo's spread, the model's widest. The cone's 15 degrees, rounded up.
     pub(crate) arc: f64,
     /// Error of an echo's range, metres: noise, the byte's centimetre, half a cell.
     pub(crate) band_m: f64,
-    /// Weight of an echo in the middle of its arc.
+    /// An echo's weight in the middle of its arc.
     pub(crate) hit: f64,
-    /// Weight of an echo at the end of its arc, where the sound is weakest; in between the weight falls linearly. It is 0,
-    /// because a beam that points there hears an obstacle better, and gaps stay open.
+    /// An echo's weight at the end of its arc, where the sound is weakest; between, it falls linearly. It is 0, so that gaps stay open:
+    /// a beam that points there hears an obstacle better.
     pub(crate) hit_at_edge: f64,
 
-    /// An obstacle this far before an echo may be its cause, metres: the beam is not evidence that the ground there is free.
+    /// An obstacle this far before an echo may be its cause, metres, so the beam does not free the ground there.
     pub(crate) before_m: f64,
-    /// Ground up to this far behind an echo counts as scanned, metres.
+    /// Ground this far behind an echo counts as scanned, metres.
     pub(crate) behind_m: f64,
-    /// Weight taken off a cell that a beam passed.
+    /// Weight taken off a passed cell.
     pub(crate) pass: i8,
-    /// Weight taken off a cell at the beam's edge, where the beam may have missed.
+    /// Less, because the beam's edge may have missed.
     pub(crate) pass_at_edge: i8,
-    /// Half the angle in which a beam is evidence against an earlier echo. Farther out the beam may have missed the obstacle.
+    /// Half the angle in which a beam is evidence against an earlier echo. Farther out it may have missed.
     pub(crate) against: f64,
-    /// Half the widest angle in which a beam is evidence against an echo at all.
+    /// Half the widest such angle.
     pub(crate) against_at_edge: f64,
-    /// Widest angle between two beams of which one is evidence against an echo of the other. A smooth wall that is hit at a
-    /// slant gives no echo, which is no evidence against what was heard square to it.
+    /// The widest angle between two beams of which one is evidence against the other's echo. A smooth wall hit at a slant gives no echo,
+    /// which says nothing against one heard square to it.
     pub(crate) same_side: f64,
 
-    /// Least weight of a cell. Weights are bounded, so that a few readings suffice where the world has changed.
+    /// Weights are bounded, so that a few readings suffice where the world has changed.
     pub(crate) least: i8,
-    /// Greatest weight of a cell.
     pub(crate) most: i8,
-    /// A free cell becomes occupied at this weight.
     pub(crate) occupied: i8,
     /// An occupied cell becomes free at this weight.
     pub(crate) released: i8,
-    /// A cell of this weight is the cause of an echo whose arc it lies on: the rest of the arc learns nothing.
+    /// A cell of this weight on an echo's arc is its cause: the rest learns nothing.
     pub(crate) explains: i8,
 
-    /// Half the angle in which a beam without echo scans ground. It is less than the cone's, because a surface that only just
-    /// reaches into the cone deflects the sound.
+    /// Half the angle in which a silent beam scans ground. Less than the cone's, because a surface that only just reaches into the cone
+    /// deflects the sound.
     pub(crate) scanned: f64,
-    /// Range up to which ground is scanned, metres. Echoes are mapped less far, because an echo from there is too wide; the
-    /// absence of an echo still says that the ground is free.
+    /// Ground is scanned up to here, metres. Echoes are mapped less far, because they are too wide there; silence still says that the
+    /// ground is free.
     pub(crate) scanned_m: f64,
     /// Half the angle in which the sonar counts as pointed at a cell that it cannot see.
     pub(crate) pointed: f64,
-    /// Range up to which the sonar counts as pointed at such a cell, metres.
     pub(crate) pointed_m: f64,
-    /// Number of such readings after which the cell counts as scanned, because there is nothing more to learn.
+    /// The cell counts as scanned after so many such readings: there is nothing more to learn.
     pub(crate) pointed_enough: u8,
-    /// Scanned ground stays scanned while the wheels roll this far, turns on the spot included, metres. By then the error of
-    /// the pose is about the clearance that hazards are given.
+    /// Ground stays scanned for this way of the wheels, turns included, metres. By then the pose's error is about the clearance of
+    /// hazards.
     pub(crate) scanned_for_m: f64,
 
-    /// Range within which the absence of an echo excludes a surface square to the beam, metres. It is half a metre less than
-    /// the sonar's reach, where answers grow weak.
+    /// Silence excludes a surface square to the beam up to here, metres: half a metre less than the sonar's reach, where answers grow
+    /// weak.
     pub(crate) clear_m: f64,
-    /// The greatest distance of an obstacle before its echo's range, metres: noise, the byte's centimetre.
+    /// An obstacle's greatest distance before its echo, metres: noise, the byte's centimetre.
     pub(crate) ahead_of_echo_m: f64,
-    /// A reading is evidence of free ground until the wheels have rolled this far, turns on the spot included, metres.
+    /// A reading is evidence of free ground for this way of the wheels, turns included, metres.
     pub(crate) clear_for_m: f64,
 
-    /// Width of the footprint's rim that is not certainly free, metres, because the pose drifts.
+    /// The footprint's rim that is not certainly free, because the pose drifts, metres.
     pub(crate) rim_m: f64,
-    /// An obstacle nearer than this to the robot survives the first reset of the sensed belief, metres: the robot may touch it.
+    /// An obstacle nearer to the robot survives the first reset, metres: the robot may touch it.
     pub(crate) near_m: f64,
 }
 
 impl SonarModel {
-    /// The model of a sonar: that of the X80 with the cone's angles and ranges in the ratio of field of view and reach.
+    /// The X80's model, scaled by field of view and reach.
     pub(crate) fn of(sensor: &Sensor) -> Self {
         let x80 = Self::default();
         let wide = sensor.field_of_view_deg / SensorModel::Dur5200.field_of_view_deg();

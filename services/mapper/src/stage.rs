@@ -1,4 +1,4 @@
-//! The mapper as a stage: the entries of its recordings, and the samples that it publishes and persists.
+//! The mapper as a stage: what it records, publishes and persists.
 
 use common::{
     grid::Part,
@@ -14,20 +14,19 @@ use serde::{Deserialize, Serialize};
 
 use crate::step::{Belief, Change, Input, Mapper};
 
-/// The state that a generation starts from.
+/// A generation starts from it.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Start {
-    /// The snapshot, if there was one.
     belief: Option<Belief>,
-    /// The inputs since the snapshot, oldest first.
+    /// Oldest first, after the snapshot.
     inputs: Vec<Input>,
 }
 
-/// An action of the mapper, and its tick.
+/// An action and its tick.
 #[allow(clippy::large_enum_variant, reason = "there is one at a time, on the stack")]
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Entry {
-    /// The step takes the input, and the changed window is published.
+    /// The changed window is published.
     Step(Input, Progress),
     /// The whole map is published although nothing changed.
     Again(Progress),
@@ -36,7 +35,7 @@ pub enum Entry {
 impl Stage for Mapper {
     type Start = Start;
     type Entry<'a> = Entry;
-    /// The part that was published.
+    /// The published part.
     type Outcome = Option<Part>;
 
     fn new(mission: &Mission) -> Self {
@@ -53,7 +52,7 @@ impl Stage for Mapper {
         for input in start.inputs {
             self.step(input, Progress::default().time);
         }
-        // The fix of the last of these inputs was published before.
+        // The last input's fix was published before.
         self.take_fix();
         restored
     }
@@ -63,7 +62,7 @@ impl Stage for Mapper {
             Entry::Step(input, at) => {
                 out.at = at;
                 let change = self.step(input.clone(), at.time);
-                // A belief that is wrong by a fault is wrong in its journal, too.
+                // A belief that a fault made wrong is wrong in its journal, too.
                 if change != Change::None || matches!(input, Input::Fault(_)) {
                     out.append(&input)?;
                 }

@@ -1,7 +1,7 @@
 //! The belief: which cells are hazard.
 //!
-//! The paper's map only grows, (10). The target's cell and the cells under the robot never become hazard, and the
-//! perimeter never changes, (18). The evidential method's map follows the evidence both ways ([`Sensed::Evidence`]).
+//! The paper's map only grows, (10). The cells of the target and under the robot never become hazard, and the perimeter never changes,
+//! (18). The evidential map follows the evidence both ways ([`Sensed::Evidence`]).
 
 use common::{
     clock::MissionTime,
@@ -22,77 +22,64 @@ use crate::{
     scan_match::{Reference, ScanMatcher},
 };
 
-/// An input of the step. The belief follows from its inputs alone, so the journal holds the inputs.
+/// The belief follows from its inputs alone, so the journal holds them.
 #[allow(clippy::large_enum_variant, reason = "one is held at a time")]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Input {
-    /// The pose of a tick with what the robot sensed.
     Tick {
         pose: PoseSample,
-        /// The readings of this tick; none if none came.
+        /// None if none came.
         ranges: Vec<RangeReading>,
-        /// The beams of the laser, metres, as the topic `scan` has them; none if none came.
+        /// Metres; none if none came.
         scan: Vec<f32>,
-        /// Where something holds the wheels at this tick.
+        /// Something holds the wheels at this tick.
         contact: Option<ContactSample>,
-        /// The target that holds from this tick on, metres; none if it is the one before.
+        /// It holds from this tick on, metres; none if unchanged.
         target: Option<DVec2>,
     },
-    /// The supervisor's reset of the sensed belief.
     Reset {
-        /// The number of the belief that begins. A reset to a belief that has begun already is ignored.
+        /// A belief that has begun already is not reset.
         epoch: u64,
     },
-    /// A fault that an operator injects into the belief; it acts from the next tick on.
+    /// An operator's; it acts from the next tick on.
     Fault(FaultKind),
 }
 
-/// The part of the map that an input changed and that is published.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
-    /// Nothing is published: nothing changed, and no stage waits for an answer.
+    /// Nothing changed, and no stage waits for an answer.
     None,
-    /// This window may have changed; an empty window answers the tick.
+    /// It may have changed; an empty window answers the tick.
     Window(Window),
-    /// The whole map changed.
     Whole,
 }
 
-/// The sensed belief, by the method of the mission.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 enum Sensed {
-    /// Method `paper`: hits are marked in the cells themselves and stay.
+    /// Method `paper`: hits are marked in the cells and stay.
     Hits,
-    /// Method `evidential`: the cells follow from evidence.
     Evidence(EvidenceMap),
 }
 
-/// The state that survives the process.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Belief {
-    /// A [`CellState`] byte for each cell, row-major.
+    /// A [`CellState`] byte a cell, row-major.
     #[serde(with = "serde_bytes")]
     cells: Vec<u8>,
-    /// The version, which grows by one with every change.
     version: u64,
     /// Ticks whose readings put a hazard on the map.
     safety_events: u64,
-    /// Resets of the sensed belief.
     epoch: u64,
-    /// The last tick mapped.
+    /// The last mapped tick, and the robot there: metres, radians.
     tick: Option<u64>,
-    /// Position of the robot at that tick, metres.
     robot: DVec2,
-    /// Heading of the robot at that tick, radians.
     heading: f64,
-    /// Distance that the wheels had rolled on average at that tick, turns on the spot included, metres.
+    /// Mean way of the wheels by then, turns on the spot included, metres.
     rolled: f64,
     sensed: Sensed,
-    /// The injected fault.
     fault: FaultKind,
-    /// The target, metres.
     target: DVec2,
-    /// The scan with which later ones are matched; none before the first.
+    /// Later scans are matched with it; none before the first.
     reference: Option<Reference>,
 }
 
@@ -101,7 +88,7 @@ impl Belief {
         &self.cells
     }
 
-    /// The version of the map; 1 for the map that a mission starts with.
+    /// 1 for a mission's first map.
     pub const fn version(&self) -> u64 {
         self.version
     }
@@ -111,10 +98,10 @@ impl Belief {
     }
 }
 
-/// The distance around a surface within which the cells of a mission's map are hazard, metres.
+/// Cells this near to a surface are hazard, metres.
 pub fn hazard_reach_m(mission: &Mission) -> f64 {
     match mission.method {
-        // A known surface blocks the same cells as a hit on it: its own cell and the margin around.
+        // A known surface blocks like a hit on it: its cell and the margin around.
         Method::Paper => {
             (f64::from(mission.margin_cells()) + 0.5) * mission.grid_frame().resolution_m
         }
@@ -122,15 +109,14 @@ pub fn hazard_reach_m(mission: &Mission) -> f64 {
     }
 }
 
-/// The mapper of (19), or of the evidential method.
+/// (19), or the evidential method.
 #[derive(Clone, Debug)]
 pub struct Mapper {
     frame: GridFrame,
-    /// The target's cell.
     target: Option<Cell>,
-    /// The shapes that the mission knows, and the distance around them within which cells are hazard, metres.
+    /// Shapes known from the mission, and the reach of their hazard, metres.
     known: (Shapes, f64),
-    /// The paper's Im of (19).
+    /// Im of (19).
     margin: u32,
     evidential: Evidential,
     sensing: bool,
@@ -139,7 +125,6 @@ pub struct Mapper {
     footprint: f64,
     half_track: f64,
     matcher: ScanMatcher,
-    /// The fix by the newest scan.
     fix: Option<FixSample>,
     belief: Belief,
 }
@@ -238,12 +223,11 @@ impl Mapper {
         self.rows.uses_row(row)
     }
 
-    /// Whether the mission uses the sensor of a reading.
     pub fn uses(&self, reading: &RangeReading) -> bool {
         self.rows.uses(reading)
     }
 
-    /// The fix by the newest scan and those before it; none if they do not give one.
+    /// The newest scan and those before may give none.
     pub const fn take_fix(&mut self) -> Option<FixSample> {
         self.fix.take()
     }
@@ -252,12 +236,10 @@ impl Mapper {
         self.frame
     }
 
-    /// The target that holds, metres.
     pub const fn target(&self) -> DVec2 {
         self.belief.target
     }
 
-    /// Upper bound of an encoded belief, bytes.
     pub const fn saved_bytes(&self) -> usize {
         let evidence = match self.belief.sensed {
             Sensed::Hits => 0,
@@ -266,7 +248,6 @@ impl Mapper {
         self.frame.area() + evidence + 5 * MOST_BEAMS + 240
     }
 
-    /// The header of a `grid` sample with `part` of this belief.
     pub fn header(&self, part: Part) -> GridHeader {
         let mut header = GridHeader {
             part,
@@ -280,7 +261,6 @@ impl Mapper {
         header
     }
 
-    /// Mark the perimeter, and every cell within `reach` metres of a shape that the mission knows.
     fn mark_known(&mut self) {
         let (frame, (known, reach)) = (self.frame, &self.known);
         let reach = *reach;
@@ -308,8 +288,7 @@ impl Mapper {
         }
     }
 
-    /// The robot is sent to `target`: its cell is no hazard from now on, and the cell of the target before may be one again. Returns the
-    /// window that changed.
+    /// The cell of the new target is no hazard, and that of the old one may be again. Returns the changed window.
     fn move_target(&mut self, target: DVec2) -> Window {
         self.belief.target = target;
         let cell = self.frame.cell_at(target).filter(|cell| !self.frame.is_rim(*cell));
@@ -326,7 +305,7 @@ impl Mapper {
         changed
     }
 
-    /// The state of a cell by the target, the known shapes and the evidence. The paper's method records hits in its map alone.
+    /// The target, the known shapes and the evidence decide. The paper's hits are in its map alone.
     fn state_for_target(&self, cell: Cell) -> CellState {
         let (known, reach) = &self.known;
         let is_target = Some(cell) == self.target;
@@ -340,8 +319,7 @@ impl Mapper {
         }
     }
 
-    /// Map the readings taken at `pose`, and the contact of that tick. Returns the window that changed together with `changed`, empty for
-    /// none. A tick given twice is mapped once.
+    /// Map readings and contact of `pose`. Returns the changed window, with `changed`. A tick given twice is mapped once.
     fn map(
         &mut self,
         pose: &PoseSample,
@@ -371,7 +349,7 @@ impl Mapper {
         changed
     }
 
-    /// Method `paper`: mark hazard where the front sonar hears an obstacle.
+    /// Method `paper`: hazard where the front sonar hears an obstacle.
     fn mark_hit(&mut self, robot: Pose2, ranges: &[RangeReading]) -> Window {
         let Some((distance, hit)) = self.rows.front_hit(robot, ranges) else {
             return Window::default();
@@ -384,7 +362,7 @@ impl Mapper {
         changed
     }
 
-    /// Method `evidential`: take the readings as evidence for and against hazard, and note which ground was scanned.
+    /// Method `evidential`: evidence for and against hazard, and scanned ground.
     fn weigh(
         &mut self,
         robot: Pose2,
@@ -395,7 +373,7 @@ impl Mapper {
             return Window::default();
         };
         let stale = self.evidential.roll(map, rolled, self.belief.rolled);
-        // The scan comes first, because the things that it shows explain echoes.
+        // The scan first: what it shows explains echoes.
         let fan = self.rows.scan(robot, scan);
         let seen = fan.map(|fan| self.evidential.take_scan(map, robot.position, &fan));
         let seen = seen.unwrap_or_default();
@@ -406,7 +384,6 @@ impl Mapper {
         changed
     }
 
-    /// Mark hazard where something touches the body.
     fn mark_touch(&mut self, touch: &Touch) -> Window {
         let changed = match &mut self.belief.sensed {
             Sensed::Hits => self.mark(touch.robot + self.footprint * touch.axis, touch.robot),
@@ -419,7 +396,7 @@ impl Mapper {
         changed
     }
 
-    /// Bring the cells of `window` up to date with the evidence. Returns the window that changed.
+    /// The evidence decides. Returns the changed window.
     fn redraw(&mut self, window: Window) -> Window {
         let mut changed = Window::default();
         let Sensed::Evidence(map) = &self.belief.sensed else {
@@ -442,7 +419,7 @@ impl Mapper {
         changed
     }
 
-    /// Mark the hit's cell and the margin around it, (19). A hit outside the map marks the part of its margin that lies inside.
+    /// The hit's cell and the margin around it, (19), as far as they lie in the map.
     fn mark(&mut self, hit: DVec2, robot: DVec2) -> Window {
         let mut changed = Window::default();
         let margin = f64::from(self.margin);
@@ -471,8 +448,8 @@ impl Mapper {
         changed
     }
 
-    /// Reset the sensed belief to the perimeter and the known shapes, if `epoch` is newer than the belief's. The evidential
-    /// method keeps echoes from near the robot. Returns whether the belief was reset.
+    /// Reset to the perimeter and the known shapes, if `epoch` is newer. The evidential method keeps echoes from near the robot. Returns
+    /// whether it did.
     fn reset_belief(&mut self, epoch: u64) -> bool {
         if epoch <= self.belief.epoch {
             return false;
@@ -498,7 +475,7 @@ impl Mapper {
         true
     }
 
-    /// Mark the hazard of an injected fault. Returns the window that changed.
+    /// Mark an injected fault's hazard. Returns the changed window.
     fn falsify(&mut self) -> Window {
         let mut changed = Window::default();
         let Some(area) = fault::hazard(self.belief.fault, self.belief.robot, self.belief.target)

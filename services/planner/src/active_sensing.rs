@@ -1,13 +1,11 @@
-//! Active sensing: the evidential method checks a direction before the robot goes there.
+//! Active sensing: the evidential method looks before the robot goes.
 //!
-//! The one sonar looks ahead, the body is wider than its cone where it matters, and a surface at a slant does not answer. So
-//! before the robot drives over ground, the sonar must have been pointed there, and square to every surface that could be
-//! touched there. The robot drives no faster than it could stop before the next thing it believes in, or the next ground
-//! it has not scanned.
+//! The one sonar looks ahead, the body is wider than its cone, and a slanted surface does not answer. So the sonar must first have been
+//! pointed at the ground ahead, and square to every surface that could be touched there. The robot goes no faster than it could stop
+//! before the next believed hazard or unscanned ground.
 //!
-//! The advice follows from the belief and the pose: a scan only turns the sonar, tick by tick, to ground that is not scanned yet, so a
-//! restarted planner goes on with it. The only memory is the side to which a scan turns: wheels lag, so a side that is chosen anew with
-//! each tick may change with each tick.
+//! Advice follows from belief and pose: a scan turns the sonar tick by tick to unscanned ground, so a restarted planner continues it.
+//! The only memory is the side of a scan: wheels lag, so a side chosen anew each tick could alternate.
 
 use common::{
     kinematics::{FACES_COSINE, LEAST_SPEED_M_S, Pose2},
@@ -22,20 +20,19 @@ use crate::{
     view::{STEP_M, View},
 };
 
-/// The length of the way ahead whose ground must have been scanned, without a surface that could be touched undetected, metres.
+/// Ground ahead that must be scanned, without a surface that could be touched undetected, metres.
 const SCANNED_AHEAD_M: f64 = 0.25;
-/// The distance for which the planned way is followed, metres; the least distance for the arc.
+/// The planned way is followed so far, metres; the arc at least so far.
 const AHEAD_M: f64 = 0.6;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Advice {
-    /// Go, no faster than this, m/s.
+    /// No faster than this, m/s.
     Go(f64),
     /// Turn on the spot until this unit vector is faced.
     Look(DVec2),
 }
 
-/// A side of the robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Side {
     Left,
@@ -47,17 +44,16 @@ pub(crate) struct ActiveSensing {
     radius: f64,
     speed: f64,
     turn: f64,
-    /// The time in which the robot must be able to stop, seconds.
+    /// The time to stop, seconds.
     stops_within_s: f64,
-    /// Unit vector from the robot's axis to the front sonar's, which is turned for a look.
+    /// Turns the robot's axis to the front sonar's, which is turned for a look.
     bearing: DVec2,
-    /// The distance for which the arc is followed: at its greatest speed the robot can stop there, metres.
+    /// The arc is followed so far: at top speed the robot can stop there, metres.
     ahead_m: f64,
-    /// The number of sonars that the mission uses.
     sonars: usize,
-    /// Whether the mission uses a laser, whose beams end at a surface of any angle: ground that its scans leave free is free.
+    /// Its beams end at a surface of any angle, so ground that scans leave free is free.
     has_laser: bool,
-    /// The side to which the present scan turns; none while there is no scan.
+    /// None without a scan.
     scan_side: Option<Side>,
 }
 
@@ -76,7 +72,7 @@ impl ActiveSensing {
         }
     }
 
-    /// Advice for a robot at `pose` that is to go along `direction`, a unit vector, by the readings in `belief`.
+    /// `direction` is a unit vector.
     pub(crate) fn advise(
         &mut self,
         view: &View<'_>,
@@ -101,13 +97,12 @@ impl ActiveSensing {
         let surfaces = surfaces.filter(|_| !self.has_laser);
         let unseen = ground.chain(surfaces);
         match scan(self.bearing.rotate(pose.axis()), unseen, &mut self.scan_side) {
-            // The robot turns until its sonar faces the unscanned place.
             Some(there) => Advice::Look(DVec2::new(self.bearing.x, -self.bearing.y).rotate(there)),
             None => Advice::Go(self.limit(view, &undetected, belief, pose, direction)),
         }
     }
 
-    /// The most speed that the newest readings allow along the robot's axis, m/s: none towards an echo right before the body.
+    /// The limit by the newest readings along the robot's axis, m/s: none towards an echo right before the body.
     pub(crate) fn limit_before_echoes(&self, belief: &GridHeader, pose: &Pose2) -> f64 {
         let clear_m = clear_ahead_m(belief, pose, self.radius, self.sonars);
         if clear_m < STANDS_BEFORE_M {
@@ -116,10 +111,8 @@ impl ActiveSensing {
         clear_m / self.stops_within_s
     }
 
-    /// The speed allowed by the readings and by the arc on which the controller brings the robot into `direction`, m/s.
-    ///
-    /// A robot that faces a way which the belief does not forbid would stand for ever where the arc allows no speed. It
-    /// goes as slowly as it can instead, as long as the readings allow that.
+    /// The speed by the readings and by the arc on which the controller turns the robot into `direction`, m/s. Where the arc allows
+    /// none, a robot that faces a permitted way would stand for ever: it goes as slowly as it can, if the readings allow.
     fn limit(
         &self,
         view: &View<'_>,
@@ -146,14 +139,14 @@ impl ActiveSensing {
     }
 }
 
-/// The direction to turn to from `axis` to scan all directions in `unseen`: the far end of a side, without a stop. A scan that began on
-/// a `side` turns there until nothing is unseen on it; a new scan begins on the side whose nearest direction is nearer.
+/// The direction to turn to from `axis` to scan all of `unseen`: the far end of a side. A scan stays on its `side` until nothing is
+/// unseen there; a new one begins on the side whose nearest direction is nearer.
 fn scan(
     axis: DVec2,
     unseen: impl Iterator<Item = DVec2>,
     side: &mut Option<Side>,
 ) -> Option<DVec2> {
-    // Each side, left and right, has the least angle, the greatest one, and the direction of the greatest.
+    // Left and right: the least angle, the greatest one, and the direction of that.
     let mut sides = [None::<(f64, f64, DVec2)>; 2];
     for there in unseen {
         let angle = axis.angle_to(there);

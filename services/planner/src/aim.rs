@@ -1,18 +1,16 @@
 //! The cell that the field leads to.
 //!
-//! The target is a point in the world, and the robot's pose drifts against the world. By the time the robot comes near, the
-//! target may be in a cell where the body cannot be. Then the field leads to the free cell next to it, and the robot has
-//! arrived there: no nearer place is free. By the paper's method the target's own cell is never marked, but margins
-//! may cover all cells around it; then the field leads to a free cell from which the target counts as reached.
+//! The pose drifts against the world, where the target is a point: near it the robot may find the target's cell where the body cannot
+//! be. Then the field leads to the nearest free cell, where the robot has arrived. The paper's method never marks the target's own cell,
+//! but margins may cover all around it; then the field leads to a free cell from which the target counts as reached.
 
 use common::grid::{Cell, CellState, GridFrame};
 use glam::DVec2;
 
-/// The greatest distance from a target that is not free at which the robot may be sent, metres: less than its body's width.
+/// The farthest that such a cell may be from its target, metres: less than the body's width.
 const REACH_M: f64 = 0.35;
 
-/// The cell to lead to for a robot that is to go to `target`: the nearest one with free cells all around, or the target's
-/// own if none is within reach; none outside the map.
+/// The nearest cell to `target` with free cells all around, or its own if none is within reach; none outside the map.
 pub(crate) fn cell(frame: &GridFrame, cells: &[u8], target: DVec2) -> Option<Cell> {
     let own = frame.cell_at(target)?;
     let is_free = |cell: Cell| !CellState::from_byte(cells[frame.index(cell)]).is_hazard();
@@ -27,8 +25,7 @@ pub(crate) fn cell(frame: &GridFrame, cells: &[u8], target: DVec2) -> Option<Cel
     nearest.or_else(|| cell_with_a_way_in(frame, cells, target, REACH_M))
 }
 
-/// The free cell nearest to `target`, no farther from it than `reach_m`, that has a free neighbour; the target's own if
-/// there is no such cell, none outside the map.
+/// The nearest free cell within `reach_m` that has a free neighbour; the target's own if there is none, none outside the map.
 pub(crate) fn cell_with_a_way_in(
     frame: &GridFrame,
     cells: &[u8],
@@ -52,7 +49,7 @@ pub(crate) fn cell_with_a_way_in(
     nearest.or(Some(own))
 }
 
-/// The cells of the map at most `reach` away from `middle` in column and row.
+/// `reach` limits column and row.
 fn around(frame: &GridFrame, middle: Cell, reach: u32) -> impl Iterator<Item = Cell> + use<> {
     let last = frame.cells - 1;
     let span = move |at: u32| at.saturating_sub(reach)..=(at + reach).min(last);

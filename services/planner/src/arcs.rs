@@ -1,10 +1,8 @@
-//! The direction that the evidential method gives a car: the car can drive the arc in this direction, and no other arc gets
-//! farther along the field.
+//! The evidential direction of a car: along the drivable arc that gets farthest along the field.
 //!
-//! The field turns sharper than a car does. So arcs of several curvatures are followed over the belief, as far as the car
-//! looks ahead. An arc that a hazard cuts off before the car could stop is excluded. Among the others, the arc with the
-//! greatest progress is given; progress is the line integral of the field's direction along the arc. If all arcs are
-//! excluded, the car stands: it can steer no way on.
+//! The field turns sharper than a car. So arcs of several curvatures are followed over the belief; one that a hazard cuts off before the
+//! car could stop is excluded. The arc of greatest progress wins: the line integral of the field's direction. If all are excluded, the
+//! car stands.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -14,20 +12,20 @@ use harmonic::Guidance;
 
 use crate::view::View;
 
-/// Number of arcs to either side of straight ahead.
+/// To either side of straight ahead.
 const ARCS_A_SIDE: i32 = 8;
-/// Distance between the points of an arc that are looked at, metres.
+/// Looked-at points of an arc are so far apart.
 const STEP_M: f64 = 0.05;
-/// How far an arc is followed, metres.
+/// An arc is followed so far, metres.
 const AHEAD_M: f64 = 0.8;
-/// The time in which the car must be able to stop, seconds: the sonar's period, the radio's, the wheels' lag.
+/// The time to stop, seconds: periods of sonar and radio, the wheels' lag.
 const STOPS_WITHIN_S: f64 = 0.6;
-/// An arc that is cut off before this is not driven, metres.
+/// An arc cut off sooner is not driven, metres.
 const LEAST_FREE_M: f64 = 0.1;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Arcs {
-    /// Curvature of the tightest circle, 1/m.
+    /// The tightest circle's, 1/m.
     most_curvature: f64,
     speed: f64,
     turn: f64,
@@ -37,14 +35,13 @@ pub(crate) struct Arcs {
 #[derive(Clone, Copy, Debug)]
 struct Followed {
     curvature: f64,
-    /// The length that no hazard cuts off, metres.
+    /// The length until a hazard.
     free_m: f64,
-    /// The progress along the field, metres.
     progress_m: f64,
 }
 
 impl Arcs {
-    /// The arcs of a mission's robot; none if it can turn on the spot.
+    /// None for a robot that can turn on the spot.
     pub(crate) fn new(mission: &Mission) -> Option<Self> {
         let car = mission.body().ackermann()?;
         Some(Self {
@@ -55,8 +52,8 @@ impl Arcs {
         })
     }
 
-    /// The direction, a unit vector, by which the controller drives the best arc from `pose`, `distance` metres from the
-    /// target, and the most speed on it, m/s. No speed where there is no way on.
+    /// The direction, a unit vector, that drives the best arc, and the most speed on it, m/s; no speed where there is no way on. The
+    /// target is `distance` metres away.
     pub(crate) fn advise(&self, view: &View<'_>, pose: &Pose2, distance: f64) -> (DVec2, f64) {
         let arcs = (-ARCS_A_SIDE..=ARCS_A_SIDE).map(|number| {
             let share = f64::from(number) / f64::from(ARCS_A_SIDE);
@@ -72,7 +69,7 @@ impl Arcs {
 
     fn follow(view: &View<'_>, pose: &Pose2, curvature: f64, distance: f64) -> Followed {
         let mut arc = Followed { curvature, free_m: 0.0, progress_m: 0.0 };
-        // A car that a new hazard was put around drives out of it.
+        // A car inside a new hazard drives out of it.
         let mut inside = view.is_hazard(pose.position);
         let steps = (AHEAD_M.min(distance) / STEP_M).ceil().max(1.0) as usize;
         for step in 1..=steps {
@@ -89,9 +86,9 @@ impl Arcs {
         arc
     }
 
-    /// The direction by which (15) and (16) give `curvature`.
+    /// The direction that makes (15) and (16) give `curvature`.
     fn direction(&self, pose: &Pose2, curvature: f64, distance: f64) -> DVec2 {
-        // With s the sine to the direction, the turn rate is wd s, the speed vd (1 - s/2), less near the target.
+        // The turn rate is wd s and the speed vd (1 - s/2), less near the target, with the sine s to the direction.
         let speed = self.speed * (distance / self.slow_radius).min(1.0);
         let sine = curvature * speed / (self.turn + curvature.abs() * speed / 2.0);
         let angle = if sine.abs() < 1.0 { sine.asin() } else { FRAC_PI_2.copysign(sine) };
@@ -100,7 +97,7 @@ impl Arcs {
 }
 
 impl View<'_> {
-    /// The field's direction at `at`, a unit vector; zero where it gives none.
+    /// Unit vector; zero where the field gives none.
     fn along(&self, at: DVec2) -> DVec2 {
         match self.guidance(at) {
             Guidance::Along(direction) | Guidance::WayOut(direction) => direction.into(),

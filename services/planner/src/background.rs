@@ -1,5 +1,4 @@
-//! A thread that does one job after the other beside the tick, and its priority: only the tick's own thread has a real-time
-//! priority that the process was given.
+//! A thread that does jobs one by one beside the tick; the process's real-time priority, if any, is the tick's thread's alone.
 
 use std::{
     io::{self, Read as _, Write as _},
@@ -16,21 +15,21 @@ use thread_priority::{
     ThreadSchedulePolicy, set_thread_priority_and_policy, thread_native_id,
 };
 
-/// The thread. Dropping this waits for the job that runs.
+/// Dropping this waits for the running job.
 #[derive(Debug)]
 pub(crate) struct Background<Job, Done> {
     jobs: Option<Sender<Job>>,
     results: Receiver<Done>,
     done: UnixStream,
-    /// Jobs whose end has not been read from `done` yet.
+    /// Jobs whose end is unread in `done`.
     unread: u64,
-    /// Ends that were read and whose results were not taken; negative if results were waited for and their ends are still to be read.
+    /// Read ends whose results were not taken; negative if results were taken whose ends are unread.
     ended: i64,
     thread: Option<JoinHandle<()>>,
 }
 
 impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
-    /// Start the thread `name`.
+    /// Fails when the system gives no pipe or thread.
     pub(crate) fn start(
         name: &str,
         mut work: impl FnMut(Job) -> Done + Send + 'static,
@@ -54,7 +53,6 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
         Ok(Self { jobs: Some(jobs), results, done, unread: 0, ended: 0, thread: Some(thread) })
     }
 
-    /// Have the thread do `job`, after those before it.
     pub(crate) fn begin(&mut self, job: Job) {
         if let Some(jobs) = &self.jobs {
             // The thread ends only when this value is dropped.
@@ -63,7 +61,7 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
         }
     }
 
-    /// The next result, if its end was signalled: a signal that came after its result was taken would wake the process for ever.
+    /// The end must have been signalled: a signal after its result was taken would wake the process for ever.
     pub(crate) fn take(&mut self) -> Option<Done> {
         self.drain();
         let result = (self.ended > 0).then(|| self.results.try_recv().ok()).flatten();
@@ -71,7 +69,7 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
         result
     }
 
-    /// The next result; waits for it. None when the thread has ended.
+    /// Waits for it. None when the thread has ended.
     pub(crate) fn wait(&mut self) -> Option<Done> {
         let result = self.results.recv().ok();
         self.ended -= i64::from(result.is_some());
@@ -105,19 +103,18 @@ impl<Job, Done> Drop for Background<Job, Done> {
     fn drop(&mut self) {
         self.jobs = None;
         if let Some(thread) = self.thread.take() {
-            // A panic of the thread has been printed, and the process ends anyway.
+            // The thread's panic has been printed, and the process ends anyway.
             let _ = thread.join();
         }
     }
 }
 
-/// Niceness 10 on the scale of [`ThreadPriority::Crossplatform`], where 99 is the highest priority.
+/// Niceness 10 by [`ThreadPriority::Crossplatform`], where 99 is the highest priority.
 const NICENESS_10: u8 = 22;
 
-/// Give this thread a tenth of the share that a stage gets of a processor that both want.
-///
-/// It gets no less, although nobody waits for it: a killed process ends only once each of its threads has run, and other threads wait
-/// for its locks in the kernel. With SCHED_IDLE both took seconds on a busy machine.
+/// Give this thread a tenth of a stage's share of a processor that both want. It gets no less, although nobody waits for it: a killed
+/// process ends only once each of its threads has run, and others wait for its locks in the kernel. With SCHED_IDLE both took seconds on
+/// a busy machine.
 fn behind_stages() {
     let Ok(value) = ThreadPriorityValue::try_from(NICENESS_10) else {
         return;

@@ -1,4 +1,4 @@
-//! The background solver: a thread that solves the newest map while the robot follows the field before.
+//! The background solver solves the newest map while the robot follows the field before.
 
 use std::{
     io,
@@ -14,7 +14,7 @@ use crate::{
     step::{Job, Solved},
 };
 
-/// A solver on a thread of its own. Dropping this cancels the solve that runs and waits for the thread.
+/// Dropping this cancels the running solve and waits for the thread.
 #[derive(Debug)]
 pub struct BackgroundSolver {
     cancellation: Cancellation,
@@ -22,7 +22,7 @@ pub struct BackgroundSolver {
 }
 
 impl BackgroundSolver {
-    /// Start the thread.
+    /// Fails when the system gives no pipe or thread.
     pub fn start() -> io::Result<Self> {
         let mut worker = Worker::default();
         let cancellation = worker.cancellation.clone();
@@ -30,23 +30,21 @@ impl BackgroundSolver {
         Ok(Self { cancellation, thread: Background::start("full-solve", solve)? })
     }
 
-    /// Begin `job`, after those before it.
     pub fn begin(&mut self, job: Job) {
         self.thread.begin(job);
     }
 
-    /// The next result, if there is one.
     pub fn take(&mut self) -> Option<Solved> {
         self.thread.take()
     }
 
-    /// The next result; waits for it. None when the thread has ended.
+    /// Waits for it. None when the thread has ended.
     pub fn wait(&mut self) -> Option<Solved> {
         self.thread.wait()
     }
 }
 
-/// The solver of the thread, and the field it solved last, from which the next solve starts.
+/// A solve starts from the field before.
 #[derive(Default)]
 pub(crate) struct Worker {
     solver: Solver,

@@ -1,9 +1,9 @@
-//! A fault of the planner: a wrong field.
+//! The planner's fault: a wrong field.
 
 use harmonic::{Cell, Field, Scaled};
 
-/// Overwrites u wherever the target can be reached so that every way leads to `summit`, in cell units: u halves with each
-/// cell away from there, through walls too. The field's verification is not changed.
+/// Overwrites u wherever the target can be reached, so that every way leads to `summit`, in cell units: u halves with each cell away
+/// from it, through walls too. The field's verification stays.
 pub(crate) fn lead_astray(field: &mut Field, summit: [f64; 2]) {
     for row in 0..field.height() {
         for col in 0..field.width() {

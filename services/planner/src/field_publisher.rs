@@ -1,5 +1,4 @@
-//! Topic `field`: the policy of every cell. It is computed on a thread of its own, from the field as it was at the end of
-//! a tick, so that no later tick waits for it.
+//! Topic `field`: a thread computes every cell's policy from the field at the end of a tick, so that no later tick waits for it.
 
 use std::{
     io,
@@ -17,7 +16,6 @@ use common::{
 
 use crate::{background::Background, step::Snapshot};
 
-/// The policy of every cell.
 #[derive(Debug)]
 pub(crate) struct Policy {
     pub(crate) header: FieldHeader,
@@ -32,21 +30,18 @@ impl Policy {
     }
 }
 
-/// A result of the thread.
 #[derive(Debug)]
 struct Computed {
     policy: Policy,
-    /// The tick whose field the policy is computed from.
+    /// The tick of the policy's field.
     at: Progress,
-    /// The window in which the policy differs from that before.
+    /// Where the policy differs from the one before.
     changed: Window,
 }
 
-/// The number of times that the thread offers the processor to others while it computes a policy. Each time it may have to
-/// wait.
+/// While it computes a policy the thread offers the processor to others so often; each time it may have to wait.
 const YIELDS: usize = 8;
 
-/// Computes policies, and holds the last one for comparison.
 #[derive(Default)]
 struct Worker {
     before: Arc<Vec<FieldCell>>,
@@ -75,22 +70,18 @@ impl Worker {
     }
 }
 
-/// Decides which part of which policy is to be published: the window that changed, or the whole policy when that is due again
-/// or there is a new reader.
+/// Decides what to publish of which policy: the changed window, or the whole when that is due or there is a new reader.
 #[derive(Debug)]
 pub(crate) struct FieldPublisher {
     thread: Background<(Snapshot, Progress), Computed>,
-    /// Whether the thread computes a policy.
     busy: bool,
     version: u64,
     change_published: Option<MissionTime>,
     keyframe_published: Option<MissionTime>,
-    /// Whether the whole policy is to be published.
     keyframe: bool,
 }
 
 impl FieldPublisher {
-    /// Start the thread.
     pub(crate) fn start() -> io::Result<Self> {
         let mut worker = Worker::default();
         Ok(Self {
@@ -103,7 +94,7 @@ impl FieldPublisher {
         })
     }
 
-    /// Whether the policy of a field that `changed` is to be computed now, at mission time `now`.
+    /// Whether the policy of a field that `changed` is due at mission time `now`.
     pub(crate) fn is_due(&self, changed: bool, now: MissionTime) -> bool {
         let age = self.change_published.map(|then| now.since(then));
         changed
@@ -111,20 +102,18 @@ impl FieldPublisher {
             && age.is_none_or(|age| age >= topics::FIELD.spec().changes_at_most_every())
     }
 
-    /// Begin to compute the policy of `snapshot`.
     pub(crate) fn begin(&mut self, snapshot: Snapshot, at: Progress) {
         self.busy = true;
         self.change_published = Some(at.time);
         self.thread.begin((snapshot, at));
     }
 
-    /// Whether a policy that was begun may be ready.
     pub(crate) const fn is_busy(&self) -> bool {
         self.busy
     }
 
-    /// The part of `policy` to publish `now`, if any, and its tick. A policy that is ready takes the place of `policy` and has
-    /// its own tick; one that is published again has that of `now`.
+    /// The part of `policy` to publish `now`, and its tick. A ready policy replaces `policy` and has its own tick; one that is published
+    /// again has that of `now`.
     pub(crate) fn next(
         &mut self,
         now: Progress,

@@ -1,11 +1,5 @@
-//! The planner stage: hazard cells in, guidance out, equation (11).
-//!
-//! The library `harmonic` solves the field; this crate is the stage around it.
-//!
-//! - [`step`]: follows the `grid`, has a field of it solved, answers a pose; pure.
-//! - [`stage`]: what a recording holds of it, and what it publishes.
-//! - [`shell`]: its process.
-//! - [`background_solver`]: the thread that solves large maps.
+//! The planner stage: hazard cells in, guidance out, equation (11). The library `harmonic` solves the field. [`step`] is pure, [`stage`]
+//! records and publishes it, [`shell`] is the process, and [`background_solver`] solves large maps on a thread.
 
 mod active_sensing;
 mod aim;

@@ -1,21 +1,20 @@
-//! The echoes of the newest readings right ahead of the body.
+//! Echoes right ahead of the body.
 //!
-//! The belief weighs echoes against silences, so an echo that comes and goes, or one for which the map has no room, may leave the
-//! way open. Right before the body that is not enough: there the nearest echo counts.
+//! The belief weighs echoes against silences, so an intermittent echo, or one for which the map has no room, may leave the way open.
+//! Right before the body the nearest echo counts.
 
 use common::{kinematics::Pose2, samples::GridHeader};
 use glam::DVec2;
 
-/// The number of readings of each sonar that count, about a second of them. One false echo stops the robot no longer than that.
+/// Readings of each sonar that count, about a second: no false echo stops the robot longer.
 const NEWEST: usize = 8;
-/// The angle from the robot's axis within which a reading looked ahead: the cone, and a little more.
+/// A reading within this angle of the robot's axis looked ahead: the cone, and a little more.
 const AHEAD_DEG: f64 = 20.0;
-/// The least free ground right ahead with which the body goes there, metres. A reading counts as free only up to 0.05 m before its
-/// echo, so the echo is then 0.13 m away.
+/// The least free ground right ahead with which the body goes there, metres. A reading counts as free only up to 0.05 m before its echo,
+/// so the echo is then 0.13 m away.
 pub(crate) const STANDS_BEFORE_M: f64 = 0.08;
 
-/// Free ground ahead of a body of `radius` metres at `pose`, metres: the least of the newest readings of the robot's `sonars` in
-/// `belief`; infinite if no reading looked ahead.
+/// Free ground ahead of a body of `radius` metres: the least of the newest readings of the `sonars`; infinite if none looked ahead.
 pub(crate) fn clear_ahead_m(belief: &GridHeader, pose: &Pose2, radius: f64, sonars: usize) -> f64 {
     let (axis, within) = (pose.axis(), AHEAD_DEG.to_radians().cos());
     let newest = belief.clear_beams().iter().rev().take(NEWEST * sonars);

@@ -32,10 +32,10 @@ pub struct Shell {
     background: BackgroundSolver,
     field: FieldPublisher,
     lockstep: bool,
-    /// In lockstep: the job begun last and the tick at which it began, until its result is taken.
+    /// The last job and its tick, in lockstep, until its result is taken.
     job: Option<(u64, u64)>,
     latest_pose: Option<PoseSample>,
-    /// The last tick that was answered.
+    /// The last answered tick.
     answered: Option<u64>,
     field_changed: bool,
 }
@@ -83,7 +83,7 @@ impl Process for Shell {
         let asked = self.follow_grid()?;
         let swapped = self.take_solved()?;
         if asked && self.lockstep {
-            // A robot that waits for its command takes no second one for the same tick.
+            // A robot that waits for its command takes no second one for a tick.
             self.take(Taken::Idle)?;
         }
         if asked || swapped && !self.lockstep {
@@ -104,7 +104,7 @@ impl Process for Shell {
         Ok(self.take(Taken::Fault(fault, robot))?.changed())
     }
 
-    /// A new reader of the field may be waiting for it; that is not known before.
+    /// A new reader may wait for the field, which is not known before.
     fn has_idle_work(&self) -> bool {
         true
     }
@@ -124,7 +124,6 @@ impl Process for Shell {
 }
 
 impl Shell {
-    /// Let the stage take this. Says what it did to the field.
     fn take(&mut self, taken: Taken<'_>) -> Result<Work, StageError> {
         self.take_at(taken, self.runner.out.at)
     }
@@ -140,10 +139,8 @@ impl Shell {
         Ok(work)
     }
 
-    /// Take the results of the background solver. Says whether the field is another now.
-    ///
-    /// In lockstep the result of a job is taken one tick after the job began, no sooner and no later, so that a run can be
-    /// repeated.
+    /// Take the solver's results; returns whether the field changed. In lockstep a result is taken exactly one tick after its job began,
+    /// so that a run can be repeated.
     fn take_solved(&mut self) -> Result<bool, StageError> {
         let mut swapped = false;
         if !self.lockstep {
@@ -172,7 +169,6 @@ impl Shell {
         Ok(self.take(Taken::Solved(number))? == Work::SwappedIn)
     }
 
-    /// Take the target of `tick`, if it is another.
     fn take_target(&mut self, tick: u64) -> Result<(), StageError> {
         if let Some(target) = self.target.next(tick)? {
             self.has_target = true;
@@ -182,7 +178,7 @@ impl Shell {
         Ok(())
     }
 
-    /// Follow every grid sample that came. Says whether an answer is due.
+    /// Returns whether an answer is due.
     fn follow_grid(&mut self) -> Result<bool, StageError> {
         let mut asked = false;
         while let Some(grid) = self.grid.next_slice()? {
@@ -200,7 +196,7 @@ impl Shell {
         Ok(asked)
     }
 
-    /// Guidance for the pose of the tick, which was published before the grid was.
+    /// The tick's pose was published before the grid.
     fn answer(&mut self) -> Result<(), StageError> {
         self.latest_pose = self.pose.newest()?.or(self.latest_pose);
         // A keyframe for new readers may belong to a tick that is over.
@@ -213,7 +209,6 @@ impl Shell {
         Ok(())
     }
 
-    /// Publish the field for consumers, after the robot has its guidance.
     fn publish_field(&mut self) -> Result<(), StageError> {
         let Runner { stage, out } = &mut self.runner;
         let (now, has_new_reader) = (out.at, out.has_new_reader(&FIELD)?);

@@ -1,4 +1,4 @@
-//! The planner as a stage: the entries of its recordings, and the samples that it publishes.
+//! The planner as a stage: what it records and publishes.
 
 use std::{borrow::Cow, collections::VecDeque, time::Instant};
 
@@ -36,42 +36,35 @@ pub struct Entry<'a> {
 #[derive(Debug, Serialize, Deserialize)]
 #[allow(clippy::large_enum_variant, reason = "there is one at a time, on the stack")]
 pub(crate) enum Taken<'a> {
-    /// The step takes a sample of `grid`.
+    /// A sample of `grid`.
     Grid(#[serde(with = "inputs::slice")] (GridHeader, Cow<'a, [u8]>)),
-    /// The step takes the pose of the tick, and its guidance is published.
+    /// The pose of the tick; its guidance is published.
     Pose {
         #[serde(with = "inputs::sample")]
         pose: PoseSample,
-        /// Wall-clock time of the last full solve, nanoseconds, which is added to the guidance.
+        /// The last full solve's, added to the guidance.
         full_solve_ns: u64,
     },
-    /// The tick is over.
     Idle,
-    /// The step takes the result of the job with this number.
     Solved(u64),
-    /// The step takes a fault; the robot is here, metres.
+    /// The robot is here, metres.
     Fault(FaultKind, DVec2),
     /// This part of the newest policy is published.
     Field(#[serde(with = "inputs::sample")] Part),
     /// A policy of the field is due.
     Policy,
-    /// The step takes another target.
     Target(#[serde(with = "inputs::sample")] TargetSample),
 }
 
-/// The step, and the computations outside of it: threads of the process take the jobs and give the results, or this
-/// thread in a replay.
+/// The step, and the computations outside of it: threads take the jobs and give the results, or this thread does in a replay.
 pub struct PlannerStage {
     pub(crate) planner: Planner,
-    /// Jobs that are not begun, oldest first.
+    /// Not begun, oldest first.
     pub(crate) jobs: VecDeque<Job>,
-    /// The result of a job that is taken next.
     pub(crate) solved: Option<Solved>,
-    /// The field of which a policy is due.
+    /// A policy of this field is due.
     pub(crate) snapshot: Option<Snapshot>,
-    /// The newest policy.
     pub(crate) policy: Option<Policy>,
-    /// Wall-clock time of the last full solve, nanoseconds.
     pub(crate) full_solve_ns: u64,
     worker: Worker,
 }
@@ -79,7 +72,7 @@ pub struct PlannerStage {
 impl Stage for PlannerStage {
     type Start = ();
     type Entry<'a> = Entry<'a>;
-    /// The effect on the field. After an error the process ends.
+    /// The process ends after an error.
     type Outcome = Result<Work, SolveError>;
 
     fn new(mission: &Mission) -> Self {
@@ -156,7 +149,7 @@ impl Stage for PlannerStage {
 }
 
 impl PlannerStage {
-    /// The result of job `number`. A replay solves the jobs in their order, as the thread did.
+    /// A replay solves the jobs in their order, as the thread did.
     fn result_of(&mut self, number: u64) -> Solved {
         if let Some(solved) = self.solved.take() {
             return solved;
@@ -170,7 +163,6 @@ impl PlannerStage {
         Solved { number, field: Err(SolveError::Cancelled), took_ns: 0 }
     }
 
-    /// Publish `part` of the newest policy, for its tick `at`.
     fn publish_field(
         &mut self,
         part: Part,

@@ -28,24 +28,23 @@ use live::{Live, Robot, is_hazard};
 
 pub use input::{Input, Job, Outcome, Snapshot, Solved, Work};
 
-/// How fast the evidential method leaves a hazard the robot stands in, m/s: something is near.
+/// Speed out of a hazard that the robot stands in, m/s: something is near.
 const WAY_OUT_M_S: f64 = 0.08;
 
-/// How a direction of the field is checked before it is given.
 #[derive(Clone, Copy, Debug)]
 enum Advisor {
-    /// The paper's method, and any without sensing: the robot goes where the field points.
+    /// The paper's method, and any without sensing.
     Follow,
     /// The evidential method: whether the sonar has looked there.
     LookFirst(ActiveSensing),
-    /// The evidential method for a car, which cannot look around on the spot: whether it can steer there.
+    /// Checks whether a car can steer there.
     Steer(Arcs),
 }
 
-/// The planner, (11).
+/// The equation is (11).
 #[derive(Debug)]
 pub struct Planner {
-    /// Where the robot is sent; none before the supervisor has said so.
+    /// None before the supervisor names one.
     target: Option<TargetSample>,
     tolerance_m: f64,
     screening: Screening,
@@ -54,9 +53,9 @@ pub struct Planner {
     solver: Solver,
     grid: Replica<u8>,
     belief: GridHeader,
-    /// The field and its map; none before the first keyframe.
+    /// None before the first keyframe.
     live: Option<Live>,
-    /// A fault is injected: no direction is given, wherever the robot is.
+    /// An injected fault: no direction anywhere.
     on_a_saddle: bool,
     jobs: u64,
     full_solves: u64,
@@ -152,7 +151,6 @@ impl Planner {
         Ok(Work::Stale)
     }
 
-    /// Solve a map without an earlier field.
     fn solve_first(&mut self) -> Result<Work, SolveError> {
         self.live = None;
         let Some(frame) = self.grid.frame() else {
@@ -168,7 +166,7 @@ impl Planner {
         Ok(Work::Solved)
     }
 
-    /// Follow a change of the map in `window`; `before` is the version before it.
+    /// The version before the change is `before`.
     fn follow(&mut self, window: Window, before: u64) -> Result<Work, SolveError> {
         let Some(mut live) = self.live.take() else {
             return self.solve_first();
@@ -194,7 +192,7 @@ impl Planner {
         self.live.as_ref().is_some_and(|live| live.is_small() && !live.is_current())
     }
 
-    /// Solve the newest map, from the field of the one before.
+    /// The solve starts from the field before.
     fn solve_newest(&mut self) -> Result<Work, SolveError> {
         let Some(live) = &mut self.live else {
             return Ok(Work::None);
@@ -205,7 +203,7 @@ impl Planner {
         Ok(Work::Solved)
     }
 
-    /// The map of the newest cells, with the target `aim`. Its cell counts as free: the mapper may not know of a new target yet.
+    /// The target's cell counts as free: the mapper may not know of it yet.
     fn map(&self, frame: &GridFrame, aim: Option<Cell>) -> Result<Domain, SolveError> {
         let side = frame.cells as usize;
         let blocked = self.grid.cells().iter().map(|&cell| is_hazard(cell));
@@ -218,13 +216,11 @@ impl Planner {
         Domain::new(side, side, blocked, aim)?.with_screening(&self.screening)
     }
 
-    /// Where the robot is sent, metres.
     fn place(&self) -> Option<DVec2> {
         self.target.map(|target| target.target.position())
     }
 
-    /// The cell that the field is to lead to: the target's, or a free one near it where that one cannot be entered or, by the
-    /// evidential method, the body does not fit.
+    /// The target's cell, or a free one near it where that cannot be entered or, by the evidential method, the body does not fit.
     fn aim(&self, frame: &GridFrame) -> Option<Cell> {
         let (cells, target) = (self.grid.cells(), self.place()?);
         let aim = match self.advisor {
@@ -234,7 +230,6 @@ impl Planner {
         aim.map(field_cell)
     }
 
-    /// The solve for the background solver to begin, if one is due.
     fn begin_job(&mut self) -> Option<Job> {
         let live = self.live.as_mut()?;
         let job = live.begin_job(self.jobs + 1, self.grid.version())?;
@@ -282,13 +277,12 @@ impl Planner {
         Ok(Outcome { work, guidance, job: None })
     }
 
-    /// Status and direction of the field at `pose`; none where it must not be followed.
+    /// None where the field must not be followed.
     fn follow_field(&self, pose: &Pose2) -> Option<(GuidanceStatus, DVec2)> {
         let (live, target) = (self.live.as_ref()?, self.place()?);
         live.guide(&self.robot, pose, target, self.grid.cells())
     }
 
-    /// The guidance for a robot that `followed` the field.
     fn guide(
         &mut self,
         sample: &PoseSample,
@@ -312,7 +306,7 @@ impl Planner {
         }
     }
 
-    /// Status, direction and speed limit to give where the field says `status` and `direction`.
+    /// The checked advice for the field's `status` and `direction`, with a speed limit.
     fn advise(
         &mut self,
         pose: &Pose2,
@@ -341,13 +335,13 @@ impl Planner {
                 let limit = sensing.limit_before_echoes(&self.belief, pose);
                 (status, direction, limit.min(WAY_OUT_M_S))
             }
-            // A false echo may block the way: the robot looks around once before its map is reset.
+            // A false echo may block the way: look around once before the map is reset.
             GuidanceStatus::Unreachable => (status, pose.axis().perp(), 0.0),
             _ => (status, direction, 0.0),
         }
     }
 
-    /// The field as it is now; none before the first solve.
+    /// None before the first solve.
     pub fn snapshot(&self) -> Option<Snapshot> {
         let (live, target) = (self.live.as_ref()?, self.place()?);
         let verification = live.field.verification();
@@ -363,7 +357,7 @@ impl Planner {
     }
 }
 
-/// The mission's screening length, in the unit of its grid.
+/// The unit is the mission's grid.
 fn screening(mission: &Mission) -> Screening {
     mission.screening_length_m().map_or(Screening::None, |length| Screening::Uniform {
         length,

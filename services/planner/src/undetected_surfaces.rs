@@ -1,61 +1,58 @@
 //! Surfaces that could stand in the way undetected.
 //!
-//! A smooth surface answers from the foot of the sonar's perpendicular on it, and only a sonar whose axis is near its normal
-//! (Kuc and Siegel 1987: a surface hit at a slant reflects the sound away). So a silent beam ahead does not exclude
-//! a wall at 45 degrees to the way. A surface that the body touches has its normal within a right angle of the motion. So for
-//! each point of the way and each normal, a surface tangent to the body is supposed there, and the readings are searched for
-//! one that would have detected it. An infrared ranger detects a surface at any angle, but only where its ray meets it.
+//! A smooth surface answers from the foot of the sonar's perpendicular on it, and only near its normal (Kuc and Siegel 1987: a slanted
+//! surface reflects the sound away), so a silent beam ahead does not exclude a wall at 45 degrees. A surface that the body touches has
+//! its normal within a right angle of the motion. For each point of the way and each normal a tangent surface is supposed, and a reading
+//! searched that would have detected it. An infrared ranger detects a surface at any angle, but only where its ray meets it.
 
 use std::f64::consts::TAU;
 
 use common::samples::{ClearBeam, GridHeader};
 use glam::DVec2;
 
-/// Largest angle between the way and a normal that is checked. A surface at a greater angle is passed, not met.
+/// Largest checked angle between the way and a normal: beyond it a surface is passed, not met.
 const WIDEST_DEG: f64 = 75.0;
-/// Angle from one normal to the next: less than a beam is wide.
+/// Angle between normals: less than a beam is wide.
 const STEP_DEG: f64 = 15.0;
-/// The angle from its normal within which a surface answers a beam: the cone, and a little more.
+/// A surface answers a beam within this angle of its normal: the cone, and a little more.
 const ANSWERS_WITHIN_DEG: f64 = 17.0;
-/// The angle from its normal within which a surface no farther away than [`NEAR_M`] answers a beam.
+/// No farther away than [`NEAR_M`].
 const NEAR_ANSWERS_WITHIN_DEG: f64 = 20.0;
-/// The greatest distance of a near surface, metres.
 const NEAR_M: f64 = 1.2;
-/// The extent of a supposed surface from the point where the body would touch it, metres. A shorter surface could be detected
-/// only from nearer; its end is an edge, which answers a beam ahead.
+/// Extent of a supposed surface from the point of touch, metres. A shorter one could be detected only from nearer; its end is an edge,
+/// which answers a beam ahead.
 const EXTENDS_M: f64 = 1.0;
-/// Least cosine of the angle between a ray and the normal of a surface that it detects: 70 degrees.
+/// Least cosine between a ray and the normal of a surface that it detects: 70 degrees.
 const LEAST_SLANT: f64 = 0.34;
-/// The greatest distance from the point of touch at which a ray that meets a supposed surface excludes it, metres.
+/// A ray that meets a supposed surface this near to the point of touch excludes it, metres.
 const MET_WITHIN_M: f64 = 0.35;
-/// A bound of the rounding of such distances, metres.
+/// Bound of rounding of such distances, metres.
 const ROUNDING_M: f64 = 1e-6;
-/// Free ground that is required between body and surface, metres.
+/// Required free ground between body and surface, metres.
 const MARGIN_M: f64 = 0.02;
-/// The greatest distance of an echo before a supposed surface at which the echo may be the surface's own, metres.
+/// An echo at most this far before a supposed surface may be its own, metres.
 const NEAR_ECHO_M: f64 = 0.25;
-/// The number of such echoes that weigh as much as one silence: pings are lost, but not twice as often as they are answered.
+/// So many such echoes weigh as much as one silence: pings are lost, but not twice as often as answered.
 const ECHOES_FOR_A_SILENCE: usize = 2;
 
-/// The number of normals: to either side of the way, and along it.
+/// To either side of the way, and along it.
 const NORMALS: usize = 2 * (WIDEST_DEG / STEP_DEG) as usize + 1;
 
-/// The number of sectors by which the sonars' readings are grouped, because a normal concerns few of them.
+/// Sonar readings are grouped by sector, because a normal concerns few.
 const SECTORS: usize = 32;
-/// The greatest number of sectors between a beam that answers a surface and the sector of the surface's normal.
+/// The most sectors between a surface's normal and a beam that it answers.
 const EITHER_SIDE: usize = (NEAR_ANSWERS_WITHIN_DEG * SECTORS as f64 / 360.0) as usize + 1;
 
-/// The readings, and the body that could touch a surface.
 #[derive(Clone, Debug)]
 pub(crate) struct UndetectedSurfaces {
     beams: BySector,
     rays: Vec<Beam>,
     reach: f64,
-    /// The greatest distance from the body's centre at which a ray that meets a supposed surface excludes it, metres.
+    /// A ray excludes a supposed surface no farther from the body's centre, metres.
     met_within: f64,
-    /// The normals that are checked for a way along x, and their angles.
+    /// The way is along x; with the normals' angles.
     normals: [(DVec2, f64); NORMALS],
-    /// Least cosine of the angle between a beam and the normal of a surface that answers it: of a far one, and of a near one.
+    /// Least cosine between a beam and the normal of a far surface that answers it, and of a near one.
     answers: [f64; 2],
 }
 
@@ -64,7 +61,7 @@ struct Beam {
     origin: DVec2,
     axis: DVec2,
     clear: f64,
-    /// Whether a surface that is supposed may lie beyond its free length, so that it may have an echo before the surface.
+    /// A supposed surface may lie beyond its free length, so that it may have an echo before it.
     may_echo: bool,
 }
 
@@ -79,7 +76,6 @@ impl From<&ClearBeam> for Beam {
     }
 }
 
-/// Beams by their sectors.
 #[derive(Clone, Debug)]
 struct BySector {
     /// In each sector, those that may have an echo come last.
@@ -89,7 +85,7 @@ struct BySector {
 }
 
 impl BySector {
-    /// The `readings`, where no surface is supposed farther than `within` metres from `place`.
+    /// No surface is supposed farther than `within` metres from `place`.
     fn new(readings: &[ClearBeam], place: DVec2, within: f64) -> Self {
         let beams = readings.iter().map(|reading| {
             let beam = Beam::from(reading);
@@ -104,8 +100,7 @@ impl BySector {
         }
     }
 
-    /// The beams that may answer a surface whose normal lies in `sector`, by sectors. The sector itself comes first, because most of
-    /// its beams answer.
+    /// Beams that may answer a surface whose normal lies in `sector`. The sector itself comes first, because most of its beams answer.
     fn around(&self, sector: usize) -> [&[Beam]; 2 * EITHER_SIDE + 1] {
         std::array::from_fn(|step| {
             let beside = if step % 2 == 0 { step / 2 } else { SECTORS - step.div_ceil(2) };
@@ -115,18 +110,17 @@ impl BySector {
     }
 }
 
-/// The readings that were weighed for one surface.
 #[derive(Clone, Copy, Debug)]
 struct Tally {
     silences: usize,
     echoes: usize,
-    /// The readings that may have an echo and are not weighed yet.
+    /// Unweighed readings that may have an echo.
     left: usize,
 }
 
 impl Tally {
-    /// Weigh a `reading` that such a surface answers from this distance, if it does. Returns whether the echoes cannot outweigh the
-    /// silences any more.
+    /// Weigh a `reading` that such a surface answers from this distance, if any. Returns whether echoes can no longer outweigh the
+    /// silences.
     fn is_decided_by(&mut self, reading: &Beam, distance: Option<f64>) -> bool {
         self.left -= usize::from(reading.may_echo);
         match distance {
@@ -143,7 +137,7 @@ fn sector_of(angle: f64) -> usize {
 }
 
 impl UndetectedSurfaces {
-    /// The surfaces that a body of `radius` metres could touch within `ahead_m` metres of `place`, by the readings in `belief`.
+    /// Surfaces that a body of `radius` metres could touch within `ahead_m` metres of `place`.
     pub(crate) fn new(belief: &GridHeader, radius: f64, place: DVec2, ahead_m: f64) -> Self {
         let reach = radius + MARGIN_M;
         Self {
@@ -161,8 +155,7 @@ impl UndetectedSurfaces {
         }
     }
 
-    /// Unit vectors towards the surfaces that a body at `at` could touch on its way along the unit vector `along`, and that no
-    /// reading excludes.
+    /// Unit vectors towards surfaces that a body at `at`, going along the unit vector `along`, could touch and no reading excludes.
     pub(crate) fn normals(&self, at: DVec2, along: DVec2) -> impl Iterator<Item = DVec2> {
         let heading = along.to_angle();
         let near = self.rays.iter().filter_map(|ray| self.near(ray, at));
@@ -175,7 +168,7 @@ impl UndetectedSurfaces {
         })
     }
 
-    /// The `ray`, if it may meet a surface that touches a body at `at`, near enough to the body and not too far behind its end.
+    /// The ray may meet a surface that touches a body at `at`, near the body and not too far behind its end.
     fn near(&self, ray: &Beam, at: DVec2) -> Option<Beam> {
         let offset = at - ray.origin;
         let (along, near) = (ray.axis.dot(offset), self.met_within);
@@ -184,7 +177,7 @@ impl UndetectedSurfaces {
         meets.then_some(Beam { may_echo: ray.clear < along + near, ..*ray })
     }
 
-    /// Whether the `beams` and `rays` exclude a surface that touches a body at `at` on the side of `normal`.
+    /// The surface touches a body at `at` on the side of `normal`.
     fn is_excluded(&self, at: DVec2, normal: DVec2, beams: &[&[Beam]], rays: &[Beam]) -> bool {
         let may_echo =
             |beams: &&[Beam]| beams.iter().rev().take_while(|beam| beam.may_echo).count();
@@ -195,11 +188,11 @@ impl UndetectedSurfaces {
             || rays.iter().any(|ray| tally.is_decided_by(ray, self.met_after(ray, at, normal)))
     }
 
-    /// The distance from which a surface like that answers `beam`, metres; none if it does not.
+    /// The distance from which such a surface answers `beam`, metres; none if it does not.
     fn answers_from(&self, beam: &Beam, at: DVec2, normal: DVec2) -> Option<f64> {
         let [far, near] = self.answers;
         let square = beam.axis.dot(normal);
-        // A surface at any distance does not answer such a beam.
+        // No surface at any distance answers such a beam.
         if square < near {
             return None;
         }
@@ -209,7 +202,7 @@ impl UndetectedSurfaces {
         (square >= answers && offset.perp_dot(normal).abs() <= EXTENDS_M).then_some(distance)
     }
 
-    /// The distance after which `ray` meets a surface like that near the body, metres; none if it does not.
+    /// Where `ray` meets such a surface near the body, metres; none if it does not.
     fn met_after(&self, ray: &Beam, at: DVec2, normal: DVec2) -> Option<f64> {
         let slant = ray.axis.dot(normal);
         if slant < LEAST_SLANT {

@@ -4,15 +4,13 @@ use common::grid::{Cell, CellState, GridFrame};
 use glam::DVec2;
 use harmonic::{Field, Guidance};
 
-/// Distance between the points of a way, metres.
+/// Points of a way are so far apart.
 pub(crate) const STEP_M: f64 = 0.05;
-/// The step in which unscanned cells are searched on a fine grid, metres.
+/// Step of the search for unscanned cells on a fine grid, metres.
 const GRAIN_M: f64 = 0.025;
 
-/// The belief, and a field over it or over an earlier belief.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct View<'a> {
-    /// The frame of the cells.
     pub(crate) frame: GridFrame,
     /// One [`CellState`] byte a cell, row-major.
     pub(crate) cells: &'a [u8],
@@ -25,7 +23,7 @@ impl View<'_> {
         self.field.guidance(cells.x, cells.y)
     }
 
-    /// Points of the way that follows the field for `length_m` metres from `from`, which it leaves along `direction`.
+    /// Points of the field's way for `length_m` metres from `from`, first along `direction`.
     pub(crate) fn way(&self, from: DVec2, direction: DVec2, length_m: f64) -> Vec<DVec2> {
         let steps = (length_m / STEP_M) as usize;
         let mut way = Vec::with_capacity(steps);
@@ -45,13 +43,13 @@ impl View<'_> {
         self.frame.cell_at(at).is_none_or(|cell| self.state(cell).is_hazard())
     }
 
-    /// Whether a cell within `radius` of `at` became hazard or free after the field's map was taken.
+    /// Whether a cell within `radius` changed after the field's map was taken.
     pub(crate) fn has_changed(&self, at: DVec2, radius: f64) -> bool {
         self.cells_within(at, radius, 1)
             .any(|cell| self.state(cell).is_hazard() != self.field.is_blocked(field_cell(cell)))
     }
 
-    /// Centres of the free and sensed cells within `radius` of `at` that the sonar has not scanned.
+    /// Centres of free and sensed cells within `radius` that the sonar has not scanned.
     pub(crate) fn unscanned(&self, at: DVec2, radius: f64) -> impl Iterator<Item = DVec2> {
         let step = (GRAIN_M / self.frame.resolution_m).max(1.0) as usize;
         self.cells_within(at, radius, step)
@@ -59,7 +57,7 @@ impl View<'_> {
             .map(|cell| self.frame.centre_of(cell))
     }
 
-    /// Cells in every `step`th column and row whose centres lie within `radius` of `at`.
+    /// Cells in every `step`th column and row, with centres within `radius`.
     fn cells_within(&self, at: DVec2, radius: f64, step: usize) -> impl Iterator<Item = Cell> {
         let frame = self.frame;
         let last = f64::from(frame.cells) - 1.0;
@@ -81,7 +79,6 @@ impl View<'_> {
     }
 }
 
-/// A cell of the grid as the field library names it.
 pub(crate) const fn field_cell(cell: Cell) -> harmonic::Cell {
     harmonic::Cell::new(cell.col as usize, cell.row as usize)
 }

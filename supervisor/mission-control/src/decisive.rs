@@ -18,8 +18,7 @@ pub(crate) fn first_contact(truth: &[GroundTruthTick]) -> Option<&GroundTruthTic
 #[derive(Debug, PartialEq)]
 pub(crate) struct Decided {
     pub ending: Ending,
-    /// The last complete tick; none if no tick decided. The tick of a contact, a timeout or a stall may be incomplete,
-    /// because the stages are stopped during it.
+    /// The last complete tick; none if no tick decided. That of a contact, a timeout or a stall may be incomplete.
     pub last_tick: Option<u64>,
     /// Number of ticks of the ground truth that count: up to the contact, or up to the last tick.
     pub truth_ticks: usize,
@@ -86,14 +85,13 @@ pub(crate) fn first(
     Decided { ending, last_tick: Some(last_tick), truth_ticks }
 }
 
-/// The index in the ground truth of the tick that `pose` was computed from. A robot at rest measures the same for many
-/// ticks; then it is the tick with the nearest number.
+/// The index in the ground truth of the tick that `pose` was computed from: of those with its counts the one with the nearest number.
 pub(crate) fn truth_of(pose: &PoseSample, truth: &[GroundTruthTick]) -> Option<usize> {
     let shown = truth.iter().enumerate().filter(|(_, it)| it.is_of(pose));
     shown.min_by_key(|(_, it)| it.heard_tick().abs_diff(pose.stamp.tick)).map(|(index, _)| index)
 }
 
-/// The tick of the pose that was computed from the measurement at `truth`; if there is none, the number that it would have.
+/// The tick of the pose that was computed from `truth`; if there is none, the number that it would have.
 fn tick_of(truth: &GroundTruthTick, poses: &[PoseSample]) -> u64 {
     poses
         .iter()

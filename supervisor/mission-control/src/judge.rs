@@ -13,12 +13,10 @@ use processes::{policy::Now, records};
 
 use crate::outcome::{Ending, Outcome};
 
-/// The time without a tick after which a pipeline that nothing holds is stuck. This is time in which the supervisor ran: in
-/// lockstep mission time does not advance meanwhile, so the mission's own timeout would not end it.
+/// Observed time without a tick after which a pipeline that nothing holds is stuck: in lockstep the mission's timeout does not pass.
 const NO_PROGRESS: Duration = Duration::from_secs(15);
 
-/// The time after which a robot that was told to stand and does not rest could not be stopped: the link has used each
-/// method of the protocol twice by then.
+/// The time within which a robot that was told to stand rests: by then the link has used each method of the protocol twice.
 pub(crate) const RESTS_WITHIN: Duration = Duration::from_secs(5);
 
 #[derive(Clone, Debug)]

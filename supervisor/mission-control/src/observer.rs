@@ -17,7 +17,7 @@ use processes::stage_processes::StageProcesses;
 
 use crate::long_record;
 
-/// The most guidance samples that are recorded: that of the arrival tick must still be there when its command is read.
+/// The most guidance samples that are kept: that of the arrival must still be there when its command is read.
 const MOST_GUIDANCE: usize = 1024;
 /// The most contacts that are recorded: more than come between two checks for stalls.
 const MOST_CONTACTS: usize = 64;
@@ -81,9 +81,8 @@ pub struct Record {
 }
 
 impl Observer {
-    /// Read everything on `bus`, to complete `record`. `waiter` wakes for heartbeats, for the state of the link, which ends a
-    /// tick, and for fields. The other samples of a tick are read at its end, so that the supervisor takes no processor time
-    /// from the stages during the tick.
+    /// Read everything on `bus`, to complete `record`. `waiter` wakes for heartbeats, fields and the state of the link, which ends a
+    /// tick: during a tick the supervisor takes no processor time from the stages.
     pub(crate) fn new(bus: &Bus, waiter: &mut Waiter, record: Record) -> Result<Self, BusError> {
         waiter.on(bus.wakeup(&topics::HEALTH)?);
         waiter.on(bus.wakeup(&topics::LINK)?);

@@ -1,5 +1,5 @@
-//! An operator's requests to a robot, from any process: stop, resume, targets, a new generation of a stage. Each function returns when
-//! the robot's link or its supervisor has confirmed the request, or says why not.
+//! An operator's requests to a robot, from any process. Each function returns when the robot's link or its supervisor has confirmed
+//! the request, or says why not.
 
 use std::{
     io::{self, Read as _},
@@ -27,7 +27,7 @@ use link::stop_guard;
 use processes::process;
 use thiserror::Error;
 
-/// The patience with a roster, which is published five times a second; a frozen supervisor publishes none.
+/// The patience with a roster, which comes five times a second.
 pub const PATIENCE: Duration = Duration::from_secs(2);
 
 #[derive(Debug, Error)]
@@ -71,15 +71,14 @@ pub type Untold = Option<String>;
 /// The time for a process to start and to tell the supervisor.
 const TOLD_WITHIN: Duration = Duration::from_secs(4);
 
-/// The patience with a stop. A robot that obeys rests within a second: the link repeats a stop five times a second, and changes its
-/// method after a second.
+/// The patience with a stop: the link changes its method after a second.
 const REST_PATIENCE: Duration = Duration::from_secs(5);
 
 /// The patience with a link, which answers within milliseconds if it is scheduled.
 const LINK_ANSWERS: Duration = Duration::from_millis(200);
 
-/// Let the robot stand, and wait until it rests. The link is asked directly, without the middleware. The supervisor is told as
-/// well: mission time stops, and the stop holds for its successors. Where no link answers, the robot itself is told to stand.
+/// Let the robot stand, and wait until it rests. The link is asked without the middleware; the supervisor is told too, so that the
+/// stop holds for its successors. Where no link answers, the robot itself is told.
 pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
     let asked_ns = monotonic_ns();
     let domain = Domain::of(robot.clone());
@@ -199,8 +198,7 @@ pub fn resume(robot: &RobotName) -> Result<(), OperatorError> {
     ask(robot, request(RequestKind::Resume))
 }
 
-/// Tell the supervisor alone of a stop that was asked at `asked_ns` of the monotonic clock. The stop is over if the robot was resumed
-/// since.
+/// Tell the supervisor alone of a stop that was asked at `asked_ns` of the monotonic clock. A later resume ends it.
 pub fn request_stop(robot: &RobotName, asked_ns: u64) -> Result<(), OperatorError> {
     ask(robot, RequestSample { asked_ns, ..request(RequestKind::Stop) })
 }

@@ -17,8 +17,7 @@ pub(crate) struct Snapshot {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Decision {
-    /// Whether the robot was ever ready to drive. From then on a stage that is down does not change the order, because the link stops
-    /// the robot itself.
+    /// Whether the robot was ever ready to drive. From then on the link stops it when a stage is down.
     pub ready: bool,
     pub reason: HoldReason,
 }

@@ -4,8 +4,8 @@ use common::{ground_truth::GroundTruthTick, mission::Mission, samples::PoseSampl
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-/// The distance from its target beyond which a simulated robot that reports its arrival is in the wrong place by the ground truth,
-/// metres. Other benchmarks use the same limit. A wider tolerance of the mission takes its place.
+/// The greatest true distance from its target of a simulated robot that has arrived, metres, as in other benchmarks. A wider
+/// tolerance of the mission takes its place.
 pub const RIGHT_PLACE_M: f64 = 0.5;
 
 /// The greatest distance from its target of a robot that reports its arrival, metres.
@@ -71,8 +71,8 @@ impl Ending {
         Self { outcome, reason: reason.into(), cause: None, asked_for: false }
     }
 
-    /// This ending; or the wrong place, if the robot did not reach its target by the ground truth `ended`, or came to rest elsewhere by
-    /// its own pose `at_rest`; or unsure, if the error of that pose may be larger than the mission allows.
+    /// This ending; or the wrong place by the ground truth `ended` or by its own pose `at_rest`; or unsure, if the error of that pose
+    /// may be larger than the mission allows.
     pub(crate) fn checked(
         self,
         mission: &Mission,

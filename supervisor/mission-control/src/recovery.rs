@@ -32,8 +32,7 @@ pub struct SupervisorState {
     pub(crate) targets: Option<TargetList>,
     /// The boot of the machine in which the supervisor ran.
     boot: String,
-    /// The time of the last save, [`boot_ns`]. That clock includes the time in which the machine is suspended, when the robot may
-    /// be moved.
+    /// The time of the last save, [`boot_ns`], which passes while the machine is suspended and the robot may be moved.
     saved_ns: u64,
 }
 

@@ -11,8 +11,7 @@ use common::samples::{RecoveryStep, StallSample, TickLimitSample};
 
 use crate::observer::Published;
 
-/// The number of ticks that the link may be ahead. With this number the link seldom waits, and a robot that has not moved for
-/// seconds loses little time.
+/// The number of ticks that the link may be ahead: it seldom waits, and a robot that stalls loses little time.
 const AHEAD: u64 = 4;
 /// The longest time that a recovery step waits for its answer. It is less than the link waits for the limit, and as long as a
 /// planner may take to start.

@@ -19,18 +19,15 @@ use crate::{
     observer::{Listener, Record},
     outcome::{Ending, Wheels, allowed_m},
     progress::Progress,
-    shutdown,
     supervisor::{Options, Supervisor},
     target_list::{self, TargetResult},
 };
 
 pub struct Finished {
     pub ending: Ending,
-    /// The last complete tick before the deciding event; none if no tick decided. Later ticks do not count, because their number
-    /// depends on how fast the stop was.
+    /// The last complete tick before the deciding event; none if no tick decided. Later ticks do not count.
     pub last_tick: Option<u64>,
-    /// The time from the first motion order to the end, seconds of the robot's clock. For a run that was resumed in wall-clock time it
-    /// begins at the start of the run.
+    /// Seconds of the robot's clock from the first motion order, or in a resumed run on a wall clock from its start, to the end.
     pub duration_s: f64,
     pub record: Record,
     /// The ground truth of a simulated robot until that tick.
@@ -57,8 +54,8 @@ impl StillMoving<'_> {
     pub fn watch(mut self) -> Result<bool, SupervisorError> {
         let supervisor = &mut self.supervisor;
         let at_rest = loop {
-            shutdown::turn(supervisor)?;
-            if shutdown::wheels(supervisor) == Wheels::AtRest {
+            supervisor.wait_turn()?;
+            if supervisor.wheels() == Wheels::AtRest {
                 break true;
             }
             if self.signals.came() {
@@ -66,38 +63,37 @@ impl StillMoving<'_> {
             }
             supervisor.wait()?;
         };
-        shutdown::finish(supervisor)?;
+        supervisor.stop_processes()?;
         Ok(at_rest)
     }
 }
 
-/// Carry out a run. `attach` is called once, when the robot's bus exists and no stage has started: consumers that start
-/// there miss no sample. `listener` hears the samples that the run reads, and `show` is called a few times a second.
+/// Carry out a run. `attach` is called once, when the bus exists and no stage has started: consumers that start there miss no sample.
+/// `listener` hears the samples that the run reads. `show` is called a few times a second.
 pub fn run<'a>(
     options: &'a Options,
     attach: &mut dyn FnMut(),
     listener: Listener,
     show: &mut dyn FnMut(&Progress<'_>),
 ) -> Result<(Finished, Option<StillMoving<'a>>), SupervisorError> {
-    let mut signals =
-        Signals::catch(&[SIGINT, SIGTERM, SIGHUP]).map_err(system("catch signals"))?;
+    let catch = || Signals::catch(&[SIGINT, SIGTERM, SIGHUP]).map_err(system("catch signals"));
+    let mut signals = catch()?;
     let turns = Turns::default();
-    let heard = Signals::catch(&[SIGINT, SIGTERM, SIGHUP]).map_err(system("catch signals"))?;
-    last_resort::watch(heard, turns.clone());
+    last_resort::watch(catch()?, turns.clone());
     let domain = Domain::of(options.robot.clone());
     let mut lock = DomainLock::acquire(domain, options.mission.grid_frame().area())?;
     let mut supervisor = Supervisor::start(options, &lock, turns.clone(), attach, listener)?;
     let ending = loop {
         match supervisor.drive(&mut signals, show) {
             Ok(Some(ending)) => break Ok(ending),
-            Ok(None) => supervisor = shutdown::recreate_bus(supervisor, &mut lock)?,
+            Ok(None) => supervisor = supervisor.recreate_bus(&mut lock)?,
             Err(error) => break Err(error),
         }
     };
     // The robot is stopped first after an error, too, and then the stages in order.
     let given_up = Some(Cause::OdometryGivenUp.name());
     let trusts_encoders = ending.as_ref().map_or(true, |ending| ending.cause != given_up);
-    let stopped = shutdown::stop(&mut supervisor, trusts_encoders);
+    let stopped = supervisor.end_mission(trusts_encoders);
     turns.end();
     let ending = ending?;
     let wheels = stopped?;

@@ -22,8 +22,8 @@ impl RunClock {
         Self { clock: run.clock(), first_tick: run.first_tick, start: run.time }
     }
 
-    /// The clock of a new run. Another pace than the wall clock's is possible only for a `simulated` robot, and for one that speaks ROS 2,
-    /// which may be simulated elsewhere.
+    /// The clock of a new run. Only a `simulated` robot, and one that speaks ROS 2 and may be simulated elsewhere, has another pace
+    /// than the wall clock's.
     pub(crate) fn begin(pace: Pace, robot: &RobotConfig, simulated: bool) -> Self {
         let has_pace = simulated || robot.protocol() == Protocol::Ros2;
         let clock = match pace {
@@ -56,8 +56,8 @@ impl RunClock {
         pose.map_or(self.start, |pose| pose.stamp.time())
     }
 
-    /// Seconds from the first motion order until `last_tick`, or the newest tick. In lockstep the ground `truth` gives this time: the
-    /// simulated robot's time begins with the order, and also passes while the link receives no frames.
+    /// Seconds from the first motion order until `last_tick`, or the newest tick. In lockstep the ground `truth` says it: its time
+    /// also passes while the link receives no frames.
     pub(crate) fn duration_s(
         &self,
         last_tick: Option<u64>,

@@ -6,7 +6,7 @@ use std::{
     net::SocketAddr,
     os::fd::{AsFd, BorrowedFd},
     path::Path,
-    process::{ChildStdout, Stdio},
+    process::{ChildStdout, Command, Stdio},
     time::{Duration, Instant},
 };
 
@@ -16,7 +16,7 @@ use common::{
     mission::Mission,
     poll, run,
 };
-use processes::process::{Process, firsthand};
+use processes::process::Process;
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use thiserror::Error;
 
@@ -56,9 +56,14 @@ struct GroundTruth {
 }
 
 impl Simulator {
-    /// Start a simulator in the world of `mission`, overrides included, and wait until it listens. Its files are in
-    /// `directory`; it goes on from the checkpoint of an earlier one there.
-    pub fn start(directory: &Path, mission: &Mission, pace: Pace) -> Result<Self, SimulatorError> {
+    /// Start a simulator in the world of `mission` and wait until it listens. `firsthand` starts that executable. The simulator goes on
+    /// from an earlier one's checkpoint in `directory`.
+    pub fn start(
+        mut firsthand: Command,
+        directory: &Path,
+        mission: &Mission,
+        pace: Pace,
+    ) -> Result<Self, SimulatorError> {
         let text = toml::to_string(mission)
             .map_err(|error| system("write the mission of")(io::Error::other(error)))?;
         let file = directory.join("mission.toml");
@@ -70,7 +75,7 @@ impl Simulator {
         let mission = file.to_str().ok_or_else(|| {
             SimulatorError::Startup("the run directory's name is not UTF-8".into())
         })?;
-        let mut command = firsthand(&[
+        firsthand.args([
             "sim",
             mission,
             "--pace",
@@ -79,9 +84,9 @@ impl Simulator {
             "--supervisor",
             &std::process::id().to_string(),
         ]);
-        command.arg("--keep").arg(checkpoint);
-        command.stdout(Stdio::piped()).stderr(log);
-        let mut process = Process::spawn(command).map_err(system("start"))?;
+        firsthand.arg("--keep").arg(checkpoint);
+        firsthand.stdout(Stdio::piped()).stderr(log);
+        let mut process = Process::spawn(firsthand).map_err(system("start"))?;
         let pipe = process
             .take_stdout()
             .ok_or_else(|| SimulatorError::Startup("it has no output".into()))?;

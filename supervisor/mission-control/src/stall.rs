@@ -26,8 +26,7 @@ use glam::{DVec2, IVec2};
 const STALLED_AFTER: Duration = Duration::from_secs(3);
 /// Mission time without a way to the target that is a stall. A false echo is gone earlier.
 const CUT_OFF_AFTER: Duration = Duration::from_secs(1);
-/// Mission time for which the robot may stand while the planner computes a field. The largest field takes several seconds,
-/// and a new planner would begin again.
+/// Mission time for which the robot may stand while the planner computes a field: the largest takes several seconds.
 const FIELD_WITHIN: Duration = Duration::from_secs(60);
 /// Turns on the spot that a robot makes first when it is cut off, with the evidential method, at half the ordered speed.
 const SCAN_TURNS: f64 = 1.2;
@@ -45,15 +44,14 @@ const TURNED_RAD: f64 = 0.1;
 const SHARE: f64 = 0.05;
 /// Distance that leads out of any margin, even of several overlapping ones, metres.
 const WAY_OUT_M: f64 = 1.0;
-/// The distance within which contacts are at the same place, metres: a robot that turns about a blocked wheel stays within it.
+/// The distance within which contacts are at the same place, metres: a robot turns about a blocked wheel.
 const HELD_WITHIN_M: f64 = 0.5;
-/// The multiple of the distance to its target after which a robot wanders, once it has driven [`WANDERS_LEAST_M`]. The way around a
-/// trap is two to three times as long.
+/// The multiple of the distance to its target after which a robot wanders. The way around a trap is two to three times as long.
 const WANDERS: f64 = 3.0;
 /// The least distance after which a robot wanders, metres.
 const WANDERS_LEAST_M: f64 = 12.0;
-/// The side of a square in which a robot was, metres. The map of a laser is to be trusted, and the way through a large building may be
-/// many times as long as the straight one: each square in which such a robot has not been lets it drive [`WANDERS`] times that farther.
+/// The side of a square, metres. A laser's map is to be trusted, and the way through a building may be long: each square in which a
+/// robot with a laser has not been lets it drive [`WANDERS`] times that farther.
 const SQUARE_M: f64 = 1.0;
 /// The most squares that are remembered.
 const MOST_SQUARES: usize = 10_000;
@@ -127,7 +125,7 @@ pub(crate) struct StallWatch {
     /// Epochs without a reset of their own, and resets because the robot was relocated.
     skipped: u64,
     relocated: u64,
-    /// The resets before the robot was sent to its present target, without those of relocations.
+    /// The resets before its present target, without those of relocations.
     resets_before: u64,
     target: Option<u64>,
     /// The relocations of the newest pose that was checked.
@@ -213,8 +211,8 @@ impl StallWatch {
         self.tick
     }
 
-    /// Check a tick of a robot that is ordered to drive; each tick once. `held` says that something else holds the robot: the
-    /// link's failsafe, or a stage that is down. `contact` says that something holds its wheels.
+    /// Check a tick of a robot that is ordered to drive; each tick once. `held`: the link's failsafe or a stage that is down holds
+    /// it. `contact`: something holds its wheels.
     pub(crate) fn step(
         &mut self,
         pose: &PoseSample,
@@ -325,7 +323,7 @@ impl StallWatch {
         self.forget_motion();
     }
 
-    /// Note that something held the robot until now, perhaps without a tick, so its time at its place begins anew.
+    /// Note that something held the robot until now, perhaps without a tick.
     pub(crate) const fn forget_motion(&mut self) {
         (self.anchor, self.place) = (None, None);
         (self.cut_off_since, self.waits_since) = (None, None);
@@ -363,7 +361,7 @@ impl StallWatch {
         None
     }
 
-    /// The stall of a robot that has driven for so long, since the start or the last reset, that its map must be wrong.
+    /// Whether the robot has driven for so long, since the start or the last reset, that its map must be wrong.
     fn without_end(&mut self, pose: &PoseSample, guidance: &GuidanceSample) -> Option<StallCause> {
         let most_m = (WANDERS * guidance.distance_m).max(WANDERS_LEAST_M);
         let wanders_at = self.wanders_at.get_or_insert(pose.travelled_m + most_m);
@@ -375,7 +373,7 @@ impl StallWatch {
         (self.forgets && pose.travelled_m >= *wanders_at).then_some(StallCause::Wandering)
     }
 
-    /// The stall of a robot that has not moved or turned for a while, or moves or turns for longer at one place.
+    /// Whether the robot has not moved or turned for a while, or moves or turns for longer at one place.
     fn without_motion(
         &mut self,
         pose: &PoseSample,

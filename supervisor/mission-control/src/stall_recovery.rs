@@ -63,7 +63,6 @@ impl Supervisor<'_> {
         }
         // A tick without its command may be incomplete here.
         let newest = record.published.tick.filter(|_| in_ticks);
-        // Several ticks may have passed since the last check. Each is checked, so the result does not depend on their number.
         let mut found = None;
         for (pose, guidance) in record.ticks_since(self.stall_watch.tick()) {
             if newest.is_some_and(|newest| pose.stamp.tick > newest) {
@@ -99,8 +98,8 @@ impl Supervisor<'_> {
         Some(Ending::failed(Outcome::Unreachable, reason))
     }
 
-    /// Find out after the run at which tick no recovery step was left, and the mission's ending. In lockstep the number of ticks that were
-    /// checked before the end depends on the machine, so the others are checked now.
+    /// The tick at which no recovery step was left, and the ending. In lockstep the ticks that were not checked before the end, whose
+    /// number depends on the machine, are checked now.
     pub(crate) fn end_by_stall(&mut self) -> Option<(u64, Ending)> {
         while self.clock.in_ticks()
             && self.stall_watch.gave_up().is_none()

@@ -62,7 +62,12 @@ impl Robot {
             let address = address.parse::<Address<String>>()?.resolve()?;
             return Ok(Self { simulator: None, address });
         }
-        let simulator = Simulator::start(&options.directory, &options.mission, options.pace)?;
+        let simulator = Simulator::start(
+            processes::process::firsthand(&[]),
+            &options.directory,
+            &options.mission,
+            options.pace,
+        )?;
         Ok(Self { address: Address::Udp(simulator.address()), simulator: Some(simulator) })
     }
 
@@ -155,14 +160,16 @@ impl<'a> Supervisor<'a> {
             service: ServiceManager::of_environment(),
         };
         supervisor.bus.observer.record.target_number = supervisor.targets.number();
-        let link = Domain::of(options.robot.clone()).run_directory();
-        symlink(directory, &link).map_err(system(format!("make {}", link.display())))?;
+        let domain = Domain::of(options.robot.clone());
+        let link_to_run = |link: PathBuf| {
+            symlink(directory, &link).map_err(system(format!("make {}", link.display())))
+        };
+        link_to_run(domain.run_directory())?;
         attach();
         supervisor.publish_state()?;
         supervisor.stages.start_all(supervisor.first_tick());
         if options.starter == Starter::External {
-            let link = Domain::of(options.robot.clone()).run_link();
-            symlink(directory, &link).map_err(system(format!("make {}", link.display())))?;
+            link_to_run(domain.run_link())?;
             // Systemd starts the stages after this notification.
             supervisor.service.ready();
         }

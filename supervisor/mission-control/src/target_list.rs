@@ -121,8 +121,7 @@ impl TargetList {
         fits
     }
 
-    /// Send the robot to `points` instead, from `since_tick` at `now_s` on. `arrival` is the arrival at the current target, if that
-    /// is reached already.
+    /// Send the robot to `points` instead, from `since_tick` at `now_s` on. `arrival` is that at the current target, if there is one.
     pub(crate) fn replace(
         &mut self,
         points: &[TargetPoint],
@@ -151,8 +150,7 @@ impl TargetList {
         }
     }
 
-    /// Send the robot, which arrived at the current target by `command` with a pose that was sure or not, to the next, from
-    /// `since_tick` on.
+    /// Send the robot, which arrived by `command` with a pose that was sure or not, to the next target, from `since_tick` on.
     pub(crate) fn advance(&mut self, command: &CommandSample, is_sure: bool, since_tick: u64) {
         if self.ahead.is_empty() {
             return;
@@ -192,8 +190,7 @@ impl TargetList {
         self.results.push(stored);
     }
 
-    /// Complete the results of arrivals by the ground truth as far as that is known. `allowed_m` is the greatest error of an
-    /// arrival.
+    /// Complete the results of arrivals by the ground truth as far as that is known, with `allowed_m` as the greatest error.
     pub(crate) fn compare(&mut self, record: &Record, truth: &[GroundTruthTick], allowed_m: f64) {
         for Stored { result, tick } in &mut self.results {
             let Some(tick) = tick.filter(|_| result.truth_m.is_none()) else {

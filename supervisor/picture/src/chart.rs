@@ -144,7 +144,7 @@ mod tests {
         ] {
             assert!(svg.contains(text), "{text} in {svg}");
         }
-        crate::png(&svg).unwrap();
+        roxmltree::Document::parse(&svg).unwrap();
     }
 
     #[test]
@@ -158,7 +158,7 @@ mod tests {
                 chart.series[0].mark = mark;
                 let svg = chart.svg();
                 assert!(svg.len() < 400_000);
-                crate::png(&svg).unwrap();
+                roxmltree::Document::parse(&svg).unwrap();
             }
         }
     }

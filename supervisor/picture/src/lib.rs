@@ -13,8 +13,7 @@
 //! | `page`, `lattice` | the page, and cells on it |
 //! | [`Scene`] | the data of a picture |
 //!
-//! `map` draws the field of a bare map, and `raster` converts it to PNG. `chart` draws values against each other;
-//! `plot` is its frame.
+//! `map` draws the field of a bare map, `chart` values against each other; `plot` is its frame.
 //!
 //! Every layer but the frame may be missing, and every input gives a valid file.
 
@@ -28,7 +27,6 @@ mod margin;
 mod motion;
 mod page;
 mod plot;
-mod raster;
 mod scene;
 mod streamlines;
 #[cfg(test)]
@@ -44,7 +42,6 @@ pub use self::{
     chart::{Chart, Mark, Series},
     map::{FieldOnMap, map_svg},
     page::escape,
-    raster::png,
     scene::{Facts, Scene},
 };
 

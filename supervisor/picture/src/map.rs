@@ -224,7 +224,6 @@ mod tests {
         assert!(svg.contains("<path d=\"M107 16h13v13h-13z\" fill=\"#1d2430\""));
         assert!(svg.contains("<path d=\"M133 133h13v13h-13z\" fill=\"#c9ccd1\""));
         assert!(svg.contains("cx=\"22.5\" cy=\"139.5\""));
-        let pixels = super::super::png(&svg).unwrap();
-        assert!(pixels.starts_with(b"\x89PNG"));
+        roxmltree::Document::parse(&svg).unwrap();
     }
 }

@@ -38,9 +38,8 @@ impl Cleanup {
         }
     }
 
-    /// Clean up if that is due. After deaths it is due once no stage is starting, because a starting stage would wait for the
-    /// cleanup, which takes about as long as a start. It is due earlier if so many processes died that places on the bus may run
-    /// out.
+    /// Clean up if that is due: after deaths once no stage is starting, which would wait for it, or earlier if so many processes died
+    /// that places on the bus may run out.
     pub fn run_if_due(&mut self, bus: &Bus, any_starting: bool) {
         let (deaths, last) = self.deaths;
         let quiet = deaths > 0 && last.elapsed() >= DELAY && !any_starting;

@@ -22,8 +22,7 @@ pub(crate) fn raise_limit() -> Result<(), u64> {
     }
 }
 
-/// The soft and the hard limit; none where the kernel does not say, or there is none. They are read from text, because the
-/// system call may be forbidden to a service.
+/// The soft and the hard limit, if the kernel says. They are read from text, because a service may not call the system for them.
 fn limits() -> Option<[u64; 2]> {
     let limits = fs::read_to_string("/proc/self/limits").ok()?;
     let line = limits.lines().find_map(|line| line.strip_prefix("Max open files"))?;

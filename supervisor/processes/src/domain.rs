@@ -163,8 +163,7 @@ fn remove_run(domain: &Domain) -> Result<(), DomainError> {
     files.iter().try_for_each(|file| remove_file(file))
 }
 
-/// Remove all files of the middleware in this domain. Files of another user in shared memory are left: a new bus has
-/// random names, so nobody can have taken them.
+/// Remove all files of the middleware in this domain, but none of another user: a new bus has random names.
 fn wipe(domain: &Domain) -> Result<(), DomainError> {
     // A process cannot join a bus without a configuration.
     remove_file(&domain.middleware_config())?;

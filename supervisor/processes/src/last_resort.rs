@@ -22,8 +22,7 @@ use common::{
 };
 use rustix::process::{Pid, Signal, kill_process};
 
-/// The time without an iteration after which the loop hangs. A healthy loop turns five times a second; an overloaded machine may
-/// slow it.
+/// The time without an iteration after which the loop hangs; a healthy one turns five times a second.
 const STUCK: Duration = Duration::from_secs(2);
 const GRACE: Duration = Duration::from_millis(300);
 /// The exit code of a run that ends like this, which is that of any run that failed.

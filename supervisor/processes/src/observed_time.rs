@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use crate::policy::Now;
 
-/// The excess over its plan beyond which a wait, or the work between two waits, does not count as observed time. On a machine that is not
-/// overloaded a wait is late by at most a hundredth of this.
+/// The excess over its plan beyond which a wait, or the work between two waits, does not count. Usually a wait is late by at most a
+/// hundredth of this.
 const TOLERANCE: Duration = Duration::from_millis(20);
 
 #[derive(Debug)]

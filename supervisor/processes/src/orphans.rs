@@ -2,8 +2,7 @@
 //! stay.
 //!
 //! Each stage holds a shared lock on one file of the domain as long as it runs, and stops when its supervisor ends. A frozen
-//! stage cannot. Only the process that holds the supervisor's lock can need the stages of the domain, so such an orphan is
-//! killed.
+//! stage cannot, and nobody needs it.
 
 use std::{
     fs::{self, File},
@@ -48,8 +47,8 @@ pub(crate) fn wait_for(domain: &Domain) -> Result<File, DomainError> {
     Err(DomainError::Orphans { robot: domain.robot.to_string(), holders: holders.join(", ") })
 }
 
-/// Wait until no consumer is joining the bus of the domain, which takes milliseconds; but not longer than [`JOINED_WITHIN`],
-/// because a consumer may be frozen meanwhile. No consumer can begin to join while the result is held.
+/// Wait until no consumer is joining the bus, but not longer than [`JOINED_WITHIN`], because one may be frozen. None can begin to join
+/// while the result is held.
 pub(crate) fn wait_for_consumers(domain: &Domain) -> Result<File, DomainError> {
     let path = domain.joining_lock_file();
     let lock = File::create(&path).map_err(failed("make", &path))?;

@@ -56,8 +56,7 @@ pub fn program_of<'a>(executable: Option<&'a Path>, stage: &'a str) -> (&'a Path
     }
 }
 
-/// A process of `program`, in a process group of its own, so that a terminal's Ctrl-C reaches the supervisor alone, which
-/// stops things in order.
+/// A process of `program`, in a process group of its own: a terminal's Ctrl-C reaches the supervisor alone.
 pub fn child(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
     command
@@ -147,7 +146,7 @@ impl Process {
         let pid = i32::try_from(id).ok().and_then(Pid::from_raw);
         let pid = pid.ok_or(io::ErrorKind::NotFound)?;
         let pidfd = pidfd_open(pid, PidfdFlags::empty())?;
-        // The process may have ended meanwhile, and its id may belong to another one, which must not be signalled.
+        // Its id may belong to another one meanwhile, which must not be signalled.
         let called = fs::read_to_string(format!("/proc/{id}/comm"))?;
         if called.trim_end() != name {
             return Err(io::ErrorKind::NotFound.into());

@@ -168,8 +168,8 @@ impl StageProcess {
         }
     }
 
-    /// The cause of the end of the process, if it has ended. For an external process that did not announce its end, the result comes an
-    /// iteration later, because its last beat may have come after the beats of this iteration were read.
+    /// The cause of the end of the process, if it has ended. That of an external process that did not announce it comes an iteration
+    /// later, because a last beat may be unread.
     pub(crate) fn try_reap(&mut self) -> Result<Option<ExitCause>, StageProcessError> {
         let Some(process) = &mut self.process else {
             return Ok(None);

@@ -29,8 +29,7 @@ const STOP_GRACE: Duration = Duration::from_millis(300);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Starter {
     Supervisor,
-    /// Systemd or a person starts the stages. An external stage is known once it beats; after its death the supervisor waits for
-    /// the next one.
+    /// Systemd or a person starts the stages, which are known once they beat.
     External,
 }
 
@@ -134,8 +133,7 @@ impl StageProcesses {
         }
     }
 
-    /// Reap ended stages, start successors, apply deadlines. A new generation on `bus` starts from `first_tick`. Returns the
-    /// deaths.
+    /// Reap ended stages, start successors on `bus` from `first_tick` on, apply deadlines. Returns the deaths.
     pub fn poll(&mut self, bus: &Bus, first_tick: u64) -> Result<Vec<Death>, StageProcessError> {
         let mut deaths = Vec::new();
         // Heartbeats were read until now. The rest may wait for the disk, which must not make a stage late.
@@ -274,8 +272,7 @@ impl StageProcesses {
     }
 }
 
-/// The destructor stops the stages in reverse order, after an error of the supervisor too. The link is the last and stops the
-/// robot.
+/// The destructor stops the stages in reverse order, after an error too. The link is the last and stops the robot.
 impl Drop for StageProcesses {
     fn drop(&mut self) {
         while let Some(mut stage) = self.stages.pop() {

@@ -15,6 +15,7 @@
 //! | `measured` | metrics of the recording itself |
 //! | `beliefs` | the map at a few moments, and the field of each |
 //! | `metrics` | the table of metrics, under their field names |
+//! | [`shortest_path`] | the shortest path of a body through known shapes |
 //! | `error` | errors |
 
 mod beliefs;
@@ -22,6 +23,7 @@ mod content;
 mod error;
 mod measured;
 mod metrics;
+pub mod shortest_path;
 mod source;
 #[cfg(test)]
 mod tests;

@@ -1,10 +1,12 @@
 //! The table of metrics, under their field names. A value comes from the run's summary, which knows the ground truth of a
 //! simulated robot; or else from the recording, which knows the robot's estimate.
 
-use evaluation::shortest_path::{ShortestPath, shortest_path};
 use serde_json::{Value, json};
 
-use crate::content::Content;
+use crate::{
+    content::Content,
+    shortest_path::{ShortestPath, shortest_path},
+};
 
 struct Metric {
     /// The name in the literature.

@@ -67,22 +67,20 @@ pub struct Summary {
     pub true_distance_m: Option<f64>,
     /// The time at which the robot had moved 0.1 m, by the ground truth.
     pub departed_s: Option<f64>,
-    /// The longest that a wheel turned after the last command the robot had received: command limit and speed loop together, in an
-    /// outage or when a stage is down.
+    /// The longest that a wheel turned after the last command that the robot had received.
     pub stopping_time_s: Option<f64>,
     pub safety_events: u64,
     pub full_solves: u64,
     pub looks: u64,
     pub look_s: f64,
-    /// Share of the ticks in which the front sonar gave no distance. It is taken from the ground truth, because a supervisor on a
-    /// busy machine may miss samples.
+    /// Share of the ticks in which the front sonar gave no distance, by the ground truth.
     pub sonar_unavailable_share: Option<f64>,
     /// The greatest commanded speed of either wheel less the least one, rad/s, in the last supervisor's part.
     pub wheel_range_rad_s: Option<f64>,
     pub ticks: u64,
     pub restarts: BTreeMap<String, u32>,
-    /// Times another supervisor went on with the run. Clearance, solves and latencies are then those of the last supervisor's part;
-    /// the path is the believed one, which is complete.
+    /// Times another supervisor went on with the run. Clearance, solves and latencies are then those of its part; the path is the
+    /// believed one.
     pub resumes: u32,
     /// Generations of the planner started because the robot stalled.
     pub replans: u32,

@@ -1,42 +1,39 @@
 //! `firsthand evaluate`: how often a robot arrives, on many worlds, judged by the ground truth.
 
 use std::{
-    fs,
     num::NonZero,
     path::{Path, PathBuf},
 };
 
 use clap::Args;
-use common::{
-    file::FileError,
-    mission::{Mission, Model},
-};
-use evaluation::{
-    directory::{self, PAGE_FILE},
-    report::{self, Report},
-    results::Results,
-    runner::{self, NoiseSeeds, Plan},
-    setting::{HARMONIC, Setting},
-    trial::BodySize,
-    worlds::{self, Ends, Worlds},
-};
-use glam::DVec2;
-use processes::planner_executable;
-use serde_json::json;
-
-use crate::{
-    mission_progress::{MissionProgress, jobs},
-    stage::BASELINES,
-};
+use common::mission::{Mission, Model};
 use console::{
     failure::Failure,
     output::{print_text, write_stderr},
+};
+use glam::DVec2;
+use processes::planner_executable;
+use serde_json::{Value, json};
+
+use crate::{
+    baselines::stage::BASELINES,
+    missions::{
+        directory,
+        report::{self, Report},
+        results::Results,
+        runner::{self, NoiseSeeds, Plan, processors},
+        setting::{HARMONIC, Setting},
+        statistics::Estimate,
+        totals::Totals,
+        trial::BodySize,
+    },
+    worlds::{self, Ends, Worlds},
 };
 
 /// Run missions on many worlds and count successes by the ground truth, with 95 % intervals, a picture and a page of every failure.
 /// Worlds and noise follow from the seed.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// rooms, doors, rotated-rooms, rotated-doors, traps, corridors, straight-corridors, furnished, glazed, moving-cylinders; a mission file, a ROS map (.yaml), a BARN .world or
     /// cylinders.csv; a folder of such files.
     #[arg(long, default_value = "rooms")]
@@ -100,7 +97,7 @@ pub(crate) struct Arguments {
 /// Free ground on both sides of the body in the narrowest way of a world, metres.
 const MARGIN_M: f64 = 0.05;
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result<(), Failure> {
     let settings = settings(arguments)?;
     let described = described(arguments, &settings);
     let directory = directory::claim(&arguments.out, &described, arguments.resume)?;
@@ -116,7 +113,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
         settings,
         repeats: arguments.repeats,
         noise: NoiseSeeds::Derived(arguments.seed),
-        jobs: jobs(arguments.jobs),
+        jobs: processors(arguments.jobs),
         pictured_seed: None,
         calibrates: arguments.calibrate,
         directory,
@@ -127,16 +124,12 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
         found.unsolvable
     ));
     let mut results = Results::open(&plan.directory)?;
-    let mut console = MissionProgress::new("");
-    runner::run(&plan, &mut results, &mut |progress| console.show(progress))?;
-    console.end();
+    runner::run(&plan, &mut results, "")?;
     results.sort()?;
-    let page = plan.directory.join(PAGE_FILE);
-    fs::write(&page, report::html(&plan, &results, &described))
-        .map_err(FileError::of("write", &page))?;
+    let page = directory::save_page(&plan.directory, &report::html(&plan, &results, &described))?;
     let report = Report::new(&plan, results.rows.rows());
     let text = if arguments.json {
-        format!("{}\n", as_json(&report)?)
+        format!("{}\n", object(&report))
     } else {
         format!("{report}rows and pictures: {}\n", page.display())
     };
@@ -163,7 +156,6 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
         .ok_or_else(|| format!("give {N} numbers with commas between them"))
 }
 
-/// The command that gives these rows.
 fn described(arguments: &Arguments, settings: &[Setting]) -> String {
     let worlds = &arguments.worlds;
     let count = arguments.count.map_or(String::new(), |count| format!(" --count {count}"));
@@ -268,27 +260,24 @@ fn body(robot: &str, set: &[String]) -> Result<BodySize, Failure> {
     Ok(BodySize { radius_m: mission.body().radius_m, margin_m: MARGIN_M })
 }
 
-fn as_json(report: &Report) -> Result<serde_json::Value, serde_json::Error> {
-    let mut totals = report.totals.iter();
-    let mut object = match totals.next() {
-        Some(first) => serde_json::to_value(first)?,
-        None => json!({}),
-    };
-    let others: Vec<_> = totals
+fn object(report: &Report) -> Value {
+    let mut objects = report.totals.iter().map(Totals::object);
+    let mut object = objects.next().unwrap_or_default();
+    let interval = |of: Estimate| [of.value, of.low, of.high];
+    let others: Vec<Value> = objects
         .zip(&report.comparisons)
         .map(|(totals, comparison)| {
-            let interval = |of: evaluation::statistics::Estimate| [of.value, of.low, of.high];
-            Ok(json!({
-                "totals": serde_json::to_value(totals)?,
+            json!({
+                "totals": totals,
                 "pairs": comparison.pairs,
                 "success_change": interval(comparison.success),
                 "collision_change": interval(comparison.collision),
                 "time_ratio": comparison.time_ratio,
-            }))
+            })
         })
-        .collect::<Result<_, serde_json::Error>>()?;
+        .collect();
     if !others.is_empty() {
         object["versus"] = others.into();
     }
-    Ok(object)
+    object
 }

@@ -10,15 +10,13 @@ use std::{
     time::{Duration, Instant},
 };
 
+use crate::missions::statistics::median;
 use clap::Args;
 use common::{process_status::kibibytes, samples::FieldCell};
-use evaluation::statistics::median;
 use harmonic::{Cancellation, Cell, Domain, Field, Phase, Screening, Settings, SolveError, Solver};
 use maps::Map;
-use npyz::WriterBuilder as _;
 use picture::FieldOnMap;
 use serde::Serialize;
-use thiserror::Error;
 
 use console::{
     failure::{Failure, Refused},
@@ -29,7 +27,7 @@ use console::{
 ///
 /// Cells that are not free count as blocked, and so does the rim of the map.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// A ROS map_server YAML, a PGM or PNG image (light is free), or a MovingAI .map.
     map: PathBuf,
     /// The target's column and row, from 0; row 0 is the top of the map.
@@ -38,11 +36,11 @@ pub(crate) struct Arguments {
     /// The screening length, in cells: in it u falls by a further factor of e. Without it there is no screening.
     #[arg(long, value_name = "LENGTH", allow_negative_numbers = true)]
     screening_cells: Option<f64>,
-    /// Write u (arrays mantissa, exponent) and the guidance (ex, ey) as a NumPy .npz.
-    #[arg(long, value_name = "F.npz")]
+    /// Write an array for NumPy, whose fields are those of u (mantissa, exponent) and the guidance (ex, ey).
+    #[arg(long, value_name = "F.npy")]
     out: Option<PathBuf>,
-    /// Draw level sets of log u and lines of the guidance as a PNG.
-    #[arg(long, value_name = "F.png")]
+    /// Draw level sets of log u and lines of the guidance.
+    #[arg(long, value_name = "F.svg")]
     picture: Option<PathBuf>,
     /// Print one line of JSON at the end, and nothing else on standard output.
     #[arg(long)]
@@ -55,7 +53,6 @@ pub(crate) struct Arguments {
     threads: NonZeroUsize,
 }
 
-/// A cell of the command line.
 #[derive(Clone, Copy, Debug)]
 struct TargetCell(Cell);
 
@@ -70,32 +67,10 @@ impl FromStr for TargetCell {
     }
 }
 
-#[derive(Debug, Error)]
-enum FieldError {
-    /// The target is blocked or outside.
-    #[error("{}: {cause}; the free cell nearest to it is --target-cell {},{}", map.display(), nearest.0, nearest.1)]
-    Target { map: PathBuf, cause: SolveError, nearest: (usize, usize) },
-    /// There is nothing to solve.
-    #[error(
-        "{}: no cell is free (the rim counts as blocked); check the thresholds, or `negate`, of the map",
-        map.display()
-    )]
-    NothingFree { map: PathBuf },
-    /// The solver's own message.
-    #[error("{}: {cause}", map.display())]
-    Solve { map: PathBuf, cause: SolveError },
-    /// A file cannot be written.
-    #[error("cannot write {}: {cause}; give another file", file.display())]
-    Write { file: PathBuf, cause: io::Error },
-}
-
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result<(), Failure> {
     let map = maps::load(&arguments.map)?;
-    let domain = domain(arguments, &map).map_err(|error| match error {
-        FieldError::Target { .. } => Failure::from(Refused::new("target", error.to_string())),
-        error => error.into(),
-    })?;
-    let failed = |cause| FieldError::Solve { map: arguments.map.clone(), cause };
+    let domain = domain(arguments, &map)?;
+    let failed = |cause| format!("{}: {cause}", arguments.map.display());
     let mut runs = Vec::new();
     let (first, times) = solve(&domain, arguments.threads).map_err(failed)?;
     runs.push(times);
@@ -104,30 +79,36 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     }
     let report = Report::of(arguments, &first, &runs);
     if let Some(file) = &arguments.out {
-        write(file, |to| write_npz(to, &first))?;
+        write(file, |to| write_array(to, &first))?;
     }
     if let Some(file) = &arguments.picture {
-        let png = picture::png(&draw(&map, &first))?;
-        write(file, |to| to.write_all(&png))?;
+        write(file, |to| to.write_all(draw(&map, &first).as_bytes()))?;
     }
     Ok(print(&report, arguments.json)?)
 }
 
-fn domain(arguments: &Arguments, map: &Map) -> Result<Domain, FieldError> {
+fn domain(arguments: &Arguments, map: &Map) -> Result<Domain, Failure> {
     let target = arguments.target_cell.0;
     let screening = arguments.screening_cells.map_or(Screening::None, Screening::cells);
-    Domain::new(map.cols, map.rows, map.blocked.clone(), target)
-        .and_then(|domain| domain.with_screening(&screening))
-        .map_err(|cause| {
-            let file = arguments.map.clone();
-            let at_target =
-                matches!(cause, SolveError::TargetBlocked { .. } | SolveError::Outside { .. });
-            match map.nearest_free(target.col, target.row) {
-                Some(nearest) if at_target => FieldError::Target { map: file, cause, nearest },
-                None if at_target => FieldError::NothingFree { map: file },
-                _ => FieldError::Solve { map: file, cause },
-            }
-        })
+    let domain = Domain::new(map.cols, map.rows, map.blocked.clone(), target)
+        .and_then(|domain| domain.with_screening(&screening));
+    domain.map_err(|cause| {
+        let file = arguments.map.display();
+        let at_target =
+            matches!(cause, SolveError::TargetBlocked { .. } | SolveError::Outside { .. });
+        match map.nearest_free(target.col, target.row) {
+            Some((col, row)) if at_target => Refused::new(
+                "target",
+                format!("{file}: {cause}; the free cell nearest to it is --target-cell {col},{row}"),
+            )
+            .into(),
+            None if at_target => format!(
+                "{file}: no cell is free (the rim counts as blocked); check the thresholds, or `negate`, of the map"
+            )
+            .into(),
+            _ => format!("{file}: {cause}").into(),
+        }
+    })
 }
 
 /// The time each phase of a solve took, summed over its attempts.
@@ -161,7 +142,6 @@ fn solve(domain: &Domain, threads: NonZeroUsize) -> Result<(Field, Times), Solve
 struct Report {
     rows: usize,
     cols: usize,
-    /// Column and row.
     target: [usize; 2],
     screening_cells: Option<f64>,
     reachable: usize,
@@ -179,7 +159,6 @@ struct Report {
     peak_memory_bytes: Option<u64>,
 }
 
-/// Medians, if there is more than one repeat.
 #[derive(Debug, Serialize)]
 struct Medians {
     setup_ms_median: f64,
@@ -265,44 +244,35 @@ impl fmt::Display for Report {
 fn write(
     file: &Path,
     fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
-) -> Result<(), FieldError> {
+) -> Result<(), String> {
     File::create(file)
         .map(BufWriter::new)
         .and_then(|mut to| fill(&mut to).and_then(|()| to.flush()))
-        .map_err(|cause| FieldError::Write { file: file.to_owned(), cause })
+        .map_err(|cause| format!("cannot write {}: {cause}; give another file", file.display()))
 }
 
-/// u and guidance of every cell as arrays of shape (rows, cols).
-fn write_npz(to: &mut BufWriter<File>, field: &Field) -> io::Result<()> {
-    let mut archive = zip::ZipWriter::new(to);
-    let u = || cells(field).map(|cell| field.u(cell));
-    let guidance: Vec<[f32; 2]> = cells(field).map(|cell| guidance(field, cell)).collect();
-    add_array(&mut archive, field, "mantissa", u().map(|u| u.mantissa))?;
-    add_array(&mut archive, field, "exponent", u().map(|u| u.exponent))?;
-    add_array(&mut archive, field, "ex", guidance.iter().map(|e| e[0]))?;
-    add_array(&mut archive, field, "ey", guidance.iter().map(|e| e[1]))?;
-    archive.finish()?;
+/// u and guidance of every cell as a structured array of NumPy, of shape (rows, cols), in version 1.0 of its format.
+fn write_array(to: &mut impl Write, field: &Field) -> io::Result<()> {
+    let header = format!(
+        "{{'descr': [('mantissa', '<f8'), ('exponent', '<i4'), ('ex', '<f4'), ('ey', '<f4')], \
+         'fortran_order': False, 'shape': ({}, {})}}",
+        field.height(),
+        field.width()
+    );
+    // The values begin at a multiple of 64 bytes.
+    const BEFORE: usize = 10;
+    let length = (BEFORE + header.len() + 1).next_multiple_of(64) - BEFORE;
+    to.write_all(b"\x93NUMPY\x01\x00")?;
+    to.write_all(&(length as u16).to_le_bytes())?;
+    writeln!(to, "{header:<0$}", length - 1)?;
+    for cell in cells(field) {
+        let (u, [ex, ey]) = (field.u(cell), guidance(field, cell));
+        to.write_all(&u.mantissa.to_le_bytes())?;
+        to.write_all(&u.exponent.to_le_bytes())?;
+        to.write_all(&ex.to_le_bytes())?;
+        to.write_all(&ey.to_le_bytes())?;
+    }
     Ok(())
-}
-
-fn add_array<T: npyz::AutoSerialize>(
-    archive: &mut zip::ZipWriter<&mut BufWriter<File>>,
-    field: &Field,
-    name: &str,
-    values: impl Iterator<Item = T>,
-) -> io::Result<()> {
-    // The members are stored uncompressed, as `numpy.savez` does: a reader may map them into its memory.
-    let options = zip::write::SimpleFileOptions::default()
-        .compression_method(zip::CompressionMethod::Stored)
-        .large_file(true);
-    archive.start_file(format!("{name}.npy"), options)?;
-    let mut array = npyz::WriteOptions::new()
-        .default_dtype()
-        .shape(&[field.height() as u64, field.width() as u64])
-        .writer(archive)
-        .begin_nd()?;
-    array.extend(values)?;
-    array.finish()
 }
 
 fn cells(field: &Field) -> impl Iterator<Item = Cell> {

@@ -1,20 +1,36 @@
 //! The laboratory: what measures robots. It is a consumer like any other, starts `firsthand` from beside itself, and contains the
-//! planners to compare with.
+//! planners to compare with. No robot contains it.
 //!
 //! | module | holds |
 //! |---|---|
-//! | `evaluate` | missions on many worlds |
-//! | `experiments` | the paper's experiments |
+//! | [`missions`] | missions on many worlds, judged by the ground truth |
+//! | [`worlds`] | worlds, drawn from a seed or read from files |
+//! | `evaluate` | the command that compares settings on worlds |
+//! | [`experiments`] | the paper's experiments with many seeds |
+//! | [`baselines`] | planners to compare with: shortest paths, Bug2 |
+//! | [`chaos`] | signals to random processes at random times; faults of the robot |
+//! | [`tick`] | the latency of a tick, compared with five bare hops on the bus |
+//! | [`sources`] | simulated sources of fixes and turns |
 //! | `field` | the field of a map |
-//! | `bench` | random faults, the time of a tick, simulated sources |
-//! | `stage` | the planners to compare with, as stages |
+//! | `random` | random numbers |
+//! | `robot` | the executable `firsthand` |
+//! | `error` | why a bench ended early |
 
-mod bench;
+// No other crate uses these modules: `pub` says that another module does, and what none uses is reported all the same.
+#![allow(unreachable_pub)]
+
+mod baselines;
+mod chaos;
+mod error;
 mod evaluate;
 mod experiments;
 mod field;
-mod mission_progress;
-mod stage;
+mod missions;
+mod random;
+mod robot;
+mod sources;
+mod tick;
+mod worlds;
 
 use std::{
     error::Error,
@@ -23,7 +39,8 @@ use std::{
 
 use clap::{Parser, Subcommand};
 use console::{executable, failure::Failure};
-use evaluation::{directory::DirectoryError, experiments::experiment::ExperimentError};
+use experiments::table::ExperimentError;
+use missions::directory::DirectoryError;
 
 /// Measure robots: missions on many worlds, the paper's experiments, random faults, ticks, fields.
 #[derive(Debug, Parser)]
@@ -38,9 +55,20 @@ enum Command {
     Evaluate(evaluate::Arguments),
     Experiments(experiments::Arguments),
     Field(field::Arguments),
-    Bench(bench::Arguments),
+    /// Measure ticks and fields; send random signals to a robot's processes; publish fixes of a simulated robot.
+    #[command(subcommand)]
+    Bench(Bench),
     #[command(hide = true)]
-    Stage(stage::Arguments),
+    Stage(baselines::stage::Arguments),
+}
+
+#[derive(Debug, Subcommand)]
+enum Bench {
+    Tick(tick::Arguments),
+    Field(field::Arguments),
+    Chaos(Box<chaos::Arguments>),
+    Consumer(chaos::consumer_process::Arguments),
+    Sources(sources::Arguments),
 }
 
 /// The main function of the executable.
@@ -52,9 +80,14 @@ fn execute(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(match &arguments.command {
         Command::Evaluate(arguments) => evaluate::main(arguments)?.report(),
         Command::Experiments(arguments) => experiments::main(arguments)?.report(),
-        Command::Field(arguments) => field::main(arguments)?.report(),
-        Command::Bench(arguments) => bench::main(arguments)?,
-        Command::Stage(arguments) => stage::main(arguments)?.report(),
+        Command::Field(arguments) | Command::Bench(Bench::Field(arguments)) => {
+            field::main(arguments)?.report()
+        }
+        Command::Stage(arguments) => baselines::stage::main(arguments)?.report(),
+        Command::Bench(Bench::Tick(arguments)) => tick::main(arguments)?.report(),
+        Command::Bench(Bench::Chaos(arguments)) => chaos::main(arguments)?,
+        Command::Bench(Bench::Consumer(arguments)) => chaos::consumer_process::main(arguments)?,
+        Command::Bench(Bench::Sources(arguments)) => sources::main(arguments)?.report(),
     })
 }
 

@@ -1,4 +1,4 @@
-//! A car under guidance: (15), (16), limited in speed, and never on the spot.
+//! A car: (15) and (16), limited in speed, and never on the spot.
 
 use common::{
     kinematics::{LEAST_SPEED_M_S, Twist},
@@ -8,7 +8,7 @@ use common::{
 use super::{Alignment, Controller};
 
 impl Controller {
-    /// The motion of a car under guidance of that status; none to stand. A car stands where it would have to turn on the spot.
+    /// None to stand, also where a car would have to turn on the spot.
     pub(super) fn car_motion(
         &mut self,
         status: GuidanceStatus,
@@ -23,10 +23,10 @@ impl Controller {
         let omega = self.angular(alignment);
         let wanted = self.tangential(alignment, omega, distance);
         let wanted = wanted.max(least);
-        // This form makes a limit that is no number stand.
+        // A limit that is no number means stand.
         if limit >= least {
             let v = wanted.min(limit);
-            // The car goes slower along the same curve.
+            // A lower speed, on the same curve.
             let omega = omega * v / wanted;
             Some(Twist { v, omega })
         } else {

@@ -1,4 +1,4 @@
-//! The battery monitor: which batteries are low or empty.
+//! The battery monitor.
 
 use std::time::Duration;
 
@@ -10,21 +10,19 @@ use common::{
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
 
-/// A low battery counts as charged again this far above its limit, volts. The voltage rises by less when the motors stop.
+/// A low battery counts as charged this far above its limit, volts. Stopping motors raise the voltage by less.
 pub(crate) const RECOVERED_V: f64 = 0.3;
-/// A battery is empty below this share of its limit, which is 1.0 V a cell if the limit is 1.1 V. Lower voltages damage cells,
-/// and from there the voltage falls faster than a robot can be fetched.
+/// A battery is empty below this share of its limit: 1.0 V a cell if the limit is 1.1 V. Lower voltages damage cells, and the voltage
+/// then falls faster than a robot can be fetched.
 pub(crate) const EMPTY_SHARE: f64 = 1.0 / 1.1;
-/// The time below the empty voltage after which a battery is empty, mission time. Motors that start lower the voltage for some
-/// tenths of a second.
+/// Time below the empty voltage until a battery is empty, mission time. Starting motors lower the voltage for some tenths of a second.
 pub(crate) const EMPTY_AFTER: Duration = Duration::from_secs(2);
-/// Below this voltage there is no battery at all, volts. A robot could not send frames on it.
+/// A robot could not send frames on less: there is no such battery, volts.
 const FITTED_V: f64 = 1.0;
 
-/// The charge of a battery.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Charge {
-    /// The battery gives enough, or there is no such battery.
+    /// Enough, or there is no such battery.
     #[default]
     Enough,
     /// The robot drives slowly.
@@ -33,7 +31,6 @@ pub enum Charge {
     Empty,
 }
 
-/// One of the robot's batteries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pack {
     Board,
@@ -44,7 +41,6 @@ pub enum Pack {
 impl Pack {
     const ALL: [Self; 3] = [Self::Board, Self::Motor, Self::Servo];
 
-    /// The name in logs.
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::Board => "board",
@@ -54,21 +50,16 @@ impl Pack {
     }
 }
 
-/// The charge of a battery changed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BatteryChange {
     pub pack: Pack,
-    /// The voltage, volts.
     pub volts: f64,
-    /// The charge now.
     pub charge: Charge,
 }
 
-/// The state of one battery.
 #[derive(Clone, Copy, Debug, Default)]
 struct Gauge {
     charge: Charge,
-    /// The time since which the voltage has been below the empty voltage.
     sunk_since: Option<MissionTime>,
 }
 
@@ -80,7 +71,7 @@ impl Gauge {
         self.sunk_since = sunk.then_some(since);
         let ends = if self.charge == Charge::Enough { limit } else { limit + RECOVERED_V };
         self.charge = if self.charge == Charge::Empty || sunk && now.since(since) >= EMPTY_AFTER {
-            // The voltage rises again when the robot stands, but the battery is still empty.
+            // The voltage rises when the robot stands, but the battery stays empty.
             Charge::Empty
         } else if fitted && volts < ends {
             Charge::Low
@@ -91,27 +82,25 @@ impl Gauge {
     }
 }
 
-/// The batteries of one robot.
 #[derive(Clone, Debug)]
 pub struct Batteries {
     limits: BatteryLimits,
-    /// The batteries in the order of [`Pack::ALL`].
+    /// Ordered as [`Pack::ALL`].
     gauges: [Gauge; 3],
     changes: Vec<BatteryChange>,
 }
 
 impl Batteries {
-    /// Whether the battery of the boards, of the motors, and of the servos is low or empty.
+    /// Low or empty: of the boards, the motors, the servos.
     pub fn low(&self) -> [bool; 3] {
         self.gauges.map(|gauge| gauge.charge > Charge::Enough)
     }
 
-    /// The changes since the last call.
     pub fn take_changes(&mut self) -> Vec<BatteryChange> {
         std::mem::take(&mut self.changes)
     }
 
-    /// The worst charge of the batteries that driving needs, which are all but the servos'.
+    /// The worst of all but the servos', without which the robot drives.
     fn charge(&self) -> Charge {
         let [board, motor, _] = self.gauges;
         board.charge.max(motor.charge)

@@ -1,7 +1,7 @@
-//! The monitor of other commanders: nodes beside the link that publish commands for the robot.
+//! The monitor of other commanders: nodes that publish commands for the robot beside the link.
 //!
-//! The robot obeys the newest command, so two commanders at once drive it where neither wants it. A node that may publish and says
-//! nothing does no harm and is no commander.
+//! The robot obeys the newest command, so two commanders drive it where neither wants. A node that could publish and is silent is no
+//! commander.
 
 use std::{fmt::Write as _, time::Duration};
 
@@ -9,22 +9,21 @@ use common::{driver::Commander, mission::Mission, samples::Cause};
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
 
-/// The silence after which a commander counts as gone.
+/// A commander is gone after this silence.
 pub(crate) const GONE_AFTER: Duration = Duration::from_secs(1);
-/// The time after which a sender of stops alone is a commander. The stop guard of an earlier link sends stops, and leaves sooner.
+/// A sender of stops alone is a commander after this time. An earlier link's stop guard leaves sooner.
 pub(crate) const STAYS: Duration = Duration::from_secs(2);
 
-/// The commands that others have sent to the robot without a pause.
+/// Others' commands, without a pause.
 #[derive(Clone, Copy, Debug)]
 struct Told {
     newest: Commander,
-    /// Whether any of them was to move the robot.
+    /// Whether any was to move the robot.
     moves: bool,
     began_ns: u64,
     newest_ns: u64,
 }
 
-/// The knowledge about other commanders of one robot.
 #[derive(Clone, Debug)]
 pub struct OtherCommander {
     topic: String,

@@ -1,10 +1,10 @@
-//! Held wheels: contacts that the wheels show.
+//! Contacts, seen by held wheels.
 //!
-//! A wheel that is told to turn and does not has a dead encoder, or something holds it. The motor current tells which: a held motor
-//! draws several times the current of a rolling one. Where a current cannot be right, it tells nothing, and the encoder is suspected:
-//! - a current above the range of the AD converter
-//! - a current that stays high while the wheel is told to stand: the frames repeat
-//! - a current that is high while the wheel rolls as told: `robot.held_current_ad` is not this robot's
+//! A wheel that does not turn as told is held, or its encoder is dead. A held motor draws several times the current of a rolling one.
+//! The encoder is suspected where a current cannot be right:
+//! - it is above the range of the AD converter
+//! - it stays high while the wheel is told to stand: the frames repeat
+//! - it is high while the wheel rolls as told: `robot.held_current_ad` is not this robot's
 
 use std::{f64::consts::PI, time::Duration};
 
@@ -12,35 +12,32 @@ use common::{clock::MissionTime, mission::Mission, samples::ContactSample};
 
 use super::monitor::Condition;
 
-/// The time after which a wheel that draws a held wheel's current is held.
+/// A wheel with a held one's current is held after this.
 pub(crate) const HELD_AFTER: Duration = Duration::from_millis(400);
-/// The time for which the robot stands while the contact is mapped and the planner is restarted.
+/// The robot stands while the contact is mapped and the planner restarted.
 pub(crate) const STANDS_FOR: Duration = Duration::from_millis(500);
-/// The least time between two contacts, so that the answer to one comes before the next, in lockstep too.
+/// The least time between two contacts: one is answered before the next, in lockstep too.
 const NEXT_AFTER: Duration = Duration::from_secs(1);
-/// The time after which the current of a wheel that stands has fallen.
+/// A standing wheel's current has fallen by then.
 const FALLEN_AFTER: Duration = Duration::from_millis(350);
-/// The time after which a current that is high while its wheel rolls as told is no sign of a held wheel.
+/// A current that is so long high while its wheel rolls as told is no sign of a held wheel.
 const HIGH_AND_ROLLS: Duration = Duration::from_secs(2);
-/// The greatest value of the AD converter.
 const MOST_AD: u16 = 4095;
-/// Half the arc in which something touches a body both of whose wheels are held, radians.
+/// Half the arc of a touch with both wheels held, radians.
 const HALF_WIDTH: f64 = PI / 4.0;
-/// Bearing of the arc if only one wheel is held, to its side, and half of that arc, radians.
+/// The touched arc of a body with one wheel held: its bearing, to that side, and half of it, radians.
 const AT_ONE_WHEEL: (f64, f64) = (PI / 4.0, PI / 6.0);
-/// Below this share of the rims' speed relative to each other a command is a turn on the spot.
+/// A command below this share of the rims' relative speed is a turn on the spot.
 const LEAST_AHEAD_SHARE: f64 = 0.5;
 
-/// The motor currents of two wheels, and the last contact.
 #[derive(Clone, Debug)]
 pub(super) struct Contacts {
     limit_ad: u16,
     currents: [u16; 2],
-    /// The time for which each current was high while its wheel rolled as told, seconds.
+    /// High while the wheel rolled as told, seconds.
     high_and_rolls_s: [f64; 2],
-    /// The wheels that are held, and the time since which that is known.
+    /// The held wheels, and since when that is known.
     held: Option<([bool; 2], MissionTime)>,
-    /// The contact that no tick has shown yet.
     new: Option<ContactSample>,
 }
 
@@ -59,7 +56,7 @@ impl Contacts {
         self.currents = currents;
     }
 
-    /// For each wheel, whether its motor draws the current of a held one.
+    /// Whether each motor draws a held one's current.
     pub(super) fn high(&self) -> [bool; 2] {
         let range = self.limit_ad.max(1)..=MOST_AD;
         let is_sign = |s: &f64| self.limit_ad > 0 && *s < HIGH_AND_ROLLS.as_secs_f64();
@@ -68,12 +65,11 @@ impl Contacts {
         })
     }
 
-    /// Note that `wheel` rolled as told for `gap_s` seconds with a high current.
     pub(super) fn rolled(&mut self, wheel: usize, gap_s: f64) {
         self.high_and_rolls_s[wheel] += gap_s;
     }
 
-    /// The wheels `held` are held, and were told these speeds, counts/s. Returns whether this is a new contact.
+    /// These wheels are held, told these speeds, counts/s. Returns whether the contact is new.
     pub(super) fn begin(&mut self, held: [bool; 2], asked: [f64; 2], now: MissionTime) -> bool {
         if self.held.is_some_and(|(_, since)| now.since(since) < NEXT_AFTER) {
             return false;
@@ -91,7 +87,7 @@ impl Contacts {
         true
     }
 
-    /// A held wheel whose current has not fallen although it was told to stand.
+    /// A held wheel whose current stays although it was told to stand.
     pub(super) fn repeats(&self, now: MissionTime) -> Option<usize> {
         let (held, since) = self.held?;
         let stood = now.since(since);
@@ -100,7 +96,7 @@ impl Contacts {
         [0, 1].into_iter().find(|&wheel| stands && held[wheel] && high[wheel])
     }
 
-    /// The contact, for the next tick alone.
+    /// The next tick alone has it.
     pub(super) const fn take(&mut self) -> Option<ContactSample> {
         self.new.take()
     }
@@ -123,7 +119,7 @@ impl Contacts {
     }
 }
 
-/// The direction in which something touches the body, and half the angle in which that may be, radians.
+/// The direction of the touch, and half the angle in which it may be, radians.
 fn arc(held: [bool; 2], [left, right]: [f64; 2]) -> (f64, f64) {
     let ahead = left + right;
     if ahead.abs() < LEAST_AHEAD_SHARE * (right - left).abs() {

@@ -1,10 +1,8 @@
-//! The latency monitor: whether the robot's frames arrive late. Buffers on the way may delay them by seconds, and frames carry no
-//! time.
+//! The latency monitor: whether the robot's frames arrive late. Buffers may delay them by seconds, and they carry no time.
 //!
 //! A robot acknowledges every command. When a lost robot answers again, and while it is late, the link sends nothing for a window. An
-//! acknowledgement is late if it arrives when nothing was sent for longer than the time limit of a command. An acknowledgement
-//! within that time proves nothing, because it may be a late one of an earlier command. A robot that acknowledges nothing counts
-//! as timely.
+//! acknowledgement when nothing was sent for longer than a command's limit is late; a sooner one may answer an earlier command, and
+//! proves nothing. A robot without acknowledgements counts as timely.
 
 use std::time::Duration;
 
@@ -12,26 +10,24 @@ use common::{clock::Pace, mission::Mission, samples::Cause};
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
 
-/// The least limit, machine time: a process may be delayed by that much at any pace of mission time.
+/// Machine time: any process may be delayed by so much at any pace.
 const LEAST_LIMIT: Duration = Duration::from_millis(100);
-/// The window is longer than the limit by this, mission time. Commands are sent every 0.2 s to a robot that stands.
+/// The window beyond the limit, mission time: a standing robot gets commands every 0.2 s.
 const WINDOW: Duration = Duration::from_millis(400);
-/// The pause after which a late robot is tested again, mission time.
+/// A late robot is tested again after this mission time.
 const AGAIN: Duration = Duration::from_secs(2);
 
-/// The present finding.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum State {
-    /// Nothing indicates that the robot is late.
+    /// Nothing shows that the robot is late.
     #[default]
     Timely,
-    /// The link has sent nothing since this time of the machine's clock, to see late acknowledgements.
+    /// Nothing was sent since then, to see late acknowledgements.
     Testing(u64),
-    /// The robot was found to be late at this time.
     Late(u64),
 }
 
-/// The latency of one robot; times are of the machine's clock, nanoseconds.
+/// Times are the machine's, nanoseconds.
 #[derive(Clone, Debug)]
 pub struct LatencyMonitor {
     command_limit: Duration,
@@ -68,7 +64,7 @@ impl LatencyMonitor {
         }
     }
 
-    /// Whether the link must send nothing now, so that late acknowledgements can be seen.
+    /// The link must send nothing, so that late acknowledgements are seen.
     pub const fn is_testing(&self) -> bool {
         matches!(self.state, State::Testing(_))
     }
@@ -110,7 +106,7 @@ impl Monitor for LatencyMonitor {
         }
     }
 
-    /// A robot that is tested may be late.
+    /// A tested robot may be late.
     fn condition(&self, _: Cause, _: Moment) -> Condition {
         (self.state != State::Timely).into()
     }

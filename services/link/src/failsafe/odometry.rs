@@ -1,23 +1,20 @@
-//! The odometry monitor: whether the wheels turn as commanded, by their own encoders.
+//! The odometry monitor: whether wheels turn as commanded, by their encoders. Each wheel is checked, and the difference of both, because
+//! a robot with swapped wheels turns the wrong way.
 //!
-//! Each wheel is checked, and the difference of both wheels, because a robot whose wheels are swapped turns the wrong way:
-//! - An interval between two frames is evidence about a wheel if the wheel has been commanded in the same direction for [`SETTLE`], at
-//!   [`LEAST_M_S`] or more. A wheel follows a command after 0.07 s of delay and 0.08 s of lag, and its dead band of 20 counts/s
-//!   (9 mm/s) is well below this speed.
-//! - In the interval the wheel must roll at least [`LEAST_SHARE`] of the smaller speed of the two newest commands. Real wheels roll
-//!   0.75 to 0.8 of it.
-//! - Evidence against a wheel adds up. Evidence for it counts down at most twice as fast.
-//! - A wheel that turns the other way counts twice, and already after [`TURNS_AFTER`]: a controller whose robot turns away from the
-//!   target changes direction every other tick.
-//! - At [`SUSPECTED_AFTER`] the robot must stand. At 7 Hz that is 0.86 s after a motion began, and the robot is at rest 0.2 s later.
-//! - A commanded wheel that counts nothing is suspected after [`STILL_AFTER`]: a controller whose pose turns the wrong way changes
-//!   direction too often for the other evidence.
-//! - A wheel that does not turn while its motor draws the current of a held one is held, and its encoder is not suspected
-//!   ([`super::contact`]).
-//! - Intervals longer than two periods are no evidence, because commands may have been lost too.
+//! An interval between two frames is evidence about a wheel that was commanded in one direction for [`SETTLE`], at [`LEAST_M_S`] or
+//! more. Wheels follow after 0.07 s of delay and 0.08 s of lag; the dead band of 20 counts/s (9 mm/s) is well below. The wheel must then
+//! roll [`LEAST_SHARE`] of the smaller speed of the two newest commands; real wheels roll 0.75 to 0.8 of it. Intervals over two periods
+//! are no evidence, because commands may have been lost.
 //!
-//! Single implausible counts, which lie farther off than wheels turn, are dropped ([`super::restart`]). [`MOST_JUMPS`] of them
-//! within [`JUMPS_WITHIN`] lead to a suspicion too.
+//! Evidence against a wheel adds up; evidence for it counts down at most twice as fast. The other direction counts twice, and already
+//! after [`TURNS_AFTER`]: a controller whose robot turns away from the target changes direction every other tick. At [`SUSPECTED_AFTER`]
+//! the robot must stand: at 7 Hz 0.86 s after a motion began, and at rest 0.2 s later.
+//!
+//! A commanded wheel that counts nothing is suspected after [`STILL_AFTER`]: a controller whose pose turns the wrong way changes
+//! direction too often for the other evidence. If its motor draws a held one's current, it is held, and not suspected
+//! ([`super::contact`]).
+//!
+//! Single counts farther off than wheels turn are dropped ([`super::restart`]); [`MOST_JUMPS`] within [`JUMPS_WITHIN`] are suspect too.
 
 use std::{collections::VecDeque, time::Duration};
 
@@ -33,51 +30,42 @@ use super::{
     monitor::{Condition, Counts, Moment, Monitor, Observation},
 };
 
-/// The time after which counts are evidence about a command in the same direction.
+/// Counts are evidence about a command in one direction after this.
 const SETTLE: Duration = Duration::from_millis(250);
-/// The time after which a real wheel has changed its direction; at 7 Hz it has reached 0.6 of its speed.
+/// A real wheel has changed direction by then; at 7 Hz it has 0.6 of its speed.
 const TURNS_AFTER: Duration = Duration::from_millis(100);
-/// The slowest commanded motion that is judged, m/s at the rim.
+/// The slowest judged motion, m/s at the rim.
 const LEAST_M_S: f64 = 0.03;
-/// The least commanded difference of the wheels that is judged, m/s.
+/// The least judged difference of the wheels, m/s.
 const LEAST_TURN_M_S: f64 = 0.1;
-/// The least commanded difference of the wheels that is judged, as a share of their mean speed. The motors of two wheels differ by
-/// some hundredths.
+/// The least judged share of the wheels' mean speed: two motors differ by some hundredths.
 const LEAST_TURN_SHARE: f64 = 0.25;
-/// A plausible wheel turns at least this share of its commanded speed.
+/// A plausible wheel turns at least this share of its command.
 const LEAST_SHARE: f64 = 0.25;
-/// A wheel that turns this share of its commanded speed rolls as told.
 const ROLLS_SHARE: f64 = 0.5;
-/// The amount of evidence that leads to a suspicion. A radio that delivers frames does not lose commands for so long.
+/// Evidence for a suspicion. A radio that delivers frames does not lose commands for so long.
 pub(crate) const SUSPECTED_AFTER: Duration = Duration::from_millis(550);
-/// The time for which a commanded wheel may count nothing, because commands may be lost.
+/// A commanded wheel may count nothing for so long, because commands may be lost.
 pub(crate) const STILL_AFTER: Duration = Duration::from_millis(1000);
-/// The number of jumps that lead to a suspicion.
 pub(crate) const MOST_JUMPS: usize = 3;
-/// The time within which jumps are counted.
 pub(crate) const JUMPS_WITHIN: Duration = Duration::from_secs(2);
-/// The time without a jump after which a suspicion about jumps ends.
+/// A suspicion about jumps ends without one for so long.
 pub(crate) const CALM: Duration = Duration::from_secs(2);
-/// The number of times that a suspicion about jumps may end by itself. The counts of a faulty robot may jump only while it moves.
+/// So often it ends by itself: a faulty robot's counts may jump only while it moves.
 const MOST_RECOVERIES: u32 = 2;
-/// The time after which the mission of a suspected robot ends.
 pub(crate) const GIVEN_UP_AFTER: Duration = Duration::from_secs(10);
 
-/// A suspicion about the odometry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Suspicion {
-    /// The left wheel, or the wheel of a car, does not turn as told.
+    /// It may be the wheel of a car.
     Left,
-    /// The right wheel does not turn as told.
     Right,
-    /// The robot does not turn as told although both wheels roll: they are swapped, or one is read wrongly.
+    /// Both wheels roll: they are swapped, or one is read wrongly.
     Turn,
-    /// The counts jump farther than wheels turn.
     Jumps,
 }
 
 impl Suspicion {
-    /// The text for logs.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Left => {
@@ -94,17 +82,15 @@ impl Suspicion {
     }
 }
 
-/// The evidence against one wheel, or against the difference of both.
+/// Evidence against one wheel, or the difference of both.
 #[derive(Clone, Copy, Debug, Default)]
 struct Evidence {
-    /// The speeds of the two newest commands, counts/s.
     asked: [f64; 2],
-    /// The time when the commanded direction last changed.
     since: MissionTime,
     against_s: f64,
-    /// The time for which the wheel has counted nothing although it was commanded to turn.
+    /// Counting nothing although commanded.
     still_s: f64,
-    /// The time for which the wheel did not turn as commanded while its motor drew a high current.
+    /// Not turning as commanded, with a high current.
     held_s: f64,
 }
 
@@ -117,8 +103,8 @@ impl Evidence {
         self.asked = [before, counts_s];
     }
 
-    /// Add the evidence that the wheel rolled `counts` in the `gap_s` seconds until `now`, while its motor drew the current of a held
-    /// wheel if `high`. Commands below `least` counts/s give none. Returns whether the wheel rolled as told.
+    /// The wheel rolled `counts` in `gap_s` until `now`, its motor drawing a held one's current if `high`. Commands below `least`
+    /// counts/s are no evidence. Returns whether it rolled as told.
     fn weigh(&mut self, counts: f64, gap_s: f64, least: f64, high: bool, now: MissionTime) -> bool {
         let [before, newest] = self.asked;
         let asked = before.abs().min(newest.abs());
@@ -128,7 +114,7 @@ impl Evidence {
         }
         let share = counts * newest.signum() / (gap_s * asked);
         if high && share < LEAST_SHARE {
-            // The motor pushes in vain. A body that turns about the thing that it touches may even push its wheel back.
+            // The motor pushes in vain. A body that turns about what it touches may even push its wheel back.
             self.still_s = 0.0;
             if told_s >= SETTLE.as_secs_f64() {
                 self.held_s += gap_s;
@@ -149,14 +135,12 @@ impl Evidence {
     }
 }
 
-/// The evidence about the odometry of one robot.
 #[derive(Clone, Debug)]
 pub struct Odometry {
     counts_per_m: f64,
     steers: bool,
-    /// Two periods of the robot.
+    /// Two periods.
     longest_gap: Duration,
-    /// The time limit of a command.
     limit: Duration,
     commanded: Option<MissionTime>,
     frame: Option<([u16; 2], MissionTime)>,
@@ -212,7 +196,7 @@ impl Odometry {
         let gap = now.since(then);
         let lapsed = |at| now.since(at) > self.limit;
         if gap > self.longest_gap || self.commanded.is_none_or(lapsed) {
-            // Commands since the frame before may have been lost, or have expired.
+            // Commands since the last frame may have been lost, or have expired.
             self.restart_evidence(now);
             return;
         }
@@ -258,7 +242,7 @@ impl Odometry {
         }
     }
 
-    /// The contact that the newest frame shows. The next call gives none.
+    /// The newest frame's contact; the next call gives none.
     pub(crate) const fn take_contact(&mut self) -> Option<ContactSample> {
         self.contacts.take()
     }
@@ -274,7 +258,6 @@ impl Odometry {
         }
     }
 
-    /// Delete all evidence.
     fn reset(&mut self) {
         self.commanded = None;
         self.frame = None;

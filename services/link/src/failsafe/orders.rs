@@ -1,4 +1,4 @@
-//! The monitor of the supervisor's directives and of an operator's stop at the link: whether the robot may drive.
+//! The monitor of the supervisor's directives and of an operator's stop at the link.
 
 use std::time::Duration;
 
@@ -9,11 +9,10 @@ use common::{
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
 
-/// The silence after which a supervisor counts as ended. This is ten times the interval of its directives, so that a loaded machine
-/// does not stop the robot, and a second before systemd's watchdog would kill the supervisor.
+/// A silent supervisor has ended. Ten times the interval of directives, so that a loaded machine does not stop the robot, and a second
+/// before systemd's watchdog would kill the supervisor.
 pub(crate) const SUPERVISOR_SILENT: Duration = Duration::from_secs(2);
 
-/// The supervisor's newest directive.
 #[derive(Clone, Copy, Debug)]
 struct Directive {
     order: Order,
@@ -21,7 +20,6 @@ struct Directive {
     heard_ns: u64,
 }
 
-/// The supervisor's directives, and an operator's stop at the link.
 #[derive(Clone, Debug)]
 pub struct Orders {
     newest: Option<Directive>,
@@ -29,18 +27,15 @@ pub struct Orders {
 }
 
 impl Orders {
-    /// Whether the robot is ordered to drive.
     pub fn drive(&self) -> bool {
         self.is(Order::Drive)
     }
 
-    /// Whether an operator stops the robot.
     pub fn by_operator(&self) -> bool {
         self.stopped_here
             || self.newest.is_some_and(|directive| directive.reason == HoldReason::Operator)
     }
 
-    /// Whether an operator stopped the robot at its link.
     pub const fn stopped_here(&self) -> bool {
         self.stopped_here
     }

@@ -1,4 +1,4 @@
-//! The presence monitor: whether the robot answers, and when to ping a robot that does not.
+//! The presence monitor: whether the robot answers, and when to ping one that does not.
 
 use std::time::Duration;
 
@@ -7,28 +7,24 @@ use common::{clock::Pace, mission::Mission, samples::Cause};
 use super::monitor::{Condition, Moment, Monitor, Observation};
 use crate::backoff::Backoff;
 
-/// The silence after which a robot is lost, in command limits. It is longer than a short fade of the radio, and the robot's last
-/// command has expired by then.
+/// Silence until a robot is lost, in command limits: longer than a short fade of the radio, and its last command has expired.
 pub(crate) const SILENT_LIMITS: u32 = 3;
-/// The least silence that counts, machine time: a process may be delayed by that much at any pace of mission time.
+/// Machine time: any process may be delayed by so much at any pace.
 const LEAST_SILENCE: Duration = Duration::from_millis(100);
-/// The pause between the first two pings of a robot that does not answer.
 const FIRST_PAUSE: Duration = Duration::from_millis(200);
-/// The longest pause between pings. A robot that waits for a ping is found only then; one that sends by itself is found at once.
+/// A robot that waits for a ping is found only then; one that sends by itself at once.
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 
-/// The absence of a robot that does not answer; times are of the machine's clock.
+/// Times are the machine's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Absence {
-    /// Nanoseconds since the robot was lost, or since the first attempt to find it; 0 while it answers.
+    /// Counted from the loss, or from the first attempt to find the robot; 0 while it answers.
     pub lost_ns: u64,
-    /// Pings since the robot was lost.
     pub pings: u64,
-    /// Nanoseconds until the next ping.
     pub next_ping_ns: u64,
 }
 
-/// The longest time for which a present robot sends nothing.
+/// A present robot sends nothing for so long at most.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Silence {
     mission: Duration,
@@ -48,13 +44,11 @@ impl Silence {
         };
     }
 
-    /// Whether the silence is over at `now_ns` of the machine's clock if the last frame came at `heard_ns`.
     pub(crate) fn is_over(&self, heard_ns: u64, now_ns: u64) -> bool {
         now_ns.saturating_sub(heard_ns) >= self.machine.as_nanos() as u64
     }
 }
 
-/// The robot's presence on the wire.
 #[derive(Clone, Debug)]
 pub struct Presence {
     silence: Silence,
@@ -67,22 +61,19 @@ pub struct Presence {
 }
 
 impl Presence {
-    /// Whether the wire is open.
     pub const fn is_wire_open(&self) -> bool {
         self.wire_open
     }
 
-    /// Whether the robot answers.
     pub const fn connected(&self) -> bool {
         self.connected
     }
 
-    /// The number of times that the robot was lost.
     pub const fn losses(&self) -> u64 {
         self.losses
     }
 
-    /// Note that a frame came. Returns whether the robot did not answer until now.
+    /// A frame came. Returns whether the robot did not answer until now.
     pub fn heard(&mut self, now_ns: u64) -> bool {
         self.heard_ns = Some(now_ns);
         self.lost_since_ns = None;
@@ -90,12 +81,11 @@ impl Presence {
         !std::mem::replace(&mut self.connected, true)
     }
 
-    /// Whether the robot has sent nothing for longer than a present robot does.
     pub fn is_silent(&self, now_ns: u64) -> bool {
         self.heard_ns.is_none_or(|heard_ns| self.silence.is_over(heard_ns, now_ns))
     }
 
-    /// Note that the robot is lost. Returns whether that is new.
+    /// Returns whether that is new.
     pub fn lose(&mut self, now_ns: u64) -> bool {
         let new = std::mem::replace(&mut self.connected, false);
         if new {
@@ -105,13 +95,12 @@ impl Presence {
         new
     }
 
-    /// Note whether the wire is open. After a change the robot is pinged at once.
+    /// A change makes the robot pinged at once.
     pub const fn wire(&mut self, open: bool) {
         self.wire_open = open;
         self.pings.reset();
     }
 
-    /// Whether a ping to a robot that does not answer is due.
     pub fn wants_ping(&mut self, now_ns: u64) -> bool {
         if self.connected {
             return false;
@@ -120,14 +109,12 @@ impl Presence {
         self.wire_open && self.pings.is_due(now_ns)
     }
 
-    /// Note that the robot was pinged.
     pub fn pinged(&mut self, now_ns: u64) {
         if !self.connected {
             self.pings.attempted(now_ns);
         }
     }
 
-    /// The robot's absence.
     pub fn absence(&self, now_ns: u64) -> Absence {
         if self.connected {
             return Absence::default();

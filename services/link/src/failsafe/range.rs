@@ -1,13 +1,10 @@
-//! The range monitor: whether the readings of the ranging sensors change as the motion says they must, and whether the front sonar hears
-//! what the infrared rangers see ([`super::undetected_surface`]).
+//! The range monitor: whether readings change with motion as they must, and the front sonar hears what the infrared rangers see
+//! ([`super::undetected_surface`]).
 //!
-//! An echo of something that stands comes nearer as the robot drives, and another thing answers when the robot turns. A reading that
-//! stays the same to the centimetre meanwhile is stuck: at one value, or at the last one. In 240 recorded missions, 150 of them with
-//! measured realism, [`READINGS`] and more equal readings never came with more than 0.53 of the motion that is needed here.
-//!
-//! A sensor that looks aside gives the same reading for long as the robot drives along a wall. So only turns on the spot count for it.
-//!
-//! A reading of nothing stays for long in the open, and before smooth walls that stand askew, so it is not judged by motion.
+//! A standing thing's echo comes nearer as the robot drives, and another thing answers when it turns: a reading that stays the same to
+//! the centimetre is stuck. In 240 recorded missions, 150 with measured realism, [`READINGS`] and more equal readings never came with
+//! more than 0.53 of the motion needed here. A sensor that looks aside reads the same along a wall, so only turns on the spot count for
+//! it. Motion does not judge a reading of nothing, which stays long in the open, and before smooth slanted walls.
 
 use std::{ops::RangeInclusive, time::Duration};
 
@@ -22,22 +19,21 @@ use super::{
     undetected_surface::UndetectedSurface,
 };
 
-/// Readings are equal if they differ from the first by no more than this, metres: a centimetre, and the rounding of the numbers.
+/// Readings are equal within this, metres: a centimetre, and rounding.
 const EQUAL_M: f64 = 0.0101;
-/// The least number of equal readings, 1.1 s at 7 Hz: fewer may be alike by chance.
+/// Equal readings, 1.1 s at 7 Hz: fewer may be chance.
 const READINGS: u32 = 8;
-/// The way after which the reading must have changed, metres, or the turn, radians. Fractions of both add up.
+/// Way, metres, or turn, radians, that must change a reading. Fractions of both add up.
 const WAY_M: f64 = 0.4;
 const TURN_RAD: f64 = std::f64::consts::FRAC_PI_2;
-/// The ranges that are judged, metres. Those at the ends of a sensor's scale are limits, not distances.
+/// Metres. The ends of a sensor's scale are limits, not distances.
 const JUDGED_SONAR_M: RangeInclusive<f64> = 0.05..=2.49;
 const JUDGED_INFRARED_M: RangeInclusive<f64> = 0.10..=0.70;
-/// A robot turns on the spot if its wheels' mean way is less than this share of half their difference.
+/// The wheels' mean way is less than this share of half their difference.
 const ON_THE_SPOT: f64 = 0.25;
-/// The time with changing readings after which the cause clears.
+/// The cause clears after readings changed for so long.
 pub(crate) const CHANGES: Duration = Duration::from_secs(2);
 
-/// Equal readings in a row.
 #[derive(Clone, Copy, Debug, Default)]
 struct Equal {
     first_m: f64,
@@ -52,7 +48,6 @@ impl Equal {
     }
 }
 
-/// The readings of one sensor.
 #[derive(Clone, Debug)]
 struct Row {
     row: u8,
@@ -113,12 +108,11 @@ impl Row {
     }
 }
 
-/// The ranging sensors that a mission uses.
 #[derive(Clone, Debug)]
 pub struct Range {
     sensing: bool,
     metres_per_count: f64,
-    /// The track; none for a car, whose second encoder is that of the steering.
+    /// None for a car, whose second encoder is the steering's.
     track_m: Option<f64>,
     counts: Option<[u16; 2]>,
     rows: Vec<Row>,

@@ -1,11 +1,10 @@
-//! The classification of a frame's counts: whether they can follow the counts before.
+//! Whether a frame's counts can follow those before.
 //!
-//! A robot that was switched off and on, or got another battery, restarts its counts, and the step in the counts is no motion. Other
-//! counts that lie farther off than wheels turn are implausible. The next counts are then compared with the last plausible ones, so
-//! a single outdated frame has no effect.
+//! A robot that was switched off and on, or got another battery, restarts its counts, and the step is no motion. Other counts farther
+//! off than wheels turn are implausible; the next are compared with the last plausible ones, so one outdated frame has no effect.
 //!
-//! While the robot is driven, a wheel turns no farther than it was commanded to, than it turned before, or than the robot reports
-//! as its speed. Without this rule, counts that restart within half a metre of the start would pass for a motion.
+//! A driven wheel turns no farther than it was commanded, than it turned before, or than the robot reports as its speed. Otherwise
+//! counts that restart within half a metre of the start would pass for a motion.
 
 use common::{
     clock::MissionTime,
@@ -15,40 +14,36 @@ use common::{
 
 use super::monitor::Counts;
 
-/// The multiple of the distance that wheels roll at their top speed from which on counts are implausible.
+/// Counts are implausible from this multiple of the way at top speed on.
 const IMPLAUSIBLE: f64 = 1.5;
-/// The difference beyond the known speeds of a wheel that is plausible, metres: in a tick a wheel hardly accelerates more.
+/// Plausible beyond a wheel's known speeds, metres: a tick hardly accelerates it more.
 const SLACK_M: f64 = 0.06;
-/// The number of periods after a command for which the known speeds bound the motion.
+/// Periods after a command in which known speeds bound the motion.
 const PERIODS: f64 = 6.0;
-/// The number of frames, in which each can follow the one before, after which implausible counts are accepted.
+/// Frames that can follow each other until implausible counts are accepted.
 const FOLLOW_EACH_OTHER: u32 = 3;
 
-/// The last plausible counts, and the implausible ones since.
 #[derive(Clone, Debug)]
 pub struct RestartWatch {
     last: Option<([u16; 2], MissionTime)>,
-    /// The speeds of the wheels at the last plausible counts: those that the robot reported, and those by the counts, counts/s.
+    /// The wheels' speeds at the last plausible counts: as reported, and by counts; counts/s.
     turned: [[f64; 2]; 2],
-    /// The speeds of the two newest commands, counts/s, and the time of the newest command that was to move a wheel.
+    /// The two newest commands, counts/s, and the time of the newest that was to move a wheel.
     commanded: [[f64; 2]; 2],
     driven: Option<MissionTime>,
-    /// The newest implausible counts, their time, and the number of frames in which each can follow the one before.
+    /// The newest implausible counts, their time, and the frames that can follow each other.
     suspected: Option<([u16; 2], MissionTime, u32)>,
     away: bool,
-    /// Whether the driver left a jump of the robot's odometry out of the counts.
+    /// The counts leave a jump of the robot's odometry out.
     jumped: bool,
     restarts: u32,
-    /// The counts of a wheel in a second at its top speed.
+    /// A wheel's counts in a second at top speed.
     top_counts: f64,
-    /// The jitter of the frames, seconds.
     jitter_s: f64,
-    /// [`SLACK_M`] in counts.
     slack: f64,
 }
 
 impl RestartWatch {
-    /// A watch of the robot of `mission`.
     pub fn new(mission: &Mission) -> Self {
         let body = mission.body();
         Self {
@@ -66,7 +61,7 @@ impl RestartWatch {
         }
     }
 
-    /// Note that the wheels were commanded to turn at these speeds, counts/s.
+    /// `counts` are counts/s.
     pub fn commanded(&mut self, counts: [i16; 2], now: MissionTime) {
         self.commanded = [self.commanded[1], counts.map(f64::from)];
         if counts != [0, 0] {
@@ -74,18 +69,17 @@ impl RestartWatch {
         }
     }
 
-    /// Note that the robot does not answer.
     pub const fn lost(&mut self) {
         self.away = true;
     }
 
-    /// Note that the robot's odometry jumped, which the next counts leave out.
+    /// The robot's odometry jumped, which the next counts leave out.
     pub const fn jumped(&mut self) {
         self.jumped = true;
     }
 
-    /// Classify the counts of the wheels, with which the robot reports `speeds`, counts/s. `was_away` says whether the robot did not answer
-    /// until this frame: then counts near the start value mean a restart, otherwise only if they are also farther off than wheels turn.
+    /// Classify counts, with the reported `speeds`, counts/s. After a robot that `was_away` (did not answer until this frame), counts
+    /// near the start value mean a restart; otherwise only if they are also farther off than wheels turn.
     pub fn step(
         &mut self,
         counts: [u16; 2],
@@ -134,7 +128,7 @@ impl RestartWatch {
         self.restarts += 1;
     }
 
-    /// The ratio of the difference of the counts to the most that wheels can turn in that time.
+    /// The step over the most that wheels can turn in that time.
     fn share_of_reach(
         &self,
         before: [u16; 2],
@@ -148,8 +142,7 @@ impl RestartWatch {
         f64::from(farthest.unwrap_or_default()) / reach
     }
 
-    /// The ratio of the difference of the counts to [`IMPLAUSIBLE`] of the most that wheels turn by their known speeds; 0 if the robot is
-    /// not driven.
+    /// The step over [`IMPLAUSIBLE`] of the most that wheels turn by their known speeds; 0 for a robot that is not driven.
     fn share_of_driven(
         &self,
         before: [u16; 2],
@@ -174,7 +167,6 @@ impl RestartWatch {
         share(0).max(share(1))
     }
 
-    /// The number of times that the counts restarted or continued elsewhere.
     pub const fn restarts(&self) -> u32 {
         self.restarts
     }

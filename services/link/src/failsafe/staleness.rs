@@ -1,4 +1,4 @@
-//! The staleness monitor: whether the newest command is too old, or the pose or the guidance from which it was computed.
+//! The staleness monitor: the age of the newest command, and of the pose and guidance behind it.
 
 use std::time::Duration;
 
@@ -10,17 +10,15 @@ use common::{
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
 
-/// Mission times of the newest command.
 #[derive(Clone, Copy, Debug)]
 struct Times {
-    /// The time of the tick that the command answers.
+    /// The answered tick's.
     command: MissionTime,
-    /// The time of the oldest pose from which the command was computed.
+    /// The oldest pose's.
     pose: MissionTime,
     guidance: MissionTime,
 }
 
-/// The age of the newest command.
 #[derive(Clone, Debug)]
 pub struct Staleness {
     limit: Duration,
@@ -62,7 +60,7 @@ impl Monitor for Staleness {
             Cause::GuidanceStale => newest.guidance,
             _ => newest.command,
         };
-        // A stamp from the future counts as too old, because it would not expire.
+        // A stamp from the future would not expire, so it counts as too old.
         (then > now || now.since(then) > self.limit).into()
     }
 

@@ -1,4 +1,4 @@
-//! The stop monitor: whether the robot comes to rest when it is stopped, by its encoders, and the next method if it does not.
+//! The stop monitor: whether a stopped robot comes to rest, by its encoders, and the next method if not.
 
 use std::time::Duration;
 
@@ -6,25 +6,23 @@ use common::{clock::MissionTime, mission::Mission, samples::Cause, wire::counts_
 
 use super::monitor::{Condition, Counts, Moment, Monitor, Observation};
 
-/// The time after which a stopped robot is at rest, with the delay and the lag of its speed loop and the loss of a stop or two.
+/// Delay and lag of the speed loop, and a lost stop or two, are included.
 const COMES_TO_REST: Duration = Duration::from_millis(600);
-/// The time after [`COMES_TO_REST`] at which a robot that still moves does not stop. A repeated stop has an effect sooner.
+/// It counts from [`COMES_TO_REST`]. A repeated stop has an effect sooner.
 pub(crate) const DOES_NOT_STOP_AFTER: Duration = Duration::from_millis(500);
-/// A wheel counts as moving from this speed on, m/s at the rim.
+/// Speed of the rim.
 const MOVES_M_S: f64 = 0.03;
-/// A wheel is at rest below this speed, m/s, or below [`RESTS_COUNTS`] between two frames, because the counts of a resting encoder
-/// vary.
+/// Rest is below this, m/s, or below [`RESTS_COUNTS`] between two frames: a resting encoder's counts vary.
 const RESTS_M_S: f64 = 0.01;
 const RESTS_COUNTS: f64 = 4.0;
-/// The time after which a command shows in the counts, because of the delay of the speed loop and of the radio. Wheels that rest
-/// before that may still start by the last command before the stop.
+/// A command shows in counts after this, by delays of speed loop and radio. Wheels that rest sooner may still start by the last command
+/// before the stop.
 const SHOWS_AFTER: Duration = Duration::from_millis(150);
-/// The time for which wheels must be at rest until the robot is.
+/// Wheels rest so long until the robot does.
 const AT_REST_AFTER: Duration = Duration::from_millis(200);
-/// The time after which the next method is used on a robot that does not stop.
+/// A robot that does not stop gets the next method after this.
 const NEXT_METHOD_AFTER: Duration = Duration::from_millis(300);
 
-/// The stop monitor of one robot.
 #[derive(Clone, Debug)]
 pub struct StopMonitor {
     counts_per_m: f64,
@@ -82,17 +80,16 @@ impl StopMonitor {
         self.resting = Duration::ZERO;
     }
 
-    /// Whether the encoders say that no wheel turns.
     pub fn is_at_rest(&self) -> bool {
         self.resting >= AT_REST_AFTER
     }
 
-    /// The number of the method by which the robot is stopped now; it grows on after the last method, when the first follows.
+    /// It grows on after the last method, when the first follows.
     pub const fn method(&self) -> usize {
         self.method
     }
 
-    /// Change to the next method if it is due, and return whether it was; `does_not_stop` says whether the cause applies.
+    /// The next method may be due; returns whether it was. `does_not_stop` is whether the cause applies.
     pub fn takes_next_method(&mut self, does_not_stop: bool, now: MissionTime) -> bool {
         if !does_not_stop {
             self.tried = None;

@@ -1,8 +1,8 @@
-//! The monitor of the robot's streams: whether their frames come, and often enough. Silence is measured by the machine's clock, like
-//! that of [`super::presence`], and intervals by mission time.
+//! The monitor of streams: whether frames come, and often enough. Silence is by the machine's clock, as in [`super::presence`],
+//! intervals by mission time.
 //!
-//! The robot goes on at half speed without one infrared ranger that looks where it does not drive, or into the cone of a sonar: what
-//! stands in the cone is still heard, and ground that nobody has scanned is looked at before the robot drives over it.
+//! Without one infrared ranger that looks aside, or into a sonar's cone, the robot goes on at half speed: the sonar still hears what
+//! stands in the cone, and unscanned ground is looked at before the robot drives over it.
 
 use std::{collections::VecDeque, time::Duration};
 
@@ -18,48 +18,40 @@ use super::{
 };
 use crate::backoff::Backoff;
 
-/// The number of intervals of which all but the two shortest must be too long for a slow robot. With a radio that is out half of the
-/// time, more than two intervals are short enough.
+/// All of so many intervals but the two shortest must be too long for a slow robot. A radio that is out half of the time gives more
+/// short ones.
 const INTERVALS: usize = 9;
 const SHORT_ONES: usize = 2;
-/// The pause between the first two requests for streams that do not come.
+/// The first pause between requests for missing streams.
 const FIRST_PAUSE: Duration = Duration::from_secs(1);
-/// The longest pause between requests.
 const LONGEST_PAUSE: Duration = Duration::from_secs(8);
 
-/// The rate of the motor frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Motor {
-    /// Motor frames come often enough.
     #[default]
     Regular,
-    /// No motor frame comes although the robot answers.
     Silent,
-    /// So few motor frames come, this many a second, that a command expires before the next.
+    /// So few a second that a command expires before the next.
     Slow(f64),
 }
 
-/// The angle from the front sonar's bearing within which a sensor looks where the robot drives, degrees.
+/// A sensor within this of the front sonar's bearing looks where the robot drives, degrees.
 const AHEAD_DEG: f64 = 60.0;
 
-/// The newest valid reading of a sensor.
 #[derive(Clone, Debug)]
 struct Newest {
     row: u8,
     name: String,
-    /// Whether the robot may go on without the sensor.
     is_covered: bool,
-    /// The time of the reading by the machine's clock.
+    /// Time of the machine's clock.
     ns: u64,
 }
 
-/// The streams of one robot.
 #[derive(Clone, Debug)]
 pub struct Streams {
     limit: Duration,
     silence: Silence,
     sensing: bool,
-    /// The sensors that the mission uses.
     sensors: Vec<Newest>,
     found_ns: u64,
     motor_ns: u64,
@@ -79,7 +71,6 @@ impl Streams {
         }
     }
 
-    /// The rate of the motor frames of a robot that answers.
     pub fn motor_frames(&self, now_ns: u64) -> Motor {
         let since = self.motor_ns.max(self.found_ns);
         if self.silence.is_over(since, now_ns) {
@@ -95,14 +86,13 @@ impl Streams {
         }
     }
 
-    /// The sensors without a valid reading.
     fn silent_sensors(&self, now_ns: u64) -> Vec<&Newest> {
-        // A robot that was just found must send a new reading first. Older readings do not show the obstacles that are ahead now.
+        // A robot that was just found must send a new reading: older ones do not show what is ahead now.
         let is_silent = |sensor: &&Newest| self.sensing && self.silence.is_over(sensor.ns, now_ns);
         self.sensors.iter().filter(is_silent).collect()
     }
 
-    /// Why the robot may not drive as usual: sensors without which it stands, or one without which it goes on slowly.
+    /// Sensors without which the robot stands, or one without which it goes slowly.
     fn silent(&self, now_ns: u64) -> Option<Cause> {
         match self.silent_sensors(now_ns)[..] {
             [] => None,
@@ -111,11 +101,11 @@ impl Streams {
         }
     }
 
-    /// Whether the next request for the streams is due. The pauses between requests grow.
+    /// Pauses between requests grow.
     pub fn wants_request(&mut self, now_ns: u64) -> bool {
         let ranges_come = self.silent(now_ns) != Some(Cause::RangeSilent);
         if self.motor_frames(now_ns) == Motor::Regular && ranges_come {
-            // A robot that sends frames only when it is asked is not asked more often.
+            // A robot that sends only when asked is not asked more often.
             return false;
         }
         let due = self.requests.is_due(now_ns);
@@ -126,8 +116,8 @@ impl Streams {
     }
 }
 
-/// Whether a robot that lacks `sensor` alone may go on: an infrared ranger that looks aside or back, or into the cone of a sonar of
-/// `table` that the mission uses. The front sonar looks at `front_deg`.
+/// Whether a robot that lacks only `sensor` may go on: an infrared ranger that looks aside or back, or into the cone of a used sonar of
+/// `table`. The front sonar looks at `front_deg`.
 fn is_covered(sensor: &Sensor, table: &[Sensor], front_deg: f64) -> bool {
     let from = |bearing_deg: f64| {
         ((sensor.bearing_deg() - bearing_deg + 180.0).rem_euclid(360.0) - 180.0).abs()

@@ -1,8 +1,8 @@
 //! Whether the front sonar hears what the infrared rangers beside it see.
 //!
-//! A sonar that is stuck at "nothing in range" reads like one before open ground. Where the infrared rangers on both sides of it see
-//! a near surface, and the line through their two hits is square to the sonar's axis, the sonar must hear it: even a smooth wall
-//! answers within 20 degrees of its normal.
+//! A sonar stuck at "nothing in range" reads like one before open ground. Where the rangers on both sides of it see a near surface, and
+//! the line through their hits is square to its axis, the sonar must hear it: even a smooth wall answers within 20 degrees of its
+//! normal.
 
 use common::{
     kinematics::Pose2,
@@ -12,16 +12,15 @@ use common::{
 };
 use glam::DVec2;
 
-/// The range below which both rangers must see a surface, metres.
+/// Both rangers must see a surface nearer than this, metres.
 const NEARER_M: f64 = 0.45;
-/// The greatest angle between the surface's normal and the sonar's axis, degrees.
+/// The greatest angle between the surface's normal and the sonar's axis.
 const SQUARE_DEG: f64 = 12.0;
-/// The angle from the sonar's axis within which rangers look into its cone, degrees.
+/// Rangers within this of the axis look into the sonar's cone, degrees.
 const BESIDE_DEG: f64 = 15.0;
-/// The number of readings without an echo that may be chance: runs of four come with a healthy sonar.
+/// Readings without an echo that may be chance: runs of four come with a healthy sonar.
 pub(super) const SILENCES: u32 = 4;
 
-/// The front sonar, and the two rangers beside it.
 #[derive(Clone, Debug)]
 pub(super) struct UndetectedSurface {
     front: u8,
@@ -39,7 +38,7 @@ struct Ranger {
 }
 
 impl UndetectedSurface {
-    /// The observation of a robot; none if it does not use a ranger on either side of the front sonar.
+    /// None without a ranger on either side of the front sonar.
     pub(super) fn of(mission: &Mission) -> Option<Self> {
         let (table, front) = (mission.sensor_table(), mission.front_row());
         let ahead = table.get(front)?.mount.bearing_rad;
@@ -64,7 +63,6 @@ impl UndetectedSurface {
         (!is_one).then_some(Self { front: front as u8, axis, beside, silences: 0 })
     }
 
-    /// Take the readings of the robot's newest frames.
     pub(super) fn take(&mut self, readings: &[RangeReading]) {
         for ranger in &mut self.beside {
             if let Some(reading) = readings.iter().find(|reading| reading.sensor == ranger.row) {
@@ -91,7 +89,7 @@ impl UndetectedSurface {
         self.silences > SILENCES
     }
 
-    /// The mean range of a surface that both rangers see near and square ahead, metres.
+    /// The mean range of a surface that both see near and square ahead.
     fn surface_m(&self) -> Option<f64> {
         let near = |ranger: &Ranger| ranger.range_m.filter(|range| *range < NEARER_M);
         let seen = |ranger: &Ranger| Some(ranger.mount.hit(Pose2::default(), near(ranger)?));
@@ -102,7 +100,6 @@ impl UndetectedSurface {
         (slant <= SQUARE_DEG.to_radians()).then_some(mean)
     }
 
-    /// The observation in words.
     pub(super) fn explain(&self, front: &str) -> String {
         let [left, right] = &self.beside;
         format!(

@@ -1,4 +1,4 @@
-//! The events that the link takes, and the effects that it asks for.
+//! The link's events and effects.
 
 use common::{
     clock::{MissionTime, Pace},
@@ -13,14 +13,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::failsafe::{Decision, battery::BatteryChange};
 
-/// The state from which a generation starts: the pace of mission time and the number of its first tick. The supervisor gives the number,
-/// because it follows the ticks. The link's checkpoint has only its driver's state of the robot's odometry.
+/// A generation starts from it: the pace of mission time, and its first tick's number, which the supervisor gives because it follows the
+/// ticks. The link's checkpoint has only its driver's state of the robot's odometry.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State {
-    /// The pace of mission time. [`Pace::Max`] is lockstep, in which the robot waits for each command. At any other pace mission time is
-    /// wall-clock time multiplied by a rate.
+    /// [`Pace::Max`] is lockstep: the robot waits for each command. At other paces mission time is wall-clock time multiplied by a rate.
     pub pace: Pace,
-    /// The number of the next tick.
     pub next_tick: u64,
 }
 
@@ -57,76 +55,54 @@ pub enum Event<'a> {
     Quiet,
 }
 
-/// An effect that the link asks for.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
-    /// Send these bytes to the robot.
     Send(Vec<u8>),
-    /// Publish the tick: `ranges` first, since `wheels` wakes the pipeline.
+    /// `ranges` come first, since `wheels` wakes the pipeline.
     Tick {
-        /// The number of the tick.
         tick: u64,
-        /// Mission time of the tick.
         time: MissionTime,
-        /// The newest reading of each sensor.
         ranges: Vec<RangeReading>,
-        /// The beams of the laser; none if none came.
+        /// None if none came.
         scan: Vec<f32>,
-        /// The turn of the robot since the tick before, by its own gyro.
+        /// The turn since the tick before, by the robot's own gyro.
         turn: Option<TurnSample>,
-        /// The encoders.
         wheels: WheelSample,
-        /// The contact that these encoders show.
         contact: Option<ContactSample>,
     },
-    /// The command of a tick was sent.
     Answered {
-        /// Reading of the monotonic clock at which the tick began, nanoseconds.
+        /// The tick's beginning on the monotonic clock, nanoseconds.
         began_ns: u64,
     },
-    /// A tick begins beyond the supervisor's limit, because the limit did not rise in time.
+    /// A tick begins beyond the supervisor's limit, which did not rise in time.
     Unlimited {
-        /// The number of the tick.
         tick: u64,
     },
-    /// The failsafe's decision changed. The stops that follow are separate effects.
+    /// The stops that follow are separate effects.
     Decided {
-        /// The decision before.
         before: Decision,
-        /// The decision now.
         now: Decision,
     },
-    /// The robot answers now, or no longer.
     Connected(bool),
-    /// The robot restarted its encoder counts.
     Restarted,
-    /// The counts jumped farther than wheels turn, and continue from there.
+    /// Counts jumped farther than wheels turn, and continue from there.
     CountsElsewhere,
-    /// The robot does not stop, so the next method was used, which has this name.
+    /// The robot did not stop, so this next method was used.
     StopBy(&'static str),
-    /// A message of the robot is none of the protocol, for this reason.
+    /// A message is none of the protocol, for this reason.
     Refused(String),
-    /// The ratio of the speed of the robot's clock to that of mission time.
+    /// The speed of the robot's clock over mission time's.
     ClockRate(f64),
-    /// The robot was asked for its streams again.
     AskedForStreams,
-    /// Publish the infrared rangers.
     Infrared(InfraredSample),
-    /// Publish batteries and motor currents.
     Power(PowerSample),
-    /// Publish the other sensors.
     Surroundings(SurroundingsSample),
-    /// The charge of a battery changed.
     Battery(BatteryChange),
 }
 
-/// The counts of the `link` topic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// The velocity commands that were sent.
     pub commands: u64,
-    /// The velocity commands that were sent again.
     pub repeated_commands: u64,
-    /// The ticks that were repeated.
     pub repeated_ticks: u64,
 }

@@ -7,13 +7,12 @@ use common::clock::MissionTime;
 use super::{Effect, Link};
 
 impl Link {
-    /// The mission time until the robot is polled next; none if that does not depend on time.
+    /// Mission time; none if polls do not depend on time.
     pub(crate) fn until_poll(&self, now: MissionTime) -> Option<Duration> {
         let by_time = self.driver.is_polled() && !self.in_ticks();
         by_time.then(|| self.polls.until_next(now))
     }
 
-    /// Poll a robot when that is due.
     pub(super) fn keep_polling(&mut self, effects: &mut Vec<Effect>) {
         let by_time = self.driver.is_polled() && !self.in_ticks();
         if by_time && self.monitors().presence.is_wire_open() && self.polls.take_due(self.now) {
@@ -21,7 +20,7 @@ impl Link {
         }
     }
 
-    /// In lockstep the robot waits for commands and pings, so it is polled after each, and begins one tick however many came.
+    /// The robot waits for commands and pings in lockstep: it is polled after each, and begins one tick however many came.
     pub(super) fn poll_in_ticks(&mut self, effects: &mut Vec<Effect>) {
         if self.driver.is_polled() && self.in_ticks() {
             self.due = self.due.min(1);

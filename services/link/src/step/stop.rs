@@ -1,4 +1,4 @@
-//! The part of the step that stops the robot when it must not move.
+//! The part of the step that stops the robot.
 
 use std::time::Duration;
 
@@ -12,8 +12,8 @@ impl Link {
         self.failsafe.decide(self.in_ticks(), self.moment(now_ns))
     }
 
-    /// Stop the robot when it must not move. In lockstep the link only passes no command, which stops mission time too, so a run that was
-    /// held continues as if it had not been.
+    /// Stop the robot when it must not move. In lockstep the link only passes no command, which stops mission time, so a run continues
+    /// as if it had not been held.
     pub(super) fn guard(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         self.observe(Observation::Time, now_ns);
         let now = self.decide(now_ns);
@@ -32,7 +32,7 @@ impl Link {
         }
     }
 
-    /// Send the wheels these speeds, counts/s.
+    /// `counts` are counts/s.
     pub(super) fn tell(
         &mut self,
         counts: [i16; 2],
@@ -41,26 +41,26 @@ impl Link {
         effects: &mut Vec<Effect>,
     ) {
         if self.other_stop().is_some() && counts != [0, 0] {
-            // Another method than velocity stopped the robot, so its settings must be sent again.
+            // Another method than velocity stopped the robot, which needs its settings again.
             effects.push(Effect::Send(self.driver.greeting()));
         }
         self.commanded(counts, now_ns);
         effects.push(Effect::Send(self.driver.velocity(counts, limit)));
     }
 
-    /// Send the stop several times when it is new, and then at intervals.
+    /// Several times when it is new, then at intervals.
     pub(super) fn send_stop(&mut self, new: bool, now_ns: u64, effects: &mut Vec<Effect>) {
         if new {
             effects.extend(self.final_stops().into_iter().map(Effect::Send));
         } else if self.monitors().latency.is_testing() && self.stop_sent_ns.is_some() {
-            // The latency monitor waits for late acknowledgements, so nothing may be sent.
+            // The latency monitor waits for late acknowledgements.
             return;
         } else if self.takes_next_stop_method() {
             effects.push(Effect::Send(self.stop()));
             effects
                 .push(Effect::StopBy(self.other_stop().map_or("velocity 0", |other| other.name)));
         } else if self.failsafe.applied(Cause::RobotDoesNotStop) {
-            // The method that was used last needs time to have an effect.
+            // The last method needs time to have an effect.
             return;
         } else if self.connected() && passed(self.stop_sent_ns, now_ns, STOP_AGAIN) {
             effects.push(Effect::Send(self.stop()));
@@ -77,7 +77,7 @@ impl Link {
         self.restart.commanded(counts, self.now);
     }
 
-    /// The method by which the robot is stopped now; none for velocity 0, which is the first and follows the last.
+    /// None for velocity 0, which is the first method and follows the last.
     pub(super) fn other_stop(&self) -> Option<StopMethod> {
         let mut others = self.driver.other_stops();
         let method = self.monitors().stop.method() % (others.len() + 1);
@@ -92,7 +92,7 @@ impl Link {
         self.driver.velocity([0, 0], self.limit)
     }
 
-    /// Change to the next method, if it is due. Returns whether it was.
+    /// Returns whether it was due.
     fn takes_next_stop_method(&mut self) -> bool {
         let does_not_stop = self.failsafe.applied(Cause::RobotDoesNotStop);
         self.failsafe.monitors.stop.takes_next_method(does_not_stop, self.now)

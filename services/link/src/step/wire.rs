@@ -1,4 +1,4 @@
-//! The part of the step that takes what the robot says and follows its presence.
+//! The part of the step that hears the robot and follows its presence.
 
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ use common::{
 use super::{Effect, Link, PING_EVERY, passed};
 use crate::failsafe::monitor::{Counts, Monitor as _, Observation};
 
-/// The pause after which a refused message is logged again, and the letters of the reason that are logged.
+/// Pause between logs of refused messages, and the letters of a reason that are logged.
 const REFUSED_AGAIN: Duration = Duration::from_secs(1);
 const LONGEST_REFUSAL: usize = 200;
 
@@ -19,7 +19,7 @@ impl Link {
     pub(super) fn take_wire(&mut self, open: bool, now_ns: u64, effects: &mut Vec<Effect>) {
         self.failsafe.monitors.presence.wire(open);
         self.driver.reset();
-        // Stops that were sent while the wire was closed are lost.
+        // Stops sent to a closed wire are lost.
         self.stop_sent_ns = None;
         if !open {
             self.lose(now_ns, effects);
@@ -40,7 +40,7 @@ impl Link {
         effects.extend(rate.map(Effect::ClockRate));
         if let Some(commander) = heard.commander {
             self.observe(Observation::Commander(commander), now_ns);
-            // The robot obeys the newest command. At the first command of another commander the failsafe stops the robot, below.
+            // The robot obeys the newest command: at another commander's first one the failsafe stops it, below.
             if commander.moves && self.decision.stops() && !self.in_ticks() {
                 effects.push(Effect::Send(self.stop()));
             }
@@ -75,8 +75,8 @@ impl Link {
             // The robot may still drive by a command of an earlier link.
             self.stop_sent_ns = None;
             if self.in_ticks() {
-                // These frames answer the greeting, and their number depends on the time that the robot took to start. Ticks begin with the
-                // frames that answer the order.
+                // These frames answer the greeting, and their number depends on the robot's start. Ticks begin with those that answer
+                // the order.
                 if motion.is_some() {
                     self.due = self.due.saturating_sub(1);
                 }
@@ -87,7 +87,7 @@ impl Link {
             }
         }
         if counts == Some(Counts::Implausible) {
-            // These counts start no tick. The robot stands until its motion is known again, so that little of it is lost.
+            // These counts start no tick: the robot stands until its motion is known again, so that little of it is lost.
             self.repeat = None;
             self.tell([0, 0], self.limit, now_ns, effects);
         } else if let Some(Motion { wheels, .. }) = motion {
@@ -95,8 +95,7 @@ impl Link {
         }
     }
 
-    /// Classify the counts of a frame. In lockstep all counts are plausible, because the robot is a simulated one that does not restart.
-    /// Only its contacts are noticed then.
+    /// All counts are plausible in lockstep, because a simulated robot does not restart; only contacts are noticed.
     fn judge_counts(&mut self, motion: &Motion, now_ns: u64) -> Counts {
         let wheels = motion.wheels;
         let counts = [wheels.left_counts, wheels.right_counts];
@@ -117,7 +116,6 @@ impl Link {
         are
     }
 
-    /// Take the sensors that do not begin a tick.
     fn take_sensors(&mut self, heard: &Heard, now_ns: u64, effects: &mut Vec<Effect>) {
         if let Some(power) = heard.power {
             let volts = [power.board_v, power.motor_v, power.servo_v];
@@ -146,7 +144,7 @@ impl Link {
 
     pub(super) fn keep_connected(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         let silent = self.monitors().presence.is_silent(now_ns);
-        // A robot that waits for a command is not lost. If its next motor frame is missing, a datagram was lost.
+        // A robot that waits for a command is not lost: if its next motor frame is missing, a datagram was lost.
         let owes = self.ordered_to_drive() && self.open.is_none();
         if silent && !self.in_ticks() {
             self.lose(now_ns, effects);
@@ -164,7 +162,7 @@ impl Link {
         if self.failsafe.monitors.presence.wants_ping(now_ns) {
             self.ping(now_ns, effects);
         } else if owing && passed(self.pinged_ns, now_ns, PING_EVERY) {
-            // The frames that the robot still had to send are lost.
+            // The frames still due are lost.
             self.due = 0;
             self.ping(now_ns, effects);
         }

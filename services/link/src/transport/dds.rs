@@ -1,9 +1,9 @@
-//! Topics of ROS 2: the robot's topics are read, and its commands are written.
+//! Topics of ROS 2: the robot's are read, and its commands written.
 //!
-//! A piece that is received is one message: the row of its topic in [`Topics`] and its payload. The topic of commands is read too,
-//! without the messages of the link itself; before the payload of another's command stands the number of its writer. A link that was
-//! killed writes nothing, so it is no other writer, however long the network remembers it. Readers are best-effort and volatile, so
-//! they match every publisher. Between calls at most [`DEPTH`] messages of a topic are kept, and older ones are dropped.
+//! A received piece is one message: the row of its topic in [`Topics`] and its payload. Others' commands are read too, with the number
+//! of their writer before the payload. A killed link writes nothing, so it is no other writer, however long the network remembers it.
+//! Readers are best-effort and volatile, so they match every publisher. At most [`DEPTH`] messages of a topic wait; older ones are
+//! dropped.
 
 use std::{
     io,
@@ -15,26 +15,22 @@ use ros2_driver::topics::{Content, Topics};
 
 use super::counts::Tally;
 
-/// The most messages of a topic that wait.
 const DEPTH: u16 = 16;
 
-/// The silence after which a participant joins the domain anew, because it may be cut off.
+/// A participant may be cut off after such a silence, and joins anew.
 const DEAF_NS: u64 = 2_000_000_000;
-/// The silence for a participant that has not heard anything yet: over a slow network, others discover it late.
+/// A participant that has heard nothing yet waits longer: over a slow network, others discover it late.
 const UNDISCOVERED_NS: u64 = 10_000_000_000;
 
-/// A participant for one robot.
 #[derive(Debug)]
 pub(super) struct Dds {
-    /// The readers, in the order of the topics' rows.
     readers: Vec<Reader>,
     writer: Writer,
     topics: Topics,
-    /// The row of the topic of commands.
     commands: Option<usize>,
-    /// The row of the reader that is asked next, so that a flood on one topic does not hold back the others.
+    /// The reader that is asked next, so that a flood on one topic does not hold back others.
     next: usize,
-    /// The time of the newest message since the domain was joined.
+    /// The newest message since the domain was joined.
     heard_ns: Option<u64>,
     joined_ns: Option<u64>,
     tally: Tally,
@@ -42,7 +38,7 @@ pub(super) struct Dds {
 }
 
 impl Dds {
-    /// A participant of `domain` for the robot with these topics.
+    /// Fails when the library gives no participant.
     pub(super) fn open(domain: u16, topics: Topics) -> io::Result<Self> {
         let participant = Participant::join(domain, None)?;
         let (readers, writer) = endpoints(&participant, &topics)?;
@@ -59,7 +55,6 @@ impl Dds {
         })
     }
 
-    /// Join the domain anew after a silence.
     pub(super) fn maintain(&mut self, now_ns: u64) -> io::Result<()> {
         let joined_ns = *self.joined_ns.get_or_insert(now_ns);
         let (since_ns, most_ns) =
@@ -77,7 +72,7 @@ impl Dds {
         true
     }
 
-    /// Copy the next message into `buffer`, after the row of its topic. Returns its length, or none if all were taken.
+    /// Copy the next message, after its topic's row, into `buffer`. Returns the length, or none if all were taken.
     pub(super) fn receive(&mut self, buffer: &mut [u8], now_ns: u64) -> Option<usize> {
         self.participant.unring();
         let count = self.readers.len();
@@ -96,15 +91,15 @@ impl Dds {
         None
     }
 
-    /// The next message of a topic that the link has not written itself.
+    /// One that the link has not written itself.
     fn take(&self, row: usize) -> Option<Message> {
         let (reader, own) = (self.readers.get(row)?, self.writer.gid());
         std::iter::from_fn(|| reader.take()).find(|message| message.from != own)
     }
 
-    /// Send a payload. It is lost if the library does not accept it now.
+    /// Lost if the library does not accept it now.
     pub(super) fn send(&mut self, payload: &[u8]) {
-        // The driver sends nothing where topics need no greeting.
+        // Topics need no greeting.
         if !payload.is_empty() && !self.writer.write(payload.to_vec()) {
             self.tally.unsent += 1;
         }
@@ -115,7 +110,7 @@ impl Dds {
     }
 }
 
-/// A reader of each topic of the robot, in their order, and the writer of commands.
+/// A reader of each topic, in their order, and the writer of commands.
 fn endpoints(participant: &Participant, topics: &Topics) -> io::Result<(Vec<Reader>, Writer)> {
     let heard = Quality { is_reliable: false, is_latched: false, depth: DEPTH };
     let readers = topics.heard.iter().map(|(_, topic)| participant.reader(topic, heard));

@@ -1,7 +1,5 @@
-//! A serial line with 115200 baud, or that of the mission's Arduino, 8 data bits, no parity and 1 stop bit; bytes are not translated.
-//!
-//! It is opened by rustix instead of the `serialport` crate, whose ports give no `BorrowedFd`. The waiter needs one, and creating it
-//! from the raw number would be `unsafe`.
+//! A serial line: 115200 baud, or the mission's Arduino's, 8 data bits, no parity, 1 stop bit, no translation. rustix opens it, because
+//! the waiter needs a `BorrowedFd`, which the crate `serialport` gives only by `unsafe`.
 
 use std::{
     fmt, io,
@@ -22,10 +20,9 @@ use rustix::{
 
 use super::stream::Dial;
 
-/// Speed of a line to a robot without an Arduino, bits a second.
+/// Bits a second, without an Arduino.
 const BAUD: u32 = 115_200;
 
-/// The path of the line and its speed, bits a second.
 #[derive(Debug)]
 pub(super) struct Serial {
     path: PathBuf,
@@ -33,7 +30,6 @@ pub(super) struct Serial {
 }
 
 impl Serial {
-    /// The line at `path` to the robot of `mission`.
     pub(super) fn of(path: &Path, mission: &Mission) -> Self {
         let baud = match mission.robot.protocol() {
             Protocol::Arduino => mission.robot.arduino.baud,
@@ -50,7 +46,7 @@ impl fmt::Display for Serial {
 }
 
 impl Dial for Serial {
-    /// A silent line is not reopened. The system reports an adapter that was unplugged as an error.
+    /// A silent line is not reopened: the system reports an unplugged adapter.
     const SILENCE: Option<Duration> = None;
 
     fn dial(&self) -> io::Result<OwnedFd> {
@@ -59,8 +55,8 @@ impl Dial for Serial {
         if !isatty(&line) {
             return Err(Errno::NOTTY.into());
         }
-        // The lock reserves the line for this process and ends with it. TIOCEXCL would reserve the line too, but after this process was
-        // killed it would stay in force as long as any process has the line open, and refuse the successor.
+        // The lock ends with this process. TIOCEXCL would outlast a killed one while any process has the line open, and refuse the
+        // successor.
         flock(&line, FlockOperation::NonBlockingLockExclusive)?;
         let mut settings = tcgetattr(&line)?;
         settings.make_raw();
@@ -73,14 +69,14 @@ impl Dial for Serial {
         // An Arduino restarts when DTR rises. Without HUPCL it stays high when this process ends, so the stop guard and the next link do
         // not restart the board.
         settings.control_modes.remove(ControlModes::HUPCL);
-        // CLOCAL ignores modem control lines, so three wires are enough.
+        // CLOCAL ignores modem lines, so three wires are enough.
         let eight = ControlModes::CS8 | ControlModes::CLOCAL | ControlModes::CREAD;
         settings.control_modes.insert(eight);
-        // With VMIN = 1 a read without bytes fails with EAGAIN. With 0 it would return 0, which means the end of the line.
+        // A read without bytes fails with EAGAIN; with VMIN = 0 it would return 0, the end of the line.
         settings.special_codes[SpecialCodeIndex::VMIN] = 1;
         settings.special_codes[SpecialCodeIndex::VTIME] = 0;
         tcsetattr(&line, OptionalActions::Now, &settings)?;
-        // Bytes that came for an earlier holder of the line are outdated.
+        // Bytes for an earlier holder are outdated.
         tcflush(&line, QueueSelector::IOFlush)?;
         Ok(line)
     }
@@ -90,7 +86,7 @@ impl Dial for Serial {
     }
 
     fn abandon(&self, line: &OwnedFd) {
-        // An error means that the line no longer exists, so there is nothing to discard.
+        // An error means that the line is gone, with nothing to discard.
         let _ = tcflush(line, QueueSelector::IOFlush);
     }
 }

@@ -1,10 +1,9 @@
-//! A stream is a connection or a serial line. It is reopened whenever it closes.
+//! A connection or serial line, reopened whenever it closes.
 //!
-//! Frames are sent completely or not at all, because a partial frame would corrupt the next one. If the system accepts only a part of
-//! a message, the rest is sent before anything else, and messages that come meanwhile are lost.
+//! Frames are sent whole, because a partial one would corrupt the next. If the system accepts part of a message, the rest goes first,
+//! and messages meanwhile are lost.
 //!
-//! The stream's descriptor changes whenever it is opened, but a waiter needs one that stays the same. That is an epoll descriptor,
-//! which is readable when the present descriptor is ready.
+//! The stream's descriptor changes, and a waiter needs one that stays: an epoll descriptor, readable when the present one is ready.
 
 use std::{
     fmt, io,
@@ -21,25 +20,24 @@ use rustix::{
 use super::counts::{Attempts, Tally};
 use crate::backoff::Backoff;
 
-/// The pause between the first two attempts. It is short, so that a robot which only restarts its network is found at once.
+/// The first pause is short, so that a robot that only restarts its network is found at once.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
-/// The longest pause between attempts, and so the longest wait for a robot that answers again.
+/// It is also the longest wait for a robot that answers again.
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
-/// The time after which an attempt is given up. A robot that is switched off does not answer.
+/// An attempt is given up after this: a robot that is off does not answer.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// A way to open a stream.
 pub(super) trait Dial: fmt::Display {
-    /// The silence after which an open stream counts as closed; none if the system reports that.
+    /// An open stream counts as closed after this; none if the system reports that.
     const SILENCE: Option<Duration>;
 
-    /// Start to open the stream, without waiting.
+    /// Start to open, without waiting. Fails when the system refuses.
     fn dial(&self) -> io::Result<OwnedFd>;
 
-    /// Check whether `descriptor`, which is writable now, is connected to the robot.
+    /// Check that the writable `descriptor` is connected. Fails when it is not.
     fn finish(&self, descriptor: &OwnedFd) -> io::Result<()>;
 
-    /// Discard the bytes that `descriptor` has not sent yet, so that closing it does not wait for them.
+    /// Discard unsent bytes, so that closing does not wait for them.
     fn abandon(&self, descriptor: &OwnedFd);
 }
 
@@ -50,17 +48,15 @@ enum State {
     Open { descriptor: OwnedFd, heard_ns: u64 },
 }
 
-/// A stream to one robot.
 #[derive(Debug)]
 pub(super) struct Stream<D> {
     dial: D,
     epoll: OwnedFd,
     state: State,
-    /// The rest of a message that was sent in part.
     tail: Vec<u8>,
     backoff: Backoff,
     unsent: u64,
-    /// The error that was logged last, which is not logged again.
+    /// It is not logged again.
     logged: Option<Errno>,
 }
 
@@ -94,7 +90,7 @@ impl<D: Dial> Stream<D> {
         Some(Attempts { made: self.backoff.attempts(), next_ns })
     }
 
-    /// Start, finish or give up an attempt to open the stream, or send the rest of a message.
+    /// Continue or give up an attempt, or send the rest of a message.
     pub(super) fn maintain(&mut self, now_ns: u64) -> io::Result<()> {
         if matches!(self.state, State::Closed) {
             if !self.backoff.is_due(now_ns) {
@@ -134,7 +130,7 @@ impl<D: Dial> Stream<D> {
         Ok(())
     }
 
-    /// Read bytes from the robot into `buffer`. Returns their number, or none if there are no bytes.
+    /// Returns the number of bytes, or none.
     pub(super) fn receive(&mut self, buffer: &mut [u8], now_ns: u64) -> Option<usize> {
         let State::Open { descriptor, heard_ns } = &mut self.state else {
             return None;
@@ -143,8 +139,8 @@ impl<D: Dial> Stream<D> {
             Ok(0) => self.close(&io::ErrorKind::UnexpectedEof.into()),
             Ok(length) => {
                 *heard_ns = now_ns;
-                // The pauses start from the shortest only after bytes came. A peer that closes each connection at once must not be called ten
-                // times a second.
+                // Only received bytes reset the pauses: a peer that closes each connection at once must not be called ten times a
+                // second.
                 self.backoff.reset();
                 self.logged = None;
                 return Some(length);
@@ -155,7 +151,7 @@ impl<D: Dial> Stream<D> {
         None
     }
 
-    /// Send `bytes` if the stream accepts them now.
+    /// They are lost if the stream does not accept them now. Fails when the stream is closed.
     pub(super) fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.flush()?;
         let State::Open { descriptor, .. } = &self.state else {
@@ -181,7 +177,6 @@ impl<D: Dial> Stream<D> {
         Ok(())
     }
 
-    /// Send the rest of a message that was sent in part.
     fn flush(&mut self) -> io::Result<()> {
         let State::Open { descriptor, .. } = &self.state else {
             return Ok(());
@@ -212,7 +207,6 @@ impl<D: Dial> Stream<D> {
         Ok(())
     }
 
-    /// Wake the waiter for `events` of the open stream.
     fn watch(&self, events: EventFlags) -> io::Result<()> {
         if let State::Open { descriptor, .. } = &self.state {
             epoll::modify(&self.epoll, descriptor, EventData::new_u64(0), events)?;
@@ -220,7 +214,7 @@ impl<D: Dial> Stream<D> {
         Ok(())
     }
 
-    /// Close the stream. The epoll descriptor drops a closed descriptor by itself.
+    /// The epoll descriptor drops a closed one by itself.
     fn close(&mut self, error: &io::Error) {
         self.log(error);
         if let State::Opening { descriptor, .. } | State::Open { descriptor, .. } =
@@ -232,7 +226,7 @@ impl<D: Dial> Stream<D> {
     }
 
     fn log(&mut self, error: &io::Error) {
-        // The end of a stream has no error number, so it gets EPIPE.
+        // The end of a stream has no error number: EPIPE.
         let errno = Errno::from_io_error(error).unwrap_or(Errno::PIPE);
         if self.logged.replace(errno) != Some(errno) {
             let remedy = remedy(errno);
@@ -241,7 +235,6 @@ impl<D: Dial> Stream<D> {
     }
 }
 
-/// The remedy for an error.
 const fn remedy(errno: Errno) -> &'static str {
     match errno {
         Errno::NOENT | Errno::NODEV | Errno::NXIO | Errno::IO => "is the adapter plugged in",

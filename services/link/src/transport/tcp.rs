@@ -1,4 +1,4 @@
-//! A TCP connection to the robot, or to its radio module.
+//! A TCP connection to the robot or its radio module.
 
 use std::{fmt, io, net::SocketAddr, os::fd::OwnedFd, time::Duration};
 
@@ -12,11 +12,10 @@ use rustix::{
 
 use super::stream::Dial;
 
-/// The system does not report that the other end was switched off. The slowest robot that a mission allows sends every 2 s, and
-/// answers pings at once.
+/// The system does not report that the other end was switched off. The slowest robot of a mission sends every 2 s, and answers pings at
+/// once.
 const SILENCE: Duration = Duration::from_secs(5);
 
-/// The address to connect to.
 #[derive(Debug)]
 pub(super) struct Tcp {
     robot: SocketAddr,
@@ -53,11 +52,11 @@ impl Dial for Tcp {
         if getpeername(socket)? == Some(getsockname(socket)?) {
             return Err(Errno::CONNREFUSED.into());
         }
-        // A command must not wait for the next one.
+        // A command must not wait for the next.
         sockopt::set_tcp_nodelay(socket, true)?;
         Ok(())
     }
 
-    /// Nothing needs to be discarded, because the system closes connections in the background.
+    /// The system closes connections in the background.
     fn abandon(&self, _: &OwnedFd) {}
 }

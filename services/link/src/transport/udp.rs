@@ -1,4 +1,4 @@
-//! Datagrams. Only those from the robot's address are accepted.
+//! Datagrams, accepted from the robot's address only.
 
 use std::{
     io,
@@ -10,7 +10,6 @@ use rustix::io::Errno;
 
 use super::counts::Tally;
 
-/// A socket for one robot.
 #[derive(Debug)]
 pub(super) struct Udp {
     socket: UdpSocket,
@@ -19,10 +18,10 @@ pub(super) struct Udp {
 }
 
 impl Udp {
-    /// A socket for the robot at `robot`, from any free port.
+    /// Binds any free port. Fails when the system refuses a socket.
     pub(super) fn open(robot: SocketAddr) -> io::Result<Self> {
         let any = match robot.ip() {
-            // A socket that is bound to loopback receives nothing from other machines.
+            // A loopback socket receives nothing from other machines.
             IpAddr::V4(ip) if ip.is_loopback() => IpAddr::V4(Ipv4Addr::LOCALHOST),
             IpAddr::V6(ip) if ip.is_loopback() => IpAddr::V6(Ipv6Addr::LOCALHOST),
             IpAddr::V4(_) => IpAddr::V4(Ipv4Addr::UNSPECIFIED),
@@ -33,8 +32,7 @@ impl Udp {
         Ok(Self { socket, robot, tally: Tally::default() })
     }
 
-    /// Read the next datagram from the robot into `buffer`. Returns its length, or none if all were taken. Datagrams from other addresses
-    /// are dropped and counted.
+    /// Returns the next datagram's length, or none if all were taken. Those from other addresses are dropped and counted.
     pub(super) fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<usize>> {
         loop {
             match self.socket.recv_from(buffer) {
@@ -58,12 +56,12 @@ impl Udp {
         }
     }
 
-    /// Send one datagram. It is lost if the network does not accept it now.
+    /// Lost if the network does not accept it now.
     pub(super) fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         match self.socket.send_to(bytes, self.robot) {
             Ok(_) => Ok(()),
             Err(error) if Errno::from_io_error(&error) == Some(Errno::BADF) => Err(error),
-            // A full queue, a firewall or a network that is down refuses the datagram.
+            // A full queue, a firewall or a network that is down refuses it.
             Err(_) => {
                 self.tally.unsent += 1;
                 Ok(())
@@ -76,7 +74,7 @@ impl Udp {
     }
 }
 
-/// Whether the error is temporary: the robot does not answer, or a signal came.
+/// The robot does not answer, or a signal came.
 fn is_passing(error: &io::Error) -> bool {
     matches!(
         error.kind(),

@@ -1,4 +1,4 @@
-//! The newest map, its field, and how the field follows the map.
+//! The newest map and the field that follows it.
 //!
 //! | event | [`Current`](State::Current) | [`Stale`](State::Stale) | [`Solving`](State::Solving) |
 //! |---|---|---|---|
@@ -7,9 +7,9 @@
 //! | the tick is over, and the map is large | `Current` | a job begins: `Solving` | `Solving` |
 //! | the job's result comes | ignored | ignored | `Current`, or `Stale` if the map `changed` meanwhile |
 //!
-//! While the field is not that of the newest map, a robot follows it only where nothing changed on its way ahead. Elsewhere
-//! a small map is solved within the tick, and on a large one the robot waits. Each tick looks at the way again, with the newest map,
-//! and on a wall clock a tick is answered once more when its map is solved.
+//! While the field is not the newest map's, a robot follows it only where nothing changed ahead. Elsewhere a small map is solved within
+//! the tick, and on a large one the robot waits. Each tick looks at the way again, and on a wall clock a tick is answered once more when
+//! its map is solved.
 
 use std::sync::Arc;
 
@@ -25,39 +25,37 @@ use harmonic::{Cell, Change, Domain, Field, Guidance};
 use super::input::Job;
 use crate::view::{View, field_cell};
 
-/// Maps of at most this many cells (512 a side) are solved by the step: before a tick is answered, or after it if it can do without.
-/// Larger maps are solved in the background.
+/// Maps of at most this many cells (512 a side) are solved by the step, before the answer or after it; larger ones in the background.
 const SMALL_CELLS: usize = 1 << 18;
 
-/// How far ahead of the robot nothing may have changed, as the time it takes to drive there, seconds: until the next tick
-/// looks at the way again, and then to stop.
+/// Nothing may have changed within the way of so many seconds: until the next tick looks again, and then to stop.
 const AHEAD_S: f64 = 0.8;
 
-/// A robot this near to the centre of the cell that the field leads to beside the target has arrived, metres.
+/// A robot this near to the field's cell beside the target has arrived, metres.
 const AT_CELL_M: f64 = 0.12;
 
-/// The relation of the field to the newest map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
-    /// It is of the newest map.
     Current,
-    /// The map changed since, and no solve of it has begun.
+    /// The map changed, and no solve of it has begun.
     Stale,
-    /// The map changed since, and the background solver runs `job`, which has the map of version `version`. `changed` tells
-    /// whether the map changed again since then.
-    Solving { job: u64, version: u64, changed: bool },
+    /// The background solver runs `job` on version `version`; `changed` says whether the map changed since.
+    Solving {
+        job: u64,
+        version: u64,
+        changed: bool,
+    },
 }
 
-/// The newest map and a field.
 #[derive(Debug)]
 pub(super) struct Live {
     pub(super) frame: GridFrame,
     pub(super) map: Domain,
-    /// The field of `map` or of one before it; shared with its snapshots.
+    /// The field of `map` or of one before; shared with its snapshots.
     pub(super) field: Arc<Field>,
-    /// The version of the grid that `field` was solved for, unless it is current.
+    /// Unless the field is current.
     field_version: u64,
-    /// The field leads to the target before: it is not followed.
+    /// It leads to the target before, so it is not followed.
     leads_elsewhere: bool,
     state: State,
 }
@@ -72,12 +70,11 @@ impl Live {
         self.frame.area() <= SMALL_CELLS
     }
 
-    /// Whether the field is that of the newest map.
     pub(super) fn is_current(&self) -> bool {
         self.state == State::Current
     }
 
-    /// The map changed; before, it had version `before`.
+    /// The version before the change is `before`.
     pub(super) fn map_changed(&mut self, before: u64) {
         match &mut self.state {
             State::Current => {
@@ -89,14 +86,14 @@ impl Live {
         }
     }
 
-    /// There is another target on the newest map, of version `version`. A job that runs is not awaited any longer.
+    /// The newest map has version `version`. No job is awaited any longer.
     pub(super) fn target_changed(&mut self, version: u64) {
         self.map_changed(version);
         self.leads_elsewhere = true;
         self.state = State::Stale;
     }
 
-    /// The job to begin, named `number`, if the field is stale and no job runs; the newest map has version `version`.
+    /// None unless the field is stale and no job runs; the newest map has version `version`.
     pub(super) fn begin_job(&mut self, number: u64, version: u64) -> Option<Job> {
         if self.state != State::Stale {
             return None;
@@ -110,7 +107,6 @@ impl Live {
         matches!(self.state, State::Solving { job, .. } if job == number)
     }
 
-    /// Take the field of the job that runs.
     pub(super) fn solved(&mut self, field: Arc<Field>) {
         let State::Solving { version, changed, .. } = self.state else {
             return;
@@ -121,14 +117,12 @@ impl Live {
         self.state = if changed { State::Stale } else { State::Current };
     }
 
-    /// Take the field of the newest map.
     pub(super) fn solve(&mut self, field: Field) {
         self.field = Arc::new(field);
         self.leads_elsewhere = false;
         self.state = State::Current;
     }
 
-    /// The version of the grid that the field is of, where the newest is `newest`.
     pub(super) fn field_version(&self, newest: u64) -> u64 {
         match self.state {
             State::Current => newest,
@@ -136,8 +130,7 @@ impl Live {
         }
     }
 
-    /// Status and direction for a robot at `pose` that is to go to `target`; `cells` are the cells of the newest map. None where the
-    /// field must not be followed.
+    /// Status and direction at `pose`; `cells` are the newest map's. None where the field must not be followed.
     pub(super) fn guide(
         &self,
         robot: &Robot,
@@ -179,7 +172,7 @@ impl Live {
         View { frame: self.frame, cells, field: &self.field }
     }
 
-    /// Whether the field leads to a cell beside `target`, and the robot has come there.
+    /// The field leads to a cell beside the target, and the robot is there.
     fn is_beside(&self, target: DVec2, robot: DVec2) -> bool {
         let Cell { col, row } = self.field.target();
         let aim = grid::Cell { col: col as u32, row: row as u32 };
@@ -187,7 +180,7 @@ impl Live {
         !own && self.frame.centre_of(aim).distance(robot) <= AT_CELL_M
     }
 
-    /// Cells of `window` that are hazard in `cells` and not in the map, and the other way round.
+    /// Cells whose hazard differs between `cells` and the map.
     pub(super) fn changes_in(&self, window: Window, cells: &[u8]) -> Vec<Change> {
         let mut changes = Vec::new();
         for row in window.row..window.row + window.height {
@@ -208,7 +201,6 @@ impl Live {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Robot {
     radius_m: f64,
-    /// The way ahead on which nothing may have changed.
     ahead_m: f64,
 }
 

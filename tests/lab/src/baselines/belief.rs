@@ -1,0 +1,178 @@
+//! A planner's copy of the map: free cells and lines of sight.
+
+use common::{
+    grid::{Applied, Cell, CellState, GridFrame, Replica},
+    samples::GridHeader,
+};
+use glam::DVec2;
+
+/// Step along a line of sight, as a share of a cell.
+const SIGHT_STEP: f64 = 0.1;
+
+#[derive(Clone, Debug, Default)]
+pub struct Belief {
+    grid: Replica<u8>,
+    header: GridHeader,
+}
+
+/// A complete map. Hazard cells include the margin of the body.
+#[derive(Clone, Copy, Debug)]
+pub struct Map<'a> {
+    pub frame: GridFrame,
+    pub epoch: u64,
+    cells: &'a [u8],
+}
+
+impl Belief {
+    /// Apply one sample of `grid`. Returns false if a version is missing; then there is no map until a keyframe comes.
+    pub fn follow(&mut self, header: &GridHeader, cells: &[u8]) -> bool {
+        let followed = self.grid.apply(&header.part, cells) != Applied::Missed;
+        if followed {
+            self.header = *header;
+        }
+        followed
+    }
+
+    pub const fn header(&self) -> &GridHeader {
+        &self.header
+    }
+
+    /// The map; none before the first keyframe.
+    pub fn map(&self) -> Option<Map<'_>> {
+        let frame = self.grid.frame()?;
+        Some(Map { frame, epoch: self.header.epoch, cells: self.grid.cells() })
+    }
+}
+
+impl Map<'_> {
+    /// Whether `cell` is in the map and not a hazard. It may be unknown.
+    pub fn is_free(&self, cell: Cell) -> bool {
+        let inside = cell.col < self.frame.cells && cell.row < self.frame.cells;
+        let byte = inside.then(|| self.cells.get(self.frame.index(cell)).copied());
+        byte.flatten().is_some_and(|byte| !CellState::from_byte(byte).is_hazard())
+    }
+
+    pub fn free_cell_at(&self, point: DVec2) -> Option<Cell> {
+        self.frame.cell_at(point).filter(|&cell| self.is_free(cell))
+    }
+
+    /// The neighbour of `cell` by so many columns and rows, if it is free and no corner of a hazard is cut on the way.
+    pub fn neighbour(&self, cell: Cell, [cols, rows]: [i32; 2]) -> Option<Cell> {
+        let step = |cols, rows| {
+            let next = Cell {
+                col: cell.col.checked_add_signed(cols)?,
+                row: cell.row.checked_add_signed(rows)?,
+            };
+            self.is_free(next).then_some(next)
+        };
+        let next = step(cols, rows)?;
+        (step(cols, 0).is_some() && step(0, rows).is_some()).then_some(next)
+    }
+
+    /// The last free point before a hazard on the straight line between two points (metres); none if the line is free.
+    pub fn last_free(&self, from: DVec2, to: DVec2) -> Option<DVec2> {
+        let steps = (from.distance(to) / (SIGHT_STEP * self.frame.resolution_m)).ceil();
+        let steps = steps.clamp(1.0, f64::from(u32::MAX)) as u32;
+        let at = |step: u32| from.lerp(to, f64::from(step) / f64::from(steps));
+        let hazard = (0..=steps).find(|&step| self.free_cell_at(at(step)).is_none())?;
+        Some(at(hazard.saturating_sub(1)))
+    }
+
+    /// Whether the straight line between two points (metres) crosses free cells only.
+    pub fn sees(&self, from: DVec2, to: DVec2) -> bool {
+        self.last_free(from, to).is_none()
+    }
+
+    /// The middle of the free cell nearest to `point` (metres); none without a free cell.
+    pub fn nearest_free(&self, point: DVec2) -> Option<DVec2> {
+        let last = f64::from(self.frame.cells) - 1.0;
+        let middle = self.frame.to_cells(point).round();
+        let middle = middle.clamp(DVec2::ZERO, DVec2::splat(last));
+        let mut nearest: Option<(f64, DVec2)> = None;
+        // The search goes in squares of growing size, until all cells of a square are farther than the nearest one so far.
+        for reach in 0..self.frame.cells {
+            let edge = f64::from(reach) - 1.0;
+            if nearest.is_some_and(|(distance, _)| edge * self.frame.resolution_m > distance) {
+                break;
+            }
+            for cell in ring(middle, reach) {
+                let centre = self.frame.centre_of(cell);
+                let distance = centre.distance(point);
+                if self.is_free(cell) && nearest.is_none_or(|(least, _)| distance < least) {
+                    nearest = Some((distance, centre));
+                }
+            }
+        }
+        nearest.map(|(_, centre)| centre)
+    }
+}
+
+/// The cells at `reach` columns or rows from the cell at `middle`; those beyond the first column or row left out.
+fn ring(middle: DVec2, reach: u32) -> impl Iterator<Item = Cell> {
+    let middle = Cell { col: middle.x as u32, row: middle.y as u32 };
+    let reach = reach as i32;
+    (-reach..=reach).flat_map(move |rows| {
+        let whole = rows.abs() == reach || reach == 0;
+        let stride = if whole { 1 } else { 2 * reach as usize };
+        (-reach..=reach).step_by(stride).filter_map(move |cols| {
+            Some(Cell {
+                col: middle.col.checked_add_signed(cols)?,
+                row: middle.row.checked_add_signed(rows)?,
+            })
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::baselines::testing::drawn;
+
+    fn belief(rows: &[&str]) -> Belief {
+        let (header, cells) = drawn(rows);
+        let mut belief = Belief::default();
+        assert!(belief.follow(&header, &cells));
+        belief
+    }
+
+    const CORNER: [&str; 5] = [
+        ".....", //
+        ".....", //
+        "..##.", //
+        "..#..", //
+        ".....",
+    ];
+
+    #[test]
+    fn a_line_of_sight_ends_at_a_hazard() {
+        let belief = belief(&CORNER);
+        let map = belief.map().unwrap();
+        let sees = |from: [f64; 2], to: [f64; 2]| map.sees(from.into(), to.into());
+        assert!(sees([-0.2, 0.1], [0.2, 0.1]));
+        assert!(!sees([-0.2, 0.0], [0.2, 0.0]));
+        let last = map.last_free(DVec2::new(-0.2, 0.0), DVec2::new(0.2, 0.0));
+        let last = last.unwrap();
+        assert!((-0.07..-0.05).contains(&last.x), "{last}");
+    }
+
+    #[test]
+    fn a_step_cuts_no_corner() {
+        let belief = belief(&CORNER);
+        let map = belief.map().unwrap();
+        let from = Cell { col: 1, row: 2 };
+        assert_eq!(map.neighbour(from, [1, 1]), None, "past the corner");
+        assert_eq!(map.neighbour(from, [0, 1]), Some(Cell { col: 1, row: 3 }));
+        assert_eq!(map.neighbour(Cell { col: 0, row: 0 }, [-1, 0]), None);
+    }
+
+    #[test]
+    fn out_of_a_hazard_the_nearest_free_cell_is_found_and_none_where_there_is_none() {
+        let belief = belief(&CORNER);
+        let nearest = belief.map().unwrap().nearest_free(DVec2::new(0.02, 0.01));
+        assert_eq!(nearest, Some(DVec2::new(0.0, 0.1)));
+        let (header, cells) = drawn(&["###"; 3]);
+        let mut full = Belief::default();
+        full.follow(&header, &cells);
+        assert_eq!(full.map().unwrap().nearest_free(DVec2::ZERO), None);
+    }
+}

@@ -1,0 +1,64 @@
+//! The boundary of a hazard, cell by cell: along it with the hazard on the right.
+
+use common::grid::Cell;
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+use crate::baselines::belief::Map;
+
+/// The four directions, counter-clockwise from x: columns and rows.
+const DIRECTIONS: [[i32; 2]; 4] = [[1, 0], [0, 1], [-1, 0], [0, -1]];
+/// Quarters of a turn counter-clockwise.
+const LEFT: usize = 1;
+const BACK: usize = 2;
+const RIGHT: usize = 3;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Place {
+    pub cell: Cell,
+    /// The direction in which the cell was entered: a number of quarters of a turn from x. The hazard is on the right of
+    /// it, or behind on the right.
+    heading: u8,
+}
+
+impl Place {
+    /// The place at `cell` from which the boundary is followed most nearly in `direction`; none where no hazard is beside
+    /// the cell.
+    pub fn at(map: &Map<'_>, cell: Cell, direction: DVec2) -> Option<Self> {
+        let along = |place: &Self| unit(place.heading.into()).dot(direction);
+        (0..4)
+            .map(|heading| Self { cell, heading })
+            .filter(|place| place.is_on(map))
+            .max_by(|a, b| along(a).total_cmp(&along(b)))
+    }
+
+    /// Whether the place still is a free cell with the hazard where it should be.
+    pub fn is_on(&self, map: &Map<'_>) -> bool {
+        let hazard = |cols, rows| {
+            let col = self.cell.col.checked_add_signed(cols);
+            let cell = col.zip(self.cell.row.checked_add_signed(rows));
+            !cell.is_some_and(|(col, row)| map.is_free(Cell { col, row }))
+        };
+        let [right, back] = [RIGHT, BACK].map(|turn| self.turned(turn));
+        map.is_free(self.cell)
+            && (hazard(right[0], right[1]) || hazard(right[0] + back[0], right[1] + back[1]))
+    }
+
+    /// The next place: the cell on the right if that is free, else ahead, on the left, behind; none in a closed cell.
+    pub fn next(&self, map: &Map<'_>) -> Option<Self> {
+        [RIGHT, 0, LEFT, BACK].into_iter().find_map(|turn| {
+            let cell = map.neighbour(self.cell, self.turned(turn))?;
+            let heading = (usize::from(self.heading) + turn) % DIRECTIONS.len();
+            Some(Self { cell, heading: heading as u8 })
+        })
+    }
+
+    fn turned(&self, turn: usize) -> [i32; 2] {
+        DIRECTIONS[(usize::from(self.heading) + turn) % DIRECTIONS.len()]
+    }
+}
+
+fn unit(heading: usize) -> DVec2 {
+    let [cols, rows] = DIRECTIONS[heading % DIRECTIONS.len()];
+    DVec2::new(f64::from(cols), f64::from(rows))
+}

@@ -1,0 +1,128 @@
+//! A planner to compare with, and the parts that all of them share: the map, and the guidance along a way.
+
+use std::fmt::Debug;
+
+use common::{
+    mission::{Method, Mission},
+    samples::{GridHeader, GuidanceSample, GuidanceStatus, PoseSample, TargetSample},
+};
+use glam::DVec2;
+use serde::{Serialize, de::DeserializeOwned};
+
+use crate::baselines::belief::{Belief, Map};
+
+/// Speed of a robot that leaves a hazard, m/s: that of the harmonic planner with the evidential method.
+const WAY_OUT_M_S: f64 = 0.08;
+
+/// A planner to compare with. It is saved whenever it has answered.
+pub trait Planner: Default + Debug + Serialize + DeserializeOwned {
+    /// The way from `here` to `target` (metres) on `map`.
+    fn way(&mut self, map: &Map<'_>, here: DVec2, target: DVec2) -> Way;
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Way {
+    Unknown,
+    To(DVec2),
+    /// The robot stands in a hazard: go slowly and straight to this point, metres.
+    Out(DVec2),
+    None,
+}
+
+impl Way {
+    /// The way out of the hazard for a robot at `point` (metres).
+    pub fn out(map: &Map<'_>, point: DVec2) -> Self {
+        map.nearest_free(point).map_or(Self::None, Self::Out)
+    }
+}
+
+#[derive(Debug)]
+pub struct Baseline<P> {
+    /// The target of the robot; none before the supervisor has published one.
+    target: Option<TargetSample>,
+    looks_around: bool,
+    belief: Belief,
+    pub planner: P,
+}
+
+impl<P: Planner> Baseline<P> {
+    /// The baseline for the robot of `mission`, without a map.
+    pub fn new(mission: &Mission) -> Self {
+        Self {
+            target: None,
+            looks_around: mission.method == Method::Evidential,
+            belief: Belief::default(),
+            planner: P::default(),
+        }
+    }
+
+    /// Apply one sample of `grid`. Returns false if a version is missing; then there is no map until a keyframe comes.
+    pub fn follow(&mut self, header: &GridHeader, cells: &[u8]) -> bool {
+        self.belief.follow(header, cells)
+    }
+
+    /// Note that the robot is sent to `target`. On the way to another target the planner begins anew.
+    pub fn send_to(&mut self, target: TargetSample) {
+        if self.target.replace(target).is_some() {
+            self.planner = P::default();
+        }
+    }
+
+    pub fn guidance(&mut self, sample: &PoseSample) -> GuidanceSample {
+        let here = sample.pose().position;
+        let way = match (self.belief.map(), &self.target) {
+            (Some(map), Some(sample)) => self.planner.way(&map, here, sample.target.position()),
+            _ => Way::Unknown,
+        };
+        self.along(way, sample)
+    }
+
+    /// The guidance that sends the robot of `sample` along `way`.
+    fn along(&self, way: Way, sample: &PoseSample) -> GuidanceSample {
+        let belief = self.belief.header();
+        let pose = sample.pose();
+        // A robot that stands on the point keeps its heading.
+        let toward = |point: DVec2| (point - pose.position).normalize_or(pose.axis());
+        let (status, direction, limit) = match way {
+            Way::Unknown => (GuidanceStatus::Waiting, DVec2::ZERO, 0.0),
+            Way::To(point) => (GuidanceStatus::Along, toward(point), f64::INFINITY),
+            Way::Out(point) => (GuidanceStatus::WayOut, toward(point), WAY_OUT_M_S),
+            // An echo may have been false: the robot looks around once before the map is reset, as with the harmonic planner.
+            Way::None if self.looks_around => {
+                (GuidanceStatus::Unreachable, pose.axis().perp(), 0.0)
+            }
+            Way::None => (GuidanceStatus::Unreachable, DVec2::ZERO, 0.0),
+        };
+        GuidanceSample {
+            ex: direction.x,
+            ey: direction.y,
+            speed_limit_m_s: limit,
+            status: status.into(),
+            grid_version: belief.part.version,
+            ..GuidanceSample::for_pose(sample, belief, &self.target.unwrap_or_default())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::baselines::{
+        testing::{pose, sent},
+        wavefront::Wavefront,
+    };
+
+    #[test]
+    fn a_robot_without_a_way_is_told_so_and_looks_around() {
+        let baseline = sent::<Wavefront>([1.0, 0.0]);
+        let guidance = baseline.along(Way::None, &pose([0.0, 0.0]));
+        assert_eq!(guidance.status, u8::from(GuidanceStatus::Unreachable));
+        assert_eq!((guidance.ex, guidance.ey), (0.0, 1.0));
+    }
+
+    #[test]
+    fn without_a_map_the_robot_waits() {
+        let guidance = sent::<Wavefront>([0.3, 0.0]).guidance(&pose([0.0, 0.0]));
+        assert_eq!(guidance.status, u8::from(GuidanceStatus::Waiting));
+    }
+}

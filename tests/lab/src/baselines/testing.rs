@@ -1,0 +1,43 @@
+//! Maps, missions and poses for tests.
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use common::{
+    grid::{CellState, GridFrame, Part},
+    mission::Mission,
+    samples::{GridHeader, PoseSample, TargetSample},
+};
+use glam::DVec2;
+
+use super::planner::{Baseline, Planner};
+
+/// The header and the cells of a map drawn row by row, the first one with the greatest y: `#` is hazard. Cells of
+/// 0.1 m, the middle one at (0, 0).
+pub fn drawn(rows: &[&str]) -> (GridHeader, Vec<u8>) {
+    let frame = GridFrame { cells: rows.len() as u32, resolution_m: 0.1, centre: DVec2::ZERO };
+    let letters = rows.iter().rev().flat_map(|row| row.bytes());
+    let state = |letter| match letter {
+        b'#' => CellState::Sensed as u8,
+        _ => CellState::Free as u8,
+    };
+    let header = GridHeader { part: Part::whole(frame, 1), ..GridHeader::default() };
+    (header, letters.map(state).collect())
+}
+
+pub fn mission([x, y]: [f64; 2]) -> Mission {
+    let text = format!("target = [{x:?}, {y:?}]");
+    Mission::parse(&text, Path::new("test.toml")).unwrap()
+}
+
+pub fn sent<P: Planner>(target: [f64; 2]) -> Baseline<P> {
+    let mission = mission(target);
+    let mut baseline = Baseline::new(&mission);
+    baseline.send_to(TargetSample::first(&mission));
+    baseline
+}
+
+/// A robot at (x, y) metres that faces along x.
+pub fn pose([x_m, y_m]: [f64; 2]) -> PoseSample {
+    PoseSample { x_m, y_m, ..PoseSample::default() }
+}

@@ -1,0 +1,386 @@
+//! The attacker of one mission: sends signals, and waits for the successors to work.
+
+use std::{
+    path::PathBuf,
+    time::{Duration, Instant},
+};
+
+use common::{
+    clock::MissionTime,
+    ground_truth::GroundTruthTick,
+    samples::{HealthState, Order, PoseSample, RosterEntry, StageState, name_str},
+    topics::{self, SUPERVISOR},
+};
+use rustix::process::{Pid, Signal, kill_process};
+use serde_json::Value;
+
+use mission_control::simulator::Simulator;
+use processes::{
+    policy::{HOLD_AFTER, HOLD_WINDOW},
+    process::Process,
+    stages,
+};
+
+use crate::chaos::{
+    consumers::Consumers,
+    kind::Kind,
+    recovery::{PendingRecovery, StartupHit},
+    report::{EVERYTHING, Report},
+    resources::Resources,
+    series::Series,
+    signals::Row,
+    subscriptions::{POLL, Subscriptions},
+};
+use crate::error::{Failure, system};
+
+/// The generation that stands for the samples of a supervisor, whose successor has a bus of its own.
+const NEWEST: u32 = u32::MAX;
+/// Signals to one stage within the window of the hold rule. A stage that dies more often is held until an operator releases
+/// it, and chaos has no operator. A second signal may follow in the start-up, and each may be counted late.
+const MOST_HITS: usize = HOLD_AFTER - 4;
+
+#[derive(Default)]
+pub struct Attack {
+    seed: u64,
+    time: Option<MissionTime>,
+    consumers: Consumers,
+    entries: Vec<RosterEntry>,
+    supervisor: u32,
+    /// Whether the supervisor was hit. Later samples of it and its stages are no sign of its successor.
+    supervisor_hit: bool,
+    driving: bool,
+    pending: Vec<PendingRecovery>,
+    /// Signals whose measurement is complete.
+    measured: Vec<Row>,
+    /// Generations that were frozen alone. The supervisor may abort these as hung.
+    frozen: Vec<(&'static str, u32)>,
+    hits: Vec<(&'static str, Instant)>,
+    pose: Option<PoseSample>,
+    /// The supervisor's resources when its robot began to drive, and at the last check.
+    resources: Option<[Resources; 2]>,
+}
+
+impl Attack {
+    pub fn new(seed: u64, consumers: Consumers) -> Self {
+        Self { seed, consumers, ..Self::default() }
+    }
+
+    /// Attack one generation of the supervisor, `child`, until it ends, for at most `patience`.
+    pub fn run(
+        &mut self,
+        series: &mut Series<'_>,
+        child: &mut Process,
+        mut robot: Option<&mut Simulator>,
+        patience: Duration,
+    ) -> Result<(), Failure> {
+        let began = Instant::now();
+        self.supervisor_hit = false;
+        self.driving = false;
+        self.entries.clear();
+        self.resources = None;
+        // The stages of a supervisor that was hit end with it.
+        let is_stage = |recovery: &mut PendingRecovery| recovery.stage != SUPERVISOR;
+        let ended = self.pending.extract_if(.., is_stage);
+        self.measured.extend(ended.map(|recovery| recovery.row));
+        let mut subscriptions = loop {
+            self.consumers.maintain(&mut series.report)?;
+            if child.try_reap().map_err(system("reap"))?.is_some() || began.elapsed() >= patience {
+                return Ok(());
+            }
+            match Subscriptions::join(series.options, child.id()) {
+                Ok(Some(subscriptions)) => break subscriptions,
+                // The bus does not exist yet.
+                Ok(None) | Err(_) => std::thread::park_timeout(POLL),
+            }
+        };
+        let mut next = Instant::now() + series.schedule.pause();
+        while child.try_reap().map_err(system("reap"))?.is_none() && began.elapsed() < patience {
+            // An overdue hit waits for the robot to drive.
+            let due = next.checked_duration_since(Instant::now());
+            let timeout = due.unwrap_or(POLL).min(self.time_to_startup_hit());
+            subscriptions.roster.waiter.wait(timeout.min(POLL))?;
+            if let Some(robot) = &mut robot {
+                robot.poll()?;
+            }
+            self.read(&mut subscriptions, &mut series.report)?;
+            self.hit_starting(&mut series.report);
+            if Instant::now() >= next && self.driving && !series.is_over() {
+                let pause = series.schedule.pause();
+                self.hit(series)?;
+                next = Instant::now() + pause;
+            }
+            self.consumers.maintain(&mut series.report)?;
+            self.keep_measured(series, robot.as_deref())?;
+        }
+        if let Some([first, last]) = self.resources {
+            series.report.add_growth(first, last);
+        }
+        Ok(())
+    }
+
+    /// Write the rows of the signals whose measurement is complete.
+    fn keep_measured(
+        &mut self,
+        series: &mut Series<'_>,
+        robot: Option<&Simulator>,
+    ) -> Result<(), Failure> {
+        for mut row in std::mem::take(&mut self.measured) {
+            row.pose_error_m = robot.and_then(|robot| self.pose_error(robot.truth()));
+            series.keep(&row)?;
+        }
+        Ok(())
+    }
+
+    /// Note that the mission is over, and end all measurements.
+    pub fn end(
+        &mut self,
+        series: &mut Series<'_>,
+        robot: Option<&Simulator>,
+    ) -> Result<(), Failure> {
+        self.consumers.end();
+        let pending = self.pending.drain(..);
+        self.measured.extend(pending.map(|recovery| recovery.row));
+        self.keep_measured(series, robot)
+    }
+
+    /// The row of a signal of `kind` that is sent to a generation of `stage` now.
+    fn row(&self, stage: &str, kind: Kind, generation: Option<u32>) -> Row {
+        let time_s = self.time.map(MissionTime::seconds);
+        Row::new(self.seed, time_s, stage, kind, generation)
+    }
+
+    /// The recordings of the run's recorder that was hit, and those of other recorders.
+    pub fn hit_recordings(&self) -> (&[PathBuf], Vec<PathBuf>) {
+        let consumers = &self.consumers;
+        (consumers.hit_recordings(), consumers.other_recordings())
+    }
+
+    /// Whether the supervisor was hit and has no working successor yet.
+    pub fn supervisor_is_down(&self) -> bool {
+        self.pending.iter().any(|recovery| recovery.stage == SUPERVISOR)
+    }
+
+    /// Stages that the supervisor aborted as hung, by the `deaths` of the run, although they were not frozen alone.
+    pub fn healthy_aborted(&self, deaths: &[Value]) -> Vec<String> {
+        let frozen = |death: &Value| {
+            self.frozen.iter().any(|(stage, generation)| {
+                death["stage"] == *stage && death["generation"] == *generation
+            })
+        };
+        let hung = deaths.iter().filter(|death| death["hung"] == true);
+        let healthy = hung.filter(|death| !frozen(death));
+        healthy
+            .map(|death| format!("{} generation {}", death["stage"], death["generation"]))
+            .collect()
+    }
+
+    /// Distance from the last published pose to the ground truth of its tick, metres; none without both.
+    pub fn pose_error(&self, truth: &[GroundTruthTick]) -> Option<f64> {
+        let pose = self.pose?;
+        let tick = truth.iter().rev().find(|tick| tick.is_of(&pose))?;
+        Some(tick.pose_error_m(&pose))
+    }
+
+    /// Read new samples, which show the stages that run, beat and publish.
+    fn read(
+        &mut self,
+        subscriptions: &mut Subscriptions,
+        report: &mut Report,
+    ) -> Result<(), Failure> {
+        while let Some(death) = subscriptions.deaths.next_sample()? {
+            let (stage, generation) = (name_str(&death.stage), death.generation);
+            let mut pending = self.pending.iter_mut();
+            if let Some(recovery) = pending
+                .find(|recovery| recovery.stage == stage && recovery.generation == generation)
+            {
+                recovery.noticed();
+            }
+        }
+        while let Some(entries) = subscriptions.roster.samples.next_slice()? {
+            self.driving = Order::from_byte(entries.header().order) == Order::Drive;
+            self.supervisor = entries.header().supervisor_pid;
+            self.entries = entries.to_vec();
+            if self.driving {
+                self.on_supervisor_sign(true, report);
+                // Resources of ended processes are freed once their successors work.
+                if self.pending.is_empty()
+                    && let Some(resources) = Resources::of(self.supervisor)
+                {
+                    let [first, _] = self.resources.unwrap_or([resources; 2]);
+                    self.resources = Some([first, resources]);
+                }
+            }
+        }
+        while let Some(health) = subscriptions.health.next_sample()? {
+            if HealthState::from_byte(health.state) == HealthState::Ready {
+                self.on_sign(name_str(&health.stage), health.stamp.generation, true, report);
+            }
+        }
+        while let Some(sample) = subscriptions.wheels.next_sample()? {
+            self.time = Some(sample.stamp.time());
+            if sample.left_counts_per_s == 0 && sample.right_counts_per_s == 0 {
+                self.pending.iter_mut().for_each(PendingRecovery::rests);
+            }
+            let writer = topics::WHEELS.spec().writer;
+            self.on_sign(writer, sample.stamp.generation, false, report);
+        }
+        while let Some(sample) = subscriptions.pose.next_sample()? {
+            let writer = topics::POSE.spec().writer;
+            self.on_sign(writer, sample.stamp.generation, false, report);
+            self.pose = Some(sample);
+        }
+        for (writer, reader) in &mut subscriptions.outputs {
+            while let Some(sample) = reader.next_sample()? {
+                self.on_sign(writer, sample.stamp().generation, false, report);
+                if *writer == topics::COMMAND.spec().writer {
+                    self.on_supervisor_sign(false, report);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn on_supervisor_sign(&mut self, beat: bool, report: &mut Report) {
+        if !self.supervisor_hit {
+            self.on_sign(SUPERVISOR, NEWEST, beat, report);
+        }
+    }
+
+    /// Note a sign of work of a generation of `stage`: a ready beat, or a sample of a tick.
+    fn on_sign(&mut self, stage: &str, generation: u32, beat: bool, report: &mut Report) {
+        let awaited = |recovery: &PendingRecovery| {
+            recovery.stage == stage && generation > recovery.generation
+        };
+        let Some(at) = self.pending.iter().position(awaited) else {
+            return;
+        };
+        let pending = &mut self.pending[at];
+        if pending.sign(beat, report.recovery(pending.stage)) {
+            self.measured.push(self.pending.remove(at).row);
+        }
+    }
+
+    /// Freeze supervisor and stages together, and thaw them after `pause`.
+    fn freeze_all(&mut self, pause: Duration, report: &mut Report) {
+        // A stage that is frozen alone stays frozen.
+        let hangs = |entry: &&RosterEntry| {
+            self.frozen.contains(&(name_str(&entry.stage), entry.generation))
+        };
+        let stages = self.entries.iter().filter(|entry| !hangs(entry));
+        let stages = stages.map(|entry| entry.pid);
+        // The supervisor is frozen first: it must not see frozen stages.
+        let all: Vec<u32> = std::iter::once(self.supervisor).chain(stages).collect();
+        let all: Vec<Pid> = all
+            .iter()
+            .filter_map(|pid| Pid::from_raw(pid.cast_signed()))
+            .filter(|pid| kill_process(*pid, Kind::FreezeAll.signal()).is_ok())
+            .collect();
+        let began = Instant::now();
+        while let Some(left) = pause.checked_sub(began.elapsed()) {
+            std::thread::park_timeout(left);
+        }
+        // The supervisor is thawed last.
+        for pid in all.iter().rev() {
+            let _ = kill_process(*pid, Signal::CONT);
+        }
+        report.hit(EVERYTHING, Kind::FreezeAll);
+        let row = self.row(EVERYTHING, Kind::FreezeAll, None);
+        self.measured.push(row);
+        // The pause does not count as time of recovery.
+        for recovery in &mut self.pending {
+            recovery.at += began.elapsed();
+        }
+    }
+
+    /// Hit a consumer, the supervisor, or a running stage without a pending recovery.
+    fn hit(&mut self, series: &mut Series<'_>) -> Result<(), Failure> {
+        let Series { options, schedule, report, .. } = series;
+        if let Some((index, kind, pause)) =
+            schedule.consumer(self.consumers.len(), options.asked.only_consumers)
+        {
+            let supervisor = self.supervisor;
+            let hit = self.consumers.hit(index, kind, pause, supervisor, report)?;
+            self.measured.extend(hit.map(|hit| self.row(&hit.name, kind, hit.generation)));
+            return Ok(());
+        }
+        if options.asked.include_supervisor && schedule.supervisor() {
+            let kind = schedule.supervisor_kind();
+            if !self.supervisor_is_down() && send(self.supervisor, kind) {
+                report.hit(SUPERVISOR, kind);
+                let row = self.row(SUPERVISOR, kind, None);
+                self.pending.push(PendingRecovery::new(SUPERVISOR, 0, StartupHit::None, row));
+                self.supervisor_hit = true;
+                self.driving = false;
+            }
+            return Ok(());
+        }
+        if options.asked.freeze_all
+            && let Some(pause) = schedule.freeze_all()
+        {
+            self.freeze_all(pause, report);
+            return Ok(());
+        }
+        let Some(stage) = stages::find(schedule.stage()).map(|stage| stage.name) else {
+            return Ok(());
+        };
+        let (kind, startup_hit) = (schedule.kind(), schedule.startup_hit());
+        let running = |entry: &&RosterEntry| {
+            name_str(&entry.stage) == stage
+                && StageState::from_byte(entry.state) == StageState::Running
+        };
+        let Some(entry) = self.entries.iter().find(running) else {
+            return Ok(());
+        };
+        let recovering = self.pending.iter().any(|recovery| recovery.stage == stage);
+        self.hits.retain(|(_, at)| at.elapsed() < HOLD_WINDOW);
+        let lately = self.hits.iter().filter(|(hit, _)| *hit == stage).count();
+        if recovering || lately >= MOST_HITS || !send(entry.pid, kind) {
+            return Ok(());
+        }
+        report.hit(stage, kind);
+        if kind == Kind::Freeze {
+            self.frozen.push((stage, entry.generation));
+        }
+        self.hits.push((stage, Instant::now()));
+        let startup_hit = match startup_hit {
+            Some(after) if options.asked.include_startup && kind != Kind::Freeze => {
+                StartupHit::After(after)
+            }
+            _ => StartupHit::None,
+        };
+        let generation = entry.generation;
+        let row = self.row(stage, kind, Some(generation));
+        self.pending.push(PendingRecovery::new(stage, generation, startup_hit, row));
+        Ok(())
+    }
+
+    /// Time until a successor is to be hit in its start-up.
+    fn time_to_startup_hit(&self) -> Duration {
+        let times = self.pending.iter();
+        let times = times.filter_map(PendingRecovery::time_to_startup_hit);
+        times.min().unwrap_or(Duration::MAX)
+    }
+
+    fn hit_starting(&mut self, report: &mut Report) {
+        for recovery in &mut self.pending {
+            recovery.schedule_startup_hit(&self.entries);
+            let Some((process, generation)) = recovery.take_due_startup_hit() else {
+                continue;
+            };
+            if send(process, Kind::KillAtStart) {
+                let stage = recovery.stage;
+                report.hit(stage, Kind::KillAtStart);
+                self.hits.push((stage, Instant::now()));
+                let time_s = self.time.map(MissionTime::seconds);
+                let row = Row::new(self.seed, time_s, stage, Kind::KillAtStart, Some(generation));
+                let next = PendingRecovery::new(stage, generation, StartupHit::None, row);
+                self.measured.push(std::mem::replace(recovery, next).row);
+            }
+        }
+    }
+}
+
+/// Whether the signal reached a process.
+fn send(pid: u32, kind: Kind) -> bool {
+    Pid::from_raw(pid.cast_signed()).is_some_and(|pid| kill_process(pid, kind.signal()).is_ok())
+}

@@ -1,0 +1,181 @@
+//! Targets that change every few seconds while a mission is attacked, as an operator sends them; and whether the run reported
+//! the
+//! outcome of each.
+
+use std::{
+    f64::consts::TAU,
+    process::Stdio,
+    sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel},
+    thread::JoinHandle,
+    time::Duration,
+};
+
+use common::{domain::RobotName, ground_truth::GroundTruthTick, mission::Mission};
+use mission_control::target_list::{TargetOutcome, TargetResult};
+use serde::Serialize;
+use summary::Summary;
+
+use crate::{random::Random, robot::firsthand};
+
+/// Changes of the targets of one mission.
+const MOST_CHANGES: usize = 6;
+/// Wall-clock time from one change to the next, seconds.
+const PAUSE_S: [f64; 2] = [0.8, 3.0];
+/// The greatest distance of a target from the start, metres.
+const WITHIN_M: f64 = 2.5;
+/// The free ground around a target beside the body, metres.
+const CLEARANCE_M: f64 = 0.45;
+/// The greatest distance by the ground truth of a robot from a target that it reached, metres.
+const REACHED_WITHIN_M: f64 = 0.5;
+
+#[derive(Debug, Default, Serialize)]
+pub struct Changes {
+    asked: u64,
+    /// Requests that the supervisor confirmed.
+    taken: u64,
+    refused: u64,
+    /// Requests without an answer, because the supervisor was hit.
+    unanswered: u64,
+    reached: u64,
+    replaced: u64,
+    /// Targets that were accepted and not reported, or not reached.
+    wrong: Vec<String>,
+}
+
+/// Sends a robot elsewhere until it is told to stop.
+pub struct Operator {
+    stop: Sender<()>,
+    thread: JoinHandle<Sent>,
+}
+
+#[derive(Debug, Default)]
+struct Sent {
+    counts: [u64; 4],
+    taken: Vec<[f64; 2]>,
+}
+
+impl Operator {
+    pub fn start(robot: RobotName, mission: &Mission, seed: u64) -> Self {
+        let (stop, stopped) = channel();
+        let mission = mission.clone();
+        let thread = std::thread::spawn(move || send(&robot, &mission, seed, &stopped));
+        Self { stop, thread }
+    }
+
+    fn end(self) -> Sent {
+        drop(self.stop);
+        self.thread.join().unwrap_or_default()
+    }
+}
+
+fn send(robot: &RobotName, mission: &Mission, seed: u64, stopped: &Receiver<()>) -> Sent {
+    let mut random = Random::new(seed, 11);
+    let mut sent = Sent::default();
+    while sent.taken.len() < 2 * MOST_CHANGES && sent.counts[1] < MOST_CHANGES as u64 {
+        let pause = Duration::from_secs_f64(random.within(PAUSE_S[0], PAUSE_S[1]));
+        if stopped.recv_timeout(pause) != Err(RecvTimeoutError::Timeout) {
+            break;
+        }
+        let count = 1 + usize::from(random.share() < 0.4);
+        let places: Vec<_> = (0..count).map(|_| place(mission, &mut random)).collect();
+        let words: Vec<_> = places.iter().flatten().map(f64::to_string).collect();
+        let mut command = firsthand(&["goto", "--robot", &robot.to_string()]);
+        if random.share() < 0.5 {
+            command.arg("--append");
+        }
+        let output = command.args(words).stdin(Stdio::null()).output();
+        let Ok(output) = output else {
+            continue;
+        };
+        let said = String::from_utf8_lossy(&output.stderr);
+        if said.contains("[not-running]") {
+            continue;
+        }
+        sent.counts[0] += 1;
+        if output.status.success() {
+            sent.counts[1] += 1;
+            sent.taken.extend(places);
+        } else if said.contains("refuses") {
+            sent.counts[2] += 1;
+        } else {
+            sent.counts[3] += 1;
+        }
+    }
+    sent
+}
+
+/// A random place at which the robot can stand, in whole centimetres.
+fn place(mission: &Mission, random: &mut Random) -> [f64; 2] {
+    let (world, frame) = (mission.obstacles(), mission.grid_frame());
+    let clear_m = mission.body().radius_m + CLEARANCE_M;
+    for _ in 0..1000 {
+        let (angle, far) = (TAU * random.share(), WITHIN_M * random.share().sqrt());
+        let at = glam::DVec2::from_angle(angle) * far;
+        let at = (at * 100.0).round() / 100.0;
+        let to_rim = frame.resolution_m * f64::from(frame.cells) / 2.0
+            - (at - frame.centre).abs().max_element();
+        if world.clearance(at) > clear_m && to_rim > clear_m {
+            return [at.x, at.y];
+        }
+    }
+    [0.0, 0.0]
+}
+
+impl Changes {
+    /// Count the mission `seed` with the changes of `operator`. Returns whether every target was reached in truth or its outcome
+    /// reported.
+    pub fn add(
+        &mut self,
+        seed: u64,
+        operator: Operator,
+        summary: &Summary,
+        truth: &[GroundTruthTick],
+    ) -> bool {
+        let sent = operator.end();
+        let before = self.wrong.len();
+        let [asked, taken, refused, unanswered] = sent.counts;
+        self.asked += asked;
+        self.taken += taken;
+        self.refused += refused;
+        self.unanswered += unanswered;
+        for [x, y] in sent.taken {
+            if !summary.targets.iter().any(|told| (told.x_m, told.y_m) == (x, y)) {
+                self.wrong.push(format!("seed {seed}: ({x}, {y}) was taken and is not told of"));
+            }
+        }
+        for (nth, target) in (1..).zip(&summary.targets) {
+            let TargetResult { number, x_m, y_m, outcome, .. } = *target;
+            if number != nth {
+                self.wrong.push(format!("seed {seed}: target {nth} is called {number}"));
+            }
+            let was_there = || {
+                let off = |tick: &GroundTruthTick| (tick.x - x_m).hypot(tick.y - y_m);
+                truth.is_empty() || truth.iter().any(|tick| off(tick) <= REACHED_WITHIN_M)
+            };
+            match outcome {
+                TargetOutcome::Replaced => self.replaced += 1,
+                TargetOutcome::Reached | TargetOutcome::ReachedUnsure if was_there() => {
+                    self.reached += 1;
+                }
+                _ => self.wrong.push(format!("seed {seed}: target {number}: {outcome:?}")),
+            }
+        }
+        self.wrong.len() == before
+    }
+
+    pub const fn is_right(&self) -> bool {
+        self.wrong.is_empty()
+    }
+}
+
+impl std::fmt::Display for Changes {
+    fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { asked, taken, refused, unanswered, reached, replaced, wrong } = self;
+        write!(
+            to,
+            "targets changed {asked} times: {taken} taken, {refused} refused, {unanswered} without an answer; {reached} targets \
+             reached, {replaced} replaced"
+        )?;
+        wrong.iter().try_for_each(|wrong| write!(to, "\n  {wrong}"))
+    }
+}

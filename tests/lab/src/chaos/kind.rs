@@ -1,0 +1,42 @@
+//! The kinds of hits on a process.
+
+use rustix::process::Signal;
+use serde::{Deserialize, Serialize};
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    Kill,
+    /// SIGKILL in the first milliseconds of a generation.
+    KillAtStart,
+    /// SIGABRT, as after a panic that cannot unwind. SIGSEGV would not serve: Rust's runtime takes the first one for an overflow
+    /// of the stack, finds none, and goes on.
+    Crash,
+    Terminate,
+    /// SIGSTOP.
+    Freeze,
+    /// SIGSTOP to supervisor and stages together, SIGCONT a moment later.
+    FreezeAll,
+}
+
+impl Kind {
+    pub const fn signal(self) -> Signal {
+        match self {
+            Self::Kill | Self::KillAtStart => Signal::KILL,
+            Self::Crash => Signal::ABORT,
+            Self::Terminate => Signal::TERM,
+            Self::Freeze | Self::FreezeAll => Signal::STOP,
+        }
+    }
+
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Kill => "killed",
+            Self::KillAtStart => "killed at start",
+            Self::Crash => "crashed",
+            Self::Terminate => "terminated",
+            Self::Freeze => "frozen",
+            Self::FreezeAll => "all frozen together",
+        }
+    }
+}

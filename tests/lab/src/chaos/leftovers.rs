@@ -1,0 +1,49 @@
+//! Files, shared memory and processes that outlived a mission.
+
+use std::{
+    fs,
+    path::Path,
+    thread,
+    time::{Duration, Instant},
+};
+
+use ::processes::STOP_GUARD;
+use common::domain::{Domain, RobotName, SHARED_MEMORY};
+
+use crate::robot::{command_line, processes};
+
+/// Longest time that a stop guard goes on after a mission.
+const GUARDS_END: Duration = Duration::from_secs(10);
+const LOOK: Duration = Duration::from_millis(10);
+
+/// Files and shared memory of `robot`, and processes with files in `directory`, that still exist: paths and command lines.
+pub fn find(robot: &RobotName, directory: &Path) -> Vec<String> {
+    let domain = Domain::of(robot.clone());
+    let prefix = domain.shared_memory_prefix();
+    let entries = fs::read_dir(SHARED_MEMORY).into_iter().flatten().flatten();
+    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let shared = names.filter(|name| name.starts_with(&prefix));
+    let mut found: Vec<String> = shared.map(|name| format!("{SHARED_MEMORY}/{name}")).collect();
+    let directory = directory.to_string_lossy();
+    // A stop guard ends after its link, when its robot rests or is gone.
+    let began = Instant::now();
+    while began.elapsed() < GUARDS_END && lines(&directory).any(|line| line.contains(STOP_GUARD)) {
+        thread::park_timeout(LOOK);
+    }
+    found.extend(lines(&directory));
+    let own_directory = domain.directory();
+    if own_directory.exists() {
+        found.push(own_directory.display().to_string());
+    }
+    found
+}
+
+/// The processes with files in `directory`, and their command lines.
+fn lines(directory: &str) -> impl Iterator<Item = String> {
+    let others = processes().filter(|pid| *pid != std::process::id());
+    others.filter_map(move |pid| {
+        let line = String::from_utf8_lossy(&command_line(pid)).replace('\0', " ");
+        let is_of_mission = line.contains(directory);
+        is_of_mission.then(|| format!("process {pid}: {}", line.trim_end()))
+    })
+}

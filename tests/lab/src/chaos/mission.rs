@@ -1,0 +1,213 @@
+//! One mission, undisturbed and under attack.
+
+use std::{
+    fs::{self, File},
+    path::Path,
+    process::{Command, Stdio},
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
+
+use common::{clock::Pace, mission::Mission};
+use serde_json::Value;
+
+use crate::chaos::{
+    attack::Attack, changes::Operator, consumers::Consumers, options::Options, report::End,
+    series::Series,
+};
+use crate::{
+    error::{self, Failure, system},
+    robot::{self, firsthand},
+};
+use mission_control::simulator::Simulator;
+use processes::{DEATHS, process::Process};
+use summary::Summary;
+
+/// The time after which a mission is stopped. In wall-clock time a mission takes half a minute.
+const PATIENCE: Duration = Duration::from_secs(600);
+
+pub fn command(
+    options: &Options,
+    seed: u64,
+    pace: &str,
+    out: &Path,
+    records: bool,
+) -> Result<Command, Failure> {
+    let Options { asked, set, .. } = options;
+    let mut command = robot::mission("run", &asked.mission, &asked.robot, set);
+    command.args(["--pace", pace, "--seed", &seed.to_string(), "--out"]).arg(out);
+    if !records {
+        command.arg("--no-record");
+    }
+    child(command, out)
+}
+
+fn resume(directory: &Path, records: bool) -> Result<Command, Failure> {
+    let mut command = firsthand(&["run", "--json", "--resume"]);
+    command.arg(directory);
+    if !records {
+        command.arg("--no-record");
+    }
+    child(command, directory)
+}
+
+/// Make `command` a child that ends with this process. Its standard output is piped; its standard error goes to a file
+/// beside the run's directory.
+fn child(mut command: Command, directory: &Path) -> Result<Command, Failure> {
+    let stderr = directory.with_extension("stderr");
+    let stderr = File::options().create(true).append(true).open(stderr);
+    let stderr = stderr.map_err(system("write a mission's standard error"))?;
+    command.args(["--parent", &std::process::id().to_string()]);
+    command.stdout(Stdio::piped()).stderr(stderr);
+    Ok(command)
+}
+
+/// The summary of the mission without an attack, to compare with. If ticks are compared, it runs at the same pace.
+pub fn undisturbed(options: &Options, seed: u64) -> Result<Summary, Failure> {
+    let directory = options.directory.join("undisturbed");
+    let pace = if options.asked.only_consumers { options.pace } else { Pace::Max };
+    let output = command(options, seed, &pace.to_string(), &directory, false)?
+        .output()
+        .map_err(system("start a mission"))?;
+    fs::remove_dir_all(directory).map_err(system("remove its directory"))?;
+    error::summary(&output.stdout, &output.stdout)
+}
+
+/// Attack the mission, and report. Its files stay if something was wrong.
+pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Result<(), Failure> {
+    let options = series.options;
+    let before = series.report.kills();
+    let files = options.directory.join(format!("seed-{seed}"));
+    fs::create_dir(&files).map_err(system("make a directory"))?;
+    let directory = files.join("run");
+    let mut robot = options
+        .asked
+        .include_supervisor
+        .then(|| robot(options, seed, &files.join("robot"), false))
+        .transpose()?;
+    let mut start =
+        command(options, seed, &options.pace.to_string(), &directory, options.records())?;
+    if let Some(robot) = &robot {
+        let address = robot.address();
+        start.args(["--set", &format!("robot.address='udp://{address}'")]);
+    }
+    let consumers = files.join("consumers");
+    let consumers = Consumers::start(options, consumers, &mut series.report)?;
+    let asked = &options.asked;
+    let operator =
+        asked.targets.then(|| Operator::start(asked.robot.clone(), &options.loaded, seed));
+    let mut attack = Attack::new(seed, consumers);
+    let began = Instant::now();
+    let summary = loop {
+        let summary = one_supervisor(series, start, robot.as_mut(), &mut attack)?;
+        // A supervisor that was hit leaves no summary, unless the run had just ended.
+        if !attack.supervisor_is_down() || !summary.is_empty() || began.elapsed() >= PATIENCE {
+            break error::summary(&summary, &summary)?;
+        }
+        start = resume(&directory, options.records())?;
+    };
+    attack.end(series, robot.as_ref())?;
+    let undisturbed_error_m = undisturbed.pose_error_m.unwrap_or_default();
+    let kills = series.report.kills() - before;
+    let mut end = End {
+        seed,
+        outcome: summary.outcome,
+        reason: summary.reason.clone(),
+        collisions: summary.collisions.unwrap_or_default(),
+        pose_excess_m: summary.pose_error_m.unwrap_or_default() - undisturbed_error_m,
+        stopping_time_s: summary.stopping_time_s.unwrap_or_default(),
+        pose_allowance_m: pose_allowance_m(&options.loaded, kills, &summary),
+        kills,
+        healthy_aborted: attack.healthy_aborted(&deaths(&directory)),
+    };
+    let mut all_truth = Vec::new();
+    if let Some(mut robot) = robot {
+        robot.stop()?;
+        let truth = robot.truth();
+        all_truth = truth.to_vec();
+        let last = truth.last();
+        end.collisions = last.map_or(0, |tick| tick.contacts);
+        end.stopping_time_s = last.map_or(0.0, |tick| tick.stopping_time_s);
+        let error = attack.pose_error(truth).unwrap_or(f64::INFINITY);
+        end.pose_excess_m = error - undisturbed_error_m;
+    }
+    if options.asked.targets {
+        // The undisturbed robot took another way.
+        end.pose_allowance_m = f64::INFINITY;
+    }
+    let mut right = series.report.add_mission(&end);
+    if let Some(operator) = operator {
+        right &= series.report.targets().add(seed, operator, &summary, &all_truth);
+    }
+    if options.asked.only_consumers {
+        series.report.tick_latencies().add(undisturbed, &summary);
+    }
+    if options.asked.replay {
+        let (hit, others) = attack.hit_recordings();
+        right &= series.report.replays().add(seed, &directory, hit, &others);
+    }
+    if right {
+        fs::remove_dir_all(&files).map_err(system("remove its directory"))?;
+    }
+    Ok(())
+}
+
+/// The records of the deaths of the run in `directory`.
+fn deaths(directory: &Path) -> Vec<Value> {
+    let text = fs::read_to_string(directory.join(DEATHS)).unwrap_or_default();
+    let lines = text.lines().map(serde_json::from_str);
+    lines.filter_map(Result::ok).collect()
+}
+
+/// Allowed pose error at the end beyond that of the undisturbed run, metres. Each signal may cost one wheel count of travel.
+/// Besides, a run that was hit takes another path, so its wheels are read at other fractions of a count: one count between the
+/// wheels turns the heading by `count / track`, which displaces the robot by that fraction of the distance to the target. Slip
+/// differs in each run, too: by three standard deviations of the robot's stated pose error, because a hundred missions include a
+/// few beyond two.
+fn pose_allowance_m(mission: &Mission, kills: u32, summary: &Summary) -> f64 {
+    let body = mission.body();
+    let target = mission.start_pose().position.distance(mission.target);
+    let slips = mission.simulation.physics().wheels.slip_noise > 0.0;
+    let slip_m = if slips { 1.5 * summary.pose_within_m.unwrap_or_default() } else { 0.0 };
+    body.metres_per_count() * (f64::from(kills) + target / body.track_m) + slip_m
+}
+
+/// Start a robot that does not end with its supervisor.
+pub fn robot(
+    options: &Options,
+    seed: u64,
+    directory: &Path,
+    ignores_time: bool,
+) -> Result<Simulator, Failure> {
+    fs::create_dir(directory).map_err(system("make a directory"))?;
+    let mut mission = Mission { seed, ..options.loaded.clone() };
+    mission.simulation.ignores_time |= ignores_time;
+    Ok(Simulator::start(firsthand(&[]), directory, &mission, options.pace)?)
+}
+
+/// Attack one generation of the supervisor. Returns its standard output.
+fn one_supervisor(
+    series: &mut Series<'_>,
+    start: Command,
+    robot: Option<&mut Simulator>,
+    attack: &mut Attack,
+) -> Result<Vec<u8>, Failure> {
+    let mut child = Process::spawn(start).map_err(system("start a mission"))?;
+    let summary = read_stdout(&mut child);
+    let attacked = attack.run(series, &mut child, robot, PATIENCE);
+    child.end(Duration::from_secs(2));
+    let summary = summary.join().unwrap_or_default();
+    attacked.map(|()| summary)
+}
+
+/// Read the standard output to the end in a thread, because a long summary would fill the pipe.
+pub fn read_stdout(child: &mut Process) -> JoinHandle<Vec<u8>> {
+    let stdout = child.take_stdout();
+    std::thread::spawn(move || {
+        let mut text = Vec::new();
+        if let Some(mut stdout) = stdout {
+            let _ = std::io::Read::read_to_end(&mut stdout, &mut text);
+        }
+        text
+    })
+}

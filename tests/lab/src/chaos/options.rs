@@ -1,0 +1,155 @@
+//! The mission that is attacked, and the kinds of attack.
+
+use std::{env, fs, path::PathBuf, process};
+
+use clap::Args;
+use common::{clock::Pace, domain::RobotName, file::FileError, mission::Mission};
+use console::missions;
+
+use crate::{
+    chaos::{
+        consumer::{Consumer, GivenConsumer},
+        robot_fault::{RobotFault, TABLE},
+    },
+    error::Failure,
+};
+
+/// Send random signals to random stages at random times, mission after mission, and report.
+#[derive(Clone, Debug, Args)]
+pub struct Arguments {
+    /// A shipped mission or a mission file.
+    #[arg(default_value = "obstacle-course")]
+    pub mission: String,
+    /// Number of signals; after the last one the mission goes on to its end.
+    #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
+    pub kills: u32,
+    /// Seed of the schedule; the missions' own seeds count up from it.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Hit some successors again within their first 12 ms: about a fifth of all signals.
+    #[arg(long)]
+    pub include_startup: bool,
+    /// Hit the supervisor too, one in twenty signals, and go on with its run each time. The robot is then a process
+    /// of its own, and mission time is wall-clock.
+    #[arg(long, conflicts_with = "pace")]
+    pub include_supervisor: bool,
+    /// Kill and freeze consumers too, one in two signals: the run's own recorder, another one, `top` (without terminals
+    /// `hz`) and `logs -f`.
+    #[arg(long, conflicts_with = "robot_faults")]
+    pub include_consumers: bool,
+    /// Kill and freeze a consumer of yours: a program and its arguments, without a shell. As often as needed.
+    #[arg(long, value_name = "COMMAND", conflicts_with = "robot_faults")]
+    pub consumer: Vec<GivenConsumer>,
+    /// Hit consumers only, and compare ticks with those of the same missions without any.
+    #[arg(long, conflicts_with_all = ["include_startup", "include_supervisor", "freeze_all"])]
+    pub only_consumers: bool,
+    /// Freeze supervisor and stages together too, for 0.3 to 1.5 s, one in two signals, as if the machine stood still.
+    #[arg(long)]
+    pub freeze_all: bool,
+    /// Send the robot elsewhere every few seconds. Each target must be reached by the ground truth, or told to be replaced.
+    #[arg(long, conflicts_with_all = ["only_consumers", "robot_faults"])]
+    pub targets: bool,
+    /// Record the missions, and replay every generation of every stage, which must be equal to the bit.
+    #[arg(long)]
+    pub replay: bool,
+    /// Mission time, R times wall-clock.
+    #[arg(long, default_value = "4")]
+    pub pace: Pace,
+    /// Set a key of the mission, as often as needed.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Write a row for each signal to DIR/signals.csv.
+    #[arg(long, value_name = "DIR", conflicts_with = "robot_faults")]
+    pub out: Option<PathBuf>,
+    /// Name of the robot, which also names its shared memory.
+    #[arg(long, default_value = "chaos")]
+    pub robot: RobotName,
+    /// Instead of signals, put a fault into the robot's frames from a random moment on, mission after mission: all faults, or
+    /// those named. The stop-time table at the end has the time from each fault to the last moving command and to wheels at rest.
+    #[arg(
+        long, value_name = "FAULT,...", num_args = 0..=1, require_equals = true, default_missing_value = "all",
+        value_parser = parse_faults, conflicts_with_all = ["kills", "include_startup", "include_supervisor", "pace"]
+    )]
+    pub robot_faults: Option<Faults>,
+    /// Missions for each fault.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..), requires = "robot_faults")]
+    pub missions: u32,
+    /// One line of JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Clone, Debug)]
+pub struct Faults(pub Vec<RobotFault>);
+
+fn parse_faults(names: &str) -> Result<Faults, String> {
+    if names == "all" {
+        return Ok(Faults(TABLE.iter().map(|row| row.fault).collect()));
+    }
+    let named = |name: &str| {
+        RobotFault::named(name).ok_or_else(|| {
+            let all: Vec<_> = TABLE.iter().map(|row| row.name).collect();
+            format!("no robot fault {name:?}; give some of {}", all.join(", "))
+        })
+    };
+    names.split(',').map(named).collect::<Result<_, _>>().map(Faults)
+}
+
+/// The mission that is attacked, and the kinds of attack.
+pub struct Options {
+    pub asked: Arguments,
+    pub loaded: Mission,
+    pub set: Vec<String>,
+    pub pace: Pace,
+    /// Parent of the run directories. It is emptied after each mission.
+    pub directory: PathBuf,
+}
+
+const LONG_TIMEOUT: &str = "timeout_s=1800";
+
+impl Options {
+    /// The options of missions, which run in a new directory.
+    ///
+    /// # Errors
+    /// The mission cannot be loaded, or is none for chaos; options contradict each other.
+    pub fn of(asked: &Arguments) -> Result<Self, Failure> {
+        let asked = asked.clone();
+        let mut set = asked.set.clone();
+        if asked.freeze_all {
+            // The robot's clock goes on while its processes are frozen. A --set of the user comes later and wins.
+            set.insert(0, LONG_TIMEOUT.to_owned());
+        }
+        let loaded = missions::load(&asked.mission, &set)?;
+        let faulty = asked.robot_faults.is_some();
+        if (asked.include_supervisor || faulty) && loaded.robot.address.is_some() {
+            return Err("chaos brings its own robot; leave robot.address out".into());
+        }
+        if faulty && loaded.body().steering.is_some() {
+            return Err(
+                "robot faults are of a robot with two driven wheels; leave robot.model = 'car' out"
+                    .into(),
+            );
+        }
+        if asked.only_consumers && !asked.include_consumers && asked.consumer.is_empty() {
+            return Err("--only-consumers hits nothing; give --include-consumers, or --consumer and your command, too".into());
+        }
+        if asked.pace == Pace::Max {
+            return Err("chaos needs a wall clock; give --pace R, 4 for four times as fast".into());
+        }
+        let real_time = asked.include_supervisor || faulty;
+        let pace = if real_time { Pace::Rate(1.0) } else { asked.pace };
+        let directory = env::temp_dir().join(format!("firsthand-chaos-{}", process::id()));
+        fs::create_dir(&directory).map_err(FileError::of("make", &directory))?;
+        Ok(Self { asked, loaded, set, pace, directory })
+    }
+
+    pub fn records(&self) -> bool {
+        self.asked.replay || self.asked.include_consumers
+    }
+
+    pub fn consumers(&self) -> Vec<Consumer> {
+        let own = if self.asked.include_consumers { Consumer::own() } else { Vec::new() };
+        let given = self.asked.consumer.iter().cloned().map(Consumer::Given);
+        own.into_iter().chain(given).collect()
+    }
+}

@@ -1,0 +1,100 @@
+//! The schedule of signals: seeded, so that it can be repeated.
+
+use std::{ops::Range, time::Duration};
+
+use processes::stages::TABLE;
+
+use crate::{chaos::kind::Kind, random::Random};
+
+/// Mean time between two signals. Each stage gets one every two to three seconds, and is stable before.
+const MEAN_PAUSE: Duration = Duration::from_millis(500);
+/// A hit in the start-up falls within this time of the start, in which the stage joins the bus.
+const STARTUP: Duration = Duration::from_millis(12);
+/// Share of the signals that are followed by one to the successor in its start-up, with `--include-startup`. A fifth of all
+/// signals are such; the others are not sent, because there was no successor, or it was ready too soon.
+const STARTUP_SHARE: f64 = 0.3;
+
+/// Share of the signals that hit the supervisor, with `--include-supervisor`.
+const SUPERVISOR_SHARE: f64 = 0.05;
+
+/// Share of the signals that hit a consumer, if there are any.
+const CONSUMER_SHARE: f64 = 0.5;
+
+/// Share of the hits that freeze everything, with `--freeze-all`.
+const FREEZE_ALL_SHARE: f64 = 0.5;
+/// Range of the time for which everything, or a consumer, is frozen, seconds: from less than a stage's deadline to three times as
+/// long.
+const FREEZE_S: Range<f64> = 0.3..1.5;
+
+#[derive(Debug)]
+pub struct Schedule(Random);
+
+impl Schedule {
+    pub fn new(seed: u64) -> Self {
+        Self(Random::new(seed, 7))
+    }
+
+    /// Time to the next signal, exponentially distributed.
+    pub fn pause(&mut self) -> Duration {
+        MEAN_PAUSE.mul_f64(-(1.0 - self.0.share()).ln())
+    }
+
+    pub fn stage(&mut self) -> &'static str {
+        TABLE[self.0.below(TABLE.len())].name
+    }
+
+    pub fn supervisor(&mut self) -> bool {
+        self.0.share() < SUPERVISOR_SHARE
+    }
+
+    /// The hit of the supervisor. SIGTERM would end the run, and only systemd notices a frozen supervisor.
+    pub fn supervisor_kind(&mut self) -> Kind {
+        match self.0.share() {
+            ..0.8 => Kind::Kill,
+            _ => Kind::Crash,
+        }
+    }
+
+    /// The time to freeze everything, if it is to be frozen instead of a stage.
+    pub fn freeze_all(&mut self) -> Option<Duration> {
+        let frozen = self.0.share() < FREEZE_ALL_SHARE;
+        frozen.then(|| self.freeze())
+    }
+
+    /// The time for which everything or a consumer is frozen.
+    fn freeze(&mut self) -> Duration {
+        let Range { start, end } = FREEZE_S;
+        Duration::from_secs_f64(self.0.within(start, end))
+    }
+
+    /// The consumer to hit instead of a stage or the supervisor, `always` or sometimes; and the time for which it is frozen, or
+    /// none to kill it.
+    pub fn consumer(&mut self, count: usize, always: bool) -> Option<(usize, Kind, Duration)> {
+        // Without consumers the sequence of decisions is the same as before there were any.
+        if count == 0 || self.0.share() >= CONSUMER_SHARE && !always {
+            return None;
+        }
+        let index = self.0.below(count);
+        let kind = match self.0.share() {
+            ..0.7 => Kind::Kill,
+            _ => Kind::Freeze,
+        };
+        Some((index, kind, self.freeze()))
+    }
+
+    pub fn kind(&mut self) -> Kind {
+        match self.0.share() {
+            ..0.6 => Kind::Kill,
+            ..0.75 => Kind::Crash,
+            ..0.9 => Kind::Terminate,
+            _ => Kind::Freeze,
+        }
+    }
+
+    /// The time after its start at which to hit the successor too, if it is to be hit.
+    pub fn startup_hit(&mut self) -> Option<Duration> {
+        // This converts the share of all signals to a share of those that can be followed by one.
+        let hit = self.0.share() < STARTUP_SHARE / (1.0 - STARTUP_SHARE);
+        hit.then(|| STARTUP.mul_f64(self.0.share()))
+    }
+}

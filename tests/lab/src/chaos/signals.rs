@@ -1,0 +1,141 @@
+//! `signals.csv`: a row for each signal, written when its last measurement is known. A chaos that is killed leaves the rows that are
+//! known by then.
+
+use std::{
+    fs::{self, File},
+    io,
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+use common::file::FileError;
+use serde::{Deserialize, Serialize};
+
+use crate::chaos::kind::Kind;
+
+pub const FILE_NAME: &str = "signals.csv";
+
+/// A signal. A value that was not measured is an empty cell.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    pub mission: u64,
+    /// Mission time of the newest wheel sample that was read before the signal, seconds.
+    pub time_s: Option<f64>,
+    /// The stage, `supervisor`, `everything`, or the consumer's name.
+    pub stage: String,
+    pub kind: Kind,
+    /// The generation; for a consumer the number of its starts in that mission. None for the supervisor, for everything and for the
+    /// run's own recorder.
+    pub generation: Option<u32>,
+    /// Whether the process was to be hit in its first milliseconds.
+    pub start_up: bool,
+    /// The time from the signal until the supervisor's record of the death was read, milliseconds. Only for stages.
+    pub noticed_ms: Option<f64>,
+    /// The time from the signal until the successor's first sign of work was read, milliseconds. For stages and the supervisor.
+    pub ready_ms: Option<f64>,
+    /// The time from the signal until the successor's first sample of a tick was read, milliseconds. For stages and the supervisor.
+    pub first_output_ms: Option<f64>,
+    /// The time from the signal until the first sample in which no wheel turned, milliseconds; none if the first output was earlier.
+    pub rest_ms: Option<f64>,
+    /// The distance from the newest pose to the true one when the row was written, metres. It is known only if the robot is a process
+    /// of its own, whose ground truth is read during the mission.
+    pub pose_error_m: Option<f64>,
+}
+
+impl Row {
+    pub fn new(
+        mission: u64,
+        time_s: Option<f64>,
+        stage: &str,
+        kind: Kind,
+        generation: Option<u32>,
+    ) -> Self {
+        Self {
+            mission,
+            time_s,
+            stage: stage.to_owned(),
+            kind,
+            generation,
+            start_up: kind == Kind::KillAtStart,
+            noticed_ms: None,
+            ready_ms: None,
+            first_output_ms: None,
+            rest_ms: None,
+            pose_error_m: None,
+        }
+    }
+}
+
+/// Milliseconds since `at`, to the microsecond.
+pub fn ms_since(at: Instant) -> f64 {
+    (at.elapsed().as_secs_f64() * 1e6).round() / 1e3
+}
+
+#[derive(Debug)]
+pub struct SignalsFile {
+    path: PathBuf,
+    writer: csv::Writer<File>,
+}
+
+impl SignalsFile {
+    pub fn create(directory: &Path) -> Result<Self, FileError> {
+        let path = directory.join(FILE_NAME);
+        fs::create_dir_all(directory).map_err(FileError::of("make the directory of", &path))?;
+        let file = File::create_new(&path).map_err(|error| {
+            let error = match error.kind() {
+                io::ErrorKind::AlreadyExists => {
+                    io::Error::other(format!("{error}; give another directory"))
+                }
+                _ => error,
+            };
+            FileError::of("make", &path)(error)
+        })?;
+        Ok(Self { path, writer: csv::Writer::from_writer(file) })
+    }
+
+    pub fn add(&mut self, row: &Row) -> Result<(), FileError> {
+        let written = self.writer.serialize(row);
+        written.map_err(FileError::of("write", &self.path))?;
+        self.writer.flush().map_err(FileError::of("write", &self.path))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(path: &Path) -> Vec<Row> {
+        let mut reader = csv::Reader::from_path(path).unwrap();
+        reader.deserialize().map(Result::unwrap).collect()
+    }
+
+    #[test]
+    fn rows_are_in_the_file_as_soon_as_they_are_added_and_are_read_as_they_were() {
+        let folder = tempfile::tempdir().unwrap();
+        let directory = folder.path().join("results");
+        let mut file = SignalsFile::create(&directory).unwrap();
+        assert_eq!(read(&directory.join(FILE_NAME)), []);
+        let plain = Row::new(3, Some(1.25), "mapper", Kind::KillAtStart, Some(4));
+        let odd = Row {
+            noticed_ms: Some(0.125),
+            ..Row::new(3, None, "sh -c 'a, \"b\"\n'", Kind::Freeze, None)
+        };
+        for row in [&plain, &odd] {
+            file.add(row).unwrap();
+        }
+        // Another process reads the file like this while it is written.
+        assert_eq!(read(&directory.join(FILE_NAME)), [plain, odd]);
+        let text = fs::read_to_string(directory.join(FILE_NAME)).unwrap();
+        let columns = "mission,time_s,stage,kind,generation,start_up,noticed_ms,";
+        assert!(text.starts_with(columns), "{text}");
+        assert!(text.contains("\n3,1.25,mapper,kill_at_start,4,true,,,,,\n"), "{text}");
+    }
+
+    #[test]
+    fn results_that_are_there_are_not_written_over() {
+        let folder = tempfile::tempdir().unwrap();
+        SignalsFile::create(folder.path()).unwrap();
+        let refused = SignalsFile::create(folder.path()).unwrap_err();
+        assert_eq!(refused.file, folder.path().join(FILE_NAME));
+    }
+}

@@ -1,0 +1,171 @@
+//! The stop-time table: how long robots moved after their fault.
+
+use std::{collections::BTreeMap, fmt};
+
+use serde::Serialize;
+
+use crate::chaos::robot_fault::{Promise, REST_AT_ONCE_S, REST_LATER_S, REST_WITHIN_S, RobotFault};
+
+/// The least time from the last tick in which a wheel turned to the end of a mission that ends at rest, seconds.
+const AT_REST_BEFORE_S: f64 = 0.15;
+
+#[derive(Clone, Debug, Serialize)]
+pub struct Entry {
+    pub fault: RobotFault,
+    pub seed: u64,
+    /// Whether the fault began: a mission may end before.
+    pub fault_began: bool,
+    /// The time from the fault to the link's last command that moves a wheel, seconds.
+    pub last_moving_s: Option<f64>,
+    /// The time from the fault to the last tick in which a wheel turned, by the ground truth, seconds.
+    pub rest_s: Option<f64>,
+    /// Time from the fault to the end of the watch, seconds.
+    pub watched_s: f64,
+    pub collisions: u64,
+    /// The outcome of the mission; `goes on` if it had none when the watch ended.
+    pub outcome: String,
+    /// The reason of the outcome; for a mission that goes on, why the link lets no command pass, empty if commands pass.
+    pub reason: String,
+}
+
+impl Entry {
+    pub fn is_kept(&self) -> bool {
+        let promise = self.fault.row().promise;
+        let unharmed = self.fault_began && self.collisions == 0 && self.outcome != "wrong_place";
+        let Some(limit_s) = promise.rest_within_s() else {
+            let rests =
+                self.rest_s.is_some_and(|rest_s| rest_s + AT_REST_BEFORE_S <= self.watched_s);
+            return unharmed && (rests || promise != Promise::EndsAtRest);
+        };
+        let within = |seconds: Option<f64>| seconds.is_some_and(|seconds| seconds <= limit_s);
+        unharmed && within(self.last_moving_s) && within(self.rest_s) && !self.reason.is_empty()
+    }
+}
+
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct StopTimeTable {
+    pub entries: Vec<Entry>,
+}
+
+impl StopTimeTable {
+    pub fn is_kept(&self) -> bool {
+        self.entries.iter().all(Entry::is_kept)
+    }
+}
+
+impl fmt::Display for StopTimeTable {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            to,
+            "{:<17} {:>14} {:>11} {:>8} {:>9}  outcome: reason",
+            "robot", "last command", "at rest", "touches", "kept"
+        )?;
+        let mut kinds: BTreeMap<RobotFault, Vec<&Entry>> = BTreeMap::new();
+        for entry in &self.entries {
+            kinds.entry(entry.fault).or_default().push(entry);
+        }
+        for (fault, entries) in kinds {
+            let kept = entries.iter().filter(|entry| entry.is_kept()).count();
+            let touches: u64 = entries.iter().map(|entry| entry.collisions).sum();
+            let last = longest(&entries, |entry| entry.last_moving_s);
+            let rest = longest(&entries, |entry| entry.rest_s);
+            let kept = format!("{kept} of {}", entries.len());
+            // The worst mission is shown.
+            let worst = entries.iter().find(|entry| !entry.is_kept());
+            let told = worst.or(entries.first()).map_or(String::new(), |entry| {
+                let reason = match &*entry.reason {
+                    "" => "no reason",
+                    reason => reason,
+                };
+                format!("{}: {reason}", entry.outcome)
+            });
+            let name = fault.row().name;
+            writeln!(to, "{name:<17} {last:>14} {rest:>11} {touches:>8} {kept:>9}  {told}")?;
+        }
+        writeln!(
+            to,
+            "Times are from the fault, the longest of each kind; at most {REST_WITHIN_S} s, {REST_LATER_S} s: {}, or \
+             {REST_AT_ONCE_S} s: {}; except where the robot may go on unharmed: {}, {}.",
+            names(Promise::RestsLater),
+            names(Promise::RestsAtOnce),
+            names(Promise::Unharmed),
+            names(Promise::EndsAtRest)
+        )
+    }
+}
+
+fn names(promise: Promise) -> String {
+    let table = crate::chaos::robot_fault::TABLE.iter();
+    let names: Vec<_> = table.filter(|row| row.promise == promise).map(|row| row.name).collect();
+    names.join(", ")
+}
+
+/// The longest time of all; marked as a lower bound if the robot still moved at the end of the watch.
+fn longest(entries: &[&Entry], time: impl Fn(&Entry) -> Option<f64>) -> String {
+    /// A robot that moves until the end of the watch was last seen to move a tick or two before.
+    const STILL_S: f64 = 0.5;
+    let moving = |entry: &Entry| {
+        let longest = time(entry)?;
+        let still = longest > REST_WITHIN_S && longest + STILL_S >= entry.watched_s;
+        Some((longest, still))
+    };
+    let times = entries.iter().filter_map(|entry| moving(entry));
+    let longest = times.max_by(|a, b| a.0.total_cmp(&b.0));
+    longest.map_or("-".to_owned(), |(seconds, still)| {
+        let more = if still { "> " } else { "" };
+        format!("{more}{seconds:.2} s")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entry(fault: RobotFault) -> Entry {
+        Entry {
+            fault,
+            seed: 1,
+            fault_began: true,
+            last_moving_s: Some(0.7),
+            rest_s: Some(0.9),
+            watched_s: 10.0,
+            collisions: 0,
+            outcome: "goes on".to_owned(),
+            reason: "robot lost".to_owned(),
+        }
+    }
+
+    #[test]
+    fn a_promise_is_broken_by_motion_a_touch_a_wrong_place_or_silence_about_the_reason() {
+        use RobotFault::{CountsReset, RangeSilent, Silence};
+        #[rustfmt::skip]
+        let rows = [
+            (entry(Silence), true),
+            (Entry { last_moving_s: Some(2.1), ..entry(Silence) }, false),
+            (Entry { rest_s: Some(9.9), ..entry(Silence) }, false),
+            (Entry { collisions: 1, ..entry(Silence) }, false),
+            (Entry { reason: String::new(), ..entry(Silence) }, false),
+            (Entry { fault_began: false, ..entry(Silence) }, false),
+            (Entry { rest_s: Some(9.9), ..entry(CountsReset) }, true),
+            (Entry { collisions: 1, ..entry(CountsReset) }, false),
+            (Entry { outcome: "wrong_place".to_owned(), ..entry(CountsReset) }, false),
+            (Entry { collisions: 1, ..entry(RangeSilent) }, false),
+            (Entry { fault_began: false, ..entry(RangeSilent) }, false),
+        ];
+        for (entry, kept) in rows {
+            assert_eq!(entry.is_kept(), kept, "{entry:?}");
+            assert_eq!(StopTimeTable { entries: vec![entry] }.is_kept(), kept);
+        }
+    }
+
+    #[test]
+    fn the_table_shows_the_longest_time_of_each_kind_and_who_still_moved() {
+        let moved = Entry { last_moving_s: Some(9.9), ..entry(RobotFault::Silence) };
+        let table = StopTimeTable { entries: vec![entry(RobotFault::Silence), moved] };
+        let text = table.to_string();
+        let row = text.lines().nth(1).unwrap_or_default();
+        let words: Vec<_> = row.split_whitespace().collect();
+        let want = "silence > 9.90 s 0.90 s 0 1 of 2 goes on: robot lost";
+        assert_eq!(words.join(" "), want);
+    }
+}

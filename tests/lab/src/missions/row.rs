@@ -1,0 +1,280 @@
+//! One mission's result: a row of the table.
+
+use mission_control::outcome::Outcome as Reported;
+use serde::{Deserialize, Serialize};
+use summary::Summary;
+
+use crate::missions::{
+    setting::Setting,
+    table::{Key, Record},
+    trial::Trial,
+};
+
+/// The outcome of a mission by the ground truth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// The robot is at the target and has touched nothing.
+    Success,
+    Collision,
+    Timeout,
+    /// The robot reported its arrival in a wrong place.
+    WrongPlace,
+    /// The robot gave up although a path to the target exists.
+    Unreachable,
+    Aborted,
+}
+
+impl Outcome {
+    /// Every outcome, in the order of the reports.
+    pub const ALL: [Self; 6] = [
+        Self::Success,
+        Self::Collision,
+        Self::Timeout,
+        Self::WrongPlace,
+        Self::Unreachable,
+        Self::Aborted,
+    ];
+
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Success => "success",
+            Self::Collision => "collision",
+            Self::Timeout => "timeout",
+            Self::WrongPlace => "wrong_place",
+            Self::Unreachable => "unreachable",
+            Self::Aborted => "aborted",
+        }
+    }
+}
+
+/// One mission's result, in metres and mission seconds. Latencies differ in every run and have a table of their own, see
+/// [`Latency`](crate::missions::latency::Latency).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    pub world: String,
+    /// Seed of the simulation's noise.
+    pub seed: u64,
+    pub setting: String,
+    pub planner: String,
+    pub outcome: Outcome,
+    pub reason: String,
+    pub time_s: f64,
+    /// Distance driven by the ground truth.
+    pub path_m: f64,
+    pub straight_m: f64,
+    /// Length of the body's shortest path.
+    pub shortest_m: f64,
+    /// K of the paper: path divided by straight distance.
+    pub k: f64,
+    /// Success weighted by path length: shortest / max(path, shortest), 0 without success.
+    pub spl: f64,
+    /// BARN score; none without an optimal time.
+    pub barn_score: Option<f64>,
+    pub min_clearance_m: Option<f64>,
+    /// MRPB's metrics, see [`Summary`]: share of the time near something, path smoothness, velocity smoothness.
+    pub p_o: Option<f64>,
+    pub f_ps_m2: Option<f64>,
+    pub f_vs_m_s2: Option<f64>,
+    /// Distance from the estimated to the true position at the end.
+    pub pose_error_m: Option<f64>,
+    /// The expected root mean square of that error, by the covariance of the last pose.
+    pub pose_error_expected_m: Option<f64>,
+    pub true_distance_m: Option<f64>,
+    pub safety_events: u64,
+    /// Share of the ticks in which the sonar gave no distance.
+    pub sonar_unavailable_share: Option<f64>,
+    /// Dynamic range of the wheel signals: the greatest commanded speed of either wheel less the least one, rad/s.
+    pub wheel_range_rad_s: Option<f64>,
+    pub looks: u64,
+    pub look_s: f64,
+    pub replans: u64,
+    pub resets: u64,
+    pub full_solves: u64,
+}
+
+/// The multiples of the optimal time up to which a robot gets the best score, and from which on the worst.
+const BARN_CLIP: [f64; 2] = [2.0, 8.0];
+/// The speed of the challenge's optimal times, m/s.
+const BARN_SPEED_M_S: f64 = 2.0;
+
+impl Row {
+    /// The row of `trial`, run with noise `seed` under `setting`, that ended with `summary`.
+    pub fn new(trial: &Trial, seed: u64, setting: &Setting, summary: &Summary) -> Self {
+        let rules = &trial.rules;
+        let straight_m = trial.mission.target.length();
+        let started_s =
+            if rules.clock_after_departure { summary.departed_s.unwrap_or_default() } else { 0.0 };
+        let time_s = (summary.mission_time_s - started_s).max(0.0);
+        let late = rules.most_s.is_some_and(|most_s| time_s > most_s);
+        let outcome = match outcome(summary, rules.success_within_m) {
+            Outcome::Success if late => Outcome::Timeout,
+            outcome => outcome,
+        };
+        let success = outcome == Outcome::Success;
+        let spl = trial.shortest_m / summary.path_length_m.max(trial.shortest_m);
+        let reference_s = rules.optimal_time_s.unwrap_or(trial.shortest_m / BARN_SPEED_M_S);
+        let barn_score = rules.scored.then_some(reference_s).map(|optimal| {
+            let [least, most] = BARN_CLIP.map(|times| times * optimal);
+            if success { optimal / time_s.clamp(least, most) } else { 0.0 }
+        });
+        Self {
+            world: trial.world.clone(),
+            seed,
+            setting: setting.name.clone(),
+            planner: setting.planner.clone(),
+            outcome,
+            reason: summary.reason.clone(),
+            time_s,
+            path_m: summary.path_length_m,
+            straight_m,
+            shortest_m: trial.shortest_m,
+            k: summary.path_length_m / straight_m,
+            spl: if success { spl } else { 0.0 },
+            barn_score,
+            min_clearance_m: summary.min_clearance_m,
+            p_o: summary.p_o,
+            f_ps_m2: summary.f_ps_m2,
+            f_vs_m_s2: summary.f_vs_m_s2,
+            pose_error_m: summary.pose_error_m,
+            pose_error_expected_m: summary.pose_error_expected_m,
+            true_distance_m: summary.true_distance_m,
+            safety_events: summary.safety_events,
+            sonar_unavailable_share: summary.sonar_unavailable_share,
+            wheel_range_rad_s: summary.wheel_range_rad_s,
+            looks: summary.looks,
+            look_s: summary.look_s,
+            replans: summary.replans.into(),
+            resets: summary.resets,
+            full_solves: summary.full_solves,
+        }
+    }
+
+    /// The row of a mission without a summary.
+    pub fn aborted(trial: &Trial, seed: u64, setting: &Setting, reason: String) -> Self {
+        let nothing = Summary { reason, ..Summary::default() };
+        Self::new(trial, seed, setting, &nothing)
+    }
+}
+
+impl Record for Row {
+    fn key(&self) -> Key {
+        (self.world.clone(), self.seed, self.setting.clone())
+    }
+}
+
+fn outcome(summary: &Summary, success_within_m: f64) -> Outcome {
+    let there = summary.true_distance_m.is_some_and(|distance| distance <= success_within_m);
+    match summary.outcome {
+        Reported::Reached | Reported::ReachedUnsure | Reported::WrongPlace => {
+            if there {
+                Outcome::Success
+            } else {
+                Outcome::WrongPlace
+            }
+        }
+        Reported::Collision => Outcome::Collision,
+        Reported::Timeout => Outcome::Timeout,
+        Reported::Unreachable => Outcome::Unreachable,
+        Reported::Aborted | Reported::CouldNotBeStopped => Outcome::Aborted,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::missions::{table::Table, trial::Rules};
+    use common::mission::Mission;
+    use std::{fs, path::Path};
+
+    fn setting() -> Setting {
+        Setting { name: "a".to_owned(), planner: "harmonic".to_owned(), set: Vec::new() }
+    }
+
+    fn trial(optimal_time_s: Option<f64>) -> Trial {
+        let mission = Mission::parse("target = [4, 0]", Path::new("test.toml")).unwrap();
+        Trial {
+            world: "test".to_owned(),
+            mission,
+            shortest_m: 4.0,
+            rules: Rules {
+                optimal_time_s,
+                scored: optimal_time_s.is_some(),
+                clock_after_departure: optimal_time_s.is_some(),
+                ..Rules::default()
+            },
+        }
+    }
+
+    fn summary(outcome: Reported, true_distance_m: f64) -> Summary {
+        Summary {
+            outcome,
+            mission_time_s: 30.0,
+            path_length_m: 5.0,
+            true_distance_m: Some(true_distance_m),
+            departed_s: Some(6.0),
+            ..Summary::default()
+        }
+    }
+
+    #[test]
+    fn success_is_what_the_ground_truth_says() {
+        let outcome = |said, distance| {
+            Row::new(&trial(None), 1, &setting(), &summary(said, distance)).outcome
+        };
+        assert_eq!(outcome(Reported::Reached, 0.4), Outcome::Success);
+        assert_eq!(outcome(Reported::Reached, 0.6), Outcome::WrongPlace);
+        assert_eq!(outcome(Reported::ReachedUnsure, 0.4), Outcome::Success);
+        assert_eq!(outcome(Reported::ReachedUnsure, 0.6), Outcome::WrongPlace);
+        assert_eq!(outcome(Reported::Collision, 0.1), Outcome::Collision);
+        assert_eq!(outcome(Reported::Timeout, 0.1), Outcome::Timeout);
+    }
+
+    #[test]
+    fn metrics_are_those_of_their_definitions() {
+        let row = Row::new(&trial(None), 1, &setting(), &summary(Reported::Reached, 0.1));
+        assert_eq!((row.k, row.spl, row.barn_score), (1.25, 0.8, None));
+        let lost = Row::new(&trial(None), 1, &setting(), &summary(Reported::Timeout, 3.0));
+        assert_eq!(lost.spl, 0.0);
+    }
+
+    #[test]
+    fn rows_from_before_a_column_was_added_are_read() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let row = Row::new(&trial(None), 1, &setting(), &summary(Reported::Reached, 0.1));
+        Table::open(file.path()).unwrap().add(row.clone()).unwrap();
+        let written = fs::read_to_string(file.path()).unwrap();
+        // The three columns and their neighbours are empty.
+        let former = written.replacen(",p_o,f_ps_m2,f_vs_m_s2", "", 1).replacen(",,,", "", 1);
+        assert_eq!(written.len() - former.len(), ",p_o,f_ps_m2,f_vs_m_s2,,,".len());
+        fs::write(file.path(), former).unwrap();
+        assert_eq!(Table::<Row>::open(file.path()).unwrap().rows(), [row]);
+    }
+
+    #[test]
+    fn the_barn_clock_starts_with_the_motion_and_the_score_is_clipped() {
+        let row = |optimal| {
+            Row::new(&trial(Some(optimal)), 1, &setting(), &summary(Reported::Reached, 0.1))
+        };
+        assert_eq!(row(6.0).time_s, 24.0);
+        assert_eq!(row(6.0).barn_score, Some(0.25));
+        assert_eq!(row(1.0).barn_score, Some(0.125), "eight optimal times and more");
+        assert_eq!(row(20.0).barn_score, Some(0.5), "two optimal times and less");
+    }
+
+    #[test]
+    fn an_arrival_after_the_challenges_time_is_a_timeout_and_a_world_without_an_optimal_time_is_scored()
+     {
+        let row = |most_s| {
+            let mut trial = trial(None);
+            trial.rules = Rules { most_s, scored: true, ..trial.rules };
+            Row::new(&trial, 1, &setting(), &summary(Reported::Reached, 0.1))
+        };
+        let time_s = row(None).time_s;
+        assert_eq!(row(Some(time_s)).outcome, Outcome::Success);
+        // The shortest path of 4 m takes 2 s at 2 m/s; the best score is half of that share, the least an eighth.
+        assert!(row(None).barn_score >= Some(0.125));
+        assert_eq!(row(Some(time_s - 1.0)).outcome, Outcome::Timeout);
+        assert_eq!(row(Some(time_s - 1.0)).barn_score, Some(0.0));
+    }
+}

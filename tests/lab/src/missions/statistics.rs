@@ -1,0 +1,118 @@
+//! Shares, differences of shares and their confidence intervals; medians and means.
+
+use serde::Serialize;
+
+/// Quantile of the normal distribution for 95 %.
+const Z: f64 = 1.959_963_984_540_054;
+
+/// A value with its 95 % interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    pub value: f64,
+    pub low: f64,
+    pub high: f64,
+}
+
+/// The share of `hits` in `n`, with Wilson's interval (Wilson 1927).
+pub fn share(hits: usize, n: usize) -> Estimate {
+    if n == 0 {
+        return Estimate { value: f64::NAN, low: 0.0, high: 1.0 };
+    }
+    let (hits, n) = (hits as f64, n as f64);
+    let value = hits / n;
+    let z2 = Z * Z;
+    let middle = (value + z2 / (2.0 * n)) / (1.0 + z2 / n);
+    let half = Z / (1.0 + z2 / n) * (value * (1.0 - value) / n + z2 / (4.0 * n * n)).sqrt();
+    Estimate { value, low: (middle - half).max(0.0), high: (middle + half).min(1.0) }
+}
+
+/// The difference of two shares on the same `n` worlds: `gained` worlds count only in the second setting, `lost` only in the
+/// first. Wald's interval with half a pair added to each cell (Agresti and Min 2005).
+pub fn paired_difference(gained: usize, lost: usize, n: usize) -> Estimate {
+    let (gained, lost, n) = (gained as f64, lost as f64, n as f64);
+    let value = if n > 0.0 { (gained - lost) / n } else { f64::NAN };
+    let (gained, lost, n) = (gained + 0.5, lost + 0.5, n + 2.0);
+    let middle = (gained - lost) / n;
+    let half = Z * (gained + lost - (gained - lost).powi(2) / n).sqrt() / n;
+    Estimate { value, low: (middle - half).max(-1.0), high: (middle + half).min(1.0) }
+}
+
+/// The value that `share` of all values do not exceed; none without values.
+pub fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
+    let mut values: Vec<f64> = values.into_iter().collect();
+    values.sort_by(f64::total_cmp);
+    let last = values.len().checked_sub(1)?;
+    values.get((last as f64 * share).round() as usize).copied()
+}
+
+pub fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    Some(Spread::of(values)?.median)
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Spread {
+    pub low: f64,
+    pub median: f64,
+    pub high: f64,
+}
+
+impl Spread {
+    /// The quartiles, linear between neighbours; none without values.
+    pub fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
+        let mut values: Vec<f64> = values.collect();
+        values.sort_by(f64::total_cmp);
+        let last = values.len().checked_sub(1)?;
+        let at = |share: f64| {
+            let place = share * last as f64;
+            let (below, above) = (values[place.floor() as usize], values[place.ceil() as usize]);
+            below + (above - below) * place.fract()
+        };
+        Some(Self { low: at(0.25), median: at(0.5), high: at(0.75) })
+    }
+}
+
+pub fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, n) = values.fold((0.0, 0.0), |(sum, n), value| (sum + value, n + 1.0));
+    (n > 0.0).then_some(sum / n)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn close(found: Estimate, low: f64, high: f64) {
+        assert!((found.low - low).abs() < 5e-4, "{found:?}");
+        assert!((found.high - high).abs() < 5e-4, "{found:?}");
+    }
+
+    #[test]
+    fn wilsons_interval_is_that_of_its_tables() {
+        close(share(0, 10), 0.0, 0.2775);
+        close(share(5, 10), 0.2366, 0.7634);
+        close(share(81, 263), 0.2553, 0.3662);
+    }
+
+    #[test]
+    fn a_paired_difference_depends_on_the_worlds_that_differ_alone() {
+        let found = paired_difference(12, 4, 100);
+        assert_eq!(found.value, 0.08);
+        assert!(found.low > 0.0 && found.high < 0.17, "{found:?}");
+        let none = paired_difference(0, 0, 100);
+        assert!(none.low < 0.0 && none.high > 0.0, "{none:?}");
+    }
+
+    #[test]
+    fn a_spread_holds_the_middle_half() {
+        let spread = Spread::of([5.0, 1.0, 2.0, 4.0, 3.0].into_iter()).unwrap();
+        assert_eq!((spread.low, spread.median, spread.high), (2.0, 3.0, 4.0));
+        assert_eq!(Spread::of(std::iter::empty()), None);
+    }
+
+    #[test]
+    fn medians_and_means_of_nothing_are_none() {
+        assert_eq!(median([3.0, 1.0, 2.0].into_iter()), Some(2.0));
+        assert_eq!(median([4.0, 1.0].into_iter()), Some(2.5));
+        assert_eq!(median(std::iter::empty()), None);
+        assert_eq!(mean(std::iter::empty()), None);
+    }
+}

@@ -1,0 +1,160 @@
+//! A trial: a mission in a solvable world, and the rules of its judgement.
+
+use common::{
+    geometry::Shapes,
+    mission::{Heights, Mission, MissionError, Realism, Thing},
+};
+use glam::DVec2;
+use mission_control::outcome::RIGHT_PLACE_M;
+use std::path::Path;
+
+use report::shortest_path::{ShortestPath, shortest_path};
+
+/// The perimeter's width is a multiple of this, metres: a whole number of cells by both methods.
+const WIDTH_STEP_M: f64 = 0.1;
+/// Free ground between the things of a world and the perimeter, metres.
+const RIM_M: f64 = 0.6;
+/// Mission seconds allowed beside those of [`Rules::most_s`], to turn before the clock starts.
+const BEFORE_CLOCK_S: f64 = 20.0;
+
+/// The rules by which the ground truth judges a mission.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rules {
+    /// Distance from the target beyond which an arrival is in the wrong place, metres.
+    pub success_within_m: f64,
+    /// Whether the clock starts once the robot has moved 0.1 m, as BARN's does, or with the mission.
+    pub clock_after_departure: bool,
+    /// Time after the clock's start within which an arrival is a success, seconds; none if the mission's timeout limits it.
+    pub most_s: Option<f64>,
+    pub scored: bool,
+    /// Time of the reference path at 2 m/s, seconds, for the score; none if the shortest path of the body takes its place.
+    pub optimal_time_s: Option<f64>,
+}
+
+impl Default for Rules {
+    fn default() -> Self {
+        Self {
+            success_within_m: RIGHT_PLACE_M,
+            clock_after_departure: false,
+            most_s: None,
+            scored: false,
+            optimal_time_s: None,
+        }
+    }
+}
+
+/// A world with a start and a target, in the frame of the world it comes from.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    pub shapes: Shapes,
+    /// The things that move in the world; the shortest path does not regard them.
+    pub things: Vec<Thing>,
+    pub start: DVec2,
+    /// Heading at the start, radians counter-clockwise from x.
+    pub heading: f64,
+    pub target: DVec2,
+}
+
+#[derive(Clone, Debug)]
+pub struct Trial {
+    /// The world's name: its kind and number.
+    pub world: String,
+    /// The mission, its origin at the start of the robot.
+    pub mission: Mission,
+    /// Length of the body's shortest path, metres.
+    pub shortest_m: f64,
+    pub rules: Rules,
+}
+
+impl Trial {
+    /// The trial `world` in `scene`, if a body of `radius_m` can get from start to target with `margin_m` to spare.
+    pub fn new(
+        world: String,
+        scene: &Scene,
+        rules: Rules,
+        body: &BodySize,
+    ) -> Result<Option<Self>, MissionError> {
+        let touched = Heights::preset(Realism::default()).touched(&scene.shapes);
+        let ShortestPath::Found(shortest_m) =
+            shortest_path(&touched, scene.start, scene.target, body.swept_m())
+        else {
+            return Ok(None);
+        };
+        let mut mission = mission(&world, scene)?;
+        mission.timeout_s = rules.most_s.map_or(timeout_s(shortest_m), |it| it + BEFORE_CLOCK_S);
+        Ok(Some(Self { world, mission, shortest_m, rules }))
+    }
+}
+
+impl Trial {
+    /// The trial `world` of an unchanged `mission`, if a body can get from start to target in its world.
+    pub fn of_mission(world: String, mission: Mission, body: &BodySize) -> Option<Self> {
+        let start = mission.start_pose().position;
+        match shortest_path(&mission.obstacles(), start, mission.target, body.swept_m()) {
+            ShortestPath::Found(shortest_m) => {
+                Some(Self { world, mission, shortest_m, rules: Rules::default() })
+            }
+            ShortestPath::None | ShortestPath::TooLarge => None,
+        }
+    }
+}
+
+/// The body for which a world must be solvable.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BodySize {
+    pub radius_m: f64,
+    /// Free ground that must be left on both sides, metres.
+    pub margin_m: f64,
+}
+
+impl BodySize {
+    /// Half the width of the narrowest passage, metres.
+    pub fn swept_m(&self) -> f64 {
+        self.radius_m + self.margin_m
+    }
+}
+
+/// Mission seconds for a path of `metres`: four times the time of a robot at 0.25 m/s, and half a minute.
+fn timeout_s(metres: f64) -> f64 {
+    (30.0 + 16.0 * metres).round()
+}
+
+/// The mission of `scene`: origin at the start, x along the x of the scene's own frame.
+fn mission(world: &str, scene: &Scene) -> Result<Mission, MissionError> {
+    let target = scene.target - scene.start;
+    let shapes = moved(&scene.shapes, -scene.start);
+    let (least, greatest) = bounds(&shapes, target);
+    let centre = (least + greatest) / 2.0;
+    let width_m =
+        (((greatest - least).max_element() + 2.0 * RIM_M) / WIDTH_STEP_M).ceil() * WIDTH_STEP_M;
+    let text = format!(
+        "target = [{:?}, {:?}]\nperimeter = {{ width_m = {width_m:?}, centre = [{:?}, {:?}] }}",
+        target.x, target.y, centre.x, centre.y,
+    );
+    let mut mission = Mission::parse(&text, Path::new(world))?;
+    mission.name = world.to_owned();
+    mission.start.heading_deg = scene.heading.to_degrees();
+    mission.world = shapes;
+    let placed = scene.things.iter().cloned();
+    mission.simulation.things =
+        placed.map(|it| Thing { shape: moved(&it.shape, -scene.start), ..it }).collect();
+    Ok(mission)
+}
+
+/// The corners of the bounding box of `shapes`, the origin and the target, metres.
+fn bounds(shapes: &Shapes, target: DVec2) -> (DVec2, DVec2) {
+    let all = shapes.pieces().map(|piece| piece.bounds());
+    let ends = (DVec2::ZERO.min(target), DVec2::ZERO.max(target));
+    all.fold(ends, |(least, greatest), (from, to)| (least.min(from), greatest.max(to)))
+}
+
+/// `shapes` moved by `by`, metres.
+fn moved(shapes: &Shapes, by: DVec2) -> Shapes {
+    let mut shapes = shapes.clone();
+    shapes.drums.iter_mut().for_each(|drum| drum.at += by);
+    shapes.boxes.iter_mut().for_each(|block| block.at += by);
+    for wall in &mut shapes.walls {
+        wall.points.iter_mut().for_each(|point| *point += by);
+    }
+    shapes
+}

@@ -1,0 +1,44 @@
+//! Random numbers: a seed and a stream always give the same ones.
+
+use glam::DVec2;
+use rand_pcg::{Pcg64, rand_core::Rng as _};
+
+#[derive(Clone, Debug)]
+pub struct Random(Pcg64);
+
+impl Random {
+    pub fn new(seed: u64, stream: u128) -> Self {
+        Self(Pcg64::new(seed.into(), stream))
+    }
+
+    /// The numbers of world `number` of the kind `kind` under `seed`.
+    pub fn of_world(seed: u64, kind: u64, number: u64) -> Self {
+        Self::new(seed, u128::from(kind) << 64 | u128::from(number))
+    }
+
+    pub fn bits(&mut self) -> u64 {
+        self.0.next_u64()
+    }
+
+    /// A number that is uniform in [0, 1).
+    pub fn share(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// A number that is uniform in [`from`, `to`).
+    pub fn within(&mut self, from: f64, to: f64) -> f64 {
+        from + (to - from) * self.share()
+    }
+
+    /// A point that is uniform over the square of half side `half` around `centre`.
+    pub fn point(&mut self, centre: DVec2, half: DVec2) -> DVec2 {
+        let x = self.within(-half.x, half.x);
+        let y = self.within(-half.y, half.y);
+        centre + DVec2::new(x, y)
+    }
+
+    /// One of 0 to `n` - 1.
+    pub fn below(&mut self, n: usize) -> usize {
+        ((self.share() * n as f64) as usize).min(n.saturating_sub(1))
+    }
+}

@@ -1,0 +1,52 @@
+//! The executable `firsthand`, which the laboratory starts, and the processes of this machine.
+
+use std::{
+    ffi::OsStr,
+    fmt::Display,
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use console::failure::Refused;
+use processes::{executable, process};
+
+/// The path of `firsthand`, beside this executable or on `PATH`.
+///
+/// # Errors
+/// It is at neither place.
+pub fn path() -> Result<PathBuf, Refused> {
+    executable::find(Path::new("firsthand")).map_err(|problem| {
+        let build = "build it with `cargo build --release`";
+        Refused::new("not-built", format!("firsthand: {problem}; {build}"))
+    })
+}
+
+/// A subcommand of `firsthand` in a process of its own. It does not start if there is no `firsthand`, see [`path`].
+pub fn firsthand(arguments: &[&str]) -> Command {
+    let mut command = process::child(path().unwrap_or_default());
+    command.args(arguments);
+    command
+}
+
+/// `firsthand run` or `firsthand calibrate` of `robot` in `mission`, with assignments, which prints its result as JSON.
+pub fn mission(
+    subcommand: &str,
+    mission: impl AsRef<OsStr>,
+    robot: impl Display,
+    set: &[String],
+) -> Command {
+    let mut command = firsthand(&[subcommand, "--json", "--robot", &robot.to_string()]);
+    command.arg(mission).args(set.iter().flat_map(|assignment| ["--set", assignment]));
+    command
+}
+
+pub fn processes() -> impl Iterator<Item = u32> {
+    let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
+    entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok())
+}
+
+/// The command line of `process`, a zero byte after each word; empty if it has ended.
+pub fn command_line(process: u32) -> Vec<u8> {
+    fs::read(format!("/proc/{process}/cmdline")).unwrap_or_default()
+}

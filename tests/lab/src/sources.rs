@@ -1,0 +1,222 @@
+//! Simulated sources of fixes and turns: a camera and a gyro that see a simulated robot by the ground truth of its run.
+
+use std::{
+    collections::VecDeque,
+    fs::File,
+    io::{self, BufRead as _, BufReader},
+    path::PathBuf,
+    time::Duration,
+};
+
+use clap::Args;
+use common::ground_truth::GROUND_TRUTH;
+use common::{
+    bus::{Bus, BusError, Reader, Writer},
+    domain::{Domain, RobotName},
+    follower::{Event, Follower},
+    ground_truth::GroundTruthTick,
+    samples::{FixSample, PoseSample, TurnSample, name},
+    topics,
+};
+
+use console::output::print_text;
+
+use crate::{
+    error::{Failure, system},
+    random::Random,
+};
+
+/// Publish what a camera and a gyro would measure of a simulated robot, until its run ends.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// The directory of the run, with the ground truth.
+    run: PathBuf,
+    /// The robot.
+    #[arg(long, default_value = "x80")]
+    robot: RobotName,
+    /// Fixes a second of mission time; 0 for none.
+    #[arg(long, value_name = "HZ", default_value_t = 1.0)]
+    fixes: f64,
+    /// Standard deviation of a fix in x and in y, metres.
+    #[arg(long, value_name = "M", default_value_t = 0.05)]
+    fix_error: f64,
+    /// Share of the fixes that are off by one metre.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    jumps: f64,
+    /// A gyro with this noise, degrees per square root of a second. It has a bias of 0.02 degrees a second and a scale of 1.005.
+    #[arg(long, value_name = "NOISE")]
+    gyro: Option<f64>,
+    /// Seed of the noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+const GYRO_BIAS_DEG_S: f64 = 0.02;
+const GYRO_SCALE: f64 = 1.005;
+/// Poses and ticks of the ground truth that wait for each other, at most.
+const WAITING: usize = 64;
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Published {
+    fixes: u64,
+    turns: u64,
+}
+
+pub fn main(arguments: &Arguments) -> Result<(), Failure> {
+    let Published { fixes, turns } = publish(arguments)?;
+    Ok(print_text(&format!("published {fixes} fixes and {turns} turns\n"))?)
+}
+
+fn publish(arguments: &Arguments) -> Result<Published, Failure> {
+    let open = |bus: &Bus| Ok((bus.reader(&topics::POSE)?, Writers::open(bus)?));
+    let mut robot =
+        Follower::new(Domain::of(arguments.robot.clone()), "sources", &topics::POSE, open);
+    let mut source = Source::new(arguments);
+    loop {
+        match robot.wait(Duration::from_secs(1))? {
+            Event::Connected => source.file = None,
+            Event::Samples((poses, writers)) => source.take(poses, writers)?,
+            Event::Nothing => {}
+            Event::Disconnected => return Ok(source.published),
+        }
+    }
+}
+
+struct Writers {
+    fixes: Writer<FixSample>,
+    turns: Writer<TurnSample>,
+}
+
+impl Writers {
+    fn open(bus: &Bus) -> Result<Self, BusError> {
+        Ok(Self { fixes: bus.writer(&topics::FIX, 1)?, turns: bus.writer(&topics::TURN, 1)? })
+    }
+}
+
+struct Source<'a> {
+    arguments: &'a Arguments,
+    chance: Random,
+    file: Option<BufReader<File>>,
+    /// The beginning of an incomplete line.
+    line: String,
+    truth: VecDeque<GroundTruthTick>,
+    poses: VecDeque<PoseSample>,
+    next_fix_s: f64,
+    turned: Option<(f64, f64)>,
+    published: Published,
+}
+
+impl<'a> Source<'a> {
+    fn new(arguments: &'a Arguments) -> Self {
+        Self {
+            arguments,
+            chance: Random::new(arguments.seed, 23),
+            file: None,
+            line: String::new(),
+            truth: VecDeque::new(),
+            poses: VecDeque::new(),
+            next_fix_s: 0.0,
+            turned: None,
+            published: Published::default(),
+        }
+    }
+
+    fn take(
+        &mut self,
+        poses: &mut Reader<PoseSample>,
+        writers: &mut Writers,
+    ) -> Result<(), Failure> {
+        while let Some(pose) = poses.next_sample()? {
+            self.poses.push_back(pose);
+        }
+        self.read_truth().map_err(system("read the ground truth of the run"))?;
+        // A pose tells the mission time of the ground truth with the same counts.
+        let mut waiting = VecDeque::new();
+        while let Some(pose) = self.poses.pop_front() {
+            match self.truth.iter().position(|truth| truth.is_of(&pose)) {
+                Some(at) => {
+                    waiting.clear();
+                    let truth = self.truth[at];
+                    self.truth.drain(..=at);
+                    self.measure(&pose, &truth, writers)?;
+                }
+                None => waiting.push_back(pose),
+            }
+        }
+        waiting.drain(..waiting.len().saturating_sub(WAITING));
+        self.poses = waiting;
+        Ok(())
+    }
+
+    fn read_truth(&mut self) -> io::Result<()> {
+        if self.file.is_none() {
+            self.file = self.open()?.map(BufReader::new);
+        }
+        let Some(file) = &mut self.file else { return Ok(()) };
+        while file.read_line(&mut self.line)? > 0 && self.line.ends_with('\n') {
+            self.truth.extend(serde_json::from_str::<GroundTruthTick>(&self.line).ok());
+            self.line.clear();
+        }
+        self.truth.drain(..self.truth.len().saturating_sub(WAITING));
+        Ok(())
+    }
+
+    /// The ground truth of the run; none before the simulated robot has written it.
+    fn open(&self) -> io::Result<Option<File>> {
+        match File::open(self.arguments.run.join(GROUND_TRUTH)) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+            opened => opened.map(Some),
+        }
+    }
+
+    fn measure(
+        &mut self,
+        pose: &PoseSample,
+        truth: &GroundTruthTick,
+        writers: &mut Writers,
+    ) -> Result<(), Failure> {
+        let Arguments { fixes, fix_error, jumps, gyro, .. } = *self.arguments;
+        let (tick, time) = (pose.stamp.tick, pose.stamp.time());
+        let now_s = time.seconds();
+        if fixes > 0.0 && now_s >= self.next_fix_s {
+            self.next_fix_s = now_s + 1.0 / fixes;
+            let direction = std::f64::consts::TAU * self.chance.share();
+            let off = if self.chance.share() < jumps { 1.0 } else { 0.0 };
+            let variance = fix_error * fix_error;
+            let fix = FixSample {
+                capture_ns: time.0,
+                source: name("simulated"),
+                x_m: truth.x + fix_error * self.normal() + off * direction.cos(),
+                y_m: truth.y + fix_error * self.normal() + off * direction.sin(),
+                heading_rad: f64::NAN,
+                covariance: [variance, 0.0, 0.0, variance, 0.0, 0.0],
+                ..FixSample::default()
+            };
+            writers.fixes.publish(tick, time, fix)?;
+            self.published.fixes += 1;
+        }
+        if let Some(noise) = gyro {
+            let (before_s, heading) =
+                self.turned.replace((now_s, truth.heading)).unwrap_or((now_s, truth.heading));
+            let seconds = now_s - before_s;
+            let deviation = noise.to_radians() * seconds.max(0.0).sqrt();
+            let turn = TurnSample {
+                capture_ns: time.0,
+                sequence: self.published.turns,
+                turn_rad: (truth.heading - heading) * GYRO_SCALE
+                    + GYRO_BIAS_DEG_S.to_radians() * seconds
+                    + deviation * self.normal(),
+                variance_rad2: deviation * deviation,
+                ..TurnSample::default()
+            };
+            writers.turns.publish(tick, time, turn)?;
+            self.published.turns += 1;
+        }
+        Ok(())
+    }
+
+    /// A number that is nearly normally distributed with the deviation 1: the sum of twelve uniform ones.
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.chance.share()).sum::<f64>() - 6.0
+    }
+}

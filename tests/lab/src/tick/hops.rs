@@ -1,0 +1,175 @@
+//! The latency of five hops between processes that do no work: the cost of the bus alone.
+//!
+//! Topics, payloads, wakeups and waits are those of a tick, and each sample is forwarded at once: wheels, pose, grid,
+//! guidance, command. The rest of a tick's time is the stages' work.
+
+use std::time::{Duration, Instant};
+
+use common::{
+    bus::{Author, Bus, BusError},
+    clock::{MissionTime, monotonic_ns},
+    domain::{Domain, RobotName},
+    latency::Histogram,
+    samples::{CommandSample, GridHeader, GuidanceSample, PoseSample, WheelSample},
+    signals::{SIGTERM, Signals},
+    start::become_child,
+    topics::{self, AnyTopic},
+    waiter::Waiter,
+};
+use processes::{
+    domain::DomainLock,
+    process::{Process, firsthand},
+};
+
+use crate::error::{Failure, LOST, LOST_SAMPLE, system};
+
+/// Cells of the smallest map. No forwarder reads it.
+const CELLS: usize = 64;
+/// The forwarders, by the stage that each stands for.
+pub const PLACES: [&str; 4] = ["dead-reckoning", "mapper", "planner", "controller"];
+/// Pause between samples to forwarders that may not have started yet.
+const SEND_AGAIN: Duration = Duration::from_millis(20);
+/// Trips before the measurement, which map all memory.
+pub const WARM_UP: u64 = 200;
+
+/// Send `trips` samples around the forwarders, one every `period`, or back to back; those that warm up are always back to
+/// back.
+pub fn measure(
+    robot: &RobotName,
+    trips: u64,
+    period: Option<Duration>,
+) -> Result<Histogram, Failure> {
+    let lock = DomainLock::acquire(Domain::of(robot.clone()), CELLS)?;
+    let bus = lock.bus().ok_or(LOST_SAMPLE)?;
+    let mut start = bus.writer(&topics::WHEELS, 1)?;
+    let mut end = bus.reader(&topics::COMMAND)?;
+    let mut waiter = Waiter::default();
+    waiter.on(bus.wakeup(&topics::COMMAND)?);
+    let own = std::process::id().to_string();
+    let mut forwarders = Vec::new();
+    for place in PLACES {
+        let arguments = ["bench", "tick", "--forwarder", place, "--supervisor", &own];
+        let mut command = firsthand(&arguments);
+        command.args(["--robot", &robot.to_string()]);
+        let forwarder = Process::spawn(command).map_err(system("start a forwarder"))?;
+        if let Some(writers) = bus.writers() {
+            let author = Author { process: forwarder.id(), generation: 1 };
+            writers.name([(place.to_owned(), author)]);
+        }
+        forwarders.push(forwarder);
+    }
+    let mut latencies = Histogram::default();
+    for trip in 0..WARM_UP + trips {
+        let began = Instant::now();
+        let mut sent_ns = 0;
+        let mut arrived = false;
+        while !arrived {
+            if began.elapsed() >= LOST {
+                return Err(LOST_SAMPLE.into());
+            }
+            // During the warm-up a forwarder may be missing; then the sample is sent again.
+            if sent_ns == 0 || trip < WARM_UP {
+                sent_ns = monotonic_ns();
+                start.publish(trip, MissionTime::default(), WheelSample::default())?;
+            }
+            waiter.wait(if trip < WARM_UP { SEND_AGAIN } else { LOST })?;
+            while let Some(command) = end.next_sample()? {
+                arrived |= command.stamp.tick == trip;
+            }
+        }
+        if trip >= WARM_UP {
+            latencies.record(monotonic_ns() - sent_ns);
+        }
+        let pause = period.filter(|_| trip >= WARM_UP);
+        if let Some(rest) = pause.and_then(|period| period.checked_sub(began.elapsed())) {
+            waiter.wait(rest)?;
+        }
+    }
+    for forwarder in &mut forwarders {
+        forwarder.end(LOST);
+    }
+    Ok(latencies)
+}
+
+/// Run the forwarder that stands for the stage `place`.
+pub fn run_forwarder(robot: &RobotName, place: &str, supervisor: u32) -> Result<(), Failure> {
+    let mut terminated = Signals::catch(&[SIGTERM]).map_err(system("catch SIGTERM"))?;
+    become_child(place, supervisor)?;
+    let domain = Domain::of(robot.clone());
+    let _stage_lock = domain.enter().map_err(system("enter the domain"))?;
+    let bus = Bus::join(&domain, place)?;
+    let mut waiter = Waiter::default();
+    waiter.on_readable(&terminated)?;
+    let mut forward = forwarder(&bus, place, &mut waiter)?;
+    while !terminated.came() {
+        forward()?;
+        waiter.wait(LOST)?;
+    }
+    Ok(())
+}
+
+/// Forwards all new samples.
+type Forward = Box<dyn FnMut() -> Result<(), BusError>>;
+
+/// A closure that gives, for each sample from `$from`, what `$publish` publishes on `$to`.
+macro_rules! forward {
+    ($next:ident, $from:expr, $to:expr, |$sample:ident, $writer:ident| $publish:expr) => {{
+        let (mut from, mut $writer) = ($from, $to);
+        Box::new(move || {
+            while let Some($sample) = from.$next()? {
+                $publish?;
+            }
+            Ok(())
+        })
+    }};
+}
+
+fn forwarder(bus: &Bus, place: &str, waiter: &mut Waiter) -> Result<Forward, Failure> {
+    let now = MissionTime::default();
+    let (wakes, forward): (&dyn AnyTopic, Forward) =
+        match PLACES.iter().position(|name| *name == place) {
+            Some(0) => (
+                &topics::WHEELS,
+                forward!(
+                    next_sample,
+                    bus.reader(&topics::WHEELS)?,
+                    bus.writer(&topics::POSE, 1)?,
+                    |sample, to| { to.publish(sample.stamp.tick, now, PoseSample::default()) }
+                ),
+            ),
+            Some(1) => (
+                &topics::POSE,
+                forward!(
+                    next_sample,
+                    bus.reader(&topics::POSE)?,
+                    bus.slice_writer(&topics::GRID, 1, CELLS)?,
+                    |sample, to| {
+                        to.publish_slice(sample.stamp.tick, now, GridHeader::default(), &[])
+                    }
+                ),
+            ),
+            Some(2) => (
+                &topics::GRID,
+                forward!(
+                    next_slice,
+                    bus.reader(&topics::GRID)?,
+                    bus.writer(&topics::GUIDANCE, 1)?,
+                    |sample, to| {
+                        to.publish(sample.header().stamp.tick, now, GuidanceSample::default())
+                    }
+                ),
+            ),
+            Some(_) => (
+                &topics::GUIDANCE,
+                forward!(
+                    next_sample,
+                    bus.reader(&topics::GUIDANCE)?,
+                    bus.writer(&topics::COMMAND, 1)?,
+                    |sample, to| { to.publish(sample.stamp.tick, now, CommandSample::default()) }
+                ),
+            ),
+            None => return Err(format!("no forwarder stands for {place:?}").into()),
+        };
+    waiter.on(bus.wakeup(wakes)?);
+    Ok(forward)
+}

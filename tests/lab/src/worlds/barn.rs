@@ -1,0 +1,207 @@
+//! The cylinder worlds of the BARN challenge: from its Gazebo `.world` files, or from a table of cylinders
+//! (`world,x_m,y_m,radius_m`, plain or gzip) beside an optional `index.csv` with each world's optimal time.
+//!
+//! Start, goal and rules are those of the challenge: from (-2.25, 3) with heading +y to (-2.25, 13), success within 1 m, the
+//! clock starts after 0.1 m, 100 s at most. Without an index the optimal time is that of the body's shortest path at 2 m/s.
+
+use std::{
+    collections::BTreeMap,
+    f64::consts::FRAC_PI_2,
+    fs::File,
+    io::{self, Read},
+    path::Path,
+};
+
+use common::geometry::{Drum, Shapes, Wall};
+use glam::DVec2;
+use serde::Deserialize;
+
+use super::error::WorldError;
+use crate::missions::trial::{Rules, Scene};
+
+const START: DVec2 = DVec2::new(-2.25, 3.0);
+const GOAL: DVec2 = DVec2::new(-2.25, 13.0);
+/// Distance from the goal within which a robot has succeeded, metres.
+const SUCCESS_WITHIN_M: f64 = 1.0;
+/// The walls left and right and the wall behind the start, metres; the far side is open.
+const SIDES_M: [f64; 2] = [-4.425, -0.075];
+const BEHIND_M: f64 = 0.075;
+const SIDES_END_M: f64 = 9.6;
+/// Most bytes of a file. A world file has some hundred kilobytes, the table of all worlds one megabyte.
+const LONGEST: u64 = 64 << 20;
+/// Seconds allowed from the clock's start.
+const MOST_S: f64 = 100.0;
+
+#[derive(Deserialize)]
+struct Cylinder {
+    world: u32,
+    x_m: f64,
+    y_m: f64,
+    radius_m: f64,
+}
+
+/// One row of the index, which has further columns.
+#[derive(Deserialize)]
+struct IndexRow {
+    world: u32,
+    optimal_time_s: f64,
+}
+
+pub type Found = (String, Scene, Rules);
+
+/// Every world of a table of cylinders, in the order of their numbers.
+pub fn table(file: &Path) -> Result<Vec<Found>, WorldError> {
+    let mut cylinders: BTreeMap<u32, Vec<Drum>> = BTreeMap::new();
+    for row in rows::<Cylinder>(file)? {
+        cylinders.entry(row.world).or_default().push(Drum {
+            at: DVec2::new(row.x_m, row.y_m),
+            radius_m: row.radius_m,
+            ..Drum::default()
+        });
+    }
+    let index = file.with_file_name("index.csv");
+    let times: BTreeMap<u32, f64> = if index.exists() {
+        let rows = rows::<IndexRow>(&index)?;
+        rows.into_iter().map(|row| (row.world, row.optimal_time_s)).collect()
+    } else {
+        BTreeMap::new()
+    };
+    let world = |(number, drums): (u32, Vec<Drum>)| {
+        let optimal = times.get(&number).copied();
+        (format!("barn-{number:03}"), scene(drums), rules(optimal))
+    };
+    Ok(cylinders.into_iter().map(world).collect())
+}
+
+pub fn gazebo(file: &Path) -> Result<Found, WorldError> {
+    let mut text = String::new();
+    open(file)?.take(LONGEST).read_to_string(&mut text).map_err(WorldError::unreadable(file))?;
+    let drums = cylinders(&text).ok_or_else(|| {
+        WorldError::malformed(file, "no <model> with a <pose> and a <cylinder>; give a BARN world")
+    })?;
+    let name = file.file_stem().unwrap_or_default().to_string_lossy();
+    Ok((format!("barn-{name}"), scene(drums), rules(None)))
+}
+
+/// The cylinders of a world's models: each stands at the last `<pose>` before its radius. None without cylinders.
+fn cylinders(text: &str) -> Option<Vec<Drum>> {
+    let mut drums = Vec::new();
+    for model in text.split("<model ").skip(1) {
+        let model = model.split("</model>").next()?;
+        let value = |tag: &str| {
+            let after = model.split(&format!("<{tag}>")).nth(1)?;
+            after.split('<').next()
+        };
+        let (Some(radius), Some(pose)) = (value("radius"), element(model, "pose")) else {
+            continue;
+        };
+        let mut pose = pose.split_whitespace().map(str::parse::<f64>);
+        if let (Ok(radius_m), Some(Ok(x)), Some(Ok(y))) =
+            (radius.trim().parse(), pose.next(), pose.next())
+        {
+            drums.push(Drum { at: DVec2::new(x, y), radius_m, ..Drum::default() });
+        }
+    }
+    // The world's state at the end of the file repeats the poses.
+    drums.dedup();
+    (!drums.is_empty()).then_some(drums)
+}
+
+/// The text of the first element `tag` of `text`, whatever its attributes.
+fn element<'a>(text: &'a str, tag: &str) -> Option<&'a str> {
+    let after = text.split(&format!("<{tag}")).nth(1)?;
+    after.split_once('>')?.1.split('<').next()
+}
+
+fn scene(drums: Vec<Drum>) -> Scene {
+    let [left, right] = SIDES_M;
+    let corners = [
+        DVec2::new(left, SIDES_END_M),
+        DVec2::new(left, BEHIND_M),
+        DVec2::new(right, BEHIND_M),
+        DVec2::new(right, SIDES_END_M),
+    ];
+    Scene {
+        shapes: Shapes {
+            drums,
+            walls: vec![Wall { points: corners.to_vec(), ..Wall::default() }],
+            ..Shapes::default()
+        },
+        things: Vec::new(),
+        start: START,
+        heading: FRAC_PI_2,
+        target: GOAL,
+    }
+}
+
+pub fn rules(optimal_time_s: Option<f64>) -> Rules {
+    Rules {
+        success_within_m: SUCCESS_WITHIN_M,
+        clock_after_departure: true,
+        most_s: Some(MOST_S),
+        scored: true,
+        optimal_time_s,
+    }
+}
+
+fn open(file: &Path) -> Result<Box<dyn Read>, WorldError> {
+    let opened = File::open(file).map_err(WorldError::unreadable(file))?;
+    let zipped = file.extension().is_some_and(|extension| extension == "gz");
+    Ok(if zipped { Box::new(flate2::read::GzDecoder::new(opened)) } else { Box::new(opened) })
+}
+
+fn rows<T: for<'row> Deserialize<'row>>(file: &Path) -> Result<Vec<T>, WorldError> {
+    let mut reader = csv::Reader::from_reader(open(file)?.take(LONGEST));
+    reader.deserialize().collect::<Result<_, _>>().map_err(|error: csv::Error| match error.kind() {
+        csv::ErrorKind::Io(_) => WorldError::unreadable(file)(io::Error::other(error.to_string())),
+        _ => WorldError::malformed(file, error.to_string()),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cylinders_of_a_gazebo_world_are_read_with_their_places() {
+        let text = "<world><model name='unit_cylinder_1'><pose frame=''>-1.5 2.25 0.5 0 0 0</pose>\
+            <link><collision><geometry><cylinder><radius>0.075</radius><length>1</length></cylinder>\
+            </geometry></collision></link></model><model name='ground'><pose>0 0 0</pose></model></world>";
+        let want = Drum { at: DVec2::new(-1.5, 2.25), radius_m: 0.075, ..Drum::default() };
+        assert_eq!(cylinders(text), Some(vec![want]));
+        assert_eq!(cylinders("<world></world>"), None);
+    }
+
+    #[test]
+    fn a_table_of_cylinders_gives_each_world_with_its_time() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("cylinders.csv");
+        std::fs::write(&file, "world,x_m,y_m,radius_m\n7,0,5,0.075\n7,1,5,0.075\n9,0,6,0.1\n")
+            .unwrap();
+        std::fs::write(
+            folder.path().join("index.csv"),
+            "world,path_length_m,optimal_time_s\n7,12,6.2\n",
+        )
+        .unwrap();
+        let worlds = table(&file).unwrap();
+        let found: Vec<_> = worlds
+            .iter()
+            .map(|(name, scene, rules)| {
+                (name.as_str(), scene.shapes.drums.len(), rules.optimal_time_s)
+            })
+            .collect();
+        assert_eq!(found, [("barn-007", 2, Some(6.2)), ("barn-009", 1, None)]);
+    }
+
+    #[test]
+    fn a_damaged_table_is_refused_with_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("cylinders.csv");
+        std::fs::write(&file, "world,x_m,y_m,radius_m\n7,left,5,0.075\n").unwrap();
+        let refused = table(&file).unwrap_err();
+        assert!(
+            matches!(&refused, WorldError::Malformed { file: named, .. } if *named == file),
+            "{refused}"
+        );
+    }
+}

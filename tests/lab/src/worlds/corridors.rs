@@ -1,0 +1,85 @@
+//! Corridors of smooth walls: straight ones from 0.8 m of width, and oblique ones with bends.
+
+use std::f64::consts::PI;
+
+use common::geometry::{Shapes, Wall};
+use glam::DVec2;
+
+use crate::{missions::trial::Scene, random::Random};
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bends {
+    /// The corridor is straight, along x, and empty.
+    None,
+    /// The corridor has two to four legs, each at an angle of up to 50 degrees with the one before.
+    Oblique,
+}
+
+pub fn draw(random: &mut Random, bends: Bends) -> Scene {
+    let (width, axis) = match bends {
+        Bends::None => {
+            let length = random.within(4.0, 8.0);
+            let axis = vec![DVec2::ZERO, DVec2::new(length, 0.0)];
+            (random.within(0.8, 1.2), axis)
+        }
+        Bends::Oblique => (random.within(1.0, 1.8), oblique(random)),
+    };
+    let (left, right) = (beside(&axis, width / 2.0), beside(&axis, -width / 2.0));
+    let mut points = left;
+    points.extend(right.into_iter().rev());
+    points.extend(points.first().copied());
+    let last = axis.len() - 1;
+    let back = (axis[last - 1] - axis[last]).normalize_or_zero();
+    let ahead = (axis[1] - axis[0]).normalize_or_zero();
+    let heading = match random.below(3) {
+        0 => random.within(-PI, PI),
+        _ => ahead.to_angle(),
+    };
+    Scene {
+        shapes: Shapes { walls: vec![Wall { points, ..Wall::default() }], ..Shapes::default() },
+        things: Vec::new(),
+        start: axis[0] + ahead * 0.6,
+        heading,
+        target: axis[last] + back * 0.7,
+    }
+}
+
+fn oblique(random: &mut Random) -> Vec<DVec2> {
+    let mut axis = vec![DVec2::ZERO];
+    let (mut at, mut angle) = (DVec2::ZERO, random.within(-PI, PI));
+    for _ in 0..2 + random.below(3) {
+        at += DVec2::from_angle(angle) * random.within(1.8, 3.0);
+        axis.push(at);
+        angle += random.within(-50.0, 50.0).to_radians();
+    }
+    axis
+}
+
+/// The line beside `axis` at the distance `by` to its left, metres, mitred at its corners.
+fn beside(axis: &[DVec2], by: f64) -> Vec<DVec2> {
+    let normal = |from: usize| (axis[from + 1] - axis[from]).perp().normalize_or_zero();
+    (0..axis.len())
+        .map(|index| {
+            let before = normal(index.max(1) - 1);
+            let after = normal(index.min(axis.len() - 2));
+            let mitre = (before + after).normalize_or_zero();
+            axis[index] + mitre * (by / mitre.dot(before).max(0.5))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn walls_beside_a_bend_keep_the_width_of_the_corridor() {
+        let axis = [DVec2::ZERO, DVec2::X, DVec2::new(1.0, 1.0)];
+        assert_eq!(
+            beside(&axis, 0.5),
+            [DVec2::new(0.0, 0.5), DVec2::new(0.5, 0.5), DVec2::new(0.5, 1.0)]
+                .map(|point: DVec2| point)
+                .to_vec()
+        );
+    }
+}

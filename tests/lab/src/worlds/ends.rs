@@ -1,0 +1,122 @@
+//! Starts and targets on a map: as given, or from the file `config.txt` of an MRPB map, which has three tests:
+//!
+//! ```text
+//! <arg name="initial_pose_x" default="-12.5"/>
+//! ```
+//!
+//! and `initial_pose_y`, `initial_pose_a` (radians), `goal_pose_x`, `goal_pose_y`. The heading at the goal is not used.
+
+use std::{fs::File, io::Read as _, path::Path};
+
+use glam::DVec2;
+
+use super::error::WorldError;
+
+/// Most bytes of such a file, which has some twenty short lines.
+const LONGEST: u64 = 64 << 10;
+const KEYS: [&str; 5] =
+    ["initial_pose_x", "initial_pose_y", "initial_pose_a", "goal_pose_x", "goal_pose_y"];
+
+/// Start and target of a mission, in the frame of its map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ends {
+    pub start: DVec2,
+    /// Heading at the start, radians counter-clockwise from x.
+    pub heading: f64,
+    pub target: DVec2,
+}
+
+/// The tests of a `config.txt`, in its order.
+pub fn read(file: &Path) -> Result<Vec<Ends>, WorldError> {
+    // The check comes before opening, because opening a pipe waits for its other end.
+    if !file.is_file() {
+        return Err(WorldError::malformed(file, "not a regular file; give MRPB's tests"));
+    }
+    let mut text = String::new();
+    File::open(file)
+        .and_then(|opened| opened.take(LONGEST).read_to_string(&mut text))
+        .map_err(WorldError::unreadable(file))?;
+    parse(&text).map_err(|problem| WorldError::malformed(file, problem))
+}
+
+fn parse(text: &str) -> Result<Vec<Ends>, String> {
+    let mut tests: Vec<[Option<f64>; KEYS.len()]> = Vec::new();
+    for (line, (key, value)) in (1..).zip(text.lines()).filter_map(argument) {
+        let Some(key) = KEYS.iter().position(|name| *name == key) else {
+            continue;
+        };
+        let parsed = value.trim().parse().ok();
+        let number = parsed.filter(|number: &f64| number.abs() <= 1e6);
+        let number = number.ok_or_else(|| {
+            let key = KEYS[key];
+            format!("line {line}: {key} is {value:?}; give metres or radians")
+        })?;
+        match tests.last_mut() {
+            Some(test) if test[key].is_none() => test[key] = Some(number),
+            _ => {
+                let mut test = [None; KEYS.len()];
+                test[key] = Some(number);
+                tests.push(test);
+            }
+        }
+    }
+    if tests.is_empty() {
+        return Err("no <arg name=\"initial_pose_x\" default=\"...\"/>; give MRPB's tests, or remove the file to have starts and targets drawn".to_owned());
+    }
+    let complete = |(number, test): (usize, [Option<f64>; KEYS.len()])| {
+        let missing = KEYS.iter().zip(test).find(|(_, value)| value.is_none());
+        match (test, missing) {
+            ([Some(x), Some(y), Some(heading), Some(to_x), Some(to_y)], _) => {
+                Ok(Ends { start: DVec2::new(x, y), heading, target: DVec2::new(to_x, to_y) })
+            }
+            (_, missing) => {
+                let key = missing.map_or("a key", |(key, _)| key);
+                Err(format!("test {number} has no {key}; add it"))
+            }
+        }
+    };
+    (1..).zip(tests).map(complete).collect()
+}
+
+/// Name and value of the `<arg>` in a numbered line.
+fn argument((line, text): (usize, &str)) -> Option<(usize, (&str, &str))> {
+    let of = |key: &str| {
+        let (_, after) = text.split_once(key)?;
+        let (_, quoted) = after.split_once('"')?;
+        Some(quoted.split_once('"')?.0)
+    };
+    text.trim_start().starts_with("<arg").then_some(())?;
+    Some((line, (of("name=")?, of("default=")?)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEST: &str = "# Test 1\n<arg name=\"initial_pose_x\" default=\"-1.5\"/>\n\
+        <arg name=\"initial_pose_y\" default=\"2\"/>\n<arg name=\"initial_pose_a\" default=\"1.571\"/>\n\n\
+        <arg name=\"goal_pose_x\" default=\"3\"/>\n<arg name=\"goal_pose_y\" default=\"4.25\"/>\n\
+        <arg name=\"goal_pose_a\" default=\"0.0\"/>\n";
+
+    #[test]
+    fn each_test_of_a_file_gives_its_start_and_target() {
+        let ends = parse(&[TEST, TEST].concat()).unwrap();
+        let want =
+            Ends { start: DVec2::new(-1.5, 2.0), heading: 1.571, target: DVec2::new(3.0, 4.25) };
+        assert_eq!(ends, [want, want]);
+    }
+
+    #[test]
+    fn a_damaged_file_is_refused_with_what_is_wrong() {
+        for (text, named) in [
+            (String::new(), "initial_pose_x"),
+            (TEST.replace("4.25", "wall"), "line 7"),
+            (TEST.replace("4.25", "inf"), "goal_pose_y"),
+            (TEST.replace("goal_pose_x", "goal"), "no goal_pose_x"),
+            ([TEST, &TEST[..TEST.len() / 2]].concat(), "test 2 has no "),
+        ] {
+            let refused = parse(&text).unwrap_err();
+            assert!(refused.contains(named), "{refused}");
+        }
+    }
+}

@@ -1,0 +1,281 @@
+//! Worlds from files: missions, BARN's worlds, ROS maps.
+
+use std::{
+    collections::BTreeSet,
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+use common::mission::Mission;
+
+use super::{
+    barn,
+    ends::{self, Ends},
+    error::WorldError,
+    floor::Floor,
+    found::Found,
+};
+use crate::{
+    missions::trial::{BodySize, Rules, Scene, Trial},
+    random::Random,
+};
+
+/// Starts and targets drawn on a map without any, if no number is asked for.
+const DRAWN: usize = 10;
+/// The stream of random numbers of these starts and targets.
+const DRAWN_KIND: u64 = 7;
+/// Name of a map's file of tests, as in MRPB.
+const TESTS_FILE: &str = "config.txt";
+
+#[derive(Clone, Copy, Debug)]
+pub struct Asked {
+    /// Number of worlds; without it all, and ten on each map without tests.
+    pub count: Option<usize>,
+    pub seed: u64,
+    pub ends: Option<Ends>,
+}
+
+/// The worlds of a file, or of all world files in a folder and its subfolders, sorted by name; the requested number, evenly
+/// spread.
+pub fn read(path: &Path, asked: Asked, body: &BodySize) -> Result<Found, WorldError> {
+    let files = if path.is_dir() {
+        files_of(path).map_err(WorldError::unreadable(path))?
+    } else {
+        vec![path.to_path_buf()]
+    };
+    let mut found = Found::default();
+    let mut maps = 0;
+    for file in &files {
+        match kind_of(file) {
+            Some(Kind::Mission) => add_mission(&mut found, file, body)?,
+            Some(Kind::Gazebo) => add_barn(&mut found, vec![barn::gazebo(file)?], body)?,
+            Some(Kind::Cylinders) => add_barn(&mut found, barn::table(file)?, body)?,
+            Some(Kind::Map) => {
+                add_map(&mut found, file, asked, body)?;
+                maps += 1;
+            }
+            None => {
+                return Err(WorldError::malformed(
+                    file,
+                    "not a world; give a mission (.toml), a ROS map (.yaml), a BARN .world or a table of its cylinders (cylinders.csv, .csv.gz)",
+                ));
+            }
+        }
+    }
+    if asked.ends.is_some() && maps == 0 {
+        return Err(WorldError::NoMap);
+    }
+    // In the results a world has the name of its file.
+    let mut names = BTreeSet::new();
+    for Trial { world, .. } in &found.trials {
+        if !names.insert(world) {
+            return Err(WorldError::malformed(
+                path,
+                format!("two worlds are called {world}; give one of them another name"),
+            ));
+        }
+    }
+    if let Some(count) = asked.count {
+        found.spread(count);
+    }
+    Ok(found)
+}
+
+/// The worlds in a folder and its subfolders, sorted by name.
+fn files_of(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for path in entries(folder)? {
+        if path.is_dir() {
+            files.extend(entries(&path)?);
+        } else {
+            files.push(path);
+        }
+    }
+    files.retain(|file| kind_of(file).is_some() && !file.is_dir());
+    files.sort();
+    Ok(files)
+}
+
+fn entries(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect()
+}
+
+fn add_mission(found: &mut Found, file: &Path, body: &BodySize) -> Result<(), WorldError> {
+    let mission = Mission::load(file)?.with_calibration()?;
+    found.add_solvable(Trial::of_mission(mission.name.clone(), mission, body));
+    Ok(())
+}
+
+fn add_barn(
+    found: &mut Found,
+    worlds: Vec<(String, Scene, Rules)>,
+    body: &BodySize,
+) -> Result<(), WorldError> {
+    for (world, scene, rules) in worlds {
+        found.add(world, &scene, rules, body)?;
+    }
+    Ok(())
+}
+
+/// A ROS map as worlds: with the given ends, or its tests, or drawn ones.
+fn add_map(
+    found: &mut Found,
+    file: &Path,
+    asked: Asked,
+    body: &BodySize,
+) -> Result<(), WorldError> {
+    let floor = Floor::load(file)?;
+    let name = map_name(file);
+    let tests = file.with_file_name(TESTS_FILE);
+    let ends = match asked.ends {
+        Some(ends) => vec![ends],
+        None if tests.exists() => ends::read(&tests)?,
+        None => {
+            let count = asked.count.unwrap_or(DRAWN) as u64;
+            let streams = (0..count).map(|number| Random::of_world(asked.seed, DRAWN_KIND, number));
+            floor.draw(streams, body.swept_m())
+        }
+    };
+    for (number, ends) in (1..).zip(ends) {
+        let scene = Scene {
+            shapes: floor.shapes(file, ends.start)?,
+            things: Vec::new(),
+            start: ends.start,
+            heading: ends.heading,
+            target: ends.target,
+        };
+        // A start outside the free ground is not connected to anything.
+        if scene.shapes.is_empty() {
+            found.unsolvable += 1;
+            continue;
+        }
+        found.add(format!("{name}-{number}"), &scene, Rules::default(), body)?;
+    }
+    Ok(())
+}
+
+/// The name of the file, or of its folder if the file is called `map`, as in MRPB.
+fn map_name(file: &Path) -> String {
+    let named = match file.file_stem() {
+        Some(stem) if stem == "map" => file.parent().and_then(Path::file_name).unwrap_or(stem),
+        stem => stem.unwrap_or_default(),
+    };
+    named.to_string_lossy().into_owned()
+}
+
+#[derive(Clone, Copy)]
+enum Kind {
+    Mission,
+    Gazebo,
+    Cylinders,
+    Map,
+}
+
+/// The kinds of files, by the ends of their names.
+const KINDS: [(&str, Kind); 6] = [
+    (".toml", Kind::Mission),
+    (".world", Kind::Gazebo),
+    ("cylinders.csv", Kind::Cylinders),
+    (".csv.gz", Kind::Cylinders),
+    (".yaml", Kind::Map),
+    (".yml", Kind::Map),
+];
+
+fn kind_of(file: &Path) -> Option<Kind> {
+    let name = file.file_name()?.to_string_lossy();
+    KINDS.iter().find(|(end, _)| name.ends_with(end)).map(|(_, kind)| *kind)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec2;
+
+    use super::*;
+
+    const BODY: BodySize = BodySize { radius_m: 0.19, margin_m: 0.05 };
+    const ALL: Asked = Asked { count: None, seed: 1, ends: None };
+
+    fn names(found: &Found) -> Vec<&str> {
+        found.trials.iter().map(|trial| &*trial.world).collect()
+    }
+
+    /// A folder with the map of a hall of 6 m by 3 m at (10, 20), its walls 10 cm thick.
+    fn hall() -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        let (cols, rows) = (60, 30);
+        let grey = |at: usize| {
+            let (col, row) = (at % cols, at / cols);
+            let solid = col == 0 || row == 0 || col + 1 == cols || row + 1 == rows;
+            if solid { 0 } else { 254 }
+        };
+        let mut image = format!("P5 {cols} {rows} 255\n").into_bytes();
+        image.extend((0..cols * rows).map(grey));
+        fs::write(folder.path().join("hall.pgm"), image).unwrap();
+        let yaml = "image: hall.pgm\nresolution: 0.1\norigin: [10, 20, 0]";
+        fs::write(folder.path().join("hall.yaml"), yaml).unwrap();
+        folder
+    }
+
+    #[test]
+    fn a_count_takes_worlds_from_the_whole_of_a_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        for number in 0..10 {
+            let file = folder.path().join(format!("m{number}.toml"));
+            fs::write(file, "target = [2, 0]").unwrap();
+        }
+        let count = Some(3);
+        let found = read(folder.path(), Asked { count, ..ALL }, &BODY).unwrap();
+        assert_eq!(names(&found), ["m3", "m6", "m9"]);
+    }
+
+    #[test]
+    fn a_map_is_a_world_with_the_ends_given_those_of_its_tests_or_drawn_ones() {
+        let folder = hall();
+        let drawn = read(folder.path(), ALL, &BODY).unwrap();
+        assert_eq!(drawn.trials.len(), DRAWN);
+
+        let ends =
+            Ends { start: DVec2::new(11.0, 21.0), heading: 0.0, target: DVec2::new(15.0, 22.0) };
+        let asked = Asked { ends: Some(ends), ..ALL };
+        let given = read(folder.path(), asked, &BODY).unwrap();
+        let mission = &given.trials[0].mission;
+        assert_eq!(mission.target, DVec2::new(4.0, 1.0));
+        let left_m = mission.world.clearance(DVec2::ZERO);
+        assert!((left_m - 0.9).abs() < 1e-9, "the wall at the left: {left_m}");
+        assert!((given.trials[0].shortest_m - 17_f64.sqrt()).abs() < 1e-9);
+
+        let value = |key: &str, value: f64| format!("<arg name=\"{key}\" default=\"{value}\"/>\n");
+        let tests = [
+            value("initial_pose_x", 11.0),
+            value("initial_pose_y", 21.0),
+            value("initial_pose_a", 0.0),
+            value("goal_pose_x", 15.0),
+            value("goal_pose_y", 22.0),
+        ];
+        fs::write(folder.path().join(TESTS_FILE), tests.concat()).unwrap();
+        let tested = read(folder.path(), ALL, &BODY).unwrap();
+        assert_eq!(names(&tested), ["hall-1"]);
+        assert_eq!(&tested.trials[0].mission, mission);
+    }
+
+    #[test]
+    fn what_cannot_be_a_world_is_refused_with_the_file_or_the_option() {
+        let folder = hall();
+        let refused = |path: &Path, asked| read(path, asked, &BODY).unwrap_err().to_string();
+        let image = refused(&folder.path().join("hall.pgm"), ALL);
+        assert!(image.contains("hall.pgm") && image.contains(".yaml"), "{image}");
+
+        let mission = folder.path().join("mission.toml");
+        fs::write(&mission, "target = [2, 0]").unwrap();
+        let ends = Some(Ends { start: DVec2::ZERO, heading: 0.0, target: DVec2::ONE });
+        let no_map = refused(&mission, Asked { ends, ..ALL });
+        assert!(no_map.contains("--start"), "{no_map}");
+
+        let twice = folder.path().join("twice");
+        fs::create_dir(&twice).unwrap();
+        fs::copy(&mission, twice.join("mission.toml")).unwrap();
+        fs::remove_file(folder.path().join("hall.yaml")).unwrap();
+        let twice = refused(folder.path(), ALL);
+        assert!(twice.contains("two worlds are called mission"), "{twice}");
+    }
+}

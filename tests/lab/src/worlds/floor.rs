@@ -1,0 +1,234 @@
+//! A ROS map as a world: every cell that is not known to be free is solid.
+//!
+//! Only solid cells beside ground that is connected to the start matter. They become as few boxes as runs of cells allow.
+
+use std::{collections::VecDeque, f64::consts::PI, path::Path};
+
+use common::geometry::{Box2, Shapes};
+use glam::DVec2;
+use maps::{MOST_BOXES, MapError, PlacedMap};
+
+use super::{ends::Ends, error::WorldError};
+use crate::random::Random;
+
+/// Longest side of a map, metres: that of the check whether it can be crossed.
+const LARGEST_M: f64 = 95.0;
+/// Range of the straight distance to a drawn target, metres.
+const DRAWN_M: [f64; 2] = [3.0, 15.0];
+/// Starts that are drawn before the search for a target is given up.
+const MOST_STARTS: usize = 50;
+
+#[derive(Debug)]
+pub struct Floor {
+    map: PlacedMap,
+}
+
+impl Floor {
+    pub fn load(file: &Path) -> Result<Self, WorldError> {
+        let map = maps::load_placed(file)?;
+        let side_m = map.map.cols.max(map.map.rows) as f64 * map.cell_m;
+        if side_m > LARGEST_M {
+            return Err(WorldError::TooLarge {
+                file: file.to_path_buf(),
+                side_m,
+                most_m: LARGEST_M,
+            });
+        }
+        Ok(Self { map })
+    }
+
+    /// The shapes around the ground that is connected to `start`, metres.
+    pub fn shapes(&self, file: &Path, start: DVec2) -> Result<Shapes, WorldError> {
+        let free: Vec<bool> = self.map.map.blocked.iter().map(|it| !it).collect();
+        let reached = self.connected(&free, self.cell(start));
+        let mut wanted = vec![false; reached.len()];
+        for cell in self.beside(&reached) {
+            wanted[cell] = true;
+        }
+        let boxes: Vec<Box2> =
+            self.map.boxes(&self.map.map.blocked, wanted).take(MOST_BOXES + 1).collect();
+        if boxes.len() > MOST_BOXES {
+            return Err(MapError::too_many_boxes(file).into());
+        }
+        Ok(Shapes { boxes, ..Shapes::default() })
+    }
+
+    /// For each stream of random numbers a start, and a target 3 to 15 m away that a body which needs `swept_m` around
+    /// its centre can reach; fewer if there is hardly any.
+    pub fn draw(&self, streams: impl Iterator<Item = Random>, swept_m: f64) -> Vec<Ends> {
+        let roomy = self.roomy(swept_m);
+        let places: Vec<usize> = (0..roomy.len()).filter(|&at| roomy[at]).collect();
+        // If one draw finds nothing, the next hardly would.
+        streams.map_while(|mut random| self.draw_one(&mut random, &roomy, &places)).collect()
+    }
+
+    /// One start and target on the cells `roomy`, which are those of `places`.
+    fn draw_one(&self, random: &mut Random, roomy: &[bool], places: &[usize]) -> Option<Ends> {
+        for _ in 0..MOST_STARTS {
+            let start = *places.get(random.below(places.len()))?;
+            let connected = self.connected(roomy, Some(start));
+            let at = self.centre(start);
+            let fits = |place: usize| {
+                let distance = self.centre(place).distance(at);
+                connected[place] && (DRAWN_M[0]..=DRAWN_M[1]).contains(&distance)
+            };
+            let targets: Vec<usize> = places.iter().copied().filter(|&it| fits(it)).collect();
+            if let Some(&target) = targets.get(random.below(targets.len())) {
+                return Some(Ends {
+                    start: at,
+                    heading: random.within(-PI, PI),
+                    target: self.centre(target),
+                });
+            }
+        }
+        None
+    }
+
+    /// The cell at a place, if it is on the map.
+    fn cell(&self, at: DVec2) -> Option<usize> {
+        let away = ((at - DVec2::from(self.map.corner_m)) / self.map.cell_m).floor();
+        let size = DVec2::new(self.map.map.cols as f64, self.map.map.rows as f64);
+        let inside = away.cmpge(DVec2::ZERO).all() && away.cmplt(size).all();
+        // Row 0 is at the top.
+        let row = size.y - 1.0 - away.y;
+        inside.then_some((row * size.x + away.x) as usize)
+    }
+
+    fn centre(&self, cell: usize) -> DVec2 {
+        let (col, row) = (cell % self.map.map.cols, cell / self.map.map.cols);
+        self.map.place(col as f64 + 0.5, row as f64 + 0.5)
+    }
+
+    /// The cells of `open` that are connected to `from`, itself included. The rim of a map is never open.
+    fn connected(&self, open: &[bool], from: Option<usize>) -> Vec<bool> {
+        let cols = self.map.map.cols;
+        let mut connected = vec![false; open.len()];
+        let mut next: VecDeque<usize> = from.into_iter().collect();
+        while let Some(cell) = next.pop_front() {
+            if open[cell] && !connected[cell] {
+                connected[cell] = true;
+                next.extend([cell - 1, cell + 1, cell - cols, cell + cols]);
+            }
+        }
+        connected
+    }
+
+    /// The free cells at least `swept_m` away from the middle of any other.
+    fn roomy(&self, swept_m: f64) -> Vec<bool> {
+        let map = &self.map.map;
+        let reach = (swept_m / self.map.cell_m + 0.5).ceil() as usize;
+        let mut roomy: Vec<bool> = map.blocked.iter().map(|it| !it).collect();
+        for solid in self.beside(&roomy.clone()) {
+            let (col, row) = (solid % map.cols, solid / map.cols);
+            for y in row.saturating_sub(reach)..=(row + reach).min(map.rows - 1) {
+                for x in col.saturating_sub(reach)..=(col + reach).min(map.cols - 1) {
+                    let (dx, dy) = (x.abs_diff(col), y.abs_diff(row));
+                    if dx * dx + dy * dy <= reach * reach {
+                        roomy[y * map.cols + x] = false;
+                    }
+                }
+            }
+        }
+        roomy
+    }
+
+    /// The solid cells that touch one of `ground`, by an edge or a corner.
+    fn beside(&self, ground: &[bool]) -> Vec<usize> {
+        let (cols, rows) = (self.map.map.cols, self.map.map.rows);
+        let touches = |cell: usize| {
+            let (col, row) = (cell % cols, cell / cols);
+            let mut around = (row.saturating_sub(1)..=(row + 1).min(rows - 1)).flat_map(|y| {
+                let columns = col.saturating_sub(1)..=(col + 1).min(cols - 1);
+                columns.map(move |x| y * cols + x)
+            });
+            around.any(|cell| ground[cell])
+        };
+        let blocked = &self.map.map.blocked;
+        let solid = (0..blocked.len()).filter(|&cell| blocked[cell]);
+        solid.filter(|&cell| touches(cell)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The floor of a drawing: `#` is solid, cells of half a metre, the lower left corner at (-1, 2).
+    fn floor(rows: &[&str]) -> Floor {
+        let folder = tempfile::tempdir().unwrap();
+        let (cols, number) = (rows[0].len(), rows.len());
+        let mut image = format!("P5 {cols} {number} 255\n").into_bytes();
+        image.extend(rows.concat().bytes().map(|byte| match byte {
+            b'#' => 0,
+            b'?' => 205,
+            _ => 254,
+        }));
+        std::fs::write(folder.path().join("a.pgm"), image).unwrap();
+        let file = folder.path().join("a.yaml");
+        std::fs::write(&file, "image: a.pgm\nresolution: 0.5\norigin: [-1.0, 2.0, 0.0]").unwrap();
+        Floor::load(&file).unwrap()
+    }
+
+    #[test]
+    fn every_solid_cell_beside_the_ground_is_in_a_box_and_no_free_one_is() {
+        let floor = floor(&[
+            "##########",
+            "#...#..???",
+            "#.#.#..###",
+            "#...#....#",
+            "#.##...#.#",
+            "#....#...#",
+            "##########",
+        ]);
+        let start = floor.centre(11);
+        assert_eq!(start, DVec2::new(-0.25, 4.75));
+        let shapes = floor.shapes(Path::new("a.yaml"), start).unwrap();
+        let inside = |cell| shapes.clearance(floor.centre(cell)) < 0.0;
+        let free: Vec<bool> = floor.map.map.blocked.iter().map(|it| !it).collect();
+        assert!((0..free.len()).all(|cell| !free[cell] || !inside(cell)));
+        assert!(floor.beside(&free).into_iter().all(inside));
+        assert!(shapes.boxes.len() < 14, "{}", shapes.boxes.len());
+    }
+
+    #[test]
+    fn what_no_robot_can_come_near_is_left_out() {
+        let floor = floor(&["#######", "#.###.#", "#######"]);
+        let shapes = floor.shapes(Path::new("a.yaml"), floor.centre(8)).unwrap();
+        let greatest = shapes.pieces().map(|piece| piece.bounds().1.x).fold(f64::MIN, f64::max);
+        assert_eq!(greatest, 0.5);
+        assert!(floor.shapes(Path::new("a.yaml"), DVec2::ZERO).unwrap().is_empty());
+    }
+
+    #[test]
+    fn drawn_ends_are_connected_for_the_body_and_follow_from_the_seed() {
+        let long = [".".repeat(16), "#".repeat(16)];
+        let rows: Vec<String> =
+            [1, 0, 0, 0, 1, 0, 1].map(|solid: usize| format!("#{}#", long[solid])).to_vec();
+        let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
+        let floor = floor(&rows);
+        let draw = |seed| floor.draw([Random::of_world(seed, 7, 0)].into_iter(), 0.24)[0];
+        assert_eq!(draw(1), draw(1));
+        assert_ne!(draw(1), draw(2));
+        for seed in 0..20 {
+            let Ends { start, target, .. } = draw(seed);
+            assert!((3.0..=15.0).contains(&start.distance(target)));
+            // The row in the middle of the upper corridor has this y.
+            let middle = 4.25;
+            assert_eq!((start.y, target.y), (middle, middle), "the lower one is too narrow");
+        }
+    }
+
+    #[test]
+    fn a_map_of_a_town_is_refused_with_its_size() {
+        let folder = tempfile::tempdir().unwrap();
+        let image = [b"P5 200 2 255\n".as_slice(), &[254; 400]].concat();
+        std::fs::write(folder.path().join("a.pgm"), image).unwrap();
+        let file = folder.path().join("a.yaml");
+        std::fs::write(&file, "image: a.pgm\nresolution: 1\norigin: [0, 0, 0]").unwrap();
+        let refused = Floor::load(&file).unwrap_err();
+        assert!(
+            matches!(&refused, WorldError::TooLarge { file: named, side_m: 200.0, .. } if *named == file),
+            "{refused}"
+        );
+    }
+}

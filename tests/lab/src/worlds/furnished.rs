@@ -1,0 +1,174 @@
+//! Rooms with furniture: tables and chairs on legs 2 to 3 cm thick, low platforms, overhanging shelves, soft sofas and
+//! curtains. Heights and echoes decide what the sonar detects and what the body touches.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use common::geometry::{Box2, Drum, Shapes, Wall};
+use glam::DVec2;
+
+use super::rooms::closed;
+use crate::{missions::trial::Scene, random::Random};
+
+/// Things per square metre of floor: sparse, usual, dense.
+const DENSITIES: [f64; 3] = [0.10, 0.16, 0.22];
+/// Free distance around start and target, metres.
+const KEPT_FREE_M: f64 = 0.5;
+/// Amplitude of an echo from cloth, relative to a hard surface.
+const SOFT: f64 = 0.1;
+/// Distance from a curtain to the wall behind it, metres.
+const BEHIND_CURTAIN_M: f64 = 0.12;
+
+/// Room `number`. The number selects the density.
+pub fn draw(random: &mut Random, number: usize) -> Scene {
+    let distance = random.within(4.0, 7.0);
+    let half_width = random.within(2.0, 3.0);
+    let target = DVec2::new(distance, random.within(-0.5, 0.5) * half_width);
+    let least = DVec2::new(-1.2, -half_width);
+    let greatest = DVec2::new(distance + 1.2, half_width);
+    let mut shapes = Shapes { walls: vec![closed(least, greatest)], ..Shapes::default() };
+    if random.share() < 0.5 {
+        shapes.walls.push(curtain(random, least, greatest));
+    }
+    let extent = greatest - least;
+    let things = (extent.x * extent.y * DENSITIES[number % DENSITIES.len()]).round() as usize;
+    let mut taken: Vec<Place> = Vec::new();
+    for _ in 0..things {
+        let at = random.point((least + greatest) / 2.0, extent / 2.0);
+        let (thing, reach) = thing(random, at);
+        let place = Place { at, reach };
+        let ends_free = thing.clearance(DVec2::ZERO).min(thing.clearance(target)) > KEPT_FREE_M;
+        // Furniture may touch other furniture, and chairs stand partly below tables; walls limit it.
+        if ends_free && place.is_inside(least, greatest) && !taken.iter().any(|it| it.meets(&place))
+        {
+            taken.push(place);
+            shapes.drums.extend(thing.drums);
+            shapes.boxes.extend(thing.boxes);
+        }
+    }
+    Scene {
+        shapes,
+        things: Vec::new(),
+        start: DVec2::ZERO,
+        heading: match random.below(3) {
+            0 => random.within(-PI, PI),
+            _ => 0.0,
+        },
+        target,
+    }
+}
+
+/// Whether a disc of radius `reach` on the floor is free, metres.
+struct Place {
+    at: DVec2,
+    reach: f64,
+}
+
+impl Place {
+    fn is_inside(&self, least: DVec2, greatest: DVec2) -> bool {
+        // Corners may be in a wall, because furniture stands against it.
+        let reach = self.reach * 0.7;
+        (self.at - reach).cmpge(least).all() && (self.at + reach).cmple(greatest).all()
+    }
+
+    fn meets(&self, other: &Self) -> bool {
+        self.at.distance(other.at) < 0.8 * (self.reach + other.reach)
+    }
+}
+
+/// A thing at `at`, and the radius of its floor space, metres.
+fn thing(random: &mut Random, at: DVec2) -> (Shapes, f64) {
+    // Most furniture stands along the walls.
+    let angle = match random.below(3) {
+        0 => random.within(0.0, PI),
+        _ => [0.0, FRAC_PI_2][random.below(2)],
+    };
+    let kind = random.below(10);
+    let size_m = match kind {
+        0..=3 => DVec2::splat(random.within(0.40, 0.48)),
+        4..=5 => DVec2::new(random.within(1.1, 1.6), random.within(0.7, 0.9)),
+        6 => DVec2::new(random.within(0.7, 1.1), random.within(0.5, 0.7)),
+        7..=8 => DVec2::new(random.within(0.3, 0.9), random.within(0.3, 0.7)),
+        _ => DVec2::new(random.within(1.3, 1.8), random.within(0.7, 0.9)),
+    };
+    let block = Box2 { at, size_m, angle_deg: angle.to_degrees(), ..Box2::default() };
+    let shapes = match kind {
+        // These are above the robot: the seat of a chair and the top of a table.
+        0..=3 => on_legs(random, &block, 0.42, 0.47),
+        4..=5 => on_legs(random, &block, 0.70, 0.74),
+        // The shelf of a low table is above the sonar and lower than the robot.
+        6 => {
+            let bottom = random.within(0.20, 0.24);
+            on_legs(random, &block, bottom, bottom + 0.02)
+        }
+        // A step or the foot of a lamp is lower than the sonar.
+        7..=8 => one(Box2 { top_m: Some(random.within(0.05, 0.10)), ..block }),
+        _ => one(Box2 { top_m: Some(0.8), echo: Some(SOFT), ..block }),
+    };
+    (shapes, size_m.length() / 2.0)
+}
+
+fn one(block: Box2) -> Shapes {
+    Shapes { boxes: vec![block], ..Shapes::default() }
+}
+
+/// `top` between two heights, metres, on four legs 2 to 3 cm thick at its corners.
+fn on_legs(random: &mut Random, top: &Box2, bottom_m: f64, top_m: f64) -> Shapes {
+    let radius_m = random.within(0.010, 0.015);
+    let middle = top.at;
+    let legs = top.corners().map(|corner| Drum {
+        // The legs are below the top.
+        at: corner + (middle - corner).normalize_or_zero() * 2.0 * radius_m,
+        radius_m,
+        top_m: Some(bottom_m),
+        ..Drum::default()
+    });
+    Shapes {
+        drums: legs.to_vec(),
+        boxes: vec![Box2 { bottom_m: Some(bottom_m), top_m: Some(top_m), ..top.clone() }],
+        ..Shapes::default()
+    }
+}
+
+/// A curtain along a part of one of the long walls.
+fn curtain(random: &mut Random, least: DVec2, greatest: DVec2) -> Wall {
+    let y = match random.below(2) {
+        0 => least.y + BEHIND_CURTAIN_M,
+        _ => greatest.y - BEHIND_CURTAIN_M,
+    };
+    let width = random.within(1.0, 2.5);
+    let from = random.within(least.x, greatest.x - width);
+    Wall {
+        points: vec![DVec2::new(from, y), DVec2::new(from + width, y)],
+        echo: Some(SOFT),
+        ..Wall::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rooms_have_legs_tops_over_and_in_the_body_low_things_and_soft_ones() {
+        let scenes: Vec<Scene> = (0..30)
+            .map(|number| draw(&mut Random::of_world(1, 6, number), number as usize))
+            .collect();
+        let boxes: Vec<&Box2> = scenes.iter().flat_map(|it| &it.shapes.boxes).collect();
+        let count = |is: &dyn Fn(&Box2) -> bool| boxes.iter().filter(|it| is(it)).count();
+        let (sonar_m, body_top_m) = (0.18, 0.255);
+        let over = count(&|it| it.profile().bottom_m > body_top_m);
+        let overhanging = count(&|it| (sonar_m..body_top_m).contains(&it.profile().bottom_m));
+        let low = count(&|it| it.profile().top_m < sonar_m);
+        let soft = count(&|it| it.profile().echo == SOFT);
+        for (what, number) in
+            [("over", over), ("overhanging", overhanging), ("low", low), ("soft", soft)]
+        {
+            assert!(number >= 5, "{what}: {number}");
+        }
+        let legs: Vec<&Drum> = scenes.iter().flat_map(|it| &it.shapes.drums).collect();
+        assert_eq!(legs.len(), 4 * (over + overhanging));
+        assert!(legs.iter().all(|leg| (0.010..=0.015).contains(&leg.radius_m)));
+        let curtains = scenes.iter().flat_map(|it| &it.shapes.walls);
+        assert!(curtains.filter(|wall| wall.echo == Some(SOFT)).count() >= 5);
+    }
+}

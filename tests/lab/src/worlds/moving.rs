@@ -1,0 +1,194 @@
+//! A hall with cylinders that move, after DynaBARN (A. Nair et al., "DynaBARN: Benchmarking Metric Ground Navigation in Dynamic
+//! Environments", SSRR 2022).
+//!
+//! Its public generator (`github.com/aninair1905/DynaBARN`) and the BARN challenge, which ships its 60 worlds, give the hall,
+//! start, goal and rules; the cylinders' radius and numbers; polynomials through points on whole metres, with ten further
+//! stations; and a speed for each leg, from a normal distribution that ends at the least and greatest speed. The speeds are those
+//! of the trajectories in these worlds, the orders are inferred from their stations, and the standard deviations of the speed are
+//! nominal.
+//!
+//! These are the differences: a cylinder goes back at the end of its path, where DynaBARN's jumps to the beginning; it goes
+//! straight between stations, where DynaBARN's follows a spline; and a path that leaves the hall ends at the last station inside,
+//! not at the wall.
+
+use std::f64::consts::PI;
+
+use common::{
+    geometry::{Box2, Drum, Shapes},
+    mission::{Move, Thing},
+};
+use glam::DVec2;
+
+use super::barn;
+use crate::{
+    missions::trial::{Rules, Scene},
+    random::Random,
+};
+
+const START: DVec2 = DVec2::new(11.0, 0.0);
+const GOAL: DVec2 = DVec2::new(-9.0, 0.0);
+/// Half the side of the hall, metres.
+const HALF_M: f64 = 10.0;
+const WALL_M: f64 = 0.5;
+const RADIUS_M: f64 = 0.5;
+/// Stations of a path beside the points that its polynomial is drawn through, evenly spread along x.
+const STATIONS: usize = 10;
+/// The least time for which cylinders move, seconds: longer than a mission by the challenge's rules.
+const MOVES_S: f64 = 130.0;
+
+/// The difficulty of a world; each range includes its ends.
+struct Difficulty {
+    cylinders: [usize; 2],
+    orders: [usize; 2],
+    speed_m_s: [f64; 2],
+    deviation_m_s: [f64; 2],
+}
+
+/// DynaBARN's easy, medium and hard worlds.
+const DIFFICULTIES: [Difficulty; 3] = [
+    Difficulty {
+        cylinders: [5, 14],
+        orders: [1, 2],
+        speed_m_s: [0.5, 0.9],
+        deviation_m_s: [0.01, 0.1],
+    },
+    Difficulty {
+        cylinders: [15, 19],
+        orders: [2, 4],
+        speed_m_s: [1.0, 1.4],
+        deviation_m_s: [0.05, 0.15],
+    },
+    Difficulty {
+        cylinders: [20, 24],
+        orders: [3, 5],
+        speed_m_s: [1.5, 1.9],
+        deviation_m_s: [0.1, 0.2],
+    },
+];
+
+/// The rules of the challenge. Its score is left out, because it has no reference path for these worlds.
+pub fn rules() -> Rules {
+    Rules { scored: false, ..barn::rules(None) }
+}
+
+/// Hall `number`. The number selects the difficulty.
+pub fn draw(random: &mut Random, number: usize) -> Scene {
+    let difficulty = &DIFFICULTIES[number % DIFFICULTIES.len()];
+    let wall = |at: DVec2, size_m: DVec2| Box2 { at, size_m, ..Box2::default() };
+    let along = DVec2::new(2.0 * HALF_M, WALL_M);
+    let boxes = vec![
+        wall(DVec2::new(-HALF_M, 0.0), DVec2::new(WALL_M, 2.0 * HALF_M)),
+        wall(DVec2::new(0.0, HALF_M), along),
+        wall(DVec2::new(0.0, -HALF_M), along),
+    ];
+    let cylinders = one_of(random, difficulty.cylinders);
+    Scene {
+        shapes: Shapes { boxes, ..Shapes::default() },
+        things: (0..cylinders).map(|_| cylinder(random, difficulty)).collect(),
+        start: START,
+        heading: PI,
+        target: GOAL,
+    }
+}
+
+fn one_of(random: &mut Random, [least, most]: [usize; 2]) -> usize {
+    least + random.below(most - least + 1)
+}
+
+fn cylinder(random: &mut Random, difficulty: &Difficulty) -> Thing {
+    let path = path(random, difficulty);
+    let [least, most] = difficulty.speed_m_s;
+    let mean = random.within(least, most);
+    let deviation = random.within(difficulty.deviation_m_s[0], difficulty.deviation_m_s[1]);
+    let (mut at_s, mut at) = (0.0, path[0]);
+    let mut moves = vec![Move { at_s, by: DVec2::ZERO }];
+    for &next in path.iter().skip(1).chain(path.iter().rev().skip(1)).cycle() {
+        if at_s > MOVES_S {
+            break;
+        }
+        // The speed is drawn by rejection.
+        let speed = loop {
+            let speed = random.within(least, most);
+            if random.share() < (-0.5 * ((speed - mean) / deviation).powi(2)).exp() {
+                break speed;
+            }
+        };
+        at_s += at.distance(next) / speed;
+        at = next;
+        moves.push(Move { at_s, by: at - path[0] });
+    }
+    let drum = Drum { at: path[0], radius_m: RADIUS_M, ..Drum::default() };
+    Thing {
+        shape: Shapes { drums: vec![drum], ..Shapes::default() },
+        from_s: 0.0,
+        until_s: None,
+        moves,
+    }
+}
+
+/// The stations of a path along a polynomial, in either direction; at least the points that the polynomial is drawn through.
+fn path(random: &mut Random, difficulty: &Difficulty) -> Vec<DVec2> {
+    let order = one_of(random, difficulty.orders);
+    let mut points: Vec<DVec2> = Vec::new();
+    while points.len() <= order {
+        let point = random.point(DVec2::ZERO, DVec2::splat(HALF_M + 0.5)).round();
+        if point.abs().max_element() <= HALF_M && points.iter().all(|other| other.x != point.x) {
+            points.push(point);
+        }
+    }
+    let step_m = 2.0 * HALF_M / (STATIONS - 1) as f64;
+    let further = (0..STATIONS).map(|station| {
+        let x = step_m * station as f64 - HALF_M;
+        DVec2::new(x, polynomial(&points, x))
+    });
+    let inside = further.filter(|station| station.y.abs() <= HALF_M);
+    let mut path: Vec<DVec2> = inside.chain(points.iter().copied()).collect();
+    path.sort_by(|a, b| a.x.total_cmp(&b.x));
+    path.dedup();
+    if random.share() < 0.5 {
+        path.reverse();
+    }
+    path
+}
+
+/// The value at `x` of the polynomial through `points`, by Lagrange's formula.
+fn polynomial(points: &[DVec2], x: f64) -> f64 {
+    let share = |own: &DVec2| -> f64 {
+        let others = points.iter().filter(|other| other.x != own.x);
+        others.map(|other| (x - other.x) / (own.x - other.x)).product()
+    };
+    points.iter().map(|own| own.y * share(own)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cylinders_start_clear_of_the_robot_and_move_in_the_hall_at_the_speeds_of_their_difficulty_all_the_time()
+     {
+        for number in 0..30 {
+            let scene = draw(&mut Random::of_world(1, 11, number), number as usize);
+            let Difficulty { cylinders, speed_m_s: [least, most], .. } =
+                DIFFICULTIES[number as usize % 3];
+            assert!((cylinders[0]..=cylinders[1]).contains(&scene.things.len()));
+            for Thing { shape, moves, .. } in &scene.things {
+                let start = shape.drums[0].at;
+                assert!(shape.clearance(START) >= 0.5 - 1e-9, "{start}");
+                assert!(moves.last().unwrap().at_s > MOVES_S);
+                for leg in moves.windows(2) {
+                    let speed = leg[0].by.distance(leg[1].by) / (leg[1].at_s - leg[0].at_s);
+                    assert!((least - 1e-6..=most + 1e-6).contains(&speed), "{speed}");
+                    assert!((start + leg[1].by).abs().max_element() <= HALF_M + 1e-9);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_polynomial_goes_through_its_points() {
+        let points = [DVec2::new(-2.0, 4.0), DVec2::new(0.0, 0.0), DVec2::new(3.0, 9.0)];
+        assert!(points.iter().all(|point| polynomial(&points, point.x) == point.y));
+        assert!((polynomial(&points, 1.0) - 1.0).abs() < 1e-12);
+    }
+}
