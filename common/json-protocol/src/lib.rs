@@ -51,7 +51,7 @@ pub enum Order {
     Drive {
         /// Left and right, rad/s.
         wheels: [f64; 2],
-        /// What `wheels` give: speed ahead, m/s, and turn rate, rad/s.
+        /// The speed ahead, m/s, and the turn rate, rad/s, that `wheels` give.
         twist: [f64; 2],
         for_s: f64,
     },
@@ -104,7 +104,7 @@ impl Lines {
         complete
     }
 
-    /// The rest of a line that has begun does not follow.
+    /// Forget the beginning of a line, because its rest does not follow.
     pub fn reset(&mut self) {
         self.dropped += self.held.len() as u64;
         self.held.clear();

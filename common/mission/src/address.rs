@@ -1,5 +1,3 @@
-//! Where a robot answers and over which transport.
-
 use std::{
     fmt,
     net::{SocketAddr, ToSocketAddrs},

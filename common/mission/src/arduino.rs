@@ -1,5 +1,3 @@
-//! The board of a robot that speaks the protocol of ROSArduinoBridge.
-
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};

@@ -20,9 +20,9 @@ pub enum Light {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Profile {
     pub bottom_m: f64,
-    /// Infinite for a shape that is higher than any robot.
+    /// A shape that is higher than any robot has an infinite top.
     pub top_m: f64,
-    /// Amplitude over that of a hard thing of the same form.
+    /// A hard thing of the same form has 1.
     pub echo: f64,
     pub light: Light,
 }
@@ -98,7 +98,7 @@ shape! {
     /// A crate, desk or cabinet: a rectangle.
     Box2 {
         at: DVec2,
-        /// Along its own two axes.
+        /// The extent along its own two axes.
         size_m: DVec2,
         /// Counter-clockwise.
         #[serde(default)]
@@ -178,7 +178,6 @@ impl Shapes {
     }
 }
 
-/// A drum, a straight edge of a wall, or a box.
 #[derive(Clone, Copy, Debug)]
 pub enum Piece<'a> {
     Drum(&'a Drum),

@@ -1,4 +1,4 @@
-//! Cells and metres: states, windows, and the cells' position in the mission frame.
+//! Cells, their states and windows, and their position in the mission frame.
 
 use std::borrow::Cow;
 
@@ -48,7 +48,7 @@ impl CellState {
     }
 }
 
-/// Fewer leave no room between the perimeter's two sides.
+/// Fewer cells leave no room between the perimeter's two sides.
 pub const MIN_CELLS: u32 = 10;
 /// 4096 x 4096 is the largest field that is solved.
 pub const MAX_CELLS: u32 = 4096;

@@ -12,7 +12,7 @@ pub use drive::Drive;
 pub use pose::{Pose2, Twist};
 
 /// Below this speed, m/s, a wheel may stick in the dead band of its loop (20 counts/s after a gain of 0.78, 11 mm/s).
-/// No robot is ordered to go slower: a lower limit means stand.
+/// A lower speed limit means stand.
 pub const LEAST_SPEED_M_S: f64 = 0.04;
 
 /// Within 11 degrees a robot faces its way: it does not turn on the spot, and where it may not go on it stands.

@@ -188,8 +188,8 @@ pub struct Perimeter {
 }
 
 impl Perimeter {
-    /// Per side, unless the mission says otherwise: the planner follows such a grid at the robot's rate with time to
-    /// spare.
+    /// Cells a side, unless the mission says otherwise: the planner follows such a grid at the robot's rate with time
+    /// to spare.
     const DEFAULT_MOST_CELLS: f64 = 512.0;
 }
 
@@ -244,7 +244,7 @@ pub struct Planner {
 }
 
 impl Planner {
-    /// So short that the field still leads to a gap that an echo narrows.
+    /// The length is so short that the field still leads to a gap that an echo narrows.
     pub const EVIDENTIAL_SCREENING_M: f64 = 0.35;
 }
 
@@ -384,7 +384,6 @@ impl Mission {
         })
     }
 
-    /// The number of used sensors of that kind.
     #[must_use]
     pub fn used(&self, kind: SensorKind) -> usize {
         self.sensor_table().iter().filter(|sensor| sensor.used && sensor.kind == kind).count()

@@ -1,4 +1,4 @@
-//! How the wheels differ from those of the nominal body, and the calibration file that says so.
+//! The wheels' differences from the nominal body, and the calibration file.
 
 use serde::{Deserialize, Serialize};
 
@@ -90,7 +90,6 @@ impl Odometry {
         [both, both * self.diameter_ratio]
     }
 
-    /// Each value with its key in a mission and its range.
     pub(crate) fn ranges(&self) -> [(&'static str, f64, std::ops::RangeInclusive<f64>); 8] {
         [
             ("robot.odometry.diameter_ratio", self.diameter_ratio, 0.8..=1.25),

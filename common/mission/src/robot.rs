@@ -1,5 +1,3 @@
-//! The robot's body: presets and what a mission overrides.
-
 use std::path::PathBuf;
 
 use crate::{
@@ -51,17 +49,15 @@ pub enum Protocol {
     Arduino,
 }
 
-/// A channel of the motor board: a wheel, or a car's steering.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Channel {
-    /// Which of the two encoder channels, 0 or 1.
+    /// One of the two encoder channels, 0 or 1.
     pub channel: u8,
     /// Forward is the negative direction of this channel.
     pub reversed: bool,
 }
 
-/// A model, and only what differs from it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RobotConfig {
@@ -103,7 +99,7 @@ pub struct RobotConfig {
     pub turn_acceleration_rad_s2: Option<f64>,
     /// A car's: the driven axle.
     pub left: Channel,
-    /// A car's: the steering, positive to the left.
+    /// A car's steering, positive to the left.
     pub right: Channel,
     /// The link makes good that the wheels turn slower than commanded; without it [`crate::Mission::speed_trim`].
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -189,7 +185,6 @@ pub struct Body {
     pub top_speed_m_s: f64,
     /// How speed and turn rate may grow, m/s^2 and rad/s^2; infinite if at once. They fall at once on every robot.
     pub acceleration: [f64; 2],
-    /// None for a robot with two driven wheels.
     pub steering: Option<Steering>,
 }
 
@@ -203,7 +198,7 @@ pub struct Steering {
 }
 
 impl Steering {
-    /// Radians, at an encoder that stands at `counts`.
+    /// Radians at an encoder that stands at `counts`.
     #[must_use]
     pub fn angle(&self, counts: f64) -> f64 {
         counts * std::f64::consts::TAU / self.counts_per_turn
@@ -279,7 +274,6 @@ impl Model {
         matches!(self, Self::X80 | Self::X80sv | Self::Car)
     }
 
-    /// Published and measured dimensions of the X80s, nominal ones of the car.
     #[must_use]
     pub const fn body(self) -> Body {
         match self {

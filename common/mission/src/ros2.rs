@@ -1,5 +1,3 @@
-//! The topics of a robot that speaks ROS 2.
-
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::sonar::Mount;
 
-/// Rows, and readings in a sample of `ranges`.
+/// The limit also holds for the readings in a sample of `ranges`.
 pub const MOST_SENSORS: usize = 16;
 pub const MOST_BEAMS: usize = 1081;
 pub const INFRARED_RANGERS: usize = 7;
@@ -33,7 +33,6 @@ const RING: [(f64, f64); INFRARED_RANGERS] = [
     (90.0, 0.121 / 0.19),
 ];
 
-/// The meaning of a reading for the ground ahead.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SensorKind {
@@ -45,7 +44,7 @@ pub enum SensorKind {
     Scan,
 }
 
-/// The product, for the mapper's model of its readings.
+/// A product, for the mapper's model of its readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SensorModel {
@@ -152,7 +151,7 @@ pub struct SensorRow {
     /// The name in logs and reasons.
     pub name: String,
     pub kind: SensorKind,
-    /// A cone's is the sonar's index in the standard frame, 0 to 5, a ray's the infrared ranger, 0 to 6.
+    /// A cone has the sonar's index in the standard frame, 0 to 5, a ray the infrared ranger, 0 to 6.
     pub channel: u8,
     /// Distance from the robot's centre along its bearing.
     pub forward_m: f64,
@@ -167,10 +166,10 @@ pub struct SensorRow {
     /// The default is the model's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reach_m: Option<f64>,
-    /// A laser's, evenly over its field of view; the default is the model's.
+    /// Beams lie evenly over the field of view; the default is the model's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beams: Option<u16>,
-    /// Where it measures less often than the frames come. Readings between are not used.
+    /// A sensor may measure less often than the frames come. Readings between are not used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
     /// The default is the X80's.
@@ -316,7 +315,6 @@ pub(crate) fn front(table: &[Sensor], sonar: &SonarConfig) -> Option<usize> {
     candidates.min_by(|(_, a), (_, b)| ahead(a).total_cmp(&ahead(b))).map(|(index, _)| index)
 }
 
-/// A robot whose only sensor is a laser.
 pub(crate) fn laser(model: SensorModel, forward_m: f64, turned_deg: f64) -> Vec<SensorRow> {
     vec![SensorRow {
         name: "laser".to_owned(),

@@ -25,7 +25,7 @@ pub struct Simulation {
     pub heights: HeightKeys,
     pub battery: BatteryKeys,
     pub radio: RadioKeys,
-    /// Besides the front one and the two at its sides.
+    /// Rangers besides the front one and the two at its sides.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub ring: Vec<Ranger>,
     #[serde(rename = "thing", skip_serializing_if = "Vec::is_empty")]
@@ -68,10 +68,11 @@ pub struct Ranger {
     pub bearing_deg: f64,
 }
 
-/// Not always there, or not always in the same place.
+/// A thing is not always there, or not always in the same place.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Thing {
+    /// The thing before any move.
     pub shape: Shapes,
     /// It appears later if the robot is in its place.
     #[serde(default)]
@@ -84,7 +85,7 @@ pub struct Thing {
     pub moves: Vec<Move>,
 }
 
-/// Keeps wheels from turning for a while, for example a cable around an axle.
+/// A block keeps wheels from turning for a while, for example a cable around an axle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Block {
@@ -359,7 +360,6 @@ impl Simulation {
         }
     }
 
-    /// Each key's value with laboratory, measured and harsh realism.
     pub fn presets() -> impl Iterator<Item = (&'static str, [f64; 3])> {
         let sections = [
             SonarPhysics::PRESETS,

@@ -1,7 +1,7 @@
 //! THE mounting of a ranging sensor, (19), for simulator and mapper.
 //!
-//! (19) puts a hit at distance S + W/2 from the robot's centre along theta + delta. So the ranger is on that line: at
-//! bearing delta from the robot's axis, W/2 from the centre, looking outward. A laser may be turned from that line.
+//! (19) puts a hit at distance S + W/2 from the robot's centre along theta + delta. So the ranger is on that line,
+//! looking outward. A laser may be turned from that line.
 
 use glam::DVec2;
 
@@ -31,7 +31,7 @@ impl Mount {
         self.bearing_rad + self.turned_rad
     }
 
-    /// (19), metres: the point `range_m` away on the axis of a ranger on `robot`.
+    /// The point of (19), metres: `range_m` away on the axis of a ranger on `robot`.
     #[must_use]
     pub fn hit(&self, robot: Pose2, range_m: f64) -> DVec2 {
         let ranger = self.on(robot);

@@ -1,5 +1,5 @@
-//! Messages as CDR, as the OMG's RTPS carries it: plain and of version 1, of either byte order. Each read checks its
-//! bounds, and no length from the wire is trusted.
+//! CDR as the OMG's RTPS carries it: plain, version 1, either byte order. Each read checks its bounds, and no length
+//! from the wire is trusted.
 
 use thiserror::Error;
 
@@ -90,8 +90,8 @@ impl<'a> Reader<'a> {
         Ok(bytes)
     }
 
-    /// Without the zero byte that ends it, and without what is not UTF-8. Fails if the bytes end early, or the text
-    /// is too long.
+    /// Leaves out the zero byte that ends it, and what is not UTF-8. Fails if the bytes end early, or the text is too
+    /// long.
     pub fn text(&mut self) -> Result<&'a str, Malformed> {
         let length = self.length(LONGEST_TEXT)?;
         let text = self.raw(length)?.split(|byte| *byte == 0).next().unwrap_or_default();

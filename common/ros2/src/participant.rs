@@ -131,8 +131,8 @@ pub struct Participant {
 }
 
 impl Participant {
-    /// Join by the network interface with the address `only`, or else by all; by this machine's own alone if the
-    /// environment says so as it does for ROS. Fails if DDS cannot start.
+    /// Join by the interface with the address `only`, or else by all; by this machine's alone if the environment says
+    /// so as it does for ROS. Fails if DDS cannot start.
     pub fn join(domain: u16, only: Option<Ipv4Addr>) -> io::Result<Self> {
         let inner = joined(domain, only)?;
         let rung = eventfd(0, EventfdFlags::NONBLOCK | EventfdFlags::CLOEXEC)?;
@@ -148,6 +148,7 @@ impl Participant {
         Ok(())
     }
 
+    /// Fails if DDS refuses the reader.
     pub fn reader(&self, topic: &Topic, quality: Quality) -> io::Result<Reader> {
         let policies = quality.policies();
         let subscriber = self.inner.create_subscriber(&policies).map_err(io::Error::other)?;
@@ -159,6 +160,7 @@ impl Participant {
         Ok(Reader { inner: reader, bell: self.bell.clone() })
     }
 
+    /// Fails if DDS refuses the writer.
     pub fn writer(&self, topic: &Topic, quality: Quality) -> io::Result<Writer> {
         let policies = quality.policies();
         let publisher = self.inner.create_publisher(&policies).map_err(io::Error::other)?;

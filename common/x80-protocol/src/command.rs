@@ -11,7 +11,7 @@ pub const CHANNELS: usize = 6;
 const ALONE: i16 = i16::MIN;
 /// One client sends this value instead.
 const ALSO_ALONE: i16 = i16::MIN + 1;
-/// It comes before the time limit of a command.
+/// This byte comes before the time limit of a command.
 const TIME_FOLLOWS: u8 = 28;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,7 +46,7 @@ impl Targets {
 pub struct Motion {
     pub quantity: Quantity,
     pub targets: Targets,
-    /// The motion ends after it. Not all robots respect it.
+    /// The motion ends after this time. Not all robots respect it.
     pub limit_ms: Option<u16>,
 }
 
@@ -67,7 +67,7 @@ pub enum Mode {
     Velocity,
 }
 
-/// A command brings up to three PID gains.
+/// A command brings up to three gains.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Gains {
     pub kp: Option<u16>,

@@ -40,7 +40,7 @@ pub struct Decoder {
     buffer: Vec<u8>,
     start: usize,
     tally: DecoderTally,
-    /// They had their CRC computed since the last push.
+    /// Bytes whose CRC was computed since the last push.
     work: Cell<usize>,
 }
 
@@ -191,7 +191,6 @@ fn is_end(bytes: &[u8]) -> Ending {
     }
 }
 
-/// The first frame that begins inside a frame with wrong end bytes.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Inside {
     Nothing,

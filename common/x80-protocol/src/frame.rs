@@ -63,7 +63,6 @@ impl Addressing {
     }
 }
 
-/// Its CRC was right, or it is about to be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame<'a> {
     pub rid: u8,

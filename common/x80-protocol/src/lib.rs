@@ -19,8 +19,8 @@
 //! | 127 | start or stop all three | |
 //! | 255 | ping, acknowledge | ping, acknowledge |
 //!
-//! There is no official document. This description comes from the vendor's manual and from drivers that are in use,
-//! so every message is sent in the commonest form and accepted in all forms.
+//! There is no official document but the vendor's manual, and drivers that are in use, so every message is sent in
+//! the commonest form and accepted in all forms.
 //!
 //! ```
 //! use x80_protocol::{Addressing, Command, Decoder, Report, SystemSignal};

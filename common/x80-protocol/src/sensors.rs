@@ -13,7 +13,6 @@ pub struct Encoder {
     /// Cyclic below [`COUNT_CYCLE`], growing in the channel's positive direction.
     pub position: u16,
     pub speed: u16,
-    /// The wheel turns in the channel's positive direction.
     pub positive: bool,
 }
 
@@ -61,7 +60,7 @@ pub fn counts_restarted(old: [u16; 2], new: [u16; 2]) -> bool {
 /// DID 123.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MotorSensors {
-    /// AD counts of the six channels, like `currents`.
+    /// AD counts of the six channels, as are `currents`.
     pub pots: [u16; 6],
     pub currents: [u16; 6],
     /// Channels 0 and 1.

@@ -1,5 +1,3 @@
-//! Bytes and AD counts to metres and volts, and back.
-
 use std::ops::RangeInclusive;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -9,7 +9,7 @@ pub(crate) enum Answer {
     Invalid,
     /// Two numbers, left and right. No other request is answered so.
     Counts([i32; 2]),
-    /// Greater than any range.
+    /// A number greater than any range.
     Baud,
     /// A smaller number, a range if a sonar was asked.
     Centimetres(u16),

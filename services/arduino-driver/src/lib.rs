@@ -6,19 +6,17 @@
 //! rules keep an answer from being taken for that of another request:
 //!
 //! 1. A round is asked for when nothing before it is unanswered. Its ranges count only when as many came as were
-//!    asked for, and then
-//!    its counts: the form of counts is no other answer's.
+//!    asked for, and then its counts: the form of counts is no other answer's.
 //! 2. A line that does not fit, and a round that is not complete within `robot.command_limit_s`, drops the round. The
-//!    driver then asks
-//!    for the baud rate alone, `b`, and drops all that is said until a number comes that is greater than any range.
+//!    driver then asks for the baud rate alone, `b`, and drops all that is said until a number comes that is greater
+//!    than any range.
 //! 3. That number is the answer to the only `b` that is unanswered: another is asked for after [`LATEST_S`] only.
-//!    Answers come in the
-//!    order of requests, so what was asked before it is answered or lost, and rule 1 holds again.
+//!    What was asked before it is answered or lost, and rule 1 holds again.
 //!
 //! The rules suppose that answers come in order, and within [`LATEST_S`] or not at all. A digit that arrives as
 //! another digit is not noticed, because the protocol has no check sum: counts then jump, which the link judges, and
-//! a range is wrong once. Velocity commands are answered by `OK`, which is dropped wherever it comes: counts that
-//! come in time show that the commands before them came in time.
+//! a range is wrong once. Velocity commands are answered by `OK`, which is dropped: counts that come in time show
+//! that the commands before them did.
 
 mod answers;
 

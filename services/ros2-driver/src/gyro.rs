@@ -1,8 +1,8 @@
 //! From messages of an IMU to the turn of each tick.
 //!
-//! Turn rates are integrated by the stamps of their messages. A tick begins with odometry, whose stamp lies between
-//! two messages of the IMU, so the turn goes on at the newest rate until there. The next message corrects the error
-//! of that, because each turn is the difference of two angles.
+//! Turn rates are integrated by their stamps. The odometry that begins a tick lies between two messages, so the turn
+//! goes on at the newest rate until there. The next message corrects the error of that, because each turn is the
+//! difference of two angles.
 
 use common::{driver::Turn, geometry::wrap_angle};
 
@@ -11,7 +11,7 @@ use crate::messages::{Imu, ImuTurn, NO_GROWTH, is_repeated};
 /// The turn is known if messages, and odometry and the newest message, are no farther apart.
 const LONGEST_GAP_NS: i64 = 100_000_000;
 /// Noise of a turn whose message states less or none, rad per square root of a second. Nominal: several times that of
-/// the gyros in robots, such as the BMI160's 0.007 degrees.
+/// robots' gyros, such as the BMI160's 0.007 degrees.
 const NOISE: f64 = 5e-4;
 /// The turn rate changes no faster from the newest message to the tick, rad/s^2. Nominal.
 const CHANGES_BY: f64 = 5.0;

@@ -106,7 +106,7 @@ impl ArduinoWords {
         true
     }
 
-    /// Returns the answer, and the command of the boards that the request is converted to.
+    /// Returns the answer, and the command that the request becomes.
     pub(crate) fn answer(
         &mut self,
         request: Request,
@@ -152,13 +152,13 @@ impl ArduinoWords {
         Command::velocity(channels, STOPS_AFTER_MS)
     }
 
-    /// As the board says them, left and right.
+    /// The counts as the board says them, left and right.
     pub(crate) fn counts(&self, motors: &[Motor; 6]) -> [i32; 2] {
         let turned = self.turned(motors);
         [0, 1].map(|wheel| (turned[wheel] - self.zero[wheel]).round() as i64 as i32)
     }
 
-    /// Since the start, forward positive.
+    /// Counts since the start, forward positive.
     fn turned(&self, motors: &[Motor; 6]) -> [f64; 2] {
         [self.robot.left, self.robot.right].map(|wheel| {
             let counts = motors[usize::from(wheel.channel.min(1))].turned();

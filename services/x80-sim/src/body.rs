@@ -87,8 +87,8 @@ impl Body {
         self.clearance
     }
 
-    /// Move as the wheels ask, metres of ground, and no farther than `world` lets the body: it slides along the thing
-    /// it touches, or halts. Returns the ground that went by under either wheel.
+    /// Move as the wheels ask, metres of ground; the body slides along the thing it touches, or halts. Returns the
+    /// ground that went by under either wheel.
     pub fn roll(&mut self, asked: Wheels<f64>, world: &World) -> Wheels<f64> {
         let turned = asked.map(|metres| metres / self.wheel_radius);
         let step = self.drive.twist(WheelSpeeds { right: turned.right, left: turned.left });
@@ -112,8 +112,8 @@ impl Body {
         touched.then(|| (self.pose.position - before.position).dot(middle))
     }
 
-    /// Push the body out of what it penetrates, or put it back to `before` if that fails. Returns whether it
-    /// penetrated anything.
+    /// Put the body outside of what it penetrates, or back to `before` if that fails. Returns whether it penetrated
+    /// anything.
     fn leave_things(&mut self, before: DVec2, world: &World) -> bool {
         for push in 0..PUSHES {
             let position = self.pose.position;

@@ -85,7 +85,7 @@ impl Car {
         })
     }
 
-    /// Move `body` as the motors ask from mission time `now` for `dt` seconds, and no farther than `world` lets it.
+    /// Move `body` as the motors ask from mission time `now` for `dt` seconds, as far as `world` lets it.
     pub(crate) fn step(
         &self,
         motors: &mut [Motor; 6],

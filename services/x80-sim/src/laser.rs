@@ -19,9 +19,9 @@ use crate::{
 /// Beams without a reading, at the edges of things and in the sun. Nominal.
 const LOST_OF_1000: f64 = 2.0;
 
-/// Greatest angle to its normal at which a pane of glass gives a reading, degrees. Nominal: L. Tibebu et al., "LiDAR-based glass
-/// detection for improved occupancy grid mapping", Sensors 21(7), 2021, find the peak of a reflection only where beams are
-/// perpendicular to the glass, and it falls fast beside that.
+/// A pane of glass gives a reading up to this angle to its normal. Nominal: L. Tibebu et al., "LiDAR-based glass
+/// detection for improved occupancy grid mapping", Sensors 21(7), 2021, find the peak of a reflection only where
+/// beams are perpendicular to the glass, falling fast beside it.
 const GLASS_LIMIT_DEG: f64 = 5.0;
 
 #[derive(Clone, Debug)]

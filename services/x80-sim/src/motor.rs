@@ -57,7 +57,7 @@ pub struct Motor {
     position_pid: PidGains,
     velocity_pid: PidGains,
     order: Option<Order>,
-    /// With their times, before the delay.
+    /// Changes of the target with their times, before the delay.
     pending: VecDeque<(f64, f64)>,
     target: f64,
     speed: f64,

@@ -23,7 +23,7 @@ impl Noise {
         Self(Pcg64::new(u128::from(seed), source as u128))
     }
 
-    /// In [0, 1).
+    /// A number in [0, 1).
     pub fn uniform(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }

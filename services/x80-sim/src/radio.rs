@@ -134,7 +134,7 @@ impl<W: Copy + PartialEq> Radio<W> {
         lost
     }
 
-    /// Then no host learns of the tick.
+    /// No host learns of a tick whose frames are lost.
     pub fn loses_tick(&mut self, now: f64) -> bool {
         let lost = self.loses(now);
         self.missed_ticks += u64::from(lost);

@@ -135,7 +135,7 @@ impl Robot {
         robot
     }
 
-    /// Where an earlier process left it. Except for its counts it is in the state of a booted robot.
+    /// The place where an earlier process left it. Except for its counts it is in the state of a booted robot.
     pub fn restored(mission: &Mission, saved: &SavedState) -> Self {
         // With the same seed the noise of the first readings would be repeated.
         let seed = mission.seed.wrapping_add(saved.tick + 1);
@@ -314,14 +314,14 @@ impl Robot {
         }
     }
 
-    /// The ultrasonic rangers listen for the next tick then, if that is before the tick and still to come.
+    /// The ultrasonic rangers listen then for the next tick, if that is still to come and before the tick.
     fn listens_at(&self) -> Option<f64> {
         let age = self.physics.sonar.age_s;
         (age > 0.0 && !self.ranging.has_listened()).then(|| self.next_tick_s() - age)
     }
 
-    /// Seconds, in short steps, none of which reaches across the end of a timed command or the moment of a range. An
-    /// end in the past does nothing.
+    /// Goes in short steps, none of which reaches across the end of a timed command or the moment of a range. An end
+    /// in the past does nothing.
     pub fn advance_to(&mut self, end: f64) {
         while self.time < end {
             if self.listens_at().is_some_and(|moment| moment <= self.time) {
@@ -476,7 +476,7 @@ impl Robot {
     pub fn ground_truth(&mut self) -> GroundTruthTick {
         let pose = self.body.pose();
         let Twist { v, omega } = self.twist();
-        // Those that the host hears: the summary finds by them the tick of a pose.
+        // The host hears these: the summary finds the tick of a pose by them.
         let [left_counts, right_counts] = match &self.arduino {
             Some(arduino) => arduino
                 .counts(&self.motors)

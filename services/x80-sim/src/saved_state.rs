@@ -1,8 +1,8 @@
 //! The pose and wheel counts that a simulated robot's next process restores.
 //!
-//! A real robot stands where it came to rest when its host went away. A simulated one whose process ends with its
-//! supervisor's comes to rest at once, and its next process begins there. By then nothing is under way: no order, no
-//! wheel speed, no datagram in flight. The random streams of its sensors begin anew, but not as they began before.
+//! Like a real robot whose host went away, it comes to rest, at once, and its next process begins there. By then
+//! nothing is under way: no order, no wheel speed, no datagram. The random streams of its sensors begin anew, but not
+//! as they began before.
 
 use common::kinematics::Pose2;
 use serde::{Deserialize, Serialize};

@@ -16,7 +16,7 @@ use crate::{
     world::World,
 };
 
-/// Ordinary surroundings, AD counts.
+/// A reading in ordinary surroundings, AD counts.
 pub const MIDDLE: u16 = 2048;
 /// Drivers convert with this supply of the AD converters, AD counts.
 const REFERENCE: u16 = 2048;

@@ -31,9 +31,9 @@ const MOST_AT_ONCE: usize = 64;
 
 pub struct SimOptions {
     pub mission: Mission,
-    /// At [`Pace::Max`] it stands still until a motion command comes; then the body moves one period under that
-    /// command and the frames of the next tick are sent. A ping is answered with the frames of this tick once more.
-    /// The same commands give the same bytes.
+    /// At [`Pace::Max`] mission time stands until a motion command comes; then the body moves one period under it and
+    /// the frames of the next tick are sent. A ping is answered with the frames of this tick once more. Equal
+    /// commands give equal bytes.
     ///
     /// At [`Pace::Rate`] mission time follows the machine's clock and frames are sent unasked. While the process is
     /// not scheduled for more than a period, mission time waits for it.
@@ -46,8 +46,8 @@ pub struct SimOptions {
     /// The robot's state is saved here, and goes on from here.
     pub keep: Option<PathBuf>,
     /// A [`common::ground_truth::GroundTruthHeader`], then a [`common::ground_truth::GroundTruthTick`] each tick, one
-    /// JSON object a line, each in one write. The robot waits for a reader that is slow; when it is gone, the robot
-    /// goes on without.
+    /// JSON object a line, each in one write. The robot waits for a slow reader, and goes on without one that is
+    /// gone.
     pub ground_truth: Option<Box<dyn Write + Send>>,
 }
 
@@ -145,8 +145,8 @@ impl SimClock {
         Some(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX))
     }
 
-    /// Shift mission time if it is more than a period behind, so that the next tick `due` is not late: a robot whose
-    /// process was not scheduled must not make up for the lost time.
+    /// Mission time that is more than a period behind is shifted to the next tick `due`: a robot whose process was
+    /// not scheduled must not make up for the lost time.
     fn forgive(&mut self, due: f64, machine_ns: u64) {
         let owed = self.now(machine_ns).map_or(0.0, |now| now - due);
         if let Some((epoch, rate)) = &mut self.runs

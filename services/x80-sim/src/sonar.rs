@@ -1,18 +1,19 @@
-//! An ultrasonic ranger, which measures the distance of the nearest point in its cone that reflects the sound.
+//! An ultrasonic ranger measures the distance of the nearest point in its cone that reflects the sound.
 //!
-//! In the laboratory a surface reflects wherever the cone meets it. A smooth wall reflects only at the foot of the perpendicular, and
-//! only if that is not too far off the axis. A drum reflects over a wider angle, and an edge reflects sometimes. A surface that
-//! does not reflect still hides the surfaces behind it.
+//! In the laboratory a surface reflects wherever the cone meets it. A smooth wall reflects only at the foot of the
+//! perpendicular, and only if that is not too far off the axis. A drum reflects over a wider angle, and an edge
+//! reflects sometimes. A surface that does not reflect still hides the surfaces behind it.
 //!
-//! An echo is detected if its amplitude is not below a threshold. With range r it falls as 10^(-2 alpha r / 20) / r: the
-//! mirror image of the transmitter in a plane is 2 r away, and air at 40 kHz takes alpha = 1.3 dB/m (ISO 9613-1, 20 degrees
-//! Celsius, half saturated). A cylinder of radius a spreads the sound further, by sqrt(a / (a + r)): a wave front of radius r
-//! comes back from it with radius a r / (a + 2 r) in the level plane. That is geometrical acoustics, for k a well above
-//! 1: a post of 1.25 cm has k a = 9. A soft surface gives back its share `echo`. The threshold is the amplitude of a post
-//! 3 cm in diameter at `post_reach_m`. A wall is therefore detected far beyond [`REACH_M`].
+//! An echo is detected if its amplitude is not below a threshold. With range r it falls as 10^(-2 alpha r / 20) / r:
+//! the mirror image of the transmitter in a plane is 2 r away, and air at 40 kHz takes alpha = 1.3 dB/m (ISO 9613-1,
+//! 20 degrees Celsius, half saturated). A cylinder of radius a spreads the sound further, by sqrt(a / (a + r)): a
+//! wave front of radius r comes back from it with radius a r / (a + 2 r) in the level plane. That is geometrical
+//! acoustics, for k a well above 1: a post of 1.25 cm has k a = 9. A soft surface gives back its share `echo`. The
+//! threshold is the amplitude of a post 3 cm in diameter at `post_reach_m`. A wall is therefore detected far beyond
+//! [`REACH_M`].
 //!
-//! A solid that ends below the ranger's height or begins above it is met by the cone, as wide upright as it is level, from a
-//! distance on. A smooth solid then answers with no more than its edge.
+//! A solid that ends below the ranger's height or begins above it is met by the cone, as wide upright as it is level,
+//! from a distance on. A smooth solid then answers with no more than its edge.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -36,11 +37,11 @@ const POST_RADIUS_M: f64 = 0.015;
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Candidate {
     range: f64,
-    /// Seen from above, metres.
+    /// The range seen from above, metres.
     level_range: f64,
     /// Unit vector from the ranger, from above.
     along: DVec2,
-    /// Often lost, because it is near a limit or comes from an edge.
+    /// The echo is often lost, because it is near a limit or comes from an edge.
     weak: bool,
     share: f64,
 }

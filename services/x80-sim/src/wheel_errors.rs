@@ -1,7 +1,7 @@
 //! Systematic errors of the wheels.
 //!
-//! The errors belong to the robot, not to the moment: they are drawn once from the seed of the mission, with a stream
-//! of their own, and are the same in each process of a run.
+//! They belong to the robot, not to the moment: drawn once from the mission's seed, with a stream of their own, they
+//! are the same in each process of a run.
 
 use common::mission::Mission;
 
@@ -16,7 +16,7 @@ pub struct WheelErrors {
     /// Their mean is 1.
     pub diameter: Wheels<f64>,
     pub track: f64,
-    /// Slips away of the rolled way; below 0 it is won.
+    /// Share of the rolled way that slips away; below 0 it is won.
     pub slip_share: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The world around the robot: what the mission has, and things that appear, vanish or move.
+//! The mission's world, with things that appear, vanish or move.
 
 use common::{
     geometry::{Box2, Profile, Shapes, Wall, nearest_on_segment},
@@ -67,7 +67,7 @@ impl Surface {
         }
     }
 
-    /// The angle is between the unit direction `along` and the normal at `point`, which is on the surface.
+    /// `along` is a unit direction; `point` is on the surface, whose normal counts.
     pub fn incidence_cos(&self, point: DVec2, along: DVec2) -> f64 {
         let normal = match *self {
             Self::Drum { at, .. } => point - at,
@@ -118,7 +118,7 @@ struct Visitor {
 }
 
 impl World {
-    /// At time 0, with the robot at the start.
+    /// The world at time 0, with the robot at the start.
     pub fn new(mission: &Mission) -> Self {
         let visitor = |thing: &Thing| Visitor {
             solids: solids_of(&thing.shape),
@@ -135,8 +135,8 @@ impl World {
         world
     }
 
-    /// Obstacles appear, disappear and move until `time`, seconds. One that would appear inside the robot, a disc of
-    /// `radius` at `centre`, appears when its place is free.
+    /// An obstacle that would appear inside the robot, a disc of `radius` at `centre`, appears when its place is
+    /// free.
     pub fn advance(&mut self, time: f64, centre: DVec2, radius: f64) {
         for visitor in &mut self.things {
             visitor.offset = visitor.thing.offset_at(time);

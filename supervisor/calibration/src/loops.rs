@@ -45,7 +45,7 @@ const MOST_CHI2: f64 = 4.0;
 /// From one visit to the wall to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Loop {
-    /// Among all: loops next to each other share a normal.
+    /// The number among all: loops next to each other share a normal.
     pub number: u32,
     /// Counter-clockwise positive.
     pub turns: f64,

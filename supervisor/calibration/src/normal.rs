@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// An echo this near to the median range is of the wall. A rough wall answers over the whole sweep; the next of these
-/// limits leaves its ends out.
+/// An echo this near to the median range is of the wall. A rough wall answers over the whole sweep; the next limit
+/// leaves its ends out.
 const WITHIN_M: [f64; 3] = [0.12, 0.06, 0.03];
 /// So many readings at either end of a leg must not be of the wall: then the arc that answers is whole.
 const MARGIN: usize = 2;

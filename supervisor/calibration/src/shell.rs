@@ -1,4 +1,5 @@
-//! `pose` and `ranges` in, `guidance` out, in place of the planner. The state is saved before the guidance is published.
+//! `pose` and `ranges` in, `guidance` out, in the planner's place. The state is saved before the guidance is
+//! published.
 
 use std::{collections::VecDeque, path::Path};
 

@@ -38,6 +38,7 @@ const SWEEP_RAD: f64 = FRAC_PI_4;
 const WIDER: f64 = 1.0 / 3.0;
 const MOST_WIDER: u32 = 2;
 const SWEEPS: u32 = 5;
+/// Whole turns of a loop before the half one: the first number after which the heading is known to [`HEADING_SD_RAD`].
 const TURNS: [f64; 2] = [3.0, 1.0];
 const HEADING_SD_RAD: f64 = 0.13;
 /// The ordered direction is so far ahead of the robot, in a sweep and at most in another turn. The controller turns

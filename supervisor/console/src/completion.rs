@@ -1,5 +1,5 @@
-//! Completions of shells, `firsthand completions`. The script of a shell asks the executable at each tab, so that it completes
-//! robots, stages, topics, missions and pages too.
+//! The script of a shell asks the executable at each tab, so that it completes robots, stages, topics, missions and
+//! pages too.
 
 use std::ffi::OsStr;
 

@@ -10,8 +10,8 @@ use crate::{
     logging,
 };
 
-/// Answer a shell that asks for completions; or parse the command line, log to standard error from `log_level` on,
-/// and `execute`. `own_code` knows the codes of errors that only this executable has.
+/// Answer a shell that asks for completions; or log to standard error from `log_level` on, and `execute`. `own_code`
+/// knows the codes of errors that only this executable has.
 pub fn run<A: Parser>(
     log_level: &str,
     execute: fn(&A) -> Result<ExitCode, Failure>,

@@ -1,7 +1,7 @@
-//! Why a subcommand failed: one sentence, a code for scripts, an exit code, and sometimes a remark.
+//! A failure is one sentence, a code for scripts, an exit code, and sometimes a remark.
 //!
-//! `firsthand` prints the code in brackets at the end of the message, `[not-running]`. A script matches the code; the sentence
-//! before it may change.
+//! `firsthand` prints the code in brackets at the end of the message, `[not-running]`. A script matches the code; the
+//! sentence before it may change.
 
 use std::{error::Error, fs, path::Path, process::ExitCode};
 
@@ -33,7 +33,7 @@ impl Refused {
     }
 }
 
-/// Reports an error on standard error, with its code: `own_code` knows those of errors that only this executable has,
+/// Reports an error and its code on standard error: `own_code` knows codes of errors that only this executable has,
 /// [`code`] the others.
 pub fn report(
     result: Result<ExitCode, Failure>,

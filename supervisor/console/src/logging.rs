@@ -1,10 +1,10 @@
-//! The log of this process: to standard error, to a file, and, under systemd, to the journal.
+//! The log of this process.
 //!
-//! The journal takes lines from standard error and reads a priority from a leading `<N>` (sd-daemon(3)); it
-//! records the time itself. That needs no library, and a line is the same wherever it is read.
+//! The journal takes lines from standard error and reads a priority from a leading `<N>` (sd-daemon(3)); that needs
+//! no library, and a line is the same wherever it is read.
 //!
-//! A line that cannot be written, because the disk is full or the terminal is closed, is dropped silently: tracing would report
-//! it on standard error and panic if that fails too.
+//! A line that cannot be written, because the disk is full or the terminal is closed, is dropped silently: tracing
+//! would report it on standard error and panic if that fails too.
 
 use std::{
     fs::File,

@@ -1,4 +1,4 @@
-//! Requests of an operator to the supervisor of a robot, and signals to its processes.
+//! Requests to a robot's supervisor, and signals to its processes.
 
 use std::fs::File;
 

@@ -1,4 +1,4 @@
-//! Standard output of a command that goes on until a signal comes or its reader closes it.
+//! Standard output until a signal comes or its reader closes it.
 
 use std::{
     io::{self, Write as _},

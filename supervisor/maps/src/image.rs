@@ -95,7 +95,7 @@ fn netpbm(
     let mut bytes = reader.bytes();
     let mut header = || number(&mut bytes);
     let (cols, rows, most) = (header()?, header()?, header()?);
-    // The size is checked first, because decoding takes as much memory as the header claims.
+    // The size is checked first: decoding takes as much memory as the header claims.
     check_size(file, cols.into(), rows.into())?;
     if !(1..=0xffff).contains(&most) {
         return Err(format!("its brightest is {most}").into());
@@ -150,7 +150,6 @@ fn png(reader: impl BufRead + Seek, lightness: Lightness, file: &Path) -> Result
     decoder.set_ignore_text_chunk(true);
     decoder.set_ignore_iccp_chunk(true);
     let (cols, rows) = decoder.read_header_info()?.size();
-    // The size is checked first, because decoding takes as much memory as the header claims.
     check_size(file, cols.into(), rows.into())?;
     let mut reader = decoder.read_info()?;
     let (colour, depth) = reader.output_color_type();

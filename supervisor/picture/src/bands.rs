@@ -39,6 +39,7 @@ pub(super) const MISSION: Style = Style {
 /// This share of the map may lie below the last level: close to hazards u has no floor.
 const BELOW: f64 = 0.02;
 
+/// The levels are -step, -2 step, ..., -count step of log2 u.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Levels {
     pub(super) step: f64,

@@ -1,23 +1,21 @@
-//! The picture of a run, an SVG file without references to others, and the picture of a field on a map.
+//! Pictures of runs, SVG files without references to others, and of fields on maps.
 //!
 //! Layers from the bottom to the top, in the mission frame (metres, y up):
 //!
 //! | module | draws |
 //! |---|---|
 //! | `bands` | log2 u of the final belief |
-//! | `streamlines` | lines of the guidance field E |
+//! | `streamlines` | lines of E |
 //! | `cells` | hazard cells of the map |
-//! | `world` | the real obstacles |
+//! | `world` | real obstacles |
 //! | `motion` | trajectories, bodies, start, target |
 //! | `margin`, `legend` | title, axes, captions; symbols |
 //! | `page`, `lattice` | the page, and cells on it |
 //! | [`Scene`] | the data of a picture |
 //!
-//! `map` draws the field of a bare map with the same bands and lines. `chart` draws values against each other; `plot` is its
-//! frame.
+//! `map` draws the field of a bare map, `chart` values against each other; `plot` is its frame.
 //!
-//! A picture shows what is known at the end of a run, however it ended: every layer but the frame may be missing, and
-//! every input gives a valid file.
+//! Every layer but the frame may be missing, and every input gives a valid file.
 
 mod bands;
 mod cells;

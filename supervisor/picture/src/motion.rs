@@ -10,6 +10,7 @@ use super::{
 
 /// Poses drawn of one trajectory: a day at 7 Hz still makes a small file.
 const MOST_POSES: usize = 4000;
+/// About so many bodies stand along the way.
 const BODIES: f64 = 16.0;
 /// Within so many standard deviations 95 % of a normal distribution in a plane are: the root of -2 ln 0.05.
 const WITHIN_95: f64 = 2.4477;

@@ -1,8 +1,8 @@
 use super::objection::{Objection, objection, within};
 use crate::{LEAST_BAUD, Mission, Protocol, SensorKind};
 
-/// One count from one run of the speed loop to the next may be at most this speed of a rim, m/s: a robot that cannot
-/// turn its wheels slower turns past its target.
+/// The greatest speed of a rim that is one count in a run of the speed loop, m/s: a robot that cannot turn its wheels
+/// slower turns past its target.
 const GREATEST_STEP_M_S: f64 = 0.1;
 
 pub(super) fn check(mission: &Mission) -> Result<(), Objection> {

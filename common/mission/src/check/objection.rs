@@ -1,4 +1,3 @@
-/// An invalid value, before its line in the file is known.
 pub(super) struct Objection {
     pub(super) key: &'static str,
     pub(super) problem: String,

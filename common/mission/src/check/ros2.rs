@@ -48,7 +48,6 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     Ok(())
 }
 
-/// ROS takes `name` for the name of a topic.
 fn is_topic(name: &str) -> bool {
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
     let token = |token: &str| {

@@ -1,5 +1,3 @@
-//! The sensor rows, and the set that a mission uses.
-
 use super::objection::{Objection, objection, within};
 use crate::{
     INFRARED_RANGERS, MOST_BEAMS, MOST_SENSORS, Method, Mission, Protocol, SONARS, SensorKind,

@@ -35,7 +35,7 @@ impl Pose2 {
         Self { position: self.position + DVec2::new(step.x, step.y), heading: self.heading + turn }
     }
 
-    /// One forward Euler step of (21), along the heading held before the turn.
+    /// One forward Euler step of (21) along the heading before the turn.
     #[must_use]
     pub fn along_euler(&self, arc: f64, turn: f64) -> Self {
         let step = Rotation2::new(self.heading) * Vector2::new(arc, 0.0);

@@ -1,5 +1,3 @@
-//! Parsing of commands in all forms that are in use.
-
 use super::{
     ALONE, ALSO_ALONE, CHANNELS, Command, Feedback, Gains, Mode, Motion, Parameter, Quantity,
     Request, Stream, TIME_FOLLOWS, Targets,

@@ -42,7 +42,7 @@ pub(super) struct Session {
     lock_step: bool,
     way: Way,
     radio: Option<Radio<Leg>>,
-    /// Source of the last valid frame of the host that is served: all streams go there.
+    /// Source of the served host's last valid frame: all streams go there.
     peer: Option<Source>,
     heard: Instant,
     /// Frames of other hosts ignored since the last warning.
@@ -216,8 +216,8 @@ impl Session {
         Ok(())
     }
 
-    /// In lockstep. If the radio loses its frames, the host sends no next command, so mission time passes by itself
-    /// until the radio delivers again.
+    /// If the radio loses the frames, the host sends no next command, so mission time passes by itself until the
+    /// radio delivers again.
     fn tick_until_heard(&mut self) -> Result<(), SimError> {
         for _ in 0..MOST_UNHEARD {
             let frames = self.measured()?;

@@ -1,5 +1,3 @@
-//! `firsthand calibrate`: the differences between a robot's wheels and nominal ones.
-
 mod drive;
 mod ends;
 mod written;

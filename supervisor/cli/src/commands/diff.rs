@@ -1,5 +1,3 @@
-//! `firsthand runs diff A B`: the first difference of two recordings.
-
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::Args;

@@ -1,5 +1,3 @@
-//! `firsthand help [PAGE]`: a page of the guide, or the options of a subcommand.
-
 use std::{
     fmt::Write as _,
     io::{self, IsTerminal as _},

@@ -1,4 +1,4 @@
-//! `firsthand install`: the files that make a robot a service of this machine, printed or written.
+//! The files that make a robot a service of this machine.
 //!
 //! The Debian package brings the same files (`[package.metadata.deb]`); this is for everyone else.
 

@@ -1,5 +1,3 @@
-//! `firsthand logs`: the logs of a run, merged by time.
-
 mod merged;
 
 use std::{

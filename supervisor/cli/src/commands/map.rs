@@ -1,5 +1,3 @@
-//! `firsthand map save RUN`: the belief of a robot, as a map of the ROS map_server.
-
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};

@@ -1,5 +1,3 @@
-//! `firsthand missions`: the missions that ship with the program.
-
 use clap::Args;
 
 use console::{

@@ -1,5 +1,3 @@
-//! `firsthand record`: everything on a robot's bus into a file.
-
 use std::{path::PathBuf, str::FromStr};
 
 use clap::Args;

@@ -1,5 +1,3 @@
-//! `firsthand replay F.mcap`: every generation of a recording is computed again and compared to the bit.
-
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::Args;

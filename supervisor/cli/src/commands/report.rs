@@ -1,5 +1,3 @@
-//! `firsthand report RUN|F.mcap`: the robot's page with a recording in it.
-
 use std::path::PathBuf;
 
 use clap::Args;

@@ -1,5 +1,3 @@
-//! `firsthand run MISSION`: a mission from start to summary.
-
 pub(crate) mod recorder;
 mod summary_file;
 

@@ -1,5 +1,3 @@
-//! `firsthand runs`: the directories of runs.
-
 use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},

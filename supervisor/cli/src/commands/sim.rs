@@ -1,5 +1,3 @@
-//! `firsthand sim MISSION`: a simulated X80 for any software that speaks its protocol.
-
 use std::{net::SocketAddr, path::PathBuf};
 
 use clap::{Args, ValueEnum};

@@ -1,5 +1,3 @@
-//! `firsthand stage`: the stages of a robot, one by one.
-
 mod fault;
 mod process;
 

@@ -1,5 +1,3 @@
-//! `firsthand status`: the stages of a robot, its link and its batteries; or all robots.
-
 mod all;
 
 use std::{

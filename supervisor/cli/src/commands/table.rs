@@ -1,4 +1,4 @@
-//! `firsthand table`, and the tables of topics and stages: Markdown, as the guide shows it.
+//! Tables as Markdown, as the guide shows them.
 
 pub(crate) mod stored;
 

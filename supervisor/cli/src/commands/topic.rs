@@ -1,5 +1,3 @@
-//! `firsthand topic`: the samples that a robot's processes publish.
-
 mod echo;
 mod hz;
 mod python;

@@ -1,5 +1,3 @@
-//! `firsthand stage fault STAGE FAULT`: break something in a running stage on purpose.
-
 use std::{fmt::Write as _, time::Instant};
 
 use clap::Args;

@@ -1,4 +1,4 @@
-//! Results and capabilities, which are stored as CSV files beside the guide and printed from them.
+//! Results and capabilities, stored as CSV files beside the guide.
 //!
 //! The first column of each file is the section of the page that shows a row.
 

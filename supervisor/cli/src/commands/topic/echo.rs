@@ -1,5 +1,3 @@
-//! `firsthand topic echo`: the samples of a topic, as they come.
-
 use clap::Args;
 use common::{
     domain::{Domain, RobotName},

@@ -1,5 +1,3 @@
-//! `firsthand topic hz`: how often topics are published, against the table.
-
 use std::time::{Duration, Instant};
 
 use clap::Args;

@@ -7,7 +7,7 @@ use common::{
     topics,
 };
 
-/// The structs of all topics, whose layouts are checked when the module is loaded, and a follower.
+/// Structs whose layouts are checked when the module is loaded, and a follower.
 pub(super) fn module() -> String {
     let mut module = include_str!("topics.py").to_owned();
     let (mut known, mut table) = (BTreeSet::new(), String::new());

@@ -1,5 +1,4 @@
-//! A sample of any topic as text, one field a line, or as JSON, one object a line. Names and order of the fields follow from
-//! the layouts; this module knows no topic.
+//! A sample of any topic as text, one field a line, or as JSON, one object a line, by the layouts alone.
 
 use std::fmt::Write as _;
 
