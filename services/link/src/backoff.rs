@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-/// Attempts at an operation that may never succeed.
 #[derive(Clone, Debug)]
 pub struct Backoff {
     first: Duration,

@@ -13,7 +13,6 @@ const SET_ANEW_NS: i64 = 1_000_000_000;
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct ClockRate {
     newest_ns: i64,
-    /// The stamp and mission time where the comparison began.
     since: Option<(i64, MissionTime)>,
     /// Robot seconds in a second of mission time, by the last comparison.
     before: Option<f64>,

@@ -47,7 +47,6 @@ impl SpeedTrim {
         self.told[STEADY - 1] = counts.map(f64::from);
     }
 
-    /// A tick's encoders at `time_s`.
     pub(crate) fn rolled(&mut self, wheels: &WheelSample, time_s: f64) {
         let counts = [wheels.left_counts, wheels.right_counts];
         let Some((before, then_s)) = self.tick.replace((counts, time_s)) else {

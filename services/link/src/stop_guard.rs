@@ -63,7 +63,6 @@ impl StopGuard {
         Ok(Self { pipe })
     }
 
-    /// The robot rests, so the guard is not needed.
     pub(crate) fn release(mut self) {
         // A killed guard needs no release.
         let _ = self.pipe.write_all(b"r");
@@ -137,7 +136,6 @@ pub fn stand(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bool, StageEr
     }
 }
 
-/// Whether a process of this machine receives datagrams there.
 fn is_taken(address: &Address) -> bool {
     match address {
         Address::Udp(address) => UdpSocket::bind(address).is_err(),

@@ -22,7 +22,6 @@ pub use self::counts::{Attempts, Tally};
 use self::dds::Dds;
 use self::{serial::Serial, stream::Stream, tcp::Tcp, udp::Udp};
 
-/// The wire cannot be opened or used because of this machine, not the robot.
 #[derive(Debug, Error)]
 #[error(
     "no wire to the robot at {address}: {source}; raise the limit of open files (`ulimit -n`) or free ports, then start it again"
@@ -42,7 +41,6 @@ impl From<TransportError> for StageError {
 pub struct Transport {
     address: Address,
     wire: Wire,
-    /// The last reported openness.
     reported: Option<bool>,
     buffer: Box<[u8]>,
 }
@@ -166,7 +164,6 @@ impl Transport {
     }
 }
 
-/// Whether this executable can.
 pub const SPEAKS_ROS2: bool = cfg!(feature = "ros2");
 
 #[cfg(feature = "ros2")]

@@ -54,7 +54,6 @@ const SHARED_S: f64 = 5.0;
 /// The least deviation of a match: metres and radians.
 const LEAST: [f64; 2] = [0.005, 0.002];
 
-/// A scan at a pose taken as known.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Reference {
     pose: Pose2,

@@ -82,7 +82,6 @@ impl Suspicion {
     }
 }
 
-/// Evidence against one wheel, or the difference of both.
 #[derive(Clone, Copy, Debug, Default)]
 struct Evidence {
     asked: [f64; 2],

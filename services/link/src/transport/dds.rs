@@ -30,7 +30,6 @@ pub(super) struct Dds {
     commands: Option<usize>,
     /// The reader that is asked next, so that a flood on one topic does not hold back others.
     next: usize,
-    /// The newest message since the domain was joined.
     heard_ns: Option<u64>,
     joined_ns: Option<u64>,
     tally: Tally,
@@ -110,7 +109,6 @@ impl Dds {
     }
 }
 
-/// A reader of each topic, in their order, and the writer of commands.
 fn endpoints(participant: &Participant, topics: &Topics) -> io::Result<(Vec<Reader>, Writer)> {
     let heard = Quality { is_reliable: false, is_latched: false, depth: DEPTH };
     let readers = topics.heard.iter().map(|(_, topic)| participant.reader(topic, heard));
