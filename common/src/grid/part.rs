@@ -33,7 +33,6 @@ layouts! {
 }
 
 impl Part {
-    /// A window of the map in `frame`.
     pub const fn of(frame: GridFrame, window: Window, version: u64) -> Self {
         Self {
             version,

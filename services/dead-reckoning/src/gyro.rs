@@ -12,7 +12,6 @@ const UNEVEN: f64 = 0.1;
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Gyro {
-    /// The newest increment's number and end.
     sequence: u64,
     end: MissionTime,
     /// The start of `turn`: the end of a tick, or of the first increment after missing ones.

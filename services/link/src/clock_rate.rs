@@ -1,5 +1,5 @@
-//! Whether a robot's clock goes as fast as mission time: otherwise it seems to drive slower or faster than it does. A simulator's clock
-//! is slow on a weak machine, and fast if nothing holds it back.
+//! Whether a robot's clock goes as fast as mission time: otherwise it seems to drive slower or faster. A simulator's clock is slow on a
+//! weak machine, and fast if nothing holds it back.
 
 use common::clock::MissionTime;
 

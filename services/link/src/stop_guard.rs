@@ -1,8 +1,8 @@
 //! The stop guard: a process that stops the robot when its link ended and nobody saw it rest.
 //!
-//! The link starts it and holds the writing end of a pipe, which the kernel closes with the link, however that ends. The guard's own
-//! session keeps it from signals to the link, the supervisor or their process groups. It speaks to the robot by the same [`Link`], and
-//! leaves when the robot rests or another link runs.
+//! The link starts it and holds the writing end of a pipe, which the kernel closes with the link. A session of its own keeps it from
+//! signals to the link, the supervisor or their process groups. It speaks to the robot by the same [`Link`], and leaves when the robot
+//! rests or another link runs.
 
 use std::{
     io,

@@ -1,5 +1,5 @@
-//! The bytes to and from the robot: datagrams (`udp`), a connection (`tcp`) or a serial line (`serial`), which a `stream` reopens after
-//! each loss, or topics of ROS 2 (`dds`, with the feature `ros2`). No call blocks. Bytes that cannot be sent now are lost.
+//! The bytes to and from the robot: datagrams, a connection or a serial line, which a `stream` reopens after each loss, or topics of ROS 2
+//! with the feature `ros2`. No call blocks. Bytes that cannot be sent now are lost.
 
 mod counts;
 #[cfg(feature = "ros2")]

@@ -90,7 +90,6 @@ impl Dds {
         None
     }
 
-    /// One that the link has not written itself.
     fn take(&self, row: usize) -> Option<Message> {
         let (reader, own) = (self.readers.get(row)?, self.writer.gid());
         std::iter::from_fn(|| reader.take()).find(|message| message.from != own)
