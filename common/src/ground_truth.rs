@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::samples::PoseSample;
 
+/// The first line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GroundTruthHeader {
     pub listening: String,
