@@ -73,7 +73,6 @@ pub trait Driver: fmt::Debug {
         None
     }
 
-    /// Continue from the state of an earlier driver.
     fn remember(&mut self, _memory: &Memory) {}
 
     /// Methods that stop a robot which does not obey a velocity of 0, in the order of their use. After one the robot must be greeted

@@ -132,7 +132,6 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
         Ok(Some(std::mem::replace(&mut joined.topics, opened)))
     }
 
-    /// Returns whether a bus was joined.
     fn look(&mut self) -> Result<bool, BusError> {
         let Ok(instance) = BusInstance::current(&self.domain) else {
             return Ok(false);

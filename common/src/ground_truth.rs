@@ -8,6 +8,7 @@ use crate::samples::PoseSample;
 /// The file in the run directory with the lines of ticks.
 pub const GROUND_TRUTH: &str = "ground_truth.jsonl";
 
+/// The first line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GroundTruthHeader {
     pub listening: String,

@@ -1,7 +1,7 @@
 //! The payloads of [`crate::topics`] in shared memory: `repr(C)`, no pointers, units in every name or doc. Size and `type_name`, for
 //! other languages, are checked at attach.
 //!
-//! `unsafe` is allowed because deriving `ZeroCopySend` writes an `unsafe impl`, which promises a self-contained type of uniform layout:
+//! Why `unsafe` is allowed here: deriving `ZeroCopySend` writes an `unsafe impl`, which promises a self-contained type of uniform layout:
 //! all fields are plain numbers, and arrays of them, in `repr(C)` structs.
 //!
 //! Another process may write any bit pattern: states are bytes, read through `from_byte`.

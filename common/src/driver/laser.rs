@@ -24,7 +24,6 @@ pub struct Laser {
     near: (usize, [f64; 2]),
     is_blind: bool,
     turned: [f64; 2],
-    /// The beams since the last tick.
     scan: Vec<f32>,
 }
 

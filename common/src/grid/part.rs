@@ -1,4 +1,4 @@
-//! The part of a map's version that a sample carries. `unsafe` is allowed for the reason that [`crate::samples`] gives.
+//! The part of a map's version that a sample carries. Why `unsafe` is allowed here: as in [`crate::samples`].
 #![allow(unsafe_code)]
 
 use glam::DVec2;
@@ -33,7 +33,6 @@ layouts! {
 }
 
 impl Part {
-    /// A window of the map in `frame`.
     pub const fn of(frame: GridFrame, window: Window, version: u64) -> Self {
         Self {
             version,

@@ -35,7 +35,6 @@ impl<T: Copy + PartialEq> Replica<T> {
         &self.cells
     }
 
-    /// Follow one part with these cells.
     pub fn apply(&mut self, part: &Part, cells: &[T]) -> Applied {
         let (frame, window, version) = (part.frame(), part.window(), part.version);
         let sane = (1..=MAX_CELLS).contains(&frame.cells);

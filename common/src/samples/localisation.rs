@@ -41,7 +41,6 @@ payloads! {
 wire_enum! {
     /// The reason why dead reckoning did not use a fix.
     FixRefusal, unknown = None, text = words {
-        /// The fix was used, or none came.
         None = 0 "none",
         /// It may also be older than the oldest tick that dead reckoning holds.
         Late = 1 "a fix is refused: it is more than 2 s old; publish it sooner",

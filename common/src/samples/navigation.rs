@@ -158,7 +158,6 @@ fn counted(beams: &[ClearBeam], count: u64) -> &[ClearBeam] {
 }
 
 wire_enum! {
-    /// The planner's answer to a pose.
     GuidanceStatus, unknown = Waiting {
         /// No field yet.
         Waiting = 0,

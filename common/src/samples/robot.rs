@@ -153,7 +153,6 @@ wire_enum! {
         RangeImplausible = 20 "ranging sensor implausible",
         /// An infrared ranger is silent, and the other sensors cover the ground ahead.
         InfraredSilent = 21 "infrared ranger silent",
-        /// Another node publishes what the robot is told.
         AnotherCommander = 22 "another commander",
     }
 }
@@ -193,7 +192,6 @@ pub struct LinkSample {
     /// Time until the next attempt, of the machine's clock.
     pub next_attempt_ns: u64,
     pub commands_out: u64,
-    /// Commands repeated halfway to the next tick.
     pub repeated_commands: u64,
     /// Ticks given to the stages again, because no command came.
     pub repeated_ticks: u64,

@@ -237,7 +237,6 @@ wire_enum! {
         /// A new generation of the planner solves the full field.
         Replan = 0,
         Reset = 1,
-        /// The mission ends: the target is unreachable.
         GiveUp = 2,
     }
 }

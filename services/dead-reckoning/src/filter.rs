@@ -121,7 +121,6 @@ impl Filter {
         Self { pose, shares: [0.0; 3], bias: 0.0, covariance }
     }
 
-    /// Arc and turn with the wheels' known errors.
     pub(crate) fn moved(&self, motions: &Motions, tick: &Tick) -> Twist {
         motions.errors.corrected(tick.moved(), self.shares)
     }
@@ -286,7 +285,6 @@ impl History {
         }
     }
 
-    /// Take a gyro's increments after those in `gyro`.
     pub(crate) fn turn(
         &mut self,
         motions: &Motions,

@@ -10,10 +10,8 @@ use crate::tick::{GyroTurn, Tick};
 /// The error of a divided increment, a share. One tick gains what the other loses, so errors do not add up.
 const UNEVEN: f64 = 0.1;
 
-/// Increments that belong to no whole tick yet.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Gyro {
-    /// The newest increment's number and end.
     sequence: u64,
     end: MissionTime,
     /// The start of `turn`: the end of a tick, or of the first increment after missing ones.

@@ -64,7 +64,6 @@ impl Contradictions {
         Some(estimate.moved_to(pose, position, heading))
     }
 
-    /// The rigid motion's turn, and its variance.
     fn turned(&self, from: DVec2, to: DVec2, variance: f64) -> (f64, f64) {
         let turns = self.0.iter().filter_map(|(pose, fix)| {
             Some((wrapped(fix.heading? - pose.heading), fix.covariance[5]))

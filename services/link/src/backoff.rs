@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-/// Attempts at an operation that may never succeed.
 #[derive(Clone, Debug)]
 pub struct Backoff {
     first: Duration,
@@ -28,7 +27,6 @@ impl Backoff {
         self.pause = (self.pause * 2).min(self.longest);
     }
 
-    /// The shortest pause comes again after a success.
     pub const fn reset(&mut self) {
         *self = Self::new(self.first, self.longest);
     }

@@ -1,5 +1,5 @@
-//! Whether a robot's clock goes as fast as mission time: otherwise it seems to drive slower or faster than it does. A simulator's clock
-//! is slow on a weak machine, and fast if nothing holds it back.
+//! Whether a robot's clock goes as fast as mission time: otherwise it seems to drive slower or faster. A simulator's clock is slow on a
+//! weak machine, and fast if nothing holds it back.
 
 use common::clock::MissionTime;
 
@@ -13,7 +13,6 @@ const SET_ANEW_NS: i64 = 1_000_000_000;
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct ClockRate {
     newest_ns: i64,
-    /// The stamp and mission time where the comparison began.
     since: Option<(i64, MissionTime)>,
     /// Robot seconds in a second of mission time, by the last comparison.
     before: Option<f64>,

@@ -16,7 +16,6 @@ impl Polls {
         Self { period_ns: (1e9 / mission.robot.rate_hz) as u64, next: MissionTime::default() }
     }
 
-    /// The result is mission time.
     pub(crate) fn until_next(&self, now: MissionTime) -> Duration {
         self.next.since(now)
     }

@@ -1,8 +1,7 @@
 //! The speed trim makes good that wheels turn slower than commanded.
 //!
-//! The speed loops of real X80s reach 0.75 to 0.8 of a commanded speed, and nothing in the robot makes good the rest. The link knows
-//! what it commanded and what the encoders counted, estimates the share that the wheels reach, and divides commands by it. Both wheels
-//! share one estimate, so commands keep their curve.
+//! The speed loops of real X80s reach 0.75 to 0.8 of a commanded speed. The link estimates that share from its commands and the encoders,
+//! and divides commands by it. Both wheels share one estimate, so commands keep their curve.
 
 use common::{samples::WheelSample, wire::counts_between};
 
@@ -47,7 +46,6 @@ impl SpeedTrim {
         self.told[STEADY - 1] = counts.map(f64::from);
     }
 
-    /// A tick's encoders at `time_s`.
     pub(crate) fn rolled(&mut self, wheels: &WheelSample, time_s: f64) {
         let counts = [wheels.left_counts, wheels.right_counts];
         let Some((before, then_s)) = self.tick.replace((counts, time_s)) else {

@@ -93,7 +93,6 @@ pub struct Link {
     open: Option<OpenTick>,
     /// The last tick that may begin in lockstep; `None` for no limit.
     last_tick: Option<u64>,
-    /// It is set in lockstep.
     target_number: u64,
     newest_command: Option<CommandSample>,
     repeat: Option<Repeat>,

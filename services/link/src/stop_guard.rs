@@ -1,8 +1,8 @@
 //! The stop guard: a process that stops the robot when its link ended and nobody saw it rest.
 //!
-//! The link starts it and holds the writing end of a pipe, which the kernel closes with the link, however that ends. The guard's own
-//! session keeps it from signals to the link, the supervisor or their process groups. It speaks to the robot by the same [`Link`], and
-//! leaves when the robot rests or another link runs.
+//! The link starts it and holds the writing end of a pipe, which the kernel closes with the link. A session of its own keeps it from
+//! signals to the link, the supervisor or their process groups. It speaks to the robot by the same [`Link`], and leaves when the robot
+//! rests or another link runs.
 
 use std::{
     io,
@@ -62,7 +62,6 @@ impl StopGuard {
         Ok(Self { pipe })
     }
 
-    /// The robot rests, so the guard is not needed.
     pub(crate) fn release(mut self) {
         // A killed guard needs no release.
         let _ = self.pipe.write_all(b"r");
@@ -134,7 +133,6 @@ pub fn stand(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bool, StageEr
     }
 }
 
-/// Whether a process of this machine receives datagrams there.
 fn is_taken(address: &Address) -> bool {
     match address {
         Address::Udp(address) => UdpSocket::bind(address).is_err(),

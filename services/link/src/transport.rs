@@ -1,5 +1,5 @@
-//! The bytes to and from the robot: datagrams (`udp`), a connection (`tcp`) or a serial line (`serial`), which a `stream` reopens after
-//! each loss, or topics of ROS 2 (`dds`, with the feature `ros2`). No call blocks. Bytes that cannot be sent now are lost.
+//! The bytes to and from the robot: datagrams, a connection or a serial line, which a `stream` reopens after each loss, or topics of ROS 2
+//! with the feature `ros2`. No call blocks. Bytes that cannot be sent now are lost.
 
 mod counts;
 #[cfg(feature = "ros2")]
@@ -22,7 +22,6 @@ pub use self::counts::{Attempts, Tally};
 use self::dds::Dds;
 use self::{serial::Serial, stream::Stream, tcp::Tcp, udp::Udp};
 
-/// The wire cannot be opened or used because of this machine, not the robot.
 #[derive(Debug, Error)]
 #[error(
     "no wire to the robot at {address}: {source}; raise the limit of open files (`ulimit -n`) or free ports, then start it again"
@@ -42,7 +41,6 @@ impl From<TransportError> for StageError {
 pub struct Transport {
     address: Address,
     wire: Wire,
-    /// The last reported openness.
     reported: Option<bool>,
     buffer: Box<[u8]>,
 }
@@ -166,7 +164,6 @@ impl Transport {
     }
 }
 
-/// Whether this executable can.
 pub const SPEAKS_ROS2: bool = cfg!(feature = "ros2");
 
 #[cfg(feature = "ros2")]

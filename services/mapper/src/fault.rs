@@ -12,7 +12,6 @@ const WALL_CELLS: f64 = 1.5;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Area {
-    /// Its radius is [`AROUND_M`].
     Disc(DVec2),
     /// Its distance from this point is [`WALL_M`].
     Wall(DVec2),

@@ -7,9 +7,7 @@ use crate::evidence_grid::Flip;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Geometry {
-    /// The evidence grid.
     pub(crate) lattice: GridFrame,
-    /// The map whose cells are blocked.
     pub(crate) grid: GridFrame,
     /// An occupied cell blocks up to here, centre to centre, metres.
     pub(crate) reach: f64,

@@ -1,8 +1,8 @@
 //! The infrared model: a ranger's voltage as evidence along its ray.
 //!
-//! A ranger triangulates a small spot straight ahead, 10 to 80 cm away, at any angle of the surface. Its voltage grows with 1 / range,
-//! so the AD converter's noise becomes one of the range that grows with the square. Nearer than 10 cm the voltage falls again: the
-//! obstacle is near, but not how near. A ranger sees no glass and no surface that reflects no infrared; the sonar hears those.
+//! A ranger triangulates a small spot straight ahead, 10 to 80 cm away, at any angle of the surface. Its voltage grows with 1 / range, so
+//! the noise of the range grows with the square. Nearer than 10 cm the voltage falls again: the obstacle is near, but not how near. A
+//! ranger sees no glass and no surface that reflects no infrared; the sonar hears those.
 
 use common::{
     samples::{RangeReading, RangeStatus},

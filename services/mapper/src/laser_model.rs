@@ -3,8 +3,8 @@
 //! A beam is thinner than a cell and ends at a surface of any angle: passed cells are free, the last one is occupied. A beam without a
 //! reading says nothing.
 //!
-//! Many beams cross a cell near the laser, so a scan counts once for a cell. It is occupied where a fifth of the beams end and the
-//! others pass: a post, or a thing's edge, fills part of it. Fewer ends are noise of a surface behind, which must not close a gap.
+//! A scan counts once for a cell, which many beams cross near the laser. It is occupied where a fifth of them end and the others pass: a
+//! post, or a thing's edge, fills part of it. Fewer ends are noise of a surface behind, which must not close a gap.
 //!
 //! Where beams are no farther apart than a cell, the passed cells are the polygon of their ends, filled row by row. Farther away, and
 //! beside a beam without a reading, beams are followed one by one.

@@ -4,9 +4,9 @@
 //! earlier one at its matched pose, replaced when the robot has gone so far that it sees other things. The search begins at dead
 //! reckoning's pose, which also holds the robot in directions without lines, as along a corridor.
 //!
-//! The result is a fix for dead reckoning, whose filter takes fixes' errors for independent. Errors of matches are alike for a while, so
-//! the fixes of [`SHARED_S`] weigh like one. All share the error of their reference, and so of all references before; a fix states it,
-//! because no number of fixes averages it out.
+//! The result is a fix for dead reckoning, which takes the errors of fixes for independent. Those of matches are alike for a while, so the
+//! fixes of [`SHARED_S`] weigh like one. All share the error of their reference, and so of all references before; a fix states it, because
+//! no number of fixes averages it out.
 
 use common::{
     geometry::principal_axes,
@@ -54,7 +54,6 @@ const SHARED_S: f64 = 5.0;
 /// The least deviation of a match: metres and radians.
 const LEAST: [f64; 2] = [0.005, 0.002];
 
-/// A scan at a pose taken as known.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Reference {
     pose: Pose2,

@@ -21,7 +21,6 @@ pub struct Start {
     inputs: Vec<Input>,
 }
 
-/// An action and its tick.
 #[allow(clippy::large_enum_variant, reason = "there is one at a time, on the stack")]
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Entry {
@@ -34,7 +33,6 @@ pub enum Entry {
 impl Stage for Mapper {
     type Start = Start;
     type Entry<'a> = Entry;
-    /// The published part.
     type Outcome = Option<Part>;
 
     fn new(mission: &Mission) -> Self {

@@ -396,7 +396,7 @@ impl Mapper {
         changed
     }
 
-    /// The evidence decides. Returns the changed window.
+    /// Returns the changed window.
     fn redraw(&mut self, window: Window) -> Window {
         let mut changed = Window::default();
         let Sensed::Evidence(map) = &self.belief.sensed else {

@@ -49,7 +49,6 @@ pub(crate) fn cell_with_a_way_in(
     nearest.or(Some(own))
 }
 
-/// `reach` limits column and row.
 fn around(frame: &GridFrame, middle: Cell, reach: u32) -> impl Iterator<Item = Cell> + use<> {
     let last = frame.cells - 1;
     let span = move |at: u32| at.saturating_sub(reach)..=(at + reach).min(last);

@@ -1,8 +1,7 @@
 //! The evidential direction of a car: along the drivable arc that gets farthest along the field.
 //!
-//! The field turns sharper than a car. So arcs of several curvatures are followed over the belief; one that a hazard cuts off before the
-//! car could stop is excluded. The arc of greatest progress wins: the line integral of the field's direction. If all are excluded, the
-//! car stands.
+//! The field turns sharper than a car, so arcs of several curvatures are followed over the belief. One that a hazard cuts off before the
+//! car could stop is excluded; the best has the greatest line integral of the field's direction. If all are excluded, the car stands.
 
 use std::f64::consts::FRAC_PI_2;
 

@@ -112,9 +112,8 @@ impl<Job, Done> Drop for Background<Job, Done> {
 /// Niceness 10 by [`ThreadPriority::Crossplatform`], where 99 is the highest priority.
 const NICENESS_10: u8 = 22;
 
-/// Give this thread a tenth of a stage's share of a processor that both want. It gets no less, although nobody waits for it: a killed
-/// process ends only once each of its threads has run, and others wait for its locks in the kernel. With SCHED_IDLE both took seconds on
-/// a busy machine.
+/// Give this thread a tenth of a stage's share of a processor that both want, and no less: a killed process ends only once each of its
+/// threads has run, and others wait for its locks in the kernel. With SCHED_IDLE both took seconds on a busy machine.
 fn behind_stages() {
     let Ok(value) = ThreadPriorityValue::try_from(NICENESS_10) else {
         return;

@@ -33,7 +33,6 @@ impl Policy {
 #[derive(Debug)]
 struct Computed {
     policy: Policy,
-    /// The tick of the policy's field.
     at: Progress,
     /// Where the policy differs from the one before.
     changed: Window,

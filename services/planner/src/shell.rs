@@ -44,7 +44,6 @@ pub struct Shell {
     /// The last job and its tick, in lockstep, until its result is taken.
     job: Option<(u64, u64)>,
     latest_pose: Option<PoseSample>,
-    /// The last answered tick.
     answered: Option<u64>,
     field_changed: bool,
 }

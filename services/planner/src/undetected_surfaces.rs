@@ -1,9 +1,9 @@
 //! Surfaces that could stand in the way undetected.
 //!
 //! A smooth surface answers from the foot of the sonar's perpendicular on it, and only near its normal (Kuc and Siegel 1987: a slanted
-//! surface reflects the sound away), so a silent beam ahead does not exclude a wall at 45 degrees. A surface that the body touches has
-//! its normal within a right angle of the motion. For each point of the way and each normal a tangent surface is supposed, and a reading
-//! searched that would have detected it. An infrared ranger detects a surface at any angle, but only where its ray meets it.
+//! surface reflects the sound away), so a silent beam ahead does not exclude a wall at 45 degrees. A surface that the body touches has its
+//! normal within a right angle of the motion. For each point of the way and each normal a tangent surface is supposed, and a reading
+//! searched that would have detected it. An infrared ranger detects it where its ray meets it, at any angle.
 
 use std::f64::consts::TAU;
 

@@ -9,7 +9,6 @@ use common::{driver::Commander, mission::Mission, samples::Cause};
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
 
-/// A commander is gone after this silence.
 pub(crate) const GONE_AFTER: Duration = Duration::from_secs(1);
 /// A sender of stops alone is a commander after this time. An earlier link's stop guard leaves sooner.
 pub(crate) const STAYS: Duration = Duration::from_secs(2);
@@ -18,7 +17,6 @@ pub(crate) const STAYS: Duration = Duration::from_secs(2);
 #[derive(Clone, Copy, Debug)]
 struct Told {
     newest: Commander,
-    /// Whether any was to move the robot.
     moves: bool,
     began_ns: u64,
     newest_ns: u64,

@@ -1,8 +1,8 @@
 //! The latency monitor: whether the robot's frames arrive late. Buffers may delay them by seconds, and they carry no time.
 //!
 //! A robot acknowledges every command. When a lost robot answers again, and while it is late, the link sends nothing for a window. An
-//! acknowledgement when nothing was sent for longer than a command's limit is late; a sooner one may answer an earlier command, and
-//! proves nothing. A robot without acknowledgements counts as timely.
+//! acknowledgement when nothing was sent for longer than a command's limit is late; a sooner one proves nothing. A robot without
+//! acknowledgements counts as timely.
 
 use std::time::Duration;
 

@@ -45,7 +45,7 @@ const LEAST_SHARE: f64 = 0.25;
 const ROLLS_SHARE: f64 = 0.5;
 /// Evidence for a suspicion. A radio that delivers frames does not lose commands for so long.
 pub(crate) const SUSPECTED_AFTER: Duration = Duration::from_millis(550);
-/// A commanded wheel may count nothing for so long, because commands may be lost.
+/// Commands may be lost for so long.
 pub(crate) const STILL_AFTER: Duration = Duration::from_millis(1000);
 pub(crate) const MOST_JUMPS: usize = 3;
 pub(crate) const JUMPS_WITHIN: Duration = Duration::from_secs(2);
@@ -82,7 +82,6 @@ impl Suspicion {
     }
 }
 
-/// Evidence against one wheel, or the difference of both.
 #[derive(Clone, Copy, Debug, Default)]
 struct Evidence {
     asked: [f64; 2],

@@ -95,7 +95,7 @@ impl Presence {
         new
     }
 
-    /// A change makes the robot pinged at once.
+    /// The robot is pinged at once after a change.
     pub const fn wire(&mut self, open: bool) {
         self.wire_open = open;
         self.pings.reset();

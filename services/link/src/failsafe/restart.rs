@@ -34,10 +34,8 @@ pub struct RestartWatch {
     /// The newest implausible counts, their time, and the frames that can follow each other.
     suspected: Option<([u16; 2], MissionTime, u32)>,
     away: bool,
-    /// The counts leave a jump of the robot's odometry out.
     jumped: bool,
     restarts: u32,
-    /// A wheel's counts in a second at top speed.
     top_counts: f64,
     jitter_s: f64,
     slack: f64,

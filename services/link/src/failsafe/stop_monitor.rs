@@ -20,7 +20,6 @@ const RESTS_COUNTS: f64 = 4.0;
 const SHOWS_AFTER: Duration = Duration::from_millis(150);
 /// Wheels rest so long until the robot does.
 const AT_REST_AFTER: Duration = Duration::from_millis(200);
-/// A robot that does not stop gets the next method after this.
 const NEXT_METHOD_AFTER: Duration = Duration::from_millis(300);
 
 #[derive(Clone, Debug)]

@@ -22,7 +22,6 @@ use crate::backoff::Backoff;
 /// short ones.
 const INTERVALS: usize = 9;
 const SHORT_ONES: usize = 2;
-/// The first pause between requests for missing streams.
 const FIRST_PAUSE: Duration = Duration::from_secs(1);
 const LONGEST_PAUSE: Duration = Duration::from_secs(8);
 

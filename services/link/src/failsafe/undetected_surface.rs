@@ -89,7 +89,6 @@ impl UndetectedSurface {
         self.silences > SILENCES
     }
 
-    /// The mean range of a surface that both see near and square ahead.
     fn surface_m(&self) -> Option<f64> {
         let near = |ranger: &Ranger| ranger.range_m.filter(|range| *range < NEARER_M);
         let seen = |ranger: &Ranger| Some(ranger.mount.hit(Pose2::default(), near(ranger)?));

@@ -92,7 +92,6 @@ impl Link {
         self.driver.velocity([0, 0], self.limit)
     }
 
-    /// Returns whether it was due.
     fn takes_next_stop_method(&mut self) -> bool {
         let does_not_stop = self.failsafe.applied(Cause::RobotDoesNotStop);
         self.failsafe.monitors.stop.takes_next_method(does_not_stop, self.now)

@@ -162,7 +162,6 @@ impl Link {
         if self.failsafe.monitors.presence.wants_ping(now_ns) {
             self.ping(now_ns, effects);
         } else if owing && passed(self.pinged_ns, now_ns, PING_EVERY) {
-            // The frames still due are lost.
             self.due = 0;
             self.ping(now_ns, effects);
         }

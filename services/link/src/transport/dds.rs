@@ -30,7 +30,6 @@ pub(super) struct Dds {
     commands: Option<usize>,
     /// The reader that is asked next, so that a flood on one topic does not hold back others.
     next: usize,
-    /// The newest message since the domain was joined.
     heard_ns: Option<u64>,
     joined_ns: Option<u64>,
     tally: Tally,
@@ -91,7 +90,6 @@ impl Dds {
         None
     }
 
-    /// One that the link has not written itself.
     fn take(&self, row: usize) -> Option<Message> {
         let (reader, own) = (self.readers.get(row)?, self.writer.gid());
         std::iter::from_fn(|| reader.take()).find(|message| message.from != own)
@@ -110,7 +108,6 @@ impl Dds {
     }
 }
 
-/// A reader of each topic, in their order, and the writer of commands.
 fn endpoints(participant: &Participant, topics: &Topics) -> io::Result<(Vec<Reader>, Writer)> {
     let heard = Quality { is_reliable: false, is_latched: false, depth: DEPTH };
     let readers = topics.heard.iter().map(|(_, topic)| participant.reader(topic, heard));
