@@ -3,7 +3,7 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`table`] | THE table of experiments: their missions, and the paper's report of each |
+//! | [`table`] | THE table of experiments: their missions, and the paper's report of each; the methods |
 //! | [`claims`] | the findings of one experiment by one method; the paper's claims, and whether they hold here |
 //! | [`report`] | the results as text, a page and JSON objects |
 
@@ -23,6 +23,7 @@ use crate::missions::{
     setting::{HARMONIC, Setting},
 };
 use report::Report;
+use table::METHODS;
 
 /// Repeat the paper's experiments with its method and with the default one, and compare the results with those of the paper.
 #[derive(Debug, Args)]
@@ -55,13 +56,6 @@ const LABORATORY: &str = "laboratory";
 const FIRST_SEED: u64 = 1;
 /// The radio's outage except with laboratory realism. The paper's link fades; the paper gives no number.
 const OUTAGE: &str = "simulation.radio.outage_share=0.2";
-
-/// The methods by which experiments are carried out, with their assignments: the paper's with its dead reckoning, (21).
-const METHODS: [(&str, &[&str]); 2] = [
-    (PAPER, &["method='paper'", "dead_reckoning.integration='euler'"]),
-    ("evidential", &["method='evidential'"]),
-];
-const PAPER: &str = "paper";
 
 pub fn main(arguments: &Arguments) -> Result<(), Failure> {
     let chosen = table::named(&arguments.only)?;

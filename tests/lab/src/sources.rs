@@ -11,7 +11,7 @@ use std::{
 use clap::Args;
 use common::ground_truth::GROUND_TRUTH;
 use common::{
-    bus::{Bus, BusError, Reader, Writer},
+    bus::{Bus, Reader, Writer},
     domain::{Domain, RobotName},
     follower::{Event, Follower},
     ground_truth::GroundTruthTick,
@@ -68,7 +68,10 @@ pub fn main(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn publish(arguments: &Arguments) -> Result<Published, Failure> {
-    let open = |bus: &Bus| Ok((bus.reader(&topics::POSE)?, Writers::open(bus)?));
+    let open = |bus: &Bus| {
+        let writers = (bus.writer(&topics::FIX, 1)?, bus.writer(&topics::TURN, 1)?);
+        Ok((bus.reader(&topics::POSE)?, writers))
+    };
     let mut robot =
         Follower::new(Domain::of(arguments.robot.clone()), "sources", &topics::POSE, open);
     let mut source = Source::new(arguments);
@@ -82,16 +85,8 @@ fn publish(arguments: &Arguments) -> Result<Published, Failure> {
     }
 }
 
-struct Writers {
-    fixes: Writer<FixSample>,
-    turns: Writer<TurnSample>,
-}
-
-impl Writers {
-    fn open(bus: &Bus) -> Result<Self, BusError> {
-        Ok(Self { fixes: bus.writer(&topics::FIX, 1)?, turns: bus.writer(&topics::TURN, 1)? })
-    }
-}
+/// The writers of fixes and of turns.
+type Writers = (Writer<FixSample>, Writer<TurnSample>);
 
 struct Source<'a> {
     arguments: &'a Arguments,
@@ -192,7 +187,7 @@ impl<'a> Source<'a> {
                 covariance: [variance, 0.0, 0.0, variance, 0.0, 0.0],
                 ..FixSample::default()
             };
-            writers.fixes.publish(tick, time, fix)?;
+            writers.0.publish(tick, time, fix)?;
             self.published.fixes += 1;
         }
         if let Some(noise) = gyro {
@@ -209,7 +204,7 @@ impl<'a> Source<'a> {
                 variance_rad2: deviation * deviation,
                 ..TurnSample::default()
             };
-            writers.turns.publish(tick, time, turn)?;
+            writers.1.publish(tick, time, turn)?;
             self.published.turns += 1;
         }
         Ok(())

@@ -43,12 +43,12 @@ pub fn main(arguments: &Arguments) -> Result<(), Failure> {
         None => format!("latency{}", std::process::id()).parse()?,
     };
     if let Some(supervisor) = arguments.supervisor {
-        return Ok(match &arguments.forwarder {
+        return match &arguments.forwarder {
             Some(place) if place == plain_hops::PLAIN => plain_hops::run_forwarder(supervisor),
             Some(place) => hops::run_forwarder(&robot, place, supervisor),
             None if arguments.spin => busy::run(supervisor),
             None => consumers::run(&robot, supervisor),
-        }?);
+        };
     }
     let rate_hz = missions::load(&arguments.mission, &arguments.set)?.robot.rate_hz;
     for report in measure(arguments, &robot, rate_hz)? {

@@ -1,7 +1,6 @@
 //! The consumers that are hit beside the stages, and the command of each.
 
 use std::{
-    ffi::OsString,
     path::{Path, PathBuf},
     process::Command,
     str::FromStr,
@@ -86,32 +85,26 @@ impl Consumer {
     /// The command that starts the consumer for `robot`; a recorder writes into `recording`. None for the run's own
     /// recorder.
     pub fn command(&self, robot: &RobotName, recording: &Path) -> Option<Command> {
-        let own = |arguments: &[&str]| {
-            let mut words: Vec<OsString> = vec![robot::path().unwrap_or_default().into()];
-            words.extend(arguments.iter().map(OsString::from));
-            words.extend(["--robot".into(), robot.to_string().into()]);
-            words
-        };
-        let words = match self {
+        let own: &[&str] = match self {
             Self::RunRecorder => return None,
-            Self::Record => {
-                let mut words = own(&["record"]);
-                words.extend(["--out".into(), recording.into()]);
-                words
-            }
-            Self::Top => own(&["top"]),
-            Self::Hz => own(&["topic", "hz"]),
-            Self::Logs => own(&["logs", "--follow"]),
-            Self::Given(given) => {
-                let mut words = vec![given.program.clone().into_os_string()];
-                words.extend(given.arguments.iter().map(OsString::from));
-                words
-            }
+            Self::Record => &["record"],
+            Self::Top => &["top"],
+            Self::Hz => &["topic", "hz"],
+            Self::Logs => &["logs", "--follow"],
+            Self::Given(_) => &[],
         };
         // The subcommand executes the program, and ends with its parent.
         let mut command =
             process::firsthand(&["bench", "consumer", &std::process::id().to_string()]);
-        command.args(words);
+        if let Self::Given(given) = self {
+            command.arg(&given.program).args(&given.arguments);
+        } else {
+            command.arg(robot::path().unwrap_or_default()).args(own);
+            command.args(["--robot", &robot.to_string()]);
+        }
+        if *self == Self::Record {
+            command.arg("--out").arg(recording);
+        }
         Some(command)
     }
 }

@@ -6,39 +6,51 @@ use std::{
 };
 
 use recording::{
-    End, Recording,
-    replay::{Options, replay},
+    End, Recording, RecordingError,
+    replay::{Options, Report, replay},
 };
 use serde::Serialize;
+
+/// Recordings, their generations whose outputs are equal to the bit, those that ended before their first step, and compared samples.
+#[derive(Debug, Default, Serialize)]
+struct Counts {
+    recordings: u64,
+    equal: u64,
+    without_step: u64,
+    compared: u64,
+}
 
 /// Results of recordings whose recorders were hit, or attached during a mission.
 #[derive(Debug, Default, Serialize)]
 struct Partial {
-    recordings: u64,
+    #[serde(flatten)]
+    counts: Counts,
     /// Recordings that end before their recorder did.
     cut: u64,
     /// Recordings that do not name their run, because the recorder was killed before it had written that.
     not_begun: u64,
-    /// Generations whose recorded outputs are equal to the bit.
-    equal: u64,
-    without_step: u64,
-    compared: u64,
     /// Generations that were recorded in part, so that their state cannot be computed.
     not_replayed: u64,
 }
 
 #[derive(Debug, Default, Serialize)]
 pub struct Replays {
-    recordings: u64,
-    /// Generations whose outputs are equal to the bit.
-    equal: u64,
-    /// Generations without input before they ended.
-    without_step: u64,
-    compared: u64,
+    #[serde(flatten)]
+    counts: Counts,
     /// Generations that differ or could not be replayed, and recordings that could not be read, with reasons.
     wrong: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     partial: Option<Partial>,
+}
+
+impl Counts {
+    fn add(&mut self, report: &Report) {
+        for found in report.stages.values() {
+            self.equal += found.equal;
+            self.without_step += found.without_step;
+            self.compared += found.compared;
+        }
+    }
 }
 
 impl Replays {
@@ -62,59 +74,54 @@ impl Replays {
             .iter()
             .filter(|file| file.extension().is_some_and(|extension| extension == "mcap"))
             .partition(|file| hit.contains(file));
+        let mut wrong = Vec::new();
         if hit.is_empty() && whole.is_empty() {
-            self.wrong.push(format!("seed {seed}: nothing was recorded"));
+            wrong.push("nothing was recorded".to_owned());
         }
         for file in whole {
-            self.recordings += 1;
-            if let Err(error) = self.replay(seed, file) {
-                self.wrong.push(format!("seed {seed}: {error}"));
+            self.counts.recordings += 1;
+            if let Err(error) = self.replay(file, &mut wrong) {
+                wrong.push(error.to_string());
             }
         }
         for file in hit.into_iter().chain(others) {
-            self.replay_partial(seed, file);
+            if let Err(error) = self.replay_partial(file, &mut wrong) {
+                wrong.push(error.to_string());
+            }
         }
+        self.wrong.extend(wrong.into_iter().map(|wrong| format!("seed {seed}: {wrong}")));
         self.wrong.len() == before
     }
 
     /// Replay a recording that may be incomplete.
-    fn replay_partial(&mut self, seed: u64, file: &Path) {
+    fn replay_partial(
+        &mut self,
+        file: &Path,
+        wrong: &mut Vec<String>,
+    ) -> Result<(), RecordingError> {
         let partial = self.partial.get_or_insert_default();
-        partial.recordings += 1;
+        partial.counts.recordings += 1;
         let Ok(recording) = Recording::open(file) else {
             partial.not_begun += 1;
-            return;
+            return Ok(());
         };
         partial.cut += u64::from(recording.end != End::Complete);
-        match replay(&recording, &Options::default()) {
-            Ok(report) => {
-                partial.not_replayed += report.not_replayed() as u64;
-                for found in report.stages.values() {
-                    partial.equal += found.equal;
-                    partial.without_step += found.without_step;
-                    partial.compared += found.compared;
-                }
-                if let Some(difference) = &report.difference {
-                    self.wrong.push(format!("seed {seed}: {difference}"));
-                }
-            }
-            Err(error) => self.wrong.push(format!("seed {seed}: {error}")),
-        }
+        let report = replay(&recording, &Options::default())?;
+        partial.not_replayed += report.not_replayed() as u64;
+        partial.counts.add(&report);
+        wrong.extend(report.difference.map(|difference| difference.to_string()));
+        Ok(())
     }
 
-    fn replay(&mut self, seed: u64, file: &Path) -> Result<(), recording::RecordingError> {
+    fn replay(&mut self, file: &Path, wrong: &mut Vec<String>) -> Result<(), RecordingError> {
         let report = replay(&Recording::open(file)?, &Options::default())?;
+        self.counts.add(&report);
         for (stage, found) in &report.stages {
-            self.equal += found.equal;
-            self.without_step += found.without_step;
-            self.compared += found.compared;
             for (generation, why) in &found.not_replayed {
-                self.wrong.push(format!("seed {seed}: {stage} generation {generation}: {why}"));
+                wrong.push(format!("{stage} generation {generation}: {why}"));
             }
         }
-        if let Some(difference) = &report.difference {
-            self.wrong.push(format!("seed {seed}: {difference}"));
-        }
+        wrong.extend(report.difference.map(|difference| difference.to_string()));
         Ok(())
     }
 }
@@ -124,10 +131,10 @@ impl fmt::Display for Replays {
         writeln!(
             to,
             "replayed {} recordings: {} generations bit-equal in {} samples, {} ended before their first step, {} not",
-            self.recordings,
-            self.equal,
-            self.compared,
-            self.without_step,
+            self.counts.recordings,
+            self.counts.equal,
+            self.counts.compared,
+            self.counts.without_step,
             self.wrong.len()
         )?;
         if let Some(partial) = &self.partial {
@@ -135,12 +142,12 @@ impl fmt::Display for Replays {
                 to,
                 "recorders hit, or attached in mid mission: {} recordings ({} cut off, {} without their beginning): {} generations bit-equal in {} \
                  samples, {} ended before their first step, {} recorded in part and not replayed",
-                partial.recordings,
+                partial.counts.recordings,
                 partial.cut,
                 partial.not_begun,
-                partial.equal,
-                partial.compared,
-                partial.without_step,
+                partial.counts.equal,
+                partial.counts.compared,
+                partial.counts.without_step,
                 partial.not_replayed
             )?;
         }

@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, fmt};
 
 use common::{latency::Histogram, topics::SUPERVISOR};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use crate::chaos::{
     changes::Changes, kind::Kind, replays::Replays, resources::Resources,
@@ -30,7 +30,6 @@ pub struct Report {
     kills: BTreeMap<&'static str, BTreeMap<Kind, u32>>,
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     consumers: BTreeMap<String, ConsumerCounts>,
-    #[serde(serialize_with = "recoveries")]
     recovery_ms: BTreeMap<&'static str, Recovery>,
     /// Largest pose error at the end beyond the same seed's undisturbed run, metres, and the signals of that mission.
     worst_pose_excess_m: f64,
@@ -81,13 +80,16 @@ impl fmt::Display for ConsumerCounts {
 }
 
 /// Times from the signal to the successor.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize)]
 pub struct Recovery {
     /// The time to the first ready beat, after kills: a death is noticed at once.
+    #[serde(serialize_with = "quantiles")]
     pub ready: Histogram,
     /// The time to the first ready beat, after freezes, which are noticed by missing beats.
+    #[serde(rename = "ready_when_frozen", serialize_with = "quantiles")]
     pub after_freeze: Histogram,
     /// The time to the first sample of a tick, which may come up to a tick later.
+    #[serde(serialize_with = "quantiles")]
     pub output: Histogram,
 }
 
@@ -227,18 +229,8 @@ impl fmt::Display for Quantiles {
     }
 }
 
-fn recoveries<S: serde::Serializer>(
-    all: &BTreeMap<&'static str, Recovery>,
-    to: S,
-) -> Result<S::Ok, S::Error> {
-    to.collect_map(all.iter().map(|(stage, recovery)| {
-        let parts = [
-            ("ready", Quantiles::of(&recovery.ready)),
-            ("ready_when_frozen", Quantiles::of(&recovery.after_freeze)),
-            ("output", Quantiles::of(&recovery.output)),
-        ];
-        (stage, parts.into_iter().collect::<BTreeMap<_, _>>())
-    }))
+fn quantiles<S: Serializer>(histogram: &Histogram, to: S) -> Result<S::Ok, S::Error> {
+    Quantiles::of(histogram).serialize(to)
 }
 
 impl fmt::Display for Report {

@@ -122,7 +122,7 @@ impl RobotFault {
     }
 
     /// Whether the robot has the fault from its start on.
-    pub const fn from_boot(self) -> bool {
+    pub const fn begins_at_boot(self) -> bool {
         matches!(self, Self::LateFromBoot)
     }
 

@@ -167,7 +167,7 @@ impl Observed {
             let due = |tick: &GroundTruthTick| {
                 departed.is_some_and(|departed| tick.time_s >= departed + fault_after_s)
             };
-            if self.fault_began.is_none() && (fault.from_boot() || newest.is_some_and(due)) {
+            if self.fault_began.is_none() && (fault.begins_at_boot() || newest.is_some_and(due)) {
                 proxy.begin_fault();
                 self.fault_began = Some((Instant::now(), self.ticks));
                 if fault.is_kill() {

@@ -5,10 +5,7 @@ use std::ops::RangeInclusive;
 use serde::Serialize;
 
 use crate::{
-    experiments::{
-        METHODS,
-        table::{Experiment, TABLE},
-    },
+    experiments::table::{Experiment, METHODS, TABLE},
     missions::{
         row::{Outcome, Row},
         statistics::{Spread, share},

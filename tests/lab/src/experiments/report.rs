@@ -7,9 +7,8 @@ use serde_json::{Value, json};
 
 use crate::{
     experiments::{
-        METHODS,
         claims::{Expectation, FIGURES, Findings, expectations},
-        table::Experiment,
+        table::{Experiment, METHODS},
     },
     missions::{
         page::{END, escaped, figure, head},

@@ -4,16 +4,20 @@ use common::mission::Mission;
 use console::missions::{self, LookupError};
 use thiserror::Error;
 
-use crate::{
-    experiments::PAPER,
-    missions::trial::{BodySize, Trial},
-};
+use crate::missions::trial::{BodySize, Trial};
 
 /// Free ground on both sides of the body in the narrowest passage of a world, metres.
 const MARGIN_M: f64 = 0.05;
 /// Experiment 3: the drum at this place is not known, metres. A robot without sensing touches unknown things on its path; the
 /// field of the other drums does not lead past this one.
 const UNKNOWN_AT_M: (f64, f64) = (2.3, -1.7);
+
+/// The methods by which experiments are carried out, with their assignments: the paper's with its dead reckoning, (21).
+pub const METHODS: [(&str, &[&str]); 2] = [
+    (PAPER, &["method='paper'", "dead_reckoning.integration='euler'"]),
+    ("evidential", &["method='evidential'"]),
+];
+const PAPER: &str = "paper";
 
 /// An experiment of section V.B of the paper.
 #[derive(Debug)]
