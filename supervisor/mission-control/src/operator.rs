@@ -2,7 +2,10 @@
 //! the request, or says why not.
 
 use std::{
+    env,
     io::{self, Read as _},
+    os::unix::process::CommandExt as _,
+    path::PathBuf,
     process::{Child, Stdio},
     time::{Duration, Instant},
 };
@@ -24,7 +27,7 @@ use common::{
     waiter::Waiter,
 };
 use link::stop_guard;
-use processes::process;
+use processes::{executable, process};
 use thiserror::Error;
 
 /// The patience with a roster, which comes five times a second.
@@ -120,10 +123,21 @@ fn rests_by(link: &stop_socket::Operator) -> bool {
     }
 }
 
+/// The robot's executable: this very program, even if its file was replaced meanwhile, or the one beside a viewer.
+fn robot_executable() -> PathBuf {
+    let own = env::current_exe().unwrap_or_default();
+    let is_viewer =
+        own.file_name().is_some_and(|name| name.to_string_lossy().starts_with("firsthand-"));
+    let beside = is_viewer.then(|| executable::find("firsthand".as_ref()).ok()).flatten();
+    beside.unwrap_or_else(|| PathBuf::from("/proc/self/exe"))
+}
+
 /// Tell the supervisor of a stop, in a process of its own: the files of a damaged bus can end the process that opens them.
 fn tell_supervisor(robot: &RobotName, asked_ns: u64) -> Result<Child, OperatorError> {
     let (robot, asked) = (robot.to_string(), asked_ns.to_string());
-    let child = process::firsthand(&["stop", "--robot", &robot, "--through-supervisor", &asked])
+    let child = process::child(robot_executable())
+        .arg0("firsthand")
+        .args(["stop", "--robot", &robot, "--through-supervisor", &asked])
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn();
