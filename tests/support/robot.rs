@@ -6,7 +6,10 @@ use std::{
     os::unix::fs::PermissionsExt as _,
     path::{Path, PathBuf},
     process::{Child, Stdio},
-    sync::{LazyLock, mpsc},
+    sync::{
+        LazyLock,
+        mpsc::{self, Receiver, RecvTimeoutError},
+    },
     thread,
     time::{Duration, Instant},
 };
@@ -144,23 +147,37 @@ pub fn follow_status(
     is_so: impl Fn(&Value) -> bool,
     mut check: impl FnMut(),
 ) -> Value {
+    let began = Instant::now();
+    let (mut follower, mut lines) = start_follower(robot);
+    loop {
+        match lines.recv_timeout(CHECK_EVERY) {
+            Ok(line) => {
+                let status = serde_json::from_str(&line).unwrap();
+                if is_so(&status) {
+                    return status;
+                }
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+            // A bus that is being made or removed ends the follower.
+            Err(RecvTimeoutError::Disconnected) => {
+                drop(follower);
+                (follower, lines) = start_follower(robot);
+            }
+        }
+        check();
+        assert!(began.elapsed() < PATIENCE, "waited too long for robot {robot}");
+    }
+}
+
+/// A process that follows the status of a robot, and its lines.
+fn start_follower(robot: &str) -> (Killed, Receiver<String>) {
     let mut command = firsthand(&["status", "--follow", "--json", "--robot", robot]);
     let follower = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
     let mut follower = Killed(follower);
     let lines = BufReader::new(follower.0.stdout.take().unwrap()).lines();
     let (sent, received) = mpsc::channel();
     thread::spawn(move || lines.map_while(Result::ok).try_for_each(|line| sent.send(line)));
-    let began = Instant::now();
-    loop {
-        if let Ok(line) = received.recv_timeout(CHECK_EVERY) {
-            let status = serde_json::from_str(&line).unwrap();
-            if is_so(&status) {
-                return status;
-            }
-        }
-        check();
-        assert!(began.elapsed() < PATIENCE, "waited too long for robot {robot}");
-    }
+    (follower, received)
 }
 
 /// A process that is killed when this is dropped.
