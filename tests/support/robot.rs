@@ -2,9 +2,15 @@
 
 use std::{
     fs,
+    io::{BufRead as _, BufReader},
     os::unix::fs::PermissionsExt as _,
     path::{Path, PathBuf},
-    sync::LazyLock,
+    process::{Child, Stdio},
+    sync::{
+        LazyLock,
+        mpsc::{self, Receiver, RecvTimeoutError},
+    },
+    thread,
     time::{Duration, Instant},
 };
 
@@ -16,7 +22,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::commands::output;
+use super::commands::{firsthand, output};
 
 /// Every stage, in the order of the pipeline.
 pub const STAGES: [&str; 5] = ["link", "dead-reckoning", "mapper", "planner", "controller"];
@@ -130,16 +136,62 @@ pub fn status_of(robot: &str) -> Option<Value> {
     serde_json::from_slice(&text).ok()
 }
 
-/// Ask for the status of a robot until `is_so` returns true, for a robot without a [`Run`](super::Run).
+/// Follow the status of a robot until `is_so` returns true, for a robot without a [`Run`](super::Run).
 pub fn wait_for_status(robot: &str, is_so: impl Fn(&Value) -> bool) -> Value {
+    follow_status(robot, is_so, || {})
+}
+
+/// Follow the status of a robot until `is_so` returns true. `check` is called meanwhile, and may panic.
+pub fn follow_status(
+    robot: &str,
+    is_so: impl Fn(&Value) -> bool,
+    mut check: impl FnMut(),
+) -> Value {
     let began = Instant::now();
+    let (mut follower, mut lines) = start_follower(robot);
     loop {
-        match status_of(robot) {
-            Some(status) if is_so(&status) => return status,
-            last => assert!(began.elapsed() < PATIENCE, "waited too long: {last:?}"),
+        match lines.recv_timeout(CHECK_EVERY) {
+            Ok(line) => {
+                let status = serde_json::from_str(&line).unwrap();
+                if is_so(&status) {
+                    return status;
+                }
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+            // A bus that is being made or removed ends the follower.
+            Err(RecvTimeoutError::Disconnected) => {
+                drop(follower);
+                (follower, lines) = start_follower(robot);
+            }
         }
+        check();
+        assert!(began.elapsed() < PATIENCE, "waited too long for robot {robot}");
     }
 }
+
+/// A process that follows the status of a robot, and its lines.
+fn start_follower(robot: &str) -> (Killed, Receiver<String>) {
+    let mut command = firsthand(&["status", "--follow", "--json", "--robot", robot]);
+    let follower = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    let mut follower = Killed(follower);
+    let lines = BufReader::new(follower.0.stdout.take().unwrap()).lines();
+    let (sent, received) = mpsc::channel();
+    thread::spawn(move || lines.map_while(Result::ok).try_for_each(|line| sent.send(line)));
+    (follower, received)
+}
+
+/// A process that is killed when this is dropped.
+struct Killed(Child);
+
+impl Drop for Killed {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// How often a test that follows a status looks whether the robot's run has ended.
+const CHECK_EVERY: Duration = Duration::from_millis(100);
 
 /// A directory for a run of `robot`. The command lines of all processes of the run contain it.
 pub fn directory_of(robot: &str) -> TempDir {

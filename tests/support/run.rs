@@ -5,7 +5,6 @@ use std::{
     io::Read as _,
     path::{Path, PathBuf},
     process::{Child, Stdio},
-    time::Instant,
 };
 
 use recording::Recording;
@@ -16,7 +15,7 @@ use tempfile::TempDir;
 use super::{
     commands::firsthand,
     robot::{
-        PATIENCE, all_run, assert_nothing_left, directory_of, find, generation, pid,
+        all_run, assert_nothing_left, directory_of, find, follow_status, generation, pid,
         signal_process, status_of,
     },
 };
@@ -73,23 +72,16 @@ impl Run {
         status_of(&self.robot)
     }
 
-    /// Ask for the status until `is_so` returns true. Each answer waits for the supervisor's next sample.
+    /// Follow the status until `is_so` returns true.
     pub fn wait_until(&mut self, what: &str, is_so: impl Fn(&Value) -> bool) -> Value {
-        let began = Instant::now();
-        loop {
-            if let Some(status) = self.status()
-                && is_so(&status)
-            {
-                return status;
-            }
-            let child = self.child.as_mut().unwrap();
+        let child = self.child.as_mut().unwrap();
+        follow_status(&self.robot, is_so, || {
             if let Some(exit) = child.try_wait().unwrap() {
                 let mut said = String::new();
                 let _ = child.stderr.take().unwrap().read_to_string(&mut said);
                 panic!("the run ended ({exit}) before {what}: {said}");
             }
-            assert!(began.elapsed() < PATIENCE, "waited too long for {what}");
-        }
+        })
     }
 
     /// Wait until the robot has been under way for `seconds` of mission time.

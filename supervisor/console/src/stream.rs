@@ -34,6 +34,11 @@ impl Stream {
     /// From now on a signal lets the command leave the bus before it ends. Fails if signals cannot be caught.
     pub fn open() -> io::Result<Self> {
         let_stages_go_first();
+        Self::with_usual_priority()
+    }
+
+    /// [`Self::open`] without the lower priority.
+    pub fn with_usual_priority() -> io::Result<Self> {
         Ok(Self { signals: Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?, ended: false })
     }
 

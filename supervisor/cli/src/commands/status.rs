@@ -8,6 +8,7 @@ use std::{
 use clap::Args;
 use common::{
     domain::{Domain, RobotName},
+    follower::{Event, Follower},
     roster,
     samples::{
         Action, HoldReason, LinkSample, Order, PowerSample, RosterEntry, StageState, TargetSample,
@@ -22,10 +23,12 @@ use serde::Serialize;
 use console::{
     failure::Failure,
     output::print,
+    stream::{LOOK_EVERY, Stream},
     table::{
         Align::{Left, Right},
         Table,
     },
+    waiting::Waiting,
     words::{age, order, seconds, state},
 };
 
@@ -38,6 +41,9 @@ pub(crate) struct Arguments {
     /// List all robots that run on this machine for this user instead.
     #[arg(long, conflicts_with = "robot")]
     all: bool,
+    /// Print a status after each change, at most fifty a second, from run to run of the robot, until Ctrl-C.
+    #[arg(long, conflicts_with = "all")]
+    follow: bool,
     /// One line of JSON for each robot; an age of null is never.
     #[arg(long)]
     json: bool,
@@ -117,32 +123,43 @@ const PATIENCE: Duration = Duration::from_secs(2);
 /// The link publishes ten times a second, and a robot reports its batteries several times a second.
 const LINK_PATIENCE: Duration = Duration::from_millis(400);
 
+/// The least time between two statuses that are followed.
+const SHOWN_EVERY: Duration = Duration::from_millis(20);
+
 pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
-    if arguments.all { all::print(arguments.json) } else { print_one(arguments) }
+    match arguments {
+        Arguments { all: true, .. } => all::print(arguments.json),
+        Arguments { follow: true, .. } => follow(arguments),
+        _ => print_one(arguments),
+    }
+}
+
+/// The topics of a status. The supervisor publishes the target before its roster.
+static WANTED: [&dyn AnyTopic; 4] =
+    [&topics::ROSTER, &topics::LINK, &topics::POWER, &topics::TARGET];
+
+/// Whether `robot` is complete after `waited`. A robot without a link or without batteries is so after a while.
+fn is_complete(robot: &RobotState, waited: Duration) -> bool {
+    let lost = robot.link.is_some_and(|link| link.connected == 0);
+    let all = robot.link.is_some() && (robot.power.is_some() || lost);
+    robot.supervisor.is_some() && (all || waited >= LINK_PATIENCE)
 }
 
 fn print_one(arguments: &Arguments) -> Result<(), Failure> {
     let bus = roster::join(&Domain::of(arguments.robot.clone()), "status")?;
-    // The supervisor publishes the target before its roster.
-    let wanted: [&dyn AnyTopic; 4] =
-        [&topics::ROSTER, &topics::LINK, &topics::POWER, &topics::TARGET];
-    let mut feed = Feed::open(&bus, &wanted)?;
+    let mut feed = Feed::open(&bus, &WANTED)?;
     let mut waiter = Waiter::default();
-    for topic in [&topics::ROSTER as &dyn AnyTopic, &topics::LINK, &topics::POWER] {
-        waiter.on(bus.wakeup(topic)?);
+    for topic in &WANTED[..3] {
+        waiter.on(bus.wakeup(*topic)?);
     }
     let began = Instant::now();
     let mut robot = RobotState::default();
-    let header = loop {
+    loop {
         feed.read(&mut |sample| {
             robot.apply(&sample);
         })?;
-        let lost = robot.link.is_some_and(|link| link.connected == 0);
-        let all = robot.link.is_some() && (robot.power.is_some() || lost);
-        if let Some(header) = robot.supervisor
-            && (all || began.elapsed() >= LINK_PATIENCE)
-        {
-            break header;
+        if let Some(status) = status(arguments, &robot, began.elapsed()) {
+            return Ok(print(&status, arguments.json)?);
         }
         if began.elapsed() >= PATIENCE {
             return Err(format!(
@@ -152,8 +169,51 @@ fn print_one(arguments: &Arguments) -> Result<(), Failure> {
             .into());
         }
         waiter.wait(LINK_PATIENCE)?;
-    };
-    let status = Status {
+    }
+}
+
+/// Print a status after each change, from run to run.
+fn follow(arguments: &Arguments) -> Result<(), Failure> {
+    let mut stream = Stream::with_usual_priority()?;
+    let domain = Domain::of(arguments.robot.clone());
+    let mut follower = Follower::new(domain, "status", WANTED[0], |bus| Feed::open(bus, &WANTED))
+        .also_on(WANTED[1..3].iter().copied());
+    let (mut robot, mut waiting) = (RobotState::default(), Waiting::default());
+    let (mut began, mut shown) = (Instant::now(), None::<Instant>);
+    while !stream.has_ended() {
+        match follower.wait(LOOK_EVERY)? {
+            Event::Connected => {
+                (robot, began) = (RobotState::default(), Instant::now());
+                waiting.on_connected();
+            }
+            Event::Disconnected => waiting.on_disconnected(&arguments.robot),
+            Event::Nothing => waiting.on_nothing(&arguments.robot),
+            Event::Samples(feed) => {
+                feed.read(&mut |sample| {
+                    robot.apply(&sample);
+                })?;
+                // In lockstep there may be thousands of ticks a second.
+                if shown.is_none_or(|shown| shown.elapsed() >= SHOWN_EVERY)
+                    && let Some(status) = status(arguments, &robot, began.elapsed())
+                {
+                    shown = Some(Instant::now());
+                    let line = serde_json::to_string(&status)? + "\n";
+                    stream.write(&if arguments.json { line } else { format!("{status}\n") })?;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The status of `robot`; none before it is complete.
+fn status<'a>(
+    arguments: &'a Arguments,
+    robot: &'a RobotState,
+    waited: Duration,
+) -> Option<Status<'a>> {
+    let header = robot.supervisor.filter(|_| is_complete(robot, waited))?;
+    Some(Status {
         robot: &arguments.robot,
         supervisor_pid: header.supervisor_pid,
         order: order(Order::from_byte(header.order), HoldReason::from_byte(header.reason)),
@@ -168,8 +228,7 @@ fn print_one(arguments: &Arguments) -> Result<(), Failure> {
         link: robot.link.as_ref().map(link_status),
         power: robot.power.as_ref().map(power_status),
         stages: robot.stages.iter().map(stage_status).collect(),
-    };
-    Ok(print(&status, arguments.json)?)
+    })
 }
 
 fn stage_status(entry: &RosterEntry) -> StageStatus<'_> {
