@@ -85,8 +85,7 @@ fn what_watches_a_robot_contains_no_pictures_no_file_formats_and_no_chance() {
 fn the_robots_executable_contains_no_viewer_and_no_laboratory() {
     let names = linked(&["--package", "firsthand"]);
     assert!(names.contains("planner") && names.contains("x80-sim"), "{names:?}");
-    for tool in ["tokio", "axum", "ratatui", "foxglove", "rustdds", "pathfinding", "firsthand-lab"]
-    {
+    for tool in ["tokio", "axum", "ratatui", "foxglove", "rustdds", "firsthand-lab"] {
         assert!(!names.contains(tool), "{tool}");
     }
 }

@@ -155,7 +155,7 @@ impl<'a> Supervisor<'a> {
             stall_watch: StallWatch::new(mission),
             recovery_steps: RecoverySteps::new(unchecked),
             published_limit: None,
-            cleanup: Cleanup::new(),
+            cleanup: Cleanup::default(),
             turns,
             service: ServiceManager::of_environment(),
         };

@@ -19,12 +19,14 @@ pub struct Cleanup {
     pending: Vec<u32>,
 }
 
-impl Cleanup {
-    pub fn new() -> Self {
+impl Default for Cleanup {
+    fn default() -> Self {
         let now = Instant::now();
         Self { done: now, deaths: (0, now), pending: Vec::new() }
     }
+}
 
+impl Cleanup {
     /// Note that these stages died. Their successors are started already.
     pub fn on_deaths(&mut self, deaths: &[Death], bus: &Bus) {
         if deaths.is_empty() {
