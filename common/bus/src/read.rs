@@ -1,6 +1,7 @@
 //! Readers and wakeups. A reader returns only samples of the authors that `authors` admits.
 
 use std::{
+    cell::Cell,
     ops::Deref,
     os::fd::{AsFd, BorrowedFd},
 };
@@ -126,18 +127,29 @@ impl<H: Payload, E: Payload> Deref for Slice<H, E> {
 #[derive(Debug)]
 pub struct Wakeup {
     listener: Listener,
+    had_events: Cell<bool>,
 }
 
 impl Wakeup {
     pub(super) fn open(bus: &Bus, spec: &'static Spec) -> Result<Self, BusError> {
         let _held = bus.hold()?;
         let admit = |taken| bus.leave_places(spec, Limits::LISTENERS, taken);
-        Ok(Self { listener: Listener::open(&bus.node, spec, admit)? })
+        let listener = Listener::open(&bus.node, spec, admit)?;
+        Ok(Self { listener, had_events: Cell::new(false) })
     }
 
-    /// Clear the wakeup, which stays readable until then. Drain it before taking the samples.
-    pub(crate) fn drain(&self) -> Result<(), BusError> {
-        self.listener.drain()
+    /// Clear the wakeup, which stays readable until then, and return whether it had an event. Drain it before taking the samples.
+    pub(crate) fn drain(&self) -> Result<bool, BusError> {
+        let had_events = self.listener.drain()?;
+        self.had_events.set(had_events);
+        Ok(had_events)
+    }
+
+    /// Drain the wakeup once more if the last drain found an event. The middleware marks a listener as not notified, and then empties
+    /// its socket. If the socket loses the datagram of a notification in between, the listener stays marked as notified: nobody
+    /// writes to its socket again. That happens only to a drain that finds an event.
+    pub(crate) fn drain_what_came_meanwhile(&self) -> Result<bool, BusError> {
+        Ok(self.had_events.get() && self.drain()?)
     }
 }
 

@@ -42,10 +42,15 @@ impl Waiter {
         let wakeups = self.wakeups.iter().map(AsFd::as_fd);
         let own = self.descriptors.iter().map(AsFd::as_fd);
         let all: Vec<BorrowedFd<'_>> = wakeups.chain(own).chain(others.iter().copied()).collect();
+        let mut woken = false;
+        for wakeup in &self.wakeups {
+            woken |= wakeup.drain_what_came_meanwhile()?;
+        }
+        let timeout = if woken { Duration::ZERO } else { timeout };
         let came = poll::readable(&all, Some(timeout)).map_err(BusError::Wait)?;
         for (wakeup, _) in self.wakeups.iter().zip(&came).filter(|(_, came)| **came) {
             wakeup.drain()?;
         }
-        Ok(came.contains(&true))
+        Ok(woken || came.contains(&true))
     }
 }

@@ -346,8 +346,9 @@ impl Listener {
         Ok(listener.map_err(refused("listen to", spec.name))?.into())
     }
 
-    pub(crate) fn drain(&self) -> Result<(), BusError> {
-        self.try_wait(|_| {}).map(drop).map_err(refused("listen to", "a topic"))
+    /// Clear the notifications. Returns whether there was one.
+    pub(crate) fn drain(&self) -> Result<bool, BusError> {
+        self.try_wait(|_| {}).map(|events| events > 0).map_err(refused("listen to", "a topic"))
     }
 }
 

@@ -1,6 +1,13 @@
 //! Tests of the ports of bytes against the middleware's own typed API.
 
-use std::{fs, os::unix::fs::DirBuilderExt as _};
+use std::{
+    fs,
+    os::{
+        fd::AsFd as _,
+        unix::{fs::DirBuilderExt as _, net::UnixDatagram},
+    },
+    time::Duration,
+};
 
 use iceoryx2::prelude::{ServiceName, ZeroCopySend};
 
@@ -12,6 +19,7 @@ use crate::{
     domain::{Domain, SHARED_MEMORY},
     layouts,
     spec::Limits,
+    waiter::Waiter,
 };
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
@@ -149,6 +157,27 @@ fn a_topic_is_not_opened_as_another_payload_or_another_shape() {
             bus.reader(&as_structs).unwrap_err(),
         ] {
             assert!(matches!(error, BusError::Incompatible { .. }), "{error}");
+        }
+    });
+}
+
+/// A datagram of the second publication is lost here as in a drain that empties the socket after it marked the listener as not notified.
+#[test]
+fn a_waiter_is_woken_again_after_a_publication_in_the_middle_of_a_drain() {
+    with_bus("woken", |bus| {
+        let mut writer = bus.writer(&STRUCTS, 1).unwrap();
+        let wakeup = bus.wakeup(&STRUCTS).unwrap();
+        let socket = UnixDatagram::from(wakeup.as_fd().try_clone_to_owned().unwrap());
+        let mut waiter = Waiter::default();
+        waiter.on(wakeup);
+        let mut publish = || writer.publish(1, TIME, Test::default()).unwrap();
+        publish();
+        assert!(waiter.wait(Duration::from_secs(5)).unwrap());
+        publish();
+        socket.recv(&mut [0]).unwrap();
+        for _ in 0..2 {
+            assert!(waiter.wait(Duration::from_secs(5)).unwrap());
+            publish();
         }
     });
 }
