@@ -1,7 +1,9 @@
 //! Robots that speak lines of JSON: the example of the guide in Python, which shares no code with this project, and the simulated one.
 
 use std::{
+    fs,
     io::{BufRead as _, BufReader},
+    path::Path,
     process::{Child, Command, Stdio},
     thread::{self, JoinHandle},
 };
@@ -27,9 +29,15 @@ struct PythonRobot {
 
 impl PythonRobot {
     fn start() -> Self {
+        Self::start_with(&[])
+    }
+
+    /// `options` are the acceleration of its wheels, m/s^2, and their delay, seconds.
+    fn start_with(options: &[&str]) -> Self {
         let mut process = Command::new("setpriv")
             .args(["--pdeathsig", "KILL", "--", "python3"])
             .args([&format!("{EXAMPLE}/robot.py"), "0"])
+            .args(options)
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
@@ -42,9 +50,13 @@ impl PythonRobot {
     }
 
     fn run(&self, robot: &str) -> Run {
+        self.run_with(robot, &[])
+    }
+
+    fn run_with(&self, robot: &str, set: &[&str]) -> Run {
         let address = format!("robot.address='udp://127.0.0.1:{}'", self.port);
         let fast = "controller.speed_m_s=0.5";
-        let set = ["--set", &address, "--set", fast];
+        let set = [&["--set", &address, "--set", fast], set].concat();
         Run::start(robot, &format!("{EXAMPLE}/robot.toml"), &set)
     }
 
@@ -83,6 +95,25 @@ fn a_robot_in_python_arrives_untouched_though_each_stage_is_killed() {
     let (code, summary) = run.finish();
     assert_reached(code, &summary);
     assert_at_its_target_untouched(&robot.end());
+}
+
+/// Whether the link of a run says that the base answers otherwise than stated.
+fn names_the_response(run: &Path) -> bool {
+    let log = fs::read_to_string(run.join("link.log")).unwrap();
+    assert!(!log.contains("counts do not follow"), "{log}");
+    log.contains("the base answers after")
+}
+
+#[test]
+fn a_heavy_late_robot_arrives_untouched_as_stated_and_is_named_where_nothing_is_stated() {
+    let stated = ["--set", "robot.response={delay_s=0.3,acceleration_m_s2=0.6}"];
+    for (robot, set, named) in [("json-stated", &stated[..], false), ("json-heavy", &[], true)] {
+        let python = PythonRobot::start_with(&["0.6", "0.3"]);
+        let unsure = ["--set", "sure_within_m=2"];
+        let (summary, directory) = python.run_with(robot, &[set, &unsure].concat()).arrives_in();
+        assert_eq!(names_the_response(&directory.path().join("run")), named, "{summary}");
+        assert_at_its_target_untouched(&python.end());
+    }
 }
 
 #[test]

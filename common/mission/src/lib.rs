@@ -23,6 +23,7 @@ pub mod geometry;
 pub mod grid;
 pub mod kinematics;
 mod odometry;
+mod response;
 mod robot;
 mod ros2;
 mod sensor;
@@ -37,6 +38,7 @@ use serde::{Deserialize, Serialize};
 pub use arduino::{ArduinoBoard, LEAST_BAUD};
 pub use error::MissionError;
 pub use odometry::{Calibration, CalibrationPlan, Odometry, Procedure, Provenance};
+pub use response::{ModelledSpeed, Response, ResponseKeys};
 pub use robot::{BatteryLimits, Body, Channel, Model, Protocol, RobotConfig, Steering};
 pub use ros2::Ros2Topics;
 pub use sensor::{
@@ -227,8 +229,8 @@ pub struct Mapper {
 #[serde(deny_unknown_fields, default)]
 pub struct Planner {
     /// Evidential: the robot must be able to stop within this before it meets what it believes in or has not scanned;
-    /// by default that of [`Mission::hurry`]. The sonar's period, the radio's delay and the wheels' lag add up to
-    /// 0.36 s.
+    /// by default that of [`Mission::hurry`], which includes the base's dead time. A base that brakes slowly is given
+    /// as much less speed as it needs: [`Response::speed_to_stop_within`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stops_within_s: Option<f64>,
     /// Lambda of laplacian u = u / lambda^2. Without it the paper's method has no screening, exactly (11), and the
@@ -438,6 +440,8 @@ impl Mission {
     /// A robot whose infrared rangers end at surfaces of any angle may hurry. One with sonars alone turns at 1.2
     /// rad/s, so that a cone of 15 degrees to either side covers each direction three times at 7 Hz: with 2.0 rad/s
     /// three times as many robots touched something, most of them the ends of loose walls.
+    ///
+    /// The times to stop were found with an X80, of whose dead time they include 0.15 s.
     #[must_use]
     pub fn hurry(&self) -> Hurry {
         let uses = |kind| self.looks_first() && self.used(kind) > 0;
@@ -450,7 +454,9 @@ impl Mission {
             full_speed_within_deg: full_speed_within_deg.unwrap_or(full),
             turns_beyond_deg: turns_beyond_deg.unwrap_or(turns),
             look_rad_s: look_rad_s.unwrap_or(look),
-            stops_within_s: self.planner.stops_within_s.unwrap_or(stops),
+            stops_within_s: self.planner.stops_within_s.unwrap_or_else(|| {
+                stops + (self.body().response.dead_time_s() - Response::X80.dead_time_s())
+            }),
         }
     }
 
@@ -499,6 +505,20 @@ impl Mission {
     #[must_use]
     pub fn obstacles(&self) -> Shapes {
         self.simulation.physics().heights.touched(&self.world)
+    }
+
+    /// The wheels of the simulated base: as `simulation.wheels` says, or else as the robot's response.
+    #[must_use]
+    pub fn wheel_physics(&self) -> WheelPhysics {
+        let (written, stated) = (&self.simulation.wheels, &self.robot.response);
+        let preset = self.simulation.physics().wheels;
+        let response = self.body().response;
+        WheelPhysics {
+            acceleration_m_s2: written.acceleration_m_s2.unwrap_or(response.acceleration_m_s2),
+            delay_s: written.delay_s.or(stated.delay_s).unwrap_or(preset.delay_s),
+            lag_s: written.lag_s.or(stated.lag_s).unwrap_or(preset.lag_s),
+            ..preset
+        }
     }
 
     #[must_use]

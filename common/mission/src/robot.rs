@@ -4,6 +4,7 @@ use crate::{
     arduino::ArduinoBoard,
     kinematics::{Ackermann, DifferentialDrive, Drive},
     odometry::Odometry,
+    response::{Response, ResponseKeys},
     ros2::Ros2Topics,
     sensor::SensorRow,
 };
@@ -92,11 +93,6 @@ pub struct RobotConfig {
     pub radius_m: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub top_speed_m_s: Option<f64>,
-    /// A car and an X80 gain speed at once.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub acceleration_m_s2: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub turn_acceleration_rad_s2: Option<f64>,
     /// A car's: the driven axle.
     pub left: Channel,
     /// A car's steering, positive to the left.
@@ -114,6 +110,8 @@ pub struct RobotConfig {
     /// Its values replace `odometry` before a run starts: [`crate::Mission::with_calibration`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration: Option<PathBuf>,
+    #[serde(skip_serializing_if = "ResponseKeys::is_default")]
+    pub response: ResponseKeys,
     pub odometry: Odometry,
     #[serde(skip_serializing_if = "ArduinoBoard::is_default")]
     pub arduino: ArduinoBoard,
@@ -157,8 +155,6 @@ impl Default for RobotConfig {
             counts_per_turn: None,
             radius_m: None,
             top_speed_m_s: None,
-            acceleration_m_s2: None,
-            turn_acceleration_rad_s2: None,
             left: Channel { channel: 0, reversed: true },
             right: Channel { channel: 1, reversed: false },
             speed_trim: None,
@@ -166,6 +162,7 @@ impl Default for RobotConfig {
             low_battery_v: BatteryLimits::default(),
             held_current_ad: 1000,
             calibration: None,
+            response: ResponseKeys::default(),
             odometry: Odometry::default(),
             arduino: ArduinoBoard::default(),
             ros2: Ros2Topics::default(),
@@ -183,8 +180,7 @@ pub struct Body {
     pub counts_per_turn: f64,
     pub radius_m: f64,
     pub top_speed_m_s: f64,
-    /// How speed and turn rate may grow, m/s^2 and rad/s^2; infinite if at once. They fall at once on every robot.
-    pub acceleration: [f64; 2],
+    pub response: Response,
     pub steering: Option<Steering>,
 }
 
@@ -252,7 +248,7 @@ const fn differential(
     track_m: f64,
     radius_m: f64,
     top_speed_m_s: f64,
-    acceleration: [f64; 2],
+    response: Response,
 ) -> Body {
     Body {
         wheel_radius_m,
@@ -260,13 +256,10 @@ const fn differential(
         counts_per_turn: 3600.0,
         radius_m,
         top_speed_m_s,
-        acceleration,
+        response,
         steering: None,
     }
 }
-
-/// Accelerations of the X80 and the car, because no source gives any.
-const AT_ONCE: [f64; 2] = [f64::INFINITY; 2];
 
 impl Model {
     #[must_use]
@@ -283,7 +276,7 @@ impl Model {
                 counts_per_turn: 1200.0,
                 radius_m: 0.19,
                 top_speed_m_s: 1.0,
-                acceleration: AT_ONCE,
+                response: Response::X80,
                 steering: None,
             },
             Self::X80sv => Body {
@@ -292,17 +285,23 @@ impl Model {
                 counts_per_turn: 756.0,
                 radius_m: 0.19,
                 top_speed_m_s: 0.76,
-                acceleration: AT_ONCE,
+                response: Response::X80,
                 steering: None,
             },
             // 508 mm by 430 mm.
-            Self::Jackal => differential(0.098, 0.375_59, 0.333, 2.0, [20.0, 25.0]),
-            Self::TurtleBot3Burger => differential(0.033, 0.16, 0.105, 0.22, [2.5, 3.2]),
-            Self::TurtleBot3Waffle => differential(0.033, 0.287, 0.22, 0.26, [2.5, 3.2]),
-            Self::TurtleBot4 | Self::Create3 => {
-                differential(0.035_75, 0.233, 0.175, 0.306, [0.9, 7.725])
+            Self::Jackal => {
+                differential(0.098, 0.375_59, 0.333, 2.0, Response::limited(20.0, 25.0))
             }
-            Self::Kobuki => differential(0.0352, 0.23, 0.1758, 0.7, [1.0, 2.0]),
+            Self::TurtleBot3Burger => {
+                differential(0.033, 0.16, 0.105, 0.22, Response::limited(2.5, 3.2))
+            }
+            Self::TurtleBot3Waffle => {
+                differential(0.033, 0.287, 0.22, 0.26, Response::limited(2.5, 3.2))
+            }
+            Self::TurtleBot4 | Self::Create3 => {
+                differential(0.035_75, 0.233, 0.175, 0.306, Response::limited(0.9, 7.725))
+            }
+            Self::Kobuki => differential(0.0352, 0.23, 0.1758, 0.7, Response::limited(1.0, 2.0)),
             // Nominal. The pose is the middle of the rear axle; the disc covers a body that reaches 0.22 m ahead of
             // it and 0.09 m to either side. It turns in 0.31 m.
             Self::Car => Body {
@@ -311,7 +310,7 @@ impl Model {
                 counts_per_turn: 600.0,
                 radius_m: 0.24,
                 top_speed_m_s: 1.0,
-                acceleration: AT_ONCE,
+                response: Response::X80,
                 steering: Some(Steering {
                     wheelbase_m: 0.18,
                     limit_rad: std::f64::consts::FRAC_PI_6,
@@ -335,16 +334,14 @@ impl RobotConfig {
     #[must_use]
     pub fn body(&self) -> Body {
         let preset = self.model.body();
+        let track_m = self.track_m.unwrap_or(preset.track_m);
         Body {
             wheel_radius_m: self.wheel_radius_m.unwrap_or(preset.wheel_radius_m),
-            track_m: self.track_m.unwrap_or(preset.track_m),
+            track_m,
             counts_per_turn: self.counts_per_turn.unwrap_or(preset.counts_per_turn),
             radius_m: self.radius_m.unwrap_or(preset.radius_m),
             top_speed_m_s: self.top_speed_m_s.unwrap_or(preset.top_speed_m_s),
-            acceleration: [
-                self.acceleration_m_s2.unwrap_or(preset.acceleration[0]),
-                self.turn_acceleration_rad_s2.unwrap_or(preset.acceleration[1]),
-            ],
+            response: self.response.over(preset.response, track_m),
             steering: preset.steering.map(|steering| Steering {
                 wheelbase_m: self.wheelbase_m.unwrap_or(steering.wheelbase_m),
                 limit_rad: self.steering_limit_deg.map_or(steering.limit_rad, f64::to_radians),

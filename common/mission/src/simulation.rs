@@ -248,6 +248,9 @@ section! {
         delay_s in 0.0..=1.0 => 0.0, 0.07, 0.07;
         /// Time constant of the speed loop, seconds.
         lag_s in 0.0..=5.0 => 0.06, 0.08, 0.08;
+        /// The most by which a rim gains or loses speed, m/s^2. Where this or the delay is not written and the robot's response is
+        /// stated or its model's, the simulated base has that.
+        acceleration_m_s2 in 0.05..=f64::INFINITY => f64::INFINITY, f64::INFINITY, f64::INFINITY;
         /// Commands below this do not turn the wheel, counts per second.
         dead_band_counts in 0.0..=1000.0 => 0.0, 20.0, 20.0;
         /// Standard deviation of the speed of a turning wheel, counts per second.

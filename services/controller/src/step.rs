@@ -1,18 +1,21 @@
 //! Align the robot with the guidance, and let alignment set the speed.
 
 mod car;
+mod lead;
 
 use common::{
     bus::Topic,
     clock::MissionTime,
     geometry::wrap_angle,
     kinematics::{Drive, FACES_COSINE, LEAST_SPEED_M_S, Twist},
-    mission::{Method, Mission},
+    mission::{Method, Mission, Response},
     samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus},
     stage::{Answer, Answering, ForeignState},
     topics::{COMMAND, GUIDANCE},
 };
 use glam::DVec2;
+
+use lead::Lead;
 
 /// The wheels stick below it.
 const LEAST_TURN_RAD_S: f64 = 0.25;
@@ -72,6 +75,9 @@ pub struct Controller {
     dead_zone: f64,
     modulated: bool,
     law: SpeedLaw,
+    response: Response,
+    /// None for a base that answers soon enough, and for a car.
+    lead: Option<Lead>,
     /// The turn of an antipodal robot: 1 left, -1 right.
     side: f64,
     /// The newest target's number, and the progress to it.
@@ -86,12 +92,14 @@ impl Answering for Controller {
     const INPUT: &'static Topic<GuidanceSample> = &GUIDANCE;
     const OUTPUT: &'static Topic<CommandSample> = &COMMAND;
     const NEWEST_ONLY: bool = true;
-    /// No state survives the process: a robot at its target is there for the next controller too, or drives the last centimetre again.
+    /// No state survives the process: a robot at its target is there for the next controller too, or drives the last centimetre again, and
+    /// commands that the base has not answered yet are forgotten.
     type State = ();
 
     fn new(mission: &Mission) -> Self {
         let body = mission.body();
         let (settings, hurry) = (&mission.controller, mission.hurry());
+        let lead = if body.steering.is_some() { None } else { Lead::new(mission) };
         Self {
             drive: body.drive(),
             tolerance: mission.arrival_tolerance_m,
@@ -108,6 +116,8 @@ impl Answering for Controller {
                 Method::Paper => SpeedLaw::Paper,
                 Method::Evidential => SpeedLaw::Evidential,
             },
+            response: body.response,
+            lead,
             side: 1.0,
             arrival: Default::default(),
         }
@@ -160,12 +170,20 @@ impl Controller {
         let unit = (direction.length() - 1.0).abs() < 1e-3;
         let is_sent = guidance.target_number != 0;
         let sane = is_sent && unit && distance.is_finite() && pose.heading.is_finite();
-        let alignment = Alignment::of(pose.axis(), direction);
+        let time_s = MissionTime(guidance.pose_ns).seconds();
+        let acts_at = match &mut self.lead {
+            Some(lead) if sane => lead.pose(pose, time_s),
+            _ => pose,
+        };
+        let alignment = Alignment::of(acts_at.axis(), direction);
         let twist = if sane {
             self.motion(status, alignment, distance, guidance.speed_limit_m_s)
         } else {
             None
         };
+        if let Some(lead) = &mut self.lead {
+            lead.command(twist.unwrap_or_default(), time_s);
+        }
         let Some(twist) = twist else {
             return CommandSample { state: CommandState::Halt.into(), ..command };
         };
@@ -240,13 +258,14 @@ impl Controller {
     /// wc of (15). Near the antipode the side stays, because noise would change the sign often.
     fn angular(&mut self, alignment: Alignment) -> f64 {
         let Alignment { cosine, sine } = alignment;
+        let most = self.response.turn_to_stop_within(sine.atan2(cosine).abs());
         if cosine > 0.0 {
-            return self.turn * sine;
+            return (self.turn * sine).clamp(-most, most);
         }
         if sine.abs() >= self.dead_zone {
             self.side = if sine > 0.0 { 1.0 } else { -1.0 };
         }
-        self.turn * self.side
+        self.turn.min(most) * self.side
     }
 
     /// The evidential wc on the spot: to the guidance and no farther, and never so slowly that the wheels stick.
@@ -254,14 +273,16 @@ impl Controller {
         let angle = alignment.sine.atan2(alignment.cosine).abs();
         let side = self.angular(alignment).signum();
         let least = LEAST_TURN_RAD_S.min(self.look);
-        side * (TURN_GAIN * angle).clamp(least, self.look)
+        let most = self.look.min(self.response.turn_to_stop_within(angle)).max(least);
+        side * (TURN_GAIN * angle).clamp(least, most)
     }
 
     /// The evidential vc: none before the robot nearly faces the guidance, at most `limit`, and never so little that the wheels stick.
     fn cautious(&self, alignment: Alignment, distance: f64, limit: f64) -> f64 {
         let sharp = ((alignment.cosine - self.turns) / (self.full_speed - self.turns)).min(1.0);
         let slow = (distance / self.slow_radius).min(1.0);
-        let wanted = self.speed * sharp.max(0.0) * slow;
+        let stops = self.response.speed_to_stop_within(distance, self.response.dead_time_s());
+        let wanted = (self.speed * sharp.max(0.0) * slow).min(stops);
         let least = LEAST_SPEED_M_S.min(self.speed);
         // A limit that is no number means stand.
         if sharp <= 0.0 {

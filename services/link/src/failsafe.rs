@@ -12,6 +12,7 @@ pub mod odometry;
 pub mod orders;
 pub mod presence;
 pub mod range;
+mod response_fit;
 pub mod restart;
 pub mod staleness;
 pub mod stop_monitor;
@@ -109,7 +110,7 @@ pub const TABLE: &[Rule] = &[
     },
     Rule {
         cause: Cause::RobotDoesNotStop,
-        when: "it was told to stand, and 0.6 s later its encoders say for 0.5 s that it moves; its other methods are tried in turn",
+        when: "it was told to stand, and when it should rest by its `robot.response` (an X80 after 0.6 s) its encoders say for 0.5 s that it moves; its other methods are tried in turn",
         action: Action::Stop,
         clears: Clears::After(Duration::from_millis(500)),
         monitor: |all| &all.stop,
@@ -172,7 +173,7 @@ pub const TABLE: &[Rule] = &[
     },
     Rule {
         cause: Cause::OdometryImplausible,
-        when: "0.55 s of commanded motion with less than a quarter of it in the encoders, until the robot restarts, or 3 jumps within 2 s; `link.log` says which",
+        when: "0.55 s of motion that was commanded and due by `robot.response` with less than a quarter of it in the encoders, and no other response explains what they say, until the robot restarts, or 3 jumps within 2 s; `link.log` says which",
         action: Action::Stop,
         clears: Clears::OnResume { or_after: Some(odometry::CALM) },
         monitor: |all| &all.odometry,

@@ -1,9 +1,14 @@
 //! The speed trim makes good that wheels turn slower than commanded.
 //!
 //! The speed loops of real X80s reach 0.75 to 0.8 of a commanded speed. The link estimates that share from its commands and the encoders,
-//! and divides commands by it. Both wheels share one estimate, so commands keep their curve.
+//! and divides commands by it. Both wheels share one estimate, so commands keep their curve. A speed that the base has not reached yet by
+//! its response tells nothing.
 
-use common::{samples::WheelSample, wire::counts_between};
+use common::{
+    mission::{Mission, ModelledSpeed, Response},
+    samples::WheelSample,
+    wire::counts_between,
+};
 
 /// Agreeing commands until a wheel's speed is steady: its delay and lag take 0.15 s, a period at 7 Hz.
 const STEADY: usize = 3;
@@ -19,8 +24,8 @@ const LEAST_SHARE: f64 = 0.7;
 
 #[derive(Clone, Debug)]
 pub(crate) struct SpeedTrim {
-    /// Driving channels: a car's second one steers.
-    wheels: usize,
+    /// The speeds of the driving channels by the response: a car's second one steers.
+    wheels: Vec<ModelledSpeed>,
     /// Oldest first, counts/s.
     told: [[f64; 2]; STEADY],
     /// The newest tick's counts, and mission time, seconds.
@@ -30,9 +35,18 @@ pub(crate) struct SpeedTrim {
 }
 
 impl SpeedTrim {
-    pub(crate) const fn new(wheels: usize, period_s: f64) -> Self {
-        let told = [[0.0; 2]; STEADY];
-        Self { wheels, told, tick: None, longest_gap_s: 2.0 * period_s, share: 1.0 }
+    pub(crate) fn new(mission: &Mission) -> Self {
+        let body = mission.body();
+        let Response { acceleration_m_s2, .. } = body.response;
+        let change = acceleration_m_s2 / body.metres_per_count();
+        let wheel = ModelledSpeed::new(body.response.dead_time_s(), change);
+        Self {
+            wheels: vec![wheel; if body.steering.is_some() { 1 } else { 2 }],
+            told: [[0.0; 2]; STEADY],
+            tick: None,
+            longest_gap_s: 2.0 / mission.robot.rate_hz,
+            share: 1.0,
+        }
     }
 
     /// It is at most 1.
@@ -44,6 +58,12 @@ impl SpeedTrim {
     pub(crate) fn told(&mut self, counts: [i16; 2]) {
         self.told.rotate_left(1);
         self.told[STEADY - 1] = counts.map(f64::from);
+        let Some((_, now_s)) = self.tick else {
+            return;
+        };
+        for (wheel, counts) in self.wheels.iter_mut().zip(counts) {
+            wheel.command(now_s, counts.into());
+        }
     }
 
     pub(crate) fn rolled(&mut self, wheels: &WheelSample, time_s: f64) {
@@ -55,13 +75,15 @@ impl SpeedTrim {
         if gap_s <= 0.0 || gap_s > self.longest_gap_s {
             return;
         }
-        for wheel in 0..self.wheels {
+        for (wheel, modelled) in self.wheels.iter_mut().enumerate() {
+            modelled.go_on(time_s);
             let told = self.told.map(|told| told[wheel]);
             let newest = told[STEADY - 1];
             let along = told.map(|counts_s| counts_s * newest.signum());
             let least = along.into_iter().fold(f64::INFINITY, f64::min);
             let greatest = along.into_iter().fold(0.0, f64::max);
-            if least < LEAST_COUNTS_S || least < AGREE * greatest {
+            let reached = modelled.speed() * newest.signum();
+            if least.min(reached) < LEAST_COUNTS_S || least.min(reached) < AGREE * greatest {
                 continue;
             }
             let rolled = f64::from(counts_between(before[wheel], counts[wheel])) / gap_s;
@@ -76,6 +98,8 @@ impl SpeedTrim {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use common::wire::COUNT_CYCLE;
 
     use super::*;
@@ -84,7 +108,8 @@ mod tests {
 
     /// The share that the trim finds after `ticks` of a robot whose wheels reach `reached` of these commands.
     fn found(reached: f64, ticks: usize, command: impl Fn(usize) -> [f64; 2]) -> f64 {
-        let mut trim = SpeedTrim::new(2, PERIOD_S);
+        let mut trim =
+            SpeedTrim::new(&Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap());
         let mut rolled = [0.0; 2];
         for tick in 0..ticks {
             let [left_counts, right_counts] =

@@ -119,10 +119,7 @@ impl Link {
             failsafe: Failsafe::new(mission),
             restart: RestartWatch::new(mission),
             pinged_ns: None,
-            trim: mission.speed_trim().then(|| {
-                let wheels = if mission.body().steering.is_some() { 1 } else { 2 };
-                SpeedTrim::new(wheels, 1.0 / mission.robot.rate_hz)
-            }),
+            trim: mission.speed_trim().then(|| SpeedTrim::new(mission)),
             wheels: WheelSample::default(),
             time: MissionTime::default(),
             open: None,

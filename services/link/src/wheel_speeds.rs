@@ -45,7 +45,8 @@ impl WheelSpeeds {
 
     /// The wheel speeds, rad/s, that a tick reaches on the way to the `wanted` ones.
     fn reachable(&self, wanted: [f64; 2]) -> [f64; 2] {
-        let Body { wheel_radius_m, track_m, acceleration, .. } = self.body;
+        let Body { wheel_radius_m, track_m, response, .. } = self.body;
+        let acceleration = [response.acceleration_m_s2, response.turn_acceleration_rad_s2];
         if acceleration == [f64::INFINITY; 2] {
             return wanted;
         }

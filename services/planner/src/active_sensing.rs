@@ -9,7 +9,7 @@
 
 use common::{
     kinematics::{FACES_COSINE, LEAST_SPEED_M_S, Pose2},
-    mission::{Mission, SensorKind},
+    mission::{Mission, Response, SensorKind},
     samples::GridHeader,
 };
 use glam::DVec2;
@@ -44,7 +44,8 @@ pub(crate) struct ActiveSensing {
     radius: f64,
     speed: f64,
     turn: f64,
-    /// The time to stop, seconds.
+    response: Response,
+    /// The time until the robot brakes, seconds.
     stops_within_s: f64,
     /// Turns the robot's axis to the front sonar's, which is turned for a look.
     bearing: DVec2,
@@ -59,13 +60,17 @@ pub(crate) struct ActiveSensing {
 
 impl ActiveSensing {
     pub(crate) fn new(mission: &Mission) -> Self {
+        let (response, speed) = (mission.body().response, mission.speed_m_s());
+        let stops_within_s = mission.hurry().stops_within_s;
+        let stops_m = response.way_to_stop_m(speed, stops_within_s);
         Self {
             radius: mission.body().radius_m,
-            speed: mission.speed_m_s(),
+            speed,
             turn: mission.turn_rad_s(),
-            stops_within_s: mission.hurry().stops_within_s,
+            response,
+            stops_within_s,
             bearing: DVec2::from_angle(mission.front_sonar().faces_rad()),
-            ahead_m: AHEAD_M.max(mission.speed_m_s() * mission.hurry().stops_within_s + STEP_M),
+            ahead_m: AHEAD_M.max(stops_m + STEP_M),
             sonars: mission.used(SensorKind::Cone),
             has_laser: mission.used(SensorKind::Scan) > 0,
             scan_side: None,
@@ -108,7 +113,7 @@ impl ActiveSensing {
         if clear_m < STANDS_BEFORE_M {
             return 0.0;
         }
-        clear_m / self.stops_within_s
+        self.response.speed_to_stop_within(clear_m, self.stops_within_s)
     }
 
     /// The speed by the readings and by the arc on which the controller turns the robot into `direction`, m/s. Where the arc allows
@@ -132,7 +137,8 @@ impl ActiveSensing {
                 && (self.has_laser || undetected.normals(at, ahead.axis()).next().is_none())
         };
         let free = (1..=steps).find(|step| !open(step)).unwrap_or(steps + 1) - 1;
-        let on_arc = free as f64 * STEP_M / self.stops_within_s;
+        let room_m = free as f64 * STEP_M;
+        let on_arc = self.response.speed_to_stop_within(room_m, self.stops_within_s);
         let faces = pose.axis().dot(direction) > FACES_COSINE;
         let least = if faces { LEAST_SPEED_M_S } else { 0.0 };
         on_arc.max(least).min(self.limit_before_echoes(belief, pose))

@@ -5,7 +5,10 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use common::{kinematics::Pose2, mission::Mission};
+use common::{
+    kinematics::Pose2,
+    mission::{Mission, Response},
+};
 use glam::DVec2;
 use harmonic::Guidance;
 
@@ -17,7 +20,7 @@ const ARCS_A_SIDE: i32 = 8;
 const STEP_M: f64 = 0.05;
 /// An arc is followed so far, metres.
 const AHEAD_M: f64 = 0.8;
-/// The time to stop, seconds: periods of sonar and radio, the wheels' lag.
+/// The time until the car brakes, seconds: periods of sonar and radio, the wheels' lag.
 const STOPS_WITHIN_S: f64 = 0.6;
 /// An arc cut off sooner is not driven, metres.
 const LEAST_FREE_M: f64 = 0.1;
@@ -29,6 +32,7 @@ pub(crate) struct Arcs {
     speed: f64,
     turn: f64,
     slow_radius: f64,
+    response: Response,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -48,6 +52,7 @@ impl Arcs {
             speed: mission.speed_m_s(),
             turn: mission.turn_rad_s(),
             slow_radius: mission.controller.slow_radius_m,
+            response: mission.body().response,
         })
     }
 
@@ -62,7 +67,8 @@ impl Arcs {
             .filter(|arc| arc.free_m >= LEAST_FREE_M.min(distance))
             .max_by(|a, b| a.progress_m.total_cmp(&b.progress_m));
         best.map_or((pose.axis(), 0.0), |arc| {
-            (self.direction(pose, arc.curvature, distance), arc.free_m / STOPS_WITHIN_S)
+            let limit = self.response.speed_to_stop_within(arc.free_m, STOPS_WITHIN_S);
+            (self.direction(pose, arc.curvature, distance), limit)
         })
     }
 

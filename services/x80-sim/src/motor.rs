@@ -51,6 +51,8 @@ pub struct Motor {
     physics: WheelPhysics,
     /// Counts per second.
     top_speed: f64,
+    /// Counts per second in a second.
+    acceleration: f64,
     enabled: bool,
     mode: Mode,
     feedback: Feedback,
@@ -78,6 +80,7 @@ impl Motor {
         Self {
             physics,
             top_speed,
+            acceleration: f64::INFINITY,
             enabled: false,
             mode: Mode::Pwm,
             feedback: Feedback::OnePot,
@@ -90,6 +93,12 @@ impl Motor {
             turned: 0.0,
             load: 0.0,
         }
+    }
+
+    /// A motor that gains and loses speed so fast, counts per second in a second.
+    #[must_use]
+    pub fn accelerating(self, acceleration: f64) -> Self {
+        Self { acceleration, ..self }
     }
 
     pub fn enabled(&self) -> bool {
@@ -199,8 +208,13 @@ impl Motor {
         let decay = if self.physics.lag_s > 0.0 { (-dt / self.physics.lag_s).exp() } else { 0.0 };
         // The distance of an exponential approach is its integral, not its end times dt.
         let behind = self.speed - self.target;
-        let counts = self.target * dt + behind * self.physics.lag_s * (1.0 - decay);
+        let (before, most) = (self.speed, self.acceleration * dt);
+        let mut counts = self.target * dt + behind * self.physics.lag_s * (1.0 - decay);
         self.speed = self.target + behind * decay;
+        if (self.speed - before).abs() > most {
+            self.speed = before + most.copysign(self.speed - before);
+            counts = (before + self.speed) / 2.0 * dt;
+        }
         let mut jitter = 0.0;
         if self.target != 0.0 {
             let sd = self.physics.noise_counts * (1.0 - decay * decay).sqrt();

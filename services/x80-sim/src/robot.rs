@@ -87,7 +87,9 @@ impl Robot {
 
     fn with_noise(mission: &Mission, seed: u64) -> Self {
         let mut physics = mission.simulation.physics();
+        physics.wheels = mission.wheel_physics();
         let size = mission.body();
+        let acceleration = physics.wheels.acceleration_m_s2 / size.metres_per_count();
         let top_counts = size.top_speed_m_s / size.metres_per_count();
         let longest_step = STEP_S.min(0.5 * size.radius_m / size.top_speed_m_s);
         let world = World::new(mission);
@@ -108,7 +110,9 @@ impl Robot {
             longest_step,
             body: Body::new(mission, &world, wheel_errors.track),
             world,
-            motors: std::array::from_fn(|channel| Motor::new(physics.wheels, top_counts(channel))),
+            motors: std::array::from_fn(|channel| {
+                Motor::new(physics.wheels, top_counts(channel)).accelerating(acceleration)
+            }),
             car,
             streams: Streams::default(),
             ranging: Ranging::new(mission, seed),

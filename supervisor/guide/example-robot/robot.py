@@ -3,10 +3,13 @@
     python3 robot.py 5600 &             # what it really does goes to standard output
     firsthand run robot.toml
 
+`robot.py 5600 0.6 0.3` is heavier and later: its wheels gain and lose 0.6 m/s in a second, 0.3 s after they were told.
+
 It simulates two wheels, a round body and three sonars in a small world. Yours replaces `Body` by what it is
 made of; `serve` stays as it is. The words are in the guide, "Your robot".
 """
 
+import collections
 import json
 import math
 import socket
@@ -19,9 +22,13 @@ DRUMS = [(1.6, 0.15, 0.3), (2.9, -0.9, 0.3), (2.7, 1.0, 0.25)]  # x, y, radius, 
 
 
 class Body:
-    """Wheels that turn as told, and what is around them."""
+    """Wheels that turn as told, late and as fast as they accelerate, and what is around them."""
 
-    def __init__(self):
+    def __init__(self, acceleration=1.0, delay=0.05):
+        self.most, self.delay = acceleration / WHEEL, delay  # rad/s^2, s
+        self.speeds = [0.0, 0.0]  # rad/s
+        self.acting = [0.0, 0.0]
+        self.waiting = collections.deque()  # when a command acts, and the command
         self.x = self.y = self.heading = 0.0
         self.turned = [0.0, 0.0]  # radians
         self.told = [0.0, 0.0]  # rad/s
@@ -32,7 +39,13 @@ class Body:
     def move(self, now, dt):
         if self.braked or now >= self.until:
             self.told = [0.0, 0.0]
-        left, right = self.told
+        self.waiting.append((now + self.delay, self.told))
+        while self.waiting and self.waiting[0][0] <= now:
+            self.acting = self.waiting.popleft()[1]
+        change = self.most * dt
+        pairs = zip(self.speeds, self.acting)
+        self.speeds = [speed + max(-change, min(change, told - speed)) for speed, told in pairs]
+        left, right = self.speeds
         self.turned[0] += left * dt
         self.turned[1] += right * dt
         self.heading += (right - left) * WHEEL / TRACK * dt
@@ -91,10 +104,10 @@ def serve(body, port):
         if now >= said + period:
             said = now
             ranges = {name: body.range_of(bearing) for name, bearing in SONARS.items()}
-            report(wheels=body.turned, speeds=body.told, ranges=ranges, battery_v=12.4)
+            report(wheels=body.turned, speeds=body.speeds, ranges=ranges, battery_v=12.4)
             truth = {"x": body.x, "y": body.y, "told": body.told, "touches": body.touches}
             print(json.dumps(truth), flush=True)
 
 
 if __name__ == "__main__":
-    serve(Body(), int(sys.argv[1]))
+    serve(Body(*map(float, sys.argv[2:])), int(sys.argv[1]))

@@ -2,7 +2,7 @@ use x80_protocol::MOTOR_SCALE_V;
 
 use super::objection::{Objection, objection, within};
 use crate::{
-    Mission, Protocol,
+    Mission, Protocol, ResponseKeys,
     address::{Address, AddressError, FORMS},
 };
 
@@ -30,12 +30,7 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     }
     within("robot.radius_m", body.radius_m, 0.01..=5.0, "m")?;
     within("robot.top_speed_m_s", body.top_speed_m_s, 0.01..=10.0, "m/s")?;
-    if let Some(acceleration) = robot.acceleration_m_s2 {
-        within("robot.acceleration_m_s2", acceleration, 0.01..=1000.0, "m/s^2")?;
-    }
-    if let Some(acceleration) = robot.turn_acceleration_rad_s2 {
-        within("robot.turn_acceleration_rad_s2", acceleration, 0.01..=1000.0, "rad/s^2")?;
-    }
+    response(robot.response)?;
     within("robot.command_limit_s", robot.command_limit_s, 0.02..=5.0, "s")?;
     let limits = robot.low_battery_v;
     for limit in [limits.board, limits.motor, limits.servo] {
@@ -109,4 +104,22 @@ fn steering(mission: &Mission) -> Result<(), Objection> {
     )?;
     // A whole turn fits twice into the counter's cycle, so an angle is never ambiguous.
     within("robot.steering_counts_per_turn", steering.counts_per_turn, 36.0..=16_384.0, "counts")
+}
+
+fn response(keys: ResponseKeys) -> Result<(), Objection> {
+    let ResponseKeys { delay_s, lag_s, acceleration_m_s2, turn_acceleration_rad_s2 } = keys;
+    for (key, value, range, unit) in [
+        ("robot.response.delay_s", delay_s, 0.0..=2.0, "s"),
+        ("robot.response.lag_s", lag_s, 0.0..=2.0, "s"),
+        ("robot.response.acceleration_m_s2", acceleration_m_s2, 0.05..=1000.0, "m/s^2"),
+        (
+            "robot.response.turn_acceleration_rad_s2",
+            turn_acceleration_rad_s2,
+            0.05..=1000.0,
+            "rad/s^2",
+        ),
+    ] {
+        value.map_or(Ok(()), |value| within(key, value, range, unit))?;
+    }
+    Ok(())
 }

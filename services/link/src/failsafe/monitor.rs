@@ -5,7 +5,7 @@ use std::{fmt, time::Duration};
 use common::{
     clock::{MissionTime, Pace},
     driver::Commander,
-    mission::Mission,
+    mission::{Mission, Response},
     samples::{Cause, CommandSample, HoldReason, Order, RangeReading},
 };
 
@@ -46,6 +46,8 @@ pub enum Observation<'a> {
     Batteries([f64; 3]),
     /// Readings of ranging sensors came.
     Readings(&'a [RangeReading]),
+    /// The base responds so, and not as it is stated to.
+    Responds(Response),
     /// A sender other than the link told the robot something.
     Commander(Commander),
     /// The robot answers again or for the first time, and was asked for its streams.

@@ -1,14 +1,17 @@
 //! The odometry monitor: whether wheels turn as commanded, by their encoders. Each wheel is checked, and the difference of both, because
 //! a robot with swapped wheels turns the wrong way.
 //!
-//! An interval between two frames is evidence about a wheel that was commanded in one direction for [`SETTLE`], at [`LEAST_M_S`] or
-//! more. Wheels follow after 0.07 s of delay and 0.08 s of lag; the dead band of 20 counts/s (9 mm/s) is well below. The wheel must then
-//! roll [`LEAST_SHARE`] of the smaller speed of the two newest commands; real wheels roll 0.75 to 0.8 of it. Intervals over two periods
-//! are no evidence, because commands may have been lost.
+//! An interval between two frames is evidence about a wheel that was commanded in one direction for as long as the base's response
+//! takes to settle, at [`LEAST_M_S`] or more; a command counts as far as the base's acceleration has reached it. The dead band of 20
+//! counts/s (9 mm/s) is well below. The wheel must then roll [`LEAST_SHARE`] of the smaller speed of the two newest commands; real
+//! wheels roll 0.75 to 0.8 of it. Intervals over two periods are no evidence, because commands may have been lost.
 //!
 //! Evidence against a wheel adds up; evidence for it counts down at most twice as fast. The other direction counts twice, and already
-//! after [`TURNS_AFTER`]: a controller whose robot turns away from the target changes direction every other tick. At [`SUSPECTED_AFTER`]
-//! the robot must stand: at 7 Hz 0.86 s after a motion began, and at rest 0.2 s later.
+//! when a wheel has turned around: a controller whose robot turns away from the target changes direction every other tick. At
+//! [`SUSPECTED_AFTER`] the robot must stand: an X80 at 7 Hz 0.86 s after a motion began, and at rest 0.2 s later.
+//!
+//! Before that, [`super::response_fit`] looks for a response that explains the motion. If there is one, it replaces the stated one, and
+//! the link's log names it: a base that is heavier than stated is no fault.
 //!
 //! A commanded wheel that counts nothing is suspected after [`STILL_AFTER`]: a controller whose pose turns the wrong way changes
 //! direction too often for the other evidence. If its motor draws a held one's current, it is held, and not suspected
@@ -20,7 +23,7 @@ use std::{collections::VecDeque, time::Duration};
 
 use common::{
     clock::MissionTime,
-    mission::Mission,
+    mission::{Mission, ModelledSpeed, Response},
     samples::{Cause, ContactSample, Order},
     wire::counts_between,
 };
@@ -28,12 +31,9 @@ use common::{
 use super::{
     contact::{Contacts, HELD_AFTER},
     monitor::{Condition, Counts, Moment, Monitor, Observation},
+    response_fit::ResponseFit,
 };
 
-/// Counts are evidence about a command in one direction after this.
-const SETTLE: Duration = Duration::from_millis(250);
-/// A real wheel has changed direction by then; at 7 Hz it has 0.6 of its speed.
-const TURNS_AFTER: Duration = Duration::from_millis(100);
 /// The slowest judged motion, m/s at the rim.
 const LEAST_M_S: f64 = 0.03;
 /// The least judged difference of the wheels, m/s.
@@ -82,6 +82,20 @@ impl Suspicion {
     }
 }
 
+/// When counts are evidence about a command in one direction, by the base's response, seconds.
+#[derive(Clone, Copy, Debug)]
+struct Settles {
+    settled_s: f64,
+    /// A wheel has changed direction by then; that of an X80 at 7 Hz has 0.6 of its speed.
+    turned_s: f64,
+}
+
+impl From<Response> for Settles {
+    fn from(Response { delay_s, lag_s, .. }: Response) -> Self {
+        Self { settled_s: delay_s + 2.0 * lag_s + 0.02, turned_s: delay_s + 0.375 * lag_s }
+    }
+}
+
 #[derive(Clone, Copy, Debug, Default)]
 struct Evidence {
     asked: [f64; 2],
@@ -104,7 +118,14 @@ impl Evidence {
 
     /// The wheel rolled `counts` in `gap_s` until `now`, its motor drawing a held one's current if `high`. Commands below `least`
     /// counts/s are no evidence. Returns whether it rolled as told.
-    fn weigh(&mut self, counts: f64, gap_s: f64, least: f64, high: bool, now: MissionTime) -> bool {
+    fn weigh(
+        &mut self,
+        (counts, gap_s): (f64, f64),
+        least: f64,
+        high: bool,
+        settles: Settles,
+        now: MissionTime,
+    ) -> bool {
         let [before, newest] = self.asked;
         let asked = before.abs().min(newest.abs());
         let told_s = now.since(self.since).as_secs_f64() - gap_s;
@@ -115,7 +136,7 @@ impl Evidence {
         if high && share < LEAST_SHARE {
             // The motor pushes in vain. A body that turns about what it touches may even push its wheel back.
             self.still_s = 0.0;
-            if told_s >= SETTLE.as_secs_f64() {
+            if told_s >= settles.settled_s {
                 self.held_s += gap_s;
             }
             return false;
@@ -123,8 +144,7 @@ impl Evidence {
         self.held_s = 0.0;
         self.still_s = if counts.abs() <= 1.0 { self.still_s + gap_s } else { 0.0 };
         let opposite = share <= -LEAST_SHARE;
-        let settled = if opposite { TURNS_AFTER } else { SETTLE };
-        if told_s < settled.as_secs_f64() {
+        if told_s < if opposite { settles.turned_s } else { settles.settled_s } {
             return false;
         }
         let most = if opposite { 2.0 } else { 1.0 };
@@ -138,6 +158,12 @@ impl Evidence {
 pub struct Odometry {
     counts_per_m: f64,
     steers: bool,
+    response: Response,
+    /// The commands, as far as the base's acceleration has reached them, counts/s.
+    reached: [ModelledSpeed; 2],
+    fit: ResponseFit,
+    /// The response that explained a motion, until it is told.
+    found: Option<Response>,
     /// Two periods.
     longest_gap: Duration,
     limit: Duration,
@@ -154,13 +180,18 @@ pub struct Odometry {
 }
 
 impl Odometry {
-    fn commanded(&mut self, [left, right]: [i16; 2], now: MissionTime) {
-        let lapsed = |then| now.since(then) > self.limit;
-        if self.commanded.is_none_or(lapsed) {
+    fn commanded(&mut self, counts: [i16; 2], now: MissionTime) {
+        let limit = self.limit;
+        let lapsed = |then: &MissionTime| now.since(*then) > limit;
+        if let Some(then) = self.commanded.filter(lapsed) {
+            let lapse = then.0.saturating_add(limit.as_nanos() as u64);
+            self.ask([0.0; 2], MissionTime(lapse));
+        }
+        if self.commanded.is_none_or(|then| lapsed(&then)) {
             self.restart_evidence(now);
         }
         self.commanded = Some(now);
-        let (left, right) = (f64::from(left), f64::from(right));
+        let [left, right] = self.ask(counts.map(f64::from), now);
         self.left.ask(left, now);
         if self.steers {
             return;
@@ -170,6 +201,28 @@ impl Odometry {
         let turn = right - left;
         let tells = turn.abs() >= LEAST_TURN_SHARE * mean;
         self.turn.ask(if tells { turn } else { 0.0 }, now);
+    }
+
+    /// The wheels are to turn at `counts`, counts/s. Returns what they have reached by the base's acceleration.
+    fn ask(&mut self, counts: [f64; 2], now: MissionTime) -> [f64; 2] {
+        self.fit.commanded(counts, now);
+        for (reached, counts) in self.reached.iter_mut().zip(counts) {
+            reached.command(now.seconds(), counts);
+            reached.go_on(now.seconds());
+        }
+        self.reached.each_ref().map(ModelledSpeed::speed)
+    }
+
+    /// Respond to commands by `response` from now on.
+    fn adopt(&mut self, response: Response) {
+        self.response = response;
+        let change = response.acceleration_m_s2 * self.counts_per_m;
+        self.reached = [(); 2].map(|()| ModelledSpeed::new(0.0, change));
+    }
+
+    /// The response that explained a motion that the one before did not; the next call gives none.
+    pub(crate) const fn take_found(&mut self) -> Option<Response> {
+        self.found.take()
     }
 
     fn plausible(&mut self, counts: [u16; 2], now: MissionTime) {
@@ -193,26 +246,28 @@ impl Odometry {
             return;
         };
         let gap = now.since(then);
+        let turned = [0, 1].map(|wheel| f64::from(counts_between(before[wheel], counts[wheel])));
+        self.fit.turned((gap <= self.longest_gap).then_some(turned), now);
         let lapsed = |at| now.since(at) > self.limit;
         if gap > self.longest_gap || self.commanded.is_none_or(lapsed) {
             // Commands since the last frame may have been lost, or have expired.
             self.restart_evidence(now);
             return;
         }
-        let [left, right] =
-            [0, 1].map(|wheel| f64::from(counts_between(before[wheel], counts[wheel])));
+        let [left, right] = turned;
+        let settles = Settles::from(self.response);
         let gap_s = gap.as_secs_f64();
         let least = LEAST_M_S * self.counts_per_m;
         let high = self.contacts.high();
         let wheels = [(&mut self.left, left), (&mut self.right, right)];
         for (wheel, (evidence, counts)) in wheels.into_iter().enumerate() {
-            if evidence.weigh(counts, gap_s, least, high[wheel], now) && high[wheel] {
+            if evidence.weigh((counts, gap_s), least, high[wheel], settles, now) && high[wheel] {
                 self.contacts.rolled(wheel, gap_s);
             }
         }
         if high == [false; 2] {
             let least = LEAST_TURN_M_S * self.counts_per_m;
-            self.turn.weigh(right - left, gap_s, least, false, now);
+            self.turn.weigh((right - left, gap_s), least, false, settles, now);
         }
         self.look_for_contact(now);
         let suspected = |evidence: &Evidence| {
@@ -224,7 +279,17 @@ impl Odometry {
             (&self.right, Suspicion::Right),
             (&self.turn, Suspicion::Turn),
         ];
-        if let Some((_, suspicion)) = all.into_iter().find(|(evidence, _)| suspected(evidence)) {
+        let suspicion = all.into_iter().find(|(evidence, _)| suspected(evidence));
+        if let Some(suspicion) = suspicion.map(|(_, suspicion)| suspicion) {
+            if self.suspicion.is_none()
+                && let Some(found) = self.fit.explain(self.response, self.steers)
+                && found != self.response
+            {
+                self.adopt(found);
+                self.found = Some(found);
+                self.clear_evidence();
+                return;
+            }
             self.suspicion.get_or_insert((suspicion, now));
         }
     }
@@ -260,13 +325,18 @@ impl Odometry {
     fn reset(&mut self) {
         self.commanded = None;
         self.frame = None;
-        self.left = Evidence::default();
-        self.right = Evidence::default();
-        self.turn = Evidence::default();
+        self.clear_evidence();
+        self.fit.reset();
         self.contacts.reset();
         self.jumps.clear();
         self.recoveries = 0;
         self.suspicion = None;
+    }
+
+    fn clear_evidence(&mut self) {
+        self.left = Evidence::default();
+        self.right = Evidence::default();
+        self.turn = Evidence::default();
     }
 
     fn restart_evidence(&mut self, now: MissionTime) {
@@ -280,8 +350,14 @@ impl Odometry {
 impl Monitor for Odometry {
     fn new(mission: &Mission) -> Self {
         let body = mission.body();
+        let counts_per_m = 1.0 / body.metres_per_count();
+        let change = body.response.acceleration_m_s2 * counts_per_m;
         Self {
-            counts_per_m: 1.0 / body.metres_per_count(),
+            counts_per_m,
+            response: body.response,
+            reached: [(); 2].map(|()| ModelledSpeed::new(0.0, change)),
+            fit: ResponseFit::new(counts_per_m),
+            found: None,
             steers: body.steering.is_some(),
             longest_gap: Duration::from_secs_f64(2.0 / mission.robot.rate_hz),
             limit: Duration::from_secs_f64(mission.robot.command_limit_s),

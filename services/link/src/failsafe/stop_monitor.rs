@@ -2,22 +2,24 @@
 
 use std::time::Duration;
 
-use common::{clock::MissionTime, mission::Mission, samples::Cause, wire::counts_between};
+use common::{
+    clock::MissionTime,
+    mission::{Mission, Response},
+    samples::Cause,
+    wire::counts_between,
+};
 
 use super::monitor::{Condition, Counts, Moment, Monitor, Observation};
 
-/// Delay and lag of the speed loop, and a lost stop or two, are included.
-const COMES_TO_REST: Duration = Duration::from_millis(600);
-/// It counts from [`COMES_TO_REST`]. A repeated stop has an effect sooner.
+/// A robot comes to rest within this, the dead time of its response, and the time for which it brakes: a lost stop or two are included.
+const STOPS_ARE_LOST_S: f64 = 0.45;
+/// It counts from the time in which the robot comes to rest. A repeated stop has an effect sooner.
 pub(crate) const DOES_NOT_STOP_AFTER: Duration = Duration::from_millis(500);
 /// Speed of the rim.
 const MOVES_M_S: f64 = 0.03;
 /// Rest is below this, m/s, or below [`RESTS_COUNTS`] between two frames: a resting encoder's counts vary.
 const RESTS_M_S: f64 = 0.01;
 const RESTS_COUNTS: f64 = 4.0;
-/// A command shows in counts after this, by delays of speed loop and radio. Wheels that rest sooner may still start by the last command
-/// before the stop.
-const SHOWS_AFTER: Duration = Duration::from_millis(150);
 /// Wheels rest so long until the robot does.
 const AT_REST_AFTER: Duration = Duration::from_millis(200);
 const NEXT_METHOD_AFTER: Duration = Duration::from_millis(300);
@@ -26,6 +28,9 @@ const NEXT_METHOD_AFTER: Duration = Duration::from_millis(300);
 pub struct StopMonitor {
     counts_per_m: f64,
     longest_gap: Duration,
+    response: Response,
+    /// The greater of the speeds of the wheels by the newest command to move, counts/s.
+    driven: f64,
     told_to_stand: Option<MissionTime>,
     frame: Option<([u16; 2], MissionTime)>,
     moving: Duration,
@@ -42,6 +47,8 @@ impl StopMonitor {
                 self.told_to_stand = Some(now);
             }
         } else {
+            self.driven =
+                counts.map(|counts| f64::from(counts).abs()).into_iter().fold(0.0, f64::max);
             self.told_to_stand = None;
             self.moving = Duration::ZERO;
             self.method = 0;
@@ -64,9 +71,12 @@ impl StopMonitor {
         let within = |speed: f64| speed * self.counts_per_m * gap.as_secs_f64();
         let rests = farthest <= RESTS_COUNTS.max(within(RESTS_M_S));
         let moves = !rests && farthest >= within(MOVES_M_S);
-        let shows_stop = self.told_to_stand.is_none_or(|told| then.since(told) >= SHOWS_AFTER);
+        // Wheels that rest sooner may still start by the last command before the stop.
+        let shows_after = Duration::from_secs_f64(self.response.dead_time_s());
+        let shows_stop = self.told_to_stand.is_none_or(|told| then.since(told) >= shows_after);
         self.resting = if rests && shows_stop { self.resting + gap } else { Duration::ZERO };
-        let due = |told: MissionTime| now.since(told).saturating_sub(gap) >= COMES_TO_REST;
+        let comes_to_rest = self.comes_to_rest();
+        let due = |told: MissionTime| now.since(told).saturating_sub(gap) >= comes_to_rest;
         if !moves {
             self.moving = Duration::ZERO;
         } else if self.told_to_stand.is_some_and(due) {
@@ -77,6 +87,11 @@ impl StopMonitor {
     const fn not_heard(&mut self) {
         self.moving = Duration::ZERO;
         self.resting = Duration::ZERO;
+    }
+
+    fn comes_to_rest(&self) -> Duration {
+        let brakes_s = self.driven / self.counts_per_m / self.response.acceleration_m_s2;
+        Duration::from_secs_f64(STOPS_ARE_LOST_S + self.response.dead_time_s() + brakes_s)
     }
 
     pub fn is_at_rest(&self) -> bool {
@@ -109,6 +124,8 @@ impl Monitor for StopMonitor {
         Self {
             counts_per_m: 1.0 / mission.body().metres_per_count(),
             longest_gap: Duration::from_secs_f64(2.0 / mission.robot.rate_hz),
+            response: mission.body().response,
+            driven: 0.0,
             told_to_stand: None,
             frame: None,
             moving: Duration::ZERO,
@@ -121,6 +138,7 @@ impl Monitor for StopMonitor {
     fn observe(&mut self, what: &Observation<'_>, now: Moment) {
         match *what {
             Observation::Commanded(counts) => self.commanded(counts, now.time),
+            Observation::Responds(response) => self.response = response,
             Observation::Motor(counts, Counts::Follow) => self.heard(counts, now.time),
             Observation::Motor(_, Counts::Restarted { .. } | Counts::Elsewhere) => {
                 self.frame = None;

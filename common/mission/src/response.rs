@@ -1,0 +1,218 @@
+//! How a robot's base answers a command: it does nothing for a while, and then its wheels gain and lose speed at a limited rate with a
+//! first-order lag.
+
+use std::collections::VecDeque;
+
+use serde::{Deserialize, Serialize};
+
+/// The keys of `[robot.response]`; those that are not written are the model's.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ResponseKeys {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub delay_s: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lag_s: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub acceleration_m_s2: Option<f64>,
+    /// Without it that of two wheels at [`ResponseKeys::acceleration_m_s2`], if that is written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub turn_acceleration_rad_s2: Option<f64>,
+}
+
+impl ResponseKeys {
+    pub(crate) fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// The response of a base with `track_m` between its wheels whose model has the response `preset`.
+    pub(crate) fn over(&self, preset: Response, track_m: f64) -> Response {
+        let turn = self.acceleration_m_s2.map(|acceleration| 2.0 * acceleration / track_m);
+        Response {
+            delay_s: self.delay_s.unwrap_or(preset.delay_s),
+            lag_s: self.lag_s.unwrap_or(preset.lag_s),
+            acceleration_m_s2: self.acceleration_m_s2.unwrap_or(preset.acceleration_m_s2),
+            turn_acceleration_rad_s2: self
+                .turn_acceleration_rad_s2
+                .or(turn)
+                .unwrap_or(preset.turn_acceleration_rad_s2),
+        }
+    }
+}
+
+/// How a base answers commands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Response {
+    /// From a command to its first effect in the odometry, as the link sees it, seconds: what a network delays is part of it.
+    pub delay_s: f64,
+    /// Time constant of the speed loop, seconds.
+    pub lag_s: f64,
+    /// The most by which speed grows and falls; infinite for a base that the lag alone describes.
+    pub acceleration_m_s2: f64,
+    pub turn_acceleration_rad_s2: f64,
+}
+
+impl Response {
+    /// Measured on X80s, whose vendor gives no acceleration. Other models have its delay and lag, because no source states theirs.
+    pub const X80: Self = Self {
+        delay_s: 0.07,
+        lag_s: 0.08,
+        acceleration_m_s2: f64::INFINITY,
+        turn_acceleration_rad_s2: f64::INFINITY,
+    };
+
+    /// [`Response::X80`] with accelerations.
+    pub(crate) const fn limited(acceleration_m_s2: f64, turn_acceleration_rad_s2: f64) -> Self {
+        Self { acceleration_m_s2, turn_acceleration_rad_s2, ..Self::X80 }
+    }
+
+    /// The time in which the base goes on as before, seconds: a lag delays the way by its time constant.
+    #[must_use]
+    pub fn dead_time_s(&self) -> f64 {
+        self.delay_s + self.lag_s
+    }
+
+    /// The way from the command to stand until the robot of this speed stands, metres, if the command is given `after_s` seconds later
+    /// than what asked for it. `after_s` includes [`Response::dead_time_s`].
+    #[must_use]
+    pub fn way_to_stop_m(&self, speed_m_s: f64, after_s: f64) -> f64 {
+        speed_m_s * after_s + speed_m_s * speed_m_s / (2.0 * self.acceleration_m_s2)
+    }
+
+    /// The greatest speed from which the robot stops within `room_m` metres, m/s: the inverse of [`Response::way_to_stop_m`].
+    #[must_use]
+    pub fn speed_to_stop_within(&self, room_m: f64, after_s: f64) -> f64 {
+        if self.acceleration_m_s2.is_infinite() {
+            return room_m / after_s;
+        }
+        // The root of v t + v^2 / 2a = d, written without a difference.
+        let brakes = 2.0 * room_m.max(0.0) / self.acceleration_m_s2;
+        2.0 * room_m / (after_s + (after_s * after_s + brakes).sqrt())
+    }
+
+    /// The greatest turn rate from which the robot stops turning within `angle_rad`, rad/s, apart from its dead time.
+    #[must_use]
+    pub fn turn_to_stop_within(&self, angle_rad: f64) -> f64 {
+        if self.turn_acceleration_rad_s2.is_infinite() {
+            return f64::INFINITY;
+        }
+        (2.0 * self.turn_acceleration_rad_s2 * angle_rad).max(0.0).sqrt()
+    }
+}
+
+/// Commands that are remembered at most; the oldest acts at once where more are given.
+const MOST_PENDING: usize = 256;
+
+/// A speed that follows commands after a delay and at a limited rate, in any unit. The lag counts as a part of the delay.
+#[derive(Clone, Debug)]
+pub struct ModelledSpeed {
+    delay_s: f64,
+    /// A second.
+    most_change: f64,
+    /// When they act, and the commands that do not act yet.
+    pending: VecDeque<(f64, f64)>,
+    target: f64,
+    speed: f64,
+    at_s: f64,
+}
+
+impl ModelledSpeed {
+    #[must_use]
+    pub const fn new(delay_s: f64, most_change: f64) -> Self {
+        let pending = VecDeque::new();
+        Self { delay_s, most_change, pending, target: 0.0, speed: 0.0, at_s: f64::NEG_INFINITY }
+    }
+
+    /// A command is given at the time `at_s`.
+    pub fn command(&mut self, at_s: f64, speed: f64) {
+        if self.pending.len() == MOST_PENDING
+            && let Some((_, oldest)) = self.pending.pop_front()
+        {
+            self.target = oldest;
+        }
+        self.pending.push_back((at_s + self.delay_s, speed));
+    }
+
+    #[must_use]
+    pub const fn speed(&self) -> f64 {
+        self.speed
+    }
+
+    /// Go on to the time `until_s`. Returns the way since the last call.
+    pub fn go_on(&mut self, until_s: f64) -> f64 {
+        let mut way = 0.0;
+        while let Some(&(acts_s, target)) = self.pending.front()
+            && acts_s <= until_s
+        {
+            way += self.approach(acts_s - self.at_s);
+            self.at_s = self.at_s.max(acts_s);
+            self.target = target;
+            self.pending.pop_front();
+        }
+        way += self.approach(until_s - self.at_s);
+        self.at_s = self.at_s.max(until_s);
+        way
+    }
+
+    /// The way in so many seconds, in which the speed approaches its target.
+    fn approach(&mut self, for_s: f64) -> f64 {
+        // Before the first call no time has passed.
+        let for_s = if for_s.is_finite() { for_s.max(0.0) } else { 0.0 };
+        let before = self.speed;
+        let left = self.target - before;
+        let changes_s = (left.abs() / self.most_change).min(for_s);
+        self.speed = if changes_s < for_s || self.most_change.is_infinite() {
+            self.target
+        } else {
+            before + self.most_change * changes_s * left.signum()
+        };
+        (before + self.speed) / 2.0 * changes_s + self.speed * (for_s - changes_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_robot_stops_from_the_speed_that_is_allowed_within_the_room_that_there_is() {
+        for acceleration_m_s2 in [0.3, 1.0, 20.0, f64::INFINITY] {
+            let response = Response { acceleration_m_s2, ..Response::X80 };
+            for (room, after) in [(0.05, 0.4), (0.6, 0.6), (3.0, 0.7)] {
+                let speed = response.speed_to_stop_within(room, after);
+                let way = response.way_to_stop_m(speed, after);
+                assert!((way - room).abs() < 1e-9, "{acceleration_m_s2} {room}: {way}");
+            }
+        }
+        assert_eq!(Response::X80.speed_to_stop_within(f64::INFINITY, 0.4), f64::INFINITY);
+        let slow = Response { acceleration_m_s2: 0.3, ..Response::X80 };
+        assert!(slow.speed_to_stop_within(0.0, 0.4) <= 0.0);
+    }
+
+    #[test]
+    fn wheels_that_are_known_to_accelerate_slowly_turn_the_robot_slowly_too() {
+        let keys = ResponseKeys { acceleration_m_s2: Some(0.6), ..ResponseKeys::default() };
+        let response = keys.over(Response::X80, 0.3);
+        assert_eq!((response.delay_s, response.turn_acceleration_rad_s2), (0.07, 4.0));
+        let none = ResponseKeys::default().over(Response::limited(1.0, 2.0), 0.3);
+        assert_eq!(none, Response::limited(1.0, 2.0));
+    }
+
+    #[test]
+    fn a_modelled_speed_begins_after_the_delay_and_grows_and_falls_at_the_rate() {
+        let mut speed = ModelledSpeed::new(0.4, 0.5);
+        speed.go_on(0.0);
+        speed.command(0.0, 0.3);
+        assert_eq!((speed.go_on(0.4), speed.speed()), (0.0, 0.0));
+        assert!((speed.go_on(0.8) - 0.04).abs() < 1e-12 && (speed.speed() - 0.2).abs() < 1e-12);
+        speed.command(0.8, -0.3);
+        // It reaches 0.3 at 1.0 s, keeps it until 1.2 s, and is 0 at 1.8 s.
+        let way = speed.go_on(1.8);
+        assert!((way - (0.05 + 0.06 + 0.09)).abs() < 1e-12, "{way}");
+        assert!(speed.speed().abs() < 1e-12);
+        let mut at_once = ModelledSpeed::new(0.0, f64::INFINITY);
+        at_once.go_on(1.0);
+        at_once.command(1.0, 0.5);
+        assert_eq!((at_once.go_on(2.0), at_once.speed()), (0.5, 0.5));
+    }
+}
