@@ -154,6 +154,7 @@ wire_enum! {
         /// An infrared ranger is silent, and the other sensors cover the ground ahead.
         InfraredSilent = 21 "infrared ranger silent",
         AnotherCommander = 22 "another commander",
+        BaseSlow = 23 "base slower than stated",
     }
 }
 

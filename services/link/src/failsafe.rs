@@ -3,6 +3,7 @@
 //!
 //! A new cause needs a variant of [`Cause`], a row, and a monitor, which is a file in `failsafe/` and a line in `monitors!`.
 
+pub mod base_response;
 pub mod battery;
 pub mod commander;
 mod contact;
@@ -54,6 +55,7 @@ macro_rules! monitors {
 
 monitors! {
     battery: battery::Batteries,
+    base: base_response::BaseResponse,
     commander: commander::OtherCommander,
     latency: latency_monitor::LatencyMonitor,
     odometry: odometry::Odometry,
@@ -226,6 +228,13 @@ pub const TABLE: &[Rule] = &[
         action: Action::Slow,
         clears: Clears::WithCondition,
         monitor: |all| &all.streams,
+    },
+    Rule {
+        cause: Cause::BaseSlow,
+        when: "its wheels have shown that it answers later or accelerates more slowly than `robot.response` says; `link.log` says how",
+        action: Action::Slow,
+        clears: Clears::OnNewMission,
+        monitor: |all| &all.base,
     },
     Rule {
         cause: Cause::BatteryLow,

@@ -9,7 +9,6 @@ use common::{
     domain::Domain,
     driver::Memory,
     latency::Histogram,
-    mission::Response,
     readers,
     samples::{
         Action, Cause, CommandSample, DirectiveSample, HoldReason, LinkSample, Order,
@@ -70,8 +69,6 @@ pub struct Shell {
     guard: Option<StopGuard>,
     has_telemetry: bool,
     clock: MissionClock,
-    /// As the mission states it.
-    stated: Response,
     latency: Histogram,
     latency_ns: u64,
     stated_ns: u64,
@@ -133,7 +130,6 @@ impl Process for Shell {
             guard,
             has_telemetry: false,
             clock: context.run.clock,
-            stated: context.run.mission.body().response,
             latency: Histogram::default(),
             latency_ns: 0,
             stated_ns: 0,
@@ -362,16 +358,6 @@ impl Shell {
                     };
                     tracing::warn!(
                         "the robot's clock goes {rate:.2} times as fast as mission time: let its simulator run in real time, or give `run --pace {pace:.2}`"
-                    );
-                }
-                Effect::Responds(response) => {
-                    let Response { delay_s, acceleration_m_s2, .. } = response;
-                    let stated = self.stated;
-                    tracing::warn!(
-                        "the base answers after {:.2} s and accelerates at {acceleration_m_s2} m/s^2, and {:.2} s and {} m/s^2 are stated: give delay_s = {delay_s:.2} and acceleration_m_s2 in [robot.response], or it turns and stops late",
-                        response.dead_time_s(),
-                        stated.dead_time_s(),
-                        stated.acceleration_m_s2,
                     );
                 }
                 Effect::AskedForStreams => {

@@ -5,6 +5,7 @@ use super::{
 use common::{
     clock::{MissionTime, Pace},
     driver::Commander,
+    mission::Response,
     samples::{CommandSample, HoldReason, Order, RangeReading, RangeStatus, Stamp},
 };
 use std::path::Path;
@@ -222,6 +223,14 @@ const CASES: &[(Break, Action, Cause)] = &[
         Cause::GuidanceStale,
     ),
     (without_an_infrared_ranger, Action::Slow, Cause::InfraredSilent),
+    (
+        |it| {
+            let response = Response { delay_s: 0.3, ..Response::X80 };
+            it.observe(&Observation::Responds(response), now());
+        },
+        Action::Slow,
+        Cause::BaseSlow,
+    ),
     (|it| it.observe(&Observation::Batteries(boards(6.5)), now()), Action::Slow, Cause::BatteryLow),
 ];
 

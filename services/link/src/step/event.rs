@@ -3,7 +3,6 @@
 use common::{
     clock::{MissionTime, Pace},
     inputs,
-    mission::Response,
     samples::{
         CommandSample, ContactSample, HoldReason, InfraredSample, Order, PowerSample, RangeReading,
         SurroundingsSample, TurnSample, WheelSample,
@@ -86,8 +85,6 @@ pub enum Effect {
     Refused(String),
     /// The speed of the robot's clock over mission time's.
     ClockRate(f64),
-    /// The base responds so, and not as it is stated to.
-    Responds(Response),
     AskedForStreams,
     Infrared(InfraredSample),
     Power(PowerSample),

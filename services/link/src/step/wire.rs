@@ -55,7 +55,7 @@ impl Link {
             self.restart.jumped();
         }
         let motion = heard.motion;
-        let counts = motion.map(|motion| self.judge_counts(&motion, now_ns, effects));
+        let counts = motion.map(|motion| self.judge_counts(&motion, now_ns));
         if counts == Some(Counts::Elsewhere) {
             effects.push(Effect::CountsElsewhere);
         }
@@ -96,7 +96,7 @@ impl Link {
     }
 
     /// All counts are plausible in lockstep, because a simulated robot does not restart; only contacts are noticed.
-    fn judge_counts(&mut self, motion: &Motion, now_ns: u64, effects: &mut Vec<Effect>) -> Counts {
+    fn judge_counts(&mut self, motion: &Motion, now_ns: u64) -> Counts {
         let wheels = motion.wheels;
         let counts = [wheels.left_counts, wheels.right_counts];
         let counts = counts.map(|count| count % COUNT_CYCLE);
@@ -115,7 +115,6 @@ impl Link {
         self.observe(Observation::Motor(counts, are), now_ns);
         if let Some(response) = self.failsafe.monitors.odometry.take_found() {
             self.observe(Observation::Responds(response), now_ns);
-            effects.push(Effect::Responds(response));
         }
         are
     }
