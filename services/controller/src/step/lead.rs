@@ -1,13 +1,16 @@
 //! The pose at which a command will act. A base that answers late turns past its direction if each command is computed for the pose that
-//! was seen: the commands that it has not answered yet are foreseen by its response.
+//! was seen: the commands that it has not answered yet are foreseen by its response. A base that answers soon is led by the pose that
+//! was seen, because the direction was computed for its place: a Jackal was a sixth slower with the lead.
 
 use common::{
     kinematics::{Pose2, Twist},
     mission::{Mission, ModelledSpeed, Response},
 };
 
-/// The laws of (14) to (16) hold with a dead time of so many periods.
-const PERIODS_BORNE: f64 = 1.5;
+use super::TURN_GAIN;
+
+/// A proportional law is well damped up to this product of its gain and the dead time; it oscillates for ever from pi / 2 on.
+const DAMPED: f64 = 0.5;
 /// Steps in which the way ahead is integrated, seconds.
 const STEP_S: f64 = 0.02;
 
@@ -24,7 +27,7 @@ impl Lead {
         let response = mission.body().response;
         let dead_time_s = response.dead_time_s();
         let Response { acceleration_m_s2, turn_acceleration_rad_s2, .. } = response;
-        (dead_time_s * mission.robot.rate_hz > PERIODS_BORNE).then(|| Self {
+        (dead_time_s * TURN_GAIN > DAMPED).then(|| Self {
             dead_time_s,
             v: ModelledSpeed::new(dead_time_s, acceleration_m_s2),
             omega: ModelledSpeed::new(dead_time_s, turn_acceleration_rad_s2),
