@@ -58,6 +58,8 @@ pub enum Procedure {
     Wall,
     LeftSquare,
     RightSquare,
+    /// To and fro on the spot.
+    Turns,
 }
 
 impl Default for CalibrationPlan {

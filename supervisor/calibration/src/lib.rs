@@ -11,10 +11,12 @@
 //! | `normal` | the wall's normal from a sweep |
 //! | [`loops`] | ratio, track and slip from loops, and refusals |
 //! | [`squares`] | ratio and track from squares measured by tape |
+//! | [`response`] | delay and acceleration from turns to and fro |
 //! | [`shell`] | the process in the planner's place |
 
 pub mod loops;
 mod normal;
+pub mod response;
 pub mod shell;
 pub mod squares;
 pub mod wall;

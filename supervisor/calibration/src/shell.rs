@@ -22,6 +22,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    response::Turns,
     squares::Square,
     wall::{Order, Wall, echo_m},
 };
@@ -35,6 +36,7 @@ const MOST_POSES: usize = 64;
 pub enum Drive {
     Wall(Box<Wall>),
     Square(Square),
+    Turns(Turns),
 }
 
 impl Drive {
@@ -48,10 +50,11 @@ impl Drive {
         Ok(Checkpoint::open(&file, STATE_BYTES)?.1)
     }
 
-    fn new(plan: CalibrationPlan) -> Self {
+    fn new(plan: CalibrationPlan, rate_hz: f64) -> Self {
         match plan.procedure {
             Procedure::Wall => Self::Wall(Box::new(Wall::new(plan))),
             Procedure::LeftSquare => Self::Square(Square::new(plan.drive_m, true)),
+            Procedure::Turns => Self::Turns(Turns::new(rate_hz)),
             Procedure::RightSquare => Self::Square(Square::new(plan.drive_m, false)),
         }
     }
@@ -60,6 +63,7 @@ impl Drive {
         match self {
             Self::Wall(wall) => wall.step(counts, echo_m, body),
             Self::Square(square) => square.step(counts, body),
+            Self::Turns(turns) => turns.step(),
         }
     }
 }
@@ -100,7 +104,7 @@ impl Process for Shell {
         let plan = mission.planner.calibration.clone().unwrap_or_default();
         let (body, front) = (mission.body(), mission.front_row());
         let target = TargetSample::first(mission);
-        let mut drive = Drive::new(plan);
+        let mut drive = Drive::new(plan, mission.robot.rate_hz);
         if let Some(state) = context.saved_state()? {
             drive = state;
             tracing::info!("restored");

@@ -40,8 +40,8 @@ impl Link {
         now_ns: u64,
         effects: &mut Vec<Effect>,
     ) {
-        if self.other_stop().is_some() && counts != [0, 0] {
-            // Another method than velocity stopped the robot, which needs its settings again.
+        if self.monitors().stop.method() > 0 && counts != [0, 0] {
+            // Another method than velocity may have stopped the robot, which needs its settings again.
             effects.push(Effect::Send(self.driver.greeting()));
         }
         self.commanded(counts, now_ns);

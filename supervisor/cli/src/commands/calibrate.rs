@@ -1,5 +1,6 @@
 mod drive;
 mod ends;
+mod response;
 mod written;
 
 use std::path::PathBuf;
@@ -23,7 +24,7 @@ use console::{
     logging, missions,
 };
 
-/// Measure the ratio of the wheels' diameters, the track and the slip of a robot.
+/// Measure the ratio of the wheels' diameters, the track and the slip of a robot, or how its base responds.
 ///
 /// Put the robot 0.5 to 2 m before the middle of a flat wall 3 m wide, facing it, with 3 m of free floor behind it. It drives loops until
 /// the values are good enough, and writes them into a file, which a mission names as robot.calibration.
@@ -40,6 +41,9 @@ pub(crate) struct Arguments {
     /// Squares to both sides, whose ends are measured by tape. The ends of a simulated robot are known.
     #[arg(long)]
     squares: bool,
+    /// The delay and the acceleration of the base, by ten seconds of turns on the spot. Prints the keys of [robot.response].
+    #[arg(long, conflicts_with_all = ["wall", "squares"])]
+    response: bool,
     /// Read the ends of the squares from FILE instead of standard input: x and y in a line, metres ahead and to the left of the mark.
     #[arg(long, value_name = "FILE", requires = "squares")]
     ends: Option<PathBuf>,
@@ -85,12 +89,19 @@ const WALL: &str = "[[wall]]\npoints = [[1.0, -2.5], [1.0, 2.5]]";
 
 pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     let plan = CalibrationPlan {
-        procedure: if arguments.squares { Procedure::LeftSquare } else { Procedure::Wall },
+        procedure: match arguments {
+            Arguments { response: true, .. } => Procedure::Turns,
+            Arguments { squares: true, .. } => Procedure::LeftSquare,
+            _ => Procedure::Wall,
+        },
         ratio_sd: arguments.sd,
         loops: arguments.loops,
         drive_m: arguments.drive,
     };
     logging::to_file(&arguments.log()?, "info")?;
+    if arguments.response {
+        return response::measure(arguments, plan);
+    }
     let found =
         if arguments.squares { by_squares(arguments, &plan) } else { by_wall(arguments, plan) }?;
     found.write(&arguments.out)?;

@@ -1,0 +1,283 @@
+//! Delay and acceleration of a base, from turns on the spot to and fro.
+//!
+//! The turn rates that were commanded pass through the model of a response, and what is left between its way and the turned angle is least
+//! for the base's own. Each turn and its return give an estimate; their spread is the deviation.
+
+use std::ops::Range;
+
+use common::{
+    geometry::wrap_angle,
+    mission::{Body, Response},
+    samples::GuidanceStatus,
+};
+use serde::{Deserialize, Serialize};
+
+use crate::wall::{Order, State};
+
+/// A turn to one side lasts so long, seconds: a base that answers after 0.5 s and gains 1 rad/s in a second turns by then.
+const LEG_S: f64 = 1.6;
+const LEGS: u32 = 8;
+/// The direction is so far aside that the robot turns as fast as it may.
+const ASIDE_RAD: f64 = 1.2;
+const LONGEST_DELAY_S: f64 = 1.0;
+const COARSE_S: f64 = 0.04;
+const DELAY_STEP_S: f64 = 0.01;
+/// Turn accelerations that are tried, rad/s^2: from the least, each by a tenth more.
+const LEAST: f64 = 0.2;
+const RATIO: f64 = 1.1;
+const ACCELERATIONS: i32 = 64;
+/// The least share of the turned angles that the response explains.
+const EXPLAINED: f64 = 0.95;
+/// A share that is less by no more than this is the same.
+const AS_MUCH: f64 = 0.001;
+/// The estimates that make a deviation.
+const FEWEST: usize = 3;
+/// The model goes on in steps of so many seconds.
+const STEP_S: f64 = 0.01;
+/// A pause between two headings is cut into no more.
+const MOST_STEPS: f64 = 100.0;
+
+/// The procedure in the planner's place.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Turns {
+    tick: u32,
+    ticks_a_leg: u32,
+}
+
+impl Turns {
+    #[must_use]
+    pub fn new(rate_hz: f64) -> Self {
+        Self { tick: 0, ticks_a_leg: (LEG_S * rate_hz).ceil() as u32 }
+    }
+
+    #[must_use]
+    pub const fn state(&self) -> State {
+        if self.tick >= LEGS * self.ticks_a_leg { State::Finished } else { State::Running }
+    }
+
+    pub fn step(&mut self) -> Order {
+        let leg = self.tick / self.ticks_a_leg;
+        let status = match self.state() {
+            State::Finished => GuidanceStatus::AtTarget,
+            _ => GuidanceStatus::Look,
+        };
+        self.tick = self.tick.saturating_add(1);
+        let aside_rad = if leg.is_multiple_of(2) { ASIDE_RAD } else { -ASIDE_RAD };
+        Order { status, aside_rad, speed_limit_m_s: 0.0, x_m: 0.0, heading_rad: 0.0 }
+    }
+}
+
+/// A value and its standard deviation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured {
+    pub value: f64,
+    pub sd: f64,
+}
+
+/// What the turns say.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// With the lag that was stated, seconds.
+    pub delay_s: Measured,
+    /// Of the rims, m/s^2; none for a base whose speed is limited by no acceleration that the turns show.
+    pub acceleration_m_s2: Option<Measured>,
+}
+
+/// The response of a base with `stated` lag and this body. `commands` are times and turn rates, `headings` times and headings, which may be
+/// wrapped.
+///
+/// # Errors
+/// The motion is not what a base that turns as told would show; the text says what to look for.
+pub fn estimate(
+    commands: &[(f64, f64)],
+    headings: &[(f64, f64)],
+    body: &Body,
+) -> Result<Estimate, String> {
+    let changes = commands.windows(2).filter(|pair| pair[0].1 * pair[1].1 < 0.0);
+    let turns: Vec<f64> = changes.map(|pair| pair[1].0).collect();
+    // The first turn starts from rest; each window is a turn and its return.
+    let windows = turns.windows(3).map(|ends| (ends[0], ends[2]));
+    let lag_s = body.response.lag_s;
+    let fits = windows.filter_map(|window| Fit::best(commands, headings, lag_s, window));
+    // The link may halve the speed within one of the windows.
+    let fits: Vec<Fit> = fits.filter(|fit| fit.explained >= EXPLAINED).collect();
+    if fits.len() < FEWEST {
+        return Err(format!(
+            "no delay and acceleration explain {FEWEST} of its turns: does it stand, are its wheels swapped or reversed, or does it slip? Look at the logs of the run"
+        ));
+    }
+    let delay = measured(fits.iter().map(|fit| fit.delay_s));
+    let limited = fits.iter().filter(|fit| fit.acceleration.is_finite()).count();
+    let rims = |fit: &Fit| fit.acceleration * body.track_m / 2.0;
+    Ok(Estimate {
+        delay_s: Measured { sd: delay.sd.max(DELAY_STEP_S / 2.0), ..delay },
+        acceleration_m_s2: (2 * limited > fits.len()).then(|| {
+            let finite = fits.iter().filter(|fit| fit.acceleration.is_finite());
+            let found = measured(finite.map(rims));
+            // The accelerations that were tried are no closer.
+            Measured { sd: found.sd.max((RATIO - 1.0) / 2.0 * found.value), ..found }
+        }),
+    })
+}
+
+/// The mean of `values`, which are not none, and its standard deviation.
+fn measured(values: impl Iterator<Item = f64> + Clone) -> Measured {
+    let count = values.clone().count() as f64;
+    let value = values.clone().sum::<f64>() / count;
+    let squares: f64 = values.map(|it| (it - value) * (it - value)).sum();
+    Measured { value, sd: (squares / (count - 1.0).max(1.0) / count).sqrt() }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Fit {
+    delay_s: f64,
+    acceleration: f64,
+    explained: f64,
+}
+
+impl Fit {
+    /// The response that explains the turns of a window of time best; none without turns.
+    fn best(
+        commands: &[(f64, f64)],
+        headings: &[(f64, f64)],
+        lag_s: f64,
+        window: (f64, f64),
+    ) -> Option<Self> {
+        let fit = |delay_s: f64, acceleration| {
+            let model = Model { delay_s: delay_s.max(0.0), lag_s, acceleration };
+            let (explained, factor) = model.explains(commands, headings, window)?;
+            // A base that turns at half the rate reaches it in half the time.
+            Some(Self { delay_s: model.delay_s, acceleration: factor * acceleration, explained })
+        };
+        let best = |delays: Range<i32>, from_s: f64, step_s: f64| {
+            let at = |step: i32| from_s + f64::from(step) * step_s;
+            let limited = |step| {
+                (0..ACCELERATIONS).filter_map(move |power| fit(at(step), LEAST * RATIO.powi(power)))
+            };
+            let better = |one: &Self, other: &Self| one.explained.total_cmp(&other.explained);
+            let unlimited = delays.clone().filter_map(|step| fit(at(step), f64::INFINITY));
+            let limited = delays.clone().flat_map(limited).max_by(better)?;
+            // What explains as much with less is right.
+            let unlimited =
+                unlimited.max_by(better).filter(|it| it.explained >= limited.explained - AS_MUCH);
+            Some(unlimited.unwrap_or(limited))
+        };
+        let coarse = best(0..(LONGEST_DELAY_S / COARSE_S) as i32, 0.0, COARSE_S)?;
+        best(-4..5, coarse.delay_s, DELAY_STEP_S)
+    }
+}
+
+/// A base, as the simulated one is: a delay, and a lag that is limited in acceleration.
+#[derive(Clone, Copy, Debug)]
+struct Model {
+    delay_s: f64,
+    lag_s: f64,
+    acceleration: f64,
+}
+
+impl Model {
+    /// The square of the correlation of the turned angles with those of the model, within `window`, and their ratio: the link or the base
+    /// may turn slower than commanded.
+    fn explains(
+        self,
+        commands: &[(f64, f64)],
+        headings: &[(f64, f64)],
+        window: (f64, f64),
+    ) -> Option<(f64, f64)> {
+        // Before it, the model needs time to forget that it began at rest.
+        let begins = window.0 - self.delay_s - 2.0 * LEG_S;
+        let mut waiting = commands.iter().skip_while(|(at, _)| *at < begins).peekable();
+        let share = if self.lag_s > 0.0 { 1.0 - (-STEP_S / self.lag_s).exp() } else { 1.0 };
+        let most = self.acceleration * STEP_S;
+        let (mut target, mut speed, mut sums) = (0.0, 0.0, [0.0; 3]);
+        for pair in headings.windows(2).filter(|pair| (begins..window.1).contains(&pair[1].0)) {
+            let [(from, heading), (until, then)] = [pair[0], pair[1]];
+            let steps = ((until - from) / STEP_S).round().clamp(1.0, MOST_STEPS);
+            let mut way = 0.0;
+            for step in 1..=steps as u32 {
+                let now = from + (until - from) * f64::from(step) / steps;
+                while let Some((_, rate)) = waiting.next_if(|(at, _)| at + self.delay_s <= now) {
+                    target = *rate;
+                }
+                speed += ((target - speed) * share).clamp(-most, most);
+                way += speed * (until - from) / steps;
+            }
+            if until >= window.0 {
+                let turned = wrap_angle(then - heading);
+                let terms = [way * way, way * turned, turned * turned];
+                sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+            }
+        }
+        let [model, both, turned] = sums;
+        (model > 0.0 && turned > 0.0 && both > 0.0)
+            .then(|| (both * both / (model * turned), both / model))
+    }
+}
+
+/// The keys of a mission for `estimate`, with the lag of `stated`.
+#[must_use]
+pub fn keys(estimate: &Estimate, stated: Response) -> String {
+    let Measured { value, sd } = estimate.delay_s;
+    let acceleration = match estimate.acceleration_m_s2 {
+        Some(Measured { value, sd }) => {
+            format!("acceleration_m_s2 = {value:.2}  # +- {sd:.2}\n")
+        }
+        None => "# no limit of its acceleration shows\n".to_owned(),
+    };
+    format!(
+        "[robot.response]\ndelay_s = {value:.3}  # +- {sd:.3}\nlag_s = {:.2}  # as stated\n{acceleration}",
+        stated.lag_s
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use common::mission::{Mission, ModelledSpeed};
+
+    use super::*;
+
+    /// Commands to and fro at 10 Hz, and the headings of a base without a lag that answers them by `model`.
+    fn turned(mut model: ModelledSpeed, factor: f64) -> [Vec<(f64, f64)>; 2] {
+        let (mut commands, mut headings, mut heading) = (Vec::new(), Vec::new(), 0.0);
+        for tick in 0..160 {
+            let at = f64::from(tick) / 10.0;
+            heading += model.go_on(at);
+            headings.push((at, heading));
+            let rate = if tick / 16 % 2 == 0 { 1.5 } else { -1.5 };
+            model.command(at, factor * rate);
+            commands.push((at, rate));
+        }
+        [commands, headings]
+    }
+
+    fn body() -> Body {
+        let text = "target = [3, 0]\nrobot.response.lag_s = 0.0";
+        Mission::parse(text, Path::new("m.toml")).unwrap().body()
+    }
+
+    #[test]
+    fn delay_and_acceleration_of_a_base_are_measured_from_its_turns() {
+        for (dead_s, acceleration) in [(0.15, 2.0), (0.48, 4.0), (0.1, 20.0), (0.28, 1.0)] {
+            let [commands, headings] = turned(ModelledSpeed::new(dead_s, acceleration), 0.8);
+            let found = estimate(&commands, &headings, &body()).unwrap();
+            let off = found.delay_s.value - dead_s;
+            assert!(off.abs() < 0.03, "{dead_s} {acceleration}: {found:?}");
+            if acceleration < 10.0 {
+                let rims = found.acceleration_m_s2.unwrap().value;
+                let share = rims / (acceleration * body().track_m / 2.0);
+                assert!((0.85..1.15).contains(&share), "{dead_s} {acceleration}: {found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_robot_that_turns_the_wrong_way_or_not_at_all_has_no_response() {
+        for factor in [-1.0, 0.0] {
+            let [commands, headings] = turned(ModelledSpeed::new(0.1, 2.0), factor);
+            assert!(estimate(&commands, &headings, &body()).is_err(), "{factor}");
+        }
+        assert!(estimate(&[], &[], &body()).is_err());
+    }
+}
