@@ -74,6 +74,10 @@ topics! {
     WHEELS: Topic<WheelSample> {
         name: "wheels", writer: "link", rate: Rate::EachTick, limits: Limits::SMALL, logged: Yes,
     }
+    /// The counts of `wheels` without their cycle, in each tick of a robot that says angles of its wheels or its odometry.
+    COUNTS: Topic<CountsSample> {
+        name: "counts", writer: "link", rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
+    }
     /// Wheels are held although they were told to turn: where something touches the body.
     CONTACT: Topic<ContactSample> {
         name: "contact", writer: "link", rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,

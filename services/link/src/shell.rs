@@ -19,8 +19,8 @@ use common::{
     stage::Runner,
     stop_socket::{Identity, Request, StopMark, StopSocket},
     topics::{
-        COMMAND, CONTACT, DIRECTIVE, IMU_TURN, INFRARED, LINK, POWER, RANGES, SCAN, SURROUNDINGS,
-        TICK_LIMIT, WHEELS, WIRE,
+        COMMAND, CONTACT, COUNTS, DIRECTIVE, IMU_TURN, INFRARED, LINK, POWER, RANGES, SCAN,
+        SURROUNDINGS, TICK_LIMIT, WHEELS, WIRE,
     },
     wiring::{Persists, Topics},
 };
@@ -84,6 +84,7 @@ impl Process for Shell {
         &CONTACT,
         &SCAN,
         &IMU_TURN,
+        &COUNTS,
         &RANGES,
         &WHEELS,
         &LINK,

@@ -12,7 +12,9 @@ use common::{
     shell::{Context, Progress},
     stage::{ForeignState, Stage},
     start::StageError,
-    topics::{CONTACT, IMU_TURN, INFRARED, POWER, RANGES, SCAN, SURROUNDINGS, WHEELS, WIRE},
+    topics::{
+        CONTACT, COUNTS, IMU_TURN, INFRARED, POWER, RANGES, SCAN, SURROUNDINGS, WHEELS, WIRE,
+    },
 };
 use serde::{Deserialize, Serialize};
 
@@ -66,7 +68,7 @@ impl LinkStage {
         out: &mut Outputs,
     ) -> Result<Option<Effect>, StageError> {
         match effect {
-            Effect::Tick { tick, time, ranges, scan, turn, wheels, contact } => {
+            Effect::Tick { tick, time, ranges, scan, turn, wheels, endless, contact } => {
                 out.at = Progress { tick, time };
                 if let Some(contact) = contact {
                     out.publish(&CONTACT, contact)?;
@@ -78,6 +80,9 @@ impl LinkStage {
                     out.publish(&IMU_TURN, turn)?;
                 }
                 out.publish_slice(&RANGES, RangesHeader::default(), &ranges)?;
+                if let Some(counts) = endless {
+                    out.publish(&COUNTS, counts)?;
+                }
                 out.publish(&WHEELS, wheels)?;
             }
             Effect::Infrared(sample) => self.infrared = Some(sample),

@@ -23,9 +23,9 @@ use std::{collections::VecDeque, time::Duration};
 
 use common::{
     clock::MissionTime,
+    driver::counts::WheelCounts,
     mission::{Mission, ModelledSpeed, Response},
     samples::{Cause, ContactSample, Order},
-    wire::counts_between,
 };
 
 use super::{
@@ -168,7 +168,7 @@ pub struct Odometry {
     longest_gap: Duration,
     limit: Duration,
     commanded: Option<MissionTime>,
-    frame: Option<([u16; 2], MissionTime)>,
+    frame: Option<(WheelCounts, MissionTime)>,
     left: Evidence,
     right: Evidence,
     turn: Evidence,
@@ -225,7 +225,8 @@ impl Odometry {
         self.found.take()
     }
 
-    fn plausible(&mut self, counts: [u16; 2], now: MissionTime) {
+    fn plausible(&mut self, counts: impl Into<WheelCounts>, now: MissionTime) {
+        let counts = counts.into();
         let newest_jump = self.jumps.back().copied();
         let calm = newest_jump.is_none_or(|jump| now.since(jump) >= CALM);
         if calm
@@ -246,7 +247,7 @@ impl Odometry {
             return;
         };
         let gap = now.since(then);
-        let turned = [0, 1].map(|wheel| f64::from(counts_between(before[wheel], counts[wheel])));
+        let turned = counts.since(before);
         self.fit.turned((gap <= self.longest_gap).then_some(turned), now);
         let lapsed = |at| now.since(at) > self.limit;
         if gap > self.longest_gap || self.commanded.is_none_or(lapsed) {
