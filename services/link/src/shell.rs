@@ -30,7 +30,7 @@ use crate::{
         Decision,
         battery::{BatteryChange, Charge},
     },
-    stage::{Entry, LinkStage, WIRE_PIECE},
+    stage::{Entry, LinkStage},
     step::{Effect, Event},
     stop_guard::StopGuard,
     transport::Transport,
@@ -119,7 +119,7 @@ impl Process for Shell {
         }
         // What an earlier link's driver must know.
         let memory: Option<Memory> = context.saved_state()?;
-        let mut runner = Runner::open(context, |_: &LinkStage| WIRE_PIECE)?;
+        let mut runner = Runner::open(context, LinkStage::longest)?;
         if let Some(memory) = memory {
             runner.take_entry(Entry::Remember(memory))?;
         }

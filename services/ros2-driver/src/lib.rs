@@ -105,7 +105,10 @@ impl Ros2 {
         match content {
             Content::Odometry => self.take_odometry(&Odometry::read(payload)?, heard),
             Content::Scan => {
-                let scan = Scan::read(payload).map_err(|error| error.to_string())?;
+                let mut scan = Scan::read(payload).map_err(|error| error.to_string())?;
+                if self.laser.as_ref().is_some_and(|laser| laser.sensor().is_upside_down) {
+                    scan.turn_over();
+                }
                 self.take_scan(&scan)
             }
             Content::Range(row) => {
