@@ -138,6 +138,8 @@ pub struct Heard {
     /// Its newest odometry by its own clock, if it says that.
     pub stamp_ns: Option<i64>,
     pub commander: Option<Commander>,
+    /// Two nodes publish its odometry: their numbers, and the remedy.
+    pub two_publishers: Option<String>,
     /// Why the newest refused message is none of the protocol.
     pub refused: Option<String>,
 }

@@ -50,6 +50,8 @@ pub enum Observation<'a> {
     Responds(Response),
     /// A sender other than the link told the robot something.
     Commander(Commander),
+    /// Two nodes publish odometry, which this text names.
+    TwoPublishers(&'a str),
     /// The robot answers again or for the first time, and was asked for its streams.
     Found {
         /// Whether it had answered before.

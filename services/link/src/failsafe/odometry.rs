@@ -177,6 +177,8 @@ pub struct Odometry {
     recoveries: u32,
     suspicion: Option<(Suspicion, MissionTime)>,
     ordered_to_drive: bool,
+    /// In words, and when both published last.
+    two_publishers: Option<(String, MissionTime)>,
 }
 
 impl Odometry {
@@ -372,6 +374,7 @@ impl Monitor for Odometry {
             recoveries: 0,
             suspicion: None,
             ordered_to_drive: false,
+            two_publishers: None,
         }
     }
 
@@ -379,6 +382,9 @@ impl Monitor for Odometry {
         match *what {
             Observation::Directive(order, _) => self.ordered_to_drive = order == Order::Drive,
             Observation::Resumed => self.reset(),
+            Observation::TwoPublishers(words) => {
+                self.two_publishers = Some((words.to_owned(), now.time));
+            }
             Observation::Commanded(counts) => self.commanded(counts, now.time),
             Observation::Currents(currents) => self.contacts.take_currents(currents),
             Observation::Motor(counts, Counts::Follow) => self.plausible(counts, now.time),
@@ -406,11 +412,16 @@ impl Monitor for Odometry {
         }
     }
 
-    fn explain(&self, cause: Cause, _: Moment) -> Option<String> {
+    fn explain(&self, cause: Cause, now: Moment) -> Option<String> {
         if cause == Cause::WheelsHeld {
             return self.contacts.explain();
         }
         let (suspicion, _) = self.suspicion?;
+        if let Some((words, at)) = &self.two_publishers
+            && now.time.since(*at) <= GIVEN_UP_AFTER
+        {
+            return Some(words.clone());
+        }
         Some(suspicion.words().to_owned())
     }
 }

@@ -45,6 +45,9 @@ impl Link {
                 effects.push(Effect::Send(self.stop()));
             }
         }
+        if let Some(words) = heard.two_publishers.take() {
+            self.observe(Observation::TwoPublishers(&words), now_ns);
+        }
         for _ in 0..heard.acknowledged {
             self.observe(Observation::Acknowledged, now_ns);
         }

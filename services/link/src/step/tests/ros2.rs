@@ -311,6 +311,25 @@ fn while_odometry_jumps_again_and_again_the_robot_stands() {
 }
 
 #[test]
+fn a_robot_that_stands_because_two_nodes_publish_its_odometry_says_so_and_names_both() {
+    let mut scene = Scene::driving();
+    for jump in 1..20 {
+        scene.pose[1] = f64::from(jump % 2);
+        let two = [&[u8::MAX][..], &[0xa1; 16], &[0xb2; 16]].concat();
+        scene.event(Event::Datagram(&two));
+        scene.run(100);
+    }
+    scene.holds(Cause::OdometryImplausible);
+    let words = scene.link.explain(Cause::OdometryImplausible, scene.ms * MS).unwrap();
+    assert!(words.starts_with("two nodes publish /odom: end one"), "{words}");
+    assert!(
+        words.ends_with("b2.b2") && words.contains("are a1.a1.") && scene.refused.contains(&words),
+        "{:?}",
+        scene.refused
+    );
+}
+
+#[test]
 fn a_tick_has_the_turn_of_the_robots_gyro_which_ends_with_it() {
     let mut scene = Scene::driving();
     assert_eq!(scene.turns, [], "gyro and odometry were not compared in a turn");
