@@ -1,5 +1,6 @@
 //! The interface between the link and a robot's protocol.
 
+pub mod counts;
 pub mod laser;
 pub mod odometry;
 
@@ -7,7 +8,8 @@ use std::{fmt, time::Duration};
 
 use crate::mission::{Mission, Sensor};
 use crate::samples::{
-    InfraredSample, PowerSample, RangeReading, RangeStatus, SurroundingsSample, WheelSample,
+    CountsSample, InfraredSample, PowerSample, RangeReading, RangeStatus, SurroundingsSample,
+    WheelSample,
 };
 
 /// The protocol of one kind of robot, without wire or clock: bytes from the robot to their meaning, orders to bytes for the robot.
@@ -136,6 +138,8 @@ pub struct Heard {
     /// Its newest odometry by its own clock, if it says that.
     pub stamp_ns: Option<i64>,
     pub commander: Option<Commander>,
+    /// Two nodes publish its odometry: their numbers, and the remedy.
+    pub two_publishers: Option<String>,
     /// Why the newest refused message is none of the protocol.
     pub refused: Option<String>,
 }
@@ -160,6 +164,8 @@ pub struct Turn {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     pub wheels: WheelSample,
+    /// Of a robot that says angles or its odometry: the counts of `wheels` without their cycle.
+    pub endless: Option<CountsSample>,
     /// AD counts of the left and the right wheel.
     pub currents: [u16; 2],
 }

@@ -27,9 +27,8 @@ const BYTES_FOR_AN_ENTRY: u64 = 20_480;
 const HEADER: usize = 16;
 /// It follows the last entry. No header is all zeros, for the checksum of zeros is not 0.
 const END: [u8; HEADER] = [0; HEADER];
-const LONGEST: usize = 8192;
-/// Room for each entry until the next snapshot, bytes: an entry of the mapper takes 250, and 4,500 with a laser scan.
-const ENTRY_ROOM: u64 = 4_608;
+/// The mapper's entry with a scan of the most beams has half of this.
+const LONGEST: usize = 131_072;
 /// Bytes of a snapshot besides the state.
 const NUMBER: usize = 10;
 
@@ -59,11 +58,13 @@ struct Snapshot<S> {
 }
 
 impl Journal {
-    /// Open, or create, the snapshot at `path` for encoded states of at most `capacity` bytes, and the journal beside it. Fails like
+    /// Open, or create, the snapshot at `path` for encoded states of at most `capacity` bytes, and the journal beside it, with
+    /// room for entries of `entry_bytes` until the next snapshot. Fails like
     /// [`Checkpoint::open`].
     pub fn open<S: DeserializeOwned, E: DeserializeOwned>(
         path: &Path,
         capacity: usize,
+        entry_bytes: usize,
     ) -> Result<(Self, Restored<S, E>), CheckpointError> {
         let (snapshots, snapshot) = Checkpoint::open::<Snapshot<S>>(path, capacity + NUMBER)?;
         let path = path.with_extension("journal");
@@ -75,7 +76,8 @@ impl Journal {
             .open(&path)
             .map_err(failed("open", &path))?;
         let snapshot_after = snapshot_after(capacity);
-        reserve(&file, snapshot_after * ENTRY_ROOM).map_err(failed("reserve room for", &path))?;
+        reserve(&file, snapshot_after * (HEADER + entry_bytes) as u64)
+            .map_err(failed("reserve room for", &path))?;
         let (first, state) = match snapshot {
             Some(Snapshot { next, state }) => (next, Some(state)),
             None => (0, None),
@@ -188,7 +190,7 @@ mod tests {
     type Sum = u64;
 
     fn open(path: &Path) -> (Journal, Restored<Sum, u64>) {
-        Journal::open(path, 64).unwrap()
+        Journal::open(path, 64, 4_592).unwrap()
     }
 
     /// The state as a new process restores it.

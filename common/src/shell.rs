@@ -71,8 +71,9 @@ impl Context {
     pub fn saved_journal<S: DeserializeOwned, E: DeserializeOwned>(
         &mut self,
         bytes: usize,
+        entry_bytes: usize,
     ) -> Result<Restored<S, E>, StageError> {
-        let (journal, restored) = Journal::open(&self.checkpoint_file(), bytes)?;
+        let (journal, restored) = Journal::open(&self.checkpoint_file(), bytes, entry_bytes)?;
         self.saved = Saved::Journal(journal);
         Ok(restored)
     }

@@ -32,6 +32,13 @@ const FIELD_RATE: Rate = Rate::OnChange {
 /// A recorder that was not scheduled for long still learns of each generation from the rosters that wait for it.
 const ROSTERS: Limits = Limits { buffer: Limits::MAP.recorder_buffer, ..Limits::MAP };
 
+/// The memory for the most beams is that of 1,024 small scans: a recorder that is not scheduled for 1.6 s loses none at 40 Hz.
+const SCANS: Limits = Limits { buffer: 16, recorder_buffer: 64, ..Limits::slices(MOST_BEAMS) };
+
+/// The most bytes of a `wire` sample; longer data take several.
+pub const WIRE_PIECE: usize = 2048;
+const WIRE_PIECES: Limits = Limits { longest: WIRE_PIECE, ..Limits::DEEP };
+
 /// At every change at once, and again after `again_after`.
 const fn on_change(again_after: Duration) -> Rate {
     Rate::OnChange { at_most_every: Duration::ZERO, again_after }
@@ -68,11 +75,15 @@ topics! {
     }
     /// The beams of the laser.
     SCAN: Topic<ScanHeader, f32> {
-        name: "scan", writer: "link", rate: Rate::WhenItHappens, limits: Limits::slices(MOST_BEAMS), logged: Yes,
+        name: "scan", writer: "link", rate: Rate::WhenItHappens, limits: SCANS, logged: Yes,
     }
     /// Encoder counts and wheel speeds.
     WHEELS: Topic<WheelSample> {
         name: "wheels", writer: "link", rate: Rate::EachTick, limits: Limits::SMALL, logged: Yes,
+    }
+    /// The counts of `wheels` without their cycle, in each tick of a robot that says angles of its wheels or its odometry.
+    COUNTS: Topic<CountsSample> {
+        name: "counts", writer: "link", rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
     }
     /// Wheels are held although they were told to turn: where something touches the body.
     CONTACT: Topic<ContactSample> {
@@ -164,7 +175,7 @@ topics! {
     }
     /// The bytes that the link received from the robot and sent to it. Wakes nobody: a reader waits for `link`.
     WIRE: Topic<WireHeader, u8> {
-        name: "wire", writer: "link", rate: Rate::WhenItHappens, limits: Limits::DEEP, logged: Yes,
+        name: "wire", writer: "link", rate: Rate::WhenItHappens, limits: WIRE_PIECES, logged: Yes,
     }
     /// The inputs of every stage's step, and the checkpoint each generation started from, for a replay.
     /// Wakes nobody: a reader waits for `link`.

@@ -10,7 +10,7 @@ use crate::sonar::Mount;
 
 /// The limit also holds for the readings in a sample of `ranges`.
 pub const MOST_SENSORS: usize = 16;
-pub const MOST_BEAMS: usize = 1081;
+pub const MOST_BEAMS: usize = 16_384;
 pub const INFRARED_RANGERS: usize = 7;
 pub const SONARS: usize = 6;
 
@@ -151,15 +151,20 @@ pub struct SensorRow {
     /// The name in logs and reasons.
     pub name: String,
     pub kind: SensorKind,
-    /// A cone has the sonar's index in the standard frame, 0 to 5, a ray the infrared ranger, 0 to 6.
-    pub channel: u8,
+    /// Of an X80: a cone has the sonar's index in the standard frame, 0 to 5, a ray the infrared ranger, 0 to 6. Other robots' protocols
+    /// have no channels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub channel: Option<u8>,
     /// Distance from the robot's centre along its bearing.
     pub forward_m: f64,
     /// delta of (19), from the robot's axis counter-clockwise.
     pub bearing_deg: f64,
     /// Angle from the bearing to a laser's middle beam, counter-clockwise; 0 looks outward.
-    #[serde(default, skip_serializing_if = "is_outward")]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub turned_deg: f64,
+    /// 180 for a laser that is mounted upside down, otherwise 0.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub roll_deg: f64,
     /// The default is the model's; a ray has none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field_of_view_deg: Option<f64>,
@@ -177,8 +182,8 @@ pub struct SensorRow {
     pub model: Option<SensorModel>,
 }
 
-fn is_outward(turned_deg: &f64) -> bool {
-    *turned_deg == 0.0
+fn is_zero(deg: &f64) -> bool {
+    *deg == 0.0
 }
 
 /// The front sonar of a robot without `[[robot.sensor]]`.
@@ -203,6 +208,7 @@ impl Default for SonarConfig {
 pub struct Sensor {
     pub name: String,
     pub kind: SensorKind,
+    /// The row's, or the least that no other sensor of its kind has.
     pub channel: u8,
     pub mount: Mount,
     /// A ray has 0.
@@ -210,18 +216,19 @@ pub struct Sensor {
     pub reach_m: f64,
     /// A sensor that is no laser has 1.
     pub beams: usize,
+    pub is_upside_down: bool,
     pub every_ticks: u64,
     pub model: SensorModel,
     pub used: bool,
 }
 
 impl Sensor {
-    fn of(row: &SensorRow, rate_hz: f64) -> Self {
+    fn of(row: &SensorRow, channel: u8, rate_hz: f64) -> Self {
         let model = row.model.unwrap_or(SensorModel::of(row.kind));
         Self {
             name: row.name.clone(),
             kind: row.kind,
-            channel: row.channel,
+            channel,
             mount: Mount {
                 forward_m: row.forward_m,
                 bearing_rad: row.bearing_deg.to_radians(),
@@ -230,6 +237,7 @@ impl Sensor {
             field_of_view_deg: row.field_of_view_deg.unwrap_or(model.field_of_view_deg()),
             reach_m: row.reach_m.unwrap_or(model.reach_m()),
             every_ticks: row.rate_hz.map_or(1.0, |hz| (rate_hz / hz).round().max(1.0)) as u64,
+            is_upside_down: row.roll_deg != 0.0,
             beams: row.beams.map_or(model.beams(), usize::from),
             model,
             used: false,
@@ -243,6 +251,18 @@ impl Sensor {
         // The first and last beam of a whole turn would coincide.
         let steps = if wide >= std::f64::consts::TAU - 1e-9 { self.beams } else { self.beams - 1 };
         (-wide / 2.0, wide / steps.max(1) as f64)
+    }
+
+    /// The robot's frame of a laser that is mounted upside down has its beams in the other order: mirrored on its middle beam. The mirror
+    /// image of the mirror image is the original.
+    pub fn mirror<T>(&self, beams: &mut [T]) {
+        let is_circle = self.field_of_view_deg >= 360.0;
+        // The first beam of a whole turn looks back, and so does its mirror image.
+        if let Some(mirrored) = beams.get_mut(usize::from(is_circle)..)
+            && self.is_upside_down
+        {
+            mirrored.reverse();
+        }
     }
 
     /// Angle from the robot's axis to where it turns to look at a place. For a laser that sees all around it is the
@@ -284,7 +304,16 @@ pub(crate) fn table(
     sonar: &SonarConfig,
     set: Sensors,
 ) -> Vec<Sensor> {
-    let mut table: Vec<_> = rows.iter().map(|row| Sensor::of(row, rate_hz)).collect();
+    let mut table: Vec<Sensor> = Vec::with_capacity(rows.len());
+    for row in rows {
+        let of_kind = |other: &&SensorRow| other.kind == row.kind;
+        let is_free = |channel: &u8| {
+            !rows.iter().filter(of_kind).any(|other| other.channel == Some(*channel))
+                && !table.iter().any(|held| (held.kind, held.channel) == (row.kind, *channel))
+        };
+        let channel = row.channel.or_else(|| (0..=u8::MAX).find(is_free)).unwrap_or_default();
+        table.push(Sensor::of(row, channel, rate_hz));
+    }
     let Some(front) = front(&table, sonar) else {
         return table;
     };
@@ -319,10 +348,11 @@ pub(crate) fn laser(model: SensorModel, forward_m: f64, turned_deg: f64) -> Vec<
     vec![SensorRow {
         name: "laser".to_owned(),
         kind: SensorKind::Scan,
-        channel: 0,
+        channel: None,
         forward_m,
         bearing_deg: 0.0,
         turned_deg,
+        roll_deg: 0.0,
         field_of_view_deg: None,
         reach_m: None,
         beams: None,
@@ -336,10 +366,11 @@ pub(crate) fn x80(radius_m: f64, sonar: &SonarConfig) -> Vec<SensorRow> {
     let row = |name: String, kind, channel, forward_m, bearing_deg| SensorRow {
         name,
         kind,
-        channel,
+        channel: Some(channel),
         forward_m,
         bearing_deg,
         turned_deg: 0.0,
+        roll_deg: 0.0,
         field_of_view_deg: None,
         reach_m: None,
         beams: None,
@@ -426,6 +457,36 @@ mod tests {
         assert_eq!((eye.kind, eye.reach_m, eye.used), (SensorKind::Ray, 0.5, true));
         assert_eq!(used(&format!("sensors = 'front'\n{ROWS}")), ["nose"]);
         assert_eq!(mission(ROWS).front_sonar().name, "nose");
+    }
+
+    #[test]
+    fn a_robot_whose_protocol_has_no_channels_names_none_and_each_sensor_gets_one_of_its_own() {
+        let row = |name: &str, kind: &str, channel: &str| {
+            format!(
+                "[[robot.sensor]]\nname = '{name}'\nkind = '{kind}'\n{channel}forward_m = 0.1\nbearing_deg = 0\n"
+            )
+        };
+        let rows = [row("a", "cone", ""), row("b", "cone", "channel = 0\n"), row("c", "ray", "")];
+        let rows = [rows.concat(), row("d", "cone", ""), row("e", "cone", "channel = 200\n")];
+        let table = mission(&format!("robot.protocol = 'json'\n{}", rows.concat())).sensor_table();
+        let channels: Vec<_> = table.iter().map(|sensor| sensor.channel).collect();
+        assert_eq!(channels, [1, 0, 0, 2, 200]);
+    }
+
+    #[test]
+    fn a_laser_upside_down_has_its_beams_mirrored_on_the_middle_one() {
+        let mirrored = |keys: &str, beams: usize| {
+            let row = format!(
+                "[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nroll_deg = 180\nbeams = {beams}\n{keys}"
+            );
+            let (_, laser) = mission(&format!("robot.protocol = 'json'\n{row}")).laser().unwrap();
+            let mut numbers: Vec<_> = (0..beams).collect();
+            laser.mirror(&mut numbers);
+            numbers
+        };
+        assert_eq!(mirrored("field_of_view_deg = 180", 5), [4, 3, 2, 1, 0]);
+        // From behind over right, ahead and left.
+        assert_eq!(mirrored("field_of_view_deg = 360", 4), [0, 3, 2, 1]);
     }
 
     #[test]

@@ -29,8 +29,8 @@ use rustix::{
 
 use crate::{cdr::ENCAPSULATION, topic::Topic};
 
-/// A longer message is cut, and its decoder refuses it.
-const LONGEST: usize = 65_535;
+/// A longer message is cut, and its decoder refuses what it needs beyond: the ranges of a scan of 16,384 beams have 66 kB.
+const LONGEST: usize = 98_304;
 /// Messages skipped at a time because they cannot be decoded.
 const MOST_BROKEN: usize = 16;
 

@@ -4,17 +4,18 @@ use std::f64::consts::TAU;
 
 use glam::DVec2;
 
-use super::{Memory, Motion};
+use super::{Memory, Motion, counts::WheelCounts};
 use crate::{
     geometry::wrap_angle,
     kinematics::{DifferentialDrive, Pose2, Twist, WheelSpeeds},
     mission::Body,
-    samples::WheelSample,
-    wire::COUNT_CYCLE,
+    samples::{CountsSample, WheelSample},
 };
 
 /// The farthest place or heading that odometry can say, metres or radians.
 const FARTHEST: f64 = 1e6;
+/// Whole numbers beyond are not exact.
+const MOST_COUNTS: f64 = 9e15;
 /// The farthest that a wheel can roll over its way at top speed.
 const IMPLAUSIBLE: f64 = 1.5;
 /// The most time between a pose and its stamp, seconds.
@@ -114,10 +115,10 @@ pub fn drive(body: &Body) -> DifferentialDrive {
 /// The motion of left and right wheels at these angles and speeds, radians and rad/s; `held` by something each or not.
 #[must_use]
 pub fn motion(body: &Body, turned: [f64; 2], speeds: [f64; 2], held: [bool; 2]) -> Motion {
-    let counts = |angle: f64| angle * body.counts_per_turn / TAU;
-    let [left_counts, right_counts] =
-        turned.map(|angle| counts(angle).round().rem_euclid(f64::from(COUNT_CYCLE)) as u16);
-    let [left_counts_per_s, right_counts_per_s] = speeds.map(|speed| counts(speed).round() as i32);
+    let counts = |angle: f64| (angle * body.counts_per_turn / TAU).round();
+    let [left, right] = turned.map(|angle| counts(angle).clamp(-MOST_COUNTS, MOST_COUNTS));
+    let [left_counts, right_counts] = WheelCounts::Endless([left, right]).cyclic();
+    let [left_counts_per_s, right_counts_per_s] = speeds.map(|speed| counts(speed) as i32);
     Motion {
         wheels: WheelSample {
             left_counts,
@@ -126,6 +127,11 @@ pub fn motion(body: &Body, turned: [f64; 2], speeds: [f64; 2], held: [bool; 2]) 
             right_counts_per_s,
             ..WheelSample::default()
         },
+        endless: Some(CountsSample {
+            left_counts: left,
+            right_counts: right,
+            ..CountsSample::default()
+        }),
         // A held wheel draws all that its motor can.
         currents: held.map(|held| if held { HELD_AD } else { 0 }),
     }

@@ -95,6 +95,15 @@ payloads! {
 }
 
 payloads! {
+    /// The counts of [`WheelSample`] without their cycle, whole numbers.
+    #[derive(Serialize, Deserialize)]
+    "firsthand.Counts" CountsSample {
+        left_counts: f64,
+        right_counts: f64,
+    }
+}
+
+payloads! {
     /// Held wheels stand by their encoders, and their motors draw a high current.
     #[derive(Serialize, Deserialize)]
     "firsthand.Contact" ContactSample {

@@ -53,7 +53,6 @@ pub use frame::{Addressing, Frame, MAX_FRAME_BYTES, MessageError, SystemSignal};
 pub use report::Report;
 pub use sensors::{
     COUNT_CYCLE, CustomSensors, Encoder, MotorSensors, StandardSensors, counts_between,
-    counts_restarted,
 };
 pub use units::{
     Echo, INFRARED_LIVE_AD, LOGIC_SCALE_V, MOTOR_SCALE_V, board_celsius, driver_celsius,

@@ -39,24 +39,6 @@ pub fn counts_between(old: u16, new: u16) -> i32 {
     if ahead >= cycle / 2 { ahead - cycle } else { ahead }
 }
 
-/// A robot that has just booted stands.
-const BOOTED_WITHIN: i32 = 4;
-/// A step no longer than this counts as motion; 14 mm for an X80.
-const NOT_WORTH_TELLING: i32 = 32;
-
-/// The robot probably booted between `old` and `new`: the new counts are near the start value of a booted robot, and
-/// the old ones are not. A robot that drove back to its start gives the same counts, so a caller that received frames
-/// in between needs further evidence.
-#[must_use]
-pub fn counts_restarted(old: [u16; 2], new: [u16; 2]) -> bool {
-    let at_start = new.iter().all(|&count| counts_between(0, count).abs() <= BOOTED_WITHIN);
-    let steps = old.iter().zip(new);
-    let stood_elsewhere = steps
-        .map(|(&old, new)| counts_between(old, new).abs())
-        .any(|step| step > NOT_WORTH_TELLING);
-    at_start && stood_elsewhere
-}
-
 /// DID 123.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MotorSensors {

@@ -159,7 +159,7 @@ impl Arduino {
             ..WheelSample::default()
         };
         // The board measures no currents.
-        Motion { wheels, currents: [0; 2] }
+        Motion { wheels, endless: None, currents: [0; 2] }
     }
 
     /// Start again with a request whose answer is unmistakable.

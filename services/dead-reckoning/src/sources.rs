@@ -3,21 +3,25 @@
 use common::{
     bus::{BusError, Reader, Stamped},
     readers,
-    samples::{FixSample, TurnSample},
+    samples::{CountsSample, FixSample, TurnSample},
     stage::Further,
-    topics::{FIX, IMU_TURN, SCAN_FIX, TURN},
+    topics::{COUNTS, FIX, IMU_TURN, SCAN_FIX, TURN},
 };
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// The most samples of a topic that are taken with a tick. Others are taken with the next one.
 const MOST_FIXES: usize = 16;
 const MOST_TURNS: usize = 128;
+const MOST_COUNTS: usize = 128;
 
 /// The samples of sources outside that came since the tick before.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Sources {
     pub fixes: Vec<FixSample>,
     pub turns: Vec<TurnSample>,
+    /// Older recordings have none.
+    #[serde(deserialize_with = "if_there")]
+    pub counts: Vec<CountsSample>,
 }
 
 readers! {
@@ -27,6 +31,7 @@ readers! {
             scan_fixes: Reader<FixSample> = SCAN_FIX,
             turns: Reader<TurnSample> = TURN,
             imu_turns: Reader<TurnSample> = IMU_TURN,
+            counts: Reader<CountsSample> = COUNTS,
         }
     }
 }
@@ -39,9 +44,19 @@ impl Further for Sources {
         fixes.extend(some(&mut readers.scan_fixes, MOST_FIXES)?);
         let outside = some(&mut readers.turns, MOST_TURNS)?;
         let own = some(&mut readers.imu_turns, MOST_TURNS)?;
+        let counts = some(&mut readers.counts, MOST_COUNTS)?;
         // The sequences of two gyros do not continue each other.
-        Ok(Self { fixes, turns: if own.is_empty() { outside } else { own } })
+        Ok(Self { fixes, turns: if own.is_empty() { outside } else { own }, counts })
     }
+}
+
+/// The last part of an encoding, or the default where the encoding ends before it, as one of an earlier version does.
+pub(crate) fn if_there<'a, T, D>(from: D) -> Result<T, D::Error>
+where
+    T: Deserialize<'a> + Default,
+    D: Deserializer<'a>,
+{
+    Ok(T::deserialize(from).unwrap_or_default())
 }
 
 fn some<H: Stamped>(reader: &mut Reader<H>, most: usize) -> Result<Vec<H>, BusError> {

@@ -4,12 +4,13 @@
 use common::{
     bus::Topic,
     clock::MissionTime,
+    driver::counts::WheelCounts,
     kinematics::{Drive, Pose2, SteeredWheel, Twist, WheelSpeeds},
     mission::{Body, Mission},
-    samples::{FixRefusal, FixSample, PoseSample, WheelSample},
+    samples::{CountsSample, FixRefusal, FixSample, PoseSample, WheelSample},
     stage::{Answer, Answering, ForeignState},
     topics::{POSE, WHEELS},
-    wire::{counts_between, counts_restarted},
+    wire::counts_between,
     wiring::Persists,
 };
 use glam::DVec2;
@@ -20,7 +21,7 @@ use crate::{
     filter::{Filter, Fix, History, Motions, Refused},
     gyro::Gyro,
     relocation::Contradictions,
-    sources::Sources,
+    sources::{Sources, if_there},
     tick::Tick,
 };
 
@@ -58,6 +59,9 @@ pub struct State {
     fixes: u64,
     fixes_refused: u64,
     refusal: u8,
+    /// The counts of `last` without their cycle, of a robot that has no counter. States of older recordings have none.
+    #[serde(deserialize_with = "if_there")]
+    counts: Option<CountsSample>,
 }
 
 impl State {
@@ -145,6 +149,7 @@ impl Answering for DeadReckoning {
                 fixes: 0,
                 fixes_refused: 0,
                 refusal: FixRefusal::None.into(),
+                counts: None,
             },
         }
     }
@@ -180,19 +185,22 @@ impl DeadReckoning {
     pub fn reckon(
         &mut self,
         wheels: &WheelSample,
-        Sources { fixes, turns }: &Sources,
+        Sources { fixes, turns, counts }: &Sources,
         now: MissionTime,
     ) -> Reckoned {
         let mut motion = Twist::default();
         let (mut rejected, mut elapsed) = (false, 0.0);
         let mut tick = Tick { time: now, ..Tick::default() };
+        let is_its = |counts: &&CountsSample| counts.stamp.tick == wheels.stamp.tick;
+        let endless = counts.iter().rfind(is_its);
+        let counts = WheelCounts::of(wheels, endless);
         if let Some(last) = self.state.last {
             if last.tick == wheels.stamp.tick {
                 let pose = self.sample();
                 return Reckoned { pose, rejected, relocated: false, refused: None };
             }
             elapsed = now.since(last.time).as_secs_f64();
-            let counted = self.moved(last, wheels, elapsed);
+            let counted = self.moved(last, counts, wheels, elapsed);
             rejected = counted.is_none();
             let Twist { v: arc, omega: turn } = counted.unwrap_or_default();
             // A robot without ticks gets no commands, so its wheels soon rest.
@@ -222,6 +230,7 @@ impl DeadReckoning {
         }
         self.follow(relocated);
         let Twist { v, omega } = self.speeds(motion, elapsed);
+        self.state.counts = endless.copied();
         self.state.last = Some(Last {
             tick: wheels.stamp.tick,
             time: now,
@@ -276,28 +285,40 @@ impl DeadReckoning {
     }
 
     /// Metres and radians; none if the counts cannot come from turning wheels.
-    fn moved(&self, last: Last, wheels: &WheelSample, elapsed: f64) -> Option<Twist> {
-        let (left, right) = (
-            counts_between(last.left, wheels.left_counts),
-            counts_between(last.right, wheels.right_counts),
-        );
+    fn moved(
+        &self,
+        last: Last,
+        counts: WheelCounts,
+        wheels: &WheelSample,
+        elapsed: f64,
+    ) -> Option<Twist> {
+        let before = self.state.counts.map_or(WheelCounts::Cyclic([last.left, last.right]), |it| {
+            WheelCounts::Endless([it.left_counts, it.right_counts])
+        });
+        let [left, right] = counts.since(before);
         let per_count = std::f64::consts::TAU / self.body.counts_per_turn;
         let top = self.body.top_speed_m_s / self.body.metres_per_count();
         let limit = top * PLAUSIBLE * (elapsed + SLACK_S);
-        if f64::from(left.abs().max(right.abs())) > limit || restarted(last, wheels, elapsed) {
+        // Of one generation the link sees a restart between frames; only a restart between two links must be read off the counts. A
+        // robot that turned back through its start gives the same counts, but sooner.
+        let restarted = match last.generation == wheels.stamp.generation {
+            true => last.restarts != wheels.restarts,
+            false => elapsed >= BOOTS_IN_S && counts.restarted_since(before),
+        };
+        if left.abs().max(right.abs()) > limit || restarted {
             return None;
         }
         // (20) is linear in the wheels: their angles give arc and turn as their speeds give v and omega.
-        let wheel = f64::from(left) * per_count;
+        let wheel = left * per_count;
         Some(match &self.drive {
             Drive::Differential(drive) => {
                 let [left_scale, right_scale] = self.wheel_scales;
-                let right = f64::from(right) * per_count * right_scale;
+                let right = right * per_count * right_scale;
                 drive.twist(WheelSpeeds { left: wheel * left_scale, right })
             }
             Drive::Ackermann(drive) => {
                 // The mean of the two angles stands for the steering on the way.
-                let middle = f64::from(counts_between(0, last.right)) + f64::from(right) / 2.0;
+                let middle = f64::from(counts_between(0, last.right)) + right / 2.0;
                 let angle = self.body.steering.map(|steering| steering.angle(middle));
                 let wheel = wheel * self.distance_scale;
                 drive.twist(SteeredWheel { wheel, steering: angle.unwrap_or_default() })
@@ -356,17 +377,6 @@ enum Taken {
     Used,
     Refused(FixRefusal),
     Relocated,
-}
-
-/// Whether the robot restarted its counts after `last`. The link sees that between frames; only a restart between two links must be read
-/// off the counts.
-fn restarted(last: Last, wheels: &WheelSample, elapsed: f64) -> bool {
-    if last.generation == wheels.stamp.generation {
-        return last.restarts != wheels.restarts;
-    }
-    // A robot that turned back through its start gives the same counts, but sooner.
-    elapsed >= BOOTS_IN_S
-        && counts_restarted([last.left, last.right], [wheels.left_counts, wheels.right_counts])
 }
 
 #[cfg(test)]

@@ -112,7 +112,9 @@ impl Json {
             let (came, want) = (beams.len(), laser.sensor().beams);
             return Err(format!("a scan of {came} beams, and the mission's laser has {want}"));
         }
-        Ok(beams.iter().map(|beam| laser.beam(*beam)).collect())
+        let mut beams: Vec<_> = beams.iter().map(|beam| laser.beam(*beam)).collect();
+        laser.sensor().mirror(&mut beams);
+        Ok(beams)
     }
 }
 
@@ -258,6 +260,20 @@ mod tests {
         assert_eq!([scan(1.0, 0.0), scan(1.0, 0.1), scan(1.0, 0.9)], [measured; 3]);
         assert_eq!(scan(1.0, 1.1), (RangeStatus::Invalid, 0));
         assert_eq!(scan(1.5, 1.2), measured);
+    }
+
+    #[test]
+    fn a_line_of_16384_beams_with_all_digits_is_taken_and_a_laser_upside_down_is_mirrored() {
+        let row = "target = [3, 0]\nrobot.protocol = 'json'\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nbeams = 16384\nroll_deg = 180";
+        let mut driver = Json::new(&Mission::parse(row, Path::new("m.toml")).unwrap());
+        let range = |beam: u16| 1.000_000_000_000_123_4 + f64::from(beam) * 1e-4;
+        let beams: Vec<_> = (0..16_384).map(|beam| range(beam).to_string()).collect();
+        assert_eq!(
+            heard(&mut driver, &format!("{{\"scan\":[{}]}}", beams.join(","))).refused,
+            None
+        );
+        let scan = driver.scan_for_tick();
+        assert_eq!((scan.len(), scan[0]), (16_384, range(16_383) as f32));
     }
 
     /// The status of the laser of `model` after scans of so many beams that end at a range, the others at nothing, each after the wheels

@@ -18,8 +18,8 @@ use common::{
     stage::Runner,
     stop_socket::{Identity, Request, StopMark, StopSocket},
     topics::{
-        COMMAND, CONTACT, DIRECTIVE, IMU_TURN, INFRARED, LINK, POWER, RANGES, SCAN, SURROUNDINGS,
-        TICK_LIMIT, WHEELS, WIRE,
+        COMMAND, CONTACT, COUNTS, DIRECTIVE, IMU_TURN, INFRARED, LINK, POWER, RANGES, SCAN,
+        SURROUNDINGS, TICK_LIMIT, WHEELS, WIRE,
     },
     wiring::{Persists, Topics},
 };
@@ -29,7 +29,7 @@ use crate::{
         Decision,
         battery::{BatteryChange, Charge},
     },
-    stage::{Entry, LinkStage, WIRE_PIECE},
+    stage::{Entry, LinkStage},
     step::{Effect, Event},
     stop_guard::StopGuard,
     transport::Transport,
@@ -81,6 +81,7 @@ impl Process for Shell {
         &CONTACT,
         &SCAN,
         &IMU_TURN,
+        &COUNTS,
         &RANGES,
         &WHEELS,
         &LINK,
@@ -115,7 +116,7 @@ impl Process for Shell {
         }
         // What an earlier link's driver must know.
         let memory: Option<Memory> = context.saved_state()?;
-        let mut runner = Runner::open(context, |_: &LinkStage| WIRE_PIECE)?;
+        let mut runner = Runner::open(context, LinkStage::longest)?;
         if let Some(memory) = memory {
             runner.take_entry(Entry::Remember(memory))?;
         }

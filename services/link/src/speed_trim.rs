@@ -5,9 +5,8 @@
 //! its response tells nothing.
 
 use common::{
+    driver::counts::WheelCounts,
     mission::{Mission, ModelledSpeed, Response},
-    samples::WheelSample,
-    wire::counts_between,
 };
 
 /// Agreeing commands until a wheel's speed is steady: its delay and lag take 0.15 s, a period at 7 Hz.
@@ -29,7 +28,7 @@ pub(crate) struct SpeedTrim {
     /// Oldest first, counts/s.
     told: [[f64; 2]; STEADY],
     /// The newest tick's counts, and mission time, seconds.
-    tick: Option<([u16; 2], f64)>,
+    tick: Option<(WheelCounts, f64)>,
     longest_gap_s: f64,
     share: f64,
 }
@@ -66,8 +65,7 @@ impl SpeedTrim {
         }
     }
 
-    pub(crate) fn rolled(&mut self, wheels: &WheelSample, time_s: f64) {
-        let counts = [wheels.left_counts, wheels.right_counts];
+    pub(crate) fn rolled(&mut self, counts: WheelCounts, time_s: f64) {
         let Some((before, then_s)) = self.tick.replace((counts, time_s)) else {
             return;
         };
@@ -75,6 +73,7 @@ impl SpeedTrim {
         if gap_s <= 0.0 || gap_s > self.longest_gap_s {
             return;
         }
+        let turned = counts.since(before);
         for (wheel, modelled) in self.wheels.iter_mut().enumerate() {
             modelled.go_on(time_s);
             let told = self.told.map(|told| told[wheel]);
@@ -86,7 +85,7 @@ impl SpeedTrim {
             if least.min(reached) < LEAST_COUNTS_S || least.min(reached) < AGREE * greatest {
                 continue;
             }
-            let rolled = f64::from(counts_between(before[wheel], counts[wheel])) / gap_s;
+            let rolled = turned[wheel] / gap_s;
             let share = rolled * newest.signum() / ((along[STEADY - 2] + along[STEADY - 1]) / 2.0);
             if SHARES.contains(&share) {
                 self.share += WEIGHT * (share - self.share);
@@ -112,10 +111,8 @@ mod tests {
             SpeedTrim::new(&Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap());
         let mut rolled = [0.0; 2];
         for tick in 0..ticks {
-            let [left_counts, right_counts] =
-                rolled.map(|counts: f64| counts.rem_euclid(COUNT_CYCLE.into()) as u16);
-            let wheels = WheelSample { left_counts, right_counts, ..WheelSample::default() };
-            trim.rolled(&wheels, tick as f64 * PERIOD_S);
+            let counts = rolled.map(|counts: f64| counts.rem_euclid(COUNT_CYCLE.into()) as u16);
+            trim.rolled(counts.into(), tick as f64 * PERIOD_S);
             let told = command(tick).map(|counts| counts / trim.share());
             trim.told(told.map(|counts| counts as i16));
             for (rolled, told) in rolled.iter_mut().zip(told) {

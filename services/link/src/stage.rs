@@ -12,14 +12,14 @@ use common::{
     shell::{Context, Progress},
     stage::{ForeignState, Stage},
     start::StageError,
-    topics::{CONTACT, IMU_TURN, INFRARED, POWER, RANGES, SCAN, SURROUNDINGS, WHEELS, WIRE},
+    topics::{
+        CONTACT, COUNTS, IMU_TURN, INFRARED, POWER, RANGES, SCAN, SURROUNDINGS, WHEELS, WIRE,
+        WIRE_PIECE,
+    },
 };
 use serde::{Deserialize, Serialize};
 
 use crate::step::{Effect, Event, Link, State};
-
-/// The most bytes of a `wire` sample; longer data take several.
-pub(crate) const WIRE_PIECE: usize = 2048;
 
 /// A generation starts from a [`State`].
 #[derive(Debug, Serialize, Deserialize)]
@@ -38,8 +38,8 @@ pub enum Entry<'a> {
 #[derive(Debug)]
 pub struct LinkStage {
     pub(crate) link: Link,
-    /// None without a laser.
-    laser: Option<ScanHeader>,
+    /// The header of its scans, and their beams; none without a laser.
+    laser: Option<(ScanHeader, usize)>,
     infrared: Option<InfraredSample>,
     power: Option<PowerSample>,
     surroundings: Option<SurroundingsSample>,
@@ -50,6 +50,11 @@ pub struct LinkStage {
 impl LinkStage {
     pub(crate) const fn has_telemetry(&self) -> bool {
         self.infrared.is_some() || self.power.is_some() || self.surroundings.is_some()
+    }
+
+    /// The most elements of a slice that it publishes.
+    pub(crate) fn longest(&self) -> usize {
+        self.laser.map_or(WIRE_PIECE, |(_, beams)| beams.max(WIRE_PIECE))
     }
 
     fn carry(&mut self, at: Progress, bytes: &[u8], machine_ns: u64, direction: Direction) {
@@ -66,18 +71,21 @@ impl LinkStage {
         out: &mut Outputs,
     ) -> Result<Option<Effect>, StageError> {
         match effect {
-            Effect::Tick { tick, time, ranges, scan, turn, wheels, contact } => {
+            Effect::Tick { tick, time, ranges, scan, turn, wheels, endless, contact } => {
                 out.at = Progress { tick, time };
                 if let Some(contact) = contact {
                     out.publish(&CONTACT, contact)?;
                 }
-                if let Some(header) = self.laser.filter(|_| !scan.is_empty()) {
+                if let Some((header, _)) = self.laser.filter(|_| !scan.is_empty()) {
                     out.publish_slice(&SCAN, header, &scan)?;
                 }
                 if let Some(turn) = turn {
                     out.publish(&IMU_TURN, turn)?;
                 }
                 out.publish_slice(&RANGES, RangesHeader::default(), &ranges)?;
+                if let Some(counts) = endless {
+                    out.publish(&COUNTS, counts)?;
+                }
                 out.publish(&WHEELS, wheels)?;
             }
             Effect::Infrared(sample) => self.infrared = Some(sample),
@@ -115,7 +123,7 @@ impl Stage for LinkStage {
     fn new(mission: &Mission) -> Self {
         Self {
             link: Link::new(mission),
-            laser: mission.laser().map(|(row, laser)| ScanHeader::of(row, &laser)),
+            laser: (mission.laser()).map(|(row, laser)| (ScanHeader::of(row, &laser), laser.beams)),
             infrared: None,
             power: None,
             surroundings: None,

@@ -13,11 +13,11 @@ use std::time::Duration;
 
 use common::{
     clock::{MissionTime, Pace},
-    driver::{Driver, Memory, Turn, WireTally},
+    driver::{Driver, Memory, Motion, Turn, WireTally, counts::WheelCounts},
     mission::Mission,
     samples::{
-        Action, Cause, CommandSample, CommandState, ContactSample, HoldReason, Order, RangeReading,
-        TurnSample, WheelSample,
+        Action, Cause, CommandSample, CommandState, ContactSample, CountsSample, HoldReason, Order,
+        RangeReading, TurnSample, WheelSample,
     },
     stop_socket::Request,
 };
@@ -58,6 +58,7 @@ struct OpenTick {
     scan: Vec<f32>,
     turn: Option<Turn>,
     wheels: WheelSample,
+    endless: Option<CountsSample>,
     contact: Option<ContactSample>,
     began_ns: u64,
     /// When it was published; `None` while it waits for the supervisor's limit.
@@ -277,7 +278,12 @@ impl Link {
         })
     }
 
-    fn begin_tick(&mut self, wheels: WheelSample, now_ns: u64, effects: &mut Vec<Effect>) {
+    fn begin_tick(
+        &mut self,
+        Motion { wheels, endless, .. }: Motion,
+        now_ns: u64,
+        effects: &mut Vec<Effect>,
+    ) {
         if !self.ordered_to_drive() && !self.held_by_operator() {
             return;
         }
@@ -296,13 +302,14 @@ impl Link {
         let wheels = WheelSample { restarts: self.restart.restarts(), ..wheels };
         self.wheels = wheels;
         if let Some(trim) = &mut self.trim {
-            trim.rolled(&wheels, self.time.seconds());
+            trim.rolled(WheelCounts::of(&wheels, endless.as_ref()), self.time.seconds());
         }
         self.open = Some(OpenTick {
             ranges: self.driver.readings_for_tick(),
             scan: self.driver.scan_for_tick(),
             turn: self.driver.turn_for_tick(),
             wheels,
+            endless,
             contact: self.failsafe.monitors.odometry.take_contact(),
             began_ns: now_ns,
             given_ns: None,
@@ -311,14 +318,14 @@ impl Link {
     }
 
     fn tick_effect(&self, tick: u64, open: OpenTick) -> Effect {
-        let OpenTick { ranges, scan, turn, wheels, contact, .. } = open;
+        let OpenTick { ranges, scan, turn, wheels, endless, contact, .. } = open;
         let time = self.time;
         let turn = turn.map(|Turn { sequence, turn_rad, variance_rad2 }| {
             // The turn ends with the motion that the tick's wheels show.
             let capture_ns = time.0;
             TurnSample { capture_ns, sequence, turn_rad, variance_rad2, ..TurnSample::default() }
         });
-        Effect::Tick { tick, time, ranges, scan, turn, wheels, contact }
+        Effect::Tick { tick, time, ranges, scan, turn, wheels, endless, contact }
     }
 
     fn open_number(&self) -> u64 {

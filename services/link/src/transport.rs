@@ -67,8 +67,8 @@ impl Transport {
             wire: wire.map_err(|source| TransportError { address: address.clone(), source })?,
             address: address.clone(),
             reported: None,
-            // The largest datagram.
-            buffer: vec![0; 65_536].into_boxed_slice(),
+            // The largest datagram has 64 kB, the largest message of ROS that is read 96 kB.
+            buffer: vec![0; 131_072].into_boxed_slice(),
         })
     }
 

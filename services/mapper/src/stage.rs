@@ -40,7 +40,7 @@ impl Stage for Mapper {
     }
 
     fn start(&self, context: &mut Context) -> Result<Start, StageError> {
-        let saved = context.saved_journal(self.saved_bytes())?;
+        let saved = context.saved_journal(self.saved_bytes(), self.entry_bytes())?;
         Ok(Start { belief: saved.state, inputs: saved.entries })
     }
 

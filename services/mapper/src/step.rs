@@ -8,7 +8,7 @@ use common::{
     geometry::Shapes,
     grid::{Cell, CellState, GridFrame, Part, Window},
     kinematics::Pose2,
-    mission::{MOST_BEAMS, Method, Mission},
+    mission::{Method, Mission},
     samples::{ContactSample, FaultKind, FixSample, GridHeader, PoseSample, RangeReading, name},
     stage::ForeignState,
 };
@@ -126,6 +126,8 @@ pub struct Mapper {
     half_track: f64,
     matcher: ScanMatcher,
     fix: Option<FixSample>,
+    /// Of the laser; 0 without one.
+    beams: usize,
     belief: Belief,
 }
 
@@ -152,6 +154,7 @@ impl Mapper {
             half_track: mission.body().track_m / 2.0,
             matcher: ScanMatcher::new(mission),
             fix: None,
+            beams: mission.laser().map_or(0, |(_, laser)| laser.beams),
             belief: Belief {
                 cells: vec![CellState::Free as u8; frame.area()],
                 version: 1,
@@ -245,7 +248,12 @@ impl Mapper {
             Sensed::Hits => 0,
             Sensed::Evidence(_) => self.evidential.saved_bytes(),
         };
-        self.frame.area() + evidence + 5 * MOST_BEAMS + 240
+        self.frame.area() + evidence + 5 * self.beams + 240
+    }
+
+    /// Room for an entry of the journal: it takes 250 bytes, and the beams of a scan four each.
+    pub const fn entry_bytes(&self) -> usize {
+        512 + 4 * self.beams
     }
 
     pub fn header(&self, part: Part) -> GridHeader {

@@ -8,10 +8,12 @@
 //! |---|---|
 //! | [`topics`] | THE table of topics |
 //! | [`messages`] | what the driver needs of them |
+//! | [`publishers`] | whether two nodes publish odometry |
 //! | `gyro` | the turn of each tick by the robot's IMU |
 
 mod gyro;
 pub mod messages;
+pub mod publishers;
 pub mod topics;
 
 use std::{f64::consts::TAU, time::Duration};
@@ -84,6 +86,14 @@ impl Ros2 {
 
     /// A refused message has no effect; the error says why.
     fn take(&mut self, piece: &[u8], heard: &mut Heard) -> Result<(), String> {
+        if let Some((&publishers::TWO, gids)) = piece.split_first() {
+            let odometry =
+                self.topics.heard.iter().find(|(content, _)| *content == Content::Odometry);
+            let words = odometry.and_then(|(_, topic)| publishers::words(&topic.name, gids));
+            let words = words.ok_or("numbers of publishers that are none")?;
+            heard.two_publishers = Some(words.clone());
+            return Err(words);
+        }
         let row_of =
             |(row, payload): (&u8, _)| Some((self.topics.heard.get(usize::from(*row))?, payload));
         let Some(((content, topic), payload)) = piece.split_first().and_then(row_of) else {
@@ -105,7 +115,10 @@ impl Ros2 {
         match content {
             Content::Odometry => self.take_odometry(&Odometry::read(payload)?, heard),
             Content::Scan => {
-                let scan = Scan::read(payload).map_err(|error| error.to_string())?;
+                let mut scan = Scan::read(payload).map_err(|error| error.to_string())?;
+                if self.laser.as_ref().is_some_and(|laser| laser.sensor().is_upside_down) {
+                    scan.turn_over();
+                }
                 self.take_scan(&scan)
             }
             Content::Range(row) => {

@@ -134,6 +134,13 @@ impl Scan {
         let ranges = reader.list(MOST_BEAMS)?;
         Ok(Self { fan: (first.into(), step.into()), least_m, most_m, ranges })
     }
+
+    /// Its laser is mounted upside down: give the beams the order and the bearings that they have in the robot's frame.
+    pub fn turn_over(&mut self) {
+        let (first, step) = self.fan;
+        self.fan.0 = -(first + step * self.ranges.len().saturating_sub(1) as f64);
+        self.ranges.reverse();
+    }
 }
 
 /// Metres of a `sensor_msgs/Range`: infinite for nothing, no number for no reading. Fails if `payload` is none.

@@ -121,7 +121,7 @@ fn a_message_that_ends_anywhere_is_refused_and_none_makes_the_driver_panic_or_al
     }
     let mut endless = bytes(SCAN);
     endless[56..60].copy_from_slice(&u32::MAX.to_le_bytes());
-    assert_eq!(Scan::read(&endless), Err(Malformed::Long(u32::MAX, 1081)));
+    assert_eq!(Scan::read(&endless), Err(Malformed::Long(u32::MAX, 16_384)));
     assert!(driver.tally().bytes_dropped > 0);
     driver.push(&[]);
     assert!(driver.heard().refused.is_some());
@@ -200,6 +200,44 @@ fn a_circle_of_beams_is_turned_to_the_missions_and_lacking_ones_have_no_reading(
     assert_eq!(said(&mut driver, LASER, &few).refused, None);
     let beams = driver.scan_for_tick();
     assert_eq!(beams.iter().filter(|beam| beam.is_nan()).count(), 120);
+}
+
+#[test]
+fn a_laser_upside_down_has_what_it_saw_on_its_left_on_the_robots_right() {
+    let laser = |keys: &str| {
+        format!(
+            "[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nroll_deg = 180\n{keys}"
+        )
+    };
+    let step = 1_f32.to_radians();
+    // 90 degrees to the laser's left; a circle may begin anywhere.
+    for (first, left) in [(0.0_f32, 90), (-180.0, 270)] {
+        let mut driver = driver(&laser("model = 'lds-02'"));
+        let mut ranges = vec![f32::INFINITY; 360];
+        ranges[left] = 1.0;
+        let scan = scan_of(first.to_radians(), step, &ranges);
+        assert_eq!(said(&mut driver, LASER, &scan).refused, None);
+        let beams = driver.scan_for_tick();
+        assert_eq!((beams[90], beams[270]), (1.0, f32::INFINITY), "{first}");
+    }
+    let mut driver = driver(&laser("beams = 181\nfield_of_view_deg = 180"));
+    let mut ranges = vec![2.0; 181];
+    ranges[180] = 1.0;
+    let scan = scan_of(-90_f32.to_radians(), step, &ranges);
+    assert_eq!(said(&mut driver, LASER, &scan).refused, None);
+    assert_eq!(driver.scan_for_tick()[..2], [1.0, 2.0]);
+}
+
+#[test]
+fn a_scan_of_16384_beams_is_taken_whole() {
+    let mut driver = driver(
+        "[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nmodel = 'lds-02'\nbeams = 16384",
+    );
+    let ranges: Vec<f32> = (0..16_384).map(|beam| 1.0 + beam as f32 * 1e-4).collect();
+    let scan = scan_of(-std::f32::consts::PI, std::f32::consts::TAU / 16_384.0, &ranges);
+    assert!(scan.len() < 98_304 - 1024, "a reader of DDS takes it whole");
+    assert_eq!(said(&mut driver, LASER, &scan).refused, None);
+    assert_eq!(driver.scan_for_tick(), ranges);
 }
 
 #[test]

@@ -71,7 +71,7 @@ impl Driver for X80 {
         if let Some(motor) = motor {
             self.telemetry.take_motor(&motor);
             let (wheels, currents) = (self.drive.wheels(&motor), self.drive.currents(&motor));
-            heard.motion = Some(Motion { wheels, currents });
+            heard.motion = Some(Motion { wheels, endless: None, currents });
         }
         if let Some(standard) = standard {
             self.rangers.take_standard(&standard);

@@ -49,7 +49,7 @@ impl Laser {
         let (noise_m, noise_share) = self.sensor.model.beam_noise();
         let black_reach_m = self.sensor.model.black_reach_m();
         let near = world.near(mount.position, self.sensor.reach_m, height_m);
-        (0..self.sensor.beams)
+        let mut beams: Vec<_> = (0..self.sensor.beams)
             .map(|beam| {
                 let along = DVec2::from_angle(mount.heading + first + step * beam as f64);
                 let hit = near
@@ -66,7 +66,9 @@ impl Laser {
                     _ => None,
                 }
             })
-            .collect()
+            .collect();
+        self.sensor.mirror(&mut beams);
+        beams
     }
 }
 
@@ -115,6 +117,21 @@ mod tests {
         assert!((at(90) - 1.0).abs() < 0.05, "{}", at(90));
         assert!((at(0) - 2.04).abs() < 0.08, "{}", at(0));
         assert!((at(135) - 1.0 / 0.5_f64.sqrt()).abs() < 0.07, "{}", at(135));
+    }
+
+    #[test]
+    fn a_laser_upside_down_gives_the_beams_of_an_upright_one_in_the_other_order() {
+        let scan = |roll_deg: f64| {
+            let text = format!(
+                "target = [0, -5]\nrobot.protocol = 'json'\nworld.wall = [{{ points = [[-2, 1], [2, 1]] }}]\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nroll_deg = {roll_deg}\n"
+            );
+            let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+            Laser::new(&mission, 1).unwrap().scan(&World::new(&mission), Pose2::default())
+        };
+        let mut turned = scan(180.0);
+        assert!(turned[180].is_some() && turned[900].is_none());
+        turned.reverse();
+        assert_eq!(turned, scan(0.0));
     }
 
     /// The readings of a UST-10LX on a Jackal at the origin in a world, by the angle of the beam, degrees from straight ahead.

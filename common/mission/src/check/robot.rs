@@ -57,7 +57,8 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     }
     // A third of the counter's cycle a tick keeps wrap-around unambiguous with a tick to spare.
     let counts = body.top_speed_m_s / body.metres_per_count() / robot.rate_hz;
-    if counts > 32_768.0 / 6.0 {
+    let has_counter = matches!(robot.protocol(), Protocol::X80 | Protocol::Arduino);
+    if has_counter && counts > 32_768.0 / 6.0 {
         return Err(objection(
             "robot.rate_hz",
             format!(

@@ -17,13 +17,18 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
         let problem = format!("{} rows, and a sample holds {MOST_SENSORS}", rows.len());
         return Err(objection(KEY, problem, "remove some"));
     }
+    let speaks_x80 = mission.robot.protocol() == Protocol::X80;
     for (index, row) in rows.iter().enumerate() {
         self::row(row, mission.robot.rate_hz)?;
+        if speaks_x80 {
+            its_channel(row)?;
+        }
         let earlier = &rows[..index];
         if earlier.iter().any(|other| other.name == row.name) {
             return Err(objection(KEY, format!("two are called {:?}", row.name), "rename one"));
         }
-        if earlier.iter().any(|other| (other.kind, other.channel) == (row.kind, row.channel)) {
+        let has_its = |other: &SensorRow| (other.kind, other.channel) == (row.kind, row.channel);
+        if speaks_x80 && earlier.iter().any(has_its) {
             let problem = format!("{:?} has the channel of another {:?}", row.name, row.kind);
             return Err(objection(KEY, problem, "give each a channel of its own"));
         }
@@ -33,7 +38,6 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     if rows.iter().filter(|row| is_scan(row)).count() > 1 {
         return Err(objection(KEY, "two rows are lasers", "keep one"));
     }
-    let speaks_x80 = mission.robot.protocol() == Protocol::X80;
     if speaks_x80 && mission.laser().is_some() {
         let problem = "the boards of an X80 have no laser";
         return Err(objection(
@@ -67,13 +71,18 @@ fn row(row: &SensorRow, rate_hz: f64) -> Result<(), Objection> {
         let remedy = format!("use letters, digits and '-', at most {LONGEST_NAME}");
         return Err(objection(KEY, format!("{:?} is no name of a sensor", row.name), remedy));
     }
-    channel(KEY, row.kind, row.channel)?;
     within(KEY, row.forward_m, -5.0..=5.0, "m of forward_m")?;
     within(KEY, row.bearing_deg, -180.0..=180.0, "degrees of bearing_deg")?;
     within(KEY, row.turned_deg, -180.0..=180.0, "degrees of turned_deg")?;
     if row.turned_deg != 0.0 && row.kind != SensorKind::Scan {
         let problem = "only a laser may look elsewhere than outward";
         return Err(objection(KEY, problem, "remove turned_deg"));
+    }
+    if row.roll_deg != 0.0 && (row.roll_deg != 180.0 || row.kind != SensorKind::Scan) {
+        let problem = format!("roll_deg is {} of {:?}", row.roll_deg, row.name);
+        let remedy =
+            "give 180 for a laser that is mounted upside down, and nothing for other sensors";
+        return Err(objection(KEY, problem, remedy));
     }
     if let Some(model) = row.model
         && model.kind() != row.kind
@@ -106,11 +115,21 @@ fn row(row: &SensorRow, rate_hz: f64) -> Result<(), Objection> {
     row.rate_hz.map_or(Ok(()), |hz| within(KEY, hz, 0.1..=rate_hz, "Hz of rate_hz"))
 }
 
+fn its_channel(row: &SensorRow) -> Result<(), Objection> {
+    let Some(number) = row.channel else {
+        let problem = format!("{:?} has no channel, by which an X80 sends its readings", row.name);
+        let remedy = "give channel: 0 to 5 for a sonar, 0 to 6 for an infrared ranger";
+        return Err(objection(KEY, problem, remedy));
+    };
+    channel(KEY, row.kind, number)
+}
+
 fn channel(key: &'static str, kind: SensorKind, channel: u8) -> Result<(), Objection> {
     let (channels, remedy) = match kind {
         SensorKind::Cone => (SONARS, "give 0 to 5 for a sonar; 1 is the front one of an X80"),
         SensorKind::Ray => (INFRARED_RANGERS, "give 0 to 6 for an infrared ranger"),
-        SensorKind::Scan => (1, "give 0 for a laser"),
+        // The boards have no laser.
+        SensorKind::Scan => return Ok(()),
     };
     if usize::from(channel) < channels {
         return Ok(());
@@ -138,6 +157,8 @@ mod tests {
             (FRONT.replace("'front'", "'a b'"), "no name"),
             (FRONT.replace("bearing_deg = 0", "bearing_deg = 200"), "bearing_deg"),
             (FRONT.replace("0.19", "nan"), "forward_m"),
+            (FRONT.replace("channel = 1\n", ""), "\"front\" has no channel"),
+            (format!("{FRONT}roll_deg = 180"), "roll_deg is 180 of \"front\""),
             (format!("{FRONT}reach_m = 3"), "reach_m"),
             (format!("{FRONT}field_of_view_deg = 90"), "field_of_view_deg"),
             (format!("{FRONT}rate_hz = 100"), "rate_hz"),
@@ -154,6 +175,20 @@ mod tests {
         }
         let both = refusal(&format!("sonar.index = 2\n{FRONT}"));
         assert!(both.starts_with("m.toml:2: sonar: "), "{both}");
+    }
+
+    #[test]
+    fn a_laser_rolls_by_180_degrees_or_not_and_has_at_most_16384_beams() {
+        let laser = "robot.protocol = 'json'\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\n";
+        for bad in ["roll_deg = 90", "roll_deg = -180", "roll_deg = nan", "roll_deg = 181"] {
+            let refusal = refusal(&format!("{laser}{bad}"));
+            assert!(refusal.contains("upside down"), "{refusal}");
+        }
+        assert!(refusal(&format!("{laser}beams = 16385")).contains("beams"));
+        for good in ["roll_deg = 180\nbeams = 16384", "roll_deg = 0", "beams = 1440"] {
+            let text = format!("target = [3, 0]\n{laser}{good}");
+            crate::Mission::parse(&text, std::path::Path::new("m.toml")).unwrap();
+        }
     }
 
     #[test]

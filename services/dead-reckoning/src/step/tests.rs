@@ -46,7 +46,7 @@ impl Take for DeadReckoning {
         fixes: &[FixSample],
         turns: &[TurnSample],
     ) -> Reckoned {
-        let sources = Sources { fixes: fixes.to_vec(), turns: turns.to_vec() };
+        let sources = Sources { fixes: fixes.to_vec(), turns: turns.to_vec(), counts: Vec::new() };
         self.reckon(wheels, &sources, wheels.stamp.time())
     }
 
@@ -74,6 +74,68 @@ fn equation_20_straight_by_hand() {
     close(pose.v_m_s, 0.2 * PI);
     close(pose.omega_rad_s, 0.0);
     close(pose.travelled_m, 0.1 * PI);
+}
+
+/// As [`wheels`], of a robot without a counter.
+fn endless(tick: u64, left: f64, right: f64) -> (WheelSample, Sources) {
+    let counts = WheelCounts::Endless([left, right]);
+    let [left_cyclic, right_cyclic] = counts.cyclic();
+    let wheels = wheels(tick, left_cyclic, right_cyclic);
+    let stamp = wheels.stamp;
+    let counts = CountsSample { stamp, left_counts: left, right_counts: right };
+    (wheels, Sources { counts: vec![counts], ..Sources::default() })
+}
+
+#[test]
+fn a_way_longer_than_the_cycle_of_a_counter_is_in_the_pose_of_a_robot_that_has_none() {
+    // 5 s at 2.5 m/s between two ticks, and a restart that ends at a whole cycle.
+    for way in [15.0, -15.0, 20.588_741_6, 3.0] {
+        let mut reckoning = reckoning("top_speed_m_s = 2.5");
+        let mut at = |tick: u64, counts: f64| {
+            let (wheels, sources) = endless(tick, counts, counts);
+            reckoning.reckon(&wheels, &sources, wheels.stamp.time())
+        };
+        at(0, 77.0);
+        let counts = (way / (0.2e-3 * PI)).round();
+        let after = at(10, 77.0 + counts);
+        assert!(!after.rejected && (after.pose.x_m - way).abs() < 0.001, "{}", after.pose.x_m);
+        let on = at(11, 78.0 + counts);
+        assert!(!on.rejected && (on.pose.x_m - way).abs() < 0.002, "{}", on.pose.x_m);
+        // Nobody turns his wheels so far in half a second.
+        let jump = at(12, 78.0 + 2.0 * counts + 32_768.0);
+        assert!(jump.rejected && jump.pose.covariance[0] > on.pose.covariance[0] + 0.1);
+    }
+}
+
+#[test]
+fn a_robot_without_a_counter_restarts_at_0_alone_and_goes_on_by_the_cycle_where_a_sample_lacks() {
+    let mut reckoning = reckoning("");
+    let mut at = |tick: u64, generation: u32, counts: f64, lacks: bool| {
+        let (mut wheels, mut sources) = endless(tick, counts, counts);
+        wheels.stamp.generation = generation;
+        sources.counts.retain(|_| !lacks);
+        reckoning.reckon(&wheels, &sources, wheels.stamp.time())
+    };
+    at(0, 1, 30_000.0, false);
+    assert!(!at(10, 2, 32_768.0, false).rejected, "a whole cycle is no start");
+    assert!((at(11, 2, 32_868.0, true).pose.x_m - 2.868 * 0.2 * PI).abs() < 1e-9);
+    assert!((at(12, 2, 32_968.0, false).pose.x_m - 2.968 * 0.2 * PI).abs() < 1e-9);
+    assert!(at(22, 3, 1.0, false).rejected);
+}
+
+#[test]
+fn a_recorded_state_and_entry_of_an_earlier_version_are_read_without_counts() {
+    let (wheels, sources) = endless(3, 5.0, 5.0);
+    let entry = postcard::to_allocvec(&sources).unwrap();
+    let earlier = postcard::to_allocvec(&(sources.fixes, sources.turns)).unwrap();
+    assert_eq!(postcard::from_bytes::<Sources>(&earlier).unwrap().counts, []);
+    assert_eq!(postcard::from_bytes::<Sources>(&entry).unwrap().counts, sources.counts);
+    let mut reckoning = reckoning("");
+    reckoning.take(&wheels);
+    let state = postcard::to_allocvec(reckoning.state()).unwrap();
+    // The last byte says that there are no counts.
+    let earlier = postcard::from_bytes::<State>(&state[..state.len() - 1]).unwrap();
+    assert_eq!(&earlier, reckoning.state());
 }
 
 #[test]

@@ -3,9 +3,10 @@
 //! The robot obeys the newest command, so two commanders drive it where neither wants. A node that could publish and is silent is no
 //! commander.
 
-use std::{fmt::Write as _, time::Duration};
+use std::time::Duration;
 
 use common::{driver::Commander, mission::Mission, samples::Cause};
+use ros2_driver::publishers::gid_text;
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
 
@@ -58,11 +59,7 @@ impl Monitor for OtherCommander {
 
     fn explain(&self, _: Cause, _: Moment) -> Option<String> {
         let topic = &self.topic;
-        let mut number = String::new();
-        for (place, byte) in self.told?.newest.number.into_iter().enumerate() {
-            let dot = if place == 0 { "" } else { "." };
-            write!(number, "{dot}{byte:02x}").ok()?;
-        }
+        let number = gid_text(self.told?.newest.number);
         Some(format!(
             "another node publishes {topic}, its GID is {number}: `ros2 topic info --verbose {topic}` names it; end it"
         ))

@@ -4,7 +4,7 @@ use std::{fmt, time::Duration};
 
 use common::{
     clock::{MissionTime, Pace},
-    driver::Commander,
+    driver::{Commander, counts::WheelCounts},
     mission::{Mission, Response},
     samples::{Cause, CommandSample, HoldReason, Order, RangeReading},
 };
@@ -41,7 +41,7 @@ pub enum Observation<'a> {
     /// The motor currents of the wheels in the motor frame that follows, AD counts.
     Currents([u16; 2]),
     /// A motor frame came, with these counts of the wheels, growing forward.
-    Motor([u16; 2], Counts),
+    Motor(WheelCounts, Counts),
     /// The voltages of the batteries of the boards, the motors and the servos came; 0 for a battery that is not fitted.
     Batteries([f64; 3]),
     /// Readings of ranging sensors came.
@@ -50,6 +50,8 @@ pub enum Observation<'a> {
     Responds(Response),
     /// A sender other than the link told the robot something.
     Commander(Commander),
+    /// Two nodes publish odometry, which this text names.
+    TwoPublishers(&'a str),
     /// The robot answers again or for the first time, and was asked for its streams.
     Found {
         /// Whether it had answered before.

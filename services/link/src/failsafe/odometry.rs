@@ -23,9 +23,9 @@ use std::{collections::VecDeque, time::Duration};
 
 use common::{
     clock::MissionTime,
+    driver::counts::WheelCounts,
     mission::{Mission, ModelledSpeed, Response},
     samples::{Cause, ContactSample, Order},
-    wire::counts_between,
 };
 
 use super::{
@@ -168,7 +168,7 @@ pub struct Odometry {
     longest_gap: Duration,
     limit: Duration,
     commanded: Option<MissionTime>,
-    frame: Option<([u16; 2], MissionTime)>,
+    frame: Option<(WheelCounts, MissionTime)>,
     left: Evidence,
     right: Evidence,
     turn: Evidence,
@@ -177,6 +177,8 @@ pub struct Odometry {
     recoveries: u32,
     suspicion: Option<(Suspicion, MissionTime)>,
     ordered_to_drive: bool,
+    /// In words, and when both published last.
+    two_publishers: Option<(String, MissionTime)>,
 }
 
 impl Odometry {
@@ -225,7 +227,8 @@ impl Odometry {
         self.found.take()
     }
 
-    fn plausible(&mut self, counts: [u16; 2], now: MissionTime) {
+    fn plausible(&mut self, counts: impl Into<WheelCounts>, now: MissionTime) {
+        let counts = counts.into();
         let newest_jump = self.jumps.back().copied();
         let calm = newest_jump.is_none_or(|jump| now.since(jump) >= CALM);
         if calm
@@ -246,7 +249,7 @@ impl Odometry {
             return;
         };
         let gap = now.since(then);
-        let turned = [0, 1].map(|wheel| f64::from(counts_between(before[wheel], counts[wheel])));
+        let turned = counts.since(before);
         self.fit.turned((gap <= self.longest_gap).then_some(turned), now);
         let lapsed = |at| now.since(at) > self.limit;
         if gap > self.longest_gap || self.commanded.is_none_or(lapsed) {
@@ -371,6 +374,7 @@ impl Monitor for Odometry {
             recoveries: 0,
             suspicion: None,
             ordered_to_drive: false,
+            two_publishers: None,
         }
     }
 
@@ -378,6 +382,9 @@ impl Monitor for Odometry {
         match *what {
             Observation::Directive(order, _) => self.ordered_to_drive = order == Order::Drive,
             Observation::Resumed => self.reset(),
+            Observation::TwoPublishers(words) => {
+                self.two_publishers = Some((words.to_owned(), now.time));
+            }
             Observation::Commanded(counts) => self.commanded(counts, now.time),
             Observation::Currents(currents) => self.contacts.take_currents(currents),
             Observation::Motor(counts, Counts::Follow) => self.plausible(counts, now.time),
@@ -405,11 +412,16 @@ impl Monitor for Odometry {
         }
     }
 
-    fn explain(&self, cause: Cause, _: Moment) -> Option<String> {
+    fn explain(&self, cause: Cause, now: Moment) -> Option<String> {
         if cause == Cause::WheelsHeld {
             return self.contacts.explain();
         }
         let (suspicion, _) = self.suspicion?;
+        if let Some((words, at)) = &self.two_publishers
+            && now.time.since(*at) <= GIVEN_UP_AFTER
+        {
+            return Some(words.clone());
+        }
         Some(suspicion.words().to_owned())
     }
 }

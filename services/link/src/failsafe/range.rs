@@ -9,9 +9,9 @@
 use std::{ops::RangeInclusive, time::Duration};
 
 use common::{
+    driver::counts::WheelCounts,
     mission::{Mission, Sensor, SensorKind},
     samples::{Cause, RangeReading, RangeStatus},
-    wire::counts_between,
 };
 
 use super::{
@@ -114,19 +114,17 @@ pub struct Range {
     metres_per_count: f64,
     /// None for a car, whose second encoder is the steering's.
     track_m: Option<f64>,
-    counts: Option<[u16; 2]>,
+    counts: Option<WheelCounts>,
     rows: Vec<Row>,
     undetected: Option<UndetectedSurface>,
 }
 
 impl Range {
-    fn turn(&mut self, counts: [u16; 2]) {
+    fn turn(&mut self, counts: WheelCounts) {
         let Some(before) = self.counts.replace(counts) else {
             return;
         };
-        let [left, right] = [0, 1].map(|wheel| {
-            f64::from(counts_between(before[wheel], counts[wheel])) * self.metres_per_count
-        });
+        let [left, right] = counts.since(before).map(|counts| counts * self.metres_per_count);
         let (way_m, turn_m) = match self.track_m {
             Some(_) => ((left + right).abs() / 2.0, (right - left).abs() / 2.0),
             None => (left.abs(), 0.0),
@@ -245,7 +243,7 @@ mod tests {
             let now = Moment { time, machine_ns: time.0 };
             let turned = wheels_m.map(|way| (way * f64::from(tick) / per_count).round() as i32);
             let counts = turned.map(|counts| counts.rem_euclid(32_768) as u16);
-            monitor.observe(&Observation::Motor(counts, Counts::Follow), now);
+            monitor.observe(&Observation::Motor(counts.into(), Counts::Follow), now);
             let of = |sensor: u8, cm: u16| {
                 let status = if cm == 255 { RangeStatus::Nothing } else { RangeStatus::Measured };
                 RangeReading {

@@ -6,11 +6,7 @@
 //! A driven wheel turns no farther than it was commanded, than it turned before, or than the robot reports as its speed. Otherwise
 //! counts that restart within half a metre of the start would pass for a motion.
 
-use common::{
-    clock::MissionTime,
-    mission::Mission,
-    wire::{counts_between, counts_restarted},
-};
+use common::{clock::MissionTime, driver::counts::WheelCounts, mission::Mission};
 
 use super::monitor::Counts;
 
@@ -25,14 +21,14 @@ const FOLLOW_EACH_OTHER: u32 = 3;
 
 #[derive(Clone, Debug)]
 pub struct RestartWatch {
-    last: Option<([u16; 2], MissionTime)>,
+    last: Option<(WheelCounts, MissionTime)>,
     /// The wheels' speeds at the last plausible counts: as reported, and by counts; counts/s.
     turned: [[f64; 2]; 2],
     /// The two newest commands, counts/s, and the time of the newest that was to move a wheel.
     commanded: [[f64; 2]; 2],
     driven: Option<MissionTime>,
     /// The newest implausible counts, their time, and the frames that can follow each other.
-    suspected: Option<([u16; 2], MissionTime, u32)>,
+    suspected: Option<(WheelCounts, MissionTime, u32)>,
     away: bool,
     jumped: bool,
     restarts: u32,
@@ -80,11 +76,12 @@ impl RestartWatch {
     /// near the start value mean a restart; otherwise only if they are also farther off than wheels turn.
     pub fn step(
         &mut self,
-        counts: [u16; 2],
+        counts: impl Into<WheelCounts>,
         speeds: [i32; 2],
         was_away: bool,
         now: MissionTime,
     ) -> Counts {
+        let counts = counts.into();
         let speeds = speeds.map(f64::from);
         let away = std::mem::take(&mut self.away);
         if std::mem::take(&mut self.jumped) {
@@ -98,15 +95,14 @@ impl RestartWatch {
         let share = self
             .share_of_reach(before, then, counts, now)
             .max(self.share_of_driven(before, then, counts, speeds, now));
-        if counts_restarted(before, counts) && (away || share > 1.0) {
+        if counts.restarted_since(before) && (away || share > 1.0) {
             self.begin_at(counts, now);
             return Counts::Restarted { was_away };
         }
         if share <= IMPLAUSIBLE {
             (self.last, self.suspected) = (Some((counts, now)), None);
             let gap_s = now.since(then).as_secs_f64().max(self.jitter_s);
-            let turned = |wheel: usize| f64::from(counts_between(before[wheel], counts[wheel]));
-            self.turned = [speeds, [0, 1].map(|wheel| turned(wheel) / gap_s)];
+            self.turned = [speeds, counts.since(before).map(|turned| turned / gap_s)];
             return Counts::Follow;
         }
         let following = self.suspected.map_or(1, |(suspected, at, following)| {
@@ -121,7 +117,7 @@ impl RestartWatch {
         Counts::Implausible
     }
 
-    fn begin_at(&mut self, counts: [u16; 2], now: MissionTime) {
+    fn begin_at(&mut self, counts: WheelCounts, now: MissionTime) {
         (self.last, self.suspected) = (Some((counts, now)), None);
         self.restarts += 1;
     }
@@ -129,23 +125,22 @@ impl RestartWatch {
     /// The step over the most that wheels can turn in that time.
     fn share_of_reach(
         &self,
-        before: [u16; 2],
+        before: WheelCounts,
         then: MissionTime,
-        counts: [u16; 2],
+        counts: WheelCounts,
         now: MissionTime,
     ) -> f64 {
         let reach = self.top_counts * (now.since(then).as_secs_f64() + self.jitter_s);
-        let ways = before.iter().zip(counts);
-        let farthest = ways.map(|(&old, new)| counts_between(old, new).abs()).max();
-        f64::from(farthest.unwrap_or_default()) / reach
+        let [left, right] = counts.since(before).map(f64::abs);
+        left.max(right) / reach
     }
 
     /// The step over [`IMPLAUSIBLE`] of the most that wheels turn by their known speeds; 0 for a robot that is not driven.
     fn share_of_driven(
         &self,
-        before: [u16; 2],
+        before: WheelCounts,
         then: MissionTime,
-        counts: [u16; 2],
+        counts: WheelCounts,
         speeds: [f64; 2],
         now: MissionTime,
     ) -> f64 {
@@ -154,8 +149,9 @@ impl RestartWatch {
             return 0.0;
         }
         let time = now.since(then).as_secs_f64() + self.jitter_s;
+        let turned = counts.since(before);
         let share = |wheel: usize| {
-            let counts = f64::from(counts_between(before[wheel], counts[wheel]));
+            let counts = turned[wheel];
             let known =
                 [self.commanded[0], self.commanded[1], self.turned[0], self.turned[1], speeds];
             let along = known.map(|speeds| speeds[wheel] * counts.signum());

@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use common::{
     clock::MissionTime,
+    driver::counts::WheelCounts,
     mission::{Mission, Response},
     samples::Cause,
-    wire::counts_between,
 };
 
 use super::monitor::{Condition, Counts, Moment, Monitor, Observation};
@@ -32,7 +32,7 @@ pub struct StopMonitor {
     /// The greater of the speeds of the wheels by the newest command to move, counts/s.
     driven: f64,
     told_to_stand: Option<MissionTime>,
-    frame: Option<([u16; 2], MissionTime)>,
+    frame: Option<(WheelCounts, MissionTime)>,
     moving: Duration,
     resting: Duration,
     method: usize,
@@ -55,7 +55,8 @@ impl StopMonitor {
         }
     }
 
-    fn heard(&mut self, counts: [u16; 2], now: MissionTime) {
+    fn heard(&mut self, counts: impl Into<WheelCounts>, now: MissionTime) {
+        let counts = counts.into();
         let Some((before, then)) = self.frame.replace((counts, now)) else {
             return;
         };
@@ -64,10 +65,7 @@ impl StopMonitor {
             self.not_heard();
             return;
         }
-        let farthest = [0, 1]
-            .map(|wheel| f64::from(counts_between(before[wheel], counts[wheel]).abs()))
-            .into_iter()
-            .fold(0.0, f64::max);
+        let farthest = counts.since(before).map(f64::abs).into_iter().fold(0.0, f64::max);
         let within = |speed: f64| speed * self.counts_per_m * gap.as_secs_f64();
         let rests = farthest <= RESTS_COUNTS.max(within(RESTS_M_S));
         let moves = !rests && farthest >= within(MOVES_M_S);

@@ -79,7 +79,7 @@ fn directive(failsafe: &mut Failsafe, order: Order, reason: HoldReason) {
 
 fn jumps(failsafe: &mut Failsafe, when: Moment) {
     for _ in 0..3 {
-        let jump = Observation::Motor([0, 0], Counts::Implausible);
+        let jump = Observation::Motor([0; 2].into(), Counts::Implausible);
         failsafe.monitors.odometry.observe(&jump, when);
     }
 }
@@ -88,7 +88,7 @@ fn jumps(failsafe: &mut Failsafe, when: Moment) {
 fn frames(failsafe: &mut Failsafe, counts: impl IntoIterator<Item = u16>, first_ago_ms: u64) {
     for (frame, counts) in (0..).zip(counts) {
         let when = ago((first_ago_ms - 100 * frame) * MS);
-        let motor = Observation::Motor([counts; 2], Counts::Follow);
+        let motor = Observation::Motor([counts; 2].into(), Counts::Follow);
         failsafe.monitors.stop.observe(&motor, when);
     }
 }
@@ -103,7 +103,7 @@ fn wheels_are_held(failsafe: &mut Failsafe) {
         let when = ago(100 * frame * MS);
         let odometry = &mut failsafe.monitors.odometry;
         odometry.observe(&Observation::Currents([1500; 2]), when);
-        odometry.observe(&Observation::Motor([0; 2], Counts::Follow), when);
+        odometry.observe(&Observation::Motor([0; 2].into(), Counts::Follow), when);
         odometry.observe(&Observation::Commanded([1200; 2]), when);
     }
 }
@@ -176,7 +176,7 @@ const CASES: &[(Break, Action, Cause)] = &[
     (
         |it| {
             for frame in 0..10 {
-                let motor = Observation::Motor([0, 0], Counts::Follow);
+                let motor = Observation::Motor([0; 2].into(), Counts::Follow);
                 it.monitors.streams.observe(&motor, ago(300 * (9 - frame) * MS));
             }
         },
@@ -199,7 +199,7 @@ const CASES: &[(Break, Action, Cause)] = &[
             for tick in 0..10 {
                 let reading = front(RangeStatus::Measured, 100);
                 it.monitors.range.observe(&Observation::Readings(&reading), now());
-                let motor = Observation::Motor([200 * tick; 2], Counts::Follow);
+                let motor = Observation::Motor([200 * tick; 2].into(), Counts::Follow);
                 it.monitors.range.observe(&motor, now());
             }
         },

@@ -4,8 +4,8 @@ use common::{
     clock::{MissionTime, Pace},
     inputs,
     samples::{
-        CommandSample, ContactSample, HoldReason, InfraredSample, Order, PowerSample, RangeReading,
-        SurroundingsSample, TurnSample, WheelSample,
+        CommandSample, ContactSample, CountsSample, HoldReason, InfraredSample, Order, PowerSample,
+        RangeReading, SurroundingsSample, TurnSample, WheelSample,
     },
     stop_socket::Request,
 };
@@ -60,6 +60,8 @@ pub enum Effect {
         /// The turn since the tick before, by the robot's own gyro.
         turn: Option<TurnSample>,
         wheels: WheelSample,
+        /// The counts of `wheels` without their cycle, of a robot that has no counter.
+        endless: Option<CountsSample>,
         contact: Option<ContactSample>,
     },
     Answered {

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use common::{
-    driver::{Heard, Motion},
+    driver::{Heard, Motion, counts::WheelCounts},
     samples::PowerSample,
     wire::COUNT_CYCLE,
 };
@@ -44,6 +44,9 @@ impl Link {
             if commander.moves && self.decision.stops() && !self.in_ticks() {
                 effects.push(Effect::Send(self.stop()));
             }
+        }
+        if let Some(words) = heard.two_publishers.take() {
+            self.observe(Observation::TwoPublishers(&words), now_ns);
         }
         for _ in 0..heard.acknowledged {
             self.observe(Observation::Acknowledged, now_ns);
@@ -90,16 +93,18 @@ impl Link {
             // These counts start no tick: the robot stands until its motion is known again, so that little of it is lost.
             self.repeat = None;
             self.tell([0, 0], self.limit, now_ns, effects);
-        } else if let Some(Motion { wheels, .. }) = motion {
-            self.begin_tick(wheels, now_ns, effects);
+        } else if let Some(motion) = motion {
+            self.begin_tick(motion, now_ns, effects);
         }
     }
 
     /// All counts are plausible in lockstep, because a simulated robot does not restart; only contacts are noticed.
     fn judge_counts(&mut self, motion: &Motion, now_ns: u64) -> Counts {
         let wheels = motion.wheels;
-        let counts = [wheels.left_counts, wheels.right_counts];
-        let counts = counts.map(|count| count % COUNT_CYCLE);
+        let counts = match WheelCounts::of(&wheels, motion.endless.as_ref()) {
+            WheelCounts::Cyclic(counts) => counts.map(|count| count % COUNT_CYCLE).into(),
+            endless @ WheelCounts::Endless(_) => endless,
+        };
         let currents = Observation::Currents(motion.currents);
         if self.in_ticks() {
             let now = self.moment(now_ns);

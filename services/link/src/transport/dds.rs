@@ -1,7 +1,7 @@
 //! Topics of ROS 2: the robot's are read, and its commands written.
 //!
 //! A received piece is one message: the row of its topic in [`Topics`] and its payload. Others' commands are read too, with the number
-//! of their writer before the payload. A killed link writes nothing, so it is no other writer, however long the network remembers it.
+//! of their writer before the payload. Two publishers of odometry are a piece of their own, too. A killed link writes nothing, so it is no other writer, however long the network remembers it.
 //! Readers are best-effort and volatile, so they match every publisher. At most [`DEPTH`] messages of a topic wait; older ones are
 //! dropped.
 
@@ -11,7 +11,10 @@ use std::{
 };
 
 use ros2::participant::{Message, Participant, Quality, Reader, Writer};
-use ros2_driver::topics::{Content, Topics};
+use ros2_driver::{
+    publishers::Publishers,
+    topics::{Content, Topics},
+};
 
 use super::counts::Tally;
 
@@ -28,6 +31,8 @@ pub(super) struct Dds {
     writer: Writer,
     topics: Topics,
     commands: Option<usize>,
+    odometry: Option<usize>,
+    publishers: Publishers,
     /// The reader that is asked next, so that a flood on one topic does not hold back others.
     next: usize,
     heard_ns: Option<u64>,
@@ -41,10 +46,13 @@ impl Dds {
     pub(super) fn open(domain: u16, topics: Topics) -> io::Result<Self> {
         let participant = Participant::join(domain, None)?;
         let (readers, writer) = endpoints(&participant, &topics)?;
+        let row_of = |wanted| topics.heard.iter().position(|(content, _)| *content == wanted);
         Ok(Self {
             readers,
             writer,
-            commands: topics.heard.iter().position(|(content, _)| *content == Content::Command),
+            commands: row_of(Content::Command),
+            odometry: row_of(Content::Odometry),
+            publishers: Publishers::default(),
             topics,
             next: 0,
             heard_ns: None,
@@ -82,7 +90,10 @@ impl Dds {
             self.next = (row + 1) % count;
             self.heard_ns = Some(now_ns);
             let writer = if self.commands == Some(row) { &from[..] } else { &[] };
-            let piece = [&[row as u8], writer, &payload].concat();
+            let is_odometry = self.odometry == Some(row);
+            // The message that shows two publishers is left out for the piece that names them.
+            let two = is_odometry.then(|| self.publishers.take(from, now_ns)).flatten();
+            let piece = two.unwrap_or_else(|| [&[row as u8], writer, &payload].concat());
             let length = piece.len().min(buffer.len());
             buffer.get_mut(..length)?.copy_from_slice(piece.get(..length)?);
             return Some(length);

@@ -6,6 +6,9 @@ use std::{
 
 use super::{owner::OwnUser, source::Source};
 
+/// A line with a scan of thousands of beams takes several datagrams, of which each has at most 65,507 bytes.
+const LONGEST: usize = 60_000;
+
 #[derive(Debug)]
 pub(crate) struct Udp {
     socket: UdpSocket,
@@ -48,6 +51,6 @@ impl Udp {
     }
 
     pub(super) fn send(&self, to: SocketAddr, bytes: &[u8]) -> io::Result<()> {
-        self.socket.send_to(bytes, to).map(drop)
+        bytes.chunks(LONGEST).try_for_each(|piece| self.socket.send_to(piece, to).map(drop))
     }
 }

@@ -25,6 +25,7 @@ use crate::{
     asked::{self, Place},
     endpoints::{Call, Endpoints},
     orders::{Done, Order, Orders, Why},
+    overlap::overlap,
     shown::Shown,
     topics::{Accept, Id},
 };
@@ -67,6 +68,10 @@ pub(crate) enum BridgeError {
         "cannot join domain {domain} of ROS 2: {source}; is the address of --interface one of this machine?"
     )]
     Join { domain: u16, source: io::Error },
+    #[error(
+        "the robot's own link reads {topic} in domain {domain} as its robot's, so the bridge does not publish it; give a namespace, such as --namespace firsthand"
+    )]
+    Overlap { topic: String, domain: u16 },
     #[error("cannot start a thread or catch a signal: {0}")]
     System(io::Error),
 }
@@ -147,7 +152,7 @@ pub(crate) fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Resul
         }
         let taken = match follower.wait(LOOK_EVERY) {
             Ok(Event::Samples(bus)) => {
-                bridge.begin(&robot_domain);
+                bridge.begin(&robot_domain, (*domain, namespace))?;
                 bridge.take_samples(bus)
             }
             Ok(Event::Disconnected) => {
@@ -178,19 +183,26 @@ fn now_ns() -> u64 {
 
 impl Bridge {
     /// Show the run of `domain`, if it is not shown yet. The run's file may be missing when the first samples come.
-    fn begin(&mut self, domain: &Domain) {
+    ///
+    /// # Errors
+    /// When the link of the run reads what would be published.
+    fn begin(&mut self, domain: &Domain, (ros, namespace): (u16, &str)) -> Result<(), BridgeError> {
         if self.shown.is_some() {
-            return;
+            return Ok(());
         }
         let Some((_, run)) = newest_run(domain) else {
-            return;
+            return Ok(());
         };
-        let shown = Shown::new(self.robot.to_string(), run.mission);
+        let shown = Shown::new(self.robot.to_string(), run.mission.clone());
+        if let Some(topic) = overlap((ros, namespace), &run, shown.sensor_topics()) {
+            return Err(BridgeError::Overlap { topic, domain: ros });
+        }
         if let Err(error) = self.endpoints.open_sensors(shown.sensor_topics()) {
             self.tell(&format!("the topics of the sensors cannot be opened: {error}"));
         }
         shown.mounting(now_ns(), &mut |id, payload| self.endpoints.publish(id, payload));
         self.shown = Some(shown);
+        Ok(())
     }
 
     /// Note that the run has ended: no goal is reached any more.

@@ -121,8 +121,7 @@ impl Endpoints {
     }
 
     fn topic(&self, row: &Spec, sensor: &str) -> Topic {
-        let name = row.name.replace("SENSOR", &ros_name(sensor));
-        Topic::new(&format!("{}/{name}", self.namespace), row.type_name)
+        Topic::new(&topic_name(&self.namespace, row, sensor), row.type_name)
     }
 
     fn write_to(&mut self, id: Id, row: &Spec, sensor: &str) -> io::Result<()> {
@@ -215,6 +214,15 @@ impl Endpoints {
         if let Some(action) = &self.action {
             action.status.write(payload);
         }
+    }
+}
+
+/// The name of the topic of `row` below `namespace`, from the root.
+pub(crate) fn topic_name(namespace: &str, row: &Spec, sensor: &str) -> String {
+    let name = row.name.replace("SENSOR", &ros_name(sensor));
+    match namespace.trim_matches('/') {
+        "" => format!("/{name}"),
+        namespace => format!("/{namespace}/{name}"),
     }
 }
 

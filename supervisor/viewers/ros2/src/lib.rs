@@ -10,6 +10,7 @@
 //! | `messages` | the messages that are written |
 //! | `bridge` | the bridge itself |
 //! | `endpoints` | its readers and writers, and the node that `ros2 node list` shows |
+//! | `overlap` | whether it would publish what the robot's own link reads |
 //! | `orders` | what was asked is done, without holding up the bridge |
 
 mod action;
@@ -18,6 +19,7 @@ mod bridge;
 mod endpoints;
 mod messages;
 mod orders;
+mod overlap;
 mod shown;
 #[cfg(test)]
 mod tests;

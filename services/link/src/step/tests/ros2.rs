@@ -39,6 +39,7 @@ struct Scene {
     decided: Vec<(u64, Cause)>,
     sent: Vec<(u64, [f64; 2])>,
     wheels: WheelSample,
+    endless: [f64; 2],
     refused: Vec<String>,
 }
 
@@ -65,6 +66,7 @@ impl Scene {
             decided: Vec::new(),
             sent: Vec::new(),
             wheels: WheelSample::default(),
+            endless: [0.0; 2],
             refused: Vec::new(),
         };
         scene.run(2000);
@@ -91,7 +93,9 @@ impl Scene {
                     self.sent.push((self.ms, self.told));
                 }
                 Effect::Decided { now, .. } => self.decided.push((self.ms, now.cause)),
-                Effect::Tick { tick, time, wheels, turn, .. } => {
+                Effect::Tick { tick, time, wheels, turn, endless, .. } => {
+                    let CountsSample { left_counts, right_counts, .. } = endless.unwrap();
+                    self.endless = [left_counts, right_counts];
                     (self.tick, self.wheels) = (tick, wheels);
                     assert!(turn.is_none_or(|turn| turn.capture_ns == time.0));
                     self.turns.extend(turn);
@@ -259,6 +263,40 @@ fn odometry_that_jumps_once_is_no_motion_and_a_restart_of_the_counts() {
 }
 
 #[test]
+fn what_a_robot_drove_while_the_network_was_down_is_its_motion_as_far_as_it_can_drive_in_that_time()
+{
+    // Half a cycle of the counts is 0.94 m.
+    for (silent_ms, ahead) in [(5000, 1.1), (5000, -1.1), (20_000, 4.4), (5000, 0.3)] {
+        let mut scene = Scene::driving();
+        scene.run(100);
+        let (before, restarts) = (scene.endless, scene.wheels.restarts);
+        let from = scene.pose[0];
+        (scene.odometry, scene.scans) = (false, false);
+        scene.run(silent_ms);
+        scene.holds(Cause::RobotLost);
+        scene.pose[0] += ahead;
+        (scene.odometry, scene.scans) = (true, true);
+        scene.run(FRAME_MS);
+        let ahead = scene.pose[0] - from;
+        let per_count = mission().body().metres_per_count();
+        for (after, before) in scene.endless.into_iter().zip(before) {
+            let driven = (after - before) * per_count;
+            assert!((driven - ahead).abs() < 0.02, "{driven} instead of {ahead}");
+        }
+        assert_eq!(scene.wheels.restarts, restarts, "{ahead}");
+    }
+    // Nobody knows the way of a robot that is too far away.
+    let mut scene = Scene::driving();
+    let (before, restarts) = (scene.endless, scene.wheels.restarts);
+    (scene.odometry, scene.scans) = (false, false);
+    scene.run(5000);
+    scene.pose[0] += 1.9;
+    (scene.odometry, scene.scans) = (true, true);
+    scene.run(FRAME_MS);
+    assert!(scene.wheels.restarts > restarts && scene.endless[0] - before[0] < 1000.0);
+}
+
+#[test]
 fn while_odometry_jumps_again_and_again_the_robot_stands() {
     let mut scene = Scene::driving();
     for jump in 1..20 {
@@ -270,6 +308,25 @@ fn while_odometry_jumps_again_and_again_the_robot_stands() {
     assert!(scene.wheels.restarts >= 19);
     scene.run(4000);
     assert_eq!(scene.link.decision(), Decision::GO);
+}
+
+#[test]
+fn a_robot_that_stands_because_two_nodes_publish_its_odometry_says_so_and_names_both() {
+    let mut scene = Scene::driving();
+    for jump in 1..20 {
+        scene.pose[1] = f64::from(jump % 2);
+        let two = [&[u8::MAX][..], &[0xa1; 16], &[0xb2; 16]].concat();
+        scene.event(Event::Datagram(&two));
+        scene.run(100);
+    }
+    scene.holds(Cause::OdometryImplausible);
+    let words = scene.link.explain(Cause::OdometryImplausible, scene.ms * MS).unwrap();
+    assert!(words.starts_with("two nodes publish /odom: end one"), "{words}");
+    assert!(
+        words.ends_with("b2.b2") && words.contains("are a1.a1.") && scene.refused.contains(&words),
+        "{:?}",
+        scene.refused
+    );
 }
 
 #[test]

@@ -1,0 +1,89 @@
+//! Counts of a robot's two wheels, and what lies between two of them.
+
+use crate::{
+    samples::{CountsSample, WheelSample},
+    wire::{COUNT_CYCLE, counts_between},
+};
+
+/// A robot that has just booted stands.
+const BOOTED_WITHIN: f64 = 4.0;
+/// A step no longer than this counts as motion; 14 mm for an X80.
+const NOT_WORTH_TELLING: f64 = 32.0;
+
+/// The counter of a board begins anew after its cycle. Counts that come from angles or odometry in SI units have no end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum WheelCounts {
+    Cyclic([u16; 2]),
+    Endless([f64; 2]),
+}
+
+impl WheelCounts {
+    /// The counts of a tick; `endless` ones belong to the same tick.
+    #[must_use]
+    pub fn of(wheels: &WheelSample, endless: Option<&CountsSample>) -> Self {
+        let endless = endless.map(|counts| [counts.left_counts, counts.right_counts]);
+        // Any process may have written them.
+        match endless.filter(|counts| counts.iter().all(|count| count.is_finite())) {
+            Some(counts) => Self::Endless(counts),
+            None => Self::Cyclic([wheels.left_counts, wheels.right_counts]),
+        }
+    }
+
+    /// The counts in their cycle.
+    #[must_use]
+    pub fn cyclic(self) -> [u16; 2] {
+        match self {
+            Self::Cyclic(counts) => counts,
+            Self::Endless(counts) => {
+                counts.map(|count| count.rem_euclid(COUNT_CYCLE.into()) as u16)
+            }
+        }
+    }
+
+    /// Counts of each wheel since `before`, the shorter way round if either is cyclic.
+    #[must_use]
+    pub fn since(self, before: Self) -> [f64; 2] {
+        if let (Self::Endless(new), Self::Endless(old)) = (self, before) {
+            return [0, 1].map(|wheel| new[wheel] - old[wheel]);
+        }
+        let (new, old) = (self.cyclic(), before.cyclic());
+        [0, 1].map(|wheel| counts_between(old[wheel], new[wheel]).into())
+    }
+
+    /// The robot probably booted after `before`: these counts are near the start value of a booted robot, and those were not. A robot
+    /// that drove back to its start gives the same counts, so a caller that received frames in between needs further evidence.
+    #[must_use]
+    pub fn restarted_since(self, before: Self) -> bool {
+        let start = match self {
+            Self::Cyclic(_) => Self::Cyclic([0; 2]),
+            Self::Endless(_) => Self::Endless([0.0; 2]),
+        };
+        let at_start = self.since(start).iter().all(|counts| counts.abs() <= BOOTED_WITHIN);
+        at_start && self.since(before).iter().any(|counts| counts.abs() > NOT_WORTH_TELLING)
+    }
+}
+
+impl From<[u16; 2]> for WheelCounts {
+    fn from(counts: [u16; 2]) -> Self {
+        Self::Cyclic(counts)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn endless_counts_have_no_cycle_and_agree_with_cyclic_ones_on_a_short_way() {
+        let far = [20_000.0, -70_000.0];
+        let (before, after) = (WheelCounts::Endless([-5.0; 2]), WheelCounts::Endless(far));
+        assert_eq!(after.since(before), [20_005.0, -69_995.0]);
+        assert!(!WheelCounts::Endless([32_768.0; 2]).restarted_since(after));
+        assert!(WheelCounts::Endless([3.0, -2.0]).restarted_since(after));
+        let near = WheelCounts::Cyclic([32_760, 10]);
+        assert_eq!(WheelCounts::Endless([2.0, 20.0]).since(near), [10.0, 10.0]);
+        let hostile = CountsSample { left_counts: f64::NAN, ..CountsSample::default() };
+        let counts = WheelCounts::of(&WheelSample::default(), Some(&hostile));
+        assert_eq!(counts, WheelCounts::Cyclic([0; 2]));
+    }
+}

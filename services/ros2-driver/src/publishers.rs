@@ -1,0 +1,75 @@
+//! The publishers of a robot's odometry: with two of them the pose jumps from one to the other.
+
+use std::fmt::Write as _;
+
+/// DDS knows a writer by it.
+pub type Gid = [u8; 16];
+
+/// The first byte of a piece that stands for no message: the numbers of two publishers of odometry follow.
+pub(crate) const TWO: u8 = u8::MAX;
+/// A publisher is gone after such a silence, and two are reported again after as long.
+const GONE_NS: u64 = 1_000_000_000;
+
+#[derive(Debug, Default)]
+pub struct Publishers {
+    newest: Option<(Gid, u64)>,
+    other: Option<(Gid, u64)>,
+    reported_ns: Option<u64>,
+}
+
+impl Publishers {
+    /// A message came from `from`. Gives a piece for the driver if two publish in turn. A node that took the place of another that
+    /// ended is alone.
+    pub fn take(&mut self, from: Gid, now_ns: u64) -> Option<Vec<u8>> {
+        let before = self.newest.replace((from, now_ns)).filter(|(gid, _)| *gid != from)?;
+        let earlier = self.other.replace(before);
+        let is_recent = |then_ns: u64| now_ns.saturating_sub(then_ns) <= GONE_NS;
+        let is_back = earlier.is_some_and(|(gid, then_ns)| gid == from && is_recent(then_ns));
+        if !is_back || self.reported_ns.is_some_and(is_recent) {
+            return None;
+        }
+        self.reported_ns = Some(now_ns);
+        Some([&[TWO][..], &before.0, &from].concat())
+    }
+}
+
+/// Two publishers of odometry on `topic` in words, by what follows [`TWO`].
+pub(crate) fn words(topic: &str, gids: &[u8]) -> Option<String> {
+    let (one, other) = gids.split_first_chunk()?;
+    let [one, other] = [*one, other.try_into().ok()?].map(gid_text);
+    Some(format!(
+        "two nodes publish {topic}: end one, or give it a namespace; their GIDs are {one} and {other}"
+    ))
+}
+
+#[must_use]
+pub fn gid_text(gid: Gid) -> String {
+    let mut text = String::new();
+    for (place, byte) in gid.into_iter().enumerate() {
+        let dot = if place == 0 { "" } else { "." };
+        // A text takes everything.
+        let _ = write!(text, "{dot}{byte:02x}");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    #[test]
+    fn two_that_publish_in_turn_are_reported_once_a_second_and_one_after_another_is_not() {
+        let mut publishers = Publishers::default();
+        let [robot, bridge, restarted] = [[1; 16], [2; 16], [3; 16]];
+        let mut take = |gid, ms: u64| publishers.take(gid, ms * MS).is_some();
+        assert!(![0, 50, 100].map(|ms| take(robot, ms)).contains(&true));
+        assert!(!take(restarted, 150) && !take(restarted, 200));
+        assert!(!take(bridge, 210) && !take(bridge, 240));
+        assert!(take(restarted, 250) && !take(bridge, 280) && !take(restarted, 300));
+        assert!(!take(bridge, 1200) && take(restarted, 1300));
+        // One that was silent for long took the other's place.
+        assert!(!take(bridge, 9000) && !take(restarted, 12_000) && !take(bridge, 15_000));
+    }
+}

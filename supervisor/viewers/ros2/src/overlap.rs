@@ -1,0 +1,79 @@
+//! Whether the bridge would publish a topic that the robot's own link reads: the link would take it for its robot's.
+
+use common::{address::Address, mission::Mission, run::Run};
+use ros2::topic::Topic;
+
+use crate::{
+    endpoints::topic_name,
+    topics::{Id, TABLE, spec},
+};
+
+/// The first topic of a bridge in `domain` and `namespace` that the link of `run` reads, with the topics of these sensors.
+pub(crate) fn overlap<'a>(
+    (domain, namespace): (u16, &str),
+    run: &Run,
+    sensors: impl Iterator<Item = (Id, &'a str)>,
+) -> Option<String> {
+    let Address::Ros2(read_in) = run.address else {
+        return None;
+    };
+    if read_in.unwrap_or_default() != domain {
+        return None;
+    }
+    let read: Vec<_> = read(&run.mission).collect();
+    let written = TABLE
+        .iter()
+        .filter(|row| row.accepted_by.is_none() && !matches!(row.id, Id::Range(_) | Id::Scan))
+        .map(|row| topic_name(namespace, row, ""));
+    let sensed = sensors.filter_map(|(id, sensor)| Some(topic_name(namespace, spec(id)?, sensor)));
+    written.chain(sensed).find(|name| read.contains(name))
+}
+
+/// The names of the topics that a link reads as its robot's.
+fn read(mission: &Mission) -> impl Iterator<Item = String> {
+    let topics = &mission.robot.ros2;
+    let scan = mission.laser().is_some().then_some(&topics.scan);
+    let further = topics.imu.iter().chain(scan).chain(topics.ranges.values());
+    [&topics.odom, &topics.battery].into_iter().chain(further).map(|name| Topic::new(name, "").name)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use common::clock::MissionClock;
+
+    fn found(domain: u16, namespace: &str, keys: &str) -> Option<String> {
+        let text = format!(
+            "target = [3, 0]\nrobot.model = 'turtlebot3-burger'\nrobot.protocol = 'ros2'\nrobot.address = 'ros2:7'\n{keys}"
+        );
+        let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+        let sensors = [(Id::Scan, "laser"), (Id::Range(1), "nose-1")];
+        let run = Run {
+            robot: "x80".parse().unwrap(),
+            address: Address::Ros2(Some(7)),
+            clock: MissionClock::Ticks { period_ns: 1 },
+            mission,
+        };
+        overlap((domain, namespace), &run, sensors.into_iter())
+    }
+
+    #[test]
+    fn a_bridge_that_would_publish_what_the_robots_link_reads_is_found_by_the_topic() {
+        assert_eq!(found(7, "", ""), Some("/odom".to_owned()));
+        assert_eq!(found(7, "/a/", "robot.ros2.odom = 'a/odom'"), Some("/a/odom".to_owned()));
+        let odom = "robot.ros2.odom = '/wheels'\n";
+        assert_eq!(found(7, "", odom), Some("/battery_state".to_owned()));
+        let both = format!("{odom}robot.ros2.battery = '/volts'\n");
+        assert_eq!(found(7, "", &both), Some("/scan".to_owned()));
+        let imu = format!("{both}robot.ros2.scan = '/s'\nrobot.ros2.imu = '/range/nose_1'\n");
+        assert_eq!(found(7, "", &imu), Some("/range/nose_1".to_owned()));
+    }
+
+    #[test]
+    fn a_bridge_in_another_domain_or_namespace_may_publish() {
+        assert_eq!(found(8, "", ""), None);
+        assert_eq!(found(7, "firsthand", ""), None);
+    }
+}
