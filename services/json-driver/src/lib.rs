@@ -4,14 +4,14 @@ use std::{collections::BTreeMap, time::Duration};
 
 use common::{
     driver::{
-        Driver, Heard, Memory, Readings, StopMethod, WireTally,
+        Driver, Heard, LaserScan, Memory, Readings, StopMethod, WireTally,
         laser::Laser,
         odometry::{Odometry, motion, twist, wheel_speeds},
     },
     json_wire::{Lines, Order, Report, line, parse},
     kinematics::Twist,
     mission::{Body, Mission},
-    samples::{PowerSample, RangeReading},
+    samples::{LONGEST_SWEEP_NS, PowerSample, RangeReading, Sweep},
 };
 
 /// Orders that count as answered by one report.
@@ -48,7 +48,7 @@ impl Json {
     /// A refused report has no effect; the error says why.
     fn take(&mut self, report: &Report, heard: &mut Heard) -> Result<(), String> {
         let rows = self.rows_of(&report.ranges)?;
-        let scan = report.scan.as_deref().map(|scan| self.beams_of(scan)).transpose()?;
+        let scan = self.scan_of(report)?;
         let turned = match (report.wheels, report.odometry) {
             (Some(_), Some(_)) => return Err("wheels and odometry: say one of them".to_owned()),
             (Some(turned), None) => Some(turned),
@@ -71,8 +71,8 @@ impl Json {
             let held = report.held.unwrap_or_default();
             heard.motion = Some(motion(&self.body, turned, speeds, held));
         }
-        if let (Some(laser), Some(beams)) = (&mut self.laser, scan) {
-            laser.take(beams, &mut self.readings);
+        if let (Some(laser), Some(scan)) = (&mut self.laser, scan) {
+            laser.take(scan, &mut self.readings);
         }
         if let Some(count) = report.heard {
             // A robot that has restarted counts from 0.
@@ -103,8 +103,10 @@ impl Json {
         ranges.iter().map(row).collect()
     }
 
-    /// Beams as the topic `scan` has them.
-    fn beams_of(&self, beams: &[Option<f32>]) -> Result<Vec<f32>, String> {
+    fn scan_of(&self, report: &Report) -> Result<Option<LaserScan>, String> {
+        let Some(beams) = &report.scan else {
+            return Ok(None);
+        };
         let Some(laser) = &self.laser else {
             return Err("a scan, and the mission has no laser: add a row of kind scan".to_owned());
         };
@@ -112,7 +114,20 @@ impl Json {
             let (came, want) = (beams.len(), laser.sensor().beams);
             return Err(format!("a scan of {came} beams, and the mission's laser has {want}"));
         }
-        Ok(beams.iter().map(|beam| laser.beam(*beam)).collect())
+        let nanoseconds = |word: &str, seconds: Option<f64>| {
+            let ns = seconds.unwrap_or_default() * 1e9;
+            match (0.0..=LONGEST_SWEEP_NS as f64).contains(&ns) {
+                true => Ok(ns.round() as i64),
+                false => Err(format!("{word} is not 0 to 2 s: say seconds")),
+            }
+        };
+        let sweep = Sweep {
+            first_beam_ns: -nanoseconds("scan_age_s", report.scan_age_s)?,
+            beam_ns: nanoseconds("scan_time_s", report.scan_time_s)? / beams.len().max(1) as i64,
+            first_beam: 0,
+        };
+        let beams = beams.iter().map(|beam| laser.beam(*beam)).collect();
+        Ok(Some(LaserScan { beams, sweep }))
     }
 }
 
@@ -143,7 +158,7 @@ impl Driver for Json {
         self.readings.for_tick()
     }
 
-    fn scan_for_tick(&mut self) -> Vec<f32> {
+    fn scan_for_tick(&mut self) -> LaserScan {
         self.laser.as_mut().map(Laser::for_tick).unwrap_or_default()
     }
 
@@ -252,7 +267,7 @@ mod tests {
             let beams = vec![range.to_string(); 360].join(",");
             let wheels = format!("\"wheels\":[{turned},{turned}],\"speeds\":[1,1]");
             let heard = heard(&mut driver, &format!("{{{wheels},\"scan\":[{beams}]}}"));
-            (heard.readings[0].status(), driver.scan_for_tick().len())
+            (heard.readings[0].status(), driver.scan_for_tick().beams.len())
         };
         let measured = (RangeStatus::Measured, 360);
         assert_eq!([scan(1.0, 0.0), scan(1.0, 0.1), scan(1.0, 0.9)], [measured; 3]);
@@ -275,7 +290,7 @@ mod tests {
             let wheels = format!("\"wheels\":[{},{turned}],\"speeds\":[1,1]", -turned);
             let line = format!("{{{wheels},\"scan\":[{}]}}", beams.join(","));
             let status = heard(&mut driver, &line).readings[0].status();
-            assert_eq!(driver.scan_for_tick().is_empty(), status == RangeStatus::Invalid);
+            assert_eq!(driver.scan_for_tick().beams.is_empty(), status == RangeStatus::Invalid);
             status
         };
         scans.iter().map(status).collect()
@@ -323,6 +338,22 @@ mod tests {
         let most = format!("{{\"heard\":0}}\n{{\"heard\":1}}\n{{\"heard\":{}}}", u64::MAX);
         let many = format!("{most}\n{most}");
         assert_eq!(heard(&mut driver, &many).acknowledged, 64);
+    }
+
+    #[test]
+    fn a_scan_is_as_old_and_took_as_long_as_the_robot_says_and_neither_if_it_says_nothing() {
+        let text = "target = [3, 0]\nrobot.model = 'kobuki'";
+        let mut driver = Json::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
+        let mut sweep = |words: &str| {
+            let line = format!("{{\"scan\":[{}]{words}}}", vec!["1"; 360].join(","));
+            (heard(&mut driver, &line).refused.is_some(), driver.scan_for_tick().sweep)
+        };
+        assert_eq!(sweep(""), (false, Sweep::default()));
+        let sent = Sweep { first_beam_ns: -300_000_000, beam_ns: 500_000, first_beam: 0 };
+        assert_eq!(sweep(",\"scan_age_s\":0.3,\"scan_time_s\":0.18"), (false, sent));
+        for wrong in ["\"scan_age_s\":-0.1", "\"scan_time_s\":2.1", "\"scan_age_s\":200"] {
+            assert_eq!(sweep(&format!(",{wrong}")), (true, Sweep::default()), "{wrong}");
+        }
     }
 
     #[test]

@@ -100,7 +100,7 @@ fn each_second(robot: &mut Robot) -> Vec<FixSample> {
 
 #[test]
 fn a_tick_that_is_given_again_takes_no_fixes_so_that_the_next_one_has_them() {
-    let mut reckoning = reckoning_of("");
+    let mut reckoning = reckoning_of("target = [3, 0]");
     let wheels = Robot::new(0.0).wind();
     assert!(!reckoning.has_answered(&wheels));
     reckoning.answer(&wheels, &Sources::default(), wheels.stamp.time());
