@@ -92,8 +92,9 @@ impl Poses {
             Some(Pose2 { position, heading: heading + turn })
         };
         let middle_ns = sweep.middle_ns(beams.len());
-        // Dead reckoning refuses a fix of a time before its first tick, when nothing moved.
-        let capture_ns = u64::try_from(time_ns(pose) + middle_ns).unwrap_or(0);
+        // A scan from before the first tick shows where the robot still stood then; dead reckoning knows no earlier time.
+        let first_ns = self.stood_at.map_or(0, |(first_ns, _)| first_ns);
+        let capture_ns = (time_ns(pose) + middle_ns).max(first_ns) as u64;
         let robot = robot_at(middle_ns)?;
         let beams = match sweep.beam_ns {
             0 => beams,
