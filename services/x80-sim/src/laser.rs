@@ -164,7 +164,8 @@ mod tests {
             simulation.laser = { delay_s = 0.2, sweep_s = 0.1 }\n";
         let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
         let mut laser = Laser::new(&mission, 1).unwrap();
-        assert_eq!(laser.stated().map(|[age, time]| (age * 10.0, time)), Some((3.0, 0.1)));
+        let [age_s, time_s] = laser.stated().unwrap();
+        assert!((age_s - 0.3).abs() < 1e-9 && time_s == 0.1);
         // The robot goes along x at 1 m/s.
         let at = |time: f64| Pose2 { position: DVec2::new(time, 0.0), heading: 0.0 };
         (0..=300).map(|step| f64::from(step) / 100.0).for_each(|s| laser.follow(s, at(s)));
