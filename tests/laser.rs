@@ -40,3 +40,19 @@ fn by_its_laser_a_robot_whose_wheels_are_not_what_they_should_be_knows_where_it_
         assert!(summary["pose_error_m"].as_f64().unwrap() < 0.12, "seed {seed}: {summary}");
     }
 }
+
+#[test]
+fn a_laser_that_is_late_and_turns_slowly_and_says_so_places_the_robot_like_a_prompt_one() {
+    for late in [["0.2", "0"], ["0", "0.2"], ["0.3", "0.2"]] {
+        let [delay, sweep] = late;
+        let times = [
+            format!("simulation.laser.delay_s={delay}"),
+            format!("simulation.laser.sweep_s={sweep}"),
+        ];
+        let robot = ["--set", "robot.model='kobuki'", "--seed", "2"];
+        let arguments = [&robot[..], &["--set", &times[0], "--set", &times[1]]].concat();
+        let (code, summary) = run("laser-late", "obstacle-course", &arguments);
+        assert_eq!(code, Some(0), "{summary}");
+        assert!(summary["pose_error_m"].as_f64().unwrap() < 0.1, "{late:?}: {summary}");
+    }
+}

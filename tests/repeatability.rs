@@ -9,6 +9,7 @@ use common::{
     topics,
     waiter::Waiter,
 };
+use rustix::process::Signal;
 use serde_json::Value;
 
 use crate::support::{self, Run, assert_nothing_left, in_own_process};
@@ -194,4 +195,29 @@ fn a_run_that_was_stopped_and_resumed_gives_the_same_summary_to_the_bit() {
     support::operate("tick-held", &["resume"]);
     let (_, resumed) = run.finish();
     assert_eq!(numbers(resumed), numbers(undisturbed));
+}
+
+/// Ticks that the link of `robot` has given again.
+fn repeated_ticks(robot: &str) -> u64 {
+    let link = support::printed(&["topic", "echo", "link", "--robot", robot, "-n", "1", "--json"]);
+    serde_json::from_str::<Value>(&link).unwrap()["repeated_ticks"].as_u64().unwrap()
+}
+
+#[test]
+fn a_robot_with_a_laser_goes_the_same_way_though_a_slow_stage_makes_the_link_repeat_ticks() {
+    let robot = ["--set", "robot.model='kobuki'", "--set", "controller.speed_m_s=0.005"];
+    let slow = [&robot[..], &["--timeout", "8000"]].concat();
+    let (_, undisturbed) = support::run("laser-calm", "open-room", &slow);
+    let mut run = Run::start("laser-slow", "open-room", &slow);
+    let planner = support::pid(&run.wait_until_under_way(1.0), "planner");
+    for _ in 0..5 {
+        let before = repeated_ticks("laser-slow");
+        support::signal_process(planner, Signal::STOP);
+        support::wait_until("a tick is repeated", || repeated_ticks("laser-slow") > before);
+        support::signal_process(planner, Signal::CONT);
+    }
+    let (_, disturbed) = run.finish();
+    assert_eq!(disturbed["restarts"]["planner"], 0, "{disturbed}");
+    assert_eq!(numbers(disturbed), numbers(undisturbed));
+    assert_nothing_left("laser-slow");
 }

@@ -9,7 +9,7 @@ use std::{fmt, time::Duration};
 use crate::mission::{Mission, Sensor};
 use crate::samples::{
     CountsSample, InfraredSample, PowerSample, RangeReading, RangeStatus, SurroundingsSample,
-    WheelSample,
+    Sweep, WheelSample,
 };
 
 /// The protocol of one kind of robot, without wire or clock: bytes from the robot to their meaning, orders to bytes for the robot.
@@ -27,9 +27,9 @@ pub trait Driver: fmt::Debug {
     /// The newest reading of each sensor, in the order of the mission's table; a reading counts for one tick.
     fn readings_for_tick(&mut self) -> Vec<RangeReading>;
 
-    /// The newest beams of the laser since the last tick, as the topic `scan` has them.
-    fn scan_for_tick(&mut self) -> Vec<f32> {
-        Vec::new()
+    /// The newest scan of the laser since the last tick.
+    fn scan_for_tick(&mut self) -> LaserScan {
+        LaserScan::default()
     }
 
     /// The turn since the tick before by the robot's own gyro, for a tick that begins now.
@@ -150,6 +150,13 @@ pub struct Commander {
     /// Its number in the network.
     pub number: [u8; 16],
     pub moves: bool,
+}
+
+/// Beams as the topic `scan` has them, none if none came, and their times.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LaserScan {
+    pub beams: Vec<f32>,
+    pub sweep: Sweep,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -197,6 +197,11 @@ pub trait Answering: Sized + 'static {
     /// [`Stage::begin`] from the state that an earlier process of the same mission saved.
     fn restore(&mut self, state: Self::State) -> Result<(), ForeignState>;
 
+    /// Whether `input` was answered before, as a tick that is given again. Then samples of further topics stay for the next one.
+    fn has_answered(&self, _input: &Self::In) -> bool {
+        false
+    }
+
     /// Answer a sample at its mission time `now`.
     fn answer(
         &mut self,
@@ -208,7 +213,7 @@ pub trait Answering: Sized + 'static {
 
 /// The samples of further topics that came before a sample of an [`Answering`] stage's input. They wake nobody, and the entry
 /// contains them, so a replay takes them with the same sample.
-pub trait Further: Serialize + DeserializeOwned + Debug + 'static {
+pub trait Further: Default + Serialize + DeserializeOwned + Debug + 'static {
     type Readers: Readers;
 
     /// Take what came, and no more than a bounded number of samples.
@@ -333,7 +338,10 @@ impl<A: Answering> Process for Answers<A> {
             let Some(sample) = next else {
                 return Ok(self.runner.out.at);
             };
-            let further = A::Further::take_samples(further)?;
+            let further = match self.runner.stage.has_answered(&sample) {
+                true => A::Further::default(),
+                false => A::Further::take_samples(further)?,
+            };
             self.runner.out.at = Progress::of(sample.stamp());
             if let Some(warning) = self.runner.take_entry(Sample(sample, further))? {
                 tracing::warn!(tick = sample.stamp().tick, "{warning}");

@@ -135,7 +135,7 @@ macro_rules! numbers {
     )*};
 }
 
-numbers!(u16: Unsigned u32: Unsigned u64: Unsigned i32: Signed f32: Single f64: Double);
+numbers!(u16: Unsigned u32: Unsigned u64: Unsigned i32: Signed i64: Signed f32: Single f64: Double);
 
 impl Layout for u8 {
     fn kind() -> Kind {

@@ -37,6 +37,12 @@ pub struct Report {
     /// Beams counter-clockwise; null for nothing in reach, less than 0 for no reading.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scan: Option<Vec<Option<f32>>>,
+    /// Age of the scan's first beam when this line is sent, at most 2 s; by default it is that of the wheels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scan_age_s: Option<f64>,
+    /// Time that the scan took, from its first beam to its last.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scan_time_s: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub battery_v: Option<f64>,
 }

@@ -46,8 +46,8 @@ pub use sensor::{
     Sensors, SonarConfig,
 };
 pub use simulation::{
-    BatteryPhysics, Block, BlockedWheels, Heights, InfraredPhysics, Move, Physics, Radio, Ranger,
-    Realism, Simulation, SonarPhysics, Thing, WheelPhysics,
+    BatteryPhysics, Block, BlockedWheels, Heights, InfraredPhysics, LaserTiming, Move, Physics,
+    Radio, Ranger, Realism, Simulation, SonarPhysics, Thing, WheelPhysics,
 };
 
 use crate::{

@@ -265,6 +265,16 @@ impl Sensor {
         }
     }
 
+    /// The number of a beam before [`Sensor::mirror`] or after it.
+    #[must_use]
+    pub fn mirrored(&self, beam: usize) -> usize {
+        match (self.is_upside_down, self.field_of_view_deg >= 360.0) {
+            (false, _) => beam,
+            (true, true) => self.beams.saturating_sub(beam) % self.beams.max(1),
+            (true, false) => self.beams.saturating_sub(beam + 1),
+        }
+    }
+
     /// Angle from the robot's axis to where it turns to look at a place. For a laser that sees all around it is the
     /// bearing: such a laser is never turned.
     #[must_use]

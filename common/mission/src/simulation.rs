@@ -21,6 +21,7 @@ pub struct Simulation {
     pub stops_when_silent_s: Option<f64>,
     pub sonar: SonarKeys,
     pub infrared: InfraredKeys,
+    pub laser: LaserKeys,
     pub wheels: WheelKeys,
     pub heights: HeightKeys,
     pub battery: BatteryKeys,
@@ -240,6 +241,18 @@ section! {
 }
 
 section! {
+    /// When a robot that speaks JSON sends its laser's scans. Things that move are seen where they are when the scan is sent.
+    LaserTiming, written as LaserKeys in "simulation.laser" {
+        /// Time from a scan's last beam to its tick, seconds.
+        delay_s in 0.0..=1.0 => 0.0, 0.0, 0.0;
+        /// Time in which the laser measures the beams of a scan one after another, counter-clockwise, seconds.
+        sweep_s in 0.0..=1.0 => 0.0, 0.0, 0.0;
+        /// Share of these times that the robot states; with 0 it says nothing of them.
+        stated_share in 0.0..=1.0 => 1.0, 1.0, 1.0;
+    }
+}
+
+section! {
     /// The wheels' speed loops and how they meet the ground.
     WheelPhysics, written as WheelKeys in "simulation.wheels" {
         /// Steady speed over commanded speed.
@@ -344,6 +357,7 @@ impl Heights {
 pub struct Physics {
     pub sonar: SonarPhysics,
     pub infrared: InfraredPhysics,
+    pub laser: LaserTiming,
     pub wheels: WheelPhysics,
     pub heights: Heights,
     pub battery: BatteryPhysics,
@@ -356,6 +370,7 @@ impl Simulation {
         Physics {
             sonar: self.sonar.over(self.realism),
             infrared: self.infrared.over(self.realism),
+            laser: self.laser.over(self.realism),
             wheels: self.wheels.over(self.realism),
             heights: self.heights.over(self.realism),
             battery: self.battery.over(self.realism),
@@ -367,6 +382,7 @@ impl Simulation {
         let sections = [
             SonarPhysics::PRESETS,
             InfraredPhysics::PRESETS,
+            LaserTiming::PRESETS,
             WheelPhysics::PRESETS,
             Heights::PRESETS,
             BatteryPhysics::PRESETS,
@@ -379,6 +395,7 @@ impl Simulation {
         let physics = self.physics();
         physics.sonar.check()?;
         physics.infrared.check()?;
+        physics.laser.check()?;
         physics.wheels.check()?;
         physics.heights.check()?;
         physics.battery.check()?;

@@ -1,6 +1,6 @@
 //! The laser of a robot, which may be stuck or blind.
 
-use super::{Readings, odometry::drive};
+use super::{LaserScan, Readings, odometry::drive};
 use crate::{
     kinematics::WheelSpeeds,
     mission::{Body, Mission, Sensor},
@@ -24,7 +24,7 @@ pub struct Laser {
     near: (usize, [f64; 2]),
     is_blind: bool,
     turned: [f64; 2],
-    scan: Vec<f32>,
+    scan: LaserScan,
 }
 
 impl Laser {
@@ -38,7 +38,7 @@ impl Laser {
             near: (0, [0.0; 2]),
             is_blind: false,
             turned: [0.0; 2],
-            scan: Vec::new(),
+            scan: LaserScan::default(),
         })
     }
 
@@ -60,25 +60,26 @@ impl Laser {
         }
     }
 
-    pub fn for_tick(&mut self) -> Vec<f32> {
+    pub fn for_tick(&mut self) -> LaserScan {
         std::mem::take(&mut self.scan)
     }
 
     /// Takes beams as [`Laser::beam`] gives them. The nearest counts as the reading of the laser's row; none does if the laser is blind
     /// or stuck.
-    pub fn take(&mut self, beams: Vec<f32>, readings: &mut Readings) {
+    pub fn take(&mut self, scan: LaserScan, readings: &mut Readings) {
+        let beams = &scan.beams;
         let (newest, turned_then) = &self.newest_scan;
         let [bits_then, bits_now] =
-            [newest, &beams].map(|beams| beams.iter().map(|beam| beam.to_bits()));
+            [newest, beams].map(|beams| beams.iter().map(|beam| beam.to_bits()));
         let is_same = beams.iter().any(|beam| beam.is_finite()) && bits_then.eq(bits_now);
         let went = |wheel: usize| (self.turned[wheel] - turned_then[wheel]).abs();
         let is_stuck = is_same && went(0).max(went(1)) > STUCK_RAD;
-        self.look_for_blindness(&beams);
+        self.look_for_blindness(&scan.beams);
         let is_refused = is_stuck || self.is_blind;
         if !is_same {
-            self.newest_scan = (beams.clone(), self.turned);
+            self.newest_scan = (scan.beams.clone(), self.turned);
         }
-        let nearest = beams.iter().copied().fold(f32::NAN, f32::min);
+        let nearest = scan.beams.iter().copied().fold(f32::NAN, f32::min);
         let (status, range_m) = match nearest {
             nearest if is_refused || nearest.is_nan() => (RangeStatus::Invalid, 0.0),
             nearest if nearest.is_infinite() => (RangeStatus::Nothing, 0.0),
@@ -87,7 +88,7 @@ impl Laser {
         let status = status.into();
         readings.take(self.row, RangeReading { range_m, status, ..RangeReading::default() });
         if !is_refused {
-            self.scan = beams;
+            self.scan = scan;
         }
     }
 

@@ -60,10 +60,62 @@ payloads! {
         first_rad: f64,
         step_rad: f64,
         reach_m: f64,
+        /// The time at which the first beam was measured, from the tick's mission time on; less than 0 is before it.
+        first_beam_ns: i64,
+        /// The time from each beam to the next counter-clockwise; less than 0 for a laser that turns clockwise.
+        beam_ns: i64,
+        /// The beam that was measured first.
+        first_beam: u64,
+    }
+}
+
+/// The longest age and the longest duration of a scan, nanoseconds. An older one is of no use to dead reckoning.
+pub const LONGEST_SWEEP_NS: i64 = 2_000_000_000;
+
+/// The times at which the beams of a scan were measured, by a tick's mission time: see [`ScanHeader`]. The default is all at the tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Sweep {
+    pub first_beam_ns: i64,
+    pub beam_ns: i64,
+    pub first_beam: u64,
+}
+
+impl Sweep {
+    /// Whether dead reckoning still knows the robot's motion then. The numbers, from shared memory, may be anything.
+    pub fn is_plausible(&self, beams: usize) -> bool {
+        let most = LONGEST_SWEEP_NS.unsigned_abs();
+        self.first_beam_ns.unsigned_abs() <= most
+            && self.beam_ns.unsigned_abs().saturating_mul(beams as u64) <= most
+            && (self.first_beam == 0 || self.first_beam < beams as u64)
+    }
+
+    /// The time of a beam among so many in a plausible sweep, from the tick's on.
+    pub const fn beam_time_ns(&self, beam: usize, beams: usize) -> i64 {
+        let (first, beams) = (self.first_beam as usize, if beams == 0 { 1 } else { beams });
+        let before = match self.beam_ns < 0 {
+            true => (first + beams - beam) % beams,
+            false => (beam + beams - first) % beams,
+        };
+        self.first_beam_ns + self.beam_ns.abs() * before as i64
+    }
+
+    pub const fn middle_ns(&self, beams: usize) -> i64 {
+        self.first_beam_ns + self.beam_ns.abs() * beams as i64 / 2
     }
 }
 
 impl ScanHeader {
+    pub const fn sweep(&self) -> Sweep {
+        let Self { first_beam_ns, beam_ns, first_beam, .. } = *self;
+        Sweep { first_beam_ns, beam_ns, first_beam }
+    }
+
+    #[must_use]
+    pub const fn swept(self, sweep: Sweep) -> Self {
+        let Sweep { first_beam_ns, beam_ns, first_beam } = sweep;
+        Self { first_beam_ns, beam_ns, first_beam, ..self }
+    }
+
     pub fn of(row: usize, sensor: &Sensor) -> Self {
         let at = sensor.mount.forward_m * DVec2::from_angle(sensor.mount.bearing_rad);
         let (first, step_rad) = sensor.fan();

@@ -163,6 +163,10 @@ impl Answering for DeadReckoning {
         Ok(())
     }
 
+    fn has_answered(&self, wheels: &WheelSample) -> bool {
+        self.state.newest().is_some_and(|(tick, _)| tick == wheels.stamp.tick)
+    }
+
     fn answer(
         &mut self,
         wheels: &WheelSample,

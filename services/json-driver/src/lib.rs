@@ -4,14 +4,14 @@ use std::{collections::BTreeMap, time::Duration};
 
 use common::{
     driver::{
-        Driver, Heard, Memory, Readings, StopMethod, WireTally,
+        Driver, Heard, LaserScan, Memory, Readings, StopMethod, WireTally,
         laser::Laser,
         odometry::{Odometry, motion, twist, wheel_speeds},
     },
     json_wire::{Lines, Order, Report, line, parse},
     kinematics::Twist,
     mission::{Body, Mission},
-    samples::{PowerSample, RangeReading},
+    samples::{LONGEST_SWEEP_NS, PowerSample, RangeReading, Sweep},
 };
 
 /// Orders that count as answered by one report.
@@ -48,7 +48,7 @@ impl Json {
     /// A refused report has no effect; the error says why.
     fn take(&mut self, report: &Report, heard: &mut Heard) -> Result<(), String> {
         let rows = self.rows_of(&report.ranges)?;
-        let scan = report.scan.as_deref().map(|scan| self.beams_of(scan)).transpose()?;
+        let scan = self.scan_of(report)?;
         let turned = match (report.wheels, report.odometry) {
             (Some(_), Some(_)) => return Err("wheels and odometry: say one of them".to_owned()),
             (Some(turned), None) => Some(turned),
@@ -71,8 +71,8 @@ impl Json {
             let held = report.held.unwrap_or_default();
             heard.motion = Some(motion(&self.body, turned, speeds, held));
         }
-        if let (Some(laser), Some(beams)) = (&mut self.laser, scan) {
-            laser.take(beams, &mut self.readings);
+        if let (Some(laser), Some(scan)) = (&mut self.laser, scan) {
+            laser.take(scan, &mut self.readings);
         }
         if let Some(count) = report.heard {
             // A robot that has restarted counts from 0.
@@ -103,8 +103,10 @@ impl Json {
         ranges.iter().map(row).collect()
     }
 
-    /// Beams as the topic `scan` has them.
-    fn beams_of(&self, beams: &[Option<f32>]) -> Result<Vec<f32>, String> {
+    fn scan_of(&self, report: &Report) -> Result<Option<LaserScan>, String> {
+        let Some(beams) = &report.scan else {
+            return Ok(None);
+        };
         let Some(laser) = &self.laser else {
             return Err("a scan, and the mission has no laser: add a row of kind scan".to_owned());
         };
@@ -112,9 +114,24 @@ impl Json {
             let (came, want) = (beams.len(), laser.sensor().beams);
             return Err(format!("a scan of {came} beams, and the mission's laser has {want}"));
         }
+        let nanoseconds = |word: &str, seconds: Option<f64>| {
+            let ns = seconds.unwrap_or_default() * 1e9;
+            match (0.0..=LONGEST_SWEEP_NS as f64).contains(&ns) {
+                true => Ok(ns.round() as i64),
+                false => Err(format!("{word} is not 0 to 2 s: say seconds")),
+            }
+        };
+        let sensor = laser.sensor();
+        let beam_ns = nanoseconds("scan_time_s", report.scan_time_s)? / beams.len().max(1) as i64;
+        // The first beam that an upside-down laser measures is not the first of its row, and the others follow the other way around.
+        let sweep = Sweep {
+            first_beam_ns: -nanoseconds("scan_age_s", report.scan_age_s)?,
+            beam_ns: if sensor.is_upside_down { -beam_ns } else { beam_ns },
+            first_beam: sensor.mirrored(0) as u64,
+        };
         let mut beams: Vec<_> = beams.iter().map(|beam| laser.beam(*beam)).collect();
-        laser.sensor().mirror(&mut beams);
-        Ok(beams)
+        sensor.mirror(&mut beams);
+        Ok(Some(LaserScan { beams, sweep }))
     }
 }
 
@@ -145,7 +162,7 @@ impl Driver for Json {
         self.readings.for_tick()
     }
 
-    fn scan_for_tick(&mut self) -> Vec<f32> {
+    fn scan_for_tick(&mut self) -> LaserScan {
         self.laser.as_mut().map(Laser::for_tick).unwrap_or_default()
     }
 
@@ -254,7 +271,7 @@ mod tests {
             let beams = vec![range.to_string(); 360].join(",");
             let wheels = format!("\"wheels\":[{turned},{turned}],\"speeds\":[1,1]");
             let heard = heard(&mut driver, &format!("{{{wheels},\"scan\":[{beams}]}}"));
-            (heard.readings[0].status(), driver.scan_for_tick().len())
+            (heard.readings[0].status(), driver.scan_for_tick().beams.len())
         };
         let measured = (RangeStatus::Measured, 360);
         assert_eq!([scan(1.0, 0.0), scan(1.0, 0.1), scan(1.0, 0.9)], [measured; 3]);
@@ -272,7 +289,7 @@ mod tests {
             heard(&mut driver, &format!("{{\"scan\":[{}]}}", beams.join(","))).refused,
             None
         );
-        let scan = driver.scan_for_tick();
+        let scan = driver.scan_for_tick().beams;
         assert_eq!((scan.len(), scan[0]), (16_384, range(16_383) as f32));
     }
 
@@ -291,7 +308,7 @@ mod tests {
             let wheels = format!("\"wheels\":[{},{turned}],\"speeds\":[1,1]", -turned);
             let line = format!("{{{wheels},\"scan\":[{}]}}", beams.join(","));
             let status = heard(&mut driver, &line).readings[0].status();
-            assert_eq!(driver.scan_for_tick().is_empty(), status == RangeStatus::Invalid);
+            assert_eq!(driver.scan_for_tick().beams.is_empty(), status == RangeStatus::Invalid);
             status
         };
         scans.iter().map(status).collect()
@@ -342,6 +359,22 @@ mod tests {
     }
 
     #[test]
+    fn a_scan_is_as_old_and_took_as_long_as_the_robot_says_and_neither_if_it_says_nothing() {
+        let text = "target = [3, 0]\nrobot.model = 'kobuki'";
+        let mut driver = Json::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
+        let mut sweep = |words: &str| {
+            let line = format!("{{\"scan\":[{}]{words}}}", vec!["1"; 360].join(","));
+            (heard(&mut driver, &line).refused.is_some(), driver.scan_for_tick().sweep)
+        };
+        assert_eq!(sweep(""), (false, Sweep::default()));
+        let sent = Sweep { first_beam_ns: -300_000_000, beam_ns: 500_000, first_beam: 0 };
+        assert_eq!(sweep(",\"scan_age_s\":0.3,\"scan_time_s\":0.18"), (false, sent));
+        for wrong in ["\"scan_age_s\":-0.1", "\"scan_time_s\":2.1", "\"scan_age_s\":200"] {
+            assert_eq!(sweep(&format!(",{wrong}")), (true, Sweep::default()), "{wrong}");
+        }
+    }
+
+    #[test]
     fn a_command_is_said_as_wheel_speeds_and_as_a_twist() {
         let said = driver().velocity([-573, 573], Duration::from_millis(250));
         let Ok(Order::Drive { wheels, twist, for_s }) = parse(&said) else {
@@ -351,5 +384,26 @@ mod tests {
         // 2 * 0.085 m/s over 0.26 m.
         assert!(twist[0].abs() < 1e-9 && (twist[1] - 0.6538).abs() < 1e-3);
         assert!((for_s - 0.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_first_beam_of_a_sweep_is_the_first_in_time_of_an_upside_down_laser_too() {
+        for (wide_deg, roll_deg, first) in [(90, 0, 0), (90, 180, 3), (360, 0, 0), (360, 180, 0)] {
+            let row = format!(
+                "[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nbeams = 4\nfield_of_view_deg = {wide_deg}\nroll_deg = {roll_deg}"
+            );
+            let text = format!("target = [3, 0]\nrobot.protocol = 'json'\n{row}");
+            let mut driver = Json::new(&Mission::parse(&text, Path::new("m.toml")).unwrap());
+            let said = r#"{"wheels":[0,0],"speeds":[0,0],"scan":[1,2,3,4],"scan_time_s":0.4}"#;
+            heard(&mut driver, said);
+            let LaserScan { beams, sweep } = driver.scan_for_tick();
+            let times = (0..4).map(|beam| (sweep.beam_time_ns(beam, 4), beams[beam]));
+            let mut measured: Vec<_> = times.collect();
+            measured.sort_by_key(|(at, _)| *at);
+            let measured = measured.into_iter().map(|(at, range)| (at / 1_000_000, range));
+            let said = [(0, 1.0), (100, 2.0), (200, 3.0), (300, 4.0)];
+            assert!(measured.eq(said), "{wide_deg} {roll_deg}: {sweep:?} {beams:?}");
+            assert_eq!(sweep.first_beam, first, "{wide_deg} {roll_deg}");
+        }
     }
 }

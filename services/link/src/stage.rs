@@ -76,8 +76,8 @@ impl LinkStage {
                 if let Some(contact) = contact {
                     out.publish(&CONTACT, contact)?;
                 }
-                if let Some((header, _)) = self.laser.filter(|_| !scan.is_empty()) {
-                    out.publish_slice(&SCAN, header, &scan)?;
+                if let Some((header, _)) = self.laser.filter(|_| !scan.beams.is_empty()) {
+                    out.publish_slice(&SCAN, header.swept(scan.sweep), &scan.beams)?;
                 }
                 if let Some(turn) = turn {
                     out.publish(&IMU_TURN, turn)?;

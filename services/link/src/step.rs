@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use common::{
     clock::{MissionTime, Pace},
-    driver::{Driver, Memory, Motion, Turn, WireTally, counts::WheelCounts},
+    driver::{Driver, LaserScan, Memory, Motion, Turn, WireTally, counts::WheelCounts},
     mission::Mission,
     samples::{
         Action, Cause, CommandSample, CommandState, ContactSample, CountsSample, HoldReason, Order,
@@ -55,7 +55,7 @@ const STOP_AGAIN: Duration = Duration::from_millis(200);
 #[derive(Clone, Debug)]
 struct OpenTick {
     ranges: Vec<RangeReading>,
-    scan: Vec<f32>,
+    scan: LaserScan,
     turn: Option<Turn>,
     wheels: WheelSample,
     endless: Option<CountsSample>,

@@ -66,6 +66,10 @@ impl Rows {
         *self.rows.get(usize::from(reading.sensor))?
     }
 
+    pub(crate) const fn has_laser(&self) -> bool {
+        self.laser.is_some()
+    }
+
     pub(crate) fn uses_row(&self, row: u64) -> bool {
         usize::try_from(row).is_ok_and(|row| self.rows.get(row).is_some_and(Option::is_some))
     }

@@ -10,7 +10,7 @@ use common::{
     readers,
     samples::{
         ContactSample, DirectiveSample, FaultKind, PoseSample, RangeReading, RangesHeader,
-        ScanHeader,
+        ScanHeader, Sweep,
     },
     shell::{Context, Process, Progress},
     stage::Runner,
@@ -45,8 +45,8 @@ readers! {
 pub struct Shell {
     inputs: Inputs,
     runner: Runner<Mapper>,
-    /// The newest scan, and its tick.
-    latest_scan: Option<(u64, Vec<f32>)>,
+    /// The newest scan with the times of its beams, and its tick.
+    latest_scan: Option<(u64, Vec<f32>, Sweep)>,
     /// The newest readings that are used, and their tick.
     latest_ranges: Option<(u64, Vec<RangeReading>)>,
     latest_contact: Option<ContactSample>,
@@ -81,11 +81,14 @@ impl Process for Shell {
         while let Some(pose) = self.inputs.pose.next_sample()? {
             let ranges = self.ranges_of(pose.stamp.tick)?;
             self.runner.out.at = Progress::of(&pose.stamp);
-            let scan = self.scan_of(pose.stamp.tick)?;
+            let (scan, sweep) = self.scan_of(pose.stamp.tick)?;
             let contact = self.contact_of(pose.stamp.tick)?;
             let target =
                 self.inputs.target.next(pose.stamp.tick)?.map(|sample| sample.target.position());
             let target = target.filter(|target| *target != self.runner.stage.target());
+            if sweep != Sweep::default() && !scan.is_empty() {
+                self.step(Input::Sweep(pose.stamp.tick, sweep))?;
+            }
             self.step(Input::Tick { pose, ranges, scan, contact, target })?;
         }
         if let Some(DirectiveSample { epoch, .. }) = self.inputs.directive.newest()?
@@ -149,18 +152,19 @@ impl Shell {
     }
 
     /// The scan of `tick`; none if the laser gave none, or the mission uses none.
-    fn scan_of(&mut self, tick: u64) -> Result<Vec<f32>, StageError> {
-        while self.latest_scan.as_ref().is_none_or(|(latest, _)| *latest < tick) {
+    fn scan_of(&mut self, tick: u64) -> Result<(Vec<f32>, Sweep), StageError> {
+        while self.latest_scan.as_ref().is_none_or(|(latest, ..)| *latest < tick) {
             let Some(slice) = self.inputs.scan.next_slice()? else {
                 break;
             };
             let used = self.runner.stage.uses_row(slice.header().sensor);
             let beams =
                 if used { slice.iter().take(MOST_BEAMS).copied().collect() } else { Vec::new() };
-            self.latest_scan = Some((slice.header().stamp.tick, beams));
+            let header = slice.header();
+            self.latest_scan = Some((header.stamp.tick, beams, header.sweep()));
         }
-        let latest = self.latest_scan.as_mut().filter(|(latest, _)| *latest == tick);
-        Ok(latest.map(|(_, beams)| std::mem::take(beams)).unwrap_or_default())
+        let latest = self.latest_scan.as_mut().filter(|(latest, ..)| *latest == tick);
+        Ok(latest.map(|(_, beams, sweep)| (std::mem::take(beams), *sweep)).unwrap_or_default())
     }
 
     /// The contact of `tick`; most ticks have none.

@@ -9,13 +9,16 @@ use common::{
     grid::{Cell, CellState, GridFrame, Part, Window},
     kinematics::Pose2,
     mission::{Method, Mission},
-    samples::{ContactSample, FaultKind, FixSample, GridHeader, PoseSample, RangeReading, name},
+    samples::{
+        ContactSample, FaultKind, FixSample, GridHeader, PoseSample, RangeReading, Sweep, name,
+    },
     stage::ForeignState,
 };
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    deskew::Poses,
     evidential::{EvidenceMap, Evidential},
     fault,
     reading::{Rows, Touch},
@@ -43,6 +46,8 @@ pub enum Input {
     },
     /// An operator's; it acts from the next tick on.
     Fault(FaultKind),
+    /// The beams of this tick's scan, which follows, were measured at these times; otherwise at the tick.
+    Sweep(u64, Sweep),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -125,6 +130,9 @@ pub struct Mapper {
     footprint: f64,
     half_track: f64,
     matcher: ScanMatcher,
+    poses: Poses,
+    /// The newest scan's that were not measured at their tick.
+    sweep: Option<(u64, Sweep)>,
     fix: Option<FixSample>,
     /// Of the laser; 0 without one.
     beams: usize,
@@ -153,6 +161,8 @@ impl Mapper {
             footprint: mission.body().radius_m,
             half_track: mission.body().track_m / 2.0,
             matcher: ScanMatcher::new(mission),
+            poses: Poses::default(),
+            sweep: None,
             fix: None,
             beams: mission.laser().map_or(0, |(_, laser)| laser.beams),
             belief: Belief {
@@ -203,14 +213,16 @@ impl Mapper {
         match input {
             Input::Tick { pose, ranges, scan, contact, target } => {
                 let moved = target.map_or(Window::default(), |target| self.move_target(target));
+                let (scanned_at, capture_ns, scan) = self.place(&pose, now, scan);
                 if self.belief.tick != Some(pose.stamp.tick) {
-                    let fix =
-                        self.matcher.step(&self.rows, &mut self.belief.reference, &pose, &scan);
+                    let reference = &mut self.belief.reference;
+                    let fix = self.matcher.step(&self.rows, reference, &scanned_at, &scan);
                     let fix = fix.filter(|_| self.matcher.publishes(pose.stamp.tick));
                     let source = name("scan");
-                    self.fix = fix.map(|fix| FixSample { capture_ns: now.0, source, ..fix });
+                    self.fix = fix.map(|fix| FixSample { capture_ns, source, ..fix });
                 }
-                Change::Window(self.map(&pose, (&ranges, &scan), contact.as_ref(), moved))
+                let scan = (scanned_at.pose(), &scan[..]);
+                Change::Window(self.map(&pose, (&ranges, scan), contact.as_ref(), moved))
             }
             Input::Reset { epoch } if self.reset_belief(epoch) => Change::Whole,
             Input::Reset { .. } => Change::None,
@@ -218,6 +230,30 @@ impl Mapper {
                 self.belief.fault = fault;
                 Change::None
             }
+            Input::Sweep(tick, sweep) => {
+                self.sweep = Some((tick, sweep));
+                Change::None
+            }
+        }
+    }
+
+    /// The robot where it took the scan, that time, and the scan from there; no scan if that place is not known.
+    fn place(
+        &mut self,
+        pose: &PoseSample,
+        now: MissionTime,
+        scan: Vec<f32>,
+    ) -> (PoseSample, u64, Vec<f32>) {
+        if self.rows.has_laser() {
+            self.poses.add(pose);
+        }
+        match self.sweep.take().filter(|(tick, _)| *tick == pose.stamp.tick) {
+            Some((_, sweep)) => self.poses.scan_at_once(&self.rows, pose, scan, sweep).unwrap_or((
+                *pose,
+                now.0,
+                Vec::new(),
+            )),
+            None => (*pose, now.0, scan),
         }
     }
 
@@ -331,7 +367,7 @@ impl Mapper {
     fn map(
         &mut self,
         pose: &PoseSample,
-        (ranges, scan): (&[RangeReading], &[f32]),
+        (ranges, (scanned_at, scan)): (&[RangeReading], (Pose2, &[f32])),
         contact: Option<&ContactSample>,
         changed: Window,
     ) -> Window {
@@ -348,7 +384,7 @@ impl Mapper {
         let (ranges, scan) = if self.sensing { (ranges, scan) } else { (&[][..], &[][..]) };
         let seen = match &self.belief.sensed {
             Sensed::Hits => self.mark_hit(now, ranges),
-            Sensed::Evidence(_) => self.weigh(now, (ranges, scan), rolled),
+            Sensed::Evidence(_) => self.weigh(now, (ranges, (scanned_at, scan)), rolled),
         };
         let contact = contact.and_then(|contact| Touch::of(now, contact));
         let felt = contact.map_or_else(Window::default, |touch| self.mark_touch(&touch));
@@ -374,7 +410,7 @@ impl Mapper {
     fn weigh(
         &mut self,
         robot: Pose2,
-        (ranges, scan): (&[RangeReading], &[f32]),
+        (ranges, (scanned_at, scan)): (&[RangeReading], (Pose2, &[f32])),
         rolled: f64,
     ) -> Window {
         let Sensed::Evidence(map) = &mut self.belief.sensed else {
@@ -382,7 +418,7 @@ impl Mapper {
         };
         let stale = self.evidential.roll(map, rolled, self.belief.rolled);
         // The scan first: what it shows explains echoes.
-        let fan = self.rows.scan(robot, scan);
+        let fan = self.rows.scan(scanned_at, scan);
         let seen = fan.map(|fan| self.evidential.take_scan(map, robot.position, &fan));
         let seen = seen.unwrap_or_default();
         let (beams, rays) = (self.rows.beams(robot, ranges), self.rows.rays(robot, ranges));

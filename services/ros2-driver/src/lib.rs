@@ -20,14 +20,14 @@ use std::{f64::consts::TAU, time::Duration};
 
 use common::{
     driver::{
-        Commander, Driver, Heard, Memory, Readings, Turn, WireTally,
+        Commander, Driver, Heard, LaserScan, Memory, Readings, Turn, WireTally,
         laser::Laser,
         odometry::{self, drive, motion, twist},
     },
     geometry::wrap_angle,
     kinematics::{Twist, WheelSpeeds},
     mission::{Body, Mission, Sensor},
-    samples::{PowerSample, RangeReading},
+    samples::{LONGEST_SWEEP_NS, PowerSample, RangeReading, Sweep},
 };
 
 use self::{
@@ -45,6 +45,8 @@ const MOST_WAITING: usize = 64;
 const UNSEEN_S: f64 = 5.0;
 /// Bearings of a laser's row and of its scans differ at most by this share of the angle between beams.
 const SAME_BEARING: f64 = 0.5;
+/// A scan's stamp is implausible if it is farther ahead of the newest odometry's.
+const AHEAD_NS: i64 = 500_000_000;
 /// The angle between beams may differ by this share.
 const SAME_STEP: f64 = 0.01;
 
@@ -57,6 +59,9 @@ pub struct Ros2 {
     waiting: Vec<Vec<u8>>,
     readings: Readings,
     laser: Option<Laser>,
+    /// Stamp of the newest scan; none if it states none that is plausible.
+    scan_stamp_ns: Option<i64>,
+    told_of_scan_stamp: bool,
     odometry: odometry::Odometry,
     gyro: Gyro,
     /// The odometry of the newest tick gives it, radians.
@@ -76,6 +81,8 @@ impl Ros2 {
             waiting: Vec::new(),
             readings: Readings::new(mission),
             laser: Laser::new(mission),
+            scan_stamp_ns: None,
+            told_of_scan_stamp: false,
             odometry: odometry::Odometry::default(),
             gyro: Gyro::default(),
             heading: None,
@@ -119,7 +126,7 @@ impl Ros2 {
                 if self.laser.as_ref().is_some_and(|laser| laser.sensor().is_upside_down) {
                     scan.turn_over();
                 }
-                self.take_scan(&scan)
+                self.take_scan(&scan, heard)
             }
             Content::Range(row) => {
                 let range = read_range(payload).map_err(|error| error.to_string())?;
@@ -190,10 +197,15 @@ impl Ros2 {
         Ok(())
     }
 
-    fn take_scan(&mut self, scan: &Scan) -> Result<(), String> {
+    fn take_scan(&mut self, scan: &Scan, heard: &mut Heard) -> Result<(), String> {
         let Some(laser) = &mut self.laser else {
             return Err("a scan, and the mission has no laser; add a row of kind scan".to_owned());
         };
+        let (beams, most_s) = (scan.ranges.len(), LONGEST_SWEEP_NS as f64 / 1e9);
+        let beam_s = f64::from(scan.beam_s);
+        if !(0.0..=most_s).contains(&(beam_s * beams as f64)) {
+            return Err(format!("a time_increment of {beam_s}; fill it in seconds, or give 0"));
+        }
         let range = |range: &f32| match *range {
             range if range < scan.least_m => f32::NAN,
             range if range > scan.most_m => f32::INFINITY,
@@ -207,9 +219,40 @@ impl Ros2 {
         } else {
             return Err(other_fan(scan, laser.sensor()));
         };
-        laser.take(beams, &mut self.readings);
+        let sweep = sweep_of(scan, laser.sensor());
+        let is_near = |tick_ns| STAMPS_NS.contains(&(scan.stamp_ns - tick_ns));
+        let is_stated = scan.stamp_ns != 0 && self.stamps_ns.is_none_or(|[ns, _]| is_near(ns));
+        self.scan_stamp_ns = is_stated.then_some(scan.stamp_ns);
+        if !is_stated && !std::mem::replace(&mut self.told_of_scan_stamp, true) {
+            heard.refused = Some(format!(
+                "the stamp of a scan, {} s, which then counts as taken when odometry came; stamp both by one clock",
+                scan.stamp_ns as f64 / 1e9
+            ));
+        }
+        let sweep = if is_stated { sweep } else { Sweep::default() };
+        laser.take(LaserScan { beams, sweep }, &mut self.readings);
         Ok(())
     }
+}
+
+/// Stamps of plausible scans, from the newest odometry's on.
+const STAMPS_NS: std::ops::RangeInclusive<i64> = -LONGEST_SWEEP_NS..=AHEAD_NS;
+
+/// The times of the row's beams from the first one of `scan` on.
+fn sweep_of(scan: &Scan, sensor: &Sensor) -> Sweep {
+    let ((first, step), (its_first, its_step)) = (scan.fan, sensor.fan());
+    let along = if scan.is_reversed { -1.0 } else { 1.0 };
+    let beam_ns = (along * f64::from(scan.beam_s) * 1e9 * its_step / step).round();
+    if beam_ns == 0.0 || !beam_ns.is_finite() {
+        return Sweep::default();
+    }
+    let measured_first = if scan.is_reversed { scan.ranges.len().saturating_sub(1) } else { 0 };
+    let first = first + measured_first as f64 * step;
+    let first_beam = match is_same_fan(scan, sensor) {
+        true => measured_first as u64,
+        false => ((first - its_first) / its_step).round().rem_euclid(sensor.beams as f64) as u64,
+    };
+    Sweep { first_beam_ns: 0, beam_ns: beam_ns as i64, first_beam }
 }
 
 /// Each beam of `scan` is that of the laser's row.
@@ -288,8 +331,12 @@ impl Driver for Ros2 {
         self.readings.for_tick()
     }
 
-    fn scan_for_tick(&mut self) -> Vec<f32> {
-        self.laser.as_mut().map(Laser::for_tick).unwrap_or_default()
+    fn scan_for_tick(&mut self) -> LaserScan {
+        let mut scan = self.laser.as_mut().map(Laser::for_tick).unwrap_or_default();
+        if let (Some(scan_ns), Some([_, tick_ns])) = (self.scan_stamp_ns, self.stamps_ns) {
+            scan.sweep.first_beam_ns = scan_ns - tick_ns;
+        }
+        scan
     }
 
     fn turn_for_tick(&mut self) -> Option<Turn> {

@@ -115,24 +115,31 @@ impl Imu {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scan {
+    /// Of the first beam; the robot's clock gives it.
+    pub stamp_ns: i64,
+    /// Time from beam to beam.
+    pub beam_s: f32,
     /// Bearing of the first beam, and the angle from beam to beam, radians counter-clockwise.
     pub fan: (f64, f64),
     /// Other ranges are none.
     pub least_m: f32,
     pub most_m: f32,
     pub ranges: Vec<f32>,
+    /// The last beam was measured first.
+    pub is_reversed: bool,
 }
 
 impl Scan {
     /// Fails if `payload` is no `sensor_msgs/LaserScan`.
     pub fn read(payload: &[u8]) -> Result<Self, Malformed> {
         let mut reader = Reader::new(payload)?;
-        reader.header()?;
+        let (stamp_ns, _frame) = reader.header()?;
         let (first, _last, step) = (reader.f32()?, reader.f32()?, reader.f32()?);
-        let (_between_beams_s, _scan_s) = (reader.f32()?, reader.f32()?);
+        let (beam_s, _scan_s) = (reader.f32()?, reader.f32()?);
         let (least_m, most_m) = (reader.f32()?, reader.f32()?);
         let ranges = reader.list(MOST_BEAMS)?;
-        Ok(Self { fan: (first.into(), step.into()), least_m, most_m, ranges })
+        let fan = (first.into(), step.into());
+        Ok(Self { stamp_ns, beam_s, fan, least_m, most_m, ranges, is_reversed: false })
     }
 
     /// Its laser is mounted upside down: give the beams the order and the bearings that they have in the robot's frame.
@@ -140,6 +147,7 @@ impl Scan {
         let (first, step) = self.fan;
         self.fan.0 = -(first + step * self.ranges.len().saturating_sub(1) as f64);
         self.ranges.reverse();
+        self.is_reversed = !self.is_reversed;
     }
 }
 

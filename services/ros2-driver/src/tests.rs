@@ -49,8 +49,10 @@ fn odometry_at(stamp_ms: u32, x: f64) -> Vec<u8> {
 }
 
 /// A scan of beams that end at `ranges`, from `first` in steps of `step`.
+/// It is stamped at 1 s.
 fn scan_of(first: f32, step: f32, ranges: &[f32]) -> Vec<u8> {
     let mut payload = bytes(SCAN)[..56].to_vec();
+    payload[4..8].copy_from_slice(&1_u32.to_le_bytes());
     payload[28..32].copy_from_slice(&first.to_le_bytes());
     payload[36..40].copy_from_slice(&step.to_le_bytes());
     payload.extend((ranges.len() as u32).to_le_bytes());
@@ -193,13 +195,66 @@ fn a_circle_of_beams_is_turned_to_the_missions_and_lacking_ones_have_no_reading(
     ranges[90] = 0.1;
     let heard = said(&mut driver, LASER, &scan_of(0.0, 1_f32.to_radians(), &ranges));
     assert_eq!(heard.readings[0].status(), RangeStatus::Measured);
-    let beams = driver.scan_for_tick();
+    let beams = driver.scan_for_tick().beams;
     assert_eq!((beams[180], beams[181]), (1.0, f32::INFINITY));
     assert!(beams[270].is_nan(), "less than the least range");
     let few = scan_of(0.0, 1.5_f32.to_radians(), &[2.0; 240]);
     assert_eq!(said(&mut driver, LASER, &few).refused, None);
-    let beams = driver.scan_for_tick();
+    let beams = driver.scan_for_tick().beams;
     assert_eq!(beams.iter().filter(|beam| beam.is_nan()).count(), 120);
+}
+
+/// The scan of [`scan_of`] with this stamp, and time from beam to beam.
+fn scan_at(stamp_ms: u32, beam_s: f32, first: f32, step: f32) -> Vec<u8> {
+    let mut payload = scan_of(first, step, &[1.0; 360]);
+    payload[4..8].copy_from_slice(&(stamp_ms / 1000).to_le_bytes());
+    payload[8..12].copy_from_slice(&(stamp_ms % 1000 * 1_000_000).to_le_bytes());
+    payload[40..44].copy_from_slice(&beam_s.to_le_bytes());
+    payload
+}
+
+#[test]
+fn a_scan_has_its_age_at_the_tick_and_each_beam_its_time_whichever_is_the_first_and_the_next() {
+    let (degree, beam_s) = (1_f32.to_radians(), 0.0005);
+    let sweep = |beam_s, first: f32, step| {
+        let mut driver = driver("");
+        said(&mut driver, ODOM, &odometry_at(5000, 1.0));
+        let heard = said(&mut driver, LASER, &scan_at(4950, beam_s, first, step));
+        assert_eq!(heard.refused, None);
+        said(&mut driver, ODOM, &odometry_at(5200, 1.0));
+        driver.scan_for_tick().sweep
+    };
+    let times = |first: f32, step: f32, beams: [usize; 3]| {
+        let sweep = sweep(beam_s, first, step);
+        beams.map(|beam| (sweep.beam_time_ns(beam, 360) as f64 / 5e5).round() as i64)
+    };
+    assert_eq!(sweep(0.0, 0.0, degree), Sweep { first_beam_ns: -250_000_000, ..Sweep::default() });
+    let pi = std::f32::consts::PI;
+    assert_eq!(times(-pi, degree, [0, 1, 359]), [-500, -499, -141]);
+    assert_eq!(times(0.0, degree, [180, 181, 179]), [-500, -499, -141]);
+    assert_eq!(times(0.0, -degree, [180, 179, 181]), [-500, -499, -141]);
+}
+
+#[test]
+fn a_scan_without_a_plausible_stamp_counts_as_taken_at_the_tick_and_the_log_says_so_once() {
+    for stamp_ms in [0, 1000, 9000] {
+        let mut driver = driver("");
+        said(&mut driver, ODOM, &odometry_at(5000, 1.0));
+        let mut hear =
+            || said(&mut driver, LASER, &scan_at(stamp_ms, 0.0005, 0.0, 0.0174533)).refused;
+        assert!(hear().is_some_and(|why| why.contains("stamp")), "{stamp_ms}");
+        assert_eq!(hear(), None);
+        let scan = driver.scan_for_tick();
+        assert_eq!((scan.beams.len(), scan.sweep), (360, Sweep::default()));
+    }
+}
+
+#[test]
+fn a_scan_whose_beams_go_back_in_time_or_take_longer_than_a_laser_does_is_refused() {
+    for beam_s in [-0.0005, f32::NAN, f32::INFINITY, 0.1] {
+        let heard = said(&mut driver(""), LASER, &scan_at(5000, beam_s, 0.0, 0.0174533));
+        assert!(heard.refused.is_some_and(|why| why.contains("time_increment")), "{beam_s}");
+    }
 }
 
 #[test]
@@ -217,7 +272,7 @@ fn a_laser_upside_down_has_what_it_saw_on_its_left_on_the_robots_right() {
         ranges[left] = 1.0;
         let scan = scan_of(first.to_radians(), step, &ranges);
         assert_eq!(said(&mut driver, LASER, &scan).refused, None);
-        let beams = driver.scan_for_tick();
+        let beams = driver.scan_for_tick().beams;
         assert_eq!((beams[90], beams[270]), (1.0, f32::INFINITY), "{first}");
     }
     let mut driver = driver(&laser("beams = 181\nfield_of_view_deg = 180"));
@@ -225,7 +280,7 @@ fn a_laser_upside_down_has_what_it_saw_on_its_left_on_the_robots_right() {
     ranges[180] = 1.0;
     let scan = scan_of(-90_f32.to_radians(), step, &ranges);
     assert_eq!(said(&mut driver, LASER, &scan).refused, None);
-    assert_eq!(driver.scan_for_tick()[..2], [1.0, 2.0]);
+    assert_eq!(driver.scan_for_tick().beams[..2], [1.0, 2.0]);
 }
 
 #[test]
@@ -237,7 +292,7 @@ fn a_scan_of_16384_beams_is_taken_whole() {
     let scan = scan_of(-std::f32::consts::PI, std::f32::consts::TAU / 16_384.0, &ranges);
     assert!(scan.len() < 98_304 - 1024, "a reader of DDS takes it whole");
     assert_eq!(said(&mut driver, LASER, &scan).refused, None);
-    assert_eq!(driver.scan_for_tick(), ranges);
+    assert_eq!(driver.scan_for_tick().beams, ranges);
 }
 
 #[test]

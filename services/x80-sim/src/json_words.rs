@@ -71,7 +71,7 @@ impl JsonWords {
     pub(crate) fn report(
         &self,
         (standard, custom, motor): (&StandardSensors, &CustomSensors, &MotorSensors),
-        scan: &[Option<f32>],
+        (scan, timing): (&[Option<f32>], Option<[f64; 2]>),
         motors: &[Motor; 6],
     ) -> Vec<u8> {
         let wheels = [self.robot.left, self.robot.right];
@@ -96,6 +96,7 @@ impl JsonWords {
             };
             Some((sensor.name.clone(), range))
         });
+        let timing = timing.filter(|_| !scan.is_empty());
         let report = Report {
             heard: Some(self.heard),
             wheels: Some(of(&|channel| turned(motor, motors, channel))),
@@ -105,6 +106,8 @@ impl JsonWords {
             battery_v: Some(volts(standard.motor_battery, MOTOR_SCALE_V)),
             odometry: None,
             scan: (!scan.is_empty()).then(|| scan.to_vec()),
+            scan_age_s: timing.map(|[age_s, _]| age_s),
+            scan_time_s: timing.map(|[_, time_s]| time_s),
         };
         line(&report)
     }

@@ -4,10 +4,12 @@
 //! drivers publish it: infinity by ROS's REP 117 ("no return") and in Slamtec's `rplidar_ros`. A beam through glass
 //! with nothing behind gives the same reading.
 
+use std::collections::VecDeque;
+
 use common::{
     geometry::Light,
     kinematics::Pose2,
-    mission::{Mission, Sensor},
+    mission::{LaserTiming, Mission, Sensor},
 };
 use glam::DVec2;
 
@@ -24,9 +26,15 @@ const LOST_OF_1000: f64 = 2.0;
 /// beams are perpendicular to the glass, falling fast beside it.
 const GLASS_LIMIT_DEG: f64 = 5.0;
 
+/// No simulated robot goes faster.
+const FASTEST_M_S: f64 = 5.0;
+
 #[derive(Clone, Debug)]
 pub(crate) struct Laser {
     sensor: Sensor,
+    timing: LaserTiming,
+    /// The body's newest poses with their times, seconds, as far back as a scan goes.
+    poses: VecDeque<(f64, Pose2)>,
     noise: Noise,
 }
 
@@ -34,23 +42,56 @@ impl Laser {
     /// None without a laser; the noise follows from `seed`.
     pub(crate) fn new(mission: &Mission, seed: u64) -> Option<Self> {
         let (_, sensor) = mission.laser()?;
-        Some(Self { sensor, noise: Noise::new(seed, Source::Laser) })
+        let timing = mission.simulation.physics().laser;
+        let noise = Noise::new(seed, Source::Laser);
+        Some(Self { sensor, timing, poses: VecDeque::new(), noise })
     }
 
     pub(crate) const fn every_ticks(&self) -> u64 {
         self.sensor.every_ticks
     }
 
-    /// Metres: none for nothing in reach, less than 0 for no reading.
-    pub(crate) fn scan(&mut self, world: &World, pose: Pose2) -> Vec<Option<f32>> {
+    /// The age of a scan's first beam and the time from it to the last when the scan is sent, seconds, as the robot states them; none if
+    /// it does not.
+    pub(crate) fn stated(&self) -> Option<[f64; 2]> {
+        let LaserTiming { delay_s, sweep_s, stated_share } = self.timing;
+        let stated = [delay_s + sweep_s, sweep_s].map(|seconds| stated_share * seconds);
+        (stated[0] > 0.0).then_some(stated)
+    }
+
+    /// Note where the body is at `time`, seconds.
+    pub(crate) fn follow(&mut self, time: f64, pose: Pose2) {
+        let oldest = time - self.timing.delay_s - self.timing.sweep_s;
+        while self.poses.get(1).is_some_and(|(at, _)| *at <= oldest) {
+            self.poses.pop_front();
+        }
+        self.poses.push_back((time, pose));
+    }
+
+    /// The body when `beam` of the scan that is sent at `time` was measured.
+    fn pose_at(&self, time: f64, beam: usize) -> Option<Pose2> {
+        let LaserTiming { delay_s, sweep_s, .. } = self.timing;
+        let left = 1.0 - self.sensor.mirrored(beam) as f64 / self.sensor.beams.max(1) as f64;
+        let at = time - delay_s - sweep_s * left;
+        let later = self.poses.partition_point(|(noted, _)| *noted < at);
+        Some(self.poses.get(later).or(self.poses.back())?.1)
+    }
+
+    /// The scan that a robot at `pose` sends at `time`. Metres: none for nothing in reach, less than 0 for no reading.
+    pub(crate) fn scan(&mut self, world: &World, pose: Pose2, time: f64) -> Vec<Option<f32>> {
         let mount = self.sensor.mount.on(pose);
         let height_m = world.heights().infrared_m;
         let (first, step) = self.sensor.fan();
         let (noise_m, noise_share) = self.sensor.model.beam_noise();
         let black_reach_m = self.sensor.model.black_reach_m();
-        let near = world.near(mount.position, self.sensor.reach_m, height_m);
+        let LaserTiming { delay_s, sweep_s, .. } = self.timing;
+        let went_m = (delay_s + sweep_s) * FASTEST_M_S;
+        let near = world.near(mount.position, self.sensor.reach_m + went_m, height_m);
+        let is_prompt = went_m == 0.0;
         let mut beams: Vec<_> = (0..self.sensor.beams)
             .map(|beam| {
+                let taken_at = if is_prompt { None } else { self.pose_at(time, beam) };
+                let mount = taken_at.map_or(mount, |pose| self.sensor.mount.on(pose));
                 let along = DVec2::from_angle(mount.heading + first + step * beam as f64);
                 let hit = near
                     .iter()
@@ -96,7 +137,7 @@ mod tests {
         )
         .unwrap();
         let mut laser = Laser::new(&mission, 1).unwrap();
-        let scan = laser.scan(&World::new(&mission), Pose2::default());
+        let scan = laser.scan(&World::new(&mission), Pose2::default(), 0.0);
         assert_eq!(scan.len(), 360);
         // The first beam looks back; the laser is 64 mm behind the centre, its deviation 5 cm at 2 m.
         let at = |degrees: usize| scan[(degrees + 180) % 360];
@@ -111,7 +152,7 @@ mod tests {
         let text = "target = [0, -5]\nrobot.model = 'turtlebot4'\nworld.wall = [{ points = [[-2, 1], [2, 1]] }, { points = [[2, -2], [2, 2]] }]\n";
         let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
         let mut laser = Laser::new(&mission, 1).unwrap();
-        let scan = laser.scan(&World::new(&mission), Pose2::default());
+        let scan = laser.scan(&World::new(&mission), Pose2::default(), 0.0);
         // The middle beam looks to the left. The laser is 40 mm behind the centre; its deviation is 1.5 cm at 2 m.
         let at = |degrees: usize| f64::from(scan[(degrees + 180 + 270) % 360].unwrap());
         assert!((at(90) - 1.0).abs() < 0.05, "{}", at(90));
@@ -126,12 +167,29 @@ mod tests {
                 "target = [0, -5]\nrobot.protocol = 'json'\nworld.wall = [{{ points = [[-2, 1], [2, 1]] }}]\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nroll_deg = {roll_deg}\n"
             );
             let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
-            Laser::new(&mission, 1).unwrap().scan(&World::new(&mission), Pose2::default())
+            Laser::new(&mission, 1).unwrap().scan(&World::new(&mission), Pose2::default(), 0.0)
         };
         let mut turned = scan(180.0);
         assert!(turned[180].is_some() && turned[900].is_none());
         turned.reverse();
         assert_eq!(turned, scan(0.0));
+    }
+
+    #[test]
+    fn a_late_laser_that_turns_measures_each_beam_from_where_the_robot_was_then() {
+        let text = "target = [3, 0]\nrobot.model = 'kobuki'\nworld.wall = [{ points = [[5, -9], [5, 9]] }]\n\
+            simulation.laser = { delay_s = 0.2, sweep_s = 0.1 }\n";
+        let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
+        let mut laser = Laser::new(&mission, 1).unwrap();
+        let [age_s, time_s] = laser.stated().unwrap();
+        assert!((age_s - 0.3).abs() < 1e-9 && time_s == 0.1);
+        // The robot goes along x at 1 m/s.
+        let at = |time: f64| Pose2 { position: DVec2::new(time, 0.0), heading: 0.0 };
+        (0..=300).map(|step| f64::from(step) / 100.0).for_each(|s| laser.follow(s, at(s)));
+        let scan = laser.scan(&World::new(&mission), at(3.0), 3.0);
+        // The 180th of 360 beams looks ahead: it was measured 0.25 s before, from 64 mm behind the centre.
+        assert!((scan[180].unwrap() - (5.0 - 2.75 + 0.064)).abs() < 0.15, "{:?}", scan[180]);
+        assert!(laser.poses.len() < 40);
     }
 
     /// The readings of a UST-10LX on a Jackal at the origin in a world, by the angle of the beam, degrees from straight ahead.
@@ -143,6 +201,7 @@ mod tests {
         let scan = laser.scan(
             &World::new(&mission),
             Pose2 { position: DVec2::new(-forward_m, 0.0), heading: 0.0 },
+            0.0,
         );
         move |degrees| scan[540 + (degrees * 4.0) as usize]
     }

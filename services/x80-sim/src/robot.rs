@@ -342,6 +342,9 @@ impl Robot {
             for step in 1..=steps as u64 {
                 self.step(span / steps);
                 self.time = from + span * step as f64 / steps;
+                if let Some(laser) = &mut self.laser {
+                    laser.follow(self.time, self.body.pose());
+                }
             }
             // Time is set exactly, so that a command that ends now has ended.
             self.time = until;
@@ -437,7 +440,7 @@ impl Robot {
         if let Some(laser) = &mut self.laser
             && self.tick.is_multiple_of(laser.every_ticks())
         {
-            self.scan = laser.scan(&self.world, self.body.pose());
+            self.scan = laser.scan(&self.world, self.body.pose(), self.time);
         } else {
             self.scan.clear();
         }
@@ -458,7 +461,8 @@ impl Robot {
     fn write(&self, due: Due, out: &mut Vec<u8>) {
         if let Some(json) = &self.json {
             let sensors = (&self.standard, &self.custom, &self.motor);
-            out.extend(json.report(sensors, &self.scan, &self.motors));
+            let stated = self.laser.as_ref().and_then(Laser::stated);
+            out.extend(json.report(sensors, (&self.scan, stated), &self.motors));
             return;
         }
         if self.arduino.is_some() {

@@ -77,6 +77,7 @@ fn number(rust: &str) -> &str {
         "u32" => "uint32",
         "u64" => "uint64",
         "i32" => "int32",
+        "i64" => "int64",
         "f32" => "float32",
         "f64" => "float64",
         other => other,

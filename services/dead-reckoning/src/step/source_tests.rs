@@ -99,6 +99,17 @@ fn each_second(robot: &mut Robot) -> Vec<FixSample> {
 }
 
 #[test]
+fn a_tick_that_is_given_again_takes_no_fixes_so_that_the_next_one_has_them() {
+    let mut reckoning = reckoning_of("target = [3, 0]");
+    let wheels = Robot::new(0.0).wind();
+    assert!(!reckoning.has_answered(&wheels));
+    reckoning.answer(&wheels, &Sources::default(), wheels.stamp.time());
+    assert!(reckoning.has_answered(&wheels));
+    let next = WheelSample { stamp: Stamp { tick: 2, ..wheels.stamp }, ..wheels };
+    assert!(!reckoning.has_answered(&next));
+}
+
+#[test]
 fn fixes_hold_the_pose_of_a_robot_with_unequal_wheels_and_teach_their_ratio() {
     let none = |_: &mut Robot| Vec::new();
     let off = rms(&mut Robot::new(0.005), &mut x80(), 600, none);

@@ -2,6 +2,7 @@
 
 use common::{
     clock::{MissionTime, Pace},
+    driver::LaserScan,
     inputs,
     samples::{
         CommandSample, ContactSample, CountsSample, HoldReason, InfraredSample, Order, PowerSample,
@@ -55,8 +56,7 @@ pub enum Effect {
         tick: u64,
         time: MissionTime,
         ranges: Vec<RangeReading>,
-        /// None if none came.
-        scan: Vec<f32>,
+        scan: LaserScan,
         /// The turn since the tick before, by the robot's own gyro.
         turn: Option<TurnSample>,
         wheels: WheelSample,

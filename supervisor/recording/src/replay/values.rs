@@ -80,6 +80,7 @@ impl Walk<'_> {
             "u32" => u32::decode(from)?.to_string(),
             "u64" => u64::decode(from)?.to_string(),
             "i32" => i32::decode(from)?.to_string(),
+            "i64" => i64::decode(from)?.to_string(),
             // The format has the digits that distinguish any two values.
             "f32" => format!("{:?}", f32::decode(from)?),
             "f64" => format!("{:?}", f64::decode(from)?),

@@ -120,7 +120,13 @@ impl Scene {
     fn scan(&self) -> Vec<u8> {
         let step = std::f32::consts::TAU / 360.0;
         let mut writer = Writer::default();
-        writer.u32(0).u32(0).text("scan").f32(0.0).f32(std::f32::consts::TAU).f32(step);
+        writer
+            .u32((self.ms / 1000) as u32)
+            .u32((self.ms % 1000 * MS) as u32)
+            .text("scan")
+            .f32(0.0)
+            .f32(std::f32::consts::TAU)
+            .f32(step);
         writer.f32(0.0).f32(0.1).f32(0.12).f32(3.5).length(360);
         let noise = if self.sees { self.ms as f32 * 1e-6 } else { 0.0 };
         (0..360).for_each(|_| {

@@ -126,3 +126,97 @@ fn a_laser_that_is_turned_and_off_the_centre_maps_a_wall_where_it_is() {
         assert!(is_there, "{row}: {wall:?} instead of {centred:?}");
     }
 }
+
+/// A robot that drives a circle of 0.5 m, seconds after the origin.
+fn circling(s: f64) -> Pose2 {
+    Pose2::default().along_arc(0.5 * s, s)
+}
+
+/// The scan of a laser on the circling robot in a room of 6 by 4 metres, with the tick at `s`.
+fn scan_in_room(s: f64, sweep: Sweep) -> Vec<f32> {
+    let beam = |beam: usize| {
+        let robot = circling(s + sweep.beam_time_ns(beam, 360) as f64 / 1e9);
+        let along = DVec2::from_angle(robot.heading + (beam as f64 - 180.0).to_radians());
+        let to = |at: f64, way: f64, wall: f64| (wall * way.signum() - at) / way;
+        let Pose2 { position, .. } = robot;
+        to(position.x, along.x, 3.0).min(to(position.y, along.y, 2.0)) as f32
+    };
+    (0..360).map(beam).collect()
+}
+
+#[test]
+fn a_scan_is_matched_and_mapped_where_it_was_taken_however_late_it_is_and_however_long_it_took() {
+    let text = "target = [0, 0]\nrobot.model = 'kobuki'\nrobot.rate_hz = 10\nperimeter = { width_m = 8, cells = 80 }\n\
+        [[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nchannel = 0\nforward_m = 0\nbearing_deg = 0\nmodel = 'rplidar-a1'\n";
+    let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
+    let beam_ns = 200_000_000 / 360;
+    let sweeps = [
+        Sweep::default(),
+        Sweep { first_beam_ns: -100_000_000, ..Sweep::default() },
+        Sweep { first_beam_ns: -300_000_000, ..Sweep::default() },
+        Sweep { first_beam_ns: 50_000_000, ..Sweep::default() },
+        Sweep { first_beam_ns: -200_000_000, beam_ns, first_beam: 0 },
+        Sweep { first_beam_ns: -250_000_000, beam_ns: -beam_ns, first_beam: 100 },
+    ];
+    for sweep in sweeps {
+        let mut mapper = Mapper::new(&mission);
+        for tick in 10..80_u64 {
+            let s = tick as f64 / 10.0;
+            let mut pose = circling(s);
+            // A correction of the pose on the way is no motion.
+            let moved = if tick > 40 { DVec2::new(0.0, 0.02) } else { DVec2::ZERO };
+            pose.position += moved;
+            let Pose2 { position, heading } = pose;
+            let mut pose = at(tick, position.x, position.y, heading);
+            (pose.map_from_odom, pose.v_m_s) = ([moved.x, moved.y, 0.0], 0.5);
+            pose.stamp.stamp_ns = tick * 100_000_000;
+            if sweep != Sweep::default() {
+                mapper.step(Input::Sweep(tick, sweep), pose.stamp.time());
+            }
+            let scan = scan_in_room(s, sweep);
+            let (ranges, contact, target) = (Vec::new(), None, None);
+            mapper.step(Input::Tick { pose, ranges, scan, contact, target }, pose.stamp.time());
+            let Some(fix) = mapper.take_fix() else {
+                assert!(tick < 15, "{sweep:?} {tick}");
+                continue;
+            };
+            let truth = circling(fix.capture_ns as f64 / 1e9);
+            let off = truth.position.distance(DVec2::new(fix.x_m, fix.y_m));
+            let turned = (fix.heading_rad - truth.heading).abs();
+            assert!(off < 0.015 && turned < 0.01, "{sweep:?} {tick}: {off} m, {turned} rad");
+        }
+        let reach = hazard_reach_m(&mission);
+        let frame = mapper.frame();
+        for (row, col) in (0..80).flat_map(|row| (0..80).map(move |col| (row, col))) {
+            let cell = Cell { col, row };
+            let there = frame.centre_of(cell);
+            let state = CellState::from_byte(mapper.state().cells()[frame.index(cell)]);
+            let to_wall = (3.0 - there.x.abs()).min(2.0 - there.y.abs());
+            let is_free_ground = state.is_hazard() && to_wall > reach + 0.1;
+            assert!(!is_free_ground, "{sweep:?}: {there} is {to_wall} m from a wall");
+        }
+    }
+}
+
+#[test]
+fn a_scan_of_impossible_times_is_left_out() {
+    for sweep in [
+        Sweep { first_beam_ns: i64::MIN, beam_ns: i64::MIN, first_beam: u64::MAX },
+        Sweep { first_beam_ns: -1_900_000_000, ..Sweep::default() },
+        Sweep { first_beam_ns: 0, beam_ns: i64::MAX, first_beam: 3 },
+        Sweep { first_beam_ns: 0, beam_ns: 1, first_beam: 360 },
+    ] {
+        let mut mapper = mapper();
+        let before = mapper.state().cells().to_vec();
+        for tick in 1..4 {
+            mapper.step(Input::Sweep(tick, sweep), MissionTime(0));
+            let mut pose = at(tick, 0.0, 0.0, 0.0);
+            (pose.stamp.stamp_ns, pose.v_m_s) = (tick * 100_000_000, 0.3);
+            let (ranges, scan) = (Vec::new(), vec![1.0; 360]);
+            let tick = Input::Tick { pose, ranges, scan, contact: None, target: None };
+            mapper.step(tick, pose.stamp.time());
+            assert!(mapper.take_fix().is_none());
+        }
+        assert_eq!(mapper.state().cells(), before, "{sweep:?}");
+    }
+}

@@ -1,0 +1,163 @@
+//! Scans at the time at which they were taken: the robot's poses of the newest ticks, and the beams of a sweep as if they had been
+//! measured at once.
+//!
+//! The poses are those of odometry, which no correction moves; the newest correction lays them into the mission's frame.
+//!
+//! A laser that turns measures its beams one after another while the robot moves. Each beam's end follows from the robot's pose at its
+//! own time. A scan from the pose in the middle of the sweep is interpolated from these ends, so that matcher and evidence grid, which
+//! look beams up by their bearing, need not know of it.
+
+use std::{collections::VecDeque, f64::consts::TAU, time::Duration};
+
+use common::{
+    geometry::wrap_angle,
+    kinematics::Pose2,
+    samples::{PoseSample, Sweep},
+};
+use glam::DVec2;
+
+use crate::reading::{Fan, Rows};
+
+const KEPT: Duration = Duration::from_secs(3);
+/// At a rate of 50 Hz they span [`KEPT`].
+const MOST_POSES: usize = 160;
+/// A beam between two ends that are farther apart, in beams, has no reading: something stands or ends between them.
+const APART_BEAMS: f64 = 3.0;
+/// Two ends whose ranges differ by more are of different surfaces, metres.
+const EDGE_M: f64 = 0.20;
+
+/// Oldest first, in the odometry's frame, with their mission times in nanoseconds. They are not saved: the first scans of a new process
+/// may be too old for it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Poses {
+    held: VecDeque<(i64, Pose2)>,
+    /// The robot stood still at the first pose of this process, as at the start of a mission, and so before.
+    stood_at: Option<(i64, Pose2)>,
+}
+
+impl Poses {
+    /// A tick given twice counts once.
+    pub(crate) fn add(&mut self, pose: &PoseSample) {
+        let ns = time_ns(pose);
+        if self.held.back().is_some_and(|(newest_ns, _)| *newest_ns >= ns) {
+            return;
+        }
+        let [x, y, turn] = pose.map_from_odom;
+        let Pose2 { position, heading } = pose.pose();
+        let position = DVec2::from_angle(-turn).rotate(position - DVec2::new(x, y));
+        let robot = Pose2 { position, heading: heading - turn };
+        if self.held.is_empty() && (pose.v_m_s, pose.omega_rad_s) == (0.0, 0.0) {
+            self.stood_at = Some((ns, robot));
+        }
+        self.held.push_back((ns, robot));
+        let oldest_ns = ns - KEPT.as_nanos() as i64;
+        let is_old = |(ns, _): &(i64, Pose2)| *ns < oldest_ns;
+        while self.held.len() > MOST_POSES || self.held.front().is_some_and(is_old) {
+            self.held.pop_front();
+        }
+    }
+
+    /// Interpolated, and extrapolated by at most the time between two ticks; none for an earlier or a later time.
+    fn at(&self, ns: i64) -> Option<Pose2> {
+        if let Some((_, pose)) = self.stood_at.filter(|(first_ns, _)| ns <= *first_ns) {
+            return Some(pose);
+        }
+        let last = self.held.len().max(2) - 1;
+        let later = self.held.partition_point(|(at, _)| *at < ns).clamp(1, last);
+        let ((from_ns, from), (to_ns, to)) = (self.held.get(later - 1)?, self.held.get(later)?);
+        let share = (ns - from_ns) as f64 / (to_ns - from_ns) as f64;
+        (-1.0..=2.0).contains(&share).then(|| Pose2 {
+            position: from.position.lerp(to.position, share),
+            heading: from.heading + share * (to.heading - from.heading),
+        })
+    }
+
+    /// The robot when the middle beam was measured, that time, and the beams as seen from there. None if the robot's pose at the time
+    /// of a beam is not known.
+    pub(crate) fn scan_at_once(
+        &self,
+        rows: &Rows,
+        pose: &PoseSample,
+        beams: Vec<f32>,
+        sweep: Sweep,
+    ) -> Option<(PoseSample, u64, Vec<f32>)> {
+        if !sweep.is_plausible(beams.len()) {
+            return None;
+        }
+        let [x, y, turn] = pose.map_from_odom;
+        let turned = DVec2::from_angle(turn);
+        let robot_at = |offset_ns: i64| {
+            let Pose2 { position, heading } = self.at(time_ns(pose) + offset_ns)?;
+            let position = DVec2::new(x, y) + turned.rotate(position);
+            Some(Pose2 { position, heading: heading + turn })
+        };
+        let middle_ns = sweep.middle_ns(beams.len());
+        // A scan from before the first tick shows where the robot still stood then; dead reckoning knows no earlier time.
+        let first_ns = self.stood_at.map_or(0, |(first_ns, _)| first_ns);
+        let capture_ns = (time_ns(pose) + middle_ns).max(first_ns) as u64;
+        let robot = robot_at(middle_ns)?;
+        let beams = match sweep.beam_ns {
+            0 => beams,
+            _ => {
+                let seen_from = |beam| {
+                    let robot = robot_at(sweep.beam_time_ns(beam, beams.len()))?;
+                    rows.scan(robot, &beams)
+                };
+                at_once(&rows.scan(robot, &beams)?, seen_from)?
+            }
+        };
+        let Pose2 { position, heading } = robot;
+        let robot = PoseSample { x_m: position.x, y_m: position.y, heading_rad: heading, ..*pose };
+        Some((robot, capture_ns, beams))
+    }
+}
+
+fn time_ns(pose: &PoseSample) -> i64 {
+    pose.stamp.time().0.min(i64::MAX as u64 / 2) as i64
+}
+
+/// The beams of `fan` if all had been measured from it, and not each from where `seen_from` says.
+fn at_once<'a>(fan: &Fan<'_>, seen_from: impl Fn(usize) -> Option<Fan<'a>>) -> Option<Vec<f32>> {
+    let count = fan.beams.len();
+    // Each beam's bearing, in beams, and range.
+    let end = |(beam, range): (usize, &f32)| {
+        let (own, range, place) = (seen_from(beam)?, f64::from(*range), beam as f64);
+        let along = DVec2::from_angle(own.first_rad + own.step_rad * place);
+        let to = own.origin + range * along - fan.origin;
+        let ends = (0.0..=fan.reach_m).contains(&range);
+        let (bearing, range) = if ends { (to, to.length()) } else { (along, range) };
+        let expected = fan.first_rad + fan.step_rad * place;
+        Some((place + wrap_angle(bearing.to_angle() - expected) / fan.step_rad, range))
+    };
+    let ends: Option<Vec<_>> = fan.beams.iter().enumerate().map(end).collect();
+    let mut ends = ends?;
+    let is_circle = (count as f64 * fan.step_rad - TAU).abs() < 0.5 * fan.step_rad;
+    if is_circle {
+        ends.extend(ends.first().map(|(place, range)| (place + count as f64, *range)));
+    }
+    let mut beams = vec![f32::NAN; count];
+    for pair in ends.windows(2) {
+        let [mut low, mut high] = [pair[0], pair[1]];
+        if low.0 > high.0 {
+            (low, high) = (high, low);
+        }
+        let apart = high.0 - low.0;
+        if !(0.0..=APART_BEAMS).contains(&apart) {
+            continue;
+        }
+        for place in low.0.ceil() as i64..=high.0.floor() as i64 {
+            let share = if apart > 0.0 { (place as f64 - low.0) / apart } else { 0.0 };
+            let range = match (low.1 - high.1).abs() <= EDGE_M && low.1.min(high.1) > 0.0 {
+                // Along a straight surface the reciprocal of the range changes evenly with a small angle.
+                true => (low.1.recip() * (1.0 - share) + high.1.recip() * share).recip(),
+                false if share < 0.5 => low.1,
+                false => high.1,
+            };
+            let place = if is_circle { place.rem_euclid(count as i64) } else { place };
+            if let Some(beam) = usize::try_from(place).ok().and_then(|place| beams.get_mut(place)) {
+                *beam = beam.min(range as f32);
+            }
+        }
+    }
+    Some(beams)
+}
