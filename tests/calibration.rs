@@ -53,6 +53,25 @@ fn unknown_wheels_are_found_within_three_deviations_and_written() {
 }
 
 #[test]
+fn the_response_of_a_stated_base_is_found_again() {
+    let folder = directory_of("response");
+    let folder_name = folder.path().to_str().unwrap();
+    for (delay_s, acceleration) in [(0.07, 0.8), (0.3, 0.6)] {
+        let stated =
+            format!("robot.response={{delay_s={delay_s},acceleration_m_s2={acceleration}}}");
+        let words =
+            ["calibrate", "--response", "--robot", "response", "--runs", folder_name, "--json"];
+        let said = printed(&[&words[..], &["--set", &stated]].concat());
+        let said: Value = serde_json::from_str(&said).unwrap();
+        let found = |key: &str| said[key].as_f64().unwrap();
+        assert!((found("delay_s") - delay_s).abs() < 0.03, "{said}");
+        assert!((found("acceleration_m_s2") / acceleration - 1.0).abs() < 0.15, "{said}");
+        assert!(found("delay_s_sd") > 0.0 && found("acceleration_m_s2_sd") > 0.0, "{said}");
+    }
+    assert_nothing_left("response");
+}
+
+#[test]
 fn without_a_wall_nothing_is_written() {
     let folder = directory_of("no-wall");
     let out = folder.path().join("calibration.toml");
