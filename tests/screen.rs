@@ -127,7 +127,8 @@ fn the_keys_of_top_do_what_they_say_and_the_mission_arrives() {
     let robot = "con-top";
     let mut screen = Screen::start(robot);
     screen.wait_for("is not running here");
-    let slow = ["--pace", "2", "--timeout", "600"];
+    // The robot is slow enough that all keys are pressed before it arrives.
+    let slow = ["--pace", "2", "--timeout", "600", "--set", "controller.speed_m_s=0.15"];
     let mut run = Run::start(robot, "obstacle-course", &slow);
     screen.wait_for("driving");
     screen.wait_for("dead-reckoning");
