@@ -24,7 +24,7 @@ DRUMS = [(1.6, 0.15, 0.3), (2.9, -0.9, 0.3), (2.7, 1.0, 0.25)]  # x, y, radius, 
 class Body:
     """Wheels that turn as told, late and as fast as they accelerate, and what is around them."""
 
-    def __init__(self, acceleration=1.0, delay=0.05):
+    def __init__(self, acceleration=20.0, delay=0.0):
         self.most, self.delay = acceleration / WHEEL, delay  # rad/s^2, s
         self.speeds = [0.0, 0.0]  # rad/s
         self.acting = [0.0, 0.0]
