@@ -10,8 +10,8 @@
 //! when a wheel has turned around: a controller whose robot turns away from the target changes direction every other tick. At
 //! [`SUSPECTED_AFTER`] the robot must stand: an X80 at 7 Hz 0.86 s after a motion began, and at rest 0.2 s later.
 //!
-//! Before that, [`super::response_fit`] looks for a response that explains the motion. If there is one, it replaces the stated one, and
-//! the link's log names it: a base that is heavier than stated is no fault.
+//! [`super::response_fit`] looks for a response that explains the motion, then and until the robot stands. If there is one, it replaces
+//! the stated one, and the link's log names it: a base that is heavier than stated is no fault.
 //!
 //! A commanded wheel that counts nothing is suspected after [`STILL_AFTER`]: a controller whose pose turns the wrong way changes
 //! direction too often for the other evidence. If its motor draws a held one's current, it is held, and not suspected
@@ -31,7 +31,7 @@ use common::{
 use super::{
     contact::{Contacts, HELD_AFTER},
     monitor::{Condition, Counts, Moment, Monitor, Observation},
-    response_fit::ResponseFit,
+    response_fit::{ResponseFit, Suspected},
 };
 
 /// The slowest judged motion, m/s at the rim.
@@ -47,6 +47,8 @@ const ROLLS_SHARE: f64 = 0.5;
 pub(crate) const SUSPECTED_AFTER: Duration = Duration::from_millis(550);
 /// Commands may be lost for so long.
 pub(crate) const STILL_AFTER: Duration = Duration::from_millis(1000);
+/// What raises a suspicion happens within so long before it, and a base stands within so long after it.
+const JUDGED: Duration = Duration::from_millis(1500);
 pub(crate) const MOST_JUMPS: usize = 3;
 pub(crate) const JUMPS_WITHIN: Duration = Duration::from_secs(2);
 /// A suspicion about jumps ends without one for so long.
@@ -283,17 +285,35 @@ impl Odometry {
             (&self.turn, Suspicion::Turn),
         ];
         let suspicion = all.into_iter().find(|(evidence, _)| suspected(evidence));
-        if let Some(suspicion) = suspicion.map(|(_, suspicion)| suspicion) {
-            if self.suspicion.is_none()
-                && let Some(found) = self.fit.explain(self.response, self.steers)
-                && found != self.response
-            {
+        if let Some((_, suspicion)) = suspicion {
+            self.suspicion.get_or_insert((suspicion, now));
+        }
+        self.look_for_explanation(now);
+    }
+
+    /// A suspicion ends when a response explains the motion that raised it, because the motion after it, until the robot stands, tells
+    /// more.
+    fn look_for_explanation(&mut self, now: MissionTime) {
+        let Some((suspicion, since)) = self.suspicion else {
+            return;
+        };
+        let channel = match suspicion {
+            Suspicion::Left => 0,
+            Suspicion::Right => 1,
+            Suspicion::Turn => 2,
+            Suspicion::Jumps => return,
+        };
+        if now.since(since) > JUDGED {
+            return;
+        }
+        let suspected = Suspected { channel, from_s: since.seconds() - JUDGED.as_secs_f64() };
+        if let Some(found) = self.fit.explain(self.response, self.steers, suspected) {
+            if found != self.response {
                 self.adopt(found);
                 self.found = Some(found);
-                self.clear_evidence();
-                return;
             }
-            self.suspicion.get_or_insert((suspicion, now));
+            self.suspicion = None;
+            self.clear_evidence();
         }
     }
 
@@ -426,5 +446,7 @@ impl Monitor for Odometry {
     }
 }
 
+#[cfg(test)]
+mod slow_bases;
 #[cfg(test)]
 mod tests;

@@ -11,23 +11,42 @@ use common::{
     mission::{ModelledSpeed, Response},
 };
 
-/// Commands and counts are kept for so long, seconds.
+/// Counts are kept for so long, seconds.
 const KEPT_S: f64 = 5.0;
+/// Commands are kept for so much longer, seconds: the wheels may be rolling when the oldest counts are taken.
+const BEFORE_S: f64 = 2.0;
 /// Whatever is sent and received, no more is kept.
 const MOST_KEPT: usize = 512;
-const DELAYS_S: usize = 21;
-const DELAY_STEP_S: f64 = 0.05;
-/// Speeds grow by so much in a second: the slowest is that of a heavy base that a person pushes in vain.
-const ACCELERATIONS_M_S2: [f64; 10] = [0.15, 0.2, 0.3, 0.4, 0.6, 0.9, 1.4, 2.2, 4.0, f64::INFINITY];
+const DEAD_TIMES: u32 = 21;
+const DEAD_TIME_STEP_S: f64 = 0.05;
+/// Speeds grow by so much in a second: the slowest is that of a heavy base that a person pushes in vain, and the last but one is
+/// [`ACCELERATION_RATIO`] to the power of [`ACCELERATIONS`] times as much. The last is infinite.
+const LEAST_ACCELERATION_M_S2: f64 = 0.15;
+const ACCELERATION_RATIO: f64 = 1.25;
+const ACCELERATIONS: i32 = 16;
 /// The least square of the correlation of a wheel's way with that of the response.
 const EXPLAINED: f64 = 0.8;
 /// The factors that real wheels have.
 const FACTORS: std::ops::RangeInclusive<f64> = 0.5..=1.5;
 /// A wheel that was to roll less, metres, tells nothing.
-const LEAST_M: f64 = 0.1;
+const LEAST_M: f64 = 0.04;
+/// The most of the motion of that time, squares of counts, that is not as modelled.
+const UNEXPLAINED: f64 = 0.25;
+
+/// The square of the share by which two wheels that are told the same differ.
+const DIFFERENT: f64 = 0.05 * 0.05;
 
 /// Left, right, and their difference.
 const CHANNELS: usize = 3;
+const TURN: usize = 2;
+
+/// What a response must explain to end a suspicion, and not only what a wheel rolled before it died.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Suspected {
+    pub(super) channel: usize,
+    /// What raised the suspicion happened from then on.
+    pub(super) from_s: f64,
+}
 
 fn channels([left, right]: [f64; 2]) -> [f64; CHANNELS] {
     [left, right, right - left]
@@ -48,11 +67,11 @@ impl ResponseFit {
     }
 
     pub(super) fn commanded(&mut self, counts: [f64; 2], now: MissionTime) {
-        keep(&mut self.commands, (now.seconds(), counts));
+        keep(&mut self.commands, (now.seconds(), counts), KEPT_S + BEFORE_S);
     }
 
     pub(super) fn turned(&mut self, counts: Option<[f64; 2]>, now: MissionTime) {
-        keep(&mut self.turned, (now.seconds(), counts));
+        keep(&mut self.turned, (now.seconds(), counts), KEPT_S);
     }
 
     pub(super) fn reset(&mut self) {
@@ -60,57 +79,122 @@ impl ResponseFit {
         self.turned.clear();
     }
 
-    /// The response that explains the motion best, with the lag of `stated`; none if none does. Each wheel that does not drive is left
-    /// out.
-    pub(super) fn explain(&self, stated: Response, steers: bool) -> Option<Response> {
-        let delays = (0..DELAYS_S).map(|step| step as f64 * DELAY_STEP_S);
-        let candidates = delays.flat_map(|delay_s| {
-            ACCELERATIONS_M_S2.into_iter().map(move |acceleration| (delay_s, acceleration))
+    /// The response that explains the motion best, with the lag of `stated`, and also what is suspected; none if none does. Each wheel that
+    /// does not drive is left out.
+    pub(super) fn explain(
+        &self,
+        stated: Response,
+        steers: bool,
+        suspected: Suspected,
+    ) -> Option<Response> {
+        let candidates = (0..DEAD_TIMES).flat_map(|step| {
+            let dead_time_s = f64::from(step) * DEAD_TIME_STEP_S;
+            let accelerations = (0..ACCELERATIONS)
+                .map(|power| LEAST_ACCELERATION_M_S2 * ACCELERATION_RATIO.powi(power))
+                .chain([f64::INFINITY]);
+            accelerations.map(move |acceleration| (dead_time_s, acceleration))
         });
-        let explained = candidates.filter_map(|(delay_s, acceleration_m_s2)| {
-            let explained = self.explained(delay_s + stated.lag_s, acceleration_m_s2, steers)?;
-            Some((explained, Response { delay_s, acceleration_m_s2, ..stated }))
+        let explained = candidates.filter_map(|(dead_time_s, acceleration_m_s2)| {
+            let explained = self.explained(dead_time_s, acceleration_m_s2, steers, suspected)?;
+            let lag_s = stated.lag_s.min(dead_time_s);
+            let delay_s = dead_time_s - lag_s;
+            Some((explained, Response { delay_s, lag_s, acceleration_m_s2, ..stated }))
         });
         let best = explained.max_by(|(one, _), (other, _)| one.total_cmp(other));
         best.filter(|(explained, _)| *explained >= EXPLAINED).map(|(_, response)| response)
     }
 
-    /// The least share of a channel's motion that the response explains; none if a channel moved by no factor of it, or none was to.
-    fn explained(&self, dead_time_s: f64, acceleration: f64, steers: bool) -> Option<f64> {
+    /// The least share of a channel's motion that the response explains; none if a channel moved by no factor of it, or
+    /// otherwise in the time that raised the suspicion, or the suspected one was hardly to move.
+    fn explained(
+        &self,
+        dead_time_s: f64,
+        acceleration: f64,
+        steers: bool,
+        suspected: Suspected,
+    ) -> Option<f64> {
         let change = acceleration * self.counts_per_m;
         let mut wheels = [(); 2].map(|()| ModelledSpeed::new(dead_time_s, change));
-        let first = self.turned.front()?.0;
+        // The oldest counts say only when the others begin.
+        let mut intervals = self.turned.iter();
+        let first = intervals.next()?.0;
         for (wheel, speed) in wheels.iter_mut().enumerate() {
             speed.go_on(self.commands.front()?.0.min(first));
             self.commands.iter().for_each(|(at, counts)| speed.command(*at, counts[wheel]));
+            speed.go_on(first);
         }
-        let mut sums = [[0.0; 4]; CHANNELS];
-        for &(until, turned) in &self.turned {
+        let mut all = [Motion::default(); CHANNELS];
+        let mut judged_all = all;
+        for &(until, turned) in intervals {
             let modelled = channels(wheels.each_mut().map(|wheel| wheel.go_on(until)));
             let Some(turned) = turned else {
                 continue;
             };
-            for ((sums, model), turned) in sums.iter_mut().zip(modelled).zip(channels(turned)) {
-                let terms = [model.abs(), model * model, model * turned, turned * turned];
-                sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+            for (channel, turned) in channels(turned).into_iter().enumerate() {
+                all[channel].add(modelled[channel], turned);
+                if until >= suspected.from_s {
+                    judged_all[channel].add(modelled[channel], turned);
+                }
             }
         }
-        let channels = if steers { 1 } else { CHANNELS };
-        let tells = |way: f64| way >= LEAST_M * self.counts_per_m;
-        let told = sums[..channels].iter().filter(|[way, ..]| tells(*way));
-        told.map(|&[_, model, both, turned]| {
-            let factor = both / model;
-            (FACTORS.contains(&factor) && turned > 0.0).then(|| both * both / (model * turned))
-        })
-        .reduce(|one, other| Some(one?.min(other?)))
-        .flatten()
+        let mut least: Option<f64> = None;
+        let motions = all.iter().zip(&judged_all).enumerate();
+        for (channel, (all, judged)) in motions.take(if steers { 1 } else { CHANNELS }) {
+            if all.way >= LEAST_M * self.counts_per_m {
+                let factor = all.both / all.model;
+                if !FACTORS.contains(&factor) || all.turned <= 0.0 || !judged.is_as_modelled(factor)
+                {
+                    return None;
+                }
+                let explained = all.both * all.both / (all.model * all.turned);
+                least = Some(least.map_or(explained, |least| least.min(explained)));
+            } else if channel == suspected.channel {
+                // A difference that is modelled as small may be that of two wheels.
+                let wheels = judged_all[0].turned + judged_all[1].turned;
+                if channel != TURN || judged.unlike(1.0) > DIFFERENT * wheels + judged.rounding {
+                    return None;
+                }
+            }
+        }
+        least
     }
 }
 
-fn keep<T>(kept: &mut VecDeque<(f64, T)>, new: (f64, T)) {
+/// Sums over the intervals of a channel: of the modelled way, of the squares of the modelled and the counted way, and of their product,
+/// counts.
+#[derive(Clone, Copy, Debug, Default)]
+struct Motion {
+    way: f64,
+    model: f64,
+    turned: f64,
+    both: f64,
+    /// Each interval begins and ends between two counts of each wheel.
+    rounding: f64,
+}
+
+impl Motion {
+    fn add(&mut self, model: f64, turned: f64) {
+        self.way += model.abs();
+        self.model += model * model;
+        self.turned += turned * turned;
+        self.both += model * turned;
+        self.rounding += 1.0;
+    }
+
+    /// The sum of squares of what was counted less `factor` times what was modelled.
+    fn unlike(&self, factor: f64) -> f64 {
+        self.turned - 2.0 * factor * self.both + factor * factor * self.model
+    }
+
+    fn is_as_modelled(&self, factor: f64) -> bool {
+        self.unlike(factor) <= UNEXPLAINED * self.model.max(self.turned) + self.rounding
+    }
+}
+
+fn keep<T>(kept: &mut VecDeque<(f64, T)>, new: (f64, T), for_s: f64) {
     let now = new.0;
     kept.push_back(new);
-    while kept.len() > MOST_KEPT || kept.front().is_some_and(|(at, _)| now - at > KEPT_S) {
+    while kept.len() > MOST_KEPT || kept.front().is_some_and(|(at, _)| now - at > for_s) {
         kept.pop_front();
     }
 }
@@ -143,7 +227,8 @@ mod tests {
                 wheel.command(now, speed);
             }
         }
-        fit.explain(Response::X80, false)
+        let suspected = Suspected { channel: 0, from_s: 3.0 };
+        fit.explain(Response::X80, false, suspected)
     }
 
     #[test]

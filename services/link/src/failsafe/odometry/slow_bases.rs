@@ -1,0 +1,108 @@
+//! Bases that answer late and accelerate slowly, which nobody stated, and encoders that die on them.
+
+use std::path::Path;
+
+use common::mission::ModelledSpeed;
+
+use super::*;
+
+const PERIOD_S: f64 = 0.1;
+const COUNTS_PER_M: f64 = 7162.0;
+const MISSION: &str = "target = [3, 0]
+[robot]
+protocol = 'json'
+wheel_radius_m = 0.08
+track_m = 0.3
+radius_m = 0.2
+top_speed_m_s = 0.6
+counts_per_turn = 3600.0
+rate_hz = 10
+[[robot.sensor]]
+name = 'front'
+kind = 'cone'
+forward_m = 0.2
+bearing_deg = 0";
+
+/// When a robot was suspected and when it was no longer, seconds.
+type Suspected = Vec<(f64, bool)>;
+
+/// Drive a base for 40 s, on, to both sides and backwards by turns, and let it stand while it is suspected. Its frames come up to 40 ms
+/// late, and so do commands. The left encoder counts nothing from `dies_s` on.
+fn drive([delay_s, acceleration]: [f64; 2], seed: u64, dies_s: f64) -> Suspected {
+    let mission = Mission::parse(MISSION, Path::new("test.toml")).unwrap();
+    let mut odometry = Odometry::new(&mission);
+    let mut state = seed;
+    let mut random = || {
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f64 / f64::from(1 << 24)
+    };
+    for _ in 0..9 {
+        random();
+    }
+    let change = acceleration * COUNTS_PER_M;
+    let mut wheels = [(); 2].map(|()| ModelledSpeed::new(delay_s, change));
+    for wheel in &mut wheels {
+        wheel.go_on(0.0);
+    }
+    let mut rolled = [0.0; 2];
+    let mut suspected = Vec::new();
+    let mut command = [0.0; 2];
+    let mut changes_s = 0.0;
+    for tick in 1..400 {
+        let now = f64::from(tick) * PERIOD_S + 0.04 * random();
+        let turned = wheels.each_mut().map(|wheel| wheel.go_on(now));
+        rolled[1] += turned[1];
+        rolled[0] += if now < dies_s { turned[0] } else { 0.0 };
+        let counts = rolled
+            .map(|counts| (counts as i64).rem_euclid(i64::from(common::wire::COUNT_CYCLE)) as u16);
+        odometry.plausible(counts, MissionTime::from_seconds(now));
+        let is_suspected = odometry.suspicion.is_some();
+        if suspected.last().is_some_and(|(_, before)| *before) != is_suspected {
+            suspected.push((now, is_suspected));
+        }
+        if now >= changes_s {
+            changes_s = now + 0.2 + 1.3 * random();
+            let speed = 0.1 + 0.4 * random();
+            command = match (4.0 * random()) as u32 {
+                0 | 1 => [speed, speed * (0.6 + 0.4 * random())],
+                2 => [-0.4 * speed, 0.4 * speed],
+                _ => [0.4 * speed, -0.4 * speed],
+            };
+        }
+        let tells = if is_suspected { [0.0; 2] } else { command.map(|speed| speed * COUNTS_PER_M) };
+        odometry.commanded(tells.map(|counts| counts as i16), MissionTime::from_seconds(now));
+        let heard = now + 0.04 * random();
+        for (wheel, counts) in wheels.iter_mut().zip(tells) {
+            wheel.command(heard, counts);
+        }
+    }
+    suspected
+}
+
+/// The bases of 20 cells.
+fn bases() -> impl Iterator<Item = [f64; 2]> {
+    let delays = [0.0, 0.1, 0.25, 0.4].into_iter();
+    delays.flat_map(|delay| [0.3, 0.6, 1.25, 3.0, 5.0].map(|acceleration| [delay, acceleration]))
+}
+
+#[test]
+fn no_slow_or_late_base_is_given_up_though_nobody_stated_it() {
+    for base in bases() {
+        for seed in 0..20 {
+            let suspected = drive(base, seed, f64::INFINITY);
+            assert!(suspected.last().is_none_or(|(_, is_so)| !is_so), "{base:?} {seed}");
+        }
+    }
+}
+
+#[test]
+fn an_encoder_that_dies_on_a_slow_base_is_suspected_for_good() {
+    for base in bases() {
+        for seed in 0..20 {
+            let last = drive(base, seed, 20.0).last().copied();
+            let in_time = last.is_some_and(|(at, is_so)| is_so && at < 24.0);
+            assert!(in_time, "{base:?} {seed}: {last:?}");
+        }
+    }
+}
