@@ -6,7 +6,7 @@
 //! | [`planner`] | a planner to compare with, and the guidance along its way |
 //! | [`wavefront`] | the shortest path over the map, planned anew in every tick; pure |
 //! | [`bug`] | Bug2: straight to the target, and around hazards; pure |
-//! | [`shell`], [`stage`] | the process of either of them; the command that it is started by |
+//! | [`process`] | the process of either of them, and the command that it is started by |
 //!
 //! Both take unknown cells for free, like the harmonic planner. Neither looks around before it drives: that is the harmonic
 //! planner's active sensing, with the evidential method.
@@ -14,8 +14,7 @@
 pub mod belief;
 pub mod bug;
 pub mod planner;
-pub mod shell;
-pub mod stage;
+pub mod process;
 #[cfg(test)]
 mod testing;
 pub mod wavefront;

@@ -53,7 +53,7 @@ use std::{fmt::Display, fs, process::ExitCode, time::Instant};
 use console::output::{print, write_stderr};
 use serde::Serialize;
 
-use crate::error::Failure;
+use crate::error::Result;
 use report::Report;
 use series::Series;
 use stop_time_table::StopTimeTable;
@@ -62,7 +62,7 @@ use stop_time_table::StopTimeTable;
 /// behind; or if a robot with a fault did not come to rest in time.
 const NOT_CLEAN: u8 = 8;
 
-pub fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     let options = Options::of(arguments)?;
     if arguments.robot_faults.is_some() {
         let kept = |table: &StopTimeTable| [table.is_kept(); 2];
@@ -80,9 +80,9 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
 /// right, and whether the command succeeded.
 fn finish<R: Display + Serialize>(
     options: &Options,
-    ended: Result<R, Failure>,
+    ended: Result<R>,
     judge: fn(&R) -> [bool; 2],
-) -> Result<ExitCode, Failure> {
+) -> Result<ExitCode> {
     let directory = options.directory.display();
     let result = match ended {
         Ok(result) => result,
@@ -103,7 +103,7 @@ fn finish<R: Display + Serialize>(
 }
 
 /// Attack missions, one after the other, until enough signals are sent.
-fn run(options: &Options) -> Result<Report, Failure> {
+fn run(options: &Options) -> Result<Report> {
     let began = Instant::now();
     let mut series = Series::new(options)?;
     while !series.is_over() {

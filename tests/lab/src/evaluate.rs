@@ -1,30 +1,26 @@
 //! `firsthand evaluate`: how often a robot arrives, on many worlds, judged by the ground truth.
 
+mod report;
+
 use std::{
     num::NonZero,
     path::{Path, PathBuf},
 };
 
 use clap::Args;
-use common::mission::{Mission, Model};
-use console::{
-    failure::Failure,
-    output::{print_text, write_stderr},
-};
+use common::mission::Mission;
+use console::output::{print_text, write_stderr};
 use glam::DVec2;
 use processes::planner_executable;
-use serde_json::{Value, json};
 
+use self::report::Report;
 use crate::{
-    baselines::stage::BASELINES,
+    baselines::process::BASELINES,
+    error::Result,
     missions::{
-        directory,
-        report::{self, Report},
+        HARMONIC, Setting,
         results::Results,
-        runner::{self, NoiseSeeds, Plan, processors},
-        setting::{HARMONIC, Setting},
-        statistics::Estimate,
-        totals::Totals,
+        runner::{self, NoiseSeeds, Plan},
         trial::BodySize,
     },
     worlds::{self, Ends, Worlds},
@@ -54,7 +50,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     repeats: u64,
     /// evidential or paper; several, with commas, are compared on the same worlds.
-    #[arg(long, value_delimiter = ',')]
+    #[arg(long, value_delimiter = ',', default_value = "evidential")]
     method: Vec<String>,
     /// harmonic; the baselines wavefront (shortest paths) and bug (Bug2); any executable of a planner. Several, with
     /// commas, are compared on the same worlds.
@@ -97,54 +93,43 @@ pub struct Arguments {
 /// Free ground on both sides of the body in the narrowest way of a world, metres.
 const MARGIN_M: f64 = 0.05;
 
-pub fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     let settings = settings(arguments)?;
     let described = described(arguments, &settings);
-    let directory = directory::claim(&arguments.out, &described, arguments.resume)?;
-    let found = worlds::find(
-        &arguments.worlds,
-        arguments.count,
-        arguments.seed,
-        arguments.ends(),
-        &body(&arguments.robot, &arguments.set)?,
-    )?;
+    let mut results = Results::open(&arguments.out, &described, arguments.resume)?;
+    let Arguments { start, target, seed, .. } = *arguments;
+    let ends = start.zip(target).map(|([x, y, heading_deg], target)| Ends {
+        start: DVec2::new(x, y),
+        heading: heading_deg.to_radians(),
+        target: target.into(),
+    });
+    let body = body(&arguments.robot, &arguments.set)?;
+    // A world that is damaged is no error of the mission on the command line.
+    let found = worlds::find(&arguments.worlds, arguments.count, seed, ends, &body)
+        .map_err(|error| error.to_string())?;
+    write_stderr(&format!(
+        "{} worlds, each crossed by the body on a grid of 5 cm ({} others were left out)\n",
+        found.trials.len(),
+        found.unsolvable
+    ));
     let plan = Plan {
         trials: found.trials,
         settings,
         repeats: arguments.repeats,
-        noise: NoiseSeeds::Derived(arguments.seed),
-        jobs: processors(arguments.jobs),
+        noise: NoiseSeeds::Derived(seed),
+        jobs: arguments.jobs,
         pictured_seed: None,
         calibrates: arguments.calibrate,
-        directory,
     };
-    write_stderr(&format!(
-        "{} worlds, each crossed by the body on a grid of 5 cm ({} others were left out)\n",
-        plan.trials.len(),
-        found.unsolvable
-    ));
-    let mut results = Results::open(&plan.directory)?;
     runner::run(&plan, &mut results, "")?;
     results.sort()?;
-    let page = directory::save_page(&plan.directory, &report::html(&plan, &results, &described))?;
-    let report = Report::new(&plan, results.rows.rows());
-    let text = if arguments.json {
-        format!("{}\n", object(&report))
+    let report = Report::new(&plan.settings, &results);
+    let page = report.save_page(&described)?;
+    Ok(print_text(&if arguments.json {
+        format!("{}\n", report.object())
     } else {
-        format!("{report}rows and pictures: {}\n", page.display())
-    };
-    Ok(print_text(&text)?)
-}
-
-impl Arguments {
-    fn ends(&self) -> Option<Ends> {
-        let ([x, y, heading_deg], [to_x, to_y]) = (self.start?, self.target?);
-        Some(Ends {
-            start: DVec2::new(x, y),
-            heading: heading_deg.to_radians(),
-            target: DVec2::new(to_x, to_y),
-        })
-    }
+        format!("{}rows and pictures: {}\n", report.text(), page.display())
+    })?)
 }
 
 /// `N` numbers between commas, none beyond 1000 km.
@@ -156,128 +141,79 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
         .ok_or_else(|| format!("give {N} numbers with commas between them"))
 }
 
+/// The command that gives these rows.
 fn described(arguments: &Arguments, settings: &[Setting]) -> String {
-    let worlds = &arguments.worlds;
+    let Arguments { worlds, seed, repeats, robot, .. } = arguments;
     let count = arguments.count.map_or(String::new(), |count| format!(" --count {count}"));
-    let ends = match (arguments.start, arguments.target) {
-        (Some([x, y, deg]), Some([to_x, to_y])) => {
-            format!(" --start {x},{y},{deg} --target {to_x},{to_y}")
-        }
-        _ => String::new(),
-    };
-    let settings: Vec<String> = settings
-        .iter()
-        .map(|setting| format!("{}: {}", setting.name, setting.set.join(" ")))
-        .collect();
+    let ends = arguments.start.zip(arguments.target);
+    let ends = ends.map_or(String::new(), |([x, y, deg], [to_x, to_y])| {
+        format!(" --start {x},{y},{deg} --target {to_x},{to_y}")
+    });
+    let calibrate = if arguments.calibrate { " --calibrate" } else { "" };
+    let settings: Vec<_> =
+        settings.iter().map(|it| format!("{}: {}", it.name, it.set.join(" "))).collect();
+    let settings = settings.join("; ");
     format!(
-        "firsthand evaluate --worlds {worlds}{ends}{count} --seed {} --repeats {} --robot {}{} [{}]",
-        arguments.seed,
-        arguments.repeats,
-        arguments.robot,
-        if arguments.calibrate { " --calibrate" } else { "" },
-        settings.join("; ")
+        "firsthand evaluate --worlds {worlds}{ends}{count} --seed {seed} --repeats {repeats} --robot {robot}{calibrate} [{settings}]"
     )
 }
 
 /// The methods to compare, each as a name and its assignments: each method with each of the sensors, but the paper's method
 /// once, because it has only the sonar.
 fn methods(arguments: &Arguments) -> Vec<(String, Vec<String>)> {
-    let methods = match &arguments.method[..] {
-        [] => vec!["evidential".to_owned()],
-        methods => methods.to_vec(),
-    };
-    let with_sensors = |method: String| {
+    let mut methods = Vec::new();
+    for method in &arguments.method {
         let set = format!("method='{method}'");
         if arguments.sensors.is_empty() || method == "paper" {
-            return vec![(method, vec![set])];
+            methods.push((method.clone(), vec![set]));
+            continue;
         }
-        let sensors = arguments.sensors.iter();
-        sensors
-            .map(|sensors| {
-                let sensed = format!("sensors='{sensors}'");
-                (format!("{method} {sensors}"), vec![set.clone(), sensed])
-            })
-            .collect()
-    };
-    methods.into_iter().flat_map(with_sensors).collect()
+        for sensors in &arguments.sensors {
+            let sensed = format!("sensors='{sensors}'");
+            methods.push((format!("{method} {sensors}"), vec![set.clone(), sensed]));
+        }
+    }
+    methods
 }
 
 /// The settings to compare, each planner by each method; the others are compared with the first.
-fn settings(arguments: &Arguments) -> Result<Vec<Setting>, Failure> {
-    let mut set = vec![
-        format!("simulation.realism='{}'", arguments.realism),
-        format!("robot.model='{}'", arguments.robot),
-    ];
-    set.extend(arguments.set.iter().cloned());
+fn settings(arguments: &Arguments) -> Result<Vec<Setting>> {
+    let Arguments { realism, robot, planner: planners, .. } = arguments;
+    let common = [format!("simulation.realism='{realism}'"), format!("robot.model='{robot}'")];
     let methods = methods(arguments);
     let mut settings = Vec::new();
-    for planner in &arguments.planner {
-        let executable = executable(planner)?;
+    for planner in planners {
+        let mut executable = None;
+        if planner != HARMONIC {
+            // A missing executable is reported before anything starts.
+            planner_executable::find_planner(Path::new(planner), BASELINES)?;
+            let value = toml::Value::from(&**planner);
+            executable = Some(format!("planner.executable={value}"));
+        }
         for (method, chosen) in &methods {
-            let mut set = [&set[..], chosen].concat();
+            let mut set = [&common, &*arguments.set, chosen].concat();
             set.extend(executable.clone());
-            settings.push(Setting {
-                name: match (&arguments.planner[..], &methods[..]) {
-                    ([_], _) if planner == HARMONIC => method.clone(),
-                    (_, [_]) => planner.clone(),
-                    _ => format!("{planner} {method}"),
-                },
-                planner: planner.clone(),
-                set,
-            });
+            let name = match (&planners[..], &methods[..]) {
+                ([_], _) if planner == HARMONIC => method.clone(),
+                (_, [_]) => planner.clone(),
+                _ => format!("{planner} {method}"),
+            };
+            settings.push(Setting { name, planner: planner.clone(), set });
         }
     }
     for versus in &arguments.versus {
-        let first = settings[0].clone();
-        let more = versus.split(',').map(str::to_owned);
-        settings.push(Setting {
-            name: versus.clone(),
-            set: first.set.into_iter().chain(more).collect(),
-            ..first
-        });
+        let mut setting = Setting { name: versus.clone(), ..settings[0].clone() };
+        setting.set.extend(versus.split(',').map(str::to_owned));
+        settings.push(setting);
     }
     Ok(settings)
 }
 
-/// The assignment for the planner of that name; none for the planner of `firsthand`.
-fn executable(planner: &str) -> Result<Option<String>, Failure> {
-    if planner == HARMONIC {
-        return Ok(None);
-    }
-    // A missing executable is reported before anything starts.
-    planner_executable::find_planner(Path::new(planner), BASELINES)?;
-    let value = toml::Value::from(planner);
-    Ok(Some(format!("planner.executable={value}")))
-}
-
 /// The body that must fit through every world, by the robot's model and the changes in `set`.
-fn body(robot: &str, set: &[String]) -> Result<BodySize, Failure> {
+fn body(robot: &str, set: &[String]) -> Result<BodySize> {
     let radius = set.iter().rfind(|assignment| assignment.starts_with("robot.radius_m"));
     let radius = radius.map_or("", String::as_str);
     let text = format!("target = [1, 0]\nrobot.model = '{robot}'\n{radius}");
-    let mission = Mission::parse(&text, Path::new("--robot"))?;
-    let _: Model = mission.robot.model;
-    Ok(BodySize { radius_m: mission.body().radius_m, margin_m: MARGIN_M })
-}
-
-fn object(report: &Report) -> Value {
-    let mut objects = report.totals.iter().map(Totals::object);
-    let mut object = objects.next().unwrap_or_default();
-    let interval = |of: Estimate| [of.value, of.low, of.high];
-    let others: Vec<Value> = objects
-        .zip(&report.comparisons)
-        .map(|(totals, comparison)| {
-            json!({
-                "totals": totals,
-                "pairs": comparison.pairs,
-                "success_change": interval(comparison.success),
-                "collision_change": interval(comparison.collision),
-                "time_ratio": comparison.time_ratio,
-            })
-        })
-        .collect();
-    if !others.is_empty() {
-        object["versus"] = others.into();
-    }
-    object
+    let radius_m = Mission::parse(&text, Path::new("--robot"))?.body().radius_m;
+    Ok(BodySize { radius_m, margin_m: MARGIN_M })
 }

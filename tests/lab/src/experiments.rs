@@ -3,24 +3,24 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`table`] | THE table of experiments: their missions, and the paper's report of each; the methods |
-//! | [`claims`] | the findings of one experiment by one method; the paper's claims, and whether they hold here |
-//! | [`report`] | the results as text, a page and JSON objects |
+//! | `table` | the tables `table.csv`, experiments with their missions and the paper's report of each, and `claims.csv`, the paper's claims |
+//! | `report` | the results as text, a page and JSON objects |
 
-pub mod claims;
-pub mod report;
-pub mod table;
+mod report;
+mod table;
 
-use std::{fmt::Write as _, num::NonZero, path::PathBuf};
+use std::{num::NonZero, path::PathBuf};
 
 use clap::Args;
-use console::{failure::Failure, output::print_text};
+use console::output::print_text;
 
-use crate::missions::{
-    directory,
-    results::Results,
-    runner::{self, NoiseSeeds, Plan, processors},
-    setting::{HARMONIC, Setting},
+use crate::{
+    error::Result,
+    missions::{
+        HARMONIC, Setting,
+        results::Results,
+        runner::{self, NoiseSeeds, Plan},
+    },
 };
 use report::Report;
 use table::METHODS;
@@ -57,46 +57,39 @@ const FIRST_SEED: u64 = 1;
 /// The radio's outage except with laboratory realism. The paper's link fades; the paper gives no number.
 const OUTAGE: &str = "simulation.radio.outage_share=0.2";
 
-pub fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
+    let Arguments { seeds, realism, .. } = arguments;
     let chosen = table::named(&arguments.only)?;
-    let names: Vec<_> = chosen.iter().map(|it| it.name).collect();
-    let realism = &arguments.realism;
+    let names: Vec<_> = chosen.iter().map(|it| &*it.name).collect();
     // The command that gives these rows.
     let described = format!(
-        "firsthand experiments --seeds {} --only {} --realism {realism}",
-        arguments.seeds,
+        "firsthand experiments --seeds {seeds} --only {} --realism {realism}",
         names.join(",")
     );
-    let directory = directory::claim(&arguments.out, &described, arguments.resume)?;
-    let mut results = Results::open(&directory)?;
+    let mut results = Results::open(&arguments.out, &described, arguments.resume)?;
     for (method, own) in METHODS {
-        let mut set: Vec<String> = own.iter().map(|&text| text.to_owned()).collect();
+        let mut set: Vec<_> = own.iter().map(|&text| text.to_owned()).collect();
         if realism != LABORATORY {
             set.extend([format!("simulation.realism='{realism}'"), OUTAGE.to_owned()]);
         }
         let its = chosen.iter().filter(|it| it.is_run_by(method));
         let plan = Plan {
             calibrates: false,
-            trials: its.map(|it| it.trial()).collect::<Result<_, _>>()?,
+            trials: its.map(|it| it.trial()).collect::<Result<_>>()?,
             settings: vec![Setting { name: method.to_owned(), planner: HARMONIC.to_owned(), set }],
-            repeats: arguments.seeds,
+            repeats: *seeds,
             noise: NoiseSeeds::Counted(FIRST_SEED),
             pictured_seed: Some(FIRST_SEED),
-            jobs: processors(arguments.jobs),
-            directory: directory.clone(),
+            jobs: arguments.jobs,
         };
         runner::run(&plan, &mut results, &format!("{method}: "))?;
     }
     results.sort()?;
-    let report = Report::new(&chosen, results.rows.rows());
-    let page = directory::save_page(&directory, &report.html(&described, FIRST_SEED))?;
-    let mut text = String::new();
-    if arguments.json {
-        for object in report.objects() {
-            writeln!(text, "{object}")?;
-        }
+    let report = Report::new(&chosen, &results.rows.rows)?;
+    let page = report.save_page(&results.directory, &described, FIRST_SEED)?;
+    Ok(print_text(&if arguments.json {
+        report.objects().map(|object| format!("{object}\n")).collect()
     } else {
-        writeln!(text, "{report}rows and pictures: {}", page.display())?;
-    }
-    Ok(print_text(&text)?)
+        format!("{}rows and pictures: {}\n", report.text(), page.display())
+    })?)
 }

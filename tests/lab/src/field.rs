@@ -10,7 +10,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::missions::statistics::median;
+use crate::{error::Result, missions::statistics::median};
 use clap::Args;
 use common::{process_status::kibibytes, samples::FieldCell};
 use harmonic::{Cancellation, Cell, Domain, Field, Phase, Screening, Settings, SolveError, Solver};
@@ -18,10 +18,7 @@ use maps::Map;
 use picture::FieldOnMap;
 use serde::Serialize;
 
-use console::{
-    failure::{Failure, Refused},
-    output::print,
-};
+use console::{failure::Refused, output::print};
 
 /// Solve the harmonic field of a map: numbers for NumPy, a picture, how long it took.
 ///
@@ -67,7 +64,7 @@ impl FromStr for TargetCell {
     }
 }
 
-pub fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     let map = maps::load(&arguments.map)?;
     let domain = domain(arguments, &map)?;
     let failed = |cause| format!("{}: {cause}", arguments.map.display());
@@ -87,7 +84,7 @@ pub fn main(arguments: &Arguments) -> Result<(), Failure> {
     Ok(print(&report, arguments.json)?)
 }
 
-fn domain(arguments: &Arguments, map: &Map) -> Result<Domain, Failure> {
+fn domain(arguments: &Arguments, map: &Map) -> Result<Domain> {
     let target = arguments.target_cell.0;
     let screening = arguments.screening_cells.map_or(Screening::None, Screening::cells);
     let domain = Domain::new(map.cols, map.rows, map.blocked.clone(), target)

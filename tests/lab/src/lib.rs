@@ -6,7 +6,7 @@
 //! | [`missions`] | missions on many worlds, judged by the ground truth |
 //! | [`worlds`] | worlds, drawn from a seed or read from files |
 //! | `evaluate` | the command that compares settings on worlds |
-//! | [`experiments`] | the paper's experiments with many seeds |
+//! | `experiments` | the paper's experiments with many seeds |
 //! | [`baselines`] | planners to compare with: shortest paths, Bug2 |
 //! | [`chaos`] | signals to random processes at random times; faults of the robot |
 //! | [`tick`] | the latency of a tick, compared with five bare hops on the bus |
@@ -32,15 +32,9 @@ mod sources;
 mod tick;
 mod worlds;
 
-use std::{
-    error::Error,
-    process::{ExitCode, Termination as _},
-};
+use std::process::{ExitCode, Termination as _};
 
 use clap::{Parser, Subcommand};
-use console::{executable, failure::Failure};
-use experiments::table::ExperimentError;
-use missions::directory::DirectoryError;
 
 /// Measure robots: missions on many worlds, the paper's experiments, random faults, ticks, fields.
 #[derive(Debug, Parser)]
@@ -59,7 +53,7 @@ enum Command {
     #[command(subcommand)]
     Bench(Bench),
     #[command(hide = true)]
-    Stage(baselines::stage::Arguments),
+    Stage(baselines::process::Arguments),
 }
 
 #[derive(Debug, Subcommand)]
@@ -73,31 +67,21 @@ enum Bench {
 
 /// The main function of the executable.
 pub fn main() -> ExitCode {
-    executable::run("error", execute, error_code)
+    console::executable::run("error", execute, |_| None)
 }
 
-fn execute(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    Ok(match &arguments.command {
-        Command::Evaluate(arguments) => evaluate::main(arguments)?.report(),
-        Command::Experiments(arguments) => experiments::main(arguments)?.report(),
+fn execute(arguments: &Arguments) -> error::Result<ExitCode> {
+    let done = match &arguments.command {
+        Command::Evaluate(arguments) => evaluate::main(arguments),
+        Command::Experiments(arguments) => experiments::main(arguments),
         Command::Field(arguments) | Command::Bench(Bench::Field(arguments)) => {
-            field::main(arguments)?.report()
+            field::main(arguments)
         }
-        Command::Stage(arguments) => baselines::stage::main(arguments)?.report(),
-        Command::Bench(Bench::Tick(arguments)) => tick::main(arguments)?.report(),
-        Command::Bench(Bench::Chaos(arguments)) => chaos::main(arguments)?,
-        Command::Bench(Bench::Consumer(arguments)) => chaos::consumer_process::main(arguments)?,
-        Command::Bench(Bench::Sources(arguments)) => sources::main(arguments)?.report(),
-    })
-}
-
-fn error_code(error: &(dyn Error + 'static)) -> Option<&'static str> {
-    if let Some(ExperimentError::Unknown { .. }) = error.downcast_ref() {
-        return Some("unknown-experiment");
-    }
-    match error.downcast_ref()? {
-        DirectoryError::Taken { .. } => Some("results-there"),
-        DirectoryError::Another { .. } => Some("other-results"),
-        DirectoryError::System { .. } => None,
-    }
+        Command::Stage(arguments) => baselines::process::main(arguments),
+        Command::Bench(Bench::Tick(arguments)) => tick::main(arguments),
+        Command::Bench(Bench::Chaos(arguments)) => return chaos::main(arguments),
+        Command::Bench(Bench::Consumer(arguments)) => chaos::consumer_process::main(arguments),
+        Command::Bench(Bench::Sources(arguments)) => sources::main(arguments),
+    };
+    Ok(done?.report())
 }

@@ -22,7 +22,7 @@ use common::{
 use console::output::print_text;
 
 use crate::{
-    error::{Failure, system},
+    error::{OrCannot as _, Result},
     random::Random,
 };
 
@@ -62,12 +62,12 @@ struct Published {
     turns: u64,
 }
 
-pub fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     let Published { fixes, turns } = publish(arguments)?;
     Ok(print_text(&format!("published {fixes} fixes and {turns} turns\n"))?)
 }
 
-fn publish(arguments: &Arguments) -> Result<Published, Failure> {
+fn publish(arguments: &Arguments) -> Result<Published> {
     let open = |bus: &Bus| {
         let writers = (bus.writer(&topics::FIX, 1)?, bus.writer(&topics::TURN, 1)?);
         Ok((bus.reader(&topics::POSE)?, writers))
@@ -116,15 +116,11 @@ impl<'a> Source<'a> {
         }
     }
 
-    fn take(
-        &mut self,
-        poses: &mut Reader<PoseSample>,
-        writers: &mut Writers,
-    ) -> Result<(), Failure> {
+    fn take(&mut self, poses: &mut Reader<PoseSample>, writers: &mut Writers) -> Result {
         while let Some(pose) = poses.next_sample()? {
             self.poses.push_back(pose);
         }
-        self.read_truth().map_err(system("read the ground truth of the run"))?;
+        self.read_truth().or_cannot("read the ground truth of the run")?;
         // A pose tells the mission time of the ground truth with the same counts.
         let mut waiting = VecDeque::new();
         while let Some(pose) = self.poses.pop_front() {
@@ -169,7 +165,7 @@ impl<'a> Source<'a> {
         pose: &PoseSample,
         truth: &GroundTruthTick,
         writers: &mut Writers,
-    ) -> Result<(), Failure> {
+    ) -> Result {
         let Arguments { fixes, fix_error, jumps, gyro, .. } = *self.arguments;
         let (tick, time) = (pose.stamp.tick, pose.stamp.time());
         let now_s = time.seconds();

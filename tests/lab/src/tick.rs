@@ -27,7 +27,7 @@ use plain_hops::Carrier;
 pub use options::Arguments;
 pub use report::Report;
 
-use crate::error::{Failure, NOTHING};
+use crate::error::{NOTHING, Result};
 use console::{missions, output::print};
 use regime::Regime;
 
@@ -37,7 +37,7 @@ const TRIPS: u64 = 2000;
 const PACED_TRIPS: u64 = 50;
 
 /// Measure, or be one of the processes that a measurement starts.
-pub fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     let robot = match &arguments.robot {
         Some(robot) => robot.clone(),
         None => format!("latency{}", std::process::id()).parse()?,
@@ -58,7 +58,7 @@ pub fn main(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// Measure missions of `robot` and hops, in turn, in each regime that is asked for. The mission has `rate_hz` ticks in a mission second.
-fn measure(arguments: &Arguments, robot: &RobotName, rate_hz: f64) -> Result<Vec<Report>, Failure> {
+fn measure(arguments: &Arguments, robot: &RobotName, rate_hz: f64) -> Result<Vec<Report>> {
     let _busy = busy::start(arguments.busy)?;
     let regimes = Regime::all(arguments.rate, arguments.pace, rate_hz);
     regimes.into_iter().map(|regime| measure_in(regime, arguments, robot, rate_hz)).collect()
@@ -69,7 +69,7 @@ fn measure_in(
     arguments: &Arguments,
     robot: &RobotName,
     rate_hz: f64,
-) -> Result<Report, Failure> {
+) -> Result<Report> {
     let trips = match regime {
         Regime::BackToBack => TRIPS,
         Regime::Rate { .. } => PACED_TRIPS,

@@ -3,26 +3,29 @@
 mod barn;
 mod corridors;
 mod ends;
-mod error;
 mod files;
 mod floor;
-mod found;
 mod furnished;
 mod moving;
 mod rooms;
+mod shapes;
 mod traps;
 
 use std::{convert::Infallible, fmt, path::PathBuf, str::FromStr};
 
+pub use self::ends::Ends;
 use self::{corridors::Bends, files::Asked, rooms::Doors};
-pub use self::{ends::Ends, error::WorldError, found::Found};
 use crate::{
-    missions::trial::{BodySize, Rules, Scene},
+    error::Result,
+    missions::trial::{BodySize, Rules, Scene, Trial},
     random::Random,
 };
 
 /// Failed draws in a row after which a kind of world is taken for unsolvable.
 const MOST_FAILURES: u64 = 10_000;
+/// Start and target were given for worlds that have their own.
+const NO_MAP: &str =
+    "--start and --target are for ROS maps; give one to --worlds, or leave them out";
 
 #[derive(Clone, Debug)]
 pub enum Worlds {
@@ -37,11 +40,11 @@ pub struct Kind {
     stream: u64,
     name: &'static str,
     draw: fn(&mut Random, usize) -> Scene,
-    rules: fn() -> Rules,
+    rules: Rules,
 }
 
 const fn kind(stream: u64, name: &'static str, draw: fn(&mut Random, usize) -> Scene) -> Kind {
-    Kind { stream, name, draw, rules: Rules::default }
+    Kind { stream, name, draw, rules: Rules::PLAIN }
 }
 
 static KINDS: [Kind; 10] = [
@@ -55,7 +58,7 @@ static KINDS: [Kind; 10] = [
     kind(8, "rotated-rooms", |random, number| rooms::rotated(random, number, Doors::Some)),
     kind(9, "rotated-doors", |random, number| rooms::rotated(random, number, Doors::All)),
     kind(10, "glazed", rooms::glazed),
-    Kind { rules: moving::rules, ..kind(11, "moving-cylinders", moving::draw) },
+    Kind { rules: moving::RULES, ..kind(11, "moving-cylinders", moving::draw) },
 ];
 
 impl FromStr for Worlds {
@@ -69,11 +72,31 @@ impl FromStr for Worlds {
 
 /// The name that [`FromStr`] reads.
 impl fmt::Display for Worlds {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Drawn(kind) => f.write_str(kind.name),
-            Self::Path(path) => path.display().fmt(f),
+            Self::Drawn(kind) => to.write_str(kind.name),
+            Self::Path(path) => path.display().fmt(to),
         }
+    }
+}
+
+/// Trials, and the number of worlds that the body could not cross.
+#[derive(Debug, Default)]
+pub struct Found {
+    pub trials: Vec<Trial>,
+    pub unsolvable: usize,
+}
+
+impl Found {
+    /// Add the trial `world` in `scene`, if `body` can cross the world.
+    fn add(&mut self, world: String, scene: &Scene, rules: Rules, body: &BodySize) -> Result {
+        self.add_solvable(Trial::new(world, scene, rules, body)?);
+        Ok(())
+    }
+
+    fn add_solvable(&mut self, trial: Option<Trial>) {
+        self.unsolvable += usize::from(trial.is_none());
+        self.trials.extend(trial);
     }
 }
 
@@ -84,31 +107,33 @@ pub fn find(
     seed: u64,
     ends: Option<Ends>,
     body: &BodySize,
-) -> Result<Found, WorldError> {
-    if ends.is_some() && !matches!(worlds, Worlds::Path(_)) {
-        return Err(WorldError::NoMap);
-    }
+) -> Result<Found> {
     let found = match worlds {
+        Worlds::Drawn(_) if ends.is_some() => return Err(NO_MAP.into()),
         Worlds::Drawn(kind) => draw_until(count.unwrap_or(100), seed, kind, body)?,
         Worlds::Path(path) => files::read(path, Asked { count, seed, ends }, body)?,
     };
     if found.trials.is_empty() {
-        return Err(WorldError::Unsolvable { swept_m: body.swept_m() });
+        let swept_m = body.swept_m();
+        return Err(format!(
+            "none of the worlds can be crossed by a body of {swept_m:.2} m around its centre; give others, or a smaller robot"
+        )
+        .into());
     }
     Ok(found)
 }
 
 /// Draw worlds until `count` of them are solvable.
-fn draw_until(count: usize, seed: u64, kind: &Kind, body: &BodySize) -> Result<Found, WorldError> {
+fn draw_until(count: usize, seed: u64, kind: &Kind, body: &BodySize) -> Result<Found> {
     let Kind { stream, name, draw, rules } = kind;
     let mut found = Found::default();
-    let mut drawn = 0;
-    while found.trials.len() < count && drawn < MOST_FAILURES + count as u64 {
+    for drawn in 0..MOST_FAILURES + count as u64 {
         let number = found.trials.len();
+        if number >= count {
+            break;
+        }
         let scene = draw(&mut Random::of_world(seed, *stream, drawn), number);
-        drawn += 1;
-        let world = format!("{name}-{seed}-{number:04}");
-        found.add(world, &scene, rules(), body)?;
+        found.add(format!("{name}-{seed}-{number:04}"), &scene, *rules, body)?;
     }
     Ok(found)
 }

@@ -12,7 +12,7 @@ const SIGHT_STEP: f64 = 0.1;
 #[derive(Clone, Debug, Default)]
 pub struct Belief {
     grid: Replica<u8>,
-    header: GridHeader,
+    pub header: GridHeader,
 }
 
 /// A complete map. Hazard cells include the margin of the body.
@@ -31,10 +31,6 @@ impl Belief {
             self.header = *header;
         }
         followed
-    }
-
-    pub const fn header(&self) -> &GridHeader {
-        &self.header
     }
 
     /// The map; none before the first keyframe.
@@ -58,15 +54,14 @@ impl Map<'_> {
 
     /// The neighbour of `cell` by so many columns and rows, if it is free and no corner of a hazard is cut on the way.
     pub fn neighbour(&self, cell: Cell, [cols, rows]: [i32; 2]) -> Option<Cell> {
-        let step = |cols, rows| {
-            let next = Cell {
-                col: cell.col.checked_add_signed(cols)?,
-                row: cell.row.checked_add_signed(rows)?,
-            };
-            self.is_free(next).then_some(next)
-        };
-        let next = step(cols, rows)?;
-        (step(cols, 0).is_some() && step(0, rows).is_some()).then_some(next)
+        self.free_neighbour(cell, [cols, 0])?;
+        self.free_neighbour(cell, [0, rows])?;
+        self.free_neighbour(cell, [cols, rows])
+    }
+
+    /// The cell so many columns and rows from `cell`, if it is free.
+    pub fn free_neighbour(&self, cell: Cell, step: [i32; 2]) -> Option<Cell> {
+        moved(cell, step).filter(|&next| self.is_free(next))
     }
 
     /// The last free point before a hazard on the straight line between two points (metres); none if the line is free.
@@ -88,39 +83,32 @@ impl Map<'_> {
         let last = f64::from(self.frame.cells) - 1.0;
         let middle = self.frame.to_cells(point).round();
         let middle = middle.clamp(DVec2::ZERO, DVec2::splat(last));
+        let middle = Cell { col: middle.x as u32, row: middle.y as u32 };
         let mut nearest: Option<(f64, DVec2)> = None;
         // The search goes in squares of growing size, until all cells of a square are farther than the nearest one so far.
-        for reach in 0..self.frame.cells {
+        for reach in 0..self.frame.cells as i32 {
             let edge = f64::from(reach) - 1.0;
             if nearest.is_some_and(|(distance, _)| edge * self.frame.resolution_m > distance) {
                 break;
             }
-            for cell in ring(middle, reach) {
-                let centre = self.frame.centre_of(cell);
-                let distance = centre.distance(point);
-                if self.is_free(cell) && nearest.is_none_or(|(least, _)| distance < least) {
-                    nearest = Some((distance, centre));
-                }
+            for (cols, rows) in (-reach..=reach).flat_map(|rows| {
+                let stride = if rows.abs() == reach { 1 } else { 2 * reach as usize };
+                (-reach..=reach).step_by(stride.max(1)).map(move |cols| (cols, rows))
+            }) {
+                let cell = self.free_neighbour(middle, [cols, rows]);
+                let centre = cell.map(|cell| self.frame.centre_of(cell));
+                let found = centre.map(|centre| (centre.distance(point), centre));
+                let least = nearest.map_or(f64::INFINITY, |(least, _)| least);
+                nearest = found.filter(|(distance, _)| *distance < least).or(nearest);
             }
         }
         nearest.map(|(_, centre)| centre)
     }
 }
 
-/// The cells at `reach` columns or rows from the cell at `middle`; those beyond the first column or row left out.
-fn ring(middle: DVec2, reach: u32) -> impl Iterator<Item = Cell> {
-    let middle = Cell { col: middle.x as u32, row: middle.y as u32 };
-    let reach = reach as i32;
-    (-reach..=reach).flat_map(move |rows| {
-        let whole = rows.abs() == reach || reach == 0;
-        let stride = if whole { 1 } else { 2 * reach as usize };
-        (-reach..=reach).step_by(stride).filter_map(move |cols| {
-            Some(Cell {
-                col: middle.col.checked_add_signed(cols)?,
-                row: middle.row.checked_add_signed(rows)?,
-            })
-        })
-    })
+fn moved(cell: Cell, [cols, rows]: [i32; 2]) -> Option<Cell> {
+    let col = cell.col.checked_add_signed(cols)?;
+    Some(Cell { col, row: cell.row.checked_add_signed(rows)? })
 }
 
 #[cfg(test)]

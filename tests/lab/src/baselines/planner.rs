@@ -4,7 +4,7 @@ use std::fmt::Debug;
 
 use common::{
     mission::{Method, Mission},
-    samples::{GridHeader, GuidanceSample, GuidanceStatus, PoseSample, TargetSample},
+    samples::{GuidanceSample, GuidanceStatus, PoseSample, TargetSample},
 };
 use glam::DVec2;
 use serde::{Serialize, de::DeserializeOwned};
@@ -41,7 +41,7 @@ pub struct Baseline<P> {
     /// The target of the robot; none before the supervisor has published one.
     target: Option<TargetSample>,
     looks_around: bool,
-    belief: Belief,
+    pub belief: Belief,
     pub planner: P,
 }
 
@@ -54,11 +54,6 @@ impl<P: Planner> Baseline<P> {
             belief: Belief::default(),
             planner: P::default(),
         }
-    }
-
-    /// Apply one sample of `grid`. Returns false if a version is missing; then there is no map until a keyframe comes.
-    pub fn follow(&mut self, header: &GridHeader, cells: &[u8]) -> bool {
-        self.belief.follow(header, cells)
     }
 
     /// Note that the robot is sent to `target`. On the way to another target the planner begins anew.
@@ -79,7 +74,7 @@ impl<P: Planner> Baseline<P> {
 
     /// The guidance that sends the robot of `sample` along `way`.
     fn along(&self, way: Way, sample: &PoseSample) -> GuidanceSample {
-        let belief = self.belief.header();
+        let belief = &self.belief.header;
         let pose = sample.pose();
         // A robot that stands on the point keeps its heading.
         let toward = |point: DVec2| (point - pose.position).normalize_or(pose.axis());

@@ -31,7 +31,7 @@ use crate::chaos::{
     signals::Row,
     subscriptions::{POLL, Subscriptions},
 };
-use crate::error::{Failure, system};
+use crate::error::{OrCannot as _, Result};
 
 /// The generation that stands for the samples of a supervisor, whose successor has a bus of its own.
 const NEWEST: u32 = u32::MAX;
@@ -72,7 +72,7 @@ impl Attack {
         child: &mut Process,
         mut robot: Option<&mut Simulator>,
         patience: Duration,
-    ) -> Result<(), Failure> {
+    ) -> Result {
         let began = Instant::now();
         self.supervisor_hit = false;
         self.driving = false;
@@ -84,7 +84,7 @@ impl Attack {
         self.measured.extend(ended.map(|recovery| recovery.row));
         let mut subscriptions = loop {
             self.consumers.maintain(&mut series.report)?;
-            if child.try_reap().map_err(system("reap"))?.is_some() || began.elapsed() >= patience {
+            if child.try_reap().or_cannot("reap")?.is_some() || began.elapsed() >= patience {
                 return Ok(());
             }
             match Subscriptions::join(series.options, child.id()) {
@@ -94,7 +94,7 @@ impl Attack {
             }
         };
         let mut next = Instant::now() + series.schedule.pause();
-        while child.try_reap().map_err(system("reap"))?.is_none() && began.elapsed() < patience {
+        while child.try_reap().or_cannot("reap")?.is_none() && began.elapsed() < patience {
             // An overdue hit waits for the robot to drive.
             let due = next.checked_duration_since(Instant::now());
             let timeout = due.unwrap_or(POLL).min(self.time_to_startup_hit());
@@ -119,11 +119,7 @@ impl Attack {
     }
 
     /// Write the rows of the signals whose measurement is complete.
-    fn keep_measured(
-        &mut self,
-        series: &mut Series<'_>,
-        robot: Option<&Simulator>,
-    ) -> Result<(), Failure> {
+    fn keep_measured(&mut self, series: &mut Series<'_>, robot: Option<&Simulator>) -> Result {
         for mut row in std::mem::take(&mut self.measured) {
             row.pose_error_m = robot.and_then(|robot| self.pose_error(robot.truth()));
             series.keep(&row)?;
@@ -132,11 +128,7 @@ impl Attack {
     }
 
     /// Note that the mission is over, and end all measurements.
-    pub fn end(
-        &mut self,
-        series: &mut Series<'_>,
-        robot: Option<&Simulator>,
-    ) -> Result<(), Failure> {
+    pub fn end(&mut self, series: &mut Series<'_>, robot: Option<&Simulator>) -> Result {
         self.consumers.end();
         let pending = self.pending.drain(..);
         self.measured.extend(pending.map(|recovery| recovery.row));
@@ -182,11 +174,7 @@ impl Attack {
     }
 
     /// Read new samples, which show the stages that run, beat and publish.
-    fn read(
-        &mut self,
-        subscriptions: &mut Subscriptions,
-        report: &mut Report,
-    ) -> Result<(), Failure> {
+    fn read(&mut self, subscriptions: &mut Subscriptions, report: &mut Report) -> Result {
         while let Some(death) = subscriptions.deaths.next_sample()? {
             let (stage, generation) = (name_str(&death.stage), death.generation);
             let mut pending = self.pending.iter_mut();
@@ -293,7 +281,7 @@ impl Attack {
     }
 
     /// Hit a consumer, the supervisor, or a running stage without a pending recovery.
-    fn hit(&mut self, series: &mut Series<'_>) -> Result<(), Failure> {
+    fn hit(&mut self, series: &mut Series<'_>) -> Result {
         let Series { options, schedule, report, .. } = series;
         if let Some((index, kind, pause)) =
             schedule.consumer(self.consumers.len(), options.asked.only_consumers)

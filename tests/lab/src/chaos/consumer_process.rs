@@ -1,15 +1,11 @@
 //! `firsthand bench consumer`: the program of a consumer, started by `firsthand bench chaos`, which it must not outlive.
 
-use std::{
-    ffi::OsString,
-    os::unix::process::CommandExt as _,
-    process::{Command, ExitCode},
-};
+use std::{ffi::OsString, os::unix::process::CommandExt as _, process::Command};
 
 use clap::Args;
 use common::start::become_child;
 
-use console::failure::Failure;
+use crate::error::Result;
 
 /// Become a program that ends with the process PARENT.
 #[derive(Debug, Args)]
@@ -22,7 +18,7 @@ pub struct Arguments {
     words: Vec<OsString>,
 }
 
-pub fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     // The kernel signals the end of the parent to this process also after it executes another program.
     become_child("consumer", arguments.parent)?;
     let Some((program, words)) = arguments.words.split_first() else {

@@ -15,7 +15,7 @@ use processes::process::Process;
 use rustix::process::{Pid, Signal, kill_process_group};
 
 use crate::chaos::{consumer::Consumer, kind::Kind, options::Options, report::Report, terminal};
-use crate::error::{Failure, system};
+use crate::error::{OrCannot as _, Result};
 
 /// The time for a consumer to end. A recorder writes its last chunk within milliseconds; a user's program may take longer.
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
@@ -52,16 +52,12 @@ pub struct Hit {
 
 impl Consumers {
     /// Start all. Their files go into the new `directory`.
-    pub fn start(
-        options: &Options,
-        directory: PathBuf,
-        report: &mut Report,
-    ) -> Result<Self, Failure> {
+    pub fn start(options: &Options, directory: PathBuf, report: &mut Report) -> Result<Self> {
         let consumers = options.consumers();
         if consumers.is_empty() {
             return Ok(Self::default());
         }
-        fs::create_dir(&directory).map_err(system("make a directory"))?;
+        fs::create_dir(&directory).or_cannot("make a directory")?;
         let setting = Setting { robot: options.asked.robot.clone(), directory };
         let mut all = Vec::new();
         for (place, consumer) in consumers.into_iter().enumerate() {
@@ -98,14 +94,14 @@ impl Consumers {
     }
 
     /// Thaw the frozen consumers whose pause is over; count those that ended by themselves.
-    pub fn maintain(&mut self, report: &mut Report) -> Result<(), Failure> {
+    pub fn maintain(&mut self, report: &mut Report) -> Result {
         for running in &mut self.all {
             if running.frozen_until.is_some_and(|until| Instant::now() >= until) {
                 running.thaw();
             }
             if running.consumer != Consumer::RunRecorder
                 && let Some(process) = &mut running.process
-                && let Some(cause) = process.try_reap().map_err(system("reap"))?
+                && let Some(cause) = process.try_reap().or_cannot("reap")?
             {
                 running.process = None;
                 running.frozen_until = None;
@@ -130,7 +126,7 @@ impl Consumers {
         pause: Duration,
         supervisor: u32,
         report: &mut Report,
-    ) -> Result<Option<Hit>, Failure> {
+    ) -> Result<Option<Hit>> {
         let (Some(running), Some(setting)) = (self.all.get_mut(index), &self.setting) else {
             return Ok(None);
         };
@@ -186,24 +182,24 @@ impl Consumers {
 
 impl Running {
     /// Start or restart the consumer, unless it is the run's own recorder.
-    fn start(&mut self, setting: &Setting, report: &mut Report) -> Result<(), Failure> {
+    fn start(&mut self, setting: &Setting, report: &mut Report) -> Result {
         let Setting { robot, directory } = setting;
         let recording = directory.join(format!("record-{}.mcap", self.starts + 1));
         let Some(mut command) = self.consumer.command(robot, &recording) else {
             return Ok(());
         };
         let said = File::options().create(true).append(true).open(&self.said);
-        let said = said.map_err(system("write what a consumer says"))?;
+        let said = said.or_cannot("write what a consumer says")?;
         if self.consumer == Consumer::Top {
-            let (reads, draws) = terminal::open().map_err(system("open a terminal"))?;
+            let (reads, draws) = terminal::open().or_cannot("open a terminal")?;
             terminal::read_all(reads);
-            let typed = draws.try_clone().map_err(system("open a terminal"))?;
+            let typed = draws.try_clone().or_cannot("open a terminal")?;
             command.stdin(typed).stdout(draws);
         } else {
             command.stdout(Stdio::null());
         }
         command.stderr(said);
-        self.process = Some(Process::spawn(command).map_err(system("start a consumer"))?);
+        self.process = Some(Process::spawn(command).or_cannot("start a consumer")?);
         self.starts += 1;
         report.consumer(self.consumer.name()).started += 1;
         Ok(())

@@ -16,7 +16,7 @@ use crate::chaos::{
     series::Series,
 };
 use crate::{
-    error::{self, Failure, system},
+    error::{self, OrCannot as _, Result},
     robot::{self, firsthand},
 };
 use mission_control::simulator::Simulator;
@@ -32,7 +32,7 @@ pub fn command(
     pace: &str,
     out: &Path,
     records: bool,
-) -> Result<Command, Failure> {
+) -> Result<Command> {
     let Options { asked, set, .. } = options;
     let mut command = robot::mission("run", &asked.mission, &asked.robot, set);
     command.args(["--pace", pace, "--seed", &seed.to_string(), "--out"]).arg(out);
@@ -42,7 +42,7 @@ pub fn command(
     child(command, out)
 }
 
-fn resume(directory: &Path, records: bool) -> Result<Command, Failure> {
+fn resume(directory: &Path, records: bool) -> Result<Command> {
     let mut command = firsthand(&["run", "--json", "--resume"]);
     command.arg(directory);
     if !records {
@@ -53,32 +53,32 @@ fn resume(directory: &Path, records: bool) -> Result<Command, Failure> {
 
 /// Make `command` a child that ends with this process. Its standard output is piped; its standard error goes to a file
 /// beside the run's directory.
-fn child(mut command: Command, directory: &Path) -> Result<Command, Failure> {
+fn child(mut command: Command, directory: &Path) -> Result<Command> {
     let stderr = directory.with_extension("stderr");
     let stderr = File::options().create(true).append(true).open(stderr);
-    let stderr = stderr.map_err(system("write a mission's standard error"))?;
+    let stderr = stderr.or_cannot("write a mission's standard error")?;
     command.args(["--parent", &std::process::id().to_string()]);
     command.stdout(Stdio::piped()).stderr(stderr);
     Ok(command)
 }
 
 /// The summary of the mission without an attack, to compare with. If ticks are compared, it runs at the same pace.
-pub fn undisturbed(options: &Options, seed: u64) -> Result<Summary, Failure> {
+pub fn undisturbed(options: &Options, seed: u64) -> Result<Summary> {
     let directory = options.directory.join("undisturbed");
     let pace = if options.asked.only_consumers { options.pace } else { Pace::Max };
     let output = command(options, seed, &pace.to_string(), &directory, false)?
         .output()
-        .map_err(system("start a mission"))?;
-    fs::remove_dir_all(directory).map_err(system("remove its directory"))?;
+        .or_cannot("start a mission")?;
+    fs::remove_dir_all(directory).or_cannot("remove its directory")?;
     error::summary(&output.stdout, &output.stdout)
 }
 
 /// Attack the mission, and report. Its files stay if something was wrong.
-pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Result<(), Failure> {
+pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Result {
     let options = series.options;
     let before = series.report.kills();
     let files = options.directory.join(format!("seed-{seed}"));
-    fs::create_dir(&files).map_err(system("make a directory"))?;
+    fs::create_dir(&files).or_cannot("make a directory")?;
     let directory = files.join("run");
     let mut robot = options
         .asked
@@ -147,7 +147,7 @@ pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Resu
         right &= series.report.replays().add(seed, &directory, hit, &others);
     }
     if right {
-        fs::remove_dir_all(&files).map_err(system("remove its directory"))?;
+        fs::remove_dir_all(&files).or_cannot("remove its directory")?;
     }
     Ok(())
 }
@@ -178,8 +178,8 @@ pub fn robot(
     seed: u64,
     directory: &Path,
     ignores_time: bool,
-) -> Result<Simulator, Failure> {
-    fs::create_dir(directory).map_err(system("make a directory"))?;
+) -> Result<Simulator> {
+    fs::create_dir(directory).or_cannot("make a directory")?;
     let mut mission = Mission { seed, ..options.loaded.clone() };
     mission.simulation.ignores_time |= ignores_time;
     Ok(Simulator::start(firsthand(&[]), directory, &mission, options.pace)?)
@@ -191,8 +191,8 @@ fn one_supervisor(
     start: Command,
     robot: Option<&mut Simulator>,
     attack: &mut Attack,
-) -> Result<Vec<u8>, Failure> {
-    let mut child = Process::spawn(start).map_err(system("start a mission"))?;
+) -> Result<Vec<u8>> {
+    let mut child = Process::spawn(start).or_cannot("start a mission")?;
     let summary = read_stdout(&mut child);
     let attacked = attack.run(series, &mut child, robot, PATIENCE);
     child.end(Duration::from_secs(2));

@@ -11,7 +11,7 @@ use crate::{
         consumer::{Consumer, GivenConsumer},
         robot_fault::{RobotFault, TABLE},
     },
-    error::Failure,
+    error::Result,
 };
 
 /// Send random signals to random stages at random times, mission after mission, and report.
@@ -112,7 +112,7 @@ impl Options {
     ///
     /// # Errors
     /// The mission cannot be loaded, or is none for chaos; options contradict each other.
-    pub fn of(asked: &Arguments) -> Result<Self, Failure> {
+    pub fn of(asked: &Arguments) -> Result<Self> {
         let asked = asked.clone();
         let mut set = asked.set.clone();
         if asked.freeze_all {

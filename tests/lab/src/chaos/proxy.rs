@@ -18,7 +18,7 @@ use crate::chaos::{
     fault_injector::{FaultInjector, Late},
     robot_fault::RobotFault,
 };
-use crate::error::{Failure, system};
+use crate::error::{OrCannot as _, Result};
 
 /// Longest wait until the thread sees that the fault begins or the proxy ends.
 const LOOK: Duration = Duration::from_millis(10);
@@ -46,9 +46,9 @@ impl Proxy {
         fault: RobotFault,
         protocol: Protocol,
         seed: u64,
-    ) -> Result<Self, Failure> {
-        let (front, back) = sockets(robot).map_err(system("open the proxy's sockets"))?;
-        let address = front.local_addr().map_err(system("name the proxy"))?;
+    ) -> Result<Self> {
+        let (front, back) = sockets(robot).or_cannot("open the proxy's sockets")?;
+        let address = front.local_addr().or_cannot("name the proxy")?;
         let shared = Arc::new(Shared::default());
         let mut wire = Wire {
             front,

@@ -30,7 +30,7 @@ use crate::chaos::{
     stop_time_table::{Entry, StopTimeTable},
 };
 use crate::{
-    error::{Failure, system},
+    error::{OrCannot as _, Result},
     random::Random,
     robot::{command_line, firsthand, processes},
 };
@@ -47,7 +47,7 @@ const END_GRACE: Duration = Duration::from_secs(5);
 const LOOK: Duration = Duration::from_millis(10);
 
 /// Run missions of each fault that is asked for and that a robot of this protocol can have.
-pub fn run(options: &Options) -> Result<StopTimeTable, Failure> {
+pub fn run(options: &Options) -> Result<StopTimeTable> {
     let asked = &options.asked;
     let protocol = options.loaded.robot.protocol();
     let faults = asked.robot_faults.iter().flat_map(|Faults(faults)| faults.iter().copied());
@@ -67,10 +67,10 @@ pub fn run(options: &Options) -> Result<StopTimeTable, Failure> {
         for number in 0..u64::from(asked.missions) {
             let seed = asked.seed + number;
             let files = directory(options, fault, seed);
-            fs::create_dir(&files).map_err(system("make a directory"))?;
+            fs::create_dir(&files).or_cannot("make a directory")?;
             let entry = one(options, fault, seed, &files)?;
             if entry.is_kept() {
-                fs::remove_dir_all(&files).map_err(system("remove its directory"))?;
+                fs::remove_dir_all(&files).or_cannot("remove its directory")?;
             }
             table.entries.push(entry);
             write_stderr(&format!("{} of {all} missions\n", table.entries.len()));
@@ -79,7 +79,7 @@ pub fn run(options: &Options) -> Result<StopTimeTable, Failure> {
     Ok(table)
 }
 
-fn one(options: &Options, fault: RobotFault, seed: u64, files: &Path) -> Result<Entry, Failure> {
+fn one(options: &Options, fault: RobotFault, seed: u64, files: &Path) -> Result<Entry> {
     let mut robot = mission::robot(options, seed, &files.join("robot"), fault.is_kill())?;
     let protocol = options.loaded.robot.protocol();
     let proxy = Proxy::start(robot.address(), fault, protocol, seed)?;
@@ -96,15 +96,10 @@ fn one(options: &Options, fault: RobotFault, seed: u64, files: &Path) -> Result<
     Ok(observed.entry(options, fault, seed, robot.truth(), &summary))
 }
 
-fn start(
-    options: &Options,
-    seed: u64,
-    robot: SocketAddr,
-    directory: &Path,
-) -> Result<Process, Failure> {
+fn start(options: &Options, seed: u64, robot: SocketAddr, directory: &Path) -> Result<Process> {
     let mut start = mission::command(options, seed, "1", directory, false)?;
     start.args(["--set", &format!("robot.address='udp://{robot}'")]);
-    Process::spawn(start).map_err(system("start a mission"))
+    Process::spawn(start).or_cannot("start a mission")
 }
 
 #[derive(Debug, Default)]
@@ -132,7 +127,7 @@ impl Observed {
         child: &mut Process,
         robot: &mut Simulator,
         proxy: &Proxy,
-    ) -> Result<(), Failure> {
+    ) -> Result {
         let began = Instant::now();
         let (least, more) = FAULT_AFTER_S;
         let fault_after_s = least + more * Random::new(seed, 17 + fault as u128).share();
@@ -150,7 +145,7 @@ impl Observed {
                 self.hear(reader)?;
             }
             self.ended_by_itself =
-                child.try_reap().map_err(system("reap"))?.is_some() && !fault.is_kill();
+                child.try_reap().or_cannot("reap")?.is_some() && !fault.is_kill();
             let watched = match fault.row().promise.rest_within_s() {
                 Some(_) => WATCHED,
                 None => WATCHED_ON_ITS_WAY,
@@ -198,7 +193,7 @@ impl Observed {
         self.ticks = truth.len();
     }
 
-    fn hear(&mut self, link: &mut Reader<LinkSample>) -> Result<(), Failure> {
+    fn hear(&mut self, link: &mut Reader<LinkSample>) -> Result {
         while let Some(sample) = link.next_sample()? {
             self.link = Some(sample);
         }
@@ -302,8 +297,8 @@ fn kill(fault: RobotFault, supervisor: &Process, directory: &Path) {
     }
 }
 
-fn operator_stop(options: &Options) -> Result<Process, Failure> {
+fn operator_stop(options: &Options) -> Result<Process> {
     let mut command = firsthand(&["stop", "--robot", &options.asked.robot.to_string()]);
     command.stdout(Stdio::null()).stderr(Stdio::null());
-    Process::spawn(command).map_err(system("stop the robot"))
+    Process::spawn(command).or_cannot("stop the robot")
 }

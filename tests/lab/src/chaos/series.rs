@@ -6,7 +6,7 @@ use crate::chaos::{
     schedule::Schedule,
     signals::{Row, SignalsFile},
 };
-use crate::error::Failure;
+use crate::error::Result;
 
 pub struct Series<'a> {
     pub options: &'a Options,
@@ -17,7 +17,7 @@ pub struct Series<'a> {
 }
 
 impl<'a> Series<'a> {
-    pub fn new(options: &'a Options) -> Result<Self, Failure> {
+    pub fn new(options: &'a Options) -> Result<Self> {
         let out = options.asked.out.as_deref();
         Ok(Self {
             options,
@@ -27,7 +27,7 @@ impl<'a> Series<'a> {
         })
     }
 
-    pub fn keep(&mut self, row: &Row) -> Result<(), Failure> {
+    pub fn keep(&mut self, row: &Row) -> Result {
         match &mut self.signals {
             Some(file) => Ok(file.add(row)?),
             None => Ok(()),

@@ -10,7 +10,7 @@ use common::{
     topics,
 };
 
-use crate::{chaos::options::Options, error::Failure};
+use crate::{chaos::options::Options, error::Result};
 
 /// Wait for the bus between checks of the processes.
 pub const POLL: Duration = Duration::from_millis(50);
@@ -28,7 +28,7 @@ pub struct Subscriptions {
 
 impl Subscriptions {
     /// Join the bus. None if the bus is not of `supervisor`: a killed supervisor leaves its bus, and its successor removes it.
-    pub fn join(options: &Options, supervisor: u32) -> Result<Option<Self>, Failure> {
+    pub fn join(options: &Options, supervisor: u32) -> Result<Option<Self>> {
         let bus = Bus::join(&Domain::of(options.asked.robot.clone()), "chaos")?;
         let mut roster = Roster::open(&bus)?;
         roster.waiter.on(bus.wakeup(&topics::DEATHS)?);

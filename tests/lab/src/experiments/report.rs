@@ -1,82 +1,96 @@
 //! The results of the experiments as text, as a page and as JSON objects.
 
-use std::fmt::{self, Write as _};
+use std::{
+    fmt::Write as _,
+    path::{Path, PathBuf},
+};
 
 use console::table::{Align, Table};
+use serde::Serialize;
 use serde_json::{Value, json};
 
+use super::table::{Claim, Experiment, METHODS, claims};
 use crate::{
-    experiments::{
-        claims::{Expectation, FIGURES, Findings, expectations},
-        table::{Experiment, METHODS},
-    },
+    error::Result,
     missions::{
-        page::{END, escaped, figure, head},
+        page::Page,
         row::{Outcome, Row},
         runner::picture,
         statistics::{Spread, share},
     },
 };
 
-/// Findings and expectations of the experiments that were run.
-#[derive(Debug)]
-pub struct Report<'a> {
-    rows: &'a [Row],
-    experiments: &'a [&'static Experiment],
-    findings: Vec<Findings<'a>>,
-    expectations: Vec<Expectation>,
-}
+/// The figures of missions that arrived: key, title and digits.
+const FIGURES: [(&str, &str, usize); 7] = [
+    ("time_s", "time, s", 1),
+    ("path_m", "path, m", 2),
+    ("k", "K", 2),
+    ("clearance_m", "clearance, m", 2),
+    ("safety_events", "safety events", 0),
+    ("sonar_unavailable", "sonar unavailable", 2),
+    ("wheel_range_rad_s", "wheel range, rad/s", 2),
+];
+const TITLES: [&str; 7] =
+    ["experiment", "method", "arrived", "touched", "wrong place", "other", "paper, s"];
+const COLUMNS: usize = TITLES.len() + FIGURES.len();
 
-const COLUMNS: usize = 7 + FIGURES.len();
-
-/// The median and the middle half, like `51.2 (48.0-55.1)`.
-fn shown(spread: Option<Spread>, digits: usize) -> String {
-    let Some(Spread { low, median, high }) = spread else {
-        return "-".to_owned();
-    };
-    format!("{median:.digits$} ({low:.digits$}-{high:.digits$})")
-}
-
-fn titles() -> [&'static str; COLUMNS] {
-    let first = ["experiment", "method", "arrived", "touched", "wrong place", "other", "paper, s"];
-    std::array::from_fn(|column| match column.checked_sub(first.len()) {
-        None => first[column],
-        Some(figure) => FIGURES[figure].1,
-    })
+/// The missions of an experiment by one method.
+struct Findings<'a> {
+    experiment: &'a Experiment,
+    method: &'static str,
+    rows: Vec<&'a Row>,
 }
 
 impl Findings<'_> {
-    /// Missions that touched something, that ended in a wrong place, and those that ran out of time, gave up or failed.
-    fn failures(&self) -> [usize; 3] {
+    fn count(&self, outcome: Outcome) -> usize {
+        self.rows.iter().filter(|row| row.outcome == outcome).count()
+    }
+
+    /// The quartiles of a figure over the missions that arrived; none if none did.
+    fn spread(&self, figure: &str) -> Option<Spread> {
+        let arrived = self.rows.iter().filter(|row| row.is_success());
+        Spread::of(arrived.filter_map(|row| row.number(figure)))
+    }
+
+    fn value(&self, figure: &str) -> Option<f64> {
+        match figure {
+            "arrived" => Some(share(self.count(Outcome::Success), self.rows.len()).value),
+            _ => Some(self.spread(figure)?.median),
+        }
+    }
+
+    /// Missions that arrived, that touched something, that ended in a wrong place, and those that ran out of time, gave up or
+    /// failed.
+    fn counts(&self) -> [usize; 4] {
         let [arrived, touched, wrong_place] =
             [Outcome::Success, Outcome::Collision, Outcome::WrongPlace].map(|it| self.count(it));
-        [touched, wrong_place, self.rows.len() - arrived - touched - wrong_place]
+        [arrived, touched, wrong_place, self.rows.len() - arrived - touched - wrong_place]
     }
 
     fn cells(&self) -> [String; COLUMNS] {
-        let [touched, wrong_place, others] = self.failures();
-        let time = self.experiment.reported_time_s;
-        let first = [
-            self.experiment.name.to_owned(),
+        let [arrived, touched, wrong_place, others] = self.counts();
+        let Experiment { name, reported_time_s, .. } = self.experiment;
+        let mut cells = vec![
+            name.clone(),
             self.method.to_owned(),
-            format!("{}/{}", self.count(Outcome::Success), self.rows.len()),
+            format!("{arrived}/{}", self.rows.len()),
             touched.to_string(),
             wrong_place.to_string(),
             others.to_string(),
-            time.map_or("-".to_owned(), |time| format!("{time:.0}")),
+            reported_time_s.map_or("-".to_owned(), |time| format!("{time:.0}")),
         ];
-        std::array::from_fn(|column| match column.checked_sub(first.len()) {
-            None => first[column].clone(),
-            Some(figure) => {
-                let (_, _, digits, value) = FIGURES[figure];
-                shown(self.spread(value), digits)
+        // The median and the middle half, like `51.2 (48.0-55.1)`.
+        cells.extend(FIGURES.map(|(figure, _, digits)| match self.spread(figure) {
+            None => "-".to_owned(),
+            Some(Spread { low, median, high }) => {
+                format!("{median:.digits$} ({low:.digits$}-{high:.digits$})")
             }
-        })
+        }));
+        std::array::from_fn(|column| std::mem::take(&mut cells[column]))
     }
 
     fn object(&self) -> Value {
-        let arrived = self.count(Outcome::Success);
-        let [touched, wrong_place, others] = self.failures();
+        let [arrived, touched, wrong_place, others] = self.counts();
         let arrival = share(arrived, self.rows.len());
         let mut object = json!({
             "count": self.rows.len(),
@@ -86,19 +100,74 @@ impl Findings<'_> {
             "wrong_place": wrong_place,
             "others": others,
         });
-        for (key, _, _, value) in FIGURES {
-            object[key] = json!(self.spread(value));
+        for (figure, ..) in FIGURES {
+            object[figure] = json!(self.spread(figure));
         }
         object
     }
 }
 
+/// A claim of the paper, and the figure of one method.
+#[derive(Serialize)]
+struct Expectation {
+    experiment: String,
+    method: &'static str,
+    claim: String,
+    found: f64,
+    holds: bool,
+}
+
+/// Findings and expectations of the experiments that were run.
+pub struct Report<'a> {
+    rows: &'a [Row],
+    experiments: &'a [Experiment],
+    findings: Vec<Findings<'a>>,
+    expectations: Vec<Expectation>,
+}
+
+fn titles() -> [&'static str; COLUMNS] {
+    std::array::from_fn(|column| match TITLES.get(column) {
+        Some(title) => title,
+        None => FIGURES[column - TITLES.len()].1,
+    })
+}
+
 impl<'a> Report<'a> {
-    pub fn new(experiments: &'a [&'static Experiment], rows: &'a [Row]) -> Self {
-        let findings = experiments.iter().flat_map(|experiment| {
-            METHODS.iter().filter_map(|(method, _)| Findings::among(rows, experiment, method))
-        });
-        Self { rows, experiments, findings: findings.collect(), expectations: expectations(rows) }
+    pub fn new(experiments: &'a [Experiment], rows: &'a [Row]) -> Result<Self> {
+        let mut findings = Vec::new();
+        for experiment in experiments {
+            for (method, _) in METHODS {
+                let is_its = |row: &&Row| row.world == experiment.name && row.setting == method;
+                let rows: Vec<_> = rows.iter().filter(is_its).collect();
+                if !rows.is_empty() {
+                    findings.push(Findings { experiment, method, rows });
+                }
+            }
+        }
+        let claims = claims()?;
+        let mut expectations = Vec::new();
+        for (method, _) in METHODS {
+            let value = |experiment: &String, figure: &str| {
+                let is_its =
+                    |it: &&Findings<'_>| it.experiment.name == *experiment && it.method == method;
+                findings.iter().find(is_its)?.value(figure)
+            };
+            expectations.extend(claims.iter().filter_map(|claim| {
+                let Claim { experiment, claim, figure, over, least, most } = claim;
+                let mut found = value(experiment, figure)?;
+                if let Some(over) = over {
+                    found /= value(over, figure).filter(|&value| value != 0.0)?;
+                }
+                Some(Expectation {
+                    experiment: experiment.clone(),
+                    method,
+                    claim: claim.clone(),
+                    found,
+                    holds: (*least..=*most).contains(&found),
+                })
+            }));
+        }
+        Ok(Self { rows, experiments, findings, expectations })
     }
 
     /// An object for each experiment: the paper's values, those of each method, and the claims that hold.
@@ -121,59 +190,65 @@ impl<'a> Report<'a> {
         })
     }
 
-    /// The page; pictures are beside it. `command` reproduces the results.
-    pub fn html(&self, command: &str, pictured_seed: u64) -> String {
-        let mut page = head("The paper's experiments");
-        // Writing to a String cannot fail.
-        let _ = write!(
-            page,
-            "<h1>The paper's experiments</h1>\n<p><code>{}</code></p>\n<p>Medians and, in brackets, the middle half of \
-             the missions that arrived.</p>\n<table><tr><th>{}</th></tr>\n",
-            escaped(command),
-            titles().join("</th><th>")
-        );
-        for findings in &self.findings {
-            let cells = findings.cells().map(|cell| escaped(&cell));
-            let _ = writeln!(page, "<tr><td>{}</td></tr>", cells.join("</td><td>"));
-        }
-        page.push_str("</table>\n<table><tr><th>experiment</th><th>method</th><th>the paper says</th><th>found</th><th>holds</th></tr>\n");
-        for expectation in &self.expectations {
-            let Expectation { experiment, method, claim, found, holds } = expectation;
-            let holds = if *holds { "yes" } else { "no" };
-            let _ = writeln!(
-                page,
-                "<tr><td>{experiment}</td><td>{method}</td><td>{claim}</td><td>{found:.2}</td><td>{holds}</td></tr>"
-            );
-        }
-        page.push_str("</table>\n");
-        for experiment in self.experiments {
-            let Experiment { name, title, reported, .. } = experiment;
-            let _ = writeln!(page, "<h2>{name}: {title}</h2>\n<p>The paper: {reported}.</p>");
-            let is_shown =
-                |row: &&Row| row.seed == pictured_seed || row.outcome != Outcome::Success;
-            let its = self.rows.iter().filter(|row| row.world == *name);
-            for row in its.filter(is_shown) {
-                let caption =
-                    format!("{}, seed {}: {}", row.setting, row.seed, row.outcome.as_str());
-                page.push_str(&figure(&caption, Some(&picture(row)), None));
+    /// Write the page into `directory`; pictures are beside it. `command` reproduces the results.
+    pub fn save_page(
+        &self,
+        directory: &Path,
+        command: &str,
+        pictured_seed: u64,
+    ) -> Result<PathBuf> {
+        let mut page = Page::new("The paper's experiments", command);
+        page.text("Medians and, in brackets, the middle half of the missions that arrived.");
+        let titles = titles().map(str::to_owned);
+        let cells = self.findings.iter().map(Findings::cells);
+        page.table([titles].into_iter().chain(cells).map(|cells| cells.to_vec()));
+        let titles = ["experiment", "method", "the paper says", "found", "holds"];
+        let claims = self.expectations.iter().map(|it| {
+            let holds = if it.holds { "yes" } else { "no" };
+            [&*it.experiment, it.method, &it.claim, &format!("{:.2}", it.found), holds]
+                .map(str::to_owned)
+        });
+        page.table([titles.map(str::to_owned)].into_iter().chain(claims).map(|it| it.to_vec()));
+        for Experiment { name, title, reported, .. } in self.experiments {
+            page.heading(&format!("{name}: {title}"));
+            page.text(&format!("The paper: {reported}."));
+            for row in self.rows.iter().filter(|row| row.world == *name) {
+                if row.seed == pictured_seed || !row.is_success() {
+                    let Row { setting, seed, .. } = row;
+                    let caption = format!("{setting}, seed {seed}: {}", row.outcome_name());
+                    page.figure(&caption, Some(&picture(row)), None);
+                }
             }
         }
-        page.push_str(END);
-        page
+        page.save(directory)
+    }
+
+    /// The table, and the claims that hold.
+    pub fn text(&self) -> String {
+        let mut table = Table::new(titles().map(|title| (title, Align::Left)));
+        self.findings.iter().for_each(|findings| table.row(findings.cells()));
+        let mut text = format!("{table}medians and the middle half of the missions that arrived\n");
+        for Expectation { experiment, method, claim, found, holds } in &self.expectations {
+            let holds = if *holds { "holds" } else { "does not hold" };
+            let _ = writeln!(text, "{experiment}, {method}: {claim}: {found:.2}, {holds}");
+        }
+        text
     }
 }
 
-impl fmt::Display for Report<'_> {
-    /// The table, and the claims that hold.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut table = Table::new(titles().map(|title| (title, Align::Left)));
-        self.findings.iter().for_each(|findings| table.row(findings.cells()));
-        writeln!(f, "{table}medians and the middle half of the missions that arrived")?;
-        for expectation in &self.expectations {
-            let Expectation { experiment, method, claim, found, holds } = expectation;
-            let holds = if *holds { "holds" } else { "does not hold" };
-            writeln!(f, "{experiment}, {method}: {claim}: {found:.2}, {holds}")?;
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiments::table::named;
+
+    #[test]
+    fn every_claim_is_of_experiments_there_are() {
+        let table = named(&[]).unwrap();
+        let is = |name: &str| table.iter().any(|experiment| experiment.name == name);
+        for Claim { experiment, figure, over, .. } in claims().unwrap() {
+            assert!(is(&experiment) && over.as_deref().is_none_or(is), "{experiment}");
+            let known = figure == "arrived" || FIGURES.iter().any(|it| it.0 == figure);
+            assert!(known, "{figure}");
         }
-        Ok(())
     }
 }

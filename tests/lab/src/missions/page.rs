@@ -1,39 +1,68 @@
-//! The common parts of result pages.
+//! A page of results.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// The page up to its first heading, with `title`.
-pub fn head(title: &str) -> String {
-    let title = escaped(title);
-    format!(
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><title>{title}</title>\n<style>{STYLE}</style></head>\n<body>\n"
-    )
-}
+use crate::error::{OrCannot as _, Result};
 
-pub const END: &str = "</body></html>\n";
-
+const PAGE_FILE: &str = "index.html";
 const STYLE: &str = "body{font:15px/1.5 sans-serif;max-width:1200px;margin:2em auto;padding:0 1em;color:#1f2933}\
 table{border-collapse:collapse;display:block;overflow-x:auto}td,th{border:1px solid #cbd2d9;padding:.3em .6em;text-align:left;vertical-align:top}\
 code{overflow-wrap:anywhere}figure{display:inline-block;width:min(100%,570px);margin:.5em .2em;vertical-align:top}img{width:100%}";
 
-/// A picture, if there is one, and a link to the page of its run. Both files are beside the page.
-pub fn figure(caption: &str, picture: Option<&Path>, page: Option<&Path>) -> String {
-    let escaped_path = |path: &Path| escaped(&path.to_string_lossy());
-    let picture = picture.map(escaped_path).map_or(String::new(), |file| {
-        format!("<img loading=\"lazy\" src=\"{file}\" alt=\"{file}\">")
-    });
-    let page = page.map(escaped_path);
-    let page = page.map_or(String::new(), |file| format!("<a href=\"{file}\">its page</a>"));
-    let caption = escaped(caption);
-    format!("<figure><figcaption>{caption}</figcaption>{picture}{page}</figure>\n")
+pub struct Page(String);
+
+impl Page {
+    /// The page with its title and the `command` that reproduces the results.
+    pub fn new(title: &str, command: &str) -> Self {
+        let command = escaped(command);
+        Self(format!(
+            "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><title>{title}</title>\n<style>{STYLE}</style></head>\n<body>\n\
+<h1>{title}</h1>\n<p><code>{command}</code></p>\n"
+        ))
+    }
+
+    pub fn heading(&mut self, text: &str) {
+        self.0 += &format!("<h2>{}</h2>\n", escaped(text));
+    }
+
+    pub fn text(&mut self, text: &str) {
+        self.0 += &format!("<p>{}</p>\n", escaped(text));
+    }
+
+    /// A table; the first row holds the titles. A line feed in a cell begins a line.
+    pub fn table(&mut self, rows: impl IntoIterator<Item = Vec<String>>) {
+        self.0 += "<table>";
+        for (row, tag) in rows.into_iter().zip(["th"].into_iter().chain(std::iter::repeat("td"))) {
+            let cells = row.iter().map(|cell| {
+                let lines: Vec<_> = cell.lines().map(escaped).collect();
+                format!("<{tag}>{}</{tag}>", lines.join("<br>"))
+            });
+            self.0 += &format!("<tr>{}</tr>\n", cells.collect::<String>());
+        }
+        self.0 += "</table>\n";
+    }
+
+    /// A picture, if there is one, and a link to the page of its run. Both files are beside the page.
+    pub fn figure(&mut self, caption: &str, picture: Option<&Path>, page: Option<&Path>) {
+        let path = |path: &Path| escaped(&path.to_string_lossy());
+        let picture = picture.map(path).map_or(String::new(), |file| {
+            format!("<img loading=\"lazy\" src=\"{file}\" alt=\"{file}\">")
+        });
+        let page = page.map(path);
+        let page = page.map_or(String::new(), |file| format!("<a href=\"{file}\">its page</a>"));
+        let caption = escaped(caption);
+        self.0 += &format!("<figure><figcaption>{caption}</figcaption>{picture}{page}</figure>\n");
+    }
+
+    /// Write the page into `directory`. Returns its path.
+    pub fn save(self, directory: &Path) -> Result<PathBuf> {
+        let file = directory.join(PAGE_FILE);
+        std::fs::write(&file, self.0 + "</body></html>\n").or_cannot_file("write", &file)?;
+        Ok(file)
+    }
 }
 
-/// `text` escaped for HTML, with spaces in place of control characters.
-pub fn escaped(text: &str) -> String {
-    text.replace(char::is_control, " ")
-        .replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
+fn escaped(text: &str) -> String {
+    picture::escape(text, usize::MAX)
 }

@@ -1,32 +1,116 @@
-//! The tables of an evaluation in its directory.
+//! The directory of an evaluation: the command that gives its rows, and two CSV files with a row for each mission, appended as
+//! missions end, sorted when all have ended.
 
-use std::path::Path;
+use std::{
+    fs::{self, File},
+    path::{Path, PathBuf},
+};
 
-use common::file::FileError;
+use common::file::replace;
+use serde::{Serialize, de::DeserializeOwned};
 
-use crate::missions::{latency::Latency, row::Row, table::Table};
+use super::row::{Latency, Row};
+use crate::error::{OrCannot as _, Refused, Result};
 
-const ROWS_FILE: &str = "rows.csv";
-/// Name of the file of latencies. The rows are the same in every run, latencies are not.
-const LATENCIES_FILE: &str = "latencies.csv";
+/// The file of the command that gives the rows.
+const PLAN_FILE: &str = "plan.txt";
 
 #[derive(Debug)]
 pub struct Results {
+    pub directory: PathBuf,
     pub rows: Table<Row>,
+    /// Latencies differ in every run; the rows do not.
     pub latencies: Table<Latency>,
 }
 
 impl Results {
-    /// The tables in `directory`, or empty ones.
-    pub fn open(directory: &Path) -> Result<Self, FileError> {
+    /// Make `directory` for the rows of `command`, or resume those of the same command.
+    pub fn open(directory: &Path, command: &str, resume: bool) -> Result<Self> {
+        let file = directory.join(PLAN_FILE);
+        let named = directory.display();
+        let use_it = format!("use {named} for results, give another --out");
+        match fs::read_to_string(&file) {
+            Ok(earlier) if resume && earlier.trim() == command => {}
+            Ok(earlier) if resume => {
+                let earlier = earlier.trim();
+                let other = format!("--resume: the command in {named} was another: {earlier}");
+                return Err(Refused::new("other-results", other).into());
+            }
+            Ok(_) => {
+                let taken = format!(
+                    "{named} contains results; continue them with --resume, or give another --out"
+                );
+                return Err(Refused::new("results-there", taken).into());
+            }
+            Err(_) => {
+                fs::create_dir_all(directory).or_cannot(&use_it)?;
+                fs::write(&file, format!("{command}\n")).or_cannot(&use_it)?;
+            }
+        }
+        let directory = fs::canonicalize(directory).or_cannot(&use_it)?;
         Ok(Self {
-            rows: Table::open(&directory.join(ROWS_FILE))?,
-            latencies: Table::open(&directory.join(LATENCIES_FILE))?,
+            rows: Table::open(directory.join("rows.csv"))?,
+            latencies: Table::open(directory.join("latencies.csv"))?,
+            directory,
         })
     }
 
-    pub fn sort(&mut self) -> Result<(), FileError> {
+    pub fn sort(&mut self) -> Result {
         self.rows.sort()?;
         self.latencies.sort()
+    }
+}
+
+/// World, noise seed and setting, which identify a mission.
+pub type Key = (String, u64, String);
+
+pub trait Record: Serialize + DeserializeOwned {
+    fn key(&self) -> Key;
+}
+
+#[derive(Debug)]
+pub struct Table<R> {
+    file: PathBuf,
+    pub rows: Vec<R>,
+}
+
+impl<R: Record> Table<R> {
+    /// The table in `file`: with its rows, or empty.
+    pub fn open(file: PathBuf) -> Result<Self> {
+        let mut rows = Vec::new();
+        if file.exists() {
+            let mut reader = csv::Reader::from_path(&file).or_cannot_file("read", &file)?;
+            // A mission whose row was cut off is run again.
+            rows.extend(reader.deserialize().map_while(Result::<R, _>::ok));
+        }
+        let table = Self { file, rows };
+        table.save()?;
+        Ok(table)
+    }
+
+    pub fn add(&mut self, row: R) -> Result {
+        let append = |has_headers| -> csv::Result<()> {
+            let file = File::options().append(true).open(&self.file)?;
+            let mut writer = csv::WriterBuilder::new().has_headers(has_headers).from_writer(file);
+            writer.serialize(&row)?;
+            Ok(writer.flush()?)
+        };
+        append(self.rows.is_empty()).or_cannot_file("append to", &self.file)?;
+        self.rows.push(row);
+        Ok(())
+    }
+
+    /// Sort the rows by world, seed and setting, and rewrite the file. If a mission has two rows, the later one stays.
+    pub fn sort(&mut self) -> Result {
+        self.rows.reverse();
+        self.rows.sort_by_key(R::key);
+        self.rows.dedup_by_key(|row| row.key());
+        self.save()
+    }
+
+    fn save(&self) -> Result {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        self.rows.iter().try_for_each(|row| writer.serialize(row))?;
+        replace(&self.file, writer.into_inner()?).or_cannot_file("write", &self.file)
     }
 }

@@ -4,14 +4,14 @@ use mission_control::outcome::Outcome as Reported;
 use serde::{Deserialize, Serialize};
 use summary::Summary;
 
-use crate::missions::{
-    setting::Setting,
-    table::{Key, Record},
+use super::{
+    Setting,
+    results::{Key, Record},
     trial::Trial,
 };
 
 /// The outcome of a mission by the ground truth.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
     /// The robot is at the target and has touched nothing.
@@ -25,31 +25,12 @@ pub enum Outcome {
     Aborted,
 }
 
-impl Outcome {
-    /// Every outcome, in the order of the reports.
-    pub const ALL: [Self; 6] = [
-        Self::Success,
-        Self::Collision,
-        Self::Timeout,
-        Self::WrongPlace,
-        Self::Unreachable,
-        Self::Aborted,
-    ];
-
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Success => "success",
-            Self::Collision => "collision",
-            Self::Timeout => "timeout",
-            Self::WrongPlace => "wrong_place",
-            Self::Unreachable => "unreachable",
-            Self::Aborted => "aborted",
-        }
-    }
-}
+/// The names of all outcomes, in the order of the reports.
+pub const OUTCOMES: [&str; 6] =
+    ["success", "collision", "timeout", "wrong_place", "unreachable", "aborted"];
 
 /// One mission's result, in metres and mission seconds. Latencies differ in every run and have a table of their own, see
-/// [`Latency`](crate::missions::latency::Latency).
+/// [`Latency`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     pub world: String,
@@ -101,23 +82,25 @@ const BARN_SPEED_M_S: f64 = 2.0;
 impl Row {
     /// The row of `trial`, run with noise `seed` under `setting`, that ended with `summary`.
     pub fn new(trial: &Trial, seed: u64, setting: &Setting, summary: &Summary) -> Self {
-        let rules = &trial.rules;
+        let Trial { rules, shortest_m, .. } = *trial;
         let straight_m = trial.mission.target.length();
-        let started_s =
-            if rules.clock_after_departure { summary.departed_s.unwrap_or_default() } else { 0.0 };
-        let time_s = (summary.mission_time_s - started_s).max(0.0);
+        let started_s = summary.departed_s.filter(|_| rules.clock_after_departure);
+        let time_s = (summary.mission_time_s - started_s.unwrap_or_default()).max(0.0);
         let late = rules.most_s.is_some_and(|most_s| time_s > most_s);
-        let outcome = match outcome(summary, rules.success_within_m) {
-            Outcome::Success if late => Outcome::Timeout,
-            outcome => outcome,
+        let arrived = summary.true_distance_m.is_some_and(|it| it <= rules.success_within_m);
+        let outcome = match summary.outcome {
+            Reported::Collision => Outcome::Collision,
+            Reported::Timeout => Outcome::Timeout,
+            Reported::Unreachable => Outcome::Unreachable,
+            Reported::Aborted | Reported::CouldNotBeStopped => Outcome::Aborted,
+            _ if !arrived => Outcome::WrongPlace,
+            _ if late => Outcome::Timeout,
+            _ => Outcome::Success,
         };
-        let success = outcome == Outcome::Success;
-        let spl = trial.shortest_m / summary.path_length_m.max(trial.shortest_m);
-        let reference_s = rules.optimal_time_s.unwrap_or(trial.shortest_m / BARN_SPEED_M_S);
-        let barn_score = rules.scored.then_some(reference_s).map(|optimal| {
-            let [least, most] = BARN_CLIP.map(|times| times * optimal);
-            if success { optimal / time_s.clamp(least, most) } else { 0.0 }
-        });
+        let if_success = |score: f64| if outcome == Outcome::Success { score } else { 0.0 };
+        let optimal_s = rules.optimal_time_s.unwrap_or(shortest_m / BARN_SPEED_M_S);
+        let [least_s, most_s] = BARN_CLIP.map(|times| times * optimal_s);
+        let path_m = summary.path_length_m;
         Self {
             world: trial.world.clone(),
             seed,
@@ -126,12 +109,12 @@ impl Row {
             outcome,
             reason: summary.reason.clone(),
             time_s,
-            path_m: summary.path_length_m,
+            path_m,
             straight_m,
-            shortest_m: trial.shortest_m,
-            k: summary.path_length_m / straight_m,
-            spl: if success { spl } else { 0.0 },
-            barn_score,
+            shortest_m,
+            k: path_m / straight_m,
+            spl: if_success(shortest_m / path_m.max(shortest_m)),
+            barn_score: rules.scored.then(|| if_success(optimal_s / time_s.clamp(least_s, most_s))),
             min_clearance_m: summary.min_clearance_m,
             p_o: summary.p_o,
             f_ps_m2: summary.f_ps_m2,
@@ -150,10 +133,22 @@ impl Row {
         }
     }
 
-    /// The row of a mission without a summary.
-    pub fn aborted(trial: &Trial, seed: u64, setting: &Setting, reason: String) -> Self {
-        let nothing = Summary { reason, ..Summary::default() };
-        Self::new(trial, seed, setting, &nothing)
+    pub fn is_success(&self) -> bool {
+        self.outcome == Outcome::Success
+    }
+
+    pub const fn outcome_name(&self) -> &'static str {
+        OUTCOMES[self.outcome as usize]
+    }
+
+    /// The number in a column, or one that follows from several.
+    pub fn number(&self, column: &str) -> Option<f64> {
+        match column {
+            "clearance_m" => self.min_clearance_m,
+            "look_share" => Some(self.look_s / self.time_s.max(1e-9)),
+            "sonar_unavailable" => self.sonar_unavailable_share,
+            _ => serde_json::to_value(self).ok()?.get(column)?.as_f64(),
+        }
     }
 }
 
@@ -163,27 +158,49 @@ impl Record for Row {
     }
 }
 
-fn outcome(summary: &Summary, success_within_m: f64) -> Outcome {
-    let there = summary.true_distance_m.is_some_and(|distance| distance <= success_within_m);
-    match summary.outcome {
-        Reported::Reached | Reported::ReachedUnsure | Reported::WrongPlace => {
-            if there {
-                Outcome::Success
-            } else {
-                Outcome::WrongPlace
-            }
+/// The latencies of one mission's ticks and solves, microseconds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Latency {
+    pub world: String,
+    pub seed: u64,
+    pub setting: String,
+    /// A tick, from the datagram in to the datagram out.
+    pub tick_p50_us: Option<f64>,
+    pub tick_p99_us: Option<f64>,
+    pub tick_max_us: Option<f64>,
+    pub full_solve_p50_us: Option<f64>,
+    pub full_solve_p99_us: Option<f64>,
+    pub full_solve_max_us: Option<f64>,
+}
+
+impl Latency {
+    pub fn new(row: &Row, summary: &Summary) -> Self {
+        let (world, seed, setting) = row.key();
+        let Summary { tick_latency_us: tick, full_solve_us: full, .. } = summary;
+        Self {
+            world,
+            seed,
+            setting,
+            tick_p50_us: tick.p50,
+            tick_p99_us: tick.p99,
+            tick_max_us: tick.max,
+            full_solve_p50_us: full.p50,
+            full_solve_p99_us: full.p99,
+            full_solve_max_us: full.max,
         }
-        Reported::Collision => Outcome::Collision,
-        Reported::Timeout => Outcome::Timeout,
-        Reported::Unreachable => Outcome::Unreachable,
-        Reported::Aborted | Reported::CouldNotBeStopped => Outcome::Aborted,
+    }
+}
+
+impl Record for Latency {
+    fn key(&self) -> Key {
+        (self.world.clone(), self.seed, self.setting.clone())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::missions::{table::Table, trial::Rules};
+    use crate::missions::{results::Table, trial::Rules};
     use common::mission::Mission;
     use std::{fs, path::Path};
 
@@ -201,7 +218,7 @@ mod tests {
                 optimal_time_s,
                 scored: optimal_time_s.is_some(),
                 clock_after_departure: optimal_time_s.is_some(),
-                ..Rules::default()
+                ..Rules::PLAIN
             },
         }
     }
@@ -242,13 +259,13 @@ mod tests {
     fn rows_from_before_a_column_was_added_are_read() {
         let file = tempfile::NamedTempFile::new().unwrap();
         let row = Row::new(&trial(None), 1, &setting(), &summary(Reported::Reached, 0.1));
-        Table::open(file.path()).unwrap().add(row.clone()).unwrap();
+        Table::open(file.path().to_path_buf()).unwrap().add(row.clone()).unwrap();
         let written = fs::read_to_string(file.path()).unwrap();
         // The three columns and their neighbours are empty.
         let former = written.replacen(",p_o,f_ps_m2,f_vs_m_s2", "", 1).replacen(",,,", "", 1);
         assert_eq!(written.len() - former.len(), ",p_o,f_ps_m2,f_vs_m_s2,,,".len());
         fs::write(file.path(), former).unwrap();
-        assert_eq!(Table::<Row>::open(file.path()).unwrap().rows(), [row]);
+        assert_eq!(Table::<Row>::open(file.path().to_path_buf()).unwrap().rows, [row]);
     }
 
     #[test]

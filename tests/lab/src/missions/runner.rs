@@ -2,34 +2,34 @@
 
 use std::{
     collections::BTreeSet,
-    fs, io,
+    fs,
     num::NonZero,
     path::{Path, PathBuf},
-    process::Stdio,
+    process::{Command, Stdio},
     sync::{Mutex, mpsc::channel},
     thread,
+    time::{Duration, Instant},
 };
 
-use common::file::FileError;
+use console::progress_line::ProgressLine;
 use summary::Summary;
-use thiserror::Error;
 
+use super::{
+    Setting,
+    results::{Record as _, Results},
+    row::{Latency, Outcome, Row},
+    trial::Trial,
+};
 use crate::{
-    missions::{
-        latency::Latency,
-        progress::Progress,
-        results::Results,
-        row::{Outcome, Row},
-        setting::Setting,
-        table::Record as _,
-        trial::Trial,
-    },
+    error::{OrCannot as _, Result},
     robot,
 };
 
 /// A run's picture and its page, in its directory.
 const PICTURE: &str = "picture.svg";
 const PAGE: &str = "report/report.html";
+/// Time between lines of progress that cannot be rewritten.
+const LINE_EVERY: Duration = Duration::from_secs(10);
 
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -40,11 +40,10 @@ pub struct Plan {
     pub noise: NoiseSeeds,
     /// The noise seed whose missions get pictures even if they did not fail.
     pub pictured_seed: Option<u64>,
-    pub jobs: usize,
+    /// Missions at once; by default one for each processor.
+    pub jobs: Option<NonZero<usize>>,
     /// Whether the robot of each mission is calibrated before, as its owner would do it. If that fails the mission runs without.
     pub calibrates: bool,
-    /// Directory of worlds, rows and pictures of failures; it must exist.
-    pub directory: PathBuf,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -76,184 +75,152 @@ const fn mixed(bits: u32) -> u32 {
     bits ^ (bits >> 16)
 }
 
-#[derive(Debug, Error)]
-pub enum RunnerError {
-    #[error(transparent)]
-    File(#[from] FileError),
-    #[error("cannot start a mission: {0}")]
-    Start(io::Error),
-}
-
-struct Job<'a> {
-    trial: &'a Trial,
-    setting: &'a Setting,
-    seed: u64,
-}
-
-impl Plan {
-    fn mission_file(&self, trial: &Trial) -> PathBuf {
-        let name = format!("{}.toml", trial.world);
-        self.directory.join("worlds").join(name)
-    }
-
-    fn keeps_picture(&self, row: &Row) -> bool {
-        row.outcome != Outcome::Success || self.pictured_seed == Some(row.seed)
-    }
-
-    fn jobs(&self) -> impl Iterator<Item = Job<'_>> {
-        let worlds = (0..).zip(&self.trials);
-        worlds.flat_map(move |(number, trial)| {
-            (0..self.repeats).flat_map(move |repeat| {
-                let seed = self.noise.seed(number, self.repeats, repeat);
-                let settings = self.settings.iter();
-                settings.map(move |setting| Job { trial, setting, seed })
-            })
-        })
-    }
-}
-
-/// Missions at once: the requested number, or one for each processor.
-pub fn processors(asked_for: Option<NonZero<usize>>) -> usize {
-    asked_for.map_or_else(|| thread::available_parallelism().map_or(1, NonZero::get), NonZero::get)
-}
-
-/// The path of a mission's picture in the directory of its plan.
+/// The path of a mission's picture in the directory of its plan; the page of a failure is beside it, with the extension `html`.
 pub fn picture(row: &Row) -> PathBuf {
-    let folder = match row.outcome {
-        Outcome::Success => "pictures",
-        _ => "failures",
-    };
+    let folder = if row.is_success() { "pictures" } else { "failures" };
     let name = format!("{}-{}-{}.svg", row.world, row.seed, row.setting);
     Path::new(folder)
         .join(name.replace(|c: char| !(c.is_ascii_alphanumeric() || "-_.".contains(c)), "_"))
-}
-
-/// The path of the page of a failure, beside its picture.
-pub fn page(picture: &Path) -> PathBuf {
-    picture.with_extension("html")
 }
 
 /// Run all missions of `plan` whose rows are not in `results` yet. A line on standard error, which begins with `title`, shows how far.
 ///
 /// # Errors
 /// A file cannot be written, or `firsthand` does not start.
-pub fn run(plan: &Plan, results: &mut Results, title: &str) -> Result<(), RunnerError> {
+pub fn run(plan: &Plan, results: &mut Results, title: &str) -> Result {
+    let directory = results.directory.clone();
     let pictures = plan.pictured_seed.map(|_| "pictures");
     for folder in ["worlds", "failures"].into_iter().chain(pictures) {
-        let folder = plan.directory.join(folder);
-        fs::create_dir_all(&folder).map_err(FileError::of("make", &folder))?;
-    }
-    for trial in &plan.trials {
-        let text = toml::to_string(&trial.mission).map_err(io::Error::other);
-        let file = plan.mission_file(trial);
-        text.and_then(|text| fs::write(&file, text)).map_err(FileError::of("write", &file))?;
+        let folder = directory.join(folder);
+        fs::create_dir_all(&folder).or_cannot_file("make", &folder)?;
     }
     // An aborted mission says nothing about navigation, only about the machine, so it is run again.
-    let settled = results.rows.rows().iter().filter(|row| row.outcome != Outcome::Aborted);
+    let settled = results.rows.rows.iter().filter(|row| row.outcome != Outcome::Aborted);
     let done: BTreeSet<_> = settled.map(Row::key).collect();
-    let all = plan.jobs().count();
-    let left = plan.jobs().filter(|job| {
-        let key = (job.trial.world.clone(), job.seed, job.setting.name.clone());
-        !done.contains(&key)
-    });
-    let left: Vec<Job<'_>> = left.collect();
-    let mut progress = Progress::new(title, all - left.len(), all);
+    let (mut all, mut left) = (0, Vec::new());
+    for (number, trial) in (0..).zip(&plan.trials) {
+        let file = directory.join("worlds").join(format!("{}.toml", trial.world));
+        fs::write(&file, toml::to_string(&trial.mission)?).or_cannot_file("write", &file)?;
+        for repeat in 0..plan.repeats {
+            let seed = plan.noise.seed(number, plan.repeats, repeat);
+            for setting in &plan.settings {
+                all += 1;
+                if !done.contains(&(trial.world.clone(), seed, setting.name.clone())) {
+                    let (file, directory) = (file.clone(), &*directory);
+                    left.push(Job { plan, trial, setting, seed, file, directory });
+                }
+            }
+        }
+    }
+    let first = all - left.len();
     let queue = Mutex::new(left.into_iter());
-    let (give, rows) = channel::<Result<_, RunnerError>>();
+    let (give, rows) = channel();
+    let processors = || thread::available_parallelism().map_or(1, NonZero::get);
     thread::scope(|scope| {
-        for worker in 0..plan.jobs.max(1) {
+        for worker in 0..plan.jobs.map_or_else(processors, NonZero::get) {
             let (give, queue) = (give.clone(), &queue);
             scope.spawn(move || {
-                loop {
-                    let job = queue.lock().ok().and_then(|mut queue| queue.next());
-                    let Some(job) = job else {
-                        return;
-                    };
-                    let ended = match mission(plan, &job, worker) {
-                        Ok((row, _)) if row.outcome == Outcome::Aborted => {
-                            mission(plan, &job, worker)
-                        }
+                while let Some(job) = queue.lock().ok().and_then(|mut queue| queue.next()) {
+                    let ended = match job.run(worker) {
+                        Ok((row, _)) if row.outcome == Outcome::Aborted => job.run(worker),
                         ended => ended,
                     };
-                    if give.send(ended).is_err() {
+                    if give.send(ended.map_err(|error| error.to_string())).is_err() {
                         return;
                     }
                 }
             });
         }
         drop(give);
-        for ended in rows {
-            let (row, latency) = ended?;
-            // Latencies are written first, so that a mission with a row has both.
-            latency.map_or(Ok(()), |latency| results.latencies.add(latency))?;
-            results.rows.add(row)?;
-            progress.count();
-        }
-        Ok(())
+        let (began, mut line) = (Instant::now(), ProgressLine::new(LINE_EVERY));
+        let keep = || {
+            for (ended, given) in (1..).zip(rows) {
+                let (row, latency) = given?;
+                // Latencies are written first, so that a mission with a row has both.
+                latency.map_or(Ok(()), |latency| results.latencies.add(latency))?;
+                results.rows.add(row)?;
+                if line.is_due() {
+                    line.begin();
+                    let each_s = began.elapsed().as_secs_f64() / f64::from(ended);
+                    let ended = first + ended as usize;
+                    let left_s = each_s * (all - ended) as f64;
+                    let shown = format!("{title}{ended} of {all} missions, {left_s:.0} s left");
+                    line.show(&shown, true);
+                }
+            }
+            Ok(())
+        };
+        let kept = keep();
+        line.end();
+        kept
     })
 }
 
-/// Run one mission, in processes of its own. Without a summary it has no latencies.
-fn mission(
-    plan: &Plan,
-    job: &Job<'_>,
-    worker: usize,
-) -> Result<(Row, Option<Latency>), RunnerError> {
-    let Job { trial, setting, seed } = job;
-    let own = std::process::id();
-    let directory = plan.directory.join(format!("run-{worker}"));
-    let robot = format!("evaluate{own}-{worker}");
-    let firsthand = |subcommand: &str| {
-        let file = plan.mission_file(trial);
-        let mut command = robot::mission(subcommand, file, &robot, &setting.set);
-        command.args(["--seed", &seed.to_string()]);
+struct Job<'a> {
+    plan: &'a Plan,
+    trial: &'a Trial,
+    setting: &'a Setting,
+    seed: u64,
+    /// The mission, and the directory of all.
+    file: PathBuf,
+    directory: &'a Path,
+}
+
+impl Job<'_> {
+    fn firsthand(&self, subcommand: &str, worker: usize) -> Command {
+        let robot = format!("evaluate{}-{worker}", std::process::id());
+        let mut command = robot::mission(subcommand, &self.file, &robot, &self.setting.set);
+        command.args(["--seed", &self.seed.to_string()]);
         command
-    };
-    let calibration = plan.directory.join(format!("calibration-{worker}"));
-    let mut calibrated = None;
-    if plan.calibrates {
-        let file = calibration.join("calibration.toml");
-        let mut calibrate = firsthand("calibrate");
-        calibrate.arg("--runs").arg(&calibration).arg("--out").arg(&file);
-        let ended = calibrate.stdout(Stdio::null()).stderr(Stdio::null()).status();
-        if ended.map_err(RunnerError::Start)?.success() {
-            let file = toml::Value::from(file.to_string_lossy().into_owned());
-            calibrated = Some(format!("robot.calibration={file}"));
-        }
     }
-    let run = |options: &[&str]| {
-        let mut command = firsthand("run");
-        command.args(options).args(["--parent", &own.to_string()]);
-        command.args(calibrated.iter().flat_map(|key| ["--set", key]));
-        command.arg("--out").arg(&directory).output().map_err(RunnerError::Start)
-    };
-    let output = run(&["--no-record"])?;
-    let (row, latency) = match serde_json::from_slice::<Summary>(&output.stdout) {
-        Ok(summary) => {
-            let row = Row::new(trial, *seed, setting, &summary);
-            let latency = Latency::new(&row, &summary);
-            (row, Some(latency))
+
+    /// Run the mission, in processes of its own. Without a summary it has no latencies.
+    fn run(&self, worker: usize) -> Result<(Row, Option<Latency>)> {
+        let Self { plan, trial, setting, seed, directory: all, .. } = *self;
+        let directory = all.join(format!("run-{worker}"));
+        let calibration = all.join(format!("calibration-{worker}"));
+        let mut calibrated = None;
+        if plan.calibrates {
+            let file = calibration.join("calibration.toml");
+            let mut calibrate = self.firsthand("calibrate", worker);
+            calibrate.arg("--runs").arg(&calibration).arg("--out").arg(&file);
+            let ended = calibrate.stdout(Stdio::null()).stderr(Stdio::null()).status();
+            if ended.or_cannot("start a calibration")?.success() {
+                let file = toml::Value::from(file.to_string_lossy().into_owned());
+                calibrated = Some(format!("robot.calibration={file}"));
+            }
         }
-        Err(_) => {
+        let run = |options: &[&str]| {
+            let mut command = self.firsthand("run", worker);
+            command.args(options).args(["--parent", &std::process::id().to_string()]);
+            command.args(calibrated.iter().flat_map(|key| ["--set", key]));
+            command.arg("--out").arg(&directory).output().or_cannot("start a mission")
+        };
+        let output = run(&["--no-record"])?;
+        let summary = serde_json::from_slice::<Summary>(&output.stdout);
+        let has_summary = summary.is_ok();
+        let summary = summary.unwrap_or_else(|_| {
             let said = String::from_utf8_lossy(&output.stderr);
             let reason = said.trim().lines().last().unwrap_or("no summary").to_owned();
-            (Row::aborted(trial, *seed, setting, reason), None)
+            Summary { reason, ..Summary::default() }
+        });
+        let row = Row::new(trial, seed, setting, &summary);
+        let latency = has_summary.then(|| Latency::new(&row, &summary));
+        let kept = all.join(picture(&row));
+        if !row.is_success() || plan.pictured_seed == Some(seed) {
+            // A mission that could not start has no picture.
+            let _ = fs::rename(directory.join(PICTURE), &kept);
         }
-    };
-    let kept = plan.directory.join(picture(&row));
-    if plan.keeps_picture(&row) {
-        // A mission that could not start has no picture.
-        let _ = fs::rename(directory.join(PICTURE), &kept);
-    }
-    if !matches!(row.outcome, Outcome::Success | Outcome::Aborted) {
-        // The mission can be run again, to the bit, and recordings of all missions would take too much room.
+        if !matches!(row.outcome, Outcome::Success | Outcome::Aborted) {
+            // The mission can be run again, to the bit, and recordings of all missions would take too much room.
+            let _ = fs::remove_dir_all(&directory);
+            run(&[])?;
+            let _ = fs::rename(directory.join(PAGE), kept.with_extension("html"));
+        }
         let _ = fs::remove_dir_all(&directory);
-        run(&[])?;
-        let _ = fs::rename(directory.join(PAGE), page(&kept));
+        let _ = fs::remove_dir_all(&calibration);
+        Ok((row, latency))
     }
-    let _ = fs::remove_dir_all(&directory);
-    let _ = fs::remove_dir_all(&calibration);
-    Ok((row, latency))
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! Shares, differences of shares and their confidence intervals; medians and means.
 
+use std::fmt;
+
 use serde::Serialize;
 
 /// Quantile of the normal distribution for 95 %.
@@ -11,6 +13,18 @@ pub struct Estimate {
     pub value: f64,
     pub low: f64,
     pub high: f64,
+}
+
+impl fmt::Display for Estimate {
+    /// Write the estimate, for example as `.620 [.564, .673]`, or with signs as `{:+}`.
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { value, low, high } = self;
+        if to.sign_plus() {
+            write!(to, "{value:+.3} [{low:+.3}, {high:+.3}]")
+        } else {
+            write!(to, "{value:.3} [{low:.3}, {high:.3}]")
+        }
+    }
 }
 
 /// The share of `hits` in `n`, with Wilson's interval (Wilson 1927).
@@ -39,10 +53,15 @@ pub fn paired_difference(gained: usize, lost: usize, n: usize) -> Estimate {
 
 /// The value that `share` of all values do not exceed; none without values.
 pub fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
+    let values = sorted(values)?;
+    values.get(((values.len() - 1) as f64 * share).round() as usize).copied()
+}
+
+/// None without values.
+fn sorted(values: impl IntoIterator<Item = f64>) -> Option<Vec<f64>> {
     let mut values: Vec<f64> = values.into_iter().collect();
     values.sort_by(f64::total_cmp);
-    let last = values.len().checked_sub(1)?;
-    values.get((last as f64 * share).round() as usize).copied()
+    (!values.is_empty()).then_some(values)
 }
 
 pub fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
@@ -59,11 +78,9 @@ pub struct Spread {
 impl Spread {
     /// The quartiles, linear between neighbours; none without values.
     pub fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
-        let mut values: Vec<f64> = values.collect();
-        values.sort_by(f64::total_cmp);
-        let last = values.len().checked_sub(1)?;
+        let values = sorted(values)?;
         let at = |share: f64| {
-            let place = share * last as f64;
+            let place = share * (values.len() - 1) as f64;
             let (below, above) = (values[place.floor() as usize], values[place.ceil() as usize]);
             below + (above - below) * place.fract()
         };

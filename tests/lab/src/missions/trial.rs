@@ -2,12 +2,13 @@
 
 use common::{
     geometry::Shapes,
-    mission::{Heights, Mission, MissionError, Realism, Thing},
+    mission::{Heights, Mission, Realism, Thing},
 };
 use glam::DVec2;
 use mission_control::outcome::RIGHT_PLACE_M;
 use std::path::Path;
 
+use crate::error::Result;
 use report::shortest_path::{ShortestPath, shortest_path};
 
 /// The perimeter's width is a multiple of this, metres: a whole number of cells by both methods.
@@ -31,20 +32,18 @@ pub struct Rules {
     pub optimal_time_s: Option<f64>,
 }
 
-impl Default for Rules {
-    fn default() -> Self {
-        Self {
-            success_within_m: RIGHT_PLACE_M,
-            clock_after_departure: false,
-            most_s: None,
-            scored: false,
-            optimal_time_s: None,
-        }
-    }
+impl Rules {
+    pub const PLAIN: Self = Self {
+        success_within_m: RIGHT_PLACE_M,
+        clock_after_departure: false,
+        most_s: None,
+        scored: false,
+        optimal_time_s: None,
+    };
 }
 
 /// A world with a start and a target, in the frame of the world it comes from.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Scene {
     pub shapes: Shapes,
     /// The things that move in the world; the shortest path does not regard them.
@@ -73,29 +72,23 @@ impl Trial {
         scene: &Scene,
         rules: Rules,
         body: &BodySize,
-    ) -> Result<Option<Self>, MissionError> {
+    ) -> Result<Option<Self>> {
         let touched = Heights::preset(Realism::default()).touched(&scene.shapes);
-        let ShortestPath::Found(shortest_m) =
-            shortest_path(&touched, scene.start, scene.target, body.swept_m())
-        else {
+        let Some(shortest_m) = body.shortest_m(&touched, scene.start, scene.target) else {
             return Ok(None);
         };
         let mut mission = mission(&world, scene)?;
-        mission.timeout_s = rules.most_s.map_or(timeout_s(shortest_m), |it| it + BEFORE_CLOCK_S);
+        // Four times the time of a robot at 0.25 m/s, and half a minute.
+        let timeout_s = (30.0 + 16.0 * shortest_m).round();
+        mission.timeout_s = rules.most_s.map_or(timeout_s, |it| it + BEFORE_CLOCK_S);
         Ok(Some(Self { world, mission, shortest_m, rules }))
     }
-}
 
-impl Trial {
     /// The trial `world` of an unchanged `mission`, if a body can get from start to target in its world.
     pub fn of_mission(world: String, mission: Mission, body: &BodySize) -> Option<Self> {
         let start = mission.start_pose().position;
-        match shortest_path(&mission.obstacles(), start, mission.target, body.swept_m()) {
-            ShortestPath::Found(shortest_m) => {
-                Some(Self { world, mission, shortest_m, rules: Rules::default() })
-            }
-            ShortestPath::None | ShortestPath::TooLarge => None,
-        }
+        let shortest_m = body.shortest_m(&mission.obstacles(), start, mission.target)?;
+        Some(Self { world, mission, shortest_m, rules: Rules::PLAIN })
     }
 }
 
@@ -112,18 +105,25 @@ impl BodySize {
     pub fn swept_m(&self) -> f64 {
         self.radius_m + self.margin_m
     }
-}
 
-/// Mission seconds for a path of `metres`: four times the time of a robot at 0.25 m/s, and half a minute.
-fn timeout_s(metres: f64) -> f64 {
-    (30.0 + 16.0 * metres).round()
+    /// The length of the shortest path between `shapes`, metres; none if there is none.
+    fn shortest_m(&self, shapes: &Shapes, start: DVec2, target: DVec2) -> Option<f64> {
+        match shortest_path(shapes, start, target, self.swept_m()) {
+            ShortestPath::Found(shortest_m) => Some(shortest_m),
+            ShortestPath::None | ShortestPath::TooLarge => None,
+        }
+    }
 }
 
 /// The mission of `scene`: origin at the start, x along the x of the scene's own frame.
-fn mission(world: &str, scene: &Scene) -> Result<Mission, MissionError> {
+fn mission(world: &str, scene: &Scene) -> Result<Mission> {
     let target = scene.target - scene.start;
     let shapes = moved(&scene.shapes, -scene.start);
-    let (least, greatest) = bounds(&shapes, target);
+    // The bounding box of shapes, origin and target.
+    let (least, greatest) = shapes.pieces().map(|piece| piece.bounds()).fold(
+        (DVec2::ZERO.min(target), DVec2::ZERO.max(target)),
+        |(least, greatest), (from, to)| (least.min(from), greatest.max(to)),
+    );
     let centre = (least + greatest) / 2.0;
     let width_m =
         (((greatest - least).max_element() + 2.0 * RIM_M) / WIDTH_STEP_M).ceil() * WIDTH_STEP_M;
@@ -141,20 +141,17 @@ fn mission(world: &str, scene: &Scene) -> Result<Mission, MissionError> {
     Ok(mission)
 }
 
-/// The corners of the bounding box of `shapes`, the origin and the target, metres.
-fn bounds(shapes: &Shapes, target: DVec2) -> (DVec2, DVec2) {
-    let all = shapes.pieces().map(|piece| piece.bounds());
-    let ends = (DVec2::ZERO.min(target), DVec2::ZERO.max(target));
-    all.fold(ends, |(least, greatest), (from, to)| (least.min(from), greatest.max(to)))
-}
-
 /// `shapes` moved by `by`, metres.
 fn moved(shapes: &Shapes, by: DVec2) -> Shapes {
     let mut shapes = shapes.clone();
-    shapes.drums.iter_mut().for_each(|drum| drum.at += by);
-    shapes.boxes.iter_mut().for_each(|block| block.at += by);
-    for wall in &mut shapes.walls {
-        wall.points.iter_mut().for_each(|point| *point += by);
-    }
+    points(&mut shapes).for_each(|point| *point += by);
     shapes
+}
+
+/// The places of all `shapes`.
+pub fn points(shapes: &mut Shapes) -> impl Iterator<Item = &mut DVec2> {
+    let Shapes { drums, boxes, walls } = shapes;
+    let drums = drums.iter_mut().map(|drum| &mut drum.at);
+    let boxes = boxes.iter_mut().map(|block| &mut block.at);
+    drums.chain(boxes).chain(walls.iter_mut().flat_map(|wall| &mut wall.points))
 }

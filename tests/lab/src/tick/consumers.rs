@@ -11,24 +11,24 @@ use common::{
 };
 use processes::process::{Process, firsthand};
 
-use crate::error::{Failure, system};
+use crate::error::{OrCannot as _, Result};
 
 /// How often a consumer looks whether it is asked to stop.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 /// Start `number` consumers of `robot`. They end when they are dropped.
-pub fn start(robot: &RobotName, number: u32) -> Result<Vec<Process>, Failure> {
+pub fn start(robot: &RobotName, number: u32) -> Result<Vec<Process>> {
     let own = std::process::id().to_string();
     let consumer = |_| {
         let mut command = firsthand(&["bench", "tick", "--consumer", "--supervisor", &own]);
         command.args(["--robot", &robot.to_string()]);
-        Process::spawn(command).map_err(system("start a consumer"))
+        Process::spawn(command).or_cannot("start a consumer")
     };
     (0..number).map(consumer).collect()
 }
 
-pub fn run(robot: &RobotName, supervisor: u32) -> Result<(), Failure> {
-    let mut terminated = Signals::catch(&[SIGTERM]).map_err(system("catch SIGTERM"))?;
+pub fn run(robot: &RobotName, supervisor: u32) -> Result {
+    let mut terminated = Signals::catch(&[SIGTERM]).or_cannot("catch SIGTERM")?;
     become_child("consumer", supervisor)?;
     let domain = Domain::of(robot.clone());
     let mut follower = Follower::new(domain, "consumer", &topics::GRID, |bus| {

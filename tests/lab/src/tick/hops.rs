@@ -21,7 +21,7 @@ use processes::{
     process::{Process, firsthand},
 };
 
-use crate::error::{Failure, LOST, LOST_SAMPLE, system};
+use crate::error::{LOST, LOST_SAMPLE, OrCannot as _, Result};
 
 /// Cells of the smallest map. No forwarder reads it.
 const CELLS: usize = 64;
@@ -34,11 +34,7 @@ pub const WARM_UP: u64 = 200;
 
 /// Send `trips` samples around the forwarders, one every `period`, or back to back; those that warm up are always back to
 /// back.
-pub fn measure(
-    robot: &RobotName,
-    trips: u64,
-    period: Option<Duration>,
-) -> Result<Histogram, Failure> {
+pub fn measure(robot: &RobotName, trips: u64, period: Option<Duration>) -> Result<Histogram> {
     let lock = DomainLock::acquire(Domain::of(robot.clone()), CELLS)?;
     let bus = lock.bus().ok_or(LOST_SAMPLE)?;
     let mut start = bus.writer(&topics::WHEELS, 1)?;
@@ -51,7 +47,7 @@ pub fn measure(
         let arguments = ["bench", "tick", "--forwarder", place, "--supervisor", &own];
         let mut command = firsthand(&arguments);
         command.args(["--robot", &robot.to_string()]);
-        let forwarder = Process::spawn(command).map_err(system("start a forwarder"))?;
+        let forwarder = Process::spawn(command).or_cannot("start a forwarder")?;
         if let Some(writers) = bus.writers() {
             let author = Author { process: forwarder.id(), generation: 1 };
             writers.name([(place.to_owned(), author)]);
@@ -92,11 +88,11 @@ pub fn measure(
 }
 
 /// Run the forwarder that stands for the stage `place`.
-pub fn run_forwarder(robot: &RobotName, place: &str, supervisor: u32) -> Result<(), Failure> {
-    let mut terminated = Signals::catch(&[SIGTERM]).map_err(system("catch SIGTERM"))?;
+pub fn run_forwarder(robot: &RobotName, place: &str, supervisor: u32) -> Result {
+    let mut terminated = Signals::catch(&[SIGTERM]).or_cannot("catch SIGTERM")?;
     become_child(place, supervisor)?;
     let domain = Domain::of(robot.clone());
-    let _stage_lock = domain.enter().map_err(system("enter the domain"))?;
+    let _stage_lock = domain.enter().or_cannot("enter the domain")?;
     let bus = Bus::join(&domain, place)?;
     let mut waiter = Waiter::default();
     waiter.on_readable(&terminated)?;
@@ -124,7 +120,7 @@ macro_rules! forward {
     }};
 }
 
-fn forwarder(bus: &Bus, place: &str, waiter: &mut Waiter) -> Result<Forward, Failure> {
+fn forwarder(bus: &Bus, place: &str, waiter: &mut Waiter) -> Result<Forward> {
     let now = MissionTime::default();
     let (wakes, forward): (&dyn AnyTopic, Forward) =
         match PLACES.iter().position(|name| *name == place) {

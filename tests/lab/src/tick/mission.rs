@@ -16,7 +16,7 @@ use super::{
     process_set::{ProcessSet, Used},
 };
 use crate::{
-    error::{self, Failure, system},
+    error::{self, OrCannot as _, Result},
     robot,
 };
 
@@ -32,9 +32,9 @@ pub struct Ticks {
 
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
-pub fn measure(arguments: &Arguments, robot: &RobotName, pace: Pace) -> Result<Ticks, Failure> {
+pub fn measure(arguments: &Arguments, robot: &RobotName, pace: Pace) -> Result<Ticks> {
     let directory = tempfile::Builder::new().prefix("firsthand-latency-").tempdir();
-    let directory = directory.map_err(system("make a directory for the mission"))?;
+    let directory = directory.or_cannot("make a directory for the mission")?;
     let mut command = robot::mission("run", &arguments.mission, robot, &arguments.set);
     command.args(["--pace", &pace.to_string(), "--out"]).arg(directory.path());
     if arguments.no_record {
@@ -46,13 +46,13 @@ pub fn measure(arguments: &Arguments, robot: &RobotName, pace: Pace) -> Result<T
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
-        .map_err(system("start the mission"))?;
+        .or_cannot("start the mission")?;
     let mut processes = ProcessSet::of(run.id());
     let (ended, end) = channel();
     let waiting = thread::spawn(move || ended.send(run.wait_with_output()));
     let output = loop {
         match end.recv_timeout(LOOK_EVERY) {
-            Ok(output) => break output.map_err(system("wait for the mission"))?,
+            Ok(output) => break output.or_cannot("wait for the mission")?,
             Err(RecvTimeoutError::Timeout) => processes.look(),
             Err(RecvTimeoutError::Disconnected) => return Err(error::NOTHING.into()),
         }
@@ -62,7 +62,7 @@ pub fn measure(arguments: &Arguments, robot: &RobotName, pace: Pace) -> Result<T
     ticks(&output, processes.used())
 }
 
-fn ticks(output: &Output, used: Option<Used>) -> Result<Ticks, Failure> {
+fn ticks(output: &Output, used: Option<Used>) -> Result<Ticks> {
     let summary = error::summary(&output.stdout, &output.stderr)?;
     let Quantiles { p50: Some(p50_us), p99: Some(p99_us), max: Some(max_us) } =
         summary.tick_latency_us

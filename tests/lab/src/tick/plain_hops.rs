@@ -16,7 +16,7 @@ use processes::process::{Process, firsthand};
 use rustix::event::{EventfdFlags, eventfd};
 
 use super::hops::{PLACES, WARM_UP};
-use crate::error::{Failure, LOST, LOST_SAMPLE, system};
+use crate::error::{LOST, LOST_SAMPLE, OrCannot as _, Result};
 
 /// The bytes of a sample; an eventfd takes no more.
 const SAMPLE: [u8; 8] = 1_u64.to_ne_bytes();
@@ -48,12 +48,8 @@ impl Carrier {
 }
 
 /// Send `trips` samples around the forwarders, one every `period`, or back to back.
-pub fn measure(
-    carrier: Carrier,
-    trips: u64,
-    period: Option<Duration>,
-) -> Result<Histogram, Failure> {
-    let hop = || carrier.hop().map_err(system("open a hop"));
+pub fn measure(carrier: Carrier, trips: u64, period: Option<Duration>) -> Result<Histogram> {
+    let hop = || carrier.hop().or_cannot("open a hop");
     let own = std::process::id().to_string();
     let (mut from, start) = hop()?;
     let mut forwarders = Vec::new();
@@ -63,18 +59,18 @@ pub fn measure(
         let arguments = ["bench", "tick", "--forwarder", PLAIN, "--supervisor", &own];
         let mut command = firsthand(&arguments);
         command.args(["--robot", PLAIN]).stdin(from).stdout(written);
-        forwarders.push(Process::spawn(command).map_err(system("start a forwarder"))?);
+        forwarders.push(Process::spawn(command).or_cannot("start a forwarder")?);
         from = read;
     }
     let (mut start, mut end) = (File::from(start), File::from(from));
     let mut latencies = Histogram::default();
     for trip in 0..WARM_UP + trips {
         let (began, began_ns) = (Instant::now(), monotonic_ns());
-        start.write_all(&SAMPLE).map_err(system("send a sample"))?;
-        if !poll::is_readable(end.as_fd(), LOST).map_err(system("wait for a sample"))? {
+        start.write_all(&SAMPLE).or_cannot("send a sample")?;
+        if !poll::is_readable(end.as_fd(), LOST).or_cannot("wait for a sample")? {
             return Err(LOST_SAMPLE.into());
         }
-        end.read_exact(&mut SAMPLE.clone()).map_err(system("read a sample"))?;
+        end.read_exact(&mut SAMPLE.clone()).or_cannot("read a sample")?;
         if trip >= WARM_UP {
             latencies.record(monotonic_ns() - began_ns);
             thread::sleep(period.map_or(Duration::ZERO, |it| it.saturating_sub(began.elapsed())));
@@ -87,14 +83,14 @@ pub fn measure(
 }
 
 /// Forward what comes in on standard input to standard output, until the parent ends this process.
-pub fn run_forwarder(supervisor: u32) -> Result<(), Failure> {
+pub fn run_forwarder(supervisor: u32) -> Result {
     become_child(PLAIN, supervisor)?;
-    let own = |end: io::Result<OwnedFd>| end.map(File::from).map_err(system("open a hop"));
+    let own = |end: io::Result<OwnedFd>| end.map(File::from).or_cannot("open a hop");
     let mut from = own(io::stdin().as_fd().try_clone_to_owned())?;
     let mut to = own(io::stdout().as_fd().try_clone_to_owned())?;
     let mut sample = SAMPLE;
     loop {
-        from.read_exact(&mut sample).map_err(system("read a sample"))?;
-        to.write_all(&sample).map_err(system("send a sample"))?;
+        from.read_exact(&mut sample).or_cannot("read a sample")?;
+        to.write_all(&sample).or_cannot("send a sample")?;
     }
 }

@@ -4,20 +4,20 @@
 //! Start, goal and rules are those of the challenge: from (-2.25, 3) with heading +y to (-2.25, 13), success within 1 m, the
 //! clock starts after 0.1 m, 100 s at most. Without an index the optimal time is that of the body's shortest path at 2 m/s.
 
-use std::{
-    collections::BTreeMap,
-    f64::consts::FRAC_PI_2,
-    fs::File,
-    io::{self, Read},
-    path::Path,
-};
+use std::{collections::BTreeMap, f64::consts::FRAC_PI_2, fs::File, io::Read, path::Path};
 
-use common::geometry::{Drum, Shapes, Wall};
+use common::geometry::{Drum, Shapes};
 use glam::DVec2;
-use serde::Deserialize;
+use serde::{Deserialize, de::DeserializeOwned};
 
-use super::error::WorldError;
-use crate::missions::trial::{Rules, Scene};
+use super::{
+    files::{malformed, unreadable},
+    shapes::{drum, wall, walls},
+};
+use crate::{
+    error::Result,
+    missions::trial::{Rules, Scene},
+};
 
 const START: DVec2 = DVec2::new(-2.25, 3.0);
 const GOAL: DVec2 = DVec2::new(-2.25, 13.0);
@@ -47,40 +47,33 @@ struct IndexRow {
     optimal_time_s: f64,
 }
 
-pub type Found = (String, Scene, Rules);
+/// A world's name, scene and rules.
+pub type World = (String, Scene, Rules);
 
 /// Every world of a table of cylinders, in the order of their numbers.
-pub fn table(file: &Path) -> Result<Vec<Found>, WorldError> {
+pub fn table(file: &Path) -> Result<Vec<World>> {
     let mut cylinders: BTreeMap<u32, Vec<Drum>> = BTreeMap::new();
-    for row in rows::<Cylinder>(file)? {
-        cylinders.entry(row.world).or_default().push(Drum {
-            at: DVec2::new(row.x_m, row.y_m),
-            radius_m: row.radius_m,
-            ..Drum::default()
-        });
+    for Cylinder { world, x_m, y_m, radius_m } in rows(file)? {
+        cylinders.entry(world).or_default().push(drum(DVec2::new(x_m, y_m), radius_m));
     }
     let index = file.with_file_name("index.csv");
-    let times: BTreeMap<u32, f64> = if index.exists() {
-        let rows = rows::<IndexRow>(&index)?;
-        rows.into_iter().map(|row| (row.world, row.optimal_time_s)).collect()
-    } else {
-        BTreeMap::new()
-    };
-    let world = |(number, drums): (u32, Vec<Drum>)| {
-        let optimal = times.get(&number).copied();
-        (format!("barn-{number:03}"), scene(drums), rules(optimal))
+    let index: Vec<IndexRow> = if index.exists() { rows(&index)? } else { Vec::new() };
+    let times: BTreeMap<_, _> = index.iter().map(|row| (row.world, row.optimal_time_s)).collect();
+    let world = |(number, drums)| {
+        let optimal_time_s = times.get(&number).copied();
+        (format!("barn-{number:03}"), scene(drums), Rules { optimal_time_s, ..RULES })
     };
     Ok(cylinders.into_iter().map(world).collect())
 }
 
-pub fn gazebo(file: &Path) -> Result<Found, WorldError> {
+pub fn gazebo(file: &Path) -> Result<World> {
     let mut text = String::new();
-    open(file)?.take(LONGEST).read_to_string(&mut text).map_err(WorldError::unreadable(file))?;
+    open(file)?.take(LONGEST).read_to_string(&mut text).map_err(unreadable(file))?;
     let drums = cylinders(&text).ok_or_else(|| {
-        WorldError::malformed(file, "no <model> with a <pose> and a <cylinder>; give a BARN world")
+        malformed(file, "no <model> with a <pose> and a <cylinder>; give a BARN world")
     })?;
-    let name = file.file_stem().unwrap_or_default().to_string_lossy();
-    Ok((format!("barn-{name}"), scene(drums), rules(None)))
+    let name = file.file_stem().unwrap_or_default().display();
+    Ok((format!("barn-{name}"), scene(drums), RULES))
 }
 
 /// The cylinders of a world's models: each stands at the last `<pose>` before its radius. None without cylinders.
@@ -88,18 +81,19 @@ fn cylinders(text: &str) -> Option<Vec<Drum>> {
     let mut drums = Vec::new();
     for model in text.split("<model ").skip(1) {
         let model = model.split("</model>").next()?;
-        let value = |tag: &str| {
-            let after = model.split(&format!("<{tag}>")).nth(1)?;
+        // The text of the first element of a name, whatever its attributes.
+        let element = |tag| {
+            let (_, after) = model.split_once(tag)?.1.split_once('>')?;
             after.split('<').next()
         };
-        let (Some(radius), Some(pose)) = (value("radius"), element(model, "pose")) else {
+        let (Some(radius), Some(pose)) = (element("<radius"), element("<pose")) else {
             continue;
         };
-        let mut pose = pose.split_whitespace().map(str::parse::<f64>);
+        let mut pose = pose.split_whitespace().map(str::parse);
         if let (Ok(radius_m), Some(Ok(x)), Some(Ok(y))) =
             (radius.trim().parse(), pose.next(), pose.next())
         {
-            drums.push(Drum { at: DVec2::new(x, y), radius_m, ..Drum::default() });
+            drums.push(drum(DVec2::new(x, y), radius_m));
         }
     }
     // The world's state at the end of the file repeats the poses.
@@ -107,26 +101,11 @@ fn cylinders(text: &str) -> Option<Vec<Drum>> {
     (!drums.is_empty()).then_some(drums)
 }
 
-/// The text of the first element `tag` of `text`, whatever its attributes.
-fn element<'a>(text: &'a str, tag: &str) -> Option<&'a str> {
-    let after = text.split(&format!("<{tag}")).nth(1)?;
-    after.split_once('>')?.1.split('<').next()
-}
-
 fn scene(drums: Vec<Drum>) -> Scene {
     let [left, right] = SIDES_M;
-    let corners = [
-        DVec2::new(left, SIDES_END_M),
-        DVec2::new(left, BEHIND_M),
-        DVec2::new(right, BEHIND_M),
-        DVec2::new(right, SIDES_END_M),
-    ];
+    let sides = [(left, SIDES_END_M), (left, BEHIND_M), (right, BEHIND_M), (right, SIDES_END_M)];
     Scene {
-        shapes: Shapes {
-            drums,
-            walls: vec![Wall { points: corners.to_vec(), ..Wall::default() }],
-            ..Shapes::default()
-        },
+        shapes: Shapes { drums, ..walls([wall(sides.map(DVec2::from))]) },
         things: Vec::new(),
         start: START,
         heading: FRAC_PI_2,
@@ -134,27 +113,27 @@ fn scene(drums: Vec<Drum>) -> Scene {
     }
 }
 
-pub fn rules(optimal_time_s: Option<f64>) -> Rules {
-    Rules {
-        success_within_m: SUCCESS_WITHIN_M,
-        clock_after_departure: true,
-        most_s: Some(MOST_S),
-        scored: true,
-        optimal_time_s,
-    }
-}
+/// The rules of the challenge.
+pub const RULES: Rules = Rules {
+    success_within_m: SUCCESS_WITHIN_M,
+    clock_after_departure: true,
+    most_s: Some(MOST_S),
+    scored: true,
+    optimal_time_s: None,
+};
 
-fn open(file: &Path) -> Result<Box<dyn Read>, WorldError> {
-    let opened = File::open(file).map_err(WorldError::unreadable(file))?;
+fn open(file: &Path) -> Result<Box<dyn Read>> {
+    let opened = File::open(file).map_err(unreadable(file))?;
     let zipped = file.extension().is_some_and(|extension| extension == "gz");
     Ok(if zipped { Box::new(flate2::read::GzDecoder::new(opened)) } else { Box::new(opened) })
 }
 
-fn rows<T: for<'row> Deserialize<'row>>(file: &Path) -> Result<Vec<T>, WorldError> {
-    let mut reader = csv::Reader::from_reader(open(file)?.take(LONGEST));
-    reader.deserialize().collect::<Result<_, _>>().map_err(|error: csv::Error| match error.kind() {
-        csv::ErrorKind::Io(_) => WorldError::unreadable(file)(io::Error::other(error.to_string())),
-        _ => WorldError::malformed(file, error.to_string()),
+fn rows<T: DeserializeOwned>(file: &Path) -> Result<Vec<T>> {
+    let reader = csv::Reader::from_reader(open(file)?.take(LONGEST));
+    let rows: csv::Result<_> = reader.into_deserialize().collect();
+    rows.map_err(|error| match error.kind() {
+        csv::ErrorKind::Io(_) => unreadable(file)(error),
+        _ => malformed(file, error),
     })
 }
 
@@ -198,10 +177,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("cylinders.csv");
         std::fs::write(&file, "world,x_m,y_m,radius_m\n7,left,5,0.075\n").unwrap();
-        let refused = table(&file).unwrap_err();
-        assert!(
-            matches!(&refused, WorldError::Malformed { file: named, .. } if *named == file),
-            "{refused}"
-        );
+        let refused = table(&file).unwrap_err().to_string();
+        let named = file.to_str().unwrap();
+        assert!(refused.starts_with(named) && refused.contains("line: 2"), "{refused}");
     }
 }

@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use common::geometry::{Shapes, Wall};
 use glam::DVec2;
 
+use super::shapes::{heading, wall, walls};
 use crate::{missions::trial::Scene, random::Random};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,23 +24,18 @@ pub fn draw(random: &mut Random, bends: Bends) -> Scene {
         }
         Bends::Oblique => (random.within(1.0, 1.8), oblique(random)),
     };
-    let (left, right) = (beside(&axis, width / 2.0), beside(&axis, -width / 2.0));
-    let mut points = left;
-    points.extend(right.into_iter().rev());
+    let mut points = beside(&axis, width / 2.0);
+    points.extend(beside(&axis, -width / 2.0).into_iter().rev());
     points.extend(points.first().copied());
     let last = axis.len() - 1;
     let back = (axis[last - 1] - axis[last]).normalize_or_zero();
     let ahead = (axis[1] - axis[0]).normalize_or_zero();
-    let heading = match random.below(3) {
-        0 => random.within(-PI, PI),
-        _ => ahead.to_angle(),
-    };
     Scene {
-        shapes: Shapes { walls: vec![Wall { points, ..Wall::default() }], ..Shapes::default() },
-        things: Vec::new(),
+        shapes: walls([wall(points)]),
         start: axis[0] + ahead * 0.6,
-        heading,
+        heading: heading(random, 3, ahead.to_angle()),
         target: axis[last] + back * 0.7,
+        ..Scene::default()
     }
 }
 

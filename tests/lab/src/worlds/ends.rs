@@ -10,7 +10,8 @@ use std::{fs::File, io::Read as _, path::Path};
 
 use glam::DVec2;
 
-use super::error::WorldError;
+use super::files::{malformed, unreadable};
+use crate::error::Result;
 
 /// Most bytes of such a file, which has some twenty short lines.
 const LONGEST: u64 = 64 << 10;
@@ -27,16 +28,16 @@ pub struct Ends {
 }
 
 /// The tests of a `config.txt`, in its order.
-pub fn read(file: &Path) -> Result<Vec<Ends>, WorldError> {
+pub fn read(file: &Path) -> Result<Vec<Ends>> {
     // The check comes before opening, because opening a pipe waits for its other end.
     if !file.is_file() {
-        return Err(WorldError::malformed(file, "not a regular file; give MRPB's tests"));
+        return Err(malformed(file, "not a regular file; give MRPB's tests"));
     }
     let mut text = String::new();
     File::open(file)
         .and_then(|opened| opened.take(LONGEST).read_to_string(&mut text))
-        .map_err(WorldError::unreadable(file))?;
-    parse(&text).map_err(|problem| WorldError::malformed(file, problem))
+        .map_err(unreadable(file))?;
+    parse(&text).map_err(|problem| malformed(file, problem))
 }
 
 fn parse(text: &str) -> Result<Vec<Ends>, String> {
@@ -47,33 +48,27 @@ fn parse(text: &str) -> Result<Vec<Ends>, String> {
         };
         let parsed = value.trim().parse().ok();
         let number = parsed.filter(|number: &f64| number.abs() <= 1e6);
-        let number = number.ok_or_else(|| {
+        if number.is_none() {
             let key = KEYS[key];
-            format!("line {line}: {key} is {value:?}; give metres or radians")
-        })?;
-        match tests.last_mut() {
-            Some(test) if test[key].is_none() => test[key] = Some(number),
-            _ => {
-                let mut test = [None; KEYS.len()];
-                test[key] = Some(number);
-                tests.push(test);
-            }
+            return Err(format!("line {line}: {key} is {value:?}; give metres or radians"));
+        }
+        if tests.last().is_none_or(|test| test[key].is_some()) {
+            tests.push([None; KEYS.len()]);
+        }
+        if let Some(test) = tests.last_mut() {
+            test[key] = number;
         }
     }
     if tests.is_empty() {
         return Err("no <arg name=\"initial_pose_x\" default=\"...\"/>; give MRPB's tests, or remove the file to have starts and targets drawn".to_owned());
     }
     let complete = |(number, test): (usize, [Option<f64>; KEYS.len()])| {
-        let missing = KEYS.iter().zip(test).find(|(_, value)| value.is_none());
-        match (test, missing) {
-            ([Some(x), Some(y), Some(heading), Some(to_x), Some(to_y)], _) => {
-                Ok(Ends { start: DVec2::new(x, y), heading, target: DVec2::new(to_x, to_y) })
-            }
-            (_, missing) => {
-                let key = missing.map_or("a key", |(key, _)| key);
-                Err(format!("test {number} has no {key}; add it"))
-            }
+        if let [Some(x), Some(y), Some(heading), Some(to_x), Some(to_y)] = test {
+            return Ok(Ends { start: DVec2::new(x, y), heading, target: DVec2::new(to_x, to_y) });
         }
+        let missing = KEYS.iter().zip(test).find(|(_, value)| value.is_none());
+        let key = missing.map_or("a key", |(key, _)| key);
+        Err(format!("test {number} has no {key}; add it"))
     };
     (1..).zip(tests).map(complete).collect()
 }

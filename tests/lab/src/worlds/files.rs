@@ -2,6 +2,7 @@
 
 use std::{
     collections::BTreeSet,
+    fmt::Display,
     fs, io,
     path::{Path, PathBuf},
 };
@@ -9,13 +10,12 @@ use std::{
 use common::mission::Mission;
 
 use super::{
-    barn,
+    Found, NO_MAP, barn,
     ends::{self, Ends},
-    error::WorldError,
     floor::Floor,
-    found::Found,
 };
 use crate::{
+    error::{Failure, Result},
     missions::trial::{BodySize, Rules, Scene, Trial},
     random::Random,
 };
@@ -27,6 +27,17 @@ const DRAWN_KIND: u64 = 7;
 /// Name of a map's file of tests, as in MRPB.
 const TESTS_FILE: &str = "config.txt";
 
+pub fn unreadable<E: Display>(file: &Path) -> impl Fn(E) -> Failure {
+    let file = file.display().to_string();
+    move |cause| {
+        format!("cannot read {file}: {cause}; give a kind of world, a file or a folder, see `firsthand help evaluation`").into()
+    }
+}
+
+pub fn malformed(file: &Path, problem: impl Display) -> Failure {
+    format!("{}: {problem}", file.display()).into()
+}
+
 #[derive(Clone, Copy, Debug)]
 pub struct Asked {
     /// Number of worlds; without it all, and ten on each map without tests.
@@ -37,52 +48,48 @@ pub struct Asked {
 
 /// The worlds of a file, or of all world files in a folder and its subfolders, sorted by name; the requested number, evenly
 /// spread.
-pub fn read(path: &Path, asked: Asked, body: &BodySize) -> Result<Found, WorldError> {
-    let files = if path.is_dir() {
-        files_of(path).map_err(WorldError::unreadable(path))?
-    } else {
-        vec![path.to_path_buf()]
-    };
-    let mut found = Found::default();
-    let mut maps = 0;
-    for file in &files {
-        match kind_of(file) {
-            Some(Kind::Mission) => add_mission(&mut found, file, body)?,
-            Some(Kind::Gazebo) => add_barn(&mut found, vec![barn::gazebo(file)?], body)?,
-            Some(Kind::Cylinders) => add_barn(&mut found, barn::table(file)?, body)?,
-            Some(Kind::Map) => {
-                add_map(&mut found, file, asked, body)?;
-                maps += 1;
-            }
-            None => {
-                return Err(WorldError::malformed(
-                    file,
-                    "not a world; give a mission (.toml), a ROS map (.yaml), a BARN .world or a table of its cylinders (cylinders.csv, .csv.gz)",
-                ));
-            }
-        }
+pub fn read(path: &Path, asked: Asked, body: &BodySize) -> Result<Found> {
+    let mut files = vec![path.to_path_buf()];
+    if path.is_dir() {
+        files = files_of(path).map_err(unreadable(path))?;
     }
-    if asked.ends.is_some() && maps == 0 {
-        return Err(WorldError::NoMap);
+    let mut found = Found::default();
+    for file in &files {
+        let Some(add) = reader_of(file) else {
+            return Err(malformed(
+                file,
+                "not a world; give a mission (.toml), a ROS map (.yaml), a BARN .world or a table of its cylinders (cylinders.csv, .csv.gz)",
+            ));
+        };
+        add(&mut found, file, asked, body)?;
+    }
+    let is_map = |file: &PathBuf| file.extension().is_some_and(|it| it == "yaml" || it == "yml");
+    if asked.ends.is_some() && !files.iter().any(is_map) {
+        return Err(NO_MAP.into());
     }
     // In the results a world has the name of its file.
     let mut names = BTreeSet::new();
-    for Trial { world, .. } in &found.trials {
-        if !names.insert(world) {
-            return Err(WorldError::malformed(
-                path,
-                format!("two worlds are called {world}; give one of them another name"),
-            ));
-        }
+    if let Some(twice) = found.trials.iter().find(|trial| !names.insert(&trial.world)) {
+        let world = &twice.world;
+        let problem = format!("two worlds are called {world}; give one of them another name");
+        return Err(malformed(path, problem));
     }
-    if let Some(count) = asked.count {
-        found.spread(count);
+    let all = found.trials.len();
+    if let Some(count) = asked.count.filter(|&count| count < all) {
+        let mut index = 0;
+        found.trials.retain(|_| {
+            index += 1;
+            index * count / all > (index - 1) * count / all
+        });
     }
     Ok(found)
 }
 
 /// The worlds in a folder and its subfolders, sorted by name.
 fn files_of(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let entries = |folder: &Path| -> io::Result<Vec<PathBuf>> {
+        fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect()
+    };
     let mut files = Vec::new();
     for path in entries(folder)? {
         if path.is_dir() {
@@ -91,41 +98,54 @@ fn files_of(folder: &Path) -> io::Result<Vec<PathBuf>> {
             files.push(path);
         }
     }
-    files.retain(|file| kind_of(file).is_some() && !file.is_dir());
+    files.retain(|file| reader_of(file).is_some() && !file.is_dir());
     files.sort();
     Ok(files)
 }
 
-fn entries(folder: &Path) -> io::Result<Vec<PathBuf>> {
-    fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect()
+/// Adds the worlds of a file.
+type Reader = fn(&mut Found, &Path, Asked, &BodySize) -> Result;
+
+/// The kinds of files, by the ends of their names.
+const READERS: [(&str, Reader); 6] = [
+    (".toml", |found, file, _, body| {
+        let mission = Mission::load(file)?.with_calibration()?;
+        found.add_solvable(Trial::of_mission(mission.name.clone(), mission, body));
+        Ok(())
+    }),
+    (".world", |found, file, _, body| add_barn(found, [barn::gazebo(file)?], body)),
+    ("cylinders.csv", add_table),
+    (".csv.gz", add_table),
+    (".yaml", add_map),
+    (".yml", add_map),
+];
+
+fn reader_of(file: &Path) -> Option<Reader> {
+    let name = file.file_name()?.to_string_lossy();
+    READERS.iter().find(|(end, _)| name.ends_with(end)).map(|(_, reader)| *reader)
 }
 
-fn add_mission(found: &mut Found, file: &Path, body: &BodySize) -> Result<(), WorldError> {
-    let mission = Mission::load(file)?.with_calibration()?;
-    found.add_solvable(Trial::of_mission(mission.name.clone(), mission, body));
-    Ok(())
+fn add_table(found: &mut Found, file: &Path, _: Asked, body: &BodySize) -> Result {
+    add_barn(found, barn::table(file)?, body)
 }
 
 fn add_barn(
     found: &mut Found,
-    worlds: Vec<(String, Scene, Rules)>,
+    worlds: impl IntoIterator<Item = barn::World>,
     body: &BodySize,
-) -> Result<(), WorldError> {
-    for (world, scene, rules) in worlds {
-        found.add(world, &scene, rules, body)?;
-    }
-    Ok(())
+) -> Result {
+    let mut worlds = worlds.into_iter();
+    worlds.try_for_each(|(world, scene, rules)| found.add(world, &scene, rules, body))
 }
 
 /// A ROS map as worlds: with the given ends, or its tests, or drawn ones.
-fn add_map(
-    found: &mut Found,
-    file: &Path,
-    asked: Asked,
-    body: &BodySize,
-) -> Result<(), WorldError> {
+fn add_map(found: &mut Found, file: &Path, asked: Asked, body: &BodySize) -> Result {
     let floor = Floor::load(file)?;
-    let name = map_name(file);
+    // The name is that of the file, or of its folder if the file is called `map`, as in MRPB.
+    let mut name = file.file_stem().unwrap_or_default();
+    if name == "map" {
+        name = file.parent().and_then(Path::file_name).unwrap_or(name);
+    }
     let tests = file.with_file_name(TESTS_FILE);
     let ends = match asked.ends {
         Some(ends) => vec![ends],
@@ -136,54 +156,17 @@ fn add_map(
             floor.draw(streams, body.swept_m())
         }
     };
-    for (number, ends) in (1..).zip(ends) {
-        let scene = Scene {
-            shapes: floor.shapes(file, ends.start)?,
-            things: Vec::new(),
-            start: ends.start,
-            heading: ends.heading,
-            target: ends.target,
-        };
+    for (number, Ends { start, heading, target }) in (1..).zip(ends) {
+        let shapes = floor.shapes(file, start)?;
         // A start outside the free ground is not connected to anything.
-        if scene.shapes.is_empty() {
+        if shapes.is_empty() {
             found.unsolvable += 1;
             continue;
         }
-        found.add(format!("{name}-{number}"), &scene, Rules::default(), body)?;
+        let scene = Scene { shapes, things: Vec::new(), start, heading, target };
+        found.add(format!("{}-{number}", name.display()), &scene, Rules::PLAIN, body)?;
     }
     Ok(())
-}
-
-/// The name of the file, or of its folder if the file is called `map`, as in MRPB.
-fn map_name(file: &Path) -> String {
-    let named = match file.file_stem() {
-        Some(stem) if stem == "map" => file.parent().and_then(Path::file_name).unwrap_or(stem),
-        stem => stem.unwrap_or_default(),
-    };
-    named.to_string_lossy().into_owned()
-}
-
-#[derive(Clone, Copy)]
-enum Kind {
-    Mission,
-    Gazebo,
-    Cylinders,
-    Map,
-}
-
-/// The kinds of files, by the ends of their names.
-const KINDS: [(&str, Kind); 6] = [
-    (".toml", Kind::Mission),
-    (".world", Kind::Gazebo),
-    ("cylinders.csv", Kind::Cylinders),
-    (".csv.gz", Kind::Cylinders),
-    (".yaml", Kind::Map),
-    (".yml", Kind::Map),
-];
-
-fn kind_of(file: &Path) -> Option<Kind> {
-    let name = file.file_name()?.to_string_lossy();
-    KINDS.iter().find(|(end, _)| name.ends_with(end)).map(|(_, kind)| *kind)
 }
 
 #[cfg(test)]

@@ -4,12 +4,12 @@
 
 use std::{collections::VecDeque, f64::consts::PI, path::Path};
 
-use common::geometry::{Box2, Shapes};
+use common::geometry::Shapes;
 use glam::DVec2;
 use maps::{MOST_BOXES, MapError, PlacedMap};
 
-use super::{ends::Ends, error::WorldError};
-use crate::random::Random;
+use super::{ends::Ends, files::malformed, shapes::boxes};
+use crate::{error::Result, random::Random};
 
 /// Longest side of a map, metres: that of the check whether it can be crossed.
 const LARGEST_M: f64 = 95.0;
@@ -24,33 +24,34 @@ pub struct Floor {
 }
 
 impl Floor {
-    pub fn load(file: &Path) -> Result<Self, WorldError> {
+    pub fn load(file: &Path) -> Result<Self> {
         let map = maps::load_placed(file)?;
         let side_m = map.map.cols.max(map.map.rows) as f64 * map.cell_m;
         if side_m > LARGEST_M {
-            return Err(WorldError::TooLarge {
-                file: file.to_path_buf(),
-                side_m,
-                most_m: LARGEST_M,
-            });
+            let problem = format!(
+                "{side_m:.0} m on a side, a world has at most {LARGEST_M:.0} m; crop the map"
+            );
+            return Err(malformed(file, problem));
         }
         Ok(Self { map })
     }
 
     /// The shapes around the ground that is connected to `start`, metres.
-    pub fn shapes(&self, file: &Path, start: DVec2) -> Result<Shapes, WorldError> {
-        let free: Vec<bool> = self.map.map.blocked.iter().map(|it| !it).collect();
-        let reached = self.connected(&free, self.cell(start));
-        let mut wanted = vec![false; reached.len()];
-        for cell in self.beside(&reached) {
+    pub fn shapes(&self, file: &Path, start: DVec2) -> Result<Shapes> {
+        let map = &self.map.map;
+        let mut wanted = vec![false; map.blocked.len()];
+        for cell in self.beside(&self.connected(&self.free(), self.cell(start))) {
             wanted[cell] = true;
         }
-        let boxes: Vec<Box2> =
-            self.map.boxes(&self.map.map.blocked, wanted).take(MOST_BOXES + 1).collect();
-        if boxes.len() > MOST_BOXES {
+        let found: Vec<_> = self.map.boxes(&map.blocked, wanted).take(MOST_BOXES + 1).collect();
+        if found.len() > MOST_BOXES {
             return Err(MapError::too_many_boxes(file).into());
         }
-        Ok(Shapes { boxes, ..Shapes::default() })
+        Ok(boxes(found))
+    }
+
+    fn free(&self) -> Vec<bool> {
+        self.map.map.blocked.iter().map(|it| !it).collect()
     }
 
     /// For each stream of random numbers a start, and a target 3 to 15 m away that a body which needs `swept_m` around
@@ -115,37 +116,32 @@ impl Floor {
 
     /// The free cells at least `swept_m` away from the middle of any other.
     fn roomy(&self, swept_m: f64) -> Vec<bool> {
-        let map = &self.map.map;
         let reach = (swept_m / self.map.cell_m + 0.5).ceil() as usize;
-        let mut roomy: Vec<bool> = map.blocked.iter().map(|it| !it).collect();
+        let mut roomy = self.free();
         for solid in self.beside(&roomy.clone()) {
-            let (col, row) = (solid % map.cols, solid / map.cols);
-            for y in row.saturating_sub(reach)..=(row + reach).min(map.rows - 1) {
-                for x in col.saturating_sub(reach)..=(col + reach).min(map.cols - 1) {
-                    let (dx, dy) = (x.abs_diff(col), y.abs_diff(row));
-                    if dx * dx + dy * dy <= reach * reach {
-                        roomy[y * map.cols + x] = false;
-                    }
-                }
+            for (cell, [dx, dy]) in self.around(solid, reach) {
+                roomy[cell] &= dx * dx + dy * dy > reach * reach;
             }
         }
         roomy
     }
 
+    /// The cells within `reach` columns and rows of `cell`, and how far away each is.
+    fn around(&self, cell: usize, reach: usize) -> impl Iterator<Item = (usize, [usize; 2])> {
+        let (cols, rows) = (self.map.map.cols, self.map.map.rows);
+        let (col, row) = (cell % cols, cell / cols);
+        let near =
+            move |at: usize, end: usize| at.saturating_sub(reach)..=(at + reach).min(end - 1);
+        near(row, rows).flat_map(move |y| {
+            near(col, cols).map(move |x| (y * cols + x, [x.abs_diff(col), y.abs_diff(row)]))
+        })
+    }
+
     /// The solid cells that touch one of `ground`, by an edge or a corner.
     fn beside(&self, ground: &[bool]) -> Vec<usize> {
-        let (cols, rows) = (self.map.map.cols, self.map.map.rows);
-        let touches = |cell: usize| {
-            let (col, row) = (cell % cols, cell / cols);
-            let mut around = (row.saturating_sub(1)..=(row + 1).min(rows - 1)).flat_map(|y| {
-                let columns = col.saturating_sub(1)..=(col + 1).min(cols - 1);
-                columns.map(move |x| y * cols + x)
-            });
-            around.any(|cell| ground[cell])
-        };
         let blocked = &self.map.map.blocked;
-        let solid = (0..blocked.len()).filter(|&cell| blocked[cell]);
-        solid.filter(|&cell| touches(cell)).collect()
+        let touches = |cell: usize| self.around(cell, 1).any(|(cell, _)| ground[cell]);
+        (0..blocked.len()).filter(|&cell| blocked[cell] && touches(cell)).collect()
     }
 }
 
@@ -184,7 +180,7 @@ mod tests {
         assert_eq!(start, DVec2::new(-0.25, 4.75));
         let shapes = floor.shapes(Path::new("a.yaml"), start).unwrap();
         let inside = |cell| shapes.clearance(floor.centre(cell)) < 0.0;
-        let free: Vec<bool> = floor.map.map.blocked.iter().map(|it| !it).collect();
+        let free = floor.free();
         assert!((0..free.len()).all(|cell| !free[cell] || !inside(cell)));
         assert!(floor.beside(&free).into_iter().all(inside));
         assert!(shapes.boxes.len() < 14, "{}", shapes.boxes.len());
@@ -225,10 +221,8 @@ mod tests {
         std::fs::write(folder.path().join("a.pgm"), image).unwrap();
         let file = folder.path().join("a.yaml");
         std::fs::write(&file, "image: a.pgm\nresolution: 1\norigin: [0, 0, 0]").unwrap();
-        let refused = Floor::load(&file).unwrap_err();
-        assert!(
-            matches!(&refused, WorldError::TooLarge { file: named, side_m: 200.0, .. } if *named == file),
-            "{refused}"
-        );
+        let refused = Floor::load(&file).unwrap_err().to_string();
+        let named = file.to_str().unwrap();
+        assert!(refused.starts_with(named) && refused.contains("200 m on a side"), "{refused}");
     }
 }

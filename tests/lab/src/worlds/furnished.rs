@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use common::geometry::{Box2, Drum, Shapes, Wall};
 use glam::DVec2;
 
-use super::rooms::closed;
+use super::shapes::{Room, block, boxes, heading, walls};
 use crate::{missions::trial::Scene, random::Random};
 
 /// Things per square metre of floor: sparse, usual, dense.
@@ -20,59 +20,29 @@ const BEHIND_CURTAIN_M: f64 = 0.12;
 
 /// Room `number`. The number selects the density.
 pub fn draw(random: &mut Random, number: usize) -> Scene {
-    let distance = random.within(4.0, 7.0);
-    let half_width = random.within(2.0, 3.0);
-    let target = DVec2::new(distance, random.within(-0.5, 0.5) * half_width);
-    let least = DVec2::new(-1.2, -half_width);
-    let greatest = DVec2::new(distance + 1.2, half_width);
-    let mut shapes = Shapes { walls: vec![closed(least, greatest)], ..Shapes::default() };
+    let room = Room::draw(random, 7.0, [2.0, 3.0]);
+    let Room { target, least, greatest } = room;
+    let mut shapes = walls([room.closed()]);
     if random.share() < 0.5 {
         shapes.walls.push(curtain(random, least, greatest));
     }
-    let extent = greatest - least;
-    let things = (extent.x * extent.y * DENSITIES[number % DENSITIES.len()]).round() as usize;
-    let mut taken: Vec<Place> = Vec::new();
-    for _ in 0..things {
-        let at = random.point((least + greatest) / 2.0, extent / 2.0);
+    let mut taken: Vec<(DVec2, f64)> = Vec::new();
+    for _ in 0..room.things(DENSITIES[number % DENSITIES.len()]) {
+        let at = room.place(random);
         let (thing, reach) = thing(random, at);
-        let place = Place { at, reach };
         let ends_free = thing.clearance(DVec2::ZERO).min(thing.clearance(target)) > KEPT_FREE_M;
+        // Corners may be in a wall, because furniture stands against it.
+        let (from, to) = (at - 0.7 * reach, at + 0.7 * reach);
+        let inside = from.cmpge(least).all() && to.cmple(greatest).all();
         // Furniture may touch other furniture, and chairs stand partly below tables; walls limit it.
-        if ends_free && place.is_inside(least, greatest) && !taken.iter().any(|it| it.meets(&place))
-        {
-            taken.push(place);
+        let meets = |other: &(DVec2, f64)| at.distance(other.0) < 0.8 * (reach + other.1);
+        if ends_free && inside && !taken.iter().any(meets) {
+            taken.push((at, reach));
             shapes.drums.extend(thing.drums);
             shapes.boxes.extend(thing.boxes);
         }
     }
-    Scene {
-        shapes,
-        things: Vec::new(),
-        start: DVec2::ZERO,
-        heading: match random.below(3) {
-            0 => random.within(-PI, PI),
-            _ => 0.0,
-        },
-        target,
-    }
-}
-
-/// Whether a disc of radius `reach` on the floor is free, metres.
-struct Place {
-    at: DVec2,
-    reach: f64,
-}
-
-impl Place {
-    fn is_inside(&self, least: DVec2, greatest: DVec2) -> bool {
-        // Corners may be in a wall, because furniture stands against it.
-        let reach = self.reach * 0.7;
-        (self.at - reach).cmpge(least).all() && (self.at + reach).cmple(greatest).all()
-    }
-
-    fn meets(&self, other: &Self) -> bool {
-        self.at.distance(other.at) < 0.8 * (self.reach + other.reach)
-    }
+    Scene { shapes, heading: heading(random, 3, 0.0), target, ..Scene::default() }
 }
 
 /// A thing at `at`, and the radius of its floor space, metres.
@@ -90,7 +60,7 @@ fn thing(random: &mut Random, at: DVec2) -> (Shapes, f64) {
         7..=8 => DVec2::new(random.within(0.3, 0.9), random.within(0.3, 0.7)),
         _ => DVec2::new(random.within(1.3, 1.8), random.within(0.7, 0.9)),
     };
-    let block = Box2 { at, size_m, angle_deg: angle.to_degrees(), ..Box2::default() };
+    let block = block(at, size_m, angle.to_degrees());
     let shapes = match kind {
         // These are above the robot: the seat of a chair and the top of a table.
         0..=3 => on_legs(random, &block, 0.42, 0.47),
@@ -101,14 +71,10 @@ fn thing(random: &mut Random, at: DVec2) -> (Shapes, f64) {
             on_legs(random, &block, bottom, bottom + 0.02)
         }
         // A step or the foot of a lamp is lower than the sonar.
-        7..=8 => one(Box2 { top_m: Some(random.within(0.05, 0.10)), ..block }),
-        _ => one(Box2 { top_m: Some(0.8), echo: Some(SOFT), ..block }),
+        7..=8 => boxes([Box2 { top_m: Some(random.within(0.05, 0.10)), ..block }]),
+        _ => boxes([Box2 { top_m: Some(0.8), echo: Some(SOFT), ..block }]),
     };
     (shapes, size_m.length() / 2.0)
-}
-
-fn one(block: Box2) -> Shapes {
-    Shapes { boxes: vec![block], ..Shapes::default() }
 }
 
 /// `top` between two heights, metres, on four legs 2 to 3 cm thick at its corners.
@@ -124,8 +90,7 @@ fn on_legs(random: &mut Random, top: &Box2, bottom_m: f64, top_m: f64) -> Shapes
     });
     Shapes {
         drums: legs.to_vec(),
-        boxes: vec![Box2 { bottom_m: Some(bottom_m), top_m: Some(top_m), ..top.clone() }],
-        ..Shapes::default()
+        ..boxes([Box2 { bottom_m: Some(bottom_m), top_m: Some(top_m), ..top.clone() }])
     }
 }
 

@@ -13,13 +13,13 @@
 
 use std::f64::consts::PI;
 
-use common::{
-    geometry::{Box2, Drum, Shapes},
-    mission::{Move, Thing},
-};
-use glam::DVec2;
+use common::mission::{Move, Thing};
+use glam::{DVec2, Vec2Swizzles as _};
 
-use super::barn;
+use super::{
+    barn,
+    shapes::{block, boxes, drum, drums},
+};
 use crate::{
     missions::trial::{Rules, Scene},
     random::Random,
@@ -36,54 +36,31 @@ const STATIONS: usize = 10;
 /// The least time for which cylinders move, seconds: longer than a mission by the challenge's rules.
 const MOVES_S: f64 = 130.0;
 
-/// The difficulty of a world; each range includes its ends.
-struct Difficulty {
-    cylinders: [usize; 2],
-    orders: [usize; 2],
-    speed_m_s: [f64; 2],
-    deviation_m_s: [f64; 2],
-}
+/// The difficulty of a world: cylinders, orders, speeds (m/s) and their deviations; each range includes its ends.
+type Difficulty = ([usize; 2], [usize; 2], [f64; 2], [f64; 2]);
 
 /// DynaBARN's easy, medium and hard worlds.
 const DIFFICULTIES: [Difficulty; 3] = [
-    Difficulty {
-        cylinders: [5, 14],
-        orders: [1, 2],
-        speed_m_s: [0.5, 0.9],
-        deviation_m_s: [0.01, 0.1],
-    },
-    Difficulty {
-        cylinders: [15, 19],
-        orders: [2, 4],
-        speed_m_s: [1.0, 1.4],
-        deviation_m_s: [0.05, 0.15],
-    },
-    Difficulty {
-        cylinders: [20, 24],
-        orders: [3, 5],
-        speed_m_s: [1.5, 1.9],
-        deviation_m_s: [0.1, 0.2],
-    },
+    ([5, 14], [1, 2], [0.5, 0.9], [0.01, 0.1]),
+    ([15, 19], [2, 4], [1.0, 1.4], [0.05, 0.15]),
+    ([20, 24], [3, 5], [1.5, 1.9], [0.1, 0.2]),
 ];
 
 /// The rules of the challenge. Its score is left out, because it has no reference path for these worlds.
-pub fn rules() -> Rules {
-    Rules { scored: false, ..barn::rules(None) }
-}
+pub const RULES: Rules = Rules { scored: false, ..barn::RULES };
 
 /// Hall `number`. The number selects the difficulty.
 pub fn draw(random: &mut Random, number: usize) -> Scene {
     let difficulty = &DIFFICULTIES[number % DIFFICULTIES.len()];
-    let wall = |at: DVec2, size_m: DVec2| Box2 { at, size_m, ..Box2::default() };
     let along = DVec2::new(2.0 * HALF_M, WALL_M);
-    let boxes = vec![
-        wall(DVec2::new(-HALF_M, 0.0), DVec2::new(WALL_M, 2.0 * HALF_M)),
-        wall(DVec2::new(0.0, HALF_M), along),
-        wall(DVec2::new(0.0, -HALF_M), along),
+    let walls = [
+        block(DVec2::new(-HALF_M, 0.0), along.yx(), 0.0),
+        block(DVec2::new(0.0, HALF_M), along, 0.0),
+        block(DVec2::new(0.0, -HALF_M), along, 0.0),
     ];
-    let cylinders = one_of(random, difficulty.cylinders);
+    let cylinders = one_of(random, difficulty.0);
     Scene {
-        shapes: Shapes { boxes, ..Shapes::default() },
+        shapes: boxes(walls),
         things: (0..cylinders).map(|_| cylinder(random, difficulty)).collect(),
         start: START,
         heading: PI,
@@ -95,11 +72,10 @@ fn one_of(random: &mut Random, [least, most]: [usize; 2]) -> usize {
     least + random.below(most - least + 1)
 }
 
-fn cylinder(random: &mut Random, difficulty: &Difficulty) -> Thing {
-    let path = path(random, difficulty);
-    let [least, most] = difficulty.speed_m_s;
+fn cylinder(random: &mut Random, &(_, orders, [least, most], deviations): &Difficulty) -> Thing {
+    let path = path(random, orders);
     let mean = random.within(least, most);
-    let deviation = random.within(difficulty.deviation_m_s[0], difficulty.deviation_m_s[1]);
+    let deviation = random.within(deviations[0], deviations[1]);
     let (mut at_s, mut at) = (0.0, path[0]);
     let mut moves = vec![Move { at_s, by: DVec2::ZERO }];
     for &next in path.iter().skip(1).chain(path.iter().rev().skip(1)).cycle() {
@@ -117,18 +93,13 @@ fn cylinder(random: &mut Random, difficulty: &Difficulty) -> Thing {
         at = next;
         moves.push(Move { at_s, by: at - path[0] });
     }
-    let drum = Drum { at: path[0], radius_m: RADIUS_M, ..Drum::default() };
-    Thing {
-        shape: Shapes { drums: vec![drum], ..Shapes::default() },
-        from_s: 0.0,
-        until_s: None,
-        moves,
-    }
+    let shape = drums([drum(path[0], RADIUS_M)]);
+    Thing { shape, from_s: 0.0, until_s: None, moves }
 }
 
 /// The stations of a path along a polynomial, in either direction; at least the points that the polynomial is drawn through.
-fn path(random: &mut Random, difficulty: &Difficulty) -> Vec<DVec2> {
-    let order = one_of(random, difficulty.orders);
+fn path(random: &mut Random, orders: [usize; 2]) -> Vec<DVec2> {
+    let order = one_of(random, orders);
     let mut points: Vec<DVec2> = Vec::new();
     while points.len() <= order {
         let point = random.point(DVec2::ZERO, DVec2::splat(HALF_M + 0.5)).round();
@@ -169,8 +140,7 @@ mod tests {
      {
         for number in 0..30 {
             let scene = draw(&mut Random::of_world(1, 11, number), number as usize);
-            let Difficulty { cylinders, speed_m_s: [least, most], .. } =
-                DIFFICULTIES[number as usize % 3];
+            let (cylinders, _, [least, most], _) = DIFFICULTIES[number as usize % 3];
             assert!((cylinders[0]..=cylinders[1]).contains(&scene.things.len()));
             for Thing { shape, moves, .. } in &scene.things {
                 let start = shape.drums[0].at;

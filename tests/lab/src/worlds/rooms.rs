@@ -4,10 +4,14 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use common::geometry::{Box2, Drum, Light, Shapes, Wall};
+use common::geometry::{Light, Shapes};
 use glam::DVec2;
 
-use crate::{missions::trial::Scene, random::Random};
+use super::shapes::{Room, block, drum, wall, walls};
+use crate::{
+    missions::trial::{Scene, points},
+    random::Random,
+};
 
 /// Things per square metre of floor: sparse, usual, dense.
 const DENSITIES: [f64; 3] = [0.10, 0.18, 0.26];
@@ -34,15 +38,13 @@ pub fn draw(random: &mut Random, number: usize, doors: Doors) -> Scene {
 pub fn rotated(random: &mut Random, number: usize, doors: Doors) -> Scene {
     let mut scene = room(random, number, doors, true);
     let angle = random.within(-PI, PI);
-    let turn = |at: &mut DVec2| *at = DVec2::from_angle(angle).rotate(*at);
-    let Shapes { drums, boxes, walls } = &mut scene.shapes;
-    drums.iter_mut().for_each(|drum| turn(&mut drum.at));
-    walls.iter_mut().flat_map(|wall| &mut wall.points).for_each(turn);
-    for block in boxes {
-        turn(&mut block.at);
+    let target = std::iter::once(&mut scene.target);
+    for at in points(&mut scene.shapes).chain(target) {
+        *at = DVec2::from_angle(angle).rotate(*at);
+    }
+    for block in &mut scene.shapes.boxes {
         block.angle_deg = (block.angle_deg + angle.to_degrees()).rem_euclid(180.0);
     }
-    turn(&mut scene.target);
     scene.heading = (scene.heading + angle + PI).rem_euclid(TAU) - PI;
     scene
 }
@@ -61,27 +63,30 @@ pub fn glazed(random: &mut Random, number: usize) -> Scene {
 }
 
 fn room(random: &mut Random, number: usize, doors: Doors, oblique: bool) -> Scene {
-    let distance = random.within(4.0, 8.0);
-    let half_width = random.within(1.6, 3.0);
-    let target = DVec2::new(distance, random.within(-0.5, 0.5) * half_width);
-    let (least, greatest) = (DVec2::new(-1.2, -half_width), DVec2::new(distance + 1.2, half_width));
-    let mut shapes = Shapes { walls: vec![closed(least, greatest)], ..Shapes::default() };
+    let room = Room::draw(random, 8.0, [1.6, 3.0]);
+    let (target, half_width) = (room.target, room.greatest.y);
+    let mut shapes = walls([room.closed()]);
     if doors == Doors::All || random.share() < DOOR_SHARE {
-        let at = random.within(1.2, distance - 1.2);
+        let at = random.within(1.2, target.x - 1.2);
         let gap = random.within(0.8, 1.2);
         let reach = half_width - gap / 2.0 - 0.1;
         let middle = random.within(-reach, reach);
-        let most = if oblique { MOST_OBLIQUE_DEG } else { 0.0 };
-        // The thing stays clear of start and target.
-        let most = most
-            .min((0.7 * (at.min(distance - at) - KEPT_FREE_M) / half_width).atan().to_degrees());
-        let slant = if oblique { random.within(-most, most).to_radians().tan() } else { 0.0 };
-        partition(&mut shapes, at, slant, middle, gap, half_width);
+        let mut slant = 0.0;
+        if oblique {
+            // The thing stays clear of start and target.
+            let most = (0.7 * (at.min(target.x - at) - KEPT_FREE_M) / half_width).atan();
+            let most = MOST_OBLIQUE_DEG.min(most.to_degrees());
+            slant = random.within(-most, most).to_radians().tan();
+        }
+        // A wall across the room through (`at`, 0), which leads `slant` metres along x for each along y, with a door around
+        // y = `middle`.
+        let half_gap = gap / 2.0 / slant.hypot(1.0);
+        for ends in [[-half_width, middle - half_gap], [middle + half_gap, half_width]] {
+            shapes.walls.push(wall(ends.map(|y| DVec2::new(at + slant * y, y))));
+        }
     }
-    let extent = greatest - least;
-    let things = (extent.x * extent.y * DENSITIES[number % DENSITIES.len()]).round() as usize;
-    for _ in 0..things {
-        let at = random.point((least + greatest) / 2.0, extent / 2.0);
+    for _ in 0..room.things(DENSITIES[number % DENSITIES.len()]) {
+        let at = room.place(random);
         add_thing(&mut shapes, random, at, target);
     }
     let heading = match random.below(4) {
@@ -90,51 +95,28 @@ fn room(random: &mut Random, number: usize, doors: Doors, oblique: bool) -> Scen
         2 => PI,
         _ => random.within(-PI, PI),
     };
-    Scene { shapes, things: Vec::new(), start: DVec2::ZERO, heading, target }
-}
-
-pub fn closed(least: DVec2, greatest: DVec2) -> Wall {
-    let corners =
-        [least, DVec2::new(greatest.x, least.y), greatest, DVec2::new(least.x, greatest.y), least];
-    Wall { points: corners.to_vec(), ..Wall::default() }
-}
-
-/// A wall across the room through (`at`, 0), which leads `slant` metres along x for each along y, with a door of `gap` metres around
-/// y = `middle`.
-fn partition(shapes: &mut Shapes, at: f64, slant: f64, middle: f64, gap: f64, half_width: f64) {
-    let half_gap = gap / 2.0 / slant.hypot(1.0);
-    for (from, to) in [(-half_width, middle - half_gap), (middle + half_gap, half_width)] {
-        shapes.walls.push(Wall {
-            points: [from, to].map(|y| DVec2::new(at + slant * y, y)).to_vec(),
-            ..Wall::default()
-        });
-    }
+    Scene { shapes, heading, target, ..Scene::default() }
 }
 
 /// Add a drum, a box or a loose wall at `at`, or nothing if start or target would not be free.
 fn add_thing(shapes: &mut Shapes, random: &mut Random, at: DVec2, target: DVec2) {
-    let is_free =
-        |reach: f64| at.length() > reach + KEPT_FREE_M && at.distance(target) > reach + KEPT_FREE_M;
+    let nearest_m = at.length().min(at.distance(target));
+    let is_free = |reach: f64| nearest_m > reach + KEPT_FREE_M;
     match random.below(10) {
         0..=4 => {
             let radius_m = random.within(0.12, 0.35);
-            if is_free(radius_m) {
-                shapes.drums.push(Drum { at, radius_m, ..Drum::default() });
-            }
+            shapes.drums.extend(is_free(radius_m).then(|| drum(at, radius_m)));
         }
         5..=7 => {
             let size_m = DVec2::new(random.within(0.24, 0.8), random.within(0.24, 0.8));
             let angle_deg = random.within(0.0, 180.0);
-            if is_free(size_m.length() / 2.0) {
-                shapes.boxes.push(Box2 { at, size_m, angle_deg, ..Box2::default() });
-            }
+            let free = is_free(size_m.length() / 2.0);
+            shapes.boxes.extend(free.then(|| block(at, size_m, angle_deg)));
         }
         _ => {
             let half = random.within(0.4, 1.1);
             let along = DVec2::from_angle(random.within(0.0, TAU)) * half;
-            if is_free(half) {
-                shapes.walls.push(Wall { points: vec![at - along, at + along], ..Wall::default() });
-            }
+            shapes.walls.extend(is_free(half).then(|| wall([at - along, at + along])));
         }
     }
 }

@@ -25,7 +25,10 @@ impl Place {
     /// The place at `cell` from which the boundary is followed most nearly in `direction`; none where no hazard is beside
     /// the cell.
     pub fn at(map: &Map<'_>, cell: Cell, direction: DVec2) -> Option<Self> {
-        let along = |place: &Self| unit(place.heading.into()).dot(direction);
+        let along = |place: &Self| {
+            let [cols, rows] = place.turned(0);
+            DVec2::new(cols.into(), rows.into()).dot(direction)
+        };
         (0..4)
             .map(|heading| Self { cell, heading })
             .filter(|place| place.is_on(map))
@@ -34,14 +37,10 @@ impl Place {
 
     /// Whether the place still is a free cell with the hazard where it should be.
     pub fn is_on(&self, map: &Map<'_>) -> bool {
-        let hazard = |cols, rows| {
-            let col = self.cell.col.checked_add_signed(cols);
-            let cell = col.zip(self.cell.row.checked_add_signed(rows));
-            !cell.is_some_and(|(col, row)| map.is_free(Cell { col, row }))
-        };
-        let [right, back] = [RIGHT, BACK].map(|turn| self.turned(turn));
-        map.is_free(self.cell)
-            && (hazard(right[0], right[1]) || hazard(right[0] + back[0], right[1] + back[1]))
+        let [[cols, rows], back] = [RIGHT, BACK].map(|turn| self.turned(turn));
+        let behind = [cols + back[0], rows + back[1]];
+        let is_hazard = |step| map.free_neighbour(self.cell, step).is_none();
+        map.is_free(self.cell) && (is_hazard([cols, rows]) || is_hazard(behind))
     }
 
     /// The next place: the cell on the right if that is free, else ahead, on the left, behind; none in a closed cell.
@@ -56,9 +55,4 @@ impl Place {
     fn turned(&self, turn: usize) -> [i32; 2] {
         DIRECTIONS[(usize::from(self.heading) + turn) % DIRECTIONS.len()]
     }
-}
-
-fn unit(heading: usize) -> DVec2 {
-    let [cols, rows] = DIRECTIONS[heading % DIRECTIONS.len()];
-    DVec2::new(f64::from(cols), f64::from(rows))
 }

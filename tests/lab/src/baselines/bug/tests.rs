@@ -47,7 +47,7 @@ impl Drive {
     }
 
     fn see(&mut self) {
-        assert!(self.bug.follow(&self.header, &self.cells));
+        assert!(self.bug.belief.follow(&self.header, &self.cells));
     }
 
     fn guidance(&mut self) -> GuidanceSample {

@@ -1,17 +1,51 @@
-//! `grid` and `pose` in, `guidance` out, the state saved before the guidance is published.
+//! `firsthand-lab stage NAME`: a planner to compare with, as the process of a stage, which `firsthand stage NAME` becomes: `grid` and
+//! `pose` in, `guidance` out, the state saved before the guidance is published.
 
+use std::ffi::OsString;
+
+use clap::Args;
 use common::{
     bus::Reader,
     outputs::Outputs,
     readers,
     samples::{GridHeader, PoseSample},
-    shell::{Context, Process, Progress, StageError},
+    shell::{Context, Process, Progress, StageError, run_stage},
+    stage_command,
     target::TargetReader,
     topics::{GRID, GUIDANCE, POSE, TARGET},
     wiring::{Persists, Topics},
 };
+use processes::stages::PLANNER;
 
-use crate::baselines::planner::{Baseline, Planner};
+use super::{
+    bug::Bug,
+    planner::{Baseline, Planner},
+    wavefront::Wavefront,
+};
+use crate::error::{Refused, Result};
+
+/// The planners to compare with.
+pub const BASELINES: &[&str] = &["wavefront", "bug"];
+
+/// Be a planner to compare with: wavefront or bug.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    name: String,
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    options: Vec<OsString>,
+}
+
+pub fn main(arguments: &Arguments) -> Result {
+    let run = match &*arguments.name {
+        "wavefront" => run_stage::<Shell<Wavefront>>,
+        "bug" => run_stage::<Shell<Bug>>,
+        name => {
+            let message = format!("{name:?} is no planner to compare with; give wavefront or bug");
+            return Err(Refused::new("unknown-stage", message).into());
+        }
+    };
+    Ok(run(&stage_command::start_with(PLANNER, arguments.options.iter().cloned())?)?)
+}
 
 /// Room for the encoded state, bytes: Bug2's is under 150.
 const STATE_BYTES: usize = 256;
@@ -47,20 +81,15 @@ impl<P: Planner> Process for Shell<P> {
             baseline.planner = planner;
             tracing::info!(state = ?baseline.planner, "restored");
         }
-        Ok(Self {
-            inputs,
-            out: Outputs::without_inputs(context)?,
-            baseline,
-            latest_pose: None,
-            answered: None,
-        })
+        let out = Outputs::without_inputs(context)?;
+        Ok(Self { inputs, out, baseline, latest_pose: None, answered: None })
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {
         let mut asked = false;
         while let Some(grid) = self.inputs.grid.next_slice()? {
             let header = grid.header();
-            if !self.baseline.follow(header, &grid) {
+            if !self.baseline.belief.follow(header, &grid) {
                 tracing::warn!(version = header.part.version, "missed a grid version");
                 continue;
             }
@@ -69,28 +98,21 @@ impl<P: Planner> Process for Shell<P> {
             asked |= header.part.keyframe == 0 || self.answered != Some(header.stamp.tick);
             self.out.at = Progress::of(&header.stamp);
         }
-        if asked {
-            self.answer()?;
-        }
-        Ok(self.out.at)
-    }
-}
-
-impl<P: Planner> Shell<P> {
-    /// Publish guidance for the pose of the tick, which was published before the grid was.
-    fn answer(&mut self) -> Result<(), StageError> {
-        self.latest_pose = self.inputs.pose.newest()?.or(self.latest_pose);
         let tick = self.out.at.tick;
-        if let Some(target) = self.inputs.target.next(tick)? {
-            self.baseline.send_to(target);
+        if asked {
+            // The pose of the tick was published before the grid was.
+            self.latest_pose = self.inputs.pose.newest()?.or(self.latest_pose);
+            if let Some(target) = self.inputs.target.next(tick)? {
+                self.baseline.send_to(target);
+            }
         }
         // A grid for new readers may be of a tick that is over.
-        if let Some(pose) = self.latest_pose.filter(|pose| pose.stamp.tick == tick) {
+        if let Some(pose) = self.latest_pose.filter(|pose| asked && pose.stamp.tick == tick) {
             let guidance = self.baseline.guidance(&pose);
             self.out.save(&self.baseline.planner)?;
             self.out.publish(&GUIDANCE, guidance)?;
             self.answered = Some(tick);
         }
-        Ok(())
+        Ok(self.out.at)
     }
 }

@@ -1,0 +1,78 @@
+//! Shapes of worlds, hard and higher than the robot.
+
+use std::f64::consts::PI;
+
+use common::geometry::{Box2, Drum, Shapes, Wall};
+use glam::DVec2;
+
+use crate::random::Random;
+
+pub fn drum(at: DVec2, radius_m: f64) -> Drum {
+    Drum { at, radius_m, ..Drum::default() }
+}
+
+pub fn wall(points: impl Into<Vec<DVec2>>) -> Wall {
+    Wall { points: points.into(), ..Wall::default() }
+}
+
+pub fn block(at: DVec2, size_m: DVec2, angle_deg: f64) -> Box2 {
+    Box2 { at, size_m, angle_deg, ..Box2::default() }
+}
+
+pub fn walls(walls: impl Into<Vec<Wall>>) -> Shapes {
+    Shapes { walls: walls.into(), ..Shapes::default() }
+}
+
+pub fn boxes(boxes: impl Into<Vec<Box2>>) -> Shapes {
+    Shapes { boxes: boxes.into(), ..Shapes::default() }
+}
+
+pub fn drums(drums: impl Into<Vec<Drum>>) -> Shapes {
+    Shapes { drums: drums.into(), ..Shapes::default() }
+}
+
+/// A closed room around a start at the origin and a target, and the middle and half extent of its floor.
+#[derive(Clone, Copy, Debug)]
+pub struct Room {
+    pub target: DVec2,
+    pub least: DVec2,
+    pub greatest: DVec2,
+}
+
+impl Room {
+    /// A room with a target at a distance along x between 4 m and `farthest_m`, half as wide as one of `half_width_m`.
+    pub fn draw(random: &mut Random, farthest_m: f64, [least, most]: [f64; 2]) -> Self {
+        let distance = random.within(4.0, farthest_m);
+        let half_width = random.within(least, most);
+        Self {
+            target: DVec2::new(distance, random.within(-0.5, 0.5) * half_width),
+            least: DVec2::new(-1.2, -half_width),
+            greatest: DVec2::new(distance + 1.2, half_width),
+        }
+    }
+
+    /// The wall around the room.
+    pub fn closed(&self) -> Wall {
+        let Self { least, greatest, .. } = *self;
+        let corners = [DVec2::new(greatest.x, least.y), DVec2::new(least.x, greatest.y)];
+        wall([least, corners[0], greatest, corners[1], least])
+    }
+
+    /// The number of things on the floor at so many per square metre.
+    pub fn things(&self, density: f64) -> usize {
+        ((self.greatest - self.least).element_product() * density).round() as usize
+    }
+
+    /// A place that is uniform over the floor.
+    pub fn place(&self, random: &mut Random) -> DVec2 {
+        random.point((self.least + self.greatest) / 2.0, (self.greatest - self.least) / 2.0)
+    }
+}
+
+/// In one of `n` cases any heading, otherwise `usual`, radians.
+pub fn heading(random: &mut Random, n: usize, usual: f64) -> f64 {
+    match random.below(n) {
+        0 => random.within(-PI, PI),
+        _ => usual,
+    }
+}
