@@ -7,7 +7,7 @@ use std::{
     num::NonZeroUsize,
     path::{Path, PathBuf},
     str::FromStr,
-    time::{Duration, Instant},
+    time::Instant,
 };
 
 use crate::{error::Result, missions::statistics::median};
@@ -68,9 +68,8 @@ pub fn main(arguments: &Arguments) -> Result {
     let map = maps::load(&arguments.map)?;
     let domain = domain(arguments, &map)?;
     let failed = |cause| format!("{}: {cause}", arguments.map.display());
-    let mut runs = Vec::new();
     let (first, times) = solve(&domain, arguments.threads).map_err(failed)?;
-    runs.push(times);
+    let mut runs = vec![times];
     for _ in 1..arguments.repeat.get() {
         runs.push(solve(&domain, arguments.threads).map_err(failed)?.1);
     }
@@ -108,13 +107,8 @@ fn domain(arguments: &Arguments, map: &Map) -> Result<Domain> {
     })
 }
 
-/// The time each phase of a solve took, summed over its attempts.
-#[derive(Clone, Copy, Debug, Default)]
-struct Times {
-    setup: Duration,
-    solve: Duration,
-    verify: Duration,
-}
+/// The times that set-up, solve and verification took, summed over their attempts, milliseconds.
+type Times = [f64; 3];
 
 fn solve(domain: &Domain, threads: NonZeroUsize) -> Result<(Field, Times), SolveError> {
     let mut solver = Solver::new(Settings { threads, ..Settings::default() });
@@ -123,13 +117,14 @@ fn solve(domain: &Domain, threads: NonZeroUsize) -> Result<(Field, Times), Solve
     let field = solver.solve_observed(domain, &Cancellation::new(), &mut |phase| {
         let now = Instant::now();
         let took = now - std::mem::replace(&mut last, now);
-        match phase {
-            Phase::SetUp => times.setup += took,
-            Phase::Cycled | Phase::Solved => times.solve += took,
-            Phase::Verified => times.verify += took,
+        let phase = match phase {
+            Phase::SetUp => 0,
+            Phase::Cycled | Phase::Solved => 1,
+            Phase::Verified => 2,
             // A phase this program does not know is no reason to fail.
-            _ => {}
-        }
+            _ => return,
+        };
+        times[phase] += took.as_secs_f64() * 1e3;
     })?;
     Ok((field, times))
 }
@@ -165,11 +160,11 @@ struct Medians {
 
 impl Report {
     fn of(arguments: &Arguments, field: &Field, runs: &[Times]) -> Self {
-        let ms = |phase: fn(&Times) -> Duration| {
-            runs.iter().map(move |run| phase(run).as_secs_f64() * 1e3)
-        };
-        let least = |phase| ms(phase).fold(f64::INFINITY, f64::min);
-        let middle = |phase| median(ms(phase)).unwrap_or_default();
+        let ms = |phase: usize| runs.iter().map(move |run| run[phase]);
+        let [setup_ms, solve_ms, verify_ms] =
+            [0, 1, 2].map(|phase| ms(phase).fold(f64::INFINITY, f64::min));
+        let medians = [0, 1, 2].map(|phase| median(ms(phase)).unwrap_or_default());
+        let [setup_ms_median, solve_ms_median, verify_ms_median] = medians;
         let verification = field.verification();
         Self {
             rows: field.height(),
@@ -180,13 +175,13 @@ impl Report {
             method: verification.method.name(),
             repeats: runs.len(),
             threads: arguments.threads.get(),
-            setup_ms: least(|run| run.setup),
-            solve_ms: least(|run| run.solve),
-            verify_ms: least(|run| run.verify),
-            medians: (runs.len() > 1).then(|| Medians {
-                setup_ms_median: middle(|run| run.setup),
-                solve_ms_median: middle(|run| run.solve),
-                verify_ms_median: middle(|run| run.verify),
+            setup_ms,
+            solve_ms,
+            verify_ms,
+            medians: (runs.len() > 1).then_some(Medians {
+                setup_ms_median,
+                solve_ms_median,
+                verify_ms_median,
             }),
             worst_residual: verification.worst_residual,
             log10_u_min: field.log10_u_min(),
@@ -279,12 +274,8 @@ fn cells(field: &Field) -> impl Iterator<Item = Cell> {
 
 /// The direction at a cell's centre, (0, 0) where there is none.
 fn guidance(field: &Field, cell: Cell) -> [f32; 2] {
-    let direction = if field.is_reachable(cell) {
-        field.direction(cell)
-    } else {
-        // A blocked cell gets no direction; the field would give its way out of the wall.
-        None
-    };
+    // A blocked cell gets no direction; the field would give its way out of the wall.
+    let direction = field.direction(cell).filter(|_| field.is_reachable(cell));
     direction.unwrap_or_default().map(|component| component as f32)
 }
 

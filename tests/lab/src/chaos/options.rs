@@ -3,7 +3,7 @@
 use std::{env, fs, path::PathBuf, process};
 
 use clap::Args;
-use common::{clock::Pace, domain::RobotName, file::FileError, mission::Mission};
+use common::{clock::Pace, domain::RobotName, mission::Mission};
 use console::missions;
 
 use crate::{
@@ -11,7 +11,7 @@ use crate::{
         consumer::{Consumer, GivenConsumer},
         robot_fault::{RobotFault, TABLE},
     },
-    error::Result,
+    error::{OrCannot as _, Result},
 };
 
 /// Send random signals to random stages at random times, mission after mission, and report.
@@ -139,7 +139,7 @@ impl Options {
         let real_time = asked.include_supervisor || faulty;
         let pace = if real_time { Pace::Rate(1.0) } else { asked.pace };
         let directory = env::temp_dir().join(format!("firsthand-chaos-{}", process::id()));
-        fs::create_dir(&directory).map_err(FileError::of("make", &directory))?;
+        fs::create_dir(&directory).or_cannot_file("make", &directory)?;
         Ok(Self { asked, loaded, set, pace, directory })
     }
 

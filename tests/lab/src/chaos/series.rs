@@ -28,10 +28,7 @@ impl<'a> Series<'a> {
     }
 
     pub fn keep(&mut self, row: &Row) -> Result {
-        match &mut self.signals {
-            Some(file) => Ok(file.add(row)?),
-            None => Ok(()),
-        }
+        self.signals.as_mut().map_or(Ok(()), |file| file.add(row))
     }
 
     pub fn is_over(&self) -> bool {

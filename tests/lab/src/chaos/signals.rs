@@ -3,15 +3,16 @@
 
 use std::{
     fs::{self, File},
-    io,
     path::{Path, PathBuf},
     time::Instant,
 };
 
-use common::file::FileError;
 use serde::{Deserialize, Serialize};
 
-use crate::chaos::kind::Kind;
+use crate::{
+    chaos::kind::Kind,
+    error::{OrCannot as _, Result},
+};
 
 pub const FILE_NAME: &str = "signals.csv";
 
@@ -78,25 +79,18 @@ pub struct SignalsFile {
 }
 
 impl SignalsFile {
-    pub fn create(directory: &Path) -> Result<Self, FileError> {
+    pub fn create(directory: &Path) -> Result<Self> {
         let path = directory.join(FILE_NAME);
-        fs::create_dir_all(directory).map_err(FileError::of("make the directory of", &path))?;
-        let file = File::create_new(&path).map_err(|error| {
-            let error = match error.kind() {
-                io::ErrorKind::AlreadyExists => {
-                    io::Error::other(format!("{error}; give another directory"))
-                }
-                _ => error,
-            };
-            FileError::of("make", &path)(error)
-        })?;
-        Ok(Self { path, writer: csv::Writer::from_writer(file) })
+        fs::create_dir_all(directory).or_cannot_file("make the directory of", &path)?;
+        let file = File::create_new(&path);
+        let file = file.map_err(|error| format!("{error}; give another directory"));
+        let writer = csv::Writer::from_writer(file.or_cannot_file("make", &path)?);
+        Ok(Self { path, writer })
     }
 
-    pub fn add(&mut self, row: &Row) -> Result<(), FileError> {
-        let written = self.writer.serialize(row);
-        written.map_err(FileError::of("write", &self.path))?;
-        self.writer.flush().map_err(FileError::of("write", &self.path))
+    pub fn add(&mut self, row: &Row) -> Result {
+        self.writer.serialize(row).or_cannot_file("write", &self.path)?;
+        self.writer.flush().or_cannot_file("write", &self.path)
     }
 }
 
@@ -106,7 +100,7 @@ mod tests {
 
     fn read(path: &Path) -> Vec<Row> {
         let mut reader = csv::Reader::from_path(path).unwrap();
-        reader.deserialize().map(Result::unwrap).collect()
+        reader.deserialize().map(csv::Result::unwrap).collect()
     }
 
     #[test]
@@ -135,7 +129,8 @@ mod tests {
     fn results_that_are_there_are_not_written_over() {
         let folder = tempfile::tempdir().unwrap();
         SignalsFile::create(folder.path()).unwrap();
-        let refused = SignalsFile::create(folder.path()).unwrap_err();
-        assert_eq!(refused.file, folder.path().join(FILE_NAME));
+        let refused = SignalsFile::create(folder.path()).unwrap_err().to_string();
+        let named = folder.path().join(FILE_NAME);
+        assert!(refused.contains(named.to_str().unwrap()), "{refused}");
     }
 }

@@ -107,65 +107,40 @@ pub fn run_forwarder(robot: &RobotName, place: &str, supervisor: u32) -> Result 
 /// Forwards all new samples.
 type Forward = Box<dyn FnMut() -> Result<(), BusError>>;
 
-/// A closure that gives, for each sample from `$from`, what `$publish` publishes on `$to`.
+/// A wake-up of the waiter on `$from`, and a closure that publishes on `$to` for each of its samples, in the same tick.
 macro_rules! forward {
-    ($next:ident, $from:expr, $to:expr, |$sample:ident, $writer:ident| $publish:expr) => {{
-        let (mut from, mut $writer) = ($from, $to);
-        Box::new(move || {
-            while let Some($sample) = from.$next()? {
-                $publish?;
+    ($bus:ident, $from:ident $next:ident $($header:ident)?, $writer:expr, $publish:ident $payload:expr $(, $cells:expr)?) => {{
+        let (mut from, mut to) = ($bus.reader(&topics::$from)?, $writer?);
+        let forward = move || {
+            while let Some(sample) = from.$next()? {
+                let tick = sample$(.$header())?.stamp.tick;
+                to.$publish(tick, MissionTime::default(), $payload $(, $cells)?)?;
             }
             Ok(())
-        })
+        };
+        (&topics::$from, Box::new(forward))
     }};
 }
 
 fn forwarder(bus: &Bus, place: &str, waiter: &mut Waiter) -> Result<Forward> {
-    let now = MissionTime::default();
-    let (wakes, forward): (&dyn AnyTopic, Forward) =
-        match PLACES.iter().position(|name| *name == place) {
-            Some(0) => (
-                &topics::WHEELS,
-                forward!(
-                    next_sample,
-                    bus.reader(&topics::WHEELS)?,
-                    bus.writer(&topics::POSE, 1)?,
-                    |sample, to| { to.publish(sample.stamp.tick, now, PoseSample::default()) }
-                ),
-            ),
-            Some(1) => (
-                &topics::POSE,
-                forward!(
-                    next_sample,
-                    bus.reader(&topics::POSE)?,
-                    bus.slice_writer(&topics::GRID, 1, CELLS)?,
-                    |sample, to| {
-                        to.publish_slice(sample.stamp.tick, now, GridHeader::default(), &[])
-                    }
-                ),
-            ),
-            Some(2) => (
-                &topics::GRID,
-                forward!(
-                    next_slice,
-                    bus.reader(&topics::GRID)?,
-                    bus.writer(&topics::GUIDANCE, 1)?,
-                    |sample, to| {
-                        to.publish(sample.header().stamp.tick, now, GuidanceSample::default())
-                    }
-                ),
-            ),
-            Some(_) => (
-                &topics::GUIDANCE,
-                forward!(
-                    next_sample,
-                    bus.reader(&topics::GUIDANCE)?,
-                    bus.writer(&topics::COMMAND, 1)?,
-                    |sample, to| { to.publish(sample.stamp.tick, now, CommandSample::default()) }
-                ),
-            ),
-            None => return Err(format!("no forwarder stands for {place:?}").into()),
-        };
+    let (wakes, forward): (&dyn AnyTopic, Forward) = match PLACES
+        .iter()
+        .position(|name| *name == place)
+    {
+        Some(0) => {
+            forward!(bus, WHEELS next_sample, bus.writer(&topics::POSE, 1), publish PoseSample::default())
+        }
+        Some(1) => {
+            forward!(bus, POSE next_sample, bus.slice_writer(&topics::GRID, 1, CELLS), publish_slice GridHeader::default(), &[])
+        }
+        Some(2) => {
+            forward!(bus, GRID next_slice header, bus.writer(&topics::GUIDANCE, 1), publish GuidanceSample::default())
+        }
+        Some(_) => {
+            forward!(bus, GUIDANCE next_sample, bus.writer(&topics::COMMAND, 1), publish CommandSample::default())
+        }
+        None => return Err(format!("no forwarder stands for {place:?}").into()),
+    };
     waiter.on(bus.wakeup(wakes)?);
     Ok(forward)
 }

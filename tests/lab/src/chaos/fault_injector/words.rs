@@ -210,40 +210,34 @@ impl Said {
 
     /// The message with the readings of `fault`, whose robot read `newest` before; none if no readings come.
     pub fn with_readings(mut self, fault: RobotFault, newest: &Readings) -> Vec<u8> {
-        match &mut self {
-            Self::Frame { did: did::STANDARD, data, .. } => {
-                let told = match fault {
-                    RobotFault::RangeMissing => return Vec::new(),
-                    RobotFault::RangeStuck => [STUCK_CM; ULTRASONIC],
-                    RobotFault::RangeSilent => [NOTHING; ULTRASONIC],
-                    RobotFault::RangeFrozen => newest.ultrasonic,
-                    _ => [0; ULTRASONIC],
-                };
-                for (byte, told) in data.iter_mut().zip(told) {
-                    *byte = told;
-                }
+        let (echo, range) = match fault {
+            RobotFault::RangeStuck => (STUCK_CM, Some(STUCK_M)),
+            RobotFault::RangeSilent => (NOTHING, None),
+            _ => (0, Some(NO_READING)),
+        };
+        match (&mut self, fault) {
+            (Self::Frame { did: did::STANDARD, .. }, RobotFault::RangeMissing) => {
+                return Vec::new();
             }
-            Self::Frame { .. } => {}
-            Self::Line(report) => {
-                let told = match fault {
-                    RobotFault::RangeMissing => {
-                        (report.ranges, report.scan) = (BTreeMap::new(), None);
-                        return self.bytes();
-                    }
-                    RobotFault::RangeFrozen => {
-                        if !report.ranges.is_empty() {
-                            report.ranges.clone_from(&newest.ranges);
-                        }
-                        report.scan = report.scan.take().and(newest.scan.clone());
-                        return self.bytes();
-                    }
-                    RobotFault::RangeStuck => Some(STUCK_M),
-                    RobotFault::RangeSilent => None,
-                    _ => Some(NO_READING),
-                };
-                report.ranges.values_mut().for_each(|range| *range = told);
+            (Self::Frame { did: did::STANDARD, data, .. }, _) => {
+                let frozen = fault == RobotFault::RangeFrozen;
+                let told = if frozen { newest.ultrasonic } else { [echo; ULTRASONIC] };
+                data.iter_mut().zip(told).for_each(|(byte, told)| *byte = told);
+            }
+            (Self::Frame { .. }, _) => {}
+            (Self::Line(report), RobotFault::RangeMissing) => {
+                (report.ranges, report.scan) = (BTreeMap::new(), None);
+            }
+            (Self::Line(report), RobotFault::RangeFrozen) => {
+                if !report.ranges.is_empty() {
+                    report.ranges.clone_from(&newest.ranges);
+                }
+                report.scan = report.scan.take().and(newest.scan.clone());
+            }
+            (Self::Line(report), _) => {
+                report.ranges.values_mut().for_each(|told| *told = range);
                 let beams = report.scan.iter_mut().flatten();
-                beams.for_each(|beam| *beam = told.map(|range| range as f32));
+                beams.for_each(|beam| *beam = range.map(|range| range as f32));
             }
         }
         self.bytes()
