@@ -89,6 +89,13 @@ impl Window {
         }
     }
 
+    /// Row by row.
+    pub fn cells(self) -> impl Iterator<Item = Cell> {
+        let columns = self.col..self.col + self.width;
+        (self.row..self.row + self.height)
+            .flat_map(move |row| columns.clone().map(move |col| Cell { col, row }))
+    }
+
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         if other.area() == 0 {
@@ -101,7 +108,7 @@ impl Window {
 }
 
 /// The N x N cells in the mission frame: (19) with the origin at the centre.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GridFrame {
     /// N, along each side.
     pub cells: u32,
@@ -170,6 +177,19 @@ impl GridFrame {
     #[must_use]
     pub const fn whole(&self) -> Window {
         Window { col: 0, row: 0, width: self.cells, height: self.cells }
+    }
+
+    /// The window of an upright rectangle between two corners, metres; those outside the map stand for its rim.
+    #[must_use]
+    pub fn between(&self, least: DVec2, greatest: DVec2) -> Window {
+        let last = DVec2::splat(f64::from(self.cells) - 1.0);
+        let cell = |at: DVec2| {
+            let at = at.clamp(DVec2::ZERO, last);
+            Cell { col: at.x as u32, row: at.y as u32 }
+        };
+        Window::default()
+            .including(cell(self.to_cells(least).floor()))
+            .including(cell(self.to_cells(greatest).ceil()))
     }
 
     /// The cells of `window` in a row-major slice of the whole map.

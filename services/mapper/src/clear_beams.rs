@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     reading::{Ray, Reading},
-    sonar_model::SonarModel,
+    sonar_model::{AHEAD_OF_ECHO_M, CLEAR_FOR_M},
 };
 
 const OF_ONE_SONAR: usize = CLEAR_BEAMS / 3;
@@ -34,35 +34,27 @@ impl ClearBeams {
 
     /// Add a reading after `rolled_m` metres of the wheels, and drop those too old.
     pub(crate) fn take(&mut self, sonars: usize, reading: &Reading, rolled_m: f64) {
-        let sonar = &reading.sonar;
-        let clear_m = reading.echo.map_or(f64::INFINITY, |range| range - sonar.ahead_of_echo_m);
-        let beam = clear_beam(reading.origin, reading.axis, clear_m.min(sonar.clear_m));
-        let newest = Dated { beam, rolled_m };
-        append(&mut self.beams, (OF_ONE_SONAR * sonars).min(CLEAR_BEAMS), sonar, newest);
+        let clear_m = reading.echo.map_or(f64::INFINITY, |range| range - AHEAD_OF_ECHO_M);
+        let beam = clear_beam(reading.origin, reading.axis, clear_m.min(reading.sonar.clear_m));
+        let most = (OF_ONE_SONAR * sonars).min(CLEAR_BEAMS);
+        append(&mut self.beams, most, Dated { beam, rolled_m });
     }
 
-    /// Does for an infrared ranger as [`ClearBeams::take`].
-    pub(crate) fn take_ray(&mut self, sonar: &SonarModel, ray: &Ray, rolled_m: f64) {
+    pub(crate) fn take_ray(&mut self, ray: &Ray, rolled_m: f64) {
         let beam = clear_beam(ray.origin, ray.axis, ray.seen.clear_m);
-        let newest = Dated { beam, rolled_m };
-        append(&mut self.rays, CLEAR_RAYS, sonar, newest);
-    }
-
-    pub(crate) fn clear(&mut self) {
-        self.beams.clear();
-        self.rays.clear();
+        append(&mut self.rays, CLEAR_RAYS, Dated { beam, rolled_m });
     }
 
     pub(crate) fn fill(&self, header: &mut GridHeader) {
-        header.clear_beam_count = self.beams.len() as u64;
-        for (to, dated) in header.clear_beams.iter_mut().zip(&self.beams) {
-            *to = dated.beam;
-        }
-        header.clear_ray_count = self.rays.len() as u64;
-        for (to, dated) in header.clear_rays.iter_mut().zip(&self.rays) {
-            *to = dated.beam;
-        }
+        let GridHeader { clear_beams, clear_beam_count, clear_rays, clear_ray_count, .. } = header;
+        *clear_beam_count = fill(clear_beams, &self.beams);
+        *clear_ray_count = fill(clear_rays, &self.rays);
     }
+}
+
+fn fill(to: &mut [ClearBeam], readings: &[Dated]) -> u64 {
+    to.iter_mut().zip(readings).for_each(|(to, dated)| *to = dated.beam);
+    readings.len() as u64
 }
 
 fn clear_beam(origin: DVec2, axis: DVec2, clear_m: f64) -> ClearBeam {
@@ -75,8 +67,8 @@ fn clear_beam(origin: DVec2, axis: DVec2, clear_m: f64) -> ClearBeam {
 }
 
 /// Append `newest`, and drop readings too old or beyond the newest `most`.
-fn append(readings: &mut Vec<Dated>, most: usize, sonar: &SonarModel, newest: Dated) {
-    let oldest_m = newest.rolled_m - sonar.clear_for_m;
+fn append(readings: &mut Vec<Dated>, most: usize, newest: Dated) {
+    let oldest_m = newest.rolled_m - CLEAR_FOR_M;
     readings.retain(|dated| dated.rolled_m > oldest_m);
     if readings.len() >= most {
         readings.remove(0);

@@ -16,7 +16,7 @@
 //!
 //! No ranger is evidence against a thing that the body touched: all may look over it.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{SQRT_2, TAU};
 
 use common::{
     grid::{Cell, GridFrame, MAX_CELLS, Window},
@@ -28,11 +28,13 @@ use serde::{Deserialize, Serialize};
 use crate::{
     infrared_model::{SCANNED_ASIDE_M, Seen},
     reading::{Ray, Reading, Touch},
-    sonar_model::SonarModel,
+    sonar_model::{self as sonar, PASS, POINTED_ENOUGH},
 };
 
-/// Scanned just now. The value falls by one for every [`step_m`] of the wheels.
+/// Scanned just now. The value falls by one for every [`STEP_M`] of the wheels.
 const SCANNED: u8 = u8::MAX;
+/// Way of the wheels until scanned ground is one step less certain, metres.
+pub(crate) const STEP_M: f64 = sonar::SCANNED_FOR_M / (SCANNED - POINTED_ENOUGH) as f64;
 
 /// Flag: an obstacle stands in the cell.
 const OCCUPIED: u8 = 1;
@@ -49,39 +51,54 @@ const SAME_RANGE_M: f64 = 0.10;
 /// Off its axis, where a sonar's lobe still hears near things, radians.
 const LOBE_RAD: f64 = 28.0 * TAU / 360.0;
 
-/// Way of the wheels until scanned ground is one step less certain, metres.
-pub(crate) fn step_m(sonar: &SonarModel) -> f64 {
-    sonar.scanned_for_m / f64::from(SCANNED - sonar.pointed_enough)
-}
-
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Flip {
     pub(crate) cell: Cell,
     pub(crate) occupied: bool,
 }
 
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Ground {
+    pub(crate) lattice: GridFrame,
+    /// The body's, metres.
+    pub(crate) radius: f64,
+}
+
+/// What readings changed since it was asked last.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct News {
+    pub(crate) flips: Vec<Flip>,
+    /// It has the cells that are newly scanned, or no longer.
+    pub(crate) window: Window,
+}
+
 /// Row-major, one byte a cell and layer.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct EvidenceGrid {
-    /// Weights of the [`SonarModel`], offset by 128.
+    /// Weights of the sonar model, offset by 128.
     #[serde(with = "serde_bytes")]
     weight: Vec<u8>,
     /// Direction of the last echo's beam, 256ths of a turn.
     #[serde(with = "serde_bytes")]
     side: Vec<u8>,
-    /// Scanned from [`SCANNED`] down to [`SonarModel::pointed_enough`]; below that, how often the sonar was pointed at the cell in vain.
+    /// Scanned from [`SCANNED`] down to [`POINTED_ENOUGH`]; below that, how often the sonar was pointed at the cell in vain.
     #[serde(with = "serde_bytes")]
     looks: Vec<u8>,
     /// The flags [`OCCUPIED`], [`SEEN`] and [`TOUCHED`].
     #[serde(with = "serde_bytes")]
     occupied: Vec<u8>,
+    /// The mission says it again to the next process.
+    #[serde(skip)]
+    pub(crate) ground: Ground,
+    #[serde(skip)]
+    pub(crate) news: News,
 }
 
 /// The lattice over the perimeter and `beyond_m` metres further: a body whose centre is inside can touch an obstacle just outside.
-pub(crate) fn lattice(sonar: &SonarModel, mission: &Mission, beyond_m: f64) -> GridFrame {
+pub(crate) fn lattice(mission: &Mission, beyond_m: f64) -> GridFrame {
     let width = mission.perimeter.width_m;
-    let cells = (width / sonar.resolution_m).ceil().min(f64::from(MAX_CELLS));
-    let resolution_m = (width / cells).max(sonar.resolution_m);
+    let cells = (width / sonar::RESOLUTION_M).ceil().min(f64::from(MAX_CELLS));
+    let resolution_m = (width / cells).max(sonar::RESOLUTION_M);
     let beyond = (beyond_m / resolution_m).ceil();
     GridFrame {
         cells: (cells + 2.0 * beyond) as u32,
@@ -91,13 +108,15 @@ pub(crate) fn lattice(sonar: &SonarModel, mission: &Mission, beyond_m: f64) -> G
 }
 
 impl EvidenceGrid {
-    pub(crate) fn none(lattice: &GridFrame) -> Self {
-        let cells = lattice.area();
+    pub(crate) fn new(ground: Ground) -> Self {
+        let layer = |byte| vec![byte; ground.lattice.area()];
         Self {
-            weight: vec![128; cells],
-            side: vec![0; cells],
-            looks: vec![0; cells],
-            occupied: vec![0; cells],
+            weight: layer(128),
+            side: layer(0),
+            looks: layer(0),
+            occupied: layer(0),
+            ground,
+            news: News::default(),
         }
     }
 
@@ -108,68 +127,54 @@ impl EvidenceGrid {
     }
 
     /// The sonar may also be unable to learn more of the cell.
-    pub(crate) fn is_scanned(&self, sonar: &SonarModel, index: usize) -> bool {
-        self.looks[index] >= sonar.pointed_enough
+    pub(crate) fn is_scanned(&self, index: usize) -> bool {
+        self.looks[index] >= POINTED_ENOUGH
     }
 
     pub(crate) fn is_occupied(&self, index: usize) -> bool {
         self.occupied[index] & OCCUPIED != 0
     }
 
-    /// Lower the certainty of scanned cells by `steps` of the wheels. Returns the window of cells no longer scanned.
-    pub(crate) fn grow_stale(
-        &mut self,
-        sonar: &SonarModel,
-        lattice: &GridFrame,
-        steps: u8,
-    ) -> Window {
-        let mut window = Window::default();
-        let enough = sonar.pointed_enough;
+    /// Lower the certainty of scanned cells by `steps` of the wheels.
+    pub(crate) fn grow_stale(&mut self, steps: u8) {
         // Passes over a row have no branches, so the compiler vectorises them.
-        let is_over = |looks: u8| looks >= enough && looks.saturating_sub(steps) < enough;
-        let rows = self.looks.chunks_exact_mut(lattice.cells as usize);
+        let is_over =
+            |looks: u8| looks >= POINTED_ENOUGH && looks.saturating_sub(steps) < POINTED_ENOUGH;
+        let rows = self.looks.chunks_exact_mut(self.ground.lattice.cells as usize);
         for (row, looks) in (0..).zip(rows) {
             if looks.iter().fold(false, |any, &looks| any | is_over(looks)) {
                 let over = |looks: &u8| is_over(*looks);
                 let ends = [looks.iter().position(over), looks.iter().rposition(over)];
                 for col in ends.into_iter().flatten() {
-                    window = window.including(Cell { col: col as u32, row });
+                    self.news.window = self.news.window.including(Cell { col: col as u32, row });
                 }
             }
             for looks in looks {
                 let less = looks.saturating_sub(steps);
-                let less = if less < enough { 0 } else { less };
-                *looks = if *looks < enough { *looks } else { less };
+                let less = if less < POINTED_ENOUGH { 0 } else { less };
+                *looks = if *looks < POINTED_ENOUGH { *looks } else { less };
             }
         }
-        window
     }
 
-    /// Take one reading, evidence up to `reach` metres, of a robot at `robot` with a body of `radius` metres. If a laser has `seen` its
-    /// cause, only cells occupied there get the echo. Appends flipped cells to `flips` and returns the window of newly scanned ones.
-    pub(crate) fn take(
-        &mut self,
-        sonar: &SonarModel,
-        lattice: &GridFrame,
-        (beam, reach): (&Reading, f64),
-        seen: Option<&Self>,
-        (robot, radius): (DVec2, f64),
-        flips: &mut Vec<Flip>,
-    ) -> Window {
-        let mut window = Window::default();
+    /// Take one reading, evidence up to `reach` metres, of a robot at `robot`. If a laser has `seen` its cause, only cells occupied there
+    /// get the echo.
+    pub(crate) fn take(&mut self, beam: &Reading, reach: f64, seen: Option<&Self>, robot: DVec2) {
+        let Ground { lattice, radius } = self.ground;
         let half_cell = lattice.resolution_m / 2.0;
-        let half_diagonal = half_cell * std::f64::consts::SQRT_2;
-        let band = sonar.band_m.max(half_cell * 1.2);
+        let half_diagonal = half_cell * SQRT_2;
+        let band = sonar::BAND_M.max(half_cell * 1.2);
+        let model = &beam.sonar;
         let echo = beam.echo.filter(|range| *range <= reach);
-        let passed_to = beam.echo.map_or(f64::INFINITY, |range| range - sonar.before_m);
+        let passed_to = beam.echo.map_or(f64::INFINITY, |range| range - sonar::BEFORE_M);
         let clear_to = passed_to.min(reach);
-        let scanned_to = passed_to.min(sonar.scanned_m.max(reach));
-        let known_to = echo.map_or(scanned_to, |range| range + sonar.behind_m);
-        let far = known_to.max(sonar.pointed_m).max(echo.unwrap_or(0.0) + band);
+        let scanned_to = passed_to.min(model.scanned_m.max(reach));
+        let known_to = echo.map_or(scanned_to, |range| range + sonar::BEHIND_M);
+        let far = known_to.max(sonar::POINTED_M).max(echo.unwrap_or(0.0) + band);
         let came_from = side_of(beam.axis);
         // Beyond `near`, half a cell's diagonal is narrower than the widest cone.
-        let near = half_diagonal / sonar.arc.sin();
-        let outside = sonar.arc.tan() * (1.0 + 1e-9);
+        let near = half_diagonal / model.arc.sin();
+        let outside = model.arc.tan() * (1.0 + 1e-9);
 
         let mut arc = Vec::new();
         let mut explained = false;
@@ -180,17 +185,17 @@ impl EvidenceGrid {
         let greatest = corners.into_iter().fold(DVec2::ZERO, DVec2::max);
         // Tangents stand for the angles: an arc tangent a cell would take most of a tick.
         let [scanned, pointed, against, at_edge, twice, arc_edge, explains, widest_slack] = [
-            sonar.scanned,
-            sonar.pointed,
-            sonar.against,
-            sonar.against_at_edge,
-            sonar.against * 2.0,
-            sonar.arc,
-            sonar.arc * 1.1,
+            model.scanned,
+            model.pointed,
+            model.against,
+            model.against_at_edge,
+            model.against * 2.0,
+            model.arc,
+            model.arc * 1.1,
             WIDEST_SLACK_RAD,
         ]
         .map(f64::tan);
-        for cell in between(lattice, beam.origin + least, beam.origin + greatest) {
+        for cell in lattice.between(beam.origin + least, beam.origin + greatest).cells() {
             let offset = lattice.centre_of(cell) - beam.origin;
             let range = offset.length();
             let (across, along) = (beam.axis.perp_dot(offset).abs(), beam.axis.dot(offset));
@@ -202,34 +207,31 @@ impl EvidenceGrid {
             let is_crossed = across <= half_diagonal && is_within(widest_slack);
             let index = lattice.index(cell);
             if range <= known_to && (is_crossed || is_within(scanned)) {
-                let was = std::mem::replace(&mut self.looks[index], SCANNED);
-                if was < sonar.pointed_enough {
-                    window = window.including(cell);
-                }
-            } else if range <= sonar.pointed_m
+                self.scan(cell);
+            } else if range <= sonar::POINTED_M
                 && (is_crossed || is_within(pointed))
-                && self.looks[index] < sonar.pointed_enough
+                && !self.is_scanned(index)
             {
                 self.looks[index] += 1;
-                if self.looks[index] >= sonar.pointed_enough {
+                if self.is_scanned(index) {
                     self.looks[index] = SCANNED;
-                    window = window.including(cell);
+                    self.news.window = self.news.window.including(cell);
                 }
             }
             if range <= clear_to && (is_within(at_edge) || is_crossed && is_within(twice)) {
                 let in_middle = is_crossed || is_within(against);
-                let pass = if in_middle { sonar.pass } else { sonar.pass_at_edge };
-                let weight = self.weight_of(index);
-                let same = apart(self.side[index], came_from) <= sonar.same_side;
-                if weight <= 0 || same && self.occupied[index] & (SEEN | TOUCHED) == 0 {
-                    self.set(sonar, lattice, cell, weight.saturating_sub(pass), flips);
+                let pass = if in_middle { PASS } else { sonar::PASS_AT_EDGE };
+                let same = apart(self.side[index], came_from) <= sonar::SAME_SIDE;
+                let may_be_unheard = self.occupied[index] & (SEEN | TOUCHED) != 0;
+                if self.weight_of(index) <= 0 || same && !may_be_unheard {
+                    self.weigh(cell, -pass);
                 }
             } else if let Some(echo) = echo
                 && (range - echo).abs() <= band
                 && (is_crossed || is_within(arc_edge))
             {
-                arc.push((cell, across.atan2(along) / sonar.arc));
-                explained |= self.weight_of(index) >= sonar.explains && is_within(explains);
+                arc.push((cell, across.atan2(along) / model.arc));
+                explained |= self.weight_of(index) >= sonar::EXPLAINS && is_within(explains);
             }
         }
         for (cell, off) in arc {
@@ -239,21 +241,19 @@ impl EvidenceGrid {
             if under_the_robot || elsewhere || explained && !self.is_occupied(index) {
                 continue;
             }
-            let more = sonar.hit + (sonar.hit_at_edge - sonar.hit) * off.min(1.0);
-            // A cell that was long free must not need as long to become occupied.
-            let weight = self.weight_of(index).max(-sonar.pass) + more as i8;
             self.side[index] = came_from;
-            self.set(sonar, lattice, cell, weight, flips);
+            self.weigh(cell, (sonar::HIT - sonar::HIT * off.min(1.0)) as i8);
         }
-        window.union(self.stand(sonar, lattice, (robot, radius), flips))
+        self.stand(robot);
     }
 
     /// Whether an occupied cell may have given the echo.
-    pub(crate) fn explains(&self, lattice: &GridFrame, beam: &Reading) -> bool {
+    pub(crate) fn explains(&self, beam: &Reading) -> bool {
         let Some(echo) = beam.echo else {
             return false;
         };
-        around(lattice, beam.origin, echo + SAME_RANGE_M).any(|cell| {
+        let lattice = self.ground.lattice;
+        self.around(beam.origin, echo + SAME_RANGE_M).any(|cell| {
             let offset = lattice.centre_of(cell) - beam.origin;
             let off = || beam.axis.perp_dot(offset).atan2(beam.axis.dot(offset)).abs();
             self.is_occupied(lattice.index(cell))
@@ -262,53 +262,33 @@ impl EvidenceGrid {
         })
     }
 
-    /// A robot with a body of `radius` metres stands here: no obstacle does, and no sensor can scan the ground that it touches.
-    pub(crate) fn stand(
-        &mut self,
-        sonar: &SonarModel,
-        lattice: &GridFrame,
-        (robot, radius): (DVec2, f64),
-        flips: &mut Vec<Flip>,
-    ) -> Window {
-        let mut window = Window::default();
+    /// A robot stands here: no obstacle does, and no sensor can scan the ground that it touches.
+    pub(crate) fn stand(&mut self, robot: DVec2) {
+        let Ground { lattice, radius } = self.ground;
         let touches = radius + lattice.resolution_m;
-        for cell in around(lattice, robot, touches) {
-            let index = lattice.index(cell);
+        for cell in self.around(robot, touches) {
             let distance = lattice.centre_of(cell).distance(robot);
-            let stands = distance <= radius - sonar.rim_m && self.weight_of(index) > 0;
             if distance > touches {
                 continue;
             }
-            let was = std::mem::replace(&mut self.looks[index], SCANNED);
-            if stands {
-                self.set(sonar, lattice, cell, 0, flips);
-            }
-            if was < sonar.pointed_enough {
-                window = window.including(cell);
+            self.scan(cell);
+            if distance <= radius - sonar::RIM_M && self.weight_of(lattice.index(cell)) > 0 {
+                self.set(cell, 0);
             }
         }
-        window
     }
 
     /// Does for an infrared ranger as [`EvidenceGrid::take`].
-    pub(crate) fn take_ray(
-        &mut self,
-        sonar: &SonarModel,
-        lattice: &GridFrame,
-        ray: &Ray,
-        (robot, radius): (DVec2, f64),
-        flips: &mut Vec<Flip>,
-    ) -> Window {
-        let mut window = Window::default();
+    pub(crate) fn take_ray(&mut self, ray: &Ray, robot: DVec2) {
+        let Ground { lattice, radius } = self.ground;
         let half_cell = lattice.resolution_m / 2.0;
         let Seen { clear_m, hit_m } = ray.seen;
         let far = clear_m.max(hit_m.unwrap_or(0.0)) + half_cell;
-        let came_from = side_of(ray.axis);
         let aside = half_cell.max(SCANNED_ASIDE_M);
         let end = ray.origin + far * ray.axis;
         let (least, greatest) = (ray.origin.min(end), ray.origin.max(end));
         let reach = aside + half_cell;
-        for cell in between(lattice, least - reach, greatest + reach) {
+        for cell in lattice.between(least - reach, greatest + reach).cells() {
             let centre = lattice.centre_of(cell);
             let offset = centre - ray.origin;
             let (across, along) = (ray.axis.perp_dot(offset), ray.axis.dot(offset));
@@ -317,97 +297,67 @@ impl EvidenceGrid {
                 continue;
             }
             let index = lattice.index(cell);
-            let weight = self.weight_of(index);
             let at_hit = hit_m.is_some_and(|hit| (hit - along).abs() <= half_cell);
             if on_ray && at_hit {
-                if centre.distance(robot) <= radius {
-                    continue;
+                if centre.distance(robot) > radius {
+                    self.side[index] = side_of(ray.axis);
+                    self.occupied[index] |= SEEN;
+                    self.weigh(cell, sonar::HIT as i8);
                 }
-                self.side[index] = came_from;
-                self.occupied[index] |= SEEN;
-                let weight = weight.max(-sonar.pass) + sonar.hit as i8;
-                self.set(sonar, lattice, cell, weight, flips);
             } else if along <= clear_m {
-                let was = std::mem::replace(&mut self.looks[index], SCANNED);
-                if was < sonar.pointed_enough {
-                    window = window.including(cell);
-                }
+                self.scan(cell);
                 if on_ray && self.occupied[index] & TOUCHED == 0 {
-                    let weight = weight.saturating_sub(sonar.pass);
-                    self.set(sonar, lattice, cell, weight, flips);
+                    self.weigh(cell, -PASS);
                 }
             }
         }
-        window
     }
 
-    /// Change the weight of a cell that a laser saw, which is then scanned; positive is for an obstacle. Returns whether the cell looks
-    /// different.
-    pub(crate) fn weigh_seen(
-        &mut self,
-        sonar: &SonarModel,
-        lattice: &GridFrame,
-        cell: Cell,
-        change: i8,
-        flips: &mut Vec<Flip>,
-    ) -> bool {
-        let index = lattice.index(cell);
-        let (weight, was_occupied) = (self.weight_of(index), self.is_occupied(index));
-        let was_scanned = self.is_scanned(sonar, index);
+    /// Change the weight of a cell that a laser saw, which is then scanned; positive is for an obstacle.
+    pub(crate) fn weigh_seen(&mut self, cell: Cell, change: i8) {
+        let index = self.ground.lattice.index(cell);
+        let was_occupied = self.is_occupied(index);
+        let is_over = change == 0 || change < 0 && self.weight_of(index) == sonar::LEAST;
+        let was_scanned = self.is_scanned(index);
         self.looks[index] = SCANNED;
-        if was_scanned && change <= 0 && (change == 0 || weight == sonar.least) {
-            return false;
+        if was_scanned && is_over {
+            return;
         }
         if change > 0 {
             self.occupied[index] |= SEEN;
-            self.set(sonar, lattice, cell, weight.max(-sonar.pass).saturating_add(change), flips);
-        } else if change < 0 && self.occupied[index] & TOUCHED == 0 {
-            self.set(sonar, lattice, cell, weight.saturating_add(change), flips);
         }
-        !was_scanned || was_occupied != self.is_occupied(index)
+        if change > 0 || change < 0 && self.occupied[index] & TOUCHED == 0 {
+            self.weigh(cell, change);
+        }
+        if !was_scanned || was_occupied != self.is_occupied(index) {
+            self.news.window = self.news.window.including(cell);
+        }
     }
 
     /// An obstacle stands in every cell at the body's rim in the arc of `touch`.
-    pub(crate) fn touch(
-        &mut self,
-        sonar: &SonarModel,
-        lattice: &GridFrame,
-        touch: &Touch,
-        radius: f64,
-        flips: &mut Vec<Flip>,
-    ) -> Window {
-        let mut window = Window::default();
-        let rim = radius - sonar.rim_m..=radius + lattice.resolution_m;
-        for cell in around(lattice, touch.robot, radius + lattice.resolution_m) {
+    pub(crate) fn touch(&mut self, touch: &Touch) {
+        let Ground { lattice, radius } = self.ground;
+        let rim = radius - sonar::RIM_M..=radius + lattice.resolution_m;
+        for cell in self.around(touch.robot, *rim.end()) {
             let offset = lattice.centre_of(cell) - touch.robot;
             let (across, along) = (touch.axis.perp_dot(offset), touch.axis.dot(offset));
             if rim.contains(&offset.length()) && across.atan2(along).abs() <= touch.half_width {
                 let index = lattice.index(cell);
                 self.side[index] = side_of(touch.axis);
-                self.set(sonar, lattice, cell, sonar.most, flips);
+                self.set(cell, sonar::MOST);
                 self.occupied[index] |= TOUCHED;
-                window = window.including(cell);
+                self.news.window = self.news.window.including(cell);
             }
         }
-        window
     }
 
     /// Keeps echoes from within `keep` metres of `robot`.
-    pub(crate) fn reset(
-        &mut self,
-        sonar: &SonarModel,
-        lattice: &GridFrame,
-        (robot, keep): (DVec2, f64),
-        flips: &mut Vec<Flip>,
-    ) {
-        for row in 0..lattice.cells {
-            for col in 0..lattice.cells {
-                let cell = Cell { col, row };
-                let index = lattice.index(cell);
-                self.looks[index] = 0;
-                if lattice.centre_of(cell).distance(robot) > keep {
-                    self.set(sonar, lattice, cell, 0, flips);
-                }
+    pub(crate) fn reset(&mut self, robot: DVec2, keep: f64) {
+        self.looks.fill(0);
+        let lattice = self.ground.lattice;
+        for cell in lattice.whole().cells() {
+            if lattice.centre_of(cell).distance(robot) > keep {
+                self.set(cell, 0);
             }
         }
     }
@@ -416,41 +366,38 @@ impl EvidenceGrid {
         self.weight[index].wrapping_sub(128).cast_signed()
     }
 
-    fn set(
-        &mut self,
-        sonar: &SonarModel,
-        lattice: &GridFrame,
-        cell: Cell,
-        weight: i8,
-        flips: &mut Vec<Flip>,
-    ) {
-        let index = lattice.index(cell);
-        let weight = weight.clamp(sonar.least, sonar.most);
+    fn scan(&mut self, cell: Cell) {
+        let index = self.ground.lattice.index(cell);
+        if !self.is_scanned(index) {
+            self.news.window = self.news.window.including(cell);
+        }
+        self.looks[index] = SCANNED;
+    }
+
+    /// Evidence for an obstacle is positive. A cell that was long free must not need as long to become occupied.
+    fn weigh(&mut self, cell: Cell, change: i8) {
+        let weight = self.weight_of(self.ground.lattice.index(cell));
+        self.set(cell, if change < 0 { weight } else { weight.max(-PASS) } + change);
+    }
+
+    fn set(&mut self, cell: Cell, weight: i8) {
+        let index = self.ground.lattice.index(cell);
+        let weight = weight.clamp(sonar::LEAST, sonar::MOST);
         self.weight[index] = weight.cast_unsigned().wrapping_add(128);
         let was = self.is_occupied(index);
-        let occupied = weight >= sonar.occupied || was && weight > sonar.released;
+        let occupied = weight >= sonar::OCCUPIED || was && weight > sonar::RELEASED;
         if occupied != was {
             self.occupied[index] ^= OCCUPIED;
-            flips.push(Flip { cell, occupied });
+            self.news.flips.push(Flip { cell, occupied });
         }
         if !occupied {
             self.occupied[index] &= !(SEEN | TOUCHED);
         }
     }
-}
 
-fn around(frame: &GridFrame, centre: DVec2, reach: f64) -> impl Iterator<Item = Cell> + use<> {
-    between(frame, centre - reach, centre + reach)
-}
-
-fn between(frame: &GridFrame, least: DVec2, greatest: DVec2) -> impl Iterator<Item = Cell> + use<> {
-    let last = f64::from(frame.cells) - 1.0;
-    let inside = |corner: DVec2| corner.clamp(DVec2::ZERO, DVec2::splat(last));
-    let from = inside(frame.to_cells(least).floor());
-    let to = inside(frame.to_cells(greatest).ceil());
-    let columns = from.x as u32..=to.x as u32;
-    (from.y as u32..=to.y as u32)
-        .flat_map(move |row| columns.clone().map(move |col| Cell { col, row }))
+    fn around(&self, centre: DVec2, reach: f64) -> impl Iterator<Item = Cell> + use<> {
+        self.ground.lattice.between(centre - reach, centre + reach).cells()
+    }
 }
 
 /// 256ths of a turn.

@@ -10,10 +10,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     clear_beams::ClearBeams,
-    evidence_grid::{EvidenceGrid, Flip, lattice, step_m},
+    evidence_grid::{EvidenceGrid, Flip, Ground, STEP_M, lattice},
     inflation::{Geometry, Inflation},
     reading::{Fan, Ray, Reading, Rows, Touch},
-    sonar_model::SonarModel,
+    sonar_model::NEAR_M,
 };
 
 /// The evidence, and the cells that it forbids to the body's centre.
@@ -28,19 +28,18 @@ pub(crate) struct EvidenceMap {
     inflation: Inflation,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Observed {
-    pub(crate) window: Window,
-    pub(crate) safety_event: bool,
+impl EvidenceMap {
+    fn grids(&mut self) -> impl Iterator<Item = &mut EvidenceGrid> {
+        std::iter::once(&mut self.evidence).chain(self.unseen.as_deref_mut())
+    }
 }
 
 #[derive(Clone, Debug)]
 pub(crate) struct Evidential {
-    sonar: SonarModel,
     geometry: Geometry,
+    ground: Ground,
     /// The lattice's column under the middle of each of the grid's; rows are the same, as both are square with one centre.
     under: Vec<Option<u32>>,
-    radius: f64,
     map_within: f64,
     sonars: usize,
     beside_laser: bool,
@@ -48,19 +47,17 @@ pub(crate) struct Evidential {
 
 impl Evidential {
     pub(crate) fn new(mission: &Mission) -> Self {
-        let sonar = SonarModel::default();
         let grid = mission.grid_frame();
         let radius = mission.body().radius_m;
         // A position is up to half a cell off the centre that stands for it.
         let reach = radius + mission.mapper.clearance_m + grid.resolution_m / 2.0;
         let rows = Rows::new(mission);
-        let lattice = lattice(&sonar, mission, reach);
+        let lattice = lattice(mission, reach);
         let under = |along| lattice.cell_at(grid.centre_of(Cell { col: along, row: along }));
         Self {
-            sonar,
             under: (0..grid.cells).map(|along| under(along).map(|cell| cell.col)).collect(),
             geometry: Geometry { lattice, grid, reach },
-            radius,
+            ground: Ground { lattice, radius },
             map_within: mission.map_within_m(),
             sonars: rows.cones(),
             beside_laser: rows.are_beside_laser(),
@@ -73,7 +70,7 @@ impl Evidential {
     }
 
     pub(crate) fn empty(&self) -> EvidenceMap {
-        let evidence = EvidenceGrid::none(&self.geometry.lattice);
+        let evidence = EvidenceGrid::new(self.ground);
         EvidenceMap {
             unseen: self.beside_laser.then(|| Box::new(evidence.clone())),
             evidence,
@@ -90,110 +87,85 @@ impl Evidential {
     /// Fails for the map of another mission.
     pub(crate) fn complete(&self, map: &mut EvidenceMap) -> Result<(), ForeignState> {
         let lattice = self.geometry.lattice;
-        if map.unseen.is_some() != self.beside_laser {
+        let fits = map.unseen.is_some() == self.beside_laser
+            && map.grids().all(|grid| grid.fits(&lattice));
+        if !fits {
             return Err(ForeignState);
         }
         map.inflation = Inflation::new(&self.geometry);
-        for grid in std::iter::once(&map.evidence).chain(map.unseen.as_deref()) {
-            if !grid.fits(&lattice) {
-                return Err(ForeignState);
-            }
-            for row in 0..lattice.cells {
-                for col in 0..lattice.cells {
-                    let cell = Cell { col, row };
-                    if grid.is_occupied(lattice.index(cell)) {
-                        let occupied = true;
-                        map.inflation.follow(&self.geometry, Flip { cell, occupied });
-                    }
-                }
-            }
+        for grid in map.grids() {
+            grid.ground = self.ground;
+            let occupied =
+                lattice.whole().cells().filter(|it| grid.is_occupied(lattice.index(*it)));
+            grid.news.flips = occupied.map(|cell| Flip { cell, occupied: true }).collect();
         }
+        self.follow(map);
         Ok(())
     }
 
-    /// Take readings of a robot at `robot` whose wheels have rolled `rolled_m` metres.
+    /// Take a scan and the readings of a robot at `robot`, whose wheels had rolled the first of these ways before, and the second now.
+    /// Returns the grid's window that may look different, and whether there is a new obstacle.
     pub(crate) fn take(
         &self,
         map: &mut EvidenceMap,
         robot: DVec2,
-        beams: impl Iterator<Item = Reading>,
-        rays: impl Iterator<Item = Ray>,
-        rolled_m: f64,
-    ) -> Observed {
-        let mut flips = Vec::new();
-        let lattice = &self.geometry.lattice;
-        let body = (robot, self.radius);
-        let mut touched = Window::default();
+        [before_m, rolled_m]: [f64; 2],
+        (scan, rays, beams): (
+            Option<Fan<'_>>,
+            impl Iterator<Item = Ray>,
+            impl Iterator<Item = Reading>,
+        ),
+    ) -> (Window, bool) {
+        let steps = (rolled_m / STEP_M).floor() - (before_m / STEP_M).floor();
+        if steps >= 1.0 {
+            map.evidence.grow_stale(steps as u8);
+        }
+        // The scan first, and then the rays: what they show explains echoes.
+        if let Some(fan) = scan {
+            map.evidence.take_scan(&fan, robot);
+        }
         let (grid, by_laser) = match &mut map.unseen {
             Some(unseen) => (unseen.as_mut(), Some(&map.evidence)),
             None => (&mut map.evidence, None),
         };
-        // Rays first: what they show explains echoes.
         for ray in rays {
-            map.beams.take_ray(&self.sonar, &ray, rolled_m);
-            let seen = grid.take_ray(&self.sonar, lattice, &ray, body, &mut flips);
-            touched = touched.union(seen);
+            map.beams.take_ray(&ray, rolled_m);
+            grid.take_ray(&ray, robot);
         }
         for reading in beams {
             map.beams.take(self.sonars, &reading, rolled_m);
-            let seen = by_laser.filter(|seen| seen.explains(lattice, &reading));
-            let beam = (&reading, self.map_within);
-            let heard = grid.take(&reading.sonar, lattice, beam, seen, body, &mut flips);
-            touched = touched.union(heard);
+            let seen = by_laser.filter(|seen| seen.explains(&reading));
+            grid.take(&reading, self.map_within, seen, robot);
         }
-        let window = self.follow(map, touched, &flips);
-        Observed { window, safety_event: flips.iter().any(|flip| flip.occupied) }
-    }
-
-    pub(crate) fn take_scan(&self, map: &mut EvidenceMap, robot: DVec2, fan: &Fan<'_>) -> Observed {
-        let mut flips = Vec::new();
-        let lattice = &self.geometry.lattice;
-        let body = (robot, self.radius);
-        let touched = map.evidence.take_scan(&self.sonar, lattice, fan, body, &mut flips);
-        let window = self.follow(map, touched, &flips);
-        Observed { window, safety_event: flips.iter().any(|flip| flip.occupied) }
+        self.follow(map)
     }
 
     /// Returns the window that may look different now.
     pub(crate) fn touch(&self, map: &mut EvidenceMap, touch: &Touch) -> Window {
-        let mut flips = Vec::new();
-        let lattice = &self.geometry.lattice;
-        let touched = map.evidence.touch(&self.sonar, lattice, touch, self.radius, &mut flips);
-        self.follow(map, touched, &flips)
+        map.evidence.touch(touch);
+        self.follow(map).0
     }
 
-    /// Inflate the flipped cells. Returns the grid's window that may look different, `touched` on the lattice included.
-    fn follow(&self, map: &mut EvidenceMap, touched: Window, flips: &[Flip]) -> Window {
-        let mut window = self.on_grid(touched);
-        for flip in flips {
-            window = window.union(map.inflation.follow(&self.geometry, *flip));
+    /// Inflate the flipped cells. Returns the grid's window that may look different, and whether there is a new obstacle.
+    fn follow(&self, map: &mut EvidenceMap) -> (Window, bool) {
+        let (mut window, mut is_new) = (Window::default(), false);
+        let news: Vec<_> = map.grids().map(|grid| std::mem::take(&mut grid.news)).collect();
+        for news in news {
+            window = window.union(self.on_grid(news.window));
+            for flip in news.flips {
+                is_new |= flip.occupied;
+                window = window.union(map.inflation.follow(&self.geometry, flip));
+            }
         }
-        window
-    }
-
-    /// Age scanned ground as the wheels roll between these ways, metres. Returns the window that may have changed.
-    pub(crate) fn roll(&self, map: &mut EvidenceMap, before: f64, now: f64) -> Window {
-        let step_m = step_m(&self.sonar);
-        let steps = (now / step_m).floor() - (before / step_m).floor();
-        if steps < 1.0 {
-            return Window::default();
-        }
-        let lattice = &self.geometry.lattice;
-        self.on_grid(map.evidence.grow_stale(&self.sonar, lattice, steps as u8))
+        (window, is_new)
     }
 
     /// Drop all evidence that is not near the robot; every second reset drops that too, since it may be wrong.
     pub(crate) fn reset(&self, map: &mut EvidenceMap, robot: DVec2, epoch: u64) {
-        let keep = if epoch % 2 == 1 { self.sonar.near_m } else { 0.0 };
-        let mut flips = Vec::new();
-        map.beams.clear();
-        let lattice = &self.geometry.lattice;
-        for grid in std::iter::once(&mut map.evidence).chain(map.unseen.as_deref_mut()) {
-            grid.reset(&self.sonar, lattice, (robot, keep), &mut flips);
-        }
-        for flip in &flips {
-            map.inflation.follow(&self.geometry, *flip);
-        }
+        let keep = if epoch % 2 == 1 { NEAR_M } else { 0.0 };
+        map.beams = ClearBeams::default();
+        map.grids().for_each(|grid| grid.reset(robot, keep));
+        self.follow(map);
     }
 
     /// The evidence decides, of a cell neither known nor perimeter.
@@ -202,7 +174,7 @@ impl Evidential {
         let hazard = map.inflation.is_hazard(grid.index(cell)) && !is_target;
         let under = |along: u32| self.under[along as usize];
         let under = under(cell.col).zip(under(cell.row)).map(|(col, row)| Cell { col, row });
-        let is_scanned = |under| map.evidence.is_scanned(&self.sonar, lattice.index(under));
+        let is_scanned = |under| map.evidence.is_scanned(lattice.index(under));
         match (hazard, under.is_some_and(is_scanned)) {
             (true, true) => CellState::Margin,
             (true, false) => CellState::Sensed,
@@ -216,18 +188,10 @@ impl Evidential {
             return window;
         }
         let Geometry { lattice, grid, .. } = self.geometry;
-        let last = DVec2::splat(f64::from(grid.cells) - 1.0);
-        let corner = |col: u32, row: u32| {
-            let point = lattice.centre_of(Cell { col, row });
-            grid.to_cells(point).clamp(DVec2::ZERO, last)
-        };
+        let last = Cell { col: window.col + window.width - 1, row: window.row + window.height - 1 };
         // A lattice cell acts up to half of it, and half a grid cell, beyond its centre.
-        let more = 0.5 * lattice.resolution_m / grid.resolution_m + 0.5;
-        let from = (corner(window.col, window.row) - more).floor().max(DVec2::ZERO);
-        let to = corner(window.col + window.width - 1, window.row + window.height - 1) + more;
-        let to = to.ceil().min(last);
-        Window::default()
-            .including(Cell { col: from.x as u32, row: from.y as u32 })
-            .including(Cell { col: to.x as u32, row: to.y as u32 })
+        let more = 0.5 * (lattice.resolution_m + grid.resolution_m);
+        let first = Cell { col: window.col, row: window.row };
+        grid.between(lattice.centre_of(first) - more, lattice.centre_of(last) + more)
     }
 }

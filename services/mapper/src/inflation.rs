@@ -1,7 +1,6 @@
 //! Cells within reach of an occupied cell, which the body's centre must not enter.
 
-use common::grid::{Cell, GridFrame, Window};
-use glam::DVec2;
+use common::grid::{GridFrame, Window};
 
 use crate::evidence_grid::Flip;
 
@@ -32,22 +31,12 @@ impl Inflation {
     pub(crate) fn follow(&mut self, geometry: &Geometry, flip: Flip) -> Window {
         let Geometry { lattice, grid, reach } = *geometry;
         let centre = lattice.centre_of(flip.cell);
-        let last = DVec2::splat(f64::from(grid.cells) - 1.0);
-        let from = grid.to_cells(centre - reach).ceil().max(DVec2::ZERO);
-        let to = grid.to_cells(centre + reach).floor().min(last);
         let mut window = Window::default();
-        if from.cmpgt(to).any() {
-            return window;
-        }
-        for row in from.y as u32..=to.y as u32 {
-            for col in from.x as u32..=to.x as u32 {
-                let cell = Cell { col, row };
-                if grid.centre_of(cell).distance(centre) > reach {
-                    continue;
-                }
+        for cell in grid.between(centre - reach, centre + reach).cells() {
+            if grid.centre_of(cell).distance(centre) <= reach {
                 let count = &mut self.count[grid.index(cell)];
-                *count =
-                    if flip.occupied { count.saturating_add(1) } else { count.saturating_sub(1) };
+                let change = if flip.occupied { 1 } else { -1 };
+                *count = count.saturating_add_signed(change);
                 window = window.including(cell);
             }
         }

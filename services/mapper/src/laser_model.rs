@@ -11,13 +11,12 @@
 
 use std::ops::Range;
 
-use common::grid::{Cell, GridFrame, Window};
+use common::grid::{Cell, GridFrame};
 use glam::{DVec2, IVec2};
 
 use crate::{
-    evidence_grid::{EvidenceGrid, Flip},
+    evidence_grid::{EvidenceGrid, Ground},
     reading::Fan,
-    sonar_model::SonarModel,
 };
 
 /// Weight of beams that end in a cell. One scan makes a free cell occupied.
@@ -59,43 +58,27 @@ struct Scan<'a> {
 }
 
 impl EvidenceGrid {
-    /// Take a scan of a robot with a body of `radius` metres. Appends flipped cells to `flips` and returns the window of changed ones.
-    pub(crate) fn take_scan(
-        &mut self,
-        sonar: &SonarModel,
-        lattice: &GridFrame,
-        fan: &Fan<'_>,
-        (robot, radius): (DVec2, f64),
-        flips: &mut Vec<Flip>,
-    ) -> Window {
-        let Some(mut scan) = Scan::new(lattice, fan) else {
-            return Window::default();
+    /// Take a scan of a robot at `robot`.
+    pub(crate) fn take_scan(&mut self, fan: &Fan<'_>, robot: DVec2) {
+        let Ground { lattice, radius } = self.ground;
+        let Some(mut scan) = Scan::new(&lattice, fan) else {
+            return;
         };
-        let near = NEAR_END_M / lattice.resolution_m;
         scan.pass(0.0, PASSED);
-        scan.pass(near, PASSED_FAR);
+        scan.pass(NEAR_END_M / lattice.resolution_m, PASSED_FAR);
         scan.end();
-        let mut window = self.stand(sonar, lattice, (robot, radius), flips);
-        let side = lattice.cells as usize;
-        for (row, marks) in (0..).zip(scan.marks.chunks_exact(side)) {
-            for (col, &mark) in (0..).zip(marks) {
-                let cell = Cell { col, row };
-                let change = match mark {
-                    0 => continue,
-                    mark if mark & ENDED != 0 => match scan.is_thing(cell) {
-                        true if lattice.centre_of(cell).distance(robot) <= radius => continue,
-                        true => HIT,
-                        false => 0,
-                    },
-                    mark if mark & PASSED_FAR != 0 => -PASS,
-                    _ => 0,
-                };
-                if self.weigh_seen(sonar, lattice, cell, change, flips) {
-                    window = window.including(cell);
-                }
-            }
+        self.stand(robot);
+        let side = lattice.cells;
+        for (index, mark) in (0..).zip(&scan.marks).filter(|(_, mark)| **mark != 0) {
+            let cell = Cell { col: index % side, row: index / side };
+            let change = match scan.is_thing(cell, *mark) {
+                true if lattice.centre_of(cell).distance(robot) <= radius => continue,
+                true => HIT,
+                false if mark & (ENDED | PASSED_FAR) == PASSED_FAR => -PASS,
+                false => 0,
+            };
+            self.weigh_seen(cell, change);
         }
-        window
     }
 }
 
@@ -159,7 +142,10 @@ impl<'a> Scan<'a> {
     }
 
     /// The share of its beams that end in it decides.
-    fn is_thing(&self, cell: Cell) -> bool {
+    fn is_thing(&self, cell: Cell, mark: u8) -> bool {
+        if mark & ENDED == 0 {
+            return false;
+        }
         let offset = DVec2::new(cell.col.into(), cell.row.into()) - self.origin;
         let away = offset.length();
         // No part of the cell is farther off its middle than this angle.
@@ -273,15 +259,14 @@ mod tests {
     const LATTICE: GridFrame = GridFrame { cells: 100, resolution_m: 0.05, centre: DVec2::ZERO };
 
     /// A grid after these scans of a laser at the centre, whose beams are a degree apart from bearing 0 on.
-    fn after(scans: &[Vec<f32>]) -> (EvidenceGrid, Vec<Flip>) {
-        let sonar = SonarModel::default();
-        let (mut grid, mut flips) = (EvidenceGrid::none(&LATTICE), Vec::new());
+    fn after(scans: &[Vec<f32>]) -> EvidenceGrid {
+        let mut grid = EvidenceGrid::new(Ground { lattice: LATTICE, radius: 0.2 });
         for beams in scans {
             let (first_rad, step_rad) = (0.0, 1_f64.to_radians());
             let fan = Fan { origin: DVec2::ZERO, first_rad, step_rad, reach_m: 8.0, beams };
-            grid.take_scan(&sonar, &LATTICE, &fan, (DVec2::ZERO, 0.2), &mut flips);
+            grid.take_scan(&fan, DVec2::ZERO);
         }
-        (grid, flips)
+        grid
     }
 
     fn index(x: f64, y: f64) -> usize {
@@ -290,11 +275,10 @@ mod tests {
 
     #[test]
     fn a_beam_frees_the_way_to_its_end_and_knows_nothing_behind_it() {
-        let (grid, flips) = after(&[vec![1.0]]);
+        let grid = after(&[vec![1.0]]);
         assert!(grid.is_occupied(index(1.0, 0.0)));
-        assert_eq!(flips.len(), 1);
-        let scanned =
-            [0.4, 0.9, 1.0, 1.2].map(|x| grid.is_scanned(&SonarModel::default(), index(x, 0.0)));
+        assert_eq!(grid.news.flips.len(), 1);
+        let scanned = [0.4, 0.9, 1.0, 1.2].map(|x| grid.is_scanned(index(x, 0.0)));
         assert_eq!(scanned, [true, true, true, false]);
     }
 
@@ -302,26 +286,24 @@ mod tests {
     fn what_goes_away_is_contradicted_by_two_scans() {
         let far = vec![2.0];
         let gone = [vec![1.0], vec![1.0], vec![1.0], far.clone(), far.clone()];
-        assert!(after(&gone[..4]).0.is_occupied(index(1.0, 0.0)), "one scan may be wrong");
-        assert!(!after(&gone).0.is_occupied(index(1.0, 0.0)));
+        assert!(after(&gone[..4]).is_occupied(index(1.0, 0.0)), "one scan may be wrong");
+        assert!(!after(&gone).is_occupied(index(1.0, 0.0)));
     }
 
     #[test]
     fn a_beam_without_a_reading_says_nothing_and_one_without_an_end_frees_its_reach() {
-        let (grid, flips) = after(&[vec![f32::NAN, f32::NEG_INFINITY]]);
-        assert!(flips.is_empty() && !grid.is_scanned(&SonarModel::default(), index(1.0, 0.0)));
-        let (grid, _) = after(&[vec![f32::INFINITY]]);
-        assert!(grid.is_scanned(&SonarModel::default(), index(2.4, 0.0)));
+        let grid = after(&[vec![f32::NAN, f32::NEG_INFINITY]]);
+        assert!(grid.news.flips.is_empty() && !grid.is_scanned(index(1.0, 0.0)));
+        assert!(after(&[vec![f32::INFINITY]]).is_scanned(index(2.4, 0.0)));
     }
 
     #[test]
     fn a_post_in_a_cell_is_a_thing_and_a_stray_beam_before_a_wall_is_not() {
         // Eleven beams cross the cell at 0.5 m in the directions of 0 to 10 degrees, about half of them through one cell.
         let beams = |near: usize| (0..6).map(|beam| if beam < near { 0.5 } else { 1.5 }).collect();
-        assert!(after(&[beams(1)]).0.is_occupied(index(0.5, 0.0)));
+        assert!(after(&[beams(1)]).is_occupied(index(0.5, 0.0)));
         let many = (0..12).map(|beam| if beam == 0 { 0.3 } else { 1.5 }).collect();
-        let (grid, _) = after(&[many]);
-        assert!(!grid.is_occupied(index(0.3, 0.0)), "one of seven");
+        assert!(!after(&[many]).is_occupied(index(0.3, 0.0)), "one of seven");
     }
 
     #[test]

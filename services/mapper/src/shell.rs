@@ -22,7 +22,7 @@ use common::{
 
 use crate::{
     stage::Entry,
-    step::{Input, Mapper},
+    step::{Input, Mapper, Tick},
 };
 
 /// Mission time after which the whole map is published again.
@@ -41,15 +41,34 @@ readers! {
     }
 }
 
+/// The newest sample of a topic, and its tick.
+#[derive(Default)]
+struct OfTick<T>(Option<(u64, T)>);
+
+impl<T: Default> OfTick<T> {
+    /// That of `tick`, if there is one: earlier ones are dropped, later ones wait for their pose.
+    fn take(
+        &mut self,
+        tick: u64,
+        mut next: impl FnMut() -> Result<Option<(u64, T)>, StageError>,
+    ) -> Result<T, StageError> {
+        while self.0.as_ref().is_none_or(|(newest, _)| *newest < tick)
+            && let Some(newer) = next()?
+        {
+            self.0 = Some(newer);
+        }
+        let own = self.0.take_if(|(newest, _)| *newest == tick);
+        Ok(own.map(|(_, sample)| sample).unwrap_or_default())
+    }
+}
+
 /// The mapper process.
 pub struct Shell {
     inputs: Inputs,
     runner: Runner<Mapper>,
-    /// The newest scan with the times of its beams, and its tick.
-    latest_scan: Option<(u64, Vec<f32>, Sweep)>,
-    /// The newest readings that are used, and their tick.
-    latest_ranges: Option<(u64, Vec<RangeReading>)>,
-    latest_contact: Option<ContactSample>,
+    ranges: OfTick<Vec<RangeReading>>,
+    scan: OfTick<(Vec<f32>, Sweep)>,
+    contact: OfTick<Option<ContactSample>>,
     last_keyframe: Option<MissionTime>,
 }
 
@@ -67,29 +86,42 @@ impl Process for Shell {
         if version > 1 {
             tracing::info!(version, "the belief is restored");
         }
-        Ok(Self {
-            inputs,
-            latest_scan: None,
-            runner,
-            latest_ranges: None,
-            latest_contact: None,
-            last_keyframe: None,
-        })
+        let (ranges, scan, contact) = Default::default();
+        Ok(Self { inputs, runner, ranges, scan, contact, last_keyframe: None })
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {
         while let Some(pose) = self.inputs.pose.next_sample()? {
-            let ranges = self.ranges_of(pose.stamp.tick)?;
+            let tick = pose.stamp.tick;
             self.runner.out.at = Progress::of(&pose.stamp);
-            let (scan, sweep) = self.scan_of(pose.stamp.tick)?;
-            let contact = self.contact_of(pose.stamp.tick)?;
-            let target =
-                self.inputs.target.next(pose.stamp.tick)?.map(|sample| sample.target.position());
+            let (mapper, inputs) = (&self.runner.stage, &mut self.inputs);
+            let ranges = self.ranges.take(tick, || {
+                let Some(slice) = inputs.ranges.next_slice()? else {
+                    return Ok(None);
+                };
+                let readings = slice.iter().take(MOST_SENSORS).copied();
+                let used = readings.filter(|reading| mapper.uses(reading)).collect();
+                Ok(Some((slice.header().stamp.tick, used)))
+            })?;
+            let (scan, sweep) = self.scan.take(tick, || {
+                let Some(slice) = inputs.scan.next_slice()? else {
+                    return Ok(None);
+                };
+                let header = slice.header();
+                let most = if mapper.uses_row(header.sensor) { MOST_BEAMS } else { 0 };
+                let beams = slice.iter().take(most).copied().collect();
+                Ok(Some((header.stamp.tick, (beams, header.sweep()))))
+            })?;
+            let contact = self.contact.take(tick, || {
+                let sample = inputs.contact.next_sample()?;
+                Ok(sample.map(|sample| (sample.stamp.tick, Some(sample))))
+            })?;
+            let target = self.inputs.target.next(tick)?.map(|sample| sample.target.position());
             let target = target.filter(|target| *target != self.runner.stage.target());
             if sweep != Sweep::default() && !scan.is_empty() {
-                self.step(Input::Sweep(pose.stamp.tick, sweep))?;
+                self.step(Input::Sweep(tick, sweep))?;
             }
-            self.step(Input::Tick { pose, ranges, scan, contact, target })?;
+            self.step(Input::Tick(Tick { pose, ranges, scan, contact, target }))?;
         }
         if let Some(DirectiveSample { epoch, .. }) = self.inputs.directive.newest()?
             && self.step(Input::Reset { epoch })?
@@ -135,47 +167,6 @@ impl Shell {
             self.last_keyframe = Some(self.runner.out.at.time);
         }
         Ok(published.is_some())
-    }
-
-    /// The readings of `tick`; earlier ones are dropped, later ones wait for their pose.
-    fn ranges_of(&mut self, tick: u64) -> Result<Vec<RangeReading>, StageError> {
-        while self.latest_ranges.as_ref().is_none_or(|(latest, _)| *latest < tick) {
-            let Some(slice) = self.inputs.ranges.next_slice()? else {
-                break;
-            };
-            let readings = slice.iter().take(MOST_SENSORS).copied();
-            let used = readings.filter(|reading| self.runner.stage.uses(reading)).collect();
-            self.latest_ranges = Some((slice.header().stamp.tick, used));
-        }
-        let latest = self.latest_ranges.as_ref().filter(|(latest, _)| *latest == tick);
-        Ok(latest.map(|(_, readings)| readings.clone()).unwrap_or_default())
-    }
-
-    /// The scan of `tick`; none if the laser gave none, or the mission uses none.
-    fn scan_of(&mut self, tick: u64) -> Result<(Vec<f32>, Sweep), StageError> {
-        while self.latest_scan.as_ref().is_none_or(|(latest, ..)| *latest < tick) {
-            let Some(slice) = self.inputs.scan.next_slice()? else {
-                break;
-            };
-            let used = self.runner.stage.uses_row(slice.header().sensor);
-            let beams =
-                if used { slice.iter().take(MOST_BEAMS).copied().collect() } else { Vec::new() };
-            let header = slice.header();
-            self.latest_scan = Some((header.stamp.tick, beams, header.sweep()));
-        }
-        let latest = self.latest_scan.as_mut().filter(|(latest, ..)| *latest == tick);
-        Ok(latest.map(|(_, beams, sweep)| (std::mem::take(beams), *sweep)).unwrap_or_default())
-    }
-
-    /// The contact of `tick`; most ticks have none.
-    fn contact_of(&mut self, tick: u64) -> Result<Option<ContactSample>, StageError> {
-        while self.latest_contact.is_none_or(|contact| contact.stamp.tick < tick) {
-            match self.inputs.contact.next_sample()? {
-                Some(contact) => self.latest_contact = Some(contact),
-                None => break,
-            }
-        }
-        Ok(self.latest_contact.filter(|contact| contact.stamp.tick == tick))
     }
 
     fn is_keyframe_due(&self) -> bool {

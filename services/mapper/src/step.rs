@@ -29,17 +29,7 @@ use crate::{
 #[allow(clippy::large_enum_variant, reason = "one is held at a time")]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Input {
-    Tick {
-        pose: PoseSample,
-        /// None if none came.
-        ranges: Vec<RangeReading>,
-        /// Metres; none if none came.
-        scan: Vec<f32>,
-        /// Something holds the wheels at this tick.
-        contact: Option<ContactSample>,
-        /// It holds from this tick on, metres; none if unchanged.
-        target: Option<DVec2>,
-    },
+    Tick(Tick),
     Reset {
         /// A belief that has begun already is not reset.
         epoch: u64,
@@ -48,6 +38,19 @@ pub enum Input {
     Fault(FaultKind),
     /// The beams of this tick's scan, which follows, were measured at these times; otherwise at the tick.
     Sweep(u64, Sweep),
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Tick {
+    pub pose: PoseSample,
+    /// None if none came.
+    pub ranges: Vec<RangeReading>,
+    /// Metres; none if none came.
+    pub scan: Vec<f32>,
+    /// Something holds the wheels at this tick.
+    pub contact: Option<ContactSample>,
+    /// It holds from this tick on, metres; none if unchanged.
+    pub target: Option<DVec2>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,6 +62,7 @@ pub enum Change {
     Whole,
 }
 
+#[allow(clippy::large_enum_variant, reason = "a mapper has one")]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 enum Sensed {
     /// Method `paper`: hits are marked in the cells and stay.
@@ -101,6 +105,25 @@ impl Belief {
     pub const fn safety_events(&self) -> u64 {
         self.safety_events
     }
+}
+
+/// `state` gives the new state of each cell of `window`, whose old one it is told. Returns the changed window.
+fn paint(
+    cells: &mut [u8],
+    frame: &GridFrame,
+    window: Window,
+    state: impl Fn(Cell, CellState) -> CellState,
+) -> Window {
+    let mut changed = Window::default();
+    for cell in window.cells() {
+        let held = &mut cells[frame.index(cell)];
+        let state = state(cell, CellState::from_byte(*held)) as u8;
+        if *held != state {
+            *held = state;
+            changed = changed.including(cell);
+        }
+    }
+    changed
 }
 
 /// Cells this near to a surface are hazard, metres.
@@ -211,19 +234,7 @@ impl Mapper {
     pub fn step(&mut self, input: Input, now: MissionTime) -> Change {
         self.fix = None;
         match input {
-            Input::Tick { pose, ranges, scan, contact, target } => {
-                let moved = target.map_or(Window::default(), |target| self.move_target(target));
-                let (scanned_at, capture_ns, scan) = self.place(&pose, now, scan);
-                if self.belief.tick != Some(pose.stamp.tick) {
-                    let reference = &mut self.belief.reference;
-                    let fix = self.matcher.step(&self.rows, reference, &scanned_at, &scan);
-                    let fix = fix.filter(|_| self.matcher.publishes(pose.stamp.tick));
-                    let source = name("scan");
-                    self.fix = fix.map(|fix| FixSample { capture_ns, source, ..fix });
-                }
-                let scan = (scanned_at.pose(), &scan[..]);
-                Change::Window(self.map(&pose, (&ranges, scan), contact.as_ref(), moved))
-            }
+            Input::Tick(tick) => Change::Window(self.tick(tick, now)),
             Input::Reset { epoch } if self.reset_belief(epoch) => Change::Whole,
             Input::Reset { .. } => Change::None,
             Input::Fault(fault) => {
@@ -234,26 +245,6 @@ impl Mapper {
                 self.sweep = Some((tick, sweep));
                 Change::None
             }
-        }
-    }
-
-    /// The robot where it took the scan, that time, and the scan from there; no scan if that place is not known.
-    fn place(
-        &mut self,
-        pose: &PoseSample,
-        now: MissionTime,
-        scan: Vec<f32>,
-    ) -> (PoseSample, u64, Vec<f32>) {
-        if self.rows.has_laser() {
-            self.poses.add(pose);
-        }
-        match self.sweep.take().filter(|(tick, _)| *tick == pose.stamp.tick) {
-            Some((_, sweep)) => self.poses.scan_at_once(&self.rows, pose, scan, sweep).unwrap_or((
-                *pose,
-                now.0,
-                Vec::new(),
-            )),
-            None => (*pose, now.0, scan),
         }
     }
 
@@ -306,30 +297,18 @@ impl Mapper {
     }
 
     fn mark_known(&mut self) {
-        let (frame, (known, reach)) = (self.frame, &self.known);
-        let reach = *reach;
-        let last = f64::from(frame.cells) - 1.0;
+        let Self { frame, target, known: (known, reach), belief, .. } = self;
         for piece in known.pieces() {
             let (least, greatest) = piece.bounds();
-            let inside = |corner: DVec2| corner.clamp(DVec2::ZERO, DVec2::splat(last));
-            let from = inside(frame.to_cells(least - reach).floor());
-            let to = inside(frame.to_cells(greatest + reach).ceil());
-            for row in from.y as u32..=to.y as u32 {
-                for col in from.x as u32..=to.x as u32 {
-                    let cell = Cell { col, row };
-                    let covered = piece.clearance(frame.centre_of(cell)) <= reach;
-                    if covered && Some(cell) != self.target {
-                        self.belief.cells[frame.index(cell)] = CellState::Known as u8;
-                    }
-                }
-            }
+            let near = frame.between(least - *reach, greatest + *reach);
+            paint(&mut belief.cells, frame, near, |cell, held| {
+                let covered = piece.clearance(frame.centre_of(cell)) <= *reach;
+                if covered && Some(cell) != *target { CellState::Known } else { held }
+            });
         }
-        let last = frame.cells - 1;
-        for along in 0..frame.cells {
-            for (col, row) in [(along, 0), (along, last), (0, along), (last, along)] {
-                self.belief.cells[frame.index(Cell { col, row })] = CellState::Perimeter as u8;
-            }
-        }
+        paint(&mut belief.cells, frame, frame.whole(), |cell, held| {
+            if frame.is_rim(cell) { CellState::Perimeter } else { held }
+        });
     }
 
     /// The cell of the new target is no hazard, and that of the old one may be again. Returns the changed window.
@@ -339,12 +318,9 @@ impl Mapper {
         let before = std::mem::replace(&mut self.target, cell);
         let mut changed = Window::default();
         for cell in [before, cell].into_iter().flatten() {
-            let state = self.state_for_target(cell) as u8;
-            let held = &mut self.belief.cells[self.frame.index(cell)];
-            if *held != state {
-                *held = state;
-                changed = changed.including(cell);
-            }
+            let state = self.state_for_target(cell);
+            let own = Window::default().including(cell);
+            changed = changed.union(paint(&mut self.belief.cells, &self.frame, own, |_, _| state));
         }
         changed
     }
@@ -363,69 +339,71 @@ impl Mapper {
         }
     }
 
-    /// Map readings and contact of `pose`. Returns the changed window, with `changed`. A tick given twice is mapped once.
-    fn map(
+    /// Map readings and contact. Returns the changed window. A tick given twice is mapped once.
+    fn tick(
         &mut self,
-        pose: &PoseSample,
-        (ranges, (scanned_at, scan)): (&[RangeReading], (Pose2, &[f32])),
-        contact: Option<&ContactSample>,
-        changed: Window,
+        Tick { pose, ranges, scan, contact, target }: Tick,
+        now: MissionTime,
     ) -> Window {
-        if self.belief.tick == Some(pose.stamp.tick) {
-            self.belief.version += u64::from(changed.area() > 0);
-            return changed;
+        let moved = target.map_or(Window::default(), |target| self.move_target(target));
+        if self.rows.has_laser() {
+            self.poses.add(&pose);
         }
-        self.belief.tick = Some(pose.stamp.tick);
-        let (last, now) = (self.belief.robot, pose.pose());
-        let rolled = self.belief.rolled;
-        self.belief.rolled += last.distance(now.position)
-            + self.half_track * (now.heading - self.belief.heading).abs();
-        (self.belief.robot, self.belief.heading) = (now.position, now.heading);
-        let (ranges, scan) = if self.sensing { (ranges, scan) } else { (&[][..], &[][..]) };
-        let seen = match &self.belief.sensed {
-            Sensed::Hits => self.mark_hit(now, ranges),
-            Sensed::Evidence(_) => self.weigh(now, (ranges, (scanned_at, scan)), rolled),
+        let sweep = self.sweep.take().filter(|(tick, _)| *tick == pose.stamp.tick);
+        let changed = if self.belief.tick == Some(pose.stamp.tick) {
+            moved
+        } else {
+            // A scan whose place is not known is left out.
+            let (scanned_at, capture_ns, scan) = match sweep {
+                Some((_, sweep)) => self.poses.scan_at_once(&self.rows, &pose, scan, sweep),
+                None => Some((pose, now.0, scan)),
+            }
+            .unwrap_or_default();
+            let reference = &mut self.belief.reference;
+            let fix = self.matcher.step(&self.rows, reference, &scanned_at, &scan);
+            let fix = fix.filter(|_| self.matcher.publishes(pose.stamp.tick));
+            let source = name("scan");
+            self.fix = fix.map(|fix| FixSample { capture_ns, source, ..fix });
+            moved.union(self.map(&pose, (&ranges, scanned_at.pose(), &scan), contact.as_ref()))
         };
-        let contact = contact.and_then(|contact| Touch::of(now, contact));
-        let felt = contact.map_or_else(Window::default, |touch| self.mark_touch(&touch));
-        let changed = changed.union(seen).union(felt).union(self.falsify());
         self.belief.version += u64::from(changed.area() > 0);
         changed
     }
 
-    /// Method `paper`: hazard where the front sonar hears an obstacle.
-    fn mark_hit(&mut self, robot: Pose2, ranges: &[RangeReading]) -> Window {
-        let Some((distance, hit)) = self.rows.front_hit(robot, ranges) else {
-            return Window::default();
-        };
-        if distance > self.map_within {
-            return Window::default();
-        }
-        let changed = self.mark(hit, robot.position);
-        self.belief.safety_events += u64::from(changed.area() > 0);
-        changed
-    }
-
-    /// Method `evidential`: evidence for and against hazard, and scanned ground.
-    fn weigh(
+    fn map(
         &mut self,
-        robot: Pose2,
-        (ranges, (scanned_at, scan)): (&[RangeReading], (Pose2, &[f32])),
-        rolled: f64,
+        pose: &PoseSample,
+        (ranges, scanned_at, scan): (&[RangeReading], Pose2, &[f32]),
+        contact: Option<&ContactSample>,
     ) -> Window {
-        let Sensed::Evidence(map) = &mut self.belief.sensed else {
-            return Window::default();
+        let (belief, robot) = (&mut self.belief, pose.pose());
+        let before_m = belief.rolled;
+        belief.tick = Some(pose.stamp.tick);
+        belief.rolled += belief.robot.distance(robot.position)
+            + self.half_track * (robot.heading - belief.heading).abs();
+        (belief.robot, belief.heading) = (robot.position, robot.heading);
+        let (ranges, scan) = if self.sensing { (ranges, scan) } else { (&[][..], &[][..]) };
+        let (seen, is_event) = match &mut belief.sensed {
+            // Hazard where the front sonar hears an obstacle.
+            Sensed::Hits => {
+                let hit = self.rows.front_hit(robot, ranges);
+                let near = hit.filter(|(distance, _)| *distance <= self.map_within);
+                let seen = near.map(|(_, hit)| self.mark(hit, robot.position)).unwrap_or_default();
+                (seen, seen.area() > 0)
+            }
+            Sensed::Evidence(map) => {
+                let (rows, rolled_m) = (&self.rows, [before_m, belief.rolled]);
+                let fan = rows.scan(scanned_at, scan);
+                let readings = (fan, rows.rays(robot, ranges), rows.beams(robot, ranges));
+                let (window, is_event) =
+                    self.evidential.take(map, robot.position, rolled_m, readings);
+                (self.redraw(window), is_event)
+            }
         };
-        let stale = self.evidential.roll(map, rolled, self.belief.rolled);
-        // The scan first: what it shows explains echoes.
-        let fan = self.rows.scan(scanned_at, scan);
-        let seen = fan.map(|fan| self.evidential.take_scan(map, robot.position, &fan));
-        let seen = seen.unwrap_or_default();
-        let (beams, rays) = (self.rows.beams(robot, ranges), self.rows.rays(robot, ranges));
-        let news = self.evidential.take(map, robot.position, beams, rays, self.belief.rolled);
-        let changed = self.redraw(stale.union(news.window).union(seen.window));
-        self.belief.safety_events += u64::from(news.safety_event || seen.safety_event);
-        changed
+        self.belief.safety_events += u64::from(is_event);
+        let contact = contact.and_then(|contact| Touch::of(robot, contact));
+        let felt = contact.map(|touch| self.mark_touch(&touch)).unwrap_or_default();
+        seen.union(felt).union(self.falsify())
     }
 
     fn mark_touch(&mut self, touch: &Touch) -> Window {
@@ -442,54 +420,38 @@ impl Mapper {
 
     /// Returns the changed window.
     fn redraw(&mut self, window: Window) -> Window {
-        let mut changed = Window::default();
-        let Sensed::Evidence(map) = &self.belief.sensed else {
-            return changed;
+        let Self { frame, target, evidential, belief, .. } = self;
+        let Sensed::Evidence(map) = &belief.sensed else {
+            return Window::default();
         };
-        for row in window.row..window.row + window.height {
-            for col in window.col..window.col + window.width {
-                let cell = Cell { col, row };
-                let index = self.frame.index(cell);
-                let state = match CellState::from_byte(self.belief.cells[index]) {
-                    fixed @ (CellState::Known | CellState::Perimeter) => fixed,
-                    _ => self.evidential.state(map, cell, Some(cell) == self.target),
-                } as u8;
-                if self.belief.cells[index] != state {
-                    self.belief.cells[index] = state;
-                    changed = changed.including(cell);
-                }
-            }
-        }
-        changed
+        paint(&mut belief.cells, frame, window, |cell, held| match held {
+            CellState::Known | CellState::Perimeter => held,
+            _ => evidential.state(map, cell, Some(cell) == *target),
+        })
     }
 
     /// The hit's cell and the margin around it, (19), as far as they lie in the map.
     fn mark(&mut self, hit: DVec2, robot: DVec2) -> Window {
-        let mut changed = Window::default();
         let margin = f64::from(self.margin);
         let middle = self.frame.to_cells(hit).round();
         let last = DVec2::splat(f64::from(self.frame.cells) - 1.0);
         let (from, to) = ((middle - margin).max(DVec2::ZERO), (middle + margin).min(last));
         if !middle.is_finite() || !from.cmple(to).all() {
-            return changed;
+            return Window::default();
         }
-        for row in from.y as u32..=to.y as u32 {
-            for col in from.x as u32..=to.x as u32 {
-                let cell = Cell { col, row };
-                if self.frame.is_rim(cell) || Some(cell) == self.target {
-                    continue;
-                }
-                if self.frame.centre_of(cell).distance(robot) <= self.footprint {
-                    continue;
-                }
-                let state = &mut self.belief.cells[self.frame.index(cell)];
-                if *state == CellState::Free as u8 {
-                    *state = CellState::Sensed as u8;
-                    changed = changed.including(cell);
-                }
-            }
-        }
-        changed
+        let [from, to] = [from, to].map(|at| Cell { col: at.x as u32, row: at.y as u32 });
+        let Self { frame, target, footprint, belief, .. } = self;
+        paint(
+            &mut belief.cells,
+            frame,
+            Window::default().including(from).including(to),
+            |cell, held| {
+                let stays = held != CellState::Free
+                    || Some(cell) == *target
+                    || frame.centre_of(cell).distance(robot) <= *footprint;
+                if stays { held } else { CellState::Sensed }
+            },
+        )
     }
 
     /// Reset to the perimeter and the known shapes, if `epoch` is newer. The evidential method keeps echoes from near the robot. Returns
@@ -504,11 +466,15 @@ impl Mapper {
                 self.redraw(self.frame.whole());
             }
             Sensed::Hits => {
-                for cell in &mut self.belief.cells {
-                    if *cell == CellState::Sensed as u8 {
-                        *cell = CellState::Free as u8;
-                    }
-                }
+                paint(
+                    &mut self.belief.cells,
+                    &self.frame,
+                    self.frame.whole(),
+                    |_, held| match held {
+                        CellState::Sensed => CellState::Free,
+                        _ => held,
+                    },
+                );
             }
         }
         self.belief.fault = fault::after_reset(self.belief.fault);
@@ -521,23 +487,15 @@ impl Mapper {
 
     /// Mark an injected fault's hazard. Returns the changed window.
     fn falsify(&mut self) -> Window {
-        let mut changed = Window::default();
-        let Some(area) = fault::hazard(self.belief.fault, self.belief.robot, self.belief.target)
-        else {
-            return changed;
+        let Self { frame, target, belief, .. } = self;
+        let Some(area) = fault::hazard(belief.fault, belief.robot, belief.target) else {
+            return Window::default();
         };
-        for row in 0..self.frame.cells {
-            for col in 0..self.frame.cells {
-                let cell = Cell { col, row };
-                let state = &mut self.belief.cells[self.frame.index(cell)];
-                let stays = Some(cell) == self.target || CellState::from_byte(*state).is_hazard();
-                if !stays && area.covers(self.frame.centre_of(cell), self.frame.resolution_m) {
-                    *state = CellState::Sensed as u8;
-                    changed = changed.including(cell);
-                }
-            }
-        }
-        changed
+        paint(&mut belief.cells, frame, frame.whole(), |cell, held| {
+            let stays = Some(cell) == *target || held.is_hazard();
+            let covered = !stays && area.covers(frame.centre_of(cell), frame.resolution_m);
+            if covered { CellState::Sensed } else { held }
+        })
     }
 }
 

@@ -33,12 +33,6 @@ pub(crate) enum Advice {
     Look(DVec2),
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Side {
-    Left,
-    Right,
-}
-
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ActiveSensing {
     radius: f64,
@@ -54,8 +48,8 @@ pub(crate) struct ActiveSensing {
     sonars: usize,
     /// Its beams end at a surface of any angle, so ground that scans leave free is free.
     has_laser: bool,
-    /// None without a scan.
-    scan_side: Option<Side>,
+    /// Left is 0, right is 1; none without a scan.
+    scan_side: Option<usize>,
 }
 
 impl ActiveSensing {
@@ -150,34 +144,22 @@ impl ActiveSensing {
 fn scan(
     axis: DVec2,
     unseen: impl Iterator<Item = DVec2>,
-    side: &mut Option<Side>,
+    side: &mut Option<usize>,
 ) -> Option<DVec2> {
     // Left and right: the least angle, the greatest one, and the direction of that.
-    let mut sides = [None::<(f64, f64, DVec2)>; 2];
+    let mut sides = [(f64::INFINITY, -1.0, axis); 2];
     for there in unseen {
         let angle = axis.angle_to(there);
-        let side = &mut sides[usize::from(angle < 0.0)];
-        let angle = angle.abs();
-        *side = Some(match *side {
-            None => (angle, angle, there),
-            Some((least, greatest, _)) if angle > greatest => (least.min(angle), angle, there),
-            Some((least, greatest, end)) => (least.min(angle), greatest, end),
-        });
+        let (least, greatest, end) = &mut sides[usize::from(angle < 0.0)];
+        *least = least.min(angle.abs());
+        if angle.abs() > *greatest {
+            (*greatest, *end) = (angle.abs(), there);
+        }
     }
-    let [left, right] = sides;
-    let nearer = |a: (f64, f64, DVec2), b: (f64, f64, DVec2)| a.0 <= b.0;
-    *side = match (left, right, *side) {
-        (None, None, _) => None,
-        (Some(_), None, _) | (Some(_), Some(_), Some(Side::Left)) => Some(Side::Left),
-        (None, Some(_), _) | (Some(_), Some(_), Some(Side::Right)) => Some(Side::Right),
-        (Some(left), Some(right), None) if nearer(left, right) => Some(Side::Left),
-        (Some(_), Some(_), None) => Some(Side::Right),
-    };
-    let (_, _, end) = match (*side)? {
-        Side::Left => left?,
-        Side::Right => right?,
-    };
-    Some(end)
+    let is_unseen = |side: &usize| sides[*side].0.is_finite();
+    let nearer = usize::from(sides[1].0 < sides[0].0);
+    *side = side.filter(is_unseen).or(Some(nearer)).filter(is_unseen);
+    side.map(|side| sides[side].2)
 }
 
 #[cfg(test)]
@@ -190,7 +172,7 @@ mod tests {
         let unseen = [at(20.0), at(50.0), at(35.0), at(-30.0), at(-80.0)];
         let there = scan(DVec2::X, unseen.into_iter(), &mut None);
         assert_eq!(there, Some(at(50.0)));
-        assert_eq!(scan(DVec2::X, std::iter::empty(), &mut Some(Side::Left)), None);
+        assert_eq!(scan(DVec2::X, std::iter::empty(), &mut Some(0)), None);
     }
 
     #[test]

@@ -13,16 +13,9 @@ const REACH_M: f64 = 0.35;
 /// The nearest cell to `target` with free cells all around, or its own if none is within reach; none outside the map.
 pub(crate) fn cell(frame: &GridFrame, cells: &[u8], target: DVec2) -> Option<Cell> {
     let own = frame.cell_at(target)?;
-    let is_free = |cell: Cell| !CellState::from_byte(cells[frame.index(cell)]).is_hazard();
-    if around(frame, own, 1).all(is_free) {
-        return Some(own);
-    }
-    let distance = |cell: &Cell| frame.centre_of(*cell).distance(frame.centre_of(own));
-    let reach = (REACH_M / frame.resolution_m) as u32;
-    let nearest = around(frame, own, reach)
-        .filter(|cell| distance(cell) <= REACH_M && around(frame, *cell, 1).all(is_free))
-        .min_by(|a, b| distance(a).total_cmp(&distance(b)));
-    nearest.or_else(|| cell_with_a_way_in(frame, cells, target, REACH_M))
+    let is_open = |cell: Cell| around(frame, cell, 1).all(|cell| is_free(frame, cells, cell));
+    nearest(frame, (own, frame.centre_of(own)), REACH_M, is_open)
+        .or_else(|| cell_with_a_way_in(frame, cells, target, REACH_M))
 }
 
 /// The nearest free cell within `reach_m` that has a free neighbour; the target's own if there is none, none outside the map.
@@ -33,20 +26,33 @@ pub(crate) fn cell_with_a_way_in(
     reach_m: f64,
 ) -> Option<Cell> {
     let own = frame.cell_at(target)?;
-    let is_free = |cell: Cell| !CellState::from_byte(cells[frame.index(cell)]).is_hazard();
     let can_be_entered = |cell: Cell| {
-        let beside = |next: &Cell| next.col == cell.col || next.row == cell.row;
+        let beside = |next: &Cell| (next.col == cell.col) != (next.row == cell.row);
         let mut next = around(frame, cell, 1).filter(beside);
-        is_free(cell) && next.any(|next| next != cell && is_free(next))
+        is_free(frame, cells, cell) && next.any(|next| is_free(frame, cells, next))
     };
-    if can_be_entered(own) {
-        return Some(own);
-    }
-    let distance = |cell: &Cell| frame.centre_of(*cell).distance(target);
-    let nearest = around(frame, own, (reach_m / frame.resolution_m) as u32)
-        .filter(|cell| distance(cell) <= reach_m && can_be_entered(*cell))
-        .min_by(|a, b| distance(a).total_cmp(&distance(b)));
-    nearest.or(Some(own))
+    nearest(frame, (own, target), reach_m, can_be_entered).or(Some(own))
+}
+
+fn is_free(frame: &GridFrame, cells: &[u8], cell: Cell) -> bool {
+    !CellState::from_byte(cells[frame.index(cell)]).is_hazard()
+}
+
+/// The cell itself, or the nearest to `place` within `reach_m` for which `fits` says so.
+fn nearest(
+    frame: &GridFrame,
+    (own, place): (Cell, DVec2),
+    reach_m: f64,
+    fits: impl Fn(Cell) -> bool,
+) -> Option<Cell> {
+    let distance = |cell: &Cell| frame.centre_of(*cell).distance(place);
+    let others = around(frame, own, (reach_m / frame.resolution_m) as u32);
+    let own = Some(own).filter(|own| fits(*own));
+    own.or_else(|| {
+        others
+            .filter(|cell| distance(cell) <= reach_m && fits(*cell))
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    })
 }
 
 fn around(frame: &GridFrame, middle: Cell, reach: u32) -> impl Iterator<Item = Cell> + use<> {
@@ -64,13 +70,8 @@ mod tests {
     /// The place of the cell to lead to, on a map with hazard where `is_hazard` says so of a cell's middle.
     fn aim(target: DVec2, is_hazard: impl Fn(DVec2) -> bool) -> Option<DVec2> {
         let mut cells = vec![CellState::Free as u8; FRAME.area()];
-        for row in 0..FRAME.cells {
-            for col in 0..FRAME.cells {
-                let cell = Cell { col, row };
-                if is_hazard(FRAME.centre_of(cell)) {
-                    cells[FRAME.index(cell)] = CellState::Sensed as u8;
-                }
-            }
+        for cell in FRAME.whole().cells().filter(|cell| is_hazard(FRAME.centre_of(*cell))) {
+            cells[FRAME.index(cell)] = CellState::Sensed as u8;
         }
         cell(&FRAME, &cells, target).map(|cell| FRAME.centre_of(cell))
     }

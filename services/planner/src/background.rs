@@ -10,12 +10,13 @@ use std::{
     thread::JoinHandle,
 };
 
+use harmonic::Cancellation;
 use thread_priority::{
     NormalThreadSchedulePolicy as Normal, ThreadPriority, ThreadPriorityValue,
     ThreadSchedulePolicy, set_thread_priority_and_policy, thread_native_id,
 };
 
-/// Dropping this waits for the running job.
+/// Dropping this cancels the running job, if it can be, and waits for it.
 #[derive(Debug)]
 pub(crate) struct Background<Job, Done> {
     jobs: Option<Sender<Job>>,
@@ -26,12 +27,14 @@ pub(crate) struct Background<Job, Done> {
     /// Read ends whose results were not taken; negative if results were taken whose ends are unread.
     ended: i64,
     thread: Option<JoinHandle<()>>,
+    cancellation: Cancellation,
 }
 
 impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
     /// Fails when the system gives no pipe or thread.
     pub(crate) fn start(
         name: &str,
+        cancellation: Cancellation,
         mut work: impl FnMut(Job) -> Done + Send + 'static,
     ) -> io::Result<Self> {
         let (jobs, orders) = channel::<Job>();
@@ -50,7 +53,15 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
             }
         };
         let thread = std::thread::Builder::new().name(name.to_owned()).spawn(all)?;
-        Ok(Self { jobs: Some(jobs), results, done, unread: 0, ended: 0, thread: Some(thread) })
+        Ok(Self {
+            jobs: Some(jobs),
+            results,
+            done,
+            unread: 0,
+            ended: 0,
+            thread: Some(thread),
+            cancellation,
+        })
     }
 
     pub(crate) fn begin(&mut self, job: Job) {
@@ -102,6 +113,7 @@ impl<Job, Done> AsFd for Background<Job, Done> {
 impl<Job, Done> Drop for Background<Job, Done> {
     fn drop(&mut self) {
         self.jobs = None;
+        self.cancellation.cancel();
         if let Some(thread) = self.thread.take() {
             // The thread's panic has been printed, and the process ends anyway.
             let _ = thread.join();
@@ -131,7 +143,8 @@ mod tests {
     #[test]
     fn after_its_result_was_taken_a_job_wakes_nobody() {
         for job in 0..200 {
-            let mut thread = Background::start("test", |job: u32| job).unwrap();
+            let mut thread =
+                Background::start("test", Cancellation::default(), |job: u32| job).unwrap();
             thread.begin(job);
             let result = std::iter::repeat_with(|| thread.take()).flatten().next();
             assert_eq!(result, Some(job));

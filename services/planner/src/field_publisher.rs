@@ -14,6 +14,8 @@ use common::{
     topics,
 };
 
+use harmonic::Cancellation;
+
 use crate::{background::Background, step::Snapshot};
 
 #[derive(Debug)]
@@ -49,16 +51,14 @@ struct Worker {
 impl Worker {
     fn compute(&mut self, (snapshot, at): (Snapshot, Progress)) -> Computed {
         let frame = snapshot.frame;
-        let rows = frame.cells as usize;
-        let mut cells = Vec::with_capacity(frame.area());
-        for row in 0..rows {
-            snapshot.append_row(row, &mut cells);
-            // A stage that waits for this processor gets it here; otherwise it might wait for some milliseconds.
-            if row % rows.div_ceil(YIELDS) == 0 {
+        let every = (frame.cells as usize).div_ceil(YIELDS);
+        // A stage that waits for this processor gets it here; otherwise it might wait for some milliseconds.
+        let yields = |row: usize| {
+            if row.is_multiple_of(every) {
                 std::thread::yield_now();
             }
-        }
-        let cells = Arc::new(cells);
+        };
+        let cells = Arc::new(snapshot.cells_with(yields));
         let changed = if self.before.len() == cells.len() {
             frame.changed_window(&self.before, &cells)
         } else {
@@ -84,7 +84,9 @@ impl FieldPublisher {
     pub(crate) fn start() -> io::Result<Self> {
         let mut worker = Worker::default();
         Ok(Self {
-            thread: Background::start("policy", move |job| worker.compute(job))?,
+            thread: Background::start("policy", Cancellation::default(), move |job| {
+                worker.compute(job)
+            })?,
             busy: false,
             version: 0,
             change_published: None,

@@ -5,7 +5,7 @@ mod active_sensing;
 mod aim;
 mod arcs;
 mod background;
-pub mod background_solver;
+mod background_solver;
 mod fault;
 mod field_publisher;
 mod near_echoes;

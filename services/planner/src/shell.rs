@@ -16,10 +16,11 @@ use common::{
 };
 
 use crate::{
-    background_solver::BackgroundSolver,
+    background::Background,
+    background_solver::Worker,
     field_publisher::FieldPublisher,
     stage::{Entry, PlannerStage, Taken},
-    step::{Solved, Work},
+    step::{Job, Solved, Work},
 };
 
 readers! {
@@ -38,7 +39,7 @@ pub struct Shell {
     /// Without a target no grid counts as followed.
     has_target: bool,
     runner: Runner<PlannerStage>,
-    background: BackgroundSolver,
+    background: Background<Job, Solved>,
     field: FieldPublisher,
     lockstep: bool,
     /// The last job and its tick, in lockstep, until its result is taken.
@@ -56,7 +57,7 @@ impl Process for Shell {
 
     fn open(context: &mut Context, inputs: Inputs) -> Result<Self, StageError> {
         let no_thread = |error| StageError::Other(format!("cannot start a thread: {error}"));
-        let background = BackgroundSolver::start().map_err(no_thread)?;
+        let background = Worker::on_a_thread().map_err(no_thread)?;
         // In lockstep a result is waited for when it is due.
         let lockstep = matches!(context.run.clock, MissionClock::Ticks { .. });
         if !lockstep {
@@ -146,31 +147,25 @@ impl Shell {
     /// Take the solver's results; returns whether the field changed. In lockstep a result is taken exactly one tick after its job began,
     /// so that a run can be repeated.
     fn take_solved(&mut self) -> Result<bool, StageError> {
-        let mut swapped = false;
-        if !self.lockstep {
-            while let Some(solved) = self.background.take() {
-                swapped |= self.swap_in(solved)?;
-            }
-            return Ok(swapped);
-        }
         let tick = self.runner.out.at.tick;
-        let Some((number, _)) = self.job.take_if(|(_, began)| tick > *began) else {
-            return Ok(false);
-        };
-        while let Some(solved) = self.background.wait() {
-            let last = solved.number == number;
-            swapped |= self.swap_in(solved)?;
-            if last {
-                break;
+        let due = self.job.take_if(|(_, began)| self.lockstep && tick > *began);
+        let mut swapped = false;
+        loop {
+            let solved = match due {
+                Some(_) => self.background.wait(),
+                None if self.lockstep => None,
+                None => self.background.take(),
+            };
+            let Some(solved) = solved else {
+                return Ok(swapped);
+            };
+            let number = solved.number;
+            self.runner.stage.solved = Some(solved);
+            swapped |= self.take(Taken::Solved(number))? == Work::SwappedIn;
+            if due.is_some_and(|(last, _)| last == number) {
+                return Ok(swapped);
             }
         }
-        Ok(swapped)
-    }
-
-    fn swap_in(&mut self, solved: Solved) -> Result<bool, StageError> {
-        let number = solved.number;
-        self.runner.stage.solved = Some(solved);
-        Ok(self.take(Taken::Solved(number))? == Work::SwappedIn)
     }
 
     fn take_target(&mut self, tick: u64) -> Result<(), StageError> {

@@ -14,7 +14,6 @@
 use std::f64::consts::TAU;
 
 use common::mission::Odometry;
-use glam::DVec2;
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -70,17 +69,13 @@ pub fn normal_sd(differences: &[f64]) -> f64 {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Wheels {
     /// (rho - 1) / (rho + 1).
-    e: f64,
+    pub(crate) e: f64,
     /// tau.
-    track: f64,
+    pub(crate) track: f64,
 }
 
 impl Wheels {
     pub const NOMINAL: Self = Self { e: 0.0, track: 1.0 };
-
-    pub(crate) const fn of(e: f64, track: f64) -> Self {
-        Self { e, track }
-    }
 
     /// The turn for these nominal ways, radians.
     #[must_use]
@@ -90,7 +85,7 @@ impl Wheels {
 }
 
 /// Mean and standard deviation, by the logarithm of the likelihood.
-pub(crate) fn posterior_of_slip(ln_likelihood: impl Fn(f64) -> f64) -> (f64, f64) {
+fn posterior_of_slip(ln_likelihood: impl Fn(f64) -> f64) -> (f64, f64) {
     let step = (MOST_SLIP / LEAST_SLIP).ln() / f64::from(SLIPS - 1);
     let slips = (0..SLIPS).map(|index| LEAST_SLIP * (step * f64::from(index)).exp());
     let posterior: Vec<(f64, f64)> = slips
@@ -145,23 +140,35 @@ pub enum Refusal {
     Singular,
 }
 
-struct Rows {
+/// Equations that are linear in e and tau.
+pub(crate) struct Rows {
     design: DMatrix<f64>,
     values: DVector<f64>,
-    /// Variance by slip for q = 1, and covariance by the normals.
+    /// Variance by slip for q = 1, and covariance by what else is off.
     by_slip: DMatrix<f64>,
-    by_normals: DMatrix<f64>,
+    otherwise: DMatrix<f64>,
 }
 
 impl Rows {
-    fn of(loops: &[Loop], normal_sd: f64, track_m: f64) -> Self {
-        let n = loops.len();
-        let turned = |it: &Loop| (it.right_m - it.left_m) / track_m;
-        let design = DMatrix::from_fn(n, 2, |row, column| match column {
-            0 => (loops[row].right_m + loops[row].left_m) / track_m,
-            _ => -TAU * loops[row].turns,
-        });
-        let variance = normal_sd * normal_sd;
+    /// Each row is the factors of e and tau, the value, and the variance by slip.
+    pub(crate) fn new(rows: &[([f64; 2], f64, f64)], otherwise: DMatrix<f64>) -> Self {
+        let n = rows.len();
+        let by_slip = DVector::from_fn(n, |row, _| rows[row].2);
+        Self {
+            design: DMatrix::from_fn(n, 2, |row, column| rows[row].0[column]),
+            values: DVector::from_fn(n, |row, _| rows[row].1),
+            by_slip: DMatrix::from_diagonal(&by_slip),
+            otherwise,
+        }
+    }
+
+    fn by_loops(loops: &[Loop], normal_sd: f64, track_m: f64) -> Self {
+        let row = |it: &Loop| {
+            let factors = [(it.right_m + it.left_m) / track_m, -TAU * it.turns];
+            let turned = (it.right_m - it.left_m) / track_m;
+            (factors, -turned, it.rolled_m / (track_m * track_m))
+        };
+        let (n, variance) = (loops.len(), normal_sd * normal_sd);
         let by_normals = DMatrix::from_fn(n, n, |row, column| {
             match loops[row].number.abs_diff(loops[column].number) {
                 0 => 2.0 * variance,
@@ -169,24 +176,12 @@ impl Rows {
                 _ => 0.0,
             }
         });
-        let by_slip = loops.iter().map(|it| it.rolled_m / (track_m * track_m));
-        Self {
-            design,
-            values: DVector::from_iterator(n, loops.iter().map(|it| -turned(it))),
-            by_slip: DMatrix::from_diagonal(&DVector::from_iterator(n, by_slip)),
-            by_normals,
-        }
+        Self::new(&loops.iter().map(row).collect::<Vec<_>>(), by_normals)
     }
 
     fn noise(&self, slip: f64) -> DMatrix<f64> {
-        &self.by_slip * (slip * slip) + &self.by_normals
+        &self.by_slip * (slip * slip) + &self.otherwise
     }
-}
-
-pub(crate) fn prior() -> (Vector2<f64>, Matrix2<f64>) {
-    // e is half of rho - 1.
-    let variances = Vector2::new((PRIOR_RATIO / 2.0).powi(2), PRIOR_TRACK.powi(2));
-    (Vector2::new(0.0, 1.0), Matrix2::from_diagonal(&variances))
 }
 
 impl Estimate {
@@ -194,9 +189,14 @@ impl Estimate {
     ///
     /// # Errors
     /// The numbers are not finite.
-    pub fn of(loops: &[Loop], normal_sd: f64, track_m: f64) -> Result<Self, Refusal> {
-        let rows = Rows::of(loops, normal_sd, track_m);
-        let (mean, covariance) = prior();
+    pub fn by_loops(loops: &[Loop], normal_sd: f64, track_m: f64) -> Result<Self, Refusal> {
+        Self::of(&Rows::by_loops(loops, normal_sd, track_m))
+    }
+
+    pub(crate) fn of(rows: &Rows) -> Result<Self, Refusal> {
+        // e is half of rho - 1.
+        let variances = Vector2::new((PRIOR_RATIO / 2.0).powi(2), PRIOR_TRACK.powi(2));
+        let (mean, covariance) = (Vector2::new(0.0, 1.0), Matrix2::from_diagonal(&variances));
         let surprise = &rows.values - &rows.design * mean;
         let by_prior = &rows.design * covariance * rows.design.transpose();
         let factor =
@@ -213,51 +213,14 @@ impl Estimate {
         let posterior = covariance - &gain * factor.solve(&gain.transpose());
         let left = &rows.values - &rows.design * values;
         let noise = rows.noise(used);
-        let residuals = (0..loops.len()).map(|row| left[row] / noise[(row, row)].sqrt()).collect();
+        let residuals = (0..left.len()).map(|row| left[row] / noise[(row, row)].sqrt()).collect();
         let whitened = Cholesky::new(noise).ok_or(Refusal::Singular)?.solve(&left);
-        let freedom = (loops.len() as f64 - 2.0).max(1.0);
+        let freedom = (left.len() as f64 - 2.0).max(1.0);
         let chi2_per_dof = left.dot(&whitened) / freedom;
-        let found = Self::from_parts(values, posterior, [slip, slip_sd], residuals, chi2_per_dof);
-        found.is_finite().then_some(found).ok_or(Refusal::Singular)
-    }
-
-    pub(crate) const fn from_parts(
-        values: Vector2<f64>,
-        covariance: Matrix2<f64>,
-        [slip, slip_sd]: [f64; 2],
-        residuals: Vec<f64>,
-        chi2_per_dof: f64,
-    ) -> Self {
-        Self { values, covariance, slip, slip_sd, residuals, chi2_per_dof }
-    }
-
-    pub(crate) fn is_finite(&self) -> bool {
-        let values = self.values.iter().chain(&self.covariance).chain([&self.slip, &self.slip_sd]);
-        values.copied().all(f64::is_finite)
-    }
-
-    /// The end by tape from the prediction by these wheels, in standard deviations of a coordinate. `by` gives the
-    /// end by wheels, and its variance by slip of 1.
-    pub(crate) fn deviations_of_end(
-        &self,
-        by: impl Fn(Wheels) -> (DVec2, f64),
-        end: DVec2,
-        tape_m: f64,
-    ) -> f64 {
-        let (here, by_slip) = by(self.wheels());
-        let square = self.slip.powi(2) + self.slip_sd.powi(2);
-        // These are the values that are a deviation off, along the axes of their ellipse.
-        let axes = self.covariance.symmetric_eigen();
-        let by_values: f64 = (0..2)
-            .map(|axis| {
-                let off = axes.eigenvectors.column(axis) * axes.eigenvalues[axis].max(0.0).sqrt();
-                by(Wheels::of(self.values.x + off[0], self.values.y + off[1]))
-                    .0
-                    .distance_squared(here)
-            })
-            .sum();
-        let variance = square * by_slip + tape_m * tape_m + by_values / 2.0;
-        (end.distance_squared(here) / 2.0 / variance).sqrt()
+        let found = Self { values, covariance: posterior, slip, slip_sd, residuals, chi2_per_dof };
+        let numbers = found.values.iter().chain(&found.covariance).chain([&slip, &slip_sd]);
+        let is_finite = numbers.copied().all(f64::is_finite);
+        is_finite.then_some(found).ok_or(Refusal::Singular)
     }
 
     /// rho: right over left.
@@ -287,13 +250,21 @@ impl Estimate {
         Wheels { e: self.values.x, track: self.values.y }
     }
 
-    /// The distance from the prediction, in its standard deviations.
-    fn deviations(&self, held_out: &Loop, normal_sd: f64, track_m: f64) -> f64 {
-        let rows = Rows::of(&[*held_out], normal_sd, track_m);
-        let square = self.slip * self.slip + self.slip_sd * self.slip_sd;
-        let off = (&rows.values - &rows.design * self.values)[0];
-        let by_values = (&rows.design * self.covariance * rows.design.transpose())[(0, 0)];
-        off / (rows.noise(square.sqrt())[(0, 0)] + by_values).sqrt()
+    /// The distance of what was held out from the prediction, in its standard deviations, root mean square.
+    fn deviations(&self, held_out: &Rows) -> f64 {
+        let off = &held_out.values - &held_out.design * self.values;
+        let by_values = &held_out.design * self.covariance * held_out.design.transpose();
+        let spread = held_out.noise(self.slip.hypot(self.slip_sd)) + by_values;
+        let square = Cholesky::new(spread).map_or(f64::NAN, |factor| off.dot(&factor.solve(&off)));
+        (square / off.len() as f64).sqrt()
+    }
+
+    /// # Errors
+    /// What was held out lies elsewhere.
+    pub(crate) fn agrees_with(&self, held_out: &Rows) -> Result<(), Refusal> {
+        let deviations = self.deviations(held_out);
+        // A deviation that is no number does not agree.
+        (deviations <= AGREES).then_some(()).ok_or(Refusal::Contradicted { deviations })
     }
 
     /// Values for `[robot.odometry]`, without provenance. The loops do not tell the distance, which stays as it was.
@@ -326,15 +297,15 @@ pub fn checked(
     if loops.len() < FEWEST_LOOPS {
         return Err(Refusal::TooFew { found: loops.len() });
     }
+    let by_loops = |loops: &[Loop]| Rows::by_loops(loops, normal_sd, track_m);
     let mut used = loops.to_vec();
     let mut accidents = 0;
     loop {
         let mut worst = (0, 0.0);
         for (index, held_out) in used.iter().enumerate() {
-            let others: Vec<Loop> =
-                used.iter().filter(|it| it.number != held_out.number).copied().collect();
-            let others = Estimate::of(&others, normal_sd, track_m)?;
-            let deviations = others.deviations(held_out, normal_sd, track_m).abs();
+            let others = used.iter().filter(|it| it.number != held_out.number);
+            let others = Estimate::of(&by_loops(&others.copied().collect::<Vec<_>>()))?;
+            let deviations = others.deviations(&by_loops(&[*held_out]));
             if deviations > worst.1 {
                 worst = (index, deviations);
             }
@@ -349,16 +320,11 @@ pub fn checked(
         used.remove(worst.0);
     }
     let (others, held_out) = used.split_at(used.len() - HELD_OUT);
-    let by_others = Estimate::of(others, normal_sd, track_m)?;
+    let by_others = Estimate::of(&by_loops(others))?;
     for held_out in held_out {
-        let deviations = by_others.deviations(held_out, normal_sd, track_m).abs();
-        // A deviation that is no number does not agree.
-        let agrees = deviations <= AGREES;
-        if !agrees {
-            return Err(Refusal::Contradicted { deviations });
-        }
+        by_others.agrees_with(&by_loops(&[*held_out]))?;
     }
-    let estimate = Estimate::of(&used, normal_sd, track_m)?;
+    let estimate = Estimate::of(&by_loops(&used))?;
     if estimate.chi2_per_dof > MOST_CHI2 {
         return Err(Refusal::Scattered { chi2_per_dof: estimate.chi2_per_dof });
     }

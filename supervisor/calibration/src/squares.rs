@@ -9,28 +9,23 @@ use std::f64::consts::FRAC_PI_2;
 
 use common::{kinematics::Pose2, mission::Body, samples::GuidanceStatus};
 use glam::DVec2;
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    loops::{Estimate, Refusal, Wheels, posterior_of_slip, prior},
-    wall::{Order, State},
+    loops::{Estimate, Refusal, Rows, Wheels},
+    wall::{FAST_RAD, Order, SPEED_M_S, State, direction_aside},
     ways::Ways,
 };
 
-/// A corner with so little rest counts as turned; the order is at most this far ahead.
+/// A corner with so little rest counts as turned.
 const TURNED_RAD: f64 = 0.03;
-const SLOW_RAD: f64 = 0.08;
-const FAST_RAD: f64 = 0.5;
-const SPEED_M_S: f64 = 0.35;
 /// Standard deviation of a coordinate by tape.
 const TAPE_M: f64 = 0.005;
 /// The fit's problem is nearly linear.
 const STEPS: u32 = 5;
 /// A value's effect is found by this change.
 const NUDGE: f64 = 1e-4;
-/// The limit for the pair that is held out, per coordinate.
-const AGREES: f64 = 3.0;
 /// Half of them are to the left.
 pub const FEWEST_SQUARES: usize = 6;
 
@@ -76,7 +71,7 @@ impl Square {
         let (status, aside, speed_limit_m_s) = if self.state() == State::Finished {
             (GuidanceStatus::AtTarget, 0.0, 0.0)
         } else if self.turning {
-            (GuidanceStatus::Look, left.signum() * left.abs().clamp(SLOW_RAD, FAST_RAD), 0.0)
+            (GuidanceStatus::Look, direction_aside(left, FAST_RAD), 0.0)
         } else {
             (GuidanceStatus::Along, left.clamp(-FAST_RAD, FAST_RAD), SPEED_M_S)
         };
@@ -127,69 +122,31 @@ impl Driven {
     }
 }
 
-/// The least squares for so much slip.
-fn fitted(
-    squares: &[Driven],
-    slip: f64,
-    track_m: f64,
-) -> Result<(Vector2<f64>, Matrix2<f64>), Refusal> {
-    let (mean, covariance) = prior();
-    let by_prior = covariance.try_inverse().ok_or(Refusal::Singular)?;
-    let mut values = mean;
-    let mut information = by_prior;
-    for _ in 0..STEPS {
-        information = by_prior;
-        let mut pull = by_prior * (mean - values);
-        for square in squares {
-            let end = |e: f64, track: f64| square.by(Wheels::of(e, track), track_m);
-            let (here, by_slip) = end(values.x, values.y);
-            let weight = 1.0 / (slip * slip * by_slip + TAPE_M * TAPE_M);
-            let by_e = (end(values.x + NUDGE, values.y).0 - here) / NUDGE;
-            let by_track = (end(values.x, values.y + NUDGE).0 - here) / NUDGE;
-            let off = square.end - here;
-            information += weight
-                * Matrix2::new(
-                    by_e.dot(by_e),
-                    by_e.dot(by_track),
-                    by_e.dot(by_track),
-                    by_track.dot(by_track),
-                );
-            pull += weight * Vector2::new(by_e.dot(off), by_track.dot(off));
-        }
-        let solved = information.try_inverse().ok_or(Refusal::Singular)? * pull;
-        values += solved;
-    }
-    let covariance = information.try_inverse().ok_or(Refusal::Singular)?;
-    Ok((values, covariance))
+/// The ends by tape, linear in e and tau near `wheels`: x and y of each square.
+fn rows(squares: &[Driven], wheels: Wheels, track_m: f64) -> Rows {
+    let Wheels { e, track } = wheels;
+    let rows = squares.iter().flat_map(|square| {
+        let end = |e, track| square.by(Wheels { e, track }, track_m);
+        let (here, by_slip) = end(e, track);
+        let by_e = (end(e + NUDGE, track).0 - here) / NUDGE;
+        let by_track = (end(e, track + NUDGE).0 - here) / NUDGE;
+        let value = square.end - here + by_e * e + by_track * track;
+        [0, 1].map(|axis| ([by_e[axis], by_track[axis]], value[axis], by_slip))
+    });
+    let rows: Vec<_> = rows.collect();
+    let by_tape = DMatrix::from_diagonal_element(rows.len(), rows.len(), TAPE_M * TAPE_M);
+    Rows::new(&rows, by_tape)
 }
 
 fn estimate(squares: &[Driven], track_m: f64) -> Result<Estimate, Refusal> {
-    let off = |values: Vector2<f64>| {
-        squares.iter().map(move |square| {
-            let (end, by_slip) = square.by(Wheels::of(values.x, values.y), track_m);
-            (square.end.distance_squared(end), by_slip)
-        })
-    };
-    let (first, _) = fitted(squares, 0.001, track_m)?;
-    let freedom = (2.0 * squares.len() as f64 - 2.0).max(1.0);
-    let share = freedom / (2.0 * squares.len() as f64);
-    let (slip, slip_sd) = posterior_of_slip(|slip| {
-        off(first)
-            .map(|(square, by_slip)| {
-                let variance = slip * slip * by_slip + TAPE_M * TAPE_M;
-                -share * variance.ln() - 0.5 * square / variance
-            })
-            .sum()
-    });
-    let used = slip.hypot(slip_sd);
-    let (values, covariance) = fitted(squares, used, track_m)?;
-    let squared: Vec<f64> = off(values)
-        .map(|(square, by_slip)| square / (used * used * by_slip + TAPE_M * TAPE_M))
-        .collect();
-    let chi2_per_dof = squared.iter().sum::<f64>() / freedom;
-    let residuals = squared.into_iter().map(|it| (it / 2.0).sqrt()).collect();
-    let found = Estimate::from_parts(values, covariance, [slip, slip_sd], residuals, chi2_per_dof);
-    found.is_finite().then_some(found).ok_or(Refusal::Singular)
+    let mut wheels = Wheels::NOMINAL;
+    for _ in 1..STEPS {
+        wheels = Estimate::of(&rows(squares, wheels, track_m))?.wheels();
+    }
+    let mut found = Estimate::of(&rows(squares, wheels, track_m))?;
+    let of_square = |pair: &[f64]| (pair.iter().map(|it| it * it).sum::<f64>() / 2.0).sqrt();
+    found.residuals = found.residuals.chunks(2).map(of_square).collect();
+    Ok(found)
 }
 
 /// The last pair must lie where the others say.
@@ -203,13 +160,8 @@ pub fn checked(squares: &[Driven], track_m: f64) -> Result<Estimate, Refusal> {
     let (others, held_out) = squares.split_at(squares.len() - 2);
     let by_others = estimate(others, track_m)?;
     for square in held_out {
-        let deviations =
-            by_others.deviations_of_end(|wheels| square.by(wheels, track_m), square.end, TAPE_M);
-        // A deviation that is no number does not agree.
-        let agrees = deviations <= AGREES;
-        if !agrees {
-            return Err(Refusal::Contradicted { deviations });
-        }
+        let held_out = rows(std::slice::from_ref(square), by_others.wheels(), track_m);
+        by_others.agrees_with(&held_out)?;
     }
     estimate(squares, track_m)
 }

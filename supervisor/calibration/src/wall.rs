@@ -44,10 +44,10 @@ const HEADING_SD_RAD: f64 = 0.13;
 /// The ordered direction is so far ahead of the robot, in a sweep and at most in another turn. The controller turns
 /// on the spot by a rate in proportion to the angle that is left, at least 0.25 rad/s.
 const SLOW_RAD: f64 = 0.08;
-const FAST_RAD: f64 = 0.5;
+pub(crate) const FAST_RAD: f64 = 0.5;
 /// A turn with this rest is over.
 const TURNED_RAD: f64 = 0.04;
-const SPEED_M_S: f64 = 0.35;
+pub(crate) const SPEED_M_S: f64 = 0.35;
 const NEAR_M_S: f64 = 0.12;
 /// The deviation of the track that is good enough, over that of the ratio.
 const TRACK_OVER_RATIO: f64 = 3.0;
@@ -128,6 +128,11 @@ pub(crate) fn echo_m(reading: &RangeReading) -> Option<f64> {
         RangeStatus::AtContact => Some(0.0),
         RangeStatus::Nothing | RangeStatus::Absent | RangeStatus::Invalid => None,
     }
+}
+
+/// The ordered direction of a robot that turns on the spot and has `left` to turn, radians.
+pub(crate) fn direction_aside(left: f64, most: f64) -> f64 {
+    left.abs().clamp(SLOW_RAD, most) * left.signum()
 }
 
 impl Wall {
@@ -290,7 +295,7 @@ impl Wall {
         }
         self.visits += 1;
         (self.visit, self.is_measured, self.facing) = (faced, true, 0.0);
-        let estimate = Estimate::of(&self.loops, self.normal_sd(), body.track_m).ok();
+        let estimate = Estimate::by_loops(&self.loops, self.normal_sd(), body.track_m).ok();
         self.wheels = estimate.as_ref().map_or(self.wheels, Estimate::wheels);
         if self.is_enough(estimate.as_ref()) {
             self.enter(Phase::Finished);
@@ -334,10 +339,8 @@ impl Wall {
 
     fn order(&self, heading: f64, echo_m: Option<f64>) -> Order {
         let turn = |target: f64, fast: bool| {
-            let left = target - heading;
             let most = if fast { FAST_RAD } else { SLOW_RAD };
-            let aside = left.abs().clamp(SLOW_RAD, most) * left.signum();
-            (GuidanceStatus::Look, aside, 0.0)
+            (GuidanceStatus::Look, direction_aside(target - heading, most), 0.0)
         };
         let along = |target: f64, limit: f64| {
             let aside = (target - heading).clamp(-PI / 6.0, PI / 6.0);
@@ -370,4 +373,4 @@ impl Wall {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -15,21 +15,27 @@ fn controller(extra: &str) -> Controller {
     Controller::new(&Mission::parse(&text, Path::new("test.toml")).unwrap())
 }
 
-/// A step with the pose apart from the direction.
-trait At {
-    fn at(&mut self, pose: Pose2, guidance: &GuidanceSample) -> CommandSample;
+impl Controller {
+    /// A step with the pose apart from the direction.
+    fn at(&mut self, pose: Pose2, guidance: &GuidanceSample) -> CommandSample {
+        let Pose2 { position, heading } = pose;
+        let (x_m, y_m) = (position.x, position.y);
+        self.command(&GuidanceSample { x_m, y_m, heading_rad: heading, ..*guidance })
+    }
 }
 
-impl At for Controller {
-    fn at(&mut self, pose: Pose2, guidance: &GuidanceSample) -> CommandSample {
-        let guidance = GuidanceSample {
-            x_m: pose.position.x,
-            y_m: pose.position.y,
-            heading_rad: pose.heading,
-            ..*guidance
-        };
-        self.command(&guidance)
-    }
+fn state(command: &CommandSample) -> CommandState {
+    CommandState::from_byte(command.state)
+}
+
+/// The paper's first command to a robot at the origin whose guidance is along x.
+fn first(heading: f64) -> CommandSample {
+    controller("").at(facing(heading), &ahead())
+}
+
+/// The robot `short_m` before its target.
+fn short(short_m: f64) -> Pose2 {
+    Pose2 { position: DVec2::new(3.0 - short_m, 0.0), heading: 0.0 }
 }
 
 fn facing(heading: f64) -> Pose2 {
@@ -62,15 +68,15 @@ fn equation_14_by_hand() {
 
 #[test]
 fn equation_15_ahead_is_proportional_to_the_sine() {
-    let command = controller("").at(facing(-FRAC_PI_3), &ahead());
+    let command = first(-FRAC_PI_3);
     close(command.omega_rad_s, 0.8 * 3_f64.sqrt() / 2.0);
 }
 
 #[test]
 fn equation_15_behind_turns_full_towards_the_guidance() {
-    let left = controller("").at(facing(-2.0), &ahead());
+    let left = first(-2.0);
     close(left.omega_rad_s, 0.8);
-    let right = controller("").at(facing(2.0), &ahead());
+    let right = first(2.0);
     close(right.omega_rad_s, -0.8);
 }
 
@@ -85,16 +91,16 @@ fn equation_15_at_the_antipode_turns_left_first_and_then_keeps_its_side() {
 #[test]
 fn equation_16_by_hand() {
     // vc is vd aligned, 1 - sin 60 / 2 of it 60 degrees off, and 0 antipodal.
-    close(controller("").at(facing(0.0), &ahead()).v_m_s, 0.4);
-    let off = controller("").at(facing(FRAC_PI_3), &ahead());
+    close(first(0.0).v_m_s, 0.4);
+    let off = first(FRAC_PI_3);
     close(off.v_m_s, 0.4 * (1.0 - 3_f64.sqrt() / 4.0));
-    close(controller("").at(facing(PI), &ahead()).v_m_s, 0.0);
+    close(first(PI).v_m_s, 0.0);
 }
 
 #[test]
 fn equation_16_is_continuous_where_its_cases_meet() {
-    let just_ahead = controller("").at(facing(FRAC_PI_2 - 1e-9), &ahead()).v_m_s;
-    let just_behind = controller("").at(facing(FRAC_PI_2 + 1e-9), &ahead()).v_m_s;
+    let just_ahead = first(FRAC_PI_2 - 1e-9).v_m_s;
+    let just_behind = first(FRAC_PI_2 + 1e-9).v_m_s;
     assert!((just_ahead - just_behind).abs() < 1e-8);
     assert!((just_ahead - 0.2).abs() < 1e-8);
 }
@@ -116,7 +122,7 @@ fn without_modulation_the_speed_is_constant_up_to_rc() {
 #[test]
 fn equation_17_by_hand() {
     // vc = 0.4 and wc = 0 turn both wheels at 4 rad/s.
-    let command = controller("").at(facing(0.0), &ahead());
+    let command = first(0.0);
     close(command.left_rad_s, 4.0);
     close(command.right_rad_s, 4.0);
 }
@@ -164,7 +170,7 @@ fn an_evidential_robot_goes_no_faster_than_its_guidance_allows() {
 fn a_limit_of_0_is_0_however_well_the_robot_faces_its_way() {
     for limit in [0.0, f64::NAN, -1.0, 0.01, 0.039] {
         let command = evidential().at(facing(0.0), &limited(limit));
-        assert_eq!(CommandState::from_byte(command.state), CommandState::Halt);
+        assert_eq!(state(&command), CommandState::Halt);
         assert_eq!((command.left_rad_s, command.right_rad_s), (0.0, 0.0), "{limit}");
         let turning = evidential().at(facing(0.4), &limited(limit));
         assert_eq!(turning.v_m_s, 0.0, "{limit}");
@@ -181,7 +187,7 @@ fn no_evidential_command_stands_in_the_dead_band_of_the_wheels() {
         for limit in [0.0, 0.01, 0.03, 0.05, 0.4] {
             let command = evidential().at(facing(f64::from(degrees).to_radians()), &limited(limit));
             let fastest = command.left_rad_s.abs().max(command.right_rad_s.abs());
-            let halts = CommandState::from_byte(command.state) == CommandState::Halt;
+            let halts = state(&command) == CommandState::Halt;
             assert!(
                 fastest > dead || halts && fastest == 0.0,
                 "{degrees} degrees, limit {limit}: {command:?}"
@@ -193,11 +199,11 @@ fn no_evidential_command_stands_in_the_dead_band_of_the_wheels() {
 #[test]
 fn arrival_is_final() {
     let mut controller = controller("");
-    let there = Pose2 { position: DVec2::new(2.95, 0.0), heading: 0.0 };
+    let there = short(0.05);
     let command = controller.at(there, &ahead());
-    assert_eq!(CommandState::from_byte(command.state), CommandState::Arrived);
+    assert_eq!(state(&command), CommandState::Arrived);
     let back_off = controller.at(facing(0.0), &ahead());
-    assert_eq!(CommandState::from_byte(back_off.state), CommandState::Arrived);
+    assert_eq!(state(&back_off), CommandState::Arrived);
     close(back_off.v_m_s, 0.0);
 }
 
@@ -207,7 +213,7 @@ fn without_guidance_the_robot_stands() {
     let unreachable = GuidanceSample { status: GuidanceStatus::Unreachable.into(), ..ahead() };
     for guidance in [GuidanceSample::default(), unreachable, nan] {
         let command = controller("").at(facing(0.0), &guidance);
-        assert_eq!(CommandState::from_byte(command.state), CommandState::Halt);
+        assert_eq!(state(&command), CommandState::Halt);
         close(command.v_m_s, 0.0);
         close(command.left_rad_s, 0.0);
     }
@@ -216,8 +222,7 @@ fn without_guidance_the_robot_stands() {
 #[test]
 fn an_arrival_holds_for_its_target_alone() {
     let mut controller = controller("");
-    let there = Pose2 { position: DVec2::new(2.95, 0.0), heading: 0.0 };
-    let state = |command: &CommandSample| CommandState::from_byte(command.state);
+    let there = short(0.05);
     let command = controller.at(there, &ahead());
     assert_eq!((state(&command), command.target_number), (CommandState::Arrived, 1));
     let next = GuidanceSample {
@@ -240,10 +245,10 @@ fn a_robot_that_is_to_face_a_heading_turns_on_the_spot_and_then_has_arrived() {
         let mut controller = Controller::new(&mission);
         let mut guidance = ahead();
         (guidance.target.heading_rad, guidance.target.has_heading) = (2.0 + 2.0 * PI, 1);
-        let mut pose = Pose2 { position: DVec2::new(2.95, 0.0), heading: 0.0 };
+        let mut pose = short(0.05);
         let mut turned = 0;
         let mut command = controller.at(pose, &guidance);
-        while CommandState::from_byte(command.state) == CommandState::Driving {
+        while state(&command) == CommandState::Driving {
             close(command.v_m_s, 0.0);
             assert!(command.omega_rad_s > 0.0, "{method}: the shorter way");
             pose.heading += command.omega_rad_s / 7.0;
@@ -253,7 +258,7 @@ fn a_robot_that_is_to_face_a_heading_turns_on_the_spot_and_then_has_arrived() {
             turned += 1;
             assert!(turned < 200, "{method}: it turns for ever");
         }
-        assert_eq!(CommandState::from_byte(command.state), CommandState::Arrived, "{method}");
+        assert_eq!(state(&command), CommandState::Arrived, "{method}");
         assert!((pose.heading - 2.0).abs() <= 5_f64.to_radians(), "{method}: {}", pose.heading);
         assert!(turned > 3, "{method}: {turned}");
     }
@@ -273,10 +278,9 @@ fn a_command_names_the_pose_and_the_guidance_that_it_follows() {
 #[test]
 fn a_robot_has_arrived_beside_a_target_that_is_not_free_if_it_is_within_half_a_metre() {
     let beside = GuidanceSample { status: GuidanceStatus::AtTarget.into(), ..ahead() };
-    for (x, has_arrived) in [(2.55, true), (2.45, false)] {
-        let there = Pose2 { position: DVec2::new(x, 0.0), heading: 0.0 };
-        let state = CommandState::from_byte(controller("").at(there, &beside).state);
-        assert_eq!(state == CommandState::Arrived, has_arrived, "{x}");
+    for (short_m, has_arrived) in [(0.45, true), (0.55, false)] {
+        let command = controller("").at(short(short_m), &beside);
+        assert_eq!(state(&command) == CommandState::Arrived, has_arrived, "{short_m}");
     }
 }
 
@@ -284,8 +288,6 @@ fn a_robot_has_arrived_beside_a_target_that_is_not_free_if_it_is_within_half_a_m
 fn an_evidential_robot_slows_down_towards_its_target() {
     let mut controller = evidential();
     controller.slow_radius = 0.5;
-    let short =
-        |short_of_it_m: f64| Pose2 { position: DVec2::new(3.0 - short_of_it_m, 0.0), heading: 0.0 };
     close(controller.at(short(0.6), &ahead()).v_m_s, 0.4);
     close(controller.at(short(0.25), &ahead()).v_m_s, 0.2);
 }

@@ -1,9 +1,6 @@
 //! Tests of fixes and a gyro with a robot of known errors.
 
-use super::{
-    tests::{Take, reckoning_of},
-    *,
-};
+use super::{tests::reckoning_of, *};
 use common::samples::{Stamp, TurnSample};
 use glam::dvec2;
 
@@ -100,7 +97,7 @@ fn each_second(robot: &mut Robot) -> Vec<FixSample> {
 
 #[test]
 fn a_tick_that_is_given_again_takes_no_fixes_so_that_the_next_one_has_them() {
-    let mut reckoning = reckoning_of("target = [3, 0]");
+    let mut reckoning = x80();
     let wheels = Robot::new(0.0).wind();
     assert!(!reckoning.has_answered(&wheels));
     reckoning.answer(&wheels, &Sources::default(), wheels.stamp.time());

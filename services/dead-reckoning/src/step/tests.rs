@@ -26,21 +26,9 @@ fn wheels(tick: u64, left: u16, right: u16) -> WheelSample {
     }
 }
 
-/// A step at the sample's own time.
-pub(super) trait Take {
-    fn given(
-        &mut self,
-        wheels: &WheelSample,
-        fixes: &[FixSample],
-        turns: &[TurnSample],
-    ) -> Reckoned;
-    fn take(&mut self, wheels: &WheelSample) -> PoseSample;
-    /// Whether the counts were rejected.
-    fn rejects(&mut self, wheels: &WheelSample) -> bool;
-}
-
-impl Take for DeadReckoning {
-    fn given(
+/// Steps at the sample's own time.
+impl DeadReckoning {
+    pub(super) fn given(
         &mut self,
         wheels: &WheelSample,
         fixes: &[FixSample],
@@ -50,13 +38,20 @@ impl Take for DeadReckoning {
         self.reckon(wheels, &sources, wheels.stamp.time())
     }
 
-    fn take(&mut self, wheels: &WheelSample) -> PoseSample {
-        self.given(wheels, &[], &[]).pose
+    fn alone(&mut self, wheels: &WheelSample) -> Reckoned {
+        self.given(wheels, &[], &[])
     }
 
-    fn rejects(&mut self, wheels: &WheelSample) -> bool {
-        self.given(wheels, &[], &[]).rejected
+    fn take(&mut self, tick: u64, left: u16, right: u16) -> PoseSample {
+        self.alone(&wheels(tick, left, right)).pose
     }
+}
+
+/// A robot whose counts are these at first.
+fn begun(extra: &str, left: u16, right: u16) -> DeadReckoning {
+    let mut reckoning = reckoning(extra);
+    reckoning.take(0, left, right);
+    reckoning
 }
 
 fn close(got: f64, want: f64) {
@@ -65,10 +60,9 @@ fn close(got: f64, want: f64) {
 
 #[test]
 fn equation_20_straight_by_hand() {
-    let mut reckoning = reckoning("");
-    reckoning.take(&wheels(0, 100, 200));
+    let mut reckoning = begun("", 100, 200);
     // 500 counts are half a turn: pi * 0.1 m in 0.5 s.
-    let pose = reckoning.take(&wheels(1, 600, 700));
+    let pose = reckoning.take(1, 600, 700);
     close(pose.x_m, 0.1 * PI);
     close(pose.y_m, 0.0);
     close(pose.v_m_s, 0.2 * PI);
@@ -131,7 +125,7 @@ fn a_recorded_state_and_entry_of_an_earlier_version_are_read_without_counts() {
     assert_eq!(postcard::from_bytes::<Sources>(&earlier).unwrap().counts, []);
     assert_eq!(postcard::from_bytes::<Sources>(&entry).unwrap().counts, sources.counts);
     let mut reckoning = reckoning("");
-    reckoning.take(&wheels);
+    reckoning.alone(&wheels);
     let state = postcard::to_allocvec(reckoning.state()).unwrap();
     // The last byte says that there are no counts.
     let earlier = postcard::from_bytes::<State>(&state[..state.len() - 1]).unwrap();
@@ -140,10 +134,9 @@ fn a_recorded_state_and_entry_of_an_earlier_version_are_read_without_counts() {
 
 #[test]
 fn equation_20_turns_left_when_the_right_wheel_leads() {
-    let mut reckoning = reckoning("");
-    reckoning.take(&wheels(0, 0, 0));
+    let mut reckoning = begun("", 0, 0);
     // +-1000 counts: 2 pi 0.1 m a side over a track of 0.4 m: pi radians, on the spot.
-    let pose = reckoning.take(&wheels(1, COUNT_CYCLE - 1000, 1000));
+    let pose = reckoning.take(1, COUNT_CYCLE - 1000, 1000);
     close(pose.heading_rad, PI);
     close(pose.x_m, 0.0);
 }
@@ -151,14 +144,12 @@ fn equation_20_turns_left_when_the_right_wheel_leads() {
 #[test]
 fn the_arc_and_the_papers_euler_differ_as_they_should() {
     // Right wheel alone, 1000 counts: arc 0.1 pi, turn pi/2, radius 0.2.
-    let mut arc = reckoning("");
-    arc.take(&wheels(0, 0, 0));
-    let pose = arc.take(&wheels(1, 0, 1000));
+    let mut arc = begun("", 0, 0);
+    let pose = arc.take(1, 0, 1000);
     close(pose.x_m, 0.2);
     close(pose.y_m, 0.2);
-    let mut euler = reckoning("[dead_reckoning]\nintegration = 'euler'");
-    euler.take(&wheels(0, 0, 0));
-    let pose = euler.take(&wheels(1, 0, 1000));
+    let mut euler = begun("[dead_reckoning]\nintegration = 'euler'", 0, 0);
+    let pose = euler.take(1, 0, 1000);
     close(pose.x_m, 0.1 * PI);
     close(pose.y_m, 0.0);
     close(pose.heading_rad, PI / 2.0);
@@ -166,20 +157,18 @@ fn the_arc_and_the_papers_euler_differ_as_they_should() {
 
 #[test]
 fn counts_wrap_around_both_ways() {
-    let mut reckoning = reckoning("");
-    reckoning.take(&wheels(0, COUNT_CYCLE - 200, COUNT_CYCLE - 200));
-    let pose = reckoning.take(&wheels(1, 300, 300));
+    let mut reckoning = begun("", COUNT_CYCLE - 200, COUNT_CYCLE - 200);
+    let pose = reckoning.take(1, 300, 300);
     close(pose.x_m, 0.1 * PI);
-    let pose = reckoning.take(&wheels(2, COUNT_CYCLE - 200, COUNT_CYCLE - 200));
+    let pose = reckoning.take(2, COUNT_CYCLE - 200, COUNT_CYCLE - 200);
     close(pose.x_m, 0.0);
 }
 
 #[test]
 fn a_tick_given_twice_moves_once() {
-    let mut reckoning = reckoning("");
-    reckoning.take(&wheels(0, 0, 0));
-    let first = reckoning.take(&wheels(1, 100, 100));
-    assert_eq!(reckoning.take(&wheels(1, 100, 100)), first);
+    let mut reckoning = begun("", 0, 0);
+    let first = reckoning.take(1, 100, 100);
+    assert_eq!(reckoning.take(1, 100, 100), first);
 }
 
 #[test]
@@ -188,20 +177,19 @@ fn a_restored_state_goes_on_as_if_nothing_had_happened() {
     let mut killed = reckoning("");
     for tick in 0..4 {
         let sample = wheels(tick, tick as u16 * 50, tick as u16 * 90);
-        whole.take(&sample);
-        killed.take(&sample);
+        whole.alone(&sample);
+        killed.alone(&sample);
     }
     let mut successor = reckoning("");
     successor.restore(killed.state().clone()).unwrap();
     let sample = wheels(4, 250, 400);
-    assert_eq!(successor.take(&sample), whole.take(&sample));
+    assert_eq!(successor.alone(&sample).pose, whole.alone(&sample).pose);
 }
 
 #[test]
 fn no_speed_is_more_than_the_body_can_do_however_the_frames_come() {
     // The rim does at most 1 m/s, so the robot does 5 rad/s on the spot.
-    let mut reckoning = reckoning("");
-    reckoning.take(&wheels(0, 0, 0));
+    let mut reckoning = begun("", 0, 0);
     let at = |tick, stamp_ns, left, right| {
         let stamp = Stamp { tick, stamp_ns, ..Stamp::default() };
         WheelSample { stamp, ..wheels(tick, left, right) }
@@ -209,57 +197,54 @@ fn no_speed_is_more_than_the_body_can_do_however_the_frames_come() {
     for (tick, after_ns) in [(1, 0), (2, 1), (3, 100_000), (4, 20_000_000)] {
         let now_ns = tick * 1_000_000_000 + after_ns;
         let before = at(2 * tick, now_ns - after_ns, 0, 0);
-        reckoning.take(&before);
-        let straight = reckoning.take(&at(2 * tick + 1, now_ns, 400, 400));
+        reckoning.alone(&before);
+        let straight = reckoning.alone(&at(2 * tick + 1, now_ns, 400, 400)).pose;
         close(straight.v_m_s, 1.0);
-        reckoning.take(&at(100 + 2 * tick, now_ns + 400_000_000, 400, 400));
+        reckoning.alone(&at(100 + 2 * tick, now_ns + 400_000_000, 400, 400));
         let turned = at(101 + 2 * tick, now_ns + 400_000_000 + after_ns, 0, 800);
-        close(reckoning.take(&turned).omega_rad_s, 5.0);
-        reckoning.take(&at(102 + 2 * tick, now_ns + 900_000_000, 0, 0));
+        close(reckoning.alone(&turned).pose.omega_rad_s, 5.0);
+        reckoning.alone(&at(102 + 2 * tick, now_ns + 900_000_000, 0, 0));
     }
     // Two ticks of 7 Hz that come at once are no motion that is too fast.
-    reckoning.take(&at(200, 9_000_000_000, 0, 0));
-    let bunched = reckoning.take(&at(201, 9_001_000_000, 50, 50));
+    reckoning.alone(&at(200, 9_000_000_000, 0, 0));
+    let bunched = reckoning.alone(&at(201, 9_001_000_000, 50, 50)).pose;
     close(bunched.v_m_s, 50.0 * 2e-4 * PI / (0.5 / 7.0));
 }
 
 #[test]
 fn a_motion_that_nobody_measured_is_in_the_covariance() {
-    let mut reckoning = reckoning("");
-    reckoning.take(&wheels(0, 600, 700));
-    let before = reckoning.take(&wheels(1, 600, 700));
-    let after = reckoning.take(&WheelSample { restarts: 1, ..wheels(2, 0, 1) });
+    let mut reckoning = begun("", 600, 700);
+    let before = reckoning.take(1, 600, 700);
+    let after = reckoning.alone(&WheelSample { restarts: 1, ..wheels(2, 0, 1) }).pose;
     // In 0.5 s each wheel rolls up to 0.5 m at the top speed; the even distribution has the variance 0.25 / 3.
     let wheel = 0.25 / 3.0;
     for (entry, more) in [(0, wheel / 2.0), (3, wheel / 2.0), (5, 2.0 * wheel / 0.16)] {
         close(after.covariance[entry] - before.covariance[entry], more);
     }
     // However long it was away, the wheels stood when its last command was over: after 1 / 7 + 0.25 + 0.2 s.
-    let much_later = reckoning.take(&WheelSample { restarts: 2, ..wheels(200, 5, 6) });
+    let much_later = reckoning.alone(&WheelSample { restarts: 2, ..wheels(200, 5, 6) }).pose;
     let lost = (1.0 / 7.0 + 0.45_f64).powi(2) / 3.0;
     close(much_later.covariance[5] - after.covariance[5], 2.0 * lost / 0.16);
 }
 
 #[test]
 fn counters_that_restart_do_not_move_the_robot() {
-    let mut reckoning = reckoning("");
-    reckoning.take(&wheels(0, 16_000, 16_000));
-    assert!(reckoning.rejects(&wheels(1, 0, 0)));
-    close(reckoning.take(&wheels(1, 0, 0)).x_m, 0.0);
-    let pose = reckoning.take(&wheels(2, 500, 500));
+    let mut reckoning = begun("", 16_000, 16_000);
+    assert!(reckoning.alone(&wheels(1, 0, 0)).rejected);
+    close(reckoning.take(1, 0, 0).x_m, 0.0);
+    let pose = reckoning.take(2, 500, 500);
     close(pose.x_m, 0.1 * PI);
 }
 
 #[test]
 fn a_robot_that_restarted_while_it_was_away_does_not_move() {
-    let mut reckoning = reckoning("");
-    reckoning.take(&wheels(0, 600, 700));
+    let mut reckoning = begun("", 600, 700);
     // In the 5 s since then, wheels could have turned so far.
     let after = WheelSample { restarts: 1, ..wheels(10, 0, 1) };
-    assert!(reckoning.rejects(&after));
-    close(reckoning.take(&after).x_m, 0.0);
+    assert!(reckoning.alone(&after).rejected);
+    close(reckoning.alone(&after).pose.x_m, 0.0);
     let on = WheelSample { restarts: 1, ..wheels(11, 500, 501) };
-    close(reckoning.take(&on).x_m, 0.1 * PI);
+    close(reckoning.alone(&on).pose.x_m, 0.1 * PI);
 }
 
 #[test]
@@ -269,12 +254,12 @@ fn a_restart_between_two_generations_of_the_link_is_told_from_the_counts() {
         sample.stamp.generation = generation;
         sample
     };
-    reckoning.take(&by(1, wheels(0, 600, 700)));
-    let pose = reckoning.take(&by(2, wheels(1, 1100, 1200)));
+    reckoning.alone(&by(1, wheels(0, 600, 700)));
+    let pose = reckoning.alone(&by(2, wheels(1, 1100, 1200))).pose;
     close(pose.x_m, 0.1 * PI);
     let began_anew = by(3, wheels(9, 0, 0));
-    assert!(reckoning.rejects(&began_anew));
-    close(reckoning.take(&began_anew).x_m, pose.x_m);
+    assert!(reckoning.alone(&began_anew).rejected);
+    close(reckoning.alone(&began_anew).pose.x_m, pose.x_m);
 }
 
 #[test]
@@ -284,42 +269,39 @@ fn a_robot_that_turns_back_through_its_start_while_the_link_is_killed_loses_no_t
         sample.stamp.generation = generation;
         sample
     };
-    reckoning.take(&by(1, wheels(0, 0, 0)));
+    reckoning.alone(&by(1, wheels(0, 0, 0)));
     // Each wheel rolls a tenth of a turn, against the other, and back.
-    reckoning.take(&by(1, wheels(1, COUNT_CYCLE - 100, 100)));
+    reckoning.alone(&by(1, wheels(1, COUNT_CYCLE - 100, 100)));
     let back = by(2, wheels(2, COUNT_CYCLE - 3, 2));
-    assert!(!reckoning.rejects(&back));
-    close(reckoning.take(&back).heading_rad, 5.0 * 2e-4 * PI / 0.4);
+    assert!(!reckoning.alone(&back).rejected);
+    close(reckoning.alone(&back).pose.heading_rad, 5.0 * 2e-4 * PI / 0.4);
 }
 
 #[test]
 fn equation_3_of_a_car_by_hand() {
     // r = 0.1 m, 1000 counts a turn; L = 0.5 m; 45 degrees of steering are 450 of 3600 counts.
     let car = "model = 'car'\nwheelbase_m = 0.5\nsteering_limit_deg = 60";
-    let mut steered = reckoning(car);
-    steered.take(&wheels(0, 100, 450));
+    let mut steered = begun(car, 100, 450);
     // Half a turn of the wheel is 0.1 pi metres, on a circle of radius 0.5 m to the left.
-    let pose = steered.take(&wheels(1, 600, 450));
+    let pose = steered.take(1, 600, 450);
     let turn = 0.1 * PI / 0.5;
     close(pose.heading_rad, turn);
     close(pose.x_m, 0.5 * turn.sin());
     close(pose.y_m, 0.5 * (1.0 - turn.cos()));
     close(pose.travelled_m, 0.1 * PI);
     // The steering goes from 45 degrees to the left to 45 degrees to the right, so its mean is straight.
-    let mut swung = reckoning(car);
-    swung.take(&wheels(0, 100, 450));
-    let pose = swung.take(&wheels(1, 600, COUNT_CYCLE - 450));
+    let mut swung = begun(car, 100, 450);
+    let pose = swung.take(1, 600, COUNT_CYCLE - 450);
     close(pose.heading_rad, 0.0);
     close(pose.x_m, 0.1 * PI);
 }
 
 #[test]
 fn a_successor_of_one_killed_between_publishing_and_saving_goes_on_with_its_pose() {
-    let mut killed = reckoning("");
-    killed.take(&wheels(0, 0, 0));
-    killed.take(&wheels(1, 90, 110));
+    let mut killed = begun("", 0, 0);
+    killed.take(1, 90, 110);
     let saved = killed.state().clone();
-    let published = killed.take(&wheels(2, 190, 200));
+    let published = killed.take(2, 190, 200);
     let successor = || {
         let mut successor = reckoning("");
         successor.restore(saved.clone()).unwrap();
@@ -327,10 +309,10 @@ fn a_successor_of_one_killed_between_publishing_and_saving_goes_on_with_its_pose
     };
     // The link's last sample is still that of the tick.
     let mut again = successor();
-    assert_eq!(again.take(&wheels(2, 190, 200)), published);
+    assert_eq!(again.take(2, 190, 200), published);
     assert_eq!(again.state(), killed.state());
     // The next tick has come meanwhile: nothing of the way is lost, but 127 mm are one arc in place of two.
-    let (got, want) = (successor().take(&wheels(3, 280, 310)), killed.take(&wheels(3, 280, 310)));
+    let (got, want) = (successor().take(3, 280, 310), killed.take(3, 280, 310));
     close(got.heading_rad, want.heading_rad);
     close(got.travelled_m, want.travelled_m);
     assert!((got.x_m - want.x_m).hypot(got.y_m - want.y_m) < 2e-3);
@@ -340,9 +322,8 @@ fn a_successor_of_one_killed_between_publishing_and_saving_goes_on_with_its_pose
 fn counts_are_ways_of_the_wheels_as_they_were_calibrated() {
     let calibrated =
         "odometry = { diameter_ratio = 1.02, distance_scale = 0.98, track_scale = 1.1 }";
-    let mut reckoning = reckoning(calibrated);
-    reckoning.take(&wheels(0, 0, 0));
-    let pose = reckoning.take(&wheels(1, 500, 500));
+    let mut reckoning = begun(calibrated, 0, 0);
+    let pose = reckoning.take(1, 500, 500);
     // left = counts * s * 2 / (1 + rho), right = rho * left, turn = (right - left) / (W tau).
     let left = 0.1 * PI * 0.98 * 2.0 / 2.02;
     close(pose.travelled_m, left * 1.01);

@@ -6,58 +6,60 @@ use super::*;
 use common::samples::{RangeStatus, Stamp};
 use std::{f64::consts::FRAC_PI_2, path::Path};
 
-/// Inputs one at a time.
 impl Mapper {
-    fn hear(&mut self, pose: &PoseSample, range: Option<&RangeReading>) -> Window {
-        self.sense(pose, range.into_iter().copied().collect())
-    }
-
-    fn sense(&mut self, pose: &PoseSample, ranges: Vec<RangeReading>) -> Window {
-        let input =
-            Input::Tick { pose: *pose, ranges, scan: Vec::new(), contact: None, target: None };
-        match self.step(input, pose.stamp.time()) {
+    fn give(&mut self, tick: Tick) -> Window {
+        let now = tick.pose.stamp.time();
+        match self.step(Input::Tick(tick), now) {
             Change::Window(window) => window,
             other => panic!("a tick gave {other:?}"),
         }
     }
 
-    fn touch(&mut self, pose: &PoseSample, bearing_rad: f64) {
+    fn sense(&mut self, pose: PoseSample, ranges: &[RangeReading]) -> Window {
+        self.give(Tick { pose, ranges: ranges.to_vec(), ..Tick::default() })
+    }
+
+    fn touch(&mut self, bearing_rad: f64) {
         let half_width_rad = 0.8;
         let contact = ContactSample { bearing_rad, half_width_rad, ..ContactSample::default() };
-        let contact = Some(contact);
-        let input = Input::Tick {
-            pose: *pose,
-            ranges: Vec::new(),
-            scan: Vec::new(),
-            contact,
-            target: None,
-        };
-        let changed = self.step(input, pose.stamp.time());
-        assert!(matches!(changed, Change::Window(window) if window.area() > 0));
+        assert!(self.give(Tick { contact: Some(contact), ..Tick::default() }).area() > 0);
     }
 
     fn reset(&mut self, epoch: u64) -> bool {
         self.step(Input::Reset { epoch }, MissionTime(0)) == Change::Whole
     }
+
+    fn state_at(&self, x: f64, y: f64) -> CellState {
+        let cell = self.frame.cell_at(DVec2::new(x, y)).unwrap();
+        CellState::from_byte(self.belief.cells[self.frame.index(cell)])
+    }
+
+    fn is_hazard(&self, x: f64, y: f64) -> bool {
+        self.state_at(x, y).is_hazard()
+    }
+
+    fn hazards(&self) -> usize {
+        let cells = self.belief.cells.iter();
+        cells.filter(|cell| CellState::from_byte(**cell).is_hazard()).count()
+    }
+}
+
+fn mapper_of(mission: &str) -> Mapper {
+    Mapper::new(&Mission::parse(mission, Path::new("test.toml")).unwrap())
 }
 
 /// D = 5 m, N = 50: Delta = 0.1 m, the origin in cell (25, 25). Sensor 0.2 m ahead.
 fn mapper(extra: &str) -> Mapper {
-    let text = format!(
-        "target = [1.5, 0.0]\nmethod = 'paper'\nperimeter = {{ width_m = 5, cells = 50 }}\n\
-         sonar = {{ forward_m = 0.2 }}\nmapper = {{ margin_m = 0.15, map_within_m = 2.0 }}\n{extra}"
-    );
-    Mapper::new(&Mission::parse(&text, Path::new("test.toml")).unwrap())
+    of(&format!("mapper.margin_m = 0.15\n{extra}"), 0.1)
 }
 
 /// A mapper of the same place with cells of `cell_m` metres; `set` is the end of its mission file.
 fn of(set: &str, cell_m: f64) -> Mapper {
-    let text = format!(
+    mapper_of(&format!(
         "target = [1.5, 0.0]\nmethod = 'paper'\nperimeter = {{ width_m = 5, cells = {} }}\n\
          sonar.forward_m = 0.2\nmapper.map_within_m = 2.0\n{set}",
         (5.0 / cell_m) as u32
-    );
-    Mapper::new(&Mission::parse(&text, Path::new("test.toml")).unwrap())
+    ))
 }
 
 fn at(tick: u64, x: f64, y: f64, heading: f64) -> PoseSample {
@@ -72,6 +74,10 @@ fn at(tick: u64, x: f64, y: f64, heading: f64) -> PoseSample {
 
 fn reading(status: RangeStatus, range_m: f64) -> RangeReading {
     RangeReading { range_m, status: status.into(), ..RangeReading::default() }
+}
+
+fn echo(range_m: f64) -> RangeReading {
+    reading(RangeStatus::Measured, range_m)
 }
 
 fn sensed(mapper: &Mapper) -> Vec<(u32, u32)> {
@@ -93,8 +99,7 @@ fn equation_18_blocks_the_border_and_nothing_else() {
 fn equation_19_by_hand() {
     // From (0.3, -0.2) facing y, S + offset = 0.5 + 0.2, so the hit is at (0.3, 0.5), cell (28, 30).
     let mut mapper = mapper("");
-    let window =
-        mapper.hear(&at(0, 0.3, -0.2, FRAC_PI_2), Some(&reading(RangeStatus::Measured, 0.5)));
+    let window = mapper.sense(at(0, 0.3, -0.2, FRAC_PI_2), &[echo(0.5)]);
     let want: Vec<_> = (29..=31).flat_map(|row| (27..=29).map(move |col| (col, row))).collect();
     assert_eq!(sensed(&mapper), want);
     assert_eq!((window.col, window.row, window.width, window.height), (27, 29, 3, 3));
@@ -111,8 +116,8 @@ fn equation_19_takes_the_sensors_offset_along_its_bearing() {
     {
         let set = format!("sonar.bearing_deg = {bearing_deg}\nmapper.margin_m = 0.0");
         let mut mapper = of(&set, 0.02);
-        let heard = reading(RangeStatus::Measured, 0.8);
-        mapper.hear(&at(0, 0.0, 0.0, 0.0), Some(&heard));
+        let heard = echo(0.8);
+        mapper.sense(at(0, 0.0, 0.0, 0.0), &[heard]);
         let cell = mapper.frame().cell_at(hit).unwrap();
         assert_eq!(sensed(&mapper), [(cell.col, cell.row)], "{bearing_deg}");
     }
@@ -122,14 +127,14 @@ fn equation_19_takes_the_sensors_offset_along_its_bearing() {
 fn a_hit_just_outside_the_map_marks_the_part_of_its_margin_that_is_inside() {
     let mut mapper = mapper("");
     // The hit is at (2.5, 0), the cell after the last; the margin is a cell, and the last one stays border.
-    let outside = reading(RangeStatus::Measured, 0.5);
-    mapper.hear(&at(0, 1.8, 0.0, 0.0), Some(&outside));
+    let outside = echo(0.5);
+    mapper.sense(at(0, 1.8, 0.0, 0.0), &[outside]);
     assert_eq!(sensed(&mapper), []);
     let mut mapper = of("mapper.margin_m = 0.25", 0.1);
-    mapper.hear(&at(0, 1.8, 0.0, 0.0), Some(&outside));
+    mapper.sense(at(0, 1.8, 0.0, 0.0), &[outside]);
     assert!(sensed(&mapper).contains(&(48, 25)), "{:?}", sensed(&mapper));
     let far = at(1, f64::NAN, 1e300, 0.0);
-    assert_eq!(mapper.hear(&far, Some(&outside)).area(), 0);
+    assert_eq!(mapper.sense(far, &[outside]).area(), 0);
 }
 
 #[test]
@@ -138,10 +143,10 @@ fn a_reading_that_shows_nothing_leaves_the_map_alone() {
     for (tick, status) in
         [RangeStatus::Nothing, RangeStatus::Invalid, RangeStatus::Absent].into_iter().enumerate()
     {
-        mapper.hear(&at(tick as u64, 0.0, 0.0, 0.0), Some(&reading(status, 0.5)));
+        mapper.sense(at(tick as u64, 0.0, 0.0, 0.0), &[reading(status, 0.5)]);
     }
-    mapper.hear(&at(8, 0.0, 0.0, 0.0), None);
-    mapper.hear(&at(9, 0.0, 0.0, 0.0), Some(&reading(RangeStatus::Measured, 2.1)));
+    mapper.sense(at(8, 0.0, 0.0, 0.0), &[]);
+    mapper.sense(at(9, 0.0, 0.0, 0.0), &[echo(2.1)]);
     assert_eq!(sensed(&mapper), []);
     assert_eq!(mapper.state().version(), 1);
 }
@@ -149,14 +154,14 @@ fn a_reading_that_shows_nothing_leaves_the_map_alone() {
 #[test]
 fn four_centimetres_or_nearer_is_mapped_just_ahead() {
     let mut mapper = mapper("");
-    mapper.hear(&at(0, 0.0, 0.0, 0.0), Some(&reading(RangeStatus::AtContact, 0.0)));
+    mapper.sense(at(0, 0.0, 0.0, 0.0), &[reading(RangeStatus::AtContact, 0.0)]);
     assert!(sensed(&mapper).contains(&(27, 25)), "{:?}", sensed(&mapper));
 }
 
 #[test]
 fn the_targets_cell_is_never_marked() {
     let mut mapper = mapper("");
-    mapper.hear(&at(0, 0.8, 0.0, 0.0), Some(&reading(RangeStatus::Measured, 0.5)));
+    mapper.sense(at(0, 0.8, 0.0, 0.0), &[echo(0.5)]);
     let marked = sensed(&mapper);
     assert!(marked.contains(&(39, 25)) && !marked.contains(&(40, 25)), "{marked:?}");
 }
@@ -164,7 +169,7 @@ fn the_targets_cell_is_never_marked() {
 #[test]
 fn the_robots_own_cells_are_never_marked() {
     let mut mapper = mapper("");
-    mapper.hear(&at(0, 0.0, 0.0, 0.0), Some(&reading(RangeStatus::AtContact, 0.0)));
+    mapper.sense(at(0, 0.0, 0.0, 0.0), &[reading(RangeStatus::AtContact, 0.0)]);
     let radius = 0.19;
     for (col, row) in sensed(&mapper) {
         let centre = mapper.frame().centre_of(Cell { col, row });
@@ -175,7 +180,7 @@ fn the_robots_own_cells_are_never_marked() {
 #[test]
 fn the_border_stays_border_when_a_margin_falls_on_it() {
     let mut mapper = mapper("");
-    mapper.hear(&at(0, 1.9, 0.0, 0.0), Some(&reading(RangeStatus::Measured, 0.2)));
+    mapper.sense(at(0, 1.9, 0.0, 0.0), &[echo(0.2)]);
     let cells = mapper.state().cells();
     assert_eq!(cells[25 * 50 + 49], CellState::Perimeter as u8);
 }
@@ -190,7 +195,7 @@ fn a_priori_shapes_are_hazard_from_the_start_and_after_a_reset() {
     let before = known(&mapper);
     // A disc of 0.2 + 0.15 m has about pi 3.5^2 = 38 cells.
     assert!((34..=42).contains(&before), "{before} cells");
-    mapper.hear(&at(0, 0.0, 0.0, 0.0), Some(&reading(RangeStatus::Measured, 0.5)));
+    mapper.sense(at(0, 0.0, 0.0, 0.0), &[echo(0.5)]);
     assert!(mapper.reset(1) && !mapper.reset(1));
     assert_eq!((known(&mapper), sensed(&mapper).len()), (before, 0));
 }
@@ -198,9 +203,9 @@ fn a_priori_shapes_are_hazard_from_the_start_and_after_a_reset() {
 #[test]
 fn a_tick_given_twice_is_one_safety_event() {
     let mut mapper = mapper("");
-    let (pose, range) = (at(3, 0.0, 0.0, 0.0), reading(RangeStatus::Measured, 0.5));
-    mapper.hear(&pose, Some(&range));
-    assert_eq!(mapper.hear(&pose, Some(&range)).area(), 0);
+    let (pose, range) = (at(3, 0.0, 0.0, 0.0), echo(0.5));
+    mapper.sense(pose, &[range]);
+    assert_eq!(mapper.sense(pose, &[range]).area(), 0);
     assert_eq!(mapper.state().safety_events(), 1);
 }
 
@@ -210,12 +215,12 @@ fn without_sensing_nothing_that_the_sonar_gives_is_mapped_by_either_method() {
         let text = format!(
             "target = [1.5, 0.0]\nmethod = '{method}'\nsensing = false\nknown.drum = [{{ at = [1, 1], radius_m = 0.2 }}]"
         );
-        let mut mapper = Mapper::new(&Mission::parse(&text, Path::new("test.toml")).unwrap());
+        let mut mapper = mapper_of(&text);
         let before = mapper.state().cells().to_vec();
         assert!(before.contains(&(CellState::Known as u8)), "{method}");
-        let echo = reading(RangeStatus::Measured, 0.5);
+        let echo = echo(0.5);
         for tick in 0..10 {
-            mapper.hear(&at(tick, 0.0, 0.0, 0.0), Some(&echo));
+            mapper.sense(at(tick, 0.0, 0.0, 0.0), &[echo]);
         }
         assert_eq!(mapper.state().cells(), before, "{method}");
         assert_eq!(mapper.state().safety_events(), 0, "{method}");
@@ -225,23 +230,15 @@ fn without_sensing_nothing_that_the_sonar_gives_is_mapped_by_either_method() {
 #[test]
 fn a_contact_is_hazard_where_the_body_touches_by_the_papers_method() {
     let mut mapper = mapper("");
-    mapper.touch(&PoseSample::default(), FRAC_PI_2);
-    let state = |x: f64, y: f64| {
-        let cell = mapper.frame().cell_at(DVec2::new(x, y)).unwrap();
-        CellState::from_byte(mapper.state().cells()[mapper.frame().index(cell)])
-    };
-    assert!(state(0.0, 0.3).is_hazard());
-    assert!(!state(0.0, -0.3).is_hazard() && !state(0.0, 0.0).is_hazard());
+    mapper.touch(FRAC_PI_2);
+    assert!(mapper.is_hazard(0.0, 0.3));
+    assert!(!mapper.is_hazard(0.0, -0.3) && !mapper.is_hazard(0.0, 0.0));
 }
 
-/// Send the robot to (x, y) in `tick`. Returns the window that changed.
-fn send(mapper: &mut Mapper, tick: u64, x: f64, y: f64) -> Window {
-    let (pose, target) = (at(tick, 0.0, 0.0, 0.0), Some(DVec2::new(x, y)));
-    let input = Input::Tick { pose, ranges: Vec::new(), scan: Vec::new(), contact: None, target };
-    match mapper.step(input, MissionTime(0)) {
-        Change::Window(window) => window,
-        other => panic!("a tick gave {other:?}"),
-    }
+/// Send the robot to (x, 0) in `tick`. Returns how many cells changed.
+fn send(mapper: &mut Mapper, tick: u64, x: f64) -> usize {
+    let (pose, target) = (at(tick, 0.0, 0.0, 0.0), Some(DVec2::new(x, 0.0)));
+    mapper.give(Tick { pose, target, ..Tick::default() }).area()
 }
 
 #[test]
@@ -249,23 +246,19 @@ fn the_cell_of_the_target_is_free_as_long_as_the_robot_is_sent_there() {
     for method in ["paper", "evidential"] {
         let drum = "known.drum = [{ at = [-1.5, 0], radius_m = 0.2 }]";
         let text = format!("target = [1.5, 0.0]\nmethod = '{method}'\n{drum}");
-        let mut mapper = Mapper::new(&Mission::parse(&text, Path::new("test.toml")).unwrap());
-        let state = |mapper: &Mapper, x: f64| {
-            let cell = mapper.frame().cell_at(DVec2::new(x, 0.0)).unwrap();
-            CellState::from_byte(mapper.state().cells()[mapper.frame().index(cell)])
-        };
+        let mut mapper = mapper_of(&text);
         // The place is in the margin of the drum; a list may name such a place beforehand.
         let margin = -1.25;
-        assert_eq!(state(&mapper, margin), CellState::Known, "{method}");
+        assert_eq!(mapper.state_at(margin, 0.0), CellState::Known, "{method}");
         let version = mapper.state().version();
-        assert_eq!(send(&mut mapper, 1, margin, 0.0).area(), 1, "{method}");
-        assert!(!state(&mapper, margin).is_hazard(), "{method}");
+        assert_eq!(send(&mut mapper, 1, margin), 1, "{method}");
+        assert!(!mapper.is_hazard(margin, 0.0), "{method}");
         assert_eq!(mapper.state().version(), version + 1, "{method}");
         // The target survives the process.
         let mut restored = mapper.clone();
         restored.restore(mapper.state().clone()).unwrap();
         assert_eq!(restored.target(), DVec2::new(margin, 0.0));
-        assert_eq!(send(&mut restored, 2, 1.5, 0.0).area(), 1, "{method}");
-        assert_eq!(state(&restored, margin), CellState::Known, "{method}");
+        assert_eq!(send(&mut restored, 2, 1.5), 1, "{method}");
+        assert_eq!(restored.state_at(margin, 0.0), CellState::Known, "{method}");
     }
 }

@@ -4,6 +4,7 @@ use common::grid::{Cell, CellState};
 use harmonic::{Cancellation, Domain, Solver};
 
 use super::*;
+use crate::view::field_cell;
 
 /// Speed limit and turn (positive to the left) of a car at the origin that faces `heading`, with `hazard` in a square of 4 m
 /// and the target 1.5 m ahead along x.
@@ -11,22 +12,15 @@ fn advice(heading: f64, hazard: impl Fn(DVec2) -> bool) -> (f64, f64) {
     let text = "target = [1.5, 0]\nrobot.model = 'car'\nperimeter = { width_m = 4, cells = 80 }";
     let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
     let frame = mission.grid_frame();
-    let cells: Vec<u8> = (0..frame.area() as u32)
-        .map(|index| Cell { col: index % frame.cells, row: index / frame.cells })
-        .map(|cell| {
-            if frame.is_rim(cell) {
-                CellState::Perimeter as u8
-            } else if hazard(frame.centre_of(cell)) {
-                CellState::Known as u8
-            } else {
-                CellState::Free as u8
-            }
-        })
-        .collect();
+    let state = |cell: Cell| match frame.is_rim(cell) {
+        true => CellState::Perimeter,
+        false if hazard(frame.centre_of(cell)) => CellState::Known,
+        false => CellState::Free,
+    };
+    let cells: Vec<u8> = frame.whole().cells().map(|cell| state(cell) as u8).collect();
     let blocked = cells.iter().map(|&cell| CellState::from_byte(cell).is_hazard());
     let target = frame.cell_at(mission.target).unwrap();
-    let target = harmonic::Cell::new(target.col as usize, target.row as usize);
-    let domain = Domain::new(80, 80, blocked.collect(), target).unwrap();
+    let domain = Domain::new(80, 80, blocked.collect(), field_cell(target)).unwrap();
     let field = Solver::default().solve(&domain, &Cancellation::default()).unwrap();
     let view = View { frame, cells: &cells, field: &field };
     let pose = Pose2 { heading, ..Pose2::default() };

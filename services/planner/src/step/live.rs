@@ -182,19 +182,14 @@ impl Live {
 
     /// Cells whose hazard differs between `cells` and the map.
     pub(super) fn changes_in(&self, window: Window, cells: &[u8]) -> Vec<Change> {
-        let mut changes = Vec::new();
-        for row in window.row..window.row + window.height {
-            for col in window.col..window.col + window.width {
-                let cell = grid::Cell { col, row };
-                let blocked = is_hazard(cells[self.frame.index(cell)]);
-                let cell = field_cell(cell);
-                // The target's cell counts as free.
-                if cell != self.map.target() && blocked != self.map.is_blocked(cell) {
-                    changes.push(Change { cell, blocked });
-                }
-            }
-        }
-        changes
+        let changed = window.cells().filter_map(|cell| {
+            let blocked = is_hazard(cells[self.frame.index(cell)]);
+            let cell = field_cell(cell);
+            // The target's cell counts as free.
+            let changed = cell != self.map.target() && blocked != self.map.is_blocked(cell);
+            changed.then_some(Change { cell, blocked })
+        });
+        changed.collect()
     }
 }
 

@@ -55,18 +55,19 @@ pub struct Snapshot {
 impl Snapshot {
     /// Row-major.
     pub fn cells(&self) -> Vec<FieldCell> {
-        let mut cells = Vec::with_capacity(self.frame.area());
-        for row in 0..self.frame.cells as usize {
-            self.append_row(row, &mut cells);
-        }
-        cells
+        self.cells_with(|_| ())
     }
 
-    pub fn append_row(&self, row: usize, cells: &mut Vec<FieldCell>) {
-        self.field.policy_of_row(row, |policy| {
-            let [ex, ey] = policy.direction.map(|component| component as f32);
-            let log2_u = policy.log2_u as f32;
-            cells.push(FieldCell { ex, ey, log2_u });
-        });
+    /// Likewise; `after_row` is told each row.
+    pub(crate) fn cells_with(&self, after_row: impl Fn(usize)) -> Vec<FieldCell> {
+        let mut cells = Vec::with_capacity(self.frame.area());
+        for row in 0..self.frame.cells as usize {
+            self.field.policy_of_row(row, |policy| {
+                let [ex, ey] = policy.direction.map(|component| component as f32);
+                cells.push(FieldCell { ex, ey, log2_u: policy.log2_u as f32 });
+            });
+            after_row(row);
+        }
+        cells
     }
 }

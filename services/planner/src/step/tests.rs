@@ -1,6 +1,6 @@
 use super::*;
 use common::{
-    grid::{self, CellState, Part},
+    grid::{CellState, Part},
     samples::{ClearBeam, TargetPoint},
 };
 use std::path::Path;
@@ -41,12 +41,18 @@ fn keyframe_of(
     version: u64,
     hazard: impl Fn(DVec2) -> bool,
 ) -> (GridHeader, Vec<u8>) {
-    let cells = (0..frame.area() as u32).map(|index| {
-        let cell = grid::Cell { col: index % frame.cells, row: index / frame.cells };
-        u8::from(frame.is_rim(cell) || hazard(frame.centre_of(cell)))
-    });
+    let cells = frame.whole().cells();
+    let cells = cells.map(|cell| u8::from(frame.is_rim(cell) || hazard(frame.centre_of(cell))));
     let header = GridHeader { part: Part::whole(frame, version), ..GridHeader::default() };
     (header, cells.collect())
+}
+
+/// A planner in a room with the perimeter, and hazard in the cells for which `hazard` says so.
+fn in_room(mission: &Mission, hazard: impl Fn(DVec2) -> bool) -> Planner {
+    let mut planner = sent(mission);
+    let (header, cells) = keyframe_of(mission.grid_frame(), 1, hazard);
+    assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::Solved);
+    planner
 }
 
 fn status(sample: &GuidanceSample) -> GuidanceStatus {
@@ -83,9 +89,7 @@ fn before_the_first_keyframe_there_is_no_guidance() {
 
 #[test]
 fn an_empty_room_is_crossed_straight() {
-    let mut planner = sent(&mission());
-    let (header, cells) = keyframe(1, |_| false);
-    assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::Solved);
+    let mut planner = in_room(&mission(), |_| false);
     let guidance = planner.ask(&at(0.0, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Along);
     assert!(guidance.ex > 0.999 && guidance.ey.abs() < 0.03, "{guidance:?}");
@@ -94,10 +98,8 @@ fn an_empty_room_is_crossed_straight() {
 
 /// A planner with the field of an empty room, and the keyframe of a wall that is open only above y = 1.
 fn with_a_wall_to_come() -> (Planner, impl Fn(u64) -> (GridHeader, Vec<u8>)) {
-    let frame = mission_of(200).grid_frame();
-    let mut planner = sent(&mission_of(200));
-    let (header, cells) = keyframe_of(frame, 1, |_| false);
-    planner.take_grid(&header, &cells).unwrap();
+    let (mission, frame) = (mission_of(200), mission_of(200).grid_frame());
+    let planner = in_room(&mission, |_| false);
     let wall = |at: DVec2| (at.x - 0.7).abs() < 0.06 && at.y < 1.0;
     (planner, move |version| keyframe_of(frame, version, wall))
 }
@@ -130,19 +132,15 @@ fn a_wall_that_appears_on_the_way_ahead_is_solved_for_in_the_tick() {
 
 #[test]
 fn a_robot_walled_in_hears_that_the_target_is_unreachable() {
-    let mut planner = sent(&mission());
     let ring = |at: DVec2| (0.5..0.75).contains(&at.length());
-    let (header, cells) = keyframe(1, ring);
-    planner.take_grid(&header, &cells).unwrap();
+    let mut planner = in_room(&mission(), ring);
     assert_eq!(status(&planner.ask(&at(0.0, 0.0))), GuidanceStatus::Unreachable);
 }
 
 #[test]
 fn a_robot_on_a_hazard_cell_is_shown_the_way_out() {
-    let mut planner = sent(&mission());
     let block = |at: DVec2| at.x.abs() < 0.25 && at.y.abs() < 0.45;
-    let (header, cells) = keyframe(1, block);
-    planner.take_grid(&header, &cells).unwrap();
+    let mut planner = in_room(&mission(), block);
     let guidance = planner.ask(&at(-0.15, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::WayOut);
     assert!(guidance.ex < -0.9, "the nearest free cell lies to the left: {guidance:?}");
@@ -150,9 +148,7 @@ fn a_robot_on_a_hazard_cell_is_shown_the_way_out() {
 
 #[test]
 fn in_the_targets_cell_the_rest_is_straight() {
-    let mut planner = sent(&mission());
-    let (header, cells) = keyframe(1, |_| false);
-    planner.take_grid(&header, &cells).unwrap();
+    let mut planner = in_room(&mission(), |_| false);
     let guidance = planner.ask(&at(1.48, 0.02));
     assert!((guidance.ex - 0.5_f64.sqrt()).abs() < 1e-9, "{guidance:?}");
 }
@@ -171,8 +167,7 @@ fn evidential(scanned: impl Fn(DVec2) -> bool) -> Planner {
     // The first of the beams looked ahead.
     header.clear_beams.swap(0, 5);
     let frame = mission.grid_frame();
-    for (index, state) in cells.iter_mut().enumerate() {
-        let cell = grid::Cell { col: index as u32 % frame.cells, row: index as u32 / frame.cells };
+    for (cell, state) in frame.whole().cells().zip(&mut cells) {
         if *state == CellState::Free as u8 && scanned(frame.centre_of(cell)) {
             *state = CellState::Scanned as u8;
         }
@@ -195,9 +190,7 @@ fn an_evidential_robot_looks_where_nobody_looked_before_it_goes_there() {
 #[test]
 fn an_evidential_robot_without_sensing_does_not_look_first() {
     let mission = Mission { method: Method::Evidential, sensing: false, ..mission() };
-    let mut planner = sent(&mission);
-    let (header, cells) = keyframe(1, |_| false);
-    planner.take_grid(&header, &cells).unwrap();
+    let mut planner = in_room(&mission, |_| false);
     let guidance = planner.ask(&at(0.0, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Along);
     assert_eq!(guidance.speed_limit_m_s, f64::INFINITY);
@@ -278,10 +271,9 @@ impl LargeRoom {
     /// Make the cells hazard for whose centres `becomes` says so.
     fn block(&mut self, becomes: impl Fn(DVec2) -> bool) {
         let frame = self.header.part.frame();
-        for (index, cell) in (0..).zip(&mut self.cells) {
-            let (col, row) = (index % LARGE, index / LARGE);
-            if becomes(frame.centre_of(grid::Cell { col, row })) {
-                *cell = CellState::Sensed as u8;
+        for (cell, state) in frame.whole().cells().zip(&mut self.cells) {
+            if becomes(frame.centre_of(cell)) {
+                *state = CellState::Sensed as u8;
             }
         }
         self.header.part.version += 1;

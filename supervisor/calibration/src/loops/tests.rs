@@ -57,7 +57,7 @@ fn ratio_and_track_are_found_within_their_stated_deviations() {
         let (mut ratios, mut tracks) = (Vec::new(), Vec::new());
         for seed in 1..=60 {
             let loops = drawn(seed, 8, 1.006, 0.98, slip);
-            let estimate = Estimate::of(&loops, NORMAL_SD, TRACK_M).unwrap();
+            let estimate = Estimate::by_loops(&loops, NORMAL_SD, TRACK_M).unwrap();
             ratios.push((estimate.ratio() - 1.006) / estimate.ratio_sd());
             tracks.push((estimate.track() - 0.98) / estimate.track_sd());
             assert!(estimate.ratio_sd() < 1.5 * slip.max(0.0005), "{estimate:?}");
@@ -78,7 +78,7 @@ fn the_slip_of_the_floor_is_found() {
         let found: Vec<f64> = (1..=20)
             .map(|seed| {
                 let loops = drawn(seed, 12, 1.0, 1.0, slip);
-                Estimate::of(&loops, NORMAL_SD, TRACK_M).unwrap().slip
+                Estimate::by_loops(&loops, NORMAL_SD, TRACK_M).unwrap().slip
             })
             .collect();
         let mean = found.iter().sum::<f64>() / 20.0;

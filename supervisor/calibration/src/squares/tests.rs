@@ -1,36 +1,26 @@
 //! Tests of the squares.
 
 use super::*;
-
-const DT: f64 = 1.0 / 7.0;
-
-fn body() -> Body {
-    common::mission::Model::X80.body()
-}
+use crate::wall::tests::{body, counts_of, obeyed};
 
 /// Drive a square with wheels of this ratio and track, which do not slip.
 fn drive(ratio: f64, track: f64, to_the_left: bool) -> Driven {
-    let wheels = Wheels::of((ratio - 1.0) / (ratio + 1.0), track);
+    let wheels = Wheels { e: (ratio - 1.0) / (ratio + 1.0), track };
     let mut square = Square::new(2.0, to_the_left);
     let mut pose = Pose2::default();
-    let (mut nominal, mut ways) = ([0.0, 0.0], Vec::new());
+    let (mut nominal, mut ways) = ([0.0; 2], Vec::new());
     for _ in 0..2000 {
-        let counts = nominal.map(|way: f64| {
-            ((way / body().metres_per_count()).round() as i64).rem_euclid(32_768) as u16
-        });
-        let order = square.step(counts, &body());
-        let (v, omega) = match order.status {
-            GuidanceStatus::Look => {
-                (0.0, (3.0 * order.aside_rad.abs()).clamp(0.25, 1.5) * order.aside_rad.signum())
-            }
-            GuidanceStatus::Along => (order.speed_limit_m_s, 0.2 * order.aside_rad.sin()),
-            _ => break,
-        };
-        let half = omega * body().track_m / 2.0;
-        let step = [(v - half) * DT, (v + half) * DT];
+        let order = square.step(counts_of(nominal), &body());
+        if order.status == GuidanceStatus::AtTarget {
+            break;
+        }
+        let step = obeyed(&order);
         nominal = [nominal[0] + step[0], nominal[1] + step[1]];
         ways.push(step);
-        pose = pose.along_arc(v * DT, wheels.turned(step[0], step[1], body().track_m));
+        pose = pose.along_arc(
+            f64::midpoint(step[0], step[1]),
+            wheels.turned(step[0], step[1], body().track_m),
+        );
     }
     assert_eq!(square.state(), State::Finished);
     Driven { ways, end: pose.position }

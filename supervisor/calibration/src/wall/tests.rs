@@ -1,73 +1,74 @@
 //! Tests of the procedure, on a robot whose wheels and world are a few lines.
 
-use common::checkpoint::Checkpoint;
+use common::{checkpoint::Checkpoint, kinematics::Pose2};
 
 use super::*;
 
 const DT: f64 = 1.0 / 7.0;
 const WALL_M: f64 = 1.0;
 
-fn body() -> Body {
+pub(crate) fn body() -> Body {
     common::mission::Model::X80.body()
+}
+
+pub(crate) fn counts_of(ways: [f64; 2]) -> [u16; 2] {
+    ways.map(|way| ((way / body().metres_per_count()).round() as i64).rem_euclid(32_768) as u16)
+}
+
+/// Nominal ways of the wheels in the next tick of a robot that obeys.
+pub(crate) fn obeyed(order: &Order) -> [f64; 2] {
+    let aside = order.aside_rad;
+    let (v, omega) = match order.status {
+        GuidanceStatus::Look => (0.0, (3.0 * aside.abs()).clamp(0.25, 1.5) * aside.signum()),
+        GuidanceStatus::Along => (order.speed_limit_m_s.min(0.35), 0.2 * aside.sin()),
+        _ => (0.0, 0.0),
+    };
+    [-1.0, 1.0].map(|side| (v + side * omega * body().track_m / 2.0) * DT)
 }
 
 /// A robot that follows its orders, before a wall that answers within 22 degrees of its normal.
 struct Robot {
-    x: f64,
-    y: f64,
-    heading: f64,
+    pose: Pose2,
     ratio: f64,
     track: f64,
-    /// Nominal ways, metres.
-    left: f64,
-    right: f64,
+    /// Nominal, metres.
+    ways: [f64; 2],
     wall: bool,
 }
 
 impl Robot {
     fn new(ratio: f64, track: f64) -> Self {
-        let (x, y, heading) = (0.0, 0.0, 0.1);
-        Self { x, y, heading, ratio, track, left: 0.0, right: 0.0, wall: true }
-    }
-
-    fn counts(&self) -> [u16; 2] {
-        [self.left, self.right]
-            .map(|way| ((way / body().metres_per_count()).round() as i64).rem_euclid(32_768) as u16)
+        let pose = Pose2 { heading: 0.1, ..Pose2::default() };
+        Self { pose, ratio, track, ways: [0.0; 2], wall: true }
     }
 
     fn echo(&self) -> Option<f64> {
-        let aside = (self.heading + PI).rem_euclid(TAU) - PI;
-        let range = WALL_M - self.x - 0.19 * aside.cos();
+        let aside = (self.pose.heading + PI).rem_euclid(TAU) - PI;
+        let range = WALL_M - self.pose.position.x - 0.19 * aside.cos();
         (self.wall && aside.abs() < 0.384 && range < 2.55)
             .then_some((range * 100.0).round() / 100.0)
     }
 
     fn obey(&mut self, order: &Order) {
-        let (v, omega) = match order.status {
-            GuidanceStatus::Look => {
-                (0.0, (3.0 * order.aside_rad.abs()).clamp(0.25, 1.5) * order.aside_rad.signum())
-            }
-            GuidanceStatus::Along => (order.speed_limit_m_s.min(0.35), 0.2 * order.aside_rad.sin()),
-            _ => (0.0, 0.0),
-        };
-        let track_m = body().track_m;
-        let (left, right) = ((v - omega * track_m / 2.0) * DT, (v + omega * track_m / 2.0) * DT);
-        self.left += left;
-        self.right += right;
+        let step = obeyed(order);
+        self.ways = [0, 1].map(|side| self.ways[side] + step[side]);
         let both = 2.0 / (1.0 + self.ratio);
-        let (left, right) = (left * both, right * both * self.ratio);
-        self.heading += (right - left) / (track_m * self.track);
-        self.x += f64::midpoint(left, right) * self.heading.cos();
-        self.y += f64::midpoint(left, right) * self.heading.sin();
+        let (left, right) = (step[0] * both, step[1] * both * self.ratio);
+        let turn = (right - left) / (body().track_m * self.track);
+        self.pose = self.pose.along_arc(f64::midpoint(left, right), turn);
     }
 }
 
 fn run(robot: &mut Robot, plan: CalibrationPlan) -> Wall {
     let mut wall = Wall::new(plan);
     for _ in 0..20_000 {
-        let order = wall.step(robot.counts(), robot.echo(), &body());
+        let order = wall.step(counts_of(robot.ways), robot.echo(), &body());
         robot.obey(&order);
-        assert!(robot.x < WALL_M - 0.25, "it came too near the wall: {:?}", wall.phase);
+        assert!(
+            robot.pose.position.x < WALL_M - 0.25,
+            "it came too near the wall: {:?}",
+            wall.phase
+        );
         if wall.state() != State::Running {
             break;
         }
@@ -86,7 +87,8 @@ fn a_robot_that_does_not_slip_is_calibrated_to_a_thousandth_and_stands_where_it_
             crate::loops::checked(wall.loops(), wall.normal_sd(), body().track_m).unwrap();
         assert!((estimate.ratio() - ratio).abs() < 0.001, "{ratio}: {}", estimate.ratio());
         assert!((estimate.track() - track).abs() < 0.002, "{track}: {}", estimate.track());
-        assert!(robot.y.abs() < 1.0, "it drifted along the wall: {}", robot.y);
+        let y = robot.pose.position.y;
+        assert!(y.abs() < 1.0, "it drifted along the wall: {y}");
     }
 }
 
@@ -109,7 +111,7 @@ fn without_a_wall_it_fails_and_the_run_ends() {
     let mut robot = Robot::new(1.0, 1.0);
     robot.wall = false;
     // Nothing is in the way of a robot without a wall.
-    robot.x = -4.0;
+    robot.pose.position.x = -4.0;
     let wall = run(&mut robot, CalibrationPlan::default());
     assert_eq!(wall.state(), State::Failed(Fault::NoWall));
     assert_eq!(wall.order(0.0, None).status, GuidanceStatus::AtTarget, "the run ends");

@@ -7,7 +7,7 @@ fn mapper() -> Mapper {
     let text = "target = [2, 0]\nrobot.model = 'kobuki'\nperimeter = { width_m = 5, cells = 50 }\n\
         [[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nchannel = 0\nforward_m = 0\nbearing_deg = 0\nmodel = 'rplidar-a1'\n\
         [[robot.sensor]]\nname = 'sonar'\nkind = 'cone'\nchannel = 0\nforward_m = 0.2\nbearing_deg = 0\n";
-    Mapper::new(&Mission::parse(text, Path::new("test.toml")).unwrap())
+    mapper_of(text)
 }
 
 /// A robot at the origin facing along x whose laser sees a wall across its way at `wall` metres, and whose sonar hears an echo.
@@ -16,20 +16,14 @@ fn sense(mapper: &mut Mapper, tick: u64, wall: f64, echo: f64) {
         let ahead = (f64::from(degrees) - 180.0).to_radians().cos();
         if ahead > 0.1 { (wall / ahead) as f32 } else { f32::INFINITY }
     };
-    let sonar = RangeReading { sensor: 1, ..reading(RangeStatus::Measured, echo) };
-    let input = Input::Tick {
+    let sonar = RangeReading { sensor: 1, ..super::echo(echo) };
+    let scan = (0..360).map(beam).collect();
+    mapper.give(Tick {
         pose: at(tick, 0.0, 0.0, 0.0),
         ranges: vec![sonar],
-        scan: (0..360).map(beam).collect(),
-        contact: None,
-        target: None,
-    };
-    mapper.step(input, MissionTime(0));
-}
-
-fn is_hazard(mapper: &Mapper, x: f64, y: f64) -> bool {
-    let cell = mapper.frame().cell_at(DVec2::new(x, y)).unwrap();
-    CellState::from_byte(mapper.state().cells()[mapper.frame().index(cell)]).is_hazard()
+        scan,
+        ..Tick::default()
+    });
 }
 
 #[test]
@@ -38,7 +32,7 @@ fn a_thing_that_the_laser_looks_over_is_hazard_while_the_sonar_hears_it_and_afte
     for tick in 0..20 {
         sense(&mut mapper, tick, 2.0, 0.4);
     }
-    assert!(is_hazard(&mapper, 0.6, 0.0));
+    assert!(mapper.is_hazard(0.6, 0.0));
     let mut restarted = self::mapper();
     restarted.restore(mapper.state().clone()).unwrap();
     for mapper in [&mut mapper, &mut restarted] {
@@ -48,25 +42,21 @@ fn a_thing_that_the_laser_looks_over_is_hazard_while_the_sonar_hears_it_and_afte
     for tick in 21..40 {
         sense(&mut mapper, tick, 2.0, 1.8);
     }
-    assert!(!is_hazard(&mapper, 0.6, 0.0), "the sonar hears that it is gone");
+    assert!(!mapper.is_hazard(0.6, 0.0), "the sonar hears that it is gone");
 }
 
 #[test]
 fn an_echo_of_what_the_laser_sees_marks_nothing_beside_it() {
     let mut mapper = mapper();
-    let hazards = |mapper: &Mapper| {
-        let cells = mapper.state().cells().iter();
-        cells.filter(|cell| CellState::from_byte(**cell).is_hazard()).count()
-    };
     sense(&mut mapper, 0, 1.0, 0.8);
-    let by_scan = hazards(&mapper);
+    let by_scan = mapper.hazards();
     for tick in 1..5 {
         // The range has the noise of the sonar.
         sense(&mut mapper, tick, 1.0, 0.78 + 0.01 * tick as f64);
     }
-    assert_eq!(hazards(&mapper), by_scan);
+    assert_eq!(mapper.hazards(), by_scan);
     sense(&mut mapper, 5, 1.0, 0.5);
-    assert!(hazards(&mapper) > by_scan, "another echo does");
+    assert!(mapper.hazards() > by_scan, "another echo does");
 }
 
 #[test]
@@ -78,7 +68,7 @@ fn a_pane_of_glass_stays_though_the_laser_looks_through_it_at_a_slant() {
     for tick in 5..15 {
         sense(&mut mapper, tick, 2.0, 0.5);
     }
-    assert!(is_hazard(&mapper, 0.6, 0.0));
+    assert!(mapper.is_hazard(0.6, 0.0));
 }
 
 /// The least y that is hazard before the wall y = 1.25, for several x, by a laser with this row that is mounted at `at`, metres ahead
@@ -88,7 +78,7 @@ fn wall_of(row: &str, at: DVec2, looks_deg: f64) -> Vec<f64> {
         "target = [2, 0]\nrobot.model = 'create3'\nperimeter = {{ width_m = 5, cells = 100 }}\n\
         [[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nchannel = 0\nmodel = 'rplidar-a1'\n{row}\n"
     );
-    let mut mapper = Mapper::new(&Mission::parse(&text, Path::new("test.toml")).unwrap());
+    let mut mapper = mapper_of(&text);
     let robot = Pose2 { position: DVec2::new(0.3, -0.2), heading: 0.5 };
     let origin = robot.position + DVec2::from_angle(robot.heading).rotate(at);
     let beam = |degrees: u32| {
@@ -96,19 +86,14 @@ fn wall_of(row: &str, at: DVec2, looks_deg: f64) -> Vec<f64> {
         let range = (1.25 - origin.y) / along.sin();
         if (0.0..3.0).contains(&range) { range as f32 } else { f32::INFINITY }
     };
+    let Pose2 { position, heading } = robot;
     for tick in 0..5 {
-        let input = Input::Tick {
-            pose: super::at(tick, robot.position.x, robot.position.y, robot.heading),
-            ranges: Vec::new(),
-            scan: (0..360).map(beam).collect(),
-            contact: None,
-            target: None,
-        };
-        mapper.step(input, MissionTime(0));
+        let pose = super::at(tick, position.x, position.y, heading);
+        mapper.give(Tick { pose, scan: (0..360).map(beam).collect(), ..Tick::default() });
     }
     let before = |x: f64| {
         let mut ys = (0..70).map(|step| 0.525 + 0.05 * f64::from(step) / 2.0);
-        ys.find(|y| is_hazard(&mapper, x, *y)).unwrap_or(f64::INFINITY)
+        ys.find(|y| mapper.is_hazard(x, *y)).unwrap_or(f64::INFINITY)
     };
     [-0.5, 0.0, 0.3, 0.8, 1.2].map(before).to_vec()
 }
@@ -174,8 +159,7 @@ fn a_scan_is_matched_and_mapped_where_it_was_taken_however_late_it_is_and_howeve
                 mapper.step(Input::Sweep(tick, sweep), pose.stamp.time());
             }
             let scan = scan_in_room(s, sweep);
-            let (ranges, contact, target) = (Vec::new(), None, None);
-            mapper.step(Input::Tick { pose, ranges, scan, contact, target }, pose.stamp.time());
+            mapper.give(Tick { pose, scan, ..Tick::default() });
             let Some(fix) = mapper.take_fix() else {
                 assert!(tick < 15, "{sweep:?} {tick}");
                 continue;
@@ -187,12 +171,10 @@ fn a_scan_is_matched_and_mapped_where_it_was_taken_however_late_it_is_and_howeve
         }
         let reach = hazard_reach_m(&mission);
         let frame = mapper.frame();
-        for (row, col) in (0..80).flat_map(|row| (0..80).map(move |col| (row, col))) {
-            let cell = Cell { col, row };
+        for cell in frame.whole().cells() {
             let there = frame.centre_of(cell);
-            let state = CellState::from_byte(mapper.state().cells()[frame.index(cell)]);
             let to_wall = (3.0 - there.x.abs()).min(2.0 - there.y.abs());
-            let is_free_ground = state.is_hazard() && to_wall > reach + 0.1;
+            let is_free_ground = mapper.is_hazard(there.x, there.y) && to_wall > reach + 0.1;
             assert!(!is_free_ground, "{sweep:?}: {there} is {to_wall} m from a wall");
         }
     }
@@ -212,9 +194,7 @@ fn a_scan_of_impossible_times_is_left_out() {
             mapper.step(Input::Sweep(tick, sweep), MissionTime(0));
             let mut pose = at(tick, 0.0, 0.0, 0.0);
             (pose.stamp.stamp_ns, pose.v_m_s) = (tick * 100_000_000, 0.3);
-            let (ranges, scan) = (Vec::new(), vec![1.0; 360]);
-            let tick = Input::Tick { pose, ranges, scan, contact: None, target: None };
-            mapper.step(tick, pose.stamp.time());
+            mapper.give(Tick { pose, scan: vec![1.0; 360], ..Tick::default() });
             assert!(mapper.take_fix().is_none());
         }
         assert_eq!(mapper.state().cells(), before, "{sweep:?}");
