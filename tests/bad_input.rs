@@ -30,23 +30,49 @@ fn an_invalid_mission_is_refused_with_line_key_and_remedy_by_check_and_run_alike
 }
 
 #[test]
-fn an_unknown_mission_is_answered_with_those_there_are() {
-    let names = ["moon", "obstacle-course"];
-    refused(&["run", "moon"], "unknown-mission", &names);
-    let missing = "/no/such/file.toml";
-    refused(&["check", missing], "mission", &[missing]);
-}
-
-#[test]
-fn an_unknown_stage_is_answered_with_those_there_are() {
-    let stage = ["stage", "warp", "--run", "/tmp", "--supervisor", "1"];
-    refused(&stage, "unknown-stage", &["warp", "dead-reckoning"]);
+fn what_is_not_there_or_cannot_be_is_named_with_what_there_is() {
+    let cases: [(&[&str], _, &[&str]); 15] = [
+        (&["run", "moon"], "unknown-mission", &["moon", "obstacle-course"]),
+        (&["check", "/no/such/file.toml"], "mission", &["/no/such/file.toml"]),
+        (
+            &["stage", "warp", "--run", "/tmp", "--supervisor", "1"],
+            "unknown-stage",
+            &["warp", "dead-reckoning"],
+        ),
+        (&["stage", "restart", "wheel"], "unknown-stage", &["dead-reckoning"]),
+        (&["stage", "fault", "wheel", "spin"], "unknown-stage", &["dead-reckoning"]),
+        (
+            &["stage", "fault", "mapper", "saddle"],
+            "unknown-fault",
+            &["hazard-around-robot", "spin"],
+        ),
+        (&["stage", "fault", "mapper", "spin", "--robot", "ghost"], "not-running", &["ghost"]),
+        (&["stop", "--robot", "ghost"], "not-running", &["ghost"]),
+        (&["status", "--robot", "ghost"], "not-running", &["ghost", "firsthand run"]),
+        (&["goto", "1", "1", "--robot", "ghost"], "not-running", &["ghost"]),
+        (
+            &["run", "--robot", "ghost", "--set", "robot.address='not an address'"],
+            "mission",
+            &["not an address", "robot.address"],
+        ),
+        (&["run", "--pace", "warp"], "usage", &["warp"]),
+        (&["run", "--robot", "../x"], "usage", &["../x"]),
+        (&["bench", "chaos", "--robot-faults=honest"], "usage", &["honest", "encoder-dead"]),
+        (&["experiments", "--only", "6"], "unknown-experiment", &["5-modulated"]),
+    ];
+    for (arguments, code, names) in cases {
+        refused(arguments, code, names);
+    }
+    // The assignment is cited, and no line of the file.
+    let output = output(&["run", "trap", "--set", "perimeter.cells=3"]);
+    assert_refused(&output, "mission", &["--set perimeter.cells=3"]);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(!said.contains("trap.toml:"), "{said}");
 }
 
 #[test]
 fn a_second_supervisor_of_a_robot_is_refused_and_the_first_goes_on() {
-    let mut first = Run::start("second", "obstacle-course", &["--pace", "1"]);
-    first.wait_until_under_way(0.3);
+    let first = Run::under_way("second", "obstacle-course", &["--pace", "1"], 0.3);
     let runs = tempfile::tempdir().unwrap();
     let runs = runs.path().to_str().unwrap();
     let pid = first.pid().to_string();
@@ -65,33 +91,12 @@ fn a_port_in_use_is_named() {
 }
 
 #[test]
-fn a_malformed_robot_address_is_named() {
-    let runs = tempfile::tempdir().unwrap();
-    let runs = runs.path().to_str().unwrap();
-    let set = "robot.address='not an address'";
-    let run = ["run", "--robot", "nowhere", "--runs", runs, "--set", set];
-    let names = ["not an address", "robot.address"];
-    assert_eq!(refused(&run, "mission", &names), Some(78));
-    assert_nothing_left("nowhere");
-}
-
-#[test]
-fn a_robot_that_does_not_run_is_named_with_how_to_start_it() {
-    let status = ["status", "--robot", "ghost"];
-    refused(&status, "not-running", &["ghost", "firsthand run"]);
-}
-
-#[test]
-fn a_bad_pace_or_robot_name_is_refused_by_the_command_line() {
-    refused(&["run", "--pace", "warp"], "usage", &["warp"]);
-    refused(&["run", "--robot", "../x"], "usage", &["../x"]);
-}
-
-#[test]
-fn results_of_an_earlier_run_are_not_overwritten() {
+fn results_of_an_earlier_run_are_not_overwritten_and_a_run_that_ended_is_not_resumed() {
     let (_, directory) = Run::start("bi-again", "open-room", &[]).arrives_in();
     let out = directory.path().join("run");
     let out = out.to_str().unwrap();
     let second = ["run", "open-room", "--robot", "bi-again", "--out", out];
     refused(&second, "results-there", &[out]);
+    refused(&["run", "--resume", out], "ended", &[out]);
+    refused(&["run", "--resume", "/no/such/run"], "no-run", &["/no/such/run"]);
 }

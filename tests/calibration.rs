@@ -1,42 +1,32 @@
 //! Tests of calibrations through real processes.
 
-use std::path::Path;
+use std::{path::PathBuf, process::Output};
 
-use common::mission::{Calibration, Odometry};
+use common::mission::Calibration;
 use serde_json::Value;
+use tempfile::TempDir;
 
-use crate::support::{assert_nothing_left, directory_of, printed, refused};
+use crate::support::{assert_nothing_left, assert_refused, directory_of, output, printed};
 
-/// Wheels that only the simulator knows: a larger right wheel on a narrower track, on a floor as measured.
-const UNKNOWN: [&str; 8] = [
-    "--set",
-    "simulation.wheels.diameter_ratio=1.006",
-    "--set",
-    "simulation.wheels.diameter_spread=0",
-    "--set",
-    "simulation.wheels.track_scale=0.985",
-    "--set",
-    "simulation.wheels.track_spread=0",
-];
-const NO_BIAS: [&str; 2] = ["--set", "simulation.wheels.slip_share_spread=0"];
-
-fn words<'a>(robot: &'a str, folder: &'a str, out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
-    let own = ["calibrate", "--robot", robot, "--runs", folder, "--out", out, "--json"];
-    [&own, &UNKNOWN[..], &NO_BIAS, more].concat()
-}
-
-fn read(file: &Path) -> Odometry {
-    Calibration::parse(&std::fs::read_to_string(file).unwrap()).unwrap()
+/// Calibrate wheels that only the simulator knows: a larger right wheel on a narrower track, on a floor as measured. Returns what the
+/// command printed, and the file that it is to write.
+fn calibrated(robot: &str, more: &[&str]) -> (Output, PathBuf, TempDir) {
+    let folder = directory_of(robot);
+    let out = folder.path().join("calibration.toml");
+    let (folder_name, out_name) = (folder.path().to_str().unwrap(), out.to_str().unwrap());
+    let files = ["calibrate", "--robot", robot, "--runs", folder_name, "--out", out_name];
+    let wheels = "simulation.wheels={diameter_ratio=1.006,diameter_spread=0,track_scale=0.985,\
+                  track_spread=0,slip_share_spread=0}";
+    let said = output(&[&files[..], &["--json", "--set", wheels], more].concat());
+    assert_nothing_left(robot);
+    (said, out, folder)
 }
 
 #[test]
 fn unknown_wheels_are_found_within_three_deviations_and_written() {
-    let folder = directory_of("calibrated");
-    let out = folder.path().join("calibration.toml");
-    let (folder_name, out_name) = (folder.path().to_str().unwrap(), out.to_str().unwrap());
-    let said = printed(&words("calibrated", folder_name, out_name, &["--seed", "3"]));
-    let said: Value = serde_json::from_str(&said).unwrap();
-    let found = read(&out);
+    let (said, out, _folder) = calibrated("calibrated", &["--seed", "3"]);
+    let said: Value = serde_json::from_slice(&said.stdout).unwrap();
+    let found = Calibration::parse(&std::fs::read_to_string(out).unwrap()).unwrap();
     let is_near = |value: f64, sd: f64, truth: f64, most_sd: f64| {
         assert!((value - truth).abs() <= 3.0 * sd, "{value} +- {sd}, not {truth}: {said}");
         assert!(sd > 0.0 && sd <= most_sd, "{sd}: {said}");
@@ -49,7 +39,6 @@ fn unknown_wheels_are_found_within_three_deviations_and_written() {
     assert!(provenance.metres > 20.0 && provenance.chi2_per_dof < 4.0, "{provenance:?}");
     let picture = std::fs::read_to_string(said["picture"].as_str().unwrap()).unwrap();
     assert!(picture.starts_with("<svg"), "{picture:.20}");
-    assert_nothing_left("calibrated");
 }
 
 #[test]
@@ -73,13 +62,10 @@ fn the_response_of_a_stated_base_is_found_again() {
 
 #[test]
 fn without_a_wall_nothing_is_written() {
-    let folder = directory_of("no-wall");
-    let out = folder.path().join("calibration.toml");
-    let (folder_name, out_name) = (folder.path().to_str().unwrap(), out.to_str().unwrap());
     // No wall answers this sonar.
     let deaf =
         ["--set", "simulation.sonar.wall_limit_deg=0", "--set", "simulation.sonar.edge_share=0"];
-    refused(&words("no-wall", folder_name, out_name, &deaf), "not-calibrated", &["wall"]);
+    let (said, out, _folder) = calibrated("no-wall", &deaf);
+    assert_refused(&said, "not-calibrated", &["wall"]);
     assert!(!out.exists());
-    assert_nothing_left("no-wall");
 }

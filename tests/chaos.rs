@@ -1,14 +1,23 @@
 //! Tests of `firsthand bench chaos` through real processes: its table of signals, and consumers that are hit.
 
-use std::{fs, process::Stdio, time::Instant};
+use std::fs;
 
 use common::domain::SUITE_VARIABLE;
 use serde_json::Value;
 
-use crate::support::{self, PATIENCE, assert_nothing_left, firsthand, output, refused, status_of};
+use crate::support::{
+    self, assert_nothing_left, firsthand, json_of, output, refused, start_quietly,
+};
 
-/// Arguments for a mission that also a machine with other work completes.
-const SLOW: [&str; 4] = ["--set", "timeout_s=600", "--set", "controller.speed_m_s=0.2"];
+/// The report of chaos on a mission that also a machine with other work completes.
+fn chaos(robot: &str, arguments: &[&str]) -> Value {
+    let slow = ["--set", "timeout_s=600", "--set", "controller.speed_m_s=0.2"];
+    let open_room = ["bench", "chaos", "open-room", "--json", "--robot", robot];
+    let (exit, report) = json_of(&output(&[&open_room[..], &slow, arguments].concat()));
+    assert_eq!(exit.code(), Some(0), "{report:?}");
+    assert_nothing_left(robot);
+    report[0].clone()
+}
 
 fn number(value: &Value) -> u64 {
     value.as_u64().unwrap_or_default()
@@ -36,12 +45,8 @@ fn processes(mark: &str) -> Vec<String> {
 fn each_signal_of_chaos_is_a_row_of_its_table() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("results");
-    let arguments = ["bench", "chaos", "open-room", "--kills", "12", "--include-startup"];
-    let robot = ["--robot", "chd-rows", "--json", "--out", out.to_str().unwrap()];
-    let ended = output(&[&arguments[..], &robot, &SLOW].concat());
-    let report: Value =
-        serde_json::from_slice(&ended.stdout).unwrap_or_else(|_| panic!("{ended:?}"));
-    assert_eq!(ended.status.code(), Some(0), "{report}");
+    let kills = ["--kills", "12", "--include-startup", "--out", out.to_str().unwrap()];
+    let report = chaos("chd-rows", &kills);
     let table = fs::read_to_string(out.join("signals.csv")).unwrap();
     let mut rows = table.lines().map(|row| row.split(',').collect::<Vec<_>>());
     let header = rows.next().unwrap();
@@ -66,19 +71,13 @@ fn each_signal_of_chaos_is_a_row_of_its_table() {
     for name in ["noticed_ms", "ready_ms", "first_output_ms"] {
         assert!(measured(name) >= rows.len() / 2, "{name}: {table}");
     }
-    assert_nothing_left("chd-rows");
 }
 
 #[test]
 fn consumers_that_are_killed_and_frozen_do_not_change_the_outcome_and_leave_nothing() {
     let given = format!("'{}' topic echo pose --robot chd-hit", env!("CARGO_BIN_EXE_firsthand"));
-    let arguments =
-        ["bench", "chaos", "open-room", "--kills", "30", "--include-consumers", "--replay"];
-    let robot = ["--robot", "chd-hit", "--json", "--consumer", &given];
-    let ended = output(&[&arguments[..], &robot, &SLOW].concat());
-    let report: Value =
-        serde_json::from_slice(&ended.stdout).unwrap_or_else(|_| panic!("{ended:?}"));
-    assert_eq!(ended.status.code(), Some(0), "{report}");
+    let kills = ["--kills", "30", "--include-consumers", "--replay", "--consumer", &given];
+    let report = chaos("chd-hit", &kills);
     assert_eq!(report["reached"], report["missions"], "{report}");
     assert_eq!(report["leftovers"], 0, "{report}");
     let consumers = &report["consumers"];
@@ -95,46 +94,29 @@ fn consumers_that_are_killed_and_frozen_do_not_change_the_outcome_and_leave_noth
     let partial = &report["replays"]["partial"];
     assert!(number(&partial["equal"]) > 0, "{report}");
     assert!(partial["not_replayed"].is_u64(), "{report}");
-    assert_nothing_left("chd-hit");
     assert_eq!(processes("chd-hit"), Vec::<String>::new());
 }
 
 #[test]
 fn a_robot_whose_targets_change_while_stages_and_supervisor_are_killed_reaches_each_or_tells() {
-    let arguments = ["bench", "chaos", "open-room", "--kills", "12", "--targets", "--replay"];
-    let robot = ["--robot", "chd-targets", "--include-supervisor", "--json"];
-    let ended = output(&[&arguments[..], &robot, &SLOW].concat());
-    let report: Value =
-        serde_json::from_slice(&ended.stdout).unwrap_or_else(|_| panic!("{ended:?}"));
-    assert_eq!(ended.status.code(), Some(0), "{report}");
+    let kills = ["--kills", "12", "--targets", "--replay", "--include-supervisor"];
+    let report = chaos("chd-targets", &kills);
     assert_eq!(report["collisions"], 0, "{report}");
     let targets = &report["targets"];
     assert!(number(&targets["taken"]) >= 2 && number(&targets["reached"]) >= 1, "{report}");
     assert_eq!(targets["wrong"].as_array().map(Vec::len), Some(0), "{report}");
-    assert_nothing_left("chd-targets");
 }
 
 #[test]
 fn chaos_that_is_killed_keeps_its_rows_and_its_consumers_end_with_it() {
     let directory = tempfile::tempdir().unwrap();
     let given = format!("'{}' topic echo pose --robot chd-cut", env!("CARGO_BIN_EXE_firsthand"));
-    let mut chaos =
-        firsthand(&["bench", "chaos", "obstacle-course", "--robot", "chd-cut", "--out"])
-            .arg(directory.path())
-            .args(["--consumer", &given])
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
+    let mut command =
+        firsthand(&["bench", "chaos", "obstacle-course", "--robot", "chd-cut", "--out"]);
+    let mut chaos = start_quietly(command.arg(directory.path()).args(["--consumer", &given]));
     let file = directory.path().join("signals.csv");
     let rows = || fs::read_to_string(&file).unwrap_or_default();
-    let began = Instant::now();
-    while rows().lines().count() < 4 {
-        assert!(began.elapsed() < PATIENCE, "{}", rows());
-        assert_eq!(chaos.try_wait().unwrap(), None);
-        // Each answer waits for the supervisor's next sample.
-        status_of("chd-cut");
-    }
+    support::wait_for_status("chd-cut", |_| rows().lines().count() >= 4);
     chaos.kill().unwrap();
     chaos.wait().unwrap();
     let table = rows();
@@ -142,10 +124,7 @@ fn chaos_that_is_killed_keeps_its_rows_and_its_consumers_end_with_it() {
     assert!(table.ends_with('\n') && table.lines().all(|row| columns(row) == 10), "{table}");
     let left = std::env::temp_dir().join(format!("firsthand-chaos-{}", chaos.id()));
     let marks = ["chd-cut", left.to_str().unwrap()];
-    let began = Instant::now();
-    while marks.iter().any(|mark| !processes(mark).is_empty()) {
-        assert!(began.elapsed() < PATIENCE, "{:?}", marks.map(processes));
-    }
+    support::wait_until("all have ended", || marks.iter().all(|mark| processes(mark).is_empty()));
     fs::remove_dir_all(left).unwrap();
 }
 

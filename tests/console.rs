@@ -69,8 +69,7 @@ fn echo_prints_every_topic_with_the_fields_of_its_layout() {
     let robot = "con-echo";
     // The robot is slow enough that all is printed before it arrives.
     let slow = ["--pace", "2", "--set", "controller.speed_m_s=0.05"];
-    let mut run = Run::start(robot, "open-room", &slow);
-    run.wait_until_under_way(0.2);
+    let run = Run::under_way(robot, "open-room", &slow, 0.2);
     let poses = printed(&["topic", "echo", "pose", "--robot", robot, "--json", "-n", "3"]);
     let ticks: Vec<u64> = poses
         .lines()
@@ -151,8 +150,7 @@ fn echo_follows_its_robot_from_run_to_run_and_ends_on_a_signal() {
 #[test]
 fn whatever_prints_without_end_ends_quietly_when_its_reader_closes_the_pipe() {
     let robot = "con-pipe";
-    let mut run = Run::start(robot, "open-room", &["--pace", "1"]);
-    run.wait_until_under_way(0.5);
+    let run = Run::under_way(robot, "open-room", &["--pace", "1"], 0.5);
     for command in [
         &["topic", "echo", "pose"][..],
         &["topic", "echo", "field", "--json"],
@@ -182,8 +180,7 @@ fn whatever_prints_without_end_ends_quietly_when_its_reader_closes_the_pipe() {
 #[test]
 fn hz_counts_every_topic_and_finds_one_that_is_not_published_as_the_table_says() {
     let robot = "con-hz";
-    let mut run = Run::start(robot, "obstacle-course", &["--pace", "1"]);
-    run.wait_until_under_way(0.5);
+    let run = Run::under_way(robot, "obstacle-course", &["--pace", "1"], 0.5);
     let lines = printed(&["topic", "hz", "--robot", robot, "--json", "-n", "2"]);
     let reports: Vec<Value> =
         lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();

@@ -62,8 +62,7 @@ fn listen(robot: &str, enough: impl Fn(&Heard) -> bool) -> Heard {
 #[test]
 fn a_late_consumer_gets_pose_grid_and_field_whole_and_its_leaving_changes_nothing() {
     in_own_process(|| {
-        let mut run = Run::start("consumed", "obstacle-course", &["--pace", "4"]);
-        run.wait_until_under_way(6.0);
+        let run = Run::under_way("consumed", "obstacle-course", &["--pace", "4"], 6.0);
         let heard = listen("consumed", |heard| {
             heard.poses.len() >= 40 && heard.grid_changes >= 3 && heard.field_changes >= 3
         });
@@ -89,8 +88,7 @@ fn a_late_consumer_gets_pose_grid_and_field_whole_and_its_leaving_changes_nothin
         );
 
         let summary = run.arrives();
-        let restarts = summary["restarts"].as_object().unwrap();
-        assert!(restarts.values().all(|times| times == 0), "{summary}");
+        support::assert_no_restart(&summary);
     });
 }
 
@@ -145,8 +143,7 @@ fn a_logger_follows_its_robot_through_five_runs_one_of_them_killed_and_harms_non
             }
             let (code, summary) = started.finish();
             assert_eq!(code, Some(0), "{summary}");
-            let restarts = summary["restarts"].as_object().unwrap();
-            assert!(restarts.values().all(|times| times == 0), "{summary}");
+            support::assert_no_restart(&summary);
             // The pause lets the consumer notice the end of the run; a robot is not started twice within a second.
             std::thread::park_timeout(Duration::from_secs(1));
         }
@@ -159,8 +156,7 @@ fn a_logger_follows_its_robot_through_five_runs_one_of_them_killed_and_harms_non
 #[test]
 fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_notices() {
     in_own_process(|| {
-        let mut run = Run::start("greedy", "open-room", &["--pace", "2"]);
-        run.wait_until_under_way(0.5);
+        let mut run = Run::under_way("greedy", "open-room", &["--pace", "2"], 0.5);
         let bus = Bus::join(&support::domain("greedy"), "greedy").unwrap();
         let mut grids = bus.reader(&topics::GRID).unwrap();
         let mut held = Vec::new();
@@ -230,8 +226,8 @@ fn ten_consumers_that_stay_and_three_that_join_again_and_again_harm_no_stage_and
  {
     in_own_process(|| {
         let robot = "visited-c6";
-        let mut run = Run::start(robot, "obstacle-course", &["--pace", "2", "--timeout", "30"]);
-        run.wait_until_under_way(0.5);
+        let mut run =
+            Run::under_way(robot, "obstacle-course", &["--pace", "2", "--timeout", "30"], 0.5);
         let mut staying = Vec::new();
         for consumer in 0..10 {
             let topic = ["grid", "field"][consumer % 2];
@@ -268,8 +264,7 @@ fn ten_consumers_that_stay_and_three_that_join_again_and_again_harm_no_stage_and
 #[test]
 fn poses_go_on_while_an_operators_stop_holds() {
     in_own_process(|| {
-        let mut run = Run::start("held-poses", "open-room", &["--pace", "2"]);
-        run.wait_until_under_way(0.5);
+        let mut run = Run::under_way("held-poses", "open-room", &["--pace", "2"], 0.5);
         operate("held-poses", &["stop"]);
         run.wait_until("it stands", |status| {
             status["order"] == "stopped by an operator" && status["link"]["stopped"] == true

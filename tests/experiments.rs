@@ -55,9 +55,3 @@ fn experiments_give_a_row_each_and_the_same_ones_again_when_they_were_cut_off() 
     let other = three_of_them(&out, "2", &["--resume"]);
     refused(&other, "other-results", &[]);
 }
-
-#[test]
-fn an_unknown_experiment_is_answered_with_those_there_are() {
-    let unknown = ["experiments", "--only", "6"];
-    refused(&unknown, "unknown-experiment", &["5-modulated"]);
-}

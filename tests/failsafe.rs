@@ -202,8 +202,7 @@ fn stages_end_with_their_supervisor_that_is_killed_and_the_last_command_is_zero(
 
 #[test]
 fn an_operators_stop_is_named_by_the_link() {
-    let mut run = Run::start("named", "obstacle-course", &["--pace", "4"]);
-    run.wait_until_under_way(0.5);
+    let mut run = Run::under_way("named", "obstacle-course", &["--pace", "4"], 0.5);
     operate("named", &["stop"]);
     run.wait_until("the link says why", |status| {
         status["link"]["cause"] == "stopped by an operator" && status["link"]["robot"] == "stands"

@@ -107,8 +107,7 @@ fn a_robot_cut_off_for_good_ends_unreachable_with_a_picture_that_says_so() {
 
 #[test]
 fn a_stage_that_spins_is_aborted_as_hung() {
-    let mut run = Run::start("spins", "open-room", &["--pace", "4"]);
-    run.wait_until_under_way(1.0);
+    let mut run = Run::under_way("spins", "open-room", &["--pace", "4"], 1.0);
     inject("spins", "controller", "spin");
     run.wait_until("it is replaced", |status| {
         generation(status, "controller") == 2 && find(status, "controller")["state"] == "running"
@@ -122,8 +121,7 @@ fn a_stage_that_spins_is_aborted_as_hung() {
 #[test]
 fn a_stage_that_beats_and_answers_nothing_is_replaced_and_nobody_behind_it() {
     let slow = ["--pace", "4", "--set", "controller.speed_m_s=0.02", "--timeout", "2000"];
-    let mut run = Run::start("mutes", "open-room", &slow);
-    run.wait_until_under_way(1.0);
+    let mut run = Run::under_way("mutes", "open-room", &slow, 1.0);
     // The link owes no answer to the output of another stage.
     for stage in STAGES.into_iter().skip(1) {
         let status = run.wait_until("all run and it drives", |status| {
@@ -191,14 +189,4 @@ fn a_real_robot_is_not_broken_unless_it_is_meant_neither_by_the_command_line_nor
         operate("metal", &["stage", "fault", "planner", "saddle", "--break-a-real-robot"]);
         run.stop();
     });
-}
-
-#[test]
-fn a_fault_that_nobody_has_is_refused_with_those_there_are() {
-    let fault = |stage, fault, code, names: &[&str]| {
-        refused(&["stage", "fault", stage, fault, "--robot", "nobody"], code, names);
-    };
-    fault("mapper", "saddle", "unknown-fault", &["hazard-around-robot", "spin"]);
-    fault("wheel", "spin", "unknown-stage", &["dead-reckoning"]);
-    fault("mapper", "spin", "not-running", &["nobody"]);
 }

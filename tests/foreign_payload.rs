@@ -11,8 +11,7 @@ use rustix::process::Signal;
 #[test]
 fn a_consumer_built_against_another_payload_is_refused_with_the_reason() {
     in_own_process(|| {
-        let mut run = Run::start("foreign", "obstacle-course", &["--pace", "1"]);
-        run.wait_until_under_way(0.3);
+        let mut run = Run::under_way("foreign", "obstacle-course", &["--pace", "1"], 0.3);
         let bus = Bus::join(&support::domain("foreign"), "foreigner").unwrap();
         let pose_as_wheels = Topic::<WheelSample>::new(topics::POSE.spec());
         let error = bus.reader(&pose_as_wheels).unwrap_err();

@@ -15,8 +15,7 @@ const SLACK: f64 = 0.020;
 fn freeze_each(robot: &str, times: usize) -> Vec<f64> {
     // At this speed the mission outlasts every freeze.
     let slow = ["--pace", "1", "--set", "controller.speed_m_s=0.002", "--timeout", "80000"];
-    let mut run = Run::start(robot, "open-room", &slow);
-    run.wait_until_under_way(0.5);
+    let mut run = Run::under_way(robot, "open-room", &slow, 0.5);
     for _ in 0..times {
         for stage in STAGES {
             let status = run.wait_until_all_run();

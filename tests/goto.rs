@@ -60,8 +60,7 @@ fn assert_replays(run: &Path) {
 
 #[test]
 fn a_robot_that_is_sent_elsewhere_in_flight_goes_on_without_a_stop() {
-    let mut run = Run::start("goto-flight", "open-room", &PACE);
-    run.wait_until_under_way(3.0);
+    let run = Run::under_way("goto-flight", "open-room", &PACE, 3.0);
     operate("goto-flight", &["goto", "1.0", "-1.0"]);
     let mut number = 0;
     follow("goto-flight", |command| {
@@ -80,8 +79,7 @@ fn a_robot_that_is_sent_elsewhere_in_flight_goes_on_without_a_stop() {
 
 #[test]
 fn a_list_is_driven_to_its_end_although_planner_and_supervisor_are_killed_in_between() {
-    let mut run = Run::start("goto-list", "open-room", &PACE);
-    run.wait_until_under_way(2.0);
+    let mut run = Run::under_way("goto-list", "open-room", &PACE, 2.0);
     operate("goto-list", &["goto", "1.0", "-0.8", "1.6", "0.4"]);
     operate("goto-list", &["goto", "0.8", "0.8", "--heading", "-90", "--append"]);
     run.kill_and_await_successor("planner", Signal::KILL);
@@ -126,8 +124,7 @@ fn a_target_is_refused_with_the_reason_and_the_robot_keeps_the_one_it_has() {
     };
     to(&["1", "1"], "not-running", &[robot]);
     let drum = "known.drum=[{at=[2.0, 2.0], radius_m=0.3}]";
-    let mut run = Run::start(robot, "open-room", &["--pace", "2", "--set", drum]);
-    run.wait_until_under_way(1.0);
+    let mut run = Run::under_way(robot, "open-room", &["--pace", "2", "--set", drum], 1.0);
     to(&["1"], "usage", &[]);
     to(&["1", "1", "2"], "no-target", &["2"]);
     to(&["inf", "1"], "no-target", &[robot]);
@@ -197,8 +194,7 @@ fn a_mission_starts_from_the_map_that_an_earlier_run_saved_and_a_damaged_map_is_
 fn each_of_fifty_commands_in_a_row_finds_a_place_on_the_bus() {
     let robot = "goto-many";
     let slowly = ["--pace", "1", "--set", "controller.speed_m_s=0.1"];
-    let mut run = Run::start(robot, "open-room", &slowly);
-    run.wait_until_under_way(0.2);
+    let _run = Run::under_way(robot, "open-room", &slowly, 0.2);
     for _ in 0..50 {
         refused(&["goto", "--robot", robot, "9", "0"], "target-outside", &["perimeter"]);
     }

@@ -14,7 +14,7 @@ use serde_json::Value;
 
 use crate::support::{
     self, Run, STAGES, all_run, assert_ended, assert_nothing_left, assert_reached, find, firsthand,
-    generation, operate, output, pid, pids_of, processes, records, refused, signal_process,
+    generation, operate, output, pid, pids_of, processes, records, signal_process,
 };
 
 /// The phase in which stages get a signal.
@@ -198,8 +198,7 @@ fn assert_every_generation_replays(directory: &Path, row: &Row) {
 
 #[test]
 fn a_frozen_stage_is_recorded_as_hung_and_a_thawed_one_goes_on() {
-    let mut run = Run::start("kf-thaw", "open-room", &["--pace", "1"]);
-    run.wait_until_under_way(0.5);
+    let mut run = Run::under_way("kf-thaw", "open-room", &["--pace", "1"], 0.5);
     let beats = |status: &Value| {
         let controller = find(status, "controller");
         controller["state"] == "running" && controller["beat_age_s"].as_f64() < Some(0.1)
@@ -281,8 +280,7 @@ fn everything_killed_at_once_the_resumed_run_arrives() {
 #[test]
 fn a_supervisor_killed_while_the_robot_waits_the_resumed_run_waits_on() {
     let robot = "kf-all-wait";
-    let mut run = Run::start(robot, "open-room", FAST);
-    run.wait_until_under_way(0.5);
+    let mut run = Run::under_way(robot, "open-room", FAST, 0.5);
     operate(robot, &["stop"]);
     run.kill();
     let mut next = support::start_quietly(&mut resume(&run.directory()));
@@ -293,13 +291,4 @@ fn a_supervisor_killed_while_the_robot_waits_the_resumed_run_waits_on() {
     operate(robot, &["resume"]);
     assert_eq!(next.wait().unwrap().code(), Some(0));
     assert_nothing_left(robot);
-}
-
-#[test]
-fn a_run_that_came_to_its_end_is_not_resumed() {
-    let (_, directory) = Run::start("kf-end", "open-room", &[]).arrives_in();
-    let run = directory.path().join("run");
-    let run = run.to_str().unwrap();
-    refused(&["run", "--resume", run], "ended", &[run]);
-    refused(&["run", "--resume", "/no/such/run"], "no-run", &["/no/such/run"]);
 }

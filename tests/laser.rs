@@ -13,8 +13,8 @@ fn a_robot_with_a_laser_arrives_though_each_stage_is_killed_and_replays_to_the_b
     let robot = ["--pace", "2", "--set", "robot.model='kobuki'", "--set", "robot.rate_hz=20"];
     // The robot is slow enough not to arrive between two kills.
     let slow = ["--set", "controller.speed_m_s=0.35"];
-    let mut run = Run::start("laser-kills", "obstacle-course", &[&robot[..], &slow].concat());
-    run.wait_until_under_way(0.3);
+    let mut run =
+        Run::under_way("laser-kills", "obstacle-course", &[&robot[..], &slow].concat(), 0.3);
     for topic in ["scan", "scan_fix"] {
         printed(&["topic", "echo", topic, "--robot", "laser-kills", "-n", "1"]);
     }

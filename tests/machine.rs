@@ -113,12 +113,10 @@ fn shared_memory_that_is_full_is_refused_at_the_start_and_harms_no_run_later() {
         let runs = runs.path().to_str().unwrap();
         refused(&[&run[..], &[runs]].concat(), "shared-memory", &["--shm-size"]);
         memory.empty();
-        let mut run = Run::start(robot, "obstacle-course", &["--pace", "4"]);
-        run.wait_until_under_way(0.3);
+        let run = Run::under_way(robot, "obstacle-course", &["--pace", "4"], 0.3);
         memory.fill();
         let summary = run.arrives();
-        let restarts = summary["restarts"].as_object().unwrap();
-        assert!(restarts.values().all(|times| times == 0), "{summary}");
+        support::assert_no_restart(&summary);
     });
 }
 
@@ -192,8 +190,7 @@ fn unread(arguments: &[&str]) -> Option<i32> {
 fn a_closed_standard_output_is_no_failure_of_any_command() {
     let directory = directory_of("mach-shut");
     let mission = format!("{}/../missions/trap.toml", env!("CARGO_MANIFEST_DIR"));
-    let mut run = Run::start("mach-shut", "open-room", &SLOW);
-    run.wait_until_under_way(0.3);
+    let run = Run::under_way("mach-shut", "open-room", &SLOW, 0.3);
     let out = directory.path().join("run");
     let out = out.to_str().unwrap();
     let commands: [&[&str]; 11] = [
@@ -222,8 +219,7 @@ fn descriptors(process: u32) -> usize {
 
 #[test]
 fn a_stage_inherits_no_descriptor_of_its_supervisor() {
-    let mut run = Run::start("mach-fds", "open-room", &SLOW);
-    run.wait_until_under_way(0.3);
+    let mut run = Run::under_way("mach-fds", "open-room", &SLOW, 0.3);
     // The stage was started when its supervisor had everything open.
     let status = run.kill_and_await_successor("planner", Signal::KILL);
     let (own, supervisors) = (descriptors(pid(&status, "planner")), descriptors(run.pid()));
@@ -234,8 +230,7 @@ fn a_stage_inherits_no_descriptor_of_its_supervisor() {
 
 #[test]
 fn a_checkpoint_of_another_version_is_refused_by_name_and_not_taken_for_none() {
-    let mut run = Run::start("mach-vers", "open-room", &SLOW);
-    run.wait_until_under_way(0.5);
+    let mut run = Run::under_way("mach-vers", "open-room", &SLOW, 0.5);
     run.kill();
     let file = run.directory().join("supervisor.checkpoint");
     let mut bytes = fs::read(&file).unwrap();
@@ -332,8 +327,7 @@ fn a_supervisor_waits_for_one_that_was_killed_a_moment_ago() {
 fn a_latency_measurement_removes_no_directory_but_its_own() {
     let user = rustix::process::geteuid().as_raw();
     // This is another robot of this user, whose directory is below the removed one.
-    let mut run = Run::start("mach-lat", "open-room", &SLOW);
-    run.wait_until_under_way(0.3);
+    let run = Run::under_way("mach-lat", "open-room", &SLOW, 0.3);
     support::printed(&["bench", "tick", "--robot", support::suite(), "--rounds", "1", "--json"]);
     let root = fs::metadata(support::domain("mach-lat").directory()).unwrap();
     assert!(root.is_dir() && root.uid() == user);
@@ -348,14 +342,6 @@ fn a_pipe_in_place_of_a_mission_is_refused_by_name_and_not_waited_for() {
     let made = Command::new("mkfifo").arg(&pipe).status().unwrap();
     assert!(made.success() && fs::metadata(&pipe).unwrap().file_type().is_fifo());
     refused(&["check", pipe.to_str().unwrap()], "mission", &["pipe.toml"]);
-}
-
-#[test]
-fn an_assignment_that_is_refused_is_cited_and_no_line_of_the_file() {
-    let output = output(&["run", "trap", "--set", "perimeter.cells=3"]);
-    assert_refused(&output, "mission", &["--set perimeter.cells=3"]);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert!(!said.contains("trap.toml:"), "{said}");
 }
 
 #[test]

@@ -44,8 +44,7 @@ fn shared(robot: &str) -> Vec<std::path::PathBuf> {
 #[test]
 fn a_second_controller_and_a_second_supervisor_are_ignored_counted_and_told_with_their_process() {
     in_own_process(|| {
-        let mut run = Run::start("two-masters", "open-room", &["--pace", "2"]);
-        run.wait_until_under_way(0.3);
+        let run = Run::under_way("two-masters", "open-room", &["--pace", "2"], 0.3);
         let bus = Bus::join(&domain("two-masters"), "second").unwrap();
         let mut commands = bus.writer(&topics::COMMAND, u32::MAX).unwrap();
         let mut orders = bus.writer(&topics::DIRECTIVE, u32::MAX).unwrap();
@@ -81,8 +80,7 @@ fn a_second_controller_and_a_second_supervisor_are_ignored_counted_and_told_with
         let (code, summary) = run.finish();
         assert_eq!((code, &summary["outcome"]), (Some(0), &"reached".into()), "{summary}");
         assert_eq!(summary["collisions"], 0, "{summary}");
-        let restarts = summary["restarts"].as_object().unwrap();
-        assert!(restarts.values().all(|times| times == 0), "{summary}");
+        support::assert_no_restart(&summary);
         assert_eq!(summary["resets"], 0, "{summary}");
     });
 }
@@ -90,8 +88,7 @@ fn a_second_controller_and_a_second_supervisor_are_ignored_counted_and_told_with
 #[test]
 fn samples_that_seem_newer_than_all_others_wedge_no_mission_and_no_consumer_whatever_their_topic() {
     in_own_process(|| {
-        let mut run = Run::start("forged", "open-room", &["--pace", "2"]);
-        run.wait_until_under_way(0.3);
+        let run = Run::under_way("forged", "open-room", &["--pace", "2"], 0.3);
         let echo = |topic| {
             let mut echo = firsthand(&["topic", "echo", topic, "--robot", "forged", "--json"]);
             echo.args(["--number", "40"]).stdout(Stdio::piped()).spawn().unwrap()
@@ -139,8 +136,7 @@ fn samples_that_seem_newer_than_all_others_wedge_no_mission_and_no_consumer_what
         let in_order =
             poses.windows(2).all(|pair| pair[0].sample.stamp.tick <= pair[1].sample.stamp.tick);
         assert!(in_order && poses.len() > 40, "{}", poses.len());
-        let restarts = summary["restarts"].as_object().unwrap();
-        assert!(restarts.values().all(|times| times == 0), "{summary}");
+        support::assert_no_restart(&summary);
     });
 }
 
@@ -232,8 +228,7 @@ fn datagrams_of_another_user_do_not_drive_the_simulated_robot_of_a_run() {
         return support::not_run(test, "only root can act as another user");
     }
     in_own_process(|| {
-        let mut run = Run::start("driven", "open-room", &["--pace", "2"]);
-        run.wait_until_under_way(0.3);
+        let run = Run::under_way("driven", "open-room", &["--pace", "2"], 0.3);
         let robot = common::run::Run::load(&run.directory()).unwrap().address;
         let Address::Udp(robot) = robot else { panic!("{robot}") };
         // The thread ends with the process of this test.
@@ -255,8 +250,7 @@ fn datagrams_of_another_user_do_not_drive_the_simulated_robot_of_a_run() {
 
 #[test]
 fn no_file_of_a_run_is_open_to_other_users() {
-    let mut run = Run::start("closed", "open-room", &["--pace", "1"]);
-    run.wait_until_under_way(0.3);
+    let run = Run::under_way("closed", "open-room", &["--pace", "1"], 0.3);
     let robot = domain("closed");
     for path in shared("closed").into_iter().chain([robot.directory().to_owned()]) {
         // A file that was just removed is not open to others.
@@ -290,8 +284,7 @@ fn a_file_of_another_user_with_a_name_of_the_robots_blocks_no_start() {
 #[test]
 fn a_bus_whose_count_of_nodes_is_empty_is_not_joined_and_the_message_says_so() {
     in_own_process(|| {
-        let mut run = Run::start("emptied", "open-room", &["--pace", "1"]);
-        run.wait_until_under_way(0.3);
+        let run = Run::under_way("emptied", "open-room", &["--pace", "1"], 0.3);
         let count = shared("emptied").into_iter();
         let count = count.filter(|path| path.to_string_lossy().ends_with(".global_mgmt"));
         for path in count {

@@ -2,15 +2,14 @@
 
 use common::clock::monotonic_ns;
 
-use crate::support::{Run, find, operate, refused};
+use crate::support::{Run, find, operate};
 
 /// Mission time runs this many times as fast as the wall clock.
 const PACE: [&str; 2] = ["--pace", "4"];
 
 #[test]
 fn a_robot_told_to_stop_stands_until_it_is_told_to_go_on() {
-    let mut run = Run::start("halt", "open-room", &PACE);
-    run.wait_until_under_way(2.0);
+    let mut run = Run::under_way("halt", "open-room", &PACE, 2.0);
     operate("halt", &["stop"]);
     let stopped =
         run.wait_until("it is stopped", |status| status["order"] == "stopped by an operator");
@@ -26,8 +25,7 @@ fn a_robot_told_to_stop_stands_until_it_is_told_to_go_on() {
 
 #[test]
 fn a_stop_of_which_the_supervisor_hears_after_the_resume_does_not_stop_the_robot_again() {
-    let mut run = Run::start("late-stop", "open-room", &PACE);
-    run.wait_until_under_way(2.0);
+    let run = Run::under_way("late-stop", "open-room", &PACE, 2.0);
     let asked_ns = monotonic_ns().to_string();
     operate("late-stop", &["stop"]);
     operate("late-stop", &["resume"]);
@@ -40,8 +38,7 @@ fn an_operators_stop_uses_up_no_mission_time_and_is_no_stall() {
     let (pace, timeout_s) = (4.0, 45.0);
     let set = format!("timeout_s={timeout_s}");
     let arguments = ["--pace", "4", "--set", &set];
-    let mut run = Run::start("stop-time", "open-room", &arguments);
-    run.wait_until_under_way(2.0);
+    let mut run = Run::under_way("stop-time", "open-room", &arguments, 2.0);
     operate("stop-time", &["stop"]);
     let stopped = std::time::Instant::now();
     run.wait_until("the stop has lasted as long as the mission may", |_| {
@@ -53,8 +50,7 @@ fn an_operators_stop_uses_up_no_mission_time_and_is_no_stall() {
 
 #[test]
 fn a_stage_that_dies_again_and_again_is_held_until_an_operator_releases_it() {
-    let mut run = Run::start("held", "open-room", &["--pace", "1"]);
-    run.wait_until_under_way(1.0);
+    let mut run = Run::under_way("held", "open-room", &["--pace", "1"], 1.0);
     // The next generation fails when it starts.
     let checkpoint = run.directory().join("mapper.checkpoint");
     std::fs::remove_file(&checkpoint).unwrap();
@@ -77,10 +73,4 @@ fn a_stage_that_dies_again_and_again_is_held_until_an_operator_releases_it() {
     std::fs::remove_dir(&checkpoint).unwrap();
     operate("held", &["stage", "restart", "mapper"]);
     run.arrives();
-}
-
-#[test]
-fn a_command_for_a_robot_or_stage_that_is_not_there_is_refused_with_the_reason() {
-    refused(&["stop", "--robot", "nobody"], "not-running", &["nobody"]);
-    refused(&["stage", "restart", "wheel"], "unknown-stage", &["dead-reckoning"]);
 }

@@ -105,9 +105,12 @@ fn killed_recorder(run: &mut Run, file: PathBuf, answers: usize) -> PathBuf {
 
 #[test]
 fn recorders_killed_leave_readable_files_that_say_so_and_the_mission_as_it_was() {
-    let mut run =
-        Run::start("rec-shot", "obstacle-course", &["--pace", "2", "--set", "sensors='front'"]);
-    run.wait_until_under_way(1.0);
+    let mut run = Run::under_way(
+        "rec-shot",
+        "obstacle-course",
+        &["--pace", "2", "--set", "sensors='front'"],
+        1.0,
+    );
     let directory = tempfile::tempdir().unwrap();
     let (mut read, mut cut) = (0, 0);
     for shot in 0..10 {
@@ -132,8 +135,7 @@ fn recorders_killed_leave_readable_files_that_say_so_and_the_mission_as_it_was()
     assert!(read > 0, "none of them lived to its first chunk");
     let (code, summary, directory) = run.finish_in();
     assert_eq!((code, &summary["outcome"]), (Some(0), &"reached".into()), "{summary}");
-    let restarts = summary["restarts"].as_object().unwrap();
-    assert!(restarts.values().all(|times| times == 0), "{summary}");
+    crate::support::assert_no_restart(&summary);
     // The run's own recorder was not affected.
     assert_eq!(assert_all_equal(&replayed(&open(directory.path()))), 5);
     assert_nothing_left("rec-shot");

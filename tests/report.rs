@@ -18,8 +18,7 @@ fn events(page: &str) -> (Vec<String>, Value) {
 
 #[test]
 fn a_run_ends_with_a_report_that_tells_of_a_planner_that_was_killed() {
-    let mut run = Run::start("report-kill", "open-room", &["--pace", "2"]);
-    run.wait_until_under_way(0.5);
+    let mut run = Run::under_way("report-kill", "open-room", &["--pace", "2"], 0.5);
     run.kill_and_await_successor("planner", Signal::KILL);
     let (code, summary, directory) = run.finish_in();
     assert_eq!(code, Some(0), "{summary}");
@@ -58,8 +57,7 @@ fn a_run_that_was_not_recorded_has_no_report_and_the_command_says_why() {
 
 #[test]
 fn a_report_that_cannot_be_written_does_not_end_the_mission() {
-    let mut run = Run::start("report-full", "open-room", &["--pace", "4"]);
-    run.wait_until_under_way(0.2);
+    let run = Run::under_way("report-full", "open-room", &["--pace", "4"], 0.2);
     // A file stands in the place of the directory.
     fs::write(run.directory().join("report"), "").unwrap();
     let (code, summary, _directory) = run.finish_in();

@@ -3,7 +3,7 @@
 
 use serde_json::Value;
 
-use crate::support::{Run, assert_nothing_left, json_of, output, refused};
+use crate::support::{Run, assert_nothing_left, json_of, output};
 
 /// The exit code, and the entry of the stop-time table for a robot with `fault`.
 fn stop_time(robot: &str, fault: &str) -> (Option<i32>, Value) {
@@ -48,10 +48,4 @@ fn a_robot_whose_wheels_are_held_on_the_way_is_unreachable_and_reports_no_arriva
     assert_eq!(code, Some(0), "{entry}");
     assert_eq!(entry["fault_began"], true, "{entry}");
     assert_eq!(entry["outcome"], "unreachable", "{entry}");
-}
-
-#[test]
-fn an_unknown_robot_fault_is_refused_with_the_known_ones() {
-    let unknown = ["bench", "chaos", "--robot-faults=honest"];
-    refused(&unknown, "usage", &["honest", "encoder-dead"]);
 }

@@ -170,8 +170,7 @@ fn the_keys_of_top_do_what_they_say_and_the_mission_arrives() {
 #[test]
 fn top_ends_when_its_terminal_is_closed_and_on_a_signal_and_needs_one() {
     let robot = "con-top-end";
-    let mut run = Run::start(robot, "open-room", &["--pace", "1"]);
-    run.wait_until_under_way(0.5);
+    let run = Run::under_way(robot, "open-room", &["--pace", "1"], 0.5);
     let mut closed = Screen::start(robot);
     closed.wait_for("controller");
     closed.terminal = None;

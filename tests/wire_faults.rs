@@ -234,8 +234,7 @@ fn a_robot_whose_counts_jump_in_motion_stands_and_its_arrival_is_unsure() {
     let body = Robot::start("open-room", "udp", "127.0.0.1:0");
     let faults = FaultInjector::before(&body, Fault::None);
     let sure = ["--set", "sure_within_m=0.5", "--set", &faults.proxy.as_robot()];
-    let mut run = Run::start("fi-jump", "open-room", &sure);
-    run.wait_until_under_way(0.5);
+    let mut run = Run::under_way("fi-jump", "open-room", &sure, 0.5);
     faults.set(Fault::Elsewhere);
     run.wait_until("it stands", cause_is("odometry implausible"));
     run.wait_until("it goes on", |status| status["link"]["cause"].is_null());

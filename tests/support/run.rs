@@ -45,6 +45,13 @@ impl Run {
         Self { robot: robot.to_owned(), child: Some(child), directory }
     }
 
+    /// [`Self::start`], and wait until the robot has been under way for `seconds` of mission time.
+    pub fn under_way(robot: &str, mission: &str, arguments: &[&str], seconds: f64) -> Self {
+        let mut run = Self::start(robot, mission, arguments);
+        run.wait_until_under_way(seconds);
+        run
+    }
+
     pub fn directory(&self) -> PathBuf {
         self.directory.path().join("run")
     }
@@ -197,6 +204,13 @@ pub fn assert_reached(code: Option<i32>, summary: &Value) {
 pub fn assert_ended(code: Option<i32>, summary: &Value, expected: i32, outcome: &str) {
     let ended = (code, &summary["outcome"]);
     assert_eq!(ended, (Some(expected), &outcome.into()), "{summary}");
+}
+
+/// Assert that no stage was started again.
+#[track_caller]
+pub fn assert_no_restart(summary: &Value) {
+    let mut restarts = summary["restarts"].as_object().unwrap().values();
+    assert!(restarts.all(|times| times == 0), "{summary}");
 }
 
 /// The lines of a file of records, each a JSON value. A file that does not exist has none.
