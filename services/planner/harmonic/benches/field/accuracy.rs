@@ -1,8 +1,8 @@
 //! The angles between computed and exact directions, after solves from scratch on thousands of maps and after long sequences of
 //! updates.
 
-use harmonic::testing::{Angles, Kind, Map, Random, exact, follow};
-use harmonic::{Cancellation, Cell, Change, Domain, Screening, Solver};
+use crate::support::{Angles, Kind, Map, Random, follow};
+use harmonic::{Cancellation, Cell, Change, Domain, Screening, Solver, solve_exactly};
 
 /// Maps of each kind and screening.
 const MAPS: u64 = 100;
@@ -43,8 +43,8 @@ pub(crate) fn angle_table() {
                     .expect("a valid map");
                 let field =
                     Solver::default().solve(&domain, &Cancellation::new()).expect("a field");
-                let exact = exact(&domain).expect("a field");
-                let angles = Angles::between(&field, &exact, |_| true);
+                let exact = solve_exactly(&domain).expect("a field");
+                let angles = Angles::between(&field, &exact);
                 worst.p50 = worst.p50.max(angles.p50);
                 worst.p99 = worst.p99.max(angles.p99);
                 worst.max = worst.max.max(angles.max);
@@ -105,8 +105,8 @@ pub(crate) fn sequence_table(maps: Vec<(String, Domain)>) {
             field = solver.solve_near(&domain, &field, &cancellation).expect("a field");
             broken += usize::from(follow(&field) < 1.0);
             if COMPARED_AFTER.contains(&update) {
-                let exact = exact(&domain).expect("a field");
-                let angles = Angles::between(&field, &exact, |_| true);
+                let exact = solve_exactly(&domain).expect("a field");
+                let angles = Angles::between(&field, &exact);
                 println!(
                     "{name:<26} {update:>8} {:>8.4} {:>8.4} {:>8.3} {:>8.2} {broken:>14}",
                     angles.p50, angles.p99, angles.clear_max, angles.max,

@@ -20,13 +20,15 @@ mod accuracy;
 mod others;
 mod real;
 mod split;
+#[path = "../../tests/harmonic/support/mod.rs"]
+mod support;
 mod sweep;
 mod updates;
 mod wavefront;
 
 use std::{path::Path, time::Instant};
 
-use harmonic::testing::{Kind, Map};
+use crate::support::{Kind, Map};
 use harmonic::{Cancellation, Cell, Change, Domain, Solver};
 
 /// Milliseconds of the fastest of `runs` calls.

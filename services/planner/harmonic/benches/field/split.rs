@@ -3,7 +3,7 @@
 use std::process::Command;
 use std::time::Instant;
 
-use harmonic::testing::{Kind, Map};
+use crate::support::{Kind, Map};
 use harmonic::{Cancellation, Domain, Phase, Solver};
 
 use crate::{others_than, runs, sweep, wavefront};

@@ -1,7 +1,7 @@
 //! A sweep over the shapes of maps that decide what a solve costs: the width of corridors and of doors, the density of obstacles and
 //! the depth of u.
 
-use harmonic::testing::{Kind, Map};
+use crate::support::{Kind, Map};
 use harmonic::{Cancellation, Domain, Screening, Solver};
 
 use crate::split::{bytes_of_a_process, split};
