@@ -88,7 +88,7 @@
 //! - Engines: `multigrid/`, `multigrid_bands.rs`, `multifrontal/`.
 //! - [`Solver`] (`solver/`): the choice of a method, the solve.
 //!
-//! The feature `testing` adds generated maps and a slow reference solver. The library has no clock, files or unsafe code, and
+//! The feature `testing` adds a solver that is exact but slow. The library has no clock, files or unsafe code, and
 //! starts no thread unless [`Settings::threads`] asks for threads; the same input gives the same field to the bit.
 
 mod cancellation;
@@ -109,7 +109,7 @@ mod simd;
 mod solver;
 mod store;
 #[cfg(feature = "testing")]
-pub mod testing;
+mod testing;
 mod verification;
 
 pub use cancellation::Cancellation;
@@ -123,4 +123,6 @@ pub use policy::Policy;
 pub use scaled::Scaled;
 pub use screening::{MIN_SCREENING_CELLS, Screening};
 pub use solver::{Phase, Settings, Solver};
+#[cfg(feature = "testing")]
+pub use testing::solve_exactly;
 pub use verification::Verification;

@@ -7,11 +7,12 @@
 //!
 //! - [`grid`]: the layout in four parity planes.
 //! - [`finest`], [`coarse`], [`coarsest`]: relaxation and transfer on the three kinds of level.
-//! - [`galerkin`]: the equations of a level from those of the finer one.
+//! - [`galerkin`], [`couplings`]: the interpolation and the equations of a level from those of the finer one.
 //! - [`sources`]: the inflow on the coarse levels.
 
 mod coarse;
 mod coarsest;
+mod couplings;
 mod finest;
 mod galerkin;
 mod grid;
@@ -22,6 +23,7 @@ mod tests;
 
 use coarse::Coarse;
 use coarsest::Coarsest;
+use couplings::Level;
 pub(crate) use finest::Progress;
 use finest::{Finest, Source, Work};
 use galerkin::Products;
@@ -157,30 +159,13 @@ impl<R: Real> Multigrid<R> {
     }
 
     /// Interpolation and coarse equations, where they depend on `rows` of the finest level.
-    fn set_up_levels(&mut self, mut rows: Range<usize>) {
-        let (finest, first) = (&mut self.finest, &mut self.coarse[0]);
-        let products = &mut self.products[0];
-        let count = finest.grid.rows;
-        self.simd.run(
-            #[inline(always)]
-            || {
-                finest.interpolate_rows(rows_of_interpolation(&rows, count));
-                finest.coarsen(first, rows_of_next(&rows, count), products);
-            },
-        );
+    fn set_up_levels(&mut self, rows: Range<usize>) {
+        let (first, products) = (&mut self.coarse[0], &mut self.products[0]);
+        let mut rows = set_up_next(&mut self.finest, first, rows, products, self.simd);
         for level in 1..self.coarse.len() {
-            rows = rows_of_next(&rows, self.coarse[level - 1].grid.height);
             let (fine, next) = self.coarse.split_at_mut(level);
-            let (fine, next) = (&mut fine[level - 1], &mut next[0]);
-            let products = &mut self.products[level];
-            let count = fine.grid.rows;
-            self.simd.run(
-                #[inline(always)]
-                || {
-                    fine.interpolate(rows_of_interpolation(&rows, count));
-                    fine.coarsen(next, rows_of_next(&rows, count), products);
-                },
-            );
+            let (fine, products) = (&mut fine[level - 1], &mut self.products[level]);
+            rows = set_up_next(fine, &mut next[0], rows, products, self.simd);
         }
         if let Some(last) = self.coarse.last() {
             self.coarsest.set_up(last);
@@ -417,12 +402,26 @@ impl<R: Real> Multigrid<R> {
     }
 }
 
-/// Rows of a level's planes whose interpolation depends on `rows` of its cells.
-fn rows_of_interpolation(rows: &Range<usize>, count: usize) -> Range<usize> {
-    (rows.start / 2).saturating_sub(1)..(rows.end / 2 + 2).min(count)
-}
-
-/// Rows of the next level whose equations depend on `rows` of a level's cells: one more on either side.
-fn rows_of_next(rows: &Range<usize>, count: usize) -> Range<usize> {
-    (rows.start / 2).saturating_sub(2)..(rows.end / 2 + 3).min(count)
+/// Sets the interpolation to `fine` from `next` and the equations of `next`, where they depend on `rows` of the cells of `fine`; returns
+/// the rows of the cells of `next` that were set.
+fn set_up_next<R: Real>(
+    fine: &mut impl Level<R>,
+    next: &mut Coarse<R>,
+    rows: Range<usize>,
+    products: &mut Products<R>,
+    simd: Simd,
+) -> Range<usize> {
+    let grid = fine.grid();
+    // One row more on either side than the cells have neighbours in.
+    let coarse_rows = |more: usize| {
+        (rows.start / 2).saturating_sub(more)..(rows.end / 2 + more + 1).min(grid.rows)
+    };
+    simd.run(
+        #[inline(always)]
+        || {
+            galerkin::interpolate(fine, coarse_rows(1));
+            galerkin::coarsen(fine, next, coarse_rows(2), products);
+        },
+    );
+    coarse_rows(2)
 }

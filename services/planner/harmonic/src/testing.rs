@@ -1,11 +1,28 @@
-//! Generated maps of every kind, and a slow reference solver. Only tests and benchmarks use them.
+//! The exact field, for tests and benchmarks.
 
-mod exact;
-mod maps;
-mod random;
-mod reference;
+use std::num::NonZeroUsize;
 
-pub use exact::{Angles, exact};
-pub use maps::{Kind, Map};
-pub use random::Random;
-pub use reference::{Reference, angle, follow};
+use crate::cancellation::Cancellation;
+use crate::domain::Domain;
+use crate::error::SolveError;
+use crate::field::Field;
+use crate::method::Method;
+use crate::multifrontal::{self, BreadthFirst, Budget, Tree, Workspace};
+use crate::verification;
+
+/// The field of `domain` by multifrontal factorisation: exact but for the rounding of `f64`, on maps of any shape.
+///
+/// # Errors
+/// See [`Solver::solve`](crate::Solver::solve).
+pub fn solve_exactly(domain: &Domain) -> Result<Field, SolveError> {
+    let cancellation = Cancellation::new();
+    let budget = Budget::of(domain, u64::MAX);
+    let pass = BreadthFirst::from_target(domain, &budget, &cancellation)?;
+    let tree = Tree::of(&pass, &budget, &cancellation)?;
+    let mut workspace = Workspace::default();
+    let mut store =
+        multifrontal::solve(domain, (&pass, &tree), None, &budget, &mut workspace, &cancellation)?;
+    multifrontal::relax(domain, &pass, &mut store);
+    let check = verification::check(domain, &store, NonZeroUsize::MIN);
+    Ok(Field::new(domain, store, &check, Method::Multifrontal))
+}

@@ -4,8 +4,7 @@
 //! Every time is the least of several runs. Arguments after `--` select the measurements:
 //! - `quick` leaves out the large maps.
 //! - `updates` measures only the updates.
-//! - `accuracy` measures angles instead of times, also along a thousand changes of a map.
-//! - `split` measures the phases of a solve; with `quick` on small maps.
+//! - `accuracy` measures angles instead of times.
 //! - `growth` measures time and memory by the size of the map.
 //! - `sweep` measures a sweep over widths of corridors and doors, densities and depths of u, the worst first.
 //! - `--maps DIR` adds the PGM and MovingAI maps of a directory.
@@ -20,13 +19,15 @@ mod accuracy;
 mod others;
 mod real;
 mod split;
+#[path = "../../tests/harmonic/support/mod.rs"]
+mod support;
 mod sweep;
 mod updates;
 mod wavefront;
 
 use std::{path::Path, time::Instant};
 
-use harmonic::testing::{Kind, Map};
+use crate::support::{Kind, Map};
 use harmonic::{Cancellation, Cell, Change, Domain, Solver};
 
 /// Milliseconds of the fastest of `runs` calls.
@@ -51,9 +52,6 @@ fn main() {
     if asked("updates") {
         return updates::table(quick);
     }
-    if asked("split") {
-        return split::table(quick, maps_directory().map(|it| real::load_all(Path::new(&it))));
-    }
     if asked(split::BYTES) {
         return split::print_bytes();
     }
@@ -65,8 +63,7 @@ fn main() {
         return sweep::table(real);
     }
     if asked("accuracy") {
-        accuracy::angle_table();
-        return accuracy::sequence_table(sequence_maps());
+        return accuracy::angle_table();
     }
     full_table(quick);
     if let Some(directory) = maps_directory() {
@@ -75,18 +72,6 @@ fn main() {
         }
     }
     updates::table(quick);
-}
-
-/// A map without walls, one with, of two sizes, and the largest of those in a directory, where one is given.
-fn sequence_maps() -> Vec<(String, Domain)> {
-    let kinds = [512, 1024].map(|side| [Kind::Empty, Kind::Office].map(|kind| (kind, side)));
-    let generated = kinds.into_iter().flatten().map(|(kind, side)| {
-        let domain = Map::generate(kind, side, side, 1).domain();
-        (format!("{kind:?} {side}"), domain.expect("a valid map"))
-    });
-    let real = maps_directory().map(|it| real::load_all(Path::new(&it)));
-    let largest = real.into_iter().flatten().max_by_key(|(_, domain)| domain.blocked().len());
-    generated.chain(largest).collect()
 }
 
 /// The directory that `--maps` names.

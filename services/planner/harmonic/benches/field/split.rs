@@ -1,49 +1,29 @@
-//! The times of the phases of a solve, and the growth of time and memory with the map.
+//! The cycles and checks of a solve, and the growth of time and memory with the map.
 
 use std::process::Command;
 use std::time::Instant;
 
-use harmonic::testing::{Kind, Map};
+use crate::support::{Kind, Map};
 use harmonic::{Cancellation, Domain, Phase, Solver};
 
-use crate::{others_than, runs, sweep, wavefront};
+use crate::{others_than, runs, wavefront};
 
-/// The times of a solve's phases, milliseconds.
+/// The time of a solve, milliseconds, and what it did.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Split {
     pub total: f64,
-    /// The choice of a method included.
-    set_up: f64,
     pub cycles: usize,
-    cycling: f64,
-    /// The end of the cycles until the field can be checked; all of a solve without cycles.
-    rest: f64,
     pub checks: usize,
-    checking: f64,
 }
 
-/// A solve of `domain` by phases, and its method.
+/// A solve of `domain`, and its method.
 pub(crate) fn split(solver: &mut Solver, domain: &Domain) -> (Split, &'static str) {
     let mut split = Split::default();
     let start = Instant::now();
-    let mut last = start;
     let field = solver
         .solve_observed(domain, &Cancellation::new(), &mut |phase| {
-            let now = Instant::now();
-            let took = (now - last).as_secs_f64() * 1e3;
-            last = now;
-            match phase {
-                Phase::SetUp => split.set_up += took,
-                Phase::Cycled => {
-                    split.cycles += 1;
-                    split.cycling += took;
-                }
-                Phase::Verified => {
-                    split.checks += 1;
-                    split.checking += took;
-                }
-                _ => split.rest += took,
-            }
+            split.cycles += usize::from(phase == Phase::Cycled);
+            split.checks += usize::from(phase == Phase::Verified);
         })
         .expect("a field");
     split.total = start.elapsed().as_secs_f64() * 1e3;
@@ -66,52 +46,6 @@ fn least(domain: &Domain) -> (Split, &'static str) {
         }
     }
     best
-}
-
-/// Print the times of the phases of a solve from scratch; `quick` leaves out all but small maps.
-pub(crate) fn table(quick: bool, real: Option<Vec<(String, Domain)>>) {
-    println!("\nA solve from scratch by phases, ms, and as a multiple of a wavefront's time");
-    println!(
-        "{:<26} {:<14} {:>8} {:>6} {:>8} {:>7} {:>8} {:>8} {:>7} {:>8}",
-        "map", "method", "total", "x", "set-up", "cycles", "cycling", "rest", "checks", "checking"
-    );
-    let kinds = [
-        Kind::Drums,
-        Kind::Office,
-        Kind::Maze { corridor: 1 },
-        Kind::Maze { corridor: 4 },
-        Kind::Maze { corridor: 8 },
-        Kind::Maze { corridor: 16 },
-        Kind::Maze { corridor: 32 },
-        Kind::Maze { corridor: 64 },
-        Kind::Serpentine { corridor: 1 },
-        Kind::Serpentine { corridor: 8 },
-        Kind::Serpentine { corridor: 24 },
-        Kind::Noise { density: 0.35 },
-    ];
-    let small =
-        [50, 120, 280].map(|n| [Kind::Empty, Kind::Drums, Kind::Office].map(|kind| (kind, n)));
-    let large = kinds.map(|kind| (kind, 512)).into_iter().filter(|_| !quick);
-    let generated = small.into_iter().flatten().chain(large);
-    let generated = generated.map(|(kind, n)| {
-        let domain = Map::generate(kind, n, n, 1).domain();
-        (format!("{kind:?} {n}"), domain.expect("a valid map"))
-    });
-    for (name, domain) in generated.chain(real.into_iter().flatten()) {
-        let (split, method) = least(&domain);
-        let (wavefront, _) = wavefront::time(&domain, runs(domain.blocked().len()));
-        println!(
-            "{name:<26} {method:<14} {:>8.3} {:>6.2} {:>8.3} {:>7} {:>8.3} {:>8.3} {:>7} {:>8.3}",
-            split.total,
-            split.total / wavefront,
-            split.set_up,
-            split.cycles,
-            split.cycling,
-            split.rest,
-            split.checks,
-            split.checking
-        );
-    }
 }
 
 /// Time and memory of a solve from scratch, by the size of the map.
@@ -145,7 +79,7 @@ pub(crate) fn growth_table() {
 pub(crate) const BYTES: &str = "bytes";
 
 /// [`most_bytes`] in a process of its own, in which no memory was used and freed before.
-pub(crate) fn bytes_of_a_process(map: &str) -> Option<f64> {
+fn bytes_of_a_process(map: &str) -> Option<f64> {
     let output = Command::new(std::env::current_exe().ok()?).args([BYTES, map]).output().ok()?;
     String::from_utf8(output.stdout).ok()?.trim().parse().ok()
 }
@@ -157,7 +91,6 @@ pub(crate) fn print_bytes() {
         let n = map.strip_prefix(&format!("{kind:?}:"))?.parse().ok()?;
         Map::generate(kind, n, n, 1).domain().ok()
     });
-    let domain = domain.or_else(|| sweep::named(&map));
     if let Some(bytes) = domain.and_then(|domain| most_bytes(&domain)) {
         println!("{bytes}");
     }

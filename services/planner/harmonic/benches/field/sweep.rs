@@ -1,10 +1,10 @@
 //! A sweep over the shapes of maps that decide what a solve costs: the width of corridors and of doors, the density of obstacles and
 //! the depth of u.
 
-use harmonic::testing::{Kind, Map};
+use crate::support::{Kind, Map};
 use harmonic::{Cancellation, Domain, Screening, Solver};
 
-use crate::split::{bytes_of_a_process, split};
+use crate::split::split;
 use crate::{others_than, wavefront};
 
 /// Side of the maps whose time is measured, cells.
@@ -50,12 +50,6 @@ fn domain(kind: Kind, length: f64, side: usize, seed: u64) -> Domain {
     domain.expect("a valid map")
 }
 
-/// The map of the sweep with this name.
-pub(crate) fn named(name: &str) -> Option<Domain> {
-    let (_, kind, length) = kinds().into_iter().find(|it| it.0 == name)?;
-    Some(domain(kind, length, SIDE, 1))
-}
-
 /// Whether the words after `only` on the command line, if any, choose the map `name`.
 fn chosen(name: &str) -> bool {
     let mut only = std::env::args().skip_while(|word| word != "only").skip(1).peekable();
@@ -65,19 +59,16 @@ fn chosen(name: &str) -> bool {
 /// Print the time of a solve from scratch of every map and of the wavefront that was run in turn with it, the worst ratio first.
 pub(crate) fn table(real: Option<Vec<(String, Domain)>>) {
     let generated = kinds().into_iter().filter(|it| chosen(&it.0));
-    let mut rows: Vec<_> = generated
-        .map(|(name, kind, length)| {
-            row(&name, &domain(kind, length, SIDE, 1), bytes_of_a_process(&name))
-        })
-        .collect();
-    rows.extend(real.into_iter().flatten().map(|(name, domain)| row(&name, &domain, None)));
+    let mut rows: Vec<_> =
+        generated.map(|(name, kind, length)| row(&name, &domain(kind, length, SIDE, 1))).collect();
+    rows.extend(real.into_iter().flatten().map(|(name, domain)| row(&name, &domain)));
     rows.sort_by(|a, b| b.0.total_cmp(&a.0));
     println!(
         "\nSolves from scratch, {SIDE} x {SIDE} cells, as multiples of a wavefront's time, the worst first"
     );
     println!(
-        "{:<28} {:>6} {:>9} {:>7} {:<28} {:>6} {:>6} {:>9} {:>9}",
-        "map", "x", "ms", "ms/1e6", "method", "cycles", "checks", "log10 u", "bytes"
+        "{:<28} {:>6} {:>9} {:>7} {:<28} {:>6} {:>6} {:>9}",
+        "map", "x", "ms", "ms/1e6", "method", "cycles", "checks", "log10 u"
     );
     for (_, line) in rows {
         println!("{line}");
@@ -85,7 +76,7 @@ pub(crate) fn table(real: Option<Vec<(String, Domain)>>) {
 }
 
 /// The multiple of a wavefront's time that a map takes, and the line to print.
-fn row(name: &str, domain: &Domain, bytes: Option<f64>) -> (f64, String) {
+fn row(name: &str, domain: &Domain) -> (f64, String) {
     let cells = domain.blocked().len() as f64;
     let others = others_than(domain);
     let mut solver = Solver::default();
@@ -104,13 +95,12 @@ fn row(name: &str, domain: &Domain, bytes: Option<f64>) -> (f64, String) {
     let field = solver.solve(domain, &Cancellation::new()).expect("a field");
     let ratio = split.total / waves;
     let line = format!(
-        "{name:<28} {ratio:>6.2} {:>9.2} {:>7.1} {method:<28} {:>6} {:>6} {:>9.1} {:>9}",
+        "{name:<28} {ratio:>6.2} {:>9.2} {:>7.1} {method:<28} {:>6} {:>6} {:>9.1}",
         split.total,
         split.total * 1e6 / cells,
         split.cycles,
         split.checks,
         field.log10_u_min(),
-        bytes.map_or("-".to_owned(), |it| format!("{:.0}", it / cells)),
     );
     (ratio, line)
 }

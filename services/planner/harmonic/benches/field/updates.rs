@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use harmonic::testing::{Kind, Map, Random};
+use crate::support::{Kind, Map, Random};
 use harmonic::{Cancellation, Cell, Screening, Solver};
 
 use crate::block;

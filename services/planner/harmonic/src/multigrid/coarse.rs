@@ -5,19 +5,10 @@
 //! last on the way down, so their residual is zero, and first on the way up, so they need no correction. So no interpolation to them is
 //! stored.
 
-use super::grid::{
-    EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Weights, Whole, around, correct, cut, join,
-    join_row, split, split_row,
-};
+use super::couplings::{EAST, SOUTH, SOUTH_EAST, SOUTH_WEST};
+use super::grid::{EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Weights, around, correct};
 use super::kernels::{add_active, gather, relax, subtract, sum_weighted};
 use crate::real::Real;
-
-/// The couplings stored with a cell: to its east, south, south-east and south-west neighbour. The others are those
-/// neighbours' own.
-pub(super) const EAST: usize = 0;
-pub(super) const SOUTH: usize = 1;
-pub(super) const SOUTH_EAST: usize = 2;
-pub(super) const SOUTH_WEST: usize = 3;
 
 const W: (isize, isize) = (-1, 0);
 const E: (isize, isize) = (1, 0);
@@ -42,7 +33,6 @@ pub(super) struct Coarse<R> {
     pub coupling: [Planes<R>; 4],
     pub weights: Weights<R>,
     scratch: Scratch<R>,
-    whole: Whole<R>,
 }
 
 impl<R: Real> Coarse<R> {
@@ -52,73 +42,39 @@ impl<R: Real> Coarse<R> {
         let values = self.u.iter_mut().chain(&mut self.first_visit).chain(&mut self.f);
         let equations = self.inverse.iter_mut().chain(self.coupling.iter_mut().flatten());
         grid.reset(values.chain(equations).chain(&mut self.weights));
-        self.whole.reset(&grid);
+        self.scratch.reset(&grid);
     }
 
     /// Relaxes from a zero guess and restricts the residual to `next`.
     #[inline(always)]
     pub(super) fn descend(&mut self, next: &mut Self) {
-        if let Some(span) = self.grid.span() {
-            return self.descend_whole(next, span);
-        }
-        let Grid { columns: n, rows, .. } = self.grid;
+        let (grid, m) = (self.grid, MARGIN);
         let mut scratch = std::mem::take(&mut self.scratch);
-        scratch.reset(&self.grid, &next.grid);
-        let Scratch { residual_eo, residual_oe, residual_ee, restricted, .. } = &mut scratch;
-        for y in 0..=rows {
-            if y < rows {
-                let o = self.grid.start(y);
-                self.relax(EE, o, n, []);
-                self.relax(OE, o, n, [W, E]);
+        scratch.residual_eo[..m + grid.stride].fill(R::default());
+        for number in 0..=grid.strips {
+            if number < grid.strips {
+                let strip = grid.strip(number);
+                self.relax(EE, strip, []);
+                self.relax(OE, strip, [W, E]);
             }
-            if y == 0 {
+            let Some(number) = number.checked_sub(1) else {
                 continue;
-            }
-            let y = y - 1;
-            let o = self.grid.start(y);
-            self.relax(EO, o, n, [N, S, NW, NE, SW, SE]);
-            self.relax(OO, o, n, ALL);
+            };
+            let (o, n) = grid.strip(number);
+            self.relax(EO, (o, n), [N, S, NW, NE, SW, SE]);
+            self.relax(OO, (o, n), ALL);
 
-            residual_eo.swap(0, 1);
-            self.gather(EE, o, ALL, &mut residual_ee[MARGIN..][..n]);
-            self.gather(OE, o, [N, S, NW, NE, SW, SE], &mut residual_oe[MARGIN..][..n]);
-            self.gather(EO, o, [W, E], &mut residual_eo[1][MARGIN..][..n]);
-            let residual_eo = (&residual_eo[0][MARGIN..][..n], &residual_eo[1][MARGIN..][..n]);
-            let m = MARGIN;
-            self.restrict(
-                o,
-                &residual_ee[m..],
-                &residual_oe[m - 1..],
-                residual_eo,
-                &mut restricted[..n],
-            );
-            split_row(&next.grid, &mut next.f, y, restricted);
+            let Scratch { residual_eo, residual_oe, residual_ee, restricted, .. } = &mut scratch;
+            let [above, here] = grid.buffered(number);
+            self.gather(EE, o, ALL, &mut residual_ee[m..][..n]);
+            self.gather(OE, o, [N, S, NW, NE, SW, SE], &mut residual_oe[m..][..n]);
+            self.gather(EO, o, [W, E], &mut residual_eo[here..][..n]);
+            let residual_eo = (&residual_eo[above..], &residual_eo[here..]);
+            let restricted = &mut restricted[..n];
+            self.restrict(o, &residual_ee[m..], &residual_oe[m - 1..], residual_eo, restricted);
+            scratch.split_restricted(&grid, &next.grid, &mut next.f, number);
         }
         self.scratch = scratch;
-    }
-
-    /// [`descend`](Self::descend) for a small level, plane by plane, with `span` places of each.
-    #[inline(always)]
-    fn descend_whole(&mut self, next: &mut Self, span: usize) {
-        let (o, stride) = (self.grid.start(0), self.grid.stride);
-        let mut whole = std::mem::take(&mut self.whole);
-        let Whole { transfer, residual_ee, residual_oe, residual_eo, .. } = &mut whole;
-        self.relax(EE, o, span, []);
-        self.relax(OE, o, span, [W, E]);
-        self.relax(EO, o, span, [N, S, NW, NE, SW, SE]);
-        self.relax(OO, o, span, ALL);
-        self.gather(EE, o, ALL, &mut residual_ee[o..][..span]);
-        self.gather(OE, o, [N, S, NW, NE, SW, SE], &mut residual_oe[o..][..span]);
-        self.gather(EO, o, [W, E], &mut residual_eo[o..][..span]);
-        self.restrict(
-            o,
-            &residual_ee[o..],
-            &residual_oe[o - 1..],
-            (&residual_eo[o - stride..], &residual_eo[o..]),
-            &mut transfer[o..][..span],
-        );
-        split(&self.grid, &next.grid, &mut next.f, transfer);
-        self.whole = whole;
     }
 
     /// Restricts residuals to as many cells of the next level from `o` on as `out` has. `odd_even` starts one cell to the west; the two
@@ -140,65 +96,32 @@ impl<R: Real> Coarse<R> {
     /// Adds `share` of the correction from `next` and relaxes.
     #[inline(always)]
     pub(super) fn ascend(&mut self, next: &Self, share: R) {
-        if let Some(span) = self.grid.span() {
-            return self.ascend_whole(next, share, span);
-        }
-        let Grid { columns: n, rows, .. } = self.grid;
+        let grid = self.grid;
         let mut scratch = std::mem::take(&mut self.scratch);
-        let Scratch { upper, lower, .. } = &mut scratch;
-        for row in [&mut *upper, &mut *lower] {
-            row.clear();
-            row.resize(2 * next.grid.columns + 2, R::default());
-        }
-        join_row(&next.grid, &next.u, 0, share, upper);
-        for y in 0..=rows {
-            if y < rows {
-                join_row(&next.grid, &next.u, y + 1, share, lower);
-                self.correct(self.grid.start(y), upper, lower, n);
-                std::mem::swap(upper, lower);
+        scratch.begin_correction(&next.grid, &next.u, share);
+        for number in 0..=grid.strips {
+            if number < grid.strips {
+                let (o, n) = grid.strip(number);
+                let (upper, lower) =
+                    scratch.correction_below(&grid, (&next.grid, &next.u), number, share);
+                add_active(&mut self.u[EE][o..][..n], &self.inverse[EE][o..], upper);
+                correct(&mut self.u, &self.weights, (upper, lower), o, n);
             }
-            if y > 0 {
-                let o = self.grid.start(y - 1);
+            if number > 0 {
                 for plane in [OO, EO, OE, EE] {
-                    self.relax(plane, o, n, ALL);
+                    self.relax(plane, grid.strip(number - 1), ALL);
                 }
             }
         }
         self.scratch = scratch;
     }
 
-    /// [`ascend`](Self::ascend) for a small level, plane by plane, with `span` places of each.
-    #[inline(always)]
-    fn ascend_whole(&mut self, next: &Self, share: R, span: usize) {
-        let o = self.grid.start(0);
-        let mut whole = std::mem::take(&mut self.whole);
-        let transfer = &mut whole.transfer;
-        join(&self.grid, &next.grid, &next.u, share, transfer);
-        let below = &transfer[o + self.grid.stride..];
-        self.correct(o, &transfer[o..], below, span);
-        for plane in [OO, EO, OE, EE] {
-            self.relax(plane, o, span, ALL);
-        }
-        self.whole = whole;
-    }
-
-    /// Adds the correction to `n` cells from `o` on of each plane but the odd-odd one.
-    #[inline(always)]
-    fn correct(&mut self, o: usize, upper: &[R], lower: &[R], n: usize) {
-        add_active(&mut self.u[EE][o..][..n], &self.inverse[EE][o..], upper);
-        correct(&mut self.u, &self.weights, (upper, lower), o, n);
-    }
-
     /// Keeps u of the first visit and makes its residual the right-hand side of the second.
     #[inline(always)]
     pub(super) fn begin_second_visit(&mut self) {
-        let (n, rows) = match self.grid.span() {
-            Some(span) => (span, 1),
-            None => (self.grid.columns, self.grid.rows),
-        };
         for plane in [EE, OE, EO, OO] {
-            for y in 0..rows {
-                let o = self.grid.start(y);
+            for number in 0..self.grid.strips {
+                let (o, n) = self.grid.strip(number);
                 let mut f = std::mem::take(&mut self.f[plane]);
                 let terms = self.terms(plane, o, n, ALL);
                 let (u, inverse) = (&self.u[plane][o..][..n], &self.inverse[plane][o..][..n]);
@@ -223,8 +146,7 @@ impl<R: Real> Coarse<R> {
     fn relax<const COUNT: usize>(
         &mut self,
         plane: usize,
-        o: usize,
-        n: usize,
+        (o, n): (usize, usize),
         steps: [(isize, isize); COUNT],
     ) {
         let mut row = std::mem::take(&mut self.u[plane]);
@@ -276,64 +198,6 @@ impl<R: Real> Coarse<R> {
             _ => SOUTH_WEST,
         };
         (&self.coupling[direction][owner][from..][..n], &self.u[there][at..][..n])
-    }
-
-    /// The weights of the odd-odd cell at `at` on the four coarse cells around it, in the order of the finest level.
-    pub(super) fn corner_weights(&self, at: usize) -> [R; 4] {
-        let a = |step| self.term(OO, at, 1, step).0[0];
-        let m = self.inverse[OO][at];
-        let below = at + self.grid.stride;
-        let [west, east, north, south] = &self.weights;
-        [
-            m * (a(NW) + a(N) * west[at] + a(W) * north[at]),
-            m * (a(NE) + a(N) * east[at] + a(E) * north[at + 1]),
-            m * (a(SW) + a(S) * west[below] + a(W) * south[at]),
-            m * (a(SE) + a(S) * east[below] + a(E) * south[at + 1]),
-        ]
-    }
-
-    /// Interpolation along the lines between coarse cells: the couplings across the line are added to those along it,
-    /// those straight across are taken off the diagonal.
-    ///
-    /// A coarse cell gives only to cells coupled to it. If a wall lies between them, or the coarse cell is itself a wall, the couplings
-    /// to cells beside it would couple the corrections on both sides of the wall, and far from the target the cycles would not
-    /// converge.
-    #[inline(always)]
-    pub(super) fn interpolate(&mut self, rows: std::ops::Range<usize>) {
-        let Grid { columns: n, stride: s, .. } = self.grid;
-        let [right, down, down_right, down_left] = &self.coupling;
-        let least = R::of(1e-4);
-        let share = |d: R, a: R, b: R| {
-            let rest = d - a - b;
-            if rest > least * d { R::ONE / rest } else { R::default() }
-        };
-        for y in rows {
-            let o = self.grid.start(y);
-            let [to_west, to_east, to_north, to_south] = &mut self.weights;
-            cut!(o, n, to_west, to_east, to_north, to_south);
-            let own = &self.inverse[OE][o..][..n];
-            let (w, nw, sw) =
-                (&right[EE][o..][..n], &down_right[EO][o - s..][..n], &down_left[OE][o..][..n]);
-            let (e, ne, se) =
-                (&right[OE][o..][..n], &down_left[EO][o + 1 - s..][..n], &down_right[OE][o..][..n]);
-            let (no, so) = (&down[OO][o - s..][..n], &down[OE][o..][..n]);
-            for x in 0..n {
-                let share = share(own[x].inverse(), no[x], so[x]);
-                to_west[x] = w[x].is_active() * (w[x] + nw[x] + sw[x]) * share;
-                to_east[x] = e[x].is_active() * (e[x] + ne[x] + se[x]) * share;
-            }
-            let own = &self.inverse[EO][o..][..n];
-            let (no, nw, ne) =
-                (&down[EE][o..][..n], &down_right[OE][o - 1..][..n], &down_left[OE][o..][..n]);
-            let (so, sw, se) =
-                (&down[EO][o..][..n], &down_left[EO][o..][..n], &down_right[EO][o..][..n]);
-            let (w, e) = (&right[OO][o - 1..][..n], &right[EO][o..][..n]);
-            for x in 0..n {
-                let share = share(own[x].inverse(), w[x], e[x]);
-                to_north[x] = no[x].is_active() * (no[x] + nw[x] + ne[x]) * share;
-                to_south[x] = so[x].is_active() * (so[x] + sw[x] + se[x]) * share;
-            }
-        }
     }
 }
 

@@ -6,13 +6,8 @@
 //! own), black from red, then red again. The changes of that last half sweep, summed over the red neighbours of a black cell,
 //! are exactly its residual, which is restricted at once.
 
-use std::ops::Range;
-
 use super::coarse::Coarse;
-use super::grid::{
-    EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Weights, Whole, around, correct, cut, join,
-    join_row, split, split_row,
-};
+use super::grid::{EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Weights, around, correct};
 use crate::real::Real;
 
 /// An inflow at one cell: the right-hand side of its equation.
@@ -41,7 +36,6 @@ pub(super) struct Finest<R> {
     /// The sources, sorted by plane and row.
     pub sources: Vec<Source<R>>,
     scratch: Scratch<R>,
-    whole: Whole<R>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -70,7 +64,7 @@ impl<R: Real> Finest<R> {
         self.grid = grid;
         grid.reset(self.u.iter_mut().chain(&mut self.inverse).chain(&mut self.weights));
         self.sources.clear();
-        self.whole.reset(&grid);
+        self.scratch.reset(&grid);
     }
 
     /// Sets one row of cells; `inverse` gives 1 / diagonal of a free cell by its column.
@@ -93,92 +87,32 @@ impl<R: Real> Finest<R> {
         }
     }
 
-    /// Interpolation by the equation itself: an odd-even cell takes its neighbours to the north and south to be its
-    /// equals, which leaves those to the west and east. Blocked cells give and take nothing.
-    #[inline(always)]
-    pub(super) fn interpolate_rows(&mut self, rows: Range<usize>) {
-        let Grid { columns: n, stride, .. } = self.grid;
-        let least = R::of(1e-4);
-        for row in rows {
-            let o = self.grid.start(row);
-            let of = |plane: usize, start: usize| &self.inverse[plane][start..start + n];
-            let [to_west, to_east, to_north, to_south] = &mut self.weights;
-            cut!(o, n, to_west, to_east, to_north, to_south);
-            let weights = |d: R, a: R, b: R| {
-                let rest = d - a.is_active() - b.is_active();
-                if rest > least * d { R::ONE / rest } else { R::default() }
-            };
-            let (own, west, east, north, south) =
-                (of(OE, o), of(EE, o), of(EE, o + 1), of(OO, o - stride), of(OO, o));
-            for x in 0..n {
-                let weight = weights(own[x].inverse(), north[x], south[x]);
-                to_west[x] = west[x].is_active() * weight;
-                to_east[x] = east[x].is_active() * weight;
-            }
-            let (own, north, south, west, east) =
-                (of(EO, o), of(EE, o), of(EE, o + stride), of(OO, o - 1), of(OO, o));
-            for x in 0..n {
-                let weight = weights(own[x].inverse(), west[x], east[x]);
-                to_north[x] = north[x].is_active() * weight;
-                to_south[x] = south[x].is_active() * weight;
-            }
-        }
-    }
-
-    /// The weights of the odd-odd cell at `at` on the coarse cells north-west, north-east, south-west and south-east of
-    /// it: its own equation, with its neighbours interpolated.
-    pub(super) fn corner_weights(&self, at: usize) -> [R; 4] {
-        let m = self.inverse[OO][at];
-        let below = at + self.grid.stride;
-        let [west, east, north, south] = &self.weights;
-        [
-            m * (west[at] + north[at]),
-            m * (east[at] + north[at + 1]),
-            m * (west[below] + south[at]),
-            m * (east[below] + south[at + 1]),
-        ]
-    }
-
     /// A pass over the level: correction from `next`, sweeps, and residual.
     #[inline(always)]
     pub(super) fn pass(&mut self, next: &mut Coarse<R>, work: Work<R>) -> Progress {
-        if let Some(span) = self.grid.span() {
-            return self.pass_whole(next, work, span);
-        }
         let Work { share, sweeps, descend, tolerance } = work;
-        let Grid { columns: n, rows, .. } = self.grid;
-        let grid = self.grid;
+        let (grid, strips, m) = (self.grid, self.grid.strips, MARGIN);
         let mut progress = Progress::default();
         let mut scratch = std::mem::take(&mut self.scratch);
-        scratch.reset(&grid, &next.grid);
-        let Scratch {
-            upper,
-            lower,
-            restricted,
-            change_ee,
-            change_oo,
-            residual_eo,
-            residual_oe,
-            ..
-        } = &mut scratch;
-        join_row(&next.grid, &next.u, 0, share, upper);
-
-        for y in 0..rows + sweeps + 2 {
-            if y < rows {
-                join_row(&next.grid, &next.u, y + 1, share, lower);
+        scratch.change_oo[..m + grid.stride].fill(R::default());
+        scratch.residual_eo[..m + grid.stride].fill(R::default());
+        scratch.begin_correction(&next.grid, &next.u, share);
+        for y in 0..=strips + sweeps {
+            if y < strips {
+                let (o, n) = grid.strip(y);
+                let (upper, lower) =
+                    scratch.correction_below(&grid, (&next.grid, &next.u), y, share);
                 if let Some(tolerance) = tolerance {
-                    progress.unsettled +=
-                        self.unsettled(self.grid.start(y), upper, lower, tolerance, n);
+                    progress.unsettled += self.unsettled(o, upper, lower, tolerance, n);
                 }
-                correct(&mut self.u, &self.weights, (upper, lower), grid.start(y), n);
-                std::mem::swap(upper, lower);
+                correct(&mut self.u, &self.weights, (upper, lower), o, n);
             }
-            // Every sweep follows the one before at a distance of one row.
+            // Every sweep follows the one before at a distance of one strip.
             for sweep in 0..sweeps {
-                if (sweep..rows + sweep).contains(&y) {
+                if (sweep..strips + sweep).contains(&y) {
                     self.relax(EE, y - sweep, None);
                 }
-                if (sweep + 1..=rows + sweep).contains(&y) {
+                if (sweep + 1..=strips + sweep).contains(&y) {
                     for plane in [OO, OE, EO] {
                         self.relax(plane, y - sweep - 1, None);
                     }
@@ -188,79 +122,32 @@ impl<R: Real> Finest<R> {
                 continue;
             }
             let y = y - sweeps;
-            // The margin beyond the last row does not change.
-            change_ee.swap(0, 1);
-            change_oo.swap(0, 1);
-            if y < rows {
-                self.relax(EE, y, Some(&mut change_ee[1]));
-            } else {
-                change_ee[1].fill(R::default());
+            let Scratch { restricted, change_ee, change_oo, residual_eo, residual_oe, .. } =
+                &mut scratch;
+            if y < strips {
+                self.relax(EE, y, Some(&mut change_ee[grid.buffered(y)[0]..]));
             }
-            if (1..=rows).contains(&y) {
-                let y = y - 1;
-                self.relax(OO, y, Some(&mut change_oo[1]));
-                residual_eo.swap(0, 1);
-                let [above, here] = &mut *residual_eo;
-                let m = MARGIN;
-                residual_on_black(
-                    [&change_ee[0], &change_ee[1]].map(|row| &row[m..]),
-                    [&change_oo[0], &change_oo[1]].map(|row| &row[m - 1..]),
-                    &mut residual_oe[m..][..n],
-                    &mut here[m..][..n],
-                );
-                self.restrict(
-                    grid.start(y),
-                    &residual_oe[m - 1..],
-                    (&above[m..], &here[m..]),
-                    &mut restricted[..n],
-                );
-                split_row(&next.grid, &mut next.f, y, restricted);
+            let Some(y) = y.checked_sub(1) else {
+                continue;
+            };
+            let ((o, n), [first, second]) = (grid.strip(y), grid.buffered(y));
+            if y + 1 == strips {
+                // The margin beyond the last row does not change.
+                let beyond = second + (grid.strip_rows - 1) * grid.stride;
+                change_ee[beyond..][..grid.stride].fill(R::default());
             }
+            self.relax(OO, y, Some(&mut change_oo[second..]));
+            residual_on_black(
+                [&change_ee[first..], &change_ee[second..]],
+                [&change_oo[first - 1..], &change_oo[second - 1..]],
+                &mut residual_oe[m..][..n],
+                &mut residual_eo[second..][..n],
+            );
+            let residual_eo = (&residual_eo[first..], &residual_eo[second..]);
+            self.restrict(o, &residual_oe[m - 1..], residual_eo, &mut restricted[..n]);
+            scratch.split_restricted(&grid, &next.grid, &mut next.f, y);
         }
         self.scratch = scratch;
-        progress
-    }
-
-    /// [`pass`](Self::pass) for a small level, plane by plane, with `span` places of each.
-    #[inline(always)]
-    fn pass_whole(&mut self, next: &mut Coarse<R>, work: Work<R>, span: usize) -> Progress {
-        let grid = self.grid;
-        let (o, stride) = (grid.start(0), grid.stride);
-        let mut whole = std::mem::take(&mut self.whole);
-        let Whole { transfer, change_ee, change_oo, residual_oe, residual_eo, .. } = &mut whole;
-        let mut progress = Progress::default();
-        join(&grid, &next.grid, &next.u, work.share, transfer);
-        let (upper, lower) = (&transfer[o..], &transfer[o + stride..]);
-        if let Some(tolerance) = work.tolerance {
-            progress.unsettled = self.unsettled(o, upper, lower, tolerance, span);
-        }
-        correct(&mut self.u, &self.weights, (upper, lower), o, span);
-        for _ in 0..work.sweeps {
-            for plane in [EE, OO, OE, EO] {
-                self.relax_places(plane, o, span, None);
-                self.add_sources(plane, 0..grid.rows, 0, None);
-            }
-        }
-        if work.descend {
-            for (plane, change) in [(EE, &mut *change_ee), (OO, &mut *change_oo)] {
-                self.relax_places(plane, o, span, Some(&mut change[o..]));
-                self.add_sources(plane, 0..grid.rows, 0, Some(change));
-            }
-            residual_on_black(
-                [&change_ee[o..], &change_ee[o + stride..]],
-                [&change_oo[o - stride - 1..], &change_oo[o - 1..]],
-                &mut residual_oe[o..][..span],
-                &mut residual_eo[o..][..span],
-            );
-            self.restrict(
-                o,
-                &residual_oe[o - 1..],
-                (&residual_eo[o - stride..], &residual_eo[o..]),
-                &mut transfer[o..][..span],
-            );
-            split(&grid, &next.grid, &mut next.f, transfer);
-        }
-        self.whole = whole;
         progress
     }
 
@@ -301,18 +188,10 @@ impl<R: Real> Finest<R> {
         sum_weighted(out, weights, [&odd_even[1..], odd_even, here, above]);
     }
 
-    /// Relaxes row `y` of a plane from its four neighbours; `change`, if given, takes the change of each cell.
+    /// Relaxes a strip of a plane from its four neighbours; `change`, if given, takes the change of each cell.
     #[inline(always)]
-    fn relax(&mut self, plane: usize, y: usize, mut change: Option<&mut [R]>) {
-        let o = self.grid.start(y);
-        let noted = change.as_deref_mut().map(|change| &mut change[MARGIN..]);
-        self.relax_places(plane, o, self.grid.columns, noted);
-        self.add_sources(plane, y..y + 1, o - MARGIN, change);
-    }
-
-    /// Relaxes `n` places of a plane from `o` on, without sources.
-    #[inline(always)]
-    fn relax_places(&mut self, plane: usize, o: usize, n: usize, change: Option<&mut [R]>) {
+    fn relax(&mut self, plane: usize, strip: usize, mut change: Option<&mut [R]>) {
+        let (o, n) = self.grid.strip(strip);
         let stride = self.grid.stride;
         let mut row = std::mem::take(&mut self.u[plane]);
         let [ee, oe, eo, oo] = &self.u;
@@ -324,22 +203,13 @@ impl<R: Real> Finest<R> {
         };
         let around = [&a[..n], &b[..n], &c[..n], &d[..n]];
         let inverse = &self.inverse[plane][o..][..n];
-        match change {
+        match change.as_deref_mut() {
             Some(change) => relax_noting(&mut row[o..][..n], inverse, around, &mut change[..n]),
             None => relax(&mut row[o..][..n], inverse, around),
         }
         self.u[plane] = row;
-    }
-
-    /// Adds the inflow of the cells in `rows` of a plane to u and to its noted change, which starts at place `origin`.
-    #[inline(always)]
-    fn add_sources(
-        &mut self,
-        plane: usize,
-        rows: Range<usize>,
-        origin: usize,
-        mut change: Option<&mut [R]>,
-    ) {
+        let rows = self.grid.strip_rows;
+        let rows = strip * rows..(strip + 1) * rows;
         let first =
             self.sources.partition_point(|source| (source.plane, source.row) < (plane, rows.start));
         for source in &self.sources[first..] {
@@ -349,7 +219,7 @@ impl<R: Real> Finest<R> {
             let inflow = self.inverse[plane][source.at] * source.value;
             self.u[plane][source.at] += inflow;
             if let Some(change) = change.as_deref_mut() {
-                change[source.at - origin] += inflow;
+                change[source.at - o] += inflow;
             }
         }
     }

@@ -1,16 +1,14 @@
-//! The equations of a coarser level: interpolation transposed times the finer equations times interpolation.
+//! The interpolation from a coarser level, and that level's equations: interpolation transposed times the finer equations times interpolation.
 //!
 //! The interpolation to an odd-odd cell satisfies that cell's own equation, so the product of the equations and the
 //! interpolation vanishes there: only the rows of the even-even, odd-even and even-odd cells are formed, one row of cells
 //! at a time, and added up with their weights on the coarse cell.
-//!
-//! The finest level has a product of its own, because its couplings are 0 or 1 and it has no diagonal ones. A common loop for all
-//! levels takes 30 % longer for the whole set-up, and a loop for each term 7 % longer.
+//! A loop for each term takes 7 % longer for the whole set-up.
 
 use std::ops::Range;
 
-use super::coarse::{Coarse, EAST, SOUTH, SOUTH_EAST, SOUTH_WEST};
-use super::finest::Finest;
+use super::coarse::Coarse;
+use super::couplings::{Couplings as _, EAST, Level, SOUTH, SOUTH_EAST, SOUTH_WEST};
 use super::grid::{EE, EO, Grid, MARGIN, OE, OO, cut, split_row};
 use crate::real::Real;
 
@@ -123,237 +121,216 @@ impl<R: Real> Products<R> {
     }
 }
 
-impl<R: Real> Finest<R> {
-    /// Sets `rows` of the equations of `next`.
-    #[inline(always)]
-    pub(super) fn coarsen(
-        &self,
-        next: &mut Coarse<R>,
-        rows: Range<usize>,
-        products: &mut Products<R>,
-    ) {
-        let Grid { columns: n, stride: s, .. } = self.grid;
-        products.start();
-        let zero = R::default();
-        let [west, east, north, south] = &self.weights;
-        let we = |at: usize| [&west[at..][..n], &east[at..][..n]];
-        let ns = |at: usize| [&north[at..][..n], &south[at..][..n]];
-        // The row before the first is included, because its contribution belongs to the first row.
-        for y in rows.start.saturating_sub(1)..rows.end {
-            products.next_row();
-            let o = self.grid.start(y);
-            let m = MARGIN;
-            let ([w, e], [no, so]) = (we(o), ns(o));
-            let ([w_below, e_below], [no_east, so_east]) = (we(o + s), ns(o + 1));
+/// The weights of the `n` odd-odd cells from `o` on, on the coarse cells north-west, north-east, south-west and south-east of each: its
+/// own equation, with its neighbours interpolated.
+#[inline(always)]
+pub(super) fn corner_weights<R: Real>(
+    fine: &impl Level<R>,
+    o: usize,
+    n: usize,
+    [nw, ne, sw, se]: [&mut [R]; 4],
+) {
+    let below = o + fine.grid().stride;
+    let [west, east, north, south] = fine.weights();
+    let (w, e, w_below, e_below) = (&west[o..], &east[o..], &west[below..], &east[below..]);
+    let (no, so, no_east, so_east) = (&north[o..], &south[o..], &north[o + 1..], &south[o + 1..]);
+    cut!(0, n, nw, ne, sw, se);
+    let (w, e, w_below, e_below) = (&w[..n], &e[..n], &w_below[..n], &e_below[..n]);
+    let (no, so, no_east, so_east) = (&no[..n], &so[..n], &no_east[..n], &so_east[..n]);
+    let inverse = &fine.inverse()[OO][o..][..n];
+    let (up, down) = (fine.across(SOUTH, (OE, o), n), fine.across(SOUTH, (OO, o), n));
+    let (left, right) = (fine.across(EAST, (EO, o), n), fine.across(EAST, (OO, o), n));
+    let c_nw = fine.diagonal(SOUTH_EAST, (EE, o), n);
+    let c_ne = fine.diagonal(SOUTH_WEST, (EE, o + 1), n);
+    let c_sw = fine.diagonal(SOUTH_WEST, (OO, o), n);
+    let c_se = fine.diagonal(SOUTH_EAST, (OO, o), n);
+    for x in 0..n {
+        nw[x] = inverse[x] * (c_nw.times(x, R::ONE) + up.times(x, w[x]) + left.times(x, no[x]));
+        ne[x] =
+            inverse[x] * (c_ne.times(x, R::ONE) + up.times(x, e[x]) + right.times(x, no_east[x]));
+    }
+    for x in 0..n {
+        sw[x] =
+            inverse[x] * (c_sw.times(x, R::ONE) + down.times(x, w_below[x]) + left.times(x, so[x]));
+        se[x] = inverse[x]
+            * (c_se.times(x, R::ONE) + down.times(x, e_below[x]) + right.times(x, so_east[x]));
+    }
+}
 
-            let [nw, ne, sw, se] = &mut products.corner[1];
-            cut!(m, n, nw, ne, sw, se);
-            let inverse = &self.inverse[OO][o..][..n];
+/// Sets `rows` of the equations of `next`.
+#[inline(always)]
+pub(super) fn coarsen<R: Real>(
+    fine: &impl Level<R>,
+    next: &mut Coarse<R>,
+    rows: Range<usize>,
+    products: &mut Products<R>,
+) {
+    let Grid { columns: n, stride: s, .. } = fine.grid();
+    products.start();
+    let (zero, m) = (R::default(), MARGIN);
+    let [west, east, north, south] = fine.weights();
+    let we = |at: usize| [&west[at..][..n], &east[at..][..n]];
+    let ns = |at: usize| [&north[at..][..n], &south[at..][..n]];
+    // The row before the first is included, because its contribution belongs to the first row.
+    for y in rows.start.saturating_sub(1)..rows.end {
+        products.next_row();
+        let o = fine.grid().start(y);
+        let along =
+            |direction, plane, start, there| fine.along(direction, (plane, start), (EE, there), n);
+        let across = |direction, plane, start| fine.across(direction, (plane, start), n);
+        let diagonal = |direction, plane, start| fine.diagonal(direction, (plane, start), n);
+        let ([w, e], [no, so], [no_east, so_east]) = (we(o), ns(o), ns(o + 1));
+        let ([w_west, e_west], [w_below_west, e_below_west]) = (we(o - 1), we(o + s - 1));
+        let [w_below, e_below] = we(o + s);
+        let ([no_above, so_above], [no_above_east, so_above_east]) = (ns(o - s), ns(o - s + 1));
+
+        let [nw, ne, sw, se] = &mut products.corner[1];
+        cut!(m, n, nw, ne, sw, se);
+        corner_weights(fine, o, n, [nw, ne, sw, se]);
+        let [above, here] = &products.corner;
+        let [a_nw, a_ne, a_sw, a_se] = places(above, m, n);
+        let [h_nw, h_ne, h_sw, h_se] = places(here, m, n);
+        let [l_nw, l_ne, l_sw, l_se] = places(here, m - 1, n);
+        {
+            let inverse = &fine.inverse()[OE][o..][..n];
+            let (left, right) = (along(EAST, EE, o, o), along(EAST, OE, o, o + 1));
+            let (up, down) = (across(SOUTH, OO, o - s), across(SOUTH, OE, o));
+            let (c_nw, c_ne) =
+                (diagonal(SOUTH_EAST, EO, o - s), diagonal(SOUTH_WEST, EO, o - s + 1));
+            let (c_sw, c_se) = (diagonal(SOUTH_WEST, OE, o), diagonal(SOUTH_EAST, OE, o));
+            let [q0, q1, q2, q3, q4, q5] = &mut products.odd_even;
+            cut!(m, n, q0, q1, q2, q3, q4, q5);
             for x in 0..n {
-                nw[x] = inverse[x] * (w[x] + no[x]);
-                ne[x] = inverse[x] * (e[x] + no_east[x]);
-                sw[x] = inverse[x] * (w_below[x] + so[x]);
-                se[x] = inverse[x] * (e_below[x] + so_east[x]);
+                let d = inverse[x].inverse();
+                q0[x] = d * w[x]
+                    - left.times(x, R::ONE)
+                    - up.times(x, a_sw[x])
+                    - down.times(x, h_nw[x])
+                    - c_nw.times(x, so_above[x])
+                    - c_sw.times(x, no[x]);
+                q1[x] = d * e[x]
+                    - right.times(x, R::ONE)
+                    - up.times(x, a_se[x])
+                    - down.times(x, h_ne[x])
+                    - c_ne.times(x, so_above_east[x])
+                    - c_se.times(x, no_east[x]);
             }
-
-            let (e_west, s_above) = (&east[o - 1..][..n], &south[o - s..][..n]);
-            let [above, here] = &products.corner;
-            let active = &self.inverse[EE][o..][..n];
-            let active_east = &self.inverse[EE][o + 1..][..n];
-            let active_south = &self.inverse[EE][o + s..][..n];
-            {
-                let d = &self.inverse[OE][o..][..n];
-                let [a_nw, a_ne, a_sw, a_se] = places(above, m, n);
-                let [h_nw, h_ne, h_sw, h_se] = places(here, m, n);
-                let [q0, q1, q2, q3, q4, q5] = &mut products.odd_even;
-                cut!(m, n, q0, q1, q2, q3, q4, q5);
-                for x in 0..n {
-                    let d = d[x].inverse();
-                    q0[x] = d * w[x] - active[x].is_active() - a_sw[x] - h_nw[x];
-                    q1[x] = d * e[x] - active_east[x].is_active() - a_se[x] - h_ne[x];
-                }
-                for x in 0..n {
-                    q2[x] = zero - a_nw[x];
-                    q3[x] = zero - a_ne[x];
-                    q4[x] = zero - h_sw[x];
-                    q5[x] = zero - h_se[x];
-                }
+            for x in 0..n {
+                q2[x] = zero - up.times(x, a_nw[x]) - c_nw.times(x, no_above[x]);
+                q3[x] = zero - up.times(x, a_ne[x]) - c_ne.times(x, no_above_east[x]);
+                q4[x] = zero - down.times(x, h_sw[x]) - c_sw.times(x, so[x]);
+                q5[x] = zero - down.times(x, h_se[x]) - c_se.times(x, so_east[x]);
             }
-            {
-                let d = &self.inverse[EO][o..][..n];
-                let [h_nw, h_ne, h_sw, h_se] = places(here, m, n);
-                let [l_nw, l_ne, l_sw, l_se] = places(here, m - 1, n);
-                let [v0, v1, v2, v3, v4, v5] = &mut products.even_odd[1];
-                cut!(m, n, v0, v1, v2, v3, v4, v5);
-                for x in 0..n {
-                    let d = d[x].inverse();
-                    v0[x] = d * no[x] - active[x].is_active() - l_ne[x] - h_nw[x];
-                    v1[x] = d * so[x] - active_south[x].is_active() - l_se[x] - h_sw[x];
-                }
-                for x in 0..n {
-                    v2[x] = zero - l_nw[x];
-                    v3[x] = zero - h_ne[x];
-                    v4[x] = zero - l_sw[x];
-                    v5[x] = zero - h_se[x];
-                }
+        }
+        {
+            let inverse = &fine.inverse()[EO][o..][..n];
+            let (up, down) = (along(SOUTH, EE, o, o), along(SOUTH, EO, o, o + s));
+            let (left, right) = (across(EAST, OO, o - 1), across(EAST, EO, o));
+            let (c_nw, c_ne) = (diagonal(SOUTH_EAST, OE, o - 1), diagonal(SOUTH_WEST, OE, o));
+            let (c_sw, c_se) = (diagonal(SOUTH_WEST, EO, o), diagonal(SOUTH_EAST, EO, o));
+            let [v0, v1, v2, v3, v4, v5] = &mut products.even_odd[1];
+            cut!(m, n, v0, v1, v2, v3, v4, v5);
+            for x in 0..n {
+                let d = inverse[x].inverse();
+                v0[x] = d * no[x]
+                    - up.times(x, R::ONE)
+                    - left.times(x, l_ne[x])
+                    - right.times(x, h_nw[x])
+                    - c_nw.times(x, e_west[x])
+                    - c_ne.times(x, w[x]);
+                v1[x] = d * so[x]
+                    - down.times(x, R::ONE)
+                    - left.times(x, l_se[x])
+                    - right.times(x, h_sw[x])
+                    - c_sw.times(x, e_below_west[x])
+                    - c_se.times(x, w_below[x]);
             }
-            {
-                let [p0, p1, p2, p3, p4] = &mut products.even_even;
-                cut!(m, n, p0, p1, p2, p3, p4);
-                for x in 0..n {
-                    let on = active[x].is_active();
-                    p0[x] = active[x].inverse() - on * (w[x] + e_west[x] + no[x] + s_above[x]);
-                    p1[x] = zero - on * e[x];
-                    p2[x] = zero - on * so[x];
-                }
-                p3.fill(zero);
-                p4.fill(zero);
+            for x in 0..n {
+                v2[x] = zero - left.times(x, l_nw[x]) - c_nw.times(x, w_west[x]);
+                v3[x] = zero - right.times(x, h_ne[x]) - c_ne.times(x, e[x]);
+                v4[x] = zero - left.times(x, l_sw[x]) - c_sw.times(x, w_below_west[x]);
+                v5[x] = zero - right.times(x, h_se[x]) - c_se.times(x, e_below[x]);
             }
-            if y >= rows.start {
-                products.finish_row([w, e_west, no, s_above], next, y);
+        }
+        {
+            let inverse = &fine.inverse()[EE][o..][..n];
+            let (left, right) = (along(EAST, OE, o - 1, o), along(EAST, EE, o, o));
+            let (up, down) = (along(SOUTH, EO, o - s, o), along(SOUTH, EE, o, o));
+            let (c_nw, c_ne) =
+                (diagonal(SOUTH_EAST, OO, o - s - 1), diagonal(SOUTH_WEST, OO, o - s));
+            let (c_sw, c_se) = (diagonal(SOUTH_WEST, EE, o), diagonal(SOUTH_EAST, EE, o));
+            let al_se = &above[3][m - 1..][..n];
+            let [p0, p1, p2, p3, p4] = &mut products.even_even;
+            cut!(m, n, p0, p1, p2, p3, p4);
+            for x in 0..n {
+                p0[x] = inverse[x].inverse()
+                    - (right.times(x, w[x])
+                        + left.times(x, e_west[x])
+                        + down.times(x, no[x])
+                        + up.times(x, so_above[x]))
+                    - (c_se.times(x, h_nw[x])
+                        + c_sw.times(x, l_ne[x])
+                        + c_ne.times(x, a_sw[x])
+                        + c_nw.times(x, al_se[x]));
             }
+            for x in 0..n {
+                p1[x] =
+                    zero - right.times(x, e[x]) - c_se.times(x, h_ne[x]) - c_ne.times(x, a_se[x]);
+                p2[x] =
+                    zero - down.times(x, so[x]) - c_se.times(x, h_sw[x]) - c_sw.times(x, l_se[x]);
+                p3[x] = zero - c_se.times(x, h_se[x]);
+                p4[x] = zero - c_sw.times(x, l_sw[x]);
+            }
+        }
+        if y >= rows.start {
+            products.finish_row([w, e_west, no, so_above], next, y);
         }
     }
 }
 
-impl<R: Real> Coarse<R> {
-    /// Sets `rows` of the equations of `next`.
-    #[inline(always)]
-    pub(super) fn coarsen(&self, next: &mut Self, rows: Range<usize>, products: &mut Products<R>) {
-        let Grid { columns: n, stride: s, .. } = self.grid;
-        products.start();
-        let zero = R::default();
-        let m = MARGIN;
-        let a = |direction: usize, plane: usize, start: usize| {
-            &self.coupling[direction][plane][start..][..n]
-        };
-        let [west, east, north, south] = &self.weights;
-        let we = |at: usize| [&west[at..][..n], &east[at..][..n]];
-        let ns = |at: usize| [&north[at..][..n], &south[at..][..n]];
-        // The row before the first is included, because its contribution belongs to the first row.
-        for y in rows.start.saturating_sub(1)..rows.end {
-            products.next_row();
-            let o = self.grid.start(y);
-            let ([w, e], [no, so], [no_east, so_east]) = (we(o), ns(o), ns(o + 1));
-            let ([w_west, e_west], [w_below, e_below]) = (we(o - 1), we(o + s));
-            let [w_below_west, e_below_west] = we(o + s - 1);
-            let ([no_above, so_above], [no_above_east, so_above_east]) = (ns(o - s), ns(o - s + 1));
-
-            {
-                let [nw, ne, sw, se] = &mut products.corner[1];
-                cut!(m, n, nw, ne, sw, se);
-                let inverse = &self.inverse[OO][o..][..n];
-                let (up, down) = (a(SOUTH, OE, o), a(SOUTH, OO, o));
-                let (left, right) = (a(EAST, EO, o), a(EAST, OO, o));
-                let (c_nw, c_ne) = (a(SOUTH_EAST, EE, o), a(SOUTH_WEST, EE, o + 1));
-                let (c_sw, c_se) = (a(SOUTH_WEST, OO, o), a(SOUTH_EAST, OO, o));
-                for x in 0..n {
-                    nw[x] = inverse[x] * (c_nw[x] + up[x] * w[x] + left[x] * no[x]);
-                    ne[x] = inverse[x] * (c_ne[x] + up[x] * e[x] + right[x] * no_east[x]);
-                }
-                for x in 0..n {
-                    sw[x] = inverse[x] * (c_sw[x] + down[x] * w_below[x] + left[x] * so[x]);
-                    se[x] = inverse[x] * (c_se[x] + down[x] * e_below[x] + right[x] * so_east[x]);
-                }
-            }
-            let [above, here] = &products.corner;
-            {
-                let inverse = &self.inverse[OE][o..][..n];
-                let (left, right) = (a(EAST, EE, o), a(EAST, OE, o));
-                let (up, down) = (a(SOUTH, OO, o - s), a(SOUTH, OE, o));
-                let (c_nw, c_ne) = (a(SOUTH_EAST, EO, o - s), a(SOUTH_WEST, EO, o - s + 1));
-                let (c_sw, c_se) = (a(SOUTH_WEST, OE, o), a(SOUTH_EAST, OE, o));
-                let [a_nw, a_ne, a_sw, a_se] = places(above, m, n);
-                let [h_nw, h_ne, h_sw, h_se] = places(here, m, n);
-                let [q0, q1, q2, q3, q4, q5] = &mut products.odd_even;
-                cut!(m, n, q0, q1, q2, q3, q4, q5);
-                for x in 0..n {
-                    let d = inverse[x].inverse();
-                    q0[x] = d * w[x]
-                        - left[x]
-                        - up[x] * a_sw[x]
-                        - down[x] * h_nw[x]
-                        - c_nw[x] * so_above[x]
-                        - c_sw[x] * no[x];
-                    q1[x] = d * e[x]
-                        - right[x]
-                        - up[x] * a_se[x]
-                        - down[x] * h_ne[x]
-                        - c_ne[x] * so_above_east[x]
-                        - c_se[x] * no_east[x];
-                }
-                for x in 0..n {
-                    q2[x] = zero - up[x] * a_nw[x] - c_nw[x] * no_above[x];
-                    q3[x] = zero - up[x] * a_ne[x] - c_ne[x] * no_above_east[x];
-                    q4[x] = zero - down[x] * h_sw[x] - c_sw[x] * so[x];
-                    q5[x] = zero - down[x] * h_se[x] - c_se[x] * so_east[x];
-                }
-            }
-            {
-                let inverse = &self.inverse[EO][o..][..n];
-                let (up, down) = (a(SOUTH, EE, o), a(SOUTH, EO, o));
-                let (left, right) = (a(EAST, OO, o - 1), a(EAST, EO, o));
-                let (c_nw, c_ne) = (a(SOUTH_EAST, OE, o - 1), a(SOUTH_WEST, OE, o));
-                let (c_sw, c_se) = (a(SOUTH_WEST, EO, o), a(SOUTH_EAST, EO, o));
-                let [l_nw, l_ne, l_sw, l_se] = places(here, m - 1, n);
-                let [h_nw, h_ne, h_sw, h_se] = places(here, m, n);
-                let [v0, v1, v2, v3, v4, v5] = &mut products.even_odd[1];
-                cut!(m, n, v0, v1, v2, v3, v4, v5);
-                for x in 0..n {
-                    let d = inverse[x].inverse();
-                    v0[x] = d * no[x]
-                        - up[x]
-                        - left[x] * l_ne[x]
-                        - right[x] * h_nw[x]
-                        - c_nw[x] * e_west[x]
-                        - c_ne[x] * w[x];
-                    v1[x] = d * so[x]
-                        - down[x]
-                        - left[x] * l_se[x]
-                        - right[x] * h_sw[x]
-                        - c_sw[x] * e_below_west[x]
-                        - c_se[x] * w_below[x];
-                }
-                for x in 0..n {
-                    v2[x] = zero - left[x] * l_nw[x] - c_nw[x] * w_west[x];
-                    v3[x] = zero - right[x] * h_ne[x] - c_ne[x] * e[x];
-                    v4[x] = zero - left[x] * l_sw[x] - c_sw[x] * w_below_west[x];
-                    v5[x] = zero - right[x] * h_se[x] - c_se[x] * e_below[x];
-                }
-            }
-            {
-                let inverse = &self.inverse[EE][o..][..n];
-                let (left, right) = (a(EAST, OE, o - 1), a(EAST, EE, o));
-                let (up, down) = (a(SOUTH, EO, o - s), a(SOUTH, EE, o));
-                let (c_nw, c_ne) = (a(SOUTH_EAST, OO, o - s - 1), a(SOUTH_WEST, OO, o - s));
-                let (c_sw, c_se) = (a(SOUTH_WEST, EE, o), a(SOUTH_EAST, EE, o));
-                let [h_nw, h_ne, h_sw, h_se] = places(here, m, n);
-                let [_, l_ne, l_sw, l_se] = places(here, m - 1, n);
-                let [_, _, a_sw, a_se] = places(above, m, n);
-                let al_se = &above[3][m - 1..][..n];
-                let [p0, p1, p2, p3, p4] = &mut products.even_even;
-                cut!(m, n, p0, p1, p2, p3, p4);
-                for x in 0..n {
-                    p0[x] = inverse[x].inverse()
-                        - (right[x] * w[x]
-                            + left[x] * e_west[x]
-                            + down[x] * no[x]
-                            + up[x] * so_above[x])
-                        - (c_se[x] * h_nw[x]
-                            + c_sw[x] * l_ne[x]
-                            + c_ne[x] * a_sw[x]
-                            + c_nw[x] * al_se[x]);
-                }
-                for x in 0..n {
-                    p1[x] = zero - right[x] * e[x] - c_se[x] * h_ne[x] - c_ne[x] * a_se[x];
-                    p2[x] = zero - down[x] * so[x] - c_se[x] * h_sw[x] - c_sw[x] * l_se[x];
-                    p3[x] = zero - c_se[x] * h_se[x];
-                    p4[x] = zero - c_sw[x] * l_sw[x];
-                }
-            }
-            if y >= rows.start {
-                products.finish_row([w, e_west, no, so_above], next, y);
-            }
+/// Sets `rows` of the interpolation along the lines between coarse cells: the couplings across the line are added to those along it,
+/// those straight across are taken off the diagonal.
+///
+/// A coarse cell gives only to cells coupled to it. If a wall lies between them, or the coarse cell is itself a wall, the couplings
+/// to cells beside it would couple the corrections on both sides of the wall, and far from the target the cycles would not
+/// converge.
+#[inline(always)]
+pub(super) fn interpolate<R: Real>(fine: &mut impl Level<R>, rows: Range<usize>) {
+    let Grid { columns: n, stride: s, .. } = fine.grid();
+    let least = R::of(1e-4);
+    let share = |d: R, a: R, b: R| {
+        let rest = d - a - b;
+        if rest > least * d { R::ONE / rest } else { R::default() }
+    };
+    let mut weights = std::mem::take(fine.weights_mut());
+    for y in rows {
+        let o = fine.grid().start(y);
+        let along = |direction, owner, there| fine.along(direction, owner, there, n);
+        let diagonal = |direction, plane, start| fine.diagonal(direction, (plane, start), n);
+        let [to_west, to_east, to_north, to_south] = &mut weights;
+        cut!(o, n, to_west, to_east, to_north, to_south);
+        let own = &fine.inverse()[OE][o..][..n];
+        let (w, e) = (along(EAST, (EE, o), (EE, o)), along(EAST, (OE, o), (EE, o + 1)));
+        let (nw, ne) = (diagonal(SOUTH_EAST, EO, o - s), diagonal(SOUTH_WEST, EO, o + 1 - s));
+        let (sw, se) = (diagonal(SOUTH_WEST, OE, o), diagonal(SOUTH_EAST, OE, o));
+        let (no, so) = (along(SOUTH, (OO, o - s), (OO, o - s)), along(SOUTH, (OE, o), (OO, o)));
+        for x in 0..n {
+            let share = share(own[x].inverse(), no.times(x, R::ONE), so.times(x, R::ONE));
+            let (w, e) = (w.times(x, R::ONE), e.times(x, R::ONE));
+            to_west[x] = w.is_active() * (w + nw.times(x, R::ONE) + sw.times(x, R::ONE)) * share;
+            to_east[x] = e.is_active() * (e + ne.times(x, R::ONE) + se.times(x, R::ONE)) * share;
+        }
+        let own = &fine.inverse()[EO][o..][..n];
+        let (no, so) = (along(SOUTH, (EE, o), (EE, o)), along(SOUTH, (EO, o), (EE, o + s)));
+        let (nw, ne) = (diagonal(SOUTH_EAST, OE, o - 1), diagonal(SOUTH_WEST, OE, o));
+        let (sw, se) = (diagonal(SOUTH_WEST, EO, o), diagonal(SOUTH_EAST, EO, o));
+        let (w, e) = (along(EAST, (OO, o - 1), (OO, o - 1)), along(EAST, (EO, o), (OO, o)));
+        for x in 0..n {
+            let share = share(own[x].inverse(), w.times(x, R::ONE), e.times(x, R::ONE));
+            let (no, so) = (no.times(x, R::ONE), so.times(x, R::ONE));
+            to_north[x] = no.is_active() * (no + nw.times(x, R::ONE) + ne.times(x, R::ONE)) * share;
+            to_south[x] = so.is_active() * (so + sw.times(x, R::ONE) + se.times(x, R::ONE)) * share;
         }
     }
+    *fine.weights_mut() = weights;
 }

@@ -18,7 +18,7 @@ pub(super) type Weights<R> = [Vec<R>; 4];
 /// Zeros before the first row; one would do, eight keep the rows aligned.
 pub(super) const MARGIN: usize = 8;
 
-/// Largest plane that is gone through as one row, in values.
+/// Largest plane that a pass takes as one row, in values.
 const SMALL: usize = 1 << 15;
 
 /// Makes each of these rows `n` of its values from `start` on, to be written. It is a macro because loops are vectorised only where the
@@ -40,19 +40,22 @@ pub(super) struct Grid {
     pub rows: usize,
     /// Values from one row of a plane to the next.
     pub stride: usize,
+    /// Rows of a plane that a pass takes at once, as one row: all of a small level, because there the work for each row and the partial
+    /// vectors at its end would cost more than the margins between the rows, which stay zero, because their diagonals and weights are
+    /// zero. The results are equal either way.
+    pub strip_rows: usize,
+    /// The number of strips of so many rows.
+    pub strips: usize,
 }
 
 impl Grid {
     pub(super) fn new(width: usize, height: usize) -> Self {
         let (columns, rows) = (width.div_ceil(2), height.div_ceil(2));
-        Self {
-            width,
-            height,
-            columns,
-            rows,
-            // There is at least one zero between rows.
-            stride: (columns + 1).next_multiple_of(8),
-        }
+        // There is at least one zero between rows.
+        let stride = (columns + 1).next_multiple_of(8);
+        let strip_rows = if rows * stride <= SMALL { rows } else { 1 };
+        let strips = rows / strip_rows;
+        Self { width, height, columns, rows, stride, strip_rows, strips }
     }
 
     /// Values of a plane with its margin.
@@ -70,89 +73,99 @@ impl Grid {
         ((col & 1) + 2 * (row & 1), self.start(row / 2) + col / 2)
     }
 
-    /// The number of cells of a plane from its first to its last with the margins between rows, if the level is small. The planes of a
-    /// small level are processed as a single row, because the work for each row and the partial vectors at its end would cost more
-    /// than the margins. The margins stay zero, because their diagonals and weights are zero. The results are equal either way.
+    /// The first place of a strip in its plane and the number of its places.
     #[inline(always)]
-    pub(super) fn span(&self) -> Option<usize> {
-        (self.rows * self.stride <= SMALL)
-            .then(|| self.rows.saturating_sub(1) * self.stride + self.columns)
+    pub(super) fn strip(&self, number: usize) -> (usize, usize) {
+        let rows = self.strip_rows;
+        (self.start(number * rows), (rows - 1) * self.stride + self.columns)
+    }
+
+    /// Two places in the buffers of a pass: those of strip `number` and of the next, or of the one before and of strip `number`.
+    /// Single rows take turns in two places, the rows of a small level lie one after the other.
+    #[inline(always)]
+    pub(super) fn buffered(&self, number: usize) -> [usize; 2] {
+        let first = MARGIN + number % 2 * self.stride;
+        [first, 2 * MARGIN + self.stride - first]
     }
 
     /// Makes `planes` the planes of this level, filled with zeros.
     pub(super) fn reset<'a, R: Real>(&self, planes: impl IntoIterator<Item = &'a mut Vec<R>>) {
-        for plane in planes {
-            if plane.capacity() < self.len() {
-                // Fresh pages are already zero.
-                *plane = vec![R::default(); self.len()];
-                continue;
-            }
-            plane.clear();
-            plane.resize(self.len(), R::default());
-        }
+        zero_values(planes, self.len());
     }
 }
 
-/// Row buffers of a pass over a level, reused between passes.
+/// Makes `rows` so many zeros each.
+fn zero_values<'a, R: Real>(rows: impl IntoIterator<Item = &'a mut Vec<R>>, len: usize) {
+    for row in rows {
+        if row.capacity() < len {
+            // Fresh pages are already zero.
+            *row = vec![R::default(); len];
+            continue;
+        }
+        row.clear();
+        row.resize(len, R::default());
+    }
+}
+
+/// The buffers of a pass over a level, each of the strip at hand and a row beside it, reused between passes.
 #[derive(Debug, Default)]
 pub(super) struct Scratch<R> {
-    /// Rows of the next level in column order.
-    pub upper: Vec<R>,
-    pub lower: Vec<R>,
+    /// Rows of the next level in column order: of its correction, and of its right-hand side.
+    pub correction: Vec<R>,
     pub restricted: Vec<R>,
-    /// Changes of even-even and odd-odd cells in the last two rows.
-    pub change_ee: [Vec<R>; 2],
-    pub change_oo: [Vec<R>; 2],
-    /// Residuals of even-odd cells in the last two rows, and of odd-even and even-even cells in the last row.
-    pub residual_eo: [Vec<R>; 2],
-    pub residual_oe: Vec<R>,
-    pub residual_ee: Vec<R>,
-}
-
-/// Planes of a pass over a small level, margins included, reused between passes.
-#[derive(Debug, Default)]
-pub(super) struct Whole<R> {
-    /// The correction of the even-even cells on the way up, their residual on the way down.
-    pub transfer: Vec<R>,
-    /// Changes of even-even and odd-odd cells, on the finest level.
+    /// Changes of even-even and odd-odd cells.
     pub change_ee: Vec<R>,
     pub change_oo: Vec<R>,
-    pub residual_oe: Vec<R>,
     pub residual_eo: Vec<R>,
+    pub residual_oe: Vec<R>,
     pub residual_ee: Vec<R>,
 }
 
-impl<R: Real> Whole<R> {
-    /// Makes these planes of zeros; none on a large level.
+impl<R: Real> Scratch<R> {
     pub(super) fn reset(&mut self, grid: &Grid) {
-        let Self { transfer, change_ee, change_oo, residual_oe, residual_eo, residual_ee } = self;
-        let planes = [transfer, change_ee, change_oo, residual_oe, residual_eo, residual_ee];
-        if grid.span().is_some() {
-            return grid.reset(planes);
+        let Self { correction, restricted, change_ee, change_oo, .. } = self;
+        let residuals = [&mut self.residual_eo, &mut self.residual_oe, &mut self.residual_ee];
+        let others = [correction, restricted, change_ee, change_oo];
+        let len = (grid.strip_rows + 1) * grid.stride + 2 * MARGIN;
+        zero_values(others.into_iter().chain(residuals), len);
+    }
+
+    /// Puts the first row of `next`, times `share`, where [`correction_below`](Self::correction_below) expects it.
+    #[inline(always)]
+    pub(super) fn begin_correction(&mut self, next: &Grid, planes: &Planes<R>, share: R) {
+        join_row(next, planes, 0, share, &mut self.correction[MARGIN..]);
+    }
+
+    /// The correction in the rows of `next` at strip `number` of the level of `grid`, and in the rows below each of them.
+    #[inline(always)]
+    pub(super) fn correction_below(
+        &mut self,
+        grid: &Grid,
+        (next, planes): (&Grid, &Planes<R>),
+        number: usize,
+        share: R,
+    ) -> (&[R], &[R]) {
+        let [upper, lower] = grid.buffered(number);
+        for row in 0..grid.strip_rows {
+            let into = &mut self.correction[lower + row * grid.stride..];
+            join_row(next, planes, number * grid.strip_rows + row + 1, share, into);
         }
-        planes.into_iter().for_each(|plane| *plane = Vec::new());
+        (&self.correction[upper..], &self.correction[lower..])
     }
-}
 
-/// Reads all rows of `next`, the level after that of `grid`, times `share`, into one of its planes.
-#[inline(always)]
-pub(super) fn join<R: Real>(
-    grid: &Grid,
-    next: &Grid,
-    planes: &Planes<R>,
-    share: R,
-    into: &mut [R],
-) {
-    for y in 0..grid.rows {
-        join_row(next, planes, y, share, &mut into[grid.start(y)..]);
-    }
-}
-
-/// Writes a plane of the level of `grid` to all rows of the level `next`.
-#[inline(always)]
-pub(super) fn split<R: Real>(grid: &Grid, next: &Grid, planes: &mut Planes<R>, from: &[R]) {
-    for y in 0..grid.rows {
-        split_row(next, planes, y, &from[grid.start(y)..]);
+    /// Writes the restricted rows of strip `number` of the level of `grid` to the planes of `next`.
+    #[inline(always)]
+    pub(super) fn split_restricted(
+        &self,
+        grid: &Grid,
+        next: &Grid,
+        planes: &mut Planes<R>,
+        number: usize,
+    ) {
+        for row in 0..grid.strip_rows {
+            let values = &self.restricted[row * grid.stride..];
+            split_row(next, planes, number * grid.strip_rows + row, values);
+        }
     }
 }
 
@@ -185,24 +198,6 @@ fn add_products<R: Real>(out: &mut [R], (w, a): (&[R], &[R]), (v, b): (&[R], &[R
     let (w, a, v, b) = (&w[..n], &a[..n], &v[..n], &b[..n]);
     for x in 0..n {
         out[x] += w[x] * a[x] + v[x] * b[x];
-    }
-}
-
-impl<R: Real> Scratch<R> {
-    /// Makes all rows zero, and as long as `grid` and `next` need them.
-    pub(super) fn reset(&mut self, grid: &Grid, next: &Grid) {
-        let reset = |row: &mut Vec<R>, len: usize| {
-            row.clear();
-            row.resize(len, R::default());
-        };
-        for row in [&mut self.upper, &mut self.lower, &mut self.restricted] {
-            reset(row, 2 * next.columns + 2);
-        }
-        let pairs =
-            self.change_ee.iter_mut().chain(&mut self.change_oo).chain(&mut self.residual_eo);
-        for row in pairs.chain([&mut self.residual_oe, &mut self.residual_ee]) {
-            reset(row, grid.stride + MARGIN);
-        }
     }
 }
 

@@ -1,8 +1,10 @@
 //! The inflow at single cells, restricted to the coarse levels: interpolation transposed, for a handful of cells a level.
 
 use super::coarse::Coarse;
+use super::couplings::Level;
 use super::finest::Finest;
-use super::grid::{EE, EO, Grid, MARGIN, OE};
+use super::galerkin::corner_weights;
+use super::grid::{EE, EO, MARGIN, OE};
 use crate::real::Real;
 
 /// Inflow at a cell, by column and row.
@@ -12,10 +14,7 @@ type Flow<R> = ((usize, usize), R);
 pub(super) fn restrict<R: Real>(finest: &Finest<R>, coarse: &mut [Coarse<R>]) {
     let mut flows = Vec::new();
     for source in &finest.sources {
-        let at = source.at;
-        let line = finest.weights.each_ref().map(|row| row[at]);
-        let corner = || finest.corner_weights(at);
-        spread(&finest.grid, source.plane, at, source.value, line, corner, &mut flows);
+        spread_flow(finest, source.plane, source.at, source.value, &mut flows);
     }
     for level in coarse {
         for plane in &mut level.f {
@@ -28,9 +27,7 @@ pub(super) fn restrict<R: Real>(finest: &Finest<R>, coarse: &mut [Coarse<R>]) {
             }
             let (plane, at) = level.grid.locate(col, row);
             level.f[plane][at] += value;
-            let line = level.weights.each_ref().map(|row| row[at]);
-            let corner = || level.corner_weights(at);
-            spread(&level.grid, plane, at, value, line, corner, &mut next);
+            spread_flow(level, plane, at, value, &mut next);
         }
         next.sort_unstable_by_key(|flow| flow.0);
         next.dedup_by(|b, a| {
@@ -44,40 +41,40 @@ pub(super) fn restrict<R: Real>(finest: &Finest<R>, coarse: &mut [Coarse<R>]) {
     }
 }
 
-/// Adds `value` of the cell at `at` of a plane to the coarse cells it is interpolated from: with the weights `line` (west,
-/// east, north, south), or those of `corner` for an odd-odd cell.
-fn spread<R: Real>(
-    grid: &Grid,
+/// Adds `value` of the cell at `at` of a plane of `level` to the coarse cells it is interpolated from.
+fn spread_flow<R: Real>(
+    level: &impl Level<R>,
     plane: usize,
     at: usize,
     value: R,
-    [west, east, north, south]: [R; 4],
-    corner: impl Fn() -> [R; 4],
     flows: &mut Vec<Flow<R>>,
 ) {
-    let row = (at - MARGIN) / grid.stride - 1;
-    let col = (at - MARGIN) % grid.stride;
-    let mut add = |col: usize, row: usize, weight: R| {
+    let stride = level.grid().stride;
+    let (col, row) = ((at - MARGIN) % stride, (at - MARGIN) / stride - 1);
+    for (k, weight) in interpolation_weights(level, plane, at).into_iter().enumerate() {
         if weight > R::default() {
-            flows.push(((col, row), value * weight));
+            flows.push(((col + k % 2, row + k / 2), value * weight));
         }
-    };
+    }
+}
+
+/// The weights of the cell at `at` of a plane on the coarse cells north-west, north-east, south-west and south-east of it, the first
+/// of which is in its own column or row if that is even.
+pub(super) fn interpolation_weights<R: Real>(
+    level: &impl Level<R>,
+    plane: usize,
+    at: usize,
+) -> [R; 4] {
+    let zero = R::default();
+    let [west, east, north, south] = level.weights().each_ref().map(|row| row[at]);
     match plane {
-        EE => add(col, row, R::ONE),
-        OE => {
-            add(col, row, west);
-            add(col + 1, row, east);
-        }
-        EO => {
-            add(col, row, north);
-            add(col, row + 1, south);
-        }
+        EE => [R::ONE, zero, zero, zero],
+        OE => [west, east, zero, zero],
+        EO => [north, zero, south, zero],
         _ => {
-            let [north_west, north_east, south_west, south_east] = corner();
-            add(col, row, north_west);
-            add(col + 1, row, north_east);
-            add(col, row + 1, south_west);
-            add(col + 1, row + 1, south_east);
+            let mut corners = [zero; 4];
+            corner_weights(level, at, 1, corners.each_mut().map(std::slice::from_mut));
+            corners
         }
     }
 }

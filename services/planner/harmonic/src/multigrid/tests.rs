@@ -1,6 +1,8 @@
 //! Tests of the algebra of the levels against dense matrices.
 
-use super::grid::{EE, EO, OE};
+use super::couplings::Level;
+use super::grid::EE;
+use super::sources::interpolation_weights;
 use super::*;
 use crate::screening::Screening;
 
@@ -31,31 +33,16 @@ fn levels() -> Multigrid<f64> {
     levels
 }
 
-/// Interpolation to a level of `grid` from the next, by the weights that level stores.
-fn interpolation(
-    grid: &Grid,
-    active: impl Fn(usize, usize) -> bool,
-    weights: impl Fn(usize) -> [f64; 4],
-    corner: impl Fn(usize) -> [f64; 4],
-) -> Dense {
+/// Interpolation to a level from the next, by the weights that level stores.
+fn interpolation(level: &impl Level<f64>) -> Dense {
+    let grid = level.grid();
     let mut matrix = vec![vec![0.0; grid.columns * grid.rows]; grid.width * grid.height];
     for row in 0..grid.height {
         for col in 0..grid.width {
             let (plane, at) = grid.locate(col, row);
-            let [west, east, north, south] = weights(at);
-            let parts = match plane {
-                EE => vec![(0, 0, if active(plane, at) { 1.0 } else { 0.0 })],
-                OE => vec![(0, 0, west), (1, 0, east)],
-                EO => vec![(0, 0, north), (0, 1, south)],
-                _ => [(0, 0), (1, 0), (0, 1), (1, 1)]
-                    .into_iter()
-                    .zip(corner(at))
-                    .map(|((x, y), w)| (x, y, w))
-                    .collect(),
-            };
-            for (dx, dy, weight) in parts {
-                let (x, y) = (col / 2 + dx, row / 2 + dy);
-                if weight != 0.0 {
+            for (k, weight) in interpolation_weights(level, plane, at).into_iter().enumerate() {
+                let (x, y) = (col / 2 + k % 2, row / 2 + k / 2);
+                if weight != 0.0 && (plane != EE || level.inverse()[plane][at] > 0.0) {
                     matrix[row * grid.width + col][y * grid.columns + x] = weight;
                 }
             }
@@ -127,12 +114,7 @@ fn the_first_coarse_equations_are_the_galerkin_product() {
         }
     }
     let fine = &levels.finest;
-    let interpolation = interpolation(
-        &fine.grid,
-        |plane, at| fine.inverse[plane][at] > 0.0,
-        |at| fine.weights.each_ref().map(|row| row[at]),
-        |at| fine.corner_weights(at),
-    );
+    let interpolation = interpolation(fine);
     assert_equal(&stored(&levels.coarse[0]), &galerkin(&equations, &interpolation));
 }
 
@@ -140,12 +122,7 @@ fn the_first_coarse_equations_are_the_galerkin_product() {
 fn the_coarser_equations_are_the_galerkin_product() {
     let levels = levels();
     let fine = &levels.coarse[0];
-    let interpolation = interpolation(
-        &fine.grid,
-        |plane, at| fine.inverse[plane][at] > 0.0,
-        |at| fine.weights.each_ref().map(|row| row[at]),
-        |at| fine.corner_weights(at),
-    );
+    let interpolation = interpolation(fine);
     assert_equal(&stored(&levels.coarse[1]), &galerkin(&stored(fine), &interpolation));
 }
 

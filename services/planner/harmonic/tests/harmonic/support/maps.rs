@@ -1,13 +1,11 @@
 //! Generated maps: the kinds of place a ground robot meets, and those that break solvers.
 
 use super::random::Random;
-use crate::cell::Cell;
-use crate::domain::Domain;
-use crate::error::SolveError;
+use harmonic::{Cell, Domain, SolveError};
 
 /// A kind of generated map.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Kind {
+pub(crate) enum Kind {
     /// The outer walls only.
     Empty,
     /// Round obstacles over a fifth of the floor.
@@ -30,17 +28,17 @@ pub enum Kind {
 
 /// A map under construction: blocked cells and a target.
 #[derive(Clone, Debug)]
-pub struct Map {
-    pub width: usize,
-    pub height: usize,
-    pub blocked: Vec<bool>,
+pub(crate) struct Map {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) blocked: Vec<bool>,
     /// The target, a free cell.
-    pub target: Cell,
+    pub(crate) target: Cell,
 }
 
 impl Map {
     /// A map of `kind`, its rim blocked, its target free.
-    pub fn generate(kind: Kind, width: usize, height: usize, seed: u64) -> Self {
+    pub(crate) fn generate(kind: Kind, width: usize, height: usize, seed: u64) -> Self {
         let mut random = Random::new(seed);
         let mut map =
             Self { width, height, blocked: vec![false; width * height], target: Cell::new(0, 0) };
@@ -80,12 +78,12 @@ impl Map {
     ///
     /// # Errors
     /// See [`Domain::new`].
-    pub fn domain(&self) -> Result<Domain, SolveError> {
+    pub(crate) fn domain(&self) -> Result<Domain, SolveError> {
         Domain::new(self.width, self.height, self.blocked.clone(), self.target)
     }
 
     /// Sets a rectangle, clipped to the map.
-    pub fn fill(
+    pub(crate) fn fill(
         &mut self,
         cols: std::ops::Range<usize>,
         rows: std::ops::Range<usize>,
@@ -99,7 +97,7 @@ impl Map {
     }
 
     /// Puts the target on the free cell nearest to `wanted`, freeing that one if there is none.
-    pub fn aim(&mut self, wanted: (usize, usize)) {
+    pub(crate) fn aim(&mut self, wanted: (usize, usize)) {
         let wanted = (wanted.0.min(self.width - 1), wanted.1.min(self.height - 1));
         let nearest = (0..self.blocked.len()).filter(|&i| !self.blocked[i]).min_by_key(|&i| {
             let (dc, dr) =

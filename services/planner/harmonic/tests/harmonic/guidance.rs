@@ -1,11 +1,6 @@
 //! Tests of the guidance at any position of a solved map.
-#![allow(
-    clippy::expect_used,
-    clippy::panic,
-    reason = "helpers of tests may stop at the first broken promise"
-)]
 
-use harmonic::testing::{Kind, Map, Random, angle};
+use crate::support::{Kind, Map, Random, angle};
 use harmonic::{Cancellation, Cell, Domain, Field, Guidance, Solver};
 
 fn solve(domain: &Domain) -> Field {

@@ -1,11 +1,6 @@
 //! Tests on any map: there is an answer, each number is one, and every reachable cell leads to the target.
-#![allow(
-    clippy::expect_used,
-    clippy::panic,
-    reason = "helpers of tests may stop at the first broken promise"
-)]
 
-use harmonic::testing::{Kind, Map, Reference, follow};
+use crate::support::{Kind, Map, Reference, follow};
 use harmonic::{Cancellation, Cell, Change, Domain, Field, Guidance, Screening, Settings, Solver};
 use proptest::prelude::*;
 
@@ -22,7 +17,7 @@ fn any_domain() -> impl Strategy<Value = Domain> {
     ];
     (1_usize..48, 1_usize..48, 0.0..0.7, any::<u64>(), screening).prop_map(
         |(width, height, density, seed, lengths)| {
-            let mut random = harmonic::testing::Random::new(seed);
+            let mut random = crate::support::Random::new(seed);
             let target = Cell::new(random.below(width), random.below(height));
             let mut blocked: Vec<bool> =
                 (0..width * height).map(|_| random.unit() < density).collect();
@@ -182,7 +177,7 @@ fn starting_from_the_field_of_a_similar_map_gives_the_same_directions() {
         for index in 0..200 * 200 {
             let cell = Cell::new(index % 200, index / 200);
             if let (Some(a), Some(b)) = (near.direction(cell), fresh.direction(cell)) {
-                assert!(harmonic::testing::angle(a, b) < 2.0, "{cell:?}: {a:?}, {b:?}");
+                assert!(crate::support::angle(a, b) < 2.0, "{cell:?}: {a:?}, {b:?}");
             }
         }
     }

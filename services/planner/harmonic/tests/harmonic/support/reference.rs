@@ -1,22 +1,19 @@
 //! A slow solver that shares nothing with the fast ones: banded elimination in row order, the right-hand side carried in
 //! extended range, then polished and its residual measured.
 
-use crate::cell::Cell;
-use crate::domain::Domain;
-use crate::field::Field;
-use crate::scaled::Scaled;
+use harmonic::{Cell, Domain, Field, Scaled};
 
 /// u of every cell to about 1e-12, relatively.
-pub struct Reference {
+pub(crate) struct Reference {
     domain: Domain,
     u: Vec<Scaled>,
     /// Largest relative residual of any cell with u > 0.
-    pub worst_residual: f64,
+    pub(crate) worst_residual: f64,
 }
 
 impl Reference {
     /// Solves `domain`. Takes width^3 * height operations and width^2 * height numbers: for small or narrow maps.
-    pub fn solve(domain: &Domain) -> Self {
+    pub(crate) fn solve(domain: &Domain) -> Self {
         let width = domain.width();
         let cells = domain.blocked().len();
         let target = domain.target().row * width + domain.target().col;
@@ -40,7 +37,7 @@ impl Reference {
             for (a, &weight) in row.iter().enumerate().filter(|(_, w)| **w > 0.0) {
                 let j = i + 1 + a;
                 let share = weight / diagonal[i];
-                right[j] = Scaled::sum([right[j], scale(right[i], share)].into_iter());
+                right[j] = sum(&[right[j], scale(right[i], share)]);
                 diagonal[j] -= share * weight;
                 for (b, &other) in row.iter().enumerate().skip(a + 1).filter(|(_, w)| **w > 0.0) {
                     coupling[j * width + (b - a - 1)] += share * other;
@@ -55,7 +52,7 @@ impl Reference {
                 .enumerate()
                 .filter(|(_, w)| **w > 0.0)
                 .map(|(a, &w)| scale(u[i + 1 + a], w));
-            let total = terms.fold(right[i], |total, term| Scaled::sum([total, term].into_iter()));
+            let total = terms.fold(right[i], |total, term| sum(&[total, term]));
             u[i] = if i == target { Scaled::ONE } else { scale(total, 1.0 / diagonal[i]) };
         }
         let mut reference = Self { domain: domain.clone(), u, worst_residual: f64::INFINITY };
@@ -67,7 +64,7 @@ impl Reference {
 
     /// Central difference of u in units of the largest u around, and that largest u; `None` where u is zero.
     fn gradient(&self, cell: Cell) -> Option<[f64; 2]> {
-        let i = self.domain.index(cell);
+        let i = cell.row * self.domain.width() + cell.col;
         let [west, east, north, south] = self.around(i);
         let largest = [west, east, north, south, self.u[i]]
             .into_iter()
@@ -81,7 +78,7 @@ impl Reference {
 
     /// Share of directions of `field` more than one degree off, and the worst angle in degrees among the cells whose
     /// gradient is above 1e-4 of the largest u around.
-    pub fn compare(&self, field: &Field) -> (f64, f64) {
+    pub(crate) fn compare(&self, field: &Field) -> (f64, f64) {
         let (mut off, mut seen, mut worst) = (0, 0, 0.0_f64);
         for index in 0..self.u.len() {
             let width = self.domain.width();
@@ -111,7 +108,7 @@ impl Reference {
 
     /// Two Gauss-Seidel passes; returns the largest relative change of the second.
     fn polish(&mut self) -> f64 {
-        let target = self.domain.index(self.domain.target());
+        let target = self.domain.target().row * self.domain.width() + self.domain.target().col;
         let mut worst = 0.0_f64;
         let order: Vec<usize> = (0..self.u.len()).collect();
         for (pass, order) in
@@ -122,7 +119,7 @@ impl Reference {
                     continue;
                 }
                 let weight = 0.25 / (1.0 + self.domain.screening_coefficient(i));
-                let mean = scale(Scaled::sum(self.around(i).into_iter()), weight);
+                let mean = scale(sum(&self.around(i)), weight);
                 if pass == 1 {
                     let ratio = mean.relative_to(self.u[i].exponent) / self.u[i].mantissa;
                     worst = worst.max((ratio - 1.0).abs());
@@ -135,12 +132,12 @@ impl Reference {
 }
 
 /// The angle between two vectors, degrees.
-pub fn angle(a: [f64; 2], b: [f64; 2]) -> f64 {
+pub(crate) fn angle(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] * b[1] - a[1] * b[0]).atan2(a[0] * b[0] + a[1] * b[1]).abs().to_degrees()
 }
 
 /// Share of the reachable cells from which steepest ascent ends at the target.
-pub fn follow(field: &Field) -> f64 {
+pub(crate) fn follow(field: &Field) -> f64 {
     let width = field.width();
     let cell = |index: usize| Cell::new(index % width, index / width);
     // For each cell, whether the walk from it arrives, once known.
@@ -173,4 +170,10 @@ pub fn follow(field: &Field) -> f64 {
 
 fn scale(a: Scaled, factor: f64) -> Scaled {
     Scaled::new(a.mantissa * factor, a.exponent)
+}
+
+fn sum(terms: &[Scaled]) -> Scaled {
+    let nonzero = terms.iter().filter(|term| !term.is_zero());
+    let largest = nonzero.map(|term| term.exponent).max().unwrap_or_default();
+    Scaled::new(terms.iter().map(|term| term.relative_to(largest)).sum(), largest)
 }

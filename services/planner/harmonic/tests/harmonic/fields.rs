@@ -1,13 +1,9 @@
 //! Tests that full solves are right in every cell of every kind of map.
-#![allow(
-    clippy::expect_used,
-    clippy::panic,
-    reason = "helpers of tests may stop at the first broken promise"
-)]
 
-use harmonic::testing::{Angles, Kind, Map, Reference, exact, follow};
+use crate::support::{Angles, Kind, Map, Reference, follow};
 use harmonic::{
     Cancellation, Cell, Domain, Field, Method, Screening, Settings, SolveError, Solver,
+    solve_exactly,
 };
 
 fn solve(domain: &Domain) -> Field {
@@ -146,7 +142,7 @@ fn in_a_disc_u_falls_like_the_logarithm_and_all_directions_lead_to_the_centre() 
         let (x, y) = from_centre(i);
         if (10.0..60.0).contains(&x.hypot(y)) {
             let direction = field.direction(Cell::new(i % n, i / n)).expect("free space");
-            assert!(harmonic::testing::angle(direction, [-x, -y]) < 1.5, "at {x}, {y}");
+            assert!(crate::support::angle(direction, [-x, -y]) < 1.5, "at {x}, {y}");
         }
     }
 }
@@ -227,6 +223,6 @@ fn double_precision_solves_what_fails_verification_in_single_precision_and_has_n
     let field = solver.solve(&domain, &Cancellation::new()).expect("the map has a field");
     assert_eq!(field.verification().method, Method::MultigridDouble);
     assert_eq!(follow(&field), 1.0);
-    let angles = Angles::between(&field, &exact(&domain).expect("a field"), |_| true);
+    let angles = Angles::between(&field, &solve_exactly(&domain).expect("a field"));
     assert!(angles.clear_max < 1.0, "{angles:?}");
 }

@@ -1,0 +1,151 @@
+//! The couplings of a level's equations, as its set-up reads them.
+//!
+//! On the finest level a coupling is 1 between free cells and there is none between diagonal neighbours; on the others all are stored. Each
+//! kind has a type of its own, so that one text compiles to loops in which those that are 1 or none take no work: a loop that
+//! loads all couplings takes 30 % longer for the whole set-up.
+
+use super::coarse::Coarse;
+use super::finest::Finest;
+use super::grid::{Grid, Planes, Weights};
+use crate::real::Real;
+
+/// The directions in which a cell stores its couplings. Those in the others are its neighbours' own.
+pub(super) const EAST: usize = 0;
+pub(super) const SOUTH: usize = 1;
+pub(super) const SOUTH_EAST: usize = 2;
+pub(super) const SOUTH_WEST: usize = 3;
+
+/// A plane and a place in it.
+pub(super) type Place = (usize, usize);
+
+/// The couplings of a row of cells to their neighbours in one direction.
+pub(super) trait Couplings<R>: Copy {
+    /// The coupling of the cell with number `x`, times `value`.
+    fn times(self, x: usize, value: R) -> R;
+}
+
+impl<R: Real> Couplings<R> for &[R] {
+    #[inline(always)]
+    fn times(self, x: usize, value: R) -> R {
+        self[x] * value
+    }
+}
+
+/// Couplings to the neighbours with these inverse diagonals: 1 if a neighbour is active.
+#[derive(Clone, Copy)]
+struct IfActive<'a, R>(&'a [R]);
+
+impl<R: Real> Couplings<R> for IfActive<'_, R> {
+    #[inline(always)]
+    fn times(self, x: usize, value: R) -> R {
+        self.0[x].is_active() * value
+    }
+}
+
+#[derive(Clone, Copy)]
+struct AllOne;
+
+impl<R: Real> Couplings<R> for AllOne {
+    #[inline(always)]
+    fn times(self, _: usize, value: R) -> R {
+        value
+    }
+}
+
+#[derive(Clone, Copy)]
+struct NoCouplings;
+
+impl<R: Real> Couplings<R> for NoCouplings {
+    #[inline(always)]
+    fn times(self, _: usize, _: R) -> R {
+        R::default()
+    }
+}
+
+/// A level whose equations make those of the next. The couplings are those of `n` cells from `owner` on, in the direction in which
+/// they are stored.
+pub(super) trait Level<R: Real> {
+    fn grid(&self) -> Grid;
+    /// 1 / diagonal, 0 where the cell is inactive.
+    fn inverse(&self) -> &Planes<R>;
+    fn weights(&self) -> &Weights<R>;
+    fn weights_mut(&mut self) -> &mut Weights<R>;
+
+    /// Couplings whose other side is at `neighbour`.
+    fn along(
+        &self,
+        direction: usize,
+        owner: Place,
+        neighbour: Place,
+        n: usize,
+    ) -> impl Couplings<R>;
+    /// Couplings between odd-odd cells and others, for products that are zero in inactive odd-odd cells.
+    fn across(&self, direction: usize, owner: Place, n: usize) -> impl Couplings<R>;
+    fn diagonal(&self, direction: usize, owner: Place, n: usize) -> impl Couplings<R>;
+}
+
+impl<R: Real> Level<R> for Finest<R> {
+    fn grid(&self) -> Grid {
+        self.grid
+    }
+
+    fn inverse(&self) -> &Planes<R> {
+        &self.inverse
+    }
+
+    fn weights(&self) -> &Weights<R> {
+        &self.weights
+    }
+
+    fn weights_mut(&mut self) -> &mut Weights<R> {
+        &mut self.weights
+    }
+
+    #[inline(always)]
+    fn along(&self, _: usize, _: Place, (plane, at): Place, n: usize) -> impl Couplings<R> {
+        IfActive(&self.inverse[plane][at..][..n])
+    }
+
+    #[inline(always)]
+    fn across(&self, _: usize, _: Place, _: usize) -> impl Couplings<R> {
+        AllOne
+    }
+
+    #[inline(always)]
+    fn diagonal(&self, _: usize, _: Place, _: usize) -> impl Couplings<R> {
+        NoCouplings
+    }
+}
+
+impl<R: Real> Level<R> for Coarse<R> {
+    fn grid(&self) -> Grid {
+        self.grid
+    }
+
+    fn inverse(&self) -> &Planes<R> {
+        &self.inverse
+    }
+
+    fn weights(&self) -> &Weights<R> {
+        &self.weights
+    }
+
+    fn weights_mut(&mut self) -> &mut Weights<R> {
+        &mut self.weights
+    }
+
+    #[inline(always)]
+    fn along(&self, direction: usize, owner: Place, _: Place, n: usize) -> impl Couplings<R> {
+        self.across(direction, owner, n)
+    }
+
+    #[inline(always)]
+    fn across(&self, direction: usize, (plane, at): Place, n: usize) -> impl Couplings<R> {
+        &self.coupling[direction][plane][at..][..n]
+    }
+
+    #[inline(always)]
+    fn diagonal(&self, direction: usize, owner: Place, n: usize) -> impl Couplings<R> {
+        self.across(direction, owner, n)
+    }
+}

@@ -1,0 +1,63 @@
+//! The angles between the directions of two fields.
+
+use harmonic::{Cell, Field};
+
+use super::reference::angle;
+
+/// Angles between the directions of two fields of one map, degrees, over the cells that can reach the target.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Angles {
+    /// The median.
+    pub(crate) p50: f64,
+    /// The 99th percentile.
+    pub(crate) p99: f64,
+    /// The largest angle.
+    pub(crate) max: f64,
+    /// The largest angle away from saddle points: in cells where u changes by at least [`CLEAR`] of itself from one cell to the
+    /// next.
+    pub(crate) clear_max: f64,
+}
+
+/// The relative change of u to the next cell from which on a direction is clear. Nearer to a saddle point, a change of u by a
+/// thousandth turns the direction by degrees in any solution.
+const CLEAR: f64 = 2e-3;
+
+impl Angles {
+    /// The angles between `field` and `right`.
+    pub(crate) fn between(field: &Field, right: &Field) -> Self {
+        let mut angles = Vec::new();
+        let mut clear_max = 0.0_f64;
+        for row in 0..right.height() {
+            for col in 0..right.width() {
+                let cell = Cell::new(col, row);
+                let Some(wanted) = right.direction(cell) else {
+                    continue;
+                };
+                let off = field.direction(cell).map_or(180.0, |it| angle(it, wanted));
+                if steepness(right, cell) >= CLEAR {
+                    clear_max = clear_max.max(off);
+                }
+                angles.push(off);
+            }
+        }
+        angles.sort_by(f64::total_cmp);
+        let Some(&max) = angles.last() else {
+            return Self::default();
+        };
+        let at = |share: f64| angles[((angles.len() - 1) as f64 * share) as usize];
+        Self { p50: at(0.5), p99: at(0.99), max, clear_max }
+    }
+}
+
+/// |grad u| / u at a cell.
+fn steepness(field: &Field, cell: Cell) -> f64 {
+    let own = field.u(cell);
+    // Beyond the first column or row the number wraps to one outside the map, where u is zero.
+    let u = |col: usize, row: usize| {
+        field.u(Cell::new(col, row)).relative_to(own.exponent) / own.mantissa
+    };
+    let Cell { col, row } = cell;
+    let across = u(col + 1, row) - u(col.wrapping_sub(1), row);
+    let along = u(col, row + 1) - u(col, row.wrapping_sub(1));
+    (0.5 * across).hypot(0.5 * along)
+}
