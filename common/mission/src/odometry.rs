@@ -60,6 +60,8 @@ pub enum Procedure {
     RightSquare,
     /// To and fro on the spot.
     Turns,
+    /// All that `firsthand bring-up` looks at.
+    BringUp,
 }
 
 impl Default for CalibrationPlan {

@@ -11,9 +11,11 @@
 //! | `normal` | the wall's normal from a sweep |
 //! | [`loops`] | ratio, track and slip from loops, and refusals |
 //! | [`squares`] | ratio and track from squares measured by tape |
+//! | [`bring_up`] | the procedure of a bring-up |
 //! | [`response`] | delay and acceleration from turns to and fro |
 //! | [`shell`] | the process in the planner's place |
 
+pub mod bring_up;
 pub mod loops;
 mod normal;
 pub mod response;

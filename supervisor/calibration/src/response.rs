@@ -15,10 +15,10 @@ use serde::{Deserialize, Serialize};
 use crate::wall::{Order, State};
 
 /// A turn to one side lasts so long, seconds: a base that answers after 0.5 s and gains 1 rad/s in a second turns by then.
-const LEG_S: f64 = 1.6;
-const LEGS: u32 = 8;
+pub(crate) const LEG_S: f64 = 1.6;
+pub(crate) const LEGS: u32 = 8;
 /// The direction is so far aside that the robot turns as fast as it may.
-const ASIDE_RAD: f64 = 1.2;
+pub(crate) const ASIDE_RAD: f64 = 1.2;
 const LONGEST_DELAY_S: f64 = 1.0;
 const COARSE_S: f64 = 0.04;
 const DELAY_STEP_S: f64 = 0.01;

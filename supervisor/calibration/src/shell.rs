@@ -22,6 +22,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    bring_up::BringUp,
     response::Turns,
     squares::Square,
     wall::{Order, Wall, echo_m},
@@ -37,6 +38,7 @@ pub enum Drive {
     Wall(Box<Wall>),
     Square(Square),
     Turns(Turns),
+    BringUp(BringUp),
 }
 
 impl Drive {
@@ -55,6 +57,7 @@ impl Drive {
             Procedure::Wall => Self::Wall(Box::new(Wall::new(plan))),
             Procedure::LeftSquare => Self::Square(Square::new(plan.drive_m, true)),
             Procedure::Turns => Self::Turns(Turns::new(rate_hz)),
+            Procedure::BringUp => Self::BringUp(BringUp::new(rate_hz)),
             Procedure::RightSquare => Self::Square(Square::new(plan.drive_m, false)),
         }
     }
@@ -64,6 +67,7 @@ impl Drive {
             Self::Wall(wall) => wall.step(counts, echo_m, body),
             Self::Square(square) => square.step(counts, body),
             Self::Turns(turns) => turns.step(),
+            Self::BringUp(procedure) => procedure.step(counts, echo_m, body),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The one list of subcommands: parser, dispatch and the groups of `--help` follow from it.
 
+pub(crate) mod bring_up;
 pub(crate) mod calibrate;
 pub(crate) mod check;
 pub(crate) mod diff;
@@ -102,6 +103,7 @@ commands! {
         Missions missions,
         Install install,
         Help help(command_line),
+        BringUp bring_up,
         Calibrate calibrate,
         Completions completion,
         Man man(command_line),
@@ -166,7 +168,7 @@ impl Command {
     /// None if the command sees to its log itself.
     pub(crate) fn log_level(&self) -> Option<&'static str> {
         match self {
-            Self::Run(_) | Self::Calibrate(_) => None,
+            Self::Run(_) | Self::BringUp(_) | Self::Calibrate(_) => None,
             Self::Stage(arguments) if arguments.is_process() => Some("info"),
             Self::Sim(_) => Some("info"),
             _ => Some("error"),
@@ -183,7 +185,7 @@ fn listed() -> String {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "{heading}:");
         for name in *names {
-            let name = name.to_lowercase();
+            let name = name.replace("gU", "g-u").to_lowercase();
             let about = all.find_subcommand(&name).and_then(clap::Command::get_about);
             let about = about.map(ToString::to_string).unwrap_or_default();
             let about = about.split([';', ':']).next().unwrap_or_default();

@@ -24,7 +24,7 @@ use std::{collections::VecDeque, time::Duration};
 use common::{
     clock::MissionTime,
     driver::counts::WheelCounts,
-    mission::{Mission, ModelledSpeed, Response},
+    mission::{Mission, ModelledSpeed, Procedure, Response},
     samples::{Cause, ContactSample, Order},
 };
 
@@ -179,6 +179,8 @@ pub struct Odometry {
     recoveries: u32,
     suspicion: Option<(Suspicion, MissionTime)>,
     ordered_to_drive: bool,
+    /// A bring-up looks for wheels that do not turn as commanded: its robot goes on, slowly and for a minute.
+    is_bring_up: bool,
     /// In words, and when both published last.
     two_publishers: Option<(String, MissionTime)>,
 }
@@ -285,7 +287,9 @@ impl Odometry {
             (&self.turn, Suspicion::Turn),
         ];
         let suspicion = all.into_iter().find(|(evidence, _)| suspected(evidence));
-        if let Some((_, suspicion)) = suspicion {
+        if let Some((_, suspicion)) = suspicion
+            && !self.is_bring_up
+        {
             self.suspicion.get_or_insert((suspicion, now));
         }
         self.look_for_explanation(now);
@@ -394,6 +398,11 @@ impl Monitor for Odometry {
             recoveries: 0,
             suspicion: None,
             ordered_to_drive: false,
+            is_bring_up: mission
+                .planner
+                .calibration
+                .as_ref()
+                .is_some_and(|plan| plan.procedure == Procedure::BringUp),
             two_publishers: None,
         }
     }

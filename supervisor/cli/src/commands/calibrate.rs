@@ -1,4 +1,4 @@
-mod drive;
+pub(super) mod drive;
 mod ends;
 mod response;
 mod written;

@@ -21,22 +21,22 @@ use crate::commands::run::recorder::RunRecorder;
 const LINE_EVERY: Duration = Duration::from_secs(5);
 
 #[derive(Clone, Copy)]
-pub(super) struct Setting<'a> {
-    pub(super) robot: &'a RobotName,
-    pub(super) pace: Pace,
-    pub(super) runs: &'a Path,
+pub(in crate::commands) struct Setting<'a> {
+    pub(in crate::commands) robot: &'a RobotName,
+    pub(in crate::commands) pace: Pace,
+    pub(in crate::commands) runs: &'a Path,
 }
 
-pub(super) struct Carried {
-    pub(super) directory: PathBuf,
-    pub(super) seconds: f64,
-    pub(super) counts: Vec<[u16; 2]>,
+pub(in crate::commands) struct Carried {
+    pub(in crate::commands) directory: PathBuf,
+    pub(in crate::commands) seconds: f64,
+    pub(in crate::commands) counts: Vec<[u16; 2]>,
     /// The end of a simulated robot, metres.
-    pub(super) truth: Option<DVec2>,
+    pub(in crate::commands) truth: Option<DVec2>,
 }
 
 /// Fails if the procedure does not come to its end.
-pub(super) fn carry_out(
+pub(in crate::commands) fn carry_out(
     setting: Setting<'_>,
     mission: Mission,
     title: &str,

@@ -1,0 +1,102 @@
+//! Bring-up: what a new robot does, against what its mission says of it.
+//!
+//! The robot stands, turns on the spot to both sides, drives a short way there and back, and turns to and fro, ordered by the planner
+//! stage of [`calibration`]. A [`Trace`] holds what was recorded meanwhile. [`findings`] compares it with the mission: each
+//! [`Finding`] is a verdict about one part, with the keys of the mission that are to be changed, or what is to be mended.
+//!
+//! The wheels' counts are compared with what they were told, which finds encoders. What the body does is seen by its lasers, rangers and
+//! gyro, which finds motors, mountings and sizes.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`trace`] | what was told, counted and seen, and the parts of the procedure |
+//! | `wheels` | which wheel counts what it is told, and how fast the base answers |
+//! | `scans` | the body's motion and the laser's mounting that place all scans on each other |
+//! | `rangers` | liveliness and noise of sensors, bearings of sonars, way and turn where there is no laser |
+
+mod rangers;
+mod scans;
+pub mod trace;
+mod wheels;
+
+use common::mission::Mission;
+
+pub use scans::Placed;
+pub use trace::Trace;
+
+/// A verdict about one part of the robot.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finding {
+    /// The part, as a user calls it: "wheels", "laser".
+    pub part: String,
+    pub verdict: Verdict,
+    /// One sentence.
+    pub text: String,
+    /// Keys of the mission, and the values that were found.
+    pub keys: Vec<(String, String)>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// As stated.
+    Right,
+    /// Not as stated.
+    Wrong,
+    /// Nothing could be told.
+    Unknown,
+}
+
+impl Verdict {
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Right => "right",
+            Self::Wrong => "WRONG",
+            Self::Unknown => "not known",
+        }
+    }
+}
+
+impl Finding {
+    pub(crate) fn new(part: impl Into<String>, verdict: Verdict, text: impl Into<String>) -> Self {
+        Self { part: part.into(), verdict, text: text.into(), keys: Vec::new() }
+    }
+
+    pub(crate) fn right(part: impl Into<String>, text: impl Into<String>) -> Self {
+        Self::new(part, Verdict::Right, text)
+    }
+
+    pub(crate) fn wrong(part: impl Into<String>, text: impl Into<String>) -> Self {
+        Self::new(part, Verdict::Wrong, text)
+    }
+
+    pub(crate) fn unknown(part: impl Into<String>, text: impl Into<String>) -> Self {
+        Self::new(part, Verdict::Unknown, text)
+    }
+
+    #[must_use]
+    pub(crate) fn with_key(mut self, key: impl Into<String>, value: impl Into<String>) -> Self {
+        self.keys.push((key.into(), value.into()));
+        self
+    }
+}
+
+/// What the trace says of the robot of `mission`, and the scans as they were placed, for a picture. With `lifted` wheels nothing is said
+/// of what the body does.
+#[must_use]
+pub fn findings(mission: &Mission, trace: &Trace, lifted: bool) -> (Vec<Finding>, Option<Placed>) {
+    let mut found = vec![wheels::rate(mission, trace)];
+    found.extend(rangers::liveliness(mission, trace));
+    let wheels = wheels::Wheels::of(trace);
+    found.push(wheels.finding(mission));
+    let motion = wheels.motion(trace, mission.body().track_m);
+    found.extend(wheels::response(mission, trace, &motion));
+    if lifted {
+        return (found, None);
+    }
+    let placed = scans::place(mission, trace, &motion);
+    let gyro = rangers::Gyro::of(trace, &motion);
+    found.extend(scans::findings(mission, trace, placed.as_ref(), gyro.as_ref()));
+    found.extend(rangers::findings(mission, trace, &motion, placed.as_ref(), gyro.as_ref()));
+    (found, placed)
+}

@@ -1,0 +1,441 @@
+//! The body's motion and the laser's mounting that place all scans on the first one.
+//!
+//! The scans of the robot at rest make a reference, a range for each bearing. Each later beam ends somewhere in the room: where, follows
+//! from the motion by the wheels and from the unknowns below. Seen from the laser's first place it should end where the reference does.
+//! Gauss-Newton with weights that fall for what the reference does not show makes the differences least, first for the scans near the
+//! beginning, then for all. It starts from eight directions of the laser, with the turns as the wheels say and the other way round, and
+//! with turning and driving exchanged, as one reversed wheel does.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use common::{
+    geometry::wrap_angle,
+    kinematics::Pose2,
+    mission::{Mission, Protocol},
+    samples::ScanHeader,
+};
+use glam::DVec2;
+use nalgebra::{SMatrix, SVector};
+
+use crate::{Finding, Trace, rangers::Gyro, trace::between, wheels::Motion};
+
+/// The unknowns, and how far from 0 they may well be: the laser's yaw, radians, and place, metres; the age of its scans beyond what they
+/// say, seconds; the logarithms of true turn and way over the wheels'; turn per metre, radians.
+const UNKNOWNS: usize = 7;
+const PRIOR: [f64; UNKNOWNS] = [3.0, 0.2, 0.2, 0.5, 0.3, 0.3, 0.3];
+const YAW: usize = 0;
+const X: usize = 1;
+const Y: usize = 2;
+const AGE: usize = 3;
+const TURN: usize = 4;
+const WAY: usize = 5;
+const CURL: usize = 6;
+/// Steps of the numerical derivatives.
+const STEPS: [f64; UNKNOWNS] = [1e-3, 1e-3, 1e-3, 2e-3, 1e-3, 5e-3, 5e-3];
+/// The turn by the wheels up to which scans are placed, radians, the distance at which a point counts half, metres, and rounds.
+const STAGES: [(f64, f64, usize); 4] =
+    [(0.7, 0.4, 6), (2.5, 0.2, 6), (f64::INFINITY, 0.1, 8), (f64::INFINITY, 0.04, 8)];
+const STARTS: usize = 8;
+/// Placed scans and beams of each, about.
+const SCANS: usize = 60;
+const BEAMS: usize = 90;
+/// A point so near the reference is placed, metres.
+const PLACED_M: f64 = 0.08;
+/// The least share of placed points.
+const LEAST_PLACED: f64 = 0.6;
+/// What is told: an angle, radians, a distance, metres, a time, seconds, and shares.
+const YAW_TOLD: f64 = 4.0 * PI / 180.0;
+const PLACE_TOLD_M: f64 = 0.05;
+const AGE_TOLD_S: f64 = 0.06;
+const SCALE_TOLD: f64 = 0.04;
+const RATIO_TOLD: f64 = 0.03;
+
+type Unknowns = SVector<f64, UNKNOWNS>;
+
+/// The body's motion against the wheels'.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Hypothesis {
+    /// It turns against the wheels, as it seems to the laser.
+    turns_back: bool,
+    /// It drives where the wheels say that it turns, and turns where they say that it drives.
+    exchanged: bool,
+}
+
+/// The scans in one frame, in which the robot stood at the origin first.
+#[derive(Clone, Debug)]
+pub struct Placed {
+    hypothesis: Hypothesis,
+    unknowns: Unknowns,
+    share: f64,
+    /// The row of the laser.
+    row: usize,
+    /// Where the beams ended, metres.
+    pub points: Vec<DVec2>,
+    poses: Vec<(f64, [f64; 3])>,
+}
+
+impl Placed {
+    /// Whether the scans agree on a motion.
+    pub(crate) fn is_sure(&self) -> bool {
+        self.share >= LEAST_PLACED
+    }
+
+    /// True turns over the wheels'; negative if they go the other way round.
+    pub(crate) fn turn_scale(&self) -> f64 {
+        let sign = if self.hypothesis.turns_back { -1.0 } else { 1.0 };
+        sign * self.unknowns[TURN].exp()
+    }
+
+    /// The body drives and turns as told, up to scales.
+    pub(crate) const fn is_plain(&self) -> bool {
+        !self.hypothesis.turns_back && !self.hypothesis.exchanged
+    }
+
+    pub(crate) fn pose(&self, at_s: f64) -> Pose2 {
+        pose(&self.poses, at_s)
+    }
+}
+
+fn pose(poses: &[(f64, [f64; 3])], at_s: f64) -> Pose2 {
+    let [x, y, heading] = between(poses, at_s).unwrap_or_default();
+    Pose2 { position: DVec2::new(x, y), heading }
+}
+
+struct Problem<'a> {
+    trace: &'a Trace,
+    motion: &'a Motion,
+    track_m: f64,
+    header: ScanHeader,
+    /// Ranges of the robot at rest; not finite for nothing.
+    reference: Vec<f64>,
+    /// The scans to place, each with the wheels' turn until then.
+    scans: Vec<(usize, f64)>,
+}
+
+impl<'a> Problem<'a> {
+    fn new(trace: &'a Trace, motion: &'a Motion, track_m: f64) -> Option<Self> {
+        let header = trace.scans.first()?.1;
+        let alike = |scan: &&(f64, ScanHeader, Vec<f32>)| scan.1.sensor == header.sensor;
+        let until = trace.rest_until_s();
+        let at_rest: Vec<_> = trace.scans.iter().filter(alike).filter(|it| it.0 < until).collect();
+        let beams = at_rest.iter().map(|it| it.2.len()).min().filter(|beams| *beams > 8)?;
+        let median = |beam: usize| {
+            let mut ranges: Vec<f64> = at_rest.iter().map(|it| f64::from(it.2[beam])).collect();
+            ranges.retain(|range| range.is_finite());
+            ranges.sort_by(f64::total_cmp);
+            let enough = 2 * ranges.len() > at_rest.len();
+            if enough { ranges[ranges.len() / 2] } else { f64::INFINITY }
+        };
+        let moving: Vec<usize> = (0..trace.scans.len())
+            .filter(|it| trace.scans[*it].0 >= until && trace.scans[*it].1.sensor == header.sensor)
+            .collect();
+        let turned = |scan: usize| {
+            let [angle, way] = between(motion, trace.scans[scan].0).unwrap_or_default();
+            (scan, angle.abs() + 2.0 * way.abs() / track_m)
+        };
+        let scans = moving.iter().step_by(1 + moving.len() / SCANS).map(|it| turned(*it)).collect();
+        Some(Self {
+            trace,
+            motion,
+            track_m,
+            header,
+            reference: (0..beams).map(median).collect(),
+            scans,
+        })
+    }
+
+    fn poses(&self, hypothesis: Hypothesis, unknowns: &Unknowns) -> Vec<(f64, [f64; 3])> {
+        let (mut at, mut before) = ([0.0; 3], [0.0; 2]);
+        let mut poses = Vec::with_capacity(self.motion.len());
+        let sign = if hypothesis.turns_back { -1.0 } else { 1.0 };
+        for (time, now) in self.motion {
+            let [mut turn, mut way] = [now[0] - before[0], now[1] - before[1]];
+            if hypothesis.exchanged {
+                (turn, way) = (2.0 * way / self.track_m, turn * self.track_m / 2.0);
+            }
+            let way = way * unknowns[WAY].exp();
+            let turn = sign * turn * unknowns[TURN].exp() + unknowns[CURL] * way;
+            let along = DVec2::from_angle(at[2] + turn / 2.0) * way;
+            at = [at[0] + along.x, at[1] + along.y, at[2] + turn];
+            poses.push((*time, at));
+            before = *now;
+        }
+        poses
+    }
+
+    /// The laser on the robot.
+    fn laser(&self, unknowns: &Unknowns) -> DVec2 {
+        DVec2::new(self.header.x_m + unknowns[X], self.header.y_m + unknowns[Y])
+    }
+
+    /// Where the beams end in the frame of the first pose; none for beams without an end. The order does not depend on the unknowns.
+    fn ends(
+        &self,
+        hypothesis: Hypothesis,
+        unknowns: &Unknowns,
+        most_turn: f64,
+    ) -> Vec<Option<DVec2>> {
+        let poses = self.poses(hypothesis, unknowns);
+        let laser = self.laser(unknowns);
+        let mut ends = Vec::new();
+        for (scan, _) in self.scans.iter().filter(|(_, turned)| *turned <= most_turn) {
+            let (at, header, beams) = &self.trace.scans[*scan];
+            for beam in (0..beams.len()).step_by(1 + beams.len() / BEAMS) {
+                let range = f64::from(beams[beam]);
+                let seconds = 1e-9 * header.sweep().beam_time_ns(beam, beams.len()) as f64;
+                ends.push(range.is_finite().then(|| {
+                    let robot = pose(&poses, at + seconds - unknowns[AGE]);
+                    let along = header.first_rad + header.step_rad * beam as f64 + unknowns[YAW];
+                    let end = laser + range * DVec2::from_angle(along);
+                    robot.position + DVec2::from_angle(robot.heading).rotate(end)
+                }));
+            }
+        }
+        ends
+    }
+
+    /// How much farther than the reference a point is from the laser's first place, metres.
+    fn beyond(&self, end: DVec2, unknowns: &Unknowns) -> Option<f64> {
+        let seen = end - self.laser(unknowns);
+        let along = seen.to_angle() - unknowns[YAW] - self.header.first_rad;
+        let beam = along.rem_euclid(TAU) / self.header.step_rad;
+        let beams = self.reference.len();
+        let whole = self.header.step_rad * beams as f64 >= TAU - 1e-6;
+        let (low, part) = (beam as usize, beam.fract());
+        let high = if whole { (low + 1) % beams } else { low + 1 };
+        let (low, high) = (*self.reference.get(low)?, *self.reference.get(high)?);
+        let range = if (high - low).abs() < 0.1 { low + part * (high - low) } else { low };
+        range.is_finite().then(|| seen.length() - range)
+    }
+
+    fn residuals(
+        &self,
+        hypothesis: Hypothesis,
+        unknowns: &Unknowns,
+        most_turn: f64,
+    ) -> Vec<Option<f64>> {
+        let ends = self.ends(hypothesis, unknowns, most_turn);
+        ends.into_iter().map(|end| self.beyond(end?, unknowns)).collect()
+    }
+
+    /// A round of Gauss-Newton; points at `half_m` count half.
+    fn improve(
+        &self,
+        hypothesis: Hypothesis,
+        unknowns: &mut Unknowns,
+        (most_turn, half_m): (f64, f64),
+    ) {
+        let now = self.residuals(hypothesis, unknowns, most_turn);
+        let shifted: Vec<_> = (0..UNKNOWNS)
+            .map(|it| {
+                let mut shifted = *unknowns;
+                shifted[it] += STEPS[it];
+                self.residuals(hypothesis, &shifted, most_turn)
+            })
+            .collect();
+        let mut normal = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::zeros();
+        let mut right = Unknowns::zeros();
+        for (point, residual) in now.iter().enumerate() {
+            let Some(residual) = residual else { continue };
+            let weight = (1.0 + (residual / half_m).powi(2)).powi(-2);
+            let mut slope = Unknowns::zeros();
+            for it in 0..UNKNOWNS {
+                let Some(there) = shifted[it][point] else { continue };
+                // At an edge of the reference the difference is no slope.
+                let difference = there - residual;
+                if difference.abs() < 0.1 {
+                    slope[it] = difference / STEPS[it];
+                }
+            }
+            normal += weight * slope * slope.transpose() / half_m.powi(2);
+            right -= weight * slope * *residual / half_m.powi(2);
+        }
+        for it in 0..UNKNOWNS {
+            normal[(it, it)] += PRIOR[it].powi(-2);
+            // The yaw starts anywhere.
+            right[it] -= if it == YAW { 0.0 } else { unknowns[it] * PRIOR[it].powi(-2) };
+        }
+        if let Some(change) = normal.cholesky().map(|it| it.solve(&right)) {
+            let longest = (0..UNKNOWNS).map(|it| (change[it] / (0.3 * PRIOR[it].min(1.0))).abs());
+            *unknowns += change / longest.fold(1.0, f64::max);
+        }
+    }
+
+    /// The share of all points that lie on the reference, among those that it shows.
+    fn placed(&self, hypothesis: Hypothesis, unknowns: &Unknowns) -> f64 {
+        let residuals = self.residuals(hypothesis, unknowns, f64::INFINITY);
+        let shown = residuals.iter().flatten().count();
+        let placed = residuals.iter().flatten().filter(|it| it.abs() <= PLACED_M).count();
+        // A solution that turns the points away from what the reference shows is none.
+        placed as f64 / shown.max(residuals.len() / 3).max(1) as f64
+    }
+}
+
+/// Place the scans of the first laser; none without scans from before the robot moved and after.
+pub(crate) fn place(mission: &Mission, trace: &Trace, motion: &Motion) -> Option<Placed> {
+    let problem = Problem::new(trace, motion, mission.body().track_m)?;
+    let mut best: Option<(f64, Hypothesis, Unknowns)> = None;
+    for exchanged in [false, true] {
+        for turns_back in [false, true] {
+            for start in 0..STARTS {
+                let hypothesis = Hypothesis { turns_back, exchanged };
+                let mut unknowns = Unknowns::zeros();
+                unknowns[YAW] = TAU * start as f64 / STARTS as f64;
+                for (most_turn, half_m, rounds) in STAGES {
+                    for _ in 0..rounds {
+                        problem.improve(hypothesis, &mut unknowns, (most_turn, half_m));
+                    }
+                }
+                let share = problem.placed(hypothesis, &unknowns);
+                // As good is not better: the robot is as stated unless the scans say otherwise.
+                if best.as_ref().is_none_or(|(most, ..)| share > most + 0.03) {
+                    best = Some((share, hypothesis, unknowns));
+                }
+            }
+        }
+    }
+    let (share, hypothesis, mut unknowns) = best?;
+    unknowns[YAW] = wrap_angle(unknowns[YAW]);
+    Some(Placed {
+        share,
+        hypothesis,
+        unknowns,
+        row: problem.header.sensor as usize,
+        points: problem.ends(hypothesis, &unknowns, f64::INFINITY).into_iter().flatten().collect(),
+        poses: problem.poses(hypothesis, &unknowns),
+    })
+}
+
+/// What the placed scans say of the laser and of the wheels' sizes.
+pub(crate) fn findings(
+    mission: &Mission,
+    trace: &Trace,
+    placed: Option<&Placed>,
+    gyro: Option<&Gyro>,
+) -> Vec<Finding> {
+    let table = mission.sensor_table();
+    let Some(placed) = placed else {
+        return Vec::new();
+    };
+    let Some(sensor) = table.get(placed.row) else {
+        return Vec::new();
+    };
+    let name = &sensor.name;
+    if !placed.is_sure() {
+        let text = format!(
+            "{:.0} % of its beams agree on a motion: put the robot where walls and things stand around it, and repeat",
+            100.0 * placed.share
+        );
+        return vec![Finding::unknown(name, text)];
+    }
+    let mut found = Vec::new();
+    let it = placed.unknowns;
+    let key = |key: &str| format!("robot.sensor.{name}.{key}");
+    let own = |channel: &common::mission::Channel| !channel.reversed;
+    let is_x80 = mission.robot.protocol() == Protocol::X80;
+    if placed.hypothesis.exchanged {
+        let side = if placed.hypothesis.turns_back { "right" } else { "left" };
+        let channel = if side == "left" { &mission.robot.left } else { &mission.robot.right };
+        let text = format!("told to drive, the body turns: the {side} wheel turns backwards");
+        let finding = Finding::wrong("motors", text);
+        found.push(match is_x80 {
+            true => finding.with_key(format!("robot.{side}.reversed"), own(channel).to_string()),
+            false => finding,
+        });
+        return found;
+    }
+    let turns_with_gyro = gyro.map(Gyro::agrees);
+    if placed.hypothesis.turns_back {
+        let (upside_down, roll) =
+            (key("roll_deg"), if sensor.is_upside_down { "0" } else { "180" });
+        let mirrored = format!("{name} sees it turn the other way");
+        found.push(match turns_with_gyro {
+            Some(true) => Finding::wrong(name, format!("{mirrored}, and the gyro does not: it is upside down"))
+                .with_key(upside_down, roll),
+            Some(false) => Finding::wrong("motors", format!("{mirrored}, and so does the gyro: the wheels are swapped, left and right")),
+            None => Finding::wrong(name, format!("{mirrored}: it is upside down, or the wheels are swapped, left and right; look which way it turns"))
+                .with_key(upside_down, roll),
+        });
+    } else if turns_with_gyro == Some(false) {
+        let text = "it says turns to the left as turns to the right: its z axis points down, or its sign is wrong";
+        found.push(Finding::wrong("gyro", text));
+    }
+    let yaw_deg = it[YAW].to_degrees();
+    if it[YAW].abs() > FRAC_PI_2 * 1.7 {
+        let text = format!(
+            "sees it drive backwards: it looks {yaw_deg:.0} degrees beside what is stated, or both motors turn backwards; look which way it drives"
+        );
+        found.push(Finding::wrong(name, text));
+    } else if it[YAW].abs() > YAW_TOLD {
+        let sign = if placed.hypothesis.turns_back { -1.0 } else { 1.0 };
+        let turned = wrap_angle(sensor.mount.turned_rad + sign * it[YAW]).to_degrees();
+        let text = format!("looks {yaw_deg:.1} degrees beside what is stated, counter-clockwise");
+        found.push(Finding::wrong(name, text).with_key(key("turned_deg"), format!("{turned:.1}")));
+    }
+    let off = DVec2::new(it[X], it[Y]);
+    if off.length() > PLACE_TOLD_M {
+        let at = DVec2::from_angle(sensor.mount.bearing_rad) * sensor.mount.forward_m + off;
+        let text = format!("stands {:.2} m beside its stated place", off.length());
+        let bearing = at.to_angle().to_degrees();
+        found.push(
+            Finding::wrong(name, text)
+                .with_key(key("forward_m"), format!("{:.3}", at.length()))
+                .with_key(key("bearing_deg"), format!("{bearing:.1}")),
+        );
+    }
+    if it[AGE].abs() > AGE_TOLD_S {
+        let text = format!(
+            "its scans are {:.2} s {} than they say: stamp them when they are taken",
+            it[AGE].abs(),
+            if it[AGE] > 0.0 { "older" } else { "younger" }
+        );
+        found.push(Finding::wrong(name, text));
+    }
+    found.extend(sizes(mission, it));
+    if found.is_empty() {
+        let count = trace.scans.len();
+        let text = format!(
+            "{:.0} % of the beams of {count} scans agree with wheels and mounting",
+            100.0 * placed.share
+        );
+        found.push(Finding::right(name, text));
+    }
+    found
+}
+
+/// Wheels and track by what the body did.
+fn sizes(mission: &Mission, it: Unknowns) -> Vec<Finding> {
+    let mut found = Vec::new();
+    let body = mission.body();
+    let (turn, way) = (it[TURN].exp(), it[WAY].exp());
+    let is_stated = (way - 1.0).abs() <= SCALE_TOLD;
+    if !is_stated {
+        let text = format!("the body drives {:.0} % of what the wheels count", 100.0 * way);
+        let finding = Finding::wrong("wheel size", text);
+        found.push(match mission.robot.protocol() {
+            Protocol::X80 | Protocol::Arduino => finding
+                .with_key("robot.counts_per_turn", format!("{:.0}", body.counts_per_turn / way)),
+            Protocol::Json | Protocol::Ros2 => finding
+                .with_key("robot.wheel_radius_m", format!("{:.4}", body.wheel_radius_m * way)),
+        });
+    }
+    // The stated wheels stay where their error is not told.
+    let track = if is_stated { 1.0 / turn } else { way / turn };
+    if (track - 1.0).abs() > SCALE_TOLD {
+        let text = format!("the body turns {:.0} % of what the wheels count", 100.0 / track);
+        let track_m = format!("{:.3}", body.track_m * track);
+        found.push(Finding::wrong("track", text).with_key("robot.track_m", track_m));
+    }
+    let ratio = 1.0 + it[CURL] * body.track_m;
+    if (ratio - 1.0).abs() > RATIO_TOLD {
+        let text = format!(
+            "it turns to one side when both wheels count the same: their diameters differ by {:.1} %",
+            100.0 * (ratio - 1.0).abs()
+        );
+        found.push(
+            Finding::wrong("wheel ratio", text)
+                .with_key("robot.odometry.diameter_ratio", format!("{ratio:.3}")),
+        );
+    }
+    found
+}

@@ -1,0 +1,95 @@
+//! What was told, counted and seen while the robot went through the procedure.
+
+use common::samples::{RangeReading, ScanHeader};
+
+/// The parts of the procedure differ by what the robot is told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Told {
+    Stand,
+    TurnLeft,
+    TurnRight,
+    Drive,
+}
+
+/// Times are mission time, seconds.
+#[derive(Clone, Debug, Default)]
+pub struct Trace {
+    /// Way of the left and the right rim since the beginning by the counts, metres, with nominal wheels.
+    pub rolled: Vec<(f64, [f64; 2])>,
+    /// Speeds of the rims as told, m/s.
+    pub told: Vec<(f64, [f64; 2])>,
+    /// Angle turned by the gyro since the beginning, radians counter-clockwise.
+    pub gyro: Vec<(f64, f64)>,
+    /// The readings of a tick, a row of the mission's table each.
+    pub ranges: Vec<(f64, Vec<RangeReading>)>,
+    pub scans: Vec<(f64, ScanHeader, Vec<f32>)>,
+}
+
+/// A stretch of time in which the robot is told one thing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Leg {
+    pub told: Told,
+    pub from_s: f64,
+    pub until_s: f64,
+}
+
+impl Leg {
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        self.until_s - self.from_s
+    }
+
+    #[must_use]
+    pub fn contains(&self, at_s: f64) -> bool {
+        (self.from_s..self.until_s).contains(&at_s)
+    }
+}
+
+/// Slower rims are told to stand, m/s.
+const STANDS_M_S: f64 = 0.005;
+
+impl Told {
+    fn of([left, right]: [f64; 2]) -> Self {
+        match (left.abs().max(right.abs()) < STANDS_M_S, left * right > 0.0, right > left) {
+            (true, ..) => Self::Stand,
+            (_, true, _) => Self::Drive,
+            (_, _, true) => Self::TurnLeft,
+            _ => Self::TurnRight,
+        }
+    }
+}
+
+impl Trace {
+    /// The legs in their order. The first begins with the trace, because no command comes before the robot moves.
+    #[must_use]
+    pub fn legs(&self) -> Vec<Leg> {
+        let begins = self.rolled.first().map_or(0.0, |(at, _)| *at);
+        let ends = self.rolled.last().map_or(0.0, |(at, _)| *at);
+        let mut legs = vec![Leg { told: Told::Stand, from_s: begins, until_s: ends }];
+        for (at, told) in &self.told {
+            let told = Told::of(*told);
+            if let Some(last) = legs.last_mut()
+                && last.told != told
+            {
+                last.until_s = *at;
+                legs.push(Leg { told, from_s: *at, until_s: ends });
+            }
+        }
+        legs
+    }
+
+    /// The time until which the robot has not been told to move.
+    #[must_use]
+    pub fn rest_until_s(&self) -> f64 {
+        self.legs().first().map_or(0.0, |rest| rest.until_s)
+    }
+}
+
+/// A value between the two that `at_s` lies between, or the nearest; none without values.
+pub(crate) fn between<const N: usize>(values: &[(f64, [f64; N])], at_s: f64) -> Option<[f64; N]> {
+    let after = values.partition_point(|(at, _)| *at < at_s);
+    let (later, earlier) = (values.get(after).or(values.last())?, values.get(after.max(1) - 1)?);
+    let gap = later.0 - earlier.0;
+    let share = if gap > 0.0 { ((at_s - earlier.0) / gap).clamp(0.0, 1.0) } else { 1.0 };
+    Some(std::array::from_fn(|i| earlier.1[i] + share * (later.1[i] - earlier.1[i])))
+}

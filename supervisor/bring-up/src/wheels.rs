@@ -1,0 +1,211 @@
+//! Which wheel counts what it is told, and how fast the base answers.
+
+use calibration::response;
+use common::mission::{Mission, Protocol};
+
+use crate::{
+    Finding,
+    trace::{Told, Trace, between},
+};
+
+/// A base of any response goes as told by then, seconds after it was told.
+const SETTLED_S: f64 = 1.0;
+/// A wheel that counts less of what it is told counts nothing, and another wheel's share that is less is noise.
+const LEAST_SHARE: f64 = 0.15;
+/// Shares of what they were told by which the two wheels may differ.
+const ALIKE: f64 = 0.1;
+/// Rates of motor frames differ from the stated one by this share at most.
+const RATE_SHARE: f64 = 0.2;
+
+/// The rate of the motor frames.
+pub(crate) fn rate(mission: &Mission, trace: &Trace) -> Finding {
+    let stated = mission.robot.rate_hz;
+    let (Some(first), Some(last)) = (trace.rolled.first(), trace.rolled.last()) else {
+        return Finding::wrong("robot", "it said nothing: check robot.address and its power");
+    };
+    let hz = (trace.rolled.len() - 1) as f64 / (last.0 - first.0).max(1e-3);
+    let text = format!("it reports its wheels {hz:.1} times a second, {stated:.1} stated");
+    match (hz / stated - 1.0).abs() <= RATE_SHARE {
+        true => Finding::right("robot", text),
+        false => Finding::wrong("robot", text).with_key("robot.rate_hz", format!("{hz:.0}")),
+    }
+}
+
+/// By how much each wheel counts what each was told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Wheels {
+    /// Rows are the wheels that count, columns the wheels that were told; left and right.
+    counted: [[f64; 2]; 2],
+    /// It was told to turn and to drive for long enough.
+    is_told: bool,
+}
+
+/// Turn and way of the body by the wheels, as if they counted what they were told: angle, radians, and way, metres.
+pub(crate) type Motion = Vec<(f64, [f64; 2])>;
+
+impl Wheels {
+    /// Least squares over all moments at which the base had time to answer.
+    pub(crate) fn of(trace: &Trace) -> Self {
+        let (mut squares, mut products) = ([[0.0; 2]; 2], [[0.0; 2]; 2]);
+        let legs = trace.legs();
+        for leg in legs.iter().filter(|leg| leg.told != Told::Stand) {
+            let settled = leg.from_s + SETTLED_S.min(leg.seconds() / 2.0);
+            let in_leg = trace.rolled.iter().filter(|(at, _)| (settled..leg.until_s).contains(at));
+            let mut before: Option<&(f64, [f64; 2])> = None;
+            for now in in_leg {
+                if let Some(before) = before
+                    && let Some(told) = between(&trace.told, before.0)
+                {
+                    let seconds = now.0 - before.0;
+                    for wheel in 0..2 {
+                        let speed = (now.1[wheel] - before.1[wheel]) / seconds.max(1e-3);
+                        for other in 0..2 {
+                            squares[wheel][other] += told[wheel] * told[other];
+                            products[wheel][other] += speed * told[other];
+                        }
+                    }
+                }
+                before = Some(now);
+            }
+        }
+        let [[ll, lr], [_, rr]] = squares;
+        let determinant = ll * rr - lr * lr;
+        // Turns and ways alone tell the two wheels apart.
+        let is_told = determinant > 1e-6 * ll * rr && determinant > 0.0;
+        let solve = |[left, right]: [f64; 2]| {
+            [(left * rr - right * lr) / determinant, (right * ll - left * lr) / determinant]
+        };
+        Self { counted: if is_told { products.map(solve) } else { [[0.0; 2]; 2] }, is_told }
+    }
+
+    /// The wheel that each encoder follows, and whether it counts backwards; none for one that counts nothing.
+    fn follows(&self) -> [Option<(usize, bool)>; 2] {
+        self.counted.map(|shares| {
+            let wheel = usize::from(shares[1].abs() > shares[0].abs());
+            let share = shares[wheel];
+            (share.abs() >= LEAST_SHARE).then_some((wheel, share < 0.0))
+        })
+    }
+
+    fn shares(&self) -> [f64; 2] {
+        self.counted.map(|shares| shares[0].abs().max(shares[1].abs()))
+    }
+
+    pub(crate) fn finding(&self, mission: &Mission) -> Finding {
+        let [left, right] = self.shares();
+        let told = format!(
+            "they count {:.0} and {:.0} % of what they are told",
+            100.0 * left,
+            100.0 * right
+        );
+        let is_x80 = mission.robot.protocol() == Protocol::X80;
+        let (own_left, own_right) = (mission.robot.left, mission.robot.right);
+        let remedy = |text: &str, x80: &str| {
+            let by = if is_x80 { x80 } else { "mend the wiring, or the robot's own program" };
+            Finding::wrong("wheels", format!("{text}: {by}"))
+        };
+        match self.follows() {
+            _ if !self.is_told => Finding::unknown(
+                "wheels",
+                "it moved for too short a time: what stopped it? Look at the logs of the run, and give it more room",
+            ),
+            [None, None] => Finding::wrong(
+                "wheels",
+                "neither wheel counts: does it move? Check the motors' power and the encoders",
+            ),
+            [None, _] => remedy("the left wheel's encoder counts nothing", "check its plug"),
+            [_, None] => remedy("the right wheel's encoder counts nothing", "check its plug"),
+            [Some((0, false)), Some((1, false))] if (left / right - 1.0).abs() > ALIKE => {
+                Finding::wrong(
+                    "wheels",
+                    format!(
+                        "{told}: one encoder loses counts or one motor is weak, or the wheels' diameters differ (calibrate them)"
+                    ),
+                )
+            }
+            [Some((0, false)), Some((1, false))] => Finding::right("wheels", told),
+            [Some((0, left)), Some((1, right))] => {
+                let which = match (left, right) {
+                    (true, true) => "both wheels' encoders count",
+                    (true, false) => "the left wheel's encoder counts",
+                    _ => "the right wheel's encoder counts",
+                };
+                remedy(
+                    &format!("{which} backwards, or the motor turns backwards"),
+                    "swap the two wires of its encoder or of its motor",
+                )
+            }
+            _ => {
+                let finding = remedy("each encoder counts the other wheel", "swap their plugs");
+                match is_x80 {
+                    true => finding
+                        .with_key("robot.left.channel", own_right.channel.to_string())
+                        .with_key("robot.right.channel", own_left.channel.to_string()),
+                    false => finding,
+                }
+            }
+        }
+    }
+
+    /// The body's motion by what the wheels counted, put right.
+    pub(crate) fn motion(&self, trace: &Trace, track_m: f64) -> Motion {
+        let follows = self.follows();
+        let of = |wheel: usize, counted: [f64; 2]| {
+            let encoder = (0..2).find(|it| follows[*it].is_some_and(|(which, _)| which == wheel));
+            let encoder = encoder.unwrap_or(wheel);
+            match follows[encoder] {
+                Some((_, true)) => -counted[encoder],
+                _ => counted[encoder],
+            }
+        };
+        let motion = |(at, counted): &(f64, [f64; 2])| {
+            let [left, right] = [of(0, *counted), of(1, *counted)];
+            (*at, [(right - left) / track_m, (left + right) / 2.0])
+        };
+        trace.rolled.iter().map(motion).collect()
+    }
+}
+
+/// Delay and acceleration of the base against the stated ones.
+pub(crate) fn response(mission: &Mission, trace: &Trace, motion: &Motion) -> Option<Finding> {
+    let body = mission.body();
+    let turn = |(at, told): &(f64, [f64; 2])| (*at, (told[1] - told[0]) / body.track_m);
+    let told: Vec<_> = trace.told.iter().map(turn).collect();
+    let turned: Vec<_> = motion.iter().map(|(at, [angle, _])| (*at, *angle)).collect();
+    let found = match response::estimate(&told, &turned, &body) {
+        Ok(found) => found,
+        Err(why) => return Some(Finding::unknown("response", why)),
+    };
+    let stated = body.response;
+    let (delay, limit) = (found.delay_s, found.acceleration_m_s2);
+    let text = format!(
+        "the base answers after {:.2} s ({:.2} stated) and gains {} m/s a second",
+        delay.value,
+        stated.delay_s,
+        limit.map_or_else(|| "any".to_owned(), |it| format!("{:.2}", it.value)),
+    );
+    // A lag of the stated length hides in the delay.
+    let late = delay.value - stated.delay_s > DELAY_S.max(4.0 * delay.sd);
+    let turning = stated.turn_acceleration_rad_s2 * body.track_m / 2.0;
+    let heavy = limit.is_some_and(|it| {
+        let stated = stated.acceleration_m_s2.min(turning);
+        it.value < STRONG_M_S2 && it.value + 4.0 * it.sd < WEAKER * stated
+    });
+    if !late && !heavy {
+        return Some(Finding::right("response", text));
+    }
+    let mut finding = Finding::wrong("response", text)
+        .with_key("robot.response.delay_s", format!("{:.3}", delay.value));
+    if let Some(limit) = limit {
+        finding =
+            finding.with_key("robot.response.acceleration_m_s2", format!("{:.2}", limit.value));
+    }
+    Some(finding)
+}
+
+/// A delay that is this much longer than stated is told, seconds.
+const DELAY_S: f64 = 0.05;
+/// An acceleration below this share of the stated one is told, if it is less than [`STRONG_M_S2`].
+const WEAKER: f64 = 0.8;
+/// Turns on the spot at their speed do not tell greater accelerations from none.
+const STRONG_M_S2: f64 = 3.0;

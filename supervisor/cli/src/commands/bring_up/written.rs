@@ -1,0 +1,122 @@
+//! Mission files for new robots, and keys in those of others, whose comments stay.
+
+use common::mission::Protocol;
+use console::failure::Failure;
+use toml_edit::{DocumentMut, Item, Table, value};
+
+/// The text of a mission for a robot that speaks `protocol` at `address`.
+pub(super) fn new_robot(protocol: Protocol, address: &str) -> String {
+    let (name, keys) = match protocol {
+        Protocol::X80 => ("x80", ""),
+        Protocol::Json => ("json", "counts_per_turn = 3600.0\n"),
+        Protocol::Arduino => {
+            ("arduino", "counts_per_turn = 1200.0       # encoder counts of a turn of a wheel\n")
+        }
+        Protocol::Ros2 => ("ros2", "counts_per_turn = 3600.0\n"),
+    };
+    let sensors = match protocol {
+        Protocol::X80 => "",
+        Protocol::Ros2 => {
+            "\n[[robot.sensor]]\nname = \"scan\"\nkind = \"scan\"\nforward_m = 0.0\nbearing_deg = 0.0\nfield_of_view_deg = 360\nbeams = 360\nreach_m = 8.0\n"
+        }
+        Protocol::Json | Protocol::Arduino => {
+            "\n[[robot.sensor]]              # one for each sensor, by the name that the robot gives it\nname = \"front\"\nkind = \"cone\"\nforward_m = 0.1\nbearing_deg = 0.0\n"
+        }
+    };
+    let pins = if matches!(protocol, Protocol::Arduino) {
+        "\n[robot.arduino]\nsonars = { front = 4 }         # the pin of each sonar\n"
+    } else {
+        ""
+    };
+    let sizes = if matches!(protocol, Protocol::X80) {
+        ""
+    } else {
+        "wheel_radius_m = 0.033\ntrack_m = 0.16                 # between the middles of the wheels\nradius_m = 0.12                # of the disc that covers the body\ntop_speed_m_s = 0.3\n"
+    };
+    format!(
+        "# Measure the sizes, give each sensor a row, then: firsthand bring-up THIS_FILE\ntarget = [2.0, 0.0]\n\n[perimeter]\nwidth_m = 6.0\ncentre = [1.0, 0.0]\n\n[robot]\nprotocol = \"{name}\"\naddress = {address:?}\n{}{sizes}{keys}{pins}{sensors}",
+        if matches!(protocol, Protocol::X80) { "" } else { "rate_hz = 10.0\n" },
+    )
+}
+
+/// `text`, a mission file, with `keys`, paths with dots and values, in place. A row of `robot.sensor` is meant by its name.
+///
+/// # Errors
+/// The text is no TOML, or a key lies below something that is no table.
+pub(super) fn with_keys(text: &str, keys: &[&(String, String)]) -> Result<String, Failure> {
+    let mut document: DocumentMut = text.parse()?;
+    for (path, new) in keys {
+        let words: Vec<&str> = path.split('.').collect();
+        let Some((last, tables)) = words.split_last() else { continue };
+        let refused =
+            || format!("{path} cannot be written: it lies below something that is no table");
+        let mut table = document.as_table_mut() as &mut dyn toml_edit::TableLike;
+        let mut words = tables.iter();
+        while let Some(word) = words.next() {
+            let item = table.entry(word).or_insert_with(|| Item::Table(Table::new()));
+            table = match item {
+                Item::ArrayOfTables(rows) => {
+                    let name = words.next().copied().unwrap_or_default();
+                    let named =
+                        |row: &&mut Table| row.get("name").and_then(Item::as_str) == Some(name);
+                    rows.iter_mut().find(named).ok_or_else(refused)?
+                }
+                item => item.as_table_like_mut().ok_or_else(refused)?,
+            };
+        }
+        let new = match (new.parse::<i64>(), new.parse::<f64>(), new.parse::<bool>()) {
+            (_, _, Ok(flag)) => value(flag),
+            (Ok(whole), ..) if matches!(*last, "channel") => value(whole),
+            (_, Ok(number), _) => value(number),
+            _ => value(new.as_str()),
+        };
+        table.insert(last, new);
+    }
+    Ok(document.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn found_keys_are_written_where_they_belong_and_comments_stay() {
+        let text = "target = [1, 0] # there\n[robot]\nrate_hz = 10.0 # mine\n[[robot.sensor]]\nname = \"a\"\n[[robot.sensor]]\nname = \"b\" # left\nbearing_deg = 3.0\n";
+        let keys = [
+            ("robot.track_m", "0.31"),
+            ("robot.response.delay_s", "0.2"),
+            ("robot.sensor.b.bearing_deg", "90"),
+            ("robot.left.reversed", "true"),
+        ]
+        .map(|(key, value)| (key.to_owned(), value.to_owned()));
+        let written = with_keys(text, &keys.iter().collect::<Vec<_>>()).unwrap();
+        for kept in [
+            "# there",
+            "# mine",
+            "# left",
+            "track_m = 0.31",
+            "[robot.response]\ndelay_s = 0.2",
+            "bearing_deg = 90.0",
+        ] {
+            assert!(written.contains(kept), "{kept}: {written}");
+        }
+        let parsed: toml::Table = written.parse().unwrap();
+        assert_eq!(parsed["robot"]["left"]["reversed"].as_bool(), Some(true));
+        let missing = ("robot.sensor.c.bearing_deg".to_owned(), "1".to_owned());
+        assert!(with_keys(text, &[&missing]).is_err());
+    }
+
+    #[test]
+    fn a_mission_for_each_protocol_is_valid() {
+        for (protocol, address) in [
+            (Protocol::X80, "udp://192.168.0.201:10001"),
+            (Protocol::Json, "udp://127.0.0.1:5600"),
+            (Protocol::Arduino, "serial:///dev/ttyUSB0"),
+            (Protocol::Ros2, "ros2:7"),
+        ] {
+            let text = new_robot(protocol, address);
+            let mission = console::missions::parsed(&text, "new", &[]).unwrap();
+            assert_eq!(mission.robot.protocol(), protocol);
+        }
+    }
+}
