@@ -33,7 +33,6 @@ impl Profile {
         (self.bottom_m - height_m).max(height_m - self.top_m).max(0.0)
     }
 
-    /// Any of it is between two heights, metres.
     pub fn is_between(&self, lower_m: f64, upper_m: f64) -> bool {
         self.bottom_m < upper_m && self.top_m > lower_m
     }
@@ -100,7 +99,6 @@ shape! {
 }
 
 impl Wall {
-    /// Each edge is (from, to).
     pub fn edges(&self) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
         self.points.windows(2).map(|pair| (pair[0], pair[1]))
     }
@@ -115,7 +113,6 @@ impl Box2 {
             .map(|(a, b)| self.at + axis.rotate(half * DVec2::new(a, b)))
     }
 
-    /// Each edge is (from, to).
     pub fn edges(&self) -> impl Iterator<Item = (DVec2, DVec2)> + use<> {
         let corners = self.corners();
         (0..4).map(move |side| (corners[side], corners[(side + 1) % 4]))

@@ -244,7 +244,6 @@ impl Planner {
     pub const EVIDENTIAL_SCREENING_M: f64 = 0.35;
 }
 
-/// How fast a robot of the evidential method may be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hurry {
     pub full_speed_within_deg: f64,
@@ -352,13 +351,11 @@ impl Mission {
         sensor::table(&rows, *rate_hz, &self.sonar, self.sensor_set())
     }
 
-    /// The laser, and its row in [`Mission::sensor_table`].
     pub fn laser(&self) -> Option<(usize, Sensor)> {
         let mut rows = self.sensor_table().into_iter().enumerate();
         rows.find(|(_, sensor)| sensor.kind == SensorKind::Scan)
     }
 
-    /// The front sonar's row in [`Mission::sensor_table`].
     pub fn front_row(&self) -> usize {
         sensor::front(&self.sensor_table(), &self.sonar).unwrap_or_default()
     }

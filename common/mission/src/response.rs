@@ -35,7 +35,6 @@ impl ResponseKeys {
     }
 }
 
-/// How a base answers commands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Response {
     /// From a command to its first effect in the odometry, as the link sees it, seconds: what a network delays is part of it.
@@ -56,7 +55,6 @@ impl Response {
         turn_acceleration_rad_s2: f64::INFINITY,
     };
 
-    /// [`Response::X80`] with accelerations.
     pub(crate) const fn limited(acceleration_m_s2: f64, turn_acceleration_rad_s2: f64) -> Self {
         Self { acceleration_m_s2, turn_acceleration_rad_s2, ..Self::X80 }
     }
@@ -113,7 +111,6 @@ impl ModelledSpeed {
         Self { delay_s, most_change, pending, target: 0.0, speed: 0.0, at_s: f64::NEG_INFINITY }
     }
 
-    /// A command is given at the time `at_s`.
     pub fn command(&mut self, at_s: f64, speed: f64) {
         if self.pending.len() == MOST_PENDING
             && let Some((_, oldest)) = self.pending.pop_front()

@@ -144,7 +144,6 @@ pub struct Steering {
 }
 
 impl Steering {
-    /// Radians at an encoder that stands at `counts`.
     pub fn angle(&self, counts: f64) -> f64 {
         counts * std::f64::consts::TAU / self.counts_per_turn
     }
@@ -181,7 +180,6 @@ impl Body {
         ))
     }
 
-    /// The way of the rim per encoder count.
     pub fn metres_per_count(&self) -> f64 {
         std::f64::consts::TAU * self.wheel_radius_m / self.counts_per_turn
     }

@@ -126,7 +126,6 @@ impl SensorModel {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorRow {
-    /// The name in logs and reasons.
     pub name: String,
     pub kind: SensorKind,
     /// Of an X80: a cone has the sonar's index in the standard frame, 0 to 5, a ray the infrared ranger, 0 to 6. Other robots' protocols
@@ -317,7 +316,6 @@ pub(crate) fn front(table: &[Sensor], sonar: &SonarConfig) -> Option<usize> {
     candidates.min_by(|(_, a), (_, b)| ahead(a).total_cmp(&ahead(b))).map(|(index, _)| index)
 }
 
-/// A row without what its model says.
 fn row(name: impl Into<String>, kind: SensorKind, forward_m: f64, bearing_deg: f64) -> SensorRow {
     SensorRow {
         name: name.into(),

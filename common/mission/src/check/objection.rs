@@ -12,7 +12,6 @@ pub(super) fn objection(
     Objection { key, problem: problem.into(), remedy: remedy.into() }
 }
 
-/// Refuse `key` if it is `wrong`.
 pub(super) fn refuse_if(
     wrong: bool,
     key: &'static str,
@@ -22,7 +21,6 @@ pub(super) fn refuse_if(
     if wrong { Err(objection(key, problem, remedy)) } else { Ok(()) }
 }
 
-/// Keys, each with its value, its range and its unit.
 pub(super) fn all_within<const N: usize>(
     limits: [(&'static str, f64, std::ops::RangeInclusive<f64>, &str); N],
 ) -> Result<(), Objection> {
