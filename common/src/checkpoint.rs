@@ -64,14 +64,7 @@ impl Checkpoint {
         path: &Path,
         capacity: usize,
     ) -> Result<(Self, Option<T>), CheckpointError> {
-        let file = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .open(path)
-            .map_err(failed("open", path))?;
-        reserve(&file, 2 * (HEADER + capacity) as u64).map_err(failed("reserve room for", path))?;
+        let file = open_reserved(path, 2 * (HEADER + capacity) as u64)?;
         let mut checkpoint =
             Self { file, path: path.to_path_buf(), capacity, sequence: 0, buffer: Vec::new() };
         let mut newest: Option<(u64, T)> = None;
@@ -111,21 +104,13 @@ impl Checkpoint {
         let mut bytes = std::mem::take(&mut self.buffer);
         bytes.clear();
         bytes.resize(HEADER, 0);
-        let mut bytes = postcard::to_extend(state, bytes)
-            .map_err(|source| CheckpointError::Encode { file: self.path.clone(), source })?;
+        let mut bytes = encode_after(bytes, state, self.capacity, &self.path)?;
         let length = bytes.len() - HEADER;
-        if length > self.capacity {
-            return Err(CheckpointError::TooLarge {
-                file: self.path.clone(),
-                capacity: self.capacity,
-                length,
-            });
-        }
         bytes[..3].copy_from_slice(&MAGIC);
         bytes[3] = VERSION;
         bytes[4..12].copy_from_slice(&sequence.to_le_bytes());
         bytes[12..16].copy_from_slice(&(length as u32).to_le_bytes());
-        let crc = checksum(&bytes);
+        let crc = checksum(&bytes, 16);
         bytes[16..20].copy_from_slice(&crc.to_le_bytes());
         self.file
             .write_all_at(&bytes, self.slot_offset(sequence % 2))
@@ -144,11 +129,28 @@ pub(crate) fn failed(
     move |source| CheckpointError::File { action, file, source }
 }
 
-/// Covers the slot but for the checksum itself.
-fn checksum(bytes: &[u8]) -> u32 {
+/// Append `state`, of at most `capacity` bytes, to `header`.
+pub(crate) fn encode_after<T: Serialize>(
+    header: Vec<u8>,
+    state: &T,
+    capacity: usize,
+    path: &Path,
+) -> Result<Vec<u8>, CheckpointError> {
+    let (start, file) = (header.len(), || path.to_path_buf());
+    let bytes = postcard::to_extend(state, header)
+        .map_err(|source| CheckpointError::Encode { file: file(), source })?;
+    let length = bytes.len() - start;
+    if length > capacity {
+        return Err(CheckpointError::TooLarge { file: file(), capacity, length });
+    }
+    Ok(bytes)
+}
+
+/// Covers all `bytes` but the four of the checksum, `at` this offset.
+pub(crate) fn checksum(bytes: &[u8], at: usize) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
-    hasher.update(&bytes[..16]);
-    hasher.update(&bytes[HEADER..]);
+    hasher.update(&bytes[..at]);
+    hasher.update(&bytes[at + 4..]);
     hasher.finalize()
 }
 
@@ -174,14 +176,22 @@ fn whole(bytes: &[u8]) -> Option<(u64, &[u8])> {
     let word = |at: usize| Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?));
     let sequence = u64::from_le_bytes(bytes.get(4..12)?.try_into().ok()?);
     let whole = bytes.get(..HEADER + word(12)? as usize)?;
-    (word(16)? == checksum(whole)).then(|| (sequence, &whole[HEADER..]))
+    (word(16)? == checksum(whole, 16)).then(|| (sequence, &whole[HEADER..]))
 }
 
-/// Reserve `length` bytes of the disk; the file's own length stays. Does nothing on a file system that cannot reserve.
-pub(crate) fn reserve(file: &File, length: u64) -> io::Result<()> {
-    match fallocate(file, FallocateFlags::KEEP_SIZE, 0, length) {
-        Err(Errno::OPNOTSUPP | Errno::NOSYS) => Ok(()),
-        reserved => Ok(reserved?),
+/// Open, or create, `path` with `length` bytes of the disk reserved; the file's own length stays. A file system that cannot reserve
+/// does not.
+pub(crate) fn open_reserved(path: &Path, length: u64) -> Result<File, CheckpointError> {
+    let file = OpenOptions::new()
+        .read(true)
+        .write(true)
+        .create(true)
+        .truncate(false)
+        .open(path)
+        .map_err(failed("open", path))?;
+    match fallocate(&file, FallocateFlags::KEEP_SIZE, 0, length) {
+        Ok(()) | Err(Errno::OPNOTSUPP | Errno::NOSYS) => Ok(file),
+        Err(errno) => Err(failed("reserve room for", path)(errno.into())),
     }
 }
 

@@ -19,7 +19,6 @@ pub trait Driver: fmt::Debug {
     /// Drop the beginning of a message, whose rest does not follow in the next connection.
     fn reset(&mut self);
 
-    /// The meaning of the bytes since the last call.
     fn heard(&mut self) -> Heard;
 
     fn tally(&self) -> WireTally;
@@ -27,7 +26,6 @@ pub trait Driver: fmt::Debug {
     /// The newest reading of each sensor, in the order of the mission's table; a reading counts for one tick.
     fn readings_for_tick(&mut self) -> Vec<RangeReading>;
 
-    /// The newest scan of the laser since the last tick.
     fn scan_for_tick(&mut self) -> LaserScan {
         LaserScan::default()
     }
@@ -115,7 +113,6 @@ impl WireTally {
     }
 
     /// Adds bytes that were dropped before they could be a message.
-    #[must_use]
     pub const fn with_dropped(self, bytes: u64) -> Self {
         Self { bytes_dropped: self.bytes_dropped + bytes, ..self }
     }
@@ -147,7 +144,6 @@ pub struct Heard {
 /// A sender, other than the link, of commands to the robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Commander {
-    /// Its number in the network.
     pub number: [u8; 16],
     pub moves: bool,
 }
@@ -163,7 +159,6 @@ pub struct LaserScan {
 pub struct Turn {
     /// One more than the number of the turn at whose end this one begins; another number if one between is missing.
     pub sequence: u64,
-    /// Radians counter-clockwise.
     pub turn_rad: f64,
     pub variance_rad2: f64,
 }
@@ -177,12 +172,10 @@ pub struct Motion {
     pub currents: [u16; 2],
 }
 
-/// The newest reading of each sensor since the last tick.
 #[derive(Clone, Debug)]
 pub struct Readings {
     table: Vec<Sensor>,
     newest: Vec<RangeReading>,
-    /// The readings since [`Readings::take_fresh`].
     fresh: Vec<RangeReading>,
     ticks: u64,
 }

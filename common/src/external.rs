@@ -26,7 +26,6 @@ use crate::{
 /// The roster is published five times a second, and the place of a process that has ended is free in the next.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// The mission of `robot`, whose supervisor only watches.
 pub fn mission(robot: &RobotName) -> Result<Mission, StageError> {
     let (directory, _stage_lock) = enter_run(&Domain::of(robot.clone()))?;
     Ok(Run::load(&directory)?.mission)
@@ -52,7 +51,6 @@ fn enter_run(domain: &Domain) -> Result<(PathBuf, File), StageError> {
     Ok((directory, stage_lock))
 }
 
-/// Take the place of `stage` in the run of `robot`.
 pub(crate) fn join(stage: &'static str, robot: &RobotName) -> Result<Joined, StageError> {
     name_process(stage)?;
     let domain = Domain::of(robot.clone());
@@ -67,7 +65,6 @@ pub(crate) fn join(stage: &'static str, robot: &RobotName) -> Result<Joined, Sta
     Ok(Joined { generation, run, bus, supervisor: Some(place.supervisor), stage_lock })
 }
 
-/// A free place, as the roster shows it.
 struct Place {
     first_tick: u64,
     supervisor: OwnedFd,

@@ -117,7 +117,6 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
         })
     }
 
-    /// None while the robot is away.
     pub fn topics(&mut self) -> Option<&mut Topics> {
         self.joined.as_mut().map(|joined| &mut joined.topics)
     }

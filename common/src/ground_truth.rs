@@ -8,7 +8,6 @@ use crate::samples::PoseSample;
 /// The file in the run directory with the lines of ticks.
 pub const GROUND_TRUTH: &str = "ground_truth.jsonl";
 
-/// The first line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GroundTruthHeader {
     pub listening: String,
@@ -24,7 +23,6 @@ pub struct GroundTruthTick {
     pub y: f64,
     /// Radians counter-clockwise from x, not wrapped.
     pub heading: f64,
-    /// m/s along the heading.
     pub v: f64,
     /// rad/s.
     pub omega: f64,
@@ -71,7 +69,6 @@ impl GroundTruthTick {
         }
     }
 
-    /// Compares wheel counts.
     pub const fn is_of(&self, pose: &PoseSample) -> bool {
         self.left_counts == pose.left_counts && self.right_counts == pose.right_counts
     }

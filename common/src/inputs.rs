@@ -26,7 +26,6 @@ const CELLS_FOR_A_BYTE: usize = 8;
 /// An entry has at most so many bytes: the whole belief of the largest map, and more.
 pub const LONGEST_ENTRY: usize = 1 << 30;
 
-/// Publishes the inputs of a step.
 #[derive(Debug)]
 pub(crate) struct InputLog {
     writer: Writer<InputsHeader, u8>,
@@ -54,7 +53,6 @@ impl InputLog {
         Ok(log)
     }
 
-    /// The step is about to take `input`, at `at`.
     pub(crate) fn note(&mut self, input: &impl Serialize, at: Progress) -> Result<(), StageError> {
         self.append(input)?;
         if self.unpublished.len() >= self.piece {

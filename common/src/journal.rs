@@ -9,14 +9,16 @@
 //! Room is reserved at opening, for a full disk. An end mark empties the journal, because shortening it would give the room away.
 
 use std::{
-    fs::{File, OpenOptions},
+    fs::File,
     os::unix::fs::FileExt,
     path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-use crate::checkpoint::{Checkpoint, CheckpointError, failed, reserve};
+use crate::checkpoint::{
+    Checkpoint, CheckpointError, checksum, encode_after, failed, open_reserved,
+};
 
 /// The fewest and the most entries after which a snapshot is due.
 const SNAPSHOT_AFTER: (u64, u64) = (8, 128);
@@ -29,7 +31,6 @@ const HEADER: usize = 16;
 const END: [u8; HEADER] = [0; HEADER];
 /// The mapper's entry with a scan of the most beams has half of this.
 const LONGEST: usize = 131_072;
-/// Bytes of a snapshot besides the state.
 const NUMBER: usize = 10;
 
 #[derive(Debug)]
@@ -47,7 +48,6 @@ pub struct Journal {
 #[derive(Debug, PartialEq, Eq)]
 pub struct Restored<S, E> {
     pub state: Option<S>,
-    /// Oldest first.
     pub entries: Vec<E>,
 }
 
@@ -68,16 +68,8 @@ impl Journal {
     ) -> Result<(Self, Restored<S, E>), CheckpointError> {
         let (snapshots, snapshot) = Checkpoint::open::<Snapshot<S>>(path, capacity + NUMBER)?;
         let path = path.with_extension("journal");
-        let file = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .open(&path)
-            .map_err(failed("open", &path))?;
         let snapshot_after = snapshot_after(capacity);
-        reserve(&file, snapshot_after * (HEADER + entry_bytes) as u64)
-            .map_err(failed("reserve room for", &path))?;
+        let file = open_reserved(&path, snapshot_after * (HEADER + entry_bytes) as u64)?;
         let (first, state) = match snapshot {
             Some(Snapshot { next, state }) => (next, Some(state)),
             None => (0, None),
@@ -121,22 +113,13 @@ impl Journal {
 
     /// Fails when the entry cannot be encoded or written, or is too long.
     pub fn append<E: Serialize>(&mut self, entry: &E) -> Result<(), CheckpointError> {
-        let header = vec![0; HEADER];
-        let mut bytes = postcard::to_extend(entry, header)
-            .map_err(|source| CheckpointError::Encode { file: self.path.clone(), source })?;
+        let mut bytes = encode_after(vec![0; HEADER], entry, LONGEST, &self.path)?;
         let length = bytes.len() - HEADER;
         bytes.extend_from_slice(&END);
-        if length > LONGEST {
-            return Err(CheckpointError::TooLarge {
-                file: self.path.clone(),
-                capacity: LONGEST,
-                length,
-            });
-        }
         bytes[..8].copy_from_slice(&self.number.to_le_bytes());
         bytes[8..12].copy_from_slice(&(length as u32).to_le_bytes());
         let end = HEADER + length;
-        let crc = checksum(&bytes[..end]);
+        let crc = checksum(&bytes[..end], 12);
         bytes[12..16].copy_from_slice(&crc.to_le_bytes());
         self.file.write_all_at(&bytes, self.end).map_err(failed("write", &self.path))?;
         self.end += end as u64;
@@ -172,15 +155,7 @@ fn entry(bytes: &[u8]) -> Option<(u64, &[u8], &[u8])> {
         return None;
     }
     let (whole, after) = bytes.split_at_checked(HEADER + length)?;
-    (checksum(whole) == crc).then(|| (number, &whole[HEADER..], after))
-}
-
-/// Covers the entry but for the checksum itself.
-fn checksum(bytes: &[u8]) -> u32 {
-    let mut hasher = crc32fast::Hasher::new();
-    hasher.update(&bytes[..12]);
-    hasher.update(&bytes[HEADER..]);
-    hasher.finalize()
+    (checksum(whole, 12) == crc).then(|| (number, &whole[HEADER..], after))
 }
 
 #[cfg(test)]

@@ -48,7 +48,6 @@ pub mod replay;
 pub mod roster;
 pub mod run;
 pub mod samples;
-pub mod saved;
 pub mod shell;
 pub mod signals;
 pub mod stage;

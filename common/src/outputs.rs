@@ -5,35 +5,40 @@ use std::any::Any;
 use serde::Serialize;
 
 use crate::{
-    bus::{AnyWriter, Payload, Stamped, Topic, Writer},
-    checkpoint::CheckpointError,
+    bus::{AnyWriter, BusError, Payload, Stamped, Topic, Writer},
+    checkpoint::Checkpoint,
     inputs::InputLog,
+    journal::Journal,
     replay::Output,
-    saved::Saved,
     shell::{Context, Progress},
     start::StageError,
     topics::Rate,
 };
 
-/// Takes what a stage publishes and persists.
+/// The open file that a stage persists its state in, by [`Persists`](crate::wiring::Persists).
+#[derive(Debug, Default)]
+pub(crate) enum Saved {
+    #[default]
+    Nothing,
+    State(Checkpoint),
+    /// Inputs since a snapshot.
+    Journal(Journal),
+}
+
+#[derive(Default)]
 pub struct Outputs {
     /// The tick and mission time of the next output.
     pub at: Progress,
-    to: Destination,
-}
-
-enum Destination {
-    Process(Box<Process>),
-    Replay { published: Vec<Output>, has_field: bool },
-}
-
-struct Process {
     writers: Vec<(&'static str, Box<dyn AnyWriter>)>,
-    /// None for a process whose inputs are not recorded.
+    /// None in a replay, and for a process whose inputs are not recorded.
     inputs: Option<InputLog>,
     saved: Saved,
-    /// An input was noted, and nothing published since.
-    noted: bool,
+    replayed: Option<Replayed>,
+}
+
+struct Replayed {
+    published: Vec<Output>,
+    has_field: bool,
 }
 
 impl Outputs {
@@ -60,154 +65,28 @@ impl Outputs {
         inputs: Option<InputLog>,
         longest: usize,
     ) -> Result<Self, StageError> {
-        let mut process = Process {
-            writers: Vec::new(),
-            inputs,
-            saved: std::mem::take(&mut context.saved),
-            noted: false,
-        };
-        process.open(context, longest, false)?;
-        Ok(Self { at: Progress::default(), to: Destination::Process(Box::new(process)) })
+        let saved = std::mem::take(&mut context.saved);
+        let mut out = Self { inputs, saved, ..Self::default() };
+        out.open(context, longest, false)?;
+        Ok(out)
     }
 
     /// The outputs of a replay. `has_field` says whether samples of `field` are compared.
     pub(crate) fn of_replay(has_field: bool) -> Self {
-        let to = Destination::Replay { published: Vec::new(), has_field };
-        Self { at: Progress::default(), to }
+        let replayed = Some(Replayed { published: Vec::new(), has_field });
+        Self { replayed, ..Self::default() }
     }
 
     /// Whether samples of `field` are published: a replay saves the time where there are none to compare with.
-    pub const fn has_field(&self) -> bool {
-        matches!(self.to, Destination::Process(_) | Destination::Replay { has_field: true, .. })
+    pub fn has_field(&self) -> bool {
+        self.replayed.as_ref().is_none_or(|replayed| replayed.has_field)
     }
 
     /// Open the topics that follow each frame of the robot.
     pub(crate) fn open_late(&mut self, context: &mut Context) -> Result<(), StageError> {
-        match &mut self.to {
-            Destination::Process(process) => process.open(context, 0, true),
-            Destination::Replay { .. } => Ok(()),
-        }
+        self.open(context, 0, true)
     }
 
-    /// The samples that a replay published since the last call.
-    pub(crate) fn drain(&mut self) -> Vec<Output> {
-        match &mut self.to {
-            Destination::Process(_) => Vec::new(),
-            Destination::Replay { published, .. } => std::mem::take(published),
-        }
-    }
-
-    /// The step is about to take `input`.
-    pub(crate) fn note(&mut self, input: &impl Serialize) -> Result<(), StageError> {
-        if let Destination::Process(process) = &mut self.to {
-            if let Some(inputs) = &mut process.inputs {
-                inputs.note(input, self.at)?;
-            }
-            process.noted = true;
-        }
-        Ok(())
-    }
-
-    /// Publish the inputs that were noted, before anything follows from them that is not a sample.
-    pub fn publish_inputs(&mut self) -> Result<(), StageError> {
-        match &mut self.to {
-            Destination::Process(process) => process.publish_inputs(self.at),
-            Destination::Replay { .. } => Ok(()),
-        }
-    }
-
-    /// Publish a sample, and wake its readers.
-    pub fn publish<H: Stamped>(
-        &mut self,
-        topic: &'static Topic<H>,
-        sample: H,
-    ) -> Result<(), StageError> {
-        self.publish_slice(topic, sample, &[])
-    }
-
-    /// Publish a header with a slice, and wake its readers.
-    pub fn publish_slice<H: Stamped, E: Payload>(
-        &mut self,
-        topic: &'static Topic<H, E>,
-        header: H,
-        slice: &[E],
-    ) -> Result<(), StageError> {
-        self.publish_quietly(topic, header, slice)?;
-        match &mut self.to {
-            Destination::Replay { .. } => Ok(()),
-            Destination::Process(process) => Ok(process.writer(topic)?.wake()?),
-        }
-    }
-
-    /// Publish a header with a slice on a topic that wakes nobody.
-    pub fn publish_quietly<H: Stamped, E: Payload>(
-        &mut self,
-        topic: &'static Topic<H, E>,
-        header: H,
-        slice: &[E],
-    ) -> Result<(), StageError> {
-        let at @ Progress { tick, time } = self.at;
-        match &mut self.to {
-            Destination::Replay { published, .. } => {
-                published.push(Output::of(topic, tick, time, header, slice));
-            }
-            Destination::Process(process) => {
-                process.publish_inputs(at)?;
-                process.writer(topic)?.publish_quietly(tick, time, header, slice)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Whether a reader of `topic` came since this was last asked: it needs a keyframe.
-    pub fn has_new_reader<H: Stamped, E: Payload>(
-        &mut self,
-        topic: &'static Topic<H, E>,
-    ) -> Result<bool, StageError> {
-        match &mut self.to {
-            Destination::Process(process) => Ok(process.writer(topic)?.has_new_reader()),
-            Destination::Replay { .. } => Ok(false),
-        }
-    }
-
-    /// Save the stage's state.
-    pub fn save(&mut self, state: &impl Serialize) -> Result<(), StageError> {
-        self.persist(|saved| saved.save(state))
-    }
-
-    /// Append an entry to the stage's journal.
-    pub fn append(&mut self, entry: &impl Serialize) -> Result<(), StageError> {
-        self.persist(|saved| saved.append(entry))
-    }
-
-    fn persist(
-        &mut self,
-        save: impl FnOnce(&mut Saved) -> Result<(), CheckpointError>,
-    ) -> Result<(), StageError> {
-        match &mut self.to {
-            Destination::Process(process) => Ok(save(&mut process.saved)?),
-            Destination::Replay { .. } => Ok(()),
-        }
-    }
-
-    /// Whether a snapshot is due, with which the stage's journal begins anew.
-    pub fn is_journal_long(&self) -> bool {
-        match &self.to {
-            Destination::Process(process) => process.saved.is_journal_long(),
-            Destination::Replay { .. } => false,
-        }
-    }
-
-    /// Save a snapshot of `state` if one is due.
-    pub fn shorten_journal(&mut self, state: &impl Serialize) -> Result<(), StageError> {
-        match &mut self.to {
-            Destination::Process(process) => Ok(process.saved.shorten_journal(state)?),
-            Destination::Replay { .. } => Ok(()),
-        }
-    }
-}
-
-impl Process {
     fn open(
         &mut self,
         context: &mut Context,
@@ -235,11 +114,88 @@ impl Process {
         writer.ok_or(StageError::NoOutput(name))
     }
 
-    fn publish_inputs(&mut self, at: Progress) -> Result<(), StageError> {
-        if let Some(inputs) = self.inputs.as_mut().filter(|_| self.noted) {
-            inputs.publish(at)?;
-            self.noted = false;
+    pub(crate) fn drain(&mut self) -> Vec<Output> {
+        self.replayed.as_mut().map(|it| std::mem::take(&mut it.published)).unwrap_or_default()
+    }
+
+    pub(crate) fn note(&mut self, input: &impl Serialize) -> Result<(), StageError> {
+        self.inputs.as_mut().map_or(Ok(()), |inputs| inputs.note(input, self.at))
+    }
+
+    /// Publish the inputs that were noted, before anything follows from them that is not a sample.
+    pub fn publish_inputs(&mut self) -> Result<(), BusError> {
+        self.inputs.as_mut().map_or(Ok(()), |inputs| inputs.publish(self.at))
+    }
+
+    pub fn publish<H: Stamped>(
+        &mut self,
+        topic: &'static Topic<H>,
+        sample: H,
+    ) -> Result<(), StageError> {
+        self.publish_slice(topic, sample, &[])
+    }
+
+    pub fn publish_slice<H: Stamped, E: Payload>(
+        &mut self,
+        topic: &'static Topic<H, E>,
+        header: H,
+        slice: &[E],
+    ) -> Result<(), StageError> {
+        self.publish_quietly(topic, header, slice)?;
+        match self.replayed {
+            Some(_) => Ok(()),
+            None => Ok(self.writer(topic)?.wake()?),
         }
-        Ok(())
+    }
+
+    /// Publish a header with a slice on a topic that wakes nobody.
+    pub fn publish_quietly<H: Stamped, E: Payload>(
+        &mut self,
+        topic: &'static Topic<H, E>,
+        header: H,
+        slice: &[E],
+    ) -> Result<(), StageError> {
+        let Progress { tick, time } = self.at;
+        if let Some(Replayed { published, .. }) = &mut self.replayed {
+            published.push(Output::of(topic, tick, time, header, slice));
+            return Ok(());
+        }
+        self.publish_inputs()?;
+        Ok(self.writer(topic)?.publish_quietly(tick, time, header, slice)?)
+    }
+
+    /// Whether a reader of `topic` came since this was last asked: it needs a keyframe.
+    pub fn has_new_reader<H: Stamped, E: Payload>(
+        &mut self,
+        topic: &'static Topic<H, E>,
+    ) -> Result<bool, StageError> {
+        Ok(self.replayed.is_none() && self.writer(topic)?.has_new_reader())
+    }
+
+    pub fn save(&mut self, state: &impl Serialize) -> Result<(), StageError> {
+        match &mut self.saved {
+            Saved::State(checkpoint) => Ok(checkpoint.save(state)?),
+            Saved::Nothing | Saved::Journal(_) => Ok(()),
+        }
+    }
+
+    pub fn append(&mut self, entry: &impl Serialize) -> Result<(), StageError> {
+        match &mut self.saved {
+            Saved::Journal(journal) => Ok(journal.append(entry)?),
+            Saved::Nothing | Saved::State(_) => Ok(()),
+        }
+    }
+
+    /// Whether a snapshot is due, with which the stage's journal begins anew.
+    pub const fn is_journal_long(&self) -> bool {
+        matches!(&self.saved, Saved::Journal(journal) if journal.is_long())
+    }
+
+    /// Save a snapshot of `state` if one is due.
+    pub fn shorten_journal(&mut self, state: &impl Serialize) -> Result<(), StageError> {
+        match &mut self.saved {
+            Saved::Journal(journal) if journal.is_long() => Ok(journal.snapshot(state)?),
+            _ => Ok(()),
+        }
     }
 }

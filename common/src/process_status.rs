@@ -17,7 +17,6 @@ pub fn kibibytes(process: &str, field: &str) -> Option<u64> {
     self::field(process, field)?.strip_suffix(" kB")?.trim().parse().ok()
 }
 
-/// User and system time of all threads.
 pub fn processor_time(process: u32) -> Option<Duration> {
     let stat = fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
     // The name in parentheses may have any letters; numbers follow.

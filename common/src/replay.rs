@@ -19,7 +19,6 @@ pub struct Output {
 }
 
 impl Output {
-    /// `header` with `slice` of `topic`, published for `tick` at mission `time`.
     pub fn of<H: Stamped, E: Payload>(
         topic: &Topic<H, E>,
         tick: u64,
@@ -34,18 +33,14 @@ impl Output {
     }
 }
 
-/// An entry of a generation's inputs cannot be taken.
 #[derive(Debug, Error)]
 pub enum ReplayError {
-    /// The entry cannot be decoded.
     #[error("not an entry of this version of the stage ({0}); replay with the version that ran")]
     Foreign(#[from] postcard::Error),
-    /// The stage could not take the entry.
     #[error("the stage cannot take an entry: {0}")]
     Stage(String),
 }
 
-/// One generation of a stage, replayed.
 pub trait Replay {
     /// Take the body of the next entry of its inputs. Gives what the process published because of it, in order.
     fn take(&mut self, entry: &[u8]) -> Result<Vec<Output>, ReplayError>;
@@ -54,7 +49,6 @@ pub trait Replay {
     fn describe(&self, entry: &[u8]) -> Result<String, ReplayError>;
 }
 
-/// The start of a generation's replay.
 #[derive(Clone, Copy, Debug)]
 pub struct Beginning<'a> {
     pub run: &'a Run,
@@ -64,10 +58,8 @@ pub struct Beginning<'a> {
     pub fields: bool,
 }
 
-/// Begins the replay of a generation of one stage.
 pub type Begin = fn(Beginning<'_>) -> Result<Box<dyn Replay>, ReplayError>;
 
-/// The body of an entry.
 pub fn entry<'a, E: Deserialize<'a>>(body: &'a [u8]) -> Result<E, ReplayError> {
     Ok(postcard::from_bytes(body)?)
 }

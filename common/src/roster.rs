@@ -15,9 +15,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 
 #[derive(Debug)]
 pub struct Roster {
-    /// The rosters, as they are published.
     pub samples: Reader<RosterHeader, RosterEntry>,
-    /// Wakes for the rosters.
     pub waiter: Waiter,
 }
 
@@ -52,7 +50,6 @@ fn names(mut rosters: Reader<RosterHeader, RosterEntry>) -> Names {
 }
 
 impl Roster {
-    /// Fails when the topic cannot be read.
     pub fn open(bus: &Bus) -> Result<Self, BusError> {
         let mut waiter = Waiter::default();
         waiter.on(bus.wakeup(&topics::ROSTER)?);

@@ -32,7 +32,6 @@ pub enum RunError {
 }
 
 impl Run {
-    /// Fails when the file cannot be written.
     pub fn save(&self, directory: &Path) -> Result<(), RunError> {
         let file = directory.join(FILE_NAME);
         let text = toml::to_string(self).map_err(|error| RunError::Content {

@@ -9,40 +9,42 @@
 
 pub use bus::{Stamp, Stamped};
 
-/// Payloads of topics: each has a name for other languages, begins with a [`Stamp`], and needs nothing else to be written, read, shown
-/// and recorded. `ZeroCopySend` must be in scope.
+/// Structs for shared memory: each has a name for other languages. A field without a default is 0.
 #[macro_export]
-macro_rules! payloads {
-    ($($(#[$meta:meta])* $type_name:literal $name:ident { $($(#[$doc:meta])* $field:ident: $kind:ty,)* })*) => {$(
+macro_rules! structs {
+    (@) => { $crate::bus::Layout::zero() };
+    (@ $default:expr) => { $default };
+    ($($(#[$meta:meta])* $type_name:literal $name:ident { $($(#[$doc:meta])* $field:ident: $kind:ty $(= $default:expr)?,)* })*) => {$(
         $(#[$meta])*
-        #[derive(Clone, Copy, Debug, Default, PartialEq, $crate::bus::ZeroCopySend)]
+        #[derive(Clone, Copy, Debug, PartialEq, $crate::bus::ZeroCopySend)]
         #[type_name($type_name)]
         #[repr(C)]
         pub struct $name {
-            pub stamp: $crate::bus::Stamp,
             $($(#[$doc])* pub $field: $kind,)*
         }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($field: $crate::structs!(@ $($default)?),)* }
+            }
+        }
+
+        $crate::bus::layouts! { $name { $($field)* } }
+    )*};
+}
+
+/// Payloads of topics: [`structs`] that begin with a [`Stamp`], which need nothing else to be written, read, shown and recorded.
+/// `ZeroCopySend` must be in scope.
+#[macro_export]
+macro_rules! payloads {
+    ($($(#[$meta:meta])* $type_name:literal $name:ident { $($fields:tt)* })*) => {$(
+        $crate::structs! { $(#[$meta])* $type_name $name { stamp: $crate::bus::Stamp, $($fields)* } }
 
         impl $crate::bus::Stamped for $name {
             fn stamp(&self) -> &$crate::bus::Stamp {
                 &self.stamp
             }
             fn stamp_mut(&mut self) -> &mut $crate::bus::Stamp {
-                &mut self.stamp
-            }
-        }
-
-        $crate::bus::layouts! { $name { stamp $($field)* } }
-    )*};
-}
-
-macro_rules! stamped {
-    ($($payload:ty),*) => {$(
-        impl Stamped for $payload {
-            fn stamp(&self) -> &Stamp {
-                &self.stamp
-            }
-            fn stamp_mut(&mut self) -> &mut Stamp {
                 &mut self.stamp
             }
         }
@@ -93,9 +95,6 @@ mod robot;
 mod supervision;
 
 pub use self::{localisation::*, navigation::*, robot::*, supervision::*};
-
-// Their defaults cannot be derived, so `payloads` does not write them.
-stamped!(GridHeader, LinkSample);
 
 #[cfg(test)]
 mod tests {

@@ -21,11 +21,11 @@ use crate::{
     external,
     faults::{Asked, Requests},
     journal::{Journal, Restored},
+    outputs::Saved,
     poll,
     roster::Roster,
     run::{self, Run},
     samples::{FaultAnswer, FaultKind, HealthSample, HealthState, name},
-    saved::Saved,
     signals::{SIGTERM, Signals},
     stage_command,
     start::{self, Generation, Joined, Start, system},
@@ -39,7 +39,6 @@ pub use crate::start::StageError;
 /// On a wall clock, a pause of this length without input means that the tick is over: a tick takes a tenth of that.
 const TICK_OVER: Duration = Duration::from_millis(5);
 
-/// The means to open a stage's process.
 pub struct Context {
     pub generation: Generation,
     pub run: Run,
@@ -52,7 +51,6 @@ pub struct Context {
 }
 
 impl Context {
-    /// The processes whose samples the readers return.
     pub fn writers(&self) -> Option<Writers> {
         self.bus.writers().cloned()
     }
@@ -78,7 +76,6 @@ impl Context {
         Ok(restored)
     }
 
-    /// Where this stage's checkpoint lies.
     fn checkpoint_file(&self) -> PathBuf {
         run::checkpoint_file(&self.generation.directory, self.generation.stage)
     }
@@ -89,12 +86,10 @@ impl Context {
 pub struct Progress {
     /// The tick last worked on.
     pub tick: u64,
-    /// Its mission time.
     pub time: MissionTime,
 }
 
 impl Progress {
-    /// The tick of a sample.
     pub const fn of(stamp: &Stamp) -> Self {
         Self { tick: stamp.tick, time: stamp.time() }
     }
@@ -102,18 +97,12 @@ impl Progress {
 
 /// A stage wired to its topics. An error ends the process, and the supervisor restarts the stage.
 pub trait Process: Sized {
-    /// [`Wiring::stage`].
     const NAME: &'static str;
-    /// [`Wiring::wakes`].
     const WAKES: Topics;
-    /// [`Wiring::outputs`].
     const OUTPUTS: Topics;
-    /// [`Wiring::persists`].
     const PERSISTS: Persists = Persists::Nothing;
-    /// The readers of the topics that it reads.
     type Readers: Readers;
 
-    /// The declaration of the process.
     const WIRING: &'static Wiring = &Wiring {
         stage: Self::NAME,
         inputs: Self::Readers::INPUTS,
@@ -138,7 +127,6 @@ pub trait Process: Sized {
         Ok(())
     }
 
-    /// Whether there is something for [`Process::idle`] to do.
     fn has_idle_work(&self) -> bool {
         false
     }
@@ -162,7 +150,6 @@ pub trait Process: Sized {
         Ok(false)
     }
 
-    /// Do what must be done before the process ends.
     fn stop(&mut self) -> Result<(), StageError> {
         Ok(())
     }
@@ -196,7 +183,6 @@ fn complain(error: &dyn fmt::Display) {
 /// The exit code for a wrong command line; `firsthand` has the same.
 const WRONG_USAGE: u8 = 2;
 
-/// Run a stage until it is asked to stop.
 pub fn run_stage<P: Process>(start: &Start) -> Result<(), StageError> {
     let terminated = Signals::catch(&[SIGTERM]).map_err(system("catch SIGTERM"))?;
     let Joined { generation, run, bus, supervisor, stage_lock: _stage_lock } = match start {
@@ -299,7 +285,6 @@ fn work(
     heartbeat.beat(HealthState::Stopping, progress)
 }
 
-/// Inject the requested fault into `process`, if that is allowed.
 fn inject(
     process: &mut impl Process,
     request: Result<FaultKind, FaultAnswer>,
@@ -320,7 +305,6 @@ struct Heartbeat {
     /// The longest time from beat to beat, by the table of topics. The stage waits no longer for input either.
     period: Duration,
     last: Instant,
-    /// The tick of the last beat.
     tick: u64,
 }
 
@@ -352,7 +336,6 @@ impl Heartbeat {
         Ok(())
     }
 
-    /// How long until the stage has to beat.
     fn time_to_beat(&self) -> Duration {
         self.period.saturating_sub(self.last.elapsed())
     }
@@ -375,7 +358,6 @@ impl Heartbeat {
         Ok(true)
     }
 
-    /// Publish the answer to the fault request `id`.
     fn answer(
         &mut self,
         id: u64,

@@ -32,7 +32,6 @@ impl Signals {
         Ok(Self { pipe })
     }
 
-    /// Whether a signal came since the last call.
     pub fn came(&mut self) -> bool {
         matches!(self.pipe.read(&mut [0; 16]), Ok(read) if read > 0)
     }

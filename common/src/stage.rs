@@ -54,10 +54,8 @@ pub trait Stage: Sized + 'static {
     /// What the stage takes at once: a sample of a topic, or an enum where it takes more than one kind. It may borrow from shared
     /// memory for the length of the call. A recording holds it in this encoding.
     type Entry<'a>: Serialize + Deserialize<'a> + Debug;
-    /// The result of an entry for the process, besides the outputs.
     type Outcome;
 
-    /// The stage at the start of `mission`.
     fn new(mission: &Mission) -> Self;
 
     /// Open the file that the stage persists its state in, and give the state that its process starts from.
@@ -86,7 +84,6 @@ pub trait Stage: Sized + 'static {
         Ok(())
     }
 
-    /// The entry in words.
     fn describe(entry: &Self::Entry<'_>) -> String {
         format!("{entry:?}")
     }
@@ -97,7 +94,7 @@ pub trait Stage: Sized + 'static {
 #[error("the saved state is of another mission; the stage starts without it")]
 pub struct ForeignState;
 
-/// The stage in its process.
+/// A stage that runs: in its process, or in a replay.
 pub struct Runner<S> {
     pub stage: S,
     pub out: Outputs,
@@ -125,27 +122,16 @@ impl<S: Stage> Runner<S> {
     }
 
     /// Note `entry` for a replay, and let the stage take it.
-    ///
-    /// # Errors
-    /// As [`Stage::take_entry`].
     pub fn take_entry(&mut self, entry: S::Entry<'_>) -> Result<S::Outcome, StageError> {
         self.out.note(&entry)?;
         self.stage.take_entry(entry, &mut self.out)
     }
 
-    /// Publish outputs that no stage waits for.
     pub fn publish_rest(&mut self) -> Result<(), StageError> {
         self.stage.publish_rest(&mut self.out)
     }
 }
 
-/// One generation, fed from a recording.
-struct Generation<S> {
-    stage: S,
-    out: Outputs,
-}
-
-/// Begin the replay of a generation.
 pub fn replay<S: Stage>(beginning: Beginning<'_>) -> Result<Box<dyn Replay>, ReplayError> {
     let mut stage = S::new(&beginning.run.mission);
     // A stage that persists nothing starts from an entry without bytes.
@@ -153,18 +139,14 @@ pub fn replay<S: Stage>(beginning: Beginning<'_>) -> Result<Box<dyn Replay>, Rep
         // The process ignored a foreign state, too.
         let _ = stage.begin(entry(beginning.start)?);
     }
-    let out = Outputs::of_replay(beginning.fields);
-    Ok(Box::new(Generation { stage, out }))
+    Ok(Box::new(Runner { stage, out: Outputs::of_replay(beginning.fields) }))
 }
 
-impl<S: Stage> Replay for Generation<S> {
+impl<S: Stage> Replay for Runner<S> {
     fn take(&mut self, body: &[u8]) -> Result<Vec<Output>, ReplayError> {
-        let Self { stage, out } = self;
-        let taken = stage.take_entry(entry(body)?, out);
-        taken
-            .and_then(|_| stage.publish_rest(out))
-            .map_err(|error| ReplayError::Stage(error.to_string()))?;
-        Ok(out.drain())
+        let taken = self.take_entry(entry(body)?).and_then(|_| self.publish_rest());
+        taken.map_err(|error| ReplayError::Stage(error.to_string()))?;
+        Ok(self.out.drain())
     }
 
     fn describe(&self, body: &[u8]) -> Result<String, ReplayError> {
@@ -188,10 +170,8 @@ pub trait Answering: Sized + 'static {
     /// Whether the stage skips samples that are not the newest.
     const NEWEST_ONLY: bool = false;
 
-    /// The stage at the start of `mission`, before any input.
     fn new(mission: &Mission) -> Self;
 
-    /// The state to save after an answer.
     fn state(&self) -> &Self::State;
 
     /// [`Stage::begin`] from the state that an earlier process of the same mission saved.
@@ -202,7 +182,6 @@ pub trait Answering: Sized + 'static {
         false
     }
 
-    /// Answer a sample at its mission time `now`.
     fn answer(
         &mut self,
         input: &Self::In,
@@ -217,9 +196,6 @@ pub trait Further: Default + Serialize + DeserializeOwned + Debug + 'static {
     type Readers: Readers;
 
     /// Take what came, and no more than a bounded number of samples.
-    ///
-    /// # Errors
-    /// As [`Reader::next_slice`].
     fn take_samples(readers: &mut Self::Readers) -> Result<Self, BusError>;
 }
 
@@ -231,7 +207,6 @@ impl Further for () {
     }
 }
 
-/// The answer to one sample.
 #[derive(Clone, Copy, Debug)]
 pub struct Answer<P> {
     pub sample: P,
@@ -247,7 +222,6 @@ impl<P> From<P> for Answer<P> {
     }
 }
 
-/// The entry of an [`Answering`] stage.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(bound = "P: Layout, F: Further")]
 pub struct Sample<P: Layout, F>(#[serde(with = "inputs::sample")] P, F);
@@ -311,7 +285,6 @@ impl<A: Answering> Readers for Questions<A> {
     }
 }
 
-/// The process of an [`Answering`] stage.
 pub struct Answers<A: Answering> {
     runner: Runner<A>,
     readers: Questions<A>,

@@ -14,12 +14,9 @@ use crate::{
     start::{Generation, Start},
 };
 
-/// The word before the stage's name.
 pub const SUBCOMMAND: &str = "stage";
-/// The robot of an external stage, if none is named.
 const DEFAULT_ROBOT: &str = "x80";
 
-/// A command line that starts no stage.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error(
     "{problem}; the supervisor starts stages (`firsthand run`), or, where it only watches, `stage {stage} --robot NAME`"
@@ -63,7 +60,6 @@ pub fn start(
     start_with(stage, arguments)
 }
 
-/// The start of `stage` with `options`, the words after its name.
 pub fn start_with(
     stage: &'static str,
     options: impl IntoIterator<Item = OsString>,

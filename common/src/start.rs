@@ -14,20 +14,16 @@ use crate::{
 /// One of a stage's processes in a run: each start of a stage is a generation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Generation {
-    /// The stage's name in the table.
     pub stage: &'static str,
     /// Where `run.toml` and the checkpoints lie.
     pub directory: PathBuf,
-    /// 1 for the first generation.
     pub number: u32,
     /// Ticks before this one are an earlier generation's.
     pub first_tick: u64,
 }
 
-/// How a stage's process was started.
 #[derive(Clone, Debug)]
 pub enum Start {
-    /// The supervisor started it.
     Child {
         generation: Generation,
         /// The supervisor's process, its parent: when that ends, this one is to end.
@@ -37,7 +33,6 @@ pub enum Start {
     External { stage: &'static str, robot: RobotName },
 }
 
-/// A process that has taken its place.
 pub(crate) struct Joined {
     pub(crate) generation: Generation,
     pub(crate) run: Run,
@@ -47,25 +42,19 @@ pub(crate) struct Joined {
     pub(crate) stage_lock: File,
 }
 
-/// Why a stage's process ended.
 #[derive(Debug, Error)]
 pub enum StageError {
-    /// Shared memory.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// The run file.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// The stage's checkpoint.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
     /// The stage publishes on a topic that is not among its outputs.
     #[error("topic {0} is not among the outputs of the stage; list it there")]
     NoOutput(&'static str),
-    /// An error that only this stage has.
     #[error("{0}")]
     Other(String),
-    /// Signals or process attributes.
     #[error("cannot {action}: {source}; this needs Linux 5.4 or newer")]
     System { action: &'static str, source: std::io::Error },
 }
@@ -83,7 +72,6 @@ impl StageError {
     }
 }
 
-/// Take the place that the supervisor, the parent, says.
 pub(crate) fn join_as_child(
     generation: &Generation,
     supervisor: u32,

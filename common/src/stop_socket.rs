@@ -60,7 +60,6 @@ impl StopSocket {
         Ok(Self { socket, asking: Vec::new() })
     }
 
-    /// None when all were taken.
     pub fn take(&mut self) -> Option<Request> {
         let mut byte = [0];
         loop {
@@ -117,7 +116,6 @@ impl Operator {
         }
     }
 
-    /// Fails when the link is gone.
     pub fn send(&self, request: Request) -> io::Result<()> {
         let byte = match request {
             Request::Stop => STOP,
@@ -158,7 +156,6 @@ impl Identity {
         ))
     }
 
-    /// Whether another link's socket is there.
     pub fn is_succeeded(&self, domain: &Domain) -> bool {
         Self::now(domain) != *self && matches!(Operator::connect(domain), Ok(Some(_)))
     }
@@ -171,17 +168,14 @@ pub struct StopMark {
 }
 
 impl StopMark {
-    #[must_use]
     pub fn of(directory: &Path) -> Self {
         Self { path: directory.join("operator-stop") }
     }
 
-    #[must_use]
     pub fn is_set(&self) -> bool {
         self.path.exists()
     }
 
-    /// Fails when the directory cannot be written.
     pub fn set(&self, stopped: bool) -> io::Result<()> {
         if stopped {
             return fs::File::create(&self.path).map(drop);

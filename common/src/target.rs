@@ -2,7 +2,6 @@
 
 use crate::{bus::Reader, samples::TargetSample, start::StageError};
 
-/// Reads topic `target`.
 #[derive(Debug)]
 pub struct TargetReader {
     samples: Reader<TargetSample>,
@@ -10,7 +9,6 @@ pub struct TargetReader {
     taken: Taken,
 }
 
-/// The target that a stage has taken.
 #[derive(Debug, Default)]
 struct Taken {
     number: Option<u64>,

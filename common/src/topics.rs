@@ -44,9 +44,12 @@ const fn on_change(again_after: Duration) -> Rate {
     Rate::OnChange { at_most_every: Duration::ZERO, again_after }
 }
 
+/// A topic without `limits` has small samples, and all recordings contain one without `logged`.
 macro_rules! topics {
+    (@ $written:expr, $default:expr) => { $written };
+    (@ $default:expr) => { $default };
     ($($(#[doc = $meaning:literal])+ $id:ident: Topic<$($payload:ty),+> {
-        name: $name:literal, writer: $writer:expr, rate: $rate:expr, limits: $limits:expr, logged: $logged:ident $(,)?
+        name: $name:literal, writer: $writer:expr, rate: $rate:expr $(, limits: $limits:expr)? $(, logged: $logged:ident)? $(,)?
     })*) => {
         $(
             $(#[doc = $meaning])+
@@ -54,8 +57,8 @@ macro_rules! topics {
                 name: $name,
                 writer: $writer,
                 rate: $rate,
-                limits: $limits,
-                logged: Logged::$logged,
+                limits: topics!(@ $($limits,)? Limits::SMALL),
+                logged: topics!(@ $(Logged::$logged,)? Logged::Yes),
                 meaning: concat!($($meaning),+),
             });
         )*
@@ -67,55 +70,55 @@ macro_rules! topics {
 topics! {
     /// Where the robot is sent: the current target, and those after it.
     TARGET: Topic<TargetSample> {
-        name: "target", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::SMALL, logged: Yes,
+        name: "target", writer: SUPERVISOR, rate: on_change(RESTATE),
     }
     /// Readings of the sonars and infrared rangers, one for each row of the mission's sensors.
     RANGES: Topic<RangesHeader, RangeReading> {
-        name: "ranges", writer: "link", rate: Rate::EachTick, limits: Limits::slices(MOST_SENSORS), logged: Yes,
+        name: "ranges", writer: "link", rate: Rate::EachTick, limits: Limits::slices(MOST_SENSORS),
     }
     /// The beams of the laser.
     SCAN: Topic<ScanHeader, f32> {
-        name: "scan", writer: "link", rate: Rate::WhenItHappens, limits: SCANS, logged: Yes,
+        name: "scan", writer: "link", rate: Rate::WhenItHappens, limits: SCANS,
     }
     /// Encoder counts and wheel speeds.
     WHEELS: Topic<WheelSample> {
-        name: "wheels", writer: "link", rate: Rate::EachTick, limits: Limits::SMALL, logged: Yes,
+        name: "wheels", writer: "link", rate: Rate::EachTick,
     }
     /// The counts of `wheels` without their cycle, in each tick of a robot that says angles of its wheels or its odometry.
     COUNTS: Topic<CountsSample> {
-        name: "counts", writer: "link", rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
+        name: "counts", writer: "link", rate: Rate::WhenItHappens,
     }
     /// Wheels are held although they were told to turn: where something touches the body.
     CONTACT: Topic<ContactSample> {
-        name: "contact", writer: "link", rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
+        name: "contact", writer: "link", rate: Rate::WhenItHappens,
     }
     /// Where a source outside saw the robot: a camera, a satellite receiver. Any consumer may publish it.
     FIX: Topic<FixSample> {
-        name: "fix", writer: OPERATOR, rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
+        name: "fix", writer: OPERATOR, rate: Rate::WhenItHappens,
     }
     /// Where the robot is by the scans of its laser.
     SCAN_FIX: Topic<FixSample> {
-        name: "scan_fix", writer: "mapper", rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
+        name: "scan_fix", writer: "mapper", rate: Rate::WhenItHappens,
     }
     /// How far a gyro turned. Any consumer may publish it, one at a time.
     TURN: Topic<TurnSample> {
-        name: "turn", writer: OPERATOR, rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
+        name: "turn", writer: OPERATOR, rate: Rate::WhenItHappens,
     }
     /// How far the robot turned by its own gyro, in each tick.
     IMU_TURN: Topic<TurnSample> {
-        name: "imu_turn", writer: "link", rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
+        name: "imu_turn", writer: "link", rate: Rate::WhenItHappens,
     }
     /// Where the robot believes it is.
     POSE: Topic<PoseSample> {
-        name: "pose", writer: "dead-reckoning", rate: Rate::EachTick, limits: Limits::SMALL, logged: Yes,
+        name: "pose", writer: "dead-reckoning", rate: Rate::EachTick,
     }
     /// The safety map: keyframes and changed windows.
     GRID: Topic<GridHeader, u8> {
-        name: "grid", writer: "mapper", rate: Rate::EachTick, limits: Limits::MAP, logged: Yes,
+        name: "grid", writer: "mapper", rate: Rate::EachTick, limits: Limits::MAP,
     }
     /// The reference direction at the robot's pose.
     GUIDANCE: Topic<GuidanceSample> {
-        name: "guidance", writer: "planner", rate: Rate::EachTick, limits: Limits::SMALL, logged: Yes,
+        name: "guidance", writer: "planner", rate: Rate::EachTick,
     }
     /// The whole-domain policy, for consumers.
     FIELD: Topic<FieldHeader, FieldCell> {
@@ -123,64 +126,64 @@ topics! {
     }
     /// Wheel speeds for the robot.
     COMMAND: Topic<CommandSample> {
-        name: "command", writer: "controller", rate: Rate::EachTick, limits: Limits::SMALL, logged: Yes,
+        name: "command", writer: "controller", rate: Rate::EachTick,
     }
     /// Heartbeats, from inside the work loop.
     HEALTH: Topic<HealthSample> {
-        name: "health", writer: EVERY_STAGE, rate: on_change(BEAT), limits: Limits::SMALL, logged: Yes,
+        name: "health", writer: EVERY_STAGE, rate: on_change(BEAT),
     }
     /// The connection to the robot: its state, counts, tick latency.
     LINK: Topic<LinkSample> {
-        name: "link", writer: "link", rate: on_change(LINK_AGAIN), limits: Limits::SMALL, logged: Yes,
+        name: "link", writer: "link", rate: on_change(LINK_AGAIN),
     }
     /// The seven infrared rangers, metres.
     INFRARED: Topic<InfraredSample> {
-        name: "infrared", writer: "link", rate: Rate::EachFrame, limits: Limits::SMALL, logged: Yes,
+        name: "infrared", writer: "link", rate: Rate::EachFrame,
     }
     /// Battery volts and whether they are low, motor currents, temperatures of the drivers.
     POWER: Topic<PowerSample> {
-        name: "power", writer: "link", rate: Rate::EachFrame, limits: Limits::SMALL, logged: Yes,
+        name: "power", writer: "link", rate: Rate::EachFrame,
     }
     /// Human sensors, tilt, temperature.
     SURROUNDINGS: Topic<SurroundingsSample> {
-        name: "surroundings", writer: "link", rate: Rate::EachFrame, limits: Limits::SMALL, logged: Yes,
+        name: "surroundings", writer: "link", rate: Rate::EachFrame,
     }
     /// The supervisor's order to all stages.
     DIRECTIVE: Topic<DirectiveSample> {
-        name: "directive", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::SMALL, logged: Yes,
+        name: "directive", writer: SUPERVISOR, rate: on_change(RESTATE),
     }
     /// How far the robot may go in lockstep, and since which tick the newest recovery step holds.
     TICK_LIMIT: Topic<TickLimitSample> {
-        name: "tick_limit", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::SMALL, logged: Yes,
+        name: "tick_limit", writer: SUPERVISOR, rate: on_change(RESTATE),
     }
     /// The stages' processes, as the supervisor sees them.
     ROSTER: Topic<RosterHeader, RosterEntry> {
-        name: "roster", writer: SUPERVISOR, rate: on_change(RESTATE), limits: ROSTERS, logged: Yes,
+        name: "roster", writer: SUPERVISOR, rate: on_change(RESTATE), limits: ROSTERS,
     }
     /// A stage's process ended: cause, ages, the end of its log, what follows.
     DEATHS: Topic<DeathSample> {
-        name: "deaths", writer: SUPERVISOR, rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
+        name: "deaths", writer: SUPERVISOR, rate: Rate::WhenItHappens,
     }
     /// The robot should make progress and does not: how, and what is tried.
     STALLS: Topic<StallSample> {
-        name: "stalls", writer: SUPERVISOR, rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
+        name: "stalls", writer: SUPERVISOR, rate: Rate::WhenItHappens,
     }
     /// Requests of an operator: restart, stop, resume, targets.
     REQUESTS: Topic<RequestSample> {
-        name: "requests", writer: OPERATOR, rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
+        name: "requests", writer: OPERATOR, rate: Rate::WhenItHappens,
     }
     /// Requests of an operator to inject a fault into a stage; every stage reads it.
     FAULTS: Topic<FaultSample> {
-        name: "faults", writer: OPERATOR, rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
+        name: "faults", writer: OPERATOR, rate: Rate::WhenItHappens,
     }
     /// The bytes that the link received from the robot and sent to it. Wakes nobody: a reader waits for `link`.
     WIRE: Topic<WireHeader, u8> {
-        name: "wire", writer: "link", rate: Rate::WhenItHappens, limits: WIRE_PIECES, logged: Yes,
+        name: "wire", writer: "link", rate: Rate::WhenItHappens, limits: WIRE_PIECES,
     }
     /// The inputs of every stage's step, and the checkpoint each generation started from, for a replay.
     /// Wakes nobody: a reader waits for `link`.
     INPUTS: Topic<InputsHeader, u8> {
-        name: "inputs", writer: EVERY_STAGE, rate: Rate::WhenItHappens, limits: Limits::DEEP, logged: Yes,
+        name: "inputs", writer: EVERY_STAGE, rate: Rate::WhenItHappens, limits: Limits::DEEP,
     }
 }
 

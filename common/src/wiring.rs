@@ -6,7 +6,6 @@ use crate::{
     topics::{FAULTS, HEALTH, INPUTS, ROSTER},
 };
 
-/// Rows of the table of topics.
 pub type Topics = &'static [&'static dyn AnyTopic];
 
 /// Every stage's process also reads the requests of faults, and the roster, which names the processes that it admits.
@@ -41,21 +40,14 @@ pub enum Persists {
     Journal,
 }
 
-/// The readers of a stage's process.
 pub trait Readers: Sized {
-    /// [`Wiring::inputs`].
     const INPUTS: Topics = &[];
-    /// [`Wiring::feedback`].
     const FEEDBACK: Topics = &[];
 
     /// Opens a reader of each topic of both lists.
-    ///
-    /// # Errors
-    /// As [`Bus::reader`].
     fn open_readers(bus: &Bus) -> Result<Self, BusError>;
 }
 
-/// No readers.
 impl Readers for () {
     fn open_readers(_: &Bus) -> Result<Self, BusError> {
         Ok(())

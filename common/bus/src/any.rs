@@ -18,7 +18,6 @@ use crate::domain::Domain;
 
 /// A row of the table, without the types of its samples.
 pub trait AnyTopic: Sync {
-    /// The topic's description.
     fn spec(&self) -> &'static Spec;
     /// The name of its payload in all languages: of a struct, or of a header and a slice of elements.
     fn payload(&self) -> String;
@@ -27,11 +26,9 @@ pub trait AnyTopic: Sync {
     /// The types of its samples for the middleware. The result has no name outside this crate.
     #[doc(hidden)]
     fn carried(&self) -> Carried;
-    /// Opens a reader with [`Bus::reader`].
     fn any_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>, BusError>;
     /// Opens a reader of the samples of all generations, with the buffer of a recorder.
     fn recorder_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>, BusError>;
-    /// Opens a [`Writer`] with [`Bus::slice_writer`].
     fn any_writer(
         &self,
         bus: &Bus,
@@ -44,9 +41,7 @@ pub trait AnyTopic: Sync {
     }
 }
 
-/// Receives samples of a topic.
 pub trait AnyReader {
-    /// [`Reader::next_slice`].
     fn next_sample(&mut self) -> Result<Option<Box<dyn AnySample>>, BusError>;
     /// Puts the next sample as a message (see [`super::cdr`]) in place of what is in `message`. Returns its stamp; none when all samples
     /// were taken.
@@ -56,15 +51,11 @@ pub trait AnyReader {
 /// A sample of a topic. It stays in shared memory, and its writer cannot reuse that memory while the sample is held.
 pub trait AnySample {
     fn stamp(&self) -> &Stamp;
-    /// The process that wrote the sample.
     fn author(&self) -> Author;
-    /// The fields of the header.
     fn value(&self) -> Value;
-    /// The elements of the slice; none where samples have no slice.
     fn elements(&self) -> Option<Vec<Value>>;
 }
 
-/// A [`Writer`] of some topic.
 pub trait AnyWriter: Any {
     /// Publish the sample in `message` with the stamp that it has, and wake the readers. Returns whether `message` is of this topic.
     fn publish_message(&mut self, message: &[u8]) -> Result<bool, BusError>;

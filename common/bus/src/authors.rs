@@ -13,19 +13,15 @@ use crate::{
     spec::{SUPERVISOR, Spec},
 };
 
-/// A process that writes a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Author {
-    /// The process number.
     pub process: u32,
-    /// The generation in its stamps.
     pub generation: u32,
 }
 
 /// Samples of processes that should not write.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Ignored {
-    /// The number of samples.
     pub samples: u64,
     /// The process that wrote the last sample; 0 for none.
     pub process: u32,
@@ -95,8 +91,6 @@ impl Writers {
         self.0.borrow_mut().names_come_by = Some(Instant::now() + patience);
     }
 
-    /// The samples that all readers of this process ignored.
-    #[must_use]
     pub fn ignored(&self) -> Ignored {
         self.0.borrow().ignored
     }
@@ -105,7 +99,6 @@ impl Writers {
         self.0.borrow().supervisor
     }
 
-    /// Read the lists of the source.
     fn read_names(&self) -> Result<(), BusError> {
         // The source is a reader of this bus, which asks for the supervisor's process.
         let Some(mut source) = self.0.borrow_mut().source.take() else {
@@ -121,13 +114,11 @@ impl Writers {
         Ok(())
     }
 
-    /// The process of `stage`, by the newest list.
     fn process_of(&self, stage: &str) -> Result<Option<Author>, BusError> {
         self.read_names()?;
         Ok(self.0.borrow().stages.get(stage).and_then(|known| known.back().copied()))
     }
 
-    /// Whether `author` is or was the process of `stage`.
     fn has_named(&self, stage: &str, author: Author) -> Result<bool, BusError> {
         let named =
             || self.0.borrow().stages.get(stage).is_some_and(|known| known.contains(&author));
@@ -141,7 +132,6 @@ impl Writers {
         self.0.borrow().names_come_by.is_some()
     }
 
-    /// Whether samples of stages wait for the first list.
     fn hold_samples(&self) -> Result<bool, BusError> {
         if self.names_are_awaited() {
             self.read_names()?;
@@ -156,7 +146,6 @@ impl Writers {
     }
 }
 
-/// The authors whose samples a reader returns.
 #[derive(Debug)]
 pub(crate) enum Admitted {
     /// All authors: several processes write the topic at a time, or nobody names them.
@@ -166,20 +155,16 @@ pub(crate) enum Admitted {
     /// The supervisor's process. It knows no [`Writers`]: a reader of the roster is their source, and a circle of owners would keep its
     /// place on the bus for ever.
     Supervisor(Newest),
-    /// The process that is named.
     Named(OneStage),
 }
 
-/// The newest generation that one process published.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Newest {
     process: u32,
     newest: u32,
-    /// Older generations are admitted, too.
     all_generations: bool,
 }
 
-/// The process of one stage.
 #[derive(Debug)]
 pub(crate) struct OneStage {
     writers: Writers,
@@ -216,7 +201,6 @@ impl Admitted {
         }
     }
 
-    /// The same authors, ended ones included.
     pub(crate) fn of_all_generations(self) -> Self {
         match self {
             Self::All | Self::Newest(_) => Self::All,
@@ -225,7 +209,6 @@ impl Admitted {
         }
     }
 
-    /// Whether the samples wait until their authors are known.
     pub(crate) fn hold_samples(&self) -> Result<bool, BusError> {
         match self {
             Self::Named(one) => one.writers.hold_samples(),

@@ -19,7 +19,6 @@ const CONFIG: [&str; 2] = ["iceoryx2-", ".toml"];
 const LENGTH: usize = 4;
 const LETTERS: &[u8; 32] = b"abcdefghijkmnpqrstuvwxyz23456789";
 
-/// The names of one instance's files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BusInstance {
     domain: Domain,
@@ -28,7 +27,6 @@ pub struct BusInstance {
 
 impl BusInstance {
     /// A new instance. Its name is random, so nobody can create its files beforehand.
-    #[must_use]
     pub fn new(domain: &Domain) -> Self {
         let mut random = RandomState::new().hash_one(std::process::id());
         let name = (0..LENGTH).map(|_| {
@@ -56,7 +54,6 @@ impl BusInstance {
         Ok(Self { domain: domain.clone(), name: name.to_owned() })
     }
 
-    /// Make this the instance that processes join.
     pub fn make_current(&self) -> io::Result<()> {
         let link = self.domain.middleware_config();
         let unfinished = link.with_extension("unfinished");
@@ -64,8 +61,6 @@ impl BusInstance {
         fs::rename(unfinished, link)
     }
 
-    /// The robot's domain.
-    #[must_use]
     pub const fn domain(&self) -> &Domain {
         &self.domain
     }
@@ -74,21 +69,17 @@ impl BusInstance {
         CONFIG.join(&self.name)
     }
 
-    /// The path of the middleware's configuration.
-    #[must_use]
     pub fn config(&self) -> PathBuf {
         self.domain.directory().join(self.config_name())
     }
 
     /// The names of all files of this instance in [`SHARED_MEMORY`] start with this prefix.
-    #[must_use]
     pub fn shared_memory_prefix(&self) -> String {
         format!("{}{}_", self.domain.shared_memory_prefix(), self.name)
     }
 
     /// The directory of the middleware's node and service files. It is in shared memory because the middleware syncs each file to
     /// the disk, and a stage that starts creates twenty.
-    #[must_use]
     pub fn root(&self) -> PathBuf {
         Path::new(SHARED_MEMORY).join(self.domain.shared_memory_prefix() + &self.name)
     }

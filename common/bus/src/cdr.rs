@@ -5,7 +5,6 @@
 /// The header of every message: little-endian CDR, no options.
 pub const HEADER: [u8; 4] = [0, 1, 0, 0];
 
-/// Writes numbers one after another.
 #[derive(Debug)]
 pub struct Encoder<'a> {
     bytes: &'a mut Vec<u8>,
@@ -13,14 +12,12 @@ pub struct Encoder<'a> {
 }
 
 impl<'a> Encoder<'a> {
-    /// Append a message to `bytes`.
     pub fn new(bytes: &'a mut Vec<u8>) -> Self {
         bytes.extend_from_slice(&HEADER);
         let origin = bytes.len();
         Self { bytes, origin }
     }
 
-    /// A number of N bytes.
     pub(super) fn number<const N: usize>(&mut self, number: [u8; N]) {
         let past = (self.bytes.len() - self.origin) % N;
         if past != 0 {
@@ -43,13 +40,11 @@ pub struct Decoder<'a> {
 
 impl<'a> Decoder<'a> {
     /// A decoder of `message`; none if the message has another encoding.
-    #[must_use]
     pub fn new(message: &'a [u8]) -> Option<Self> {
         let rest = message.strip_prefix(&HEADER)?;
         Some(Self { rest, length: rest.len() })
     }
 
-    /// A number of N bytes.
     pub(super) fn number<const N: usize>(&mut self) -> Option<[u8; N]> {
         let past = (self.length - self.rest.len()) % N;
         let padding = if past == 0 { 0 } else { N - past };
@@ -64,7 +59,6 @@ impl<'a> Decoder<'a> {
         Some(bytes)
     }
 
-    /// The number of bytes that are left.
     pub(super) const fn left(&self) -> usize {
         self.rest.len()
     }

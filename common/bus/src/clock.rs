@@ -13,26 +13,21 @@ use thiserror::Error;
 pub struct MissionTime(pub u64);
 
 impl MissionTime {
-    /// Seconds since the mission began.
-    #[must_use]
     pub fn seconds(self) -> f64 {
         self.0 as f64 * 1e-9
     }
 
     /// The time `seconds` after the beginning; negative and NaN give the beginning.
-    #[must_use]
     pub fn from_seconds(seconds: f64) -> Self {
         Self((seconds.max(0.0) * 1e9) as u64)
     }
 
     /// The time from `earlier` to this; zero if `earlier` is later.
-    #[must_use]
     pub fn since(self, earlier: Self) -> Duration {
         Duration::from_nanos(self.0.saturating_sub(earlier.0))
     }
 }
 
-/// The pace of mission time in a simulated run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Pace {
@@ -42,7 +37,6 @@ pub enum Pace {
     Rate(f64),
 }
 
-/// The text is neither `max` nor a valid rate.
 #[derive(Debug, Error)]
 #[error(
     "pace {0:?} is neither `max` nor a rate between 0.05 and 100; give `max`, or 1 for wall-clock"
@@ -72,27 +66,17 @@ impl fmt::Display for Pace {
     }
 }
 
-/// The clock the link stamps samples with.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MissionClock {
     /// Lockstep, a simulated robot at `--pace max`: tick k happens at k periods.
-    Ticks {
-        /// Nanoseconds from tick to tick.
-        period_ns: u64,
-    },
+    Ticks { period_ns: u64 },
     /// A real robot, or a simulated one at `--pace R`: the wall-clock time since the epoch, multiplied by a rate.
-    Wall {
-        /// [`monotonic_ns`] when the mission began.
-        epoch_ns: u64,
-        /// Mission seconds a wall-clock second.
-        rate: f64,
-    },
+    Wall { epoch_ns: u64, rate: f64 },
 }
 
 impl MissionClock {
     /// Mission time at `tick`, when the machine's clock reads `monotonic_ns`.
-    #[must_use]
     pub fn at(&self, tick: u64, monotonic_ns: u64) -> MissionTime {
         match *self {
             Self::Ticks { period_ns } => MissionTime(tick.saturating_mul(period_ns)),
@@ -104,13 +88,11 @@ impl MissionClock {
 }
 
 /// CLOCK_MONOTONIC, nanoseconds. All processes of the machine read the same time.
-#[must_use]
 pub fn monotonic_ns() -> u64 {
     nanoseconds(ClockId::Monotonic)
 }
 
 /// CLOCK_BOOTTIME, nanoseconds. Unlike [`monotonic_ns`] it includes the time that the machine was suspended.
-#[must_use]
 pub fn boot_ns() -> u64 {
     nanoseconds(ClockId::Boottime)
 }

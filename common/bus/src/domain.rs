@@ -24,7 +24,6 @@ use crate::lock_holders::holders;
 #[serde(try_from = "String", into = "String")]
 pub struct RobotName(String);
 
-/// The text is not a valid robot name.
 #[derive(Debug, Error)]
 #[error("{0:?} cannot name a robot; use 1 to 16 of a-z, 0-9 and '-'")]
 pub struct RobotNameError(String);
@@ -62,7 +61,6 @@ impl fmt::Display for RobotName {
     }
 }
 
-/// The directory of shared memory on Linux.
 pub const SHARED_MEMORY: &str = "/dev/shm";
 
 /// The names of one robot's files on this machine, for one user.
@@ -75,8 +73,6 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// The domain of `robot` for the user this process runs as.
-    #[must_use]
     pub fn of(robot: RobotName) -> Self {
         let user = rustix::process::geteuid().as_raw();
         let suite =
@@ -87,13 +83,11 @@ impl Domain {
     }
 
     /// The directory of the domain's files. Only its owner may enter it.
-    #[must_use]
     pub fn directory(&self) -> &Path {
         &self.directory
     }
 
     /// The lock that the supervisor holds exclusively as long as it runs.
-    #[must_use]
     pub fn lock_file(&self) -> PathBuf {
         self.directory.join("lock")
     }
@@ -112,7 +106,6 @@ impl Domain {
     }
 
     /// Whether a process holds the supervisor's lock; true if that cannot be found out.
-    #[must_use]
     pub fn is_supervised(&self) -> bool {
         match File::open(self.lock_file()) {
             Ok(lock) => lock.try_lock_shared().is_err(),
@@ -122,7 +115,6 @@ impl Domain {
 
     /// The lock that consumers share while they join a bus. The supervisor holds it exclusively while it creates or removes a bus, so a
     /// consumer cannot recreate files of a bus that was removed.
-    #[must_use]
     pub fn joining_lock_file(&self) -> PathBuf {
         self.directory.join("joining.lock")
     }
@@ -136,7 +128,6 @@ impl Domain {
     }
 
     /// The lock that all stages share as long as they run. A new supervisor waits until the stages of the last one have released it.
-    #[must_use]
     pub fn stages_lock_file(&self) -> PathBuf {
         self.directory.join("stages.lock")
     }
@@ -149,33 +140,27 @@ impl Domain {
     }
 
     /// A link to the run directory. A supervisor creates it if another program starts the stages.
-    #[must_use]
     pub fn run_link(&self) -> PathBuf {
         self.directory.join("run")
     }
 
-    /// A link to the directory of the present run, for consumers.
-    #[must_use]
     pub fn run_directory(&self) -> PathBuf {
         self.directory.join("run-directory")
     }
 
     /// The socket of the link that an operator's stop needs no middleware for.
-    #[must_use]
     pub fn stop_socket(&self) -> PathBuf {
         self.directory.join("stop")
     }
 
     /// A link to the middleware's configuration of the current [`BusInstance`](crate::bus_instance::BusInstance). A consumer in any
     /// language loads it first.
-    #[must_use]
     pub fn middleware_config(&self) -> PathBuf {
         self.directory.join("iceoryx2.toml")
     }
 
     /// The names of all files of this domain in [`SHARED_MEMORY`] start with this prefix. No other domain's prefix starts with it,
     /// because robot names have no `_`.
-    #[must_use]
     pub fn shared_memory_prefix(&self) -> String {
         format!("fh{}_{}_", self.owner, self.robot)
     }

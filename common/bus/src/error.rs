@@ -11,24 +11,16 @@ use thiserror::Error;
 use super::spec::Spec;
 use crate::domain::SHARED_MEMORY;
 
-/// Errors between a process and shared memory.
 #[derive(Debug, Error)]
 pub enum BusError {
-    /// The robot has no bus.
     #[error(
         "robot {robot:?} is not running here ({detail}); start it with `firsthand run`, or name another with --robot"
     )]
-    NotRunning {
-        robot: String,
-        /// The file that is missing, and the system's error.
-        detail: String,
-    },
-    /// This program and the bus were built with different payloads.
+    NotRunning { robot: String, detail: String },
     #[error(
         "topic {topic:?} carries another payload than this program was built for; build it against the firsthand that runs (`firsthand --version`)"
     )]
     Incompatible { topic: &'static str },
-    /// Consumers already take all the places for readers that they may take.
     #[error(
         "topic {topic:?} has places for {places} readers, and those for consumers are taken; end one that reads it, or read it once and share it"
     )]
@@ -37,32 +29,14 @@ pub enum BusError {
         /// The number of places, the reserved ones of the stages included.
         places: usize,
     },
-    /// A reader holds as many samples as it may.
     #[error(
         "this reader holds {most} samples of topic {topic:?}, as many as one may; drop one before the next is taken (nobody waits for it: the oldest that is not taken is lost)"
     )]
-    HoldsTooMany {
-        topic: &'static str,
-        /// The number of samples that a reader may hold.
-        most: usize,
-    },
-    /// The middleware refused an operation.
+    HoldsTooMany { topic: &'static str, most: usize },
     #[error("cannot {action} topic {topic:?}: {detail}; is {shm} full, `ulimit -n` reached, or the topic's last place taken?", shm = SHARED_MEMORY)]
-    Refused {
-        /// The operation.
-        action: &'static str,
-        topic: &'static str,
-        /// The middleware's error.
-        detail: String,
-    },
-    /// The process could not join the domain.
+    Refused { action: &'static str, topic: &'static str, detail: String },
     #[error("cannot join the bus of robot {robot:?}: {detail}; if it runs, is it this user's, and is {shm} writable and not full?", shm = SHARED_MEMORY)]
-    Join {
-        robot: String,
-        /// The middleware's error.
-        detail: String,
-    },
-    /// Waiting failed.
+    Join { robot: String, detail: String },
     #[error("cannot wait for samples: {0}")]
     Wait(#[source] std::io::Error),
 }
@@ -74,7 +48,6 @@ pub(super) fn refused<E: Debug>(
     move |detail| BusError::Refused { action, topic, detail: format!("{detail:?}") }
 }
 
-/// Converts the middleware's refusal of a reader.
 pub(super) fn reading(spec: &Spec) -> impl FnOnce(SubscriberCreateError) -> BusError {
     let (topic, places) = (spec.name, spec.limits.readers);
     move |error| match error {
@@ -85,7 +58,6 @@ pub(super) fn reading(spec: &Spec) -> impl FnOnce(SubscriberCreateError) -> BusE
     }
 }
 
-/// Converts the middleware's refusal to give a sample.
 pub(super) fn taking(spec: &Spec) -> impl FnOnce(ReceiveError) -> BusError {
     let (topic, most) = (spec.name, spec.limits.borrowed);
     move |error| match error {

@@ -14,33 +14,29 @@ pub(super) fn type_name<P: ZeroCopySend>() -> &'static str {
     unsafe { <P as ZeroCopySend>::type_name() }
 }
 
-/// A payload or a field whose layout is known.
 pub trait Layout: Copy {
-    /// The type.
+    /// The value of which every number is 0.
+    fn zero() -> Self;
+
     fn kind() -> Kind;
 
-    /// The value.
     fn value(&self) -> Value;
 
-    /// The value of an array.
     fn array(array: &[Self]) -> Value {
         Value::Array(array.iter().map(Self::value).collect())
     }
 
-    /// Encode it, field by field.
     fn encode(&self, to: &mut Encoder<'_>);
 
     /// Decode the bytes that [`Layout::encode`] wrote; none where they are too short.
     fn decode(from: &mut Decoder<'_>) -> Option<Self>;
 
-    /// Encode all of `items`, one after another.
     fn encode_all(items: &[Self], to: &mut Encoder<'_>) {
         for item in items {
             item.encode(to);
         }
     }
 
-    /// Decode into all of `items`.
     fn decode_all(items: &mut [Self], from: &mut Decoder<'_>) -> Option<()> {
         for item in items {
             *item = Self::decode(from)?;
@@ -49,48 +45,34 @@ pub trait Layout: Copy {
     }
 }
 
-/// The value of a payload or a field.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// An unsigned integer.
     Unsigned(u64),
-    /// A signed integer.
     Signed(i64),
-    /// A number of 32 bits.
     Single(f32),
-    /// A number of 64 bits.
     Double(f64),
     /// An array of bytes in a struct: UTF-8, filled up with zeros. Bytes that are not UTF-8 are replaced.
     Text(String),
-    /// An array of values of one kind.
     Array(Vec<Self>),
-    /// A struct: the names and values of its fields, in their order.
     Struct(Vec<(&'static str, Self)>),
 }
 
-/// The type of a payload or a field.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// A number; its name in Rust.
     Number(&'static str),
-    /// An array: the kind and the number of its elements.
     Array(Box<Self>, usize),
-    /// A struct.
     Struct(Structure),
 }
 
-/// A `repr(C)` struct.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Structure {
     /// The name in all languages, for example `firsthand.Pose`.
     pub name: &'static str,
-    /// The size, bytes.
     pub size: usize,
-    /// The fields, in their order.
     pub fields: Vec<Field>,
 }
 
-/// A field of a struct.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Field {
     pub name: &'static str,
@@ -100,15 +82,12 @@ pub struct Field {
 }
 
 impl Structure {
-    /// The kind of `P`, which has these fields.
-    #[must_use]
     pub fn of<P: ZeroCopySend>(fields: Vec<Field>) -> Kind {
         Kind::Struct(Self { name: type_name::<P>(), size: size_of::<P>(), fields })
     }
 }
 
 /// The kind of the field that an accessor of the struct returns.
-#[must_use]
 pub fn kind_of<P, F: Layout>(_: fn(&P) -> &F) -> Kind {
     F::kind()
 }
@@ -116,6 +95,10 @@ pub fn kind_of<P, F: Layout>(_: fn(&P) -> &F) -> Kind {
 macro_rules! numbers {
     ($($number:ident: $value:ident)*) => {$(
         impl Layout for $number {
+            fn zero() -> Self {
+                0 as Self
+            }
+
             fn kind() -> Kind {
                 Kind::Number(stringify!($number))
             }
@@ -138,6 +121,10 @@ macro_rules! numbers {
 numbers!(u16: Unsigned u32: Unsigned u64: Unsigned i32: Signed i64: Signed f32: Single f64: Double);
 
 impl Layout for u8 {
+    fn zero() -> Self {
+        0
+    }
+
     fn kind() -> Kind {
         Kind::Number("u8")
     }
@@ -171,6 +158,8 @@ impl Layout for u8 {
 
 /// The element of a sample without a slice.
 impl Layout for () {
+    fn zero() {}
+
     fn kind() -> Kind {
         Structure::of::<Self>(Vec::new())
     }
@@ -186,7 +175,11 @@ impl Layout for () {
     }
 }
 
-impl<T: Layout + Default, const N: usize> Layout for [T; N] {
+impl<T: Layout, const N: usize> Layout for [T; N] {
+    fn zero() -> Self {
+        [T::zero(); N]
+    }
+
     fn kind() -> Kind {
         Kind::Array(Box::new(T::kind()), N)
     }
@@ -200,7 +193,7 @@ impl<T: Layout + Default, const N: usize> Layout for [T; N] {
     }
 
     fn decode(from: &mut Decoder<'_>) -> Option<Self> {
-        let mut items = [T::default(); N];
+        let mut items = Self::zero();
         T::decode_all(&mut items, from)?;
         Some(items)
     }
@@ -211,6 +204,10 @@ impl<T: Layout + Default, const N: usize> Layout for [T; N] {
 macro_rules! layouts {
     ($($payload:ident { $($field:ident)* })*) => {$(
         impl $crate::Layout for $payload {
+            fn zero() -> Self {
+                Self { $($field: $crate::Layout::zero()),* }
+            }
+
             fn kind() -> $crate::Kind {
                 let _all = |&Self { $($field: _),* }: &Self| ();
                 $crate::Structure::of::<Self>(vec![$($crate::Field {

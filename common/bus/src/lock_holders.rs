@@ -13,7 +13,6 @@ use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 /// with 180 locks that came and went, one reading in 200 missed a lock that was held all the time.
 const READINGS: usize = 5;
 
-/// The processes that hold a lock on `file`.
 pub fn holders(file: &File) -> io::Result<Vec<u32>> {
     let inode = file.metadata()?.ino();
     let mut found = BTreeSet::new();

@@ -30,7 +30,6 @@ use crate::{
     domain::{Domain, SHARED_MEMORY},
 };
 
-/// The connection of a process to a robot's bus.
 #[derive(Debug)]
 pub struct Bus {
     pub(super) node: BusNode,
@@ -57,7 +56,6 @@ fn not_running(domain: &Domain) -> impl Fn(io::Error) -> BusError {
 }
 
 impl Bus {
-    /// Create the bus of a robot with the services of `topics`.
     pub(super) fn make_services(
         domain: &Domain,
         name: &str,
@@ -144,14 +142,12 @@ impl Bus {
     }
 
     /// The processes whose samples are read; none if nobody names them, and the newest generation is read.
-    #[must_use]
     pub const fn writers(&self) -> Option<&Writers> {
         self.writers.as_ref()
     }
 
     /// Whether this bus is no longer used: another bus replaced it, in this run or the next one, or the run has ended. A consumer then
     /// drops everything that it opened on this bus, and joins again.
-    #[must_use]
     pub fn is_replaced(&self) -> bool {
         BusInstance::current(self.instance.domain()).map_or(true, |now| now != self.instance)
     }
@@ -170,13 +166,11 @@ impl Bus {
         }
     }
 
-    /// The directory of the service files.
     fn services(&self) -> PathBuf {
         let services = self.node.config().global.service_dir();
         PathBuf::from(OsStr::from_bytes(services.as_bytes()))
     }
 
-    /// The directory of the second names of the service files.
     fn backup(&self) -> PathBuf {
         self.services().with_extension("backup")
     }

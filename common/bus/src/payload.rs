@@ -32,7 +32,6 @@ pub(super) const fn has_slice<E>() -> bool {
 pub struct Stamp {
     /// The tick it belongs to: one tick runs from a motor frame to its command.
     pub tick: u64,
-    /// Mission time, nanoseconds.
     pub stamp_ns: u64,
     /// The generation of the writer, which grows by one each time the stage is started.
     pub generation: u32,
@@ -43,8 +42,6 @@ pub struct Stamp {
 layouts! { Stamp { tick stamp_ns generation sequence } }
 
 impl Stamp {
-    /// Mission time.
-    #[must_use]
     pub const fn time(&self) -> MissionTime {
         MissionTime(self.stamp_ns)
     }
@@ -53,7 +50,6 @@ impl Stamp {
 /// The header of a sample: a payload that starts with a [`Stamp`].
 pub trait Stamped: Payload {
     fn stamp(&self) -> &Stamp;
-    /// The stamp, which the writer fills in.
     fn stamp_mut(&mut self) -> &mut Stamp;
 }
 
@@ -67,13 +63,11 @@ pub fn encode_slice<H: Layout, E: Layout>(header: &H, slice: &[E], bytes: &mut V
     }
 }
 
-/// [`encode_slice`] of a sample without a slice.
 pub fn encode_sample<H: Layout>(sample: &H, bytes: &mut Vec<u8>) {
     encode_slice::<H, ()>(sample, &[], bytes);
 }
 
 /// The header and slice in a message; none if the message holds others.
-#[must_use]
 pub fn decode_slice<H: Layout, E: Layout + Default>(message: &[u8]) -> Option<(H, Vec<E>)> {
     let mut from = Decoder::new(message)?;
     let header = H::decode(&mut from)?;
@@ -89,7 +83,6 @@ pub fn decode_slice<H: Layout, E: Layout + Default>(message: &[u8]) -> Option<(H
 }
 
 /// The header in a message; none if the message holds another.
-#[must_use]
 pub fn decode_sample<H: Layout>(message: &[u8]) -> Option<H> {
     Some(decode_slice::<H, ()>(message)?.0)
 }

@@ -23,7 +23,6 @@ use super::{
     spec::Spec,
 };
 
-/// The service that carries headers `H` with elements `E`.
 #[derive(Debug)]
 pub(super) struct Service<H, E> {
     raw: RawService,
@@ -32,13 +31,11 @@ pub(super) struct Service<H, E> {
 }
 
 impl<H: Payload, E: Payload> Service<H, E> {
-    /// Open a topic.
     pub(super) fn open(node: &BusNode, spec: &'static Spec) -> Result<Self, BusError> {
         let raw = RawService::open(node, spec, &Carried::of::<H, E>())?;
         Ok(Self { raw, spec, carries: PhantomData })
     }
 
-    /// A publisher of samples of at most `longest` elements.
     pub(super) fn publisher(&self, longest: usize) -> Result<Publisher<H, E>, BusError> {
         let longest = if has_slice::<E>() { longest } else { 1 };
         Ok(Publisher {
@@ -57,7 +54,6 @@ impl<H: Payload, E: Payload> Service<H, E> {
         })
     }
 
-    /// The ids of the subscribers.
     pub(super) fn readers(&self) -> HashSet<u128> {
         self.raw.readers()
     }
@@ -67,7 +63,6 @@ impl<H: Payload, E: Payload> Service<H, E> {
     }
 }
 
-/// Publishes headers `H` with elements `E`.
 #[derive(Debug)]
 pub(super) struct Publisher<H, E> {
     raw: RawPublisher,
@@ -76,12 +71,10 @@ pub(super) struct Publisher<H, E> {
 }
 
 impl<H: Payload, E: Payload> Publisher<H, E> {
-    /// The name of the topic.
     pub(super) const fn topic(&self) -> &'static str {
         self.topic
     }
 
-    /// Publish `header` with `slice`.
     pub(super) fn send(&self, header: H, slice: &[E]) -> Result<(), BusError> {
         let count = if has_slice::<E>() { slice.len() } else { 1 };
         self.raw.send(self.topic, count, &mut |loan| {
@@ -102,7 +95,6 @@ impl<H: Payload, E: Payload> Publisher<H, E> {
     }
 }
 
-/// Receives headers `H` with elements `E`.
 #[derive(Debug)]
 pub(super) struct Subscriber<H, E> {
     raw: RawSubscriber,
@@ -118,7 +110,6 @@ impl<H: Payload, E: Payload> Subscriber<H, E> {
     }
 }
 
-/// A header with its elements, in shared memory.
 #[derive(Debug)]
 pub(super) struct Sample<H, E> {
     raw: RawSample,
@@ -141,7 +132,6 @@ impl<H: Payload, E: Payload> Sample<H, E> {
         elements
     }
 
-    /// The process that published the sample.
     pub(super) fn process(&self) -> u32 {
         self.raw.process()
     }

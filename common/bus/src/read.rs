@@ -50,7 +50,6 @@ impl Bus {
     }
 }
 
-/// Receives samples.
 #[derive(Debug)]
 pub struct Reader<H, E = ()> {
     subscriber: Subscriber<H, E>,
@@ -73,7 +72,6 @@ impl<H: Stamped, E: Payload> Reader<H, E> {
     }
 
     /// Return the samples of all generations. Samples of an older generation may arrive after the first of the next one.
-    #[must_use]
     pub fn of_all_generations(mut self) -> Self {
         self.admitted = self.admitted.of_all_generations();
         self
@@ -103,13 +101,11 @@ pub struct Slice<H, E = ()> {
 }
 
 impl<H: Stamped, E: Payload> Slice<H, E> {
-    #[must_use]
     pub fn header(&self) -> &H {
         self.sample.header()
     }
 
     /// The process and the generation that wrote the sample. The process is part of the id of the port that published it.
-    #[must_use]
     pub fn author(&self) -> Author {
         Author { process: self.sample.process(), generation: self.header().stamp().generation }
     }

@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-/// How often a topic is published.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rate {
     /// Once a tick. It is published again for a tick that the link repeats because no command came, and completely for a new reader
@@ -19,46 +18,35 @@ pub enum Rate {
         /// The time after the last sample, or after the last complete one if samples carry only changes.
         again_after: Duration,
     },
-    /// Once for each event.
     WhenItHappens,
 }
 
-/// Whether a recording contains a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Logged {
-    /// All recordings contain it.
     Yes,
     /// Only recordings with fields contain it, because fields take more space than all other topics together.
     WithFields,
 }
 
-/// A topic's description in the table.
 #[derive(Debug)]
 pub struct Spec {
     /// The name of the topic, and of its two services.
     pub name: &'static str,
     /// The writer: a stage, [`SUPERVISOR`], [`OPERATOR`] or [`EVERY_STAGE`].
     pub writer: &'static str,
-    /// How often the topic is published.
     pub rate: Rate,
-    /// Whether a recording contains it.
     pub logged: Logged,
-    /// The sizes of its buffers, and the number of readers.
     pub limits: Limits,
-    /// The meaning, for the documentation.
     pub meaning: &'static str,
 }
 
-/// The writer of topics that all stages write.
 pub const EVERY_STAGE: &str = "every stage";
 /// The writer of topics that commands of an operator write, each in a process of its own.
 pub const OPERATOR: &str = "operator";
-/// The writer of topics that the supervisor writes.
 pub const SUPERVISOR: &str = "supervisor";
 
 impl Spec {
     /// The time after which its writer publishes the topic again if nothing changes; zero if it does not.
-    #[must_use]
     pub const fn restated_every(&self) -> Duration {
         match self.rate {
             Rate::EachTick | Rate::EachFrame | Rate::WhenItHappens => Duration::ZERO,
@@ -67,7 +55,6 @@ impl Spec {
     }
 
     /// The least time between two changes that its writer publishes; zero if there is none.
-    #[must_use]
     pub const fn changes_at_most_every(&self) -> Duration {
         match self.rate {
             Rate::EachTick | Rate::EachFrame | Rate::WhenItHappens => Duration::ZERO,
@@ -81,7 +68,6 @@ impl Spec {
     }
 }
 
-/// The limits of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Samples that wait for a reader; when there are more, the oldest are dropped.
@@ -97,18 +83,13 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// The limits of topics of one small struct.
     pub const SMALL: Self =
         Self { buffer: 128, recorder_buffer: 1024, borrowed: 2, readers: 16, longest: usize::MAX };
     /// The limits of topics that a replay needs without gaps. A recorder that is not scheduled for 0.1 s loses nothing.
     pub const DEEP: Self = Self { buffer: 1024, borrowed: 2, readers: 8, ..Self::SMALL };
-    /// The limits of topics whose slices may be a whole map.
     pub const MAP: Self = Self { buffer: 4, recorder_buffer: 256, readers: 24, ..Self::SMALL };
-    /// The limits of topics whose every slice is most of a whole map.
     pub const WHOLE_MAP: Self = Self { recorder_buffer: 8, ..Self::MAP };
 
-    /// The limits of topics of slices of at most so many small elements.
-    #[must_use]
     pub const fn slices(longest: usize) -> Self {
         Self { longest, ..Self::SMALL }
     }

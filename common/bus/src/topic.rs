@@ -12,14 +12,10 @@ pub struct Topic<H, E = ()> {
 }
 
 impl<H, E> Topic<H, E> {
-    /// A row of the table.
-    #[must_use]
     pub const fn new(spec: &'static Spec) -> Self {
         Self { spec, carries: PhantomData }
     }
 
-    /// The topic's description.
-    #[must_use]
     pub const fn spec(&self) -> &'static Spec {
         self.spec
     }

@@ -15,7 +15,6 @@ pub struct Waiter {
 }
 
 impl Waiter {
-    /// Wait for `wakeup` too.
     pub fn on(&mut self, wakeup: Wakeup) {
         self.wakeups.push(wakeup);
     }
@@ -33,7 +32,6 @@ impl Waiter {
         self.wait_also_for(&[], timeout)
     }
 
-    /// [`Waiter::wait`] that this once also waits for `others`.
     pub fn wait_also_for(
         &self,
         others: &[BorrowedFd<'_>],

@@ -42,12 +42,10 @@ impl Bus {
     }
 }
 
-/// Publishes samples.
 #[derive(Debug)]
 pub struct Writer<H, E = ()> {
     publisher: Publisher<H, E>,
     service: Service<H, E>,
-    /// The readers that [`Writer::has_new_reader`] has seen.
     known: HashSet<u128>,
     notifier: Notifier,
     generation: u32,
@@ -95,7 +93,6 @@ impl<H: Stamped, E: Payload> Writer<H, E> {
         self.wake()
     }
 
-    /// Wake the readers after quiet publications.
     pub fn wake(&self) -> Result<(), BusError> {
         self.notifier.wake(self.publisher.topic())
     }

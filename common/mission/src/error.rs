@@ -33,7 +33,6 @@ pub enum MissionError {
 
 impl MissionError {
     /// Without file and line, for a value that is not from the file.
-    #[must_use]
     pub fn without_place(&self) -> String {
         match self {
             Self::Unreadable { source, .. } => source.to_string(),
@@ -44,7 +43,6 @@ impl MissionError {
     }
 
     /// The fault may be on another line of `other`.
-    #[must_use]
     pub fn is_same_fault(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Syntax { problem, .. }, Self::Syntax { problem: its, .. }) => problem == its,

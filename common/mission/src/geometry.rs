@@ -29,13 +29,10 @@ pub struct Profile {
 
 impl Profile {
     /// Vertical distance to the shape's nearest part, metres; 0 if the shape extends to that height.
-    #[must_use]
     pub fn height_gap(&self, height_m: f64) -> f64 {
         (self.bottom_m - height_m).max(height_m - self.top_m).max(0.0)
     }
 
-    /// Any of it is between two heights, metres.
-    #[must_use]
     pub fn is_between(&self, lower_m: f64, upper_m: f64) -> bool {
         self.bottom_m < upper_m && self.top_m > lower_m
     }
@@ -52,21 +49,16 @@ macro_rules! shape {
         #[serde(deny_unknown_fields)]
         pub struct $name {
             $($(#[$doc])* pub $field: $type,)*
-            #[serde(default, skip_serializing_if = "Option::is_none")]
             pub bottom_m: Option<f64>,
             /// By default the shape is higher than the robot.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
             pub top_m: Option<f64>,
             /// By default the shape is hard.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
             pub echo: Option<f64>,
             /// By default the shape is matt.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
             pub light: Option<Light>,
         }
 
         impl $name {
-            #[must_use]
             pub fn profile(&self) -> Profile {
                 Profile {
                     bottom_m: self.bottom_m.unwrap_or(0.0),
@@ -107,7 +99,6 @@ shape! {
 }
 
 impl Wall {
-    /// Each edge is (from, to).
     pub fn edges(&self) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
         self.points.windows(2).map(|pair| (pair[0], pair[1]))
     }
@@ -115,7 +106,6 @@ impl Wall {
 
 impl Box2 {
     /// Counter-clockwise.
-    #[must_use]
     pub fn corners(&self) -> [DVec2; 4] {
         let axis = DVec2::from_angle(self.angle_deg.to_radians());
         let half = self.size_m / 2.0;
@@ -123,7 +113,6 @@ impl Box2 {
             .map(|(a, b)| self.at + axis.rotate(half * DVec2::new(a, b)))
     }
 
-    /// Each edge is (from, to).
     pub fn edges(&self) -> impl Iterator<Item = (DVec2, DVec2)> + use<> {
         let corners = self.corners();
         (0..4).map(move |side| (corners[side], corners[(side + 1) % 4]))
@@ -142,7 +131,6 @@ pub struct Shapes {
 }
 
 impl Shapes {
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.drums.is_empty() && self.walls.is_empty() && self.boxes.is_empty()
     }
@@ -161,7 +149,6 @@ impl Shapes {
     }
 
     /// The shapes with a part between two heights, metres: a body between them can touch these.
-    #[must_use]
     pub fn between(&self, lower_m: f64, upper_m: f64) -> Self {
         let mut shapes = self.clone();
         let meets = |profile: Profile| profile.is_between(lower_m, upper_m);
@@ -172,7 +159,6 @@ impl Shapes {
     }
 
     /// Distance to the nearest surface, metres; negative inside a drum or a box, infinite where nothing stands.
-    #[must_use]
     pub fn clearance(&self, point: DVec2) -> f64 {
         self.pieces().map(|piece| piece.clearance(point)).fold(f64::INFINITY, f64::min)
     }
@@ -187,7 +173,6 @@ pub enum Piece<'a> {
 
 impl Piece<'_> {
     /// Distance to its surface, metres; negative inside.
-    #[must_use]
     pub fn clearance(&self, point: DVec2) -> f64 {
         match self {
             Self::Drum(drum) => drum.at.distance(point) - drum.radius_m,
@@ -201,7 +186,6 @@ impl Piece<'_> {
     }
 
     /// The least and the greatest corner of an upright rectangle around it, metres.
-    #[must_use]
     pub fn bounds(&self) -> (DVec2, DVec2) {
         match self {
             Self::Drum(drum) => {
@@ -220,12 +204,10 @@ impl Piece<'_> {
     }
 }
 
-#[must_use]
 pub fn distance_to_segment(point: DVec2, from: DVec2, to: DVec2) -> f64 {
     nearest_on_segment(point, from, to).distance(point)
 }
 
-#[must_use]
 pub fn nearest_on_segment(point: DVec2, from: DVec2, to: DVec2) -> DVec2 {
     let along = to - from;
     let length_squared = along.length_squared();
@@ -237,7 +219,6 @@ pub fn nearest_on_segment(point: DVec2, from: DVec2, to: DVec2) -> DVec2 {
 
 /// The standard deviations along the longer and the shorter axis of the covariance `[xx, xy, yy]` of a place, and the
 /// angle of the longer one from x, radians.
-#[must_use]
 pub fn principal_axes([xx, xy, yy]: [f64; 3]) -> ([f64; 2], f64) {
     let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
     let variances = [mean + half.hypot(xy), mean - half.hypot(xy)];
@@ -245,7 +226,6 @@ pub fn principal_axes([xx, xy, yy]: [f64; 3]) -> ([f64; 2], f64) {
 }
 
 /// The result is in (-pi, pi], radians.
-#[must_use]
 pub fn wrap_angle(angle: f64) -> f64 {
     use std::f64::consts::{PI, TAU};
     let turned = angle.rem_euclid(TAU);

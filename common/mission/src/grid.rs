@@ -24,18 +24,15 @@ pub enum CellState {
 
 impl CellState {
     /// The harmonic field is 0 here.
-    #[must_use]
     pub const fn is_hazard(self) -> bool {
         !matches!(self, Self::Free | Self::Scanned)
     }
 
-    #[must_use]
     pub const fn is_scanned(self) -> bool {
         matches!(self, Self::Scanned | Self::Margin)
     }
 
     /// A byte of the `grid` topic; an unknown one counts as a hazard.
-    #[must_use]
     pub const fn from_byte(byte: u8) -> Self {
         match byte {
             0 => Self::Free,
@@ -70,12 +67,10 @@ pub struct Window {
 }
 
 impl Window {
-    #[must_use]
     pub const fn area(&self) -> usize {
         self.width as usize * self.height as usize
     }
 
-    #[must_use]
     pub fn including(self, cell: Cell) -> Self {
         if self.area() == 0 {
             return Self { col: cell.col, row: cell.row, width: 1, height: 1 };
@@ -96,7 +91,6 @@ impl Window {
             .flat_map(move |row| columns.clone().map(move |col| Cell { col, row }))
     }
 
-    #[must_use]
     pub fn union(self, other: Self) -> Self {
         if other.area() == 0 {
             return self;
@@ -119,24 +113,20 @@ pub struct GridFrame {
 }
 
 impl GridFrame {
-    #[must_use]
     pub const fn centre_index(&self) -> u32 {
         self.cells / 2
     }
 
-    #[must_use]
     pub const fn area(&self) -> usize {
         self.cells as usize * self.cells as usize
     }
 
     /// Metres to cell units: cell centres lie at whole numbers.
-    #[must_use]
     pub fn to_cells(&self, point: DVec2) -> DVec2 {
         (point - self.centre) / self.resolution_m + DVec2::splat(f64::from(self.centre_index()))
     }
 
     /// [x / Delta] of (19); none outside the map.
-    #[must_use]
     pub fn cell_at(&self, point: DVec2) -> Option<Cell> {
         let index = self.to_cells(point).round();
         let last = f64::from(self.cells) - 1.0;
@@ -148,7 +138,6 @@ impl GridFrame {
     }
 
     /// The middle of `cell`, metres.
-    #[must_use]
     pub fn centre_of(&self, cell: Cell) -> DVec2 {
         let centre = f64::from(self.centre_index());
         let offset = DVec2::new(f64::from(cell.col) - centre, f64::from(cell.row) - centre);
@@ -156,25 +145,21 @@ impl GridFrame {
     }
 
     /// The corner where x and y are least, metres.
-    #[must_use]
     pub fn corner_of(&self, cell: Cell) -> DVec2 {
         self.centre_of(cell) - DVec2::splat(self.resolution_m / 2.0)
     }
 
     /// The index in a row-major slice of the whole map.
-    #[must_use]
     pub const fn index(&self, cell: Cell) -> usize {
         cell.row as usize * self.cells as usize + cell.col as usize
     }
 
     /// The cell is on the perimeter, (18).
-    #[must_use]
     pub const fn is_rim(&self, cell: Cell) -> bool {
         let last = self.cells - 1;
         cell.col == 0 || cell.row == 0 || cell.col >= last || cell.row >= last
     }
 
-    #[must_use]
     pub const fn whole(&self) -> Window {
         Window { col: 0, row: 0, width: self.cells, height: self.cells }
     }
@@ -206,7 +191,6 @@ impl GridFrame {
     }
 
     /// The smallest window outside of which two whole maps are equal; empty if the maps are.
-    #[must_use]
     pub fn changed_window<T: PartialEq>(&self, old: &[T], new: &[T]) -> Window {
         let side = self.cells as usize;
         let mut window = Window::default();
@@ -226,7 +210,6 @@ impl GridFrame {
         window
     }
 
-    #[must_use]
     pub fn contains(&self, window: Window) -> bool {
         let fits =
             |from: u32, extent: u32| from.checked_add(extent).is_some_and(|end| end <= self.cells);

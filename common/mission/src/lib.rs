@@ -15,6 +15,26 @@
 //! | [`address`] | a robot's address |
 //! | `arduino`, `ros2` | the board of a robot with an Arduino; topics of ROS 2 |
 
+/// Tables of the mission file: their keys, each with the default that it has if its type has no other. An unknown key is an error.
+macro_rules! keys {
+    (@) => { Default::default() };
+    (@ $default:expr) => { $default };
+    ($(#[$about:meta])* $name:ident { $($(#[$doc:meta])* $key:ident: $type:ty $(= $default:expr)?,)* }) => {
+        $(#[$about])*
+        #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(deny_unknown_fields, default)]
+        pub struct $name {
+            $($(#[$doc])* pub $key: $type,)*
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($key: keys!(@ $($default)?),)* }
+            }
+        }
+    };
+}
+
 pub mod address;
 mod arduino;
 mod check;
@@ -56,75 +76,55 @@ use crate::{
     kinematics::Pose2,
 };
 
-/// Every key but `target` has a default.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Mission {
-    /// The default is the file's name.
-    #[serde(default)]
-    pub name: String,
-    /// One line for `firsthand missions`.
-    #[serde(default)]
-    pub description: String,
-    /// X_T, metres.
-    #[serde(default = "defaults::no_target")]
-    pub target: DVec2,
-    /// The places to visit one after the other; [`Mission::target`] is then the first of them.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub targets: Vec<Waypoint>,
-    #[serde(default)]
-    pub method: Method,
-    /// Readings of the sonar go into the map. Without them the robot knows only [`Mission::known`].
-    #[serde(default = "defaults::sensing")]
-    pub sensing: bool,
-    /// The rows that are mapped; by default [`Mission::sensor_set`].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub sensors: Option<Sensors>,
-    /// Within this the target counts as reached.
-    #[serde(default = "defaults::arrival_tolerance_m")]
-    pub arrival_tolerance_m: f64,
-    /// An arrival is unsure if two standard deviations of the position's error exceed this along the worst axis. A
-    /// simulated robot that is farther off is in the wrong place.
-    #[serde(default = "defaults::sure_within_m")]
-    pub sure_within_m: f64,
-    #[serde(default = "defaults::timeout_s")]
-    pub timeout_s: f64,
-    /// The seed of everything random in the simulation.
-    #[serde(default = "defaults::seed")]
-    pub seed: u64,
-    #[serde(default)]
-    pub start: Start,
-    /// Pi: where the robot may operate, and the grid laid over it.
-    #[serde(default)]
-    pub perimeter: Perimeter,
-    #[serde(default)]
-    pub robot: RobotConfig,
-    /// The front sonar of a robot without `[[robot.sensor]]`.
-    #[serde(default)]
-    pub sonar: SonarConfig,
-    #[serde(default)]
-    pub dead_reckoning: DeadReckoning,
-    #[serde(default)]
-    pub mapper: Mapper,
-    #[serde(default)]
-    pub planner: Planner,
-    #[serde(default)]
-    pub controller: Controller,
-    /// A map of the ROS map_server whose occupied cells become boxes of [`Mission::known`]. A relative name is taken
-    /// from the current directory.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub map: Option<PathBuf>,
-    /// Hazards that the map holds before the robot starts.
-    #[serde(default, skip_serializing_if = "Shapes::is_empty")]
-    pub known: Shapes,
-    /// Shapes that really exist; only the simulator reads them.
-    #[serde(default, skip_serializing_if = "Shapes::is_empty")]
-    pub world: Shapes,
-    #[serde(default)]
-    pub simulation: Simulation,
-    /// One line each on a valid file: keys or values with a new name, and requests that the robot cannot fulfil.
-    #[serde(skip)]
-    pub remarks: Vec<String>,
+keys! {
+    /// Every key but `target` has a default.
+    Mission {
+        /// The default is the file's name.
+        name: String,
+        /// One line for `firsthand missions`.
+        description: String,
+        /// X_T, metres.
+        target: DVec2 = DVec2::NAN,
+        /// The places to visit one after the other; [`Mission::target`] is then the first of them.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        targets: Vec<Waypoint>,
+        method: Method,
+        /// Readings of the sonar go into the map. Without them the robot knows only [`Mission::known`].
+        sensing: bool = true,
+        /// The rows that are mapped; by default [`Mission::sensor_set`].
+        sensors: Option<Sensors>,
+        /// Within this the target counts as reached.
+        arrival_tolerance_m: f64 = 0.15,
+        /// An arrival is unsure if two standard deviations of the position's error exceed this along the worst axis. A
+        /// simulated robot that is farther off is in the wrong place.
+        sure_within_m: f64 = 0.5,
+        timeout_s: f64 = 180.0,
+        /// The seed of everything random in the simulation.
+        seed: u64 = 1,
+        start: Start,
+        /// Pi: where the robot may operate, and the grid laid over it.
+        perimeter: Perimeter,
+        robot: RobotConfig,
+        /// The front sonar of a robot without `[[robot.sensor]]`.
+        sonar: SonarConfig,
+        dead_reckoning: DeadReckoning,
+        mapper: Mapper,
+        planner: Planner,
+        controller: Controller,
+        /// A map of the ROS map_server whose occupied cells become boxes of [`Mission::known`]. A relative name is taken
+        /// from the current directory.
+        map: Option<PathBuf>,
+        /// Hazards that the map holds before the robot starts.
+        #[serde(skip_serializing_if = "Shapes::is_empty")]
+        known: Shapes,
+        /// Shapes that really exist; only the simulator reads them.
+        #[serde(skip_serializing_if = "Shapes::is_empty")]
+        world: Shapes,
+        simulation: Simulation,
+        /// One line each on a valid file: keys or values with a new name, and requests that the robot cannot fulfil.
+        #[serde(skip)]
+        remarks: Vec<String>,
+    }
 }
 
 pub const MOST_TARGETS: usize = 16;
@@ -168,25 +168,24 @@ pub enum Method {
     Paper,
 }
 
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Start {
-    /// Counter-clockwise from x of the mission frame.
-    pub heading_deg: f64,
+keys! {
+    Start {
+        /// Counter-clockwise from x of the mission frame.
+        heading_deg: f64,
+    }
 }
 
-/// The square the robot may operate in, (18).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Perimeter {
-    /// D.
-    pub width_m: f64,
-    /// N along each side. By default a cell has 0.05 m, a quarter of the X80's body, for a robot that looks first
-    /// ([`Mission::looks_first`]), else 0.1 m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub cells: Option<u32>,
-    /// Metres.
-    pub centre: DVec2,
+keys! {
+    /// The square the robot may operate in, (18).
+    Perimeter {
+        /// D.
+        width_m: f64 = 12.0,
+        /// N along each side. By default a cell has 0.05 m, a quarter of the X80's body, for a robot that looks first
+        /// ([`Mission::looks_first`]), else 0.1 m.
+        cells: Option<u32>,
+        /// Metres.
+        centre: DVec2,
+    }
 }
 
 impl Perimeter {
@@ -195,11 +194,11 @@ impl Perimeter {
     const DEFAULT_MOST_CELLS: f64 = 512.0;
 }
 
-/// All but the wheels' values, which are in [`Odometry`].
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct DeadReckoning {
-    pub integration: Integration,
+keys! {
+    /// All but the wheels' values, which are in [`Odometry`].
+    DeadReckoning {
+        integration: Integration,
+    }
 }
 
 /// Integrates (20) into (21).
@@ -213,36 +212,31 @@ pub enum Integration {
     Euler,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Mapper {
-    /// Paper: cells this far around a hit are marked with it; [`Mission::margin_cells`] is Im of (19).
-    pub margin_m: f64,
-    /// Evidential: left free between the body and a hit.
-    pub clearance_m: f64,
-    /// Hits farther than this are no safety event yet; by default [`Mission::map_within_m`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub map_within_m: Option<f64>,
+keys! {
+    Mapper {
+        /// Paper: cells this far around a hit are marked with it; [`Mission::margin_cells`] is Im of (19).
+        margin_m: f64 = 0.25,
+        /// Evidential: left free between the body and a hit.
+        clearance_m: f64 = 0.03,
+        /// Hits farther than this are no safety event yet; by default [`Mission::map_within_m`].
+        map_within_m: Option<f64>,
+    }
 }
 
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Planner {
-    /// Evidential: the robot must be able to stop within this before it meets what it believes in or has not scanned;
-    /// by default that of [`Mission::hurry`], which includes the base's dead time. A base that brakes slowly is given
-    /// as much less speed as it needs: [`Response::speed_to_stop_within`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub stops_within_s: Option<f64>,
-    /// Lambda of laplacian u = u / lambda^2. Without it the paper's method has no screening, exactly (11), and the
-    /// evidential one takes [`Planner::EVIDENTIAL_SCREENING_M`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub screening_m: Option<f64>,
-    /// A planner in place of `firsthand`'s own; it is given the command line of `common::stage_command`. A run file
-    /// has it absolute.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub executable: Option<PathBuf>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub calibration: Option<CalibrationPlan>,
+keys! {
+    Planner {
+        /// Evidential: the robot must be able to stop within this before it meets what it believes in or has not scanned;
+        /// by default that of [`Mission::hurry`], which includes the base's dead time. A base that brakes slowly is given
+        /// as much less speed as it needs: [`Response::speed_to_stop_within`].
+        stops_within_s: Option<f64>,
+        /// Lambda of laplacian u = u / lambda^2. Without it the paper's method has no screening, exactly (11), and the
+        /// evidential one takes [`Planner::EVIDENTIAL_SCREENING_M`].
+        screening_m: Option<f64>,
+        /// A planner in place of `firsthand`'s own; it is given the command line of `common::stage_command`. A run file
+        /// has it absolute.
+        executable: Option<PathBuf>,
+        calibration: Option<CalibrationPlan>,
+    }
 }
 
 impl Planner {
@@ -250,7 +244,6 @@ impl Planner {
     pub const EVIDENTIAL_SCREENING_M: f64 = 0.35;
 }
 
-/// How fast a robot of the evidential method may be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hurry {
     pub full_speed_within_deg: f64,
@@ -259,85 +252,31 @@ pub struct Hurry {
     pub stops_within_s: f64,
 }
 
-/// Equations (14)-(17).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Controller {
-    /// vd; by default [`Mission::speed_m_s`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub speed_m_s: Option<f64>,
-    /// wd; by default [`Mission::turn_rad_s`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub turn_rad_s: Option<f64>,
-    /// Evidential: at full speed while the robot faces its way within this angle; by default that of
-    /// [`Mission::hurry`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub full_speed_within_deg: Option<f64>,
-    /// Evidential: turn on the spot while the way lies farther than this to a side; at smaller angles the speed falls
-    /// with the cosine. By default that of [`Mission::hurry`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub turns_beyond_deg: Option<f64>,
-    /// Evidential: on the spot, at most; by default that of [`Mission::hurry`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub look_rad_s: Option<f64>,
-    /// Rc: slowing down begins this far from the target.
-    pub slow_radius_m: f64,
-    /// |eta_c| below which an antipodal robot keeps its turning side.
-    pub dead_zone: f64,
-    /// (16) modulates the speed by alignment; without it the speed is constant up to Rc.
-    pub modulated: bool,
-}
-
-mod defaults {
-    pub(super) const fn no_target() -> glam::DVec2 {
-        glam::DVec2::NAN
-    }
-    pub(super) const fn arrival_tolerance_m() -> f64 {
-        0.15
-    }
-    pub(super) const fn sure_within_m() -> f64 {
-        0.5
-    }
-    pub(super) const fn sensing() -> bool {
-        true
-    }
-    pub(super) const fn timeout_s() -> f64 {
-        180.0
-    }
-    pub(super) const fn seed() -> u64 {
-        1
-    }
-}
-
-impl Default for Perimeter {
-    fn default() -> Self {
-        Self { width_m: 12.0, cells: None, centre: DVec2::ZERO }
-    }
-}
-
-impl Default for Mapper {
-    fn default() -> Self {
-        Self { margin_m: 0.25, clearance_m: 0.03, map_within_m: None }
-    }
-}
-
-impl Default for Controller {
-    fn default() -> Self {
-        Self {
-            speed_m_s: None,
-            turn_rad_s: None,
-            full_speed_within_deg: None,
-            turns_beyond_deg: None,
-            look_rad_s: None,
-            slow_radius_m: 0.4,
-            dead_zone: 0.05,
-            modulated: true,
-        }
+keys! {
+    /// Equations (14)-(17).
+    Controller {
+        /// vd; by default [`Mission::speed_m_s`].
+        speed_m_s: Option<f64>,
+        /// wd; by default [`Mission::turn_rad_s`].
+        turn_rad_s: Option<f64>,
+        /// Evidential: at full speed while the robot faces its way within this angle; by default that of
+        /// [`Mission::hurry`].
+        full_speed_within_deg: Option<f64>,
+        /// Evidential: turn on the spot while the way lies farther than this to a side; at smaller angles the speed falls
+        /// with the cosine. By default that of [`Mission::hurry`].
+        turns_beyond_deg: Option<f64>,
+        /// Evidential: on the spot, at most; by default that of [`Mission::hurry`].
+        look_rad_s: Option<f64>,
+        /// Rc: slowing down begins this far from the target.
+        slow_radius_m: f64 = 0.4,
+        /// |eta_c| below which an antipodal robot keeps its turning side.
+        dead_zone: f64 = 0.05,
+        /// (16) modulates the speed by alignment; without it the speed is constant up to Rc.
+        modulated: bool = true,
     }
 }
 
 impl Mission {
-    #[must_use]
     pub fn waypoints(&self) -> Vec<Waypoint> {
         match self.targets.is_empty() {
             true => vec![Waypoint { at: self.target, heading_deg: None }],
@@ -345,7 +284,6 @@ impl Mission {
         }
     }
 
-    #[must_use]
     pub fn grid_frame(&self) -> GridFrame {
         let Perimeter { width_m, centre, .. } = self.perimeter;
         let cells = self.perimeter.cells.unwrap_or_else(|| {
@@ -357,7 +295,6 @@ impl Mission {
     }
 
     /// Im of (19): the least number of cells around a hit's own that covers the margin.
-    #[must_use]
     pub fn margin_cells(&self) -> u32 {
         // The hit's own cell covers half a cell, and a rounding error adds no cell.
         let cells = self.mapper.margin_m / self.grid_frame().resolution_m - 0.5;
@@ -366,7 +303,6 @@ impl Mission {
 
     /// The robot turns to look before it drives in a direction: with the evidential method if it senses, can turn on
     /// the spot, and has no other planner. It can then stop within scanned ground, so its defaults are faster.
-    #[must_use]
     pub fn looks_first(&self) -> bool {
         self.method == Method::Evidential
             && self.sensing
@@ -376,7 +312,6 @@ impl Mission {
 
     /// vd: `controller.speed_m_s`, or by default 0.5 for a robot that looks first, 0.7 with infrared rangers, the
     /// body's top speed with a laser; else the paper's 0.25.
-    #[must_use]
     pub fn speed_m_s(&self) -> f64 {
         self.controller.speed_m_s.unwrap_or_else(|| match self.looks_first() {
             false => 0.25,
@@ -386,14 +321,12 @@ impl Mission {
         })
     }
 
-    #[must_use]
     pub fn used(&self, kind: SensorKind) -> usize {
         self.sensor_table().iter().filter(|sensor| sensor.used && sensor.kind == kind).count()
     }
 
     /// `sensors`, or by default all of them with the evidential method, and the front sonar alone with the paper's
     /// method or on a car.
-    #[must_use]
     pub fn sensor_set(&self) -> Sensors {
         self.sensors.unwrap_or(match (self.method, self.robot.model) {
             (Method::Paper, _) | (_, Model::Car) => Sensors::Front,
@@ -402,7 +335,6 @@ impl Mission {
     }
 
     /// A reading names its sensor by the row of this table.
-    #[must_use]
     pub fn sensor_table(&self) -> Vec<Sensor> {
         let RobotConfig { sensors, rate_hz, .. } = &self.robot;
         let rows = match self.robot.model {
@@ -419,20 +351,15 @@ impl Mission {
         sensor::table(&rows, *rate_hz, &self.sonar, self.sensor_set())
     }
 
-    /// The laser, and its row in [`Mission::sensor_table`].
-    #[must_use]
     pub fn laser(&self) -> Option<(usize, Sensor)> {
         let mut rows = self.sensor_table().into_iter().enumerate();
         rows.find(|(_, sensor)| sensor.kind == SensorKind::Scan)
     }
 
-    /// The front sonar's row in [`Mission::sensor_table`].
-    #[must_use]
     pub fn front_row(&self) -> usize {
         sensor::front(&self.sensor_table(), &self.sonar).unwrap_or_default()
     }
 
-    #[must_use]
     pub fn front_sonar(&self) -> Sensor {
         self.sensor_table().swap_remove(self.front_row())
     }
@@ -442,7 +369,6 @@ impl Mission {
     /// three times as many robots touched something, most of them the ends of loose walls.
     ///
     /// The times to stop were found with an X80, of whose dead time they include 0.15 s.
-    #[must_use]
     pub fn hurry(&self) -> Hurry {
         let uses = |kind| self.looks_first() && self.used(kind) > 0;
         let sees = uses(SensorKind::Ray) || uses(SensorKind::Scan);
@@ -461,7 +387,6 @@ impl Mission {
     }
 
     /// wd: `controller.turn_rad_s`, or by default 2.4 for a robot that looks first, else the paper's 0.8.
-    #[must_use]
     pub fn turn_rad_s(&self) -> f64 {
         let default = if self.looks_first() { 2.4 } else { 0.8 };
         self.controller.turn_rad_s.unwrap_or(default)
@@ -469,21 +394,18 @@ impl Mission {
 
     /// The link makes good that the wheels turn slower than commanded: `robot.speed_trim`, by default if the robot
     /// looks first.
-    #[must_use]
     pub fn speed_trim(&self) -> bool {
         self.robot.speed_trim.unwrap_or_else(|| self.looks_first())
     }
 
     /// `mapper.map_within_m`, by default 0.6 for a robot that looks first and 1.0 for others. Farther out the arc of
     /// an echo is wider than the gaps that it would close.
-    #[must_use]
     pub fn map_within_m(&self) -> f64 {
         let default = if self.looks_first() { 0.6 } else { 1.0 };
         self.mapper.map_within_m.unwrap_or(default)
     }
 
     /// `planner.screening_m`, or by default that of the method; none is exactly (11).
-    #[must_use]
     pub fn screening_length_m(&self) -> Option<f64> {
         let default = match self.method {
             // The length is at least what the grid resolves.
@@ -496,19 +418,16 @@ impl Mission {
         self.planner.screening_m.or(default)
     }
 
-    #[must_use]
     pub fn start_pose(&self) -> Pose2 {
         Pose2 { position: DVec2::ZERO, heading: self.start.heading_deg.to_radians() }
     }
 
     /// Shapes of the world that the body can touch; the others are above or below it.
-    #[must_use]
     pub fn obstacles(&self) -> Shapes {
         self.simulation.physics().heights.touched(&self.world)
     }
 
     /// The wheels of the simulated base: as `simulation.wheels` says, or else as the robot's response.
-    #[must_use]
     pub fn wheel_physics(&self) -> WheelPhysics {
         let (written, stated) = (&self.simulation.wheels, &self.robot.response);
         let preset = self.simulation.physics().wheels;
@@ -521,7 +440,6 @@ impl Mission {
         }
     }
 
-    #[must_use]
     pub fn body(&self) -> Body {
         self.robot.body()
     }

@@ -2,28 +2,27 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Each value with its standard deviation. With s = `distance_scale` and rho = `diameter_ratio` the left wheel rolls
-/// 2 s / (1 + rho) times its nominal way and the right one 2 s rho / (1 + rho) times. The track on the ground is
-/// `track_scale` times the nominal one.
-///
-/// The defaults are those of a robot that nobody has calibrated.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Odometry {
-    /// Right over left.
-    pub diameter_ratio: f64,
-    pub diameter_ratio_sd: f64,
-    /// The track on the ground over the nominal one.
-    pub track_scale: f64,
-    pub track_scale_sd: f64,
-    /// Mean diameter over the nominal one.
-    pub distance_scale: f64,
-    pub distance_scale_sd: f64,
-    /// Standard deviation of the way lost or won, metres per square root of a metre.
-    pub slip: f64,
-    pub slip_sd: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub calibrated: Option<Provenance>,
+keys! {
+    /// Each value with its standard deviation. With s = `distance_scale` and rho = `diameter_ratio` the left wheel rolls
+    /// 2 s / (1 + rho) times its nominal way and the right one 2 s rho / (1 + rho) times. The track on the ground is
+    /// `track_scale` times the nominal one.
+    ///
+    /// The defaults are those of a robot that nobody has calibrated.
+    Odometry {
+        /// Right over left.
+        diameter_ratio: f64 = 1.0,
+        diameter_ratio_sd: f64 = 0.005,
+        /// The track on the ground over the nominal one.
+        track_scale: f64 = 1.0,
+        track_scale_sd: f64 = 0.015,
+        /// Mean diameter over the nominal one.
+        distance_scale: f64 = 1.0,
+        distance_scale_sd: f64 = 0.01,
+        /// Standard deviation of the way lost or won, metres per square root of a metre.
+        slip: f64 = 0.001,
+        slip_sd: f64 = 0.0005,
+        calibrated: Option<Provenance>,
+    }
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,15 +39,15 @@ pub struct Provenance {
     pub chi2_per_dof: f64,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct CalibrationPlan {
-    pub procedure: Procedure,
-    /// Standard deviation of the ratio of the diameters at which it may stop.
-    pub ratio_sd: f64,
-    pub loops: u32,
-    /// The way from the wall, or the side of the square.
-    pub drive_m: f64,
+keys! {
+    CalibrationPlan {
+        procedure: Procedure,
+        /// Standard deviation of the ratio of the diameters at which it may stop.
+        ratio_sd: f64 = 0.0005,
+        loops: u32 = 12,
+        /// The way from the wall, or the side of the square.
+        drive_m: f64 = 2.0,
+    }
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -64,31 +63,8 @@ pub enum Procedure {
     BringUp,
 }
 
-impl Default for CalibrationPlan {
-    fn default() -> Self {
-        Self { procedure: Procedure::Wall, ratio_sd: 0.0005, loops: 12, drive_m: 2.0 }
-    }
-}
-
-impl Default for Odometry {
-    fn default() -> Self {
-        Self {
-            diameter_ratio: 1.0,
-            diameter_ratio_sd: 0.005,
-            track_scale: 1.0,
-            track_scale_sd: 0.015,
-            distance_scale: 1.0,
-            distance_scale_sd: 0.01,
-            slip: 0.001,
-            slip_sd: 0.0005,
-            calibrated: None,
-        }
-    }
-}
-
 impl Odometry {
     /// The ways of the left and the right wheel over the nominal ones.
-    #[must_use]
     pub fn wheel_scales(&self) -> [f64; 2] {
         let both = 2.0 * self.distance_scale / (1.0 + self.diameter_ratio);
         [both, both * self.diameter_ratio]
@@ -122,7 +98,6 @@ struct Calibrated {
 }
 
 impl Calibration {
-    #[must_use]
     pub const fn new(odometry: Odometry) -> Self {
         Self { robot: Calibrated { odometry } }
     }

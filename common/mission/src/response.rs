@@ -3,21 +3,16 @@
 
 use std::collections::VecDeque;
 
-use serde::{Deserialize, Serialize};
-
-/// The keys of `[robot.response]`; those that are not written are the model's.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ResponseKeys {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub delay_s: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub lag_s: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub acceleration_m_s2: Option<f64>,
-    /// Without it that of two wheels at [`ResponseKeys::acceleration_m_s2`], if that is written.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub turn_acceleration_rad_s2: Option<f64>,
+keys! {
+    /// The keys of `[robot.response]`; those that are not written are the model's.
+    #[derive(Copy)]
+    ResponseKeys {
+        delay_s: Option<f64>,
+        lag_s: Option<f64>,
+        acceleration_m_s2: Option<f64>,
+        /// Without it that of two wheels at [`ResponseKeys::acceleration_m_s2`], if that is written.
+        turn_acceleration_rad_s2: Option<f64>,
+    }
 }
 
 impl ResponseKeys {
@@ -40,7 +35,6 @@ impl ResponseKeys {
     }
 }
 
-/// How a base answers commands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Response {
     /// From a command to its first effect in the odometry, as the link sees it, seconds: what a network delays is part of it.
@@ -61,26 +55,22 @@ impl Response {
         turn_acceleration_rad_s2: f64::INFINITY,
     };
 
-    /// [`Response::X80`] with accelerations.
     pub(crate) const fn limited(acceleration_m_s2: f64, turn_acceleration_rad_s2: f64) -> Self {
         Self { acceleration_m_s2, turn_acceleration_rad_s2, ..Self::X80 }
     }
 
     /// The time in which the base goes on as before, seconds: a lag delays the way by its time constant.
-    #[must_use]
     pub fn dead_time_s(&self) -> f64 {
         self.delay_s + self.lag_s
     }
 
     /// The way from the command to stand until the robot of this speed stands, metres, if the command is given `after_s` seconds later
     /// than what asked for it. `after_s` includes [`Response::dead_time_s`].
-    #[must_use]
     pub fn way_to_stop_m(&self, speed_m_s: f64, after_s: f64) -> f64 {
         speed_m_s * after_s + speed_m_s * speed_m_s / (2.0 * self.acceleration_m_s2)
     }
 
     /// The greatest speed from which the robot stops within `room_m` metres, m/s: the inverse of [`Response::way_to_stop_m`].
-    #[must_use]
     pub fn speed_to_stop_within(&self, room_m: f64, after_s: f64) -> f64 {
         if self.acceleration_m_s2.is_infinite() {
             return room_m / after_s;
@@ -91,7 +81,6 @@ impl Response {
     }
 
     /// The greatest turn rate from which the robot stops turning within `angle_rad`, rad/s, apart from its dead time.
-    #[must_use]
     pub fn turn_to_stop_within(&self, angle_rad: f64) -> f64 {
         if self.turn_acceleration_rad_s2.is_infinite() {
             return f64::INFINITY;
@@ -117,13 +106,11 @@ pub struct ModelledSpeed {
 }
 
 impl ModelledSpeed {
-    #[must_use]
     pub const fn new(delay_s: f64, most_change: f64) -> Self {
         let pending = VecDeque::new();
         Self { delay_s, most_change, pending, target: 0.0, speed: 0.0, at_s: f64::NEG_INFINITY }
     }
 
-    /// A command is given at the time `at_s`.
     pub fn command(&mut self, at_s: f64, speed: f64) {
         if self.pending.len() == MOST_PENDING
             && let Some((_, oldest)) = self.pending.pop_front()
@@ -133,7 +120,6 @@ impl ModelledSpeed {
         self.pending.push_back((at_s + self.delay_s, speed));
     }
 
-    #[must_use]
     pub const fn speed(&self) -> f64 {
         self.speed
     }

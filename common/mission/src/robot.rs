@@ -59,115 +59,65 @@ pub struct Channel {
     pub reversed: bool,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct RobotConfig {
-    /// The preset of all values that are not written.
-    pub model: Model,
-    /// The default is the model's: [`RobotConfig::protocol`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub protocol: Option<Protocol>,
-    /// Written as [`crate::address::Address`]. Without it a simulated robot is started.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub address: Option<String>,
-    pub rate_hz: f64,
-    /// r of (2).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub wheel_radius_m: Option<f64>,
-    /// W of (2); a car does not use it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub track_m: Option<f64>,
-    /// L of (3); of a car only, like the other keys of its steering.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub wheelbase_m: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub steering_limit_deg: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub steering_rate_deg_s: Option<f64>,
-    /// Counts of a whole turn of the steering; 0 is straight ahead.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub steering_counts_per_turn: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub counts_per_turn: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub radius_m: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub top_speed_m_s: Option<f64>,
-    /// A car's: the driven axle.
-    pub left: Channel,
-    /// A car's steering, positive to the left.
-    pub right: Channel,
-    /// The link makes good that the wheels turn slower than commanded; without it [`crate::Mission::speed_trim`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub speed_trim: Option<bool>,
-    /// Age at which a command no longer moves the robot.
-    pub command_limit_s: f64,
-    pub low_battery_v: BatteryLimits,
-    /// The least motor current of a wheel that something holds. A wheel that does not turn as told and draws less
-    /// counts as one with a dead encoder, and so does every such wheel if this is 0. The default is the simulated
-    /// robot's, because no X80 was measured.
-    pub held_current_ad: u16,
-    /// Its values replace `odometry` before a run starts: [`crate::Mission::with_calibration`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub calibration: Option<PathBuf>,
-    #[serde(skip_serializing_if = "ResponseKeys::is_default")]
-    pub response: ResponseKeys,
-    pub odometry: Odometry,
-    #[serde(skip_serializing_if = "ArduinoBoard::is_default")]
-    pub arduino: ArduinoBoard,
-    #[serde(skip_serializing_if = "Ros2Topics::is_default")]
-    pub ros2: Ros2Topics,
-    /// At most [`crate::MOST_SENSORS`] rows; without any those of the X80.
-    #[serde(rename = "sensor", skip_serializing_if = "Vec::is_empty")]
-    pub sensors: Vec<SensorRow>,
-}
-
-/// Volts. A battery with the limit 0 is never low. The X80's packs have six NiMH cells, 7.2 V: at 1.1 V a cell nine
-/// tenths of the charge are used, and the rest lasts for minutes. With a low board or motor battery the robot drives
-/// at half speed. If one of them is below 10/11 of its limit for 2 s, which is 1.0 V a cell, the mission ends.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct BatteryLimits {
-    pub board: f64,
-    pub motor: f64,
-    pub servo: f64,
-}
-
-impl Default for BatteryLimits {
-    fn default() -> Self {
-        Self { board: 6.6, motor: 6.6, servo: 6.6 }
+keys! {
+    RobotConfig {
+        /// The preset of all values that are not written.
+        model: Model,
+        /// The default is the model's: [`RobotConfig::protocol`].
+        protocol: Option<Protocol>,
+        /// Written as [`crate::address::Address`]. Without it a simulated robot is started.
+        address: Option<String>,
+        rate_hz: f64 = 7.0,
+        /// r of (2).
+        wheel_radius_m: Option<f64>,
+        /// W of (2); a car does not use it.
+        track_m: Option<f64>,
+        /// L of (3); of a car only, like the other keys of its steering.
+        wheelbase_m: Option<f64>,
+        steering_limit_deg: Option<f64>,
+        steering_rate_deg_s: Option<f64>,
+        /// Counts of a whole turn of the steering; 0 is straight ahead.
+        steering_counts_per_turn: Option<f64>,
+        counts_per_turn: Option<f64>,
+        radius_m: Option<f64>,
+        top_speed_m_s: Option<f64>,
+        /// A car's: the driven axle.
+        left: Channel = Channel { channel: 0, reversed: true },
+        /// A car's steering, positive to the left.
+        right: Channel = Channel { channel: 1, reversed: false },
+        /// The link makes good that the wheels turn slower than commanded; without it [`crate::Mission::speed_trim`].
+        speed_trim: Option<bool>,
+        /// Age at which a command no longer moves the robot.
+        command_limit_s: f64 = 0.25,
+        low_battery_v: BatteryLimits,
+        /// The least motor current of a wheel that something holds. A wheel that does not turn as told and draws less
+        /// counts as one with a dead encoder, and so does every such wheel if this is 0. The default is the simulated
+        /// robot's, because no X80 was measured.
+        held_current_ad: u16 = 1000,
+        /// Its values replace `odometry` before a run starts: [`crate::Mission::with_calibration`].
+        calibration: Option<PathBuf>,
+        #[serde(skip_serializing_if = "ResponseKeys::is_default")]
+        response: ResponseKeys,
+        odometry: Odometry,
+        #[serde(skip_serializing_if = "ArduinoBoard::is_default")]
+        arduino: ArduinoBoard,
+        #[serde(skip_serializing_if = "Ros2Topics::is_default")]
+        ros2: Ros2Topics,
+        /// At most [`crate::MOST_SENSORS`] rows; without any those of the X80.
+        #[serde(rename = "sensor", skip_serializing_if = "Vec::is_empty")]
+        sensors: Vec<SensorRow>,
     }
 }
 
-impl Default for RobotConfig {
-    fn default() -> Self {
-        Self {
-            model: Model::X80,
-            protocol: None,
-            address: None,
-            rate_hz: 7.0,
-            wheel_radius_m: None,
-            track_m: None,
-            wheelbase_m: None,
-            steering_limit_deg: None,
-            steering_rate_deg_s: None,
-            steering_counts_per_turn: None,
-            counts_per_turn: None,
-            radius_m: None,
-            top_speed_m_s: None,
-            left: Channel { channel: 0, reversed: true },
-            right: Channel { channel: 1, reversed: false },
-            speed_trim: None,
-            command_limit_s: 0.25,
-            low_battery_v: BatteryLimits::default(),
-            held_current_ad: 1000,
-            calibration: None,
-            response: ResponseKeys::default(),
-            odometry: Odometry::default(),
-            arduino: ArduinoBoard::default(),
-            ros2: Ros2Topics::default(),
-            sensors: Vec::new(),
-        }
+keys! {
+    /// Volts. A battery with the limit 0 is never low. The X80's packs have six NiMH cells, 7.2 V: at 1.1 V a cell nine
+    /// tenths of the charge are used, and the rest lasts for minutes. With a low board or motor battery the robot drives
+    /// at half speed. If one of them is below 10/11 of its limit for 2 s, which is 1.0 V a cell, the mission ends.
+    #[derive(Copy)]
+    BatteryLimits {
+        board: f64 = 6.6,
+        motor: f64 = 6.6,
+        servo: f64 = 6.6,
     }
 }
 
@@ -194,14 +144,11 @@ pub struct Steering {
 }
 
 impl Steering {
-    /// Radians at an encoder that stands at `counts`.
-    #[must_use]
     pub fn angle(&self, counts: f64) -> f64 {
         counts * std::f64::consts::TAU / self.counts_per_turn
     }
 
     /// Counts at the steering `angle`, radians; per second where it is a rate.
-    #[must_use]
     pub fn counts(&self, angle: f64) -> f64 {
         angle * self.counts_per_turn / std::f64::consts::TAU
     }
@@ -211,7 +158,6 @@ impl Steering {
 const CREEP_M_S: f64 = 0.1;
 
 impl Body {
-    #[must_use]
     pub fn drive(&self) -> Drive {
         let top = self.top_speed_m_s / self.wheel_radius_m;
         match self.ackermann() {
@@ -223,7 +169,6 @@ impl Body {
     }
 
     /// None for a robot with two driven wheels.
-    #[must_use]
     pub fn ackermann(&self) -> Option<Ackermann> {
         let steering = self.steering?;
         Some(Ackermann::new(
@@ -235,8 +180,6 @@ impl Body {
         ))
     }
 
-    /// The way of the rim per encoder count.
-    #[must_use]
     pub fn metres_per_count(&self) -> f64 {
         std::f64::consts::TAU * self.wheel_radius_m / self.counts_per_turn
     }
@@ -262,12 +205,10 @@ const fn differential(
 }
 
 impl Model {
-    #[must_use]
     pub const fn is_x80(self) -> bool {
         matches!(self, Self::X80 | Self::X80sv | Self::Car)
     }
 
-    #[must_use]
     pub const fn body(self) -> Body {
         match self {
             Self::X80 => Body {
@@ -323,7 +264,6 @@ impl Model {
 }
 
 impl RobotConfig {
-    #[must_use]
     pub fn protocol(&self) -> Protocol {
         self.protocol.unwrap_or(match self.model.is_x80() {
             true => Protocol::X80,
@@ -331,7 +271,6 @@ impl RobotConfig {
         })
     }
 
-    #[must_use]
     pub fn body(&self) -> Body {
         let preset = self.model.body();
         let track_m = self.track_m.unwrap_or(preset.track_m);

@@ -1,39 +1,22 @@
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
-
-/// The defaults are the names that ROS robots have. A relative name is taken from the root.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Ros2Topics {
-    /// `nav_msgs/Odometry`.
-    pub odom: String,
-    /// `sensor_msgs/LaserScan`.
-    pub scan: String,
-    /// `geometry_msgs/Twist`.
-    pub cmd_vel: String,
-    /// Commands are `geometry_msgs/TwistStamped` instead.
-    pub stamped: bool,
-    /// `sensor_msgs/BatteryState`.
-    pub battery: String,
-    /// `sensor_msgs/Imu`; none by default.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub imu: Option<String>,
-    /// `sensor_msgs/Range` of sonars and infrared rangers, by the names of their rows.
-    pub ranges: BTreeMap<String, String>,
-}
-
-impl Default for Ros2Topics {
-    fn default() -> Self {
-        Self {
-            odom: "/odom".to_owned(),
-            scan: "/scan".to_owned(),
-            cmd_vel: "/cmd_vel".to_owned(),
-            stamped: false,
-            battery: "/battery_state".to_owned(),
-            imu: None,
-            ranges: BTreeMap::new(),
-        }
+keys! {
+    /// The defaults are the names that ROS robots have. A relative name is taken from the root.
+    Ros2Topics {
+        /// `nav_msgs/Odometry`.
+        odom: String = "/odom".to_owned(),
+        /// `sensor_msgs/LaserScan`.
+        scan: String = "/scan".to_owned(),
+        /// `geometry_msgs/Twist`.
+        cmd_vel: String = "/cmd_vel".to_owned(),
+        /// Commands are `geometry_msgs/TwistStamped` instead.
+        stamped: bool,
+        /// `sensor_msgs/BatteryState`.
+        battery: String = "/battery_state".to_owned(),
+        /// `sensor_msgs/Imu`; none by default.
+        imu: Option<String>,
+        /// `sensor_msgs/Range` of sonars and infrared rangers, by the names of their rows.
+        ranges: BTreeMap<String, String>,
     }
 }
 

@@ -63,14 +63,29 @@ pub enum SensorModel {
     Lds02,
 }
 
+/// What the source of a [`SensorModel`] says of it.
+pub(crate) struct Product {
+    pub(crate) kind: SensorKind,
+    /// A ray has 0.
+    field_of_view_deg: f64,
+    reach_m: f64,
+    least_m: f64,
+    /// A sensor that is no laser has 1.
+    beams: usize,
+    noise: (f64, f64),
+}
+
 impl SensorModel {
-    #[must_use]
-    pub const fn kind(self) -> SensorKind {
-        match self {
-            Self::Dur5200 => SensorKind::Cone,
-            Self::X80Infrared => SensorKind::Ray,
-            Self::Ust10lx | Self::RplidarA1 | Self::Lds02 => SensorKind::Scan,
-        }
+    pub(crate) const fn product(self) -> Product {
+        use SensorKind::{Cone, Ray, Scan};
+        let (kind, field_of_view_deg, reach_m, least_m, beams, noise) = match self {
+            Self::Dur5200 => (Cone, 30.0, 2.55, 0.0, 1, (0.0, 0.0)),
+            Self::X80Infrared => (Ray, 0.0, 0.81, 0.0, 1, (0.0, 0.0)),
+            Self::Ust10lx => (Scan, 270.0, 10.0, 0.06, 1081, (0.02, 0.0)),
+            Self::RplidarA1 => (Scan, 360.0, 12.0, 0.15, 360, (0.005, 0.005)),
+            Self::Lds02 => (Scan, 360.0, 8.0, 0.16, 360, (0.0075, 0.025)),
+        };
+        Product { kind, field_of_view_deg, reach_m, least_m, beams, noise }
     }
 
     const fn of(kind: SensorKind) -> Self {
@@ -81,79 +96,40 @@ impl SensorModel {
         }
     }
 
-    /// A ray has 0.
-    #[must_use]
-    pub const fn field_of_view_deg(self) -> f64 {
-        match self {
-            Self::Dur5200 => 30.0,
-            Self::X80Infrared => 0.0,
-            Self::Ust10lx => 270.0,
-            Self::RplidarA1 | Self::Lds02 => 360.0,
-        }
-    }
-
-    #[must_use]
-    pub const fn reach_m(self) -> f64 {
-        match self {
-            Self::Dur5200 => 2.55,
-            Self::X80Infrared => 0.81,
-            Self::Ust10lx => 10.0,
-            Self::RplidarA1 => 12.0,
-            Self::Lds02 => 8.0,
-        }
-    }
-
     /// Reach at a black surface, which reflects a tenth of the light. The specification of the UST-10LX gives 4 m, and
     /// 10 m for white. The others are given the same share of their reach, which is nominal: Slamtec gives it for its
     /// RPLIDAR A3 (black 10 m, white 25 m).
-    #[must_use]
     pub const fn black_reach_m(self) -> f64 {
         0.4 * self.reach_m()
     }
 
-    #[must_use]
-    pub const fn least_m(self) -> f64 {
-        match self {
-            Self::Dur5200 | Self::X80Infrared => 0.0,
-            Self::Ust10lx => 0.06,
-            Self::RplidarA1 => 0.15,
-            Self::Lds02 => 0.16,
-        }
+    pub const fn field_of_view_deg(self) -> f64 {
+        self.product().field_of_view_deg
     }
 
-    /// A sensor that is no laser has 1.
-    #[must_use]
-    pub const fn beams(self) -> usize {
-        match self {
-            Self::Dur5200 | Self::X80Infrared => 1,
-            Self::Ust10lx => 1081,
-            Self::RplidarA1 | Self::Lds02 => 360,
-        }
+    pub const fn reach_m(self) -> f64 {
+        self.product().reach_m
+    }
+
+    pub const fn least_m(self) -> f64 {
+        self.product().least_m
     }
 
     /// Standard deviation of a range: metres, and a share of it. The manuals give 15 mm up to half a metre and 5 %
     /// beyond for the LDS-02, less than 1 % for the A1, 40 mm at most for the UST-10LX: these are taken as two
     /// deviations.
-    #[must_use]
     pub const fn beam_noise(self) -> (f64, f64) {
-        match self {
-            Self::Dur5200 | Self::X80Infrared => (0.0, 0.0),
-            Self::Ust10lx => (0.02, 0.0),
-            Self::RplidarA1 => (0.005, 0.005),
-            Self::Lds02 => (0.0075, 0.025),
-        }
+        self.product().noise
     }
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorRow {
-    /// The name in logs and reasons.
     pub name: String,
     pub kind: SensorKind,
     /// Of an X80: a cone has the sonar's index in the standard frame, 0 to 5, a ray the infrared ranger, 0 to 6. Other robots' protocols
     /// have no channels.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub channel: Option<u8>,
     /// Distance from the robot's centre along its bearing.
     pub forward_m: f64,
@@ -166,19 +142,14 @@ pub struct SensorRow {
     #[serde(default, skip_serializing_if = "is_zero")]
     pub roll_deg: f64,
     /// The default is the model's; a ray has none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field_of_view_deg: Option<f64>,
     /// The default is the model's.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reach_m: Option<f64>,
     /// Beams lie evenly over the field of view; the default is the model's.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beams: Option<u16>,
     /// A sensor may measure less often than the frames come. Readings between are not used.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
     /// The default is the X80's.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<SensorModel>,
 }
 
@@ -186,21 +157,15 @@ fn is_zero(deg: &f64) -> bool {
     *deg == 0.0
 }
 
-/// The front sonar of a robot without `[[robot.sensor]]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct SonarConfig {
-    /// The index among the six of the standard frame.
-    pub index: u8,
-    /// Distance from the robot's centre along its bearing; the paper writes W/2.
-    pub forward_m: f64,
-    /// delta of (19), from the robot's axis.
-    pub bearing_deg: f64,
-}
-
-impl Default for SonarConfig {
-    fn default() -> Self {
-        Self { index: 1, forward_m: 0.1915, bearing_deg: 0.0 }
+keys! {
+    /// The front sonar of a robot without `[[robot.sensor]]`.
+    SonarConfig {
+        /// The index among the six of the standard frame.
+        index: u8 = 1,
+        /// Distance from the robot's centre along its bearing; the paper writes W/2.
+        forward_m: f64 = 0.1915,
+        /// delta of (19), from the robot's axis.
+        bearing_deg: f64,
     }
 }
 
@@ -225,6 +190,7 @@ pub struct Sensor {
 impl Sensor {
     fn of(row: &SensorRow, channel: u8, rate_hz: f64) -> Self {
         let model = row.model.unwrap_or(SensorModel::of(row.kind));
+        let product = model.product();
         Self {
             name: row.name.clone(),
             kind: row.kind,
@@ -234,18 +200,17 @@ impl Sensor {
                 bearing_rad: row.bearing_deg.to_radians(),
                 turned_rad: row.turned_deg.to_radians(),
             },
-            field_of_view_deg: row.field_of_view_deg.unwrap_or(model.field_of_view_deg()),
-            reach_m: row.reach_m.unwrap_or(model.reach_m()),
+            field_of_view_deg: row.field_of_view_deg.unwrap_or(product.field_of_view_deg),
+            reach_m: row.reach_m.unwrap_or(product.reach_m),
             every_ticks: row.rate_hz.map_or(1.0, |hz| (rate_hz / hz).round().max(1.0)) as u64,
             is_upside_down: row.roll_deg != 0.0,
-            beams: row.beams.map_or(model.beams(), usize::from),
+            beams: row.beams.map_or(product.beams, usize::from),
             model,
             used: false,
         }
     }
 
     /// Bearing of the first beam from the sensor's own, and the angle from beam to beam, radians counter-clockwise.
-    #[must_use]
     pub fn fan(&self) -> (f64, f64) {
         let wide = self.field_of_view_deg.to_radians();
         // The first and last beam of a whole turn would coincide.
@@ -266,7 +231,6 @@ impl Sensor {
     }
 
     /// The number of a beam before [`Sensor::mirror`] or after it.
-    #[must_use]
     pub fn mirrored(&self, beam: usize) -> usize {
         match (self.is_upside_down, self.field_of_view_deg >= 360.0) {
             (false, _) => beam,
@@ -277,7 +241,6 @@ impl Sensor {
 
     /// Angle from the robot's axis to where it turns to look at a place. For a laser that sees all around it is the
     /// bearing: such a laser is never turned.
-    #[must_use]
     pub fn faces_rad(&self) -> f64 {
         match self.field_of_view_deg >= 360.0 {
             true => self.mount.bearing_rad,
@@ -285,7 +248,6 @@ impl Sensor {
         }
     }
 
-    #[must_use]
     pub fn bearing_deg(&self) -> f64 {
         self.mount.bearing_rad.to_degrees()
     }
@@ -354,29 +316,11 @@ pub(crate) fn front(table: &[Sensor], sonar: &SonarConfig) -> Option<usize> {
     candidates.min_by(|(_, a), (_, b)| ahead(a).total_cmp(&ahead(b))).map(|(index, _)| index)
 }
 
-pub(crate) fn laser(model: SensorModel, forward_m: f64, turned_deg: f64) -> Vec<SensorRow> {
-    vec![SensorRow {
-        name: "laser".to_owned(),
-        kind: SensorKind::Scan,
-        channel: None,
-        forward_m,
-        bearing_deg: 0.0,
-        turned_deg,
-        roll_deg: 0.0,
-        field_of_view_deg: None,
-        reach_m: None,
-        beams: None,
-        rate_hz: None,
-        model: Some(model),
-    }]
-}
-
-/// The car has the same boards and sensors.
-pub(crate) fn x80(radius_m: f64, sonar: &SonarConfig) -> Vec<SensorRow> {
-    let row = |name: String, kind, channel, forward_m, bearing_deg| SensorRow {
-        name,
+fn row(name: impl Into<String>, kind: SensorKind, forward_m: f64, bearing_deg: f64) -> SensorRow {
+    SensorRow {
+        name: name.into(),
         kind,
-        channel: Some(channel),
+        channel: None,
         forward_m,
         bearing_deg,
         turned_deg: 0.0,
@@ -386,10 +330,19 @@ pub(crate) fn x80(radius_m: f64, sonar: &SonarConfig) -> Vec<SensorRow> {
         beams: None,
         rate_hz: None,
         model: None,
-    };
-    let cone = |name: &str, beside: u8, forward_m, bearing_deg| {
-        let channel = (sonar.index % SONARS as u8 + beside) % SONARS as u8;
-        row(name.to_owned(), SensorKind::Cone, channel, forward_m, bearing_deg)
+    }
+}
+
+pub(crate) fn laser(model: SensorModel, forward_m: f64, turned_deg: f64) -> Vec<SensorRow> {
+    let laser = row("laser", SensorKind::Scan, forward_m, 0.0);
+    vec![SensorRow { turned_deg, model: Some(model), ..laser }]
+}
+
+/// The car has the same boards and sensors.
+pub(crate) fn x80(radius_m: f64, sonar: &SonarConfig) -> Vec<SensorRow> {
+    let cone = |name, beside: u8, forward_m, bearing_deg| SensorRow {
+        channel: Some((sonar.index % SONARS as u8 + beside) % SONARS as u8),
+        ..row(name, SensorKind::Cone, forward_m, bearing_deg)
     };
     let ahead = sonar.bearing_deg;
     let cones = [
@@ -397,9 +350,9 @@ pub(crate) fn x80(radius_m: f64, sonar: &SonarConfig) -> Vec<SensorRow> {
         cone("front-left", 5, SIDE_FORWARD_M, ahead + SIDE_BEARING_DEG),
         cone("front-right", 1, SIDE_FORWARD_M, ahead - SIDE_BEARING_DEG),
     ];
-    let rays = (0..).zip(RING).map(|(channel, (bearing_deg, share))| {
-        let name = format!("infrared-{channel}");
-        row(name, SensorKind::Ray, channel, share * radius_m, bearing_deg)
+    let rays = (0..).zip(RING).map(|(channel, (bearing_deg, share))| SensorRow {
+        channel: Some(channel),
+        ..row(format!("infrared-{channel}"), SensorKind::Ray, share * radius_m, bearing_deg)
     });
     cones.into_iter().chain(rays).collect()
 }

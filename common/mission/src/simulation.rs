@@ -9,30 +9,29 @@ use serde::{Deserialize, Serialize};
 
 use crate::geometry::Shapes;
 
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Simulation {
-    /// The preset of every key that is not written.
-    pub realism: Realism,
-    /// One real robot is said to ignore the time limit of commands.
-    pub ignores_time: bool,
-    /// The host's silence after which the motors stop; by default they never do.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub stops_when_silent_s: Option<f64>,
-    pub sonar: SonarKeys,
-    pub infrared: InfraredKeys,
-    pub laser: LaserKeys,
-    pub wheels: WheelKeys,
-    pub heights: HeightKeys,
-    pub battery: BatteryKeys,
-    pub radio: RadioKeys,
-    /// Rangers besides the front one and the two at its sides.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub ring: Vec<Ranger>,
-    #[serde(rename = "thing", skip_serializing_if = "Vec::is_empty")]
-    pub things: Vec<Thing>,
-    #[serde(rename = "block", skip_serializing_if = "Vec::is_empty")]
-    pub blocks: Vec<Block>,
+keys! {
+    Simulation {
+        /// The preset of every key that is not written.
+        realism: Realism,
+        /// One real robot is said to ignore the time limit of commands.
+        ignores_time: bool,
+        /// The host's silence after which the motors stop; by default they never do.
+        stops_when_silent_s: Option<f64>,
+        sonar: SonarKeys,
+        infrared: InfraredKeys,
+        laser: LaserKeys,
+        wheels: WheelKeys,
+        heights: HeightKeys,
+        battery: BatteryKeys,
+        radio: RadioKeys,
+        /// Rangers besides the front one and the two at its sides.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        ring: Vec<Ranger>,
+        #[serde(rename = "thing", skip_serializing_if = "Vec::is_empty")]
+        things: Vec<Thing>,
+        #[serde(rename = "block", skip_serializing_if = "Vec::is_empty")]
+        blocks: Vec<Block>,
+    }
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -49,7 +48,6 @@ pub enum Realism {
 impl Realism {
     pub const ALL: [Self; 3] = [Self::Laboratory, Self::Measured, Self::Harsh];
 
-    #[must_use]
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::Laboratory => "laboratory",
@@ -79,7 +77,6 @@ pub struct Thing {
     #[serde(default)]
     pub from_s: f64,
     /// None is never.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub until_s: Option<f64>,
     /// Positions in order of time, with straight lines between them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -93,7 +90,6 @@ pub struct Block {
     pub wheels: BlockedWheels,
     #[serde(default)]
     pub from_s: f64,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub until_s: Option<f64>,
 }
 
@@ -113,12 +109,8 @@ pub struct Move {
     pub by: DVec2,
 }
 
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct OutOfRange {
-    pub(super) key: &'static str,
-    pub(super) value: f64,
-    pub(super) range: std::ops::RangeInclusive<f64>,
-}
+/// A key with its value and the range for it.
+type Ranged = (&'static str, f64, std::ops::RangeInclusive<f64>);
 
 /// Makes two structs from one table of keys: the settled one that the simulator reads, and the written one, whose keys may all be
 /// missing. The columns of the table are key, range, laboratory, measured, harsh.
@@ -136,7 +128,6 @@ macro_rules! section {
         }
 
         impl $settled {
-            #[must_use]
             pub const fn preset(realism: Realism) -> Self {
                 match realism {
                     Realism::Laboratory => Self { $($key: $laboratory,)* },
@@ -150,18 +141,8 @@ macro_rules! section {
                 $((concat!($table, ".", stringify!($key)), [$laboratory, $measured, $harsh]),)*
             ];
 
-            pub(super) fn check(&self) -> Result<(), OutOfRange> {
-                $(
-                    let range: std::ops::RangeInclusive<f64> = $range;
-                    if !range.contains(&self.$key) {
-                        return Err(OutOfRange {
-                            key: concat!($table, ".", stringify!($key)),
-                            value: self.$key,
-                            range,
-                        });
-                    }
-                )*
-                Ok(())
+            fn ranges(&self) -> Vec<Ranged> {
+                vec![$((concat!($table, ".", stringify!($key)), self.$key, $range),)*]
             }
         }
 
@@ -169,11 +150,10 @@ macro_rules! section {
         #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
         #[serde(deny_unknown_fields, default)]
         pub struct $written {
-            $($(#[$doc])* #[serde(skip_serializing_if = "Option::is_none")] pub $key: Option<f64>,)*
+            $($(#[$doc])* pub $key: Option<f64>,)*
         }
 
         impl $written {
-            #[must_use]
             pub fn over(&self, realism: Realism) -> $settled {
                 let preset = $settled::preset(realism);
                 $settled { $($key: self.$key.unwrap_or(preset.$key),)* }
@@ -347,58 +327,42 @@ section! {
 }
 
 impl Heights {
-    #[must_use]
     pub fn touched(&self, shapes: &Shapes) -> Shapes {
         shapes.between(self.ground_clearance_m, self.body_top_m)
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Physics {
-    pub sonar: SonarPhysics,
-    pub infrared: InfraredPhysics,
-    pub laser: LaserTiming,
-    pub wheels: WheelPhysics,
-    pub heights: Heights,
-    pub battery: BatteryPhysics,
-    pub radio: Radio,
+/// The sections, in the order of the guide.
+macro_rules! physics {
+    ($($section:ident: $settled:ident,)*) => {
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct Physics {
+            $(pub $section: $settled,)*
+        }
+
+        impl Simulation {
+            pub fn physics(&self) -> Physics {
+                Physics { $($section: self.$section.over(self.realism),)* }
+            }
+
+            pub fn presets() -> impl Iterator<Item = (&'static str, [f64; 3])> {
+                [$($settled::PRESETS,)*].into_iter().flatten().copied()
+            }
+
+            pub(super) fn ranges(&self) -> Vec<Ranged> {
+                let physics = self.physics();
+                [$(physics.$section.ranges(),)*].concat()
+            }
+        }
+    };
 }
 
-impl Simulation {
-    #[must_use]
-    pub fn physics(&self) -> Physics {
-        Physics {
-            sonar: self.sonar.over(self.realism),
-            infrared: self.infrared.over(self.realism),
-            laser: self.laser.over(self.realism),
-            wheels: self.wheels.over(self.realism),
-            heights: self.heights.over(self.realism),
-            battery: self.battery.over(self.realism),
-            radio: self.radio.over(self.realism),
-        }
-    }
-
-    pub fn presets() -> impl Iterator<Item = (&'static str, [f64; 3])> {
-        let sections = [
-            SonarPhysics::PRESETS,
-            InfraredPhysics::PRESETS,
-            LaserTiming::PRESETS,
-            WheelPhysics::PRESETS,
-            Heights::PRESETS,
-            BatteryPhysics::PRESETS,
-            Radio::PRESETS,
-        ];
-        sections.into_iter().flatten().copied()
-    }
-
-    pub(super) fn check_physics(&self) -> Result<(), OutOfRange> {
-        let physics = self.physics();
-        physics.sonar.check()?;
-        physics.infrared.check()?;
-        physics.laser.check()?;
-        physics.wheels.check()?;
-        physics.heights.check()?;
-        physics.battery.check()?;
-        physics.radio.check()
-    }
+physics! {
+    sonar: SonarPhysics,
+    infrared: InfraredPhysics,
+    laser: LaserTiming,
+    wheels: WheelPhysics,
+    heights: Heights,
+    battery: BatteryPhysics,
+    radio: Radio,
 }

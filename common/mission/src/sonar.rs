@@ -19,20 +19,17 @@ pub struct Mount {
 
 impl Mount {
     /// The heading is the direction of the beam, or of the middle one.
-    #[must_use]
     pub fn on(&self, robot: Pose2) -> Pose2 {
         let outward = robot.heading + self.bearing_rad;
         let position = robot.position + self.forward_m * DVec2::from_angle(outward);
         Pose2 { position, heading: outward + self.turned_rad }
     }
 
-    #[must_use]
     pub fn looks_rad(&self) -> f64 {
         self.bearing_rad + self.turned_rad
     }
 
     /// The point of (19), metres: `range_m` away on the axis of a ranger on `robot`.
-    #[must_use]
     pub fn hit(&self, robot: Pose2, range_m: f64) -> DVec2 {
         let ranger = self.on(robot);
         ranger.position + ranger.axis() * range_m

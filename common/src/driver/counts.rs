@@ -19,7 +19,6 @@ pub enum WheelCounts {
 
 impl WheelCounts {
     /// The counts of a tick; `endless` ones belong to the same tick.
-    #[must_use]
     pub fn of(wheels: &WheelSample, endless: Option<&CountsSample>) -> Self {
         let endless = endless.map(|counts| [counts.left_counts, counts.right_counts]);
         // Any process may have written them.
@@ -30,7 +29,6 @@ impl WheelCounts {
     }
 
     /// The counts in their cycle.
-    #[must_use]
     pub fn cyclic(self) -> [u16; 2] {
         match self {
             Self::Cyclic(counts) => counts,
@@ -41,7 +39,6 @@ impl WheelCounts {
     }
 
     /// Counts of each wheel since `before`, the shorter way round if either is cyclic.
-    #[must_use]
     pub fn since(self, before: Self) -> [f64; 2] {
         if let (Self::Endless(new), Self::Endless(old)) = (self, before) {
             return [0, 1].map(|wheel| new[wheel] - old[wheel]);
@@ -52,7 +49,6 @@ impl WheelCounts {
 
     /// The robot probably booted after `before`: these counts are near the start value of a booted robot, and those were not. A robot
     /// that drove back to its start gives the same counts, so a caller that received frames in between needs further evidence.
-    #[must_use]
     pub fn restarted_since(self, before: Self) -> bool {
         let start = match self {
             Self::Cyclic(_) => Self::Cyclic([0; 2]),

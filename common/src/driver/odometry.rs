@@ -107,13 +107,11 @@ fn is_start(pose: Pose2) -> bool {
 }
 
 /// The drive of wheels without a speed limit.
-#[must_use]
 pub fn drive(body: &Body) -> DifferentialDrive {
     DifferentialDrive::new(body.wheel_radius_m, body.track_m, f64::INFINITY)
 }
 
 /// The motion of left and right wheels at these angles and speeds, radians and rad/s; `held` by something each or not.
-#[must_use]
 pub fn motion(body: &Body, turned: [f64; 2], speeds: [f64; 2], held: [bool; 2]) -> Motion {
     let counts = |angle: f64| (angle * body.counts_per_turn / TAU).round();
     let [left, right] = turned.map(|angle| counts(angle).clamp(-MOST_COUNTS, MOST_COUNTS));
@@ -138,14 +136,12 @@ pub fn motion(body: &Body, turned: [f64; 2], speeds: [f64; 2], held: [bool; 2]) 
 }
 
 /// `counts` are wheel speeds, counts/s.
-#[must_use]
 pub fn twist(body: &Body, counts: [i16; 2]) -> Twist {
     let [left, right] = wheel_speeds(body, counts);
     drive(body).twist(WheelSpeeds { right, left })
 }
 
 /// Converts counts/s to rad/s.
-#[must_use]
 pub fn wheel_speeds(body: &Body, counts: [i16; 2]) -> [f64; 2] {
     counts.map(|counts| f64::from(counts) * TAU / body.counts_per_turn)
 }

@@ -3,33 +3,28 @@
 
 use glam::DVec2;
 
-use bus::{ZeroCopySend, layouts};
+use bus::ZeroCopySend;
 use mission::grid::{GridFrame, Window};
 
-/// A map's frame, and the window of one version, in the headers of `grid` and `field`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.Part")]
-#[repr(C)]
-pub struct Part {
-    /// The version of the map with these cells. Consecutive versions differ in one window; an empty one means no change.
-    pub version: u64,
-    /// N: the map is N x N cells.
-    pub cells: u32,
-    pub col: u32,
-    pub row: u32,
-    pub width: u32,
-    pub height: u32,
-    /// 1: the window is the whole map. Otherwise it changes the version before.
-    pub keyframe: u32,
-    /// Delta: side of a cell, metres.
-    pub resolution_m: f64,
-    /// Centre of cell (N/2, N/2), metres.
-    pub centre_x_m: f64,
-    pub centre_y_m: f64,
-}
-
-layouts! {
-    Part { version cells col row width height keyframe resolution_m centre_x_m centre_y_m }
+crate::structs! {
+    /// A map's frame, and the window of one version, in the headers of `grid` and `field`.
+    "firsthand.Part" Part {
+        /// The version of the map with these cells. Consecutive versions differ in one window; an empty one means no change.
+        version: u64,
+        /// N: the map is N x N cells.
+        cells: u32,
+        col: u32,
+        row: u32,
+        width: u32,
+        height: u32,
+        /// 1: the window is the whole map. Otherwise it changes the version before.
+        keyframe: u32,
+        /// Delta: side of a cell, metres.
+        resolution_m: f64,
+        /// Centre of cell (N/2, N/2), metres.
+        centre_x_m: f64,
+        centre_y_m: f64,
+    }
 }
 
 impl Part {

@@ -4,7 +4,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    bus::{Stamp, ZeroCopySend, layouts},
+    bus::ZeroCopySend,
     geometry::principal_axes,
     grid::Part,
     kinematics::{Pose2, Twist},
@@ -89,41 +89,39 @@ impl PoseSample {
 /// The most sonar readings in a `grid` sample: 128 ticks of three sonars.
 pub const CLEAR_BEAMS: usize = 3 * 128;
 
-/// One reading as evidence of free ground: for a sonar, nothing square to the beam stands nearer than `clear_m`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ZeroCopySend)]
-#[type_name("firsthand.ClearBeam")]
-#[repr(C)]
-pub struct ClearBeam {
-    /// The sensor's place, metres in the mission frame.
-    pub x_m: f32,
-    pub y_m: f32,
-    /// The direction of the sensor, radians counter-clockwise from x.
-    pub bearing_rad: f32,
-    pub clear_m: f32,
+structs! {
+    /// One reading as evidence of free ground: for a sonar, nothing square to the beam stands nearer than `clear_m`.
+    #[derive(Serialize, Deserialize)]
+    "firsthand.ClearBeam" ClearBeam {
+        /// The sensor's place, metres in the mission frame.
+        x_m: f32,
+        y_m: f32,
+        /// The direction of the sensor, radians counter-clockwise from x.
+        bearing_rad: f32,
+        clear_m: f32,
+    }
 }
 
 /// The most infrared rays in a `grid` sample: 32 ticks.
 pub const CLEAR_RAYS: usize = 32 * INFRARED_RANGERS;
 
-/// The slice is one [`crate::grid::CellState`] byte a cell of the window.
-#[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.GridHeader")]
-#[repr(C)]
-pub struct GridHeader {
-    pub stamp: Stamp,
-    pub part: Part,
-    /// Range samples that have put a hazard on the map.
-    pub safety_events: u64,
-    /// Each reset of the sensed belief begins another epoch.
-    pub epoch: u64,
-    /// 0 by the paper's method.
-    pub clear_beam_count: u64,
-    /// The newest sonar readings, oldest first.
-    pub clear_beams: [ClearBeam; CLEAR_BEAMS],
-    /// 0 without infrared rangers in the evidence.
-    pub clear_ray_count: u64,
-    /// The newest infrared readings, oldest first: nothing stands on the ray nearer than `clear_m`, at any angle.
-    pub clear_rays: [ClearBeam; CLEAR_RAYS],
+payloads! {
+    /// The slice is one [`crate::grid::CellState`] byte a cell of the window.
+    "firsthand.GridHeader" GridHeader {
+        part: Part,
+        /// Range samples that have put a hazard on the map.
+        safety_events: u64,
+        /// Each reset of the sensed belief begins another epoch.
+        epoch: u64,
+        /// 0 by the paper's method.
+        clear_beam_count: u64,
+        /// The newest sonar readings, oldest first.
+        clear_beams: [ClearBeam; CLEAR_BEAMS],
+        /// 0 without infrared rangers in the evidence.
+        clear_ray_count: u64,
+        /// The newest infrared readings, oldest first: nothing stands on the ray nearer than `clear_m`, at any angle.
+        clear_rays: [ClearBeam; CLEAR_RAYS],
+    }
 }
 
 impl GridHeader {
@@ -133,21 +131,6 @@ impl GridHeader {
 
     pub fn clear_rays(&self) -> &[ClearBeam] {
         counted(&self.clear_rays, self.clear_ray_count)
-    }
-}
-
-impl Default for GridHeader {
-    fn default() -> Self {
-        Self {
-            stamp: Stamp::default(),
-            part: Part::default(),
-            safety_events: 0,
-            epoch: 0,
-            clear_beam_count: 0,
-            clear_beams: [ClearBeam::default(); CLEAR_BEAMS],
-            clear_ray_count: 0,
-            clear_rays: [ClearBeam::default(); CLEAR_RAYS],
-        }
     }
 }
 
@@ -173,17 +156,17 @@ wire_enum! {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ZeroCopySend)]
-#[type_name("firsthand.TargetPoint")]
-#[repr(C)]
-pub struct TargetPoint {
-    /// X_T, metres in the mission frame.
-    pub x_m: f64,
-    pub y_m: f64,
-    /// Radians counter-clockwise from x.
-    pub heading_rad: f64,
-    /// 1: an arrival needs `heading_rad` too.
-    pub has_heading: u8,
+structs! {
+    #[derive(Serialize, Deserialize)]
+    "firsthand.TargetPoint" TargetPoint {
+        /// X_T, metres in the mission frame.
+        x_m: f64,
+        y_m: f64,
+        /// Radians counter-clockwise from x.
+        heading_rad: f64,
+        /// 1: an arrival needs `heading_rad` too.
+        has_heading: u8,
+    }
 }
 
 impl TargetPoint {
@@ -302,15 +285,14 @@ payloads! {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.FieldCell")]
-#[repr(C)]
-pub struct FieldCell {
-    /// (ex, ey) at the cell's centre: unit vector, 0 where there is no guidance.
-    pub ex: f32,
-    pub ey: f32,
-    /// log2 u; -inf on hazards and where the target cannot be reached.
-    pub log2_u: f32,
+structs! {
+    "firsthand.FieldCell" FieldCell {
+        /// (ex, ey) at the cell's centre: unit vector, 0 where there is no guidance.
+        ex: f32,
+        ey: f32,
+        /// log2 u; -inf on hazards and where the target cannot be reached.
+        log2_u: f32,
+    }
 }
 
 wire_enum! {
@@ -346,11 +328,4 @@ payloads! {
         /// A [`CommandState`].
         state: u8,
     }
-}
-
-layouts! {
-    TargetPoint { x_m y_m heading_rad has_heading }
-    ClearBeam { x_m y_m bearing_rad clear_m }
-    GridHeader { stamp part safety_events epoch clear_beam_count clear_beams clear_ray_count clear_rays }
-    FieldCell { ex ey log2_u }
 }

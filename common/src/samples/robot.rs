@@ -4,7 +4,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    bus::{Stamp, ZeroCopySend, layouts},
+    bus::ZeroCopySend,
     latency,
     mission::{INFRARED_RANGERS, Sensor},
 };
@@ -28,18 +28,18 @@ payloads! {
     "firsthand.RangesHeader" RangesHeader {}
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ZeroCopySend)]
-#[type_name("firsthand.RangeReading")]
-#[repr(C)]
-pub struct RangeReading {
-    /// S of (19): metres from the sensor if the status says so; else 0.
-    pub range_m: f64,
-    /// The value as sent: centimetres of a sonar, AD counts of an infrared ranger; 0 if none came.
-    pub raw: u16,
-    /// The row of [`crate::mission::Mission::sensor_table`].
-    pub sensor: u8,
-    /// A [`RangeStatus`].
-    pub status: u8,
+structs! {
+    #[derive(Serialize, Deserialize)]
+    "firsthand.RangeReading" RangeReading {
+        /// S of (19): metres from the sensor if the status says so; else 0.
+        range_m: f64,
+        /// The value as sent: centimetres of a sonar, AD counts of an infrared ranger; 0 if none came.
+        raw: u16,
+        /// The row of [`crate::mission::Mission::sensor_table`].
+        sensor: u8,
+        /// A [`RangeStatus`].
+        status: u8,
+    }
 }
 
 impl RangeReading {
@@ -110,7 +110,6 @@ impl ScanHeader {
         Sweep { first_beam_ns, beam_ns, first_beam }
     }
 
-    #[must_use]
     pub const fn swept(self, sweep: Sweep) -> Self {
         let Sweep { first_beam_ns, beam_ns, first_beam } = sweep;
         Self { first_beam_ns, beam_ns, first_beam, ..self }
@@ -219,79 +218,47 @@ wire_enum! {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.Link")]
-#[repr(C)]
-pub struct LinkSample {
-    pub stamp: Stamp,
-    /// 1: the robot answers.
-    pub connected: u32,
-    /// The failsafe's [`Action`].
-    pub action: u8,
-    /// The [`Cause`] of the action.
-    pub cause: u8,
-    /// 1: no wheel turns, by the encoders; 0: one does, or it is not known.
-    pub at_rest: u8,
-    pub frames_in: u64,
-    /// Bytes that belonged to no frame.
-    pub bytes_dropped: u64,
-    /// Dropped, because another address sent them.
-    pub foreign_datagrams: u64,
-    pub unsent: u64,
-    /// Samples of processes that the supervisor does not name.
-    pub ignored_samples: u64,
-    /// 0 for none.
-    pub ignored_writer: u32,
-    /// Another port from which the robot's host answered; 0 for none.
-    pub other_port: u32,
-    pub losses: u64,
-    /// Times the robot was seen to restart its counts.
-    pub reboots: u64,
-    /// Time without an answer, of the machine's clock; 0 while the robot answers.
-    pub lost_ns: u64,
-    /// Pings, or attempts to connect, since the robot was lost.
-    pub attempts: u64,
-    /// Time until the next attempt, of the machine's clock.
-    pub next_attempt_ns: u64,
-    pub commands_out: u64,
-    pub repeated_commands: u64,
-    /// Ticks given to the stages again, because no command came.
-    pub repeated_ticks: u64,
-    /// The last tick's, from the datagram in to the datagram out.
-    pub latency_ns: u64,
-    /// The longest in this process of the link.
-    pub latency_max_ns: u64,
-    /// A [`crate::latency::Histogram`] of this process: bucket k counts latencies from 2^(k/8) microseconds.
-    pub latency_histogram: [u32; latency::BUCKETS],
-}
-
-impl Default for LinkSample {
-    fn default() -> Self {
-        Self {
-            stamp: Stamp::default(),
-            connected: 0,
-            action: Action::Stop.into(),
-            cause: Cause::NotOrdered.into(),
-            at_rest: 0,
-            frames_in: 0,
-            bytes_dropped: 0,
-            foreign_datagrams: 0,
-            unsent: 0,
-            ignored_samples: 0,
-            ignored_writer: 0,
-            other_port: 0,
-            losses: 0,
-            reboots: 0,
-            lost_ns: 0,
-            attempts: 0,
-            next_attempt_ns: 0,
-            commands_out: 0,
-            repeated_commands: 0,
-            repeated_ticks: 0,
-            latency_ns: 0,
-            latency_max_ns: 0,
-            latency_histogram: [0; latency::BUCKETS],
-        }
+payloads! {
+    "firsthand.Link" LinkSample {
+        /// 1: the robot answers.
+        connected: u32,
+        /// The failsafe's [`Action`].
+        action: u8 = Action::Stop.into(),
+        /// The [`Cause`] of the action.
+        cause: u8 = Cause::NotOrdered.into(),
+        /// 1: no wheel turns, by the encoders; 0: one does, or it is not known.
+        at_rest: u8,
+        frames_in: u64,
+        /// Bytes that belonged to no frame.
+        bytes_dropped: u64,
+        /// Dropped, because another address sent them.
+        foreign_datagrams: u64,
+        unsent: u64,
+        /// Samples of processes that the supervisor does not name.
+        ignored_samples: u64,
+        /// 0 for none.
+        ignored_writer: u32,
+        /// Another port from which the robot's host answered; 0 for none.
+        other_port: u32,
+        losses: u64,
+        /// Times the robot was seen to restart its counts.
+        reboots: u64,
+        /// Time without an answer, of the machine's clock; 0 while the robot answers.
+        lost_ns: u64,
+        /// Pings, or attempts to connect, since the robot was lost.
+        attempts: u64,
+        /// Time until the next attempt, of the machine's clock.
+        next_attempt_ns: u64,
+        commands_out: u64,
+        repeated_commands: u64,
+        /// Ticks given to the stages again, because no command came.
+        repeated_ticks: u64,
+        /// The last tick's, from the datagram in to the datagram out.
+        latency_ns: u64,
+        /// The longest in this process of the link.
+        latency_max_ns: u64,
+        /// A [`crate::latency::Histogram`] of this process: bucket k counts latencies from 2^(k/8) microseconds.
+        latency_histogram: [u32; latency::BUCKETS],
     }
 }
 
@@ -367,9 +334,4 @@ payloads! {
         /// A [`Direction`].
         direction: u8,
     }
-}
-
-layouts! {
-    RangeReading { range_m raw sensor status }
-    LinkSample { stamp connected action cause at_rest frames_in bytes_dropped foreign_datagrams unsent ignored_samples ignored_writer other_port losses reboots lost_ns attempts next_attempt_ns commands_out repeated_commands repeated_ticks latency_ns latency_max_ns latency_histogram }
 }

@@ -128,22 +128,21 @@ payloads! {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.RosterEntry")]
-#[repr(C)]
-pub struct RosterEntry {
-    pub stage: Name,
-    /// 0 for none.
-    pub pid: u32,
-    pub generation: u32,
-    /// A [`StageState`].
-    pub state: u8,
-    pub restarts: u32,
-    pub uptime_ns: u64,
-    /// Age of its last heartbeat; u64::MAX for none yet.
-    pub beat_age_ns: u64,
-    /// Age of its last output on any topic; u64::MAX for none yet.
-    pub output_age_ns: u64,
+structs! {
+    "firsthand.RosterEntry" RosterEntry {
+        stage: Name,
+        /// 0 for none.
+        pid: u32,
+        generation: u32,
+        /// A [`StageState`].
+        state: u8,
+        restarts: u32,
+        uptime_ns: u64,
+        /// Age of its last heartbeat; u64::MAX for none yet.
+        beat_age_ns: u64,
+        /// Age of its last output on any topic; u64::MAX for none yet.
+        output_age_ns: u64,
+    }
 }
 
 wire_enum! {
@@ -408,6 +407,5 @@ payloads! {
 }
 
 layouts! {
-    RosterEntry { stage pid generation state restarts uptime_ns beat_age_ns output_age_ns }
     Words { bytes }
 }

@@ -80,7 +80,6 @@ macro_rules! dropped_here {
 type Bytes = [CustomPayloadMarker];
 
 dropped_here! {
-    /// A process's node of the middleware.
     BusNode(Node<ipc::Service>);
     /// Wakes the readers of a topic.
     Notifier(notifier::Notifier<ipc::Service>);
@@ -125,7 +124,6 @@ pub struct Carried {
 }
 
 impl Carried {
-    /// The types of headers `H` with slices of `E`.
     pub(crate) fn of<H: Payload, E: Payload>() -> Self {
         let (header, element, elements) = match has_slice::<E>() {
             true => (Type::of::<H>(), Type::of::<E>(), TypeVariant::Dynamic),
@@ -135,7 +133,6 @@ impl Carried {
     }
 }
 
-/// The builder of the service that carries a topic's samples.
 fn samples(
     node: &BusNode,
     spec: &Spec,
@@ -185,18 +182,13 @@ pub(crate) fn create(
     Ok(Box::new((samples, event)))
 }
 
-/// The processes that have a topic open.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct OpenedBy {
-    /// The processes that read its samples.
     pub readers: BTreeSet<u32>,
-    /// The processes that write samples.
     pub writers: BTreeSet<u32>,
-    /// The processes that are woken by samples.
     pub woken: BTreeSet<u32>,
 }
 
-/// The processes that have a topic open.
 pub(crate) fn opened_by(
     node: &BusNode,
     spec: &Spec,
@@ -266,7 +258,6 @@ impl RawService {
     }
 }
 
-/// A sample that is being written.
 pub(super) struct Loan<'a> {
     pub(super) header: *mut CustomHeaderMarker,
     pub(super) elements: &'a mut [MaybeUninit<CustomPayloadMarker>],

@@ -1,4 +1,4 @@
-use super::objection::{Objection, objection, within};
+use super::objection::{Objection, all_within, objection, refuse_if};
 use crate::{LEAST_BAUD, Mission, Protocol, SensorKind};
 
 /// The greatest speed of a rim that is one count in a run of the speed loop, m/s: a robot that cannot turn its wheels
@@ -9,51 +9,49 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     let robot = &mission.robot;
     let board = &robot.arduino;
     if robot.protocol() != Protocol::Arduino {
-        if board.is_default() {
-            return Ok(());
-        }
         let remedy = "give robot.protocol = \"arduino\" too, or remove it";
-        return Err(objection("robot.arduino", "the robot has no Arduino by its protocol", remedy));
+        let problem = "the robot has no Arduino by its protocol";
+        return refuse_if(!board.is_default(), "robot.arduino", problem, remedy);
     }
     let baud = f64::from(LEAST_BAUD)..=2_000_000.0;
-    within("robot.arduino.baud", f64::from(board.baud), baud, "bits a second")?;
-    within("robot.arduino.pid_rate_hz", board.pid_rate_hz, 1.0..=1000.0, "Hz")?;
-    if robot.counts_per_turn.is_none() {
-        let problem =
-            "nobody says how many counts a turn of a wheel has, and the board says counts";
-        let remedy =
-            "give robot.counts_per_turn: turn a wheel once by hand and ask the board for `e`";
-        return Err(objection("robot.counts_per_turn", problem, remedy));
-    }
+    all_within([
+        ("robot.arduino.baud", f64::from(board.baud), baud, "bits a second"),
+        ("robot.arduino.pid_rate_hz", board.pid_rate_hz, 1.0..=1000.0, "Hz"),
+    ])?;
+    refuse_if(
+        robot.counts_per_turn.is_none(),
+        "robot.counts_per_turn",
+        "nobody says how many counts a turn of a wheel has, and the board says counts",
+        "give robot.counts_per_turn: turn a wheel once by hand and ask the board for `e`",
+    )?;
     let step_m_s = board.pid_rate_hz * mission.body().metres_per_count();
-    if step_m_s > GREATEST_STEP_M_S {
-        let problem = format!(
+    refuse_if(
+        step_m_s > GREATEST_STEP_M_S,
+        "robot.counts_per_turn",
+        format!(
             "one count in each run of the speed loop is {step_m_s:.2} m/s, and the board takes whole counts"
-        );
-        let remedy = "give the wheels encoders of more counts, or lower the rate of the firmware's loop and robot.arduino.pid_rate_hz";
-        return Err(objection("robot.counts_per_turn", problem, remedy));
-    }
+        ),
+        "give the wheels encoders of more counts, or lower the rate of the firmware's loop and robot.arduino.pid_rate_hz",
+    )?;
     let table = mission.sensor_table();
     if let Some(other) = table.iter().find(|sensor| sensor.kind != SensorKind::Cone) {
         let problem = format!("{:?} is no sonar, and the board has no other sensor", other.name);
         let remedy = "give rows of robot.sensor that are of kind cone";
         return Err(objection("robot.sensor", problem, remedy));
     }
+    const PINS: &str = "robot.arduino.sonars";
     if let Some(silent) = table.iter().find(|sensor| !board.sonars.contains_key(&sensor.name)) {
         let problem = format!("no pin is that of the sonar {:?}", silent.name);
         let remedy = format!("add it: robot.arduino.sonars = {{ {} = 4 }}", silent.name);
-        return Err(objection("robot.arduino.sonars", problem, remedy));
+        return Err(objection(PINS, problem, remedy));
     }
     for (name, pin) in &board.sonars {
-        if !table.iter().any(|sensor| sensor.name == *name) {
-            let problem = format!("it names {name:?}, and no sonar is called so");
-            let remedy = "give the name of a row of robot.sensor";
-            return Err(objection("robot.arduino.sonars", problem, remedy));
-        }
-        if board.sonars.iter().any(|(other, its_pin)| other != name && its_pin == pin) {
-            let problem = format!("pin {pin} is that of two sonars");
-            return Err(objection("robot.arduino.sonars", problem, "give each a pin of its own"));
-        }
+        let is_other = !table.iter().any(|sensor| sensor.name == *name);
+        let problem = format!("it names {name:?}, and no sonar is called so");
+        refuse_if(is_other, PINS, problem, "give the name of a row of robot.sensor")?;
+        let uses = board.sonars.values().filter(|its_pin| *its_pin == pin).count();
+        let problem = format!("pin {pin} is that of two sonars");
+        refuse_if(uses > 1, PINS, problem, "give each a pin of its own")?;
     }
     Ok(())
 }

@@ -12,6 +12,21 @@ pub(super) fn objection(
     Objection { key, problem: problem.into(), remedy: remedy.into() }
 }
 
+pub(super) fn refuse_if(
+    wrong: bool,
+    key: &'static str,
+    problem: impl Into<String>,
+    remedy: impl Into<String>,
+) -> Result<(), Objection> {
+    if wrong { Err(objection(key, problem, remedy)) } else { Ok(()) }
+}
+
+pub(super) fn all_within<const N: usize>(
+    limits: [(&'static str, f64, std::ops::RangeInclusive<f64>, &str); N],
+) -> Result<(), Objection> {
+    limits.into_iter().try_for_each(|(key, value, range, unit)| within(key, value, range, unit))
+}
+
 /// `value` must lie in `range`; NaN lies in none.
 pub(super) fn within(
     key: &'static str,
@@ -19,12 +34,7 @@ pub(super) fn within(
     range: std::ops::RangeInclusive<f64>,
     unit: &str,
 ) -> Result<(), Objection> {
-    if range.contains(&value) {
-        return Ok(());
-    }
-    Err(objection(
-        key,
-        format!("{value} {unit} is out of range"),
-        format!("give {} to {} {unit}", range.start(), range.end()),
-    ))
+    let problem = format!("{value} {unit} is out of range");
+    let remedy = format!("give {} to {} {unit}", range.start(), range.end());
+    refuse_if(!range.contains(&value), key, problem, remedy)
 }

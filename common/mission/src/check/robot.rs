@@ -1,6 +1,6 @@
 use x80_protocol::MOTOR_SCALE_V;
 
-use super::objection::{Objection, objection, within};
+use super::objection::{Objection, all_within, objection, refuse_if, within};
 use crate::{
     Mission, Protocol, ResponseKeys,
     address::{Address, AddressError, FORMS},
@@ -16,58 +16,60 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
         };
         return Err(objection("robot.address", problem, FORMS));
     }
-    within("robot.rate_hz", robot.rate_hz, 0.5..=200.0, "Hz")?;
-    within("robot.wheel_radius_m", body.wheel_radius_m, 0.005..=2.0, "m")?;
-    within("robot.track_m", body.track_m, 0.01..=5.0, "m")?;
-    within("robot.counts_per_turn", body.counts_per_turn, 1.0..=100_000.0, "counts")?;
-    if robot.protocol() != Protocol::X80 && body.steering.is_some() {
-        let problem = "a car's steering has no word in lines of JSON, topics of ROS or requests to an Arduino";
-        return Err(objection("robot.protocol", problem, "give \"x80\", or another robot.model"));
-    }
+    all_within([
+        ("robot.rate_hz", robot.rate_hz, 0.5..=200.0, "Hz"),
+        ("robot.wheel_radius_m", body.wheel_radius_m, 0.005..=2.0, "m"),
+        ("robot.track_m", body.track_m, 0.01..=5.0, "m"),
+        ("robot.counts_per_turn", body.counts_per_turn, 1.0..=100_000.0, "counts"),
+    ])?;
+    refuse_if(
+        robot.protocol() != Protocol::X80 && body.steering.is_some(),
+        "robot.protocol",
+        "a car's steering has no word in lines of JSON, topics of ROS or requests to an Arduino",
+        "give \"x80\", or another robot.model",
+    )?;
     steering(mission)?;
     for (key, value, range) in robot.odometry.ranges() {
         within(key, value, range, "")?;
     }
-    within("robot.radius_m", body.radius_m, 0.01..=5.0, "m")?;
-    within("robot.top_speed_m_s", body.top_speed_m_s, 0.01..=10.0, "m/s")?;
+    all_within([
+        ("robot.radius_m", body.radius_m, 0.01..=5.0, "m"),
+        ("robot.top_speed_m_s", body.top_speed_m_s, 0.01..=10.0, "m/s"),
+    ])?;
     response(robot.response)?;
-    within("robot.command_limit_s", robot.command_limit_s, 0.02..=5.0, "s")?;
-    let limits = robot.low_battery_v;
-    for limit in [limits.board, limits.motor, limits.servo] {
-        within("robot.low_battery_v", limit, 0.0..=MOTOR_SCALE_V, "V")?;
-    }
-    within("robot.held_current_ad", f64::from(robot.held_current_ad), 0.0..=4095.0, "AD counts")?;
-    if robot.command_limit_s * robot.rate_hz <= 1.0 {
-        return Err(objection(
-            "robot.command_limit_s",
-            format!(
-                "a command would go stale before the next tick: {} s at {} Hz",
-                robot.command_limit_s, robot.rate_hz
-            ),
-            "raise robot.command_limit_s or robot.rate_hz",
-        ));
-    }
+    let (limits, limit_s) = (robot.low_battery_v, robot.command_limit_s);
+    all_within([
+        ("robot.command_limit_s", limit_s, 0.02..=5.0, "s"),
+        ("robot.low_battery_v", limits.board, 0.0..=MOTOR_SCALE_V, "V"),
+        ("robot.low_battery_v", limits.motor, 0.0..=MOTOR_SCALE_V, "V"),
+        ("robot.low_battery_v", limits.servo, 0.0..=MOTOR_SCALE_V, "V"),
+        ("robot.held_current_ad", f64::from(robot.held_current_ad), 0.0..=4095.0, "AD counts"),
+    ])?;
+    let rate_hz = robot.rate_hz;
+    refuse_if(
+        limit_s * rate_hz <= 1.0,
+        "robot.command_limit_s",
+        format!("a command would go stale before the next tick: {limit_s} s at {rate_hz} Hz"),
+        "raise robot.command_limit_s or robot.rate_hz",
+    )?;
     let (left, right) = (robot.left.channel, robot.right.channel);
-    if left > 1 || right > 1 || left == right {
-        return Err(objection(
-            "robot.left",
-            format!("wheels on channels {left} and {right}"),
-            "put one on channel 0 and one on channel 1",
-        ));
-    }
+    refuse_if(
+        left > 1 || right > 1 || left == right,
+        "robot.left",
+        format!("wheels on channels {left} and {right}"),
+        "put one on channel 0 and one on channel 1",
+    )?;
     // A third of the counter's cycle a tick keeps wrap-around unambiguous with a tick to spare.
-    let counts = body.top_speed_m_s / body.metres_per_count() / robot.rate_hz;
+    let counts = body.top_speed_m_s / body.metres_per_count() / rate_hz;
     let has_counter = matches!(robot.protocol(), Protocol::X80 | Protocol::Arduino);
-    if has_counter && counts > 32_768.0 / 6.0 {
-        return Err(objection(
-            "robot.rate_hz",
-            format!(
-                "at top speed a wheel makes {counts:.0} counts a tick, and the counter wraps at 32768"
-            ),
-            "raise robot.rate_hz or lower robot.top_speed_m_s",
-        ));
-    }
-    Ok(())
+    refuse_if(
+        has_counter && counts > 32_768.0 / 6.0,
+        "robot.rate_hz",
+        format!(
+            "at top speed a wheel makes {counts:.0} counts a tick, and the counter wraps at 32768"
+        ),
+        "raise robot.rate_hz or lower robot.top_speed_m_s",
+    )
 }
 
 fn steering(mission: &Mission) -> Result<(), Objection> {
@@ -79,48 +81,41 @@ fn steering(mission: &Mission) -> Result<(), Objection> {
             ("robot.steering_rate_deg_s", robot.steering_rate_deg_s),
             ("robot.steering_counts_per_turn", robot.steering_counts_per_turn),
         ];
-        let unread = written.into_iter().find(|(_, value)| value.is_some());
-        return unread.map_or(Ok(()), |(key, _)| {
-            Err(objection(
-                key,
-                "this robot has two driven wheels and no steering",
-                "remove the key, or set robot.model = \"car\"",
-            ))
-        });
+        let problem = "this robot has two driven wheels and no steering";
+        let remedy = "remove the key, or set robot.model = \"car\"";
+        let mut written = written.into_iter();
+        return written
+            .try_for_each(|(key, value)| refuse_if(value.is_some(), key, problem, remedy));
     };
-    if !mission.simulation.blocks.is_empty() {
-        return Err(objection(
-            "simulation.block",
-            "wheels of a car are not blocked",
-            "remove it, or choose another robot.model",
-        ));
-    }
-    within("robot.wheelbase_m", steering.wheelbase_m, 0.01..=5.0, "m")?;
-    within("robot.steering_limit_deg", steering.limit_rad.to_degrees(), 1.0..=80.0, "degrees")?;
-    within(
-        "robot.steering_rate_deg_s",
-        steering.rate_rad_s.to_degrees(),
-        1.0..=3600.0,
-        "degrees/s",
+    refuse_if(
+        !mission.simulation.blocks.is_empty(),
+        "simulation.block",
+        "wheels of a car are not blocked",
+        "remove it, or choose another robot.model",
     )?;
+    let [limit, rate] = [steering.limit_rad, steering.rate_rad_s].map(f64::to_degrees);
     // A whole turn fits twice into the counter's cycle, so an angle is never ambiguous.
-    within("robot.steering_counts_per_turn", steering.counts_per_turn, 36.0..=16_384.0, "counts")
+    let counts = steering.counts_per_turn;
+    all_within([
+        ("robot.wheelbase_m", steering.wheelbase_m, 0.01..=5.0, "m"),
+        ("robot.steering_limit_deg", limit, 1.0..=80.0, "degrees"),
+        ("robot.steering_rate_deg_s", rate, 1.0..=3600.0, "degrees/s"),
+        ("robot.steering_counts_per_turn", counts, 36.0..=16_384.0, "counts"),
+    ])
 }
 
 fn response(keys: ResponseKeys) -> Result<(), Objection> {
     let ResponseKeys { delay_s, lag_s, acceleration_m_s2, turn_acceleration_rad_s2 } = keys;
-    for (key, value, range, unit) in [
-        ("robot.response.delay_s", delay_s, 0.0..=2.0, "s"),
-        ("robot.response.lag_s", lag_s, 0.0..=2.0, "s"),
-        ("robot.response.acceleration_m_s2", acceleration_m_s2, 0.05..=1000.0, "m/s^2"),
+    let turn = turn_acceleration_rad_s2.unwrap_or(1.0);
+    all_within([
+        ("robot.response.delay_s", delay_s.unwrap_or(0.0), 0.0..=2.0, "s"),
+        ("robot.response.lag_s", lag_s.unwrap_or(0.0), 0.0..=2.0, "s"),
         (
-            "robot.response.turn_acceleration_rad_s2",
-            turn_acceleration_rad_s2,
+            "robot.response.acceleration_m_s2",
+            acceleration_m_s2.unwrap_or(1.0),
             0.05..=1000.0,
-            "rad/s^2",
+            "m/s^2",
         ),
-    ] {
-        value.map_or(Ok(()), |value| within(key, value, range, unit))?;
-    }
-    Ok(())
+        ("robot.response.turn_acceleration_rad_s2", turn, 0.05..=1000.0, "rad/s^2"),
+    ])
 }

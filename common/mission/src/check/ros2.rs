@@ -1,4 +1,4 @@
-use super::objection::{Objection, objection};
+use super::objection::{Objection, objection, refuse_if};
 use crate::{Mission, Protocol, SensorKind, address::Address};
 
 const LONGEST_TOPIC: usize = 200;
@@ -8,42 +8,44 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     let speaks = robot.protocol() == Protocol::Ros2;
     let address = robot.address.as_deref().map(str::parse);
     let is_domain = matches!(address, Some(Ok(Address::Ros2(_))));
+    refuse_if(
+        is_domain && !speaks,
+        "robot.address",
+        "a ROS domain, and the robot speaks no ROS 2",
+        "give robot.protocol = \"ros2\" too, or another address",
+    )?;
+    refuse_if(
+        !speaks && !robot.ros2.is_default(),
+        "robot.ros2",
+        "the robot speaks no ROS 2",
+        "give robot.protocol = \"ros2\" too, or remove it",
+    )?;
     if !speaks {
-        return if is_domain {
-            let remedy = "give robot.protocol = \"ros2\" too, or another address";
-            Err(objection("robot.address", "a ROS domain, and the robot speaks no ROS 2", remedy))
-        } else if !robot.ros2.is_default() {
-            let remedy = "give robot.protocol = \"ros2\" too, or remove it";
-            Err(objection("robot.ros2", "the robot speaks no ROS 2", remedy))
-        } else {
-            Ok(())
-        };
+        return Ok(());
     }
-    if !is_domain {
-        let remedy = "give \"ros2\" for the domain that ROS_DOMAIN_ID names, or \"ros2:0\"";
-        return Err(objection("robot.address", "a robot that speaks ROS 2 has a domain", remedy));
-    }
+    refuse_if(
+        !is_domain,
+        "robot.address",
+        "a robot that speaks ROS 2 has a domain",
+        "give \"ros2\" for the domain that ROS_DOMAIN_ID names, or \"ros2:0\"",
+    )?;
     let topics = &robot.ros2;
     let named = [&topics.odom, &topics.scan, &topics.cmd_vel, &topics.battery];
     for name in named.into_iter().chain(&topics.imu).chain(topics.ranges.values()) {
-        if !is_topic(name) {
-            let remedy = "use letters, digits and '_' between slashes, as in \"/robot/odom\"";
-            return Err(objection("robot.ros2", format!("{name:?} is no topic of ROS"), remedy));
-        }
+        let remedy = "use letters, digits and '_' between slashes, as in \"/robot/odom\"";
+        refuse_if(!is_topic(name), "robot.ros2", format!("{name:?} is no topic of ROS"), remedy)?;
     }
     let table = mission.sensor_table();
-    let mut rangers = table.iter().filter(|sensor| sensor.kind != SensorKind::Scan);
-    if let Some(silent) = rangers.find(|sensor| !topics.ranges.contains_key(&sensor.name)) {
+    let rangers = || table.iter().filter(|sensor| sensor.kind != SensorKind::Scan);
+    if let Some(silent) = rangers().find(|sensor| !topics.ranges.contains_key(&sensor.name)) {
         let problem = format!("no topic is that of the sensor {:?}", silent.name);
         let remedy = "name it in robot.ros2.ranges, or give other rows of robot.sensor";
         return Err(objection("robot.ros2", problem, remedy));
     }
-    let is_ranger =
-        |name: &str| table.iter().any(|row| row.name == name && row.kind != SensorKind::Scan);
-    if let Some(other) = topics.ranges.keys().find(|name| !is_ranger(name)) {
-        let problem =
-            format!("robot.ros2.ranges names {other:?}, and no sonar or ray is called so");
-        return Err(objection("robot.ros2", problem, "give the name of a row of robot.sensor"));
+    for name in topics.ranges.keys() {
+        let is_other = !rangers().any(|row| row.name == *name);
+        let problem = format!("robot.ros2.ranges names {name:?}, and no sonar or ray is called so");
+        refuse_if(is_other, "robot.ros2", problem, "give the name of a row of robot.sensor")?;
     }
     Ok(())
 }

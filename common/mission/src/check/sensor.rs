@@ -1,4 +1,4 @@
-use super::objection::{Objection, objection, within};
+use super::objection::{Objection, all_within, objection, refuse_if};
 use crate::{
     INFRARED_RANGERS, MOST_BEAMS, MOST_SENSORS, Method, Mission, Protocol, SONARS, SensorKind,
     SensorRow, Sensors, SonarConfig,
@@ -10,51 +10,46 @@ const LONGEST_NAME: usize = 23;
 pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     let sonar = &mission.sonar;
     channel("sonar.index", SensorKind::Cone, sonar.index)?;
-    within("sonar.forward_m", sonar.forward_m, -5.0..=5.0, "m")?;
-    within("sonar.bearing_deg", sonar.bearing_deg, -180.0..=180.0, "degrees")?;
+    all_within([
+        ("sonar.forward_m", sonar.forward_m, -5.0..=5.0, "m"),
+        ("sonar.bearing_deg", sonar.bearing_deg, -180.0..=180.0, "degrees"),
+    ])?;
     let rows = &mission.robot.sensors;
-    if rows.len() > MOST_SENSORS {
-        let problem = format!("{} rows, and a sample holds {MOST_SENSORS}", rows.len());
-        return Err(objection(KEY, problem, "remove some"));
-    }
+    let problem = format!("{} rows, and a sample holds {MOST_SENSORS}", rows.len());
+    refuse_if(rows.len() > MOST_SENSORS, KEY, problem, "remove some")?;
     let speaks_x80 = mission.robot.protocol() == Protocol::X80;
     for (index, row) in rows.iter().enumerate() {
+        let SensorRow { name, kind, .. } = row;
         self::row(row, mission.robot.rate_hz)?;
         if speaks_x80 {
             its_channel(row)?;
         }
-        let earlier = &rows[..index];
-        if earlier.iter().any(|other| other.name == row.name) {
-            return Err(objection(KEY, format!("two are called {:?}", row.name), "rename one"));
-        }
-        let has_its = |other: &SensorRow| (other.kind, other.channel) == (row.kind, row.channel);
-        if speaks_x80 && earlier.iter().any(has_its) {
-            let problem = format!("{:?} has the channel of another {:?}", row.name, row.kind);
-            return Err(objection(KEY, problem, "give each a channel of its own"));
-        }
+        let mut earlier = rows[..index].iter();
+        let is_called_so = earlier.clone().any(|other| other.name == *name);
+        refuse_if(is_called_so, KEY, format!("two are called {name:?}"), "rename one")?;
+        let is_shared =
+            speaks_x80 && earlier.any(|it| (it.kind, it.channel) == (*kind, row.channel));
+        let problem = format!("{name:?} has the channel of another {kind:?}");
+        refuse_if(is_shared, KEY, problem, "give each a channel of its own")?;
     }
-    let is_cone = |row: &SensorRow| row.kind == SensorKind::Cone;
-    let is_scan = |row: &SensorRow| row.kind == SensorKind::Scan;
-    if rows.iter().filter(|row| is_scan(row)).count() > 1 {
-        return Err(objection(KEY, "two rows are lasers", "keep one"));
-    }
-    if speaks_x80 && mission.laser().is_some() {
-        let problem = "the boards of an X80 have no laser";
-        return Err(objection(
-            KEY,
-            problem,
-            "remove it, or give robot.protocol = \"json\" or \"ros2\"",
-        ));
-    }
-    if !rows.is_empty() && !rows.iter().any(|row| is_cone(row) || is_scan(row)) {
-        return Err(objection(KEY, "no row is a cone or a laser", "add the front sonar"));
-    }
-    if !rows.is_empty() && *sonar != SonarConfig::default() {
-        let remedy = "remove it: the rows of robot.sensor say where the front sonar is";
-        return Err(objection("sonar", "it is written beside robot.sensor", remedy));
-    }
-    let table = mission.sensor_table();
-    let used = |kind| table.iter().filter(|sensor| sensor.used && sensor.kind == kind).count();
+    let written = |kind| rows.iter().filter(|row| row.kind == kind).count();
+    let lasers = written(SensorKind::Scan);
+    refuse_if(lasers > 1, KEY, "two rows are lasers", "keep one")?;
+    refuse_if(
+        speaks_x80 && mission.laser().is_some(),
+        KEY,
+        "the boards of an X80 have no laser",
+        "remove it, or give robot.protocol = \"json\" or \"ros2\"",
+    )?;
+    let is_blind = !rows.is_empty() && lasers + written(SensorKind::Cone) == 0;
+    refuse_if(is_blind, KEY, "no row is a cone or a laser", "add the front sonar")?;
+    refuse_if(
+        !rows.is_empty() && *sonar != SonarConfig::default(),
+        "sonar",
+        "it is written beside robot.sensor",
+        "remove it: the rows of robot.sensor say where the front sonar is",
+    )?;
+    let used = |kind| mission.used(kind);
     let lacks = match mission.sensors {
         _ if mission.method == Method::Paper && used(SensorKind::Cone) == 0 => "a sonar",
         Some(Sensors::Laser) if used(SensorKind::Scan) == 0 => "a laser",
@@ -67,60 +62,62 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
 
 fn row(row: &SensorRow, rate_hz: f64) -> Result<(), Objection> {
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '-';
-    if row.name.is_empty() || row.name.len() > LONGEST_NAME || !row.name.chars().all(plain) {
-        let remedy = format!("use letters, digits and '-', at most {LONGEST_NAME}");
-        return Err(objection(KEY, format!("{:?} is no name of a sensor", row.name), remedy));
+    let SensorRow { name, kind, roll_deg, .. } = row;
+    let is_scan = *kind == SensorKind::Scan;
+    refuse_if(
+        name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(plain),
+        KEY,
+        format!("{name:?} is no name of a sensor"),
+        format!("use letters, digits and '-', at most {LONGEST_NAME}"),
+    )?;
+    all_within([
+        (KEY, row.forward_m, -5.0..=5.0, "m of forward_m"),
+        (KEY, row.bearing_deg, -180.0..=180.0, "degrees of bearing_deg"),
+        (KEY, row.turned_deg, -180.0..=180.0, "degrees of turned_deg"),
+    ])?;
+    refuse_if(
+        row.turned_deg != 0.0 && !is_scan,
+        KEY,
+        "only a laser may look elsewhere than outward",
+        "remove turned_deg",
+    )?;
+    refuse_if(
+        *roll_deg != 0.0 && (*roll_deg != 180.0 || !is_scan),
+        KEY,
+        format!("roll_deg is {roll_deg} of {name:?}"),
+        "give 180 for a laser that is mounted upside down, and nothing for other sensors",
+    )?;
+    if let Some(model) = row.model {
+        let problem = format!("{model:?} is no {kind:?}");
+        let is_other = model.product().kind != *kind;
+        refuse_if(is_other, KEY, problem, "remove model, or change kind")?;
     }
-    within(KEY, row.forward_m, -5.0..=5.0, "m of forward_m")?;
-    within(KEY, row.bearing_deg, -180.0..=180.0, "degrees of bearing_deg")?;
-    within(KEY, row.turned_deg, -180.0..=180.0, "degrees of turned_deg")?;
-    if row.turned_deg != 0.0 && row.kind != SensorKind::Scan {
-        let problem = "only a laser may look elsewhere than outward";
-        return Err(objection(KEY, problem, "remove turned_deg"));
-    }
-    if row.roll_deg != 0.0 && (row.roll_deg != 180.0 || row.kind != SensorKind::Scan) {
-        let problem = format!("roll_deg is {} of {:?}", row.roll_deg, row.name);
-        let remedy =
-            "give 180 for a laser that is mounted upside down, and nothing for other sensors";
-        return Err(objection(KEY, problem, remedy));
-    }
-    if let Some(model) = row.model
-        && model.kind() != row.kind
-    {
-        let problem = format!("{model:?} is no {:?}", row.kind);
-        return Err(objection(KEY, problem, "remove model, or change kind"));
-    }
-    let reach = match row.kind {
-        SensorKind::Cone => 0.3..=2.55,
-        SensorKind::Ray => 0.2..=0.81,
-        SensorKind::Scan => 0.5..=30.0,
+    let has_view = row.field_of_view_deg.is_some();
+    let (reach, view, most) = match kind {
+        SensorKind::Cone => (0.3..=2.55, 5.0..=60.0, 1),
+        SensorKind::Ray => (0.2..=0.81, 0.0..=0.0, 1),
+        SensorKind::Scan => (0.5..=30.0, 10.0..=360.0, MOST_BEAMS),
     };
-    within(KEY, row.reach_m.unwrap_or(*reach.end()), reach, "m of reach_m")?;
-    if let Some(beams) = row.beams {
-        let most = if row.kind == SensorKind::Scan { MOST_BEAMS } else { 1 };
-        within(KEY, f64::from(beams), 1.0..=most as f64, "beams")?;
-    }
-    match (row.kind, row.field_of_view_deg) {
-        (SensorKind::Ray, Some(_)) => {
-            return Err(objection(KEY, "a ray has no field of view", "remove field_of_view_deg"));
-        }
-        (SensorKind::Cone, Some(deg)) => {
-            within(KEY, deg, 5.0..=60.0, "degrees of field_of_view_deg")?;
-        }
-        (SensorKind::Scan, Some(deg)) => {
-            within(KEY, deg, 10.0..=360.0, "degrees of field_of_view_deg")?;
-        }
-        (_, None) => {}
-    }
-    row.rate_hz.map_or(Ok(()), |hz| within(KEY, hz, 0.1..=rate_hz, "Hz of rate_hz"))
+    let reach_m = row.reach_m.unwrap_or(*reach.end());
+    all_within([
+        (KEY, reach_m, reach, "m of reach_m"),
+        (KEY, row.beams.map_or(1.0, f64::from), 1.0..=most as f64, "beams"),
+    ])?;
+    let is_ray = *kind == SensorKind::Ray;
+    refuse_if(is_ray && has_view, KEY, "a ray has no field of view", "remove field_of_view_deg")?;
+    let view_deg = row.field_of_view_deg.unwrap_or(*view.end());
+    all_within([
+        (KEY, view_deg, view, "degrees of field_of_view_deg"),
+        (KEY, row.rate_hz.unwrap_or(rate_hz), 0.1..=rate_hz, "Hz of rate_hz"),
+    ])
 }
 
 fn its_channel(row: &SensorRow) -> Result<(), Objection> {
-    let Some(number) = row.channel else {
+    let number = row.channel.ok_or_else(|| {
         let problem = format!("{:?} has no channel, by which an X80 sends its readings", row.name);
         let remedy = "give channel: 0 to 5 for a sonar, 0 to 6 for an infrared ranger";
-        return Err(objection(KEY, problem, remedy));
-    };
+        objection(KEY, problem, remedy)
+    })?;
     channel(KEY, row.kind, number)
 }
 
@@ -131,10 +128,8 @@ fn channel(key: &'static str, kind: SensorKind, channel: u8) -> Result<(), Objec
         // The boards have no laser.
         SensorKind::Scan => return Ok(()),
     };
-    if usize::from(channel) < channels {
-        return Ok(());
-    }
-    Err(objection(key, format!("the robot has no {kind:?} on channel {channel}"), remedy))
+    let problem = format!("the robot has no {kind:?} on channel {channel}");
+    refuse_if(usize::from(channel) >= channels, key, problem, remedy)
 }
 
 #[cfg(test)]

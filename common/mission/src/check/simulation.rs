@@ -1,5 +1,5 @@
-use super::{Checker, MAX_TIMEOUT_S, Objection, objection, within};
-use crate::simulation::{Block, OutOfRange, Ranger, Simulation, Thing};
+use super::{Checker, MAX_TIMEOUT_S, Objection, all_within, point, refuse_if, within};
+use crate::simulation::{Block, Ranger, Simulation, Thing};
 
 /// More than these are a mistake.
 const MAX_THINGS: usize = 1000;
@@ -8,73 +8,60 @@ const MAX_MOVES: usize = 1000;
 
 impl Checker {
     pub(super) fn simulation(&mut self, simulation: &Simulation) -> Result<(), Objection> {
-        simulation.check_physics().map_err(|OutOfRange { key, value, range }| {
-            objection(
-                key,
-                format!("{value} is out of range"),
-                format!("give {} to {}", range.start(), range.end()),
-            )
-        })?;
-        if let Some(silence) = simulation.stops_when_silent_s {
-            within("simulation.stops_when_silent_s", silence, 0.01..=3600.0, "s")?;
+        for (key, value, range) in simulation.ranges() {
+            let problem = format!("{value} is out of range");
+            let remedy = format!("give {} to {}", range.start(), range.end());
+            refuse_if(!range.contains(&value), key, problem, remedy)?;
         }
-        for ranger in &simulation.ring {
-            self::ranger(ranger)?;
-        }
-        if simulation.things.len() > MAX_THINGS {
-            return Err(objection(
-                "simulation.thing",
-                format!("more than {MAX_THINGS} things come and go"),
-                "give fewer",
-            ));
-        }
+        let silence = simulation.stops_when_silent_s.unwrap_or(1.0);
+        within("simulation.stops_when_silent_s", silence, 0.01..=3600.0, "s")?;
+        simulation.ring.iter().try_for_each(ranger)?;
+        let problem = format!("more than {MAX_THINGS} things come and go");
+        let are_many = simulation.things.len() > MAX_THINGS;
+        refuse_if(are_many, "simulation.thing", problem, "give fewer")?;
         for thing in &simulation.things {
             self.thing(thing)?;
         }
-        if simulation.blocks.len() > MAX_BLOCKS {
-            let problem = format!("more than {MAX_BLOCKS} blocks of wheels");
-            return Err(objection("simulation.block", problem, "give fewer"));
-        }
+        let problem = format!("more than {MAX_BLOCKS} blocks of wheels");
+        let are_many = simulation.blocks.len() > MAX_BLOCKS;
+        refuse_if(are_many, "simulation.block", problem, "give fewer")?;
         simulation.blocks.iter().try_for_each(block)
     }
 
     fn thing(&mut self, thing: &Thing) -> Result<(), Objection> {
         const KEY: &str = "simulation.thing";
         self.shapes(KEY, &thing.shape)?;
-        within(KEY, thing.from_s, 0.0..=MAX_TIMEOUT_S, "s")?;
-        if let Some(until) = thing.until_s {
-            within(KEY, until, thing.from_s..=MAX_TIMEOUT_S, "s of until_s")?;
-        }
-        if thing.moves.len() > MAX_MOVES {
-            return Err(objection(
-                KEY,
-                format!("more than {MAX_MOVES} moves of one thing"),
-                "give fewer",
-            ));
-        }
+        span(KEY, thing.from_s, thing.until_s)?;
+        let problem = format!("more than {MAX_MOVES} moves of one thing");
+        refuse_if(thing.moves.len() > MAX_MOVES, KEY, problem, "give fewer")?;
         let mut earliest = 0.0;
         for station in &thing.moves {
             within(KEY, station.at_s, earliest..=MAX_TIMEOUT_S, "s of at_s, in order,")?;
-            self.point(KEY, station.by)?;
+            point(KEY, station.by)?;
             earliest = station.at_s;
         }
         Ok(())
     }
 }
 
+fn span(key: &'static str, from_s: f64, until_s: Option<f64>) -> Result<(), Objection> {
+    all_within([
+        (key, from_s, 0.0..=MAX_TIMEOUT_S, "s"),
+        (key, until_s.unwrap_or(from_s), from_s..=MAX_TIMEOUT_S, "s of until_s"),
+    ])
+}
+
 fn block(block: &Block) -> Result<(), Objection> {
-    const KEY: &str = "simulation.block";
-    within(KEY, block.from_s, 0.0..=MAX_TIMEOUT_S, "s")?;
-    block
-        .until_s
-        .map_or(Ok(()), |until| within(KEY, until, block.from_s..=MAX_TIMEOUT_S, "s of until_s"))
+    span("simulation.block", block.from_s, block.until_s)
 }
 
 fn ranger(ranger: &Ranger) -> Result<(), Objection> {
     const KEY: &str = "simulation.ring";
-    within(KEY, f64::from(ranger.index), 0.0..=5.0, "as the index")?;
-    within(KEY, ranger.forward_m, -5.0..=5.0, "m of forward_m")?;
-    within(KEY, ranger.bearing_deg, -180.0..=180.0, "degrees")
+    all_within([
+        (KEY, f64::from(ranger.index), 0.0..=5.0, "as the index"),
+        (KEY, ranger.forward_m, -5.0..=5.0, "m of forward_m"),
+        (KEY, ranger.bearing_deg, -180.0..=180.0, "degrees"),
+    ])
 }
 
 #[cfg(test)]

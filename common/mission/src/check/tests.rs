@@ -3,7 +3,7 @@ use super::*;
 /// The error with which a mission file of this text is refused.
 #[track_caller]
 pub(super) fn refusal(text: &str) -> String {
-    match parse(text, Path::new("m.toml")) {
+    match Mission::parse(text, Path::new("m.toml")) {
         Ok(_) => panic!("accepted: {text}"),
         Err(error) => error.to_string(),
     }
@@ -11,7 +11,7 @@ pub(super) fn refusal(text: &str) -> String {
 
 #[test]
 fn a_target_is_all_a_mission_needs() {
-    let mission = parse("target = [3, 0.5]", Path::new("dir/short.toml")).unwrap();
+    let mission = Mission::parse("target = [3, 0.5]", Path::new("dir/short.toml")).unwrap();
     assert_eq!(mission.name, "short");
     assert_eq!(mission.grid_frame().resolution_m, 0.05);
     assert_eq!(mission.body().counts_per_turn, 1200.0);
@@ -20,19 +20,19 @@ fn a_target_is_all_a_mission_needs() {
 #[test]
 fn a_mission_written_out_reads_back_the_same() {
     let text = "target = [3, 0.5]\n[[world.drum]]\nat = [1.5, 1]\nradius_m = 0.3\n[robot]\nmodel = 'x80sv'";
-    let mission = parse(text, Path::new("m.toml")).unwrap();
+    let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
     let written = toml::to_string(&mission).unwrap();
-    assert_eq!(parse(&written, Path::new("x")).unwrap(), mission);
+    assert_eq!(Mission::parse(&written, Path::new("x")).unwrap(), mission);
 }
 
 #[test]
 fn a_list_of_targets_is_written_in_place_of_one_and_reads_back_the_same() {
-    let mission = parse("targets = [[3, 0.5], [1, -1, 90]]", Path::new("m.toml")).unwrap();
+    let mission = Mission::parse("targets = [[3, 0.5], [1, -1, 90]]", Path::new("m.toml")).unwrap();
     assert_eq!(mission.target, DVec2::new(3.0, 0.5));
     let last = Waypoint { at: DVec2::new(1.0, -1.0), heading_deg: Some(90.0) };
     assert_eq!(mission.waypoints()[1..], [last]);
     let written = toml::to_string(&mission).unwrap();
-    assert_eq!(parse(&written, Path::new("m.toml")).unwrap(), mission);
+    assert_eq!(Mission::parse(&written, Path::new("m.toml")).unwrap(), mission);
     let seventeen = format!("targets = [{}]", "[1, 1],".repeat(17));
     assert!(refusal(&seventeen).contains("1 to 16"));
 }
@@ -88,18 +88,18 @@ fn every_refusal_names_line_and_key() {
 fn a_car_has_the_presets_of_its_model_and_what_the_mission_overrides() {
     let text =
         "target = [3, 0]\n[robot]\nmodel = 'car'\nsteering_limit_deg = 45\nwheelbase_m = 0.3";
-    let mission = parse(text, Path::new("m.toml")).unwrap();
+    let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
     let car = mission.body().ackermann().unwrap();
     assert!((car.least_turning_radius() - 0.3).abs() < 1e-12);
     assert_eq!(mission.body().steering.unwrap().counts_per_turn, 3600.0, "the preset's");
     let written = toml::to_string(&mission).unwrap();
-    assert_eq!(parse(&written, Path::new("m.toml")).unwrap().robot, mission.robot);
+    assert_eq!(Mission::parse(&written, Path::new("m.toml")).unwrap().robot, mission.robot);
 }
 
 #[test]
 fn a_car_that_is_to_look_first_is_remarked_on_with_its_turning_radius() {
     let car = "target = [3, 0]\nrobot.model = 'car'";
-    let remarks = |text: &str| parse(text, Path::new("m.toml")).unwrap().remarks;
+    let remarks = |text: &str| Mission::parse(text, Path::new("m.toml")).unwrap().remarks;
     let remark = &remarks(car)[0];
     assert!(
         remark.starts_with("m.toml:2: robot.model: a car turns in no less than 0.31 m"),

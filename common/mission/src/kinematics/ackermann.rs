@@ -24,7 +24,6 @@ impl Ackermann {
     /// The radius r and the `wheelbase` L from the driven axle to the steered one in metres, the top speed in rad/s,
     /// the limit in radians, below pi/2. All positive. It creeps at `creep` m/s at most where a turn is asked for
     /// without the speed for it.
-    #[must_use]
     pub const fn new(
         wheel_radius: f64,
         wheelbase: f64,
@@ -36,13 +35,11 @@ impl Ackermann {
     }
 
     /// The circle of the middle of the driven axle, metres.
-    #[must_use]
     pub fn least_turning_radius(&self) -> f64 {
         self.wheelbase / self.steering_limit.tan()
     }
 
     /// The map (3).
-    #[must_use]
     pub fn twist(&self, input: SteeredWheel) -> Twist {
         let v = self.wheel_radius * input.wheel;
         Twist { v, omega: input.steering.tan() / self.wheelbase * v }
@@ -50,7 +47,6 @@ impl Ackermann {
 
     /// (17): omega_h = v/r, phi = atan(L omega / v), clipped. A car cannot turn on the spot: it creeps forward where
     /// v would leave the turn impossible. A wheel at its limit keeps the steering, and so the curvature.
-    #[must_use]
     pub fn wheel(&self, twist: Twist) -> SteeredWheel {
         let needed = twist.omega.abs() * self.least_turning_radius();
         let v = if twist.v.abs() < needed {

@@ -22,7 +22,6 @@ pub struct WheelSpeeds {
 
 impl DifferentialDrive {
     /// The `radius` r and the `track` W in metres, the top speed in rad/s; all positive.
-    #[must_use]
     pub fn new(radius: f64, track: f64, top_wheel_speed: f64) -> Self {
         let (half, over) = (radius / 2.0, radius / track);
         Self {
@@ -38,14 +37,12 @@ impl DifferentialDrive {
     }
 
     /// (2). The map is linear, so wheel angles give (arc, turn).
-    #[must_use]
     pub fn twist(&self, wheels: WheelSpeeds) -> Twist {
         let body = self.g * Vector2::new(wheels.right, wheels.left);
         Twist { v: body.x, omega: body.y }
     }
 
     /// (17); both are scaled by one factor when a wheel would exceed its limit, so that the curvature stays.
-    #[must_use]
     pub fn wheels(&self, twist: Twist) -> WheelSpeeds {
         let wheels = self.inverse * Vector2::new(twist.v, twist.omega);
         let fastest = wheels.amax();

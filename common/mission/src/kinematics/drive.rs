@@ -13,7 +13,6 @@ pub enum Drive {
 impl Drive {
     /// (17), as far as the drive can: left and right wheel, rad/s; for a car the driven wheel, rad/s, and the
     /// steering angle, radians, positive to the left.
-    #[must_use]
     pub fn inputs(&self, twist: Twist) -> [f64; 2] {
         match self {
             Self::Differential(drive) => {

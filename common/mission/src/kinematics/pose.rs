@@ -20,13 +20,11 @@ pub struct Twist {
 }
 
 impl Pose2 {
-    #[must_use]
     pub fn axis(&self) -> DVec2 {
         DVec2::from_angle(self.heading)
     }
 
     /// (1) integrated exactly for constant v and omega: `arc` metres along a circle while turning by `turn` radians.
-    #[must_use]
     pub fn along_arc(&self, arc: f64, turn: f64) -> Self {
         // sin(h)/h, the chord over its arc, stable through h = 0.
         let half = turn / 2.0;
@@ -36,7 +34,6 @@ impl Pose2 {
     }
 
     /// One forward Euler step of (21) along the heading before the turn.
-    #[must_use]
     pub fn along_euler(&self, arc: f64, turn: f64) -> Self {
         let step = Rotation2::new(self.heading) * Vector2::new(arc, 0.0);
         Self { position: self.position + DVec2::new(step.x, step.y), heading: self.heading + turn }
