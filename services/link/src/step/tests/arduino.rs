@@ -61,7 +61,8 @@ impl Scene {
             Pace::Max => self.link.state().next_tick * POLL_MS * MS,
             Pace::Rate(_) => (machine_ns as f64 * self.rate) as u64,
         };
-        for effect in self.link.step(event, machine_ns, MissionTime(now)) {
+        let now = MissionTime(now);
+        for effect in self.link.step(Entry { event, machine_ns, now }) {
             match effect {
                 Effect::Send(bytes) if !bytes.is_empty() => {
                     let said = String::from_utf8(bytes).unwrap();
