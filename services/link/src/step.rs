@@ -13,16 +13,16 @@ use std::time::Duration;
 
 use common::{
     clock::{MissionTime, Pace},
-    driver::{Base, Driver, LaserScan, Memory, Motion, Turn, WireTally, counts::WheelCounts},
+    driver::{Base, Driver, Memory, Motion, Turn, WireTally, counts::WheelCounts},
     mission::Mission,
     samples::{
-        Action, Cause, CommandSample, CommandState, ContactSample, CountsSample, HoldReason, Order,
-        RangeReading, TurnSample, WheelSample,
+        Action, Cause, CommandSample, CommandState, HoldReason, Order, TurnSample, WheelSample,
     },
     stop_socket::Request,
 };
 
 use crate::{
+    backoff::has_passed,
     clock_rate::ClockRate,
     drivers,
     failsafe::{
@@ -55,12 +55,8 @@ const STOP_AGAIN: Duration = Duration::from_millis(200);
 
 #[derive(Clone, Debug)]
 struct OpenTick {
-    ranges: Vec<RangeReading>,
-    scans: Vec<LaserScan>,
-    turn: Option<Turn>,
-    wheels: WheelSample,
-    endless: Option<CountsSample>,
-    contact: Option<ContactSample>,
+    /// [`Effect::Tick`], given again until it is answered.
+    effect: Effect,
     began_ns: u64,
     /// When it was published; `None` while it waits for the supervisor's limit.
     given_ns: Option<u64>,
@@ -94,7 +90,6 @@ pub struct Link {
     /// None if the mission wants commands sent as they are.
     trim: Option<SpeedTrim>,
     wheels: WheelSample,
-    time: MissionTime,
     open: Option<OpenTick>,
     /// The last tick that may begin in lockstep; `None` for no limit.
     last_tick: Option<u64>,
@@ -128,7 +123,6 @@ impl Link {
             pinged_ns: None,
             trim: mission.speed_trim().then(|| SpeedTrim::new(mission)),
             wheels: WheelSample::default(),
-            time: MissionTime::default(),
             open: None,
             last_tick: None,
             target_number: 0,
@@ -301,7 +295,6 @@ impl Link {
                 return;
             }
         }
-        self.time = self.now;
         if !self.in_ticks() {
             // The tick uses up its number even if it is never answered.
             self.state.next_tick += 1;
@@ -310,31 +303,27 @@ impl Link {
         let wheels = WheelSample { restarts: self.restart.restarts(), ..motion.wheels };
         self.wheels = wheels;
         if let Some(trim) = &mut self.trim {
-            trim.rolled(WheelCounts::of(&wheels, endless.as_ref()), self.time.seconds());
+            trim.rolled(WheelCounts::of(&wheels, endless.as_ref()), self.now.seconds());
         }
         let (ranges, scans) = self.sensors.for_tick(&motion, self.now);
-        self.open = Some(OpenTick {
+        let turn = self.base.turn_for_tick().map(|turn| {
+            let Turn { sequence, turn_rad, variance_rad2 } = turn;
+            // The turn ends with the motion that the tick's wheels show.
+            let capture_ns = self.now.0;
+            TurnSample { capture_ns, sequence, turn_rad, variance_rad2, ..TurnSample::default() }
+        });
+        let effect = Effect::Tick {
+            tick: self.open_number(),
+            time: self.now,
             ranges,
             scans,
-            turn: self.base.turn_for_tick(),
+            turn,
             wheels,
             endless,
             contact: self.failsafe.monitors.odometry.take_contact(),
-            began_ns: now_ns,
-            given_ns: None,
-        });
+        };
+        self.open = Some(OpenTick { effect, began_ns: now_ns, given_ns: None });
         self.give_tick(now_ns, effects);
-    }
-
-    fn tick_effect(&self, tick: u64, open: OpenTick) -> Effect {
-        let OpenTick { ranges, scans, turn, wheels, endless, contact, .. } = open;
-        let time = self.time;
-        let turn = turn.map(|Turn { sequence, turn_rad, variance_rad2 }| {
-            // The turn ends with the motion that the tick's wheels show.
-            let capture_ns = time.0;
-            TurnSample { capture_ns, sequence, turn_rad, variance_rad2, ..TurnSample::default() }
-        });
-        Effect::Tick { tick, time, ranges, scans, turn, wheels, endless, contact }
     }
 
     fn open_number(&self) -> u64 {
@@ -414,8 +403,7 @@ impl Link {
         };
         if self.is_due(&mut open, now_ns, effects) {
             open.given_ns = Some(now_ns);
-            let tick = self.open_number();
-            effects.push(self.tick_effect(tick, open.clone()));
+            effects.push(open.effect.clone());
         }
         self.open = Some(open);
     }
@@ -464,7 +452,7 @@ impl Link {
 
 /// True if `since_ns` is `None`.
 fn passed(since_ns: Option<u64>, now_ns: u64, span: Duration) -> bool {
-    since_ns.is_none_or(|since| now_ns.saturating_sub(since) >= span.as_nanos() as u64)
+    since_ns.is_none_or(|since_ns| has_passed(since_ns, now_ns, span))
 }
 
 #[cfg(test)]

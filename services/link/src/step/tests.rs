@@ -4,8 +4,8 @@ use std::path::Path;
 use common::{
     clock::{MissionTime, Pace},
     samples::{
-        Action, Cause, CommandSample, CommandState, CountsSample, HoldReason, Order, RangeStatus,
-        Stamp, WheelSample,
+        Action, Cause, CommandSample, CommandState, CountsSample, HoldReason, Order, RangeReading,
+        RangeStatus, Stamp, WheelSample,
     },
     wire::{
         Addressing, Command, CustomSensors, Decoder, Mode, MotorSensors, Parameter, Report,

@@ -21,7 +21,7 @@ use super::{
     Wire,
     counts::{Attempts, Tally},
 };
-use crate::backoff::Backoff;
+use crate::backoff::{Backoff, has_passed};
 
 /// The first pause is short, so that a robot that only restarts its network is found at once.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
@@ -119,13 +119,13 @@ impl<D: Dial> Wire for Stream<D> {
                         Ok(()) => self.opened(now_ns)?,
                         Err(error) => self.close(&error),
                     }
-                } else if passed(*since_ns, now_ns, PATIENCE) {
+                } else if has_passed(*since_ns, now_ns, PATIENCE) {
                     self.close(&Errno::TIMEDOUT.into());
                 }
             }
             State::Open { heard_ns, .. } => {
                 let heard_ns = *heard_ns;
-                if D::SILENCE.is_some_and(|silence| passed(heard_ns, now_ns, silence)) {
+                if D::SILENCE.is_some_and(|silence| has_passed(heard_ns, now_ns, silence)) {
                     self.close(&Errno::TIMEDOUT.into());
                 } else {
                     self.flush()?;
@@ -248,10 +248,6 @@ const fn remedy(errno: Errno) -> &'static str {
         Errno::NOTTY => "robot.address names no serial line",
         _ => "is the robot on, is robot.address right",
     }
-}
-
-fn passed(since_ns: u64, now_ns: u64, span: Duration) -> bool {
-    now_ns.saturating_sub(since_ns) >= span.as_nanos() as u64
 }
 
 impl<D> AsFd for Stream<D> {

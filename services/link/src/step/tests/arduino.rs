@@ -165,20 +165,6 @@ fn a_closed_wire_is_not_polled_and_an_open_one_is_asked_for_its_baud_rate_first(
 }
 
 #[test]
-fn a_board_that_falls_silent_is_lost_and_told_to_stand_and_drives_on_when_it_answers() {
-    let mut scene = Scene::driving();
-    scene.delay_ms = None;
-    scene.run(900);
-    let decision = scene.link.decision();
-    assert_eq!((decision.action, decision.cause), (Action::Stop, Cause::RobotLost));
-    assert_eq!(scene.speed, 0);
-    scene.delay_ms = Some(5);
-    scene.run(5000);
-    assert_eq!(scene.link.decision(), Decision::GO);
-    assert!(scene.speed > 0);
-}
-
-#[test]
 fn answers_later_than_a_command_lasts_begin_no_tick_and_the_robot_stands() {
     let mut scene = Scene::driving();
     scene.delay_ms = Some(400);
