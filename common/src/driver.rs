@@ -1,43 +1,43 @@
-//! The interface between the link and a robot's protocol.
+//! The interface between the link and the devices on its wires: one [`Base`], which drives, and any number of sensors with wires of their
+//! own. A driver knows neither wire nor clock: bytes come in, what they say goes out.
 
 pub mod counts;
-pub mod laser;
 pub mod odometry;
 
 use std::{fmt, time::Duration};
 
-use crate::mission::{Mission, Sensor};
+use crate::mission::Sensor;
 use crate::samples::{
     CountsSample, InfraredSample, PowerSample, RangeReading, RangeStatus, SurroundingsSample,
     Sweep, WheelSample,
 };
 
-/// The protocol of one kind of robot, without wire or clock: bytes from the robot to their meaning, orders to bytes for the robot.
+/// The protocol of one device. A sensor needs no more than this.
 pub trait Driver: fmt::Debug {
-    fn push(&mut self, bytes: &[u8]);
+    /// The meaning of `bytes`, and of those before that they complete.
+    fn hear(&mut self, bytes: &[u8]) -> Heard;
 
     /// Drop the beginning of a message, whose rest does not follow in the next connection.
     fn reset(&mut self);
 
-    fn heard(&mut self) -> Heard;
-
     fn tally(&self) -> WireTally;
 
-    /// The newest reading of each sensor, in the order of the mission's table; a reading counts for one tick.
-    fn readings_for_tick(&mut self) -> Vec<RangeReading>;
-
-    fn scan_for_tick(&mut self) -> LaserScan {
-        LaserScan::default()
+    /// The bytes for a device that was found: settings, and the order to send what it measures. A sensor that fell silent gets them
+    /// again.
+    fn greeting(&self) -> Vec<u8> {
+        Vec::new()
     }
+}
+
+/// The driver of what moves the robot. All but [`Base::velocity`] depends on the robot.
+pub trait Base: Driver {
+    /// A command for the speeds of the two wheels, or of a car's wheel and steering, counts/s, forward positive; the robot itself stops
+    /// after `limit`.
+    fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8>;
 
     /// The turn since the tick before by the robot's own gyro, for a tick that begins now.
     fn turn_for_tick(&mut self) -> Option<Turn> {
         None
-    }
-
-    /// The bytes for a robot that was found: settings, and the order to send its sensors.
-    fn greeting(&self) -> Vec<u8> {
-        Vec::new()
     }
 
     /// The request to send the sensors, for a robot that neither publishes them nor is polled.
@@ -50,6 +50,10 @@ pub trait Driver: fmt::Debug {
         Vec::new()
     }
 
+    fn acknowledge(&self) -> Vec<u8> {
+        Vec::new()
+    }
+
     fn is_polled(&self) -> bool {
         false
     }
@@ -59,14 +63,6 @@ pub trait Driver: fmt::Debug {
     fn poll(&mut self) -> Vec<u8> {
         Vec::new()
     }
-
-    fn acknowledge(&self) -> Vec<u8> {
-        Vec::new()
-    }
-
-    /// A command for the speeds of the two wheels, or of a car's wheel and steering, counts/s, forward positive; the robot itself stops
-    /// after `limit`.
-    fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8>;
 
     /// Continues the wheels' counts in the next driver; none if the robot counts.
     fn memory(&self) -> Option<Memory> {
@@ -98,6 +94,14 @@ pub struct WireTally {
     pub bytes_dropped: u64,
 }
 
+impl Heard {
+    /// One battery feeds all of the robot.
+    pub fn take_battery(&mut self, volts: f64) {
+        let (board_v, motor_v, servo_v) = (volts, volts, volts);
+        self.power = Some(PowerSample { board_v, motor_v, servo_v, ..PowerSample::default() });
+    }
+}
+
 impl WireTally {
     /// Count `piece`, a whole or broken message, and note in `heard` why it was refused. Returns whether it was `taken`.
     pub fn count(&mut self, piece: &[u8], taken: Result<(), String>, heard: &mut Heard) -> bool {
@@ -113,6 +117,7 @@ impl WireTally {
     }
 
     /// Adds bytes that were dropped before they could be a message.
+    #[must_use]
     pub const fn with_dropped(self, bytes: u64) -> Self {
         Self { bytes_dropped: self.bytes_dropped + bytes, ..self }
     }
@@ -125,7 +130,9 @@ pub struct Heard {
     pub acknowledged: usize,
     /// A tick begins with it.
     pub motion: Option<Motion>,
+    /// The rows of the sensors are those of the mission's table. Others are ignored.
     pub readings: Vec<RangeReading>,
+    pub scans: Vec<LaserScan>,
     /// The link says which batteries are low.
     pub power: Option<PowerSample>,
     pub surroundings: Option<SurroundingsSample>,
@@ -144,21 +151,26 @@ pub struct Heard {
 /// A sender, other than the link, of commands to the robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Commander {
+    /// Its number in the network.
     pub number: [u8; 16],
     pub moves: bool,
 }
 
-/// Beams as the topic `scan` has them, none if none came, and their times.
+/// A scan of the laser in `row`, its beams as [`beam`] gives them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LaserScan {
+    pub row: usize,
     pub beams: Vec<f32>,
     pub sweep: Sweep,
+    /// When its first beam was measured by the clock of [`Motion::stamp_ns`]. Without it, `sweep` counts from the tick on.
+    pub stamp_ns: Option<i64>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turn {
     /// One more than the number of the turn at whose end this one begins; another number if one between is missing.
     pub sequence: u64,
+    /// Radians counter-clockwise.
     pub turn_rad: f64,
     pub variance_rad2: f64,
 }
@@ -168,67 +180,32 @@ pub struct Motion {
     pub wheels: WheelSample,
     /// Of a robot that says angles or its odometry: the counts of `wheels` without their cycle.
     pub endless: Option<CountsSample>,
+    /// When it was measured, by the robot's clock.
+    pub stamp_ns: Option<i64>,
     /// AD counts of the left and the right wheel.
     pub currents: [u16; 2],
 }
 
-#[derive(Clone, Debug)]
-pub struct Readings {
-    table: Vec<Sensor>,
-    newest: Vec<RangeReading>,
-    fresh: Vec<RangeReading>,
-    ticks: u64,
+/// The reading of the sensor in `row` of the mission's table at a range, metres: infinite or beyond reach is nothing, negative or no number
+/// is no reading.
+#[must_use]
+pub fn range_reading(row: usize, sensor: &Sensor, range: f64) -> RangeReading {
+    let (status, range_m) = match range {
+        range if range < 0.0 || range.is_nan() => (RangeStatus::Invalid, 0.0),
+        range if range <= sensor.reach_m => (RangeStatus::Measured, range),
+        _ => (RangeStatus::Nothing, 0.0),
+    };
+    let raw = (range_m * 100.0).round() as u16;
+    RangeReading { sensor: row as u8, range_m, raw, status: status.into() }
 }
 
-impl Readings {
-    pub fn new(mission: &Mission) -> Self {
-        let table = mission.sensor_table();
-        Self { newest: absent(&table).collect(), table, fresh: Vec::new(), ticks: 0 }
+/// A beam as the topic `scan` has it: infinite for none or one beyond reach, no number for one too short to be a range.
+#[must_use]
+pub fn beam(sensor: &Sensor, range: Option<f32>) -> f32 {
+    let (least_m, reach_m) = (sensor.model.least_m() as f32, sensor.reach_m as f32);
+    match range {
+        Some(range) if range < least_m || range.is_nan() => f32::NAN,
+        Some(range) if range <= reach_m => range,
+        _ => f32::INFINITY,
     }
-
-    pub fn table(&self) -> &[Sensor] {
-        &self.table
-    }
-
-    /// Takes a reading; one of a row that does not exist is dropped.
-    pub fn take(&mut self, row: usize, reading: RangeReading) {
-        if let Some(newest) = self.newest.get_mut(row) {
-            *newest = RangeReading { sensor: row as u8, ..reading };
-            self.fresh.push(*newest);
-        }
-    }
-
-    pub fn take_fresh(&mut self) -> Vec<RangeReading> {
-        std::mem::take(&mut self.fresh)
-    }
-
-    /// Takes a range, metres: infinite or beyond reach is nothing, negative or no number is no reading.
-    pub fn take_range(&mut self, row: usize, range: f64) {
-        let reach_m = self.table.get(row).map_or(0.0, |sensor| sensor.reach_m);
-        let (status, range_m) = match range {
-            range if range < 0.0 || range.is_nan() => (RangeStatus::Invalid, 0.0),
-            range if range <= reach_m => (RangeStatus::Measured, range),
-            _ => (RangeStatus::Nothing, 0.0),
-        };
-        let (raw, status) = ((range_m * 100.0).round() as u16, status.into());
-        self.take(row, RangeReading { range_m, raw, status, ..RangeReading::default() });
-    }
-
-    /// The readings for a tick, one for each row. Each is given once.
-    pub fn for_tick(&mut self) -> Vec<RangeReading> {
-        let tick = self.ticks;
-        self.ticks += 1;
-        let absent = absent(&self.table).collect();
-        let mut readings = std::mem::replace(&mut self.newest, absent);
-        for (reading, sensor) in readings.iter_mut().zip(&self.table) {
-            if !tick.is_multiple_of(sensor.every_ticks) {
-                *reading = RangeReading { sensor: reading.sensor, ..RangeReading::default() };
-            }
-        }
-        readings
-    }
-}
-
-fn absent(table: &[Sensor]) -> impl Iterator<Item = RangeReading> {
-    (0..).zip(table).map(|(sensor, _)| RangeReading { sensor, ..RangeReading::default() })
 }

@@ -130,6 +130,7 @@ pub fn motion(body: &Body, turned: [f64; 2], speeds: [f64; 2], held: [bool; 2]) 
             right_counts: right,
             ..CountsSample::default()
         }),
+        stamp_ns: None,
         // A held wheel draws all that its motor can.
         currents: held.map(|held| if held { HELD_AD } else { 0 }),
     }

@@ -24,6 +24,19 @@ pub enum Quantity {
     Velocity,
 }
 
+impl Quantity {
+    const ALL: [Self; 3] = [Self::Position, Self::Pwm, Self::Velocity];
+
+    /// Of a command for one channel, and for all.
+    const fn dids(self) -> [u8; 2] {
+        match self {
+            Self::Position => [did::POSITION, did::POSITION_ALL],
+            Self::Pwm => [did::PWM, did::PWM_ALL],
+            Self::Velocity => [did::VELOCITY, did::VELOCITY_ALL],
+        }
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Targets {
     /// Channel 0 to 5.
@@ -89,14 +102,12 @@ pub enum Parameter {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
 pub enum Stream {
-    /// DID 123.
-    Motor,
-    /// DID 124.
-    Custom,
-    /// DID 125.
-    Standard,
-    All,
+    Motor = did::MOTOR,
+    Custom = did::CUSTOM,
+    Standard = did::STANDARD,
+    All = did::ALL_SENSORS,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -153,12 +164,7 @@ impl Command {
                     Request::Stop => data.push(0),
                     Request::Count(count) => data.push(count),
                 }
-                match stream {
-                    Stream::Motor => did::MOTOR,
-                    Stream::Custom => did::CUSTOM,
-                    Stream::Standard => did::STANDARD,
-                    Stream::All => did::ALL_SENSORS,
-                }
+                stream as u8
             }
             Self::System(signal) => {
                 data.push(signal.byte());
@@ -179,11 +185,7 @@ impl Motion {
                     data.push(TIME_FOLLOWS);
                     data.extend_from_slice(&limit.to_le_bytes());
                 }
-                match self.quantity {
-                    Quantity::Position => did::POSITION,
-                    Quantity::Pwm => did::PWM,
-                    Quantity::Velocity => did::VELOCITY,
-                }
+                self.quantity.dids()[0]
             }
             Targets::All(values) => {
                 for value in values {
@@ -192,11 +194,7 @@ impl Motion {
                 if let Some(limit) = self.limit_ms {
                     data.extend_from_slice(&limit.to_le_bytes());
                 }
-                match self.quantity {
-                    Quantity::Position => did::POSITION_ALL,
-                    Quantity::Pwm => did::PWM_ALL,
-                    Quantity::Velocity => did::VELOCITY_ALL,
-                }
+                self.quantity.dids()[1]
             }
         }
     }

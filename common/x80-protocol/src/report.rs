@@ -1,7 +1,7 @@
 use super::{
     did,
     frame::{Addressing, Frame, MessageError, SystemSignal},
-    sensors::{CustomSensors, MotorSensors, StandardSensors},
+    sensors::{CustomSensors, Layout as _, MotorSensors, StandardSensors},
 };
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

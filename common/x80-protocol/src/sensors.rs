@@ -84,110 +84,85 @@ pub struct CustomSensors {
     pub io: u8,
 }
 
-const MOTOR_BYTES: usize = 33;
-const STANDARD_BYTES: usize = 40;
-const CUSTOM_BYTES: usize = 17;
+/// A frame's data in their order, described once for reading and for writing.
+pub(super) trait Layout: Default {
+    const DID: u8;
+    const BYTES: usize;
+    const EXPECTED: &str;
 
-/// Little-endian; missing ones read 0, because the length was checked.
-struct Words<'a>(&'a [u8]);
+    /// Passes each byte to `byte`, which reads or replaces it.
+    fn each_byte(&mut self, byte: &mut impl FnMut(&mut u8));
 
-impl Words<'_> {
-    fn at(&self, offset: usize) -> u16 {
-        match self.0.get(offset..offset + 2) {
-            Some(&[low, high]) => u16::from_le_bytes([low, high]),
-            _ => 0,
+    /// Further bytes are ignored.
+    fn from_bytes(data: &[u8]) -> Result<Self, MessageError> {
+        if data.len() < Self::BYTES {
+            return Err(length(Self::DID, data, Self::EXPECTED));
         }
+        let (mut new, mut bytes) = (Self::default(), data.iter());
+        new.each_byte(&mut |byte| *byte = bytes.next().copied().unwrap_or_default());
+        Ok(new)
     }
 
-    fn array<const N: usize>(&self, offset: usize) -> [u16; N] {
-        std::array::from_fn(|index| self.at(offset + 2 * index))
-    }
-}
-
-fn put(bytes: &mut [u8], offset: usize, words: &[u16]) {
-    for (slot, word) in bytes[offset..].chunks_exact_mut(2).zip(words) {
-        slot.copy_from_slice(&word.to_le_bytes());
-    }
-}
-
-impl MotorSensors {
-    pub(super) fn from_bytes(data: &[u8]) -> Result<Self, MessageError> {
-        if data.len() < MOTOR_BYTES {
-            return Err(length(did::MOTOR, data, "33"));
-        }
-        let words = Words(data);
-        let directions = data[32];
-        let encoder = |channel: usize| Encoder {
-            position: words.at(24 + 4 * channel) % COUNT_CYCLE,
-            speed: words.at(26 + 4 * channel),
-            positive: directions >> channel & 1 == 1,
-        };
-        Ok(Self {
-            pots: words.array(0),
-            currents: words.array(12),
-            encoders: [encoder(0), encoder(1)],
-        })
-    }
-
-    pub(super) fn to_bytes(self) -> [u8; MOTOR_BYTES] {
-        let mut bytes = [0; MOTOR_BYTES];
-        put(&mut bytes, 0, &self.pots);
-        put(&mut bytes, 12, &self.currents);
-        for (channel, encoder) in self.encoders.iter().enumerate() {
-            put(&mut bytes, 24 + 4 * channel, &[encoder.position, encoder.speed]);
-            bytes[32] |= u8::from(encoder.positive) << channel;
-        }
+    fn to_bytes(mut self) -> Vec<u8> {
+        let mut bytes = Vec::with_capacity(Self::BYTES);
+        self.each_byte(&mut |byte| bytes.push(*byte));
+        bytes.resize(Self::BYTES, 0);
         bytes
     }
 }
 
-impl StandardSensors {
-    pub(super) fn from_bytes(data: &[u8]) -> Result<Self, MessageError> {
-        if data.len() < STANDARD_BYTES {
-            return Err(length(did::STANDARD, data, "40 or 41"));
-        }
-        let words = Words(data);
-        Ok(Self {
-            ultrasonic: std::array::from_fn(|index| data[index]),
-            human: words.array(6),
-            tilt: words.array(14),
-            overheat: words.array(18),
-            temperature: words.at(22),
-            infrared: words.at(24),
-            infrared_code: std::array::from_fn(|index| data[26 + index]),
-            board_battery: words.at(30),
-            motor_battery: words.at(32),
-            servo_battery: words.at(34),
-            reference: words.at(36),
-        })
-    }
-
-    pub(super) fn to_bytes(self) -> [u8; STANDARD_BYTES] {
-        let mut bytes = [0; STANDARD_BYTES];
-        bytes[..6].copy_from_slice(&self.ultrasonic);
-        put(&mut bytes, 6, &self.human);
-        put(&mut bytes, 14, &self.tilt);
-        put(&mut bytes, 18, &self.overheat);
-        put(&mut bytes, 22, &[self.temperature, self.infrared]);
-        bytes[26..30].copy_from_slice(&self.infrared_code);
-        let supplies = [self.board_battery, self.motor_battery, self.servo_battery, self.reference];
-        put(&mut bytes, 30, &supplies);
-        bytes
+/// Little-endian.
+fn each_word<'a>(words: impl IntoIterator<Item = &'a mut u16>, byte: &mut impl FnMut(&mut u8)) {
+    for word in words {
+        let mut bytes = word.to_le_bytes();
+        bytes.iter_mut().for_each(&mut *byte);
+        *word = u16::from_le_bytes(bytes);
     }
 }
 
-impl CustomSensors {
-    pub(super) fn from_bytes(data: &[u8]) -> Result<Self, MessageError> {
-        if data.len() < CUSTOM_BYTES {
-            return Err(length(did::CUSTOM, data, "17"));
-        }
-        Ok(Self { ad: Words(data).array(0), io: data[16] })
-    }
+impl Layout for MotorSensors {
+    const DID: u8 = did::MOTOR;
+    const BYTES: usize = 33;
+    const EXPECTED: &str = "33";
 
-    pub(super) fn to_bytes(self) -> [u8; CUSTOM_BYTES] {
-        let mut bytes = [0; CUSTOM_BYTES];
-        put(&mut bytes, 0, &self.ad);
-        bytes[16] = self.io;
-        bytes
+    fn each_byte(&mut self, byte: &mut impl FnMut(&mut u8)) {
+        each_word(self.pots.iter_mut().chain(&mut self.currents), byte);
+        for encoder in &mut self.encoders {
+            each_word([&mut encoder.position, &mut encoder.speed], byte);
+            encoder.position %= COUNT_CYCLE;
+        }
+        let [first, second] = self.encoders.map(|encoder| u8::from(encoder.positive));
+        let mut directions = first | second << 1;
+        byte(&mut directions);
+        for (channel, encoder) in self.encoders.iter_mut().enumerate() {
+            encoder.positive = directions >> channel & 1 == 1;
+        }
+    }
+}
+
+impl Layout for StandardSensors {
+    const DID: u8 = did::STANDARD;
+    const BYTES: usize = 40;
+    const EXPECTED: &str = "40 or 41";
+
+    fn each_byte(&mut self, byte: &mut impl FnMut(&mut u8)) {
+        self.ultrasonic.iter_mut().for_each(&mut *byte);
+        let further = self.tilt.iter_mut().chain(&mut self.overheat);
+        each_word(self.human.iter_mut().chain(further), byte);
+        each_word([&mut self.temperature, &mut self.infrared], byte);
+        self.infrared_code.iter_mut().for_each(&mut *byte);
+        each_word([&mut self.board_battery, &mut self.motor_battery], byte);
+        each_word([&mut self.servo_battery, &mut self.reference], byte);
+    }
+}
+
+impl Layout for CustomSensors {
+    const DID: u8 = did::CUSTOM;
+    const BYTES: usize = 17;
+    const EXPECTED: &str = "17";
+
+    fn each_byte(&mut self, byte: &mut impl FnMut(&mut u8)) {
+        each_word(&mut self.ad, byte);
+        byte(&mut self.io);
     }
 }

@@ -23,17 +23,17 @@ mod answers;
 use std::time::Duration;
 
 use common::{
-    driver::{Driver, Heard, Motion, Readings, WireTally},
+    driver::{Base, Driver, Heard, Motion, WireTally, range_reading},
     json_wire::Lines,
-    mission::Mission,
-    samples::{RangeReading, WheelSample},
+    mission::{Mission, Sensor},
+    samples::WheelSample,
     wire::COUNT_CYCLE,
 };
 
 use self::answers::Answer;
 
-/// More lines that wait are dropped. A round has at most seven.
-const MOST_WAITING: usize = 64;
+/// More lines at once are dropped. A round has at most seven.
+const MOST_AT_ONCE: usize = 64;
 /// The board waits for an echo for one second at most.
 const LATEST_S: f64 = 2.0;
 /// A greater multiple of a wheel's top speed is no speed.
@@ -61,11 +61,9 @@ pub struct Arduino {
     /// Polls: a round is complete within `overdue`, and a request is answered or lost after `lost`.
     overdue: u64,
     lost: u64,
-    /// Pin and row, in the order in which they are asked.
-    sonars: Vec<(u8, usize)>,
+    /// Pin, row and sensor, in the order in which they are asked.
+    sonars: Vec<(u8, usize, Sensor)>,
     lines: Lines,
-    waiting: Vec<Vec<u8>>,
-    readings: Readings,
     waits: Waits,
     polls: u64,
     /// The newest counts, the poll at which they were asked for, and the speeds up to them, counts/s.
@@ -78,19 +76,17 @@ pub struct Arduino {
 impl Arduino {
     pub fn new(mission: &Mission) -> Self {
         let (robot, body) = (&mission.robot, mission.body());
-        let readings = Readings::new(mission);
-        let pin = |(row, name): (usize, &String)| Some((*robot.arduino.sonars.get(name)?, row));
-        let names = readings.table().iter().map(|sensor| &sensor.name).enumerate();
+        let pin = |(row, sensor): (usize, Sensor)| {
+            Some((*robot.arduino.sonars.get(&sensor.name)?, row, sensor))
+        };
         Self {
             pid_rate_hz: robot.arduino.pid_rate_hz,
             rate_hz: robot.rate_hz,
             most_counts_s: IMPLAUSIBLE * body.top_speed_m_s / body.metres_per_count(),
             overdue: (robot.command_limit_s * robot.rate_hz).ceil() as u64,
             lost: (LATEST_S * robot.rate_hz).ceil() as u64,
-            sonars: names.filter_map(pin).collect(),
+            sonars: mission.sensor_table().into_iter().enumerate().filter_map(pin).collect(),
             lines: Lines::default(),
-            waiting: Vec::new(),
-            readings,
             waits: Waits::Baud { since: None },
             polls: 0,
             counts: None,
@@ -118,10 +114,11 @@ impl Arduino {
             {
                 let (since, ranges) = (*since, std::mem::take(ranges));
                 self.waits = Waits::No;
-                for (&(_, row), centimetres) in self.sonars.iter().zip(ranges) {
+                for ((_, row, sensor), centimetres) in self.sonars.iter().zip(ranges) {
                     // The board says 0 for no echo.
                     let range = f64::from(centimetres) / 100.0;
-                    self.readings.take_range(row, if range > 0.0 { range } else { f64::INFINITY });
+                    let range = if range > 0.0 { range } else { f64::INFINITY };
+                    heard.readings.push(range_reading(*row, sensor, range));
                 }
                 heard.motion = Some(self.motion(counts, since));
             }
@@ -159,7 +156,7 @@ impl Arduino {
             ..WheelSample::default()
         };
         // The board measures no currents.
-        Motion { wheels, endless: None, currents: [0; 2] }
+        Motion { wheels, endless: None, stamp_ns: None, currents: [0; 2] }
     }
 
     /// Start again with a request whose answer is unmistakable.
@@ -175,44 +172,35 @@ fn text(line: &[u8]) -> String {
 }
 
 impl Driver for Arduino {
-    fn push(&mut self, bytes: &[u8]) {
-        let lines = self.lines.push(bytes);
-        let room = MOST_WAITING.saturating_sub(self.waiting.len());
-        if lines.len() > room {
-            let dropped = lines.iter().skip(room).map(Vec::len).sum::<usize>();
+    fn hear(&mut self, bytes: &[u8]) -> Heard {
+        let mut lines = self.lines.push(bytes);
+        let mut heard = Heard { refused: self.dropped.take(), ..Heard::default() };
+        if lines.len() > MOST_AT_ONCE {
+            let dropped = lines.drain(MOST_AT_ONCE..).map(|line| line.len()).sum::<usize>();
             self.tally.bytes_dropped += dropped as u64;
-            self.dropped = Some("more lines than were asked for".to_owned());
+            heard.refused = Some("more lines than were asked for".to_owned());
             self.begin_anew();
         }
-        self.waiting.extend(lines.into_iter().take(room));
-    }
-
-    fn reset(&mut self) {
-        self.lines.reset();
-        self.waiting.clear();
-        self.waits = Waits::Baud { since: None };
-    }
-
-    fn heard(&mut self) -> Heard {
-        let mut heard = Heard { refused: self.dropped.take(), ..Heard::default() };
-        for line in std::mem::take(&mut self.waiting) {
+        for line in lines {
             let taken = self.take(&line, &mut heard);
             if !self.tally.count(&line, taken, &mut heard) {
                 self.begin_anew();
             }
         }
-        heard.readings = self.readings.take_fresh();
         heard
+    }
+
+    fn reset(&mut self) {
+        self.lines.reset();
+        self.waits = Waits::Baud { since: None };
     }
 
     fn tally(&self) -> WireTally {
         self.tally.with_dropped(self.lines.dropped())
     }
+}
 
-    fn readings_for_tick(&mut self) -> Vec<RangeReading> {
-        self.readings.for_tick()
-    }
-
+impl Base for Arduino {
     fn is_polled(&self) -> bool {
         true
     }
@@ -224,7 +212,7 @@ impl Driver for Arduino {
             && now - since >= overdue
         {
             let asked = self.sonars.get(ranges.len());
-            let asked = asked.map_or_else(|| "e".to_owned(), |(pin, _)| format!("p {pin}"));
+            let asked = asked.map_or_else(|| "e".to_owned(), |(pin, ..)| format!("p {pin}"));
             self.dropped = Some(format!(
                 "the answer to `{asked}` is overdue by robot.command_limit_s: is that sonar connected, are all bytes carried?"
             ));
@@ -233,7 +221,7 @@ impl Driver for Arduino {
         match &self.waits {
             Waits::No => {
                 self.waits = Waits::Round { since: now, ranges: Vec::new() };
-                let pins = self.sonars.iter().map(|(pin, _)| format!("p {pin}\r"));
+                let pins = self.sonars.iter().map(|(pin, ..)| format!("p {pin}\r"));
                 pins.chain(["e\r".to_owned()]).collect::<String>().into_bytes()
             }
             Waits::Baud { since } if since.is_none_or(|since| now - since >= self.lost) => {

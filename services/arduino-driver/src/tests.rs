@@ -1,6 +1,6 @@
 use std::path::Path;
 
-use common::samples::RangeStatus;
+use common::samples::{RangeReading, RangeStatus};
 
 use super::*;
 
@@ -32,8 +32,7 @@ fn polled(driver: &mut Arduino) -> String {
 }
 
 fn heard(driver: &mut Arduino, bytes: &str) -> Heard {
-    driver.push(bytes.as_bytes());
-    driver.heard()
+    driver.hear(bytes.as_bytes())
 }
 
 const ROUND: &str = "p 4\rp 5\re\r";
@@ -150,7 +149,7 @@ fn a_baud_rate_is_asked_for_again_only_when_its_answer_is_lost() {
 fn a_wire_that_opens_again_begins_anew() {
     let mut driver = driver();
     assert_eq!(polled(&mut driver), ROUND);
-    driver.push(b"1\r\n2");
+    driver.hear(b"1\r\n2");
     driver.reset();
     assert_eq!(polled(&mut driver), "\rb\r");
     let said = heard(&mut driver, "57600\r\n");
@@ -201,13 +200,11 @@ fn counts_that_begin_anew_are_said_as_they_are_and_their_jump_is_no_speed() {
 fn a_flood_of_lines_or_of_bytes_without_an_end_is_bounded_and_begins_anew() {
     let mut driver = driver();
     assert_eq!(polled(&mut driver), ROUND);
-    driver.push("1\r\n".repeat(100_000).as_bytes());
-    assert!(driver.waiting.len() <= MOST_WAITING);
-    let said = driver.heard();
+    let said = heard(&mut driver, &"1\r\n".repeat(100_000));
     assert!(said.readings.is_empty() && said.refused.is_some());
     assert_eq!(polled(&mut driver), "\rb\r");
     for _ in 0..100 {
-        driver.push(&[b'1'; 10_000]);
+        driver.hear(&[b'1'; 10_000]);
     }
     assert!(driver.tally().bytes_dropped > 900_000);
     heard(&mut driver, "\r\n57600\r\n");

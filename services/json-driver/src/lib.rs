@@ -4,14 +4,14 @@ use std::{collections::BTreeMap, time::Duration};
 
 use common::{
     driver::{
-        Driver, Heard, LaserScan, Memory, Readings, StopMethod, WireTally,
-        laser::Laser,
+        Base, Driver, Heard, LaserScan, Memory, StopMethod, WireTally, beam,
         odometry::{Odometry, motion, twist, wheel_speeds},
+        range_reading,
     },
     json_wire::{Lines, Order, Report, line, parse},
     kinematics::Twist,
-    mission::{Body, Mission},
-    samples::{LONGEST_SWEEP_NS, PowerSample, RangeReading, Sweep},
+    mission::{Body, Mission, Sensor},
+    samples::{LONGEST_SWEEP_NS, RangeReading, Sweep},
 };
 
 /// Orders that count as answered by one report.
@@ -22,9 +22,8 @@ pub struct Json {
     body: Body,
     rate_hz: f64,
     lines: Lines,
-    waiting: Vec<Vec<u8>>,
-    readings: Readings,
-    laser: Option<Laser>,
+    table: Vec<Sensor>,
+    laser: Option<(usize, Sensor)>,
     answered: Option<u64>,
     odometry: Odometry,
     tally: WireTally,
@@ -33,12 +32,11 @@ pub struct Json {
 impl Json {
     pub fn new(mission: &Mission) -> Self {
         Self {
-            laser: Laser::new(mission),
+            laser: mission.laser(),
             body: mission.body(),
             rate_hz: mission.robot.rate_hz,
             lines: Lines::default(),
-            waiting: Vec::new(),
-            readings: Readings::new(mission),
+            table: mission.sensor_table(),
             answered: None,
             odometry: Odometry::default(),
             tally: WireTally::default(),
@@ -47,7 +45,7 @@ impl Json {
 
     /// A refused report has no effect; the error says why.
     fn take(&mut self, report: &Report, heard: &mut Heard) -> Result<(), String> {
-        let rows = self.rows_of(&report.ranges)?;
+        let readings = self.readings_of(&report.ranges)?;
         let scan = self.scan_of(report)?;
         let turned = match (report.wheels, report.odometry) {
             (Some(_), Some(_)) => return Err("wheels and odometry: say one of them".to_owned()),
@@ -61,19 +59,12 @@ impl Json {
         if turned.is_some() && report.speeds.is_none() {
             return Err("wheels or odometry without speeds: say both".to_owned());
         }
-        for (row, range) in rows {
-            self.readings.take_range(row, range.unwrap_or(f64::INFINITY));
-        }
+        heard.readings.extend(readings);
         if let (Some(turned), Some(speeds)) = (turned, report.speeds) {
-            if let Some(laser) = &mut self.laser {
-                laser.turned(turned);
-            }
             let held = report.held.unwrap_or_default();
             heard.motion = Some(motion(&self.body, turned, speeds, held));
         }
-        if let (Some(laser), Some(scan)) = (&mut self.laser, scan) {
-            laser.take(scan, &mut self.readings);
-        }
+        heard.scans.extend(scan);
         if let Some(count) = report.heard {
             // A robot that has restarted counts from 0.
             let before = self.answered.replace(count).filter(|before| *before <= count);
@@ -82,36 +73,35 @@ impl Json {
             heard.acknowledged = answered.min(MOST_ANSWERED);
         }
         if let Some(volts) = report.battery_v {
-            let (board_v, motor_v, servo_v) = (volts, volts, volts);
-            heard.power = Some(PowerSample { board_v, motor_v, servo_v, ..PowerSample::default() });
+            heard.take_battery(volts);
         }
         Ok(())
     }
 
-    fn rows_of(
+    fn readings_of(
         &self,
         ranges: &BTreeMap<String, Option<f64>>,
-    ) -> Result<Vec<(usize, Option<f64>)>, String> {
-        let table = self.readings.table();
-        let row = |(name, range): (&String, &Option<f64>)| {
-            let row = table.iter().position(|sensor| sensor.name == *name);
-            row.map(|row| (row, *range)).ok_or_else(|| {
-                let names: Vec<_> = table.iter().map(|sensor| sensor.name.as_str()).collect();
+    ) -> Result<Vec<RangeReading>, String> {
+        let reading = |(name, range): (&String, &Option<f64>)| {
+            let row = self.table.iter().position(|sensor| sensor.name == *name);
+            let row = row.ok_or_else(|| {
+                let names: Vec<_> = self.table.iter().map(|sensor| sensor.name.as_str()).collect();
                 format!("no sensor is called {name:?}; {} are", names.join(", "))
-            })
+            })?;
+            Ok(range_reading(row, &self.table[row], range.unwrap_or(f64::INFINITY)))
         };
-        ranges.iter().map(row).collect()
+        ranges.iter().map(reading).collect()
     }
 
     fn scan_of(&self, report: &Report) -> Result<Option<LaserScan>, String> {
         let Some(beams) = &report.scan else {
             return Ok(None);
         };
-        let Some(laser) = &self.laser else {
+        let Some((row, sensor)) = &self.laser else {
             return Err("a scan, and the mission has no laser: add a row of kind scan".to_owned());
         };
-        if beams.len() != laser.sensor().beams {
-            let (came, want) = (beams.len(), laser.sensor().beams);
+        if beams.len() != sensor.beams {
+            let (came, want) = (beams.len(), sensor.beams);
             return Err(format!("a scan of {came} beams, and the mission's laser has {want}"));
         }
         let nanoseconds = |word: &str, seconds: Option<f64>| {
@@ -121,7 +111,6 @@ impl Json {
                 false => Err(format!("{word} is not 0 to 2 s: say seconds")),
             }
         };
-        let sensor = laser.sensor();
         let beam_ns = nanoseconds("scan_time_s", report.scan_time_s)? / beams.len().max(1) as i64;
         // The first beam that an upside-down laser measures is not the first of its row, and the others follow the other way around.
         let sweep = Sweep {
@@ -129,47 +118,36 @@ impl Json {
             beam_ns: if sensor.is_upside_down { -beam_ns } else { beam_ns },
             first_beam: sensor.mirrored(0) as u64,
         };
-        let mut beams: Vec<_> = beams.iter().map(|beam| laser.beam(*beam)).collect();
+        let mut beams: Vec<_> = beams.iter().map(|range| beam(sensor, *range)).collect();
         sensor.mirror(&mut beams);
-        Ok(Some(LaserScan { beams, sweep }))
+        Ok(Some(LaserScan { row: *row, beams, sweep, stamp_ns: None }))
     }
 }
 
 impl Driver for Json {
-    fn push(&mut self, bytes: &[u8]) {
-        self.waiting.extend(self.lines.push(bytes));
+    fn hear(&mut self, bytes: &[u8]) -> Heard {
+        let mut heard = Heard::default();
+        for line in self.lines.push(bytes) {
+            let taken = parse(&line).and_then(|report| self.take(&report, &mut heard));
+            heard.anything |= self.tally.count(&line, taken, &mut heard);
+        }
+        heard
     }
 
     fn reset(&mut self) {
         self.lines.reset();
     }
 
-    fn heard(&mut self) -> Heard {
-        let mut heard = Heard::default();
-        for line in std::mem::take(&mut self.waiting) {
-            let taken = parse(&line).and_then(|report| self.take(&report, &mut heard));
-            heard.anything |= self.tally.count(&line, taken, &mut heard);
-        }
-        heard.readings = self.readings.take_fresh();
-        heard
-    }
-
     fn tally(&self) -> WireTally {
         self.tally.with_dropped(self.lines.dropped())
-    }
-
-    fn readings_for_tick(&mut self) -> Vec<RangeReading> {
-        self.readings.for_tick()
-    }
-
-    fn scan_for_tick(&mut self) -> LaserScan {
-        self.laser.as_mut().map(Laser::for_tick).unwrap_or_default()
     }
 
     fn greeting(&self) -> Vec<u8> {
         line(&Order::Hello { rate_hz: self.rate_hz })
     }
+}
 
+impl Base for Json {
     fn ask_for_sensors(&self) -> Vec<u8> {
         self.greeting()
     }
@@ -211,8 +189,7 @@ mod tests {
     }
 
     fn heard(driver: &mut Json, line: &str) -> Heard {
-        driver.push(format!("{line}\n").as_bytes());
-        driver.heard()
+        driver.hear(format!("{line}\n").as_bytes())
     }
 
     #[test]
@@ -264,72 +241,14 @@ mod tests {
     }
 
     #[test]
-    fn a_laser_that_says_the_same_while_the_wheels_turn_gives_no_reading_until_it_changes() {
-        let text = "target = [3, 0]\nrobot.model = 'kobuki'";
-        let mut driver = Json::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
-        let mut scan = |range: f64, turned: f64| {
-            let beams = vec![range.to_string(); 360].join(",");
-            let wheels = format!("\"wheels\":[{turned},{turned}],\"speeds\":[1,1]");
-            let heard = heard(&mut driver, &format!("{{{wheels},\"scan\":[{beams}]}}"));
-            (heard.readings[0].status(), driver.scan_for_tick().beams.len())
-        };
-        let measured = (RangeStatus::Measured, 360);
-        assert_eq!([scan(1.0, 0.0), scan(1.0, 0.1), scan(1.0, 0.9)], [measured; 3]);
-        assert_eq!(scan(1.0, 1.1), (RangeStatus::Invalid, 0));
-        assert_eq!(scan(1.5, 1.2), measured);
-    }
-
-    #[test]
     fn a_line_of_16384_beams_with_all_digits_is_taken_and_a_laser_upside_down_is_mirrored() {
         let row = "target = [3, 0]\nrobot.protocol = 'json'\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nbeams = 16384\nroll_deg = 180";
         let mut driver = Json::new(&Mission::parse(row, Path::new("m.toml")).unwrap());
         let range = |beam: u16| 1.000_000_000_000_123_4 + f64::from(beam) * 1e-4;
         let beams: Vec<_> = (0..16_384).map(|beam| range(beam).to_string()).collect();
-        assert_eq!(
-            heard(&mut driver, &format!("{{\"scan\":[{}]}}", beams.join(","))).refused,
-            None
-        );
-        let scan = driver.scan_for_tick().beams;
+        let heard = heard(&mut driver, &format!("{{\"scan\":[{}]}}", beams.join(",")));
+        let scan = &heard.scans[0].beams;
         assert_eq!((scan.len(), scan[0]), (16_384, range(16_383) as f32));
-    }
-
-    /// The status of the laser of `model` after scans of so many beams that end at a range, the others at nothing, each after the wheels
-    /// have turned on the spot by an angle more.
-    fn scanned(model: &str, scans: &[(usize, f64, f64)]) -> Vec<RangeStatus> {
-        let text = format!("target = [3, 0]\nrobot.model = '{model}'");
-        let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
-        let (_, laser) = mission.laser().unwrap();
-        let mut driver = Json::new(&mission);
-        let mut turned = 0.0;
-        let status = |&(ending, range, turn): &(usize, f64, f64)| {
-            turned += turn;
-            let mut beams = vec![range.to_string(); ending];
-            beams.resize(laser.beams, "null".to_owned());
-            let wheels = format!("\"wheels\":[{},{turned}],\"speeds\":[1,1]", -turned);
-            let line = format!("{{{wheels},\"scan\":[{}]}}", beams.join(","));
-            let status = heard(&mut driver, &line).readings[0].status();
-            assert_eq!(driver.scan_for_tick().beams.is_empty(), status == RangeStatus::Invalid);
-            status
-        };
-        scans.iter().map(status).collect()
-    }
-
-    #[test]
-    fn a_laser_that_sees_nothing_where_much_was_near_gives_no_reading_until_it_sees_anything() {
-        use RangeStatus::{Invalid, Measured, Nothing};
-        let blind = [(30, 1.0, 0.0), (0, 0.0, 0.1), (0, 0.0, 9.0), (1, 3.0, 0.0), (0, 0.0, 0.0)];
-        assert_eq!(scanned("kobuki", &blind), [Measured, Invalid, Invalid, Measured, Nothing]);
-    }
-
-    #[test]
-    fn a_laser_sees_nothing_where_what_it_saw_was_small_far_or_is_out_of_view_by_the_turn() {
-        use RangeStatus::{Invalid, Measured, Nothing};
-        for small_or_far in [(18, 1.0, 0.0), (360, 7.0, 0.0)] {
-            assert_eq!(scanned("kobuki", &[small_or_far, (0, 0.0, 0.0)]), [Measured, Nothing]);
-        }
-        // 100 beams of a Jackal's laser are 25 degrees; a wheel that turns by 1 rad turns it by 30.
-        assert_eq!(scanned("jackal", &[(100, 1.0, 0.0), (0, 0.0, 1.0)]), [Measured, Nothing]);
-        assert_eq!(scanned("jackal", &[(100, 1.0, 0.0), (0, 0.0, 0.1)]), [Measured, Invalid]);
     }
 
     #[test]
@@ -364,13 +283,13 @@ mod tests {
         let mut driver = Json::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
         let mut sweep = |words: &str| {
             let line = format!("{{\"scan\":[{}]{words}}}", vec!["1"; 360].join(","));
-            (heard(&mut driver, &line).refused.is_some(), driver.scan_for_tick().sweep)
+            heard(&mut driver, &line).scans.pop().map(|scan| scan.sweep)
         };
-        assert_eq!(sweep(""), (false, Sweep::default()));
+        assert_eq!(sweep(""), Some(Sweep::default()));
         let sent = Sweep { first_beam_ns: -300_000_000, beam_ns: 500_000, first_beam: 0 };
-        assert_eq!(sweep(",\"scan_age_s\":0.3,\"scan_time_s\":0.18"), (false, sent));
+        assert_eq!(sweep(",\"scan_age_s\":0.3,\"scan_time_s\":0.18"), Some(sent));
         for wrong in ["\"scan_age_s\":-0.1", "\"scan_time_s\":2.1", "\"scan_age_s\":200"] {
-            assert_eq!(sweep(&format!(",{wrong}")), (true, Sweep::default()), "{wrong}");
+            assert_eq!(sweep(&format!(",{wrong}")), None, "{wrong}");
         }
     }
 
@@ -395,8 +314,7 @@ mod tests {
             let text = format!("target = [3, 0]\nrobot.protocol = 'json'\n{row}");
             let mut driver = Json::new(&Mission::parse(&text, Path::new("m.toml")).unwrap());
             let said = r#"{"wheels":[0,0],"speeds":[0,0],"scan":[1,2,3,4],"scan_time_s":0.4}"#;
-            heard(&mut driver, said);
-            let LaserScan { beams, sweep } = driver.scan_for_tick();
+            let LaserScan { beams, sweep, .. } = heard(&mut driver, said).scans.remove(0);
             let times = (0..4).map(|beam| (sweep.beam_time_ns(beam, 4), beams[beam]));
             let mut measured: Vec<_> = times.collect();
             measured.sort_by_key(|(at, _)| *at);

@@ -41,6 +41,11 @@ impl Backoff {
     }
 }
 
+/// Whether `span` of the machine's clock lies between the two readings.
+pub(crate) fn has_passed(since_ns: u64, now_ns: u64, span: Duration) -> bool {
+    now_ns.saturating_sub(since_ns) >= span.as_nanos() as u64
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -25,12 +25,13 @@ use common::{
 };
 
 use crate::{
+    drivers,
     failsafe::{
         Decision,
         battery::{BatteryChange, Charge},
     },
-    stage::{Entry, LinkStage},
-    step::{Effect, Event},
+    stage::LinkStage,
+    step::{Effect, Entry, Event},
     stop_guard::StopGuard,
     transport::Transport,
 };
@@ -58,6 +59,8 @@ readers! {
 /// The link process.
 pub struct Shell {
     transport: Transport,
+    /// Of the sensors with wires of their own.
+    wires: Vec<Transport>,
     inputs: Inputs,
     writers: Option<Writers>,
     runner: Runner<LinkStage>,
@@ -109,22 +112,26 @@ impl Process for Shell {
             })
             .flatten();
         let stop_mark = StopMark::of(directory);
-        let transport = Transport::open(&context.run.address, &context.run.mission)?;
-        context.waiter.on_readable(&transport)?;
+        let mission = &context.run.mission;
+        let transport = Transport::of_base(&context.run.address, mission)?;
+        let wires = drivers::sensors(mission)
+            .iter()
+            .map(|sensor| Transport::open(&sensor.address, sensor.baud))
+            .collect::<Result<Vec<_>, _>>()?;
+        for wire in std::iter::once(&transport).chain(&wires) {
+            context.waiter.on_readable(wire)?;
+        }
         if let Some(socket) = &stop_socket {
             context.waiter.on_readable(socket)?;
         }
         // What an earlier link's driver must know.
         let memory: Option<Memory> = context.saved_state()?;
-        let mut runner = Runner::open(context, LinkStage::longest)?;
-        if let Some(memory) = memory {
-            runner.take_entry(Entry::Remember(memory))?;
-        }
         let mut shell = Self {
             transport,
+            wires,
             inputs,
             writers: context.writers(),
-            runner,
+            runner: Runner::open(context, LinkStage::longest)?,
             stop_socket,
             marked: stop_mark.is_set(),
             stop_mark,
@@ -135,6 +142,9 @@ impl Process for Shell {
             latency_ns: 0,
             stated_ns: 0,
         };
+        if let Some(memory) = memory {
+            shell.take(Event::Remember(memory), monotonic_ns())?;
+        }
         if shell.marked {
             shell.take(Event::Operator(Request::Stop), monotonic_ns())?;
         }
@@ -163,13 +173,29 @@ impl Process for Shell {
             if now_ns - began_ns > MOST_LISTENING_NS {
                 break;
             }
-            let Some(bytes) = self.transport.receive(now_ns)? else {
-                break;
-            };
             let now = self.clock.at(self.runner.stage.link.state().next_tick, now_ns);
-            let entry = Entry::Step(Event::Datagram(bytes), now_ns, now);
-            let effects = self.runner.take_entry(entry)?;
+            let mut effects = Vec::new();
+            let mut came = false;
+            for (number, wire) in (0..).zip(&mut self.wires) {
+                if let Some(bytes) = wire.receive(now_ns)? {
+                    let event = Event::Sensor(number, bytes);
+                    effects.extend(self.runner.take_entry(Entry {
+                        event,
+                        machine_ns: now_ns,
+                        now,
+                    })?);
+                    came = true;
+                }
+            }
+            if let Some(bytes) = self.transport.receive(now_ns)? {
+                let event = Event::Datagram(bytes);
+                effects.extend(self.runner.take_entry(Entry { event, machine_ns: now_ns, now })?);
+                came = true;
+            }
             self.carry_out(effects)?;
+            if !came {
+                break;
+            }
         }
         self.maintain()?;
         self.take(Event::Quiet, monotonic_ns())?;
@@ -205,14 +231,13 @@ impl Process for Shell {
 
     fn idle(&mut self) -> Result<(), StageError> {
         if self.has_idle_work() {
-            self.runner.take_entry(Entry::Telemetry)?;
+            self.take(Event::Telemetry, monotonic_ns())?;
         }
         Ok(())
     }
 
     fn stop(&mut self) -> Result<(), StageError> {
-        let effects = self.runner.take_entry(Entry::Stop(monotonic_ns()))?;
-        self.carry_out(effects)?;
+        self.take(Event::End, monotonic_ns())?;
         self.runner.publish_rest()?;
         tracing::info!("stop sent to the robot");
         let link = &self.runner.stage.link;
@@ -289,13 +314,18 @@ impl Shell {
         if let Some(open) = self.transport.maintain(now_ns)? {
             self.take(Event::Wire(open), now_ns)?;
         }
+        for number in 0..self.wires.len() {
+            if let Some(open) = self.wires[number].maintain(now_ns)? {
+                self.take(Event::SensorWire(number as u8, open), now_ns)?;
+            }
+        }
         Ok(())
     }
 
     fn take(&mut self, event: Event<'_>, machine_ns: u64) -> Result<(), StageError> {
         let next_tick = self.runner.stage.link.state().next_tick;
         let now = self.clock.at(next_tick, machine_ns);
-        let effects = self.runner.take_entry(Entry::Step(event, machine_ns, now))?;
+        let effects = self.runner.take_entry(Entry { event, machine_ns, now })?;
         self.carry_out(effects)
     }
 
@@ -303,6 +333,11 @@ impl Shell {
         for effect in effects {
             match effect {
                 Effect::Send(bytes) => self.transport.send(&bytes)?,
+                Effect::SendSensor(number, bytes) => {
+                    if let Some(wire) = self.wires.get_mut(usize::from(number)) {
+                        wire.send(&bytes)?;
+                    }
+                }
                 Effect::Answered { began_ns } => {
                     if let Some(memory) = self.runner.stage.link.driver_memory() {
                         self.runner.out.save(&memory)?;

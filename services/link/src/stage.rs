@@ -1,9 +1,8 @@
 //! The link as a stage: what it records and publishes, telemetry and the wire's bytes included.
 
 use common::{
-    clock::{MissionClock, MissionTime, Pace},
-    driver::Memory,
-    mission::Mission,
+    clock::{MissionClock, Pace},
+    mission::{Mission, SensorKind},
     outputs::Outputs,
     samples::{
         Direction, InfraredSample, PowerSample, RangesHeader, ScanHeader, SurroundingsSample,
@@ -17,29 +16,15 @@ use common::{
         WIRE_PIECE,
     },
 };
-use serde::{Deserialize, Serialize};
 
-use crate::step::{Effect, Event, Link, State};
-
-/// A generation starts from a [`State`].
-#[derive(Debug, Serialize, Deserialize)]
-pub enum Entry<'a> {
-    /// The step takes an event at this reading of the monotonic clock, nanoseconds, and this mission time.
-    Step(#[serde(borrow)] Event<'a>, u64, MissionTime),
-    /// The newest telemetry is published.
-    Telemetry,
-    /// The reading of the monotonic clock, nanoseconds.
-    Stop(u64),
-    /// The driver's state of the link before.
-    Remember(Memory),
-}
+use crate::step::{Effect, Entry, Event, Link, State};
 
 /// The step, and the samples that are published later, when no stage of the pipeline waits for the link.
 #[derive(Debug)]
 pub struct LinkStage {
     pub(crate) link: Link,
-    /// The header of its scans, and their beams; none without a laser.
-    laser: Option<(ScanHeader, usize)>,
+    /// The header of each laser's scans, and their beams.
+    lasers: Vec<(ScanHeader, usize)>,
     infrared: Option<InfraredSample>,
     power: Option<PowerSample>,
     surroundings: Option<SurroundingsSample>,
@@ -54,7 +39,7 @@ impl LinkStage {
 
     /// The most elements of a slice that it publishes.
     pub(crate) fn longest(&self) -> usize {
-        self.laser.map_or(WIRE_PIECE, |(_, beams)| beams.max(WIRE_PIECE))
+        self.lasers.iter().map(|(_, beams)| *beams).fold(WIRE_PIECE, usize::max)
     }
 
     fn carry(&mut self, at: Progress, bytes: &[u8], machine_ns: u64, direction: Direction) {
@@ -71,13 +56,17 @@ impl LinkStage {
         out: &mut Outputs,
     ) -> Result<Option<Effect>, StageError> {
         match effect {
-            Effect::Tick { tick, time, ranges, scan, turn, wheels, endless, contact } => {
+            Effect::Tick { tick, time, ranges, scans, turn, wheels, endless, contact } => {
                 out.at = Progress { tick, time };
                 if let Some(contact) = contact {
                     out.publish(&CONTACT, contact)?;
                 }
-                if let Some((header, _)) = self.laser.filter(|_| !scan.beams.is_empty()) {
-                    out.publish_slice(&SCAN, header.swept(scan.sweep), &scan.beams)?;
+                for scan in scans {
+                    let mut lasers = self.lasers.iter();
+                    let header = lasers.find(|(header, _)| header.sensor == scan.row as u64);
+                    if let Some((header, _)) = header {
+                        out.publish_slice(&SCAN, header.swept(scan.sweep), &scan.beams)?;
+                    }
                 }
                 if let Some(turn) = turn {
                     out.publish(&IMU_TURN, turn)?;
@@ -121,9 +110,11 @@ impl Stage for LinkStage {
     type Outcome = Vec<Effect>;
 
     fn new(mission: &Mission) -> Self {
+        let table = mission.sensor_table().into_iter().enumerate();
+        let lasers = table.filter(|(_, sensor)| sensor.kind == SensorKind::Scan);
         Self {
             link: Link::new(mission),
-            laser: (mission.laser()).map(|(row, laser)| (ScanHeader::of(row, &laser), laser.beams)),
+            lasers: lasers.map(|(row, laser)| (ScanHeader::of(row, &laser), laser.beams)).collect(),
             infrared: None,
             power: None,
             surroundings: None,
@@ -151,32 +142,20 @@ impl Stage for LinkStage {
         entry: Entry<'_>,
         out: &mut Outputs,
     ) -> Result<Vec<Effect>, StageError> {
-        let (effects, machine_ns) = match entry {
-            Entry::Step(event, machine_ns, now) => {
-                if let Event::Datagram(bytes) = event {
-                    self.carry(out.at, bytes, machine_ns, Direction::Received);
-                }
-                (self.link.step(event, machine_ns, now), machine_ns)
+        match entry.event {
+            Event::Datagram(bytes) => {
+                self.carry(out.at, bytes, entry.machine_ns, Direction::Received);
             }
-            Entry::Telemetry => {
-                self.publish_telemetry(out)?;
-                return Ok(Vec::new());
-            }
-            Entry::Remember(memory) => {
-                self.link.remember(&memory);
-                return Ok(Vec::new());
-            }
-            Entry::Stop(machine_ns) => {
-                let stops = self.link.final_stops().into_iter();
-                (stops.map(Effect::Send).collect(), machine_ns)
-            }
-        };
+            Event::Telemetry => self.publish_telemetry(out)?,
+            _ => {}
+        }
+        let effects = self.link.step(entry);
         if !effects.is_empty() {
             out.publish_inputs()?;
         }
         let mut left = Vec::new();
         for effect in effects {
-            left.extend(self.carry_out(effect, machine_ns, out)?);
+            left.extend(self.carry_out(effect, entry.machine_ns, out)?);
         }
         Ok(left)
     }

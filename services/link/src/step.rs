@@ -13,16 +13,16 @@ use std::time::Duration;
 
 use common::{
     clock::{MissionTime, Pace},
-    driver::{Driver, LaserScan, Memory, Motion, Turn, WireTally, counts::WheelCounts},
+    driver::{Base, Driver, Memory, Motion, Turn, WireTally, counts::WheelCounts},
     mission::Mission,
     samples::{
-        Action, Cause, CommandSample, CommandState, ContactSample, CountsSample, HoldReason, Order,
-        RangeReading, TurnSample, WheelSample,
+        Action, Cause, CommandSample, CommandState, HoldReason, Order, TurnSample, WheelSample,
     },
     stop_socket::Request,
 };
 
 use crate::{
+    backoff::has_passed,
     clock_rate::ClockRate,
     drivers,
     failsafe::{
@@ -32,11 +32,12 @@ use crate::{
         restart::RestartWatch,
     },
     polls::Polls,
+    sensors::Sensors,
     speed_trim::SpeedTrim,
     wheel_speeds::WheelSpeeds,
 };
 
-pub use event::{Effect, Event, State, Tally};
+pub use event::{Effect, Entry, Event, State, Tally};
 
 /// The pause of pings to a robot whose next motor frame is missing.
 const PING_EVERY: Duration = Duration::from_millis(200);
@@ -54,12 +55,8 @@ const STOP_AGAIN: Duration = Duration::from_millis(200);
 
 #[derive(Clone, Debug)]
 struct OpenTick {
-    ranges: Vec<RangeReading>,
-    scan: LaserScan,
-    turn: Option<Turn>,
-    wheels: WheelSample,
-    endless: Option<CountsSample>,
-    contact: Option<ContactSample>,
+    /// [`Effect::Tick`], given again until it is answered.
+    effect: Effect,
     began_ns: u64,
     /// When it was published; `None` while it waits for the supervisor's limit.
     given_ns: Option<u64>,
@@ -78,7 +75,10 @@ struct Repeat {
 pub struct Link {
     state: State,
     now: MissionTime,
-    driver: Box<dyn Driver>,
+    base: Box<dyn Base>,
+    /// Drivers of sensors with wires of their own.
+    drivers: Vec<Box<dyn Driver>>,
+    sensors: Sensors,
     polls: Polls,
     speeds: WheelSpeeds,
     clock_rate: ClockRate,
@@ -90,7 +90,6 @@ pub struct Link {
     /// None if the mission wants commands sent as they are.
     trim: Option<SpeedTrim>,
     wheels: WheelSample,
-    time: MissionTime,
     open: Option<OpenTick>,
     /// The last tick that may begin in lockstep; `None` for no limit.
     last_tick: Option<u64>,
@@ -111,7 +110,9 @@ impl Link {
         Self {
             state: State::default(),
             now: MissionTime::default(),
-            driver: drivers::of(mission),
+            base: drivers::base(mission).0,
+            drivers: drivers::sensors(mission).into_iter().map(|sensor| sensor.driver).collect(),
+            sensors: Sensors::new(mission),
             polls: Polls::new(mission),
             speeds: WheelSpeeds::new(mission),
             clock_rate: ClockRate::default(),
@@ -122,7 +123,6 @@ impl Link {
             pinged_ns: None,
             trim: mission.speed_trim().then(|| SpeedTrim::new(mission)),
             wheels: WheelSample::default(),
-            time: MissionTime::default(),
             open: None,
             last_tick: None,
             target_number: 0,
@@ -147,16 +147,18 @@ impl Link {
         self.observe(Observation::Pace(state.pace), 0);
     }
 
-    /// Take an event at mission time `now` and `now_ns` of the monotonic clock, which the deadlines of the wire use.
-    pub fn step(&mut self, event: Event<'_>, now_ns: u64, now: MissionTime) -> Vec<Effect> {
+    pub fn step(&mut self, entry: Entry<'_>) -> Vec<Effect> {
+        let Entry { event, machine_ns: now_ns, now } = entry;
         self.now = now;
         let mut effects = Vec::new();
         match event {
             Event::Datagram(bytes) => {
-                self.driver.push(bytes);
-                self.take_heard(now_ns, &mut effects);
+                let heard = self.base.hear(bytes);
+                self.take_heard(heard, now_ns, &mut effects);
             }
             Event::Wire(open) => self.take_wire(open, now_ns, &mut effects),
+            Event::Sensor(number, bytes) => self.take_sensor(number, bytes, now_ns, &mut effects),
+            Event::SensorWire(number, open) => self.take_sensor_wire(number, open, &mut effects),
             Event::Command(command) => self.take_command(&command, now_ns, &mut effects),
             Event::Order(order, reason) => self.take_order(order, reason, now_ns, &mut effects),
             Event::Operator(Request::Stop) => self.observe(Observation::Stopped, now_ns),
@@ -165,6 +167,12 @@ impl Link {
                 (self.last_tick, self.target_number) = (Some(last_tick), target_number);
             }
             Event::Quiet => {}
+            Event::Remember(memory) => {
+                self.base.remember(&memory);
+                return effects;
+            }
+            Event::Telemetry => return effects,
+            Event::End => return self.final_stops(),
         }
         self.keep_connected(now_ns, &mut effects);
         self.keep_polling(&mut effects);
@@ -187,7 +195,9 @@ impl Link {
     }
 
     pub fn wire_tally(&self) -> WireTally {
-        self.driver.tally()
+        let base = self.base.tally();
+        let dropped = self.drivers.iter().map(|driver| driver.tally().bytes_dropped);
+        base.with_dropped(dropped.sum())
     }
 
     pub const fn tally(&self) -> Tally {
@@ -230,19 +240,15 @@ impl Link {
 
     /// None if the robot itself counts.
     pub(crate) fn driver_memory(&self) -> Option<Memory> {
-        self.driver.memory()
-    }
-
-    pub(crate) fn remember(&mut self, memory: &Memory) {
-        self.driver.remember(memory);
+        self.base.memory()
     }
 
     pub const fn is_stopped_by_operator(&self) -> bool {
         self.monitors().orders.stopped_here()
     }
 
-    pub fn final_stops(&self) -> Vec<Vec<u8>> {
-        (0..STOPS).map(|_| self.velocity_0()).collect()
+    fn final_stops(&self) -> Vec<Effect> {
+        (0..STOPS).map(|_| Effect::Send(self.velocity_0())).collect()
     }
 
     const fn monitors(&self) -> &Monitors {
@@ -278,12 +284,7 @@ impl Link {
         })
     }
 
-    fn begin_tick(
-        &mut self,
-        Motion { wheels, endless, .. }: Motion,
-        now_ns: u64,
-        effects: &mut Vec<Effect>,
-    ) {
+    fn begin_tick(&mut self, motion: Motion, now_ns: u64, effects: &mut Vec<Effect>) {
         if !self.ordered_to_drive() && !self.held_by_operator() {
             return;
         }
@@ -294,38 +295,35 @@ impl Link {
                 return;
             }
         }
-        self.time = self.now;
         if !self.in_ticks() {
             // The tick uses up its number even if it is never answered.
             self.state.next_tick += 1;
         }
-        let wheels = WheelSample { restarts: self.restart.restarts(), ..wheels };
+        let endless = motion.endless;
+        let wheels = WheelSample { restarts: self.restart.restarts(), ..motion.wheels };
         self.wheels = wheels;
         if let Some(trim) = &mut self.trim {
-            trim.rolled(WheelCounts::of(&wheels, endless.as_ref()), self.time.seconds());
+            trim.rolled(WheelCounts::of(&wheels, endless.as_ref()), self.now.seconds());
         }
-        self.open = Some(OpenTick {
-            ranges: self.driver.readings_for_tick(),
-            scan: self.driver.scan_for_tick(),
-            turn: self.driver.turn_for_tick(),
+        let (ranges, scans) = self.sensors.for_tick(&motion, self.now);
+        let turn = self.base.turn_for_tick().map(|turn| {
+            let Turn { sequence, turn_rad, variance_rad2 } = turn;
+            // The turn ends with the motion that the tick's wheels show.
+            let capture_ns = self.now.0;
+            TurnSample { capture_ns, sequence, turn_rad, variance_rad2, ..TurnSample::default() }
+        });
+        let effect = Effect::Tick {
+            tick: self.open_number(),
+            time: self.now,
+            ranges,
+            scans,
+            turn,
             wheels,
             endless,
             contact: self.failsafe.monitors.odometry.take_contact(),
-            began_ns: now_ns,
-            given_ns: None,
-        });
+        };
+        self.open = Some(OpenTick { effect, began_ns: now_ns, given_ns: None });
         self.give_tick(now_ns, effects);
-    }
-
-    fn tick_effect(&self, tick: u64, open: OpenTick) -> Effect {
-        let OpenTick { ranges, scan, turn, wheels, endless, contact, .. } = open;
-        let time = self.time;
-        let turn = turn.map(|Turn { sequence, turn_rad, variance_rad2 }| {
-            // The turn ends with the motion that the tick's wheels show.
-            let capture_ns = time.0;
-            TurnSample { capture_ns, sequence, turn_rad, variance_rad2, ..TurnSample::default() }
-        });
-        Effect::Tick { tick, time, ranges, scan, turn, wheels, endless, contact }
     }
 
     fn open_number(&self) -> u64 {
@@ -405,8 +403,7 @@ impl Link {
         };
         if self.is_due(&mut open, now_ns, effects) {
             open.given_ns = Some(now_ns);
-            let tick = self.open_number();
-            effects.push(self.tick_effect(tick, open.clone()));
+            effects.push(open.effect.clone());
         }
         self.open = Some(open);
     }
@@ -455,7 +452,7 @@ impl Link {
 
 /// True if `since_ns` is `None`.
 fn passed(since_ns: Option<u64>, now_ns: u64, span: Duration) -> bool {
-    since_ns.is_none_or(|since| now_ns.saturating_sub(since) >= span.as_nanos() as u64)
+    since_ns.is_none_or(|since_ns| has_passed(since_ns, now_ns, span))
 }
 
 #[cfg(test)]

@@ -28,7 +28,7 @@ use common::{
 use rustix::process::setsid;
 
 use crate::{
-    step::{Effect, Event, Link, State},
+    step::{Effect, Entry, Event, Link, State},
     transport::Transport,
 };
 
@@ -93,7 +93,7 @@ pub fn stand(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bool, StageEr
     };
     // A simulated robot ends with its supervisor.
     let is_gone = || run.mission.robot.address.is_none() && !is_taken(&run.address);
-    let mut transport = Transport::open(&run.address, &run.mission)?;
+    let mut transport = Transport::of_base(&run.address, &run.mission)?;
     let mut link = Link::new(&run.mission);
     link.restore(State { pace: Pace::Rate(rate), next_tick: 0 });
     let began_ns = monotonic_ns();
@@ -101,9 +101,9 @@ pub fn stand(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bool, StageEr
     loop {
         let now_ns = monotonic_ns();
         let mut effects = Vec::new();
-        let mut take = |event: Event<'_>| {
-            effects.extend(link.step(event, now_ns, run.clock.at(0, now_ns)));
-        };
+        let now = run.clock.at(0, now_ns);
+        let mut take =
+            |event: Event<'_>| effects.extend(link.step(Entry { event, machine_ns: now_ns, now }));
         take(Event::Order(Order::Stop, HoldReason::Ending));
         if let Some(open) = transport.maintain(now_ns)? {
             take(Event::Wire(open));

@@ -10,7 +10,7 @@ mod tcp;
 mod udp;
 
 use std::{
-    io,
+    fmt, io,
     os::fd::{AsFd, BorrowedFd},
 };
 
@@ -21,6 +21,7 @@ pub use self::counts::{Attempts, Tally};
 #[cfg(feature = "ros2")]
 use self::dds::Dds;
 use self::{serial::Serial, stream::Stream, tcp::Tcp, udp::Udp};
+use crate::drivers;
 
 #[derive(Debug, Error)]
 #[error(
@@ -37,32 +38,64 @@ impl From<TransportError> for StageError {
     }
 }
 
+/// Bits a second of a serial line, if its device does not say otherwise.
+pub const BAUD: u32 = 115_200;
+pub const SPEAKS_ROS2: bool = cfg!(feature = "ros2");
+
+/// Errors mean that this machine is the cause.
+trait Wire: AsFd + fmt::Debug {
+    /// Reopen it if due at `now_ns` of the monotonic clock, and send the rest of a message.
+    fn maintain(&mut self, _now_ns: u64) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn is_open(&self) -> bool {
+        true
+    }
+
+    /// The length of the next bytes; none when all were taken.
+    fn receive(&mut self, buffer: &mut [u8], now_ns: u64) -> io::Result<Option<usize>>;
+
+    /// They are lost if the wire does not accept them now.
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    fn tally(&self) -> Tally;
+
+    /// None while the wire is open.
+    fn attempts(&self, _now_ns: u64) -> Option<Attempts> {
+        None
+    }
+}
+
 #[derive(Debug)]
 pub struct Transport {
     address: Address,
-    wire: Wire,
+    wire: Box<dyn Wire>,
     reported: Option<bool>,
     buffer: Box<[u8]>,
 }
 
-#[derive(Debug)]
-enum Wire {
-    Udp(Udp),
-    Tcp(Stream<Tcp>),
-    Serial(Stream<Serial>),
-    #[cfg(feature = "ros2")]
-    Dds(Box<Dds>),
-}
-
 impl Transport {
-    /// [`Transport::maintain`] opens a connection or serial line. Fails when this machine cannot.
-    pub fn open(address: &Address, mission: &Mission) -> Result<Self, TransportError> {
+    /// The wire of what moves the robot of `mission`. Fails as [`Transport::open`] does.
+    pub fn of_base(address: &Address, mission: &Mission) -> Result<Self, TransportError> {
+        match address {
+            Address::Ros2(domain) => Self::new(address, ros2(domain.unwrap_or_default(), mission)),
+            _ => Self::open(address, drivers::base(mission).1),
+        }
+    }
+
+    /// [`Transport::maintain`] opens a connection or serial line, whose baud rate is `baud`. Fails when this machine cannot.
+    pub fn open(address: &Address, baud: u32) -> Result<Self, TransportError> {
         let wire = match address {
-            Address::Udp(robot) => Udp::open(*robot).map(Wire::Udp),
-            Address::Tcp(robot) => Stream::new(Tcp::to(*robot)).map(Wire::Tcp),
-            Address::Serial(path) => Stream::new(Serial::of(path, mission)).map(Wire::Serial),
-            Address::Ros2(domain) => ros2(domain.unwrap_or_default(), mission),
+            Address::Udp(robot) => Udp::open(*robot).map(|udp| Box::new(udp) as Box<dyn Wire>),
+            Address::Tcp(robot) => Stream::boxed(Tcp::to(*robot)),
+            Address::Serial(path) => Stream::boxed(Serial::new(path, baud)),
+            Address::Ros2(_) => Err(io::Error::other("only a robot's base speaks ROS 2")),
         };
+        Self::new(address, wire)
+    }
+
+    fn new(address: &Address, wire: io::Result<Box<dyn Wire>>) -> Result<Self, TransportError> {
         Ok(Self {
             wire: wire.map_err(|source| TransportError { address: address.clone(), source })?,
             address: address.clone(),
@@ -72,20 +105,12 @@ impl Transport {
         })
     }
 
-    /// Reopen a closed wire if due at `now_ns` of the monotonic clock, and send the rest of a message. Returns whether the wire is open
-    /// if that changed since the last report; a close and a reopening are reported one after the other. Fails when this machine is the
-    /// cause.
+    /// Maintain the wire. Returns whether it is open if that changed since the last report; a close and a reopening are reported one after
+    /// the other. Fails when this machine is the cause.
     pub fn maintain(&mut self, now_ns: u64) -> Result<Option<bool>, TransportError> {
         let closed_unreported = self.reported == Some(true) && !self.is_open();
         if !closed_unreported {
-            let maintained = match &mut self.wire {
-                Wire::Udp(_) => Ok(()),
-                Wire::Tcp(stream) => stream.maintain(now_ns),
-                Wire::Serial(stream) => stream.maintain(now_ns),
-                #[cfg(feature = "ros2")]
-                Wire::Dds(dds) => dds.maintain(now_ns),
-            };
-            maintained.map_err(|source| self.broken(source))?;
+            self.wire.maintain(now_ns).map_err(|source| self.broken(source))?;
         }
         let open = Some(self.is_open());
         if self.reported == open {
@@ -95,26 +120,13 @@ impl Transport {
         Ok(open)
     }
 
-    pub const fn is_open(&self) -> bool {
-        match &self.wire {
-            Wire::Udp(_) => true,
-            Wire::Tcp(stream) => stream.is_open(),
-            Wire::Serial(stream) => stream.is_open(),
-            #[cfg(feature = "ros2")]
-            Wire::Dds(dds) => dds.is_open(),
-        }
+    pub fn is_open(&self) -> bool {
+        self.wire.is_open()
     }
 
     /// None when all were taken. Fails when this machine is the cause.
     pub fn receive(&mut self, now_ns: u64) -> Result<Option<&[u8]>, TransportError> {
-        let received = match &mut self.wire {
-            Wire::Udp(udp) => udp.receive(&mut self.buffer),
-            Wire::Tcp(stream) => Ok(stream.receive(&mut self.buffer, now_ns)),
-            Wire::Serial(stream) => Ok(stream.receive(&mut self.buffer, now_ns)),
-            #[cfg(feature = "ros2")]
-            Wire::Dds(dds) => Ok(dds.receive(&mut self.buffer, now_ns)),
-        };
-        match received {
+        match self.wire.receive(&mut self.buffer, now_ns) {
             Ok(length) => Ok(length.and_then(|length| self.buffer.get(..length))),
             Err(source) => Err(self.broken(source)),
         }
@@ -125,38 +137,16 @@ impl Transport {
         if bytes.is_empty() {
             return Ok(());
         }
-        let sent = match &mut self.wire {
-            Wire::Udp(udp) => udp.send(bytes),
-            Wire::Tcp(stream) => stream.send(bytes),
-            Wire::Serial(stream) => stream.send(bytes),
-            #[cfg(feature = "ros2")]
-            Wire::Dds(dds) => {
-                dds.send(bytes);
-                Ok(())
-            }
-        };
-        sent.map_err(|source| self.broken(source))
+        self.wire.send(bytes).map_err(|source| self.broken(source))
     }
 
-    pub const fn tally(&self) -> Tally {
-        match &self.wire {
-            Wire::Udp(udp) => udp.tally(),
-            Wire::Tcp(stream) => stream.tally(),
-            Wire::Serial(stream) => stream.tally(),
-            #[cfg(feature = "ros2")]
-            Wire::Dds(dds) => dds.tally(),
-        }
+    pub fn tally(&self) -> Tally {
+        self.wire.tally()
     }
 
     /// None while the wire is open.
     pub fn attempts(&self, now_ns: u64) -> Option<Attempts> {
-        match &self.wire {
-            Wire::Udp(_) => None,
-            Wire::Tcp(stream) => stream.attempts(now_ns),
-            Wire::Serial(stream) => stream.attempts(now_ns),
-            #[cfg(feature = "ros2")]
-            Wire::Dds(_) => None,
-        }
+        self.wire.attempts(now_ns)
     }
 
     fn broken(&self, source: io::Error) -> TransportError {
@@ -164,28 +154,20 @@ impl Transport {
     }
 }
 
-pub const SPEAKS_ROS2: bool = cfg!(feature = "ros2");
-
 #[cfg(feature = "ros2")]
-fn ros2(domain: u16, mission: &Mission) -> io::Result<Wire> {
-    Dds::open(domain, ros2_driver::topics::Topics::of(mission)).map(|dds| Wire::Dds(Box::new(dds)))
+fn ros2(domain: u16, mission: &Mission) -> io::Result<Box<dyn Wire>> {
+    Ok(Box::new(Dds::open(domain, ros2_driver::topics::Topics::of(mission))?))
 }
 
 #[cfg(not(feature = "ros2"))]
-fn ros2(_: u16, _: &Mission) -> io::Result<Wire> {
+fn ros2(_: u16, _: &Mission) -> io::Result<Box<dyn Wire>> {
     Err(io::Error::other("this executable speaks no ROS 2: build it with `--features ros2`"))
 }
 
 /// Readable when the wire needs attention; the same after a reopening.
 impl AsFd for Transport {
     fn as_fd(&self) -> BorrowedFd<'_> {
-        match &self.wire {
-            Wire::Udp(udp) => udp.as_fd(),
-            Wire::Tcp(stream) => stream.as_fd(),
-            Wire::Serial(stream) => stream.as_fd(),
-            #[cfg(feature = "ros2")]
-            Wire::Dds(dds) => dds.as_fd(),
-        }
+        self.wire.as_fd()
     }
 }
 

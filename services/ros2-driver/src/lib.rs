@@ -20,14 +20,14 @@ use std::{f64::consts::TAU, time::Duration};
 
 use common::{
     driver::{
-        Commander, Driver, Heard, LaserScan, Memory, Readings, Turn, WireTally,
-        laser::Laser,
+        Base, Commander, Driver, Heard, LaserScan, Memory, Motion, Turn, WireTally, beam,
         odometry::{self, drive, motion, twist},
+        range_reading,
     },
     geometry::wrap_angle,
     kinematics::{Twist, WheelSpeeds},
     mission::{Body, Mission, Sensor},
-    samples::{LONGEST_SWEEP_NS, PowerSample, RangeReading, Sweep},
+    samples::{LONGEST_SWEEP_NS, Sweep},
 };
 
 use self::{
@@ -39,8 +39,6 @@ use self::{
     topics::{Content, Topics},
 };
 
-/// More messages that wait are dropped.
-const MOST_WAITING: usize = 64;
 /// A link is started again within this. Nobody knows how far the robot drove meanwhile.
 const UNSEEN_S: f64 = 5.0;
 /// Bearings of a laser's row and of its scans differ at most by this share of the angle between beams.
@@ -56,11 +54,8 @@ pub struct Ros2 {
     period_ns: i64,
     stamped: bool,
     topics: Topics,
-    waiting: Vec<Vec<u8>>,
-    readings: Readings,
-    laser: Option<Laser>,
-    /// Stamp of the newest scan; none if it states none that is plausible.
-    scan_stamp_ns: Option<i64>,
+    table: Vec<Sensor>,
+    laser: Option<(usize, Sensor)>,
     told_of_scan_stamp: bool,
     odometry: odometry::Odometry,
     gyro: Gyro,
@@ -78,10 +73,8 @@ impl Ros2 {
             period_ns: (1e9 / mission.robot.rate_hz) as i64,
             stamped: mission.robot.ros2.stamped,
             topics: Topics::of(mission),
-            waiting: Vec::new(),
-            readings: Readings::new(mission),
-            laser: Laser::new(mission),
-            scan_stamp_ns: None,
+            table: mission.sensor_table(),
+            laser: mission.laser(),
             told_of_scan_stamp: false,
             odometry: odometry::Odometry::default(),
             gyro: Gyro::default(),
@@ -123,23 +116,21 @@ impl Ros2 {
             Content::Odometry => self.take_odometry(&Odometry::read(payload)?, heard),
             Content::Scan => {
                 let mut scan = Scan::read(payload).map_err(|error| error.to_string())?;
-                if self.laser.as_ref().is_some_and(|laser| laser.sensor().is_upside_down) {
+                if self.laser.as_ref().is_some_and(|(_, sensor)| sensor.is_upside_down) {
                     scan.turn_over();
                 }
                 self.take_scan(&scan, heard)
             }
             Content::Range(row) => {
                 let range = read_range(payload).map_err(|error| error.to_string())?;
-                self.readings.take_range(row, range);
+                let sensor = self.table.get(row);
+                heard.readings.extend(sensor.map(|sensor| range_reading(row, sensor, range)));
                 Ok(())
             }
             Content::Battery => {
                 let volts = read_voltage(payload).map_err(|error| error.to_string())?;
                 if volts.is_finite() && volts >= 0.0 {
-                    let volts = f64::from(volts);
-                    let (board_v, motor_v, servo_v) = (volts, volts, volts);
-                    let power = PowerSample { board_v, motor_v, servo_v, ..PowerSample::default() };
-                    heard.power = Some(power);
+                    heard.take_battery(volts.into());
                 }
                 Ok(())
             }
@@ -148,8 +139,7 @@ impl Ros2 {
                 let (&number, payload) =
                     payload.split_first_chunk().ok_or("a command without its writer")?;
                 let moves = read_moves(payload, self.stamped).map_err(|error| error.to_string())?;
-                let moved = heard.commander.is_some_and(|commander| commander.moves);
-                heard.commander = Some(Commander { number, moves: moves || moved });
+                heard.commander = Some(Commander { number, moves });
                 Ok(())
             }
         }
@@ -176,9 +166,6 @@ impl Ros2 {
         }
         let turned = self.odometry.turned(odometry.pose, &self.body);
         let turned = turned.ok_or("a pose that no robot can have; say metres")?;
-        if let Some(laser) = &mut self.laser {
-            laser.turned(turned);
-        }
         // If odometry comes faster than ticks, the message nearest to a tick's time begins the tick.
         let slack_ns = (stamp_ns - newest_ns) / 2;
         let is_tick = stamp_ns - tick_ns >= self.period_ns - slack_ns;
@@ -192,13 +179,14 @@ impl Ros2 {
             }
             let [v, omega] = odometry.twist;
             let WheelSpeeds { right, left } = drive(&self.body).wheels(Twist { v, omega });
-            heard.motion = Some(motion(&self.body, turned, [left, right], [false; 2]));
+            let motion = motion(&self.body, turned, [left, right], [false; 2]);
+            heard.motion = Some(Motion { stamp_ns: Some(stamp_ns), ..motion });
         }
         Ok(())
     }
 
     fn take_scan(&mut self, scan: &Scan, heard: &mut Heard) -> Result<(), String> {
-        let Some(laser) = &mut self.laser else {
+        let Some((row, sensor)) = &self.laser else {
             return Err("a scan, and the mission has no laser; add a row of kind scan".to_owned());
         };
         let (beams, most_s) = (scan.ranges.len(), LONGEST_SWEEP_NS as f64 / 1e9);
@@ -211,18 +199,17 @@ impl Ros2 {
             range if range > scan.most_m => f32::INFINITY,
             range => range,
         };
-        let came = scan.ranges.iter().map(|beam| laser.beam(Some(range(beam))));
-        let beams = if is_same_fan(scan, laser.sensor()) {
+        let came = scan.ranges.iter().map(|came| beam(sensor, Some(range(came))));
+        let beams = if is_same_fan(scan, sensor) {
             came.collect()
-        } else if is_circle(scan.ranges.len(), scan.fan.1) && is_whole(laser.sensor(), scan) {
-            turned_to(laser.sensor(), scan.fan, came)
+        } else if is_circle(scan.ranges.len(), scan.fan.1) && is_whole(sensor, scan) {
+            turned_to(sensor, scan.fan, came)
         } else {
-            return Err(other_fan(scan, laser.sensor()));
+            return Err(other_fan(scan, sensor));
         };
-        let sweep = sweep_of(scan, laser.sensor());
+        let sweep = sweep_of(scan, sensor);
         let is_near = |tick_ns| STAMPS_NS.contains(&(scan.stamp_ns - tick_ns));
         let is_stated = scan.stamp_ns != 0 && self.stamps_ns.is_none_or(|[ns, _]| is_near(ns));
-        self.scan_stamp_ns = is_stated.then_some(scan.stamp_ns);
         if !is_stated && !std::mem::replace(&mut self.told_of_scan_stamp, true) {
             heard.refused = Some(format!(
                 "the stamp of a scan, {} s, which then counts as taken when odometry came; stamp both by one clock",
@@ -230,7 +217,8 @@ impl Ros2 {
             ));
         }
         let sweep = if is_stated { sweep } else { Sweep::default() };
-        laser.take(LaserScan { beams, sweep }, &mut self.readings);
+        let stamp_ns = is_stated.then_some(scan.stamp_ns);
+        heard.scans.push(LaserScan { row: *row, beams, sweep, stamp_ns });
         Ok(())
     }
 }
@@ -301,44 +289,23 @@ fn other_fan(scan: &Scan, sensor: &Sensor) -> String {
 }
 
 impl Driver for Ros2 {
-    fn push(&mut self, bytes: &[u8]) {
-        if self.waiting.len() < MOST_WAITING {
-            self.waiting.push(bytes.to_vec());
-        } else {
-            self.tally.bytes_dropped += bytes.len() as u64;
-        }
+    fn hear(&mut self, piece: &[u8]) -> Heard {
+        let mut heard = Heard::default();
+        let taken = self.take(piece, &mut heard);
+        self.tally.count(piece, taken, &mut heard);
+        heard
     }
 
     fn reset(&mut self) {
         // A message comes whole or not at all.
     }
 
-    fn heard(&mut self) -> Heard {
-        let mut heard = Heard::default();
-        for piece in std::mem::take(&mut self.waiting) {
-            let taken = self.take(&piece, &mut heard);
-            self.tally.count(&piece, taken, &mut heard);
-        }
-        heard.readings = self.readings.take_fresh();
-        heard
-    }
-
     fn tally(&self) -> WireTally {
         self.tally
     }
+}
 
-    fn readings_for_tick(&mut self) -> Vec<RangeReading> {
-        self.readings.for_tick()
-    }
-
-    fn scan_for_tick(&mut self) -> LaserScan {
-        let mut scan = self.laser.as_mut().map(Laser::for_tick).unwrap_or_default();
-        if let (Some(scan_ns), Some([_, tick_ns])) = (self.scan_stamp_ns, self.stamps_ns) {
-            scan.sweep.first_beam_ns = scan_ns - tick_ns;
-        }
-        scan
-    }
-
+impl Base for Ros2 {
     fn turn_for_tick(&mut self) -> Option<Turn> {
         self.gyro.for_tick()
     }

@@ -30,27 +30,19 @@ impl Drive {
 
     /// Encoders as feedback, velocity mode, enabled motors and running streams.
     pub fn greeting(&self) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        let mut say = |command: Command| command.encode(Addressing::default(), &mut bytes);
-        for channel in [self.robot.left.channel, self.robot.right.channel] {
-            for parameter in
-                [Parameter::Feedback(Feedback::Encoder), Parameter::Mode(Mode::Velocity)]
-            {
-                say(Command::Parameter { channel, parameter });
-            }
-            say(Command::Enable { on: true, channel: Some(channel) });
-        }
-        bytes.extend(self.streams());
-        bytes
+        let settings = [self.robot.left.channel, self.robot.right.channel].map(|channel| {
+            [
+                Command::Parameter { channel, parameter: Parameter::Feedback(Feedback::Encoder) },
+                Command::Parameter { channel, parameter: Parameter::Mode(Mode::Velocity) },
+                Command::Enable { on: true, channel: Some(channel) },
+            ]
+        });
+        [settings.concat().into_iter().flat_map(encoded).collect(), self.streams()].concat()
     }
 
     pub fn streams(&self) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        for stream in [Stream::Motor, Stream::Custom, Stream::Standard] {
-            let request = Request::Start;
-            Command::Stream { stream, request }.encode(Addressing::default(), &mut bytes);
-        }
-        bytes
+        let start = |stream| encoded(Command::Stream { stream, request: Request::Start });
+        [Stream::Motor, Stream::Custom, Stream::Standard].map(start).concat()
     }
 
     /// The counts grow forward.

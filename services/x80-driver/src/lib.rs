@@ -13,9 +13,8 @@ pub mod telemetry;
 use std::time::Duration;
 
 use common::{
-    driver::{Driver, Heard, Motion, StopMethod, WireTally},
+    driver::{Base, Driver, Heard, Motion, StopMethod, WireTally},
     mission::Mission,
-    samples::RangeReading,
     wire::{Command, Decoder, Report, SystemSignal},
 };
 
@@ -45,15 +44,8 @@ impl X80 {
 }
 
 impl Driver for X80 {
-    fn push(&mut self, bytes: &[u8]) {
+    fn hear(&mut self, bytes: &[u8]) -> Heard {
         self.decoder.push(bytes);
-    }
-
-    fn reset(&mut self) {
-        self.decoder.reset();
-    }
-
-    fn heard(&mut self) -> Heard {
         let mut heard = Heard::default();
         let (mut motor, mut standard, mut custom) = (None, None, None);
         while let Some(frame) = self.decoder.next_frame() {
@@ -71,16 +63,24 @@ impl Driver for X80 {
         if let Some(motor) = motor {
             self.telemetry.take_motor(&motor);
             let (wheels, currents) = (self.drive.wheels(&motor), self.drive.currents(&motor));
-            heard.motion = Some(Motion { wheels, endless: None, currents });
+            heard.motion = Some(Motion { wheels, endless: None, stamp_ns: None, currents });
         }
         if let Some(standard) = standard {
-            self.rangers.take_standard(&standard);
+            heard.readings = self.rangers.take_standard(&standard);
             heard.power = Some(self.telemetry.power(&standard));
             heard.surroundings = Some(telemetry::surroundings(&standard));
         }
-        heard.infrared = custom.and_then(|custom| self.rangers.take_custom(&custom));
-        heard.readings = self.rangers.readings.take_fresh();
+        if let Some((infrared, readings)) =
+            custom.and_then(|custom| self.rangers.take_custom(&custom))
+        {
+            heard.infrared = Some(infrared);
+            heard.readings.extend(readings);
+        }
         heard
+    }
+
+    fn reset(&mut self) {
+        self.decoder.reset();
     }
 
     fn tally(&self) -> WireTally {
@@ -88,14 +88,12 @@ impl Driver for X80 {
         WireTally { messages: tally.frames, bytes_dropped: tally.noise_bytes + tally.dropped_bytes }
     }
 
-    fn readings_for_tick(&mut self) -> Vec<RangeReading> {
-        self.rangers.readings.for_tick()
-    }
-
     fn greeting(&self) -> Vec<u8> {
         self.drive.greeting()
     }
+}
 
+impl Base for X80 {
     fn ask_for_sensors(&self) -> Vec<u8> {
         self.drive.streams()
     }

@@ -1,53 +1,49 @@
 //! Ranging readings for the next tick, collected from several frames.
 
 use common::{
-    driver::Readings,
-    mission::{INFRARED_RANGERS, Mission, SensorKind},
+    mission::{INFRARED_RANGERS, Mission, Sensor, SensorKind},
     samples::{InfraredSample, RangeReading, RangeStatus},
     wire::{CustomSensors, Echo, INFRARED_LIVE_AD, StandardSensors, infrared_m},
 };
 
 #[derive(Clone, Debug)]
 pub(crate) struct Rangers {
-    pub(crate) readings: Readings,
+    table: Vec<Sensor>,
     /// The first infrared ranger comes in the standard frame, the other six in the custom one.
     first_infrared: Option<u16>,
 }
 
 impl Rangers {
     pub(crate) fn new(mission: &Mission) -> Self {
-        Self { readings: Readings::new(mission), first_infrared: None }
+        Self { table: mission.sensor_table(), first_infrared: None }
     }
 
-    pub(crate) fn take_standard(&mut self, standard: &StandardSensors) {
+    pub(crate) fn take_standard(&mut self, standard: &StandardSensors) -> Vec<RangeReading> {
         self.first_infrared = Some(standard.infrared);
-        self.take(SensorKind::Cone, |channel| standard.ultrasonic.get(channel).copied().map(heard));
+        self.readings(SensorKind::Cone, &standard.ultrasonic.map(heard))
     }
 
     /// None until a standard frame has brought the first ranger's reading.
-    pub(crate) fn take_custom(&mut self, custom: &CustomSensors) -> Option<InfraredSample> {
+    pub(crate) fn take_custom(
+        &self,
+        custom: &CustomSensors,
+    ) -> Option<(InfraredSample, Vec<RangeReading>)> {
         let [_, _, second, third, fourth, fifth, sixth, seventh] = custom.ad;
         let first = self.first_infrared?;
         let raw_ad = [first, second, third, fourth, fifth, sixth, seventh];
-        self.take(SensorKind::Ray, |channel| raw_ad.get(channel).copied().map(seen));
         let range_m: [f64; INFRARED_RANGERS] = raw_ad.map(infrared_m);
-        Some(InfraredSample { range_m, raw_ad, ..InfraredSample::default() })
+        let sample = InfraredSample { range_m, raw_ad, ..InfraredSample::default() };
+        Some((sample, self.readings(SensorKind::Ray, &raw_ad.map(seen))))
     }
 
-    fn take(&mut self, kind: SensorKind, read: impl Fn(usize) -> Option<RangeReading>) {
-        let channels: Vec<_> = self
-            .readings
-            .table()
-            .iter()
-            .enumerate()
-            .filter(|(_, sensor)| sensor.kind == kind)
-            .map(|(row, sensor)| (row, usize::from(sensor.channel)))
-            .collect();
-        for (row, channel) in channels {
-            if let Some(reading) = read(channel) {
-                self.readings.take(row, reading);
-            }
-        }
+    /// Those of the rows of a kind, by their channels.
+    fn readings(&self, kind: SensorKind, channels: &[RangeReading]) -> Vec<RangeReading> {
+        let rows = (0..).zip(&self.table).filter(|(_, row)| row.kind == kind);
+        let read = |(sensor, row): (u8, &Sensor)| {
+            let reading = *channels.get(usize::from(row.channel))?;
+            Some(RangeReading { sensor, ..reading })
+        };
+        rows.filter_map(read).collect()
     }
 }
 
@@ -93,13 +89,12 @@ mod tests {
         let custom = CustomSensors { ad: [9, 9, 1000, 0, 4095, 0, 0, 300], io: 0 };
         assert_eq!(rangers.take_custom(&custom), None, "one is missing");
         rangers.take_standard(&StandardSensors { infrared: 1000, ..StandardSensors::default() });
-        let infrared = rangers.take_custom(&custom).unwrap();
+        let (infrared, readings) = rangers.take_custom(&custom).unwrap();
         assert_eq!(infrared.raw_ad, [1000, 1000, 0, 4095, 0, 0, 300]);
         assert_eq!(infrared.range_m[2..4], [0.81, 0.09]);
         assert!((infrared.range_m[0] - 0.375_79).abs() < 1e-5);
-        let readings = rangers.readings.for_tick();
-        assert!(is(&readings[3], RangeStatus::Measured, 0.375_79, 1000));
-        assert!(is(&readings[9], RangeStatus::Nothing, 0.0, 300));
+        assert!(readings[0].sensor == 3 && is(&readings[0], RangeStatus::Measured, 0.375_79, 1000));
+        assert!(readings[6].sensor == 9 && is(&readings[6], RangeStatus::Nothing, 0.0, 300));
     }
 
     #[test]
@@ -120,33 +115,14 @@ mod tests {
     }
 
     #[test]
-    fn every_sonar_that_has_a_row_is_read_and_the_next_tick_has_no_readings_until_new_ones_come() {
-        let mut rangers = rangers("");
+    fn every_sonar_that_has_a_row_is_read() {
         let ultrasonic = [45, 80, 135, 0, 0, 0];
-        rangers.take_standard(&StandardSensors { ultrasonic, ..StandardSensors::default() });
-        assert_eq!(rangers.readings.take_fresh().len(), 3);
-        let readings = rangers.readings.for_tick();
-        assert_eq!(readings.len(), 10);
+        let standard = StandardSensors { ultrasonic, ..StandardSensors::default() };
+        let readings = rangers("").take_standard(&standard);
+        assert_eq!(readings.len(), 3);
         for (row, cm) in [(0, 80), (1, 45), (2, 135)] {
             let measured = is(&readings[row], RangeStatus::Measured, f64::from(cm) / 100.0, cm);
             assert!(measured && usize::from(readings[row].sensor) == row, "{readings:?}");
         }
-        let is_absent = |reading: &RangeReading| reading.status() == RangeStatus::Absent;
-        assert!(rangers.readings.for_tick().iter().all(is_absent));
-    }
-
-    #[test]
-    fn a_slower_sensor_has_a_reading_only_as_often_as_it_measures() {
-        let row = "[[robot.sensor]]\nname = 'front'\nkind = 'cone'\nchannel = 1\nforward_m = 0.19\nbearing_deg = 0\nrate_hz = 2.4";
-        let mut rangers = rangers(row);
-        let measured: Vec<_> = (0..6)
-            .filter(|_| {
-                let ultrasonic = [0, 80, 0, 0, 0, 0];
-                let standard = StandardSensors { ultrasonic, ..StandardSensors::default() };
-                rangers.take_standard(&standard);
-                rangers.readings.for_tick()[0].status() == RangeStatus::Measured
-            })
-            .collect();
-        assert_eq!(measured, [0, 3]);
     }
 }

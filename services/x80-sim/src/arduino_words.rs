@@ -2,11 +2,14 @@
 //! answers. A sonar says its reading of the newest tick.
 
 use common::{
-    mission::{Mission, RobotConfig},
+    mission::{ArduinoBoard, Mission},
     wire::{Command, Echo, StandardSensors},
 };
 
-use crate::motor::Motor;
+use crate::{
+    drivetrain::{OnChannel, velocity},
+    motor::Motor,
+};
 
 /// A board that restarts hears nothing for so long: its boot loader waits for a program.
 const BOOTS_S: f64 = 1.5;
@@ -69,7 +72,8 @@ impl Requests {
 
 #[derive(Clone, Debug)]
 pub(crate) struct ArduinoWords {
-    robot: RobotConfig,
+    board: ArduinoBoard,
+    wheels: [OnChannel; 2],
     sonars: Vec<(i32, usize)>,
     /// The board counts 0 here.
     zero: [f64; 2],
@@ -84,7 +88,8 @@ impl ArduinoWords {
         let pin = |name: &String| pins.get(name).copied().map(i32::from);
         let sonars = table.filter_map(|row| Some((pin(&row.name)?, usize::from(row.channel))));
         Self {
-            robot: mission.robot.clone(),
+            board: mission.robot.arduino.clone(),
+            wheels: OnChannel::left_and_right(&mission.robot),
             sonars: sonars.collect(),
             zero: [0.0; 2],
             boots_until: None,
@@ -124,7 +129,9 @@ impl ArduinoWords {
                 "OK".to_owned()
             }
             Request::Speeds(speeds) => {
-                command = Some(self.velocity(speeds));
+                // Counts in a run of the speed loop.
+                let counts = speeds.map(|speed| f64::from(speed) * self.board.pid_rate_hz);
+                command = Some(velocity(self.wheels, counts, STOPS_AFTER_MS));
                 "OK".to_owned()
             }
             Request::Range(pin) => {
@@ -133,23 +140,10 @@ impl ArduinoWords {
                 let metres = byte.and_then(|byte| Echo::from_byte(*byte)?.metres());
                 format!("{}", (metres.unwrap_or_default() * 100.0).round() as i32)
             }
-            Request::Baud => format!(" {}", self.robot.arduino.baud),
+            Request::Baud => format!(" {}", self.board.baud),
             Request::Unknown => "Invalid Command".to_owned(),
         };
         (text + "\r\n", command)
-    }
-
-    /// Counts in a run of the speed loop.
-    fn velocity(&self, speeds: [i32; 2]) -> Command {
-        let mut channels = [None; 2];
-        for (wheel, speed) in [self.robot.left, self.robot.right].into_iter().zip(speeds) {
-            let counts = f64::from(speed) * self.robot.arduino.pid_rate_hz;
-            let signed = if wheel.reversed { -counts } else { counts };
-            // -32768 and -32767 mean that a channel is not changed.
-            let counts = signed.round().clamp(-32_766.0, 32_766.0) as i16;
-            channels[usize::from(wheel.channel.min(1))] = Some(counts);
-        }
-        Command::velocity(channels, STOPS_AFTER_MS)
     }
 
     /// The counts as the board says them, left and right.
@@ -158,11 +152,7 @@ impl ArduinoWords {
         [0, 1].map(|wheel| (turned[wheel] - self.zero[wheel]).round() as i64 as i32)
     }
 
-    /// Counts since the start, forward positive.
     fn turned(&self, motors: &[Motor; 6]) -> [f64; 2] {
-        [self.robot.left, self.robot.right].map(|wheel| {
-            let counts = motors[usize::from(wheel.channel.min(1))].turned();
-            if wheel.reversed { -counts } else { counts }
-        })
+        self.wheels.map(|wheel| wheel.turned(motors))
     }
 }

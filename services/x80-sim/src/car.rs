@@ -2,12 +2,12 @@
 
 use common::{
     kinematics::{Ackermann, SteeredWheel, Twist},
-    mission::{Channel, Mission, Steering, WheelPhysics},
+    mission::{Mission, Steering, WheelPhysics},
 };
 
 use crate::{
     body::Body,
-    drivetrain::{grip, slipped},
+    drivetrain::{OnChannel, grip, slipped},
     motor::Motor,
     noise::Noise,
     wheel_errors::WheelErrors,
@@ -24,28 +24,13 @@ pub(crate) struct Car {
     counts_per_radian: f64,
 }
 
-#[derive(Clone, Copy, Debug)]
-struct OnChannel {
-    channel: usize,
-    sign: f64,
-}
-
-impl From<Channel> for OnChannel {
-    fn from(channel: Channel) -> Self {
-        Self {
-            // The mission was checked, so channels are 0 and 1.
-            channel: usize::from(channel.channel.min(1)),
-            sign: if channel.reversed { -1.0 } else { 1.0 },
-        }
-    }
-}
-
 impl Car {
     /// Driven wheel and wheelbase are off by the `errors` of a left wheel and of a track; none if the robot is no
     /// car.
     pub(crate) fn new(mission: &Mission, errors: &WheelErrors) -> Option<Self> {
         let body = mission.body();
         let steering = body.steering?;
+        let [driven, steered] = OnChannel::left_and_right(&mission.robot);
         let wheel_radius_m = body.wheel_radius_m * errors.diameter.left;
         Some(Self {
             drive: Ackermann::new(
@@ -56,8 +41,8 @@ impl Car {
                 0.0,
             ),
             steering,
-            driven: mission.robot.left.into(),
-            steered: mission.robot.right.into(),
+            driven,
+            steered,
             wheel_radius_m,
             counts_per_radian: body.counts_per_turn / std::f64::consts::TAU,
         })
@@ -73,8 +58,7 @@ impl Car {
     }
 
     fn angle(&self, motors: &[Motor; 6]) -> f64 {
-        let OnChannel { channel, sign } = self.steered;
-        self.steering.angle(sign * motors[channel].turned())
+        self.steering.angle(self.steered.turned(motors))
     }
 
     pub(crate) fn twist(&self, motors: &[Motor; 6]) -> Twist {

@@ -1,8 +1,8 @@
 //! Channel, direction and real diameter of each wheel.
 
 use common::{
-    mission::{Mission, WheelPhysics},
-    wire::{COUNT_CYCLE, Encoder},
+    mission::{Mission, RobotConfig, WheelPhysics},
+    wire::{COUNT_CYCLE, Command, Encoder},
 };
 
 use crate::{body::Wheels, motor::Motor, noise::Noise};
@@ -19,10 +19,41 @@ pub(crate) fn grip(held: bool, physics: &WheelPhysics) -> Option<f64> {
     held.then_some(1.0 - physics.contact_slip)
 }
 
+/// The channel of a wheel, or of a car's steering, and the sign of its counts when the robot goes ahead or steers to the left.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OnChannel {
+    pub(crate) channel: usize,
+    pub(crate) sign: f64,
+}
+
+impl OnChannel {
+    pub(crate) fn left_and_right(robot: &RobotConfig) -> [Self; 2] {
+        [robot.left, robot.right].map(|wheel| Self {
+            // The mission was checked, so channels are 0 and 1.
+            channel: usize::from(wheel.channel.min(1)),
+            sign: if wheel.reversed { -1.0 } else { 1.0 },
+        })
+    }
+
+    /// Counts since the start.
+    pub(crate) fn turned(self, motors: &[Motor; 6]) -> f64 {
+        self.sign * motors[self.channel].turned()
+    }
+}
+
+/// The command that turns `wheels` with these counts/s for so long.
+pub(crate) fn velocity(wheels: [OnChannel; 2], counts: [f64; 2], limit_ms: u16) -> Command {
+    let mut channels = [None; 2];
+    for (OnChannel { channel, sign }, counts) in wheels.into_iter().zip(counts) {
+        // -32768 and -32767 mean that a channel is not changed.
+        channels[channel] = Some((sign * counts).round().clamp(-32_766.0, 32_766.0) as i16);
+    }
+    Command::velocity(channels, limit_ms)
+}
+
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Drivetrain {
-    channel: Wheels<usize>,
-    sign: Wheels<f64>,
+    on: Wheels<OnChannel>,
     /// The wheel has the nominal diameter.
     metres_per_count: f64,
     diameter: Wheels<f64>,
@@ -31,11 +62,9 @@ pub(crate) struct Drivetrain {
 impl Drivetrain {
     /// The wheels are `diameter` times the nominal one.
     pub(crate) fn new(mission: &Mission, diameter: Wheels<f64>) -> Self {
-        let wheels = Wheels { left: mission.robot.left, right: mission.robot.right };
+        let [left, right] = OnChannel::left_and_right(&mission.robot);
         Self {
-            // The mission was checked, so channels are 0 and 1.
-            channel: wheels.map(|wheel| usize::from(wheel.channel.min(1))),
-            sign: wheels.map(|wheel| if wheel.reversed { -1.0 } else { 1.0 }),
+            on: Wheels { left, right },
             metres_per_count: mission.body().metres_per_count(),
             diameter,
         }
@@ -49,14 +78,9 @@ impl Drivetrain {
         dt: f64,
         noise: &mut Noise,
     ) -> Wheels<f64> {
-        let mut asked = |channel: usize, sign: f64| {
-            let counts = motors.get_mut(channel).map_or(0.0, |motor| motor.step(now, dt, noise));
-            sign * counts * self.metres_per_count
-        };
-        Wheels {
-            left: asked(self.channel.left, self.sign.left),
-            right: asked(self.channel.right, self.sign.right),
-        }
+        self.on.map(|OnChannel { channel, sign }| {
+            sign * motors[channel].step(now, dt, noise) * self.metres_per_count
+        })
     }
 
     /// The way of the real rims when nominal wheels would roll `metres`.
@@ -74,41 +98,32 @@ impl Drivetrain {
         grip: Wheels<Option<f64>>,
         dt: f64,
     ) {
-        let mut turn = |channel: usize, sign: f64, asked: f64, went: f64, grip: Option<f64>| {
-            let Some(motor) = motors.get_mut(channel) else {
-                return;
-            };
-            let counts = |metres: f64| sign * metres / self.metres_per_count;
+        let mut turn = |on: OnChannel, asked: f64, went: f64, grip: Option<f64>| {
+            let counts = |metres: f64| on.sign * metres / self.metres_per_count;
             let share = grip.unwrap_or(0.0);
+            let motor = &mut motors[on.channel];
             motor.turn(counts(went * share + asked * (1.0 - share)));
             if let Some(grip) = grip {
                 motor.hold(counts(went) / dt, grip);
             }
         };
         let Wheels { left, right } = self.diameter;
-        turn(self.channel.left, self.sign.left, asked.left, went.left / left, grip.left);
-        turn(self.channel.right, self.sign.right, asked.right, went.right / right, grip.right);
+        turn(self.on.left, asked.left, went.left / left, grip.left);
+        turn(self.on.right, asked.right, went.right / right, grip.right);
     }
 
     /// m/s, forward positive.
     pub(crate) fn rim_speeds(&self, motors: &[Motor; 6]) -> Wheels<f64> {
-        let speed =
-            |channel: usize, sign: f64| sign * motors[channel].speed() * self.metres_per_count;
-        self.rims(Wheels {
-            left: speed(self.channel.left, self.sign.left),
-            right: speed(self.channel.right, self.sign.right),
-        })
+        self.rims(self.on.map(|OnChannel { channel, sign }| {
+            sign * motors[channel].speed() * self.metres_per_count
+        }))
     }
 
     /// Counts grow forward.
     pub(crate) fn counts(&self, encoders: &[Encoder; 2]) -> Wheels<u16> {
-        let counts = |channel: usize, sign: f64| {
+        self.on.map(|OnChannel { channel, sign }| {
             let position = encoders[channel].position;
             if sign < 0.0 { (COUNT_CYCLE - position) % COUNT_CYCLE } else { position }
-        };
-        Wheels {
-            left: counts(self.channel.left, self.sign.left),
-            right: counts(self.channel.right, self.sign.right),
-        }
+        })
     }
 }

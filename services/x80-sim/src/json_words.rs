@@ -5,18 +5,23 @@ use std::f64::consts::TAU;
 
 use common::{
     json_wire::{Order, Report, line},
-    mission::{Mission, RobotConfig, Sensor, SensorKind},
+    mission::{Mission, Sensor, SensorKind},
     wire::{
         Command, CustomSensors, Echo, Feedback, INFRARED_LIVE_AD, MOTOR_SCALE_V, Mode,
         MotorSensors, Parameter, StandardSensors, infrared_m, volts,
     },
 };
 
-use crate::{motor::Motor, sensors::STALL_CURRENT};
+use crate::{
+    drivetrain::{OnChannel, velocity},
+    motor::Motor,
+    sensors::STALL_CURRENT,
+};
 
 #[derive(Clone, Debug)]
 pub(crate) struct JsonWords {
-    robot: RobotConfig,
+    wheels: [OnChannel; 2],
+    held_current_ad: f64,
     counts_per_radian: f64,
     table: Vec<Sensor>,
     heard: u64,
@@ -25,7 +30,8 @@ pub(crate) struct JsonWords {
 impl JsonWords {
     pub(crate) fn new(mission: &Mission) -> Self {
         Self {
-            robot: mission.robot.clone(),
+            wheels: OnChannel::left_and_right(&mission.robot),
+            held_current_ad: mission.robot.held_current_ad.into(),
             counts_per_radian: mission.body().counts_per_turn / TAU,
             table: mission.sensor_table(),
             heard: 0,
@@ -35,29 +41,22 @@ impl JsonWords {
     /// The order counts as taken.
     pub(crate) fn commands(&mut self, order: &Order) -> Vec<Command> {
         self.heard += 1;
-        let wheels = [self.robot.left, self.robot.right];
+        let channels = self.wheels.map(|wheel| wheel.channel as u8);
         let enabled =
-            |on| wheels.map(|wheel| Command::Enable { on, channel: Some(wheel.channel) }).to_vec();
+            |on| channels.map(|channel| Command::Enable { on, channel: Some(channel) }).to_vec();
         match *order {
             Order::Hello { .. } => {
-                let parameters = wheels.iter().flat_map(|wheel| {
+                let parameters = channels.iter().flat_map(|&channel| {
                     [Parameter::Feedback(Feedback::Encoder), Parameter::Mode(Mode::Velocity)]
-                        .map(|parameter| Command::Parameter { channel: wheel.channel, parameter })
+                        .map(|parameter| Command::Parameter { channel, parameter })
                 });
                 parameters.chain(enabled(true)).collect()
             }
             Order::Drive { wheels: speeds, for_s, .. } => {
-                let mut channels = [None; 2];
-                for (wheel, speed) in wheels.into_iter().zip(speeds) {
-                    let counts = (speed * self.counts_per_radian).round() as i16;
-                    let signed = if wheel.reversed { counts.saturating_neg() } else { counts };
-                    // -32768 and -32767 mean that a channel is not changed.
-                    let counts = signed.clamp(-32_766, 32_766);
-                    channels[usize::from(wheel.channel.min(1))] = Some(counts);
-                }
                 // A time of 0 would be a command without an end.
                 let limit_ms = (for_s * 1000.0).round().clamp(1.0, f64::from(u16::MAX));
-                vec![Command::velocity(channels, limit_ms as u16)]
+                let counts = speeds.map(|speed| speed * self.counts_per_radian);
+                vec![velocity(self.wheels, counts, limit_ms as u16)]
             }
             Order::Brake {} => enabled(false),
             Order::Ping {} => Vec::new(),
@@ -74,18 +73,14 @@ impl JsonWords {
         (scan, timing): (&[Option<f32>], Option<[f64; 2]>),
         motors: &[Motor; 6],
     ) -> Vec<u8> {
-        let wheels = [self.robot.left, self.robot.right];
-        let forward = |reversed: bool| if reversed { -1.0 } else { 1.0 };
         let of = |value: &dyn Fn(usize) -> f64| {
-            wheels.map(|wheel| {
-                let counts = value(usize::from(wheel.channel.min(1)));
-                forward(wheel.reversed) * counts / self.counts_per_radian
-            })
+            self.wheels
+                .map(|OnChannel { channel, sign }| sign * value(channel) / self.counts_per_radian)
         };
         // The current of a rolling motor is left out: it is in an X80's counts, and other robots have more of them in a turn.
-        let held = wheels.map(|wheel| {
-            let motor = &motors[usize::from(wheel.channel.min(1))];
-            motor.enabled() && STALL_CURRENT * motor.load() >= self.robot.held_current_ad.into()
+        let held = self.wheels.map(|wheel| {
+            let motor = &motors[wheel.channel];
+            motor.enabled() && STALL_CURRENT * motor.load() >= self.held_current_ad
         });
         let ranges = self.table.iter().filter_map(|sensor| {
             let channel = usize::from(sensor.channel);

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 
 use common::{
     mission::WheelPhysics,
-    wire::{COUNT_CYCLE, Feedback, Gains, Mode, Parameter, Quantity},
+    wire::{COUNT_CYCLE, Mode, Parameter, Quantity},
 };
 
 use crate::noise::Noise;
@@ -28,24 +28,6 @@ const SLIPS_AT: f64 = 0.4;
 /// faster overwrites the newest one.
 const MOST_PENDING: usize = 1024;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PidGains {
-    pub kp: u16,
-    pub kd: u16,
-    /// Integral, times 100.
-    pub ki_x100: u16,
-}
-
-impl PidGains {
-    const BOOT: Self = Self { kp: 50, kd: 5, ki_x100: 0 };
-
-    fn set(&mut self, gains: Gains) {
-        self.kp = gains.kp.unwrap_or(self.kp);
-        self.kd = gains.kd.unwrap_or(self.kd);
-        self.ki_x100 = gains.ki_x100.unwrap_or(self.ki_x100);
-    }
-}
-
 #[derive(Clone, Debug)]
 pub struct Motor {
     physics: WheelPhysics,
@@ -55,9 +37,6 @@ pub struct Motor {
     acceleration: f64,
     enabled: bool,
     mode: Mode,
-    feedback: Feedback,
-    position_pid: PidGains,
-    velocity_pid: PidGains,
     order: Option<Order>,
     /// Changes of the target with their times, before the delay.
     pending: VecDeque<(f64, f64)>,
@@ -75,7 +54,7 @@ struct Order {
 }
 
 impl Motor {
-    /// A booted channel is suspended, in PWM mode, with one potentiometer as feedback.
+    /// A booted channel is suspended, in PWM mode.
     pub fn new(physics: WheelPhysics, top_speed: f64) -> Self {
         Self {
             physics,
@@ -83,9 +62,6 @@ impl Motor {
             acceleration: f64::INFINITY,
             enabled: false,
             mode: Mode::Pwm,
-            feedback: Feedback::OnePot,
-            position_pid: PidGains::BOOT,
-            velocity_pid: PidGains::BOOT,
             order: None,
             pending: VecDeque::new(),
             target: 0.0,
@@ -103,20 +79,6 @@ impl Motor {
 
     pub fn enabled(&self) -> bool {
         self.enabled
-    }
-
-    pub fn mode(&self) -> Mode {
-        self.mode
-    }
-
-    pub fn feedback(&self) -> Feedback {
-        self.feedback
-    }
-
-    /// Position and velocity loop. They are stored and reported; the simulated loop is the measured one with any
-    /// gains.
-    pub fn gains(&self) -> (PidGains, PidGains) {
-        (self.position_pid, self.velocity_pid)
     }
 
     /// Counts per second.
@@ -161,18 +123,13 @@ impl Motor {
         self.order = None;
     }
 
+    /// The simulated loop is the measured one with any gains and feedback.
     pub fn configure(&mut self, parameter: Parameter) {
-        match parameter {
-            Parameter::PositionPid(gains) => self.position_pid.set(gains),
-            Parameter::VelocityPid(gains) => self.velocity_pid.set(gains),
-            Parameter::Feedback(feedback) => self.feedback = feedback,
-            Parameter::Mode(mode) => {
-                if mode != self.mode {
-                    self.order = None;
-                }
-                self.mode = mode;
+        if let Parameter::Mode(mode) = parameter {
+            if mode != self.mode {
+                self.order = None;
             }
-            Parameter::Other { .. } => {}
+            self.mode = mode;
         }
     }
 

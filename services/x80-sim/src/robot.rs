@@ -22,7 +22,7 @@ use crate::{
     noise::{Noise, Source},
     saved_state::SavedState,
     sensors::{self, Ranging},
-    streams::{Due, Streams},
+    streams::Streams,
     wheel_errors::WheelErrors,
     world::World,
 };
@@ -449,7 +449,7 @@ impl Robot {
     /// Append one frame of every stream that runs, the motor frame last. They count against the frames that a host
     /// has asked for.
     pub fn stream(&mut self, out: &mut Vec<u8>) {
-        let due = self.streams.take();
+        let due = self.streams.take_due();
         self.write(due, out);
     }
 
@@ -458,7 +458,7 @@ impl Robot {
         self.write(self.streams.running(), out);
     }
 
-    fn write(&self, due: Due, out: &mut Vec<u8>) {
+    fn write(&self, due: [bool; 3], out: &mut Vec<u8>) {
         if let Some(json) = &self.json {
             let sensors = (&self.standard, &self.custom, &self.motor);
             let stated = self.laser.as_ref().and_then(Laser::stated);
@@ -469,14 +469,10 @@ impl Robot {
             // This robot sends nothing unasked.
             return;
         }
-        if due.standard {
-            Report::Standard(self.standard).encode(self.addressing, out);
-        }
-        if due.custom {
-            Report::Custom(self.custom).encode(self.addressing, out);
-        }
-        if due.motor {
-            Report::Motor(self.motor).encode(self.addressing, out);
+        let standard = Report::Standard(self.standard);
+        let reports = [standard, Report::Custom(self.custom), Report::Motor(self.motor)];
+        for (report, _) in reports.iter().zip(due).filter(|(_, is_due)| *is_due) {
+            report.encode(self.addressing, out);
         }
     }
 

@@ -2,78 +2,36 @@
 
 use common::wire::{Request, Stream};
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Run {
-    ForEver,
-    Frames(u8),
-}
-
-impl Run {
-    const fn runs(self) -> bool {
-        !matches!(self, Self::Frames(0))
-    }
-
-    fn take(&mut self) -> bool {
-        match self {
-            Self::ForEver => true,
-            Self::Frames(0) => false,
-            Self::Frames(left) => {
-                *left -= 1;
-                true
-            }
-        }
-    }
-}
-
-/// All three run from boot.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Streams {
-    motor: Run,
-    custom: Run,
-    standard: Run,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Due {
-    pub(crate) motor: bool,
-    pub(crate) custom: bool,
-    pub(crate) standard: bool,
-}
-
-impl Default for Streams {
-    fn default() -> Self {
-        Self { motor: Run::ForEver, custom: Run::ForEver, standard: Run::ForEver }
-    }
-}
+/// Frames left of the standard, the custom and the motor stream; none for ever. All run from boot.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Streams([Option<u8>; 3]);
 
 impl Streams {
     pub(crate) fn request(&mut self, stream: Stream, request: Request) {
-        let run = match request {
-            Request::Start => Run::ForEver,
-            Request::Stop => Run::Frames(0),
-            Request::Count(frames) => Run::Frames(frames),
+        let left = match request {
+            Request::Start => None,
+            Request::Stop => Some(0),
+            Request::Count(frames) => Some(frames),
         };
-        let (motor, custom, standard) = match stream {
-            Stream::Motor => (true, false, false),
-            Stream::Custom => (false, true, false),
-            Stream::Standard => (false, false, true),
-            Stream::All => (true, true, true),
+        let named = match stream {
+            Stream::Standard => 0..1,
+            Stream::Custom => 1..2,
+            Stream::Motor => 2..3,
+            Stream::All => 0..3,
         };
-        for (named, slot) in
-            [(motor, &mut self.motor), (custom, &mut self.custom), (standard, &mut self.standard)]
-        {
-            if named {
-                *slot = run;
-            }
+        self.0[named].fill(left);
+    }
+
+    /// Returns which run. One frame of each counts as sent.
+    pub(crate) fn take_due(&mut self) -> [bool; 3] {
+        let due = self.running();
+        for left in self.0.iter_mut().flatten() {
+            *left = left.saturating_sub(1);
         }
+        due
     }
 
-    /// One frame of each counts as sent.
-    pub(crate) fn take(&mut self) -> Due {
-        Due { motor: self.motor.take(), custom: self.custom.take(), standard: self.standard.take() }
-    }
-
-    pub(crate) const fn running(&self) -> Due {
-        Due { motor: self.motor.runs(), custom: self.custom.runs(), standard: self.standard.runs() }
+    pub(crate) fn running(&self) -> [bool; 3] {
+        self.0.map(|left| left != Some(0))
     }
 }

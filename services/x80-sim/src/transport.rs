@@ -21,13 +21,31 @@ pub enum Transport {
     Pty,
 }
 
-/// Bytes that cannot be sent are lost.
-#[derive(Debug)]
-pub(crate) enum Way {
-    Udp(udp::Udp),
-    Tcp(tcp::Tcp),
-    Pty(pty::Pty),
+trait Wire {
+    /// `address:port`, or the path of the line.
+    fn address(&self) -> String;
+
+    /// Readable when bytes have come; the second only if there are two.
+    fn readable(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>);
+
+    fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<(Source, usize)>>;
+
+    fn send(&mut self, to: Source, bytes: &[u8]) -> io::Result<()>;
+
+    /// A peer that exists before it sends anything: a connected host, or the other end of the line.
+    fn connected(&mut self) -> io::Result<Option<Source>> {
+        Ok(None)
+    }
+
+    /// The newest bytes are the first on a line or connection that a host opened. A line that a host closed so that
+    /// DTR stays high does not count as opened again.
+    fn take_opened(&mut self) -> bool {
+        false
+    }
 }
+
+/// Bytes that cannot be sent are lost.
+pub(crate) struct Way(Box<dyn Wire>);
 
 impl Way {
     pub(crate) fn open(
@@ -36,76 +54,44 @@ impl Way {
         own_user_only: bool,
     ) -> Result<Self, SimError> {
         let bound = |source| SimError::Bind { address, source };
-        match transport {
-            Transport::Udp => udp::Udp::bind(address, own_user_only).map(Self::Udp).map_err(bound),
-            Transport::Tcp => tcp::Tcp::bind(address).map(Self::Tcp).map_err(bound),
-            Transport::Pty => pty::Pty::open().map(Self::Pty).map_err(SimError::Line),
-        }
+        Ok(Self(match transport {
+            Transport::Udp => Box::new(udp::Udp::bind(address, own_user_only).map_err(bound)?),
+            Transport::Tcp => Box::new(tcp::Tcp::bind(address).map_err(bound)?),
+            Transport::Pty => Box::new(pty::Pty::open().map_err(SimError::Line)?),
+        }))
     }
 
-    /// A peer that exists before it sends anything: a connected host, or the other end of the line.
     pub(crate) fn connected(&mut self) -> Result<Option<Source>, SimError> {
-        let connected = match self {
-            Self::Udp(_) => Ok(None),
-            Self::Tcp(tcp) => tcp.connected(),
-            Self::Pty(_) => Ok(Some(Source::Line)),
-        };
-        connected.map_err(|source| SimError::Lost { address: self.address(), source })
+        self.0.connected().map_err(|source| self.lost(source))
     }
 
-    /// `address:port`, or the path of the line.
     pub(crate) fn address(&self) -> String {
-        match self {
-            Self::Udp(udp) => udp.address().to_string(),
-            Self::Tcp(tcp) => tcp.address().to_string(),
-            Self::Pty(pty) => pty.path().to_owned(),
-        }
+        self.0.address()
     }
 
-    /// Readable when bytes have come; the second only if there are two.
     pub(crate) fn readable(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>) {
-        match self {
-            Self::Udp(udp) => (udp.readable(), None),
-            Self::Tcp(tcp) => tcp.readable(),
-            Self::Pty(pty) => (pty.readable(), None),
-        }
+        self.0.readable()
     }
 
-    /// The newest bytes are the first on a line or connection that a host opened. A line that a host closed so that
-    /// DTR stays high does not count as opened again.
     pub(crate) fn take_opened(&mut self) -> bool {
-        match self {
-            Self::Udp(_) => false,
-            Self::Tcp(tcp) => tcp.take_opened(),
-            Self::Pty(pty) => pty.take_opened(),
-        }
+        self.0.take_opened()
     }
 
     pub(crate) fn receive<'b>(
         &mut self,
         buffer: &'b mut [u8],
     ) -> Result<Option<(Source, &'b [u8])>, SimError> {
-        let received = match self {
-            Self::Udp(udp) => udp.receive(buffer),
-            Self::Tcp(tcp) => tcp.receive(buffer),
-            Self::Pty(pty) => pty.receive(buffer),
-        };
-        match received {
-            Ok(Some((source, length))) => Ok(buffer.get(..length).map(|bytes| (source, bytes))),
-            Ok(None) => Ok(None),
-            Err(source) => Err(SimError::Lost { address: self.address(), source }),
-        }
+        let received = self.0.receive(buffer).map_err(|source| self.lost(source))?;
+        Ok(received.and_then(|(source, length)| Some((source, buffer.get(..length)?))))
     }
 
     pub(crate) fn send(&mut self, to: Source, bytes: &[u8]) {
-        let sent = match (self, to) {
-            (Self::Udp(udp), Source::Peer(peer)) => udp.send(peer, bytes),
-            (Self::Tcp(tcp), Source::Connection(number)) => tcp.send(number, bytes),
-            (Self::Pty(pty), Source::Line) => pty.send(bytes),
-            _ => Err(io::ErrorKind::NotConnected.into()),
-        };
-        if let Err(error) = sent {
+        if let Err(error) = self.0.send(to, bytes) {
             tracing::debug!(?to, %error, "bytes to the host are lost");
         }
+    }
+
+    fn lost(&self, source: io::Error) -> SimError {
+        SimError::Lost { address: self.address(), source }
     }
 }

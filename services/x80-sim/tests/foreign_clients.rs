@@ -77,11 +77,9 @@ fn read_some(stream: &mut impl Read) -> Vec<u8> {
     buffer[..length].to_vec()
 }
 
-/// A foreign host: its addresses, the end of its frames, and its unread bytes.
+/// A foreign host: the end of its frames, and its unread bytes.
 struct Host<W> {
     wire: W,
-    robot: u8,
-    own: u8,
     end: [u8; 2],
     bytes: Vec<u8>,
     frames: VecDeque<(u8, Vec<u8>)>,
@@ -90,19 +88,11 @@ struct Host<W> {
 
 impl<W: Wire> Host<W> {
     fn new(wire: W) -> Self {
-        Self {
-            wire,
-            robot: 0x01,
-            own: 0x00,
-            end: [0x5e, 0x0d],
-            bytes: Vec::new(),
-            frames: VecDeque::new(),
-            acks: 0,
-        }
+        Self { wire, end: [0x5e, 0x0d], bytes: Vec::new(), frames: VecDeque::new(), acks: 0 }
     }
 
     fn send(&mut self, did: u8, data: &[u8]) {
-        let mut frame = vec![0x5e, 0x02, self.robot, 0, did, data.len() as u8];
+        let mut frame = vec![0x5e, 0x02, 0x01, 0, did, data.len() as u8];
         frame.extend(data);
         frame.push(checksum(&frame[2..]));
         frame.extend(self.end);
@@ -130,7 +120,7 @@ impl<W: Wire> Host<W> {
             }
             let frame: Vec<u8> = self.bytes.drain(..length).collect();
             assert_eq!(frame[..2], [0x5e, 0x02], "{frame:x?}");
-            assert_eq!(frame[2], self.own, "addressed to somebody else");
+            assert_eq!(frame[2], 0x00, "addressed to somebody else");
             assert_eq!(frame[length - 3], checksum(&frame[2..length - 3]));
             assert_eq!(frame[length - 2..], [0x5e, 0x0d]);
             if frame[4] == 255 {
@@ -240,33 +230,6 @@ fn one_that_begins_with_zeros_ends_wrong_and_leaves_channels_alone_its_own_way()
     // The wheel turned 400 counts/s for half a second of mission time, and then stood.
     assert!((195..=205).contains(&counts[1]), "it moved {counts:?}");
     assert_eq!(host.counts(), counts);
-}
-
-#[test]
-fn one_that_speaks_in_letters_is_answered_in_letters() {
-    let sim = Sim::start(QUICK, Pace::Rate(5.0));
-    let mut host = Host::new(sim.host());
-    (host.robot, host.own) = (0x8b, 0xb8);
-    host.send(255, &[0]);
-    host.wait_for_ack(1);
-    for _ in 0..5 {
-        host.counts();
-    }
-}
-
-#[test]
-fn one_that_asks_for_so_many_frames_gets_so_many() {
-    let sim = Sim::start(QUICK, Pace::Rate(5.0));
-    let mut host = Host::new(sim.host());
-    host.send(127, &[0]);
-    host.wait_for_ack(1);
-    host.frames.clear();
-    host.send(125, &[3]);
-    host.send(255, &[0]);
-    let dids: Vec<u8> = (0..3).map(|_| host.next().0).collect();
-    assert_eq!(dids, [125; 3]);
-    host.send(123, &[]);
-    assert_eq!(host.next().0, 123, "no fourth standard frame came before");
 }
 
 #[test]

@@ -95,28 +95,6 @@ fn at_max_the_same_seed_and_commands_give_the_same_bytes() {
     assert!(first != run(8), "another seed gave the same bytes");
 }
 
-#[test]
-fn at_a_rate_frames_come_unasked_and_truth_goes_with_them() {
-    let mut sim = Sim::start("robot.rate_hz = 20", Pace::Rate(5.0));
-    let host = sim.host();
-    host.send(&encoded(forward(400))).unwrap();
-    assert_eq!(reports(&receive(&host)), [ACK]);
-    let mut moved = 0;
-    for _ in 0..10 {
-        let reports = reports(&receive(&host));
-        assert!(matches!(reports[0], Report::Standard(_)), "{reports:?}");
-        assert!(matches!(reports[2], Report::Motor(_)), "{reports:?}");
-        if let Report::Motor(motor) = reports[2] {
-            moved = motor.encoders[1].position;
-        }
-    }
-    // The wheel turns 400 counts/s for 250 ms of mission time, and the lag.
-    assert!((95..=105).contains(&moved), "it moved {moved} counts");
-    let ticks: Vec<u64> = (0..10).map(|_| sim.next_truth().tick).collect();
-    assert_eq!(ticks, (0..10).collect::<Vec<_>>());
-    assert!(sim.stop().is_ok());
-}
-
 /// Assert that sensor frames come without a message from the host.
 fn listen_only(mut line: impl std::io::Read) {
     let mut decoder = Decoder::default();
@@ -137,15 +115,11 @@ fn listen_only(mut line: impl std::io::Read) {
 }
 
 #[test]
-fn a_client_that_only_listens_hears_the_streams_over_tcp() {
+fn a_client_that_only_listens_hears_the_streams_over_tcp_and_on_a_serial_line() {
     let sim = Sim::start_on("robot.rate_hz = 20", Pace::Rate(5.0), Transport::Tcp);
     let line = std::net::TcpStream::connect(&sim.listening).unwrap();
     line.set_read_timeout(Some(support::PATIENCE)).unwrap();
     listen_only(line);
-}
-
-#[test]
-fn a_client_that_only_listens_hears_the_streams_on_a_serial_line() {
     let sim = Sim::start_on("robot.rate_hz = 20", Pace::Rate(5.0), Transport::Pty);
     listen_only(std::fs::File::open(&sim.listening).unwrap());
 }

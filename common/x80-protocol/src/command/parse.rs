@@ -11,33 +11,31 @@ impl Command {
     /// # Errors
     /// The DID is unknown, the length is wrong, or a byte has no meaning.
     pub fn parse(frame: &Frame<'_>) -> Result<Self, MessageError> {
-        command(frame)
-    }
-}
-
-fn command(frame: &Frame<'_>) -> Result<Command, MessageError> {
-    let data = frame.data;
-    match frame.did {
-        did::POSITION => one(frame, Quantity::Position),
-        did::PWM => one(frame, Quantity::Pwm),
-        did::VELOCITY => one(frame, Quantity::Velocity),
-        did::POSITION_ALL => all(frame, Quantity::Position),
-        did::PWM_ALL => all(frame, Quantity::Pwm),
-        did::VELOCITY_ALL => all(frame, Quantity::Velocity),
-        did::PARAMETER => parameter(data),
-        did::ENABLE => match *data {
-            [on] => Ok(Command::Enable { on: on != 0, channel: None }),
-            [on, number, ..] => {
-                Ok(Command::Enable { on: on != 0, channel: Some(channel(did::ENABLE, number)?) })
+        let (did, data) = (frame.did, frame.data);
+        for quantity in Quantity::ALL {
+            match quantity.dids() {
+                [of_one, _] if of_one == did => return one(frame, quantity),
+                [_, of_all] if of_all == did => return all(frame, quantity),
+                _ => {}
             }
-            [] => Err(length(did::ENABLE, data, "1 or 2")),
-        },
-        did::MOTOR => Ok(stream(Stream::Motor, data)),
-        did::CUSTOM => Ok(stream(Stream::Custom, data)),
-        did::STANDARD => Ok(stream(Stream::Standard, data)),
-        did::ALL_SENSORS => Ok(stream(Stream::All, data)),
-        did::SYSTEM => SystemSignal::parse(data).map(Command::System),
-        did => Err(MessageError::UnknownDid { did }),
+        }
+        let stream = |stream| Ok(Self::Stream { stream, request: request(data) });
+        match did {
+            did::PARAMETER => parameter(data),
+            did::ENABLE => match *data {
+                [on] => Ok(Self::Enable { on: on != 0, channel: None }),
+                [on, number, ..] => {
+                    Ok(Self::Enable { on: on != 0, channel: Some(channel(did, number)?) })
+                }
+                [] => Err(length(did, data, "1 or 2")),
+            },
+            did::MOTOR => stream(Stream::Motor),
+            did::CUSTOM => stream(Stream::Custom),
+            did::STANDARD => stream(Stream::Standard),
+            did::ALL_SENSORS => stream(Stream::All),
+            did::SYSTEM => SystemSignal::parse(data).map(Self::System),
+            did => Err(MessageError::UnknownDid { did }),
+        }
     }
 }
 
@@ -141,11 +139,10 @@ fn gains(terms: &[u8]) -> Result<Gains, MessageError> {
     Ok(gains)
 }
 
-fn stream(stream: Stream, data: &[u8]) -> Command {
-    let request = match data.first() {
+fn request(data: &[u8]) -> Request {
+    match data.first() {
         None | Some(255) => Request::Start,
         Some(0) => Request::Stop,
         Some(&count) => Request::Count(count),
-    };
-    Command::Stream { stream, request }
+    }
 }

@@ -9,6 +9,7 @@ use common::{driver::Commander, mission::Mission, samples::Cause};
 use ros2_driver::publishers::gid_text;
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
+use crate::backoff::has_passed;
 
 pub(crate) const GONE_AFTER: Duration = Duration::from_secs(1);
 /// A sender of stops alone is a commander after this time. An earlier link's stop guard leaves sooner.
@@ -68,8 +69,4 @@ impl Monitor for OtherCommander {
     fn judges_frames(&self) -> bool {
         false
     }
-}
-
-fn has_passed(then_ns: u64, now_ns: u64, span: Duration) -> bool {
-    now_ns.saturating_sub(then_ns) >= span.as_nanos() as u64
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use common::{clock::Pace, mission::Mission, samples::Cause};
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
-use crate::backoff::Backoff;
+use crate::backoff::{Backoff, has_passed};
 
 /// Silence until a robot is lost, in command limits: longer than a short fade of the radio, and its last command has expired.
 pub(crate) const SILENT_LIMITS: u32 = 3;
@@ -45,7 +45,7 @@ impl Silence {
     }
 
     pub(crate) fn is_over(&self, heard_ns: u64, now_ns: u64) -> bool {
-        now_ns.saturating_sub(heard_ns) >= self.machine.as_nanos() as u64
+        has_passed(heard_ns, now_ns, self.machine)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use common::{
     clock::{MissionTime, Pace},
-    driver::LaserScan,
+    driver::{LaserScan, Memory},
     inputs,
     samples::{
         CommandSample, ContactSample, CountsSample, HoldReason, InfraredSample, Order, PowerSample,
@@ -29,13 +29,26 @@ impl Default for State {
     }
 }
 
-/// An event that the link takes. Recordings hold it in this encoding.
+/// What the link takes at once, and when. Recordings hold it in this encoding.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Entry<'a> {
+    #[serde(borrow)]
+    pub event: Event<'a>,
+    /// Reading of the machine's monotonic clock, nanoseconds, which the deadlines of wires use.
+    pub machine_ns: u64,
+    pub now: MissionTime,
+}
+
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub enum Event<'a> {
     /// Bytes from the robot.
     Datagram(#[serde(with = "serde_bytes")] &'a [u8]),
     /// Whether the wire is open now. A wire counts as open until the first such event. A wire of datagrams is always open.
     Wire(bool),
+    /// Bytes on the wire of a sensor, by its number in [`crate::drivers::sensors`].
+    Sensor(u8, #[serde(with = "serde_bytes")] &'a [u8]),
+    /// Whether the wire of a sensor is open now.
+    SensorWire(u8, bool),
     /// A command from the controller.
     Command(#[serde(with = "inputs::sample")] CommandSample),
     /// The supervisor's directive: an order, and the reason for not driving.
@@ -46,17 +59,25 @@ pub enum Event<'a> {
     Quiet,
     /// An operator's request at the link.
     Operator(Request),
+    /// The driver's state of the link before.
+    Remember(Memory),
+    /// The process has time to publish the newest telemetry.
+    Telemetry,
+    /// The process ends.
+    End,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
     Send(Vec<u8>),
+    /// To the sensor of this number.
+    SendSensor(u8, Vec<u8>),
     /// `ranges` come first, since `wheels` wakes the pipeline.
     Tick {
         tick: u64,
         time: MissionTime,
         ranges: Vec<RangeReading>,
-        scan: LaserScan,
+        scans: Vec<LaserScan>,
         /// The turn since the tick before, by the robot's own gyro.
         turn: Option<TurnSample>,
         wheels: WheelSample,

@@ -42,16 +42,16 @@ impl Link {
     ) {
         if self.monitors().stop.method() > 0 && counts != [0, 0] {
             // Another method than velocity may have stopped the robot, which needs its settings again.
-            effects.push(Effect::Send(self.driver.greeting()));
+            effects.push(Effect::Send(self.base.greeting()));
         }
         self.commanded(counts, now_ns);
-        effects.push(Effect::Send(self.driver.velocity(counts, limit)));
+        effects.push(Effect::Send(self.base.velocity(counts, limit)));
     }
 
     /// Several times when it is new, then at intervals.
     pub(super) fn send_stop(&mut self, new: bool, now_ns: u64, effects: &mut Vec<Effect>) {
         if new {
-            effects.extend(self.final_stops().into_iter().map(Effect::Send));
+            effects.extend(self.final_stops());
         } else if self.monitors().latency.is_testing() && self.stop_sent_ns.is_some() {
             // The latency monitor waits for late acknowledgements.
             return;
@@ -79,7 +79,7 @@ impl Link {
 
     /// None for velocity 0, which is the first method and follows the last.
     pub(super) fn other_stop(&self) -> Option<StopMethod> {
-        let mut others = self.driver.other_stops();
+        let mut others = self.base.other_stops();
         let method = self.monitors().stop.method() % (others.len() + 1);
         method.checked_sub(1).map(|other| others.swap_remove(other))
     }
@@ -89,7 +89,7 @@ impl Link {
     }
 
     pub(super) fn velocity_0(&self) -> Vec<u8> {
-        self.driver.velocity([0, 0], self.limit)
+        self.base.velocity([0, 0], self.limit)
     }
 
     fn takes_next_stop_method(&mut self) -> bool {

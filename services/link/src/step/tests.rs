@@ -4,8 +4,8 @@ use std::path::Path;
 use common::{
     clock::{MissionTime, Pace},
     samples::{
-        Action, Cause, CommandSample, CommandState, CountsSample, HoldReason, Order, RangeStatus,
-        Stamp, WheelSample,
+        Action, Cause, CommandSample, CommandState, CountsSample, HoldReason, Order, RangeReading,
+        RangeStatus, Stamp, WheelSample,
     },
     wire::{
         Addressing, Command, CustomSensors, Decoder, Mode, MotorSensors, Parameter, Report,
@@ -51,7 +51,7 @@ impl At for Link {
             Pace::Max => self.state().next_tick * PERIOD_NS,
             Pace::Rate(_) => machine_ns,
         };
-        self.step(event, machine_ns, MissionTime(now))
+        self.step(Entry { event, machine_ns, now: MissionTime(now) })
     }
 }
 
@@ -427,3 +427,4 @@ mod held;
 mod lockstep;
 mod robot_health;
 mod ros2;
+mod sensor_wire;

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use common::{
+    clock::MissionTime,
     driver::{Heard, Motion, counts::WheelCounts},
     samples::PowerSample,
     wire::COUNT_CYCLE,
@@ -18,7 +19,7 @@ const LONGEST_REFUSAL: usize = 200;
 impl Link {
     pub(super) fn take_wire(&mut self, open: bool, now_ns: u64, effects: &mut Vec<Effect>) {
         self.failsafe.monitors.presence.wire(open);
-        self.driver.reset();
+        self.base.reset();
         // Stops sent to a closed wire are lost.
         self.stop_sent_ns = None;
         if !open {
@@ -26,16 +27,45 @@ impl Link {
         }
     }
 
-    pub(super) fn take_heard(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        let mut heard = self.driver.heard();
-        if let Some(why) = heard.refused.take()
+    /// A sensor says nothing of the robot's motion or presence.
+    pub(super) fn take_sensor(
+        &mut self,
+        number: u8,
+        bytes: &[u8],
+        now_ns: u64,
+        effects: &mut Vec<Effect>,
+    ) {
+        let Some(driver) = self.drivers.get_mut(usize::from(number)) else {
+            return;
+        };
+        let Heard { readings, scans, refused, .. } = driver.hear(bytes);
+        self.take_refusal(refused, now_ns, effects);
+        let mut heard = Heard { readings, scans, ..Heard::default() };
+        self.take_readings(&mut heard, Some(self.now), now_ns);
+    }
+
+    pub(super) fn take_sensor_wire(&mut self, number: u8, open: bool, effects: &mut Vec<Effect>) {
+        if let Some(driver) = self.drivers.get_mut(usize::from(number)) {
+            driver.reset();
+            if open {
+                effects.push(Effect::SendSensor(number, driver.greeting()));
+            }
+        }
+    }
+
+    fn take_refusal(&mut self, why: Option<String>, now_ns: u64, effects: &mut Vec<Effect>) {
+        if let Some(why) = why
             && passed(self.refused_ns, now_ns, REFUSED_AGAIN)
         {
             self.refused_ns = Some(now_ns);
-            // The reason may quote the robot, which may send any text.
+            // The reason may quote the device, which may send any text.
             let why = why.escape_debug().take(LONGEST_REFUSAL).collect();
             effects.push(Effect::Refused(why));
         }
+    }
+
+    pub(super) fn take_heard(&mut self, mut heard: Heard, now_ns: u64, effects: &mut Vec<Effect>) {
+        self.take_refusal(heard.refused.take(), now_ns, effects);
         let rate = heard.stamp_ns.and_then(|stamp_ns| self.clock_rate.take(stamp_ns, self.now));
         effects.extend(rate.map(Effect::ClockRate));
         if let Some(commander) = heard.commander {
@@ -52,7 +82,7 @@ impl Link {
             self.observe(Observation::Acknowledged, now_ns);
         }
         if heard.pinged {
-            effects.push(Effect::Send(self.driver.acknowledge()));
+            effects.push(Effect::Send(self.base.acknowledge()));
         }
         if heard.jumped {
             self.restart.jumped();
@@ -66,15 +96,16 @@ impl Link {
             effects.push(Effect::Restarted);
             if self.connected() {
                 // A restarted robot has its default settings.
-                effects.push(Effect::Send(self.driver.greeting()));
+                effects.push(Effect::Send(self.base.greeting()));
             }
         }
-        self.take_sensors(&heard, now_ns, effects);
+        self.take_power(&heard, now_ns, effects);
+        self.take_readings(&mut heard, None, now_ns);
         if heard.anything && self.failsafe.monitors.presence.heard(now_ns) {
             let again = self.losses() > 0;
             self.observe(Observation::Found { again }, now_ns);
             effects.push(Effect::Connected(true));
-            effects.push(Effect::Send(self.driver.greeting()));
+            effects.push(Effect::Send(self.base.greeting()));
             // The robot may still drive by a command of an earlier link.
             self.stop_sent_ns = None;
             if self.in_ticks() {
@@ -124,7 +155,15 @@ impl Link {
         are
     }
 
-    fn take_sensors(&mut self, heard: &Heard, now_ns: u64, effects: &mut Vec<Effect>) {
+    /// `own_wire` is the time at which readings came that did not come with the robot's motion.
+    fn take_readings(&mut self, heard: &mut Heard, own_wire: Option<MissionTime>, now_ns: u64) {
+        let readings = self.sensors.take_heard(heard, own_wire);
+        if !readings.is_empty() {
+            self.observe(Observation::Readings(&readings), now_ns);
+        }
+    }
+
+    fn take_power(&mut self, heard: &Heard, now_ns: u64, effects: &mut Vec<Effect>) {
         if let Some(power) = heard.power {
             let volts = [power.board_v, power.motor_v, power.servo_v];
             self.observe(Observation::Batteries(volts), now_ns);
@@ -135,9 +174,6 @@ impl Link {
         }
         effects.extend(heard.surroundings.map(Effect::Surroundings));
         effects.extend(heard.infrared.map(Effect::Infrared));
-        if !heard.readings.is_empty() {
-            self.observe(Observation::Readings(&heard.readings), now_ns);
-        }
     }
 
     pub(super) fn ping(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
@@ -146,7 +182,7 @@ impl Link {
         if self.ordered_to_drive() {
             self.due += 1;
         }
-        effects.push(Effect::Send(self.driver.ping()));
+        effects.push(Effect::Send(self.base.ping()));
         self.poll_in_ticks(effects);
     }
 
@@ -163,7 +199,9 @@ impl Link {
             && self.other_stop().is_none()
             && self.failsafe.monitors.streams.wants_request(now_ns)
         {
-            effects.push(Effect::Send(self.driver.ask_for_sensors()));
+            effects.push(Effect::Send(self.base.ask_for_sensors()));
+            let greetings = (0..).zip(self.drivers.iter().map(|driver| driver.greeting()));
+            effects.extend(greetings.map(|(number, bytes)| Effect::SendSensor(number, bytes)));
             effects.push(Effect::AskedForStreams);
         }
         let owing = self.in_ticks() && owes && silent && self.connected();

@@ -16,7 +16,7 @@ use ros2_driver::{
     topics::{Content, Topics},
 };
 
-use super::counts::Tally;
+use super::{Wire, counts::Tally};
 
 const DEPTH: u16 = 16;
 
@@ -62,7 +62,14 @@ impl Dds {
         })
     }
 
-    pub(super) fn maintain(&mut self, now_ns: u64) -> io::Result<()> {
+    fn take(&self, row: usize) -> Option<Message> {
+        let (reader, own) = (self.readers.get(row)?, self.writer.gid());
+        std::iter::from_fn(|| reader.take()).find(|message| message.from != own)
+    }
+}
+
+impl Wire for Dds {
+    fn maintain(&mut self, now_ns: u64) -> io::Result<()> {
         let joined_ns = *self.joined_ns.get_or_insert(now_ns);
         let (since_ns, most_ns) =
             self.heard_ns.map_or((joined_ns, UNDISCOVERED_NS), |heard_ns| (heard_ns, DEAF_NS));
@@ -75,12 +82,8 @@ impl Dds {
         Ok(())
     }
 
-    pub(super) const fn is_open(&self) -> bool {
-        true
-    }
-
-    /// Copy the next message, after its topic's row, into `buffer`. Returns the length, or none if all were taken.
-    pub(super) fn receive(&mut self, buffer: &mut [u8], now_ns: u64) -> Option<usize> {
+    /// Copies the next message, after its topic's row, into `buffer`.
+    fn receive(&mut self, buffer: &mut [u8], now_ns: u64) -> io::Result<Option<usize>> {
         self.participant.unring();
         let count = self.readers.len();
         for row in (0..count).map(|turn| (self.next + turn) % count) {
@@ -95,26 +98,20 @@ impl Dds {
             let two = is_odometry.then(|| self.publishers.take(from, now_ns)).flatten();
             let piece = two.unwrap_or_else(|| [&[row as u8], writer, &payload].concat());
             let length = piece.len().min(buffer.len());
-            buffer.get_mut(..length)?.copy_from_slice(piece.get(..length)?);
-            return Some(length);
+            buffer[..length].copy_from_slice(&piece[..length]);
+            return Ok(Some(length));
         }
-        None
+        Ok(None)
     }
 
-    fn take(&self, row: usize) -> Option<Message> {
-        let (reader, own) = (self.readers.get(row)?, self.writer.gid());
-        std::iter::from_fn(|| reader.take()).find(|message| message.from != own)
-    }
-
-    /// Lost if the library does not accept it now.
-    pub(super) fn send(&mut self, payload: &[u8]) {
-        // Topics need no greeting.
-        if !payload.is_empty() && !self.writer.write(payload.to_vec()) {
+    fn send(&mut self, payload: &[u8]) -> io::Result<()> {
+        if !self.writer.write(payload.to_vec()) {
             self.tally.unsent += 1;
         }
+        Ok(())
     }
 
-    pub(super) const fn tally(&self) -> Tally {
+    fn tally(&self) -> Tally {
         self.tally
     }
 }

@@ -1,4 +1,4 @@
-//! A serial line: 115200 baud, or the mission's Arduino's, 8 data bits, no parity, 1 stop bit, no translation. rustix opens it, because
+//! A serial line: 8 data bits, no parity, 1 stop bit, no translation. rustix opens it, because
 //! the waiter needs a `BorrowedFd`, which the crate `serialport` gives only by `unsafe`.
 
 use std::{
@@ -8,7 +8,6 @@ use std::{
     time::Duration,
 };
 
-use common::mission::{Mission, Protocol};
 use rustix::{
     fs::{FlockOperation, Mode, OFlags, flock, open},
     io::Errno,
@@ -20,9 +19,6 @@ use rustix::{
 
 use super::stream::Dial;
 
-/// Bits a second, without an Arduino.
-const BAUD: u32 = 115_200;
-
 #[derive(Debug)]
 pub(super) struct Serial {
     path: PathBuf,
@@ -30,11 +26,8 @@ pub(super) struct Serial {
 }
 
 impl Serial {
-    pub(super) fn of(path: &Path, mission: &Mission) -> Self {
-        let baud = match mission.robot.protocol() {
-            Protocol::Arduino => mission.robot.arduino.baud,
-            Protocol::X80 | Protocol::Json | Protocol::Ros2 => BAUD,
-        };
+    /// `baud` are bits a second.
+    pub(super) fn new(path: &Path, baud: u32) -> Self {
         Self { path: path.to_owned(), baud }
     }
 }

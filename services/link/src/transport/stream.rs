@@ -17,8 +17,11 @@ use rustix::{
     io::{Errno, read, write},
 };
 
-use super::counts::{Attempts, Tally};
-use crate::backoff::Backoff;
+use super::{
+    Wire,
+    counts::{Attempts, Tally},
+};
+use crate::backoff::{Backoff, has_passed};
 
 /// The first pause is short, so that a robot that only restarts its network is found at once.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
@@ -27,7 +30,7 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 /// An attempt is given up after this: a robot that is off does not answer.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-pub(super) trait Dial: fmt::Display {
+pub(super) trait Dial: fmt::Display + fmt::Debug {
     /// An open stream counts as closed after this; none if the system reports that.
     const SILENCE: Option<Duration>;
 
@@ -60,9 +63,9 @@ pub(super) struct Stream<D> {
     logged: Option<Errno>,
 }
 
-impl<D: Dial> Stream<D> {
-    pub(super) fn new(dial: D) -> io::Result<Self> {
-        Ok(Self {
+impl<D: Dial + 'static> Stream<D> {
+    pub(super) fn boxed(dial: D) -> io::Result<Box<dyn Wire>> {
+        Ok(Box::new(Self {
             dial,
             epoll: epoll::create(CreateFlags::CLOEXEC)?,
             state: State::Closed,
@@ -70,18 +73,20 @@ impl<D: Dial> Stream<D> {
             backoff: Backoff::new(FIRST_PAUSE, LONGEST_PAUSE),
             unsent: 0,
             logged: None,
-        })
+        }))
     }
+}
 
-    pub(super) const fn is_open(&self) -> bool {
+impl<D: Dial> Wire for Stream<D> {
+    fn is_open(&self) -> bool {
         matches!(self.state, State::Open { .. })
     }
 
-    pub(super) const fn tally(&self) -> Tally {
-        Tally { foreign_datagrams: 0, other_port: 0, unsent: self.unsent }
+    fn tally(&self) -> Tally {
+        Tally { unsent: self.unsent, ..Tally::default() }
     }
 
-    pub(super) fn attempts(&self, now_ns: u64) -> Option<Attempts> {
+    fn attempts(&self, now_ns: u64) -> Option<Attempts> {
         let next_ns = match self.state {
             State::Open { .. } => return None,
             State::Opening { .. } => 0,
@@ -91,7 +96,7 @@ impl<D: Dial> Stream<D> {
     }
 
     /// Continue or give up an attempt, or send the rest of a message.
-    pub(super) fn maintain(&mut self, now_ns: u64) -> io::Result<()> {
+    fn maintain(&mut self, now_ns: u64) -> io::Result<()> {
         if matches!(self.state, State::Closed) {
             if !self.backoff.is_due(now_ns) {
                 return Ok(());
@@ -114,13 +119,13 @@ impl<D: Dial> Stream<D> {
                         Ok(()) => self.opened(now_ns)?,
                         Err(error) => self.close(&error),
                     }
-                } else if passed(*since_ns, now_ns, PATIENCE) {
+                } else if has_passed(*since_ns, now_ns, PATIENCE) {
                     self.close(&Errno::TIMEDOUT.into());
                 }
             }
             State::Open { heard_ns, .. } => {
                 let heard_ns = *heard_ns;
-                if D::SILENCE.is_some_and(|silence| passed(heard_ns, now_ns, silence)) {
+                if D::SILENCE.is_some_and(|silence| has_passed(heard_ns, now_ns, silence)) {
                     self.close(&Errno::TIMEDOUT.into());
                 } else {
                     self.flush()?;
@@ -130,10 +135,9 @@ impl<D: Dial> Stream<D> {
         Ok(())
     }
 
-    /// Returns the number of bytes, or none.
-    pub(super) fn receive(&mut self, buffer: &mut [u8], now_ns: u64) -> Option<usize> {
+    fn receive(&mut self, buffer: &mut [u8], now_ns: u64) -> io::Result<Option<usize>> {
         let State::Open { descriptor, heard_ns } = &mut self.state else {
-            return None;
+            return Ok(None);
         };
         match read(&*descriptor, buffer) {
             Ok(0) => self.close(&io::ErrorKind::UnexpectedEof.into()),
@@ -143,16 +147,15 @@ impl<D: Dial> Stream<D> {
                 // second.
                 self.backoff.reset();
                 self.logged = None;
-                return Some(length);
+                return Ok(Some(length));
             }
             Err(Errno::AGAIN | Errno::INTR) => {}
             Err(error) => self.close(&error.into()),
         }
-        None
+        Ok(None)
     }
 
-    /// They are lost if the stream does not accept them now. Fails when the stream is closed.
-    pub(super) fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.flush()?;
         let State::Open { descriptor, .. } = &self.state else {
             self.unsent += 1;
@@ -176,7 +179,9 @@ impl<D: Dial> Stream<D> {
         }
         Ok(())
     }
+}
 
+impl<D: Dial> Stream<D> {
     fn flush(&mut self) -> io::Result<()> {
         let State::Open { descriptor, .. } = &self.state else {
             return Ok(());
@@ -243,10 +248,6 @@ const fn remedy(errno: Errno) -> &'static str {
         Errno::NOTTY => "robot.address names no serial line",
         _ => "is the robot on, is robot.address right",
     }
-}
-
-fn passed(since_ns: u64, now_ns: u64, span: Duration) -> bool {
-    now_ns.saturating_sub(since_ns) >= span.as_nanos() as u64
 }
 
 impl<D> AsFd for Stream<D> {

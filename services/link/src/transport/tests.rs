@@ -21,8 +21,7 @@ use tempfile::TempDir;
 use super::*;
 
 fn open_at(address: &Address) -> Result<Transport, TransportError> {
-    let mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
-    Transport::open(address, &mission)
+    Transport::open(address, BAUD)
 }
 
 const MS: u64 = 1_000_000;
@@ -262,7 +261,7 @@ fn a_line_to_an_arduino_has_the_boards_speed_and_is_closed_without_a_hangup_that
     tcsetattr(&line.robot, OptionalActions::Now, &settings).unwrap();
     let text = "target = [3, 0]\nrobot.protocol = 'arduino'\nrobot.counts_per_turn = 1320\nrobot.arduino.sonars = { front = 4 }\n[[robot.sensor]]\nname = 'front'\nkind = 'cone'\nchannel = 1\nforward_m = 0.1\nbearing_deg = 0\n";
     let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
-    let mut transport = Transport::open(&Address::Serial(line.name.clone()), &mission).unwrap();
+    let mut transport = Transport::of_base(&Address::Serial(line.name.clone()), &mission).unwrap();
     maintain_until(&mut transport, true, 0);
     let settings = tcgetattr(&line.robot).unwrap();
     assert_eq!(settings.output_speed(), 57_600);

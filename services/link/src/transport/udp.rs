@@ -8,7 +8,7 @@ use std::{
 
 use rustix::io::Errno;
 
-use super::counts::Tally;
+use super::{Wire, counts::Tally};
 
 #[derive(Debug)]
 pub(super) struct Udp {
@@ -31,9 +31,11 @@ impl Udp {
         socket.set_nonblocking(true)?;
         Ok(Self { socket, robot, tally: Tally::default() })
     }
+}
 
-    /// Returns the next datagram's length, or none if all were taken. Those from other addresses are dropped and counted.
-    pub(super) fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<usize>> {
+impl Wire for Udp {
+    /// Those from other addresses are dropped and counted.
+    fn receive(&mut self, buffer: &mut [u8], _: u64) -> io::Result<Option<usize>> {
         loop {
             match self.socket.recv_from(buffer) {
                 Ok((length, from)) if from == self.robot => return Ok(Some(length)),
@@ -56,8 +58,7 @@ impl Udp {
         }
     }
 
-    /// Lost if the network does not accept it now.
-    pub(super) fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         match self.socket.send_to(bytes, self.robot) {
             Ok(_) => Ok(()),
             Err(error) if Errno::from_io_error(&error) == Some(Errno::BADF) => Err(error),
@@ -69,7 +70,7 @@ impl Udp {
         }
     }
 
-    pub(super) const fn tally(&self) -> Tally {
+    fn tally(&self) -> Tally {
         self.tally
     }
 }

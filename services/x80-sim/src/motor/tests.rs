@@ -24,15 +24,6 @@ fn run(motor: &mut Motor, from: f64, seconds: f64) -> Vec<f64> {
 }
 
 #[test]
-fn it_boots_suspended_in_pwm_mode_on_one_pot_with_50_5_0() {
-    let motor = Motor::new(ideal(), 2000.0);
-    assert!(!motor.enabled());
-    assert_eq!((motor.mode(), motor.feedback()), (Mode::Pwm, Feedback::OnePot));
-    let boot = PidGains { kp: 50, kd: 5, ki_x100: 0 };
-    assert_eq!(motor.gains(), (boot, boot));
-}
-
-#[test]
 fn a_velocity_command_alone_turns_the_wheel_and_ends_in_time() {
     let mut motor = Motor::new(ideal(), 2000.0);
     motor.order(Quantity::Velocity, 400, Some(0.5));

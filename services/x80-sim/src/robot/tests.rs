@@ -3,9 +3,7 @@
 use std::path::Path;
 
 use common::mission::Realism;
-use common::wire::{
-    COUNT_CYCLE, Decoder, Gains, Parameter, Quantity, Request, Stream, Targets, counts_between,
-};
+use common::wire::{COUNT_CYCLE, Decoder, Quantity, Request, Stream, Targets, counts_between};
 
 use proptest::prelude::*;
 
@@ -233,17 +231,9 @@ fn motor_speed(robot: &Robot) -> f64 {
 }
 
 #[test]
-fn parameters_and_enabling_reach_their_channel() {
+fn enabling_and_a_speed_reach_their_channel() {
     let mut robot = robot("");
-    send(
-        &mut robot,
-        Command::Parameter {
-            channel: 1,
-            parameter: Parameter::VelocityPid(Gains { kp: Some(15), ..Default::default() }),
-        },
-    );
-    let (position, velocity) = robot.motor(1).unwrap().gains();
-    assert_eq!((position.kp, velocity.kp, velocity.kd), (50, 15, 5));
+    assert!(!robot.motor(5).unwrap().enabled(), "it boots suspended");
     send(&mut robot, Command::Enable { on: true, channel: None });
     assert!(robot.motor(5).unwrap().enabled());
     let other = Motion {

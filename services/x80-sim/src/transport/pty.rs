@@ -12,7 +12,7 @@ use rustix::{
     termios::{ControlModes, OptionalActions, Termios, tcgetattr, tcsetattr},
 };
 
-use super::source::Source;
+use super::{Wire, source::Source};
 
 /// The robot sets the line to this speed; a host sets its own when it opens the line, which shows the robot that it
 /// did.
@@ -48,25 +48,6 @@ impl Pty {
         Ok(Self { robot, host, hangs_up: true, opened: false, path })
     }
 
-    pub(super) fn path(&self) -> &str {
-        &self.path
-    }
-
-    pub(super) fn readable(&self) -> BorrowedFd<'_> {
-        self.robot.as_fd()
-    }
-
-    pub(super) fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<(Source, usize)>> {
-        match read(&self.robot, buffer) {
-            Ok(0) | Err(Errno::AGAIN | Errno::INTR) => Ok(None),
-            Ok(length) => {
-                self.notice_host()?;
-                Ok(Some((Source::Line, length)))
-            }
-            Err(error) => Err(error.into()),
-        }
-    }
-
     fn notice_host(&mut self) -> io::Result<()> {
         let mut settings: Termios = tcgetattr(&self.host)?;
         if settings.output_speed() != NOBODYS_BAUD {
@@ -77,13 +58,38 @@ impl Pty {
         }
         Ok(())
     }
+}
 
-    pub(super) fn take_opened(&mut self) -> bool {
+impl Wire for Pty {
+    fn address(&self) -> String {
+        self.path.clone()
+    }
+
+    fn readable(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>) {
+        (self.robot.as_fd(), None)
+    }
+
+    fn connected(&mut self) -> io::Result<Option<Source>> {
+        Ok(Some(Source::Line))
+    }
+
+    fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<(Source, usize)>> {
+        match read(&self.robot, buffer) {
+            Ok(0) | Err(Errno::AGAIN | Errno::INTR) => Ok(None),
+            Ok(length) => {
+                self.notice_host()?;
+                Ok(Some((Source::Line, length)))
+            }
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    fn take_opened(&mut self) -> bool {
         std::mem::take(&mut self.opened)
     }
 
     /// Bytes that a host does not read in time are lost; its decoder finds the next frame.
-    pub(super) fn send(&self, bytes: &[u8]) -> io::Result<()> {
+    fn send(&mut self, _: Source, bytes: &[u8]) -> io::Result<()> {
         write(&self.robot, bytes).map(drop).map_err(io::Error::from)
     }
 }

@@ -6,7 +6,7 @@ use std::{
     os::fd::{AsFd, BorrowedFd},
 };
 
-use super::source::Source;
+use super::{Wire, source::Source};
 
 #[derive(Debug)]
 pub(crate) struct Tcp {
@@ -32,16 +32,37 @@ impl Tcp {
         })
     }
 
-    pub(super) fn address(&self) -> SocketAddr {
-        self.address
+    fn accept(&mut self) -> io::Result<()> {
+        match self.listener.accept() {
+            Ok((connection, _)) => {
+                connection.set_nonblocking(true)?;
+                connection.set_nodelay(true)?;
+                self.accepted += 1;
+                self.opened = true;
+                self.connection = Some(connection);
+                Ok(())
+            }
+            Err(error) => match error.kind() {
+                ErrorKind::WouldBlock | ErrorKind::Interrupted | ErrorKind::ConnectionAborted => {
+                    Ok(())
+                }
+                _ => Err(error),
+            },
+        }
+    }
+}
+
+impl Wire for Tcp {
+    fn address(&self) -> String {
+        self.address.to_string()
     }
 
-    pub(super) fn readable(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>) {
+    fn readable(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>) {
         let connection = self.connection.as_ref().map(AsFd::as_fd);
         (self.listener.as_fd(), connection)
     }
 
-    pub(super) fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<(Source, usize)>> {
+    fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<(Source, usize)>> {
         self.accept()?;
         let Some(connection) = &mut self.connection else {
             return Ok(None);
@@ -62,38 +83,20 @@ impl Tcp {
         }
     }
 
-    pub(super) fn take_opened(&mut self) -> bool {
+    fn take_opened(&mut self) -> bool {
         std::mem::take(&mut self.opened)
     }
 
-    pub(super) fn connected(&mut self) -> io::Result<Option<Source>> {
+    fn connected(&mut self) -> io::Result<Option<Source>> {
         self.accept()?;
         let open = self.connection.as_ref();
         Ok(open.map(|_| Source::Connection(self.accepted)))
     }
 
-    fn accept(&mut self) -> io::Result<()> {
-        match self.listener.accept() {
-            Ok((connection, _)) => {
-                connection.set_nonblocking(true)?;
-                connection.set_nodelay(true)?;
-                self.accepted += 1;
-                self.opened = true;
-                self.connection = Some(connection);
-                Ok(())
-            }
-            Err(error) => match error.kind() {
-                ErrorKind::WouldBlock | ErrorKind::Interrupted | ErrorKind::ConnectionAborted => {
-                    Ok(())
-                }
-                _ => Err(error),
-            },
-        }
-    }
-
     /// The connection to a host that does not read is closed: half a frame would garble all later ones.
-    pub(super) fn send(&mut self, number: u64, bytes: &[u8]) -> io::Result<()> {
-        let Some(connection) = self.connection.as_mut().filter(|_| number == self.accepted) else {
+    fn send(&mut self, to: Source, bytes: &[u8]) -> io::Result<()> {
+        let is_newest = to == Source::Connection(self.accepted);
+        let Some(connection) = self.connection.as_mut().filter(|_| is_newest) else {
             return Err(ErrorKind::NotConnected.into());
         };
         let sent = connection.write_all(bytes);

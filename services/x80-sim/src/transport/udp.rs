@@ -4,7 +4,7 @@ use std::{
     os::fd::{AsFd, BorrowedFd},
 };
 
-use super::{owner::OwnUser, source::Source};
+use super::{Wire, owner::OwnUser, source::Source};
 
 /// A line with a scan of thousands of beams takes several datagrams, of which each has at most 65,507 bytes.
 const LONGEST: usize = 60_000;
@@ -24,16 +24,18 @@ impl Udp {
         let address = socket.local_addr()?;
         Ok(Self { socket, address, own_user: own_user_only.then(OwnUser::default) })
     }
+}
 
-    pub(super) fn address(&self) -> SocketAddr {
-        self.address
+impl Wire for Udp {
+    fn address(&self) -> String {
+        self.address.to_string()
     }
 
-    pub(super) fn readable(&self) -> BorrowedFd<'_> {
-        self.socket.as_fd()
+    fn readable(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>) {
+        (self.socket.as_fd(), None)
     }
 
-    pub(super) fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<(Source, usize)>> {
+    fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<(Source, usize)>> {
         loop {
             match self.socket.recv_from(buffer) {
                 Ok((_, from)) if self.own_user.as_mut().is_some_and(|own| !own.admits(from)) => {}
@@ -50,7 +52,10 @@ impl Udp {
         }
     }
 
-    pub(super) fn send(&self, to: SocketAddr, bytes: &[u8]) -> io::Result<()> {
+    fn send(&mut self, to: Source, bytes: &[u8]) -> io::Result<()> {
+        let Source::Peer(to) = to else {
+            return Err(ErrorKind::NotConnected.into());
+        };
         bytes.chunks(LONGEST).try_for_each(|piece| self.socket.send_to(piece, to).map(drop))
     }
 }

@@ -53,6 +53,9 @@ fn three_frames_a_second_are_told_with_their_rate_and_a_fading_radio_is_not() {
         panic!();
     };
     assert!((hz - 3.0).abs() < 0.01, "{hz}");
+    let now = Moment { time: MissionTime(last), machine_ns: last };
+    let words = slow.explain(Cause::FramesSlow, now).unwrap();
+    assert!(words.contains("3.0 motor frames") && words.contains("raise robot.command_limit_s"));
     let mut fading = streams("");
     let last = frames(&mut fading, [143, 700, 500, 143, 600, 400, 143, 500, 600]);
     assert_eq!(fading.motor_frames(last), Motor::Regular);

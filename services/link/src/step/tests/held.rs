@@ -109,17 +109,6 @@ fn a_fresh_command_from_an_old_pose_or_guidance_moves_nothing() {
 }
 
 #[test]
-fn a_pose_that_grows_old_stops_the_robot_before_the_command_does() {
-    let mut link = driving(on_the_wall());
-    tick(&mut link, 0, 0);
-    let older = CommandSample { pose_ns: 0, ..command(1, 150 * MS, TURN, TURN) };
-    let effects = tick_by(&mut link, 150 * MS, &datagram(255, 0, 0), &older);
-    assert_eq!(velocities(&effects).len(), 1);
-    let effects = link.at(Event::Quiet, 251 * MS);
-    assert_eq!(decided(&effects), [(Action::Stop, Cause::PoseStale)]);
-}
-
-#[test]
 fn on_a_low_battery_the_robot_goes_the_same_way_at_half_speed() {
     let mut link = driving(on_the_wall());
     let curve = command(0, 0, TURN, 0.5 * TURN);
@@ -153,25 +142,6 @@ fn on_an_empty_battery_the_robot_stands_for_good() {
         let mut commands = velocities(&effects).into_iter();
         assert!(commands.all(|velocity| velocity == STAND), "{effects:?}");
     }
-}
-
-#[test]
-fn the_cause_of_a_hold_is_the_supervisors() {
-    for (reason, cause) in [
-        (HoldReason::Operator, Cause::OperatorStop),
-        (HoldReason::StageHeld, Cause::StageHeld),
-        (HoldReason::Starting, Cause::NotOrdered),
-    ] {
-        let mut link = driving(on_the_wall());
-        tick(&mut link, 0, 0);
-        let effects = link.at(Event::Order(Order::Hold, reason), 20 * MS);
-        assert_eq!(velocities(&effects), [STAND; 3]);
-        assert_eq!(decided(&effects), [(Action::Stop, cause)]);
-    }
-    let mut link = driving(on_the_wall());
-    let over = Event::Order(Order::Stop, HoldReason::Ending);
-    let effects = link.at(over, 20 * MS);
-    assert_eq!(decided(&effects), [(Action::End, Cause::MissionOver)]);
 }
 
 #[test]

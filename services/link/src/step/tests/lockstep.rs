@@ -27,15 +27,6 @@ fn in_lockstep_a_second_answer_to_a_ping_is_no_tick() {
 }
 
 #[test]
-fn in_lockstep_nothing_follows_the_arrival() {
-    let mut link = driving(in_ticks());
-    link.at(Event::Datagram(&datagram(255, 0, 0)), 1);
-    let arrived = CommandSample { state: CommandState::Arrived.into(), ..command(0, 0, 0.0, 0.0) };
-    assert_eq!(velocities(&link.at(Event::Command(arrived), 2)), [[Some(0), Some(0)]]);
-    assert!(ticks(&link.at(Event::Datagram(&datagram(255, 0, 0)), 3)).is_empty());
-}
-
-#[test]
 fn in_lockstep_the_order_asks_for_tick_0_and_each_command_for_the_next() {
     let mut link = in_ticks();
     let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 0);

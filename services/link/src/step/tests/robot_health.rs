@@ -161,24 +161,6 @@ fn a_robot_that_only_acknowledges_is_asked_for_its_streams_and_the_cause_is_name
 }
 
 #[test]
-fn frames_at_3_hz_are_told_with_rate_and_remedy() {
-    let mut link = driving(on_the_wall());
-    let mut now = 0;
-    for number in 0..12 {
-        now = number * 333 * MS;
-        link.at(Event::Order(Order::Drive, HoldReason::None), now);
-        link.at(Event::Datagram(&datagram(255, 0, 0)), now);
-    }
-    assert_eq!(link.decision().cause, Cause::FramesSlow);
-    let words = link.explain(Cause::FramesSlow, now).unwrap();
-    assert!(
-        words.contains("3.0 motor frames a second")
-            && words.contains("raise robot.command_limit_s"),
-        "{words}"
-    );
-}
-
-#[test]
 fn a_robot_that_was_lost_and_acknowledges_what_was_sent_long_ago_is_not_driven() {
     let mut link = driving(on_the_wall());
     link.at(Event::Quiet, 1000 * MS);

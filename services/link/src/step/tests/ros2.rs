@@ -83,7 +83,8 @@ impl Scene {
 
     fn event(&mut self, event: Event<'_>) {
         let machine_ns = self.ms * MS;
-        let effects = self.link.step(event, machine_ns, MissionTime(machine_ns));
+        let now = MissionTime(machine_ns);
+        let effects = self.link.step(Entry { event, machine_ns, now });
         for effect in effects {
             match effect {
                 Effect::Send(bytes) if !bytes.is_empty() => {

@@ -111,24 +111,6 @@ fn a_blocked_wheel_stands_while_the_block_lasts_and_its_robot_turns_about_it() {
 }
 
 #[test]
-fn a_silent_ranger_hears_nothing_and_falls_silent_in_runs() {
-    let mut robot = robot(
-        "[simulation.sonar]\nsilence_share = 0.3\nsilence_mean_s = 2\n[[world.wall]]\npoints = [[1, -1], [1, 1]]",
-    );
-    let (mut silent, mut runs, mut before) = (0, 0, false);
-    for _ in 0..7000 {
-        robot.advance_to_next_tick();
-        let now = robot.ground_truth().sonar_cm == 255;
-        silent += u32::from(now);
-        runs += u32::from(now && !before);
-        before = now;
-    }
-    let mean_s = f64::from(silent) / f64::from(runs) / 7.0;
-    assert!((1600..2600).contains(&silent), "{silent} of 7000");
-    assert!((1.6..2.4).contains(&mean_s), "{mean_s} s");
-}
-
-#[test]
 fn what_is_low_is_heard_at_middle_ranges_only_and_touched_and_a_sill_is_passed_over() {
     let driven_to = |top_m: f64| {
         let text = format!(

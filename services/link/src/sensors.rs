@@ -1,0 +1,176 @@
+//! What the sensors of a robot said since the last tick, whichever driver heard them. A laser may be stuck or blind.
+
+use std::f64::consts::TAU;
+
+use common::{
+    clock::MissionTime,
+    driver::{Heard, LaserScan, Motion, counts::WheelCounts, odometry::drive},
+    kinematics::WheelSpeeds,
+    mission::{Body, Mission, Sensor, SensorKind},
+    samples::{RangeReading, RangeStatus},
+};
+
+/// A laser is stuck if its scans stay the same to the bit while a wheel turns this far, radians.
+const STUCK_RAD: f64 = 1.0;
+/// A laser whose beams all see nothing is blind if, in the scan before, more than one beam in so many ended within half its reach:
+/// nothing that fills so much of its view leaves it in a moment.
+const BLIND_ONE_IN: usize = 20;
+
+#[derive(Clone, Debug)]
+pub(crate) struct Sensors {
+    body: Body,
+    table: Vec<Sensor>,
+    /// A row's newest reading counts for one tick.
+    newest: Vec<RangeReading>,
+    lasers: Vec<Laser>,
+    ticks: u64,
+    /// The newest counts, and the angles that the wheels have turned by then.
+    counts: Option<WheelCounts>,
+    turned: [f64; 2],
+}
+
+impl Sensors {
+    pub(crate) fn new(mission: &Mission) -> Self {
+        let table = mission.sensor_table();
+        let rows = table.iter().enumerate();
+        let lasers = rows.filter(|(_, sensor)| sensor.kind == SensorKind::Scan);
+        Self {
+            body: mission.body(),
+            newest: absent(&table),
+            lasers: lasers.map(|(row, sensor)| Laser::new(row, sensor.clone())).collect(),
+            table,
+            ticks: 0,
+            counts: None,
+            turned: [0.0; 2],
+        }
+    }
+
+    /// Take what a driver heard, `own_wire` at this time if not with the robot's motion. Returns its readings; the nearest beam of a scan
+    /// counts as one of the laser's row.
+    pub(crate) fn take_heard(
+        &mut self,
+        heard: &mut Heard,
+        own_wire: Option<MissionTime>,
+    ) -> Vec<RangeReading> {
+        if let Some(Motion { wheels, endless, .. }) = &heard.motion {
+            let counts = WheelCounts::of(wheels, endless.as_ref());
+            let since = self.counts.replace(counts).map_or([0.0; 2], |then| counts.since(then));
+            let radians = since.map(|counts| counts * TAU / self.body.counts_per_turn);
+            self.turned = [0, 1].map(|wheel| self.turned[wheel] + radians[wheel]);
+        }
+        let mut readings = std::mem::take(&mut heard.readings);
+        for scan in std::mem::take(&mut heard.scans) {
+            if let Some(laser) = self.lasers.iter_mut().find(|laser| laser.row == scan.row) {
+                readings.push(laser.take_scan((scan, own_wire), self.turned, &self.body));
+            }
+        }
+        let rows = self.newest.len();
+        readings.retain(|reading| usize::from(reading.sensor) < rows);
+        for reading in &readings {
+            self.newest[usize::from(reading.sensor)] = *reading;
+        }
+        readings
+    }
+
+    /// The readings for a tick that begins with `motion` now, one for each row, and the scans. Each is given once.
+    pub(crate) fn for_tick(
+        &mut self,
+        motion: &Motion,
+        now: MissionTime,
+    ) -> (Vec<RangeReading>, Vec<LaserScan>) {
+        let tick = self.ticks;
+        self.ticks += 1;
+        let mut readings = std::mem::replace(&mut self.newest, absent(&self.table));
+        for (reading, sensor) in readings.iter_mut().zip(&self.table) {
+            if !tick.is_multiple_of(sensor.every_ticks) {
+                *reading = RangeReading { sensor: reading.sensor, ..RangeReading::default() };
+            }
+        }
+        let taken = |laser: &mut Laser| {
+            let (mut scan, own_wire) = laser.scan.take()?;
+            let first_beam_ns = &mut scan.sweep.first_beam_ns;
+            match (own_wire, scan.stamp_ns, motion.stamp_ns) {
+                (Some(came), ..) => *first_beam_ns -= now.since(came).as_nanos() as i64,
+                (None, Some(scan_ns), Some(tick_ns)) => *first_beam_ns = scan_ns - tick_ns,
+                (None, ..) => {}
+            }
+            Some(scan)
+        };
+        (readings, self.lasers.iter_mut().filter_map(taken).collect())
+    }
+}
+
+fn absent(table: &[Sensor]) -> Vec<RangeReading> {
+    let rows = (0..).zip(table);
+    rows.map(|(sensor, _)| RangeReading { sensor, ..RangeReading::default() }).collect()
+}
+
+#[derive(Clone, Debug)]
+struct Laser {
+    row: usize,
+    sensor: Sensor,
+    /// The newest scan that differed from the one before, and the wheels' angles then.
+    newest_scan: (Vec<f32>, [f64; 2]),
+    /// The beams that ended near in the newest scan that saw anything, and the wheels' angles then.
+    near: (usize, [f64; 2]),
+    is_blind: bool,
+    /// For the next tick, and when it came on a wire of its own.
+    scan: Option<(LaserScan, Option<MissionTime>)>,
+}
+
+impl Laser {
+    const fn new(row: usize, sensor: Sensor) -> Self {
+        let newest_scan = (Vec::new(), [0.0; 2]);
+        Self { row, sensor, newest_scan, near: (0, [0.0; 2]), is_blind: false, scan: None }
+    }
+
+    /// Returns the reading of the nearest beam; it is invalid if the laser is blind or stuck.
+    fn take_scan(
+        &mut self,
+        scan: (LaserScan, Option<MissionTime>),
+        turned: [f64; 2],
+        body: &Body,
+    ) -> RangeReading {
+        let beams = &scan.0.beams;
+        let (newest, turned_then) = &self.newest_scan;
+        let [bits_then, bits_now] =
+            [newest, beams].map(|beams| beams.iter().map(|beam| beam.to_bits()));
+        let is_same = beams.iter().any(|beam| beam.is_finite()) && bits_then.eq(bits_now);
+        let went = |wheel: usize| (turned[wheel] - turned_then[wheel]).abs();
+        let is_stuck = is_same && went(0).max(went(1)) > STUCK_RAD;
+        self.look_for_blindness(beams, turned, body);
+        let is_refused = is_stuck || self.is_blind;
+        if !is_same {
+            self.newest_scan = (beams.clone(), turned);
+        }
+        let nearest = beams.iter().copied().fold(f32::NAN, f32::min);
+        let (status, range_m) = match nearest {
+            nearest if is_refused || nearest.is_nan() => (RangeStatus::Invalid, 0.0),
+            nearest if nearest.is_infinite() => (RangeStatus::Nothing, 0.0),
+            nearest => (RangeStatus::Measured, nearest.into()),
+        };
+        if !is_refused {
+            self.scan = Some(scan).filter(|(scan, _)| !scan.beams.is_empty());
+        }
+        RangeReading { sensor: self.row as u8, range_m, raw: 0, status: status.into() }
+    }
+
+    fn look_for_blindness(&mut self, beams: &[f32], turned: [f64; 2], body: &Body) {
+        if beams.iter().any(|beam| beam.is_finite()) {
+            let near_m = self.sensor.reach_m as f32 / 2.0;
+            let near = beams.iter().filter(|beam| **beam < near_m).count();
+            (self.near, self.is_blind) = ((near, turned), false);
+        } else if beams.iter().any(|beam| beam.is_infinite()) {
+            let (near, turned_then) = self.near;
+            let [left, right] = [0, 1].map(|wheel| turned[wheel] - turned_then[wheel]);
+            let turn = drive(body).twist(WheelSpeeds { right, left }).omega;
+            // A turn removes things from a view that is no whole circle.
+            let is_circle = self.sensor.field_of_view_deg >= 360.0;
+            let lost = if is_circle { 0.0 } else { turn.abs() / self.sensor.fan().1 };
+            self.is_blind |= near > beams.len() / BLIND_ONE_IN + lost.ceil() as usize;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,79 @@
+use std::path::Path;
+
+use common::{
+    driver::odometry::motion,
+    samples::RangeStatus::{self, Absent, Invalid, Measured, Nothing},
+};
+
+use super::*;
+
+fn mission(text: &str) -> Mission {
+    Mission::parse(&format!("target = [3, 0]\n{text}"), Path::new("m.toml")).unwrap()
+}
+
+/// The status of the laser of `model` after scans of so many beams that end at a range, the others at nothing, each after the wheels
+/// have turned, to either side, by an angle more. A reading that is invalid comes with no scan.
+fn scanned(model: &str, scans: &[(usize, f32, f64)]) -> Vec<RangeStatus> {
+    let mission = mission(&format!("robot.model = '{model}'"));
+    let (row, laser) = mission.laser().unwrap();
+    let mut sensors = Sensors::new(&mission);
+    let mut turned = 0.0;
+    let status = |&(ending, range, turn): &(usize, f32, f64)| {
+        turned += turn;
+        let mut beams = vec![range; ending];
+        beams.resize(laser.beams, f32::INFINITY);
+        let motion = motion(&mission.body(), [-turned, turned], [1.0; 2], [false; 2]);
+        let scan = LaserScan { row, beams, ..LaserScan::default() };
+        let mut heard = Heard { motion: Some(motion), scans: vec![scan], ..Heard::default() };
+        let status = sensors.take_heard(&mut heard, None)[0].status();
+        let (readings, scans) = sensors.for_tick(&motion, MissionTime::default());
+        assert_eq!((readings[row].status(), scans.is_empty()), (status, status == Invalid));
+        status
+    };
+    scans.iter().map(status).collect()
+}
+
+#[test]
+fn a_laser_that_says_the_same_while_the_wheels_turn_gives_no_reading_until_it_changes() {
+    let scans = [(360, 1.0, 0.0), (360, 1.0, 0.1), (360, 1.0, 0.8), (360, 1.0, 0.2)];
+    assert_eq!(scanned("kobuki", &scans), [Measured, Measured, Measured, Invalid]);
+    assert_eq!(
+        scanned("kobuki", &[scans[0], (360, 1.0, 1.1), (360, 1.5, 0.1)])[1..],
+        [Invalid, Measured]
+    );
+}
+
+#[test]
+fn a_laser_that_sees_nothing_where_much_was_near_gives_no_reading_until_it_sees_anything() {
+    let blind = [(30, 1.0, 0.0), (0, 0.0, 0.1), (0, 0.0, 9.0), (1, 3.0, 0.0), (0, 0.0, 0.0)];
+    assert_eq!(scanned("kobuki", &blind), [Measured, Invalid, Invalid, Measured, Nothing]);
+}
+
+#[test]
+fn a_laser_sees_nothing_where_what_it_saw_was_small_far_or_is_out_of_view_by_the_turn() {
+    for small_or_far in [(18, 1.0, 0.0), (360, 7.0, 0.0)] {
+        assert_eq!(scanned("kobuki", &[small_or_far, (0, 0.0, 0.0)]), [Measured, Nothing]);
+    }
+    // 100 beams of a Jackal's laser are 25 degrees; a wheel that turns by 1 rad turns it by 30.
+    assert_eq!(scanned("jackal", &[(100, 1.0, 0.0), (0, 0.0, 1.0)]), [Measured, Nothing]);
+    assert_eq!(scanned("jackal", &[(100, 1.0, 0.0), (0, 0.0, 0.1)]), [Measured, Invalid]);
+}
+
+#[test]
+fn a_reading_counts_for_one_tick_and_only_as_often_as_its_sensor_measures_and_of_no_row_for_none() {
+    let row = "[[robot.sensor]]\nname = 'front'\nkind = 'cone'\nchannel = 1\nforward_m = 0.19\nbearing_deg = 0\nrate_hz = 2.4";
+    for (row, every) in [(row, 3), ("", 1)] {
+        let mut sensors = Sensors::new(&mission(row));
+        let motion = motion(&sensors.body, [0.0; 2], [0.0; 2], [false; 2]);
+        for tick in 0..6 {
+            let status = Measured.into();
+            let readings =
+                [0, 99].map(|sensor| RangeReading { sensor, status, ..RangeReading::default() });
+            let mut heard = Heard { readings: readings.to_vec(), ..Heard::default() };
+            assert_eq!(sensors.take_heard(&mut heard, None).len(), 1);
+            let given = sensors.for_tick(&motion, MissionTime::default()).0[0].status();
+            assert_eq!(given, if tick % every == 0 { Measured } else { Absent }, "{tick}");
+        }
+        assert_eq!(sensors.for_tick(&motion, MissionTime::default()).0[0].status(), Absent);
+    }
+}

@@ -1,0 +1,65 @@
+//! A laser on a wire of its own beside the robot's.
+
+use common::driver::{Driver, Heard, LaserScan, WireTally};
+
+use super::*;
+
+/// It says one byte for a scan: the range of all beams, decimetres; or 0, which is none of its protocol.
+#[derive(Debug)]
+struct Laser;
+
+impl Driver for Laser {
+    fn hear(&mut self, bytes: &[u8]) -> Heard {
+        let mut heard = Heard { anything: true, ..Heard::default() };
+        match bytes {
+            [0] => heard.refused = Some("no scan".to_owned()),
+            bytes => heard.scans.extend(bytes.iter().map(|decimetres| LaserScan {
+                beams: vec![f32::from(*decimetres) / 10.0; 360],
+                ..LaserScan::default()
+            })),
+        }
+        heard
+    }
+
+    fn reset(&mut self) {}
+
+    fn tally(&self) -> WireTally {
+        WireTally::default()
+    }
+
+    fn greeting(&self) -> Vec<u8> {
+        b"scan".to_vec()
+    }
+}
+
+#[test]
+fn a_sensor_with_a_wire_of_its_own_is_greeted_heard_at_the_next_tick_and_no_sign_of_the_robot() {
+    let text = "target = [3, 0]\nrobot.model = 'kobuki'";
+    let mut link = Link::new(&Mission::parse(text, Path::new("test.toml")).unwrap());
+    link.drivers.push(Box::new(Laser));
+    link.restore(State { pace: Pace::Rate(1.0), next_tick: 0 });
+    let greeted = link.at(Event::SensorWire(0, true), 0);
+    assert!(greeted.contains(&Effect::SendSensor(0, b"scan".to_vec())), "{greeted:?}");
+    link.at(Event::Sensor(0, &[10]), MS);
+    assert!(!link.connected());
+    let wheels = b"{\"wheels\":[0,0],\"speeds\":[0,0]}\n";
+    link.at(Event::Datagram(wheels), 10 * MS);
+    link.at(Event::Order(Order::Drive, HoldReason::None), 11 * MS);
+    link.at(Event::Sensor(0, &[20]), 50 * MS);
+    // There is no such sensor.
+    link.at(Event::Sensor(7, &[30]), 60 * MS);
+    let effects = link.at(Event::Datagram(wheels), 110 * MS);
+    let scans = effects.iter().filter_map(|effect| match effect {
+        Effect::Tick { ranges, scans, .. } => Some((ranges[0].range_m, scans.clone())),
+        _ => None,
+    });
+    let [(2.0, scans)] = &scans.collect::<Vec<_>>()[..] else {
+        panic!("{effects:?}");
+    };
+    assert_eq!((scans[0].beams[0], scans[0].sweep.first_beam_ns), (2.0, -60_000_000));
+    let refused = link.at(Event::Sensor(0, &[0]), 120 * MS);
+    assert!(refused.contains(&Effect::Refused("no scan".to_owned())));
+    // It falls silent.
+    let again = (3..30).flat_map(|tick| link.at(Event::Datagram(wheels), 50 * tick * MS));
+    assert!(again.filter(|effect| matches!(effect, Effect::SendSensor(..))).count() > 0);
+}
