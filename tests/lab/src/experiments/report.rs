@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Write as _};
 
-use console::table::{Align, Table};
+use console::table::Table;
 use serde_json::{Value, json};
 
 use crate::{
@@ -166,8 +166,10 @@ impl<'a> Report<'a> {
 impl fmt::Display for Report<'_> {
     /// The table, and the claims that hold.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut table = Table::new(titles().map(|title| (title, Align::Left)));
-        self.findings.iter().for_each(|findings| table.row(findings.cells()));
+        let mut table = Table::new(titles());
+        self.findings
+            .iter()
+            .for_each(|findings| table.row(findings.cells().each_ref().map(|cell| cell as _)));
         writeln!(f, "{table}medians and the middle half of the missions that arrived")?;
         for expectation in &self.expectations {
             let Expectation { experiment, method, claim, found, holds } = expectation;
