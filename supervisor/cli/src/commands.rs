@@ -1,30 +1,30 @@
 //! The one list of subcommands: parser, dispatch and the groups of `--help` follow from it.
 
-pub(crate) mod bring_up;
-pub(crate) mod calibrate;
-pub(crate) mod check;
-pub(crate) mod diff;
-pub(crate) mod go_back;
-pub(crate) mod goto;
+mod bring_up;
+mod calibrate;
+mod check;
+mod diff;
+mod go_back;
+mod goto;
 pub(crate) mod help;
-pub(crate) mod install;
-pub(crate) mod logs;
-pub(crate) mod man;
-pub(crate) mod map;
-pub(crate) mod missions;
-pub(crate) mod record;
-pub(crate) mod replay;
-pub(crate) mod report;
-pub(crate) mod resume;
-pub(crate) mod run;
-pub(crate) mod run_report;
-pub(crate) mod runs;
-pub(crate) mod sim;
-pub(crate) mod stage;
-pub(crate) mod status;
-pub(crate) mod stop;
-pub(crate) mod table;
-pub(crate) mod topic;
+mod install;
+mod logs;
+mod man;
+mod map;
+mod missions;
+mod record;
+mod replay;
+mod report;
+mod resume;
+mod run;
+mod run_report;
+mod runs;
+mod sim;
+mod stage;
+mod status;
+mod stop;
+mod table;
+mod topic;
 
 use std::{
     error::Error,
@@ -151,7 +151,7 @@ pub(crate) fn command_line() -> clap::Command {
 /// Only errors that no other executable has get a code here.
 pub(crate) fn error_code(error: &(dyn Error + 'static)) -> Option<&'static str> {
     match error.downcast_ref()? {
-        ReportError::Recording(error) => failure::code_of_recording(error),
+        ReportError::Recording(error) => failure::code(error),
         _ => None,
     }
 }

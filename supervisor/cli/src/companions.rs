@@ -17,11 +17,11 @@ use console::{
 use processes::executable;
 
 pub(crate) struct Companion {
-    pub(crate) name: &'static str,
+    pub name: &'static str,
     executable: &'static str,
     /// The executable has further subcommands and is told this one's name.
     is_one_of_many: bool,
-    pub(crate) about: &'static str,
+    pub about: &'static str,
 }
 
 const fn viewer(name: &'static str, executable: &'static str, about: &'static str) -> Companion {

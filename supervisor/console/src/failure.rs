@@ -68,82 +68,68 @@ fn exit_code(error: &(dyn Error + 'static)) -> ExitCode {
 
 /// None stands for errors to which no script could react in particular.
 pub fn code(error: &(dyn Error + 'static)) -> Option<&'static str> {
-    let code = error.downcast_ref().map(|refused: &Refused| refused.code);
-    code.or_else(|| error.downcast_ref().and_then(of_supervisor))
-        .or_else(|| error.downcast_ref().and_then(of_resumption))
-        .or_else(|| error.downcast_ref().and_then(of_operator))
-        .or_else(|| error.downcast_ref().and_then(of_bus))
-        .or_else(|| error.downcast_ref().and_then(code_of_recording))
-        .or_else(|| error.downcast_ref().map(of_lookup))
-        .or_else(|| error.is::<MissionError>().then_some("mission"))
-        .or_else(|| {
-            let planner = error.is::<PlannerExecutableError>();
-            planner.then_some("planner-executable")
-        })
-}
-
-fn of_supervisor(error: &SupervisorError) -> Option<&'static str> {
-    match error {
-        SupervisorError::Domain(error) => of_domain(error),
-        SupervisorError::Bus(error) => of_bus(error),
-        SupervisorError::Checkpoint(error) => of_checkpoint(error),
-        SupervisorError::Address(AddressError::Form { .. }) => Some("address"),
-        _ => None,
+    macro_rules! codes {
+        ($($type:ty { $($pattern:pat => $code:expr,)* })*) => {{
+            $(if let Some(error) = error.downcast_ref::<$type>() {
+                return match error { $($pattern => $code,)* };
+            })*
+            None
+        }};
     }
-}
-
-fn of_operator(error: &OperatorError) -> Option<&'static str> {
-    match error {
-        OperatorError::Refused { code, .. } => Some(code),
-        OperatorError::Bus(error) => of_bus(error),
-        OperatorError::Stage(_) | OperatorError::System(..) => None,
-    }
-}
-
-fn of_domain(error: &DomainError) -> Option<&'static str> {
-    match error {
-        DomainError::Supervised { .. } => Some("supervised"),
-        DomainError::SharedMemory { .. } => Some("shared-memory"),
-        DomainError::Descriptors { .. } => Some("descriptors"),
-        DomainError::Bus(error) => of_bus(error),
-        _ => None,
-    }
-}
-
-fn of_bus(error: &BusError) -> Option<&'static str> {
-    match error {
-        BusError::NotRunning { .. } => Some("not-running"),
-        BusError::Incompatible { .. } => Some("other-payload"),
-        BusError::NoPlace { .. } => Some("no-place"),
-        _ => None,
-    }
-}
-
-fn of_resumption(error: &ResumeError) -> Option<&'static str> {
-    match error {
-        ResumeError::Ended { .. } => Some("ended"),
-        ResumeError::Checkpoint(error) => of_checkpoint(error),
-        _ => None,
-    }
-}
-
-fn of_checkpoint(error: &CheckpointError) -> Option<&'static str> {
-    matches!(error, CheckpointError::Foreign { .. }).then_some("other-version")
-}
-
-pub fn code_of_recording(error: &RecordingError) -> Option<&'static str> {
-    match error {
-        RecordingError::NoRecording(_) => Some("no-recording"),
-        RecordingError::Several { .. } => Some("several-recordings"),
-        RecordingError::Foreign { .. } => Some("not-a-recording"),
-        _ => None,
-    }
-}
-
-fn of_lookup(error: &LookupError) -> &'static str {
-    match error {
-        LookupError::Unknown { .. } | LookupError::Neither { .. } => "unknown-mission",
-        _ => "mission",
+    codes! {
+        Refused {
+            refused => Some(refused.code),
+        }
+        SupervisorError {
+            SupervisorError::Domain(error) => code(error),
+            SupervisorError::Bus(error) => code(error),
+            SupervisorError::Checkpoint(error) => code(error),
+            SupervisorError::Address(AddressError::Form { .. }) => Some("address"),
+            _ => None,
+        }
+        ResumeError {
+            ResumeError::Ended { .. } => Some("ended"),
+            ResumeError::Checkpoint(error) => code(error),
+            _ => None,
+        }
+        OperatorError {
+            OperatorError::Refused { code, .. } => Some(code),
+            OperatorError::Bus(error) => code(error),
+            OperatorError::Stage(_) | OperatorError::System(..) => None,
+        }
+        DomainError {
+            DomainError::Supervised { .. } => Some("supervised"),
+            DomainError::SharedMemory { .. } => Some("shared-memory"),
+            DomainError::Descriptors { .. } => Some("descriptors"),
+            DomainError::Bus(error) => code(error),
+            _ => None,
+        }
+        BusError {
+            BusError::NotRunning { .. } => Some("not-running"),
+            BusError::Incompatible { .. } => Some("other-payload"),
+            BusError::NoPlace { .. } => Some("no-place"),
+            _ => None,
+        }
+        RecordingError {
+            RecordingError::NoRecording(_) => Some("no-recording"),
+            RecordingError::Several { .. } => Some("several-recordings"),
+            RecordingError::Foreign { .. } => Some("not-a-recording"),
+            _ => None,
+        }
+        LookupError {
+            LookupError::Unknown { .. } | LookupError::Neither { .. } => Some("unknown-mission"),
+            _ => Some("mission"),
+        }
+        CheckpointError {
+            CheckpointError::Foreign { .. } => Some("other-version"),
+            _ => None,
+        }
+        MissionError {
+            _ => Some("mission"),
+        }
+        PlannerExecutableError {
+            _ => Some("planner-executable"),
+        }
     }
 }
 

@@ -18,7 +18,11 @@ use tracing::{Level, Metadata};
 use tracing_subscriber::{
     Layer, Registry,
     filter::Targets,
-    fmt::{self, MakeWriter},
+    fmt::{
+        self, MakeWriter,
+        format::Writer,
+        time::{FormatTime as _, SystemTime},
+    },
     layer::SubscriberExt,
     util::SubscriberInitExt,
 };
@@ -55,14 +59,21 @@ pub fn to_file(file: &Path, default: &str) -> io::Result<()> {
     Ok(())
 }
 
+/// The date as logs have it: UTC, year-month-day.
+pub fn today() -> String {
+    let mut now = String::new();
+    // Writing to a String cannot fail.
+    let _ = SystemTime.format_time(&mut Writer::new(&mut now));
+    now.truncate("1970-01-01".len());
+    now
+}
+
 fn stderr_layer() -> AnyLayer {
+    let lines = fmt::layer().log_internal_errors(false).with_ansi(false);
     if to_journal() {
-        let lines = fmt::layer().without_time().with_level(false);
-        let lines = lines.log_internal_errors(false);
-        lines.with_writer(Journal).with_ansi(false).boxed()
+        lines.without_time().with_level(false).with_writer(Journal("<6>")).boxed()
     } else {
-        let lines = fmt::layer().with_writer(io::stderr).log_internal_errors(false);
-        lines.with_ansi(false).boxed()
+        lines.with_writer(io::stderr).boxed()
     }
 }
 
@@ -75,22 +86,18 @@ fn start(layers: Vec<AnyLayer>, default: &str) {
     tracing_subscriber::registry().with(layers).with(filter).init();
 }
 
-/// Standard error with a priority before each line.
-struct Journal;
-
-struct Entry {
-    priority: &'static str,
-}
+/// Standard error with this priority before each line.
+struct Journal(&'static str);
 
 impl<'writer> MakeWriter<'writer> for Journal {
-    type Writer = Entry;
+    type Writer = Self;
 
-    fn make_writer(&'writer self) -> Entry {
-        Entry { priority: "<6>" }
+    fn make_writer(&'writer self) -> Self {
+        Self(self.0)
     }
 
-    fn make_writer_for(&'writer self, event: &Metadata<'_>) -> Entry {
-        Entry { priority: priority(*event.level()) }
+    fn make_writer_for(&'writer self, event: &Metadata<'_>) -> Self {
+        Self(priority(*event.level()))
     }
 }
 
@@ -104,13 +111,13 @@ fn priority(level: Level) -> &'static str {
     }
 }
 
-impl Write for Entry {
+impl Write for Journal {
     /// Each line of an event is an entry of the journal and gets the priority. All are written at once, so that lines
     /// of two processes do not mix.
     fn write(&mut self, event: &[u8]) -> io::Result<usize> {
-        let mut entry = Vec::with_capacity(event.len() + self.priority.len());
+        let mut entry = Vec::with_capacity(event.len() + self.0.len());
         for line in event.split_inclusive(|&byte| byte == b'\n') {
-            entry.extend_from_slice(self.priority.as_bytes());
+            entry.extend_from_slice(self.0.as_bytes());
             entry.extend_from_slice(line);
         }
         io::stderr().write_all(&entry)?;

@@ -44,7 +44,14 @@ pub fn shipped(name: &str) -> Option<&'static str> {
 /// The shipped mission or the file `name`, with `KEY=VALUE` assignments on top and the values of its calibration in
 /// place. Fails if there is none or it is invalid.
 pub fn load(name: &str, assignments: &[String]) -> Result<Mission, LookupError> {
-    complete(as_assigned(name, assignments)?)
+    let file = Path::new(name);
+    match shipped(name) {
+        Some(text) => parsed(text, &format!("{name}.toml"), assignments),
+        None if file.extension().is_some() || file.exists() => {
+            parsed(&Mission::read(file)?, name, assignments)
+        }
+        None => Err(LookupError::Neither { name: name.to_owned() }),
+    }
 }
 
 /// Puts the content of the files that it names in place. Fails if one cannot be read.
@@ -52,43 +59,29 @@ pub fn complete(mission: Mission) -> Result<Mission, LookupError> {
     Ok(maps::with_prior_map(mission.with_calibration()?)?)
 }
 
-fn as_assigned(name: &str, assignments: &[String]) -> Result<Mission, LookupError> {
-    let file = Path::new(name);
-    let (text, origin) = match shipped(name) {
-        Some(text) => (text.to_owned(), format!("{name}.toml")),
-        None if file.extension().is_some() || file.exists() => {
-            (Mission::read(file)?, name.to_owned())
-        }
-        None => {
-            return Err(LookupError::Neither { name: name.to_owned() });
-        }
-    };
-    as_parsed(&text, &origin, assignments)
-}
-
 /// `origin` names `text`. Fails if it or an assignment is invalid.
 pub fn parsed(text: &str, origin: &str, assignments: &[String]) -> Result<Mission, LookupError> {
-    complete(as_parsed(text, origin, assignments)?)
-}
-
-fn as_parsed(text: &str, name: &str, assignments: &[String]) -> Result<Mission, LookupError> {
-    let as_written = Mission::parse(text, Path::new(name));
+    let as_written = Mission::parse(text, Path::new(origin));
     // Values are checked after all assignments, because one assignment may correct what would be refused without it.
     let table = text.parse::<toml::Table>();
     let (false, Ok(table)) = (assignments.is_empty(), table) else {
-        return Ok(as_written?);
+        return complete(as_written?);
     };
-    let assigned = assign(table, assignments)?;
-    Mission::parse(&assigned, Path::new(name)).map_err(|error| match as_written {
+    let mission = Mission::parse(&assign(table, assignments)?, Path::new(origin));
+    complete(mission.map_err(|error| match as_written {
         // The error of the file is better, because it names the line.
         Err(of_file) if of_file.is_same_fault(&error) => of_file.into(),
         // The fault is in no line of the file.
-        _ => LookupError::Assigned {
-            name: name.to_owned(),
-            assignments: assignments.join(" --set "),
-            problem: error.without_place(),
-        },
-    })
+        _ => assigned(origin, assignments, error.without_place()),
+    })?)
+}
+
+fn assigned(name: &str, assignments: &[String], problem: String) -> LookupError {
+    LookupError::Assigned {
+        name: name.to_owned(),
+        assignments: assignments.join(" --set "),
+        problem,
+    }
 }
 
 /// None if there are no assignments. Fails if one is invalid.
@@ -96,14 +89,9 @@ pub fn with(mission: &Mission, assignments: &[String]) -> Result<Option<Mission>
     if assignments.is_empty() {
         return Ok(None);
     }
-    let failed = |problem: String| LookupError::Assigned {
-        name: mission.name.clone(),
-        assignments: assignments.join(" --set "),
-        problem,
-    };
+    let failed = |problem| assigned(&mission.name, assignments, problem);
     let table = toml::Table::try_from(mission).map_err(|error| failed(error.to_string()))?;
-    let assigned = assign(table, assignments)?;
-    let mission = Mission::parse(&assigned, Path::new(&mission.name));
+    let mission = Mission::parse(&assign(table, assignments)?, Path::new(&mission.name));
     complete(mission.map_err(|error| failed(error.without_place()))?).map(Some)
 }
 

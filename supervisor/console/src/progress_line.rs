@@ -7,6 +7,9 @@ use std::{
 
 use super::output::write_stderr;
 
+/// The time between lines of a run that cannot be rewritten.
+pub const LINE_EVERY: Duration = Duration::from_secs(5);
+
 pub struct ProgressLine {
     rewrites: bool,
     every: Duration,
@@ -17,6 +20,16 @@ impl ProgressLine {
     /// Lines that cannot be rewritten are shown once in each `every`.
     pub fn new(every: Duration) -> Self {
         Self { rewrites: io::stderr().is_terminal(), every, shown: None }
+    }
+
+    /// Show a line if one is due, and before the first one a `title`.
+    pub fn update(&mut self, title: &str, line: impl FnOnce() -> String, may_stay: bool) {
+        if self.is_due() {
+            if self.begin() {
+                write_stderr(&format!("{title}\n"));
+            }
+            self.show(&line(), may_stay);
+        }
     }
 
     pub fn is_due(&self) -> bool {

@@ -11,13 +11,7 @@ use common::{
 };
 use serde::Serialize;
 
-use super::{
-    table::{
-        Align::{Left, Right},
-        Table,
-    },
-    words::age,
-};
+use super::{table::Table, words::age};
 
 /// A topic is late after so many intervals: its writer looks at the clock only once in each turn of its loop.
 const LATE: u32 = 2;
@@ -25,17 +19,11 @@ const LATE: u32 = 2;
 #[derive(Debug)]
 pub struct TopicRates {
     spec: &'static Spec,
-    /// Newest samples, by process, because a topic may have many writers.
-    writers: BTreeMap<u32, Newest>,
+    /// The newest sample of each process and its time, because a topic may have many writers.
+    writers: BTreeMap<u32, (Instant, Stamp)>,
     at: Option<Instant>,
     since: Instant,
     counts: Counts,
-}
-
-#[derive(Debug)]
-struct Newest {
-    at: Instant,
-    stamp: Stamp,
 }
 
 #[derive(Debug, Default)]
@@ -76,22 +64,19 @@ impl TopicRates {
     /// The first sample of each process is not counted, because it may be old: a topic stores one for new readers.
     pub fn add(&mut self, author: Author, stamp: Stamp, now: Instant) {
         self.at = Some(now);
-        let newest = Newest { at: now, stamp };
-        let Some(last) = self.writers.insert(author.process, newest) else {
-            return;
-        };
+        let Some((at, last)) = self.writers.insert(author.process, (now, stamp)) else { return };
         let counts = &mut self.counts;
         counts.samples += 1;
-        if last.stamp.generation == stamp.generation {
-            let next = last.stamp.sequence.wrapping_add(1);
+        if last.generation == stamp.generation {
+            let next = last.sequence.wrapping_add(1);
             counts.lost += u64::from(stamp.sequence.wrapping_sub(next).min(i32::MAX as u32));
         }
-        let ticks = stamp.tick.saturating_sub(last.stamp.tick);
+        let ticks = stamp.tick.saturating_sub(last.tick);
         counts.ticks += ticks;
         counts.missing_ticks += ticks.saturating_sub(1);
-        let gap = now.saturating_duration_since(last.at);
+        let gap = now.saturating_duration_since(at);
         // A rate may be in mission time, which may pass faster or slower than the clock.
-        let mission = stamp.stamp_ns.saturating_sub(last.stamp.stamp_ns);
+        let mission = stamp.stamp_ns.saturating_sub(last.stamp_ns);
         counts.late |= is_late(self.spec.rate, gap.min(Duration::from_nanos(mission)));
         counts.longest_gap = counts.longest_gap.max(gap);
     }
@@ -126,23 +111,17 @@ fn is_late(rate: Rate, gap: Duration) -> bool {
 }
 
 pub fn table(reports: &[Report]) -> String {
-    let mut table = Table::new([
-        ("topic", Left),
-        ("samples/s", Right),
-        ("longest gap", Right),
-        ("age", Right),
-        ("lost", Right),
-        ("by the table", Left),
-    ]);
+    let mut table =
+        Table::new(["topic", ">samples/s", ">longest gap", ">age", ">lost", "by the table"]);
     for report in reports {
         let gap = report.longest_gap_s;
         table.row([
-            report.topic.to_owned(),
-            format!("{:.1}", report.rate_hz),
-            gap.map_or("-".to_owned(), |gap| age(Some(gap))),
-            age(report.age_s),
-            report.lost.to_string(),
-            report.by_the_table(),
+            &report.topic,
+            &format!("{:.1}", report.rate_hz),
+            &gap.map_or("-".to_owned(), |gap| age(Some(gap))),
+            &age(report.age_s),
+            &report.lost,
+            &report.by_the_table(),
         ]);
     }
     table.to_string()

@@ -1,42 +1,35 @@
 //! Text tables; each column is as wide as its widest cell.
 
-/// The side that is filled with blanks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Align {
-    Left,
-    Right,
-}
+use std::fmt::{Display, Formatter, Result};
 
 pub struct Table<const N: usize> {
-    columns: [Align; N],
+    to_the_right: [bool; N],
     rows: Vec<[String; N]>,
 }
 
 impl<const N: usize> Table<N> {
-    pub fn new(heading: [(&str, Align); N]) -> Self {
-        Self {
-            columns: heading.map(|(_, align)| align),
-            rows: vec![heading.map(|(name, _)| name.to_owned())],
-        }
+    /// A heading that begins with `>` stands above cells that are aligned to the right.
+    pub fn new(headings: [&str; N]) -> Self {
+        let names = headings.map(|heading| heading.trim_start_matches('>').to_owned());
+        Self { to_the_right: headings.map(|heading| heading.starts_with('>')), rows: vec![names] }
     }
 
-    pub fn row(&mut self, cells: [String; N]) {
-        self.rows.push(cells);
+    pub fn row(&mut self, cells: [&dyn Display; N]) {
+        self.rows.push(cells.map(ToString::to_string));
     }
 }
 
-impl<const N: usize> std::fmt::Display for Table<N> {
-    fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let width = |cell: &String| cell.chars().count();
+impl<const N: usize> Display for Table<N> {
+    fn fmt(&self, to: &mut Formatter<'_>) -> Result {
         let widths: [usize; N] = std::array::from_fn(|column| {
-            let cells = self.rows.iter().map(|row| width(&row[column]));
-            cells.max().unwrap_or_default()
+            let widths = self.rows.iter().map(|row| row[column].chars().count());
+            widths.max().unwrap_or_default()
         });
         for row in &self.rows {
-            let cells = row.iter().zip(widths).zip(self.columns);
-            let cells = cells.map(|((cell, width), align)| match align {
-                Align::Left => format!("{cell:<width$}"),
-                Align::Right => format!("{cell:>width$}"),
+            let cells = row.iter().zip(widths).zip(self.to_the_right);
+            let cells = cells.map(|((cell, width), to_the_right)| match to_the_right {
+                true => format!("{cell:>width$}"),
+                false => format!("{cell:<width$}"),
             });
             writeln!(to, "{}", cells.collect::<Vec<_>>().join("  ").trim_end())?;
         }
@@ -50,8 +43,8 @@ mod tests {
 
     #[test]
     fn every_column_is_as_wide_as_its_widest_cell() {
-        let mut table = Table::new([("a", Align::Left), ("long", Align::Right)]);
-        table.row(["wide".to_owned(), "1".to_owned()]);
+        let mut table = Table::new(["a", ">long"]);
+        table.row([&"wide", &1]);
         assert_eq!(table.to_string(), "a     long\nwide     1\n");
     }
 }

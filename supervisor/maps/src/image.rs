@@ -21,11 +21,11 @@ const LONGEST: u64 = (MAX_SIDE as u64).pow(2) * 8 + (1 << 20);
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lightness {
     /// Dark means free.
-    pub(super) negate: bool,
+    pub negate: bool,
     /// A pixel is free below this darkness, 0 to 1.
-    pub(super) free_thresh: f64,
+    pub free_thresh: f64,
     /// A pixel is occupied above this darkness.
-    pub(super) occupied_thresh: f64,
+    pub occupied_thresh: f64,
 }
 
 impl Default for Lightness {
@@ -47,8 +47,8 @@ type Cause = Box<dyn Error>;
 
 /// Row by row.
 pub(super) struct Free {
-    pub(super) cols: usize,
-    pub(super) pixels: Vec<bool>,
+    pub cols: usize,
+    pub pixels: Vec<bool>,
 }
 
 /// Each pixel is a cell.

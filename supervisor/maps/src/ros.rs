@@ -104,12 +104,12 @@ fn named_image(file: &Path, text: &str) -> Result<(PathBuf, Lightness), MapError
 
 /// Row-major, row 0 at the top.
 pub(super) struct Saved {
-    pub(super) cols: usize,
+    pub cols: usize,
     /// 0 is occupied, 254 free, 205 unknown, as the map_saver writes them.
-    pub(super) pixels: Vec<u8>,
-    pub(super) cell_m: f64,
+    pub pixels: Vec<u8>,
+    pub cell_m: f64,
     /// The corner where x and y are least.
-    pub(super) corner_m: [f64; 2],
+    pub corner_m: [f64; 2],
 }
 
 /// Writes the YAML `file` and an image of the same name beside it.

@@ -48,16 +48,6 @@ pub(crate) struct Arrival {
     pub since: Now,
 }
 
-/// The end of the mission at `now`, if it has come. The first rule that applies decides.
-pub(crate) fn judge(snapshot: &Snapshot<'_>, now: Now) -> Option<Ending> {
-    simulator_ended(snapshot)
-        .or_else(|| arrived(snapshot, now))
-        .or_else(|| ended_by_failsafe(snapshot))
-        .or_else(|| collided(snapshot))
-        .or_else(|| overran(snapshot))
-        .or_else(|| stuck(snapshot, now))
-}
-
 pub(crate) fn reached(distance_m: f64) -> Ending {
     let reason = format!("{distance_m:.2} m from the target");
     Ending::asked_for(Outcome::Reached, reason)
@@ -94,71 +84,80 @@ impl Deadline {
     }
 }
 
-fn simulator_ended(snapshot: &Snapshot<'_>) -> Option<Ending> {
-    let reason = "the simulated robot ended; see x80-sim.log";
-    (snapshot.simulator_ended).then(|| Ending::failed(Outcome::Aborted, reason))
-}
-
-/// An arrival counts when the encoders say that the robot rests. In lockstep it does when no command follows.
-fn arrived(snapshot: &Snapshot<'_>, now: Now) -> Option<Ending> {
-    let Arrival { distance_m, since } = snapshot.arrival?;
-    let at_rest = snapshot.link.is_some_and(|link| link.at_rest == 1);
-    if snapshot.in_ticks || at_rest {
-        return Some(reached(distance_m));
+impl Snapshot<'_> {
+    /// The end of the mission at `now`, if it has come. The first rule that applies decides.
+    pub(crate) fn ending(&self, now: Now) -> Option<Ending> {
+        self.simulator_ended()
+            .or_else(|| self.arrived(now))
+            .or_else(|| self.ended_by_failsafe())
+            .or_else(|| self.collision_m.map(touched))
+            .or_else(|| self.overran())
+            .or_else(|| self.stuck(now))
     }
-    let arrived = format!("arrived {distance_m:.2} m from the target");
-    (now.saturating_sub(since) >= RESTS_WITHIN)
-        .then(|| Ending::failed(Outcome::Aborted, format!("{arrived}, and was not seen at rest")))
-}
 
-fn ended_by_failsafe(snapshot: &Snapshot<'_>) -> Option<Ending> {
-    let link = snapshot.link.filter(|link| link.action() == Action::End)?;
-    let rule = failsafe::rule(link.cause())?;
-    let name = rule.cause.name();
-    let reason = format!("{name}: {}", rule.when);
-    Some(Ending { cause: Some(name), ..Ending::failed(Outcome::Aborted, reason) })
-}
-
-fn collided(snapshot: &Snapshot<'_>) -> Option<Ending> {
-    snapshot.collision_m.map(touched)
-}
-
-fn overran(snapshot: &Snapshot<'_>) -> Option<Ending> {
-    let late = snapshot.time.seconds() >= snapshot.deadline.at_s();
-    late.then(|| snapshot.deadline.timed_out())
-}
-
-fn stuck(snapshot: &Snapshot<'_>, now: Now) -> Option<Ending> {
-    let may_wait = match snapshot.reason {
-        // A real robot may be out of reach for any time.
-        HoldReason::None => !snapshot.simulated,
-        HoldReason::Operator => true,
-        // In wall-clock time the mission's timeout ends such a mission.
-        HoldReason::StageHeld => !snapshot.in_ticks,
-        HoldReason::Starting | HoldReason::Ending => false,
-    };
-    if may_wait || now.saturating_sub(snapshot.progress) < NO_PROGRESS {
-        return None;
+    fn simulator_ended(&self) -> Option<Ending> {
+        let reason = "the simulated robot ended; see x80-sim.log";
+        self.simulator_ended.then(|| Ending::failed(Outcome::Aborted, reason))
     }
-    let robot_answers = snapshot.link.is_some_and(|link| link.connected == 1);
-    let reason = if !snapshot.not_started.is_empty() {
-        let (robot, stages) = (snapshot.robot, snapshot.not_started.join(", "));
-        format!("not running: {stages}; start each with `firsthand stage NAME --robot {robot}`")
-    } else if !snapshot.held.is_empty() {
-        let (held, file) = (snapshot.held.join(", "), records::DEATHS);
-        format!("{held} died again and again and is held; see {file} in the run directory")
-    } else if !snapshot.was_ready && !robot_answers {
-        let address = snapshot.address;
-        match snapshot.link.map_or(0, |link| link.other_port) {
-            0 => format!("no robot answers at {address}; is it on, is robot.address right?"),
-            port => format!(
-                "no robot answers at {address}, but its host does from port {port}; name that one in robot.address"
-            ),
+
+    /// An arrival counts when the encoders say that the robot rests. In lockstep it does when no command follows.
+    fn arrived(&self, now: Now) -> Option<Ending> {
+        let Arrival { distance_m, since } = self.arrival?;
+        let at_rest = self.link.is_some_and(|link| link.at_rest == 1);
+        if self.in_ticks || at_rest {
+            return Some(reached(distance_m));
         }
-    } else {
-        "the pipeline makes no progress; see the stages' logs".to_owned()
-    };
-    Some(Ending::failed(Outcome::Aborted, reason))
+        let arrived = format!("arrived {distance_m:.2} m from the target");
+        (now.saturating_sub(since) >= RESTS_WITHIN).then(|| {
+            Ending::failed(Outcome::Aborted, format!("{arrived}, and was not seen at rest"))
+        })
+    }
+
+    fn ended_by_failsafe(&self) -> Option<Ending> {
+        let link = self.link.filter(|link| link.action() == Action::End)?;
+        let rule = failsafe::rule(link.cause())?;
+        let name = rule.cause.name();
+        let reason = format!("{name}: {}", rule.when);
+        Some(Ending { cause: Some(name), ..Ending::failed(Outcome::Aborted, reason) })
+    }
+
+    fn overran(&self) -> Option<Ending> {
+        let late = self.time.seconds() >= self.deadline.at_s();
+        late.then(|| self.deadline.timed_out())
+    }
+
+    fn stuck(&self, now: Now) -> Option<Ending> {
+        let may_wait = match self.reason {
+            // A real robot may be out of reach for any time.
+            HoldReason::None => !self.simulated,
+            HoldReason::Operator => true,
+            // In wall-clock time the mission's timeout ends such a mission.
+            HoldReason::StageHeld => !self.in_ticks,
+            HoldReason::Starting | HoldReason::Ending => false,
+        };
+        if may_wait || now.saturating_sub(self.progress) < NO_PROGRESS {
+            return None;
+        }
+        let robot_answers = self.link.is_some_and(|link| link.connected == 1);
+        let reason = if !self.not_started.is_empty() {
+            let (robot, stages) = (self.robot, self.not_started.join(", "));
+            format!("not running: {stages}; start each with `firsthand stage NAME --robot {robot}`")
+        } else if !self.held.is_empty() {
+            let (held, file) = (self.held.join(", "), records::DEATHS);
+            format!("{held} died again and again and is held; see {file} in the run directory")
+        } else if !self.was_ready && !robot_answers {
+            let address = self.address;
+            match self.link.map_or(0, |link| link.other_port) {
+                0 => format!("no robot answers at {address}; is it on, is robot.address right?"),
+                port => format!(
+                    "no robot answers at {address}, but its host does from port {port}; name that one in robot.address"
+                ),
+            }
+        } else {
+            "the pipeline makes no progress; see the stages' logs".to_owned()
+        };
+        Some(Ending::failed(Outcome::Aborted, reason))
+    }
 }
 
 #[derive(Debug, Default)]

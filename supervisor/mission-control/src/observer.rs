@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use common::{
     bus::{Bus, BusError, Reader, Writers},
     grid::{Applied, Part, Replica},
+    mission::Mission,
     roster,
     samples::{
         CommandSample, CommandState, ContactSample, FieldCell, FieldHeader, GridHeader,
@@ -135,7 +136,7 @@ impl Observer {
             stages.on_output(topics::GUIDANCE.spec().writer, guidance.stamp.tick);
             listener(Heard::Guidance(&guidance));
             record.published.epoch = guidance.epoch;
-            record.push_guidance(guidance);
+            push(&mut record.guidance, guidance, MOST_GUIDANCE);
         }
         while let Some(grid) = self.grid.next_slice()? {
             stages.on_output(topics::GRID.spec().writer, grid.header().stamp.tick);
@@ -157,10 +158,7 @@ impl Observer {
         }
         // Poses are computed from the link's samples, so these are read last.
         while let Some(contact) = self.contact.next_sample()? {
-            if record.contacts.len() == MOST_CONTACTS {
-                record.contacts.pop_front();
-            }
-            record.contacts.push_back(contact.stamp.tick);
+            push(&mut record.contacts, contact.stamp.tick, MOST_CONTACTS);
         }
         while let Some(link) = self.link.next_sample()? {
             stages.on_output(topics::LINK.spec().writer, link.stamp.tick);
@@ -171,12 +169,20 @@ impl Observer {
     }
 }
 
+/// Append `item`, in place of the oldest one if there are `most`.
+fn push<T>(items: &mut VecDeque<T>, item: T, most: usize) {
+    if items.len() == most {
+        items.pop_front();
+    }
+    items.push_back(item);
+}
+
 impl Record {
-    fn push_guidance(&mut self, guidance: GuidanceSample) {
-        if self.guidance.len() == MOST_GUIDANCE {
-            self.guidance.pop_front();
-        }
-        self.guidance.push_back(guidance);
+    /// The arrival at the current target, and whether the pose is sure enough for it.
+    pub(crate) fn sure_arrival(&self, mission: &Mission) -> Option<(CommandSample, bool)> {
+        let command = self.arrival?;
+        let pose = self.pose_at(command.stamp.tick);
+        Some((command, pose.is_none_or(|pose| pose.is_sure(mission))))
     }
 
     pub fn guidance_at(&self, tick: u64) -> Option<&GuidanceSample> {
@@ -196,12 +202,11 @@ impl Record {
     ) -> impl Iterator<Item = (&PoseSample, &GuidanceSample)> {
         let first = last.map_or(0, |tick| tick + 1);
         let new = self.poses.partition_point(|pose| pose.stamp.tick < first);
-        let guidance_of = |tick: u64| {
-            let guidance = self.guidance_at(tick);
-            guidance.filter(|guidance| guidance.stamp.tick == tick)
-        };
-        let ticks = self.poses[new..].iter();
-        ticks.filter_map(move |pose| Some((pose, guidance_of(pose.stamp.tick)?)))
+        self.poses[new..].iter().filter_map(|pose| {
+            let tick = pose.stamp.tick;
+            let guidance = self.guidance_at(tick).filter(|guidance| guidance.stamp.tick == tick);
+            Some((pose, guidance?))
+        })
     }
 
     pub fn newest_guidance(&self) -> Option<&GuidanceSample> {

@@ -145,7 +145,7 @@ mod tests {
             [TargetPoint { x_m: 1.5, has_heading: 1, ..TargetPoint::default() }; MOST_TARGETS];
         for tick in 0..500 {
             let arrival = CommandSample { distance_m: 0.1, ..CommandSample::default() };
-            list.replace(&points, (tick, tick as f64), Some((&arrival, true)));
+            list.replace(&points, (tick, tick as f64), Some((arrival, true)));
         }
         assert!(!list.append(&points[..1]), "the list is full");
         let directory = tempfile::tempdir().unwrap();

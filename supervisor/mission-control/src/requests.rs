@@ -5,10 +5,7 @@ use common::{
     samples::{Cause, HoldReason, RequestAnswer, RequestKind, RequestSample, name_str},
 };
 
-use crate::{
-    error::SupervisorError, outcome::allowed_m, simulator::Simulator, supervisor::Supervisor,
-    target_list,
-};
+use crate::{error::SupervisorError, outcome::allowed_m, supervisor::Supervisor, target_list};
 
 impl Supervisor<'_> {
     /// Carry out and answer the requests of operators. Returns whether there was one.
@@ -75,16 +72,14 @@ impl Supervisor<'_> {
         }
         let points = points.unwrap_or_default();
         if appends {
-            let fits = self.targets.append(points);
-            return if fits { RequestAnswer::Taken } else { RequestAnswer::TooMany };
+            return match self.targets.append(points) {
+                true => RequestAnswer::Taken,
+                false => RequestAnswer::TooMany,
+            };
         }
-        let arrival = record.arrival.as_ref().map(|command| {
-            (command, target_list::is_sure(record.pose_at(command.stamp.tick), mission))
-        });
         let limit = self.recovery_steps.limit();
         let since_tick = limit.map_or(first_tick, |limit| limit.last_tick + 1);
-        let truth = self.robot.simulator.as_ref().and_then(|simulator| simulator.truth().last());
-        let now_s = self.clock.now(record.pose.as_ref(), truth).seconds();
+        let (arrival, now_s) = (record.sure_arrival(mission), self.mission_time().seconds());
         self.targets.replace(points, (since_tick, now_s), arrival);
         self.on_new_target();
         RequestAnswer::Taken
@@ -93,22 +88,20 @@ impl Supervisor<'_> {
     /// Send the robot to its next target if it has arrived at one that is not the last. Returns whether it is sent.
     pub(crate) fn take_arrival(&mut self) -> bool {
         let mission = &self.options.mission;
-        let truth = self.robot.simulator.as_ref().map_or(&[][..], Simulator::truth);
-        self.targets.compare(&self.bus.observer.record, truth, allowed_m(mission));
         let record = &self.bus.observer.record;
-        let Some(command) = record.arrival.filter(|_| !self.targets.is_last()) else {
-            return false;
-        };
-        if command.stamp.time().seconds() >= self.deadline().at_s() {
+        self.targets.compare(record, self.robot.truth(), allowed_m(mission));
+        let arrival = record.sure_arrival(mission).filter(|_| !self.targets.is_last());
+        let Some(arrival) = arrival else { return false };
+        let stamp = arrival.0.stamp;
+        if stamp.time().seconds() >= self.deadline().at_s() {
             return false;
         }
-        let is_sure = target_list::is_sure(record.pose_at(command.stamp.tick), mission);
         let since_tick = match self.clock.in_ticks() {
             // No tick follows an arrival in lockstep.
-            true => command.stamp.tick + 1,
+            true => stamp.tick + 1,
             false => self.first_tick(),
         };
-        self.targets.advance(&command, is_sure, since_tick);
+        self.targets.advance(arrival, since_tick);
         self.on_new_target();
         true
     }

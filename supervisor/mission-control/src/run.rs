@@ -99,8 +99,7 @@ pub fn run<'a>(
     let wheels = stopped?;
     let end_by_stall = supervisor.end_by_stall();
     let deadline = supervisor.deadline();
-    let simulator = supervisor.robot.simulator.as_ref();
-    let mut truth = simulator.map_or_else(Vec::new, |simulator| simulator.truth().to_vec());
+    let mut truth = supervisor.robot.truth().to_vec();
     let mut record = std::mem::take(&mut supervisor.bus.observer.record);
     let mut targets = supervisor.targets.clone();
     targets.compare(&record, &truth, allowed_m(&options.mission));

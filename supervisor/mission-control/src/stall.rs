@@ -72,13 +72,12 @@ pub(crate) fn words(cause: StallCause, body: &Body) -> String {
         StallCause::InsideHazard => "the belief puts the robot inside hazard, again and again",
         StallCause::CutOff => "the belief isolates the robot from the target, again and again",
     };
-    body.ackermann().map_or_else(
-        || cause.to_owned(),
-        |car| {
-            let radius = car.least_turning_radius();
-            format!("{cause}; this car turns in no less than {radius:.2} m and does not reverse: it needs more room")
-        },
-    )
+    match body.ackermann().map(|car| car.least_turning_radius()) {
+        None => cause.to_owned(),
+        Some(radius) => format!(
+            "{cause}; this car turns in no less than {radius:.2} m and does not reverse: it needs more room"
+        ),
+    }
 }
 
 pub(crate) fn log(stall: &StallSample) {
@@ -227,13 +226,11 @@ impl StallWatch {
         }
         // The map may be older than this supervisor.
         self.epoch = self.epoch.max(guidance.epoch);
-        if self
-            .target
-            .replace(guidance.target_number)
-            .is_some_and(|it| it != guidance.target_number)
-        {
+        let target = Some(guidance.target_number);
+        if self.target.is_some() && self.target != target {
             self.on_new_target(pose.stamp.tick);
         }
+        self.target = target;
         if held {
             self.hold(pose.stamp.tick);
             return None;
@@ -381,29 +378,29 @@ impl StallWatch {
     ) -> Option<StallCause> {
         let now = pose.stamp.time();
         let here = Anchor { time: now, travelled: pose.travelled_m, heading: pose.heading_rad };
-        let anchor = *self.anchor.get_or_insert(here);
+        let anchor = self.anchor.get_or_insert(here);
         if (here.travelled - anchor.travelled).abs() >= self.moved_m
             || (here.heading - anchor.heading).abs() >= self.turned_rad
         {
-            self.anchor = Some(here);
+            *anchor = here;
         }
-        let arrived =
-            Place { since: now, middle: pose.pose().position, nearest_m: guidance.distance_m };
-        let place = *self.place.get_or_insert(arrived);
-        if arrived.middle.distance(place.middle) >= self.place_m {
-            self.place = Some(arrived);
+        let (middle, nearest_m) = (pose.pose().position, guidance.distance_m);
+        let arrived = Place { since: now, middle, nearest_m };
+        let place = self.place.get_or_insert(arrived);
+        if middle.distance(place.middle) >= self.place_m {
+            *place = arrived;
             self.replans_here = 0;
-        } else if arrived.nearest_m <= place.nearest_m - self.moved_m {
+        } else if nearest_m <= place.nearest_m - self.moved_m {
             // A robot that crawls to its target makes progress, too.
-            self.place = Some(Place { middle: place.middle, ..arrived });
+            *place = Place { middle: place.middle, ..arrived };
         }
+        let since = place.since;
         // The planner looks around first, which has a timeout of its own.
         if GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::Unreachable {
             return None;
         }
-        let since = |then: Option<MissionTime>| then.map_or(Duration::ZERO, |then| now.since(then));
-        let still = since(self.anchor.map(|anchor| anchor.time)) >= STALLED_AFTER;
-        let pinned = since(self.place.map(|place| place.since)) >= self.pinned_after;
+        let still = now.since(anchor.time) >= STALLED_AFTER;
+        let pinned = now.since(since) >= self.pinned_after;
         match (still, pinned) {
             (true, _) => Some(StallCause::Still),
             (_, true) => Some(StallCause::Pinned),

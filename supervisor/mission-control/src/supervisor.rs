@@ -6,6 +6,7 @@ use common::{
     address::Address,
     clock::{MissionTime, Pace},
     domain::{Domain, RobotName},
+    ground_truth::GroundTruthTick,
     mission::Mission,
     run::Run,
     samples::{DirectiveSample, HoldReason, Order, RosterHeader, TickLimitSample},
@@ -71,12 +72,14 @@ impl Robot {
         Ok(Self { address: Address::Udp(simulator.address()), simulator: Some(simulator) })
     }
 
+    /// The ground truth of a simulated robot.
+    pub(crate) fn truth(&self) -> &[GroundTruthTick] {
+        self.simulator.as_ref().map_or(&[], Simulator::truth)
+    }
+
     /// Read the ground truth. Returns whether a simulated robot's process still runs.
     pub(crate) fn poll(&mut self) -> Result<bool, SupervisorError> {
-        match &mut self.simulator {
-            Some(simulator) => Ok(simulator.poll()?),
-            None => Ok(true),
-        }
+        Ok(self.simulator.as_mut().map(Simulator::poll).transpose()?.unwrap_or(true))
     }
 }
 
@@ -271,37 +274,36 @@ impl<'a> Supervisor<'a> {
         let record = &self.bus.observer.record;
         let target = self.targets.current().position();
         let newest_m = record.pose.map(|pose| target.distance(pose.pose().position));
-        let last = record.arrival.filter(|_| self.targets.is_last());
-        let arrival = last.map(|command| Arrival {
+        let arrival = record.arrival.filter(|_| self.targets.is_last()).map(|command| Arrival {
             distance_m: newest_m.unwrap_or(command.distance_m),
             since: *self.arrived.get_or_insert(now),
         });
-        let simulator = self.robot.simulator.as_ref();
-        let truth = simulator.map_or(&[][..], Simulator::truth);
-        let collision = decisive::first_contact(truth);
-        let time = self.clock.now(record.pose.as_ref(), truth.last());
+        let collision = decisive::first_contact(self.robot.truth());
+        let time = self.mission_time();
         let stopped = self.decision.reason == HoldReason::Operator;
         self.state_file.state.operator_stopped_s += self.stop_clock.passed_s(stopped, time);
-        judge::judge(
-            &judge::Snapshot {
-                arrival,
-                link: record.link.as_ref(),
-                simulated: simulator.is_some(),
-                simulator_ended,
-                collision_m: collision.map(|truth| [truth.x, truth.y]),
-                time,
-                deadline: self.deadline(),
-                in_ticks: self.clock.in_ticks(),
-                progress: self.tick_progress.update(record.newest_tick(), now),
-                was_ready: self.decision.ready,
-                reason: self.decision.reason,
-                held: self.stages.held(),
-                not_started: self.stages.not_started(),
-                robot: &self.options.robot,
-                address: &self.robot.address,
-            },
-            now,
-        )
+        judge::Snapshot {
+            arrival,
+            link: record.link.as_ref(),
+            simulated: self.robot.simulator.is_some(),
+            simulator_ended,
+            collision_m: collision.map(|truth| [truth.x, truth.y]),
+            time,
+            deadline: self.deadline(),
+            in_ticks: self.clock.in_ticks(),
+            progress: self.tick_progress.update(record.newest_tick(), now),
+            was_ready: self.decision.ready,
+            reason: self.decision.reason,
+            held: self.stages.held(),
+            not_started: self.stages.not_started(),
+            robot: &self.options.robot,
+            address: &self.robot.address,
+        }
+        .ending(now)
+    }
+
+    pub(crate) fn mission_time(&self) -> MissionTime {
+        self.clock.now(self.bus.observer.record.pose.as_ref(), self.robot.truth().last())
     }
 
     pub(crate) const fn deadline(&self) -> Deadline {
@@ -373,9 +375,7 @@ impl<'a> Supervisor<'a> {
     pub(crate) fn wait(&mut self) -> Result<(), SupervisorError> {
         self.turns.count();
         let mut descriptors = self.stages.descriptors();
-        if let Some(simulator) = &self.robot.simulator {
-            descriptors.push(simulator.descriptor());
-        }
+        descriptors.extend(self.robot.simulator.as_ref().map(Simulator::descriptor));
         let deadlines = [self.stages.time_to_deadline(), self.service.time_to_feed()];
         let soonest = deadlines.into_iter().flatten().min();
         let timeout = soonest.map_or(topics::RESTATE, |soonest| soonest.min(topics::RESTATE));

@@ -3,10 +3,7 @@
 use common::{
     ground_truth::GroundTruthTick,
     mission::Mission,
-    samples::{
-        CommandSample, HoldReason, MOST_TARGETS, PoseSample, RequestAnswer, TargetPoint,
-        TargetSample,
-    },
+    samples::{CommandSample, HoldReason, MOST_TARGETS, RequestAnswer, TargetPoint, TargetSample},
 };
 use serde::{Deserialize, Serialize};
 
@@ -126,22 +123,18 @@ impl TargetList {
         &mut self,
         points: &[TargetPoint],
         (since_tick, now_s): (u64, f64),
-        arrival: Option<(&CommandSample, bool)>,
+        arrival: Option<(CommandSample, bool)>,
     ) {
         let skipped = self.ahead.len() as u64;
         match arrival {
-            Some((command, is_sure)) => self.store_arrival(command, is_sure),
-            None => self.store(Stored {
-                result: TargetResult {
-                    at_s: Some(now_s),
-                    ..self.result_of(0, &self.current, TargetOutcome::Replaced)
-                },
-                tick: None,
-            }),
+            Some(arrival) => self.store_arrival(arrival),
+            None => {
+                let replaced = self.result_of(0, &self.current, TargetOutcome::Replaced);
+                self.store(TargetResult { at_s: Some(now_s), ..replaced }, None);
+            }
         }
         for (nth, point) in (1..).zip(std::mem::take(&mut self.ahead)) {
-            let result = self.result_of(nth, &point, TargetOutcome::Replaced);
-            self.store(Stored { result, tick: None });
+            self.store(self.result_of(nth, &point, TargetOutcome::Replaced), None);
         }
         if let Some((first, ahead)) = points.split_first() {
             self.number += skipped + 1;
@@ -150,15 +143,15 @@ impl TargetList {
         }
     }
 
-    /// Send the robot, which arrived by `command` with a pose that was sure or not, to the next target, from `since_tick` on.
-    pub(crate) fn advance(&mut self, command: &CommandSample, is_sure: bool, since_tick: u64) {
+    /// Send the robot, whose `arrival` is a command and whether its pose was sure, to the next target, from `since_tick` on.
+    pub(crate) fn advance(&mut self, arrival: (CommandSample, bool), since_tick: u64) {
         if self.ahead.is_empty() {
             return;
         }
-        self.store_arrival(command, is_sure);
+        self.store_arrival(arrival);
         self.current = self.ahead.remove(0);
         self.number += 1;
-        (self.since_tick, self.began_s) = (since_tick, command.stamp.time().seconds());
+        (self.since_tick, self.began_s) = (since_tick, arrival.0.stamp.time().seconds());
     }
 
     fn result_of(&self, nth: u64, point: &TargetPoint, outcome: TargetOutcome) -> TargetResult {
@@ -173,21 +166,21 @@ impl TargetList {
         }
     }
 
-    fn store_arrival(&mut self, command: &CommandSample, is_sure: bool) {
+    fn store_arrival(&mut self, (command, is_sure): (CommandSample, bool)) {
         let outcome = if is_sure { TargetOutcome::Reached } else { TargetOutcome::ReachedUnsure };
         let result = TargetResult {
             at_s: Some(command.stamp.time().seconds()),
             distance_m: Some(command.distance_m),
             ..self.result_of(0, &self.current, outcome)
         };
-        self.store(Stored { result, tick: Some(command.stamp.tick) });
+        self.store(result, Some(command.stamp.tick));
     }
 
-    fn store(&mut self, stored: Stored) {
+    fn store(&mut self, result: TargetResult, tick: Option<u64>) {
         if self.results.len() == MOST_RESULTS {
             self.results.remove(0);
         }
-        self.results.push(stored);
+        self.results.push(Stored { result, tick });
     }
 
     /// Complete the results of arrivals by the ground truth as far as that is known, with `allowed_m` as the greatest error.
@@ -200,7 +193,7 @@ impl TargetList {
             // The ground truth of a tick that is not over may be missing.
             let known = truth.last().is_some_and(|last| last.heard_tick() >= tick);
             if let Some(index) = pose.filter(|_| known).and_then(|pose| truth_of(pose, truth)) {
-                let distance_m = (truth[index].x - result.x_m).hypot(truth[index].y - result.y_m);
+                let distance_m = apart_m(&truth[index], result);
                 result.truth_m = Some(distance_m);
                 if distance_m > allowed_m {
                     result.outcome = TargetOutcome::WrongPlace;
@@ -217,12 +210,11 @@ impl TargetList {
         arrival: Option<&CommandSample>,
         ended: Option<&GroundTruthTick>,
     ) -> Vec<TargetResult> {
-        let counts = |stored: &Stored| match (stored.tick, last_tick) {
-            (Some(tick), Some(last)) => tick <= last,
-            _ => true,
-        };
         let mut results: Vec<_> = self.results.iter().map(|stored| stored.result).collect();
-        let over = self.results.iter().position(|stored| !counts(stored));
+        // An event before an arrival may be seen after it.
+        let over = self.results.iter().position(|stored| {
+            stored.tick.zip(last_tick).is_some_and(|(arrived, last)| arrived > last)
+        });
         let outcome = match ending.outcome {
             Outcome::Reached => TargetOutcome::Reached,
             Outcome::WrongPlace => TargetOutcome::WrongPlace,
@@ -233,31 +225,22 @@ impl TargetList {
         if let Some(arrival) = arrival.filter(|_| outcome != TargetOutcome::Missed) {
             current.at_s = Some(arrival.stamp.time().seconds());
             current.distance_m = Some(arrival.distance_m);
-            current.truth_m =
-                ended.map(|ended| (ended.x - current.x_m).hypot(ended.y - current.y_m));
+            current.truth_m = ended.map(|ended| apart_m(ended, &current));
         }
         results.push(current);
-        results.extend(
-            (1..)
-                .zip(&self.ahead)
-                .map(|(nth, it)| self.result_of(nth, it, TargetOutcome::NotTried)),
-        );
-        // An event before an arrival may be seen after it.
-        if let Some(over) = over {
-            for (nth, result) in results.iter_mut().enumerate().skip(over) {
-                let outcome =
-                    if nth == over { TargetOutcome::Missed } else { TargetOutcome::NotTried };
-                *result = TargetResult {
-                    outcome,
-                    at_s: None,
-                    distance_m: None,
-                    truth_m: None,
-                    ..*result
-                };
-            }
+        let ahead = (1..).zip(&self.ahead);
+        results.extend(ahead.map(|(nth, it)| self.result_of(nth, it, TargetOutcome::NotTried)));
+        for (nth, result) in results.iter_mut().enumerate().skip(over.unwrap_or(usize::MAX)) {
+            let is_first = over == Some(nth);
+            result.outcome = if is_first { TargetOutcome::Missed } else { TargetOutcome::NotTried };
+            (result.at_s, result.distance_m, result.truth_m) = (None, None, None);
         }
         results
     }
+}
+
+fn apart_m(truth: &GroundTruthTick, target: &TargetResult) -> f64 {
+    (truth.x - target.x_m).hypot(truth.y - target.y_m)
 }
 
 /// The ending of a run whose last target ended with `ending`: a target before it that was not reached makes it worse.
@@ -265,26 +248,16 @@ pub(crate) fn of_all(ending: Ending, results: &[TargetResult]) -> Ending {
     if ending.outcome != Outcome::Reached {
         return ending;
     }
-    let is = |outcome| results.iter().find(|result| result.outcome == outcome);
-    let worse = is(TargetOutcome::WrongPlace)
-        .map(|result| (result, Outcome::WrongPlace, "was in the wrong place"))
-        .or_else(|| {
-            let unsure = is(TargetOutcome::ReachedUnsure)?;
-            Some((unsure, Outcome::ReachedUnsure, "was not sure"))
-        });
-    match worse {
-        None => ending,
-        Some((result, outcome, words)) => {
-            let reason =
-                format!("{}; the arrival at target {} {words}", ending.reason, result.number);
-            Ending::failed(outcome, reason)
-        }
-    }
-}
-
-/// Whether `pose` is sure enough for an arrival.
-pub(crate) fn is_sure(pose: Option<&PoseSample>, mission: &Mission) -> bool {
-    pose.is_none_or(|pose| pose.is_sure(mission))
+    let worse = [
+        (TargetOutcome::WrongPlace, Outcome::WrongPlace, "was in the wrong place"),
+        (TargetOutcome::ReachedUnsure, Outcome::ReachedUnsure, "was not sure"),
+    ];
+    let first = worse.into_iter().find_map(|(of_target, outcome, words)| {
+        let result = results.iter().find(|result| result.outcome == of_target)?;
+        let reason = format!("{}; the arrival at target {} {words}", ending.reason, result.number);
+        Some(Ending::failed(outcome, reason))
+    });
+    first.unwrap_or(ending)
 }
 
 /// The reason why the robot is not sent to `points`; none if it is.

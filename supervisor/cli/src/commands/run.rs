@@ -1,7 +1,7 @@
 pub(crate) mod recorder;
 mod summary_file;
 
-use std::{fs, path::PathBuf, process::ExitCode, time::Duration};
+use std::{fs, path::PathBuf, process::ExitCode};
 
 use clap::Args;
 use common::{
@@ -12,7 +12,7 @@ use common::{
 };
 use link::transport::SPEAKS_ROS2;
 use mission_control::{
-    Finished, Options, Progress,
+    Finished, Options,
     outcome::{Ending, Outcome},
     recovery::{self, RecoveredRun},
 };
@@ -25,7 +25,7 @@ use console::{
     failure::{Failure, Refused},
     logging, missions,
     output::{print_text, write_stderr},
-    progress_line::ProgressLine,
+    progress_line::{LINE_EVERY, ProgressLine},
     robots::SUPERVISOR_LOG,
     runs,
 };
@@ -105,9 +105,9 @@ impl Default for Arguments {
 fn options(arguments: &Arguments) -> Result<Option<Options>, Failure> {
     if let Some(directory) = &arguments.resume {
         let found = fs::canonicalize(directory).map_err(|error| {
+            let directory = directory.display();
             let message = format!(
-                "cannot resume the run in {}: {error}; give the directory of a run",
-                directory.display()
+                "cannot resume the run in {directory}: {error}; give the directory of a run"
             );
             Refused::new("no-run", message)
         })?;
@@ -205,7 +205,9 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         }
     };
     let summary_file = prepare(&options).inspect_err(|_| made_for_nothing())?;
-    let mut console = Console::new(&options);
+    let (mut line, title) = (ProgressLine::new(LINE_EVERY), title(&options));
+    // The journal gets no progress, because the status of the service has it.
+    let may_stay = !logging::to_journal();
     let mut recorder = None;
     let mut attach = || {
         if !arguments.no_record {
@@ -214,22 +216,17 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     };
     let (heard, listener) = Hearer::with_listener();
     let ran = mission_control::run(&options, &mut attach, listener, &mut |progress| {
-        console.show(progress);
+        line.update(&title, || progress.to_string(), may_stay);
     });
-    let end_recorder = || {
-        if let Some(recorder) = recorder {
-            recorder.end();
-        }
-    };
     let (finished, still_moving) = match ran {
         Ok(ran) => ran,
         Err(error) => {
-            end_recorder();
+            drop(recorder);
             made_for_nothing();
             return Err(error.into());
         }
     };
-    console.line.end();
+    line.end();
     let summary = Summary::new(&options.mission, &finished, &heard.borrow());
     let json = serde_json::to_string(&summary)?;
     let text = if arguments.json { format!("{json}\n") } else { summary.to_string() };
@@ -246,7 +243,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         write_stderr(&format!("firsthand: the robot {now}\n"));
     }
     // On a busy machine the recorder may need seconds for its last chunks.
-    end_recorder();
+    drop(recorder);
     if may_be_removed {
         let _ = fs::remove_dir_all(directory);
     } else {
@@ -267,8 +264,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
 
 /// Begins the log in the run directory, reserves room for the summary, and reports the mission's remarks.
 fn prepare(options: &Options) -> Result<SummaryFile, Failure> {
-    let directory = &options.directory;
-    let log = directory.join(SUPERVISOR_LOG);
+    let log = options.directory.join(SUPERVISOR_LOG);
     logging::to_file(&log, "info")
         .map_err(|error| format!("cannot log to {}: {error}", log.display()))?;
     for remark in &options.mission.remarks {
@@ -276,11 +272,8 @@ fn prepare(options: &Options) -> Result<SummaryFile, Failure> {
         write_stderr(&format!("firsthand: {remark}\n"));
     }
     // A resumed run has its files.
-    let needed = match options.recovered {
-        Some(_) => 0,
-        None => summary_file::room_of_run(options.mission.grid_frame().area()),
-    };
-    Ok(SummaryFile::reserve(directory, needed)?)
+    let cells = options.recovered.is_none().then(|| options.mission.grid_frame().area());
+    Ok(SummaryFile::reserve(&options.directory, cells.map_or(0, summary_file::room_of_run))?)
 }
 
 /// The exit code of the mission stays.
@@ -318,45 +311,20 @@ fn exit_code(summary: &Summary, ending: &Ending) -> ExitCode {
     })
 }
 
-/// The journal gets no progress, because the status of the service has it.
-struct Console {
-    line: ProgressLine,
-    silent: bool,
-    title: String,
-}
-
-/// The time between lines that cannot be rewritten.
-const LINE_EVERY: Duration = Duration::from_secs(5);
-
-impl Console {
-    fn new(options: &Options) -> Self {
-        let mission = &options.mission;
-        // A real robot does not wait.
-        let pace = match &mission.robot.address {
-            Some(address) => format!("at {address}"),
-            None => format!("pace {}", options.pace),
-        };
-        Self {
-            line: ProgressLine::new(LINE_EVERY),
-            silent: logging::to_journal(),
-            title: format!(
-                "mission {}{}: {:.1} m to the target, robot {}, {pace}; everything of this run is in {}",
-                mission.name,
-                if options.recovered.is_some() { " goes on" } else { "" },
-                mission.target.length(),
-                options.robot,
-                options.directory.display()
-            ),
-        }
-    }
-
-    fn show(&mut self, progress: &Progress<'_>) {
-        if !self.line.is_due() {
-            return;
-        }
-        if self.line.begin() {
-            write_stderr(&format!("{}\n", self.title));
-        }
-        self.line.show(&progress.to_string(), !self.silent);
-    }
+/// The first line of the progress.
+fn title(options: &Options) -> String {
+    let mission = &options.mission;
+    // A real robot does not wait.
+    let pace = match &mission.robot.address {
+        Some(address) => format!("at {address}"),
+        None => format!("pace {}", options.pace),
+    };
+    format!(
+        "mission {}{}: {:.1} m to the target, robot {}, {pace}; everything of this run is in {}",
+        mission.name,
+        if options.recovered.is_some() { " goes on" } else { "" },
+        mission.target.length(),
+        options.robot,
+        options.directory.display()
+    )
 }

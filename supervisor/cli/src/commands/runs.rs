@@ -14,10 +14,7 @@ use console::{
     failure::Failure,
     output::{json_lines, print_text},
     runs::{self, Outcome, RunDirectory},
-    table::{
-        Align::{Left, Right},
-        Table,
-    },
+    table::Table,
     words,
 };
 
@@ -81,26 +78,22 @@ fn list(arguments: &List) -> Result<ExitCode, Failure> {
             format!("there is no directory {}; say where with --runs", runs.display()).into()
         );
     }
+    let chosen = || {
+        let wanted =
+            |run: &RunDirectory| arguments.robot.as_ref().is_none_or(|it| *it == run.robot);
+        runs::list(runs).into_iter().filter(wanted)
+    };
     if let Some(keep) = arguments.prune {
-        let robots: BTreeSet<_> = chosen(arguments).into_iter().map(|run| run.robot).collect();
+        let robots: BTreeSet<_> = chosen().map(|run| run.robot).collect();
         for robot in robots {
             runs::prune(runs, &robot, keep);
         }
     }
-    let mut chosen = chosen(arguments);
+    let mut chosen: Vec<_> = chosen().collect();
     chosen.sort();
     let listed: Vec<_> = chosen.iter().map(listed).collect();
-    let text = if arguments.json { json_lines(&listed)? } else { table(&listed) };
-    print_text(&text)?;
+    print_text(&if arguments.json { json_lines(&listed)? } else { table(&listed) })?;
     Ok(ExitCode::SUCCESS)
-}
-
-fn chosen(arguments: &List) -> Vec<RunDirectory> {
-    let mut runs = runs::list(&arguments.runs);
-    if let Some(robot) = &arguments.robot {
-        runs.retain(|run| run.robot == *robot);
-    }
-    runs
 }
 
 fn listed(run: &RunDirectory) -> Listed<'_> {
@@ -122,29 +115,20 @@ fn listed(run: &RunDirectory) -> Listed<'_> {
 }
 
 fn table(listed: &[Listed<'_>]) -> String {
-    let mut table = Table::new([
-        ("run", Left),
-        ("robot", Left),
-        ("mission", Left),
-        ("began", Right),
-        ("outcome", Left),
-        ("time", Right),
-        ("size", Right),
-    ]);
+    let mut table = Table::new(["run", "robot", "mission", ">began", "outcome", ">time", ">size"]);
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let mut all = 0;
     for run in listed {
         let began = (now.as_secs_f64() - run.began_s).max(0.0);
         let time = run.mission_time_s.map_or("-".to_owned(), |time_s| format!("{time_s:.1} s"));
-        let name = run.run.file_name().unwrap_or_default().to_string_lossy();
         table.row([
-            name.into_owned(),
-            run.robot.to_string(),
-            run.mission.unwrap_or("-").to_owned(),
-            words::age(Some(began)) + " ago",
-            run.outcome.clone(),
-            time,
-            words::size(run.size_bytes),
+            &run.run.file_name().unwrap_or_default().to_string_lossy(),
+            run.robot,
+            &run.mission.unwrap_or("-"),
+            &(words::age(Some(began)) + " ago"),
+            &run.outcome,
+            &time,
+            &words::size(run.size_bytes),
         ]);
         all += run.size_bytes;
     }

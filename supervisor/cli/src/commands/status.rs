@@ -24,10 +24,7 @@ use console::{
     failure::Failure,
     output::print,
     stream::{LOOK_EVERY, Stream},
-    table::{
-        Align::{Left, Right},
-        Table,
-    },
+    table::Table,
     waiting::Waiting,
     words::{age, order, seconds, state},
 };
@@ -292,25 +289,25 @@ impl fmt::Display for Status<'_> {
             writeln!(f, "{power}")?;
         }
         let mut table = Table::new([
-            ("stage", Left),
-            ("state", Left),
-            ("pid", Right),
-            ("gen", Right),
-            ("uptime", Right),
-            ("restarts", Right),
-            ("last beat", Right),
-            ("last output", Right),
+            "stage",
+            "state",
+            ">pid",
+            ">gen",
+            ">uptime",
+            ">restarts",
+            ">last beat",
+            ">last output",
         ]);
         for stage in &self.stages {
             table.row([
-                stage.name.to_owned(),
-                stage.state.to_owned(),
-                stage.pid.to_string(),
-                stage.generation.to_string(),
-                age(stage.uptime_s),
-                stage.restarts.to_string(),
-                age(stage.beat_age_s),
-                age(stage.output_age_s),
+                &stage.name,
+                &stage.state,
+                &stage.pid,
+                &stage.generation,
+                &age(stage.uptime_s),
+                &stage.restarts,
+                &age(stage.beat_age_s),
+                &age(stage.output_age_s),
             ]);
         }
         write!(f, "{table}")

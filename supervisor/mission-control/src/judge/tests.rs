@@ -100,7 +100,7 @@ fn every_rule_of_the_judgement_decides_its_row() {
          late, Some((Outcome::Aborted, "not running: planner; start each with `firsthand stage NAME --robot x80`"))),
     ];
     for (rule, snapshot, after, expected) in rows {
-        let ending = judge(&snapshot, start + after);
+        let ending = snapshot.ending(start + after);
         let outcome = ending.as_ref().map(|ending| ending.outcome);
         assert_eq!(outcome, expected.map(|(outcome, _)| outcome), "{rule}");
         if let (Some(ending), Some((outcome, words))) = (ending, expected) {

@@ -1,6 +1,6 @@
 use std::path::Path;
 
-use common::samples::Stamp;
+use common::samples::{PoseSample, Stamp};
 use glam::DVec2;
 
 use super::*;
@@ -32,14 +32,14 @@ fn a_list_goes_on_from_target_to_target_and_says_what_became_of_each() {
     let TargetSample { number, last, since_tick, target, .. } = list.sample();
     assert_eq!((number, last, since_tick, target), (1, 3, 0, at(3.0, 0.0)));
     assert_eq!(list.sample().ahead(), [at(1.0, 1.0), at(2.0, 2.0)]);
-    list.advance(&arrival(7), true, 8);
+    list.advance((arrival(7), true), 8);
     let TargetSample { number, last, since_tick, target, .. } = list.sample();
     assert_eq!((number, last, since_tick, target), (2, 3, 8, at(1.0, 1.0)));
     assert_eq!(list.began_s(), 7.0);
     list.replace(&[at(0.5, 0.0), at(0.0, 0.0)], (12, 11.0), None);
     let TargetSample { number, last, since_tick, target, .. } = list.sample();
     assert_eq!((number, last, since_tick, target), (4, 5, 12, at(0.5, 0.0)));
-    list.advance(&arrival(20), false, 21);
+    list.advance((arrival(20), false), 21);
     assert!(list.is_last());
     let reached = Ending::asked_for(Outcome::Reached, "");
     let results = list.results(&reached, Some(30), Some(&arrival(30)), None);
@@ -60,7 +60,7 @@ fn an_arrival_that_the_ground_truth_contradicts_makes_the_whole_list_wrong() {
     for (x, outcome) in [(2.6, Outcome::Reached), (2.4, Outcome::WrongPlace)] {
         let mut list = TargetList::of(&mission(""));
         assert!(list.append(&[at(0.0, 0.0)]));
-        list.advance(&arrival(7), true, 8);
+        list.advance((arrival(7), true), 8);
         let mut record = Record::default();
         record.poses.push(pose);
         list.compare(&record, &[truth(x, 7)], 0.5);

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use console::table::{Align, Table};
+use console::table::Table;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -225,8 +225,10 @@ impl<'a> Report<'a> {
 
     /// The table, and the claims that hold.
     pub fn text(&self) -> String {
-        let mut table = Table::new(titles().map(|title| (title, Align::Left)));
-        self.findings.iter().for_each(|findings| table.row(findings.cells()));
+        let mut table = Table::new(titles());
+        self.findings
+            .iter()
+            .for_each(|findings| table.row(findings.cells().each_ref().map(|cell| cell as _)));
         let mut text = format!("{table}medians and the middle half of the missions that arrived\n");
         for Expectation { experiment, method, claim, found, holds } in &self.expectations {
             let holds = if *holds { "holds" } else { "does not hold" };

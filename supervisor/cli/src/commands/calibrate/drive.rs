@@ -1,7 +1,4 @@
-use std::{
-    path::{Path, PathBuf},
-    time::Duration,
-};
+use std::path::{Path, PathBuf};
 
 use common::{clock::Pace, domain::RobotName, mission::Mission, samples::PoseSample};
 use glam::DVec2;
@@ -10,29 +7,25 @@ use processes::Starter;
 
 use console::{
     failure::{Failure, Refused},
-    output::write_stderr,
-    progress_line::ProgressLine,
+    progress_line::{LINE_EVERY, ProgressLine},
     runs,
 };
 
 use crate::commands::run::recorder::RunRecorder;
 
-/// The time between lines that cannot be rewritten.
-const LINE_EVERY: Duration = Duration::from_secs(5);
-
 #[derive(Clone, Copy)]
 pub(in crate::commands) struct Setting<'a> {
-    pub(in crate::commands) robot: &'a RobotName,
-    pub(in crate::commands) pace: Pace,
-    pub(in crate::commands) runs: &'a Path,
+    pub robot: &'a RobotName,
+    pub pace: Pace,
+    pub runs: &'a Path,
 }
 
 pub(in crate::commands) struct Carried {
-    pub(in crate::commands) directory: PathBuf,
-    pub(in crate::commands) seconds: f64,
-    pub(in crate::commands) counts: Vec<[u16; 2]>,
+    pub directory: PathBuf,
+    pub seconds: f64,
+    pub counts: Vec<[u16; 2]>,
     /// The end of a simulated robot, metres.
-    pub(in crate::commands) truth: Option<DVec2>,
+    pub truth: Option<DVec2>,
 }
 
 /// Fails if the procedure does not come to its end.
@@ -51,24 +44,16 @@ pub(in crate::commands) fn carry_out(
         recovered: None,
     };
     let place = options.directory.display();
+    let title = format!("{title}: everything of this run is in {place}");
     let mut line = ProgressLine::new(LINE_EVERY);
     let mut recorder = None;
     let ran = mission_control::run(
         &options,
         &mut || recorder = RunRecorder::start(&options, None),
         Box::new(|_| {}),
-        &mut |progress| {
-            if line.is_due() {
-                if line.begin() {
-                    write_stderr(&format!("{title}: everything of this run is in {place}\n"));
-                }
-                line.show(&shown(progress), true);
-            }
-        },
+        &mut |progress| line.update(&title, || shown(progress), true),
     );
-    if let Some(recorder) = recorder {
-        recorder.end();
-    }
+    drop(recorder);
     line.end();
     let (finished, still_moving) = ran?;
     if still_moving.is_some() {

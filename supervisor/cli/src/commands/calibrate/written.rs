@@ -13,24 +13,24 @@ use common::{
 use picture::{Chart, Mark, Series};
 use serde_json::json;
 
-use console::{failure::Failure, output::print_text};
+use console::{failure::Failure, logging::today, output::print_text};
 
 pub(super) struct Found {
-    pub(super) robot: String,
-    pub(super) method: &'static str,
-    pub(super) before: Odometry,
-    pub(super) estimate: Estimate,
-    pub(super) metres: f64,
-    pub(super) seconds: f64,
-    pub(super) residuals: Vec<Residual>,
-    pub(super) directory: PathBuf,
+    pub robot: String,
+    pub method: &'static str,
+    pub before: Odometry,
+    pub estimate: Estimate,
+    pub metres: f64,
+    pub seconds: f64,
+    pub residuals: Vec<Residual>,
+    pub directory: PathBuf,
 }
 
 /// A loop or a square against the estimate.
 pub(super) struct Residual {
-    pub(super) number: u32,
-    pub(super) to_the_left: bool,
-    pub(super) deviations: f64,
+    pub number: u32,
+    pub to_the_left: bool,
+    pub deviations: f64,
 }
 
 impl Found {
@@ -121,38 +121,5 @@ impl Found {
             series: vec![series("to the left", true), series("to the right", false)],
         }
         .svg()
-    }
-}
-
-/// UTC, year-month-day.
-fn today() -> String {
-    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
-    let days = now.map_or(0, |since| since.as_secs() / 86_400);
-    date(i64::try_from(days).unwrap_or_default())
-}
-
-/// `days` since 1970, by H. Hinnant's algorithm `civil_from_days`.
-fn date(days: i64) -> String {
-    let shifted = days + 719_468;
-    let era = shifted.div_euclid(146_097);
-    let of_era = shifted.rem_euclid(146_097);
-    let year = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
-    let of_year = of_era - (365 * year + year / 4 - year / 100);
-    let shifted_month = (5 * of_year + 2) / 153;
-    let day = of_year - (153 * shifted_month + 2) / 5 + 1;
-    let month = if shifted_month < 10 { shifted_month + 3 } else { shifted_month - 9 };
-    let year = year + era * 400 + i64::from(month <= 2);
-    format!("{year:04}-{month:02}-{day:02}")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_day_has_its_date() {
-        for (days, text) in [(0, "1970-01-01"), (11_016, "2000-02-29"), (20_779, "2026-11-22")] {
-            assert_eq!(date(days), text);
-        }
     }
 }

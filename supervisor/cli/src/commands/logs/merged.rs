@@ -35,10 +35,10 @@ struct Log {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Line {
     /// UTC, as the process wrote it. A line without a time has that of the line before.
-    pub(crate) time: String,
+    pub time: String,
     /// A stage, `supervisor`, `x80-sim`.
-    pub(crate) process: String,
-    pub(crate) text: String,
+    pub process: String,
+    pub text: String,
 }
 
 impl std::fmt::Display for Line {

@@ -8,40 +8,28 @@ use processes::process::{Process, firsthand};
 
 use crate::commands::record::DiskBudget;
 
-/// Waiting for the recorder takes milliseconds for either, and seconds beside 30 busy processes a core.
-#[derive(Clone, Copy)]
-struct Patience {
-    /// A recorder that attaches later misses the beginning.
-    attached: Duration,
-    ended: Duration,
-}
-
-impl Patience {
-    /// A robot and the service manager wait for a run on a wall clock, nobody for one in lockstep.
-    const fn at(pace: Pace) -> Self {
-        let (attached, ended) = match pace {
-            Pace::Max => (20, 60),
-            Pace::Rate(_) => (2, 5),
-        };
-        Self { attached: Duration::from_secs(attached), ended: Duration::from_secs(ended) }
-    }
+/// Waiting for the recorder takes milliseconds, and seconds beside 30 busy processes a core. These are the most seconds until it
+/// is attached, because one that attaches later misses the beginning, and until it has ended. A robot and the service manager
+/// wait for a run on a wall clock, nobody for one in lockstep.
+const fn patience(pace: Pace) -> [Duration; 2] {
+    let [attached, ended] = match pace {
+        Pace::Max => [20, 60],
+        Pace::Rate(_) => [2, 5],
+    };
+    [Duration::from_secs(attached), Duration::from_secs(ended)]
 }
 
 pub(crate) struct RunRecorder {
     process: Process,
-    patience: Patience,
+    ends_within: Duration,
 }
 
 impl RunRecorder {
     /// Waits until the recorder is attached. None if it cannot be started, which is logged.
     pub(crate) fn start(options: &Options, budget: Option<DiskBudget>) -> Option<Self> {
-        match Self::spawn(options, budget) {
-            Ok(recorder) => Some(recorder),
-            Err(error) => {
-                tracing::error!(%error, "nothing is recorded");
-                None
-            }
-        }
+        Self::spawn(options, budget)
+            .inspect_err(|error| tracing::error!(%error, "nothing is recorded"))
+            .ok()
     }
 
     fn spawn(options: &Options, budget: Option<DiskBudget>) -> std::io::Result<Self> {
@@ -57,22 +45,22 @@ impl RunRecorder {
         command.args(["--supervisor", &std::process::id().to_string()]);
         command.stdout(Stdio::piped()).stderr(log);
         let mut process = Process::spawn(command)?;
-        let patience = Patience::at(options.pace);
+        let [attached_within, ends_within] = patience(options.pace);
         let said = process.take_stdout();
-        let attached = match &said {
-            Some(said) => poll::is_readable(said, patience.attached)?,
-            None => false,
-        };
+        let readable = said.map(|said| poll::is_readable(said, attached_within));
+        let attached = readable.transpose()?.unwrap_or_default();
         if !attached {
             tracing::warn!(
                 "the recorder is not attached yet; what is published now is not recorded"
             );
         }
-        Ok(Self { process, patience })
+        Ok(Self { process, ends_within })
     }
+}
 
-    /// It writes the rest at the end of the run.
-    pub(crate) fn end(mut self) {
-        self.process.end(self.patience.ended);
+/// It writes the rest at the end of the run.
+impl Drop for RunRecorder {
+    fn drop(&mut self) {
+        self.process.end(self.ends_within);
     }
 }

@@ -14,10 +14,7 @@ use console::{
     failure::Failure,
     output::{json_lines, print_text, write_stderr},
     robots::{self, Robot},
-    table::{
-        Align::{Left, Right},
-        Table,
-    },
+    table::Table,
     words,
 };
 
@@ -89,30 +86,21 @@ fn roster(robot: &Robot) -> Result<Option<RosterFacts>, BusError> {
 }
 
 fn table(listed: &[Listed]) -> String {
-    let mut table = Table::new([
-        ("robot", Left),
-        ("supervisor", Right),
-        ("state", Left),
-        ("time", Right),
-        ("kind", Left),
-        ("run", Left),
-    ]);
+    let mut table = Table::new(["robot", ">supervisor", "state", ">time", "kind", "run"]);
     let unknown = || "-".to_owned();
     for robot in listed {
-        let time = robot.mission_time_s;
         let kind = match robot.simulated {
             Some(true) => "simulated",
             Some(false) => "real",
             None => "-",
         };
-        let run = robot.run.as_ref();
         table.row([
-            robot.robot.clone(),
-            robot.supervisor_pid.map_or_else(unknown, |pid| pid.to_string()),
-            robot.state.to_owned(),
-            time.map_or_else(unknown, |time_s| format!("{time_s:.1} s")),
-            kind.to_owned(),
-            run.map_or_else(unknown, |run| run.display().to_string()),
+            &robot.robot,
+            &robot.supervisor_pid.map_or_else(unknown, |pid| pid.to_string()),
+            &robot.state,
+            &robot.mission_time_s.map_or_else(unknown, |time_s| format!("{time_s:.1} s")),
+            &kind,
+            &robot.run.as_ref().map_or_else(unknown, |run| run.display().to_string()),
         ]);
     }
     table.to_string()
