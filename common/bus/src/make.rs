@@ -23,7 +23,7 @@ use super::{
     error::BusError,
     leftovers, ownership,
     ports::{self, BusNode, Carried},
-    spec::Spec,
+    spec::{Limits, Spec},
 };
 use crate::{
     bus_instance::BusInstance,
@@ -92,6 +92,8 @@ impl Bus {
         config.global.node.cleanup_dead_nodes_on_creation = false;
         config.global.node.cleanup_dead_nodes_on_destruction = false;
         config.global.service.cleanup_dead_nodes_on_open = false;
+        // A reader sees at most so many writers end at once, and has memory for the connection to each: 400 kB a topic with the default.
+        config.defaults.publish_subscribe.subscriber_expired_connection_buffer = Limits::WRITERS;
         let text = toml::to_string(&config).map_err(|error| failed(error.to_string()))?;
         let file = instance.config();
         std::fs::write(&file, text).map_err(|error| failed(format!("{}: {error}", file.display())))

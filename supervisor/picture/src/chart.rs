@@ -3,13 +3,23 @@
 use glam::DVec2;
 
 use super::{
-    page::{Path, ink},
-    plot::{Entry, Plot, Range},
+    margin::FONT,
+    page::{Path, Px, ink, round_up, text},
 };
 
-const HEIGHT: f64 = 230.0;
-/// From more points, the least and the greatest of each stretch are drawn.
-const MOST_POINTS: usize = 2400;
+/// Text is readable on a telephone, and as large as the text in a column of print.
+const WIDTH: f64 = 620.0;
+const LEFT: f64 = 70.0;
+const RIGHT: f64 = WIDTH - 20.0;
+const TOP: f64 = 60.0;
+const BOTTOM: f64 = TOP + 230.0;
+const HEIGHT: f64 = BOTTOM + 52.0;
+/// A character is about as wide.
+const CHARACTER: f64 = 8.6;
+/// Room of a symbol in the legend, and from one entry to the next.
+const SYMBOL: f64 = 38.0;
+const APART: f64 = 24.0;
+const MIDDLE: &str = " text-anchor=\"middle\"";
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mark {
@@ -19,154 +29,156 @@ pub enum Mark {
 
 #[derive(Clone, Debug)]
 pub struct Series {
-    pub name: String,
+    pub name: &'static str,
     pub mark: Mark,
-    /// Points in the units of the axes, in the order of x.
+    /// Points in the units of the axes.
     pub points: Vec<[f64; 2]>,
 }
 
 #[derive(Clone, Debug)]
 pub struct Chart {
-    pub title: String,
+    pub title: &'static str,
     /// A sentence for people who cannot see it.
-    pub description: String,
-    /// Quantity and unit.
-    pub x: String,
-    pub y: String,
+    pub description: &'static str,
+    /// Quantity and unit along x and y.
+    pub axes: [&'static str; 2],
     /// Later series are drawn above the first ones.
     pub series: Vec<Series>,
 }
 
+/// The range of an axis, between round numbers.
+struct Range {
+    low: f64,
+    high: f64,
+    step: f64,
+}
+
+impl Range {
+    /// 0 to 1 around no values.
+    fn around(values: impl Iterator<Item = f64>) -> Self {
+        let bounds = values
+            .filter(|value| value.is_finite())
+            .map(|value| (value, value))
+            .reduce(|(low, high), (value, _)| (low.min(value), high.max(value)));
+        let (low, high) = bounds.unwrap_or((0.0, 1.0));
+        let (low, high) = (low.max(-1e12), high.min(1e12));
+        let step = round_up((high - low).max(1e-9 * high.abs().max(1e-3)) / 5.0);
+        let (low, high) = ((low / step).floor() * step, (high / step).ceil() * step);
+        Self { low, high: if high > low { high } else { low + step }, step }
+    }
+
+    /// 0 at the low end, 1 at the high one; NaN if it has no place.
+    fn part(&self, value: f64) -> f64 {
+        let part = (value - self.low) / (self.high - self.low);
+        if part.is_finite() { part.clamp(0.0, 1.0) } else { f64::NAN }
+    }
+
+    /// The parts at which round numbers stand, and these numbers.
+    fn ticks(&self) -> impl Iterator<Item = (f64, String)> {
+        let digits = (-self.step.log10().floor()).clamp(0.0, 9.0) as usize;
+        let first = (self.low / self.step - 1e-6).ceil();
+        (0..40)
+            .map(move |nth| (first + f64::from(nth)) * self.step + 0.0)
+            .take_while(|value| *value <= self.high + self.step * 1e-6)
+            .map(move |value| {
+                ((value - self.low) / (self.high - self.low), format!("{value:.digits$}"))
+            })
+    }
+}
+
+/// The place of shares of both ranges.
+fn place(x: f64, y: f64) -> DVec2 {
+    DVec2::new(LEFT + x * (RIGHT - LEFT), TOP + (1.0 - y) * (BOTTOM - TOP))
+}
+
 impl Chart {
     pub fn svg(&self) -> String {
+        let Self { title, description, axes, series } = self;
         let along = |axis: usize| {
-            let points = self.series.iter().flat_map(|series| &series.points);
-            points.map(move |point| point[axis])
+            Range::around(series.iter().flat_map(|it| &it.points).map(move |point| point[axis]))
         };
-        let (x, y) = (Range::around(along(0)), Range::around(along(1)));
-        let entries: Vec<Entry> = self.series.iter().map(entry).collect();
-        let plot = Plot::new(&self.title, HEIGHT, &entries);
-        let place = |[at, value]: [f64; 2]| plot.place(x.part(at), y.part(value));
-        let drawn: String = self
-            .series
-            .iter()
-            .map(|series| drawn(series.mark, reduced(&series.points).into_iter().map(place)))
-            .collect();
-        let nothing = self.series.iter().all(|series| series.points.is_empty());
-        let remark = if nothing {
-            let at = plot.place(0.5, 0.5);
-            format!(
-                "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">nothing recorded</text>\n",
-                at.x, at.y
-            )
-        } else {
-            String::new()
-        };
-        plot.svg((&x, &self.x), (&y, &self.y), &self.description, &(drawn + &remark))
+        let [x, y] = [along(0), along(1)];
+        let (mut legend, mut marks, mut labels) = (String::new(), String::new(), String::new());
+        let mut at = DVec2::new(LEFT, 48.0);
+        for Series { name, mark, points } in series {
+            legend += &drawn(*mark, [at + DVec2::new(SYMBOL / 2.0 - 4.0, -5.0)]);
+            legend += &text(at + DVec2::X * SYMBOL, "", name);
+            at.x += SYMBOL + name.len() as f64 * CHARACTER + APART;
+            marks +=
+                &drawn(*mark, points.iter().map(|point| place(x.part(point[0]), y.part(point[1]))));
+        }
+        if series.iter().all(|it| it.points.is_empty()) {
+            marks += &text(place(0.5, 0.5), MIDDLE, "nothing recorded");
+        }
+        let mut rules = Path::default();
+        for (part, number) in x.ticks() {
+            rules.segment(place(part, 0.0), place(part, 1.0));
+            labels += &text(place(part, 0.0) + DVec2::Y * 19.0, MIDDLE, &number);
+        }
+        for (part, number) in y.ticks() {
+            rules.segment(place(0.0, part), place(1.0, part));
+            let at = place(0.0, part) + DVec2::new(-7.0, 5.0);
+            labels += &text(at, " text-anchor=\"end\"", &number);
+        }
+        labels += &text(place(0.5, 0.0) + DVec2::Y * 42.0, MIDDLE, axes[0]);
+        let middle = Px(place(0.0, 0.5).y);
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" \
+             role=\"img\" font-family=\"{FONT}\" font-size=\"14\" fill=\"{ink}\">\n\
+             <title>{title}</title>\n<desc>{description}</desc>\n\
+             <rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"#fff\"/>\n\
+             <text x=\"{LEFT}\" y=\"22\" font-size=\"16\" font-weight=\"600\">{title}</text>\n{legend}{}{marks}\
+             <rect x=\"{LEFT}\" y=\"{TOP}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"{ink}\" stroke-width=\"1.2\"/>\n{labels}\
+             <text transform=\"translate(17 {middle}) rotate(-90)\"{MIDDLE}>{}</text>\n</svg>\n",
+            rules.element("stroke=\"#d5dbe1\" stroke-width=\"0.8\" fill=\"none\""),
+            RIGHT - LEFT,
+            BOTTOM - TOP,
+            axes[1],
+            ink = ink::TEXT,
+        )
     }
 }
 
-/// Least and greatest of each interval, so that no peak is lost.
-fn reduced(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
-    if points.len() <= MOST_POINTS {
-        return points.to_vec();
-    }
-    let stretch = points.len().div_ceil(MOST_POINTS / 2);
-    let kept = points.chunks(stretch).flat_map(|stretch| {
-        let by_value = |a: &&[f64; 2], b: &&[f64; 2]| a[1].total_cmp(&b[1]);
-        let least = stretch.iter().min_by(by_value);
-        let greatest = stretch.iter().max_by(by_value);
-        let mut both: Vec<_> = [least, greatest].into_iter().flatten().copied().collect();
-        both.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        both
-    });
-    kept.collect()
-}
-
-fn style(mark: Mark) -> String {
-    match mark {
-        Mark::Discs => format!("fill=\"{}\"", ink::TRUTH),
-        Mark::Crosses => format!("fill=\"none\" stroke=\"{}\" stroke-width=\"1.5\"", ink::FAILURE),
-    }
-}
-
-fn drawn(mark: Mark, points: impl Iterator<Item = DVec2>) -> String {
+fn drawn(mark: Mark, places: impl IntoIterator<Item = DVec2>) -> String {
     let mut path = Path::default();
-    for at in points.filter(|at| at.is_finite()) {
+    for at in places.into_iter().filter(|at| at.is_finite()) {
         match mark {
             Mark::Discs => path.circle(at, 1.7),
-            Mark::Crosses => add_cross(&mut path, at, 3.0),
+            Mark::Crosses => {
+                for reach in [DVec2::new(3.0, 3.0), DVec2::new(3.0, -3.0)] {
+                    path.segment(at - reach, at + reach);
+                }
+            }
         }
     }
-    path.element(&style(mark))
-}
-
-fn add_cross(path: &mut Path, at: DVec2, reach: f64) {
-    for side in [DVec2::new(1.0, 1.0), DVec2::new(1.0, -1.0)] {
-        path.move_to(at - side * reach);
-        path.line_to(at + side * reach);
-    }
-}
-
-fn entry(series: &Series) -> Entry {
-    let mark = series.mark;
-    let symbol = move |at: DVec2| drawn(mark, std::iter::once(at));
-    (Box::new(symbol), series.name.clone())
+    path.element(&match mark {
+        Mark::Discs => format!("fill=\"{}\"", ink::TRUTH),
+        Mark::Crosses => format!("fill=\"none\" stroke=\"{}\" stroke-width=\"1.5\"", ink::FAILURE),
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn chart(points: Vec<[f64; 2]>) -> Chart {
-        Chart {
-            title: "a <b> & \"c\"".to_owned(),
-            description: "speeds".to_owned(),
-            x: "time, s".to_owned(),
-            y: "v, m/s".to_owned(),
-            series: vec![
-                Series { name: "commanded".to_owned(), mark: Mark::Discs, points: points.clone() },
-                Series { name: "</text><script>".to_owned(), mark: Mark::Crosses, points },
-            ],
-        }
-    }
-
     #[test]
-    fn a_chart_names_axes_with_units_and_series_in_a_legend_and_escapes_all_of_it() {
-        let svg = chart(vec![[0.0, 0.1], [1.0, 0.2], [2.0, 0.15]]).svg();
-        for text in [
-            ">time, s<",
-            ">v, m/s<",
-            ">commanded<",
-            ">0.20<",
-            "a &lt;b&gt; &amp; &quot;c&quot;",
-            "&lt;/text&gt;&lt;script&gt;",
-        ] {
-            assert!(svg.contains(text), "{text} in {svg}");
-        }
-        roxmltree::Document::parse(&svg).unwrap();
-    }
-
-    #[test]
-    fn whatever_the_values_a_chart_is_a_file_of_bounded_size() {
+    fn a_chart_of_any_values_is_a_file_with_its_axes_their_units_and_a_legend() {
         let odd = [f64::NAN, f64::INFINITY, -1e300, 1e300, 0.0, -0.0, 1e-300];
-        let points = odd.iter().flat_map(|&x| odd.map(|y| [x, y])).collect();
-        let many = (0..1_000_000).map(|nth| [f64::from(nth), f64::from(nth % 977)]);
-        for points in [points, Vec::new(), vec![[1.0, 1.0]], many.collect()] {
-            let mut chart = chart(points);
-            for mark in [Mark::Discs, Mark::Crosses] {
-                chart.series[0].mark = mark;
-                let svg = chart.svg();
-                assert!(svg.len() < 400_000);
-                roxmltree::Document::parse(&svg).unwrap();
+        let odd = odd.iter().flat_map(|&x| odd.map(|y| [x, y])).collect();
+        for points in [odd, Vec::new(), vec![[1.0, 1.0]], vec![[0.0, 0.1], [1.0, 0.2]]] {
+            let series = |name, mark| Series { name, mark, points: points.clone() };
+            let chart = Chart {
+                title: "speeds",
+                description: "the speeds of a robot",
+                axes: ["time, s", "v, m/s"],
+                series: vec![series("commanded", Mark::Discs), series("driven", Mark::Crosses)],
+            };
+            let svg = chart.svg();
+            for text in [">time, s<", ">v, m/s<", ">commanded<", ">driven<"] {
+                assert!(svg.contains(text), "{text} in {svg}");
             }
+            assert!(points.len() != 2 || svg.contains(">0.20<"), "{svg}");
+            roxmltree::Document::parse(&svg).unwrap();
         }
-    }
-
-    #[test]
-    fn a_peak_among_very_many_points_is_drawn() {
-        let mut points: Vec<_> = (0..100_000).map(|nth| [f64::from(nth), 0.0]).collect();
-        points[54_321][1] = 7.0;
-        assert!(reduced(&points).contains(&[54_321.0, 7.0]));
     }
 }

@@ -11,36 +11,35 @@ pub(super) struct Lattice {
     pub(super) rows: usize,
     pub(super) width: f64,
     pub(super) height: f64,
-    placing: Placing,
-}
-
-#[derive(Clone, Copy, Debug)]
-enum Placing {
-    /// The mission frame, metres, y up.
-    Mission { frame: GridFrame, view: View },
-    /// Like an image, from a corner of the sheet, with the first row at the top and `cell` units a cell.
-    Image { corner: DVec2, cell: f64 },
+    /// The outer corner of the first cell, and the step from a cell to the next in both directions.
+    corner: DVec2,
+    step: DVec2,
 }
 
 impl Lattice {
+    /// Cells of the mission frame, with y up.
     pub(super) fn of_mission(frame: &GridFrame, view: &View) -> Self {
+        let side = frame.cells as usize;
+        let step = view.px(frame.resolution_m);
         Self {
-            cols: frame.cells as usize,
-            rows: frame.cells as usize,
+            cols: side,
+            rows: side,
             width: PLOT_SIDE,
             height: PLOT_SIDE,
-            placing: Placing::Mission { frame: *frame, view: *view },
+            corner: view.place(metres(frame, DVec2::splat(-0.5))),
+            step: DVec2::new(step, -step),
         }
     }
 
-    /// Each pixel is `cell` units wide.
+    /// Like an image, from `corner` of the sheet, with the first row at the top. Each cell is `cell` units wide.
     pub(super) fn of_image((cols, rows): (usize, usize), corner: DVec2, cell: f64) -> Self {
         Self {
             cols,
             rows,
             width: cols as f64 * cell,
             height: rows as f64 * cell,
-            placing: Placing::Image { corner, cell },
+            corner,
+            step: DVec2::splat(cell),
         }
     }
 
@@ -50,9 +49,6 @@ impl Lattice {
 
     /// `cells` has cell centres at whole numbers.
     pub(super) fn place(&self, cells: DVec2) -> DVec2 {
-        match &self.placing {
-            Placing::Mission { frame, view } => view.place(metres(frame, cells)),
-            Placing::Image { corner, cell } => *corner + (cells + 0.5) * *cell,
-        }
+        self.corner + (cells + 0.5) * self.step
     }
 }

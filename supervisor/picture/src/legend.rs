@@ -7,7 +7,7 @@ use super::{
     bands::Levels,
     cells::BelievedHazard,
     motion::{self, Motion},
-    page::{PLOT_LEFT, PLOT_SIDE, PLOT_TOP, Path, Px, View, ink, round_up},
+    page::{PLOT_LEFT, PLOT_SIDE, PLOT_TOP, Path, Px, View, ink, round_up, text},
     streamlines::arrowhead,
     world::Outline,
 };
@@ -41,21 +41,12 @@ impl Legend<'_> {
     pub(super) fn field_rows(&self, column: &mut Column) {
         if self.guidance {
             column.heading("Field of that belief");
-        }
-        if self.guidance {
             column.row("guidance E", guidance_symbol);
         }
         if self.isolated {
-            column.row("no way to the target", |at| {
-                patch(
-                    at,
-                    &format!(
-                        "fill=\"{}\" stroke=\"{}\" stroke-width=\"0.6\"",
-                        ink::NOWHERE,
-                        ink::QUIET
-                    ),
-                )
-            });
+            let style =
+                format!("fill=\"{}\" stroke=\"{}\" stroke-width=\"0.6\"", ink::NOWHERE, ink::QUIET);
+            column.row("no way to the target", |at| patch(at, &style));
         }
         if let Some(levels) = self.levels {
             column.text += &colour_bar(levels, column.x, column.y);
@@ -65,14 +56,7 @@ impl Legend<'_> {
 
     pub(super) fn motion_rows(&self, column: &mut Column) {
         column.heading("Motion");
-        let line = |style: String| {
-            move |at: DVec2| {
-                let mut path = Path::default();
-                path.move_to(at - DVec2::X * 17.0);
-                path.line_to(at + DVec2::X * 17.0);
-                path.element(&style)
-            }
-        };
+        let line = |style: String| move |at: DVec2| line(at, &style);
         let body = |style: String| {
             move |at: DVec2| {
                 let mut path = Path::default();
@@ -107,14 +91,10 @@ impl Legend<'_> {
         let cell = |colour: &'static str| move |at: DVec2| patch(at, &format!("fill=\"{colour}\""));
         if let Some(hazard) = self.hazard {
             column.heading("Believed hazardous");
-            if hazard.has_sensed() {
-                column.row("sensed, with margin", cell(ink::SENSED));
-            }
-            if hazard.has_known() {
-                column.row("known beforehand", cell(ink::KNOWN));
-            }
-            if hazard.has_perimeter() {
-                column.row("perimeter", cell(ink::PERIMETER));
+            for (colour, words, area) in hazard.areas().iter().rev() {
+                if !area.is_empty() {
+                    column.row(words, cell(colour));
+                }
             }
         }
         if !self.world.is_empty() {
@@ -135,10 +115,10 @@ impl Legend<'_> {
         bar.line_to(DVec2::new(right, y));
         bar.line_to(DVec2::new(right, y - 8.0));
         bar.element(&format!("fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\"", ink::TEXT))
-            + &format!(
-                "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">{length} m</text>\n",
-                Px((COLUMN + right) / 2.0),
-                Px(y - 7.0)
+            + &text(
+                DVec2::new((COLUMN + right) / 2.0, y - 7.0),
+                " text-anchor=\"middle\"",
+                &format!("{length} m"),
             )
     }
 }
@@ -159,18 +139,14 @@ impl Column {
         if !self.text.is_empty() {
             self.y += 14.0;
         }
-        self.text += &format!(
-            "<text x=\"{}\" y=\"{}\" font-size=\"14\" font-weight=\"600\">{words}</text>\n",
-            Px(self.x),
-            Px(self.y)
-        );
+        let at = DVec2::new(self.x, self.y);
+        self.text += &text(at, " font-size=\"14\" font-weight=\"600\"", words);
         self.y += ROW;
     }
 
     fn row(&mut self, words: &str, symbol: impl FnOnce(DVec2) -> String) {
         self.text += &symbol(DVec2::new(self.x + SYMBOL, self.y - 4.0));
-        self.text +=
-            &format!("<text x=\"{}\" y=\"{}\">{words}</text>\n", Px(self.x + WORDS), Px(self.y));
+        self.text += &text(DVec2::new(self.x + WORDS, self.y), "", words);
         self.y += ROW;
     }
 }
@@ -182,14 +158,17 @@ fn patch(at: DVec2, style: &str) -> String {
     path.element(style)
 }
 
+fn line(at: DVec2, style: &str) -> String {
+    let mut path = Path::default();
+    path.segment(at - DVec2::X * 17.0, at + DVec2::X * 17.0);
+    path.element(style)
+}
+
 fn guidance_symbol(at: DVec2) -> String {
-    let mut line = Path::default();
-    line.move_to(at - DVec2::X * 17.0);
-    line.line_to(at + DVec2::X * 17.0);
     let mut head = Path::default();
     head.polygon(arrowhead(at, DVec2::X));
     let colour = ink::GUIDANCE;
-    line.element(&format!("stroke=\"{colour}\" stroke-width=\"1\""))
+    line(at, &format!("stroke=\"{colour}\" stroke-width=\"1\""))
         + &head.element(&format!("fill=\"{colour}\""))
 }
 
@@ -200,20 +179,20 @@ fn colour_bar(levels: Levels, left: f64, y: f64) -> String {
     let bands = levels.count + 1;
     let width = LENGTH / f64::from(bands);
     let edge = |nth: u32| left + LENGTH - f64::from(nth) * width;
-    let mut text = format!(
-        "<text x=\"{left}\" y=\"{}\">log<tspan font-size=\"9\" dy=\"3\">2</tspan>\
-         <tspan dx=\"3\" dy=\"-3\">u, where u is the chance that</tspan></text>\n",
-        Px(y)
+    let at = |x: f64, down: f64| DVec2::new(x, y + down);
+    let mut bar = text(
+        at(left, 0.0),
+        "",
+        "log<tspan font-size=\"9\" dy=\"3\">2</tspan>\
+         <tspan dx=\"3\" dy=\"-3\">u, where u is the chance that</tspan>",
     );
-    for (nth, words) in [(1.0, "a random walk meets the"), (2.0, "target before a hazard")] {
-        text += &format!("<text x=\"{left}\" y=\"{}\">{words}</text>\n", Px(y + nth * 17.0));
-    }
-    let top = y + 45.0;
+    bar += &text(at(left, 17.0), "", "a random walk meets the");
+    bar += &text(at(left, 34.0), "", "target before a hazard");
     for nth in 0..bands {
-        text += &format!(
+        bar += &format!(
             "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"13\" fill=\"{}\"/>\n",
             Px(edge(nth + 1)),
-            Px(top),
+            Px(y + 45.0),
             Px(width),
             levels.colour(nth)
         );
@@ -221,14 +200,10 @@ fn colour_bar(levels: Levels, left: f64, y: f64) -> String {
     // Labels are so many levels apart that the longest has room.
     let longest = format!("-{}", levels.step * f64::from(levels.count)).len() as f64;
     let apart = ((longest * 7.0 + 14.0) / width).ceil().max(1.0) as usize;
+    let style = format!(" font-size=\"11\" text-anchor=\"middle\" fill=\"{}\"", ink::QUIET);
     for nth in (0..=levels.count).step_by(apart) {
         let value = 0.0 - levels.step * f64::from(nth);
-        text += &format!(
-            "<text x=\"{}\" y=\"{}\" font-size=\"11\" text-anchor=\"middle\" fill=\"{}\">{value}</text>\n",
-            Px(edge(nth)),
-            Px(top + 27.0),
-            ink::QUIET
-        );
+        bar += &text(at(edge(nth), 72.0), &style, &value.to_string());
     }
-    text
+    bar
 }

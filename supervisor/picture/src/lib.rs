@@ -13,7 +13,7 @@
 //! | `page`, `lattice` | the page, and cells on it |
 //! | [`Scene`] | the data of a picture |
 //!
-//! `map` draws the field of a bare map, `chart` values against each other; `plot` is its frame.
+//! `map` draws the field of a bare map, `chart` values against each other.
 //!
 //! Every layer but the frame may be missing, and every input gives a valid file.
 
@@ -26,7 +26,6 @@ mod map;
 mod margin;
 mod motion;
 mod page;
-mod plot;
 mod scene;
 mod streamlines;
 #[cfg(test)]
@@ -70,22 +69,6 @@ fn has_isolated_cells(
 }
 
 pub fn svg(scene: &Scene<'_>) -> String {
-    drawn(scene, |view, plot, legend| {
-        [
-            margin::open(scene),
-            plot,
-            margin::title(scene),
-            margin::axes(view),
-            legend.layer(),
-            margin::captions(scene),
-            "</svg>\n".to_owned(),
-        ]
-        .concat()
-    })
-}
-
-/// `sheet` puts the plot and its explanations together.
-fn drawn(scene: &Scene<'_>, sheet: impl FnOnce(&View, String, &Legend<'_>) -> String) -> String {
     let view = View::of(&scene.mission.grid_frame());
     let field = scene.field.filter(|(frame, cells)| cells.len() == frame.area());
     let grid = scene.grid.filter(|(frame, cells)| cells.len() == frame.area());
@@ -120,5 +103,14 @@ fn drawn(scene: &Scene<'_>, sheet: impl FnOnce(&View, String, &Legend<'_>) -> St
          {drawn}</g>\n",
         ink::NOWHERE
     );
-    sheet(&view, plot, &legend)
+    [
+        margin::open(scene),
+        plot,
+        margin::title(scene),
+        margin::axes(&view),
+        legend.layer(),
+        margin::captions(scene),
+        "</svg>\n".to_owned(),
+    ]
+    .concat()
 }

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::{
-    page::{PLOT_LEFT, PLOT_SIDE, PLOT_TOP, Path, Px, View, WIDTH, escape, ink, round_up},
+    page::{PLOT_LEFT, PLOT_SIDE, PLOT_TOP, Path, Px, View, WIDTH, escape, ink, round_up, text},
     scene::Scene,
     world,
 };
@@ -29,9 +29,11 @@ pub(super) fn open(scene: &Scene<'_>) -> String {
          width=\"{WIDTH}\" height=\"{height}\" role=\"img\" font-family=\"{FONT}\" \
          font-size=\"12.5\" fill=\"{}\">\n\
          <title>{name}</title>\n<desc>{facts}</desc>\n\
-         {}<rect width=\"{WIDTH}\" height=\"{height}\" fill=\"#fff\"/>\n",
+         <defs><clipPath id=\"plot\"><rect x=\"{PLOT_LEFT}\" y=\"{PLOT_TOP}\" \
+         width=\"{PLOT_SIDE}\" height=\"{PLOT_SIDE}\"/></clipPath>{}</defs>\n\
+         <rect width=\"{WIDTH}\" height=\"{height}\" fill=\"#fff\"/>\n",
         ink::TEXT,
-        definitions()
+        world::HATCH
     )
 }
 
@@ -90,20 +92,14 @@ pub(super) fn axes(view: &View) -> String {
             at[axis] = nth * step;
             let mark = view.place(at);
             let away = if axis == 0 { DVec2::Y } else { DVec2::NEG_X } * 6.0;
-            ticks.move_to(mark);
-            ticks.line_to(mark + away);
-            let (x, y, anchor) = if axis == 0 {
-                (mark.x, bottom + 20.0, "middle")
+            ticks.segment(mark, mark + away);
+            let (at, anchor) = if axis == 0 {
+                (DVec2::new(mark.x, bottom + 20.0), " text-anchor=\"middle\"")
             } else {
-                (PLOT_LEFT - 10.0, mark.y + 4.5, "end")
+                (DVec2::new(PLOT_LEFT - 10.0, mark.y + 4.5), " text-anchor=\"end\"")
             };
             // Adding 0 turns -0 into 0.
-            let value = nth * step + 0.0;
-            labels += &format!(
-                "<text x=\"{}\" y=\"{}\" text-anchor=\"{anchor}\">{value:.digits$}</text>\n",
-                Px(x),
-                Px(y)
-            );
+            labels += &text(at, anchor, &format!("{:.digits$}", nth * step + 0.0));
         }
     }
     let middle = PLOT_TOP + PLOT_SIDE / 2.0;
@@ -123,26 +119,12 @@ pub(super) fn axes(view: &View) -> String {
     )
 }
 
-/// Definitions that the layers of the plot use.
-fn definitions() -> String {
-    format!(
-        "<defs><clipPath id=\"plot\"><rect x=\"{PLOT_LEFT}\" y=\"{PLOT_TOP}\" \
-         width=\"{PLOT_SIDE}\" height=\"{PLOT_SIDE}\"/></clipPath>{}</defs>\n",
-        world::HATCH
-    )
-}
-
 pub(super) fn captions(scene: &Scene<'_>) -> String {
     let top = PLOT_TOP + PLOT_SIDE + BELOW + 6.0;
-    (0..)
-        .zip(scene.captions.iter().take(MOST_CAPTIONS))
-        .map(|(nth, caption)| {
-            format!(
-                "<text x=\"{PLOT_LEFT}\" y=\"{}\" fill=\"{}\">{}</text>\n",
-                Px(top + f64::from(nth) * LINE),
-                ink::QUIET,
-                escape(caption, ACROSS)
-            )
-        })
-        .collect()
+    let style = format!(" fill=\"{}\"", ink::QUIET);
+    let line = |(nth, caption): (u32, &String)| {
+        let at = DVec2::new(PLOT_LEFT, top + f64::from(nth) * LINE);
+        text(at, &style, &escape(caption, ACROSS))
+    };
+    (0..).zip(scene.captions.iter().take(MOST_CAPTIONS)).map(line).collect()
 }

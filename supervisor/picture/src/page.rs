@@ -178,6 +178,11 @@ impl Path {
         }
     }
 
+    pub(super) fn segment(&mut self, from: DVec2, to: DVec2) {
+        self.move_to(from);
+        self.line_to(to);
+    }
+
     pub(super) fn polygon(&mut self, corners: impl IntoIterator<Item = DVec2>) {
         for (nth, corner) in corners.into_iter().enumerate() {
             self.push(if nth == 0 { 'M' } else { 'L' }, corner);
@@ -217,6 +222,11 @@ impl Path {
         }
         format!("<path d=\"{}\" {style}/>\n", self.data)
     }
+}
+
+/// `words` are XML, `style` further attributes, each behind a space.
+pub(super) fn text(at: DVec2, style: &str, words: &str) -> String {
+    format!("<text x=\"{}\" y=\"{}\"{style}>{words}</text>\n", Px(at.x), Px(at.y))
 }
 
 /// XML character data of at most `limit` characters.

@@ -1,9 +1,8 @@
-//! Tests of the picture, on a true harmonic field and on unusual scenes.
+//! Tests of the picture, on an ordinary run and on unusual scenes.
 
 use std::path::Path;
 
 use common::{
-    geometry::distance_to_segment,
     grid::{Cell, CellState},
     kinematics::Pose2,
     mission::Mission,
@@ -83,97 +82,35 @@ fn mission(cells: u32) -> Mission {
     Mission::parse(&text, Path::new("three-drums.toml")).unwrap()
 }
 
-/// The belief of a robot that came along y = 0: the near sides of the shapes there.
-fn belief(mission: &Mission) -> Vec<u8> {
-    let frame = mission.grid_frame();
-    let margin = 0.25;
-    (0..frame.area() as u32)
-        .map(|at| {
-            let cell = Cell { col: at % frame.cells, row: at / frame.cells };
-            let point = frame.centre_of(cell);
-            let faces_start = |centre: DVec2| (point - centre).dot(centre) < 0.0;
-            let at_wall = |nth: usize| {
-                let corners = &mission.world.walls[0].points;
-                distance_to_segment(point, corners[nth], corners[nth + 1]) < margin
-            };
-            let sensed = mission.world.drums.iter().any(|drum| {
-                (point.distance(drum.at) - drum.radius_m).abs() < margin && faces_start(drum.at)
-            }) || at_wall(1);
-            let state = if frame.is_rim(cell) {
-                CellState::Perimeter
-            } else if mission.known.clearance(point) < margin {
-                CellState::Known
-            } else if sensed {
-                CellState::Sensed
-            } else {
-                CellState::Free
-            };
-            state as u8
-        })
-        .collect()
-}
-
-/// u of (11) by over-relaxation, and E from it.
-fn harmonic(mission: &Mission, grid: &[u8], sweeps: usize) -> Vec<FieldCell> {
-    let frame = mission.grid_frame();
-    let across = frame.cells as usize;
-    let target = frame.index(frame.cell_at(mission.target).unwrap());
-    let mut u = vec![0.0_f64; grid.len()];
-    u[target] = 1.0;
-    for _ in 0..sweeps {
-        for at in (0..grid.len()).filter(|&at| grid[at] == 0 && at != target) {
-            let mean = (u[at - 1] + u[at + 1] + u[at - across] + u[at + across]) / 4.0;
-            u[at] += 1.9 * (mean - u[at]);
-        }
-    }
-    let cell = |at: usize| {
-        if grid[at] != 0 {
-            return FieldCell { log2_u: f32::NEG_INFINITY, ..FieldCell::default() };
-        }
-        let rise = DVec2::new(u[at + 1] - u[at - 1], u[at + across] - u[at - across]);
-        let e = if at == target { DVec2::ZERO } else { rise.normalize_or_zero() };
-        FieldCell { ex: e.x as f32, ey: e.y as f32, log2_u: u[at].log2() as f32 }
-    };
-    (0..grid.len()).map(cell).collect()
-}
-
-/// A robot that turns towards E, and what it believes with a wheel that is a little too large.
-fn drive(mission: &Mission, field: &[FieldCell]) -> (Vec<Pose2>, Vec<Pose2>) {
-    let frame = mission.grid_frame();
-    let (mut truth, mut believed) = (vec![mission.start_pose()], vec![mission.start_pose()]);
-    while truth.len() < 7 * 60 {
-        let (here, believed_here) = (truth[truth.len() - 1], believed[believed.len() - 1]);
-        let to_go = here.position.distance(mission.target);
-        if to_go < mission.arrival_tolerance_m {
-            break;
-        }
-        let e = frame.cell_at(here.position).map_or(DVec2::ZERO, |cell| {
-            let cell = field[frame.index(cell)];
-            DVec2::new(cell.ex.into(), cell.ey.into())
-        });
-        let turn = (here.axis().perp_dot(e) * 1.8).clamp(-0.8, 0.8) / 7.0;
-        let arc = 0.3 / 7.0 * here.axis().dot(e).max(0.1) * (to_go / 0.4).min(1.0);
-        truth.push(here.along_arc(arc, turn));
-        believed.push(believed_here.along_arc(arc * 1.01, turn * 1.06));
-    }
-    (truth, believed)
-}
-
+/// A robot that goes straight to the target, on a field that leads there.
 fn three_drums() -> Run {
     let mission = mission(120);
-    let grid = belief(&mission);
-    let field = harmonic(&mission, &grid, 3000);
-    let (truth, believed) = drive(&mission, &field);
+    let frame = mission.grid_frame();
+    let cells =
+        (0..frame.area() as u32).map(|at| Cell { col: at % frame.cells, row: at / frame.cells });
+    let state = |cell| match (frame.is_rim(cell), mission.known.clearance(frame.centre_of(cell))) {
+        (true, _) => CellState::Perimeter as u8,
+        (false, clearance) if clearance < 0.25 => CellState::Known as u8,
+        (false, _) => CellState::Free as u8,
+    };
+    let policy = |cell| {
+        let way = mission.target - frame.centre_of(cell);
+        let e = way.normalize_or_zero();
+        FieldCell { ex: e.x as f32, ey: e.y as f32, log2_u: -way.length() as f32 }
+    };
+    let poses = |aside: f64| -> Vec<Pose2> {
+        let at = |nth: u32| mission.target * f64::from(nth) / 100.0 + DVec2::Y * aside;
+        (0..100)
+            .map(|nth| Pose2 { position: at(nth), heading: mission.target.to_angle() })
+            .collect()
+    };
     Run {
+        grid: cells.clone().map(state).collect(),
+        field: cells.map(policy).collect(),
+        believed: poses(0.1),
+        truth: poses(0.0),
+        captions: vec!["Least true clearance 0.11 m".to_owned()],
         mission,
-        grid,
-        field,
-        believed,
-        truth,
-        captions: vec![
-            "Least true clearance 0.11 m · pose error at the end 0.08 m · 1 full solve".to_owned(),
-            "Tick latency 310 µs (median), 520 µs (99 %) · no restarts".to_owned(),
-        ],
     }
 }
 
@@ -229,47 +166,8 @@ impl Dice {
     }
 }
 
-/// Assert that every tag is closed in order, every attribute is quoted, and no stray `<`, `&` or control character is
-/// left.
 fn assert_well_formed(xml: &str) {
-    let mut open = Vec::new();
-    let mut rest = xml;
-    while let Some((text, tail)) = rest.split_once('<') {
-        assert_characters(text);
-        let (tag, after) = tail.split_once('>').unwrap();
-        rest = after;
-        if let Some(name) = tag.strip_prefix('/') {
-            assert_eq!(open.pop(), Some(name));
-            continue;
-        }
-        let body = tag.strip_suffix('/').unwrap_or(tag);
-        let name = body.split(' ').next().unwrap();
-        assert!(name.chars().all(char::is_alphabetic), "<{tag}>");
-        let mut quoted = body[name.len()..].split('"');
-        let mut before = quoted.next().unwrap();
-        while let Some(value) = quoted.next() {
-            let key = before.trim().strip_suffix('=');
-            assert!(key.is_some_and(|key| !key.contains(' ')), "<{tag}>");
-            assert_characters(value);
-            before = quoted.next().unwrap();
-        }
-        assert!(before.trim().is_empty(), "<{tag}>");
-        if body == tag {
-            open.push(name);
-        }
-    }
-    assert!(open.is_empty() && rest.trim().is_empty());
-}
-
-fn assert_characters(text: &str) {
-    assert!(!text.contains('>') && !text.chars().any(|c| c.is_control() && c != '\n'));
-    for reference in text.split('&').skip(1) {
-        let name = reference.split(';').next().unwrap();
-        assert!(["lt", "gt", "amp", "quot"].contains(&name), "&{reference}");
-    }
-}
-
-fn assert_numbers(xml: &str) {
+    roxmltree::Document::parse(xml).unwrap();
     assert!(!xml.contains("NaN") && !xml.contains("inf"), "not a number");
 }
 
@@ -284,7 +182,6 @@ fn any_scene_makes_well_formed_xml_without_nan() {
         scene.facts.straight_m = 0.0;
         let picture = svg(&scene);
         assert_well_formed(&picture);
-        assert_numbers(&picture);
     }
 }
 
@@ -296,7 +193,6 @@ fn a_run_that_ended_at_once_still_makes_a_picture() {
     (scene.believed, scene.truth) = (&[], &[]);
     let picture = svg(&scene);
     assert_well_formed(&picture);
-    assert_numbers(&picture);
     assert!(picture.contains("three-drums"));
 
     // A field of another size than its frame says is not drawn.

@@ -146,6 +146,26 @@ fn slices_of_any_length_up_to_the_longest_arrive_and_longer_ones_are_refused() {
 }
 
 #[test]
+fn a_reader_gets_what_the_most_writers_published_that_ended_at_once() {
+    with_bus("ended", |bus| {
+        let mut reader = STRUCTS.recorder_reader(bus).unwrap();
+        let writers = 0..Limits::WRITERS as u32;
+        let mut writers: Vec<_> =
+            writers.map(|generation| bus.writer(&STRUCTS, generation).unwrap()).collect();
+        let mut message = Vec::new();
+        assert_eq!(reader.next_message(&mut message).unwrap(), None);
+        for writer in &mut writers {
+            writer.publish_quietly(1, TIME, Test::default(), &[]).unwrap();
+        }
+        drop(writers);
+        let taken = std::iter::from_fn(|| reader.next_message(&mut message).unwrap());
+        let mut generations: Vec<_> = taken.map(|stamp| stamp.generation).collect();
+        generations.sort_unstable();
+        assert_eq!(generations, (0..Limits::WRITERS as u32).collect::<Vec<_>>());
+    });
+}
+
+#[test]
 fn a_topic_is_not_opened_as_another_payload_or_another_shape() {
     with_bus("foreign", |bus| {
         let as_cells = Topic::<Test, Cell>::new(BYTES.spec());

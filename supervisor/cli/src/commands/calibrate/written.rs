@@ -102,8 +102,8 @@ impl Found {
     }
 
     fn svg(&self) -> String {
-        let series = |name: &str, to_the_left: bool| Series {
-            name: name.to_owned(),
+        let series = |name, to_the_left: bool| Series {
+            name,
             mark: if to_the_left { Mark::Discs } else { Mark::Crosses },
             points: self
                 .residuals
@@ -113,11 +113,9 @@ impl Found {
                 .collect(),
         };
         Chart {
-            title: "Residuals of the calibration".to_owned(),
-            description: "How far each loop or square is from what the calibrated wheels say, in standard deviations."
-                .to_owned(),
-            x: "loop or square".to_owned(),
-            y: "residual, standard deviations".to_owned(),
+            title: "Residuals of the calibration",
+            description: "How far each loop or square is from what the calibrated wheels say, in standard deviations.",
+            axes: ["loop or square", "residual, standard deviations"],
             series: vec![series("to the left", true), series("to the right", false)],
         }
         .svg()
