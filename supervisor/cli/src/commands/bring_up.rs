@@ -274,14 +274,11 @@ fn as_json(finding: &Finding) -> serde_json::Value {
 fn drawn(placed: Option<&Placed>) -> String {
     let points = placed.map_or(&[][..], |placed| &placed.points);
     Chart {
-        title: "What the laser saw, placed by the motion that was found".to_owned(),
-        description:
-            "Where the beams of all scans ended: one sharp outline if everything is as found."
-                .to_owned(),
-        x: "ahead of the robot's first place, m".to_owned(),
-        y: "to its left, m".to_owned(),
+        title: "What the laser saw, placed by the motion that was found",
+        description: "Where the beams of all scans ended: one sharp outline if everything is as found.",
+        axes: ["ahead of the robot's first place, m", "to its left, m"],
         series: vec![Series {
-            name: "ends of beams".to_owned(),
+            name: "ends of beams",
             mark: Mark::Crosses,
             points: points.iter().map(|it| [it.x, it.y]).collect(),
         }],
