@@ -30,7 +30,7 @@
 //! # A stage of your own
 //! The guide's page `add-a-stage.md` adds one, an odometer.
 
-use std::fmt::Debug;
+use std::{borrow::Cow, fmt::Debug};
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use thiserror::Error;
@@ -207,13 +207,13 @@ impl Further for () {
     }
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Answer<P> {
     pub sample: P,
     /// Whether the state is saved before the sample is published. Otherwise no tick waits for the file.
     pub saves_first: bool,
     /// A warning for the log of the process.
-    pub warning: Option<&'static str>,
+    pub warning: Option<Cow<'static, str>>,
 }
 
 impl<P> From<P> for Answer<P> {
@@ -229,7 +229,7 @@ pub struct Sample<P: Layout, F>(#[serde(with = "inputs::sample")] P, F);
 impl<A: Answering> Stage for A {
     type Start = Option<A::State>;
     type Entry<'a> = Sample<A::In, A::Further>;
-    type Outcome = Option<&'static str>;
+    type Outcome = Option<Cow<'static, str>>;
 
     fn new(mission: &Mission) -> Self {
         Answering::new(mission)

@@ -48,26 +48,6 @@ impl<'a> Reader<'a> {
         Ok(bytes)
     }
 
-    pub fn u8(&mut self) -> Result<u8, Malformed> {
-        self.primitive().map(u8::from_be_bytes)
-    }
-
-    pub fn u32(&mut self) -> Result<u32, Malformed> {
-        self.primitive().map(u32::from_be_bytes)
-    }
-
-    pub fn i32(&mut self) -> Result<i32, Malformed> {
-        self.primitive().map(i32::from_be_bytes)
-    }
-
-    pub fn f32(&mut self) -> Result<f32, Malformed> {
-        self.primitive().map(f32::from_be_bytes)
-    }
-
-    pub fn f64(&mut self) -> Result<f64, Malformed> {
-        self.primitive().map(f64::from_be_bytes)
-    }
-
     pub fn f64s<const N: usize>(&mut self) -> Result<[f64; N], Malformed> {
         let mut numbers = [0.0; N];
         for number in &mut numbers {
@@ -125,30 +105,6 @@ impl Writer {
         self
     }
 
-    pub fn u8(&mut self, number: u8) -> &mut Self {
-        self.primitive([number])
-    }
-
-    pub fn u16(&mut self, number: u16) -> &mut Self {
-        self.primitive(number.to_le_bytes())
-    }
-
-    pub fn u32(&mut self, number: u32) -> &mut Self {
-        self.primitive(number.to_le_bytes())
-    }
-
-    pub fn i32(&mut self, number: i32) -> &mut Self {
-        self.primitive(number.to_le_bytes())
-    }
-
-    pub fn f32(&mut self, number: f32) -> &mut Self {
-        self.primitive(number.to_le_bytes())
-    }
-
-    pub fn f64(&mut self, number: f64) -> &mut Self {
-        self.primitive(number.to_le_bytes())
-    }
-
     pub fn f64s(&mut self, numbers: &[f64]) -> &mut Self {
         numbers.iter().fold(self, |writer, number| writer.f64(*number))
     }
@@ -185,3 +141,21 @@ impl Writer {
         std::mem::take(&mut self.0)
     }
 }
+
+macro_rules! numbers {
+    ($($number:ident)*) => {
+        impl Reader<'_> {
+            $(pub fn $number(&mut self) -> Result<$number, Malformed> {
+                self.primitive().map($number::from_be_bytes)
+            })*
+        }
+
+        impl Writer {
+            $(pub fn $number(&mut self, number: $number) -> &mut Self {
+                self.primitive(number.to_le_bytes())
+            })*
+        }
+    };
+}
+
+numbers! { u8 u16 u32 i32 f32 f64 }

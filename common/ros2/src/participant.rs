@@ -288,20 +288,14 @@ impl AsFd for Participant {
     }
 }
 
-impl fmt::Debug for Participant {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Participant").field("guid", &self.inner.guid()).finish_non_exhaustive()
-    }
+macro_rules! debug_by_guid {
+    ($($name:ident.$inner:tt)*) => {$(
+        impl fmt::Debug for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                write!(f, "{} {:?}", stringify!($name), self.$inner.guid())
+            }
+        }
+    )*};
 }
 
-impl fmt::Debug for Reader {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Reader").field("guid", &self.inner.guid()).finish_non_exhaustive()
-    }
-}
-
-impl fmt::Debug for Writer {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Writer").field("guid", &self.0.guid()).finish_non_exhaustive()
-    }
-}
+debug_by_guid! { Participant.inner Reader.inner Writer.0 }

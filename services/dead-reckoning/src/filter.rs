@@ -265,6 +265,10 @@ impl History {
         &self.newest
     }
 
+    pub(crate) const fn ticks(&self) -> &VecDeque<Tick> {
+        &self.ticks
+    }
+
     pub(crate) fn restart(&mut self, estimate: Filter) {
         let last = self.ticks.back().map(|tick| Tick { time: tick.time, ..Tick::default() });
         *self = Self::new(estimate);

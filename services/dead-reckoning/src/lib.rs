@@ -8,6 +8,7 @@
 //! | `filter` | the estimate, and the ticks and fixes of the last 2 s |
 //! | `tick` | the motion of one tick |
 //! | `gyro` | the turn of a tick from a gyro's increments |
+//! | `disagreement` | whether laser and wheels disagree on every motion, and why |
 //! | `relocation` | whether fixes that contradict the pose agree among themselves |
 //!
 //! The state is saved after the pose is published, so that the tick does not wait for the file. A process killed in between has
@@ -17,6 +18,7 @@
 //! saved first; if all processes are killed then, a resumed run counts the tick again.
 
 mod covariance;
+mod disagreement;
 mod filter;
 mod gyro;
 mod relocation;

@@ -18,6 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     covariance::ErrorModel,
+    disagreement::{Cause, DOUBT, Disagreement},
     filter::{Filter, Fix, History, Motions, Refused},
     gyro::Gyro,
     relocation::Contradictions,
@@ -62,6 +63,8 @@ pub struct State {
     /// The counts of `last` without their cycle, of a robot that has no counter. States of older recordings have none.
     #[serde(deserialize_with = "if_there")]
     counts: Option<CountsSample>,
+    #[serde(deserialize_with = "if_there")]
+    disagreement: Disagreement,
 }
 
 impl State {
@@ -95,6 +98,8 @@ pub struct Reckoned {
     pub relocated: bool,
     /// Unless the fix before was refused for the same reason.
     pub refused: Option<FixRefusal>,
+    /// Why laser and wheels disagree, if that is new.
+    pub(crate) disagree: Option<Cause>,
 }
 
 /// (20) and (21).
@@ -150,6 +155,7 @@ impl Answering for DeadReckoning {
                 fixes_refused: 0,
                 refusal: FixRefusal::None.into(),
                 counts: None,
+                disagreement: Disagreement::default(),
             },
         }
     }
@@ -174,11 +180,15 @@ impl Answering for DeadReckoning {
         now: MissionTime,
     ) -> Answer<PoseSample> {
         let first = self.state.newest().is_none();
-        let Reckoned { pose, rejected, relocated, refused } = self.reckon(wheels, sources, now);
-        let warning = match refused {
-            _ if rejected => Some("the encoder counts restarted or jumped; the pose stays"),
-            _ if relocated => Some("fixes that agree contradict the pose; the pose is theirs now"),
-            refused => refused.map(FixRefusal::words),
+        let Reckoned { pose, rejected, relocated, refused, disagree } =
+            self.reckon(wheels, sources, now);
+        let warning = match (disagree, refused) {
+            (Some(cause), _) => Some(cause.words().into()),
+            _ if rejected => Some("the encoder counts restarted or jumped; the pose stays".into()),
+            _ if relocated => {
+                Some("fixes that agree contradict the pose; the pose is theirs now".into())
+            }
+            (None, refused) => refused.map(|why| why.words().into()),
         };
         Answer { sample: pose, saves_first: first || rejected || relocated, warning }
     }
@@ -201,7 +211,13 @@ impl DeadReckoning {
         if let Some(last) = self.state.last {
             if last.tick == wheels.stamp.tick {
                 let pose = self.sample();
-                return Reckoned { pose, rejected, relocated: false, refused: None };
+                return Reckoned {
+                    pose,
+                    rejected,
+                    relocated: false,
+                    refused: None,
+                    disagree: None,
+                };
             }
             elapsed = now.since(last.time).as_secs_f64();
             let counted = self.moved(last, counts, wheels, elapsed);
@@ -220,9 +236,13 @@ impl DeadReckoning {
         state.travelled += motion.v.abs();
         state.history.advance(&self.motions, tick);
         state.history.turn(&self.motions, &mut state.gyro, turns);
-        let (mut relocated, mut refused) = (false, None);
+        let (mut relocated, mut refused, mut disagree) = (false, None, None);
         for fix in fixes {
             let taken = self.take_fix(fix);
+            if let Ok(fix) = Fix::try_from(fix) {
+                let State { disagreement, history, .. } = &mut self.state;
+                disagree = disagreement.compare(&fix, history.ticks()).or(disagree);
+            }
             relocated |= taken == Taken::Relocated;
             let why = match taken {
                 Taken::Refused(why) => why,
@@ -245,7 +265,7 @@ impl DeadReckoning {
             v,
             omega,
         });
-        Reckoned { pose: self.sample(), rejected, relocated, refused }
+        Reckoned { pose: self.sample(), rejected, relocated, refused, disagree }
     }
 
     /// Take a fix, unless it is refused.
@@ -354,6 +374,12 @@ impl DeadReckoning {
         let way = [x * x, x * y, x * turn, y * y, y * turn, turn * turn];
         let mut covariance = estimate.covariance.of_pose();
         covariance.iter_mut().zip(way).for_each(|(entry, more)| *entry += more);
+        if self.state.disagreement.is_named() {
+            let [place, heading] = DOUBT;
+            for (entry, more) in [(0, place), (3, place), (5, heading)] {
+                covariance[entry] += more;
+            }
+        }
         let turned = heading - odometry.heading;
         let origin = position - DVec2::from_angle(turned).rotate(odometry.position);
         PoseSample {

@@ -1,21 +1,13 @@
 //! The table of metrics, under their field names. A value comes from the run's summary, which knows the ground truth of a
 //! simulated robot; or else from the recording, which knows the robot's estimate.
 
+use common::samples::PoseSample;
 use serde_json::{Value, json};
 
 use crate::{
     content::Content,
     shortest_path::{ShortestPath, shortest_path},
 };
-
-struct Metric {
-    /// The name in the literature.
-    name: &'static str,
-    /// The field in `summary.json`, or the formula.
-    field: &'static str,
-    /// The value with its unit; a dash if it is unknown.
-    value: String,
-}
 
 fn shown(value: Option<f64>, digits: usize, unit: &str) -> String {
     match value.filter(|value| value.is_finite()) {
@@ -39,22 +31,15 @@ fn spl(content: &Content, path: Option<f64>) -> Option<f64> {
     }
 }
 
-/// The rows of the table as the page takes them: name, value, field.
+/// The rows of the table as the page takes them: the name in the literature, the value with its unit or a dash, and the field in
+/// `summary.json` or the formula.
 pub(crate) fn rows(content: &Content) -> Vec<Value> {
-    let rows = table(content).into_iter();
-    rows.map(|metric| json!([metric.name, metric.value, metric.field])).collect()
-}
-
-fn table(content: &Content) -> Vec<Metric> {
     let measured = &content.measured;
-    let of = |field: &str, measured: Option<f64>| content.summed(field).or(measured);
     let has_poses = measured.ticks > 0;
-    let time = of("mission_time_s", has_poses.then_some(content.duration_s()));
+    let of = |field: &str, measured: Option<f64>| content.summed(field).or(measured);
     let path = of("path_length_m", has_poses.then_some(measured.path_m));
-    let straight = content.mission.target.length();
-    let straight = (straight > 0.0).then_some(straight);
+    let straight = Some(content.mission.target.length()).filter(|straight| *straight > 0.0);
     let ratio = path.zip(straight).map(|(path, straight)| path / straight);
-    let full = measured.solves();
     let latency = measured.latency();
     let quantile = |field: &str, share: f64| {
         let summed = content.summary.get("tick_latency_us");
@@ -64,76 +49,68 @@ fn table(content: &Content) -> Vec<Metric> {
     let success = match content.outcome() {
         Some(reached) if reached.starts_with("reached") => format!("1 ({reached})"),
         Some(other) => format!("0 ({other})"),
-        None => "\u{2013}".to_owned(),
+        None => shown(None, 0, ""),
     };
-    let row = |name, field, value| Metric { name, field, value };
+    let row = |name, field: &str, value: Option<f64>, digits, unit| {
+        json!([name, shown(value, digits, unit), field])
+    };
+    // The recording says what the summary does not.
+    let known =
+        |name, field, measured, digits, unit| row(name, field, of(field, measured), digits, unit);
     let count = |value: u64| Some(value as f64);
+    let pose = measured.last_pose();
+    let time = has_poses.then_some(content.duration_s());
+    let [rms, within] = [PoseSample::position_rms_m, PoseSample::position_within_m];
     vec![
-        row("success", "outcome", success),
-        row("mission time", "mission_time_s", shown(time, 1, "s")),
-        row("path length", "path_length_m", shown(path, 2, "m")),
-        row("straight distance", "straight_m", shown(straight, 2, "m")),
-        row("K, path / straight", "path_length_m / straight_m", shown(ratio, 3, "")),
+        json!(["success", success, "outcome"]),
+        known("mission time", "mission_time_s", time, 1, "s"),
+        row("path length", "path_length_m", path, 2, "m"),
+        row("straight distance", "straight_m", straight, 2, "m"),
+        row("K, path / straight", "path_length_m / straight_m", ratio, 3, ""),
         row(
             "SPL, success weighted by path length",
             "success × shortest / max(path, shortest)",
-            shown(spl(content, path), 3, ""),
+            spl(content, path),
+            3,
+            "",
         ),
-        row(
-            "least true clearance",
-            "min_clearance_m",
-            shown(content.summed("min_clearance_m"), 3, "m"),
-        ),
+        known("least true clearance", "min_clearance_m", None, 3, "m"),
         row(
             "share of ticks with a sonar reading nearer than d_safe",
             "range below mapper.map_within_m",
-            shown(measured.near(), 3, ""),
+            measured.near(),
+            3,
+            "",
         ),
-        row("mean |dv/dt|", "v of pose", shown(measured.speed_change(), 3, "m/s²")),
-        row(
-            "safety events",
-            "safety_events",
-            shown(of("safety_events", count(measured.safety_events)), 0, ""),
-        ),
-        row(
+        row("mean |dv/dt|", "v of pose", measured.speed_change(), 3, "m/s²"),
+        known("safety events", "safety_events", count(measured.safety_events), 0, ""),
+        known(
             "share of the sonar unavailable",
             "sonar_unavailable_share",
-            shown(of("sonar_unavailable_share", measured.unavailable()), 3, ""),
+            measured.unavailable(),
+            3,
+            "",
         ),
         row(
             "range of the commanded wheel speeds",
             "wheel_range_rad_s",
-            shown(wheel_range(content), 2, "rad/s"),
+            wheel_range(content),
+            2,
+            "rad/s",
         ),
-        row("pose error at the end", "pose_error_m", shown(content.summed("pose_error_m"), 3, "m")),
-        row(
-            "pose error expected",
-            "pose_error_expected_m",
-            shown(
-                of("pose_error_expected_m", measured.last_pose().map(|pose| pose.position_rms_m())),
-                3,
-                "m",
-            ),
-        ),
-        row(
-            "pose known within",
-            "pose_within_m",
-            shown(
-                of("pose_within_m", measured.last_pose().map(|pose| pose.position_within_m())),
-                3,
-                "m",
-            ),
-        ),
-        row("collisions", "collisions", shown(content.summed("collisions"), 0, "")),
-        row("full solves", "full_solves", shown(of("full_solves", count(full)), 0, "")),
-        row("looks", "looks", shown(content.summed("looks"), 0, "")),
-        row("tick latency, median", "tick_latency_us.p50", shown(quantile("p50", 0.5), 2, "ms")),
-        row("tick latency, 99 %", "tick_latency_us.p99", shown(quantile("p99", 0.99), 2, "ms")),
-        row("tick latency, longest", "tick_latency_us.max", shown(quantile("max", 1.0), 2, "ms")),
-        row("ticks", "ticks", shown(of("ticks", count(measured.ticks)), 0, "")),
-        row("restarts of stages", "restarts", restarts(content)),
-        row("replans after stalls", "replans", shown(content.summed("replans"), 0, "")),
-        row("resets of the map", "resets", shown(content.summed("resets"), 0, "")),
+        known("pose error at the end", "pose_error_m", None, 3, "m"),
+        known("pose error expected", "pose_error_expected_m", pose.map(rms), 3, "m"),
+        known("pose known within", "pose_within_m", pose.map(within), 3, "m"),
+        known("collisions", "collisions", None, 0, ""),
+        known("full solves", "full_solves", count(measured.solves()), 0, ""),
+        known("looks", "looks", None, 0, ""),
+        row("tick latency, median", "tick_latency_us.p50", quantile("p50", 0.5), 2, "ms"),
+        row("tick latency, 99 %", "tick_latency_us.p99", quantile("p99", 0.99), 2, "ms"),
+        row("tick latency, longest", "tick_latency_us.max", quantile("max", 1.0), 2, "ms"),
+        known("ticks", "ticks", count(measured.ticks), 0, ""),
+        row("restarts of stages", "restarts", restarts(content), 0, ""),
+        known("replans after stalls", "replans", None, 0, ""),
+        known("resets of the map", "resets", None, 0, ""),
     ]
 }
 
@@ -146,11 +123,7 @@ fn wheel_range(content: &Content) -> Option<f64> {
     summed.or_else(|| content.measured.wheel_range())
 }
 
-fn restarts(content: &Content) -> String {
-    let restarts = content.summary.get("restarts");
-    let times = restarts.and_then(|restarts| {
-        let times = restarts.as_object()?.values();
-        Some(times.filter_map(Value::as_u64).sum::<u64>() as f64)
-    });
-    shown(times, 0, "")
+fn restarts(content: &Content) -> Option<f64> {
+    let times = content.summary.get("restarts")?.as_object()?.values();
+    Some(times.filter_map(Value::as_u64).sum::<u64>() as f64)
 }

@@ -123,11 +123,10 @@ impl Shared {
     }
 }
 
-/// The data that one browser has been sent.
-#[derive(Debug)]
-pub(crate) struct Cursor {
-    shared: Arc<Shared>,
-    run: u64,
+/// The data of a run that a browser has been sent.
+#[derive(Debug, Default)]
+struct Sent {
+    run: Option<u64>,
     connected: bool,
     problem: String,
     rows: u64,
@@ -136,6 +135,13 @@ pub(crate) struct Cursor {
     map: u64,
     field: u64,
     preview: u64,
+}
+
+/// One browser that watches.
+#[derive(Debug)]
+pub(crate) struct Cursor {
+    shared: Arc<Shared>,
+    sent: Sent,
 }
 
 /// The new data for a browser.
@@ -149,40 +155,26 @@ pub(crate) struct News {
 impl Cursor {
     pub(crate) fn new(shared: &Arc<Shared>) -> Self {
         shared.watching.fetch_add(1, Ordering::Relaxed);
-        Self {
-            shared: shared.clone(),
-            run: u64::MAX,
-            connected: false,
-            problem: String::new(),
-            rows: 0,
-            events: 0,
-            state: 0,
-            map: 0,
-            field: 0,
-            preview: 0,
-        }
+        Self { shared: shared.clone(), sent: Sent::default() }
     }
 
     /// The new data since the last time.
     pub(crate) fn news(&mut self) -> News {
-        let shared = self.shared.clone();
-        let shown = shared.lock();
+        let sent = &mut self.sent;
+        let shown = self.shared.lock();
         let mut parts = Vec::new();
-        if self.run != shown.run {
-            self.run = shown.run;
-            self.connected = !shown.connected;
-            (self.rows, self.events, self.state) = (0, 0, 0);
-            (self.map, self.field, self.preview) = (0, 0, 0);
+        if sent.run != Some(shown.run) {
+            *sent = Sent { run: Some(shown.run), connected: !shown.connected, ..Sent::default() };
             parts.push(format!("\"about\":{}", shown.about.as_deref().unwrap_or("null")));
         }
-        if self.connected != shown.connected || self.problem != shown.problem {
-            self.connected = shown.connected;
-            self.problem.clone_from(&shown.problem);
+        if sent.connected != shown.connected || sent.problem != shown.problem {
+            sent.connected = shown.connected;
+            sent.problem.clone_from(&shown.problem);
             parts.push(format!("\"running\":{}", shown.connected));
             parts.push(format!("\"problem\":{}", Value::from(shown.problem.as_str())));
         }
-        let rows = shown.rows.after(&mut self.rows);
-        let events = shown.events.after(&mut self.events);
+        let rows = shown.rows.after(&mut sent.rows);
+        let events = shown.events.after(&mut sent.events);
         for (name, items) in [("rows", rows), ("events", events)] {
             if !items.is_empty() {
                 let mut part = format!("\"{name}\":[");
@@ -193,13 +185,13 @@ impl Cursor {
                 parts.push(part + "]");
             }
         }
-        if let Some(state) = shown.state.after(&mut self.state) {
+        if let Some(state) = shown.state.after(&mut sent.state) {
             parts.push(format!("\"state\":{state}"));
         }
         let blobs = [
-            shown.map.after(&mut self.map),
-            shown.field.after(&mut self.field),
-            shown.preview.after(&mut self.preview),
+            shown.map.after(&mut sent.map),
+            shown.field.after(&mut sent.field),
+            shown.preview.after(&mut sent.preview),
         ];
         let text =
             if parts.is_empty() { String::new() } else { format!("{{{}}}", parts.join(",")) };

@@ -365,7 +365,7 @@ impl Bridge {
     fn publish(&mut self) {
         let now_ns = now_ns();
         if let Some(status) = self.goals.take_status() {
-            self.endpoints.status(status);
+            self.endpoints.publish(Id::Status, status);
         }
         let (goals, endpoints) = (&self.goals, &self.endpoints);
         self.results.retain(|(request, id)| match goals.result(*id) {
@@ -383,7 +383,7 @@ impl Bridge {
             self.feedback_at = Instant::now();
             let feedback = self.goals.feedback(&shown.newest_pose(), shown.state.stalls, now_ns);
             if let Some(feedback) = feedback {
-                self.endpoints.feedback(feedback);
+                self.endpoints.publish(Id::Feedback, feedback);
             }
         }
     }

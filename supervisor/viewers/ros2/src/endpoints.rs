@@ -40,22 +40,14 @@ pub(crate) enum Call {
     GetResult,
 }
 
-/// The action's readers and writers.
-#[derive(Debug)]
-struct Action {
-    services: [(Call, Service); 3],
-    feedback: Writer,
-    status: Writer,
-}
-
 /// Readers and writers.
 #[derive(Debug)]
 pub(crate) struct Endpoints {
     namespace: String,
     writers: BTreeMap<Id, Writer>,
     readers: Vec<(Id, Reader)>,
-    /// The action; none if goals are not accepted.
-    action: Option<Action>,
+    /// The services of the action; none if goals are not accepted.
+    services: Vec<(Call, Service)>,
     /// The list of the participant's readers and writers, for other nodes.
     entities: Writer,
     participant: Participant,
@@ -79,7 +71,7 @@ impl Endpoints {
         let mut endpoints = Self {
             writers: BTreeMap::new(),
             readers: Vec::new(),
-            action: None,
+            services: Vec::new(),
             entities: participant.writer(&entities, LATCHED)?,
             namespace,
             participant,
@@ -98,7 +90,7 @@ impl Endpoints {
             }
         }
         if accepted.contains(&Accept::Goals) {
-            endpoints.action = Some(endpoints.open_action()?);
+            endpoints.open_action()?;
         }
         endpoints.announce();
         Ok(endpoints)
@@ -131,35 +123,34 @@ impl Endpoints {
         Ok(())
     }
 
-    fn open_action(&self) -> io::Result<Action> {
+    fn open_action(&mut self) -> io::Result<()> {
         let name = |name| format!("{}/{name}", self.namespace);
-        let service = |call, (of, types)| {
+        for (call, (of, types)) in [
+            (Call::SendGoal, SEND_GOAL),
+            (Call::CancelGoal, CANCEL_GOAL),
+            (Call::GetResult, GET_RESULT),
+        ] {
             let [requests, replies] = Topic::service(&name(of), types);
             let requests = self.participant.reader(&requests, SURE)?;
             let replies = self.participant.writer(&replies, SURE)?;
-            Ok::<_, io::Error>((call, Service { requests, replies }))
-        };
-        let topic = |(of, type_name)| Topic::new(&name(of), type_name);
-        Ok(Action {
-            services: [
-                service(Call::SendGoal, SEND_GOAL)?,
-                service(Call::CancelGoal, CANCEL_GOAL)?,
-                service(Call::GetResult, GET_RESULT)?,
-            ],
-            feedback: self.participant.writer(&topic(FEEDBACK), SURE)?,
-            status: self.participant.writer(&topic(STATUS), LATCHED)?,
-        })
+            self.services.push((call, Service { requests, replies }));
+        }
+        for (id, (of, type_name), quality) in
+            [(Id::Feedback, FEEDBACK, SURE), (Id::Status, STATUS, LATCHED)]
+        {
+            let topic = Topic::new(&name(of), type_name);
+            self.writers.insert(id, self.participant.writer(&topic, quality)?);
+        }
+        Ok(())
     }
 
     /// Tell other nodes which readers and writers are the node's.
     fn announce(&self) {
-        let services = || self.action.iter().flat_map(|action| &action.services);
-        let readers = self.readers.iter().map(|(_, reader)| reader.gid());
-        let readers = readers.chain(services().map(|(_, service)| service.requests.gid()));
-        let own =
-            self.action.iter().flat_map(|action| [action.feedback.gid(), action.status.gid()]);
-        let writers = self.writers.values().map(Writer::gid).chain(own);
-        let writers = writers.chain(services().map(|(_, service)| service.replies.gid()));
+        let services = || self.services.iter().map(|(_, service)| service);
+        let readers = self.readers.iter().map(|(_, reader)| reader);
+        let readers = readers.chain(services().map(|service| &service.requests)).map(Reader::gid);
+        let writers = self.writers.values().chain(services().map(|service| &service.replies));
+        let writers = writers.map(Writer::gid);
         let gid = |writer: &mut cdr::Writer, gid: Gid| {
             writer.raw(&gid);
         };
@@ -187,8 +178,7 @@ impl Endpoints {
 
     /// The calls of clients of the action.
     pub(crate) fn called(&self) -> Vec<(Call, Message)> {
-        let services = self.action.iter().flat_map(|action| &action.services);
-        let taken = services.flat_map(|(call, service)| {
+        let taken = self.services.iter().flat_map(|(call, service)| {
             service.requests.messages().take(AT_A_TIME).map(|message| (*call, message))
         });
         taken.collect()
@@ -196,23 +186,8 @@ impl Endpoints {
 
     /// Answer a call.
     pub(crate) fn reply(&self, call: Call, to: &Request, payload: &[u8]) {
-        let mut services = self.action.iter().flat_map(|action| &action.services);
-        if let Some((_, service)) = services.find(|(of, _)| *of == call) {
+        if let Some((_, service)) = self.services.iter().find(|(of, _)| *of == call) {
             service.replies.reply(to, payload);
-        }
-    }
-
-    /// Publish the progress of the robot with its goal.
-    pub(crate) fn feedback(&self, payload: Vec<u8>) {
-        if let Some(action) = &self.action {
-            action.feedback.write(payload);
-        }
-    }
-
-    /// Publish the states of all goals.
-    pub(crate) fn status(&self, payload: Vec<u8>) {
-        if let Some(action) = &self.action {
-            action.status.write(payload);
         }
     }
 }
