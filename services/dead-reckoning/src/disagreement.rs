@@ -17,7 +17,7 @@ use crate::{
 
 /// So much of the sums is left after each further pair of fixes: 200 pairs are remembered.
 const REMEMBERED: f64 = 1.0 - 1.0 / 200.0;
-const LEAST_PAIRS: f64 = 40.0;
+const LEAST_PAIRS: f64 = 15.0;
 /// The fixes of a pair are so far apart, seconds: nearer ones tell more of their own errors than of the motion.
 const APART_S: std::ops::RangeInclusive<f64> = 0.18..=1.0;
 /// The least way, m^2, and turn, rad^2, squared for each pair and summed up.
