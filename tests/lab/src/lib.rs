@@ -10,6 +10,7 @@
 //! | [`baselines`] | planners to compare with: shortest paths, Bug2 |
 //! | [`chaos`] | signals to random processes at random times; faults of the robot |
 //! | [`tick`] | the latency of a tick, compared with five bare hops on the bus |
+//! | `bring_up` | bring-ups of robots with faults of assembly |
 //! | [`sources`] | simulated sources of fixes and turns |
 //! | `field` | the field of a map |
 //! | `random` | random numbers |
@@ -20,6 +21,7 @@
 #![allow(unreachable_pub)]
 
 mod baselines;
+mod bring_up;
 mod chaos;
 mod error;
 mod evaluate;
@@ -61,6 +63,7 @@ enum Bench {
     Tick(tick::Arguments),
     Field(field::Arguments),
     Chaos(Box<chaos::Arguments>),
+    BringUp(bring_up::Arguments),
     Consumer(chaos::consumer_process::Arguments),
     Sources(sources::Arguments),
 }
@@ -80,6 +83,7 @@ fn execute(arguments: &Arguments) -> error::Result<ExitCode> {
         Command::Stage(arguments) => baselines::process::main(arguments),
         Command::Bench(Bench::Tick(arguments)) => tick::main(arguments),
         Command::Bench(Bench::Chaos(arguments)) => return chaos::main(arguments),
+        Command::Bench(Bench::BringUp(arguments)) => bring_up::main(arguments),
         Command::Bench(Bench::Consumer(arguments)) => chaos::consumer_process::main(arguments),
         Command::Bench(Bench::Sources(arguments)) => sources::main(arguments),
     };
