@@ -100,3 +100,6 @@ pub fn findings(mission: &Mission, trace: &Trace, lifted: bool) -> (Vec<Finding>
     found.extend(rangers::findings(mission, trace, &motion, placed.as_ref(), gyro.as_ref()));
     (found, placed)
 }
+
+#[cfg(test)]
+mod tests;

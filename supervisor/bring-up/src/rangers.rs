@@ -297,7 +297,9 @@ fn motors(
     // A wheel that turns backwards drives the body where it is told to turn.
     for (told, sign) in [(Told::TurnLeft, 1.0), (Told::TurnRight, -1.0)] {
         let rims = |[angle, _]: [f64; 2]| angle * track_m / 2.0;
-        if let Some(share) = share_of_way(mission, trace, motion, told, rims) {
+        if let Some(share) = share_of_way(mission, trace, motion, told, rims)
+            && (0.5..2.0).contains(&share.abs())
+        {
             let (side, now) = if share * sign > 0.0 {
                 ("left", left.reversed)
             } else {
@@ -406,7 +408,9 @@ fn share_of_way(
         };
         let (xx, xy, yy) = (sum(&|x, _| x * x), sum(&|x, y| x * y), sum(&|_, y| y * y));
         // Another wall behind the first, or a slanted one, gives no straight line.
-        if points.len() >= 6 && xx > 1e-3 && xy * xy > 0.95 * xx * yy {
+        let mostly =
+            2 * points.len() > readings(trace, row).filter(|(at, _)| leg.contains(*at)).count();
+        if points.len() >= 6 && mostly && xx > 1e-3 && xy * xy > 0.95 * xx * yy {
             shares.push(-xy / xx);
         }
     }

@@ -201,7 +201,7 @@ impl Arguments {
         mission.planner.executable = Some(calibration::PLANNER.into());
         mission.planner.calibration =
             Some(CalibrationPlan { procedure: Procedure::BringUp, ..CalibrationPlan::default() });
-        mission.controller.speed_m_s = Some(0.2);
+        mission.controller.speed_m_s = Some(named.body().top_speed_m_s.min(0.2));
         mission.controller.turn_rad_s = Some(0.1);
         mission.controller.look_rad_s = Some(1.5);
         mission.controller.slow_radius_m = 0.01;

@@ -28,14 +28,15 @@ pub(super) fn new_robot(protocol: Protocol, address: &str) -> String {
     } else {
         ""
     };
-    let sizes = if matches!(protocol, Protocol::X80) {
-        ""
-    } else {
-        "wheel_radius_m = 0.033\ntrack_m = 0.16                 # between the middles of the wheels\nradius_m = 0.12                # of the disc that covers the body\ntop_speed_m_s = 0.3\n"
+    let (speed, sizes) = match protocol {
+        Protocol::X80 => ("", ""),
+        _ => (
+            "[controller]\nspeed_m_s = 0.25\n\n",
+            "rate_hz = 10.0\nwheel_radius_m = 0.033\ntrack_m = 0.16                 # between the middles of the wheels\nradius_m = 0.12                # of the disc that covers the body\ntop_speed_m_s = 0.3\n",
+        ),
     };
     format!(
-        "# Measure the sizes, give each sensor a row, then: firsthand bring-up THIS_FILE\ntarget = [2.0, 0.0]\n\n[perimeter]\nwidth_m = 6.0\ncentre = [1.0, 0.0]\n\n[robot]\nprotocol = \"{name}\"\naddress = {address:?}\n{}{sizes}{keys}{pins}{sensors}",
-        if matches!(protocol, Protocol::X80) { "" } else { "rate_hz = 10.0\n" },
+        "# Measure the sizes, give each sensor a row, then: firsthand bring-up THIS_FILE\ntarget = [2.0, 0.0]\n\n[perimeter]\nwidth_m = 6.0\ncentre = [1.0, 0.0]\n\n{speed}[robot]\nprotocol = \"{name}\"\naddress = {address:?}\n{sizes}{keys}{pins}{sensors}",
     )
 }
 
