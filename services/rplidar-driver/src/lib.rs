@@ -61,12 +61,10 @@ impl Rplidar {
             over = self.turn.replace(Turn { began: self.count, first_beam: at, beams });
         }
         self.turn.take_if(|turn| (self.count - turn.began) * self.sample_ns > LONGEST_SWEEP_NS);
-        if let Some(held) = self.turn.as_mut().and_then(|turn| turn.beams.get_mut(at))
-            && node.quality > 0
-            && node.distance_q2 > 0
-        {
-            let range = f32::from(node.distance_q2) / 4000.0;
-            *held = held.min(beam(&self.sensor, Some(range)));
+        if let Some(held) = self.turn.as_mut().and_then(|turn| turn.beams.get_mut(at)) {
+            let is_reading = node.quality > 0 && node.distance_q2 > 0;
+            let range = is_reading.then(|| f32::from(node.distance_q2) / 4000.0);
+            *held = held.min(beam(&self.sensor, range));
         }
         let scan = over.map(|turn| self.scan_of(turn));
         self.count += 1;
@@ -75,7 +73,17 @@ impl Rplidar {
 
     /// The scan's first beam is at the number of its measurement, until that becomes a time.
     fn scan_of(&self, turn: Turn) -> LaserScan {
-        let Turn { began, first_beam, beams } = turn;
+        let Turn { began, first_beam, mut beams } = turn;
+        // The sensor says the same of a lost echo and of nothing in reach: nothing is there where no beam beside it ended.
+        let ended: Vec<_> = beams.iter().map(|beam| beam.is_finite()).collect();
+        let last = ended.len().saturating_sub(1);
+        for (beam, range) in beams.iter_mut().enumerate().filter(|(_, range)| range.is_infinite()) {
+            let beside =
+                [beam.checked_sub(1).unwrap_or(last), if beam == last { 0 } else { beam + 1 }];
+            if beside.into_iter().any(|beam| ended.get(beam) == Some(&true)) {
+                *range = f32::NAN;
+            }
+        }
         let beam_ns = (self.count - began) * self.sample_ns / beams.len().max(1) as i64;
         let sweep = Sweep {
             first_beam_ns: began,

@@ -68,9 +68,14 @@ fn a_turn_is_a_scan_counter_clockwise_and_no_quality_no_range_and_one_too_short_
     let turned = heard.scans.pop().unwrap();
     assert_eq!([at(&turned, 270), at(&turned, 90)], [3.0, 1.0]);
     assert_eq!(turned.sweep, Sweep { beam_ns: -scan.sweep.beam_ns, ..scan.sweep });
+    let open = |degrees| if degrees > 180 { 0.0 } else { 2.0 };
+    let mut heard = scanning("").hear(&[turn(open), next()].concat());
+    let scan = heard.scans.pop().unwrap();
+    // Nothing is in reach on the left, but for the beams beside those that end.
+    assert!(at(&scan, 90) == f32::INFINITY && at(&scan, 10).is_nan() && at(&scan, 170).is_nan());
     let silent = Node { is_first: false, quality: 0, angle_q6: 64, distance_q2: 400 }.encode();
     let mut heard = scanning("").hear(&[&node(0, 0.0), &silent[..], &next()].concat());
-    assert!(heard.scans.pop().unwrap().beams.iter().all(|beam| beam.is_nan()));
+    assert!(heard.scans.pop().unwrap().beams.iter().all(|beam| !beam.is_finite()));
 }
 
 #[test]
