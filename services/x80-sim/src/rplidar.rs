@@ -90,3 +90,57 @@ impl Rplidar {
         bytes
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use rplidar_protocol::{Decoder, Said};
+
+    use super::*;
+
+    /// A wall 2 m to the right and another 1 m ahead, beside which nothing stands.
+    fn at_the_walls(model: &str) -> (Rplidar, World) {
+        let text = format!(
+            "target = [0, -1]\nrobot.protocol = 'arduino'\nrobot.counts_per_turn = 1320\nworld.wall = [{{ points = [[-9, -2], [9, -2]] }}, {{ points = [[1, -1], [1, 1]] }}]\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nmodel = '{model}'\nforward_m = 0\nbearing_deg = 0\n"
+        );
+        let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+        let mut laser = Rplidar::new(&mission, 1).unwrap();
+        laser.laser.follow(0.0, Pose2::default());
+        (laser, World::new(&mission))
+    }
+
+    #[test]
+    fn a_laser_measures_after_a_request_only_each_sample_in_its_time_and_clockwise() {
+        for (model, a_second, turns) in [("rplidar-a1", 1969, 5), ("rplidar-c1", 5000, 9)] {
+            let (mut laser, world) = at_the_walls(model);
+            let express = [0xa5, 0x82, 5, 0, 0, 0, 0, 0, 0x22];
+            assert!(laser.answer(&express, 0.0).is_empty());
+            assert!(laser.measured(&world, Pose2::default(), 1.0).is_empty());
+            let mut decoder = Decoder::default();
+            let answer = laser.answer(&[0xa5, 0x20], 1.0);
+            assert_eq!(decoder.push(&answer), [Said::Answer(Answer::Scan)]);
+            let said: Vec<_> = (1..=200)
+                .flat_map(|ms| {
+                    let now = 1.0 + f64::from(ms) * 0.005;
+                    decoder.push(&laser.measured(&world, Pose2::default(), now))
+                })
+                .collect();
+            assert!(said.len().abs_diff(a_second) < 4, "{}", said.len());
+            let nodes = said.iter().map(|said| match said {
+                Said::Node(node) => *node,
+                other => panic!("{other:?}"),
+            });
+            let nodes: Vec<_> = nodes.collect();
+            let first = nodes.iter().filter(|node| node.is_first).count();
+            assert!(first.abs_diff(turns) < 2, "{first}");
+            let at = |degrees: u16| {
+                let near = |node: &&Node| node.angle_q6.abs_diff(degrees * 64) < 48;
+                nodes.iter().filter(near).map(|node| node.distance_q2 / 4).max().unwrap()
+            };
+            assert!(at(90).abs_diff(2000) < 100 && at(1).abs_diff(1000) < 60 && at(180) == 0);
+            assert!(laser.answer(&[0xa5, 0x25], 2.0).is_empty());
+            assert!(laser.measured(&world, Pose2::default(), 3.0).is_empty());
+        }
+    }
+}

@@ -222,6 +222,45 @@ mod tests {
     }
 
     #[test]
+    fn an_rplidar_has_an_address_of_its_own_beside_a_real_robot_and_none_beside_a_simulated_one() {
+        let mission = |robot: &str, row: &str| {
+            let counts = if robot.contains("x80") { "" } else { "robot.counts_per_turn = 1320\n" };
+            let laser =
+                "[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\n";
+            let front = FRONT
+                .replace("channel = 1\n", if counts.is_empty() { "channel = 1\n" } else { "" });
+            let front = if robot.contains("arduino") { "" } else { &*front };
+            format!("target = [3, 0]\nrobot.protocol = {robot}\n{counts}{front}{laser}{row}")
+        };
+        let (real, a1) = ("'arduino'\nrobot.address = 'serial:///dev/a'", "model = 'rplidar-a1'\n");
+        let at = |address: &str| format!("model = 'rplidar-c1'\naddress = '{address}'\n");
+        for (robot, row, own) in [
+            ("'arduino'", a1, true),
+            ("'x80'", a1, true),
+            (real, &*at("serial:///dev/b"), true),
+            ("'json'", a1, false),
+            ("'json'\nrobot.address = '1.2.3.4:5'", &*at("tcp://host:6"), true),
+        ] {
+            let text = mission(robot, row);
+            let mission = crate::Mission::parse(&text, std::path::Path::new("m.toml")).unwrap();
+            assert_eq!(mission.rplidar().is_some(), own, "{text}");
+        }
+        for (robot, row, problem) in [
+            ("'x80'", "", "no laser"),
+            (real, a1, "one is real"),
+            ("'arduino'", &*at("serial:///dev/b"), "one is real"),
+            (real, &*at("ros2"), "no address of a laser"),
+            (real, &*at("dev"), "no address of a laser"),
+            ("'arduino'", "model = 'rplidar-a1'\nfield_of_view_deg = 90", "sees all around"),
+            ("'json'", "address = 'serial:///dev/b'", "only RPLIDARs"),
+        ] {
+            let text = mission(robot, row).replace("target = [3, 0]\n", "");
+            let refusal = refusal(&text);
+            assert!(refusal.contains(problem), "{text}: {refusal}");
+        }
+    }
+
+    #[test]
     fn a_set_that_the_rows_do_not_have_is_refused() {
         for set in ["front+infrared", "three-front"] {
             let refusal = refusal(&format!("sensors = '{set}'\n{FRONT}"));
