@@ -30,6 +30,9 @@ fn assert_replays(directory: &Path) {
     assert_eq!(report.not_replayed(), 0, "{report}");
 }
 
+const WITH_LASER: &str =
+    concat!(env!("CARGO_MANIFEST_DIR"), "/../guide/example-arduino/laser.toml");
+
 /// Assert that `run` arrives with its robot, and that its recording replays to the bit.
 #[track_caller]
 fn assert_arrives(run: Run, robot: Robot) {
@@ -112,4 +115,27 @@ fn a_robot_with_an_arduino_that_falls_silent_stands_and_drives_on_when_it_answer
     silent.store(false, Ordering::Relaxed);
     run.wait_until("the robot is found", |status| status["link"]["connected"] == true);
     assert_arrives(run, robot);
+}
+
+#[test]
+fn a_robot_of_an_arduino_and_an_rplidar_goes_the_same_way_each_time_in_lockstep() {
+    let [first, second] = ["rplidar-max", "rplidar-again"].map(|name| {
+        let summary = Run::start(name, WITH_LASER, &["--pace", "max"]).arrives();
+        ["ticks", "path_length_m", "pose_error_m"].map(|key| summary[key].to_string())
+    });
+    assert_eq!(first, second);
+}
+
+#[test]
+fn a_robot_of_an_arduino_and_an_rplidar_on_a_serial_line_each_arrives_and_replays_to_the_bit() {
+    let robot = Robot::start(WITH_LASER, "pty", "127.0.0.1:0");
+    let lines = [&*robot.listening, robot.laser.as_deref().unwrap()];
+    let [base, laser] = lines.map(|line| format!("address = \"serial://{line}\"\n"));
+    let text = std::fs::read_to_string(WITH_LASER).unwrap();
+    let (protocol, model) = ("protocol = \"arduino\"\n", "model = \"rplidar-a1\"\n");
+    let real = text.replace(protocol, &(base + protocol)).replace(model, &(laser + model));
+    let directory = tempfile::tempdir().unwrap();
+    let mission = directory.path().join("real.toml");
+    std::fs::write(&mission, real).unwrap();
+    assert_arrives(Run::start("rplidar-pty", mission.to_str().unwrap(), &[]), robot);
 }

@@ -11,6 +11,9 @@ pub const GROUND_TRUTH: &str = "ground_truth.jsonl";
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GroundTruthHeader {
     pub listening: String,
+    /// The wire of its laser, if that has one of its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub laser: Option<String>,
 }
 
 /// Written when the tick's frames are made; tick 0 comes before any motion.

@@ -21,6 +21,8 @@ use super::{PATIENCE, firsthand};
 pub struct Robot {
     process: Child,
     pub listening: String,
+    /// The wire of its laser, if that has one of its own.
+    pub laser: Option<String>,
     /// The records of ground truth. They are received at once, because the robot waits for a slow reader.
     truth: Receiver<Value>,
     /// The last known distance of the robot from its start, metres.
@@ -56,6 +58,7 @@ impl Robot {
         Self {
             process,
             listening: header["listening"].as_str().unwrap().to_owned(),
+            laser: header["laser"].as_str().map(str::to_owned),
             truth,
             went: 0.0,
         }

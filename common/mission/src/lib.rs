@@ -62,8 +62,8 @@ pub use response::{ModelledSpeed, Response, ResponseKeys};
 pub use robot::{BatteryLimits, Body, Channel, Model, Protocol, RobotConfig, Steering};
 pub use ros2::Ros2Topics;
 pub use sensor::{
-    INFRARED_RANGERS, MOST_BEAMS, MOST_SENSORS, SONARS, Sensor, SensorKind, SensorModel, SensorRow,
-    Sensors, SonarConfig,
+    INFRARED_RANGERS, MOST_BEAMS, MOST_SENSORS, Rplidar, SONARS, Sensor, SensorKind, SensorModel,
+    SensorRow, Sensors, SonarConfig,
 };
 pub use simulation::{
     BatteryPhysics, Block, BlockedWheels, Heights, InfraredPhysics, LaserTiming, Move, Physics,
@@ -354,6 +354,14 @@ impl Mission {
     pub fn laser(&self) -> Option<(usize, Sensor)> {
         let mut rows = self.sensor_table().into_iter().enumerate();
         rows.find(|(_, sensor)| sensor.kind == SensorKind::Scan)
+    }
+
+    /// The laser with a wire of its own and its row. Its scans do not come with the robot's frames.
+    pub fn rplidar(&self) -> Option<(usize, Sensor, Rplidar)> {
+        let (row, sensor) = self.laser()?;
+        let has_address = self.robot.sensors.get(row)?.address.is_some();
+        let product = sensor.model.rplidar()?;
+        (has_address || !self.robot.protocol().has_scans()).then_some((row, sensor, product))
     }
 
     pub fn front_row(&self) -> usize {

@@ -50,6 +50,12 @@ pub enum Protocol {
     Arduino,
 }
 
+impl Protocol {
+    pub const fn has_scans(self) -> bool {
+        matches!(self, Self::Json | Self::Ros2)
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Channel {

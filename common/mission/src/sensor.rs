@@ -58,9 +58,24 @@ pub enum SensorModel {
     Ust10lx,
     /// Slamtec's RPLIDAR A1, a laser: 360 degrees, 0.15 to 12 m, 5.5 Hz, 8,000 readings a second. Source: its data sheet, 2020.
     RplidarA1,
+    /// Slamtec's RPLIDAR C1, a laser: 360 degrees in 500 readings, 0.05 to 12 m, 10 Hz, 30 mm. Source: its data sheet, 2023.
+    RplidarC1,
     /// The LDS-02 of a TurtleBot 3, a laser: 360 degrees in steps of 1, 0.16 to 8 m, 5 Hz. Source: ROBOTIS e-Manual.
     #[serde(rename = "lds-02")]
     Lds02,
+}
+
+/// A laser that may have a serial line of its own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rplidar {
+    pub baud: u32,
+    /// The time from one measurement of a standard scan to the next.
+    pub sample_us: u16,
+    pub turns_hz: f64,
+    /// Its motor stands while the line's DTR is set.
+    pub stands_by_dtr: bool,
+    /// The byte of its model in its own words.
+    pub number: u8,
 }
 
 /// What the source of a [`SensorModel`] says of it.
@@ -83,9 +98,31 @@ impl SensorModel {
             Self::X80Infrared => (Ray, 0.0, 0.81, 0.0, 1, (0.0, 0.0)),
             Self::Ust10lx => (Scan, 270.0, 10.0, 0.06, 1081, (0.02, 0.0)),
             Self::RplidarA1 => (Scan, 360.0, 12.0, 0.15, 360, (0.005, 0.005)),
+            Self::RplidarC1 => (Scan, 360.0, 12.0, 0.05, 500, (0.015, 0.0)),
             Self::Lds02 => (Scan, 360.0, 8.0, 0.16, 360, (0.0075, 0.025)),
         };
         Product { kind, field_of_view_deg, reach_m, least_m, beams, noise }
+    }
+
+    /// An A1 measures 8,000 times a second, of which its line carries 2,304 in a standard scan: it says one in four.
+    pub const fn rplidar(self) -> Option<Rplidar> {
+        match self {
+            Self::RplidarA1 => Some(Rplidar {
+                baud: 115_200,
+                sample_us: 508,
+                turns_hz: 5.5,
+                stands_by_dtr: true,
+                number: 0x18,
+            }),
+            Self::RplidarC1 => Some(Rplidar {
+                baud: 460_800,
+                sample_us: 200,
+                turns_hz: 10.0,
+                stands_by_dtr: false,
+                number: 0x41,
+            }),
+            _ => None,
+        }
     }
 
     const fn of(kind: SensorKind) -> Self {
@@ -151,6 +188,8 @@ pub struct SensorRow {
     pub rate_hz: Option<f64>,
     /// The default is the X80's.
     pub model: Option<SensorModel>,
+    /// Of an RPLIDAR with a wire of its own, written as that of the robot.
+    pub address: Option<String>,
 }
 
 fn is_zero(deg: &f64) -> bool {
@@ -330,6 +369,7 @@ fn row(name: impl Into<String>, kind: SensorKind, forward_m: f64, bearing_deg: f
         beams: None,
         rate_hz: None,
         model: None,
+        address: None,
     }
 }
 

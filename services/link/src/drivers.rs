@@ -4,19 +4,20 @@ use arduino_driver::Arduino;
 use common::{
     address::Address,
     driver::{Base, Driver},
-    mission::{Mission, Protocol},
+    mission::{Mission, Protocol, Rplidar, Sensor},
 };
 use json_driver::Json;
 use ros2_driver::Ros2;
 use x80_driver::X80;
 
-use crate::transport::BAUD;
+use crate::transport::{BAUD, Line};
 
 /// A sensor with a wire of its own.
 #[derive(Debug)]
 pub struct SensorWire {
-    pub address: Address,
-    pub baud: u32,
+    /// None for that of the simulated robot, which hears the sensor's requests too.
+    pub address: Option<Address<String>>,
+    pub line: Line,
     pub driver: Box<dyn Driver>,
 }
 
@@ -30,7 +31,12 @@ pub fn base(mission: &Mission) -> (Box<dyn Base>, u32) {
     }
 }
 
-/// The sensors of `mission` with wires of their own, of which no mission can name one yet. Events and effects number them in this order.
-pub const fn sensors(_: &Mission) -> Vec<SensorWire> {
-    Vec::new()
+/// The sensors of `mission` with wires of their own. Events and effects number them in this order.
+pub fn sensors(mission: &Mission) -> Vec<SensorWire> {
+    let wire = |(row, sensor, product): (usize, Sensor, Rplidar)| SensorWire {
+        address: mission.robot.sensors.get(row).and_then(|row| row.address.as_ref()?.parse().ok()),
+        line: Line { baud: product.baud, lowers_dtr: product.stands_by_dtr },
+        driver: Box::new(rplidar_driver::Rplidar::new(row, sensor, product)),
+    };
+    mission.rplidar().into_iter().map(wire).collect()
 }

@@ -4,6 +4,7 @@
 use std::{io, time::Duration};
 
 use common::{
+    address::Address,
     bus::{Reader, Writers},
     clock::{MissionClock, monotonic_ns},
     domain::Domain,
@@ -115,9 +116,13 @@ impl Process for Shell {
         let mission = &context.run.mission;
         let transport = Transport::of_base(&context.run.address, mission)?;
         let wires = drivers::sensors(mission)
-            .iter()
-            .map(|sensor| Transport::open(&sensor.address, sensor.baud))
-            .collect::<Result<Vec<_>, _>>()?;
+            .into_iter()
+            .map(|sensor| {
+                let address = sensor.address.as_ref().map(Address::resolve).transpose();
+                let address = address.map_err(|error| StageError::Other(error.to_string()))?;
+                Ok(Transport::open(&address.unwrap_or(context.run.address.clone()), sensor.line)?)
+            })
+            .collect::<Result<Vec<_>, StageError>>()?;
         for wire in std::iter::once(&transport).chain(&wires) {
             context.waiter.on_readable(wire)?;
         }
@@ -175,9 +180,11 @@ impl Process for Shell {
             }
             let now = self.clock.at(self.runner.stage.link.state().next_tick, now_ns);
             let mut effects = Vec::new();
-            let mut came = false;
+            // A simulated laser speaks before the frames of its tick: it is heard after they came, and taken before them.
+            let datagram = self.transport.receive(now_ns)?;
+            let mut came = datagram.is_some();
             for (number, wire) in (0..).zip(&mut self.wires) {
-                if let Some(bytes) = wire.receive(now_ns)? {
+                while let Some(bytes) = wire.receive(now_ns)? {
                     let event = Event::Sensor(number, bytes);
                     effects.extend(self.runner.take_entry(Entry {
                         event,
@@ -185,12 +192,14 @@ impl Process for Shell {
                         now,
                     })?);
                     came = true;
+                    if monotonic_ns() - began_ns > MOST_LISTENING_NS {
+                        break;
+                    }
                 }
             }
-            if let Some(bytes) = self.transport.receive(now_ns)? {
+            if let Some(bytes) = datagram {
                 let event = Event::Datagram(bytes);
                 effects.extend(self.runner.take_entry(Entry { event, machine_ns: now_ns, now })?);
-                came = true;
             }
             self.carry_out(effects)?;
             if !came {

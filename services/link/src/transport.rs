@@ -40,6 +40,15 @@ impl From<TransportError> for StageError {
 
 /// Bits a second of a serial line, if its device does not say otherwise.
 pub const BAUD: u32 = 115_200;
+/// The settings of a serial line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Line {
+    /// Bits a second.
+    pub baud: u32,
+    /// The device works only while DTR is low, which opening the line raises.
+    pub lowers_dtr: bool,
+}
+
 pub const SPEAKS_ROS2: bool = cfg!(feature = "ros2");
 
 /// Errors mean that this machine is the cause.
@@ -80,16 +89,16 @@ impl Transport {
     pub fn of_base(address: &Address, mission: &Mission) -> Result<Self, TransportError> {
         match address {
             Address::Ros2(domain) => Self::new(address, ros2(domain.unwrap_or_default(), mission)),
-            _ => Self::open(address, drivers::base(mission).1),
+            _ => Self::open(address, Line { baud: drivers::base(mission).1, lowers_dtr: false }),
         }
     }
 
-    /// [`Transport::maintain`] opens a connection or serial line, whose baud rate is `baud`. Fails when this machine cannot.
-    pub fn open(address: &Address, baud: u32) -> Result<Self, TransportError> {
+    /// [`Transport::maintain`] opens a connection or serial `line`. Fails when this machine cannot.
+    pub fn open(address: &Address, line: Line) -> Result<Self, TransportError> {
         let wire = match address {
             Address::Udp(robot) => Udp::open(*robot).map(|udp| Box::new(udp) as Box<dyn Wire>),
             Address::Tcp(robot) => Stream::boxed(Tcp::to(*robot)),
-            Address::Serial(path) => Stream::boxed(Serial::new(path, baud)),
+            Address::Serial(path) => Stream::boxed(Serial::new(path, line)),
             Address::Ros2(_) => Err(io::Error::other("only a robot's base speaks ROS 2")),
         };
         Self::new(address, wire)

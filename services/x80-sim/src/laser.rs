@@ -42,7 +42,11 @@ impl Laser {
     /// None without a laser; the noise follows from `seed`.
     pub(crate) fn new(mission: &Mission, seed: u64) -> Option<Self> {
         let (_, sensor) = mission.laser()?;
-        let timing = mission.simulation.physics().laser;
+        let mut timing = mission.simulation.physics().laser;
+        if mission.rplidar().is_some() {
+            // It says each measurement by itself, up to a tick late.
+            timing = LaserTiming { delay_s: 0.0, sweep_s: 1.0 / mission.robot.rate_hz, ..timing };
+        }
         let noise = Noise::new(seed, Source::Laser);
         Some(Self { sensor, timing, poses: VecDeque::new(), noise })
     }
@@ -69,47 +73,70 @@ impl Laser {
     }
 
     /// The body when `beam` of the scan that is sent at `time` was measured.
-    fn pose_at(&self, time: f64, beam: usize) -> Option<Pose2> {
+    fn pose_of_beam(&self, time: f64, beam: usize) -> Option<Pose2> {
         let LaserTiming { delay_s, sweep_s, .. } = self.timing;
         let left = 1.0 - self.sensor.mirrored(beam) as f64 / self.sensor.beams.max(1) as f64;
-        let at = time - delay_s - sweep_s * left;
-        let later = self.poses.partition_point(|(noted, _)| *noted < at);
+        self.pose_at(time - delay_s - sweep_s * left)
+    }
+
+    /// The body at `time`, seconds.
+    fn pose_at(&self, time: f64) -> Option<Pose2> {
+        let later = self.poses.partition_point(|(noted, _)| *noted < time);
         Some(self.poses.get(later).or(self.poses.back())?.1)
+    }
+
+    /// What a robot at `pose` has in the laser's reach, and a little more for poses before.
+    pub(crate) fn near(&self, world: &World, pose: Pose2) -> Vec<Solid> {
+        let position = self.sensor.mount.on(pose).position;
+        world.near(position, self.sensor.reach_m + self.went_m(), world.heights().infrared_m)
+    }
+
+    /// The way that the robot makes at most during a scan, until it is sent.
+    fn went_m(&self) -> f64 {
+        (self.timing.delay_s + self.timing.sweep_s) * FASTEST_M_S
     }
 
     /// The scan that a robot at `pose` sends at `time`. Metres: none for nothing in reach, less than 0 for no reading.
     pub(crate) fn scan(&mut self, world: &World, pose: Pose2, time: f64) -> Vec<Option<f32>> {
         let mount = self.sensor.mount.on(pose);
-        let height_m = world.heights().infrared_m;
         let (first, step) = self.sensor.fan();
-        let (noise_m, noise_share) = self.sensor.model.beam_noise();
-        let black_reach_m = self.sensor.model.black_reach_m();
-        let LaserTiming { delay_s, sweep_s, .. } = self.timing;
-        let went_m = (delay_s + sweep_s) * FASTEST_M_S;
-        let near = world.near(mount.position, self.sensor.reach_m + went_m, height_m);
-        let is_prompt = went_m == 0.0;
+        let near = self.near(world, pose);
+        let is_prompt = self.went_m() == 0.0;
         let mut beams: Vec<_> = (0..self.sensor.beams)
             .map(|beam| {
-                let taken_at = if is_prompt { None } else { self.pose_at(time, beam) };
+                let taken_at = if is_prompt { None } else { self.pose_of_beam(time, beam) };
                 let mount = taken_at.map_or(mount, |pose| self.sensor.mount.on(pose));
-                let along = DVec2::from_angle(mount.heading + first + step * beam as f64);
-                let hit = near
-                    .iter()
-                    .filter_map(|solid| end(solid, mount.position, along))
-                    .min_by(|(a, _), (b, _)| a.total_cmp(b))
-                    .filter(|&(range, light)| light != Light::Black || range <= black_reach_m);
-                let lost = self.noise.chance(LOST_OF_1000 / 1000.0);
-                let noise = self.noise.normal(1.0);
-                let range = hit.map(|(range, _)| range + noise * (noise_m + noise_share * range));
-                match range {
-                    Some(range) if lost || range < self.sensor.model.least_m() => Some(-1.0),
-                    Some(range) if range <= self.sensor.reach_m => Some(range as f32),
-                    _ => None,
-                }
+                self.reading(&near, mount.position, mount.heading + first + step * beam as f64)
             })
             .collect();
         self.sensor.mirror(&mut beams);
         beams
+    }
+
+    /// The reading at `time` of a beam at an angle clockwise from the laser's front, radians; as those of a scan.
+    pub(crate) fn clockwise(&mut self, near: &[Solid], time: f64, angle: f64) -> Option<f32> {
+        let mount = self.sensor.mount.on(self.pose_at(time)?);
+        let angle = if self.sensor.is_upside_down { angle } else { -angle };
+        self.reading(near, mount.position, mount.heading + angle)
+    }
+
+    fn reading(&mut self, near: &[Solid], from: DVec2, heading: f64) -> Option<f32> {
+        let (noise_m, noise_share) = self.sensor.model.beam_noise();
+        let black_reach_m = self.sensor.model.black_reach_m();
+        let along = DVec2::from_angle(heading);
+        let hit = near
+            .iter()
+            .filter_map(|solid| end(solid, from, along))
+            .min_by(|(a, _), (b, _)| a.total_cmp(b))
+            .filter(|&(range, light)| light != Light::Black || range <= black_reach_m);
+        let lost = self.noise.chance(LOST_OF_1000 / 1000.0);
+        let noise = self.noise.normal(1.0);
+        let range = hit.map(|(range, _)| range + noise * (noise_m + noise_share * range));
+        match range {
+            Some(range) if lost || range < self.sensor.model.least_m() => Some(-1.0),
+            Some(range) if range <= self.sensor.reach_m => Some(range as f32),
+            _ => None,
+        }
     }
 }
 

@@ -11,6 +11,7 @@
 //! | [`sonar`], [`infrared`], `laser`, [`sensors`] | readings, as the frames carry them |
 //! | `json_words` | lines of JSON |
 //! | [`arduino_words`] | an Arduino's requests and answers |
+//! | `rplidar` | a laser with a wire of its own |
 //! | [`noise`] | seeded, one stream for each source |
 //! | [`robot`] | the pure state machine: frames in, time forward, frames out |
 //! | [`radio`] | outages, losses, delays between host and robot |
@@ -50,6 +51,7 @@ pub mod motor;
 pub mod noise;
 pub mod radio;
 pub mod robot;
+mod rplidar;
 pub mod saved_state;
 pub mod sensors;
 pub mod shell;

@@ -20,6 +20,7 @@ use crate::{
     laser::Laser,
     motor::Motor,
     noise::{Noise, Source},
+    rplidar::Rplidar,
     saved_state::SavedState,
     sensors::{self, Ranging},
     streams::Streams,
@@ -75,7 +76,9 @@ pub struct Robot {
     /// None for an X80.
     json: Option<JsonWords>,
     arduino: Option<ArduinoWords>,
+    /// Its scans come with the robot's frames.
     laser: Option<Laser>,
+    rplidar: Option<Rplidar>,
     scan: Vec<Option<f32>>,
 }
 
@@ -96,6 +99,7 @@ impl Robot {
         let wheel_errors = WheelErrors::of(mission);
         physics.wheels.slip_share = wheel_errors.slip_share;
         let car = Car::new(mission, &wheel_errors);
+        let rplidar = Rplidar::new(mission, seed);
         let top_counts = |channel| match &car {
             Some(car) if car.steers_by(channel) => car.top_steering_counts(),
             _ => top_counts,
@@ -131,7 +135,8 @@ impl Robot {
             json: (mission.robot.protocol() == Protocol::Json).then(|| JsonWords::new(mission)),
             arduino: (mission.robot.protocol() == Protocol::Arduino)
                 .then(|| ArduinoWords::new(mission)),
-            laser: Laser::new(mission, seed),
+            laser: Laser::new(mission, seed).filter(|_| rplidar.is_none()),
+            rplidar,
             scan: Vec::new(),
         };
         robot.least_clearance = robot.body.clearance();
@@ -318,6 +323,27 @@ impl Robot {
         }
     }
 
+    pub fn has_rplidar(&self) -> bool {
+        self.rplidar.is_some()
+    }
+
+    pub fn is_scanning(&self) -> bool {
+        self.rplidar.as_ref().is_some_and(Rplidar::is_scanning)
+    }
+
+    /// The answers of the laser with a wire of its own.
+    pub fn on_laser(&mut self, bytes: &[u8]) -> Vec<u8> {
+        let now = self.time;
+        self.rplidar.as_mut().map_or_else(Vec::new, |rplidar| rplidar.answer(bytes, now))
+    }
+
+    /// What that laser measured since the last call.
+    pub fn laser_measured(&mut self) -> Vec<u8> {
+        let (now, pose) = (self.time, self.body.pose());
+        let rplidar = self.rplidar.as_mut();
+        rplidar.map_or_else(Vec::new, |rplidar| rplidar.measured(&self.world, pose, now))
+    }
+
     /// The ultrasonic rangers listen then for the next tick, if that is still to come and before the tick.
     fn listens_at(&self) -> Option<f64> {
         let age = self.physics.sonar.age_s;
@@ -342,7 +368,8 @@ impl Robot {
             for step in 1..=steps as u64 {
                 self.step(span / steps);
                 self.time = from + span * step as f64 / steps;
-                if let Some(laser) = &mut self.laser {
+                let own = self.rplidar.as_mut().map(|rplidar| &mut rplidar.laser);
+                if let Some(laser) = self.laser.as_mut().or(own) {
                     laser.follow(self.time, self.body.pose());
                 }
             }

@@ -58,6 +58,13 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result<(), SimError> {
         options;
     let way = Way::open(transport, listen, own_user_only)?;
     tracing::info!(address = way.address(), %pace, "a simulated X80 listens");
+    let laser_way = match (mission.rplidar(), transport) {
+        (None, _) | (_, Transport::Udp) => None,
+        _ => Some(Way::open(transport, SocketAddr::new(listen.ip(), 0), own_user_only)?),
+    };
+    if let Some(way) = &laser_way {
+        tracing::info!(address = way.address(), "its laser listens");
+    }
     let (robot, checkpoint, _lock) = match keep {
         None => (Robot::new(&mission), None, None),
         Some(file) => {
@@ -76,7 +83,8 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result<(), SimError> {
         }
     };
     let mut clock = SimClock::new(pace, 1.0 / mission.robot.rate_hz, robot.time_s());
-    let mut session = Session::new(&mission, robot, pace, way, ground_truth, checkpoint)?;
+    let mut session =
+        Session::new(&mission, robot, pace, (way, laser_way), ground_truth, checkpoint)?;
     let mut buffer = vec![0; 65_536];
     loop {
         let timeout = clock.wait_for(session.next_due_s(), monotonic_ns());
@@ -107,10 +115,11 @@ fn wait(
     stop: &impl AsFd,
     timeout: Option<Duration>,
 ) -> Result<[bool; 2], SimError> {
-    let (first, second) = session.readable();
-    let descriptors = [stop.as_fd(), first, second.unwrap_or(first)];
-    let came = poll::readable(&descriptors, timeout).map_err(SimError::Wait)?;
-    Ok([came[1] || came[2], came[0]])
+    let mut descriptors = session.readable();
+    descriptors.push(stop.as_fd());
+    let mut came = poll::readable(&descriptors, timeout).map_err(SimError::Wait)?;
+    let stopped = came.pop().unwrap_or_default();
+    Ok([came.contains(&true), stopped])
 }
 
 /// Lockstep has none.

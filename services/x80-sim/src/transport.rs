@@ -69,8 +69,9 @@ impl Way {
         self.0.address()
     }
 
-    pub(crate) fn readable(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>) {
-        self.0.readable()
+    pub(crate) fn readable(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
+        let (first, second) = self.0.readable();
+        std::iter::once(first).chain(second)
     }
 
     pub(crate) fn take_opened(&mut self) -> bool {

@@ -33,10 +33,11 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
         ),
         "give the wheels encoders of more counts, or lower the rate of the firmware's loop and robot.arduino.pid_rate_hz",
     )?;
-    let table = mission.sensor_table();
+    let mut table = mission.sensor_table();
+    table.retain(|sensor| sensor.model.rplidar().is_none());
     if let Some(other) = table.iter().find(|sensor| sensor.kind != SensorKind::Cone) {
         let problem = format!("{:?} is no sonar, and the board has no other sensor", other.name);
-        let remedy = "give rows of robot.sensor that are of kind cone";
+        let remedy = "give rows of robot.sensor that are of kind cone, or RPLIDARs";
         return Err(objection("robot.sensor", problem, remedy));
     }
     const PINS: &str = "robot.arduino.sonars";

@@ -1,7 +1,7 @@
 use super::objection::{Objection, all_within, objection, refuse_if};
 use crate::{
     INFRARED_RANGERS, MOST_BEAMS, MOST_SENSORS, Method, Mission, Protocol, SONARS, SensorKind,
-    SensorRow, Sensors, SonarConfig,
+    SensorRow, Sensors, SonarConfig, address::Address,
 };
 
 const KEY: &str = "robot.sensor";
@@ -21,7 +21,7 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     for (index, row) in rows.iter().enumerate() {
         let SensorRow { name, kind, .. } = row;
         self::row(row, mission.robot.rate_hz)?;
-        if speaks_x80 {
+        if speaks_x80 && *kind != SensorKind::Scan {
             its_channel(row)?;
         }
         let mut earlier = rows[..index].iter();
@@ -36,11 +36,12 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     let lasers = written(SensorKind::Scan);
     refuse_if(lasers > 1, KEY, "two rows are lasers", "keep one")?;
     refuse_if(
-        speaks_x80 && mission.laser().is_some(),
+        speaks_x80 && lasers > 0 && mission.rplidar().is_none(),
         KEY,
         "the boards of an X80 have no laser",
-        "remove it, or give robot.protocol = \"json\" or \"ros2\"",
+        "remove it, give it the model rplidar-a1 or rplidar-c1, or give robot.protocol = \"json\" or \"ros2\"",
     )?;
+    wire(mission)?;
     let is_blind = !rows.is_empty() && lasers + written(SensorKind::Cone) == 0;
     refuse_if(is_blind, KEY, "no row is a cone or a laser", "add the front sonar")?;
     refuse_if(
@@ -110,6 +111,40 @@ fn row(row: &SensorRow, rate_hz: f64) -> Result<(), Objection> {
         (KEY, view_deg, view, "degrees of field_of_view_deg"),
         (KEY, row.rate_hz.unwrap_or(rate_hz), 0.1..=rate_hz, "Hz of rate_hz"),
     ])
+}
+
+/// An RPLIDAR beside the robot's wire.
+fn wire(mission: &Mission) -> Result<(), Objection> {
+    let is_real = mission.robot.address.is_some();
+    for row in &mission.robot.sensors {
+        let own = mission.rplidar().filter(|(_, sensor, _)| sensor.name == row.name);
+        let (name, has_address) = (&row.name, row.address.is_some());
+        refuse_if(
+            has_address && own.is_none(),
+            KEY,
+            format!("{name:?} has an address, and only RPLIDARs have wires of their own"),
+            "remove it, or give model = \"rplidar-a1\" or \"rplidar-c1\"",
+        )?;
+        if let Some(address) = &row.address {
+            let parsed = address.parse::<Address<String>>();
+            let is_wire = parsed.is_ok_and(|address| !matches!(address, Address::Ros2(_)));
+            let problem = format!("{address:?} is no address of a laser");
+            refuse_if(!is_wire, KEY, problem, "give \"serial:///dev/ttyUSB1\"")?;
+        }
+        refuse_if(
+            own.is_some() && is_real != has_address,
+            KEY,
+            format!("of {name:?} and the robot one is real, the other simulated"),
+            "give both address and robot.address, or neither",
+        )?;
+        refuse_if(
+            own.is_some_and(|(_, sensor, _)| sensor.field_of_view_deg < 360.0),
+            KEY,
+            format!("{name:?} sees all around"),
+            "remove field_of_view_deg",
+        )?;
+    }
+    Ok(())
 }
 
 fn its_channel(row: &SensorRow) -> Result<(), Objection> {
@@ -183,6 +218,45 @@ mod tests {
         for good in ["roll_deg = 180\nbeams = 16384", "roll_deg = 0", "beams = 1440"] {
             let text = format!("target = [3, 0]\n{laser}{good}");
             crate::Mission::parse(&text, std::path::Path::new("m.toml")).unwrap();
+        }
+    }
+
+    #[test]
+    fn an_rplidar_has_an_address_of_its_own_beside_a_real_robot_and_none_beside_a_simulated_one() {
+        let mission = |robot: &str, row: &str| {
+            let counts = if robot.contains("x80") { "" } else { "robot.counts_per_turn = 1320\n" };
+            let laser =
+                "[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\n";
+            let front = FRONT
+                .replace("channel = 1\n", if counts.is_empty() { "channel = 1\n" } else { "" });
+            let front = if robot.contains("arduino") { "" } else { &*front };
+            format!("target = [3, 0]\nrobot.protocol = {robot}\n{counts}{front}{laser}{row}")
+        };
+        let (real, a1) = ("'arduino'\nrobot.address = 'serial:///dev/a'", "model = 'rplidar-a1'\n");
+        let at = |address: &str| format!("model = 'rplidar-c1'\naddress = '{address}'\n");
+        for (robot, row, own) in [
+            ("'arduino'", a1, true),
+            ("'x80'", a1, true),
+            (real, &*at("serial:///dev/b"), true),
+            ("'json'", a1, false),
+            ("'json'\nrobot.address = '1.2.3.4:5'", &*at("tcp://host:6"), true),
+        ] {
+            let text = mission(robot, row);
+            let mission = crate::Mission::parse(&text, std::path::Path::new("m.toml")).unwrap();
+            assert_eq!(mission.rplidar().is_some(), own, "{text}");
+        }
+        for (robot, row, problem) in [
+            ("'x80'", "", "no laser"),
+            (real, a1, "one is real"),
+            ("'arduino'", &*at("serial:///dev/b"), "one is real"),
+            (real, &*at("ros2"), "no address of a laser"),
+            (real, &*at("dev"), "no address of a laser"),
+            ("'arduino'", "model = 'rplidar-a1'\nfield_of_view_deg = 90", "sees all around"),
+            ("'json'", "address = 'serial:///dev/b'", "only RPLIDARs"),
+        ] {
+            let text = mission(robot, row).replace("target = [3, 0]\n", "");
+            let refusal = refusal(&text);
+            assert!(refusal.contains(problem), "{text}: {refusal}");
         }
     }
 

@@ -1,5 +1,9 @@
 //! A serial line: 8 data bits, no parity, 1 stop bit, no translation. rustix opens it, because
 //! the waiter needs a `BorrowedFd`, which the crate `serialport` gives only by `unsafe`.
+//!
+//! `unsafe` is needed for one request to the line that rustix does not have: it lowers DTR.
+
+#![allow(unsafe_code)]
 
 use std::{
     fmt, io,
@@ -11,24 +15,35 @@ use std::{
 use rustix::{
     fs::{FlockOperation, Mode, OFlags, flock, open},
     io::Errno,
+    ioctl::{Opcode, Setter, ioctl},
     termios::{
         ControlModes, OptionalActions, QueueSelector, SpecialCodeIndex, isatty, tcflush, tcgetattr,
         tcsetattr,
     },
 };
 
-use super::stream::Dial;
+use super::{Line, stream::Dial};
 
 #[derive(Debug)]
 pub(super) struct Serial {
     path: PathBuf,
-    baud: u32,
+    line: Line,
 }
 
 impl Serial {
-    /// `baud` are bits a second.
-    pub(super) fn new(path: &Path, baud: u32) -> Self {
-        Self { path: path.to_owned(), baud }
+    pub(super) fn new(path: &Path, line: Line) -> Self {
+        Self { path: path.to_owned(), line }
+    }
+}
+
+/// A line without DTR, such as a pseudo-terminal, stays as it is.
+fn lower_dtr(line: &OwnedFd) {
+    const TIOCMBIC: Opcode = 0x5417;
+    const TIOCM_DTR: i32 = 0x002;
+    // SAFETY: Linux reads an `int` for this request, by the header `asm-generic/termios.h`, and writes nothing.
+    let lowered = unsafe { ioctl(line, Setter::<TIOCMBIC, _>::new(TIOCM_DTR)) };
+    if let Err(error) = lowered {
+        tracing::debug!(%error, "DTR stays as it is");
     }
 }
 
@@ -53,7 +68,7 @@ impl Dial for Serial {
         flock(&line, FlockOperation::NonBlockingLockExclusive)?;
         let mut settings = tcgetattr(&line)?;
         settings.make_raw();
-        settings.set_speed(self.baud)?;
+        settings.set_speed(self.line.baud)?;
         let flow = ControlModes::CSIZE
             | ControlModes::PARENB
             | ControlModes::CSTOPB
@@ -69,6 +84,9 @@ impl Dial for Serial {
         settings.special_codes[SpecialCodeIndex::VMIN] = 1;
         settings.special_codes[SpecialCodeIndex::VTIME] = 0;
         tcsetattr(&line, OptionalActions::Now, &settings)?;
+        if self.line.lowers_dtr {
+            lower_dtr(&line);
+        }
         // Bytes for an earlier holder are outdated.
         tcflush(&line, QueueSelector::IOFlush)?;
         Ok(line)

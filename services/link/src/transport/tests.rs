@@ -21,7 +21,7 @@ use tempfile::TempDir;
 use super::*;
 
 fn open_at(address: &Address) -> Result<Transport, TransportError> {
-    Transport::open(address, BAUD)
+    Transport::open(address, super::Line { baud: BAUD, lowers_dtr: false })
 }
 
 const MS: u64 = 1_000_000;

@@ -14,6 +14,7 @@ use common::{
     mission::{Mission, Protocol},
     wire::{Decoder, Frame},
 };
+use rplidar_protocol::START;
 use serde::Serialize;
 
 use crate::{
@@ -29,6 +30,9 @@ const MOST_UNHEARD: usize = 120_000;
 
 /// After this silence, by the machine's clock, a host has gone and another may take the robot.
 const HOST_SILENT: Duration = Duration::from_secs(2);
+
+/// Time between the messages of an RPLIDAR, seconds: a serial adapter gathers bytes for a few milliseconds.
+const GATHERS_S: f64 = 0.004;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Leg {
@@ -49,6 +53,11 @@ pub(super) struct Session {
     strangers: u64,
     /// The peer's, and one other source's: half a frame of one must not garble the other's.
     decoders: Vec<SourceDecoder>,
+    /// The RPLIDAR's; none if its host sends datagrams to the robot's address.
+    laser_way: Option<Way>,
+    laser_peer: Option<Source>,
+    /// Mission time of the newest message of the RPLIDAR.
+    gathered_s: f64,
     protocol: Protocol,
     ground_truth: Option<Box<dyn Write + Send>>,
     checkpoint: Option<Checkpoint>,
@@ -107,11 +116,11 @@ impl Session {
         mission: &Mission,
         robot: Robot,
         pace: Pace,
-        way: Way,
+        (way, laser_way): (Way, Option<Way>),
         ground_truth: Option<Box<dyn Write + Send>>,
         checkpoint: Option<Checkpoint>,
     ) -> Result<Self, SimError> {
-        let listening = way.address();
+        let (listening, laser) = (way.address(), laser_way.as_ref().map(Way::address));
         let radio = Radio::new(mission.simulation.physics().radio, mission.seed);
         let mut session = Self {
             robot,
@@ -122,11 +131,14 @@ impl Session {
             heard: Instant::now(),
             strangers: 0,
             decoders: Vec::new(),
+            laser_way,
+            laser_peer: None,
+            gathered_s: 0.0,
             protocol: mission.robot.protocol(),
             ground_truth,
             checkpoint,
         };
-        session.write(&GroundTruthHeader { listening });
+        session.write(&GroundTruthHeader { listening, laser });
         session.write_tick();
         session.save()?;
         Ok(session)
@@ -145,8 +157,9 @@ impl Session {
         self.save()
     }
 
-    pub(super) fn readable(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>) {
-        self.way.readable()
+    pub(super) fn readable(&self) -> Vec<BorrowedFd<'_>> {
+        let ways = std::iter::once(&self.way).chain(&self.laser_way);
+        ways.flat_map(Way::readable).collect()
     }
 
     pub(super) fn next_tick_s(&self) -> f64 {
@@ -156,7 +169,28 @@ impl Session {
     /// Mission time of what happens by itself next, seconds.
     pub(super) fn next_due_s(&self) -> f64 {
         let flight = self.radio.as_ref().and_then(Radio::next_due);
-        flight.map_or(self.next_tick_s(), |due| due.min(self.next_tick_s()))
+        let laser = self.robot.is_scanning().then_some(self.gathered_s + GATHERS_S);
+        flight.into_iter().chain(laser).fold(self.next_tick_s(), f64::min)
+    }
+
+    fn send_laser(&mut self, bytes: &[u8]) {
+        let way = self.laser_way.as_mut().unwrap_or(&mut self.way);
+        if let Some(peer) = self.laser_peer.filter(|_| !bytes.is_empty()) {
+            way.send(peer, bytes);
+        }
+    }
+
+    fn send_measured(&mut self) {
+        self.gathered_s = self.robot.time_s();
+        let measured = self.robot.laser_measured();
+        self.send_laser(&measured);
+    }
+
+    fn hear_laser(&mut self, source: Source, bytes: &[u8]) {
+        self.laser_peer = Some(source);
+        self.gathered_s = self.robot.time_s();
+        let answers = self.robot.on_laser(bytes);
+        self.send_laser(&answers);
     }
 
     /// Takes at most `most` pieces of what has come; `now` is mission time by a clock, if there is one.
@@ -166,23 +200,39 @@ impl Session {
         most: usize,
         now: impl Fn() -> Option<f64>,
     ) -> Result<(), SimError> {
+        while let Some((source, bytes)) =
+            self.laser_way.as_mut().map(|way| way.receive(buffer)).transpose()?.flatten()
+        {
+            if let Some(now) = now() {
+                self.pass(now)?;
+            }
+            self.hear_laser(source, bytes);
+        }
         for _ in 0..most {
             let Some((source, bytes)) = self.way.receive(buffer)? else {
                 return Ok(());
             };
             let opened = self.way.take_opened();
+            // No robot's protocol has messages that begin so.
+            let is_laser = self.robot.has_rplidar()
+                && (self.laser_peer == Some(source) || bytes.starts_with(&[START]))
+                && self.laser_way.is_none();
             if let Some(now) = now() {
                 self.pass(now)?;
                 if opened {
                     self.robot.on_opened();
                 }
                 let now = self.robot.time_s();
-                if let Some(radio) = &mut self.radio {
+                if let Some(radio) = self.radio.as_mut().filter(|_| !is_laser) {
                     radio.send(now, Leg::ToRobot(source), bytes);
                     continue;
                 }
             }
-            self.hear(source, bytes)?;
+            if is_laser {
+                self.hear_laser(source, bytes);
+            } else {
+                self.hear(source, bytes)?;
+            }
         }
         Ok(())
     }
@@ -201,6 +251,7 @@ impl Session {
             match arrived {
                 Some((Leg::ToRobot(source), bytes)) => self.hear(source, &bytes)?,
                 Some((Leg::ToHost(source), bytes)) => self.way.send(source, &bytes),
+                None if due < self.next_tick_s() => self.send_measured(),
                 None => self.tick()?,
             }
         }
@@ -239,6 +290,7 @@ impl Session {
     /// The frames of the next tick; its ground truth is written, its state saved.
     fn measured(&mut self) -> Result<Vec<u8>, SimError> {
         self.robot.advance_to_next_tick();
+        self.send_measured();
         self.write_tick();
         self.save()?;
         let mut frames = Vec::with_capacity(256);

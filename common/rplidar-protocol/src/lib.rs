@@ -1,0 +1,274 @@
+//! The protocol of Slamtec's RPLIDARs on a serial line: a host's requests, and the sensor's answers and measurements in standard scans.
+//! Source: Slamtec, "Interface Protocol and Application Notes", rev. 2.1, 2019.
+//!
+//! A measurement has five bytes and only four bits to check, so a reader that lost its place believes the next run of measurements
+//! whose angles follow each other.
+
+/// The first byte of a request, and of what precedes an answer.
+pub const START: u8 = 0xa5;
+/// A request with this bit has a payload: its length, its bytes, a checksum.
+const HAS_PAYLOAD: u8 = 0x80;
+const NODE_BYTES: usize = 5;
+const TURN_Q6: u16 = 360 * 64;
+/// A reader's place is found where so many measurements follow each other. One counts when the next has begun well: bytes that were lost
+/// in it must not take the first of the next turn with them.
+const RUN: usize = 4;
+/// The most by which the angles of two that follow each other differ, 1/64 degree. An A1 corrects angles by the range.
+const MOST_STEP_Q6: u16 = 20 * 64;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Request {
+    Stop,
+    Reset,
+    Scan,
+    /// Scan without waiting for the motor's speed.
+    ForceScan,
+    Info,
+    Health,
+    SampleRate,
+    /// All others, of which no standard scan needs one.
+    Other,
+}
+
+const REQUESTS: [(Request, u8); 7] = [
+    (Request::Stop, 0x25),
+    (Request::Reset, 0x40),
+    (Request::Scan, 0x20),
+    (Request::ForceScan, 0x21),
+    (Request::Info, 0x50),
+    (Request::Health, 0x52),
+    (Request::SampleRate, 0x59),
+];
+
+impl Request {
+    pub fn encode(self) -> Vec<u8> {
+        let byte = REQUESTS.iter().find(|(request, _)| *request == self);
+        byte.map_or_else(Vec::new, |(_, byte)| vec![START, *byte])
+    }
+}
+
+/// A sensor's reader of requests.
+#[derive(Clone, Debug, Default)]
+pub struct Requests {
+    held: Vec<u8>,
+}
+
+impl Requests {
+    /// Returns the requests that `bytes` complete.
+    pub fn push(&mut self, bytes: &[u8]) -> Vec<Request> {
+        let mut complete = Vec::new();
+        for byte in bytes {
+            if self.held.is_empty() && *byte != START {
+                continue;
+            }
+            self.held.push(*byte);
+            let length = match self.held[..] {
+                [_] => continue,
+                [_, name, ..] if name & HAS_PAYLOAD == 0 => 2,
+                [_, _] => continue,
+                [_, _, payload, ..] => 4 + usize::from(payload),
+                [] => continue,
+            };
+            if self.held.len() >= length {
+                let known = REQUESTS.iter().find(|(_, name)| *name == self.held[1]);
+                complete.push(known.map_or(Request::Other, |(request, _)| *request));
+                self.held.clear();
+            }
+        }
+        complete
+    }
+}
+
+/// The sensor's status is 0 for good, 1 for a warning, 2 for an error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Answer {
+    Info([u8; 20]),
+    Health {
+        status: u8,
+        code: u16,
+    },
+    /// Time from one measurement to the next, microseconds.
+    SampleRate {
+        standard_us: u16,
+        express_us: u16,
+    },
+    /// Measurements follow.
+    Scan,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Info,
+    Health,
+    SampleRate,
+    Scan,
+}
+
+impl Kind {
+    const ALL: [Self; 4] = [Self::Info, Self::Health, Self::SampleRate, Self::Scan];
+
+    /// The length of the answer, its mode (many in a scan) and its type.
+    const fn descriptor(self) -> [u8; 7] {
+        let [length, mode, kind] = match self {
+            Self::Info => [20, 0x00, 0x04],
+            Self::Health => [3, 0x00, 0x06],
+            Self::SampleRate => [4, 0x00, 0x15],
+            Self::Scan => [NODE_BYTES as u8, 0x40, 0x81],
+        };
+        [START, 0x5a, length, 0, 0, mode, kind]
+    }
+
+    /// None if `body` is too short.
+    fn answer(self, body: &[u8]) -> Option<(usize, Answer)> {
+        Some(match (self, body) {
+            (Self::Info, _) => (20, Answer::Info(*body.first_chunk()?)),
+            (Self::Health, [status, low, high, ..]) => {
+                (3, Answer::Health { status: *status, code: u16::from_le_bytes([*low, *high]) })
+            }
+            (Self::SampleRate, [a, b, c, d, ..]) => {
+                let [standard_us, express_us] = [[*a, *b], [*c, *d]].map(u16::from_le_bytes);
+                (4, Answer::SampleRate { standard_us, express_us })
+            }
+            (Self::Scan, _) => (0, Answer::Scan),
+            _ => return None,
+        })
+    }
+}
+
+impl Answer {
+    pub fn encode(self) -> Vec<u8> {
+        let (kind, body) = match self {
+            Self::Info(info) => (Kind::Info, info.to_vec()),
+            Self::Health { status, code } => {
+                (Kind::Health, [&[status][..], &code.to_le_bytes()].concat())
+            }
+            Self::SampleRate { standard_us, express_us } => {
+                let words = [standard_us, express_us].map(u16::to_le_bytes);
+                (Kind::SampleRate, words.concat())
+            }
+            Self::Scan => (Kind::Scan, Vec::new()),
+        };
+        [&kind.descriptor()[..], &body].concat()
+    }
+}
+
+/// One measurement of a standard scan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Node {
+    /// A turn begins with it.
+    pub is_first: bool,
+    /// 0 to 63; 0 is no reading.
+    pub quality: u8,
+    /// Clockwise from the sensor's front, 1/64 degree.
+    pub angle_q6: u16,
+    /// 1/4 mm; 0 is no reading.
+    pub distance_q2: u16,
+}
+
+impl Node {
+    pub fn encode(self) -> [u8; NODE_BYTES] {
+        let flags = if self.is_first { 0b01 } else { 0b10 };
+        let [angle_low, angle_high] = (self.angle_q6 << 1 | 1).to_le_bytes();
+        let [low, high] = self.distance_q2.to_le_bytes();
+        [self.quality << 2 | flags, angle_low, angle_high, low, high]
+    }
+
+    fn parse(bytes: [u8; NODE_BYTES]) -> Option<Self> {
+        let [flags, angle_low, angle_high, low, high] = bytes;
+        let is_node = matches!(flags & 0b11, 0b01 | 0b10) && angle_low & 1 == 1;
+        is_node.then(|| Self {
+            is_first: flags & 1 == 1,
+            quality: flags >> 2,
+            angle_q6: (u16::from_le_bytes([angle_low, angle_high]) >> 1) % TURN_Q6,
+            distance_q2: u16::from_le_bytes([low, high]),
+        })
+    }
+
+    fn follows(self, earlier: Self) -> bool {
+        let step = (self.angle_q6 + TURN_Q6 - earlier.angle_q6) % TURN_Q6;
+        step.min(TURN_Q6 - step) <= MOST_STEP_Q6 && !(self.is_first && earlier.is_first)
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Said {
+    Answer(Answer),
+    Node(Node),
+    /// A byte that belongs to nothing.
+    Noise,
+}
+
+/// A host's reader.
+#[derive(Clone, Debug, Default)]
+pub struct Decoder {
+    held: Vec<u8>,
+    state: State,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+enum State {
+    #[default]
+    Idle,
+    Answers(Kind),
+    /// The newest measurement; none if none came, or the place is lost.
+    Scans {
+        after: Option<Node>,
+        is_lost: bool,
+    },
+}
+
+impl Decoder {
+    /// Returns the meaning of `bytes`, and of those before that they complete. Fewer than 20 bytes are held.
+    pub fn push(&mut self, bytes: &[u8]) -> Vec<Said> {
+        let mut held = std::mem::take(&mut self.held);
+        held.extend_from_slice(bytes);
+        let mut said = Vec::new();
+        let mut at = 0;
+        while let Some((length, meaning)) = held.get(at..).and_then(|rest| self.next_piece(rest)) {
+            at += length;
+            said.extend(meaning);
+        }
+        held.drain(..at);
+        self.held = held;
+        said
+    }
+
+    /// The length of the next piece of `rest`, and its meaning, if it has one; none while more bytes must come.
+    fn next_piece(&mut self, rest: &[u8]) -> Option<(usize, Option<Said>)> {
+        if let State::Answers(kind) = self.state {
+            let (length, answer) = kind.answer(rest)?;
+            self.state = match kind {
+                Kind::Scan => State::Scans { after: None, is_lost: false },
+                _ => State::Idle,
+            };
+            return Some((length, Some(Said::Answer(answer))));
+        }
+        for kind in Kind::ALL {
+            let descriptor = kind.descriptor();
+            if rest.starts_with(&descriptor) {
+                self.state = State::Answers(kind);
+                return Some((descriptor.len(), None));
+            }
+            // One byte alone may be a measurement's.
+            if descriptor.starts_with(rest) {
+                return None;
+            }
+        }
+        let State::Scans { after, is_lost } = self.state else {
+            return Some((1, Some(Said::Noise)));
+        };
+        let run = if is_lost { RUN } else { 2 };
+        let mut node = first_of_run(rest.get(..run * NODE_BYTES)?);
+        node.take_if(|node| after.is_some_and(|after| !node.follows(after)));
+        self.state = State::Scans { after: node, is_lost: node.is_none() };
+        Some(node.map_or((1, Some(Said::Noise)), |node| (NODE_BYTES, Some(Said::Node(node)))))
+    }
+}
+
+/// The first of the measurements in `bytes`, if they follow each other.
+fn first_of_run(bytes: &[u8]) -> Option<Node> {
+    let (nodes, _) = bytes.as_chunks();
+    let nodes: Option<Vec<_>> = nodes.iter().map(|node| Node::parse(*node)).collect();
+    let nodes = nodes.filter(|nodes| nodes.windows(2).all(|pair| pair[1].follows(pair[0])))?;
+    nodes.first().copied()
+}

@@ -1,0 +1,144 @@
+//! The driver of RPLIDARs: lasers that turn clockwise and say each measurement by itself. [`rplidar_protocol`] has their words.
+
+use std::f64::consts::{PI, TAU};
+
+use common::{
+    driver::{Driver, Heard, LaserScan, WireTally, beam},
+    mission::{Rplidar as Product, Sensor},
+    samples::{LONGEST_SWEEP_NS, Sweep},
+};
+use rplidar_protocol::{Answer, Decoder, Node, Request, Said};
+
+/// The sensor needs 1 ms after a stop before it reads a request, and 64 bytes that are none take longer at 460,800 baud.
+const PAUSE: [u8; 64] = [0; 64];
+const HEALTH_ERROR: u8 = 2;
+
+#[derive(Clone, Debug)]
+pub struct Rplidar {
+    row: usize,
+    sensor: Sensor,
+    decoder: Decoder,
+    sample_ns: i64,
+    /// Measurements so far.
+    count: i64,
+    /// None until a turn begins, and after a loss until the next one does.
+    turn: Option<Turn>,
+    tally: WireTally,
+}
+
+/// A turn that is not over.
+#[derive(Clone, Debug)]
+struct Turn {
+    /// The number of its first measurement.
+    began: i64,
+    first_beam: usize,
+    beams: Vec<f32>,
+}
+
+impl Rplidar {
+    /// The `product` in `row` of the mission's table.
+    pub fn new(row: usize, sensor: Sensor, product: Product) -> Self {
+        Self {
+            row,
+            sensor,
+            decoder: Decoder::default(),
+            sample_ns: i64::from(product.sample_us) * 1000,
+            count: 0,
+            turn: None,
+            tally: WireTally::default(),
+        }
+    }
+
+    fn take_node(&mut self, node: Node) -> Option<LaserScan> {
+        let degrees = f64::from(node.angle_q6) / 64.0;
+        // Counter-clockwise in the robot's frame; a laser upside down turns the other way there.
+        let bearing = if self.sensor.is_upside_down { degrees } else { -degrees }.to_radians();
+        let step = TAU / self.sensor.beams as f64;
+        let at = ((bearing + PI).rem_euclid(TAU) / step).round() as usize % self.sensor.beams;
+        let mut over = None;
+        if node.is_first {
+            let beams = vec![f32::NAN; self.sensor.beams];
+            over = self.turn.replace(Turn { began: self.count, first_beam: at, beams });
+        }
+        self.turn.take_if(|turn| (self.count - turn.began) * self.sample_ns > LONGEST_SWEEP_NS);
+        if let Some(held) = self.turn.as_mut().and_then(|turn| turn.beams.get_mut(at)) {
+            let is_reading = node.quality > 0 && node.distance_q2 > 0;
+            let range = is_reading.then(|| f32::from(node.distance_q2) / 4000.0);
+            *held = held.min(beam(&self.sensor, range));
+        }
+        let scan = over.map(|turn| self.scan_of(turn));
+        self.count += 1;
+        scan
+    }
+
+    /// The scan's first beam is at the number of its measurement, until that becomes a time.
+    fn scan_of(&self, turn: Turn) -> LaserScan {
+        let Turn { began, first_beam, mut beams } = turn;
+        // The sensor says the same of a lost echo and of nothing in reach: nothing is there where no beam beside it ended.
+        let ended: Vec<_> = beams.iter().map(|beam| beam.is_finite()).collect();
+        let last = ended.len().saturating_sub(1);
+        for (beam, range) in beams.iter_mut().enumerate().filter(|(_, range)| range.is_infinite()) {
+            let beside =
+                [beam.checked_sub(1).unwrap_or(last), if beam == last { 0 } else { beam + 1 }];
+            if beside.into_iter().any(|beam| ended.get(beam) == Some(&true)) {
+                *range = f32::NAN;
+            }
+        }
+        let beam_ns = (self.count - began) * self.sample_ns / beams.len().max(1) as i64;
+        let sweep = Sweep {
+            first_beam_ns: began,
+            beam_ns: if self.sensor.is_upside_down { beam_ns } else { -beam_ns },
+            first_beam: first_beam as u64,
+        };
+        LaserScan { row: self.row, beams, sweep, stamp_ns: None }
+    }
+}
+
+impl Driver for Rplidar {
+    fn hear(&mut self, bytes: &[u8]) -> Heard {
+        let mut heard = Heard::default();
+        for said in self.decoder.push(bytes) {
+            match said {
+                Said::Node(node) => heard.scans.extend(self.take_node(node)),
+                Said::Answer(Answer::Health { status: HEALTH_ERROR, code }) => {
+                    heard.refused = Some(format!(
+                        "the laser {:?} reports the error {code:#06x} of its health and does not scan: cut its power for a moment",
+                        self.sensor.name
+                    ));
+                }
+                Said::Answer(Answer::SampleRate { standard_us: us @ 50..=2000, .. }) => {
+                    self.sample_ns = i64::from(us) * 1000;
+                }
+                Said::Answer(Answer::Scan) => self.turn = None,
+                Said::Answer(_) => {}
+                Said::Noise => {
+                    self.turn = None;
+                    self.tally.bytes_dropped += 1;
+                }
+            }
+        }
+        // The newest measurement is held back by the decoder.
+        for LaserScan { sweep, .. } in &mut heard.scans {
+            sweep.first_beam_ns = (sweep.first_beam_ns - self.count) * self.sample_ns;
+        }
+        self.tally.messages += heard.scans.len() as u64;
+        heard.anything = !heard.scans.is_empty();
+        heard
+    }
+
+    fn reset(&mut self) {
+        (self.decoder, self.turn) = (Decoder::default(), None);
+    }
+
+    fn tally(&self) -> WireTally {
+        self.tally
+    }
+
+    fn greeting(&self) -> Vec<u8> {
+        let requests = [Request::Stop, Request::Health, Request::SampleRate, Request::Scan];
+        requests.map(Request::encode).join(&PAUSE[..])
+    }
+}
+
+#[cfg(test)]
+mod tests;
