@@ -47,8 +47,7 @@ fn over(transport: &str, name: &str) -> (Robot, Run) {
     let robot = Robot::start(MISSION, transport, "127.0.0.1:0");
     let scheme = if transport == "pty" { "serial" } else { transport };
     let address = format!("robot.address='{scheme}://{}'", robot.listening);
-    let run = Run::start(name, MISSION, &["--set", &address]);
-    (robot, run)
+    (robot, Run::at_own_speed(name, MISSION, &["--set", &address]))
 }
 
 #[test]
@@ -102,7 +101,7 @@ fn a_robot_with_an_arduino_that_falls_silent_stands_and_drives_on_when_it_answer
         false => bytes.to_vec(),
     };
     let proxy = Proxy::before(&robot, Box::new(<[u8]>::to_vec), Box::new(to_link));
-    let mut run = Run::start("arduino-mute", MISSION, &["--set", &proxy.as_robot()]);
+    let mut run = Run::at_own_speed("arduino-mute", MISSION, &["--set", &proxy.as_robot()]);
     robot.wait_until_driven(1.0);
     silent.store(true, Ordering::Relaxed);
     run.wait_until("the silent robot is lost", |status| {

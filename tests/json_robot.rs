@@ -56,7 +56,8 @@ impl PythonRobot {
     fn run_with(&self, robot: &str, set: &[&str]) -> Run {
         let address = format!("robot.address='udp://127.0.0.1:{}'", self.port);
         let fast = "controller.speed_m_s=0.5";
-        let set = [&["--set", &address, "--set", fast], set].concat();
+        let near = "target=[3, 0]";
+        let set = [&["--set", &address, "--set", fast, "--set", near], set].concat();
         Run::start(robot, &format!("{EXAMPLE}/robot.toml"), &set)
     }
 
@@ -71,7 +72,7 @@ impl PythonRobot {
 #[track_caller]
 fn assert_at_its_target_untouched(truth: &Value) {
     let [x, y] = ["x", "y"].map(|axis| truth[axis].as_f64().unwrap());
-    assert!((x - 4.5).hypot(y) < 0.5, "{truth}");
+    assert!((x - 3.0).hypot(y) < 0.5, "{truth}");
     assert_eq!(truth["touches"], 0, "{truth}");
     assert_eq!(truth["told"], serde_json::json!([0.0, 0.0]), "{truth}");
 }
@@ -107,10 +108,15 @@ fn names_the_response(run: &Path) -> bool {
 #[test]
 fn a_heavy_late_robot_arrives_untouched_as_stated_and_is_named_where_nothing_is_stated() {
     let stated = ["--set", "robot.response={delay_s=0.3,acceleration_m_s2=0.6}"];
-    for (robot, set, named) in [("json-stated", &stated[..], false), ("json-heavy", &[], true)] {
+    let robots = [("json-stated", &stated[..], false), ("json-heavy", &[], true)];
+    let runs = robots.map(|(robot, set, named)| {
         let python = PythonRobot::start_with(&["0.6", "0.3"]);
         let unsure = ["--set", "sure_within_m=2"];
-        let (summary, directory) = python.run_with(robot, &[set, &unsure].concat()).arrives_in();
+        let run = python.run_with(robot, &[set, &unsure].concat());
+        (python, run, named)
+    });
+    for (python, run, named) in runs {
+        let (summary, directory) = run.arrives_in();
         assert_eq!(names_the_response(&directory.path().join("run")), named, "{summary}");
         assert_at_its_target_untouched(&python.end());
     }

@@ -46,8 +46,8 @@ const FAST: &[&str] = &["--pace", "4"];
 /// At this speed the robot is under way for longer than the signals take.
 const LONG: &[&str] = &["--pace", "4", "--set", "controller.speed_m_s=0.1"];
 const CAR: &[&str] = &["--pace", "4", "--set", "robot.model=\"car\""];
-/// At this speed a mission in lockstep has tens of thousands of ticks, which take seconds. That is time enough for the signals.
-const LOCKSTEP: &[&str] = &["--set", "controller.speed_m_s=0.002", "--timeout", "80000"];
+/// At this speed a mission in lockstep has thousands of ticks, which take seconds. That is time enough for the signals.
+const LOCKSTEP: &[&str] = &["--set", "controller.speed_m_s=0.006", "--timeout", "80000"];
 
 /// A test for each row, named by the promise that it guards.
 macro_rules! rows {

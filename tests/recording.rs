@@ -108,17 +108,18 @@ fn recorders_killed_leave_readable_files_that_say_so_and_the_mission_as_it_was()
     let mut run = Run::under_way(
         "rec-shot",
         "obstacle-course",
-        &["--pace", "2", "--set", "sensors='front'"],
+        // The robot is slow enough that all recorders are killed before it arrives.
+        &["--pace", "4", "--set", "controller.speed_m_s=0.08"],
         1.0,
     );
     let directory = tempfile::tempdir().unwrap();
     let (mut read, mut cut) = (0, 0);
-    for shot in 0..10 {
+    for shot in 0..6 {
         if !run.is_running() {
             break;
         }
         let file = directory.path().join(format!("{shot}.mcap"));
-        let file = killed_recorder(&mut run, file, shot * 2);
+        let file = killed_recorder(&mut run, file, shot * 3);
         let recording = Recording::open(&file).unwrap();
         if recording.end == End::Complete {
             // The mission ended before, because the machine is very loaded.

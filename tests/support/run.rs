@@ -32,11 +32,17 @@ impl Run {
     /// Start `firsthand run MISSION --robot ROBOT --json` with further arguments. Unless an argument says otherwise, wheels that nobody
     /// calibrated do not make its arrival unsure, and the robot is slow, so that a test can act while it drives.
     pub fn start(robot: &str, mission: &str, arguments: &[&str]) -> Self {
+        let slow = ["--set", "controller.speed_m_s=0.2"];
+        Self::at_own_speed(robot, mission, &[&slow[..], arguments].concat())
+    }
+
+    /// [`Self::start`] with the speed that the mission itself has.
+    pub fn at_own_speed(robot: &str, mission: &str, arguments: &[&str]) -> Self {
         let directory = directory_of(robot);
         let out = directory.path().join("run");
         let child = firsthand(&["run", mission, "--robot", robot, "--json", "--out"])
             .arg(&out)
-            .args(["--set", "sure_within_m=9", "--set", "controller.speed_m_s=0.2"])
+            .args(["--set", "sure_within_m=9"])
             .args(arguments)
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -227,9 +233,9 @@ pub fn logged(directory: &Path, process: &str, parts: &[&str]) -> usize {
     log.lines().filter(has_all).count()
 }
 
-/// Run a mission to its end.
+/// Run a mission at its own speed to its end.
 pub fn run(robot: &str, mission: &str, arguments: &[&str]) -> (Option<i32>, Value) {
-    Run::start(robot, mission, arguments).finish()
+    Run::at_own_speed(robot, mission, arguments).finish()
 }
 
 /// The committed recording of the first seconds of a mission.
