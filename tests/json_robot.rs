@@ -8,14 +8,10 @@ use std::{
     thread::{self, JoinHandle},
 };
 
-use recording::{
-    Recording,
-    replay::{Options, replay},
-};
 use rustix::process::Signal;
 use serde_json::Value;
 
-use crate::support::{Run, STAGES, assert_reached};
+use crate::support::{Run, STAGES, assert_reached, replayed_in};
 
 const EXAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../guide/example-robot");
 
@@ -126,8 +122,5 @@ fn a_heavy_late_robot_arrives_untouched_as_stated_and_is_named_where_nothing_is_
 fn a_simulated_robot_that_speaks_json_arrives_and_replays_to_the_bit() {
     let protocol = ["--pace", "4", "--set", "robot.protocol='json'"];
     let (_, directory) = Run::start("json-sim", "obstacle-course", &protocol).arrives_in();
-    let recording = Recording::open(&directory.path().join("run/recording.mcap")).unwrap();
-    let report = replay(&recording, &Options::default()).unwrap();
-    assert_eq!(report.difference, None, "{report}");
-    assert_eq!((report.equal(), report.not_replayed()), (5, 0), "{report}");
+    assert_eq!(replayed_in(&directory).equal(), 5);
 }

@@ -7,7 +7,10 @@ use std::{
     process::{Child, Stdio},
 };
 
-use recording::Recording;
+use recording::{
+    Recording,
+    replay::{Options, Report, replay},
+};
 use rustix::process::Signal;
 use serde_json::Value;
 use tempfile::TempDir;
@@ -236,6 +239,22 @@ pub fn logged(directory: &Path, process: &str, parts: &[&str]) -> usize {
 /// Run a mission at its own speed to its end.
 pub fn run(robot: &str, mission: &str, arguments: &[&str]) -> (Option<i32>, Value) {
     Run::at_own_speed(robot, mission, arguments).finish()
+}
+
+/// Open the recording of a run in the directory above the run's, and replay it. Assert that every generation of every stage is
+/// bit-equal, or ended before it took anything.
+#[track_caller]
+pub fn replayed_in(directory: &TempDir) -> Report {
+    replayed(&Recording::open(&directory.path().join("run/recording.mcap")).unwrap())
+}
+
+/// [`replayed_in`] for a recording.
+#[track_caller]
+pub fn replayed(recording: &Recording) -> Report {
+    let report = replay(recording, &Options::default()).unwrap();
+    assert_eq!(report.difference, None, "{report}");
+    assert_eq!(report.not_replayed(), 0, "{report}");
+    report
 }
 
 /// The committed recording of the first seconds of a mission.
