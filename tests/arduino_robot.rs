@@ -1,34 +1,19 @@
 //! Robots whose Arduino speaks the protocol of ROSArduinoBridge, simulated: the mission of the guide over each wire.
 
-use std::{
-    path::Path,
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
+use std::sync::{
+    Arc,
+    atomic::{AtomicBool, Ordering},
 };
 
-use recording::{
-    Recording,
-    replay::{Options, replay},
-};
 use rustix::process::Signal;
 
 use crate::support::{
-    Run, assert_nothing_left, assert_reached,
+    Run, assert_nothing_left, assert_reached, replayed_in,
     wire::{Proxy, Robot},
 };
 
 const MISSION: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../guide/example-arduino/robot.toml");
 const TARGET_M: f64 = 4.0;
-
-#[track_caller]
-fn assert_replays(directory: &Path) {
-    let recording = Recording::open(&directory.join("run/recording.mcap")).unwrap();
-    let report = replay(&recording, &Options::default()).unwrap();
-    assert_eq!(report.difference, None, "{report}");
-    assert_eq!(report.not_replayed(), 0, "{report}");
-}
 
 const WITH_LASER: &str =
     concat!(env!("CARGO_MANIFEST_DIR"), "/../guide/example-arduino/laser.toml");
@@ -41,7 +26,7 @@ fn assert_arrives(run: Run, robot: Robot) {
     assert_reached(code, &summary);
     let went = robot.kill();
     assert!((went - TARGET_M).abs() < 0.5, "{went} m");
-    assert_replays(directory.path());
+    replayed_in(&directory);
     assert_nothing_left(&name);
 }
 
@@ -50,8 +35,7 @@ fn over(transport: &str, name: &str) -> (Robot, Run) {
     let robot = Robot::start(MISSION, transport, "127.0.0.1:0");
     let scheme = if transport == "pty" { "serial" } else { transport };
     let address = format!("robot.address='{scheme}://{}'", robot.listening);
-    let run = Run::start(name, MISSION, &["--set", &address]);
-    (robot, run)
+    (robot, Run::at_own_speed(name, MISSION, &["--set", &address]))
 }
 
 #[test]
@@ -70,7 +54,7 @@ fn a_robot_with_an_arduino_arrives_in_lockstep_on_the_same_way_each_time() {
 #[test]
 fn a_simulated_robot_with_an_arduino_arrives_and_replays_to_the_bit() {
     let (_, directory) = Run::start("arduino-sim", MISSION, &["--pace", "4"]).arrives_in();
-    assert_replays(directory.path());
+    replayed_in(&directory);
 }
 
 #[test]
@@ -105,7 +89,7 @@ fn a_robot_with_an_arduino_that_falls_silent_stands_and_drives_on_when_it_answer
         false => bytes.to_vec(),
     };
     let proxy = Proxy::before(&robot, Box::new(<[u8]>::to_vec), Box::new(to_link));
-    let mut run = Run::start("arduino-mute", MISSION, &["--set", &proxy.as_robot()]);
+    let mut run = Run::at_own_speed("arduino-mute", MISSION, &["--set", &proxy.as_robot()]);
     robot.wait_until_driven(1.0);
     silent.store(true, Ordering::Relaxed);
     run.wait_until("the silent robot is lost", |status| {

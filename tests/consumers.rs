@@ -130,7 +130,7 @@ fn a_logger_follows_its_robot_through_five_runs_one_of_them_killed_and_harms_non
         let counted = Arc::clone(&heard);
         let logger = std::thread::spawn(move || follow("followed", 5, &counted));
         for run in 0..5 {
-            let mut started = Run::start("followed", "open-room", &["--pace", "4"]);
+            let mut started = Run::at_own_speed("followed", "open-room", &["--pace", "4"]);
             if run == 1 {
                 let has_heard = || heard.lock().unwrap().get(1).is_some_and(|&poses| poses > 5);
                 let status = started.wait_until("the logger hears it", |_| has_heard());
@@ -156,7 +156,7 @@ fn a_logger_follows_its_robot_through_five_runs_one_of_them_killed_and_harms_non
 #[test]
 fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_notices() {
     in_own_process(|| {
-        let mut run = Run::under_way("greedy", "open-room", &["--pace", "2"], 0.5);
+        let mut run = Run::under_way("greedy", "open-room", &["--pace", "4"], 0.5);
         let bus = Bus::join(&support::domain("greedy"), "greedy").unwrap();
         let mut grids = bus.reader(&topics::GRID).unwrap();
         let mut held = Vec::new();
@@ -264,7 +264,7 @@ fn ten_consumers_that_stay_and_three_that_join_again_and_again_harm_no_stage_and
 #[test]
 fn poses_go_on_while_an_operators_stop_holds() {
     in_own_process(|| {
-        let mut run = Run::under_way("held-poses", "open-room", &["--pace", "2"], 0.5);
+        let mut run = Run::under_way("held-poses", "open-room", &["--pace", "4"], 0.5);
         operate("held-poses", &["stop"]);
         run.wait_until("it stands", |status| {
             status["order"] == "stopped by an operator" && status["link"]["stopped"] == true

@@ -19,7 +19,7 @@ use serde_json::Value;
 /// field until the supervisor notices, would make the arrival unsure.
 const SLOW: [&str; 6] = [
     "--set",
-    "controller.speed_m_s=0.004",
+    "controller.speed_m_s=0.012",
     "--set",
     "robot.odometry={slip=0.001,diameter_ratio_sd=0,track_scale_sd=0,distance_scale_sd=0}",
     "--timeout",

@@ -5,16 +5,13 @@
 
 use std::{path::Path, process::Stdio};
 
-use recording::{
-    Recording,
-    replay::{Options, replay},
-};
 use rustix::process::Signal;
 use serde_json::Value;
+use tempfile::TempDir;
 
 use crate::support::{
     self, Run, STAGES, all_run, assert_ended, assert_nothing_left, assert_reached, find, firsthand,
-    generation, operate, output, pid, pids_of, processes, records, signal_process,
+    generation, operate, output, pid, pids_of, processes, records, replayed_in, signal_process,
 };
 
 /// The phase in which stages get a signal.
@@ -46,8 +43,8 @@ const FAST: &[&str] = &["--pace", "4"];
 /// At this speed the robot is under way for longer than the signals take.
 const LONG: &[&str] = &["--pace", "4", "--set", "controller.speed_m_s=0.1"];
 const CAR: &[&str] = &["--pace", "4", "--set", "robot.model=\"car\""];
-/// At this speed a mission in lockstep has tens of thousands of ticks, which take seconds. That is time enough for the signals.
-const LOCKSTEP: &[&str] = &["--set", "controller.speed_m_s=0.002", "--timeout", "80000"];
+/// At this speed a mission in lockstep has thousands of ticks, which take seconds. That is time enough for the signals.
+const LOCKSTEP: &[&str] = &["--set", "controller.speed_m_s=0.006", "--timeout", "80000"];
 
 /// A test for each row, named by the promise that it guards.
 macro_rules! rows {
@@ -101,7 +98,7 @@ impl Row {
                 let (summary, directory) = run.arrives_in();
                 self.assert_restarts(&summary);
                 assert_pose_was_not_lost(&summary);
-                assert_every_generation_replays(&directory.path().join("run"), self);
+                assert_every_generation_replays(&directory, self);
             }
             Phase::Waiting => {
                 run.wait_until_under_way(1.0);
@@ -181,18 +178,15 @@ fn assert_pose_was_not_lost(summary: &Value) {
 }
 
 /// Assert that every generation of every stage is bit-equal, or ended before it took anything.
-fn assert_every_generation_replays(directory: &Path, row: &Row) {
-    let deaths = records(&directory.join("deaths.jsonl"));
+fn assert_every_generation_replays(directory: &TempDir, row: &Row) {
+    let deaths = records(&directory.path().join("run/deaths.jsonl"));
     let hit: Vec<_> = deaths.iter().map(|death| &death["stage"]).collect();
     assert_eq!(hit[..5], STAGES);
     // In lockstep no stage waits for the recorder, so it may lose samples.
     if row.arguments == LOCKSTEP {
         return;
     }
-    let recording = Recording::open(&directory.join("recording.mcap")).unwrap();
-    let report = replay(&recording, &Options::default()).unwrap();
-    assert_eq!(report.difference, None, "{report}");
-    assert_eq!(report.not_replayed(), 0, "{report}");
+    let report = replayed_in(directory);
     assert!(report.equal() >= 10, "{report}");
 }
 

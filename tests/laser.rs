@@ -1,12 +1,9 @@
 //! Tests of robots with a simulated laser, through real processes.
 
-use recording::{
-    Recording,
-    replay::{Options, replay},
-};
+use recording::Recording;
 use rustix::process::Signal;
 
-use crate::support::{Run, STAGES, printed, run};
+use crate::support::{Run, STAGES, printed, replayed, run};
 
 #[test]
 fn a_robot_with_a_laser_arrives_though_each_stage_is_killed_and_replays_to_the_bit() {
@@ -25,8 +22,7 @@ fn a_robot_with_a_laser_arrives_though_each_stage_is_killed_and_replays_to_the_b
     let recording = Recording::open(&directory.path().join("run/recording.mcap")).unwrap();
     assert!(recording.counts["scan"] > 100, "{:?}", recording.counts);
     assert!(recording.counts["foxglove/scan/laser"] > 100, "{:?}", recording.counts);
-    let report = replay(&recording, &Options::default()).unwrap();
-    assert_eq!(report.difference, None, "{report}");
+    let report = replayed(&recording);
     assert!(report.equal() >= 2 * STAGES.len() as u64, "{report}");
 }
 

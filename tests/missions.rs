@@ -8,7 +8,7 @@ use crate::support::{self, Run, assert_ended, assert_nothing_left, printed, run}
 #[track_caller]
 fn arrives_untouched(robot: &str, mission: &str, arguments: &[&str]) -> Value {
     println!("{arguments:?}");
-    let summary = Run::start(robot, mission, arguments).arrives();
+    let summary = Run::at_own_speed(robot, mission, arguments).arrives();
     assert_eq!(summary["collisions"], 0, "{summary}");
     summary
 }
@@ -29,6 +29,8 @@ fn ends(robot: &str, mission: &str, arguments: &[&str], code: i32, outcome: &str
 }
 
 const PAPER: [&str; 2] = ["--set", "method=\"paper\""];
+/// Faster, a robot by the paper's method or a car touches something with some seeds.
+const SLOW: [&str; 2] = ["--set", "controller.speed_m_s=0.2"];
 const MEASURED: [&str; 2] = ["--set", "simulation.realism=\"measured\""];
 
 #[test]
@@ -45,7 +47,7 @@ fn by_the_papers_method_it_does_for_seeds_1_to_8() {
         ["--set", "robot.odometry.diameter_ratio_sd=0", "--set", "robot.odometry.slip=0.001"];
     for seed in 1..=8 {
         let seed = seed.to_string();
-        let arguments = [&PAPER[..], &wheels, &["--seed", &seed]].concat();
+        let arguments = [&PAPER[..], &SLOW, &wheels, &["--seed", &seed]].concat();
         arrives_untouched("paper", "obstacle-course", &arguments);
     }
 }
@@ -120,7 +122,8 @@ const CAR: [&str; 2] = ["--set", "robot.model=\"car\""];
 fn a_car_crosses_the_course_untouched_for_seeds_1_to_5() {
     for seed in 1..=5 {
         let seed = seed.to_string();
-        arrives_untouched("car", "obstacle-course", &[&CAR[..], &["--seed", &seed]].concat());
+        let arguments = [&CAR[..], &SLOW, &["--seed", &seed]].concat();
+        arrives_untouched("car", "obstacle-course", &arguments);
     }
 }
 
@@ -156,7 +159,7 @@ fn a_turn_of_a_quarter_at_the_start_costs_little() {
 fn by_the_papers_method_a_known_course_is_crossed_faster_than_an_unknown_one() {
     let known = "known.drum=[{at=[1.7,0.2],radius_m=0.35},{at=[3.7,-0.7],radius_m=0.4},\
                  {at=[2.3,-1.7],radius_m=0.3},{at=[3.9,1.2],radius_m=0.3}]";
-    let laboratory = [&PAPER[..], &["--set", "simulation.realism='laboratory'"]].concat();
+    let laboratory = [&PAPER[..], &SLOW, &["--set", "simulation.realism='laboratory'"]].concat();
     let (_, sensing) = run("sensing", "obstacle-course", &laboratory);
     let knows = [&laboratory[..], &["--set", known]].concat();
     let (_, knowing) = run("knowing", "obstacle-course", &knows);
@@ -212,9 +215,9 @@ fn latency(robot: &str, arguments: &[&str]) -> Vec<Value> {
 
 #[test]
 fn latency_measures_ticks_beside_hops_in_both_regimes_and_leaves_nothing() {
-    let reports = latency("hops", &["--busy", "2"]);
+    let reports = latency("hops", &["--busy", "1", "--set", "robot.rate_hz=20"]);
     let regimes: Vec<_> = reports.iter().map(|report| &report["regime"]).collect();
-    assert_eq!(regimes, ["back to back", "at 7 Hz"]);
+    assert_eq!(regimes, ["back to back", "at 20 Hz"]);
     for report in &reports {
         let times = report["times"].as_array().unwrap();
         assert_eq!(times.len(), 4, "{report}");
@@ -227,7 +230,10 @@ fn latency_measures_ticks_beside_hops_in_both_regimes_and_leaves_nothing() {
 
 #[test]
 fn latency_at_a_rate_is_measured_at_that_rate_alone() {
-    let reports = latency("hops-9hz", &["--rate", "9", "--no-record", "--consumers", "0"]);
+    let reports = latency(
+        "hops-30hz",
+        &["--rate", "30", "--set", "timeout_s=12", "--no-record", "--consumers", "0"],
+    );
     assert_eq!(reports.len(), 1, "{reports:?}");
-    assert_eq!(reports[0]["regime"], "at 9 Hz");
+    assert_eq!(reports[0]["regime"], "at 30 Hz");
 }

@@ -44,7 +44,7 @@ fn shared(robot: &str) -> Vec<std::path::PathBuf> {
 #[test]
 fn a_second_controller_and_a_second_supervisor_are_ignored_counted_and_told_with_their_process() {
     in_own_process(|| {
-        let run = Run::under_way("two-masters", "open-room", &["--pace", "2"], 0.3);
+        let run = Run::under_way("two-masters", "open-room", &["--pace", "4"], 0.3);
         let bus = Bus::join(&domain("two-masters"), "second").unwrap();
         let mut commands = bus.writer(&topics::COMMAND, u32::MAX).unwrap();
         let mut orders = bus.writer(&topics::DIRECTIVE, u32::MAX).unwrap();
@@ -88,7 +88,7 @@ fn a_second_controller_and_a_second_supervisor_are_ignored_counted_and_told_with
 #[test]
 fn samples_that_seem_newer_than_all_others_wedge_no_mission_and_no_consumer_whatever_their_topic() {
     in_own_process(|| {
-        let run = Run::under_way("forged", "open-room", &["--pace", "2"], 0.3);
+        let run = Run::under_way("forged", "open-room", &["--pace", "4"], 0.3);
         let echo = |topic| {
             let mut echo = firsthand(&["topic", "echo", topic, "--robot", "forged", "--json"]);
             echo.args(["--number", "40"]).stdout(Stdio::piped()).spawn().unwrap()
@@ -228,7 +228,7 @@ fn datagrams_of_another_user_do_not_drive_the_simulated_robot_of_a_run() {
         return support::not_run(test, "only root can act as another user");
     }
     in_own_process(|| {
-        let run = Run::under_way("driven", "open-room", &["--pace", "2"], 0.3);
+        let run = Run::under_way("driven", "open-room", &["--pace", "4"], 0.3);
         let robot = common::run::Run::load(&run.directory()).unwrap().address;
         let Address::Udp(robot) = robot else { panic!("{robot}") };
         // The thread ends with the process of this test.
@@ -349,7 +349,7 @@ fn files_of_the_bus_truncated_or_removed_in_a_run_leave_sigterm_its_three_second
 #[test]
 fn two_robots_on_one_machine_do_not_see_each_other() {
     let mut one = Run::start("one", "open-room", &["--pace", "4"]);
-    let mut two = Run::start("two", "trap", &["--pace", "4"]);
+    let mut two = Run::at_own_speed("two", "trap", &["--pace", "4"]);
     let status = one.wait_until_under_way(1.0);
     two.wait_until_under_way(1.0);
     let other = two.status().unwrap();

@@ -35,9 +35,9 @@ fn a_stop_of_which_the_supervisor_hears_after_the_resume_does_not_stop_the_robot
 
 #[test]
 fn an_operators_stop_uses_up_no_mission_time_and_is_no_stall() {
-    let (pace, timeout_s) = (4.0, 45.0);
+    let (pace, timeout_s) = (4.0, 20.0);
     let set = format!("timeout_s={timeout_s}");
-    let arguments = ["--pace", "4", "--set", &set];
+    let arguments = ["--pace", "4", "--set", &set, "--set", "controller.speed_m_s=0.5"];
     let mut run = Run::under_way("stop-time", "open-room", &arguments, 2.0);
     operate("stop-time", &["stop"]);
     let stopped = std::time::Instant::now();
@@ -50,7 +50,7 @@ fn an_operators_stop_uses_up_no_mission_time_and_is_no_stall() {
 
 #[test]
 fn a_stage_that_dies_again_and_again_is_held_until_an_operator_releases_it() {
-    let mut run = Run::under_way("held", "open-room", &["--pace", "1"], 1.0);
+    let mut run = Run::under_way("held", "open-room", &PACE, 1.0);
     // The next generation fails when it starts.
     let checkpoint = run.directory().join("mapper.checkpoint");
     std::fs::remove_file(&checkpoint).unwrap();

@@ -18,7 +18,7 @@ fn events(page: &str) -> (Vec<String>, Value) {
 
 #[test]
 fn a_run_ends_with_a_report_that_tells_of_a_planner_that_was_killed() {
-    let mut run = Run::under_way("report-kill", "open-room", &["--pace", "2"], 0.5);
+    let mut run = Run::under_way("report-kill", "open-room", &["--pace", "4"], 0.5);
     run.kill_and_await_successor("planner", Signal::KILL);
     let (code, summary, directory) = run.finish_in();
     assert_eq!(code, Some(0), "{summary}");

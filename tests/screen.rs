@@ -128,7 +128,7 @@ fn the_keys_of_top_do_what_they_say_and_the_mission_arrives() {
     let mut screen = Screen::start(robot);
     screen.wait_for("is not running here");
     // The robot is slow enough that all keys are pressed before it arrives.
-    let slow = ["--pace", "2", "--timeout", "600", "--set", "controller.speed_m_s=0.15"];
+    let slow = ["--pace", "2", "--timeout", "600", "--set", "controller.speed_m_s=0.2"];
     let mut run = Run::start(robot, "obstacle-course", &slow);
     screen.wait_for("driving");
     screen.wait_for("dead-reckoning");
@@ -182,5 +182,5 @@ fn top_ends_when_its_terminal_is_closed_and_on_a_signal_and_needs_one() {
     assert_eq!(code, Some(0), "{written:?}");
     assert!(written.contains("\x1b[?1049l"), "{written:?}");
     refused(&["top", "--robot", robot], "no-terminal", &["firsthand status"]);
-    run.arrives();
+    run.stop();
 }

@@ -215,18 +215,27 @@ fn cause_is(cause: &'static str) -> impl Fn(&Value) -> bool {
 #[test]
 fn a_robot_whose_encoders_cannot_be_true_drives_for_1_5_s_at_most_and_its_mission_ends_with_the_reason()
  {
-    for fault in [Fault::SameFrame, Fault::DeadEncoder, Fault::Reversed, Fault::Random] {
-        let (_body, faults, mut run) = faulty("fi-encoders", fault);
-        run.wait_until("it is suspected", cause_is("odometry implausible"));
-        let moved = faults.moved_for();
-        println!("{fault:?}: told to move for {} ms", moved.as_millis());
-        assert!(moved < BOUND, "{fault:?}: {moved:?}");
-        let (code, summary) = run.finish();
-        assert_eq!(faults.moved_for(), moved, "{fault:?}: it never moved again");
-        assert_ended(code, &summary, 6, "aborted");
-        assert_eq!(summary["cause"], "odometry implausible for long", "{summary}");
-        assert_nothing_left("fi-encoders");
-    }
+    std::thread::scope(|scope| {
+        for (robot, fault) in [
+            ("fi-same", Fault::SameFrame),
+            ("fi-dead", Fault::DeadEncoder),
+            ("fi-reversed", Fault::Reversed),
+            ("fi-random", Fault::Random),
+        ] {
+            scope.spawn(move || {
+                let (_body, faults, mut run) = faulty(robot, fault);
+                run.wait_until("it is suspected", cause_is("odometry implausible"));
+                let moved = faults.moved_for();
+                println!("{fault:?}: told to move for {} ms", moved.as_millis());
+                assert!(moved < BOUND, "{fault:?}: {moved:?}");
+                let (code, summary) = run.finish();
+                assert_eq!(faults.moved_for(), moved, "{fault:?}: it never moved again");
+                assert_ended(code, &summary, 6, "aborted");
+                assert_eq!(summary["cause"], "odometry implausible for long", "{summary}");
+                assert_nothing_left(robot);
+            });
+        }
+    });
 }
 
 #[test]
@@ -234,7 +243,8 @@ fn a_robot_whose_counts_jump_in_motion_stands_and_its_arrival_is_unsure() {
     let body = Robot::start("open-room", "udp", "127.0.0.1:0");
     let faults = FaultInjector::before(&body, Fault::None);
     let sure = ["--set", "sure_within_m=0.5", "--set", &faults.proxy.as_robot()];
-    let mut run = Run::under_way("fi-jump", "open-room", &sure, 0.5);
+    let mut run = Run::at_own_speed("fi-jump", "open-room", &sure);
+    run.wait_until_under_way(0.5);
     faults.set(Fault::Elsewhere);
     run.wait_until("it stands", cause_is("odometry implausible"));
     run.wait_until("it goes on", |status| status["link"]["cause"].is_null());

@@ -7,7 +7,10 @@ use std::{
     process::{Child, Stdio},
 };
 
-use recording::Recording;
+use recording::{
+    Recording,
+    replay::{Options, Report, replay},
+};
 use rustix::process::Signal;
 use serde_json::Value;
 use tempfile::TempDir;
@@ -32,11 +35,17 @@ impl Run {
     /// Start `firsthand run MISSION --robot ROBOT --json` with further arguments. Unless an argument says otherwise, wheels that nobody
     /// calibrated do not make its arrival unsure, and the robot is slow, so that a test can act while it drives.
     pub fn start(robot: &str, mission: &str, arguments: &[&str]) -> Self {
+        let slow = ["--set", "controller.speed_m_s=0.2"];
+        Self::at_own_speed(robot, mission, &[&slow[..], arguments].concat())
+    }
+
+    /// [`Self::start`] with the speed that the mission itself has.
+    pub fn at_own_speed(robot: &str, mission: &str, arguments: &[&str]) -> Self {
         let directory = directory_of(robot);
         let out = directory.path().join("run");
         let child = firsthand(&["run", mission, "--robot", robot, "--json", "--out"])
             .arg(&out)
-            .args(["--set", "sure_within_m=9", "--set", "controller.speed_m_s=0.2"])
+            .args(["--set", "sure_within_m=9"])
             .args(arguments)
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -227,9 +236,25 @@ pub fn logged(directory: &Path, process: &str, parts: &[&str]) -> usize {
     log.lines().filter(has_all).count()
 }
 
-/// Run a mission to its end.
+/// Run a mission at its own speed to its end.
 pub fn run(robot: &str, mission: &str, arguments: &[&str]) -> (Option<i32>, Value) {
-    Run::start(robot, mission, arguments).finish()
+    Run::at_own_speed(robot, mission, arguments).finish()
+}
+
+/// Open the recording of a run in the directory above the run's, and replay it. Assert that every generation of every stage is
+/// bit-equal, or ended before it took anything.
+#[track_caller]
+pub fn replayed_in(directory: &TempDir) -> Report {
+    replayed(&Recording::open(&directory.path().join("run/recording.mcap")).unwrap())
+}
+
+/// [`replayed_in`] for a recording.
+#[track_caller]
+pub fn replayed(recording: &Recording) -> Report {
+    let report = replay(recording, &Options::default()).unwrap();
+    assert_eq!(report.difference, None, "{report}");
+    assert_eq!(report.not_replayed(), 0, "{report}");
+    report
 }
 
 /// The committed recording of the first seconds of a mission.
