@@ -39,6 +39,7 @@ pub mod address;
 mod arduino;
 mod check;
 mod error;
+mod footprint;
 pub mod geometry;
 pub mod grid;
 pub mod kinematics;
@@ -57,6 +58,7 @@ use serde::{Deserialize, Serialize};
 
 pub use arduino::{ArduinoBoard, LEAST_BAUD};
 pub use error::MissionError;
+pub use footprint::Footprint;
 pub use odometry::{Calibration, CalibrationPlan, Odometry, Procedure, Provenance};
 pub use response::{ModelledSpeed, Response, ResponseKeys};
 pub use robot::{BatteryLimits, Body, Channel, Model, Protocol, RobotConfig, Steering};

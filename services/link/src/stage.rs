@@ -72,7 +72,7 @@ impl LinkStage {
                     out.publish(&CONTACT, contact)?;
                 }
                 if let Some(response) = response {
-                    out.publish(&BASE_RESPONSE, response)?;
+                    out.publish(&BASE_RESPONSE, *response)?;
                 }
                 for scan in scans {
                     let mut lasers = self.lasers.iter();

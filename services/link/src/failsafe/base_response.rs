@@ -94,8 +94,4 @@ impl Monitor for BaseResponse {
     fn condition(&self, _: Cause, _: Moment) -> Condition {
         (self.found.is_some() && !self.is_followed).into()
     }
-
-    fn explain(&self, _: Cause, _: Moment) -> Option<String> {
-        self.words()
-    }
 }

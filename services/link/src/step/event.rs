@@ -84,7 +84,7 @@ pub enum Effect {
         /// The counts of `wheels` without their cycle, of a robot that has no counter.
         endless: Option<CountsSample>,
         contact: Option<ContactSample>,
-        response: Option<BaseResponseSample>,
+        response: Option<Box<BaseResponseSample>>,
     },
     Answered {
         /// The tick's beginning on the monotonic clock, nanoseconds.
