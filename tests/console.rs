@@ -85,6 +85,7 @@ fn echo_prints_every_topic_with_the_fields_of_its_layout() {
         // These topics come when something happens, from a laser, or from a robot without counters; that of lockstep is not this run's.
         if [
             "counts",
+            "base_response",
             "tick_limit",
             "contact",
             "scan",

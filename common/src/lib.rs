@@ -29,6 +29,7 @@
 //! | [`driver`] | what the link needs of a robot's protocol |
 //! | [`inputs`], [`replay`] | the inputs of every step, published; their replay |
 //! | [`outputs`], [`stage`] | where a stage's outputs go; its runner: process and replay of every stage, once |
+//! | [`found_response`] | what the link found of the base's response, as stages take it |
 
 pub mod checkpoint;
 pub mod driver;
@@ -36,6 +37,7 @@ pub mod external;
 pub mod faults;
 pub mod file;
 pub mod follower;
+pub mod found_response;
 pub mod grid;
 pub mod ground_truth;
 pub mod inputs;

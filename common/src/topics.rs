@@ -88,6 +88,10 @@ topics! {
     COUNTS: Topic<CountsSample> {
         name: "counts", writer: "link", rate: Rate::WhenItHappens,
     }
+    /// How the base was found to answer, in each tick, if it stops later than the mission states.
+    BASE_RESPONSE: Topic<BaseResponseSample> {
+        name: "base_response", writer: "link", rate: Rate::WhenItHappens,
+    }
     /// Wheels are held although they were told to turn: where something touches the body.
     CONTACT: Topic<ContactSample> {
         name: "contact", writer: "link", rate: Rate::WhenItHappens,

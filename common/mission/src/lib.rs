@@ -39,6 +39,7 @@ pub mod address;
 mod arduino;
 mod check;
 mod error;
+mod footprint;
 pub mod geometry;
 pub mod grid;
 pub mod kinematics;
@@ -57,6 +58,7 @@ use serde::{Deserialize, Serialize};
 
 pub use arduino::{ArduinoBoard, LEAST_BAUD};
 pub use error::MissionError;
+pub use footprint::Footprint;
 pub use odometry::{Calibration, CalibrationPlan, Odometry, Procedure, Provenance};
 pub use response::{ModelledSpeed, Response, ResponseKeys};
 pub use robot::{BatteryLimits, Body, Channel, Model, Protocol, RobotConfig, Steering};
@@ -450,6 +452,29 @@ impl Mission {
 
     pub fn body(&self) -> Body {
         self.robot.body()
+    }
+
+    /// The mission of a robot whose base was found to go on as before for `dead_time_s` and to accelerate at `acceleration_m_s2`, which
+    /// may be infinite. None if no base does that.
+    pub fn with_response(&self, dead_time_s: f64, acceleration_m_s2: f64) -> Option<Self> {
+        let is_a_base = (0.0..=4.0).contains(&dead_time_s) && acceleration_m_s2 >= 0.05;
+        is_a_base.then(|| {
+            let body = self.body();
+            let turn = 2.0 * acceleration_m_s2 / body.track_m;
+            let mut mission = self.clone();
+            mission.robot.response = ResponseKeys {
+                delay_s: Some(dead_time_s),
+                lag_s: Some(0.0),
+                acceleration_m_s2: Some(acceleration_m_s2),
+                turn_acceleration_rad_s2: Some(body.response.turn_acceleration_rad_s2.min(turn)),
+            };
+            mission
+        })
+    }
+
+    /// Whether planner and controller let the base's response limit the speed towards what they know.
+    pub fn brakes_by_response(&self) -> bool {
+        self.method == Method::Evidential && self.sensing && self.planner.executable.is_none()
     }
 }
 

@@ -2,12 +2,14 @@ use std::path::PathBuf;
 
 use crate::{
     arduino::ArduinoBoard,
+    footprint::Footprint,
     kinematics::{Ackermann, DifferentialDrive, Drive},
     odometry::Odometry,
     response::{Response, ResponseKeys},
     ros2::Ros2Topics,
     sensor::SensorRow,
 };
+use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -86,6 +88,9 @@ keys! {
         steering_counts_per_turn: Option<f64>,
         counts_per_turn: Option<f64>,
         radius_m: Option<f64>,
+        /// The corners of a body that is no disc, metres in the robot's frame.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        footprint: Vec<DVec2>,
         top_speed_m_s: Option<f64>,
         /// A car's: the driven axle.
         left: Channel = Channel { channel: 0, reversed: true },
@@ -134,7 +139,10 @@ pub struct Body {
     /// W.
     pub track_m: f64,
     pub counts_per_turn: f64,
+    /// Of a disc that covers the body at any heading.
     pub radius_m: f64,
+    /// None for a disc.
+    pub footprint: Option<Footprint>,
     pub top_speed_m_s: f64,
     pub response: Response,
     pub steering: Option<Steering>,
@@ -204,6 +212,7 @@ const fn differential(
         track_m,
         counts_per_turn: 3600.0,
         radius_m,
+        footprint: None,
         top_speed_m_s,
         response,
         steering: None,
@@ -222,6 +231,7 @@ impl Model {
                 track_m: 0.26,
                 counts_per_turn: 1200.0,
                 radius_m: 0.19,
+                footprint: None,
                 top_speed_m_s: 1.0,
                 response: Response::X80,
                 steering: None,
@@ -231,20 +241,23 @@ impl Model {
                 track_m: 0.283,
                 counts_per_turn: 756.0,
                 radius_m: 0.19,
+                footprint: None,
                 top_speed_m_s: 0.76,
                 response: Response::X80,
                 steering: None,
             },
-            // 508 mm by 430 mm.
-            Self::Jackal => {
-                differential(0.098, 0.375_59, 0.333, 2.0, Response::limited(20.0, 25.0))
-            }
+            Self::Jackal => Body {
+                footprint: Some(Footprint::rectangle(-0.254, 0.254, 0.215)),
+                ..differential(0.098, 0.375_59, 0.333, 2.0, Response::limited(20.0, 25.0))
+            },
             Self::TurtleBot3Burger => {
                 differential(0.033, 0.16, 0.105, 0.22, Response::limited(2.5, 3.2))
             }
-            Self::TurtleBot3Waffle => {
-                differential(0.033, 0.287, 0.22, 0.26, Response::limited(2.5, 3.2))
-            }
+            // Its body reaches farther back than ahead of its wheels.
+            Self::TurtleBot3Waffle => Body {
+                footprint: Some(Footprint::rectangle(-0.2045, 0.0765, 0.153)),
+                ..differential(0.033, 0.287, 0.2555, 0.26, Response::limited(2.5, 3.2))
+            },
             Self::TurtleBot4 | Self::Create3 => {
                 differential(0.035_75, 0.233, 0.175, 0.306, Response::limited(0.9, 7.725))
             }
@@ -256,6 +269,7 @@ impl Model {
                 track_m: 0.16,
                 counts_per_turn: 600.0,
                 radius_m: 0.24,
+                footprint: None,
                 top_speed_m_s: 1.0,
                 response: Response::X80,
                 steering: Some(Steering {
@@ -280,11 +294,15 @@ impl RobotConfig {
     pub fn body(&self) -> Body {
         let preset = self.model.body();
         let track_m = self.track_m.unwrap_or(preset.track_m);
+        let written = Footprint::new(&self.footprint).ok();
+        let covers_m = written.map_or(preset.radius_m, |written| written.circumscribed_m());
         Body {
+            // A radius alone means a disc.
+            footprint: written.or(preset.footprint.filter(|_| self.radius_m.is_none())),
             wheel_radius_m: self.wheel_radius_m.unwrap_or(preset.wheel_radius_m),
             track_m,
             counts_per_turn: self.counts_per_turn.unwrap_or(preset.counts_per_turn),
-            radius_m: self.radius_m.unwrap_or(preset.radius_m),
+            radius_m: self.radius_m.unwrap_or(covers_m),
             top_speed_m_s: self.top_speed_m_s.unwrap_or(preset.top_speed_m_s),
             response: self.response.over(preset.response, track_m),
             steering: preset.steering.map(|steering| Steering {

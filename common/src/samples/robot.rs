@@ -155,6 +155,16 @@ payloads! {
 }
 
 payloads! {
+    #[derive(Serialize, Deserialize)]
+    "firsthand.BaseResponse" BaseResponseSample {
+        /// From a command to its effect, with the lag, seconds.
+        dead_time_s: f64,
+        /// Infinite for a base that the dead time alone describes.
+        acceleration_m_s2: f64,
+    }
+}
+
+payloads! {
     /// Held wheels stand by their encoders, and their motors draw a high current.
     #[derive(Serialize, Deserialize)]
     "firsthand.Contact" ContactSample {

@@ -6,6 +6,7 @@ mod lead;
 use common::{
     bus::Topic,
     clock::MissionTime,
+    found_response::FoundResponse,
     geometry::wrap_angle,
     kinematics::{Drive, FACES_COSINE, LEAST_SPEED_M_S, Twist},
     mission::{Method, Mission, Response},
@@ -82,12 +83,14 @@ pub struct Controller {
     side: f64,
     /// The newest target's number, and the progress to it.
     arrival: (u64, Arrival),
+    mission: Mission,
+    found: FoundResponse,
 }
 
 impl Answering for Controller {
     type In = GuidanceSample;
     type Out = CommandSample;
-    type Further = ();
+    type Further = FoundResponse;
     const NAME: &'static str = "controller";
     const INPUT: &'static Topic<GuidanceSample> = &GUIDANCE;
     const OUTPUT: &'static Topic<CommandSample> = &COMMAND;
@@ -120,6 +123,8 @@ impl Answering for Controller {
             lead,
             side: 1.0,
             arrival: Default::default(),
+            mission: mission.clone(),
+            found: FoundResponse::default(),
         }
     }
 
@@ -134,9 +139,15 @@ impl Answering for Controller {
     fn answer(
         &mut self,
         guidance: &GuidanceSample,
-        (): &(),
+        found: &FoundResponse,
         _: MissionTime,
     ) -> Answer<CommandSample> {
+        if let Some(mission) = self.found.changed(found, &self.mission) {
+            // Commands that the base has not answered yet are foreseen no more: it stood while its response was found.
+            let Self { side, arrival, found, .. } = *self;
+            let stated = std::mem::take(&mut self.mission);
+            *self = Self { side, arrival, mission: stated, found, ..Answering::new(&mission) };
+        }
         self.command(guidance).into()
     }
 }

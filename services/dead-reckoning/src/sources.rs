@@ -2,12 +2,13 @@
 
 use common::{
     bus::{BusError, Reader, Stamped},
+    found_response::if_there,
     readers,
     samples::{CountsSample, FixSample, TurnSample},
     stage::Further,
     topics::{COUNTS, FIX, IMU_TURN, SCAN_FIX, TURN},
 };
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 
 /// The most samples of a topic that are taken with a tick. Others are taken with the next one.
 const MOST_FIXES: usize = 16;
@@ -48,15 +49,6 @@ impl Further for Sources {
         // The sequences of two gyros do not continue each other.
         Ok(Self { fixes, turns: if own.is_empty() { outside } else { own }, counts })
     }
-}
-
-/// The last part of an encoding, or the default where the encoding ends before it, as one of an earlier version does.
-pub(crate) fn if_there<'a, T, D>(from: D) -> Result<T, D::Error>
-where
-    T: Deserialize<'a> + Default,
-    D: Deserializer<'a>,
-{
-    Ok(T::deserialize(from).unwrap_or_default())
 }
 
 fn some<H: Stamped>(reader: &mut Reader<H>, most: usize) -> Result<Vec<H>, BusError> {

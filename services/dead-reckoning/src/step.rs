@@ -5,6 +5,7 @@ use common::{
     bus::Topic,
     clock::MissionTime,
     driver::counts::WheelCounts,
+    found_response::if_there,
     kinematics::{Drive, Pose2, SteeredWheel, Twist, WheelSpeeds},
     mission::{Body, Mission},
     samples::{CountsSample, FixRefusal, FixSample, PoseSample, WheelSample},
@@ -22,7 +23,7 @@ use crate::{
     filter::{Filter, Fix, History, Motions, Refused},
     gyro::Gyro,
     relocation::Contradictions,
-    sources::{Sources, if_there},
+    sources::Sources,
     tick::Tick,
 };
 

@@ -231,9 +231,9 @@ pub const TABLE: &[Rule] = &[
     },
     Rule {
         cause: Cause::BaseSlow,
-        when: "its wheels have shown that it answers later or accelerates more slowly than `robot.response` says; `link.log` says how",
+        when: "its wheels have shown that it answers later or accelerates more slowly than `robot.response` says, until planner and controller go by what was found; by the paper's method and with a planner of another executable until the next mission; `link.log` says how",
         action: Action::Slow,
-        clears: Clears::OnNewMission,
+        clears: Clears::WithCondition,
         monitor: |all| &all.base,
     },
     Rule {

@@ -19,8 +19,8 @@ use common::{
     stage::Runner,
     stop_socket::{Identity, Request, StopMark, StopSocket},
     topics::{
-        COMMAND, CONTACT, COUNTS, DIRECTIVE, IMU_TURN, INFRARED, LINK, POWER, RANGES, SCAN,
-        SURROUNDINGS, TICK_LIMIT, WHEELS, WIRE,
+        BASE_RESPONSE, COMMAND, CONTACT, COUNTS, DIRECTIVE, IMU_TURN, INFRARED, LINK, POWER,
+        RANGES, SCAN, SURROUNDINGS, TICK_LIMIT, WHEELS, WIRE,
     },
     wiring::{Persists, Topics},
 };
@@ -82,6 +82,7 @@ impl Process for Shell {
     const NAME: &'static str = "link";
     const WAKES: Topics = &[&COMMAND, &DIRECTIVE, &TICK_LIMIT];
     const OUTPUTS: Topics = &[
+        &BASE_RESPONSE,
         &CONTACT,
         &SCAN,
         &IMU_TURN,
@@ -393,6 +394,7 @@ impl Shell {
                         "the robot does not stop; it is stopped by the next method"
                     );
                 }
+                Effect::FoundResponse(words) => tracing::warn!("{words}"),
                 Effect::Refused(why) => {
                     tracing::warn!("the robot says what is not in its protocol: {why}");
                 }

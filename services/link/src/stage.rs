@@ -12,8 +12,8 @@ use common::{
     stage::{ForeignState, Stage},
     start::StageError,
     topics::{
-        CONTACT, COUNTS, IMU_TURN, INFRARED, POWER, RANGES, SCAN, SURROUNDINGS, WHEELS, WIRE,
-        WIRE_PIECE,
+        BASE_RESPONSE, CONTACT, COUNTS, IMU_TURN, INFRARED, POWER, RANGES, SCAN, SURROUNDINGS,
+        WHEELS, WIRE, WIRE_PIECE,
     },
 };
 
@@ -56,10 +56,23 @@ impl LinkStage {
         out: &mut Outputs,
     ) -> Result<Option<Effect>, StageError> {
         match effect {
-            Effect::Tick { tick, time, ranges, scans, turn, wheels, endless, contact } => {
+            Effect::Tick {
+                tick,
+                time,
+                ranges,
+                scans,
+                turn,
+                wheels,
+                endless,
+                contact,
+                response,
+            } => {
                 out.at = Progress { tick, time };
                 if let Some(contact) = contact {
                     out.publish(&CONTACT, contact)?;
+                }
+                if let Some(response) = response {
+                    out.publish(&BASE_RESPONSE, *response)?;
                 }
                 for scan in scans {
                     let mut lasers = self.lasers.iter();

@@ -321,6 +321,7 @@ impl Link {
             wheels,
             endless,
             contact: self.failsafe.monitors.odometry.take_contact(),
+            response: self.failsafe.monitors.base.sample().map(Box::new),
         };
         self.open = Some(OpenTick { effect, began_ns: now_ns, given_ns: None });
         self.give_tick(now_ns, effects);

@@ -6,12 +6,12 @@ use common::{
     bus::Reader,
     clock::MissionClock,
     readers,
-    samples::{FaultKind, GridHeader, PoseSample},
+    samples::{BaseResponseSample, FaultKind, GridHeader, PoseSample},
     shell::{Context, Process, Progress},
     stage::Runner,
     start::StageError,
     target::TargetReader,
-    topics::{FIELD, GRID, GUIDANCE, POSE, TARGET},
+    topics::{BASE_RESPONSE, FIELD, GRID, GUIDANCE, POSE, TARGET},
     wiring::Topics,
 };
 
@@ -29,6 +29,9 @@ readers! {
             pose: Reader<PoseSample> = POSE,
             grid: Reader<GridHeader, u8> = GRID,
             target: TargetReader = TARGET,
+        }
+        feedback {
+            response: Reader<BaseResponseSample> = BASE_RESPONSE,
         }
     }
 }
@@ -201,6 +204,9 @@ impl Shell {
         // A keyframe for new readers may belong to a tick that is over.
         let tick = self.runner.out.at.tick;
         if let Some(pose) = self.latest_pose.filter(|pose| pose.stamp.tick == tick) {
+            if let Some(response) = self.inputs.response.newest()? {
+                self.take(Taken::Response(response.into()))?;
+            }
             let full_solve_ns = self.runner.stage.full_solve_ns;
             self.take(Taken::Pose { pose, full_solve_ns })?;
             self.answered = Some(tick);

@@ -3,6 +3,7 @@
 use std::{borrow::Cow, collections::VecDeque, time::Instant};
 
 use common::{
+    found_response::FoundResponse,
     grid::Part,
     inputs,
     mission::Mission,
@@ -53,6 +54,7 @@ pub(crate) enum Taken<'a> {
     /// A policy of the field is due.
     Policy,
     Target(#[serde(with = "inputs::sample")] TargetSample),
+    Response(FoundResponse),
 }
 
 /// The step, and the computations outside of it: threads take the jobs and give the results, or this thread does in a replay.
@@ -115,6 +117,7 @@ impl Stage for PlannerStage {
                 self.jobs.extend(job);
                 work
             }),
+            Taken::Response(found) => Ok(planner.take_response(&found)),
             Taken::Target(target) => planner.take_target(&target),
             Taken::Solved(number) => {
                 let solved = self.result_of(number);

@@ -6,6 +6,7 @@ mod output;
 use std::sync::Arc;
 
 use common::{
+    found_response::FoundResponse,
     grid::{Applied, GridFrame, Replica, Window},
     kinematics::Pose2,
     mission::{Method, Mission},
@@ -39,9 +40,23 @@ enum Advisor {
     Steer(Arcs),
 }
 
+impl Advisor {
+    fn new(mission: &Mission) -> Self {
+        match (mission.method, Arcs::new(mission)) {
+            (Method::Evidential, Some(arcs)) => Self::Steer(arcs),
+            (Method::Evidential, None) if mission.sensing => {
+                Self::LookFirst(ActiveSensing::new(mission))
+            }
+            (Method::Paper | Method::Evidential, _) => Self::Follow,
+        }
+    }
+}
+
 /// The equation is (11).
 #[derive(Debug)]
 pub struct Planner {
+    mission: Mission,
+    found: FoundResponse,
     /// None before the supervisor names one.
     target: Option<TargetSample>,
     tolerance_m: f64,
@@ -63,17 +78,13 @@ impl Planner {
     /// It knows nothing until the first keyframe. It persists nothing: the mapper publishes a keyframe for each new planner.
     pub fn new(mission: &Mission) -> Self {
         Self {
+            mission: mission.clone(),
+            found: FoundResponse::default(),
             target: None,
             tolerance_m: mission.arrival_tolerance_m,
             screening: screening(mission),
             robot: Robot::new(mission),
-            advisor: match (mission.method, Arcs::new(mission)) {
-                (Method::Evidential, Some(arcs)) => Advisor::Steer(arcs),
-                (Method::Evidential, None) if mission.sensing => {
-                    Advisor::LookFirst(ActiveSensing::new(mission))
-                }
-                (Method::Paper | Method::Evidential, _) => Advisor::Follow,
-            },
+            advisor: Advisor::new(mission),
             solver: Solver::new(Settings::default()),
             grid: Replica::default(),
             belief: GridHeader::default(),
@@ -98,6 +109,14 @@ impl Planner {
         };
         self.belief = *header;
         Ok(work)
+    }
+
+    /// The link found how the base answers: speeds are limited by that from now on.
+    pub fn take_response(&mut self, found: &FoundResponse) -> Work {
+        if let Some(mission) = self.found.changed(found, &self.mission) {
+            self.advisor = Advisor::new(&mission);
+        }
+        Work::None
     }
 
     /// The robot is sent elsewhere. A target that is not inside the perimeter is ignored.

@@ -1,12 +1,12 @@
-//! The body: a disc that cannot go through things, on two driven wheels or on a car's.
+//! The body: a disc or a polygon that cannot go through things, on two driven wheels or on a car's.
 
 use common::{
     kinematics::{DifferentialDrive, Pose2, Twist, WheelSpeeds},
-    mission::Mission,
+    mission::{Footprint, Mission},
 };
 use glam::DVec2;
 
-use crate::world::World;
+use crate::world::{Surface, World};
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wheels<T> {
@@ -31,6 +31,7 @@ pub struct Body {
     wheel_radius: f64,
     track: f64,
     radius: f64,
+    footprint: Option<Footprint>,
     pose: Pose2,
     clearance: f64,
     touching: bool,
@@ -44,22 +45,25 @@ impl Body {
         let track = body.track_m * track_scale;
         let pose = mission.start_pose();
         let top = body.top_speed_m_s / body.wheel_radius_m;
-        Self {
+        let mut it = Self {
             drive: DifferentialDrive::new(body.wheel_radius_m, track, top),
             wheel_radius: body.wheel_radius_m,
             track,
             radius: body.radius_m,
+            footprint: body.footprint,
             pose,
-            clearance: world.clearance(pose.position) - body.radius_m,
+            clearance: 0.0,
             touching: false,
             contacts: 0,
-        }
+        };
+        it.clearance = it.clearance_in(world);
+        it
     }
 
     pub fn put(&mut self, pose: Pose2, contacts: u64, world: &World) {
         self.pose = pose;
         self.contacts = contacts;
-        self.clearance = world.clearance(pose.position) - self.radius;
+        self.clearance = self.clearance_in(world);
         // A contact that lasts is not counted again.
         self.touching = self.clearance <= RELEASE_M;
     }
@@ -104,7 +108,7 @@ impl Body {
     pub fn go(&mut self, step: Twist, world: &World) -> Option<f64> {
         let before = self.pose;
         self.pose = before.along_arc(step.v, step.omega);
-        let touched = self.leave_things(before.position, world);
+        let touched = self.leave_things(before, world);
         let clear = self.clearance > RELEASE_M;
         self.contacts += u64::from(touched && !self.touching);
         self.touching = touched || (self.touching && !clear);
@@ -114,29 +118,62 @@ impl Body {
 
     /// Put the body outside of what it penetrates, or back to `before` if that fails. Returns whether it penetrated
     /// anything.
-    fn leave_things(&mut self, before: DVec2, world: &World) -> bool {
+    fn leave_things(&mut self, before: Pose2, world: &World) -> bool {
         for push in 0..PUSHES {
-            let position = self.pose.position;
-            let nearest = world
-                .touchable()
-                .map(|surface| (surface.distance(position) - self.radius, surface))
-                .min_by(|(a, _), (b, _)| a.total_cmp(b));
+            let nearest = self.nearest(world);
             self.clearance = nearest.map_or(f64::INFINITY, |(gap, _)| gap);
-            let Some((gap, surface)) = nearest.filter(|(gap, _)| *gap < 0.0) else {
+            let Some((gap, outward)) = nearest.filter(|(gap, _)| *gap < 0.0) else {
                 return push > 0;
             };
-            let Some(outward) = surface.outward(position) else {
+            let Some(outward) = outward else {
                 break;
             };
             // Without the margin, rounding would let the body penetrate for ever.
             self.pose.position += outward * (1e-9 - gap);
         }
-        self.clearance = world.clearance(self.pose.position) - self.radius;
+        self.clearance = self.clearance_in(world);
         if self.clearance < 0.0 {
-            self.pose.position = before;
-            self.clearance = world.clearance(before) - self.radius;
+            self.pose.position = before.position;
+            if self.footprint.is_some() {
+                self.pose.heading = before.heading;
+            }
+            self.clearance = self.clearance_in(world);
         }
         true
+    }
+
+    fn clearance_in(&self, world: &World) -> f64 {
+        self.nearest(world).map_or(f64::INFINITY, |(gap, _)| gap)
+    }
+
+    /// The distance to the nearest thing, negative inside, and the direction from the thing to the body.
+    fn nearest(&self, world: &World) -> Option<(f64, Option<DVec2>)> {
+        let position = self.pose.position;
+        let Some(footprint) = self.footprint else {
+            let gaps = world.touchable().map(|it| (it.distance(position) - self.radius, it));
+            let nearest = gaps.min_by(|(a, _), (b, _)| a.total_cmp(b));
+            return nearest.map(|(gap, surface)| (gap, surface.outward(position)));
+        };
+        let axis = self.pose.axis();
+        let local = |at: DVec2| DVec2::new(axis.x, -axis.y).rotate(at - position);
+        let mut nearest: Option<(f64, Option<DVec2>)> = None;
+        for surface in world.touchable() {
+            let at_least = surface.distance(position) - self.radius;
+            if nearest.is_some_and(|(gap, _)| gap < at_least) {
+                continue;
+            }
+            let (gap, out) = match surface {
+                Surface::Drum { at, radius } => {
+                    let (gap, out) = footprint.gap_to_point(local(at));
+                    (gap - radius, out)
+                }
+                Surface::Face { from, to } => footprint.gap_to_face(local(from), local(to)),
+            };
+            if nearest.is_none_or(|(before, _)| gap < before) {
+                nearest = Some((gap, Some(-axis.rotate(out))));
+            }
+        }
+        nearest
     }
 }
 
@@ -204,5 +241,35 @@ mod tests {
             assert!(body.clearance() >= 0.0, "it went into the corner");
         }
         assert!(body.pose().position.x < 1.0);
+    }
+
+    const LONG: &str = "robot.footprint = [[-0.1, -0.1], [0.4, -0.1], [0.4, 0.1], [-0.1, 0.1]]\n";
+
+    #[test]
+    fn a_long_body_drives_through_a_gap_that_its_circle_does_not_fit_and_touches_nothing() {
+        let walls = "world.wall = [{ points = [[0.5, 0.15], [3, 0.15]] }, { points = [[0.5, -0.15], [3, -0.15]] }]";
+        let (mut body, world) = at_start(&format!("{LONG}{walls}"));
+        for _ in 0..400 {
+            body.roll(both(0.005), &world);
+        }
+        assert!((body.pose().position.x - 2.0).abs() < 1e-9 && body.contacts() == 0);
+        assert!((body.clearance() - 0.05).abs() < 1e-9, "{}", body.clearance());
+    }
+
+    #[test]
+    fn a_long_body_that_turns_touches_a_wall_with_its_corner_and_goes_into_nothing() {
+        for shape in [
+            "wall = [{ points = [[-2, 0.5], [2, 0.5]] }]",
+            "drum = [{ at = [0, 1], radius_m = 0.5 }]",
+        ] {
+            let (mut body, world) = at_start(&format!("{LONG}world.{shape}"));
+            let position = DVec2::new(0.0, 0.2);
+            body.put(Pose2 { position, heading: 0.0 }, 0, &world);
+            for _ in 0..400 {
+                body.roll(Wheels { left: -0.001, right: 0.001 }, &world);
+                assert!(body.clearance() >= 0.0, "it went into it: {shape}");
+            }
+            assert!(body.contacts() >= 1, "{shape}");
+        }
     }
 }

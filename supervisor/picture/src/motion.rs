@@ -102,8 +102,20 @@ impl<'a> Motion<'a> {
         for pose in poses {
             let at = view.place(pose.position);
             add_body(&mut outlines, at, radius, pose.heading);
+            self.add_footprint(&mut outlines, view, pose);
         }
         outlines.element(BODY)
+    }
+
+    /// The outline of a body that is no disc, inside the disc that covers it.
+    fn add_footprint(&self, path: &mut Path, view: &View, pose: &Pose2) {
+        let footprint = self.mission.body().footprint;
+        let corners = footprint.iter().flat_map(|it| it.corners_at(*pose));
+        let mut corners = corners.map(|corner| view.place(corner)).collect::<Vec<_>>();
+        corners.extend(corners.first().copied());
+        for (number, corner) in corners.into_iter().enumerate() {
+            if number == 0 { path.move_to(corner) } else { path.line_to(corner) }
+        }
     }
 
     /// The robot's centre is in this ellipse with 95 %.
@@ -136,6 +148,7 @@ impl<'a> Motion<'a> {
             let mut path = Path::default();
             if let Some(pose) = pose.filter(|pose| is_shown(view, pose)) {
                 add_body(&mut path, view.place(pose.position), radius, pose.heading);
+                self.add_footprint(&mut path, view, pose);
             }
             path.element(style)
         };

@@ -2,7 +2,7 @@ use x80_protocol::MOTOR_SCALE_V;
 
 use super::objection::{Objection, all_within, objection, refuse_if, within};
 use crate::{
-    Mission, Protocol, ResponseKeys,
+    Footprint, Mission, Protocol, ResponseKeys,
     address::{Address, AddressError, FORMS},
 };
 
@@ -31,6 +31,21 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     steering(mission)?;
     for (key, value, range) in robot.odometry.ranges() {
         within(key, value, range, "")?;
+    }
+    if !robot.footprint.is_empty() {
+        let remedy = "list it as [[x, y], ...] in metres of the robot's frame";
+        let footprint = Footprint::new(&robot.footprint)
+            .map_err(|rule| objection("robot.footprint", format!("no outline: {rule}"), remedy))?;
+        let covers_m = footprint.circumscribed_m();
+        refuse_if(
+            body.radius_m < covers_m - 1e-6,
+            "robot.radius_m",
+            format!(
+                "a disc of {} m does not cover robot.footprint, which reaches {covers_m:.3} m",
+                body.radius_m
+            ),
+            "remove robot.radius_m",
+        )?;
     }
     all_within([
         ("robot.radius_m", body.radius_m, 0.01..=5.0, "m"),

@@ -108,3 +108,25 @@ fn a_car_that_is_to_look_first_is_remarked_on_with_its_turning_radius() {
     assert!(remarks(&format!("{car}\nmethod = 'paper'")).is_empty());
     assert!(remarks("target = [3, 0]").is_empty());
 }
+
+#[test]
+fn a_footprint_makes_the_radius_that_covers_it_and_a_radius_alone_makes_a_disc() {
+    let parse = |robot: &str| {
+        let text = format!("target = [3, 0]\n[robot]\n{robot}");
+        Mission::parse(&text, Path::new("m.toml")).map(|mission| mission.body())
+    };
+    let long = "footprint = [[-0.3, -0.1], [0.4, -0.1], [0.4, 0.1], [-0.3, 0.1]]";
+    let body = parse(long).unwrap();
+    assert!((body.radius_m - 0.4_f64.hypot(0.1)).abs() < 1e-12 && body.footprint.is_some());
+    for model in ["jackal", "turtlebot3-waffle"] {
+        let body = parse(&format!("model = '{model}'")).unwrap();
+        assert!(body.footprint.unwrap().circumscribed_m() <= body.radius_m, "{model}");
+        let disc = parse(&format!("model = '{model}'\nradius_m = 0.3")).unwrap();
+        assert_eq!((disc.footprint, disc.radius_m), (None, 0.3));
+    }
+    assert_eq!(parse("model = 'x80'").unwrap().footprint, None);
+    let small = parse(&format!("{long}\nradius_m = 0.4")).unwrap_err().to_string();
+    assert!(small.contains("does not cover robot.footprint"), "{small}");
+    let outline = parse("footprint = [[1, 0], [2, 0], [2, 1]]").unwrap_err().to_string();
+    assert!(outline.contains("robot.footprint"), "{outline}");
+}

@@ -1,5 +1,8 @@
 use super::*;
-use common::{kinematics::Pose2, samples::TargetPoint};
+use common::{
+    kinematics::Pose2,
+    samples::{BaseResponseSample, TargetPoint},
+};
 use std::{
     f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, FRAC_PI_3, FRAC_PI_4, PI},
     path::Path,
@@ -290,4 +293,27 @@ fn an_evidential_robot_slows_down_towards_its_target() {
     controller.slow_radius = 0.5;
     close(controller.at(short(0.6), &ahead()).v_m_s, 0.4);
     close(controller.at(short(0.25), &ahead()).v_m_s, 0.2);
+}
+
+#[test]
+fn a_controller_goes_by_the_response_that_the_link_found_as_if_it_were_stated() {
+    let text = "target = [3, 0]\nmethod = 'evidential'";
+    let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
+    let mut told = Controller::new(&mission);
+    let sample =
+        BaseResponseSample { dead_time_s: 0.5, acceleration_m_s2: 0.3, ..Default::default() };
+    let mut knows = Controller::new(&mission.with_response(0.5, 0.3).unwrap());
+    let mut guidance = ahead();
+    for tick in 0..40 {
+        (guidance.pose_ns, guidance.x_m) = (tick * 100_000_000, 2.4 + 0.01 * tick as f64);
+        guidance.heading_rad = 0.3 - 0.01 * tick as f64;
+        let found = if tick == 0 { sample.into() } else { FoundResponse::default() };
+        let answer = told.answer(&guidance, &found, MissionTime::default());
+        assert_eq!(answer.sample, knows.command(&guidance), "{tick}");
+    }
+    assert!(told.lead.is_some());
+    let hostile = BaseResponseSample { dead_time_s: f64::NAN, ..sample };
+    let before = told.response;
+    told.answer(&guidance, &hostile.into(), MissionTime::default());
+    assert_eq!(told.response, before);
 }

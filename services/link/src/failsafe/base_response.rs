@@ -1,11 +1,17 @@
-//! A base that answers later, or brakes more slowly, than stated: whatever allows it a speed counts on the stated response.
+//! A base that answers later, or brakes more slowly, than stated. What was found is given with each tick, so that planner and controller
+//! go by it; until a command follows from such a tick, the robot drives at half speed, because whatever allows it a speed counts on the
+//! stated response. It stays slow where nothing lets the response limit the speed: by the paper's method and with another planner.
 
 use common::{
+    clock::MissionTime,
     mission::{Body, Mission, Response},
-    samples::Cause,
+    samples::{BaseResponseSample, Cause},
 };
 
-use super::monitor::{Condition, Moment, Monitor, Observation};
+use super::{
+    monitor::{Condition, Moment, Monitor, Observation},
+    response_fit::{ACCELERATION_RATIO, DEAD_TIME_STEP_S},
+};
 
 /// A way to stop that is longer by this share and by so many metres is not as stated: what was found is no more exact.
 const LONGER_SHARE: f64 = 1.3;
@@ -15,40 +21,77 @@ const LONGER_M: f64 = 0.02;
 pub struct BaseResponse {
     stated: Response,
     top_speed_m_s: f64,
+    brakes_by_response: bool,
+    /// The newest that stops later than stated.
     found: Option<Response>,
+    /// Ticks since then have told it.
+    told_from: MissionTime,
+    is_followed: bool,
 }
 
 impl BaseResponse {
     fn stops_within_m(&self, response: Response) -> f64 {
         response.way_to_stop_m(self.top_speed_m_s, response.dead_time_s())
     }
+
+    /// What was found, at the slow end of its steps.
+    pub(crate) fn sample(&self) -> Option<BaseResponseSample> {
+        let found = self.found.filter(|_| self.brakes_by_response)?;
+        Some(BaseResponseSample {
+            dead_time_s: found.dead_time_s() + DEAD_TIME_STEP_S / 2.0,
+            acceleration_m_s2: found.acceleration_m_s2 / ACCELERATION_RATIO.sqrt(),
+            ..BaseResponseSample::default()
+        })
+    }
+
+    /// What was found, and what to do about it.
+    pub(crate) fn words(&self) -> Option<String> {
+        let Response { delay_s, acceleration_m_s2, .. } = self.found?;
+        let stated = self.stated;
+        let until_then = match self.brakes_by_response {
+            true => "until then each run finds it out anew",
+            false => "until then it drives at half speed, because it stops later than stated",
+        };
+        Some(format!(
+            "the base answers after {:.2} s and accelerates at {acceleration_m_s2} m/s^2, and {:.2} s and {} m/s^2 are stated: give delay_s = {delay_s:.2} and acceleration_m_s2 = {acceleration_m_s2} in [robot.response]; {until_then}",
+            self.found?.dead_time_s(),
+            stated.dead_time_s(),
+            stated.acceleration_m_s2,
+        ))
+    }
 }
 
 impl Monitor for BaseResponse {
     fn new(mission: &Mission) -> Self {
         let Body { response: stated, top_speed_m_s, .. } = mission.body();
-        Self { stated, top_speed_m_s, found: None }
+        Self {
+            stated,
+            top_speed_m_s,
+            brakes_by_response: mission.brakes_by_response(),
+            found: None,
+            told_from: MissionTime::default(),
+            is_followed: false,
+        }
     }
 
-    fn observe(&mut self, what: &Observation<'_>, _: Moment) {
-        if let Observation::Responds(response) = *what {
-            self.found = Some(response);
+    fn observe(&mut self, what: &Observation<'_>, now: Moment) {
+        match *what {
+            Observation::Responds(response) => {
+                let most_m = LONGER_SHARE * self.stops_within_m(self.stated) + LONGER_M;
+                if self.stops_within_m(response) > most_m {
+                    self.found = Some(response);
+                    (self.told_from, self.is_followed) = (now.time, false);
+                }
+            }
+            Observation::Command(command) => {
+                let follows = command.pose_ns >= self.told_from.0;
+                self.is_followed |= self.brakes_by_response && follows;
+            }
+            _ => {}
         }
     }
 
     fn condition(&self, _: Cause, _: Moment) -> Condition {
-        let most_m = LONGER_SHARE * self.stops_within_m(self.stated) + LONGER_M;
-        self.found.is_some_and(|found| self.stops_within_m(found) > most_m).into()
-    }
-
-    fn explain(&self, _: Cause, _: Moment) -> Option<String> {
-        let Response { delay_s, acceleration_m_s2, .. } = self.found?;
-        let stated = self.stated;
-        Some(format!(
-            "the base answers after {:.2} s and accelerates at {acceleration_m_s2} m/s^2, and {:.2} s and {} m/s^2 are stated: give delay_s = {delay_s:.2} and acceleration_m_s2 = {acceleration_m_s2} in [robot.response]; until then it drives at half speed, because it stops later than stated",
-            self.found?.dead_time_s(),
-            stated.dead_time_s(),
-            stated.acceleration_m_s2,
-        ))
+        (self.found.is_some() && !self.is_followed).into()
     }
 }

@@ -18,11 +18,11 @@ const BEFORE_S: f64 = 2.0;
 /// Whatever is sent and received, no more is kept.
 const MOST_KEPT: usize = 512;
 const DEAD_TIMES: u32 = 21;
-const DEAD_TIME_STEP_S: f64 = 0.05;
+pub(super) const DEAD_TIME_STEP_S: f64 = 0.05;
 /// Speeds grow by so much in a second: the slowest is that of a heavy base that a person pushes in vain, and the last but one is
 /// [`ACCELERATION_RATIO`] to the power of [`ACCELERATIONS`] times as much. The last is infinite.
 const LEAST_ACCELERATION_M_S2: f64 = 0.15;
-const ACCELERATION_RATIO: f64 = 1.25;
+pub(super) const ACCELERATION_RATIO: f64 = 1.25;
 const ACCELERATIONS: i32 = 16;
 /// The least square of the correlation of a wheel's way with that of the response.
 const EXPLAINED: f64 = 0.8;

@@ -411,3 +411,26 @@ fn who_tells_the_robot_only_to_stand_as_a_stop_guard_does_is_a_commander_after_2
     }
     assert_eq!(failsafe.decide(false, now()).cause, Cause::AnotherCommander);
 }
+
+#[test]
+fn a_slow_base_drives_at_half_speed_until_a_command_follows_from_what_was_found() {
+    let late = Response { delay_s: 0.3, ..Response::X80 };
+    let mut failsafe = well();
+    failsafe.observe(&Observation::Responds(late), now());
+    failsafe.observe(&Observation::Command(&command(0, MOMENT_NS, 0)), now());
+    assert_eq!(failsafe.decide(false, now()).cause, Cause::BaseSlow);
+    let told = failsafe.monitors.base.sample().unwrap();
+    assert!(told.dead_time_s >= late.dead_time_s(), "{told:?}");
+    failsafe.observe(&Observation::Command(&command(0, 0, 0)), now());
+    assert_eq!(failsafe.decide(false, now()), Decision::GO);
+    assert!(failsafe.monitors.base.sample().is_some(), "a restarted stage needs it");
+    for set in ["method = 'paper'", "planner.executable = './mine'"] {
+        let text = format!("target = [3, 0]\nsensors = 'front'\n{set}");
+        let mission = Mission::parse(&text, Path::new("test.toml")).unwrap();
+        let mut base = base_response::BaseResponse::new(&mission);
+        base.observe(&Observation::Responds(late), now());
+        base.observe(&Observation::Command(&command(0, 0, 0)), now());
+        assert_eq!(base.condition(Cause::BaseSlow, now()), Condition::Holds, "{set}");
+        assert_eq!(base.sample(), None, "{set}");
+    }
+}

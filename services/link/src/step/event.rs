@@ -5,8 +5,8 @@ use common::{
     driver::{LaserScan, Memory},
     inputs,
     samples::{
-        CommandSample, ContactSample, CountsSample, HoldReason, InfraredSample, Order, PowerSample,
-        RangeReading, SurroundingsSample, TurnSample, WheelSample,
+        BaseResponseSample, CommandSample, ContactSample, CountsSample, HoldReason, InfraredSample,
+        Order, PowerSample, RangeReading, SurroundingsSample, TurnSample, WheelSample,
     },
     stop_socket::Request,
 };
@@ -84,6 +84,7 @@ pub enum Effect {
         /// The counts of `wheels` without their cycle, of a robot that has no counter.
         endless: Option<CountsSample>,
         contact: Option<ContactSample>,
+        response: Option<Box<BaseResponseSample>>,
     },
     Answered {
         /// The tick's beginning on the monotonic clock, nanoseconds.
@@ -104,6 +105,8 @@ pub enum Effect {
     CountsElsewhere,
     /// The robot did not stop, so this next method was used.
     StopBy(&'static str),
+    /// The base answers otherwise than stated, in these words.
+    FoundResponse(String),
     /// A message is none of the protocol, for this reason.
     Refused(String),
     /// The speed of the robot's clock over mission time's.

@@ -88,7 +88,7 @@ impl Link {
             self.restart.jumped();
         }
         let motion = heard.motion;
-        let counts = motion.map(|motion| self.judge_counts(&motion, now_ns));
+        let counts = motion.map(|motion| self.judge_counts(&motion, now_ns, effects));
         if counts == Some(Counts::Elsewhere) {
             effects.push(Effect::CountsElsewhere);
         }
@@ -130,7 +130,7 @@ impl Link {
     }
 
     /// All counts are plausible in lockstep, because a simulated robot does not restart; only contacts are noticed.
-    fn judge_counts(&mut self, motion: &Motion, now_ns: u64) -> Counts {
+    fn judge_counts(&mut self, motion: &Motion, now_ns: u64, effects: &mut Vec<Effect>) -> Counts {
         let wheels = motion.wheels;
         let counts = match WheelCounts::of(&wheels, motion.endless.as_ref()) {
             WheelCounts::Cyclic(counts) => counts.map(|count| count % COUNT_CYCLE).into(),
@@ -151,6 +151,8 @@ impl Link {
         self.observe(Observation::Motor(counts, are), now_ns);
         if let Some(response) = self.failsafe.monitors.odometry.take_found() {
             self.observe(Observation::Responds(response), now_ns);
+            let base = &self.failsafe.monitors.base;
+            effects.extend(base.words().map(Effect::FoundResponse));
         }
         are
     }

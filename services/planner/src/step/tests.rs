@@ -1,7 +1,7 @@
 use super::*;
 use common::{
     grid::{CellState, Part},
-    samples::{ClearBeam, TargetPoint},
+    samples::{BaseResponseSample, ClearBeam, TargetPoint},
 };
 use std::path::Path;
 
@@ -212,6 +212,21 @@ fn over_scanned_ground_an_evidential_robot_goes_at_full_speed() {
     let guidance = evidential(|_| true).ask(&at(0.0, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Along);
     assert!(guidance.speed_limit_m_s > 0.25, "{guidance:?}");
+}
+
+#[test]
+fn a_robot_whose_base_was_found_to_stop_late_goes_no_faster_than_it_can_stop() {
+    let mut planner = evidential(|at| at.x < 0.7);
+    let asked = at(0.0, 0.0);
+    let before = planner.ask(&asked).speed_limit_m_s;
+    let sample =
+        BaseResponseSample { dead_time_s: 0.5, acceleration_m_s2: 0.3, ..Default::default() };
+    planner.take_response(&sample.into());
+    let limit = planner.ask(&asked).speed_limit_m_s;
+    assert!(limit > 0.0 && limit < 0.6 * before, "{before} to {limit}");
+    let hostile = BaseResponseSample { dead_time_s: f64::INFINITY, ..sample };
+    planner.take_response(&hostile.into());
+    assert_eq!(planner.ask(&asked).speed_limit_m_s, limit);
 }
 
 #[test]

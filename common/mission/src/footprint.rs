@@ -1,0 +1,180 @@
+//! The outline of a body that is no disc: a convex polygon around the origin of the robot's frame, metres.
+
+use glam::DVec2;
+
+use crate::{geometry::nearest_on_segment, kinematics::Pose2};
+
+const MOST_CORNERS: usize = 16;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Footprint {
+    /// Counter-clockwise; the first `count` count.
+    corners: [DVec2; MOST_CORNERS],
+    count: usize,
+}
+
+impl Footprint {
+    pub(crate) const fn rectangle(back_m: f64, front_m: f64, half_width_m: f64) -> Self {
+        let mut corners = [DVec2::ZERO; MOST_CORNERS];
+        corners[0] = DVec2::new(back_m, -half_width_m);
+        corners[1] = DVec2::new(front_m, -half_width_m);
+        corners[2] = DVec2::new(front_m, half_width_m);
+        corners[3] = DVec2::new(back_m, half_width_m);
+        Self { corners, count: 4 }
+    }
+
+    /// # Errors
+    /// When the corners are not those of a convex polygon around the origin in the order of its outline, with what is wrong.
+    pub fn new(corners: &[DVec2]) -> Result<Self, &'static str> {
+        if !(3..=MOST_CORNERS).contains(&corners.len()) {
+            return Err("it has 3 to 16 corners");
+        }
+        if !corners.iter().all(|corner| corner.abs().max_element() <= 5.0) {
+            return Err("its corners are within 5 m");
+        }
+        let mut footprint = Self { corners: [DVec2::ZERO; MOST_CORNERS], count: corners.len() };
+        footprint.corners[..corners.len()].copy_from_slice(corners);
+        let doubled_area: f64 = footprint.edges().map(|(from, to)| from.perp_dot(to)).sum();
+        if doubled_area < 0.0 {
+            footprint.corners[..corners.len()].reverse();
+        }
+        let all = footprint.corners();
+        let turns = |index: usize| {
+            let [one, two, three] = [0, 1, 2].map(|next| all[(index + next) % all.len()]);
+            (two - one).perp_dot(three - two)
+        };
+        // An outline that turns left at each corner may still go around more than once: then its corners' angles do, too.
+        let around: f64 = footprint.edges().map(|(from, to)| from.angle_to(to)).sum();
+        if !(0..all.len()).all(|index| turns(index) > 1e-9) || around > 1.5 * std::f64::consts::TAU
+        {
+            return Err(
+                "it is convex, its corners in the order of its outline, no three in a line",
+            );
+        }
+        if footprint.inscribed_m() < 0.01 {
+            return Err("the robot's origin, between its wheels, is at least 0.01 m inside");
+        }
+        Ok(footprint)
+    }
+
+    pub fn corners(&self) -> &[DVec2] {
+        &self.corners[..self.count]
+    }
+
+    /// The corners of the robot at `pose`, in the mission frame.
+    pub fn corners_at(&self, pose: Pose2) -> impl Iterator<Item = DVec2> + '_ {
+        self.corners().iter().map(move |corner| pose.position + pose.axis().rotate(*corner))
+    }
+
+    /// The disc around the origin that covers it at any heading.
+    pub fn circumscribed_m(&self) -> f64 {
+        self.corners().iter().map(|corner| corner.length()).fold(0.0, f64::max)
+    }
+
+    /// The disc around the origin that it covers.
+    pub fn inscribed_m(&self) -> f64 {
+        -self.sides().map(|(from, out)| -out.dot(from)).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    fn edges(&self) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
+        let corners = self.corners();
+        corners.iter().zip(corners.iter().cycle().skip(1)).map(|(from, to)| (*from, *to))
+    }
+
+    /// A corner of each side, and its unit normal outward.
+    fn sides(&self) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
+        self.edges().map(|(from, to)| (from, -(to - from).perp().normalize_or_zero()))
+    }
+
+    /// Metres from the body to `point` of its frame, negative inside, and the unit direction from the body to it.
+    pub fn gap_to_point(&self, point: DVec2) -> (f64, DVec2) {
+        let sides = self.sides().map(|(from, out)| (out.dot(point - from), out));
+        let inside = greatest(sides);
+        if inside.0 <= 0.0 {
+            return inside;
+        }
+        let nearest = self.edges().map(|(from, to)| nearest_on_segment(point, from, to));
+        least(nearest.map(|near| (near, point)))
+    }
+
+    /// Metres from the body to a straight face in its frame, and the unit direction from the body to it. The distance is negative where
+    /// they overlap: the body leaves the face by that way against the direction.
+    pub fn gap_to_face(&self, from: DVec2, to: DVec2) -> (f64, DVec2) {
+        let Some(across) = (to - from).perp().try_normalize() else {
+            return self.gap_to_point(from);
+        };
+        let sides = self
+            .sides()
+            .map(|(corner, out)| (out.dot(from - corner).min(out.dot(to - corner)), out));
+        let faces = [across, -across].map(|out| {
+            let beyond = self.corners().iter().map(|corner| out.dot(from - *corner));
+            (beyond.fold(f64::INFINITY, f64::min), out)
+        });
+        let overlap = greatest(sides.chain(faces));
+        if overlap.0 <= 0.0 {
+            return overlap;
+        }
+        let corners = self.corners().iter().map(|at| (*at, nearest_on_segment(*at, from, to)));
+        let ends = self.edges().flat_map(|(one, other)| {
+            [from, to].map(|end| (nearest_on_segment(end, one, other), end))
+        });
+        least(corners.chain(ends))
+    }
+}
+
+fn greatest(gaps: impl Iterator<Item = (f64, DVec2)>) -> (f64, DVec2) {
+    let none = (f64::NEG_INFINITY, DVec2::X);
+    gaps.fold(none, |best, gap| if gap.0 > best.0 { gap } else { best })
+}
+
+/// The least distance of pairs of points of the body and a thing, and its direction.
+fn least(pairs: impl Iterator<Item = (DVec2, DVec2)>) -> (f64, DVec2) {
+    let none = (f64::INFINITY, DVec2::X);
+    pairs.fold(none, |best, (body, thing)| {
+        let distance = body.distance(thing);
+        if distance < best.0 { (distance, (thing - body).normalize_or(DVec2::X)) } else { best }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LONG: Footprint = Footprint::rectangle(-0.2, 0.3, 0.1);
+
+    fn close((gap, out): (f64, DVec2), want: f64, along: DVec2) {
+        assert!((gap - want).abs() < 1e-12 && out.distance(along) < 1e-9, "{gap} {out}");
+    }
+
+    #[test]
+    fn gaps_of_a_polygon_are_to_its_sides_and_corners_and_negative_inside() {
+        close(LONG.gap_to_point(DVec2::new(0.5, 0.05)), 0.2, DVec2::X);
+        close(LONG.gap_to_point(DVec2::new(0.6, 0.5)), 0.5, DVec2::new(0.6, 0.8));
+        close(LONG.gap_to_point(DVec2::new(0.0, -0.09)), -0.01, -DVec2::Y);
+        let face = |from: [f64; 2], to: [f64; 2]| LONG.gap_to_face(from.into(), to.into());
+        close(face([0.4, -5.0], [0.4, 5.0]), 0.1, DVec2::X);
+        close(face([-5.0, 0.15], [0.0, 0.15]), 0.05, DVec2::Y);
+        close(face([0.6, 0.5], [0.6, 5.0]), 0.5, DVec2::new(0.6, 0.8));
+        close(face([-5.0, 0.08], [5.0, 0.08]), -0.02, DVec2::Y);
+        close(face([0.29, 0.0], [5.0, 0.0]), -0.01, DVec2::X);
+    }
+
+    #[test]
+    fn a_footprint_is_a_convex_polygon_around_the_origin_in_either_order() {
+        let mut corners = LONG.corners().to_vec();
+        assert_eq!(Footprint::new(&corners), Ok(LONG));
+        assert!((LONG.inscribed_m() - 0.1).abs() < 1e-12);
+        assert!((LONG.circumscribed_m() - 0.1_f64.hypot(0.3)).abs() < 1e-12);
+        corners.reverse();
+        assert!(Footprint::new(&corners).is_ok());
+        corners.swap(0, 1);
+        assert!(Footprint::new(&corners).is_err(), "it crosses itself");
+        assert!(Footprint::new(&corners[..2]).is_err());
+        let beside = LONG.corners().iter().map(|corner| *corner + DVec2::Y).collect::<Vec<_>>();
+        assert!(Footprint::new(&beside).is_err());
+        let star =
+            [0, 2, 4, 1, 3].map(|k| DVec2::from_angle(f64::from(k) * 0.4 * std::f64::consts::PI));
+        assert!(Footprint::new(&star).is_err());
+        assert!(Footprint::new(&[DVec2::NAN; 4]).is_err());
+    }
+}

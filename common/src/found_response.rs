@@ -1,0 +1,60 @@
+//! What the link found of the base's response, as planner and controller take it.
+
+use serde::{Deserialize, Deserializer, Serialize};
+
+use crate::{
+    bus::{BusError, Reader},
+    mission::Mission,
+    readers,
+    samples::BaseResponseSample,
+    stage::Further,
+    topics::BASE_RESPONSE,
+};
+
+/// The newest that came, if any: dead time, seconds, and acceleration, m/s^2.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FoundResponse {
+    /// Older recordings have none.
+    #[serde(deserialize_with = "if_there")]
+    response: Option<[f64; 2]>,
+}
+
+impl FoundResponse {
+    /// The mission by `newer`, if that differs; `stated` is the mission as it was given.
+    pub fn changed(&mut self, newer: &Self, stated: &Mission) -> Option<Mission> {
+        let [dead_time_s, acceleration] = newer.response.filter(|_| newer != self)?;
+        *self = *newer;
+        stated.with_response(dead_time_s, acceleration)
+    }
+}
+
+impl From<BaseResponseSample> for FoundResponse {
+    fn from(sample: BaseResponseSample) -> Self {
+        Self { response: Some([sample.dead_time_s, sample.acceleration_m_s2]) }
+    }
+}
+
+readers! {
+    pub struct FoundResponseReader {
+        feedback {
+            samples: Reader<BaseResponseSample> = BASE_RESPONSE,
+        }
+    }
+}
+
+impl Further for FoundResponse {
+    type Readers = FoundResponseReader;
+
+    fn take_samples(readers: &mut FoundResponseReader) -> Result<Self, BusError> {
+        Ok(readers.samples.newest()?.map(Self::from).unwrap_or_default())
+    }
+}
+
+/// The last part of an encoding, or the default where the encoding ends before it, as one of an earlier version does.
+pub fn if_there<'a, T, D>(from: D) -> Result<T, D::Error>
+where
+    T: Deserialize<'a> + Default,
+    D: Deserializer<'a>,
+{
+    Ok(T::deserialize(from).unwrap_or_default())
+}
