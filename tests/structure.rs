@@ -30,7 +30,8 @@ fn linked(arguments: &[&str]) -> BTreeSet<String> {
 fn dependencies(folder: &Path) -> Vec<String> {
     let text = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
     let manifest: toml::Table = text.parse().unwrap();
-    manifest["dependencies"].as_table().unwrap().keys().cloned().collect()
+    let named = manifest.get("dependencies").and_then(toml::Value::as_table);
+    named.into_iter().flat_map(toml::Table::keys).cloned().collect()
 }
 
 /// The members of the workspace, each a name and its folder.
