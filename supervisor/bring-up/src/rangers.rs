@@ -278,9 +278,9 @@ fn motors(
     mirrored: Option<f64>,
 ) -> Option<Finding> {
     let track_m = mission.body().track_m;
-    let turns_back = plain
-        .zip(mirrored)
-        .is_some_and(|(plain, mirrored)| plain > LEAST_DIFFERENCE_M && mirrored < EXPLAINS * plain);
+    let turns_back = plain.zip(mirrored).is_some_and(|(plain, mirrored)| {
+        plain > LEAST_DIFFERENCE_M && mirrored < LEAST_DIFFERENCE_M.min(EXPLAINS * plain)
+    });
     let is_x80 = mission.robot.protocol() == Protocol::X80;
     let (left, right) = (mission.robot.left, mission.robot.right);
     let reversed = |finding: Finding, sides: &[(&str, bool)]| {
@@ -312,6 +312,7 @@ fn motors(
     let share = share_of_way(mission, trace, motion, Told::Drive, |[_, way]| way);
     let both = [("left", left.reversed), ("right", right.reversed)];
     match (turns_back, share.map(|share| share < 0.0)) {
+        (_, Some(false)) if share.is_some_and(|share| (share - 1.0).abs() > WAY_TOLD) => {}
         (true, Some(true)) => {
             let text = "it turns and drives the other way: both motors turn backwards";
             return Some(reversed(Finding::wrong("motors", text), &both));
@@ -370,7 +371,9 @@ fn bearing(reference: &Profile, sensor: &Sensor, seen: &[(f64, f64)]) -> Option<
     let turned = |bins: usize| Some((reference.difference(seen, bins)?, bins));
     let (least, bins) = (0..BINS).filter_map(turned).min_by(|a, b| a.0.total_cmp(&b.0))?;
     let beside = bins.min(BINS - bins);
-    if stated < LEAST_DIFFERENCE_M || least > EXPLAINS * stated || beside < BESIDE_BINS {
+    // Where the wheels' sizes are wrong no bearing fits.
+    let fits = least < LEAST_DIFFERENCE_M.min(EXPLAINS * stated);
+    if stated < LEAST_DIFFERENCE_M || !fits || beside < BESIDE_BINS {
         return None;
     }
     let off = wrap_angle(TAU * bins as f64 / BINS as f64);

@@ -102,7 +102,7 @@ const OF_LASER: &[Fault] = &[
     }),
 ];
 
-const ROOM: &str = "target = [1.5, 0]\nsensors = 'all'\nsimulation.realism = 'measured'\n[perimeter]\nwidth_m = 8.0\ncentre = [0.0, 0.0]\n";
+const ROOM: &str = "target = [0.8, 0]\nsensors = 'all'\nsimulation.realism = 'measured'\n[perimeter]\nwidth_m = 8.0\ncentre = [0.0, 0.0]\n";
 const X80: &str = "[robot]\nmodel = 'x80'\n";
 const KOBUKI: &str = "[robot]\nmodel = 'kobuki'\nrate_hz = 10.0\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nmodel = 'rplidar-a1'\nforward_m = 0.05\nbearing_deg = 0.0\n";
 /// Longer than a bring-up on a loaded machine.
