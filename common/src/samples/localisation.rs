@@ -50,5 +50,7 @@ wire_enum! {
         Covariance = 4 "a fix is refused: its covariance is not positive or states less than 5 mm",
         Far = 5 "a fix is refused: it contradicts the pose",
         TooMany = 6 "a fix is refused: too many came in 2 s; publish fewer",
+        /// Fixes moved the robot as often as they may.
+        Contradicts = 7 "a fix is refused: fixes have moved the robot twice, and contradict the pose again; look at their source",
     }
 }

@@ -142,6 +142,10 @@ payloads! {
         /// Restarts of the robot's counts that this process of the link noticed: the step from a sample with a lower number is no
         /// motion.
         restarts: u32,
+        /// The share of its commanded way that the right wheel counts, over the left wheel's, and the standard deviation; 1 and 0 where it
+        /// is not known, and for a car.
+        told_ratio: f64 = 1.0,
+        told_ratio_sd: f64,
     }
 }
 

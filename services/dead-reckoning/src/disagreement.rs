@@ -23,6 +23,8 @@ const APART_S: std::ops::RangeInclusive<f64> = 0.18..=1.0;
 /// The least way, m^2, and turn, rad^2, squared for each pair and summed up.
 const LEAST_WAY: f64 = 0.03;
 const LEAST_TURN: f64 = 0.02;
+/// The least share of turn and way that the other does not explain.
+const LEAST_ALONE: f64 = 0.05;
 /// An estimate is this number of its deviations away from none.
 const DEVIATIONS: f64 = 6.0;
 /// The least share of a motion that a factor must explain: slipping wheels are no factor.
@@ -31,6 +33,8 @@ const EXPLAINED: f64 = 0.95;
 const FACTOR: f64 = 0.12;
 const ASIDE_RAD: f64 = 0.05;
 const DELAY_S: f64 = 0.06;
+/// Of the wheels' ratio.
+const UNEVEN: f64 = 0.03;
 const SHIFTS: usize = 13;
 const FIRST_SHIFT_S: f64 = -0.1;
 const SHIFT_STEP_S: f64 = 0.05;
@@ -67,6 +71,14 @@ impl Line {
     }
 }
 
+/// Turn for turn, and radians for a metre, each with its deviation; and the share of the turns that both explain.
+#[derive(Clone, Copy)]
+struct Turns {
+    factor: [f64; 2],
+    bend: [f64; 2],
+    explained: f64,
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) enum Cause {
     Mirrored,
@@ -78,6 +90,8 @@ pub(crate) enum Cause {
     Way(f64),
     /// The turn likewise.
     Turn(f64),
+    /// The way of the right wheel over that of the left one, for equal counts.
+    Uneven(f64),
 }
 
 impl Cause {
@@ -94,6 +108,9 @@ impl Cause {
             Self::Way(factor) => format!(
                 "the robot goes {factor:.2} of the way that its wheels say: correct robot.counts_per_turn or wheel_radius_m"
             ),
+            Self::Uneven(ratio) => format!(
+                "the right wheel goes {ratio:.2} of the left one's way for the same counts: check encoders and wheels, or `firsthand calibrate`"
+            ),
             Self::Turn(factor) => format!(
                 "the robot turns {factor:.2} of what its wheels say: correct robot.track_m, or `firsthand calibrate`"
             ),
@@ -109,6 +126,9 @@ pub(crate) struct Disagreement {
     turn: Line,
     way: Line,
     aside: Line,
+    /// The fixes' turn by the wheels' way, and the sum of products of the wheels' turn and way.
+    bend: Line,
+    turn_way: f64,
     /// Squares of the turns' differences by the shift of time.
     shifted: [f64; SHIFTS],
     cause: Option<Cause>,
@@ -120,7 +140,12 @@ impl Disagreement {
     }
 
     /// Compare the two fixes before `newest` with the ticks of the last 2 s, which go on after them. Returns a cause that is new.
-    pub(crate) fn compare(&mut self, newest: &Fix, ticks: &VecDeque<Tick>) -> Option<Cause> {
+    pub(crate) fn compare(
+        &mut self,
+        newest: &Fix,
+        ticks: &VecDeque<Tick>,
+        track_m: f64,
+    ) -> Option<Cause> {
         // Of all sources only the scan matcher states both.
         if newest.heading.is_none() || newest.shared[1] <= 0.0 {
             return None;
@@ -155,34 +180,63 @@ impl Disagreement {
         self.turn.add(by_wheels.heading, turn);
         self.way.add(by_wheels.position.x, way.x);
         self.aside.add(by_wheels.position.x, way.y - by_wheels.position.y);
+        self.bend.add(by_wheels.position.x, turn);
+        self.turn_way = self.turn_way * REMEMBERED + by_wheels.heading * by_wheels.position.x;
         if self.is_named() || self.pairs < LEAST_PAIRS {
             return None;
         }
-        self.cause = self.likely();
+        self.cause = self.likely(track_m);
         self.cause
     }
 
-    fn likely(&self) -> Option<Cause> {
+    fn likely(&self, track_m: f64) -> Option<Cause> {
+        let is_off = |factor: f64, deviation: f64, explained: f64| {
+            (factor - 1.0).abs() > FACTOR.max(DEVIATIONS * deviation) && explained > EXPLAINED
+        };
         let factor = |line: &Line, least| {
             let (factor, deviation) = line.factor(least, self.pairs)?;
-            let off = (factor - 1.0).abs();
-            let sure = off > FACTOR.max(DEVIATIONS * deviation) && line.explained() > EXPLAINED;
-            sure.then_some(factor)
+            is_off(factor, deviation, line.explained()).then_some(factor)
         };
-        let turn = factor(&self.turn, LEAST_TURN);
-        if turn.is_some_and(|turn| turn < 0.0) {
+        if factor(&self.turn, LEAST_TURN).is_some_and(|turn| turn < 0.0) {
             return Some(Cause::Mirrored);
         }
         if let Some(by_s) = self.late() {
             return Some(Cause::Late(by_s));
+        }
+        let turns = self.turns();
+        if let Some([bend, deviation]) = turns.map(|turns| turns.bend)
+            && bend.abs() > (UNEVEN / track_m).max(DEVIATIONS * deviation)
+        {
+            return Some(Cause::Uneven(1.0 + bend * track_m));
         }
         if let Some((aside, deviation)) = self.aside.factor(LEAST_WAY, self.pairs)
             && aside.abs() > ASIDE_RAD.max(DEVIATIONS * deviation)
         {
             return Some(Cause::Turned(-aside.clamp(-1.0, 1.0).asin()));
         }
+        let turn = turns.filter(|Turns { factor: [factor, deviation], explained, .. }| {
+            is_off(*factor, *deviation, *explained)
+        });
         let way = factor(&self.way, LEAST_WAY).map(Cause::Way);
-        way.or(turn.map(Cause::Turn))
+        way.or(turn.map(|turns| Cause::Turn(turns.factor[0])))
+    }
+
+    /// The turns of the fixes by the turns and ways of the wheels, together: a robot that drives curves has both.
+    fn turns(&self) -> Option<Turns> {
+        let (turn, way) = (&self.turn, &self.bend);
+        let determinant = turn.xx * way.xx - self.turn_way * self.turn_way;
+        if turn.xx < LEAST_TURN || determinant < LEAST_ALONE * turn.xx * way.xx {
+            return None;
+        }
+        let factor = (turn.xy * way.xx - way.xy * self.turn_way) / determinant;
+        let bend = (way.xy * turn.xx - turn.xy * self.turn_way) / determinant;
+        let rest = (turn.yy - factor * turn.xy - bend * way.xy).max(0.0);
+        let deviation = |of: f64| (rest / self.pairs * of / determinant).sqrt();
+        Some(Turns {
+            factor: [factor, deviation(way.xx)],
+            bend: [bend, deviation(turn.xx)],
+            explained: 1.0 - rest / turn.yy,
+        })
     }
 
     /// The delay, seconds, if the turns agree far better with it than without.

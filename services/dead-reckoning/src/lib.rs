@@ -9,6 +9,7 @@
 //! | `tick` | the motion of one tick |
 //! | `gyro` | the turn of a tick from a gyro's increments |
 //! | `disagreement` | whether laser and wheels disagree on every motion, and why |
+//! | `doubt` | what no fix settles, and widens the covariance that is given |
 //! | `relocation` | whether fixes that contradict the pose agree among themselves |
 //!
 //! The state is saved after the pose is published, so that the tick does not wait for the file. A process killed in between has
@@ -19,6 +20,7 @@
 
 mod covariance;
 mod disagreement;
+mod doubt;
 mod filter;
 mod gyro;
 mod relocation;

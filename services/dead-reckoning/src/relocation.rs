@@ -9,6 +9,8 @@ use serde::{Deserialize, Serialize};
 use crate::filter::{Filter, Fix, GATES, wrapped};
 
 const AGREE: usize = 10;
+/// Fixes that contradict the pose again after these are a source that contradicts itself.
+pub(crate) const MOST_RELOCATIONS: u64 = 2;
 /// Ten such fixes take 3 s.
 const APART: Duration = Duration::from_millis(334);
 /// Variance of the way between two fixes by the wheels, m^2.
@@ -17,6 +19,8 @@ const WHEELS: f64 = 4e-4;
 const KNOWN_RAD: f64 = 0.2;
 /// The heading's variance otherwise, rad^2.
 const UNKNOWN: f64 = 1.0;
+/// A turn of less than so many deviations is none: the heading by the wheels is better than one by the robot's short way.
+const NO_TURN: f64 = 3.0;
 
 /// Refused fixes since one was used, each with the pose at its time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -80,6 +84,8 @@ impl Contradictions {
         }
         let sum = |of: fn((DVec2, DVec2)) -> f64| arms.clone().map(of).sum::<f64>();
         let (cosine, sine) = (sum(|(a, b)| a.dot(b)), sum(|(a, b)| a.perp_dot(b)));
-        (sine.atan2(cosine), variance / spread)
+        let turn = sine.atan2(cosine);
+        let is_turn = turn * turn > NO_TURN * NO_TURN * variance / spread;
+        (if is_turn { turn } else { 0.0 }, variance / spread)
     }
 }

@@ -20,9 +20,10 @@ use serde::{Deserialize, Serialize};
 use crate::{
     covariance::ErrorModel,
     disagreement::{Cause, DOUBT, Disagreement},
-    filter::{Filter, Fix, History, Motions, Refused},
+    doubt::Doubt,
+    filter::{Filter, Fix, History, Motions, Refused, wrapped},
     gyro::Gyro,
-    relocation::Contradictions,
+    relocation::{Contradictions, MOST_RELOCATIONS},
     sources::Sources,
     tick::Tick,
 };
@@ -66,6 +67,8 @@ pub struct State {
     counts: Option<CountsSample>,
     #[serde(deserialize_with = "if_there")]
     disagreement: Disagreement,
+    #[serde(deserialize_with = "if_there")]
+    doubt: Doubt,
 }
 
 impl State {
@@ -89,7 +92,7 @@ struct Last {
     omega: f64,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Reckoned {
     pub pose: PoseSample,
     /// The counts jumped farther than wheels turn, or the robot restarted them: the pose stays, and its covariance grows by how far the
@@ -101,6 +104,8 @@ pub struct Reckoned {
     pub refused: Option<FixRefusal>,
     /// Why laser and wheels disagree, if that is new.
     pub(crate) disagree: Option<Cause>,
+    /// Why the wheels are doubted, once.
+    pub(crate) doubted: Option<String>,
 }
 
 /// (20) and (21).
@@ -157,6 +162,7 @@ impl Answering for DeadReckoning {
                 refusal: FixRefusal::None.into(),
                 counts: None,
                 disagreement: Disagreement::default(),
+                doubt: Doubt::default(),
             },
         }
     }
@@ -181,10 +187,11 @@ impl Answering for DeadReckoning {
         now: MissionTime,
     ) -> Answer<PoseSample> {
         let first = self.state.newest().is_none();
-        let Reckoned { pose, rejected, relocated, refused, disagree } =
+        let Reckoned { pose, rejected, relocated, refused, disagree, doubted } =
             self.reckon(wheels, sources, now);
         let warning = match (disagree, refused) {
             (Some(cause), _) => Some(cause.words().into()),
+            _ if doubted.is_some() => doubted.map(Into::into),
             _ if rejected => Some("the encoder counts restarted or jumped; the pose stays".into()),
             _ if relocated => {
                 Some("fixes that agree contradict the pose; the pose is theirs now".into())
@@ -218,6 +225,7 @@ impl DeadReckoning {
                     relocated: false,
                     refused: None,
                     disagree: None,
+                    doubted: None,
                 };
             }
             elapsed = now.since(last.time).as_secs_f64();
@@ -235,6 +243,8 @@ impl DeadReckoning {
             *pose = self.motions.along(*pose, motion);
         }
         state.travelled += motion.v.abs();
+        let rim_m = motion.v.abs() + motion.omega.abs() * self.body.track_m / 2.0;
+        let doubted = state.doubt.roll(wheels, rim_m, self.body.track_m);
         state.history.advance(&self.motions, tick);
         state.history.turn(&self.motions, &mut state.gyro, turns);
         let (mut relocated, mut refused, mut disagree) = (false, None, None);
@@ -242,7 +252,8 @@ impl DeadReckoning {
             let taken = self.take_fix(fix);
             if let Ok(fix) = Fix::try_from(fix) {
                 let State { disagreement, history, .. } = &mut self.state;
-                disagree = disagreement.compare(&fix, history.ticks()).or(disagree);
+                let found = disagreement.compare(&fix, history.ticks(), self.body.track_m);
+                disagree = found.or(disagree);
             }
             relocated |= taken == Taken::Relocated;
             let why = match taken {
@@ -266,7 +277,7 @@ impl DeadReckoning {
             v,
             omega,
         });
-        Reckoned { pose: self.sample(), rejected, relocated, refused, disagree }
+        Reckoned { pose: self.sample(), rejected, relocated, refused, disagree, doubted }
     }
 
     /// Take a fix, unless it is refused.
@@ -278,6 +289,9 @@ impl DeadReckoning {
         let Err(Refused { why, there }) = taken else {
             state.fixes += 1;
             state.contradictions = Contradictions::default();
+            if sample.shared[1] <= 0.0 {
+                state.doubt.place_by_others();
+            }
             return Taken::Used;
         };
         state.fixes_refused += 1;
@@ -285,6 +299,11 @@ impl DeadReckoning {
         if let (Ok(fix), Some(there)) = (fix, there)
             && let Some(elsewhere) = state.contradictions.add(there, &fix, estimate)
         {
+            if state.relocations >= MOST_RELOCATIONS {
+                return Taken::Refused(FixRefusal::Contradicts);
+            }
+            let (from, to) = (estimate.pose, elsewhere.pose);
+            state.doubt.relocate(to.position - from.position, wrapped(to.heading - from.heading));
             state.history.restart(elsewhere);
             state.relocations += 1;
             return Taken::Relocated;
@@ -375,11 +394,13 @@ impl DeadReckoning {
         let way = [x * x, x * y, x * turn, y * y, y * turn, turn * turn];
         let mut covariance = estimate.covariance.of_pose();
         covariance.iter_mut().zip(way).for_each(|(entry, more)| *entry += more);
+        let [mut place, mut heading_doubt] = self.state.doubt.variances(self.body.track_m);
         if self.state.disagreement.is_named() {
-            let [place, heading] = DOUBT;
-            for (entry, more) in [(0, place), (3, place), (5, heading)] {
-                covariance[entry] += more;
-            }
+            place += DOUBT[0];
+            heading_doubt += DOUBT[1];
+        }
+        for (entry, more) in [(0, place), (3, place), (5, heading_doubt)] {
+            covariance[entry] += more;
         }
         let turned = heading - odometry.heading;
         let origin = position - DVec2::from_angle(turned).rotate(odometry.position);

@@ -19,6 +19,7 @@ pub mod staleness;
 pub mod stop_monitor;
 pub mod streams;
 mod undetected_surface;
+pub(crate) mod wheel_shares;
 
 use std::time::Duration;
 

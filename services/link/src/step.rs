@@ -30,6 +30,7 @@ use crate::{
         monitor::{Moment, Observation},
         presence::Absence,
         restart::RestartWatch,
+        wheel_shares::WheelRatio,
     },
     polls::Polls,
     sensors::Sensors,
@@ -300,7 +301,13 @@ impl Link {
             self.state.next_tick += 1;
         }
         let endless = motion.endless;
-        let wheels = WheelSample { restarts: self.restart.restarts(), ..motion.wheels };
+        let WheelRatio { ratio, deviation } = self.monitors().odometry.wheel_ratio();
+        let wheels = WheelSample {
+            restarts: self.restart.restarts(),
+            told_ratio: ratio,
+            told_ratio_sd: deviation,
+            ..motion.wheels
+        };
         self.wheels = wheels;
         if let Some(trim) = &mut self.trim {
             trim.rolled(WheelCounts::of(&wheels, endless.as_ref()), self.now.seconds());

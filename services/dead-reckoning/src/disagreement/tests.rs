@@ -4,6 +4,7 @@ use glam::DVec2;
 use super::*;
 
 const PERIOD_S: f64 = 0.1;
+const TRACK_M: f64 = 0.26;
 
 /// How a robot differs from what is stated of it.
 #[derive(Clone, Copy, Debug)]
@@ -14,12 +15,21 @@ struct Robot {
     /// True way and turn over those by the wheels.
     way: f64,
     turn: f64,
+    /// The right wheel's way over the left one's, for equal counts.
+    uneven: f64,
     /// Its wheels slip: every tenth second they say twice what they went.
     slips: bool,
 }
 
-const RIGHT: Robot =
-    Robot { late_s: 0.0, turned_rad: 0.0, mirrored: false, way: 1.0, turn: 1.0, slips: false };
+const RIGHT: Robot = Robot {
+    late_s: 0.0,
+    turned_rad: 0.0,
+    mirrored: false,
+    way: 1.0,
+    turn: 1.0,
+    uneven: 1.0,
+    slips: false,
+};
 
 /// The cause that is named within `for_s` of driving to both sides, and when.
 fn named(robot: Robot, seed: u64, for_s: f64) -> Option<(f64, Cause)> {
@@ -60,7 +70,8 @@ fn named(robot: Robot, seed: u64, for_s: f64) -> Option<(f64, Cause)> {
             ticks.pop_front();
         }
         let before = poses[poses.len() - 1];
-        poses.push(before.along_arc(arc * robot.way, turn * robot.turn));
+        let bend = arc * (robot.uneven - 1.0) / TRACK_M;
+        poses.push(before.along_arc(arc * robot.way, turn * robot.turn + bend));
         let late = (robot.late_s / PERIOD_S).round() as usize;
         let Some(seen) = poses.len().checked_sub(1 + late).map(|at| poses[at]) else {
             continue;
@@ -79,7 +90,7 @@ fn named(robot: Robot, seed: u64, for_s: f64) -> Option<(f64, Cause)> {
             covariance: [1e-4, 0.0, 0.0, 1e-4, 0.0, 1e-4],
             shared: [1e-5, 1e-6],
         };
-        if let Some(cause) = disagreement.compare(&fix, &ticks) {
+        if let Some(cause) = disagreement.compare(&fix, &ticks, TRACK_M) {
             return Some((now, cause));
         }
     }
@@ -106,6 +117,10 @@ fn a_late_a_turned_and_a_mirrored_laser_and_wrong_wheels_are_named_within_half_a
         is(Robot { turned_rad, ..RIGHT }, &near);
     }
     is(Robot { mirrored: true, ..RIGHT }, &|cause| cause == Cause::Mirrored);
+    for uneven in [0.94, 1.1] {
+        let near = |cause| matches!(cause, Cause::Uneven(it) if (it - uneven).abs() < 0.02);
+        is(Robot { uneven, ..RIGHT }, &near);
+    }
     for factor in [0.8, 1.3] {
         let near = |found: f64| (found - factor).abs() < 0.08;
         is(Robot { way: factor, ..RIGHT }, &|cause| matches!(cause, Cause::Way(it) if near(it)));

@@ -265,6 +265,67 @@ fn fixes_that_agree_for_three_seconds_relocate_a_robot_that_was_carried() {
     assert_eq!(scattered, []);
 }
 
+/// The greatest error in 60 s with a source whose fixes are all `aside_m` aside, and the deviation that the pose then gives.
+fn aside(aside_m: f64) -> (f64, f64, u64) {
+    let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
+    let mut worst = 0.0_f64;
+    for _ in 0..600 {
+        let wheels = robot.wind();
+        let fix = robot.fix();
+        let fix = FixSample { y_m: fix.y_m + aside_m, ..fix };
+        let pose = reckoning.given(&wheels, &[fix], &[]).pose;
+        worst = worst.max(robot.error_m(&pose));
+    }
+    let sample = reckoning.sample();
+    (worst, sample.covariance[3].sqrt(), sample.relocations)
+}
+
+#[test]
+fn a_source_that_is_aside_moves_the_robot_no_farther_than_it_is_and_the_pose_keeps_the_doubt() {
+    for aside_m in [0.3, 1.0, 3.0] {
+        let (worst, deviation, relocations) = aside(aside_m);
+        assert_eq!(relocations, 1, "{aside_m}");
+        assert!(worst < 1.2 * aside_m + 0.1, "{worst} by a source {aside_m} aside");
+        assert!(deviation > 0.8 * aside_m, "{deviation} by a source {aside_m} aside");
+    }
+}
+
+#[test]
+fn a_source_that_contradicts_itself_moves_the_robot_twice_and_is_then_refused() {
+    let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
+    let (mut relocated, mut refused) = (0, Vec::new());
+    for tick in 0..1200 {
+        let wheels = robot.wind();
+        let fix = robot.fix();
+        let fix = FixSample { y_m: fix.y_m + [0.0, 3.0][tick / 100 % 2], ..fix };
+        let reckoned = reckoning.given(&wheels, &[fix], &[]);
+        relocated += u32::from(reckoned.relocated);
+        refused.extend(reckoned.refused);
+    }
+    assert_eq!(relocated, 2);
+    assert!(refused.contains(&FixRefusal::Contradicts), "{refused:?}");
+}
+
+#[test]
+fn wheels_that_count_unequal_shares_of_what_they_are_told_make_the_pose_unsure_until_another_source_places_it()
+ {
+    let deviation = |ratio: f64, by_others: bool| {
+        let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
+        let mut told = 0;
+        for _ in 0..80 {
+            let told_ratio = ratio;
+            let wheels = WheelSample { told_ratio, told_ratio_sd: 0.001, ..robot.wind() };
+            let fixes = if by_others { vec![robot.fix()] } else { Vec::new() };
+            told += u32::from(reckoning.given(&wheels, &fixes, &[]).doubted.is_some());
+        }
+        (reckoning.sample().covariance[3].sqrt(), told)
+    };
+    let (even, _) = deviation(1.01, false);
+    let (uneven, told) = deviation(0.95, false);
+    assert!(even < 0.15 && uneven > 0.5 && told == 1, "{even} and {uneven}, told {told} times");
+    assert!(deviation(0.95, true).0 < 0.1);
+}
+
 /// The error of the heading after 20 s at rest and 60 s of driving, with a gyro of this bias that says how often it is off.
 fn heading_error(bias: f64, mut gyro: impl FnMut(u64, f64) -> Vec<TurnSample>) -> f64 {
     let (mut robot, mut reckoning) = (Robot::new(0.01), x80());

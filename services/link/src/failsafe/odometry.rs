@@ -32,6 +32,7 @@ use super::{
     contact::{Contacts, HELD_AFTER},
     monitor::{Condition, Counts, Moment, Monitor, Observation},
     response_fit::{ResponseFit, Suspected},
+    wheel_shares::{WheelRatio, WheelShares},
 };
 
 /// The slowest judged motion, m/s at the rim.
@@ -164,6 +165,7 @@ pub struct Odometry {
     /// The commands, as far as the base's acceleration has reached them, counts/s.
     reached: [ModelledSpeed; 2],
     fit: ResponseFit,
+    shares: WheelShares,
     /// The response that explained a motion, until it is told.
     found: Option<Response>,
     /// Two periods.
@@ -187,6 +189,7 @@ pub struct Odometry {
 
 impl Odometry {
     fn commanded(&mut self, counts: [i16; 2], now: MissionTime) {
+        self.shares.told(counts, now.seconds());
         let limit = self.limit;
         let lapsed = |then: &MissionTime| now.since(*then) > limit;
         if let Some(then) = self.commanded.filter(lapsed) {
@@ -226,6 +229,10 @@ impl Odometry {
         self.reached = [(); 2].map(|()| ModelledSpeed::new(0.0, change));
     }
 
+    pub(crate) fn wheel_ratio(&self) -> WheelRatio {
+        self.shares.ratio()
+    }
+
     /// The response that explained a motion that the one before did not; the next call gives none.
     pub(crate) const fn take_found(&mut self) -> Option<Response> {
         self.found.take()
@@ -233,6 +240,7 @@ impl Odometry {
 
     fn plausible(&mut self, counts: impl Into<WheelCounts>, now: MissionTime) {
         let counts = counts.into();
+        self.shares.rolled(counts, now.seconds());
         let newest_jump = self.jumps.back().copied();
         let calm = newest_jump.is_none_or(|jump| now.since(jump) >= CALM);
         if calm
@@ -352,6 +360,7 @@ impl Odometry {
     fn reset(&mut self) {
         self.commanded = None;
         self.frame = None;
+        self.shares.interrupt();
         self.clear_evidence();
         self.fit.reset();
         self.contacts.reset();
@@ -384,6 +393,7 @@ impl Monitor for Odometry {
             response: body.response,
             reached: [(); 2].map(|()| ModelledSpeed::new(0.0, change)),
             fit: ResponseFit::new(counts_per_m),
+            shares: WheelShares::new(mission),
             found: None,
             steers: body.steering.is_some(),
             longest_gap: Duration::from_secs_f64(2.0 / mission.robot.rate_hz),
@@ -422,6 +432,7 @@ impl Monitor for Odometry {
             Observation::Motor(_, Counts::Restarted { .. } | Counts::Elsewhere) => {
                 self.implausible(now.time);
                 self.frame = None;
+                self.shares.interrupt();
             }
             _ => {}
         }
