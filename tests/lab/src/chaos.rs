@@ -76,6 +76,30 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     finish(&options, ended, |report: &Report| [report.is_right(), report.is_clean()])
 }
 
+/// The number of kinds of robot faults.
+pub const FAULTS: usize = robot_fault::TABLE.len();
+
+/// What a chaos tried, what went wrong, and the worst case in words.
+#[derive(Debug)]
+pub struct Judged {
+    pub tried: u64,
+    pub lost: u64,
+    pub worst: String,
+}
+
+/// Run and judge without printing. The missions' directory stays if something went wrong.
+pub fn judge(arguments: &Arguments) -> Result<Judged> {
+    let options = Options::of(arguments)?;
+    let judged = match arguments.robot_faults {
+        Some(_) => robot_faults::run(&options)?.judged(),
+        None => run(&options)?.judged(),
+    };
+    if judged.lost == 0 {
+        fs::remove_dir_all(&options.directory)?;
+    }
+    Ok(judged)
+}
+
 /// Print the result of all missions. Their directory stays if something went wrong. `judge` says of a result whether all missions were
 /// right, and whether the command succeeded.
 fn finish<R: Display + Serialize>(

@@ -10,6 +10,7 @@
 //! | [`baselines`] | planners to compare with: shortest paths, Bug2 |
 //! | [`chaos`] | signals to random processes at random times; faults of the robot |
 //! | [`tick`] | the latency of a tick, compared with five bare hops on the bus |
+//! | `certify` | the certificate: what was tried, what was lost, and bounds |
 //! | `bring_up` | bring-ups of robots with faults of assembly |
 //! | [`sources`] | simulated sources of fixes and turns |
 //! | `field` | the field of a map |
@@ -22,6 +23,7 @@
 
 mod baselines;
 mod bring_up;
+mod certify;
 mod chaos;
 mod error;
 mod evaluate;
@@ -51,6 +53,7 @@ enum Command {
     Evaluate(evaluate::Arguments),
     Experiments(experiments::Arguments),
     Field(field::Arguments),
+    Certify(certify::Arguments),
     /// Measure ticks and fields; send random signals to a robot's processes; publish fixes of a simulated robot.
     #[command(subcommand)]
     Bench(Bench),
@@ -80,6 +83,7 @@ fn execute(arguments: &Arguments) -> error::Result<ExitCode> {
         Command::Field(arguments) | Command::Bench(Bench::Field(arguments)) => {
             field::main(arguments)
         }
+        Command::Certify(arguments) => certify::main(arguments),
         Command::Stage(arguments) => baselines::process::main(arguments),
         Command::Bench(Bench::Tick(arguments)) => tick::main(arguments),
         Command::Bench(Bench::Chaos(arguments)) => return chaos::main(arguments),

@@ -1,44 +1,58 @@
-//! The share of its commanded way that each wheel counts, and the ratio of the two.
+//! The share of its commanded way that the right wheel counts, over the left wheel's.
 //!
 //! Speed loops that fall short do so alike, and commands keep their curve ([`crate::speed_trim`]). Where one wheel counts another share
 //! than the other, its encoder, its loop or the ground is not as stated, and nothing here tells which: dead reckoning gets the ratio as a
-//! doubt of the curve that the robot drove. The shares are least squares of the counted over the modelled way of each tick.
+//! doubt of the curve that the robot drove. With ways x that are modelled and y that are counted, the ratio is (y/x) of the right wheel
+//! over that of the left one. Least squares of `y_right x_left` over `y_left x_right` give it, so that what both wheels share, as a
+//! frame that comes late, is no error.
 
 use common::{
     driver::counts::WheelCounts,
     mission::{Body, Mission, ModelledSpeed},
 };
 
-/// So much of the sums is left after each wheel's further metre: 4 m are remembered.
-const LEFT_AFTER_A_METRE: f64 = 0.78;
-/// Each wheel must have been told to roll so far, metres.
+/// So much of the sums is left after each further metre: 3 m are remembered.
+const LEFT_AFTER_A_METRE: f64 = 0.72;
+/// The wheels must have been told to roll so far, metres.
 const LEAST_M: f64 = 0.6;
+/// A wheel that counts less than this share of its commanded way in a tick is held, or dead: other monitors judge it.
+const TURNS: f64 = 0.25;
 
-/// Sums of the modelled way x and the counted way y of ticks, metres.
+/// Sums over ticks.
 #[derive(Clone, Copy, Debug, Default)]
-struct Share {
-    told_m: f64,
+struct Sums {
+    way_m: f64,
     ticks: f64,
     xx: f64,
     xy: f64,
     yy: f64,
 }
 
-impl Share {
-    fn add(&mut self, x: f64, y: f64) {
-        let left = LEFT_AFTER_A_METRE.powf(x.abs());
-        let sums = [&mut self.told_m, &mut self.ticks, &mut self.xx, &mut self.xy, &mut self.yy];
-        for (sum, term) in sums.into_iter().zip([x.abs(), 1.0, x * x, x * y, y * y]) {
+impl Sums {
+    /// The modelled and the counted ways of a tick, left and right, metres.
+    fn add(&mut self, told: [f64; 2], counted: [f64; 2]) {
+        let [left, right] = told;
+        let way_m = f64::midpoint(left.abs(), right.abs());
+        let turns =
+            |wheel: usize| counted[wheel] * told[wheel].signum() >= TURNS * told[wheel].abs();
+        if left == 0.0 || right == 0.0 || !turns(0) || !turns(1) {
+            return;
+        }
+        let (x, y) = (counted[0] * right / way_m, counted[1] * left / way_m);
+        let left = LEFT_AFTER_A_METRE.powf(way_m);
+        let sums = [&mut self.way_m, &mut self.ticks, &mut self.xx, &mut self.xy, &mut self.yy];
+        for (sum, term) in sums.into_iter().zip([way_m, 1.0, x * x, x * y, y * y]) {
             *sum = *sum * left + term;
         }
     }
 
-    /// The share, and the variance of its relative error.
-    fn known(&self) -> Option<(f64, f64)> {
-        let share = self.xy / self.xx;
-        let rest = (self.yy - share * self.xy).max(0.0) / self.ticks;
-        let told = self.told_m >= LEAST_M && share > 0.0;
-        told.then(|| (share, rest / self.xx / (share * share)))
+    fn ratio(&self) -> WheelRatio {
+        let ratio = self.xy / self.xx;
+        let rest = (self.yy - ratio * self.xy).max(0.0) / self.ticks;
+        match self.way_m >= LEAST_M {
+            true => WheelRatio { ratio, deviation: (rest / self.xx).sqrt() },
+            false => WheelRatio::UNKNOWN,
+        }
     }
 }
 
@@ -58,7 +72,7 @@ pub(crate) struct WheelShares {
     metres_per_count: f64,
     /// None for a car, which has one driven wheel.
     wheels: Option<[ModelledSpeed; 2]>,
-    shares: [Share; 2],
+    sums: Sums,
     frame: Option<(WheelCounts, f64)>,
     longest_gap_s: f64,
 }
@@ -74,7 +88,7 @@ impl WheelShares {
         Self {
             metres_per_count,
             wheels: steering.is_none().then(|| [wheel.clone(), wheel]),
-            shares: [Share::default(); 2],
+            sums: Sums::default(),
             frame: None,
             longest_gap_s: 2.0 / mission.robot.rate_hz,
         }
@@ -102,23 +116,13 @@ impl WheelShares {
             && now_s - then_s <= self.longest_gap_s
         {
             let rolled = counts.since(before);
-            for (wheel, share) in self.shares.iter_mut().enumerate() {
-                share.add(
-                    told[wheel] * self.metres_per_count,
-                    rolled[wheel] * self.metres_per_count,
-                );
-            }
+            let metres = |counts: [f64; 2]| counts.map(|count| count * self.metres_per_count);
+            self.sums.add(metres(told), metres(rolled));
         }
     }
 
     pub(crate) fn ratio(&self) -> WheelRatio {
-        let [left, right] = self.shares.each_ref().map(Share::known);
-        match (left, right) {
-            (Some((left, of_left)), Some((right, of_right))) => {
-                WheelRatio { ratio: right / left, deviation: (of_left + of_right).sqrt() }
-            }
-            _ => WheelRatio::UNKNOWN,
-        }
+        self.sums.ratio()
     }
 }
 
@@ -134,14 +138,16 @@ mod tests {
     fn ratio(reached: f64, counted: [f64; 2], told: impl Fn(usize) -> [i16; 2]) -> WheelRatio {
         let mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
         let mut shares = WheelShares::new(&mission);
+        let mut wheels = shares.wheels.clone().unwrap();
         let mut rolled = [0.0; 2];
         for tick in 0..56 {
             let now_s = tick as f64 * PERIOD_S;
             shares.rolled(WheelCounts::Endless(rolled.map(f64::round)), now_s);
             let told = told(tick);
             shares.told(told, now_s);
-            for wheel in 0..2 {
-                rolled[wheel] += f64::from(told[wheel]) * reached * counted[wheel] * PERIOD_S;
+            for (wheel, rolls) in wheels.iter_mut().enumerate() {
+                rolls.command(now_s, told[wheel].into());
+                rolled[wheel] += rolls.go_on(now_s + PERIOD_S) * reached * counted[wheel];
             }
         }
         shares.ratio()

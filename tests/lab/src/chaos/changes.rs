@@ -163,6 +163,10 @@ impl Changes {
         self.wrong.len() == before
     }
 
+    pub fn wrong(&self) -> &[String] {
+        &self.wrong
+    }
+
     pub const fn is_right(&self) -> bool {
         self.wrong.is_empty()
     }

@@ -15,6 +15,7 @@ const OLD: Duration = Duration::from_secs(3);
 const AGAIN_EVERY: Duration = Duration::from_secs(2);
 /// Period of slow messages: three a second.
 const SLOW: Duration = Duration::from_millis(333);
+const RUNS_COUNTS_S: f64 = 150.0;
 /// Messages with wheels that are stored: as many as come in [`OLD`] at ten times the usual rate.
 const MOST_KEPT: usize = 1024;
 
@@ -31,6 +32,8 @@ pub struct Late {
 pub struct FaultInjector {
     fault: RobotFault,
     faulty: bool,
+    /// Of the first message that the fault changed.
+    began: Option<Duration>,
     chance: Random,
     channel: usize,
     words: Words,
@@ -54,6 +57,7 @@ impl FaultInjector {
         Self {
             fault,
             faulty: false,
+            began: None,
             chance,
             channel,
             words: Words::of(protocol),
@@ -182,20 +186,27 @@ impl FaultInjector {
             }
             fault => {
                 let base = self.base.get_or_insert_with(|| said.clone());
+                self.began.get_or_insert(now);
                 let (Some(wheels), Some(before)) = (said.wheels(base), base.wheels(base)) else {
                     return said.bytes();
                 };
                 if fault == F::MotorRepeated {
                     return base.bytes();
                 }
-                let told = self.counted(fault, wheels, before);
+                let told = self.counted(fault, wheels, before, now);
                 said.with_wheels(&told, self.holds_wheels() && self.pushes)
             }
         }
     }
 
     /// The wheels into which the fault changes `true_ones`, which were at `base` when it began.
-    fn counted(&mut self, fault: RobotFault, true_ones: Wheels, base: Wheels) -> Wheels {
+    fn counted(
+        &mut self,
+        fault: RobotFault,
+        true_ones: Wheels,
+        base: Wheels,
+        now: Duration,
+    ) -> Wheels {
         let mut told = true_ones;
         let channel = self.channel;
         let turned = [0, 1].map(|wheel| true_ones.counts[wheel] - base.counts[wheel]);
@@ -213,6 +224,16 @@ impl FaultInjector {
             RobotFault::EncoderReversed => {
                 told.counts[channel] = base.counts[channel] - turned[channel];
                 told.speeds[channel] = -true_ones.speeds[channel];
+            }
+            RobotFault::EncoderLow | RobotFault::EncoderLower => {
+                let share = if fault == RobotFault::EncoderLow { 0.95 } else { 0.8 };
+                told.counts[channel] = base.counts[channel] + share * turned[channel];
+                told.speeds[channel] *= share;
+            }
+            RobotFault::EncoderRuns => {
+                let since_s = now.saturating_sub(self.began.unwrap_or(now)).as_secs_f64();
+                told.counts[channel] += RUNS_COUNTS_S * since_s;
+                told.speeds[channel] += RUNS_COUNTS_S;
             }
             RobotFault::CountsRandom => {
                 for wheel in [0, 1] {

@@ -54,6 +54,10 @@ impl Counts {
 }
 
 impl Replays {
+    pub fn wrong(&self) -> &[String] {
+        &self.wrong
+    }
+
     pub const fn all_equal(&self) -> bool {
         self.wrong.is_empty()
     }

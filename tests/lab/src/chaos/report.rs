@@ -6,7 +6,7 @@ use common::{latency::Histogram, topics::SUPERVISOR};
 use serde::{Serialize, Serializer};
 
 use crate::chaos::{
-    changes::Changes, kind::Kind, replays::Replays, resources::Resources,
+    Judged, changes::Changes, kind::Kind, replays::Replays, resources::Resources,
     tick_latencies::TickLatencies,
 };
 use mission_control::outcome::Outcome;
@@ -190,6 +190,20 @@ impl Report {
         let replayed = self.replays.as_ref().is_none_or(Replays::all_equal);
         let told = self.targets.as_ref().is_none_or(Changes::is_right);
         self.wrong.is_empty() && replayed && told
+    }
+
+    pub fn judged(&self) -> Judged {
+        let replays = self.replays.as_ref().map_or(&[][..], Replays::wrong);
+        let targets = self.targets.as_ref().map_or(&[][..], Changes::wrong);
+        let mut lost = [&self.wrong[..], replays, targets, &self.left_behind].into_iter().flatten();
+        let count = self.wrong.len() + replays.len() + targets.len() + self.leftovers;
+        let moved =
+            || format!("wheels at rest {:.2} s after a command", self.longest_stopping_time_s);
+        Judged {
+            tried: self.signals().into(),
+            lost: count as u64 + self.healthy_aborted,
+            worst: lost.next().cloned().unwrap_or_else(moved),
+        }
     }
 
     pub fn left_behind(&mut self, found: Vec<String>) {

@@ -67,6 +67,9 @@ faults! {
     EncoderDead "encoder-dead" Rests: "one encoder does not count", LIKEWISE;
     EncodersSwapped "encoders-swapped" RestsLater: "the encoders of left and right are swapped", LIKEWISE;
     EncoderReversed "encoder-reversed" Rests: "one encoder counts backwards", LIKEWISE;
+    EncoderLow "encoder-low" Unharmed: "one encoder counts 5 % too little", LIKEWISE;
+    EncoderLower "encoder-lower" Unharmed: "one encoder counts 20 % too little", LIKEWISE;
+    EncoderRuns "encoder-runs" Unharmed: "one encoder counts 150 a second too many", LIKEWISE;
     CountsRandom "counts-random" Rests: "random counts in each frame", "random angles and speeds in each line";
     CountsReset "counts-reset" Unharmed: "counts begin again from 0 without silence", LIKEWISE;
     RangeInvalid "range-invalid" Rests: "every ultrasonic byte is 0, which is not valid", "every range and beam is -1, no reading";

@@ -232,6 +232,7 @@ impl Observed {
             fault_began: false,
             last_moving_s: None,
             rest_s: None,
+            way_m: 0.0,
             watched_s: 0.0,
             collisions: 0,
             outcome,
@@ -253,6 +254,8 @@ impl Observed {
         let counts = |tick: &&GroundTruthTick| at_time(tick.time_s).is_some_and(|at| at <= ended);
         let track_m = options.loaded.body().track_m;
         let mut watched = truth.get(tick..).unwrap_or_default().iter().filter(counts);
+        let along = watched.clone().zip(watched.clone().skip(1));
+        entry.way_m = along.map(|(from, to)| (to.x - from.x).hypot(to.y - from.y)).sum();
         let moving = watched.clone().rfind(|tick| !is_at_rest(tick, track_m));
         let moved_until = moving.and_then(|tick| at_time(tick.time_s));
         entry.rest_s = Some(moved_until.map_or(0.0, since_fault));

@@ -4,6 +4,7 @@ use std::{collections::BTreeMap, fmt};
 
 use serde::Serialize;
 
+use crate::chaos::Judged;
 use crate::chaos::robot_fault::{Promise, REST_AT_ONCE_S, REST_LATER_S, REST_WITHIN_S, RobotFault};
 
 /// The least time from the last tick in which a wheel turned to the end of a mission that ends at rest, seconds.
@@ -19,6 +20,8 @@ pub struct Entry {
     pub last_moving_s: Option<f64>,
     /// The time from the fault to the last tick in which a wheel turned, by the ground truth, seconds.
     pub rest_s: Option<f64>,
+    /// The way from the fault to the end of the watch, metres.
+    pub way_m: f64,
     /// Time from the fault to the end of the watch, seconds.
     pub watched_s: f64,
     pub collisions: u64,
@@ -51,14 +54,28 @@ impl StopTimeTable {
     pub fn is_kept(&self) -> bool {
         self.entries.iter().all(Entry::is_kept)
     }
+
+    pub fn judged(&self) -> Judged {
+        let lost = self.entries.iter().filter(|entry| !entry.is_kept());
+        let farthest = self.entries.iter().max_by(|a, b| a.way_m.total_cmp(&b.way_m));
+        let worst = lost.clone().next().or(farthest);
+        Judged {
+            tried: self.entries.len() as u64,
+            lost: lost.count() as u64,
+            worst: worst.map_or(String::new(), |entry| {
+                let Entry { fault, seed, way_m, outcome, reason, .. } = entry;
+                format!("{} (seed {seed}): {way_m:.2} m, {outcome}: {reason}", fault.row().name)
+            }),
+        }
+    }
 }
 
 impl fmt::Display for StopTimeTable {
     fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             to,
-            "{:<17} {:>14} {:>11} {:>8} {:>9}  outcome: reason",
-            "robot", "last command", "at rest", "touches", "kept"
+            "{:<17} {:>14} {:>11} {:>8} {:>8} {:>9}  outcome: reason",
+            "robot", "last command", "at rest", "way", "touches", "kept"
         )?;
         let mut kinds: BTreeMap<RobotFault, Vec<&Entry>> = BTreeMap::new();
         for entry in &self.entries {
@@ -69,6 +86,8 @@ impl fmt::Display for StopTimeTable {
             let touches: u64 = entries.iter().map(|entry| entry.collisions).sum();
             let last = longest(&entries, |entry| entry.last_moving_s);
             let rest = longest(&entries, |entry| entry.rest_s);
+            let way = entries.iter().map(|entry| entry.way_m).fold(0.0, f64::max);
+            let way = format!("{way:.2} m");
             let kept = format!("{kept} of {}", entries.len());
             // The worst mission is shown.
             let worst = entries.iter().find(|entry| !entry.is_kept());
@@ -80,11 +99,14 @@ impl fmt::Display for StopTimeTable {
                 format!("{}: {reason}", entry.outcome)
             });
             let name = fault.row().name;
-            writeln!(to, "{name:<17} {last:>14} {rest:>11} {touches:>8} {kept:>9}  {told}")?;
+            writeln!(
+                to,
+                "{name:<17} {last:>14} {rest:>11} {way:>8} {touches:>8} {kept:>9}  {told}"
+            )?;
         }
         writeln!(
             to,
-            "Times are from the fault, the longest of each kind; at most {REST_WITHIN_S} s, {REST_LATER_S} s: {}, or \
+            "Times and ways are from the fault, the longest of each kind; at most {REST_WITHIN_S} s, {REST_LATER_S} s: {}, or \
              {REST_AT_ONCE_S} s: {}; except where the robot may go on unharmed: {}, {}.",
             names(Promise::RestsLater),
             names(Promise::RestsAtOnce),
@@ -128,6 +150,7 @@ mod tests {
             fault_began: true,
             last_moving_s: Some(0.7),
             rest_s: Some(0.9),
+            way_m: 0.12,
             watched_s: 10.0,
             collisions: 0,
             outcome: "goes on".to_owned(),
@@ -165,7 +188,7 @@ mod tests {
         let text = table.to_string();
         let row = text.lines().nth(1).unwrap_or_default();
         let words: Vec<_> = row.split_whitespace().collect();
-        let want = "silence > 9.90 s 0.90 s 0 1 of 2 goes on: robot lost";
+        let want = "silence > 9.90 s 0.90 s 0.12 m 0 1 of 2 goes on: robot lost";
         assert_eq!(words.join(" "), want);
     }
 }

@@ -40,6 +40,29 @@ pub fn share(hits: usize, n: usize) -> Estimate {
     Estimate { value, low: (middle - half).max(0.0), high: (middle + half).min(1.0) }
 }
 
+/// The share that is lost at most, if `lost` of `tried` were: the bound of 95 % (Clopper and Pearson 1934).
+pub fn most_by_95_percent(lost: u64, tried: u64) -> f64 {
+    if lost >= tried {
+        return 1.0;
+    }
+    // The probability of at most `lost`, of which the bound makes 5 %.
+    let at_most = |share: f64| {
+        let mut term = tried as f64 * (-share).ln_1p();
+        let terms = (0..=lost).map(|k| {
+            let now = term.exp();
+            term += ((tried - k) as f64 / (k + 1) as f64).ln() + share.ln() - (-share).ln_1p();
+            now
+        });
+        terms.sum::<f64>()
+    };
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..60 {
+        let middle = f64::midpoint(low, high);
+        if at_most(middle) > 0.05 { low = middle } else { high = middle }
+    }
+    high
+}
+
 /// The difference of two shares on the same `n` worlds: `gained` worlds count only in the second setting, `lost` only in the
 /// first. Wald's interval with half a pair added to each cell (Agresti and Min 2005).
 pub fn paired_difference(gained: usize, lost: usize, n: usize) -> Estimate {

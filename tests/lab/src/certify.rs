@@ -1,0 +1,222 @@
+//! The certificate: what was tried on real processes, what was lost, and how often at most it may be lost by that. Each part runs on two
+//! robots at once. `rows.csv` has a row for each robot of each run and is added to, so that a large number may take many nights;
+//! `certificate.md` is written again from all rows.
+
+use std::{
+    collections::BTreeMap,
+    fs::{self, OpenOptions},
+    path::PathBuf,
+    thread,
+    time::Instant,
+};
+
+use clap::{Args, Parser as _};
+use console::output::write_stderr;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    chaos::{self, Judged},
+    error::{OrCannot as _, Result},
+    missions::statistics::most_by_95_percent,
+};
+
+/// Try robots with signals and faults, and write what was lost to a page, with bounds at 95 %.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// The directory of `rows.csv`, which is added to, and of the page.
+    #[arg(long, default_value = "certificate")]
+    out: PathBuf,
+    /// The share of the whole certificate that is tried now.
+    #[arg(long, default_value_t = 0.001)]
+    share: f64,
+    /// The parts, with commas; by default all.
+    #[arg(long, value_delimiter = ',')]
+    parts: Vec<String>,
+}
+
+struct Part {
+    name: &'static str,
+    what: &'static str,
+    /// Of the whole certificate, over both robots.
+    whole: u32,
+    /// Options of `firsthand bench chaos`, without numbers.
+    options: &'static [&'static str],
+}
+
+const PARTS: &[Part] = &[
+    Part {
+        name: "signals",
+        what: "kills and freezes of stages, successors as they start, and the supervisor",
+        whole: 10_000,
+        options: &["--include-startup", "--include-supervisor"],
+    },
+    Part {
+        name: "consumers",
+        what: "the same of stages and consumers; every generation is replayed",
+        whole: 2000,
+        options: &["--include-consumers", "--replay"],
+    },
+    Part {
+        name: "machine",
+        what: "freezes of all processes, while the target changes",
+        whole: 1000,
+        options: &["--freeze-all", "--targets"],
+    },
+    Part {
+        name: "faults-x80",
+        what: "missions with a fault of the robot, an X80",
+        whole: 500,
+        options: &["--robot-faults"],
+    },
+    Part {
+        name: "faults-json",
+        what: "missions with a fault of the robot, which speaks lines of JSON and has a laser",
+        whole: 500,
+        options: &["--robot-faults", "--set", "robot={model='kobuki',protocol='json',rate_hz=10}"],
+    },
+];
+
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Row {
+    part: String,
+    seed: u64,
+    tried: u64,
+    lost: u64,
+    worst: String,
+    took_s: f64,
+    version: String,
+    processors: usize,
+    command: String,
+}
+
+pub fn main(arguments: &Arguments) -> Result {
+    let known = |name: &String| PARTS.iter().any(|part| part.name == name);
+    if let Some(unknown) = arguments.parts.iter().find(|name| !known(name)) {
+        let all: Vec<_> = PARTS.iter().map(|part| part.name).collect();
+        return Err(format!("no part {unknown:?}; give some of {}", all.join(", ")).into());
+    }
+    fs::create_dir_all(&arguments.out).or_cannot_file("make", &arguments.out)?;
+    let file = arguments.out.join("rows.csv");
+    let mut rows: Vec<Row> = match csv::Reader::from_path(&file) {
+        Ok(mut reader) => {
+            reader.deserialize().collect::<Result<_, _>>().or_cannot_file("read", &file)?
+        }
+        Err(_) => Vec::new(),
+    };
+    let asked = |part: &&Part| {
+        arguments.parts.is_empty() || arguments.parts.iter().any(|name| name == part.name)
+    };
+    for part in PARTS.iter().filter(asked) {
+        write_stderr(&format!("{}: {}\n", part.name, part.what));
+        for row in both(part, arguments.share, rows.len() as u64)? {
+            let is_new = !file.exists();
+            let to = OpenOptions::new().append(true).create(true).open(&file);
+            let to = to.or_cannot_file("open", &file)?;
+            let mut writer = csv::WriterBuilder::new().has_headers(is_new).from_writer(to);
+            writer.serialize(&row).or_cannot_file("write", &file)?;
+            rows.push(row);
+        }
+        let page = arguments.out.join("certificate.md");
+        fs::write(&page, certificate(&rows)).or_cannot_file("write", &page)?;
+    }
+    console::output::print_text(&certificate(&rows)).or_cannot("print")
+}
+
+/// The two robots at once. A row's number is its seed's, so that no seed is tried twice.
+fn both(part: &Part, share: f64, number: u64) -> Result<Vec<Row>> {
+    let told = |number| one(part, share / 2.0, number).map_err(|error| error.to_string());
+    thread::scope(|scope| {
+        let robots = [number, number + 1].map(|number| scope.spawn(move || told(number)));
+        let ended = robots.into_iter().map(|robot| match robot.join() {
+            Ok(row) => Ok(row?),
+            Err(_) => Err("a part of the certificate panicked".into()),
+        });
+        ended.collect()
+    })
+}
+
+#[derive(Debug, clap::Parser)]
+struct Chaos {
+    #[command(flatten)]
+    asked: chaos::Arguments,
+}
+
+fn one(part: &Part, share: f64, number: u64) -> Result<Row> {
+    let began = Instant::now();
+    let many = (f64::from(part.whole) * share).ceil().max(1.0);
+    let seed = 1 + number * 10_000;
+    let count = match part.options.contains(&"--robot-faults") {
+        true => ["--missions".to_owned(), (many / chaos::FAULTS as f64).ceil().to_string()],
+        false => ["--kills".to_owned(), many.to_string()],
+    };
+    let words = part.options.iter().map(|word| (*word).to_owned()).chain(count);
+    let robot = format!("certify-{number}");
+    let words: Vec<String> =
+        words.chain(["--seed".to_owned(), seed.to_string(), "--robot".to_owned(), robot]).collect();
+    let asked = Chaos::try_parse_from([String::new()].iter().chain(&words)).or_cannot("try")?.asked;
+    let Judged { tried, lost, worst } = chaos::judge(&asked)?;
+    Ok(Row {
+        part: part.name.to_owned(),
+        seed,
+        tried,
+        lost,
+        worst,
+        took_s: began.elapsed().as_secs_f64(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        processors: thread::available_parallelism().map_or(0, usize::from),
+        command: format!("firsthand bench chaos {}", words.join(" ")),
+    })
+}
+
+fn certificate(rows: &[Row]) -> String {
+    let mut parts: BTreeMap<&str, Vec<&Row>> = BTreeMap::new();
+    for row in rows {
+        parts.entry(&row.part).or_default().push(row);
+    }
+    let mut text = "| part | tried | lost | at most, by 95 % | worst case | hours |\n|---|---|---|---|---|---|\n".to_owned();
+    for (name, rows) in parts {
+        let what = PARTS.iter().find(|part| part.name == name).map_or("", |part| part.what);
+        let sum = |of: fn(&Row) -> u64| rows.iter().map(|row| of(row)).sum::<u64>();
+        let (tried, lost) = (sum(|row| row.tried), sum(|row| row.lost));
+        let worst = rows.iter().rfind(|row| row.lost > 0).or(rows.last());
+        let hours = rows.iter().map(|row| row.took_s).sum::<f64>() / 3600.0;
+        text += &format!(
+            "| {name}: {what} | {tried} | {lost} | {:.1e} | {} | {hours:.2} |\n",
+            most_by_95_percent(lost, tried),
+            worst.map_or("", |row| &row.worst).replace('|', "/"),
+        );
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_of_several_runs_add_up_and_the_worst_case_is_one_that_was_lost() {
+        let row = |seed: u64, lost: u64, worst: &str| Row {
+            part: "signals".to_owned(),
+            seed,
+            tried: 5000,
+            lost,
+            worst: worst.to_owned(),
+            took_s: 3600.0,
+            version: String::new(),
+            processors: 2,
+            command: String::new(),
+        };
+        let none = certificate(&[row(1, 0, "1 mm"), row(2, 0, "2 mm")]);
+        assert!(none.contains("| 10000 | 0 | 3.0e-4 | 2 mm | 2.00 |"), "{none}");
+        let one = certificate(&[row(1, 1, "touched"), row(2, 0, "2 mm")]);
+        assert!(one.contains("| 10000 | 1 | 4.7e-4 | touched | 2.00 |"), "{one}");
+    }
+
+    #[test]
+    fn every_part_is_a_chaos_that_its_options_allow() {
+        for part in PARTS {
+            let words = ["", "--seed", "1"].iter().chain(part.options);
+            assert!(Chaos::try_parse_from(words).is_ok(), "{}", part.name);
+        }
+    }
+}
