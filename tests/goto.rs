@@ -199,3 +199,40 @@ fn each_of_fifty_commands_in_a_row_finds_a_place_on_the_bus() {
         refused(&["goto", "--robot", robot, "9", "0"], "target-outside", &["perimeter"]);
     }
 }
+
+/// No target, and a place with a wall all around it.
+const STAYS: &str = "
+perimeter.width_m = 8.0
+robot.odometry = { diameter_ratio_sd = 0.0, track_scale_sd = 0.0 }
+simulation.realism = 'laboratory'
+[[world.wall]]
+points = [[2.2, -0.4], [3.0, -0.4], [3.0, 0.4], [2.2, 0.4], [2.2, -0.4]]
+";
+
+#[test]
+fn a_run_that_stays_waits_before_between_and_after_its_targets_and_none_ends_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let mission = directory.path().join("stays.toml");
+    std::fs::write(&mission, STAYS).unwrap();
+    let mut run = Run::start("goto-stay", mission.to_str().unwrap(), &["--stay", "--pace", "4"]);
+    let waits = |status: &Value| status["order"] == "waiting for a target";
+    run.wait_until("it waits for its first target", waits);
+    operate("goto-stay", &["goto", "1.0", "-1.0", "1.5", "0.0"]);
+    run.wait_until("it drives", |status| status["order"] == "driving");
+    run.wait_until("it waits again", waits);
+    operate("goto-stay", &["stop"]);
+    operate("goto-stay", &["resume"]);
+    run.wait_until("it waits after a stop", waits);
+    operate("goto-stay", &["goto", "2.6", "0.0"]);
+    run.wait_until("it drives to the walled target", |status| status["order"] == "driving");
+    run.wait_until("it waits after it has given up", waits);
+    run.kill_and_await_successor("planner", Signal::KILL);
+    operate("goto-stay", &["goto", "0.5", "-1.0"]);
+    run.wait_until("it drives again", |status| status["order"] == "driving");
+    run.wait_until("it waits at last", waits);
+    run.signal(Signal::INT);
+    let (code, summary) = run.finish();
+    assert_eq!(outcomes(&summary), ["reached", "reached", "unreachable", "reached"], "{summary}");
+    assert_eq!(code, Some(0), "{summary}");
+    support::assert_nothing_left("goto-stay");
+}

@@ -53,9 +53,12 @@ impl Mission {
         let tree = DeTable::parse(text).map_err(|error| syntax(&error))?;
         let mut mission: Self = toml::from_str(text).map_err(|error| syntax(&error))?;
         if !tree.get_ref().contains_key("target") {
-            let first = mission.targets.first();
-            mission.target =
-                first.ok_or_else(|| unreadable(origin, 1, "missing field `target`"))?.at;
+            mission.target = match mission.targets.first() {
+                Some(first) => first.at,
+                // The robot stands at its target.
+                None if mission.stay => DVec2::ZERO,
+                None => return Err(unreadable(origin, 1, "missing field `target`")),
+            };
         }
         if mission.name.is_empty() {
             mission.name = origin.file_stem().unwrap_or_default().to_string_lossy().into_owned();

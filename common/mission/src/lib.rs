@@ -79,7 +79,7 @@ use crate::{
 };
 
 keys! {
-    /// Every key but `target` has a default.
+    /// Every key but `target` has a default, and a mission with `stay` needs none.
     Mission {
         /// The default is the file's name.
         name: String,
@@ -101,6 +101,9 @@ keys! {
         /// simulated robot that is farther off is in the wrong place.
         sure_within_m: f64 = 0.5,
         timeout_s: f64 = 180.0,
+        /// The run goes on when a target is reached or given up: the robot stands and waits for the next one. Without a target it waits
+        /// from its start on.
+        stay: bool,
         /// The seed of everything random in the simulation.
         seed: u64 = 1,
         start: Start,

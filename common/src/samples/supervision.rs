@@ -109,6 +109,8 @@ wire_enum! {
         Operator = 2,
         StageHeld = 3,
         Ending = 4,
+        /// There is no target: the robot waits for the next one.
+        Waiting = 5,
     }
 }
 

@@ -134,7 +134,7 @@ pub const TABLE: &[Rule] = &[
     },
     Rule {
         cause: Cause::NotOrdered,
-        when: "the supervisor has not said drive: the stages start",
+        when: "the supervisor has not said drive: the stages start, or the robot waits for a target",
         action: Action::Stop,
         clears: Clears::WithCondition,
         monitor: |all| &all.orders,

@@ -268,9 +268,9 @@ impl Link {
         self.monitors().orders.drive()
     }
 
-    /// An operator holds the robot while ticks continue, so it may be carried. In lockstep mission time stands still.
-    fn held_by_operator(&self) -> bool {
-        !self.in_ticks() && self.monitors().orders.by_operator()
+    /// The robot is held while ticks continue, so it may be carried. In lockstep mission time stands still.
+    fn stands_by(&self) -> bool {
+        !self.in_ticks() && self.monitors().orders.stands_by()
     }
 
     fn in_ticks(&self) -> bool {
@@ -286,7 +286,7 @@ impl Link {
     }
 
     fn begin_tick(&mut self, motion: Motion, now_ns: u64, effects: &mut Vec<Effect>) {
-        if !self.ordered_to_drive() && !self.held_by_operator() {
+        if !self.ordered_to_drive() && !self.stands_by() {
             return;
         }
         if self.in_ticks() {

@@ -7,6 +7,7 @@ pub const fn order(order: Order, reason: HoldReason) -> &'static str {
         Order::Hold => match reason {
             HoldReason::Operator => "stopped by an operator",
             HoldReason::StageHeld => "stopped, a stage is held",
+            HoldReason::Waiting => "waiting for a target",
             HoldReason::Starting | HoldReason::None | HoldReason::Ending => "starting",
         },
         Order::Drive => "driving",

@@ -130,7 +130,7 @@ impl Snapshot<'_> {
         let may_wait = match self.reason {
             // A real robot may be out of reach for any time.
             HoldReason::None => !self.simulated,
-            HoldReason::Operator => true,
+            HoldReason::Operator | HoldReason::Waiting => true,
             // In wall-clock time the mission's timeout ends such a mission.
             HoldReason::StageHeld => !self.in_ticks,
             HoldReason::Starting | HoldReason::Ending => false,

@@ -13,6 +13,8 @@ pub(crate) struct Snapshot {
     pub field_known: bool,
     pub operator_stop: bool,
     pub stage_held: bool,
+    /// The robot has no target any more.
+    pub waits: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +32,10 @@ impl Decision {
         match self.reason {
             HoldReason::None => Order::Drive,
             HoldReason::Ending => Order::Stop,
-            HoldReason::Starting | HoldReason::Operator | HoldReason::StageHeld => Order::Hold,
+            HoldReason::Starting
+            | HoldReason::Operator
+            | HoldReason::StageHeld
+            | HoldReason::Waiting => Order::Hold,
         }
     }
 }
@@ -45,6 +50,8 @@ pub(crate) const fn decide(snapshot: &Snapshot) -> Decision {
         HoldReason::Operator
     } else if snapshot.stage_held {
         HoldReason::StageHeld
+    } else if snapshot.waits {
+        HoldReason::Waiting
     } else {
         HoldReason::None
     };
@@ -63,6 +70,7 @@ mod tests {
         field_known: true,
         operator_stop: false,
         stage_held: false,
+        waits: false,
     };
     /// The robot has driven, and now nothing is as it should be.
     const ALL_LOST: Snapshot = Snapshot {
@@ -83,6 +91,7 @@ mod tests {
             ("waits for a field", Snapshot { field_known: false, ..CAN_START }, HoldReason::Starting),
             ("once ready stays ready", ALL_LOST, HoldReason::None),
             ("an operator's stop holds", Snapshot { operator_stop: true, ..CAN_START }, HoldReason::Operator),
+            ("a robot without a target waits", Snapshot { waits: true, ..CAN_START }, HoldReason::Waiting),
             ("a held stage holds", Snapshot { stage_held: true, ..CAN_START }, HoldReason::StageHeld),
             ("starting comes before an operator's stop",
              Snapshot { field_known: false, operator_stop: true, ..CAN_START }, HoldReason::Starting),
@@ -102,6 +111,7 @@ mod tests {
             (HoldReason::Starting, Order::Hold),
             (HoldReason::Operator, Order::Hold),
             (HoldReason::StageHeld, Order::Hold),
+            (HoldReason::Waiting, Order::Hold),
             (HoldReason::Ending, Order::Stop),
         ];
         for (reason, order) in rows {

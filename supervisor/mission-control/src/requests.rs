@@ -5,7 +5,12 @@ use common::{
     samples::{Cause, HoldReason, RequestAnswer, RequestKind, RequestSample, name_str},
 };
 
-use crate::{error::SupervisorError, outcome::allowed_m, supervisor::Supervisor, target_list};
+use crate::{
+    error::SupervisorError,
+    outcome::{Ending, Outcome, allowed_m},
+    supervisor::Supervisor,
+    target_list,
+};
 
 impl Supervisor<'_> {
     /// Carry out and answer the requests of operators. Returns whether there was one.
@@ -71,7 +76,7 @@ impl Supervisor<'_> {
             return answer;
         }
         let points = points.unwrap_or_default();
-        if appends {
+        if appends && !self.targets.waits() {
             return match self.targets.append(points) {
                 true => RequestAnswer::Taken,
                 false => RequestAnswer::TooMany,
@@ -83,6 +88,34 @@ impl Supervisor<'_> {
         self.targets.replace(points, (since_tick, now_s), arrival);
         self.on_new_target();
         RequestAnswer::Taken
+    }
+
+    /// Let the robot wait for its next target if the run stays, and `ending` is that of its target. Returns whether it waits.
+    pub(crate) fn settle(&mut self, ending: &Ending) -> bool {
+        let ends =
+            matches!(ending.outcome, Outcome::Reached | Outcome::Timeout | Outcome::Unreachable);
+        if !self.options.mission.stay || !ends {
+            return false;
+        }
+        let now_s = self.mission_time().seconds();
+        let arrival = self.bus.observer.record.sure_arrival(&self.options.mission);
+        tracing::info!(
+            number = self.targets.number(),
+            outcome = ending.outcome.as_str(),
+            reason = ending.reason,
+            "the robot waits for its next target"
+        );
+        self.targets.settle(ending.outcome, now_s, arrival);
+        self.stall_watch.settle();
+        self.await_target();
+        true
+    }
+
+    /// No command is an arrival before there is a target.
+    pub(crate) fn await_target(&mut self) {
+        let record = &mut self.bus.observer.record;
+        (record.target_number, record.arrival) = (u64::MAX, None);
+        self.arrived = None;
     }
 
     /// Send the robot to its next target if it has arrived at one that is not the last. Returns whether it is sent.

@@ -131,6 +131,8 @@ pub(crate) struct StallWatch {
     relocations: u64,
     tick: Option<u64>,
     stalls: Vec<StallSample>,
+    /// Those of targets that were given up while the run went on.
+    settled: usize,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -203,7 +205,12 @@ impl StallWatch {
 
     pub(crate) fn gave_up(&self) -> Option<&StallSample> {
         let is_last = |stall: &&StallSample| stall.recovery() == RecoveryStep::GiveUp;
-        self.stalls.iter().find(is_last)
+        self.stalls.iter().skip(self.settled).find(is_last)
+    }
+
+    /// The run goes on although the target was given up.
+    pub(crate) const fn settle(&mut self) {
+        self.settled = self.stalls.len();
     }
 
     pub(crate) const fn tick(&self) -> Option<u64> {

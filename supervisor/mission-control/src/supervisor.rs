@@ -163,6 +163,9 @@ impl<'a> Supervisor<'a> {
             service: ServiceManager::of_environment(),
         };
         supervisor.bus.observer.record.target_number = supervisor.targets.number();
+        if supervisor.targets.waits() {
+            supervisor.await_target();
+        }
         let domain = Domain::of(options.robot.clone());
         let link_to_run = |link: PathBuf| {
             symlink(directory, &link).map_err(system(format!("make {}", link.display())))
@@ -194,7 +197,8 @@ impl<'a> Supervisor<'a> {
         self.bus.waiter.on_readable(&*signals)?;
         loop {
             if signals.came() {
-                return Ok(Some(Ending::asked_for(Outcome::Aborted, "stopped by a signal")));
+                let outcome = self.targets.outcome_while_waiting().unwrap_or(Outcome::Aborted);
+                return Ok(Some(Ending::asked_for(outcome, "stopped by a signal")));
             }
             if let Some(ending) = self.iterate()? {
                 return Ok(Some(ending));
@@ -225,10 +229,18 @@ impl<'a> Supervisor<'a> {
         if self.decide_order() || roster_changed || died || asked || next {
             self.publish_state()?;
         }
-        match self.judge(simulator_ended) {
-            None => self.watch_for_stalls(),
-            ending => Ok(ending),
-        }
+        let ending = match self.judge(simulator_ended) {
+            None => self.watch_for_stalls()?,
+            ending => ending,
+        };
+        Ok(match ending {
+            Some(ending) if self.settle(&ending) => {
+                self.decide_order();
+                self.publish_state()?;
+                None
+            }
+            ending => ending,
+        })
     }
 
     /// Reap and restart stages; log, publish and record each death once. Returns whether there was one.
@@ -254,6 +266,7 @@ impl<'a> Supervisor<'a> {
             field_known: record.field_known || self.options.mission.planner.executable.is_some(),
             operator_stop: self.state_file.state.operator_stop,
             stage_held: !self.stages.held().is_empty(),
+            waits: self.targets.waits(),
         });
         if decision.ready && !self.decision.ready {
             tracing::info!("all stages ready");
@@ -306,10 +319,15 @@ impl<'a> Supervisor<'a> {
         self.clock.now(self.bus.observer.record.pose.as_ref(), self.robot.truth().last())
     }
 
+    /// That of the current target; a robot that waits for one has any time.
     pub(crate) const fn deadline(&self) -> Deadline {
+        let timeout_s = match self.targets.waits() {
+            true => f64::INFINITY,
+            false => self.options.mission.timeout_s,
+        };
         Deadline {
             began_s: self.targets.began_s(),
-            timeout_s: self.options.mission.timeout_s,
+            timeout_s,
             stopped_s: self.state_file.state.operator_stopped_s,
         }
     }

@@ -5,6 +5,7 @@ use common::{
     mission::Mission,
     samples::{CommandSample, HoldReason, MOST_TARGETS, RequestAnswer, TargetPoint, TargetSample},
 };
+use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -26,6 +27,10 @@ pub enum TargetOutcome {
     ReachedUnsure,
     /// An operator named another target before it was reached.
     Replaced,
+    /// The robot stalled, and no recovery step was left.
+    Unreachable,
+    /// The robot was not there in time.
+    TimedOut,
     /// The run ended on the way to the target.
     Missed,
     /// The run ended before the robot was sent to it.
@@ -63,6 +68,8 @@ pub struct TargetList {
     began_s: f64,
     ahead: Vec<TargetPoint>,
     results: Vec<Stored>,
+    /// The current target has its result, and the robot waits for the next one.
+    waits: bool,
 }
 
 impl TargetList {
@@ -76,6 +83,7 @@ impl TargetList {
             began_s: 0.0,
             ahead: points.collect(),
             results: Vec::new(),
+            waits: mission.stay && mission.target == DVec2::ZERO && mission.targets.is_empty(),
         }
     }
 
@@ -89,6 +97,21 @@ impl TargetList {
 
     pub(crate) const fn began_s(&self) -> f64 {
         self.began_s
+    }
+
+    pub(crate) const fn waits(&self) -> bool {
+        self.waits
+    }
+
+    /// That of the newest target, if the robot waits for the next one.
+    pub(crate) fn outcome_while_waiting(&self) -> Option<Outcome> {
+        let tried = |it: &&Stored| it.result.outcome != TargetOutcome::NotTried;
+        let newest = self.results.iter().rfind(tried).map(|it| it.result.outcome);
+        self.waits.then_some(match newest {
+            Some(TargetOutcome::Unreachable) => Outcome::Unreachable,
+            Some(TargetOutcome::TimedOut) => Outcome::Timeout,
+            _ => Outcome::Reached,
+        })
     }
 
     pub(crate) const fn is_last(&self) -> bool {
@@ -127,6 +150,7 @@ impl TargetList {
     ) {
         let skipped = self.ahead.len() as u64;
         match arrival {
+            _ if self.waits => {}
             Some(arrival) => self.store_arrival(arrival),
             None => {
                 let replaced = self.result_of(0, &self.current, TargetOutcome::Replaced);
@@ -140,7 +164,34 @@ impl TargetList {
             self.number += skipped + 1;
             (self.current, self.ahead) = (*first, ahead.to_vec());
             (self.since_tick, self.began_s) = (since_tick, now_s);
+            self.waits = false;
         }
+    }
+
+    /// The run of a robot that stays goes on without a target: the current one ended with `outcome` at `now_s`, by an `arrival` or not,
+    /// and those after it are not tried.
+    pub(crate) fn settle(
+        &mut self,
+        outcome: Outcome,
+        now_s: f64,
+        arrival: Option<(CommandSample, bool)>,
+    ) {
+        match arrival.filter(|_| outcome == Outcome::Reached) {
+            Some(arrival) => self.store_arrival(arrival),
+            None => {
+                let outcome = match outcome {
+                    Outcome::Timeout => TargetOutcome::TimedOut,
+                    _ => TargetOutcome::Unreachable,
+                };
+                let result = self.result_of(0, &self.current, outcome);
+                self.store(TargetResult { at_s: Some(now_s), ..result }, None);
+            }
+        }
+        for (nth, point) in (1..).zip(std::mem::take(&mut self.ahead)) {
+            self.store(self.result_of(nth, &point, TargetOutcome::NotTried), None);
+            self.number += 1;
+        }
+        self.waits = true;
     }
 
     /// Send the robot, whose `arrival` is a command and whether its pose was sure, to the next target, from `since_tick` on.
@@ -227,7 +278,9 @@ impl TargetList {
             current.distance_m = Some(arrival.distance_m);
             current.truth_m = ended.map(|ended| apart_m(ended, &current));
         }
-        results.push(current);
+        if !self.waits {
+            results.push(current);
+        }
         let ahead = (1..).zip(&self.ahead);
         results.extend(ahead.map(|(nth, it)| self.result_of(nth, it, TargetOutcome::NotTried)));
         for (nth, result) in results.iter_mut().enumerate().skip(over.unwrap_or(usize::MAX)) {
@@ -270,7 +323,7 @@ pub(crate) fn refusal(
     match reason {
         HoldReason::Starting | HoldReason::Ending => return Some(RequestAnswer::NotRunning),
         HoldReason::Operator => return Some(RequestAnswer::Stopped),
-        HoldReason::None | HoldReason::StageHeld => {}
+        HoldReason::None | HoldReason::StageHeld | HoldReason::Waiting => {}
     }
     let Some(points) = points else {
         return Some(RequestAnswer::Malformed);

@@ -36,6 +36,12 @@ impl Orders {
             || self.newest.is_some_and(|directive| directive.reason == HoldReason::Operator)
     }
 
+    /// The robot stands by and its ticks go on: it is known where it is, also if it is carried.
+    pub fn stands_by(&self) -> bool {
+        self.by_operator()
+            || self.newest.is_some_and(|directive| directive.reason == HoldReason::Waiting)
+    }
+
     pub const fn stopped_here(&self) -> bool {
         self.stopped_here
     }

@@ -71,6 +71,10 @@ pub(crate) struct Arguments {
     /// Set a key of the mission, as often as needed: `--set start.heading_deg=90`.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Go on when a target is reached or given up: the robot stands and waits for the next one, by `goto`, page or ROS 2, until Ctrl-C. The
+    /// mission needs no target.
+    #[arg(long, conflicts_with = "resume")]
+    stay: bool,
     /// Start no stages: systemd does, or you do, with `firsthand stage NAME --robot R`.
     #[arg(long)]
     watch_only: bool,
@@ -166,7 +170,9 @@ fn starter(arguments: &Arguments) -> Starter {
 }
 
 fn mission(arguments: &Arguments) -> Result<Mission, Failure> {
-    let mut mission = missions::load(&arguments.mission, &arguments.set)?;
+    let stay = arguments.stay.then(|| "stay=true".to_owned());
+    let set: Vec<_> = arguments.set.iter().cloned().chain(stay).collect();
+    let mut mission = missions::load(&arguments.mission, &set)?;
     refuse_unspoken(&mission)?;
     if let Some(seed) = arguments.seed {
         mission.seed = seed;

@@ -111,3 +111,20 @@ fn every_reason_against_a_target_has_its_answer() {
     let unmapped = refusal(Some(&[at(2.0, 0.0)]), HoldReason::None, &plain, &Record::default());
     assert_eq!(unmapped, Some(NotRunning));
 }
+
+#[test]
+fn a_robot_that_stays_has_a_result_for_each_target_and_none_for_the_wait() {
+    use TargetOutcome::{NotTried, Reached, TimedOut};
+    let stays = Mission::parse("stay = true\nperimeter.width_m = 8", Path::new("m.toml")).unwrap();
+    let mut list = TargetList::of(&stays);
+    assert!(list.waits());
+    list.replace(&[at(1.0, 0.0), at(2.0, 0.0)], (5, 5.0), None);
+    assert!(!list.waits());
+    list.settle(Outcome::Timeout, 9.0, None);
+    assert_eq!(list.outcome_while_waiting(), Some(Outcome::Timeout));
+    list.replace(&[at(0.5, 0.0)], (20, 20.0), None);
+    list.settle(Outcome::Reached, 30.0, Some((arrival(30), true)));
+    assert_eq!(list.outcome_while_waiting(), Some(Outcome::Reached));
+    let results = list.results(&Ending::asked_for(Outcome::Reached, ""), None, None, None);
+    assert_eq!(outcomes(&results), [(2, TimedOut), (3, NotTried), (4, Reached)]);
+}
