@@ -106,6 +106,16 @@ impl Base for X80 {
         encoded(Command::System(SystemSignal::Ack))
     }
 
+    fn owed(&self, sent: &[u8]) -> usize {
+        let mut decoder = Decoder::default();
+        decoder.push(sent);
+        let mut frames = 0;
+        while decoder.next_frame().is_some() {
+            frames += 1;
+        }
+        frames
+    }
+
     fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8> {
         self.drive.velocity(counts, limit)
     }

@@ -434,3 +434,27 @@ fn a_slow_base_drives_at_half_speed_until_a_command_follows_from_what_was_found(
         assert_eq!(base.sample(), None, "{set}");
     }
 }
+
+#[test]
+fn acknowledgements_of_what_was_not_sent_show_another_commander_and_late_or_doubled_ones_do_not() {
+    let unowed = commander::UNOWED as u64;
+    let acknowledge = |failsafe: &mut Failsafe, count: u64| {
+        for number in (0..count).rev() {
+            failsafe.observe(&Observation::Acknowledged, ago(number * 10 * MS));
+        }
+        failsafe.decide(false, now()).cause
+    };
+    let mut failsafe = well();
+    assert_eq!(acknowledge(&mut failsafe, 64), Cause::None, "what was sent before it was found");
+    failsafe.observe(&Observation::Owed(50), ago(1000 * MS));
+    assert_eq!(acknowledge(&mut failsafe, 49 + unowed), Cause::None, "a few came twice");
+    assert_eq!(acknowledge(&mut failsafe, 1), Cause::AnotherCommander);
+    let why = failsafe.explain(Cause::AnotherCommander, now()).unwrap();
+    assert!(why.contains("another host commands it"), "{why}");
+    let later = Moment { machine_ns: now().machine_ns + 2000 * MS, ..now() };
+    let over = failsafe.monitors.commander.condition(Cause::AnotherCommander, later);
+    assert_eq!(over, Condition::OverFor(Duration::MAX), "it has gone");
+    let mut in_ticks = well();
+    in_ticks.observe(&Observation::Pace(Pace::Max), now());
+    assert_eq!(acknowledge(&mut in_ticks, 60), Cause::None);
+}
