@@ -105,7 +105,7 @@ pub const TABLE: &[Rule] = &[
     },
     Rule {
         cause: Cause::AnotherCommander,
-        when: "another node has published on `robot.ros2.cmd_vel` within 1 s: that the robot moves, or for 2 s that it stands; or the robot has acknowledged 6 commands within 2 s that the link did not send; `link.log` says which. It is told to stand after each command of the other",
+        when: "another node has published on `robot.ros2.cmd_vel` within 1 s: that the robot moves, or for 2 s that it stands; or the robot has acknowledged 6 commands within 2 s that the link did not send, or an X80 for 4 s those that it did while a fifth of its motor frames went elsewhere; `link.log` says which. It is told to stand after each command of the other",
         action: Action::Stop,
         clears: Clears::WithCondition,
         monitor: |all| &all.commander,

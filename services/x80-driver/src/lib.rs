@@ -109,11 +109,7 @@ impl Base for X80 {
     fn owed(&self, sent: &[u8]) -> usize {
         let mut decoder = Decoder::default();
         decoder.push(sent);
-        let mut frames = 0;
-        while decoder.next_frame().is_some() {
-            frames += 1;
-        }
-        frames
+        std::iter::from_fn(|| decoder.next_frame().map(drop)).count()
     }
 
     fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8> {

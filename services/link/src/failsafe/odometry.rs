@@ -17,8 +17,9 @@
 //! direction too often for the other evidence. If its motor draws a held one's current, it is held, and not suspected
 //! ([`super::contact`]).
 //!
-//! Wheels that turn by [`LEAST_TURN_SHARE`] more than any command of the last moments, or the robot by more than any difference of two, turn
-//! untold: at [`UNTOLD_AFTER`] another host may command them. A lost command does not, nor one between two distant frames.
+//! A wheel, or the difference of both, that turns by [`LEAST_TURN_M_S`] and a quarter of the wheels' speed farther than any command
+//! of the last moments told turns untold: at [`UNTOLD_AFTER`] another host may command it. A robot that is told to stand is judged by its
+//! stop.
 //!
 //! Single counts farther off than wheels turn are dropped ([`super::restart`]); [`MOST_JUMPS`] within [`JUMPS_WITHIN`] are suspect too.
 
@@ -52,11 +53,6 @@ pub(crate) const SUSPECTED_AFTER: Duration = Duration::from_millis(550);
 pub(crate) const STILL_AFTER: Duration = Duration::from_millis(1000);
 /// A wheel that is held makes the body turn for a moment, and is suspected itself sooner.
 pub(crate) const UNTOLD_AFTER: Duration = Duration::from_millis(1000);
-/// Frames more distant tell nothing about untold motion, and a gap counts no longer than [`UNTOLD_GAP_S`] towards it.
-const LONGEST_UNTOLD: Duration = Duration::from_millis(1000);
-const UNTOLD_GAP_S: f64 = 0.3;
-/// The most commands kept to judge it.
-const MOST_TOLD: usize = 64;
 /// What raises a suspicion happens within so long before it, and a base stands within so long after it.
 const JUDGED: Duration = Duration::from_millis(1500);
 pub(crate) const MOST_JUMPS: usize = 3;
@@ -188,10 +184,7 @@ pub struct Odometry {
     left: Evidence,
     right: Evidence,
     turn: Evidence,
-    /// The newest commands, counts/s: left, right, and the difference.
-    told: VecDeque<(MissionTime, [f64; 3])>,
-    /// Seconds of untold motion, likewise.
-    untold_s: [f64; 3],
+    untold_s: f64,
     contacts: Contacts,
     jumps: VecDeque<MissionTime>,
     recoveries: u32,
@@ -230,11 +223,6 @@ impl Odometry {
     /// The wheels are to turn at `counts`, counts/s. Returns what they have reached by the base's acceleration.
     fn ask(&mut self, counts: [f64; 2], now: MissionTime) -> [f64; 2] {
         self.fit.commanded(counts, now);
-        let [left, right] = counts;
-        self.told.push_back((now, [left, right, right - left]));
-        if self.told.len() > MOST_TOLD {
-            self.told.pop_front();
-        }
         for (reached, counts) in self.reached.iter_mut().zip(counts) {
             reached.command(now.seconds(), counts);
             reached.go_on(now.seconds());
@@ -278,7 +266,6 @@ impl Odometry {
         let gap = now.since(then);
         let turned = counts.since(before);
         self.fit.turned((gap <= self.longest_gap).then_some(turned), now);
-        self.weigh_untold(turned, gap, now);
         let lapsed = |at| now.since(at) > self.limit;
         if gap > self.longest_gap || self.commanded.is_none_or(lapsed) {
             // Commands since the last frame may have been lost, or have expired.
@@ -299,6 +286,10 @@ impl Odometry {
         if high == [false; 2] {
             let least = LEAST_TURN_M_S * self.counts_per_m;
             self.turn.weigh((right - left, gap_s), least, false, settles, now);
+            let from_s = now.seconds() - gap_s - settles.settled_s - self.limit.as_secs_f64();
+            let speeds = turned.map(|counts| counts / gap_s);
+            let is_untold = self.fit.is_untold(speeds, from_s, least, self.steers);
+            self.untold_s = (self.untold_s + if is_untold { gap_s } else { -gap_s }).max(0.0);
         }
         self.look_for_contact(now);
         let suspected = |evidence: &Evidence| {
@@ -311,46 +302,13 @@ impl Odometry {
             (&self.turn, Suspicion::Turn),
         ];
         let suspicion = all.into_iter().find(|(evidence, _)| suspected(evidence));
-        if let Some((_, suspicion)) = suspicion
+        let untold = (self.untold_s >= UNTOLD_AFTER.as_secs_f64()).then_some(Suspicion::Untold);
+        if let Some(suspicion) = suspicion.map(|(_, suspicion)| suspicion).or(untold)
             && !self.is_bring_up
         {
             self.suspicion.get_or_insert((suspicion, now));
         }
         self.look_for_explanation(now);
-    }
-
-    /// The wheels rolled `turned` counts in `gap`. A robot that is told to stand is judged by its stop.
-    fn weigh_untold(&mut self, turned: [f64; 2], gap: Duration, now: MissionTime) {
-        let settled = Duration::from_secs_f64(Settles::from(self.response).settled_s);
-        let window = settled + self.limit + gap;
-        while self.told.get(1).is_some_and(|(at, _)| now.since(*at) > window) {
-            self.told.pop_front();
-        }
-        let most = |channel: usize, sign: f64| {
-            self.told.iter().map(|(_, told)| sign * told[channel]).fold(0.0, f64::max)
-        };
-        let [left, right] = [0, 1].map(|wheel| most(wheel, 1.0).max(most(wheel, -1.0)));
-        let (fastest, channels) = if self.steers { (left, 1) } else { (left.max(right), 3) };
-        if fastest == 0.0 || gap > LONGEST_UNTOLD || self.contacts.high() != [false; 2] {
-            self.untold_s = [0.0; 3];
-            return;
-        }
-        let gap_s = gap.as_secs_f64();
-        let counted_s = gap_s.min(UNTOLD_GAP_S);
-        let least = [(LEAST_M_S, left), (LEAST_M_S, right), (LEAST_TURN_M_S, fastest)];
-        let turned = [turned[0], turned[1], turned[1] - turned[0]];
-        for channel in 0..channels {
-            let (least_m_s, fastest) = least[channel];
-            let margin = least_m_s * self.counts_per_m + LEAST_TURN_SHARE * fastest;
-            let told = most(channel, turned[channel].signum()) + margin;
-            let change_s =
-                if turned[channel].abs() > told * gap_s { counted_s } else { -counted_s };
-            self.untold_s[channel] = (self.untold_s[channel] + change_s).max(0.0);
-        }
-        let is_untold = |untold_s: &f64| *untold_s >= UNTOLD_AFTER.as_secs_f64();
-        if self.untold_s.iter().any(is_untold) && !self.is_bring_up {
-            self.suspicion.get_or_insert((Suspicion::Untold, now));
-        }
     }
 
     /// A suspicion ends when a response explains the motion that raised it, because the motion after it, until the robot stands, tells
@@ -422,7 +380,7 @@ impl Odometry {
         self.left = Evidence::default();
         self.right = Evidence::default();
         self.turn = Evidence::default();
-        self.untold_s = [0.0; 3];
+        self.untold_s = 0.0;
     }
 
     fn restart_evidence(&mut self, now: MissionTime) {
@@ -452,8 +410,7 @@ impl Monitor for Odometry {
             left: Evidence::default(),
             right: Evidence::default(),
             turn: Evidence::default(),
-            told: VecDeque::new(),
-            untold_s: [0.0; 3],
+            untold_s: 0.0,
             contacts: Contacts::new(mission),
             jumps: VecDeque::new(),
             recoveries: 0,

@@ -441,7 +441,7 @@ fn a_robot_that_another_host_commands_is_told_to_stand_after_each_acknowledgemen
         }
     }
     let at = causes.iter().find(|(_, cause)| *cause == Cause::AnotherCommander);
-    assert!(at.is_some_and(|(ms, _)| (5000..8000).contains(ms)), "{causes:?}");
+    assert!(at.is_some_and(|(ms, _)| *ms >= 5000), "{causes:?}");
 }
 
 #[test]

@@ -36,7 +36,7 @@ pub struct Arguments {
 /// Run the executable.
 pub fn main() -> ExitCode {
     // A client could fill the log with its own errors.
-    executable::run("error,foxglove=off", serve, |error| {
+    executable::run("error,firsthand_foxglove=warn,foxglove=off", serve, |error| {
         error.is::<LiveError>().then_some("cannot-listen")
     })
 }
@@ -46,6 +46,9 @@ fn serve(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut signals = Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?;
     let live = Live::open(&arguments.robot, arguments.listen)?;
     let address = SocketAddr::new(arguments.listen.ip(), live.port());
+    if !address.ip().is_loopback() {
+        tracing::warn!(%address, "the protocol has no authentication: whoever reaches this address can watch the robot");
+    }
     print_text(&format!("ws://{address}\n"))?;
     live.serve(&Domain::of(arguments.robot.clone()), &mut || signals.came());
     Ok(ExitCode::SUCCESS)

@@ -9,6 +9,6 @@ pub(crate) struct Context {
     pub(crate) shared: Arc<Shared>,
     pub(crate) operator: Arc<dyn Operator>,
     /// Places of browsers that may watch, and of those that may drive.
-    pub(crate) watching: Arc<Places>,
-    pub(crate) driving: Arc<Places>,
+    pub(crate) watching: Places,
+    pub(crate) driving: Places,
 }

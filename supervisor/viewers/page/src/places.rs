@@ -3,52 +3,41 @@
 
 use std::{
     collections::VecDeque,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex, PoisonError, Weak},
 };
 
 use tokio::sync::Semaphore;
 
+/// A place of a client, until it is dropped. It closes when another client gets it.
+pub(crate) type Place = Arc<Semaphore>;
+
 #[derive(Debug)]
 pub(crate) struct Places {
     most: usize,
-    /// One for each place, the oldest first. It is closed when the place goes to another client.
-    taken: Mutex<VecDeque<Arc<Semaphore>>>,
-}
-
-/// A place of a client, which is free when this is dropped.
-pub(crate) struct Place {
-    places: Arc<Places>,
-    mark: Arc<Semaphore>,
+    /// The oldest is the first.
+    taken: Mutex<VecDeque<Weak<Semaphore>>>,
 }
 
 impl Places {
-    pub(crate) fn new(most: usize) -> Arc<Self> {
-        Arc::new(Self { most, taken: Mutex::default() })
+    pub(crate) fn new(most: usize) -> Self {
+        Self { most, taken: Mutex::default() }
     }
 
-    pub(crate) fn take(self: &Arc<Self>) -> Place {
-        let mark = Arc::new(Semaphore::new(0));
+    pub(crate) fn take(&self) -> Place {
+        let place = Arc::new(Semaphore::new(0));
         let mut taken = self.taken.lock().unwrap_or_else(PoisonError::into_inner);
+        taken.retain(|place| place.strong_count() > 0);
         if taken.len() >= self.most
-            && let Some(oldest) = taken.pop_front()
+            && let Some(oldest) = taken.pop_front().and_then(|oldest| oldest.upgrade())
         {
             oldest.close();
         }
-        taken.push_back(mark.clone());
-        Place { places: self.clone(), mark }
+        taken.push_back(Arc::downgrade(&place));
+        place
     }
 }
 
-impl Place {
-    /// Wait until another client gets this place.
-    pub(crate) async fn lost(&self) {
-        let _ = self.mark.acquire().await;
-    }
-}
-
-impl Drop for Place {
-    fn drop(&mut self) {
-        let mut taken = self.places.taken.lock().unwrap_or_else(PoisonError::into_inner);
-        taken.retain(|mark| !Arc::ptr_eq(mark, &self.mark));
-    }
+/// Wait until another client gets `place`.
+pub(crate) async fn lost(place: &Place) {
+    let _ = place.acquire().await;
 }

@@ -16,7 +16,7 @@ use tokio::{net::TcpStream, time::timeout};
 
 use crate::{
     context::Context,
-    places::{Place, Places},
+    places::{Place, Places, lost},
     session,
 };
 
@@ -46,23 +46,19 @@ pub(crate) async fn serve(context: Arc<Context>, listener: TcpListener) {
             tokio::time::sleep(Duration::from_millis(100)).await;
             continue;
         };
-        let (context, place) = (context.clone(), Arc::new(strangers.take()));
+        let (context, place) = (context.clone(), strangers.take());
         tokio::spawn(async move {
             tokio::select! {
                 // The failure of a connection concerns only its client.
                 _ = connection(&context, stream, &place) => {}
-                () = place.lost() => {}
+                () = lost(&place) => {}
             }
         });
     }
 }
 
 /// Answer one request, or begin a session.
-async fn connection(
-    context: &Arc<Context>,
-    stream: TcpStream,
-    place: &Arc<Place>,
-) -> io::Result<()> {
+async fn connection(context: &Arc<Context>, stream: TcpStream, place: &Place) -> io::Result<()> {
     let service = service_fn(|request: hyper::Request<Incoming>| {
         let (context, place) = (context.clone(), place.clone());
         async move { Ok::<_, Infallible>(answer(&context, request.map(Body::new), place).await) }
@@ -81,7 +77,7 @@ async fn connection(
     }
 }
 
-async fn answer(context: &Arc<Context>, request: Request, place: Arc<Place>) -> Response {
+async fn answer(context: &Arc<Context>, request: Request, place: Place) -> Response {
     let Some(host) = host(context, &request) else {
         return StatusCode::MISDIRECTED_REQUEST.into_response();
     };
@@ -129,7 +125,7 @@ fn host(context: &Context, request: &Request) -> Option<String> {
     absolute.is_none_or(|absolute| absolute.as_str() == host).then(|| host.to_owned())
 }
 
-async fn session(context: &Arc<Context>, request: Request, place: Arc<Place>) -> Response {
+async fn session(context: &Arc<Context>, request: Request, place: Place) -> Response {
     let (mut parts, _) = request.into_parts();
     let upgrade = match WebSocketUpgrade::from_request_parts(&mut parts, &()).await {
         Ok(upgrade) => upgrade,

@@ -116,15 +116,13 @@ impl Page {
 fn keep(domain: &Domain, port: u16, addresses: &str) -> Result<PathBuf, FileError> {
     let directory = domain.directory().parent().unwrap_or(domain.directory());
     let file = directory.join(format!("{}.page-{port}", domain.robot));
-    make_own_directory(directory)
-        .map_err(io::Error::other)
-        .map_err(FileError::of("keep", &file))?;
-    // A page that was killed left its file.
-    let _ = fs::remove_file(&file);
-    let made = fs::OpenOptions::new().write(true).create_new(true).mode(0o600).open(&file);
-    let written = made.and_then(|mut made| made.write_all(addresses.as_bytes()));
-    written.map_err(FileError::of("keep", &file))?;
-    Ok(file)
+    let written = make_own_directory(directory).map_err(io::Error::other).and_then(|()| {
+        // A page that was killed left its file.
+        let _ = fs::remove_file(&file);
+        let made = fs::OpenOptions::new().write(true).create_new(true).mode(0o600).open(&file);
+        made?.write_all(addresses.as_bytes())
+    });
+    written.map_err(FileError::of("keep", &file)).map(|()| file)
 }
 
 impl Drop for Page {

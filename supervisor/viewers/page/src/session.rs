@@ -19,7 +19,7 @@ use crate::{
     access::Role,
     context::Context,
     orders::{Asked, Order},
-    places::Place,
+    places::{Place, lost},
     shared::Cursor,
 };
 
@@ -56,10 +56,10 @@ struct Hello {
 type Sender = SplitSink<WebSocket, Message>;
 
 /// `stranger` is the place of a client that has shown no token.
-pub(crate) async fn run(mut socket: WebSocket, stranger: Arc<Place>, context: &Arc<Context>) {
+pub(crate) async fn run(mut socket: WebSocket, stranger: Place, context: &Arc<Context>) {
     let first = tokio::select! {
         first = timeout(TOKEN_WITHIN, socket.recv()) => first.ok().flatten(),
-        () = stranger.lost() => None,
+        () = lost(&stranger) => None,
     };
     let role = match &first {
         Some(Ok(Message::Text(text))) => {
@@ -83,7 +83,7 @@ pub(crate) async fn run(mut socket: WebSocket, stranger: Arc<Place>, context: &A
     loop {
         let message = tokio::select! {
             message = receiver.next() => message,
-            () = place.lost() => {
+            () = lost(&place) => {
                 code = Some(REPLACED);
                 break;
             }
