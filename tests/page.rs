@@ -134,8 +134,13 @@ fn operate(robot: &str, width: u32) {
     let listen = page.listen().to_owned();
     page.end(Signal::KILL);
     browser.wait_until(IS_LOST);
-    // The next page has other tokens, so a browser that could drive only watches now.
+    // The next page has other tokens. An attempt follows half a second after the one before, and here none does.
     let page = Page::start(robot, &listen);
+    browser.wait_until(&says("notice", "wrong or expired: open an address that `firsthand page`"));
+    browser.run("window.since = performance.now()");
+    browser.wait_until("performance.now() - window.since > 2000");
+    assert!(browser.text("notice").contains("expired"), "the notice stays");
+    browser.go(&page.watch);
     browser.wait_until(IS_THERE);
     browser.wait_until("!document.body.classList.contains('drive')");
     browser.wait_until(GOES);

@@ -54,6 +54,11 @@ pub trait Base: Driver {
         Vec::new()
     }
 
+    /// How many acknowledgements, which [`Heard::acknowledged`] counts, the robot owes for these bytes to it.
+    fn owed(&self, _sent: &[u8]) -> usize {
+        0
+    }
+
     fn is_polled(&self) -> bool {
         false
     }
@@ -186,25 +191,31 @@ pub struct Motion {
     pub currents: [u16; 2],
 }
 
-/// The reading of the sensor in `row` of the mission's table at a range, metres: infinite or beyond reach is nothing, negative or no number
-/// is no reading.
+/// The greatest range by which a sensor may say that nothing is in its reach. A greater one is of another unit, or garbage.
+fn most_m(sensor: &Sensor) -> f64 {
+    2.0 * sensor.reach_m.max(sensor.model.reach_m())
+}
+
+/// The reading of the sensor in `row` of the mission's table at a range, metres: none or one beyond reach is nothing; one that is negative,
+/// no number, or beyond twice the reach is no reading.
 #[must_use]
-pub fn range_reading(row: usize, sensor: &Sensor, range: f64) -> RangeReading {
+pub fn range_reading(row: usize, sensor: &Sensor, range: Option<f64>) -> RangeReading {
     let (status, range_m) = match range {
-        range if range < 0.0 || range.is_nan() => (RangeStatus::Invalid, 0.0),
-        range if range <= sensor.reach_m => (RangeStatus::Measured, range),
+        Some(range) if !(0.0..=most_m(sensor)).contains(&range) => (RangeStatus::Invalid, 0.0),
+        Some(range) if range <= sensor.reach_m => (RangeStatus::Measured, range),
         _ => (RangeStatus::Nothing, 0.0),
     };
     let raw = (range_m * 100.0).round() as u16;
     RangeReading { sensor: row as u8, range_m, raw, status: status.into() }
 }
 
-/// A beam as the topic `scan` has it: infinite for none or one beyond reach, no number for one too short to be a range.
+/// A beam as the topic `scan` has it: infinite for none or one beyond reach, no number for one too short to be a range or beyond twice
+/// the reach.
 #[must_use]
 pub fn beam(sensor: &Sensor, range: Option<f32>) -> f32 {
     let (least_m, reach_m) = (sensor.model.least_m() as f32, sensor.reach_m as f32);
     match range {
-        Some(range) if range < least_m || range.is_nan() => f32::NAN,
+        Some(range) if !(f64::from(least_m)..=most_m(sensor)).contains(&range.into()) => f32::NAN,
         Some(range) if range <= reach_m => range,
         _ => f32::INFINITY,
     }

@@ -15,8 +15,7 @@
 //!
 //! The rules suppose that answers come in order, and within [`LATEST_S`] or not at all. A digit that arrives as
 //! another digit is not noticed, because the protocol has no check sum: counts then jump, which the link judges, and
-//! a range is wrong once. Velocity commands are answered by `OK`, which is dropped: counts that come in time show
-//! that the commands before them did.
+//! a range is wrong once. Velocity commands are answered by `OK`, which acknowledges them.
 
 mod answers;
 
@@ -101,7 +100,7 @@ impl Arduino {
         // While the driver waits for the baud rate, only that shows that the board understands it.
         heard.anything |= answer == Answer::Baud || !matches!(self.waits, Waits::Baud { .. });
         match (answer, &mut self.waits) {
-            (Answer::Done, _) => {}
+            (Answer::Done, _) => heard.acknowledged += 1,
             (Answer::Baud, waits @ Waits::Baud { since: Some(_) }) => *waits = Waits::No,
             (_, Waits::Baud { .. }) => {}
             (Answer::Centimetres(range), Waits::Round { ranges, .. })
@@ -116,8 +115,7 @@ impl Arduino {
                 self.waits = Waits::No;
                 for ((_, row, sensor), centimetres) in self.sonars.iter().zip(ranges) {
                     // The board says 0 for no echo.
-                    let range = f64::from(centimetres) / 100.0;
-                    let range = if range > 0.0 { range } else { f64::INFINITY };
+                    let range = (centimetres > 0).then(|| f64::from(centimetres) / 100.0);
                     heard.readings.push(range_reading(*row, sensor, range));
                 }
                 heard.motion = Some(self.motion(counts, since));
@@ -231,6 +229,10 @@ impl Base for Arduino {
             }
             Waits::Baud { .. } | Waits::Round { .. } => Vec::new(),
         }
+    }
+
+    fn owed(&self, sent: &[u8]) -> usize {
+        usize::from(sent.starts_with(b"m "))
     }
 
     /// The board takes whole counts in a run of its speed loop, and stands by itself after the time that its firmware has. A command that

@@ -59,9 +59,10 @@ fn a_round_gives_the_range_of_each_sonar_and_the_counts_that_begin_a_tick() {
     assert_eq!(counts(&said), Some([32_763, 70]));
     let want = [(0, RangeStatus::Measured, 1.23), (1, RangeStatus::Nothing, 0.0)];
     assert_eq!((ranges(&said), said.refused), (want.to_vec(), None));
-    // An echo from beyond the sonar's reach counts as none.
+    // An echo from beyond the sonar's reach counts as none, and one from beyond twice that is no reading.
     let said = round(&mut driver, "300\r\n17241\r\n0 0\r\n");
-    assert!(ranges(&said).iter().all(|range| range.1 == RangeStatus::Nothing));
+    let statuses: Vec<_> = ranges(&said).iter().map(|range| range.1).collect();
+    assert_eq!(statuses, [RangeStatus::Nothing, RangeStatus::Invalid]);
 }
 
 #[test]
@@ -237,4 +238,13 @@ fn all_that_a_poll_and_a_stop_send_fits_into_the_boards_buffer() {
     // An Arduino holds 63 bytes that it has not read; at most six sonars have a row.
     let (round, stops) = ("p 255\r".len() * 6 + "e\r".len(), "m 0 0\r".len() * 3);
     assert!(round + stops < 63);
+}
+
+#[test]
+fn a_board_acknowledges_each_velocity_and_owes_nothing_for_what_it_is_asked() {
+    let mut driver = driver();
+    assert_eq!(heard(&mut driver, "OK\r\nOK\r\n").acknowledged, 2);
+    assert_eq!(driver.owed(&driver.velocity([100, 100], Duration::ZERO)), 1);
+    let asked = driver.poll();
+    assert_eq!(driver.owed(&asked), 0);
 }

@@ -88,7 +88,7 @@ impl Json {
                 let names: Vec<_> = self.table.iter().map(|sensor| sensor.name.as_str()).collect();
                 format!("no sensor is called {name:?}; {} are", names.join(", "))
             })?;
-            Ok(range_reading(row, &self.table[row], range.unwrap_or(f64::INFINITY)))
+            Ok(range_reading(row, &self.table[row], *range))
         };
         ranges.iter().map(reading).collect()
     }
@@ -154,6 +154,10 @@ impl Base for Json {
 
     fn ping(&self) -> Vec<u8> {
         line(&Order::Ping {})
+    }
+
+    fn owed(&self, sent: &[u8]) -> usize {
+        sent.iter().filter(|byte| **byte == b'\n').count()
     }
 
     fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8> {
@@ -252,16 +256,30 @@ mod tests {
     }
 
     #[test]
-    fn null_and_what_is_beyond_reach_are_nothing_and_less_than_0_is_no_reading() {
+    fn null_and_what_is_beyond_reach_are_nothing_and_less_than_0_or_beyond_twice_the_reach_is_no_reading()
+     {
         for (said, status) in [
             ("null", RangeStatus::Nothing),
-            ("99", RangeStatus::Nothing),
+            ("5", RangeStatus::Nothing),
+            ("5.2", RangeStatus::Invalid),
+            ("1e308", RangeStatus::Invalid),
             ("-1", RangeStatus::Invalid),
             ("0.5", RangeStatus::Measured),
         ] {
             let heard = heard(&mut driver(), &format!("{{\"ranges\":{{\"front\":{said}}}}}"));
             assert_eq!(heard.readings[0].status(), status, "{said}");
         }
+    }
+
+    #[test]
+    fn a_beam_beyond_twice_the_reach_is_no_reading() {
+        let text = "target = [3, 0]\nrobot.model = 'kobuki'";
+        let mut driver = Json::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
+        let mut beams = vec!["null"; 360];
+        beams[1] = "1e308";
+        let scan =
+            heard(&mut driver, &format!("{{\"scan\":[{}]}}", beams.join(","))).scans.remove(0);
+        assert!(scan.beams[0] == f32::INFINITY && scan.beams[1].is_nan(), "{:?}", scan.beams);
     }
 
     #[test]
@@ -272,6 +290,8 @@ mod tests {
             let heard = heard(&mut driver, &format!("{{\"heard\":{count}}}"));
             assert_eq!(heard.acknowledged, answered, "{count}");
         }
+        let sent = [driver.greeting(), driver.velocity([1, 1], Duration::ZERO)].concat();
+        assert_eq!(driver.owed(&sent), 2);
         let most = format!("{{\"heard\":0}}\n{{\"heard\":1}}\n{{\"heard\":{}}}", u64::MAX);
         let many = format!("{most}\n{most}");
         assert_eq!(heard(&mut driver, &many).acknowledged, 64);

@@ -106,7 +106,7 @@ pub const TABLE: &[Rule] = &[
     },
     Rule {
         cause: Cause::AnotherCommander,
-        when: "another node has published on `robot.ros2.cmd_vel` within 1 s: that the robot moves, or for 2 s that it stands; `link.log` says which. It is told to stand after each command of the other",
+        when: "another node has published on `robot.ros2.cmd_vel` within 1 s: that the robot moves, or for 2 s that it stands; or the robot has acknowledged 6 commands within 2 s that the link did not send, or an X80 for 4 s those that it did while a fifth of its motor frames went elsewhere; `link.log` says which. It is told to stand after each command of the other",
         action: Action::Stop,
         clears: Clears::WithCondition,
         monitor: |all| &all.commander,
@@ -176,7 +176,7 @@ pub const TABLE: &[Rule] = &[
     },
     Rule {
         cause: Cause::OdometryImplausible,
-        when: "0.55 s of motion that was commanded and due by `robot.response` with less than a quarter of it in the encoders, and no other response explains what they say, until the robot restarts, or 3 jumps within 2 s; `link.log` says which",
+        when: "0.55 s of motion that was commanded and due by `robot.response` with less than a quarter of it in the encoders, or 1 s of motion that was not commanded, and no other response explains what they say, until the robot restarts, or 3 jumps within 2 s; `link.log` says which",
         action: Action::Stop,
         clears: Clears::OnResume { or_after: Some(odometry::CALM) },
         monitor: |all| &all.odometry,

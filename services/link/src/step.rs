@@ -180,8 +180,13 @@ impl Link {
         self.give_tick(now_ns, &mut effects);
         self.repeat_command(now_ns, &mut effects);
         self.guard(now_ns, &mut effects);
-        if effects.iter().any(|effect| matches!(effect, Effect::Send(_))) {
+        let sent = effects.iter().filter_map(|effect| match effect {
+            Effect::Send(bytes) => Some(self.base.owed(bytes)),
+            _ => None,
+        });
+        if let Some(owed) = sent.reduce(|one, other| one + other) {
             self.observe(Observation::Sent, now_ns);
+            self.observe(Observation::Owed(owed), now_ns);
         }
         effects
     }

@@ -124,6 +124,8 @@ impl Ros2 {
             Content::Range(row) => {
                 let range = read_range(payload).map_err(|error| error.to_string())?;
                 let sensor = self.table.get(row);
+                // Infinite is nothing in reach.
+                let range = Some(range).filter(|range| *range != f64::INFINITY);
                 heard.readings.extend(sensor.map(|sensor| range_reading(row, sensor, range)));
                 Ok(())
             }
@@ -195,11 +197,13 @@ impl Ros2 {
             return Err(format!("a time_increment of {beam_s}; fill it in seconds, or give 0"));
         }
         let range = |range: &f32| match *range {
-            range if range < scan.least_m => f32::NAN,
-            range if range > scan.most_m => f32::INFINITY,
-            range => range,
+            range if range < scan.least_m => Some(f32::NAN),
+            // Infinite is nothing in reach.
+            f32::INFINITY => None,
+            range if range > scan.most_m && range <= 2.0 * scan.most_m => None,
+            range => Some(range),
         };
-        let came = scan.ranges.iter().map(|came| beam(sensor, Some(range(came))));
+        let came = scan.ranges.iter().map(|came| beam(sensor, range(came)));
         let beams = if is_same_fan(scan, sensor) {
             came.collect()
         } else if is_circle(scan.ranges.len(), scan.fan.1) && is_whole(sensor, scan) {

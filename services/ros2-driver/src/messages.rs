@@ -161,8 +161,9 @@ pub fn read_range(payload: &[u8]) -> Result<f64, Malformed> {
     // A sensor with a single range says by an infinite one whether it is empty to there.
     Ok(match range {
         range if range == f32::NEG_INFINITY => 0.0,
+        f32::INFINITY => f64::INFINITY,
+        range if range < least_m || range > 2.0 * most_m => f64::NAN,
         range if range > most_m => f64::INFINITY,
-        range if range < least_m => f64::NAN,
         range => range.into(),
     })
 }

@@ -193,6 +193,9 @@ fn a_circle_of_beams_is_turned_to_the_missions_and_lacking_ones_have_no_reading(
     ranges[90] = 0.1;
     let beams = beams_of(&mut driver, &scan_of(0.0, 1_f32.to_radians(), &ranges));
     assert_eq!((beams[180], beams[181]), (1.0, f32::INFINITY));
+    ranges[1] = 1e38;
+    let garbage = beams_of(&mut driver, &scan_of(0.0, 1_f32.to_radians(), &ranges));
+    assert!(garbage[181].is_nan(), "a range that no laser has is none");
     assert!(beams[270].is_nan(), "less than the least range");
     let few = scan_of(0.0, 1.5_f32.to_radians(), &[2.0; 240]);
     let beams = beams_of(&mut driver, &few);
@@ -301,6 +304,7 @@ fn ranges_and_the_battery_are_those_of_their_topics() {
         (f32::INFINITY, RangeStatus::Nothing),
         (5.0, RangeStatus::Nothing),
         (f32::NAN, RangeStatus::Invalid),
+        (1e38, RangeStatus::Invalid),
         (0.01, RangeStatus::Invalid),
     ] {
         let mut payload = bytes(RANGE);

@@ -106,6 +106,12 @@ impl Base for X80 {
         encoded(Command::System(SystemSignal::Ack))
     }
 
+    fn owed(&self, sent: &[u8]) -> usize {
+        let mut decoder = Decoder::default();
+        decoder.push(sent);
+        std::iter::from_fn(|| decoder.next_frame().map(drop)).count()
+    }
+
     fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8> {
         self.drive.velocity(counts, limit)
     }

@@ -3,7 +3,11 @@
 // The server sends something every 300 ms; without anything for this time it is lost.
 const LOST_AFTER_MS = 900;
 const AGAIN_AFTER_MS = 500;
-const WRONG_TOKEN = 4401;
+// After these codes a new attempt would end alike, so the notice stays.
+const FINAL = {
+  4401: "this page has no token, or one that is wrong or expired: open an address that `firsthand page` printed when it started, or an address in the file that it named",
+  4409: "another browser has taken the place of this page; reload it to take a place again",
+};
 
 /// The token of the address's fragment. The tab remembers it, and the address bar does not show it.
 function token() {
@@ -21,13 +25,15 @@ export class Net {
     this.next = 1;
     addEventListener("hashchange", () => {
       this.token = token();
-      this.socket?.close();
+      if (this.socket) this.socket.close();
+      else this.connect();
     });
     this.connect();
     setInterval(() => this.watch(), 200);
   }
 
   connect() {
+    clearTimeout(this.again);
     const scheme = location.protocol === "https:" ? "wss" : "ws";
     const socket = new WebSocket(`${scheme}://${location.host}/live`);
     socket.binaryType = "arraybuffer";
@@ -48,9 +54,7 @@ export class Net {
     };
     socket.onclose = ({ code }) => {
       if (socket !== this.socket) return;
-      // A token of an earlier page opens nothing; without one the page may still watch on this machine.
-      if (code === WRONG_TOKEN) this.token = "";
-      this.lose(code === WRONG_TOKEN ? "the token opens nothing; use an address that the page printed" : "the page has lost its server; it tries again");
+      this.lose(FINAL[code] ?? "the page has lost its server; it tries again", code in FINAL);
     };
   }
 
@@ -62,13 +66,13 @@ export class Net {
     }
   }
 
-  lose(why) {
+  lose(why, isFinal = false) {
     this.socket = null;
     this.isOpen = false;
     for (const answer of this.asked.values()) answer({ ok: false, text: "the server was lost; look at the state" });
     this.asked.clear();
     this.on.lost(why);
-    setTimeout(() => this.connect(), AGAIN_AFTER_MS);
+    if (!isFinal) this.again = setTimeout(() => this.connect(), AGAIN_AFTER_MS);
   }
 
   answered({ id, ok, text }) {

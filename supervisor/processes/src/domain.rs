@@ -106,7 +106,7 @@ fn make_directory(domain: &Domain) -> Result<(), DomainError> {
 }
 
 /// Make a directory for its owner only, in a place where another user may have made it before.
-fn make_own_directory(path: &Path) -> Result<(), DomainError> {
+pub fn make_own_directory(path: &Path) -> Result<(), DomainError> {
     match DirBuilder::new().mode(0o700).create(path) {
         Ok(()) => {}
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}

@@ -1,11 +1,23 @@
-//! The monitor of other commanders: nodes that publish commands for the robot beside the link.
+//! The monitor of other commanders: nodes that publish commands for the robot beside the link, and hosts whose commands the robot
+//! acknowledges.
 //!
 //! The robot obeys the newest command, so two commanders drive it where neither wants. A node that could publish and is silent is no
 //! commander.
+//!
+//! A robot acknowledges each command, and over a serial server every host hears that; one that speaks JSON counts the orders of all. A
+//! few acknowledgements too many may be of datagrams that came twice.
+//!
+//! An X80 acknowledges datagrams to their sender, and sends its frames to the last one. So if some frames stay away and all
+//! acknowledgements come at once, frames go to another host: a bad radio loses both, and a busy machine delays both.
 
-use std::time::Duration;
+use std::{collections::VecDeque, iter::repeat_n, time::Duration};
 
-use common::{driver::Commander, mission::Mission, samples::Cause};
+use common::{
+    clock::Pace,
+    driver::Commander,
+    mission::{Mission, Protocol},
+    samples::Cause,
+};
 use ros2_driver::publishers::gid_text;
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
@@ -14,6 +26,31 @@ use crate::backoff::has_passed;
 pub(crate) const GONE_AFTER: Duration = Duration::from_secs(1);
 /// A sender of stops alone is a commander after this time. An earlier link's stop guard leaves sooner.
 pub(crate) const STAYS: Duration = Duration::from_secs(2);
+/// Frames and acknowledgements are counted for so long. An acknowledgement that took longer is lost.
+pub(crate) const WINDOW: Duration = Duration::from_secs(2);
+/// So many acknowledgements in a window that the robot did not owe show another commander.
+pub(crate) const UNOWED: usize = 6;
+/// A robot that was found may acknowledge so much that it was sent before.
+const OWED_WHEN_FOUND: usize = 64;
+/// Another host has a share of the frames if more than this stay away in each of [`WINDOWS`], and fewer than half as many acknowledgements
+/// are late or lost.
+const AWAY_SHARE: f64 = 0.2;
+const WINDOWS: usize = 2;
+
+/// The counts of a window.
+#[derive(Clone, Copy, Debug, Default)]
+struct Window {
+    began_ns: u64,
+    frames: usize,
+    unowed: usize,
+    late: usize,
+}
+
+impl Window {
+    fn shows(&self) -> Option<&'static str> {
+        (self.unowed >= UNOWED).then_some("acknowledges commands that it was not sent")
+    }
+}
 
 /// Others' commands, without a pause.
 #[derive(Clone, Copy, Debug)]
@@ -28,18 +65,102 @@ struct Told {
 pub struct OtherCommander {
     topic: String,
     told: Option<Told>,
+    in_ticks: bool,
+    /// When the owed acknowledgements became so, nanoseconds.
+    owed: VecDeque<u64>,
+    window: Window,
+    /// The most frames of a window, and the windows in which another host had a share.
+    most: usize,
+    shared: usize,
+    /// The frames of a window of a robot that answers the last sender; 0 of another.
+    stated: f64,
+    half_period: Duration,
+    /// What the robot has done that shows another commander.
+    shows: Option<&'static str>,
+    is_told: bool,
+}
+
+impl OtherCommander {
+    /// Whether an acknowledgement since the last call was of another's command.
+    pub(crate) fn take_told(&mut self) -> bool {
+        std::mem::take(&mut self.is_told)
+    }
+
+    fn shows(&self) -> Option<&'static str> {
+        self.window.shows().or(self.shows)
+    }
+
+    fn acknowledged(&mut self, now_ns: u64) {
+        // One that was lost makes no later one late.
+        match self.owed.pop_back() {
+            Some(then_ns) => {
+                self.window.late += usize::from(has_passed(then_ns, now_ns, self.half_period));
+            }
+            None => {
+                self.window.unowed += 1;
+                self.is_told = true;
+            }
+        }
+    }
+
+    fn pass(&mut self, now_ns: u64) {
+        let is_lost = |then_ns: &u64| has_passed(*then_ns, now_ns, WINDOW);
+        while self.owed.front().is_some_and(is_lost) {
+            self.owed.pop_front();
+            self.window.late += 1;
+        }
+        let Window { began_ns, frames, late, .. } = self.window;
+        if has_passed(began_ns, now_ns, WINDOW) {
+            let stated = self.stated.min(self.most as f64);
+            let away = stated - frames as f64;
+            let is_shared = frames > 0 && away > AWAY_SHARE * stated && (2 * late) as f64 <= away;
+            self.shared = if is_shared { self.shared + 1 } else { 0 };
+            self.most = self.most.max(frames);
+            let is_sure = self.shared >= WINDOWS;
+            self.shows = self.window.shows().or_else(|| {
+                is_sure
+                    .then_some("acknowledges all commands and sends part of its frames elsewhere")
+            });
+            self.window = Window { began_ns: now_ns, ..Window::default() };
+        }
+    }
 }
 
 impl Monitor for OtherCommander {
     fn new(mission: &Mission) -> Self {
-        Self { topic: mission.robot.ros2.cmd_vel.clone(), told: None }
+        Self {
+            topic: mission.robot.ros2.cmd_vel.clone(),
+            told: None,
+            in_ticks: false,
+            owed: VecDeque::new(),
+            window: Window::default(),
+            most: 0,
+            shared: 0,
+            stated: match mission.robot.protocol() {
+                Protocol::X80 => WINDOW.as_secs_f64() * mission.robot.rate_hz,
+                _ => 0.0,
+            },
+            half_period: Duration::from_secs_f64(0.5 / mission.robot.rate_hz),
+            shows: None,
+            is_told: false,
+        }
     }
 
     fn observe(&mut self, what: &Observation<'_>, now: Moment) {
-        let Observation::Commander(newest) = *what else {
-            return;
-        };
         let now_ns = now.machine_ns;
+        let newest = match *what {
+            Observation::Commander(newest) => newest,
+            Observation::Pace(pace) => return self.in_ticks = pace == Pace::Max,
+            Observation::Time => return self.pass(now_ns),
+            Observation::Motor(..) => return self.window.frames += 1,
+            Observation::Acknowledged => return self.acknowledged(now_ns),
+            Observation::Owed(count) => return self.owed.extend(repeat_n(now_ns, count)),
+            Observation::Found { .. } => {
+                self.shared = 0;
+                return self.owed.extend(repeat_n(now_ns, OWED_WHEN_FOUND));
+            }
+            _ => return,
+        };
         let goes_on = |told: &Told| !has_passed(told.newest_ns, now_ns, GONE_AFTER);
         let before = self.told.filter(goes_on);
         self.told = Some(Told {
@@ -55,11 +176,18 @@ impl Monitor for OtherCommander {
             (told.moves || has_passed(told.began_ns, told.newest_ns, STAYS))
                 && !has_passed(told.newest_ns, now.machine_ns, GONE_AFTER)
         };
-        self.told.is_some_and(commands).into()
+        // A robot in lockstep answers whenever its process comes to it.
+        let shows = !self.in_ticks && self.shows().is_some();
+        (shows || self.told.is_some_and(commands)).into()
     }
 
     fn explain(&self, _: Cause, _: Moment) -> Option<String> {
         let topic = &self.topic;
+        if let Some(shows) = self.shows() {
+            return Some(format!(
+                "the robot {shows}: another host commands it over its network or serial server; end that host's program"
+            ));
+        }
         let number = gid_text(self.told?.newest.number);
         Some(format!(
             "another node publishes {topic}, its GID is {number}: `ros2 topic info --verbose {topic}` names it; end it"

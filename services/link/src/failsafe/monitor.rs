@@ -36,6 +36,8 @@ pub enum Observation<'a> {
     Commanded([i16; 2]),
     /// Something was sent to the robot.
     Sent,
+    /// The robot owes so many acknowledgements for what was sent.
+    Owed(usize),
     /// The robot acknowledged something.
     Acknowledged,
     /// The motor currents of the wheels in the motor frame that follows, AD counts.

@@ -17,6 +17,10 @@
 //! direction too often for the other evidence. If its motor draws a held one's current, it is held, and not suspected
 //! ([`super::contact`]).
 //!
+//! A wheel, or the difference of both, that turns by [`LEAST_TURN_M_S`] and a quarter of the wheels' speed farther than any command
+//! of the last moments told turns untold: at [`UNTOLD_AFTER`] another host may command it. A robot that is told to stand is judged by its
+//! stop.
+//!
 //! Single counts farther off than wheels turn are dropped ([`super::restart`]); [`MOST_JUMPS`] within [`JUMPS_WITHIN`] are suspect too.
 
 use std::{collections::VecDeque, time::Duration};
@@ -48,6 +52,8 @@ const ROLLS_SHARE: f64 = 0.5;
 pub(crate) const SUSPECTED_AFTER: Duration = Duration::from_millis(550);
 /// Commands may be lost for so long.
 pub(crate) const STILL_AFTER: Duration = Duration::from_millis(1000);
+/// A wheel that is held makes the body turn for a moment, and is suspected itself sooner.
+pub(crate) const UNTOLD_AFTER: Duration = Duration::from_millis(1000);
 /// What raises a suspicion happens within so long before it, and a base stands within so long after it.
 const JUDGED: Duration = Duration::from_millis(1500);
 pub(crate) const MOST_JUMPS: usize = 3;
@@ -66,6 +72,7 @@ pub enum Suspicion {
     /// Both wheels roll: they are swapped, or one is read wrongly.
     Turn,
     Jumps,
+    Untold,
 }
 
 impl Suspicion {
@@ -81,6 +88,9 @@ impl Suspicion {
                 "the robot was told to turn and its counts do not follow: are robot.left and robot.right swapped?"
             }
             Self::Jumps => "the counts jump farther than wheels turn",
+            Self::Untold => {
+                "the wheels turn as they were not told to: another host may command the robot, or something pushes it"
+            }
         }
     }
 }
@@ -176,6 +186,7 @@ pub struct Odometry {
     left: Evidence,
     right: Evidence,
     turn: Evidence,
+    untold_s: f64,
     contacts: Contacts,
     jumps: VecDeque<MissionTime>,
     recoveries: u32,
@@ -283,6 +294,10 @@ impl Odometry {
         if high == [false; 2] {
             let least = LEAST_TURN_M_S * self.counts_per_m;
             self.turn.weigh((right - left, gap_s), least, false, settles, now);
+            let from_s = now.seconds() - gap_s - settles.settled_s - self.limit.as_secs_f64();
+            let speeds = turned.map(|counts| counts / gap_s);
+            let is_untold = self.fit.is_untold(speeds, from_s, least, self.steers);
+            self.untold_s = (self.untold_s + if is_untold { gap_s } else { -gap_s }).max(0.0);
         }
         self.look_for_contact(now);
         let suspected = |evidence: &Evidence| {
@@ -295,7 +310,8 @@ impl Odometry {
             (&self.turn, Suspicion::Turn),
         ];
         let suspicion = all.into_iter().find(|(evidence, _)| suspected(evidence));
-        if let Some((_, suspicion)) = suspicion
+        let untold = (self.untold_s >= UNTOLD_AFTER.as_secs_f64()).then_some(Suspicion::Untold);
+        if let Some(suspicion) = suspicion.map(|(_, suspicion)| suspicion).or(untold)
             && !self.is_bring_up
         {
             self.suspicion.get_or_insert((suspicion, now));
@@ -312,7 +328,7 @@ impl Odometry {
         let channel = match suspicion {
             Suspicion::Left => 0,
             Suspicion::Right => 1,
-            Suspicion::Turn => 2,
+            Suspicion::Turn | Suspicion::Untold => 2,
             Suspicion::Jumps => return,
         };
         if now.since(since) > JUDGED {
@@ -373,6 +389,7 @@ impl Odometry {
         self.left = Evidence::default();
         self.right = Evidence::default();
         self.turn = Evidence::default();
+        self.untold_s = 0.0;
     }
 
     fn restart_evidence(&mut self, now: MissionTime) {
@@ -403,6 +420,7 @@ impl Monitor for Odometry {
             left: Evidence::default(),
             right: Evidence::default(),
             turn: Evidence::default(),
+            untold_s: 0.0,
             contacts: Contacts::new(mission),
             jumps: VecDeque::new(),
             recoveries: 0,

@@ -36,6 +36,9 @@ const UNEXPLAINED: f64 = 0.25;
 /// The square of the share by which two wheels that are told the same differ.
 const DIFFERENT: f64 = 0.05 * 0.05;
 
+/// The share of the fastest wheel's speed by which a wheel may be faster than told.
+const UNTOLD_SHARE: f64 = 0.25;
+
 /// Left, right, and their difference.
 const CHANNELS: usize = 3;
 const TURN: usize = 2;
@@ -72,6 +75,27 @@ impl ResponseFit {
 
     pub(super) fn turned(&mut self, counts: Option<[f64; 2]>, now: MissionTime) {
         keep(&mut self.turned, (now.seconds(), counts), KEPT_S);
+    }
+
+    /// Whether a channel's speed is beyond every command since `from_s`, and beyond 0, by `least` and a share of the fastest; counts/s.
+    pub(super) fn is_untold(
+        &self,
+        speeds: [f64; 2],
+        from_s: f64,
+        least: f64,
+        steers: bool,
+    ) -> bool {
+        let told = |channel: usize, sign: f64| {
+            let recent = self.commands.iter().filter(|(at, _)| *at >= from_s);
+            recent.fold(0.0_f64, |most, (_, told)| most.max(sign * channels(*told)[channel]))
+        };
+        let fastest = [0, 1].map(|wheel| told(wheel, 1.0).max(told(wheel, -1.0)));
+        let fastest = fastest[0].max(fastest[1]);
+        let is_beyond = |(channel, speed): (usize, f64)| {
+            speed.abs() > told(channel, speed.signum()) + least + UNTOLD_SHARE * fastest
+        };
+        let judged = if steers { 1 } else { CHANNELS };
+        fastest > 0.0 && channels(speeds).into_iter().enumerate().take(judged).any(is_beyond)
     }
 
     pub(super) fn reset(&mut self) {

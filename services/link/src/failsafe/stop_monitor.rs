@@ -22,6 +22,8 @@ const RESTS_M_S: f64 = 0.01;
 const RESTS_COUNTS: f64 = 4.0;
 /// Wheels rest so long until the robot does.
 const AT_REST_AFTER: Duration = Duration::from_millis(200);
+/// Motion between frames that are farther apart is not judged. Another host may take most of them.
+const LONGEST_GAP: Duration = Duration::from_secs(1);
 const NEXT_METHOD_AFTER: Duration = Duration::from_millis(300);
 
 #[derive(Clone, Debug)]
@@ -61,7 +63,7 @@ impl StopMonitor {
             return;
         };
         let gap = now.since(then);
-        if gap > self.longest_gap {
+        if gap > LONGEST_GAP {
             self.not_heard();
             return;
         }
@@ -72,7 +74,12 @@ impl StopMonitor {
         // Wheels that rest sooner may still start by the last command before the stop.
         let shows_after = Duration::from_secs_f64(self.response.dead_time_s());
         let shows_stop = self.told_to_stand.is_none_or(|told| then.since(told) >= shows_after);
-        self.resting = if rests && shows_stop { self.resting + gap } else { Duration::ZERO };
+        // Wheels that rest may have turned there and back in a long gap. Those that moved in it did so though they were told to stand.
+        self.resting = if rests && shows_stop && gap <= self.longest_gap {
+            self.resting + gap
+        } else {
+            Duration::ZERO
+        };
         let comes_to_rest = self.comes_to_rest();
         let due = |told: MissionTime| now.since(told).saturating_sub(gap) >= comes_to_rest;
         if !moves {
@@ -156,7 +163,7 @@ impl Monitor for StopMonitor {
     }
 
     fn explain(&self, _: Cause, _: Moment) -> Option<String> {
-        let text = "it was told to stand and its encoders say that it moves; every method of the robot is tried in turn";
+        let text = "it was told to stand and its encoders say that it moves; every method of the robot is tried in turn; another host may command it";
         Some(text.to_owned())
     }
 }

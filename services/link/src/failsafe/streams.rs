@@ -203,10 +203,10 @@ impl Monitor for Streams {
                 ))
             }
             (Cause::FramesSilent, _) => {
-                Some("the robot answers and sends no motor frames; they are asked for".to_owned())
+                Some("the robot answers and sends no motor frames; they are asked for. A robot that answers datagrams sends them to the last host that commanded it, which may be another".to_owned())
             }
             (_, Motor::Slow(hz)) => Some(format!(
-                "the robot sends {hz:.1} motor frames a second, one in {:.2} s, and a command lasts {:.2} s: let it send faster, or raise robot.command_limit_s",
+                "the robot sends {hz:.1} motor frames a second, one in {:.2} s, and a command lasts {:.2} s: let it send faster, or raise robot.command_limit_s; if it sends datagrams, another host may take the others",
                 1.0 / hz,
                 self.limit.as_secs_f64()
             )),

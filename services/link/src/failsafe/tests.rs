@@ -434,3 +434,56 @@ fn a_slow_base_drives_at_half_speed_until_a_command_follows_from_what_was_found(
         assert_eq!(base.sample(), None, "{set}");
     }
 }
+
+#[test]
+fn acknowledgements_of_what_was_not_sent_show_another_commander_and_late_or_doubled_ones_do_not() {
+    // The robot is sent 50 commands at the end of each window, and acknowledges so many.
+    let after = |failsafe: &mut Failsafe, windows: std::ops::Range<u64>, count: usize| {
+        let monitor = &mut failsafe.monitors.commander;
+        for when in windows.map(|window| ago((20 - 2 * window) * 1000 * MS)) {
+            monitor.observe(&Observation::Owed(50), when);
+            (0..count).for_each(|_| monitor.observe(&Observation::Acknowledged, when));
+            monitor.observe(&Observation::Time, when);
+        }
+        failsafe.decide(false, now()).cause
+    };
+    let mut failsafe = Failsafe::new(&mission());
+    failsafe.monitors.presence.heard(now().machine_ns);
+    let none = after(&mut failsafe, 0..3, 50 + commander::UNOWED - 1);
+    assert_ne!(none, Cause::AnotherCommander, "a few came twice");
+    assert_eq!(after(&mut failsafe, 3..4, 50 + commander::UNOWED), Cause::AnotherCommander);
+    let why = failsafe.explain(Cause::AnotherCommander, now()).unwrap();
+    assert!(why.contains("another host commands it"), "{why}");
+    assert_ne!(after(&mut failsafe, 4..5, 50), Cause::AnotherCommander, "it has gone");
+    failsafe.observe(&Observation::Pace(Pace::Max), now());
+    assert_ne!(after(&mut failsafe, 5..6, 60), Cause::AnotherCommander, "it waits for commands");
+}
+
+#[test]
+fn frames_that_go_elsewhere_while_acknowledgements_come_at_once_show_another_commander() {
+    // The first 6 s are undisturbed. Then one in `every` frames comes, and an acknowledgement after `late_ms`, of one in `answered`.
+    let cause = |every: u64, late_ms: u64, answered: u64| {
+        let mut monitor = commander::OtherCommander::new(&mission());
+        for tick in 0..140_u64 {
+            let at = ago((140 - tick) * 100 * MS);
+            let is_disturbed = tick > 60;
+            let mut take = |what: Observation<'_>, when: Moment| monitor.observe(&what, when);
+            if !is_disturbed || tick % every == 0 {
+                take(Observation::Motor([0; 2].into(), Counts::Follow), at);
+            }
+            take(Observation::Owed(1), at);
+            if !is_disturbed || tick % answered == 0 {
+                let late = if is_disturbed { late_ms } else { 0 };
+                take(Observation::Acknowledged, ago((140 - tick) * 100 * MS - late * MS));
+            }
+            take(Observation::Time, at);
+        }
+        monitor.condition(Cause::AnotherCommander, now())
+    };
+    assert_eq!(cause(3, 5, 1), Condition::Holds);
+    let none = Condition::OverFor(Duration::MAX);
+    assert_eq!(cause(1, 5, 1), none, "all is well");
+    assert_eq!(cause(3, 5, 3), none, "the radio loses both");
+    assert_eq!(cause(3, 90, 1), none, "the machine is busy");
+    assert_eq!(cause(1000, 5, 1), none, "its motor frames have stopped");
+}

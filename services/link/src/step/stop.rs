@@ -5,7 +5,10 @@ use std::time::Duration;
 use common::{driver::StopMethod, samples::Cause};
 
 use super::{Effect, Link, STOP_AGAIN, passed};
-use crate::failsafe::{Decision, monitor::Observation};
+use crate::failsafe::{
+    Decision,
+    monitor::{Monitor as _, Observation},
+};
 
 impl Link {
     pub(super) fn decide(&mut self, now_ns: u64) -> Decision {
@@ -18,6 +21,11 @@ impl Link {
         self.observe(Observation::Time, now_ns);
         let now = self.decide(now_ns);
         let before = std::mem::replace(&mut self.decision, now);
+        if now.cause == Cause::AnotherCommander {
+            // The wheels obey the other.
+            let now = self.moment(now_ns);
+            self.failsafe.monitors.odometry.observe(&Observation::Resumed, now);
+        }
         if now.stops() {
             self.repeat = None;
             if !self.in_ticks() {

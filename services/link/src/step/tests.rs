@@ -415,6 +415,36 @@ fn a_silent_robot_is_lost_told_to_stand_and_pinged() {
 }
 
 #[test]
+fn a_robot_that_another_host_commands_is_told_to_stand_after_each_acknowledgement_of_its_commands()
+{
+    let mut link = driving(on_the_wall());
+    let mut acknowledged = Vec::new();
+    Report::System(SystemSignal::Ack).encode(Addressing::default(), &mut acknowledged);
+    let mut causes = Vec::new();
+    // The robot was found at 0 s. It acknowledges what it is sent, and from 5 s on commands of another host.
+    for (tick, ms) in (0..100).map(|tick| (tick, 100 * (tick + 1))) {
+        let mut effects = link.at(Event::Datagram(&datagram(255, 0, 0)), ms * MS);
+        effects.extend(link.at(Event::Order(Order::Drive, HoldReason::None), ms * MS));
+        effects.extend(link.at(Event::Command(command(tick, ms * MS, 0.0, 0.0)), ms * MS));
+        causes.extend(decided(&effects).into_iter().map(|(_, cause)| (ms, cause)));
+        for _ in sent(&effects) {
+            link.at(Event::Datagram(&acknowledged), ms * MS);
+        }
+        if ms >= 5000 {
+            let stops = causes.last().is_some_and(|(_, cause)| *cause == Cause::AnotherCommander);
+            let effects = link.at(Event::Datagram(&acknowledged), ms * MS + MS);
+            assert!(!stops || !velocities(&effects).is_empty(), "it obeys the newest command");
+            causes.extend(decided(&effects).into_iter().map(|(_, cause)| (ms, cause)));
+            for _ in sent(&effects) {
+                link.at(Event::Datagram(&acknowledged), ms * MS + MS);
+            }
+        }
+    }
+    let at = causes.iter().find(|(_, cause)| *cause == Cause::AnotherCommander);
+    assert!(at.is_some_and(|(ms, _)| *ms >= 5000), "{causes:?}");
+}
+
+#[test]
 fn an_abandoned_tick_does_not_keep_the_next_from_starting() {
     let mut link = driving(on_the_wall());
     let first = link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);

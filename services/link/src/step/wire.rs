@@ -68,18 +68,22 @@ impl Link {
         self.take_refusal(heard.refused.take(), now_ns, effects);
         let rate = heard.stamp_ns.and_then(|stamp_ns| self.clock_rate.take(stamp_ns, self.now));
         effects.extend(rate.map(Effect::ClockRate));
-        if let Some(commander) = heard.commander {
-            self.observe(Observation::Commander(commander), now_ns);
-            // The robot obeys the newest command: at another commander's first one the failsafe stops it, below.
-            if commander.moves && self.decision.stops() && !self.in_ticks() {
-                effects.push(Effect::Send(self.stop()));
-            }
-        }
         if let Some(words) = heard.two_publishers.take() {
             self.observe(Observation::TwoPublishers(&words), now_ns);
         }
         for _ in 0..heard.acknowledged {
             self.observe(Observation::Acknowledged, now_ns);
+        }
+        if let Some(commander) = heard.commander {
+            self.observe(Observation::Commander(commander), now_ns);
+        }
+        let is_told = self.failsafe.monitors.commander.take_told();
+        // The robot obeys the newest command: at another commander's first one the failsafe stops it, below.
+        if (is_told || heard.commander.is_some_and(|commander| commander.moves))
+            && self.decision.stops()
+            && !self.in_ticks()
+        {
+            effects.push(Effect::Send(self.stop()));
         }
         if heard.pinged {
             effects.push(Effect::Send(self.base.acknowledge()));

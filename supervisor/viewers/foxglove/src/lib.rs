@@ -2,8 +2,10 @@
 //!
 //! | module | holds |
 //! |---|---|
+//! | `gate` | which web pages may open it |
 //! | `live` | the channels of a recording ([`recording::viewers`]), live |
 
+mod gate;
 mod live;
 #[cfg(test)]
 mod tests;
@@ -27,16 +29,19 @@ pub struct Arguments {
     /// Name of the robot; it need not run yet.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
-    /// Where to listen. The protocol has no authentication: whoever reaches another address than one of this machine can watch
-    /// the robot, and so can any web page in a browser on this machine. Nobody can send it anything.
+    /// Where to listen. The protocol has no authentication: whoever reaches the address can watch the robot. Nobody can send it anything.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8765")]
     listen: SocketAddr,
+    /// The origin of a viewer's web page, such as https://lichtblick.example. Pages of other origins are refused; programs that are no
+    /// browsers are not.
+    #[arg(long = "origin", value_name = "ORIGIN", default_value = gate::FOXGLOVE)]
+    origins: Vec<String>,
 }
 
 /// Run the executable.
 pub fn main() -> ExitCode {
     // A client could fill the log with its own errors.
-    executable::run("error,foxglove=off", serve, |error| {
+    executable::run("error,firsthand_foxglove=warn,foxglove=off", serve, |error| {
         error.is::<LiveError>().then_some("cannot-listen")
     })
 }
@@ -44,8 +49,11 @@ pub fn main() -> ExitCode {
 fn serve(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let_stages_go_first();
     let mut signals = Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?;
-    let live = Live::open(&arguments.robot, arguments.listen)?;
-    let address = SocketAddr::new(arguments.listen.ip(), live.port());
+    let listen = arguments.listen;
+    let (live, address) = Live::open(&arguments.robot, listen, &arguments.origins)?;
+    if !listen.ip().is_loopback() {
+        tracing::warn!(%listen, "the protocol has no authentication: whoever reaches this address can watch the robot");
+    }
     print_text(&format!("ws://{address}\n"))?;
     live.serve(&Domain::of(arguments.robot.clone()), &mut || signals.came());
     Ok(ExitCode::SUCCESS)

@@ -5,7 +5,8 @@
 
 use std::{
     collections::HashMap,
-    net::SocketAddr,
+    io,
+    net::{SocketAddr, TcpListener},
     sync::Arc,
     thread,
     time::{Duration, Instant},
@@ -19,8 +20,7 @@ use common::{
     topics::{self, AnyTopic},
 };
 use foxglove::{
-    ChannelBuilder, Context, FoxgloveError, RawChannel, Schema, WebSocketServer,
-    WebSocketServerHandle,
+    ChannelBuilder, Context, RawChannel, Schema, WebSocketServer, WebSocketServerHandle,
 };
 use recording::{
     log_files::LogFiles,
@@ -29,6 +29,8 @@ use recording::{
 };
 use robot_state::newest_run;
 use thiserror::Error;
+
+use crate::gate;
 
 /// The interval at which a run that has ended or begun, or the end of this process, is noticed when nothing is published.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
@@ -43,7 +45,7 @@ const MOST_WAITING: usize = 512;
 #[error("cannot listen on {address}: {source}; choose another port with --listen")]
 pub(crate) struct LiveError {
     address: SocketAddr,
-    source: FoxgloveError,
+    source: io::Error,
 }
 
 /// A server for viewers.
@@ -70,22 +72,27 @@ struct Serving {
 }
 
 impl Live {
-    /// Listen from now on.
-    pub(crate) fn open(robot: &RobotName, address: SocketAddr) -> Result<Self, LiveError> {
+    /// Listen from now on, for web pages of these origins and for other programs. Returns the address, too, whose port the system may
+    /// choose.
+    pub(crate) fn open(
+        robot: &RobotName,
+        address: SocketAddr,
+        origins: &[String],
+    ) -> Result<(Self, SocketAddr), LiveError> {
+        let failed = |source| LiveError { address, source };
+        let listener = TcpListener::bind(address).map_err(failed)?;
+        let listens = listener.local_addr().map_err(failed)?;
+        let hidden = gate::hidden_address().map_err(failed)?;
         let context = Context::new();
         let server = WebSocketServer::new()
             .name(robot.to_string())
-            .bind(address.ip().to_string(), address.port())
+            .bind(hidden.to_string(), 0)
             .context(&context)
             .message_backlog_size(MOST_WAITING)
             .start_blocking()
-            .map_err(|source| LiveError { address, source })?;
-        Ok(Self { context, server })
-    }
-
-    /// The port on which it listens.
-    pub(crate) fn port(&self) -> u16 {
-        self.server.port()
+            .map_err(|source| failed(io::Error::other(source)))?;
+        gate::open(listener, SocketAddr::from((hidden, server.port())), origins.to_vec());
+        Ok((Self { context, server }, listens))
     }
 
     /// Serve the robot of `domain`, from run to run, until `ended` returns true.

@@ -1,7 +1,14 @@
 //! Tests of the messages for viewers, decoded by Foxglove's SDK.
 #![allow(clippy::unwrap_used)]
 
-use std::{collections::BTreeMap, f64::consts::FRAC_PI_2, path::Path};
+use std::{
+    collections::BTreeMap,
+    f64::consts::FRAC_PI_2,
+    io::{Read as _, Write as _},
+    net::TcpStream,
+    path::Path,
+    time::Duration,
+};
 
 use common::{
     bus::{encode_sample, encode_slice},
@@ -17,6 +24,8 @@ use foxglove::{
     },
 };
 use recording::viewers::{self, Drawn};
+
+use crate::live::Live;
 
 /// The topics of messages and the messages.
 type Sent = BTreeMap<String, Vec<u8>>;
@@ -127,4 +136,26 @@ fn messages_have_what_viewers_draw() {
     let log: Log = decoded(&sent, "log");
     assert_eq!((log.level, &*log.name), (3, "mapper"));
     assert_eq!(log.message, "12.5  WARN missed a grid version");
+}
+
+#[test]
+fn a_web_page_of_another_origin_is_refused_and_a_viewer_is_served() {
+    let own = ["https://lichtblick.example".to_owned()];
+    let robot = "foxglove-test".parse().unwrap();
+    let (_live, address) = Live::open(&robot, "127.0.0.1:0".parse().unwrap(), &own).unwrap();
+    for (origin, status) in [
+        ("", "101"),
+        ("Origin: https://lichtblick.example\r\n", "101"),
+        ("Origin: https://evil.example\r\n", "403"),
+        ("origin:null\r\n", "403"),
+        ("Origin: https://lichtblick.example\r\nOrigin: https://evil.example\r\n", "403"),
+    ] {
+        let mut stream = TcpStream::connect(address).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(30))).unwrap();
+        let head = "GET / HTTP/1.1\r\nHost: x\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Protocol: foxglove.sdk.v1\r\n";
+        stream.write_all(format!("{head}{origin}\r\n").as_bytes()).unwrap();
+        let mut answer = [0; 12];
+        stream.read_exact(&mut answer).unwrap();
+        assert_eq!(std::str::from_utf8(&answer[9..]).unwrap(), status, "{origin}");
+    }
 }

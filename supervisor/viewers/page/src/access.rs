@@ -1,7 +1,7 @@
 //! The access to a page: the names that it answers to, and the two tokens.
 //!
-//! On this machine everybody may watch and stop the robot. Behind a proxy, which others reach, that needs a token. Orders besides the
-//! stop need the token to drive in both cases.
+//! Other users of this machine reach a loopback address too, so nobody watches without a token. Orders besides the stop need the token
+//! to drive.
 
 use std::{
     fmt,
@@ -19,7 +19,7 @@ pub(crate) enum Role {
     Drive,
 }
 
-/// A secret that gives rights to its owner. It is printed once, at the start.
+/// A secret that gives rights to its owner.
 #[derive(Clone)]
 pub(crate) struct Token(String);
 
@@ -37,7 +37,7 @@ impl Token {
         self.0.len() == shown.len() && differing == 0
     }
 
-    /// The text of the token, to be shown to the operator alone.
+    #[cfg(test)]
     pub(crate) fn reveal(&self) -> &str {
         &self.0
     }
@@ -77,10 +77,12 @@ impl Access {
         Ok(Self { scheme, hosts, watch: Token::new()?, drive: Token::new()? })
     }
 
-    /// The address of the page for a person.
-    pub(crate) fn url(&self) -> String {
+    /// The addresses of the page with their tokens, in lines, for the operator alone.
+    pub(crate) fn addresses(&self) -> String {
         let host = self.hosts.first().map(String::as_str).unwrap_or_default();
-        format!("{}://{host}/", self.scheme)
+        let line =
+            |role, Token(token): &Token| format!("{role} {}://{host}/#{token}\n", self.scheme);
+        line("watch", &self.watch) + &line("drive", &self.drive)
     }
 
     /// The name of `host` as the rules have it; none if the page does not answer to it.
@@ -103,10 +105,8 @@ impl Access {
     pub(crate) fn role(&self, token: &str) -> Option<Role> {
         if self.drive.is(token) {
             Some(Role::Drive)
-        } else if self.watch.is(token) || self.scheme == "http" && token.is_empty() {
-            Some(Role::Watch)
         } else {
-            None
+            self.watch.is(token).then_some(Role::Watch)
         }
     }
 }
@@ -153,9 +153,9 @@ mod tests {
     }
 
     #[test]
-    fn behind_a_proxy_only_its_name_counts_and_nobody_watches_without_a_token() {
+    fn behind_a_proxy_only_its_name_counts() {
         let far = access(Some("robot.example"));
-        assert_eq!((far.url(), far.role("")), ("https://robot.example/".to_owned(), None));
+        assert!(far.addresses().starts_with("watch https://robot.example/#"));
         assert!(far.host("127.0.0.1:8080").is_none());
         let host = far.host("robot.example").unwrap();
         assert!(far.is_own_origin("https://robot.example", host));
@@ -168,9 +168,9 @@ mod tests {
     }
 
     #[test]
-    fn a_token_opens_what_it_is_for_and_no_token_only_watches() {
+    fn a_token_opens_what_it_is_for_and_no_token_opens_nothing() {
         let own = access(None);
-        assert_eq!(own.role(""), Some(Role::Watch));
+        assert_eq!((own.role(""), access(Some("robot.example")).role("")), (None, None));
         assert_eq!(own.role(own.watch.reveal()), Some(Role::Watch));
         assert_eq!(own.role(own.drive.reveal()), Some(Role::Drive));
         let earlier = access(None);

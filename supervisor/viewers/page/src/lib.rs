@@ -12,6 +12,7 @@
 //! | `shared` | what browsers are shown |
 //! | `robot` | the thread that reads the bus |
 //! | `server` | connections, requests, checks |
+//! | `places` | how many clients there are at a time |
 //! | `session` | one browser: authentication, messages, orders |
 //! | `orders` | what an operator may ask for |
 //! | `operator` | how that is done |
@@ -20,6 +21,7 @@ mod access;
 mod context;
 mod operator;
 mod orders;
+mod places;
 mod robot;
 mod server;
 mod serving;
@@ -46,7 +48,8 @@ use self::{
 
 /// Show a robot in a browser: map, field, charts, stages, events; orders for whoever has the token to drive.
 ///
-/// It prints two addresses. The part behind # is a token: keep it to those who may drive.
+/// It prints two addresses, and keeps them in a file that only you can read. The part behind # is a token, without which the page shows
+/// nothing: keep it to those who may watch or drive.
 #[derive(Debug, Parser)]
 #[command(name = "firsthand-page", version)]
 pub struct Arguments {
@@ -56,8 +59,7 @@ pub struct Arguments {
     /// Where to listen, on this machine only. Others come through a tunnel of SSH, or a proxy.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8080")]
     listen: SocketAddr,
-    /// A proxy on this machine encrypts for others, who know the page as https://NAME/. Then nobody watches without a token, and the
-    /// page answers to no other name.
+    /// A proxy on this machine encrypts for others, who know the page as https://NAME/. The page answers to no other name.
     #[arg(long, value_name = "NAME", value_parser = host_name)]
     behind_proxy: Option<String>,
 }
@@ -67,7 +69,7 @@ pub fn main() -> ExitCode {
     executable::run("error", serve, |error| match error.downcast_ref()? {
         PageError::NotLoopback(_) => Some("not-loopback"),
         PageError::Listen { .. } => Some("cannot-listen"),
-        PageError::System(_) => None,
+        PageError::Keep(_) | PageError::System(_) => None,
     })
 }
 
@@ -77,9 +79,7 @@ fn serve(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let Arguments { robot, listen, behind_proxy } = arguments;
     let options = Options { robot: robot.clone(), listen: *listen, proxy: behind_proxy.clone() };
     let page = Page::open(&options, Arc::new(RobotOperator { robot: robot.clone() }))?;
-    let url = page.access.url();
-    let (watch, drive) = (page.access.watch.reveal(), page.access.drive.reveal());
-    print_text(&format!("watch {url}#{watch}\ndrive {url}#{drive}\n"))?;
+    print_text(&format!("{}kept in {}\n", page.access.addresses(), page.kept.display()))?;
     page.show(&mut || signals.came());
     Ok(ExitCode::SUCCESS)
 }

@@ -12,14 +12,16 @@ use axum::{
 use hyper::{body::Incoming, server::conn::http1, service::service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use page::assets;
-use tokio::{net::TcpStream, sync::Semaphore, time::timeout};
+use tokio::{net::TcpStream, time::timeout};
 
-use crate::{context::Context, session};
+use crate::{
+    context::Context,
+    places::{Place, Places, lost},
+    session,
+};
 
-/// Most connections at a time; more are closed at once.
-const MOST_CONNECTIONS: usize = 64;
-/// Most websockets at a time.
-const MOST_SESSIONS: usize = 16;
+/// Most connections at a time whose clients have shown no token.
+const MOST_STRANGERS: usize = 64;
 /// The time for the request of a connection.
 const REQUEST_WITHIN: Duration = Duration::from_secs(3);
 /// The time within which a connection that does not become a websocket ends.
@@ -37,35 +39,29 @@ pub(crate) async fn serve(context: Arc<Context>, listener: TcpListener) {
         tracing::error!("the system refuses to watch the socket of the page");
         return;
     };
-    let connections = Arc::new(Semaphore::new(MOST_CONNECTIONS));
-    let sessions = Arc::new(Semaphore::new(MOST_SESSIONS));
+    let strangers = Places::new(MOST_STRANGERS);
     loop {
         let Ok((stream, _)) = listener.accept().await else {
             // There are too many open files.
             tokio::time::sleep(Duration::from_millis(100)).await;
             continue;
         };
-        let Ok(permit) = connections.clone().try_acquire_owned() else {
-            continue;
-        };
-        let (context, sessions) = (context.clone(), sessions.clone());
+        let (context, place) = (context.clone(), strangers.take());
         tokio::spawn(async move {
-            // The failure of a connection concerns only its client.
-            let _ = connection(&context, stream, &sessions).await;
-            drop(permit);
+            tokio::select! {
+                // The failure of a connection concerns only its client.
+                _ = connection(&context, stream, &place) => {}
+                () = lost(&place) => {}
+            }
         });
     }
 }
 
 /// Answer one request, or begin a session.
-async fn connection(
-    context: &Arc<Context>,
-    stream: TcpStream,
-    sessions: &Arc<Semaphore>,
-) -> io::Result<()> {
+async fn connection(context: &Arc<Context>, stream: TcpStream, place: &Place) -> io::Result<()> {
     let service = service_fn(|request: hyper::Request<Incoming>| {
-        let (context, sessions) = (context.clone(), sessions.clone());
-        async move { Ok::<_, Infallible>(answer(&context, request.map(Body::new), &sessions).await) }
+        let (context, place) = (context.clone(), place.clone());
+        async move { Ok::<_, Infallible>(answer(&context, request.map(Body::new), place).await) }
     });
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
@@ -81,7 +77,7 @@ async fn connection(
     }
 }
 
-async fn answer(context: &Arc<Context>, request: Request, sessions: &Arc<Semaphore>) -> Response {
+async fn answer(context: &Arc<Context>, request: Request, place: Place) -> Response {
     let Some(host) = host(context, &request) else {
         return StatusCode::MISDIRECTED_REQUEST.into_response();
     };
@@ -96,7 +92,7 @@ async fn answer(context: &Arc<Context>, request: Request, sessions: &Arc<Semapho
         return StatusCode::METHOD_NOT_ALLOWED.into_response();
     }
     if path == LIVE {
-        return session(context, request, sessions).await;
+        return session(context, request, place).await;
     }
     let Some((_, kind, text)) = assets::ALL.iter().find(|(at, ..)| *at == path) else {
         return StatusCode::NOT_FOUND.into_response();
@@ -129,20 +125,16 @@ fn host(context: &Context, request: &Request) -> Option<String> {
     absolute.is_none_or(|absolute| absolute.as_str() == host).then(|| host.to_owned())
 }
 
-async fn session(context: &Arc<Context>, request: Request, sessions: &Arc<Semaphore>) -> Response {
+async fn session(context: &Arc<Context>, request: Request, place: Place) -> Response {
     let (mut parts, _) = request.into_parts();
     let upgrade = match WebSocketUpgrade::from_request_parts(&mut parts, &()).await {
         Ok(upgrade) => upgrade,
         Err(refused) => return refused.into_response(),
     };
-    let Ok(permit) = sessions.clone().try_acquire_owned() else {
-        return StatusCode::SERVICE_UNAVAILABLE.into_response();
-    };
     let context = context.clone();
     let upgrade = upgrade.max_message_size(MOST_MESSAGE_BYTES).max_frame_size(MOST_MESSAGE_BYTES);
     upgrade.on_upgrade(async move |socket| {
-        session::run(socket, &context).await;
-        drop(permit);
+        session::run(socket, place, &context).await;
     })
 }
 

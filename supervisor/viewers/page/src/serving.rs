@@ -1,17 +1,30 @@
 //! A page that is served: its threads, its options, its errors.
 
 use std::{
-    io,
+    fs,
+    io::{self, Write as _},
     net::{SocketAddr, TcpListener},
+    os::unix::fs::OpenOptionsExt as _,
+    path::PathBuf,
     sync::Arc,
     thread,
     time::Duration,
 };
 
-use common::domain::{Domain, RobotName};
+use common::{
+    domain::{Domain, RobotName},
+    file::FileError,
+};
+use processes::domain::make_own_directory;
 use thiserror::Error;
 
-use crate::{access::Access, context::Context, orders::Operator, robot, server, shared::Shared};
+use crate::{
+    access::Access, context::Context, orders::Operator, places::Places, robot, server,
+    shared::Shared,
+};
+
+/// Most browsers at a time that may watch, and that may drive.
+const MOST_SESSIONS: usize = 16;
 
 /// The options of a page.
 #[derive(Clone, Debug)]
@@ -31,6 +44,8 @@ pub(crate) enum PageError {
     NotLoopback(SocketAddr),
     #[error("cannot listen on {address}: {source}; choose another port with --listen")]
     Listen { address: SocketAddr, source: io::Error },
+    #[error("{0}; nobody could open the page without its addresses")]
+    Keep(#[from] FileError),
     #[error("cannot start the page: {0}")]
     System(#[from] io::Error),
 }
@@ -42,6 +57,8 @@ pub(crate) struct Page {
     #[cfg_attr(not(test), allow(dead_code, reason = "tests connect to it"))]
     pub(crate) address: SocketAddr,
     pub(crate) access: Arc<Access>,
+    /// The file with the addresses, which is removed with the page.
+    pub(crate) kept: PathBuf,
     domain: Domain,
     pub(crate) shared: Arc<Shared>,
     server: Option<(tokio::sync::oneshot::Sender<()>, thread::JoinHandle<()>)>,
@@ -61,9 +78,16 @@ impl Page {
         listener.set_nonblocking(true)?;
         let address = listener.local_addr()?;
         let access = Arc::new(Access::new(address, options.proxy.as_deref())?);
+        let domain = Domain::of(options.robot.clone());
+        let kept = keep(&domain, address.port(), &access.addresses())?;
         let shared = Arc::new(Shared::default());
-        let context = Context { access: access.clone(), shared: shared.clone(), operator };
-        let context = Arc::new(context);
+        let context = Arc::new(Context {
+            access: access.clone(),
+            shared: shared.clone(),
+            operator,
+            watching: Places::new(MOST_SESSIONS),
+            driving: Places::new(MOST_SESSIONS),
+        });
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_io()
             .enable_time()
@@ -79,13 +103,7 @@ impl Page {
             });
             runtime.shutdown_timeout(Duration::from_secs(1));
         })?;
-        Ok(Self {
-            address,
-            access,
-            domain: Domain::of(options.robot.clone()),
-            shared,
-            server: Some((end, thread)),
-        })
+        Ok(Self { address, access, kept, domain, shared, server: Some((end, thread)) })
     }
 
     /// Show the robot, from run to run, until `ended` returns true.
@@ -94,8 +112,22 @@ impl Page {
     }
 }
 
+/// Keep the addresses of the page on `port` in a file that only its owner can read. No robot has its name, because that has a dot.
+fn keep(domain: &Domain, port: u16, addresses: &str) -> Result<PathBuf, FileError> {
+    let directory = domain.directory().parent().unwrap_or(domain.directory());
+    let file = directory.join(format!("{}.page-{port}", domain.robot));
+    let written = make_own_directory(directory).map_err(io::Error::other).and_then(|()| {
+        // A page that was killed left its file.
+        let _ = fs::remove_file(&file);
+        let made = fs::OpenOptions::new().write(true).create_new(true).mode(0o600).open(&file);
+        made?.write_all(addresses.as_bytes())
+    });
+    written.map_err(FileError::of("keep", &file)).map(|()| file)
+}
+
 impl Drop for Page {
     fn drop(&mut self) {
+        let _ = fs::remove_file(&self.kept);
         if let Some((end, thread)) = self.server.take() {
             drop(end);
             let _ = thread.join();

@@ -19,6 +19,7 @@ use crate::{
     access::Role,
     context::Context,
     orders::{Asked, Order},
+    places::{Place, lost},
     shared::Cursor,
 };
 
@@ -42,6 +43,7 @@ static STOPS: Semaphore = Semaphore::const_new(MOST_STOPS);
 
 /// Codes of websockets from 4000 are the application's.
 const WRONG_TOKEN: u16 = 4401;
+const REPLACED: u16 = 4409;
 const TOO_MUCH: u16 = 4429;
 
 /// The first message of a browser.
@@ -53,10 +55,14 @@ struct Hello {
 
 type Sender = SplitSink<WebSocket, Message>;
 
-pub(crate) async fn run(mut socket: WebSocket, context: &Arc<Context>) {
-    let first = timeout(TOKEN_WITHIN, socket.recv()).await;
+/// `stranger` is the place of a client that has shown no token.
+pub(crate) async fn run(mut socket: WebSocket, stranger: Place, context: &Arc<Context>) {
+    let first = tokio::select! {
+        first = timeout(TOKEN_WITHIN, socket.recv()) => first.ok().flatten(),
+        () = lost(&stranger) => None,
+    };
     let role = match &first {
-        Ok(Some(Ok(Message::Text(text)))) => {
+        Some(Ok(Message::Text(text))) => {
             let hello = serde_json::from_str::<Hello>(text).ok();
             hello.and_then(|hello| context.access.role(&hello.token))
         }
@@ -64,14 +70,27 @@ pub(crate) async fn run(mut socket: WebSocket, context: &Arc<Context>) {
     };
     let (sender, mut receiver) = socket.split();
     let Some(role) = role else {
-        close(sender, WRONG_TOKEN, "token").await;
+        close(sender, WRONG_TOKEN).await;
         return;
     };
+    drop(stranger);
+    let places = if role == Role::Drive { &context.driving } else { &context.watching };
+    let place = places.take();
     let (answers, told) = mpsc::channel(16);
     let sending = tokio::spawn(send(sender, Cursor::new(&context.shared), role, told));
     let (mut counted_since, mut count) = (Instant::now(), 0);
     let mut code = None;
-    while let Some(Ok(message)) = receiver.next().await {
+    loop {
+        let message = tokio::select! {
+            message = receiver.next() => message,
+            () = lost(&place) => {
+                code = Some(REPLACED);
+                break;
+            }
+        };
+        let Some(Ok(message)) = message else {
+            break;
+        };
         if counted_since.elapsed() >= Duration::from_secs(1) {
             (counted_since, count) = (Instant::now(), 0);
         }
@@ -120,7 +139,7 @@ async fn send(mut sender: Sender, mut cursor: Cursor, role: Role, mut told: mpsc
         tokio::select! {
             answer = told.recv() => match answer {
                 Some(Told::Answer(answer)) => due.push(Message::text(answer)),
-                Some(Told::Close(code)) => return close(sender, code, "too many messages").await,
+                Some(Told::Close(code)) => return close(sender, code).await,
                 None => return,
             },
             _ = ticks.tick() => {
@@ -137,8 +156,8 @@ async fn send(mut sender: Sender, mut cursor: Cursor, role: Role, mut told: mpsc
     }
 }
 
-async fn close(mut sender: Sender, code: u16, reason: &'static str) {
-    let frame = CloseFrame { code, reason: reason.into() };
+async fn close(mut sender: Sender, code: u16) {
+    let frame = CloseFrame { code, reason: Default::default() };
     let _ = timeout(TAKEN_WITHIN, sender.send(Message::Close(Some(frame)))).await;
 }
 

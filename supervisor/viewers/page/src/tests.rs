@@ -2,12 +2,15 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::{
+    fs,
     io::{ErrorKind, Read as _, Write as _},
     net::TcpStream,
+    os::unix::fs::MetadataExt as _,
     sync::{Arc, Mutex},
     time::Duration,
 };
 
+use rustix::process::geteuid;
 use serde_json::{Value, json};
 
 use crate::{
@@ -131,6 +134,14 @@ impl Browser {
         let mut browser = Self::open(page);
         browser.say(&json!({"token": token}).to_string());
         browser
+    }
+
+    fn watching(page: &Page) -> Self {
+        Self::with_token(page, page.access.watch.reveal())
+    }
+
+    fn driving(page: &Page) -> Self {
+        Self::with_token(page, page.access.drive.reveal())
     }
 
     fn say(&mut self, text: &str) {
@@ -271,7 +282,7 @@ fn every_file_forbids_scripts_of_others_and_none_has_a_token() {
 fn a_browser_that_shows_a_wrong_token_or_none_in_time_is_left() {
     let (page, noted) = page();
     let earlier = self::page().0;
-    for token in [earlier.access.drive.reveal(), "x", &page.access.drive.reveal()[..31]] {
+    for token in ["", earlier.access.drive.reveal(), "x", &page.access.drive.reveal()[..31]] {
         assert_eq!(Browser::with_token(&page, token).await_close(), 4401, "{token}");
     }
     let mut hasty = Browser::open(&page);
@@ -285,29 +296,27 @@ fn a_browser_that_shows_a_wrong_token_or_none_in_time_is_left() {
 fn who_watches_may_stop_the_robot_and_nothing_else() {
     let (page, noted) = page();
     page.shared.lock().begin(&json!({}), true);
-    for token in ["", page.access.watch.reveal()] {
-        let mut browser = Browser::with_token(&page, token);
-        assert_eq!(browser.await_key("role"), "watch");
-        for order in [
-            json!({"order": "resume"}),
-            json!({"order": "kill", "stage": "planner"}),
-            json!({"order": "restart", "stage": "planner"}),
-            json!({"order": "go_to", "targets": [[1.0, 2.0]]}),
-            json!({"order": "go_back"}),
-            json!({"order": "preview", "x": 1.0, "y": 0.0}),
-        ] {
-            let (done, why) = browser.order(&order);
-            assert!(!done && why.contains("driving"), "{order}: {why}");
-        }
-        assert_eq!(browser.order(&json!({"order": "stop"})), (true, "confirmed".to_owned()));
+    let mut browser = Browser::watching(&page);
+    assert_eq!(browser.await_key("role"), "watch");
+    for order in [
+        json!({"order": "resume"}),
+        json!({"order": "kill", "stage": "planner"}),
+        json!({"order": "restart", "stage": "planner"}),
+        json!({"order": "go_to", "targets": [[1.0, 2.0]]}),
+        json!({"order": "go_back"}),
+        json!({"order": "preview", "x": 1.0, "y": 0.0}),
+    ] {
+        let (done, why) = browser.order(&order);
+        assert!(!done && why.contains("driving"), "{order}: {why}");
     }
-    assert_eq!(*noted.0.lock().unwrap(), ["stop", "stop"]);
+    assert_eq!(browser.order(&json!({"order": "stop"})), (true, "confirmed".to_owned()));
+    assert_eq!(*noted.0.lock().unwrap(), ["stop"]);
 }
 
 #[test]
 fn who_drives_is_told_what_was_confirmed_or_why_it_was_not_done() {
     let (page, noted) = page();
-    let mut browser = Browser::with_token(&page, page.access.drive.reveal());
+    let mut browser = Browser::driving(&page);
     assert_eq!(browser.await_key("role"), "drive");
     let kill = json!({"order": "kill", "stage": "planner"});
     let (done, why) = browser.order(&kill);
@@ -326,10 +335,10 @@ fn who_drives_is_told_what_was_confirmed_or_why_it_was_not_done() {
 #[test]
 fn a_long_message_and_a_flood_end_the_session() {
     let (page, noted) = page();
-    let mut browser = Browser::with_token(&page, "");
+    let mut browser = Browser::watching(&page);
     browser.say(&format!("{{\"id\":1,\"order\":\"stop\",\"x\":\"{}\"}}", "x".repeat(4096)));
     browser.await_close();
-    let mut browser = Browser::with_token(&page, "");
+    let mut browser = Browser::watching(&page);
     for _ in 0..200 {
         browser.say("{}");
     }
@@ -341,7 +350,7 @@ fn a_long_message_and_a_flood_end_the_session() {
 #[test]
 fn connections_beyond_the_limit_are_closed_at_once_and_silent_ones_soon() {
     let (page, _) = page();
-    let mut watching = Browser::with_token(&page, "");
+    let mut watching = Browser::watching(&page);
     watching.await_key("role");
     let mut silent: Vec<_> = (0..300).map(|_| connect(&page)).collect();
     // Half a request is sent, so that the header is never complete.
@@ -350,6 +359,7 @@ fn connections_beyond_the_limit_are_closed_at_once_and_silent_ones_soon() {
     }
     watching.say(&json!({"id": 1, "order": "stop"}).to_string());
     assert_eq!(watching.await_key("answer")["ok"], true, "who watches is served meanwhile");
+    Browser::driving(&page).await_key("role");
     for stream in &mut silent {
         let mut answer = Vec::new();
         // The connection ends with any answer.
@@ -358,13 +368,38 @@ fn connections_beyond_the_limit_are_closed_at_once_and_silent_ones_soon() {
         }
     }
     assert_eq!(status(&ask(&page, &["GET / HTTP/1.1", &host(&page)])), "200");
-    let mut many: Vec<_> = (0..15).map(|_| Browser::with_token(&page, "")).collect();
-    for browser in &mut many {
-        browser.await_key("role");
+}
+
+#[test]
+fn clients_without_the_token_take_no_place_of_a_session_and_an_owner_always_gets_one() {
+    let (page, _) = page();
+    let strangers: Vec<_> = (0..100).map(|_| Browser::open(&page)).collect();
+    let mut sessions = Vec::new();
+    for open in [Browser::watching, Browser::driving] {
+        for _ in 0..17 {
+            let mut browser = open(&page);
+            browser.await_key("role");
+            sessions.push(browser);
+        }
     }
-    let (host, origin) = (host(&page), origin(&page));
-    let lines = [&["GET /live HTTP/1.1", &host, &origin][..], &UPGRADE].concat();
-    assert_eq!(status(&ask(&page, &lines)), "503", "sessions are counted");
+    for (number, browser) in sessions.iter_mut().enumerate() {
+        match number {
+            0 | 17 => assert_eq!(browser.await_close(), 4409, "the oldest of its role goes"),
+            _ => assert!(browser.order(&json!({"order": "stop"})).0, "{number}"),
+        }
+    }
+    drop(strangers);
+}
+
+#[test]
+fn the_addresses_are_kept_for_the_owner_alone_and_removed_with_the_page() {
+    let page = page().0;
+    let kept = fs::metadata(&page.kept).unwrap();
+    assert_eq!((kept.mode() & 0o777, kept.uid()), (0o600, geteuid().as_raw()));
+    assert_eq!(fs::read_to_string(&page.kept).unwrap(), page.access.addresses());
+    let file = page.kept.clone();
+    drop(page);
+    assert!(!file.exists());
 }
 
 #[test]

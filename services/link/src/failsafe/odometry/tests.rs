@@ -365,3 +365,43 @@ fn one_held_wheel_is_a_contact_at_its_side_and_behind_a_robot_that_backs() {
     // A robot that turns on the spot may be touched anywhere.
     assert_eq!(at([true, true], [-TURN, TURN]).half_width_rad, 0.0);
 }
+
+/// Drive a robot that is told `tells`, while another host tells it `other` `hertz` times a second.
+fn beside_another(tells: [i16; 2], other: [i16; 2], hertz: f64) -> Option<(f64, Suspicion)> {
+    let mut odometry = odometry();
+    let mut wheels = Wheels::default();
+    let mut told_s = 0.0;
+    for tick in 0..140 {
+        let time = f64::from(tick) * PERIOD;
+        while told_s < time {
+            wheels.roll_to(told_s);
+            wheels.tell(other);
+            told_s += 1.0 / hertz;
+        }
+        wheels.roll_to(time);
+        let now = MissionTime::from_seconds(time);
+        odometry.plausible(wheels.counts(), now);
+        if let Some(suspicion) = suspicion(&odometry) {
+            return Some((time, suspicion));
+        }
+        odometry.commanded(tells, now);
+        wheels.tell(tells);
+    }
+    None
+}
+
+#[test]
+fn a_robot_that_another_host_turns_or_speeds_is_suspected_and_the_words_name_that() {
+    for (other, hertz) in [
+        ([-TURN / 2, TURN / 2], 20.0),
+        ([TURN / 2, -TURN / 2], 10.0),
+        ([TURN, TURN], 20.0),
+        ([-TURN / 2, -TURN / 2], 20.0),
+    ] {
+        let suspected = beside_another([TURN / 3, TURN / 3], other, hertz);
+        assert!(suspected.is_some_and(|(after_s, _)| after_s < 5.0), "{other:?}: {suspected:?}");
+    }
+    let pushed = beside_another([TURN / 3, TURN / 3], [TURN, TURN], 20.0);
+    assert!(matches!(pushed, Some((_, Suspicion::Untold))), "{pushed:?}");
+    assert!(Suspicion::Untold.words().contains("another host may command"));
+}

@@ -111,3 +111,15 @@ fn every_method_is_tried_in_turn_while_the_robot_does_not_stop() {
     assert_eq!(tried(1000, 1100, false), []);
     assert_eq!(tried(1100, 1120, true), [(1100, 5)]);
 }
+
+#[test]
+fn a_robot_that_another_host_moves_and_whose_frames_it_takes_does_not_stop() {
+    let mut monitor = stop_monitor();
+    monitor.commanded([0, 0], MissionTime::default());
+    for frame in 0..8_u16 {
+        let now = MissionTime::from_seconds(4.0 * PERIOD * f64::from(frame));
+        monitor.heard([100 * frame; 2], now);
+        assert!(!monitor.is_at_rest());
+    }
+    assert_eq!(monitor.condition(Cause::RobotDoesNotStop, Moment::default()), Condition::Holds);
+}
