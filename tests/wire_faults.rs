@@ -293,6 +293,7 @@ fn a_robot_without_usable_motor_frames_is_said_to_be_unknown_and_the_first_signa
         run.signal(Signal::INT);
         let began = Instant::now();
         let (code, summary) = run.finish();
+        println!("{robot}: the run ended after {:.1} s", began.elapsed().as_secs_f64());
         assert!(began.elapsed() < ENDS_WITHIN, "{:?}", began.elapsed());
         assert_ended(code, &summary, 0, "aborted");
         let reason = summary["reason"].as_str().unwrap();
