@@ -9,7 +9,8 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::support::{
-    PATIENCE, Run, find, output, pid, signal_process,
+    PATIENCE, Run, domain, find, logged, operate, output, pid, refused, shared_memory,
+    signal_process, wait_until,
     wire::{Pass, Proxy, Robot},
 };
 
@@ -179,6 +180,58 @@ fn stops_without_middleware(name: &str, damage: impl Fn(&Run)) {
 #[test]
 fn an_operator_stops_a_robot_whose_supervisor_is_frozen() {
     stops_without_middleware("so-frozen", |run| run.signal(Signal::STOP));
+}
+
+fn remove_directory_of(robot: &str) {
+    // Its processes may make a part of it again meanwhile.
+    wait_until("it is removed", || fs::remove_dir_all(domain(robot).directory()).is_ok());
+}
+
+#[test]
+fn an_operator_stops_a_robot_whose_directory_was_removed_and_its_supervisor_frozen() {
+    stops_without_middleware("so-directory", |run| {
+        run.signal(Signal::STOP);
+        remove_directory_of(&run.robot);
+    });
+}
+
+#[test]
+fn a_robot_whose_directory_is_removed_again_and_again_is_stopped_resumed_sent_and_leaves_nothing() {
+    let robot = "so-cleaned";
+    let (_directory, mut body, mut run) = under_way(robot, "udp");
+    let domain = domain(robot);
+    for what in [&["stop"][..], &["resume"], &["goto", "4", "0"], &["stop"], &["resume"]] {
+        remove_directory_of(robot);
+        operate(robot, what);
+        match what[0] {
+            "stop" => assert!(body.is_at_rest()),
+            _ => drop(run.wait_until_driving()),
+        }
+    }
+    remove_directory_of(robot);
+    // The name of the robot stays taken, although no file says so.
+    refused(&["run", "open-room", "--robot", robot], "supervised", &[robot]);
+    run.wait_until("it is found", |_| domain.lock_file().exists());
+    assert!(logged(&run.directory(), "supervisor", &["files of the robot were removed"]) > 0);
+    fs::remove_file(domain.lock_file()).unwrap();
+    fs::remove_file(domain.middleware_config()).unwrap();
+    run.wait_until("it is found", |_| domain.lock_file().exists());
+    remove_directory_of(robot);
+    run.stop();
+}
+
+#[test]
+fn a_robot_without_its_files_of_the_middleware_is_stopped_and_its_run_leaves_nothing() {
+    let robot = "so-memory";
+    let (_directory, mut body, run) = under_way(robot, "udp");
+    for path in shared_memory(&domain(robot).shared_memory_prefix()) {
+        let removed = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+        removed.unwrap();
+    }
+    let stopped = output(&["stop", "--robot", robot]);
+    assert!(stopped.status.success(), "{stopped:?}");
+    assert!(body.is_at_rest());
+    run.stop();
 }
 
 #[test]

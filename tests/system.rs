@@ -38,6 +38,7 @@ mod report;
 mod robot_faults;
 mod screen;
 mod services;
+mod starting;
 mod stopping;
 mod structure;
 mod telemetry;

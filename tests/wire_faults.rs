@@ -14,6 +14,7 @@ use crate::support::{
 use common::wire::{
     Addressing, Command, Decoder, Motion, MotorSensors, Quantity, Report, Request, Stream,
 };
+use rustix::process::Signal;
 use serde_json::Value;
 
 /// The longest time from the first motion that shows a fault to the last command that moves the robot.
@@ -22,6 +23,8 @@ const BOUND: Duration = Duration::from_millis(1500);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fault {
     None,
+    /// No motor frame comes.
+    NoFrame,
     /// Every motor frame is the same.
     SameFrame,
     /// The right encoder stays at 0.
@@ -147,6 +150,7 @@ impl Shared {
                 continue;
             };
             match &mut report {
+                Report::Motor(_) if self.fault == Fault::NoFrame => continue,
                 Report::Motor(sensors) => self.distort(sensors),
                 Report::Standard(sensors) if self.fault == Fault::NoSonar => {
                     sensors.ultrasonic[1] = 0;
@@ -169,6 +173,7 @@ impl Shared {
         let [left, right] = &mut sensors.encoders;
         match self.fault {
             Fault::None
+            | Fault::NoFrame
             | Fault::NoSonar
             | Fault::DeafSonar
             | Fault::DeadRanger
@@ -266,6 +271,40 @@ fn an_operators_stop_fails_until_the_encoders_say_that_the_robot_rests() {
     run.wait_until("it rests", |status| status["link"]["at_rest"] == true);
     operate("fi-stop", &["stop"]);
     run.stop();
+}
+
+/// The longest time from a signal to the end of a run whose robot says nothing of its wheels: some of it is the load of the machine.
+const ENDS_WITHIN: Duration = Duration::from_secs(15);
+
+#[test]
+fn a_robot_without_usable_motor_frames_is_said_to_be_unknown_and_the_first_signal_ends_its_run() {
+    let ends = |robot: &str, before: Fault, fault: Fault| {
+        let (_body, faults, mut run) = faulty(robot, before);
+        if before == Fault::None {
+            faults.wait_until_moving(&mut run, Duration::from_millis(500));
+            faults.set(fault);
+        }
+        run.wait_until("the link stands", |status| {
+            let link = &status["link"];
+            link["connected"] == true && link["stopped"] == true && link["at_rest"] == false
+        });
+        // An operator is told the same.
+        refused(&["stop", "--robot", robot], "not-at-rest", &["whether it rests is not known"]);
+        run.signal(Signal::INT);
+        let began = Instant::now();
+        let (code, summary) = run.finish();
+        println!("{robot}: the run ended after {:.1} s", began.elapsed().as_secs_f64());
+        assert!(began.elapsed() < ENDS_WITHIN, "{:?}", began.elapsed());
+        assert_ended(code, &summary, 0, "aborted");
+        let reason = summary["reason"].as_str().unwrap();
+        assert!(reason.contains("whether it rests is not known: no usable motor fr"), "{reason}");
+        assert_nothing_left(robot);
+    };
+    std::thread::scope(|scope| {
+        scope.spawn(|| ends("fi-unheard", Fault::NoFrame, Fault::NoFrame));
+        scope.spawn(|| ends("fi-lost", Fault::None, Fault::NoFrame));
+        scope.spawn(|| ends("fi-useless", Fault::None, Fault::Random));
+    });
 }
 
 #[test]

@@ -7,11 +7,12 @@ use std::{
         fd::{AsFd, BorrowedFd},
         unix::net::UnixStream,
     },
+    time::Duration,
 };
 
 pub use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGTERM};
 
-use crate::process_status;
+use crate::{poll, process_status};
 
 #[derive(Debug)]
 pub struct Signals {
@@ -30,6 +31,11 @@ impl Signals {
             signal_hook::low_level::pipe::register(signal, written_by_handler.try_clone()?)?;
         }
         Ok(Self { pipe })
+    }
+
+    /// Whether a signal came that [`Self::came`] has not taken.
+    pub fn pending(&self) -> bool {
+        poll::is_readable(self, Duration::ZERO).unwrap_or(true)
     }
 
     pub fn came(&mut self) -> bool {

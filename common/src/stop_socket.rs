@@ -9,7 +9,7 @@ use std::{
         fd::{AsFd, BorrowedFd},
         linux::net::SocketAddrExt as _,
         unix::{
-            fs::MetadataExt as _,
+            fs::{DirBuilderExt as _, MetadataExt as _},
             net::{SocketAddr, UnixDatagram},
         },
     },
@@ -46,6 +46,7 @@ const MOST_ASKING: usize = 16;
 
 #[derive(Debug)]
 pub struct StopSocket {
+    path: PathBuf,
     socket: UnixDatagram,
     asking: Vec<SocketAddr>,
 }
@@ -55,13 +56,17 @@ impl StopSocket {
     pub fn bind(domain: &Domain) -> io::Result<Self> {
         let path = domain.stop_socket();
         remove(&path)?;
-        let socket = UnixDatagram::bind(&path)?;
-        socket.set_nonblocking(true)?;
-        Ok(Self { socket, asking: Vec::new() })
+        Ok(Self { socket: bind(&path)?, path, asking: Vec::new() })
     }
 
     pub fn take(&mut self) -> Option<Request> {
         let mut byte = [0];
+        // A cleaner of temporary files may remove it while the robot drives.
+        if !self.path.exists()
+            && let Ok(again) = bind(&self.path)
+        {
+            self.socket = again;
+        }
         loop {
             // Whatever is wrong with the socket, the robot drives on as ordered.
             let (length, from) = self.socket.recv_from(&mut byte).ok()?;
@@ -94,6 +99,16 @@ impl AsFd for StopSocket {
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.socket.as_fd()
     }
+}
+
+/// Bind a socket at `path`, and make its directory, if that was removed.
+fn bind(path: &Path) -> io::Result<UnixDatagram> {
+    if let Some(directory) = path.parent() {
+        fs::DirBuilder::new().recursive(true).mode(0o700).create(directory)?;
+    }
+    let socket = UnixDatagram::bind(path)?;
+    socket.set_nonblocking(true)?;
+    Ok(socket)
 }
 
 #[derive(Debug)]
@@ -188,5 +203,25 @@ fn remove(path: &Path) -> io::Result<()> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_link_whose_socket_and_directory_were_removed_is_reached_when_it_has_looked_again() {
+        let domain = Domain::of(format!("stop-{}", std::process::id()).parse().unwrap());
+        let mut link = StopSocket::bind(&domain).unwrap();
+        for _ in 0..2 {
+            fs::remove_dir_all(domain.directory()).unwrap();
+            assert_eq!(link.take(), None);
+            let operator = Operator::connect(&domain).unwrap().unwrap();
+            operator.send(Request::Stop).unwrap();
+            assert_eq!(link.take(), Some(Request::Stop));
+            assert_eq!(operator.answer(Duration::ZERO).unwrap(), Some(Answer::Heard));
+        }
+        fs::remove_dir_all(domain.directory()).unwrap();
     }
 }

@@ -10,12 +10,14 @@ use std::{
     path::{Path, PathBuf},
     str::FromStr,
     sync::OnceLock,
+    thread,
+    time::{Duration, Instant},
 };
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::lock_holders::holders;
+use crate::{claim, lock_holders::holders};
 
 /// The name of a robot, and of its domain: 1 to 16 of a-z, 0-9 and `-`.
 ///
@@ -63,6 +65,10 @@ impl fmt::Display for RobotName {
 
 pub const SHARED_MEMORY: &str = "/dev/shm";
 
+/// The patience with a supervisor that makes its directory again, for which it looks five times a second.
+const MADE_AGAIN: Duration = Duration::from_secs(2);
+const LOOK_EVERY: Duration = Duration::from_millis(10);
+
 /// The names of one robot's files on this machine, for one user.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Domain {
@@ -92,10 +98,11 @@ impl Domain {
         self.directory.join("lock")
     }
 
-    /// The process that holds the supervisor's lock; none if the lock is free.
+    /// The process that holds the supervisor's lock, or claims the robot while the lock is missing; none if there is neither.
     pub fn supervisor(&self) -> io::Result<Option<u32>> {
         let lock = match File::open(self.lock_file()) {
-            Err(error) if error.kind() == NotFound => return Ok(None),
+            // A cleaner of temporary files may have removed it.
+            Err(error) if error.kind() == NotFound => return claim::holder(self),
             opened => opened?,
         };
         match lock.try_lock_shared() {
@@ -105,12 +112,28 @@ impl Domain {
         }
     }
 
-    /// Whether a process holds the supervisor's lock; true if that cannot be found out.
+    /// Whether the robot has a supervisor; true if that cannot be found out.
     pub fn is_supervised(&self) -> bool {
-        match File::open(self.lock_file()) {
-            Ok(lock) => lock.try_lock_shared().is_err(),
-            Err(error) => error.kind() != NotFound,
+        !matches!(self.supervisor(), Ok(None))
+    }
+
+    /// The name of the claim on the robot. Two containers may have the network in common, and with it such names, so the name has the set
+    /// of processes that this one sees.
+    pub(crate) fn claim_name(&self) -> String {
+        let seen = fs::read_link("/proc/self/ns/pid").unwrap_or_default();
+        format!("firsthand-{}-{}-{}", self.owner, self.robot, seen.display())
+    }
+
+    /// Wait for `file` of the directory. A supervisor that runs makes it again, if a cleaner of temporary files removed it.
+    pub fn made_again(&self, file: PathBuf) -> PathBuf {
+        let began = Instant::now();
+        while !file.exists()
+            && began.elapsed() < MADE_AGAIN
+            && matches!(claim::holder(self), Ok(Some(_)))
+        {
+            thread::park_timeout(LOOK_EVERY);
         }
+        file
     }
 
     /// The lock that consumers share while they join a bus. The supervisor holds it exclusively while it creates or removes a bus, so a
@@ -122,7 +145,7 @@ impl Domain {
     /// Prevent the supervisor from creating or removing a bus until the result is dropped or the process ends. Hold it only briefly. An
     /// error means that there is no domain.
     pub fn joining(&self) -> io::Result<File> {
-        let lock = File::open(self.joining_lock_file())?;
+        let lock = File::open(self.made_again(self.joining_lock_file()))?;
         lock.lock_shared()?;
         Ok(lock)
     }

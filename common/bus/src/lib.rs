@@ -5,6 +5,7 @@
 //! |---|---|
 //! | [`clock`] | mission time, pace, the monotonic clock |
 //! | [`domain`] | a robot's directory, locks and shared memory on this machine |
+//! | [`claim`] | a supervisor's claim on its robot, without a file |
 //! | [`lock_holders`] | the processes that hold a lock on a file |
 //! | [`bus_instance`] | the names of one bus instance |
 //! | [`poll`], [`waiter`] | waiting for descriptors; one wait for topics, sockets, signals, processes |
@@ -37,6 +38,7 @@ mod any;
 mod authors;
 pub mod bus_instance;
 pub mod cdr;
+pub mod claim;
 pub mod clock;
 mod close_on_exec;
 pub mod domain;

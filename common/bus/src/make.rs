@@ -78,6 +78,13 @@ impl Bus {
         Ok((bus, Services(services)))
     }
 
+    /// Write the configuration again that processes join by.
+    pub fn restore_config(&self) -> Result<(), BusError> {
+        Self::write_config(&self.instance)?;
+        let failed = |error: io::Error| no_join(self.instance.domain())(error.to_string());
+        self.instance.make_current().map_err(failed)
+    }
+
     fn write_config(instance: &BusInstance) -> Result<(), BusError> {
         let failed = no_join(instance.domain());
         let mut config = Config::default();

@@ -183,6 +183,16 @@ payloads! {
 }
 
 wire_enum! {
+    /// What the encoders say.
+    Rest, unknown = Unknown {
+        /// Their newest frames are old, or cannot be used.
+        Unknown = 0,
+        AtRest = 1,
+        Moving = 2,
+    }
+}
+
+wire_enum! {
     /// The action of the link's failsafe, the least severe first.
     #[derive(PartialOrd, Ord)]
     Action, unknown = Stop, text = effect {
@@ -240,7 +250,7 @@ payloads! {
         action: u8 = Action::Stop.into(),
         /// The [`Cause`] of the action.
         cause: u8 = Cause::NotOrdered.into(),
-        /// 1: no wheel turns, by the encoders; 0: one does, or it is not known.
+        /// A [`Rest`]. 1: no wheel turns.
         at_rest: u8,
         frames_in: u64,
         /// Bytes that belonged to no frame.
@@ -283,6 +293,10 @@ impl LinkSample {
 
     pub const fn cause(&self) -> Cause {
         Cause::from_byte(self.cause)
+    }
+
+    pub const fn rest(&self) -> Rest {
+        Rest::from_byte(self.at_rest)
     }
 
     pub fn stopped(&self) -> bool {

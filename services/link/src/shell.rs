@@ -439,7 +439,7 @@ impl Shell {
             connected: link.connected().into(),
             action: link.decision().action.into(),
             cause: link.decision().cause.into(),
-            at_rest: link.is_at_rest().into(),
+            at_rest: link.rest().into(),
             frames_in: wire.messages,
             bytes_dropped: wire.bytes_dropped,
             foreign_datagrams: carried.foreign_datagrams,

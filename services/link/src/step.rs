@@ -16,7 +16,8 @@ use common::{
     driver::{Base, Driver, Memory, Motion, Turn, WireTally, counts::WheelCounts},
     mission::Mission,
     samples::{
-        Action, Cause, CommandSample, CommandState, HoldReason, Order, TurnSample, WheelSample,
+        Action, Cause, CommandSample, CommandState, HoldReason, Order, Rest, TurnSample,
+        WheelSample,
     },
     stop_socket::Request,
 };
@@ -214,12 +215,16 @@ impl Link {
         self.restart.restarts()
     }
 
-    /// The encoders say so. A held robot counts as at rest in lockstep, because mission time stands still.
     pub fn is_at_rest(&self) -> bool {
-        if self.in_ticks() {
-            self.decision.stops()
-        } else {
-            self.connected() && self.monitors().stop.is_at_rest()
+        self.rest() == Rest::AtRest
+    }
+
+    /// What the encoders say. A held robot counts as at rest in lockstep, because mission time stands still.
+    pub fn rest(&self) -> Rest {
+        match (self.in_ticks(), self.connected()) {
+            (true, _) if self.decision.stops() => Rest::AtRest,
+            (false, true) => self.monitors().stop.rest(self.now),
+            _ => Rest::Unknown,
         }
     }
 

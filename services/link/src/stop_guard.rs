@@ -21,7 +21,7 @@ use common::{
     domain::Domain,
     poll,
     run::Run,
-    samples::{HoldReason, Order},
+    samples::{HoldReason, Order, Rest},
     shell::StageError,
     stop_socket::Identity,
 };
@@ -36,7 +36,7 @@ use crate::{
 pub const NAME: &str = "stop-guard";
 
 const LOOKS_AGAIN: Duration = Duration::from_millis(20);
-/// A robot that is silent for longer is out of reach.
+/// A robot whose encoders say nothing for longer is out of reach, or does not know.
 const SILENT: Duration = Duration::from_secs(10);
 /// A robot that says that it moves, in spite of all stops, for longer may have wrong encoders.
 const TOLD_IN_VAIN: Duration = Duration::from_secs(60);
@@ -84,8 +84,8 @@ pub fn run(directory: &Path, link: &Identity) -> Result<(), StageError> {
     Ok(())
 }
 
-/// Tell the robot to stand, by each method of the protocol in turn, until its encoders say that it rests. Returns false if the robot is
-/// out of reach or does not stop, or `leave` returns true. Fails when the wire cannot be used.
+/// Tell the robot to stand, by each method of the protocol in turn, until its encoders say that it rests. Returns false if they say
+/// nothing or it does not stop, or `leave` returns true. Fails when the wire cannot be used.
 pub fn stand(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bool, StageError> {
     let MissionClock::Wall { rate, .. } = run.clock else {
         // In lockstep a robot waits for commands.
@@ -109,7 +109,6 @@ pub fn stand(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bool, StageEr
             take(Event::Wire(open));
         }
         while let Some(bytes) = transport.receive(now_ns)? {
-            heard_ns = now_ns;
             take(Event::Datagram(bytes));
         }
         for effect in effects {
@@ -121,8 +120,10 @@ pub fn stand(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bool, StageEr
                 _ => {}
             }
         }
-        if link.is_at_rest() {
-            return Ok(true);
+        match link.rest() {
+            Rest::AtRest => return Ok(true),
+            Rest::Moving => heard_ns = now_ns,
+            Rest::Unknown => {}
         }
         let since = |then_ns: u64| Duration::from_nanos(now_ns.saturating_sub(then_ns));
         if since(heard_ns) >= SILENT || is_gone() || since(began_ns) >= TOLD_IN_VAIN || leave() {

@@ -14,7 +14,7 @@ use processes::{DomainError, planner_executable::PlannerExecutableError};
 use recording::RecordingError;
 use thiserror::Error;
 
-use super::{missions::LookupError, output::write_stderr};
+use super::{missions::LookupError, output::write_stderr, robots};
 
 /// A sentence that names the input and the remedy.
 pub type Failure = Box<dyn Error>;
@@ -43,10 +43,8 @@ pub fn report(
         let error = error.as_ref();
         let code = own_code(error).or_else(|| code(error));
         let code = code.map_or(String::new(), |code| format!(" [{code}]"));
-        write_stderr(&format!("firsthand: {error}{code}\n"));
-        if let Some(remark) = remark(error) {
-            write_stderr(&format!("firsthand: {remark}\n"));
-        }
+        let said = not_running(error).unwrap_or_else(|| error.to_string());
+        write_stderr(&format!("firsthand: {said}{code}\n"));
         exit_code(error)
     })
 }
@@ -133,8 +131,8 @@ pub fn code(error: &(dyn Error + 'static)) -> Option<&'static str> {
     }
 }
 
-/// A robot that does not run for this user may run for another one, whose bus nobody else can join.
-fn remark(error: &(dyn Error + 'static)) -> Option<String> {
+/// A robot that does not run for this user may run for another one, whose bus nobody else can join; or its name is wrong.
+fn not_running(error: &(dyn Error + 'static)) -> Option<String> {
     let operator = error.downcast_ref().and_then(|error| match error {
         OperatorError::Bus(error) => Some(error),
         _ => None,
@@ -142,8 +140,14 @@ fn remark(error: &(dyn Error + 'static)) -> Option<String> {
     let Some(BusError::NotRunning { robot, .. }) = operator.or_else(|| error.downcast_ref()) else {
         return None;
     };
-    let user = users(Path::new(SHARED_MEMORY), robot).next()?;
-    Some(format!("a robot {robot:?} runs here for user {user}: `sudo -u '#{user}' firsthand ...`"))
+    let own = rustix::process::geteuid().as_raw();
+    let mut users = users(Path::new(SHARED_MEMORY), robot);
+    if let Some(user) = users.find(|user| *user != own) {
+        return Some(format!("robot {robot} of user {user} runs here; its owner may stop it"));
+    }
+    let running = robots::own().into_iter().filter(|robot| robot.supervisor.is_some());
+    let names: Vec<_> = running.map(|robot| robot.name.to_string()).collect();
+    (!names.is_empty()).then(|| format!("{error}; these run here: {}", names.join(", ")))
 }
 
 /// Users with files of that robot in `shared` memory: file names begin with the user's number.

@@ -1,6 +1,6 @@
 //! The supervisor's readers on the bus, and the record by which a run is judged.
 
-use std::collections::VecDeque;
+use std::{collections::VecDeque, time::Instant};
 
 use common::{
     bus::{Bus, BusError, Reader, Writers},
@@ -9,7 +9,7 @@ use common::{
     roster,
     samples::{
         CommandSample, CommandState, ContactSample, FieldCell, FieldHeader, GridHeader,
-        GuidanceSample, HealthSample, LinkSample, PoseSample, name_str,
+        GuidanceSample, HealthSample, LinkSample, PoseSample, Rest, name_str,
     },
     topics,
     waiter::Waiter,
@@ -77,6 +77,8 @@ pub struct Record {
     pub(crate) target_number: u64,
     pub arrival: Option<CommandSample>,
     pub link: Option<LinkSample>,
+    /// The time when a sample of the link was last read in which the encoders say whether the robot rests.
+    pub(crate) rest_read: Option<Instant>,
     pub grid: Replica<u8>,
     pub field_known: bool,
 }
@@ -164,6 +166,9 @@ impl Observer {
             stages.on_output(topics::LINK.spec().writer, link.stamp.tick);
             listener(Heard::Link(&link));
             record.link = Some(link);
+            if link.rest() != Rest::Unknown {
+                record.rest_read = Some(Instant::now());
+            }
         }
         Ok(roster_changed)
     }

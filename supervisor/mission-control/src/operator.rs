@@ -18,7 +18,7 @@ use common::{
     roster::{self, Roster},
     run::Run,
     samples::{
-        Action, Cause, LinkSample, MOST_TARGETS, RequestAnswer, RequestKind, RequestSample,
+        Action, Cause, LinkSample, MOST_TARGETS, RequestAnswer, RequestKind, RequestSample, Rest,
         RosterEntry, RosterHeader, TargetPoint, name,
     },
     start::StageError,
@@ -85,6 +85,7 @@ const LINK_ANSWERS: Duration = Duration::from_millis(200);
 pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
     let asked_ns = monotonic_ns();
     let domain = Domain::of(robot.clone());
+    domain.made_again(domain.stop_socket());
     let link = stop_socket::Operator::connect(&domain)
         .map_err(|error| OperatorError::System("open a socket to the link", error))?
         .filter(|link| {
@@ -189,7 +190,8 @@ fn await_rest(robot: &RobotName) -> Result<(), OperatorError> {
         Some(link) if link.connected == 0 => {
             "it does not answer; it is ordered to stand when it does".to_owned()
         }
-        Some(link) => format!("{}: it moves", link.cause().name()),
+        Some(link) if link.rest() == Rest::Moving => format!("{}: it moves", link.cause().name()),
+        Some(_) => "whether it rests is not known: no usable motor frames come".to_owned(),
     };
     let message = format!(
         "robot {robot} is ordered to stand and was not seen at rest within {} s: {seen}; see `firsthand status`",

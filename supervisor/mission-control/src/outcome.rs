@@ -48,11 +48,12 @@ impl Outcome {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What the encoders say at the end.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Wheels {
     AtRest,
-    /// The robot or its link does not answer.
-    Unknown,
+    /// Nothing, and why.
+    Unknown(String),
     Turning,
 }
 
@@ -114,8 +115,9 @@ impl Ending {
     pub(crate) fn with(self, wheels: Wheels) -> Self {
         match wheels {
             Wheels::AtRest => self,
-            Wheels::Unknown => {
-                Self { reason: format!("{}; nobody saw it at rest", self.reason), ..self }
+            Wheels::Unknown(why) => {
+                let reason = format!("{}; whether it rests is not known: {why}", self.reason);
+                Self { reason, ..self }
             }
             Wheels::Turning => {
                 let reason = format!("{}; told to stand by every method, it moves", self.reason);

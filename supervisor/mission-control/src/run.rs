@@ -46,47 +46,62 @@ pub struct Finished {
 pub struct StillMoving<'a> {
     supervisor: Supervisor<'a>,
     signals: Signals,
-    _lock: DomainLock,
 }
 
 impl StillMoving<'_> {
-    /// Wait until the robot rests or a signal tells this process to leave it. Returns whether the robot rests.
-    pub fn watch(mut self) -> Result<bool, SupervisorError> {
+    /// Wait until the robot rests or a signal tells this process to leave it. Returns what the robot did then.
+    pub fn watch(mut self) -> Result<&'static str, SupervisorError> {
         let supervisor = &mut self.supervisor;
-        let at_rest = loop {
+        let did = loop {
             supervisor.wait_turn()?;
-            if supervisor.wheels() == Wheels::AtRest {
-                break true;
+            match supervisor.wheels() {
+                Wheels::AtRest => break "rests",
+                wheels if self.signals.came() => {
+                    break if wheels == Wheels::Turning {
+                        "was left while it moved"
+                    } else {
+                        "was left"
+                    };
+                }
+                _ => supervisor.wait()?,
             }
-            if self.signals.came() {
-                break false;
-            }
-            supervisor.wait()?;
         };
         supervisor.stop_processes()?;
-        Ok(at_rest)
+        Ok(did)
     }
 }
 
+/// The signals that end a run, for its loop and for the last resort, which acts when the loop does not.
+pub type EndSignals = [Signals; 2];
+
+/// Catch them from now on. Call this before the first file of a run is made, so that a signal leaves none.
+pub fn end_signals() -> Result<EndSignals, SupervisorError> {
+    let catch = || Signals::catch(&[SIGINT, SIGTERM, SIGHUP]).map_err(system("catch signals"));
+    Ok([catch()?, catch()?])
+}
+
 /// Carry out a run. `attach` is called once, when the bus exists and no stage has started: consumers that start there miss no sample.
-/// `listener` hears the samples that the run reads. `show` is called a few times a second.
+/// It returns early when one of its signals comes. `listener` hears the samples that the run reads. `show` is called a few times a
+/// second. The files of the robot stay until `lock` is dropped, which is after the consumers have ended.
 pub fn run<'a>(
     options: &'a Options,
-    attach: &mut dyn FnMut(),
+    [mut signals, for_last_resort]: EndSignals,
+    lock: &mut Option<DomainLock>,
+    attach: &mut dyn FnMut(&Signals),
     listener: Listener,
     show: &mut dyn FnMut(&Progress<'_>),
 ) -> Result<(Finished, Option<StillMoving<'a>>), SupervisorError> {
-    let catch = || Signals::catch(&[SIGINT, SIGTERM, SIGHUP]).map_err(system("catch signals"));
-    let mut signals = catch()?;
     let turns = Turns::default();
-    last_resort::watch(catch()?, turns.clone());
     let domain = Domain::of(options.robot.clone());
-    let mut lock = DomainLock::acquire(domain, options.mission.grid_frame().area())?;
-    let mut supervisor = Supervisor::start(options, &lock, turns.clone(), attach, listener)?;
+    last_resort::watch(for_last_resort, turns.clone(), domain.clone());
+    let lock = lock.insert(DomainLock::acquire(domain, options.mission.grid_frame().area())?);
+    let mut supervisor =
+        Supervisor::start(options, lock, (turns.clone(), &signals), attach, listener)
+            .inspect_err(|_| turns.end())?;
     let ending = loop {
-        match supervisor.drive(&mut signals, show) {
+        match supervisor.drive(&mut signals, lock, show) {
             Ok(Some(ending)) => break Ok(ending),
-            Ok(None) => supervisor = supervisor.recreate_bus(&mut lock)?,
+            Ok(None) => supervisor = supervisor.recreate_bus(lock)?,
             Err(error) => break Err(error),
         }
     };
@@ -120,7 +135,7 @@ pub fn run<'a>(
     let ending = target_list::of_all(ending, &targets);
     let finished = Finished {
         duration_s: supervisor.clock.duration_s(decided.last_tick, &record, &truth),
-        ending: ending.with(wheels),
+        ending: ending.with(wheels.clone()),
         last_tick: decided.last_tick,
         record,
         truth,
@@ -131,7 +146,6 @@ pub fn run<'a>(
         resets,
         targets,
     };
-    let still_moving =
-        (wheels == Wheels::Turning).then_some(StillMoving { supervisor, signals, _lock: lock });
+    let still_moving = (wheels == Wheels::Turning).then_some(StillMoving { supervisor, signals });
     Ok((finished, still_moving))
 }

@@ -2,7 +2,10 @@
 
 use std::time::Duration;
 
-use common::{samples::Action, topics};
+use common::{
+    samples::{Action, LinkSample, Rest},
+    topics,
+};
 use processes::{domain::DomainLock, policy::Now};
 
 use crate::{
@@ -15,8 +18,10 @@ use crate::{
 
 /// Time for the link to confirm that the robot was ordered to stand, before the link is stopped.
 const STAND_CONFIRMED: Duration = Duration::from_millis(100);
-/// The time that a robot whose encoders nobody reads is waited for: its link may be starting.
-const HEARD_WITHIN: Duration = Duration::from_secs(1);
+/// The time for which a robot is waited for whose encoders say nothing: its link may be starting, or has not obeyed.
+const HEARD_WITHIN: Duration = Duration::from_secs(2);
+/// What the link said of the encoders so long ago, when it says it ten times a second, does not count.
+const NEW: Duration = Duration::from_secs(1);
 
 impl Supervisor<'_> {
     /// Bring the robot to rest and stop the stages. The link comes last, and not while wheels turn. Without `trusts_encoders` nobody
@@ -25,7 +30,9 @@ impl Supervisor<'_> {
         self.service.stopping();
         self.decision = Decision::ENDING;
         let wheels = match self.come_to_rest()? {
-            Wheels::Turning if !trusts_encoders => Wheels::Unknown,
+            Wheels::Turning if !trusts_encoders => {
+                Wheels::Unknown("its encoders cannot be right".to_owned())
+            }
             wheels => wheels,
         };
         if wheels == Wheels::Turning {
@@ -75,34 +82,55 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Order the end of the mission, and wait until the encoders say that the robot rests.
+    /// Order the end of the mission, and wait until the encoders say that the robot rests, or have said nothing for too long.
     fn come_to_rest(&mut self) -> Result<Wheels, SupervisorError> {
         self.publish_state()?;
         let began = self.stages.now();
+        let mut heard = began;
         loop {
             self.wait_turn()?;
-            let (wheels, patience) = match self.wheels() {
-                Wheels::AtRest => return Ok(Wheels::AtRest),
-                Wheels::Turning => (Wheels::Turning, RESTS_WITHIN),
-                Wheels::Unknown if self.drove => (Wheels::Unknown, HEARD_WITHIN),
-                Wheels::Unknown => (Wheels::Unknown, Duration::ZERO),
+            let wheels = self.wheels();
+            let now = self.stages.now();
+            let (since, patience) = match wheels {
+                Wheels::AtRest => return Ok(wheels),
+                Wheels::Turning => {
+                    heard = now;
+                    (began, RESTS_WITHIN)
+                }
+                Wheels::Unknown(_) if self.drove || self.connected_link().is_some() => {
+                    (heard, HEARD_WITHIN)
+                }
+                Wheels::Unknown(_) => return Ok(wheels),
             };
-            if self.waited_since(began) >= patience {
+            if now.saturating_sub(since) >= patience {
                 return Ok(wheels);
             }
             self.wait()?;
         }
     }
 
-    /// The link's answer since the end of the mission was ordered.
+    /// What the encoders say since the end of the mission was ordered.
     pub(crate) fn wheels(&self) -> Wheels {
-        let link = self.bus.observer.record.link;
-        match link.filter(|_| self.stages.runs(topics::LINK.spec().writer)) {
-            Some(link) if link.connected == 0 => Wheels::Unknown,
-            Some(link) if link.action() == Action::End && link.at_rest == 1 => Wheels::AtRest,
-            Some(_) => Wheels::Turning,
-            None => Wheels::Unknown,
+        let Some(link) = self.connected_link() else {
+            return Wheels::Unknown("it does not answer".to_owned());
+        };
+        let age = self.bus.observer.record.rest_read.map(|read| read.elapsed());
+        match (link.rest(), age) {
+            (_, None) => Wheels::Unknown("no usable motor frames came".to_owned()),
+            (Rest::AtRest, Some(age)) if age < NEW && link.action() == Action::End => {
+                Wheels::AtRest
+            }
+            (Rest::Moving, Some(age)) if age < NEW => Wheels::Turning,
+            (_, Some(age)) => {
+                Wheels::Unknown(format!("no usable motor frames for {:.1} s", age.as_secs_f64()))
+            }
         }
+    }
+
+    /// The state of a link that runs and hears the robot.
+    fn connected_link(&self) -> Option<LinkSample> {
+        let runs = self.stages.runs(topics::LINK.spec().writer);
+        self.bus.observer.record.link.filter(|link| runs && link.connected == 1)
     }
 
     fn waited_since(&self, since: Now) -> Duration {

@@ -22,7 +22,8 @@ use thiserror::Error;
 
 use crate::long_record;
 
-const STARTUP: Duration = Duration::from_secs(5);
+/// Beside 30 busy processes a core it takes seconds.
+const STARTUP: Duration = Duration::from_secs(30);
 const STOP_GRACE: Duration = Duration::from_millis(300);
 /// The greatest length of a line of ground truth, which has under 300 bytes; a longer one is an error.
 const LONGEST_LINE: usize = 64 * 1024;
@@ -33,6 +34,8 @@ pub enum SimulatorError {
     System { action: String, source: io::Error },
     #[error("the simulated robot did not start: {0}")]
     Startup(String),
+    #[error("the start of the simulated robot was given up")]
+    GivenUp,
 }
 
 fn system(action: impl Into<String>) -> impl FnOnce(io::Error) -> SimulatorError {
@@ -56,13 +59,14 @@ struct GroundTruth {
 }
 
 impl Simulator {
-    /// Start a simulator in the world of `mission` and wait until it listens. `firsthand` starts that executable. The simulator goes on
-    /// from an earlier one's checkpoint in `directory`.
+    /// Start a simulator in the world of `mission` and wait until it listens, or `given_up` is readable. `firsthand` starts that
+    /// executable. The simulator goes on from an earlier one's checkpoint in `directory`.
     pub fn start(
         mut firsthand: Command,
         directory: &Path,
         mission: &Mission,
         pace: Pace,
+        given_up: Option<BorrowedFd<'_>>,
     ) -> Result<Self, SimulatorError> {
         let text = toml::to_string(mission)
             .map_err(|error| system("write the mission of")(io::Error::other(error)))?;
@@ -111,8 +115,13 @@ impl Simulator {
                 let words = fs::read_to_string(&log_path).unwrap_or_default();
                 return Err(SimulatorError::Startup(words.trim().to_owned()));
             }
-            let descriptors = [truth.pipe.as_fd(), process.as_fd()];
-            poll::readable(&descriptors, Some(STARTUP)).map_err(system("wait for"))?;
+            let mut descriptors = vec![truth.pipe.as_fd(), process.as_fd()];
+            descriptors.extend(given_up);
+            let readable =
+                poll::readable(&descriptors, Some(STARTUP)).map_err(system("wait for"))?;
+            if readable.get(2) == Some(&true) {
+                return Err(SimulatorError::GivenUp);
+            }
         }
     }
 

@@ -1,6 +1,6 @@
 //! The loop of one robot's supervisor: it reads events, asks the pure functions for decisions, and carries them out.
 
-use std::{os::unix::fs::symlink, path::PathBuf};
+use std::{net::Ipv4Addr, os::fd::AsFd as _, path::PathBuf};
 
 use common::{
     address::Address,
@@ -26,7 +26,7 @@ use processes::{
 use crate::{
     bus_endpoints::BusEndpoints,
     decisive,
-    error::{SupervisorError, system},
+    error::SupervisorError,
     judge::{self, Arrival, Deadline, StopClock, TickProgress},
     observer::Listener,
     order::{self, Decision},
@@ -35,7 +35,7 @@ use crate::{
     recovery::{RecoveredRun, StateFile},
     recovery_step::RecoverySteps,
     run_clock::RunClock,
-    simulator::Simulator,
+    simulator::{Simulator, SimulatorError},
     stall::StallWatch,
     target_list::TargetList,
 };
@@ -58,18 +58,26 @@ pub(crate) struct Robot {
 }
 
 impl Robot {
-    fn start(options: &Options) -> Result<Self, SupervisorError> {
+    fn start(options: &Options, signals: &Signals) -> Result<Self, SupervisorError> {
         if let Some(address) = &options.mission.robot.address {
             let address = address.parse::<Address<String>>()?.resolve()?;
             return Ok(Self { simulator: None, address });
         }
-        let simulator = Simulator::start(
+        let started = Simulator::start(
             processes::process::firsthand(&[]),
             &options.directory,
             &options.mission,
             options.pace,
-        )?;
-        Ok(Self { address: Address::Udp(simulator.address()), simulator: Some(simulator) })
+            Some(signals.as_fd()),
+        );
+        let simulator = match started {
+            // The run ends before anyone speaks to a robot.
+            Err(SimulatorError::GivenUp) => None,
+            started => Some(started?),
+        };
+        let address = simulator.as_ref().map(Simulator::address);
+        let address = Address::Udp(address.unwrap_or((Ipv4Addr::UNSPECIFIED, 0).into()));
+        Ok(Self { simulator, address })
     }
 
     /// The ground truth of a simulated robot.
@@ -110,18 +118,18 @@ pub(crate) struct Supervisor<'a> {
 }
 
 impl<'a> Supervisor<'a> {
-    /// Start the robot, write the run file, start the stages.
+    /// Start the robot, write the run file, start the stages. After one of `signals` no stage is started.
     pub(crate) fn start(
         options: &'a Options,
-        lock: &DomainLock,
-        turns: Turns,
-        attach: &mut dyn FnMut(),
+        lock: &mut DomainLock,
+        (turns, signals): (Turns, &Signals),
+        attach: &mut dyn FnMut(&Signals),
         listener: Listener,
     ) -> Result<Self, SupervisorError> {
         let directory = &options.directory;
         let mission = &options.mission;
         let mut state_file = StateFile::open(directory)?;
-        let robot = Robot::start(options)?;
+        let robot = Robot::start(options, signals)?;
         let clock = match &options.recovered {
             Some(run) => {
                 state_file.state.resumes += 1;
@@ -167,15 +175,17 @@ impl<'a> Supervisor<'a> {
             supervisor.await_target();
         }
         let domain = Domain::of(options.robot.clone());
-        let link_to_run = |link: PathBuf| {
-            symlink(directory, &link).map_err(system(format!("make {}", link.display())))
-        };
-        link_to_run(domain.run_directory())?;
-        attach();
+        lock.link_to_run(directory, domain.run_directory())?;
+        if !signals.pending() {
+            attach(signals);
+        }
+        if signals.pending() {
+            return Ok(supervisor);
+        }
         supervisor.publish_state()?;
         supervisor.stages.start_all(supervisor.first_tick());
         if options.starter == Starter::External {
-            link_to_run(domain.run_link())?;
+            lock.link_to_run(directory, domain.run_link())?;
             // Systemd starts the stages after this notification.
             supervisor.service.ready();
         }
@@ -192,6 +202,7 @@ impl<'a> Supervisor<'a> {
     pub(crate) fn drive(
         &mut self,
         signals: &mut Signals,
+        lock: &mut DomainLock,
         show: &mut dyn FnMut(&Progress<'_>),
     ) -> Result<Option<Ending>, SupervisorError> {
         self.bus.waiter.on_readable(&*signals)?;
@@ -209,6 +220,7 @@ impl<'a> Supervisor<'a> {
             if self.bus.is_due(topics::RESTATE) {
                 self.publish_state()?;
                 self.show_progress(show);
+                lock.restore();
             }
             let any_starting = self.stages.any_starting();
             self.cleanup.run_if_due(&self.bus.bus, any_starting);

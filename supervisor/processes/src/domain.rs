@@ -3,14 +3,16 @@
 use std::{
     fs::{self, DirBuilder, File, OpenOptions},
     io,
-    os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt},
-    path::Path,
+    os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt, symlink},
+    path::{Path, PathBuf},
     rc::Rc,
+    thread,
     time::{Duration, Instant},
 };
 
 use common::{
     bus::{Bus, Services},
+    claim::Claim,
     domain::{Domain, SHARED_MEMORY},
     topics,
 };
@@ -41,16 +43,33 @@ pub struct DomainLock {
     // This lock keeps consumers from joining while the bus is made and removed, except one that is stuck.
     joining_lock: Option<File>,
     cells: usize,
-    _lock: File,
+    /// Links to the run's directory, each with where it leads.
+    links: Vec<(PathBuf, PathBuf)>,
+    /// Whether what is missing could not be made again, which the log says once.
+    stays_missing: bool,
+    lock: File,
+    // None where another user has taken its name. The claim is given up last.
+    claim: Option<Claim>,
 }
 
 impl DomainLock {
     /// Lock `domain`, remove the files of an earlier supervisor, create the services for a map of `cells` cells.
     pub fn acquire(domain: Domain, cells: usize) -> Result<Self, DomainError> {
         descriptors::raise_limit().map_err(|limit| DomainError::Descriptors { limit })?;
+        // A robot whose directory was removed is still claimed.
+        let claim = claim(&domain)?;
         let lock = lock(&domain)?;
-        let mut acquired =
-            Self { domain, bus: None, stages_lock: None, joining_lock: None, cells, _lock: lock };
+        let mut acquired = Self {
+            domain,
+            bus: None,
+            stages_lock: None,
+            joining_lock: None,
+            cells,
+            links: Vec::new(),
+            stays_missing: false,
+            lock,
+            claim,
+        };
         // No consumer mistakes the bus of a supervisor that was killed for the new one.
         remove_file(&acquired.domain.middleware_config())?;
         remove_run(&acquired.domain)?;
@@ -71,6 +90,8 @@ impl DomainLock {
     /// Remove the bus. No stage can join until there is one again.
     fn clear(&mut self) -> Result<(), DomainError> {
         self.bus = None;
+        // A cleaner of temporary files may have removed it.
+        make_directory(&self.domain)?;
         if self.stages_lock.is_none() {
             // External stages may still be stopping, or just starting.
             self.stages_lock = Some(orphans::wait_for(&self.domain)?);
@@ -84,19 +105,103 @@ impl DomainLock {
     pub fn bus(&self) -> Option<Rc<Bus>> {
         self.bus.as_ref().map(|(_, bus)| Rc::clone(bus))
     }
+
+    /// Link `at` in the domain's directory to the directory of the run.
+    pub fn link_to_run(&mut self, run: &Path, at: PathBuf) -> Result<(), DomainError> {
+        symlink(run, &at).map_err(failed("make", &at))?;
+        self.links.push((at, run.to_path_buf()));
+        Ok(())
+    }
+
+    /// Make again what is missing in the domain's directory, because a cleaner of temporary files may remove it while the robot drives.
+    /// Without it nobody finds the robot. Call this a few times a second.
+    pub fn restore(&mut self) {
+        if let Some(claim) = &self.claim {
+            claim.forget_askers();
+        }
+        let domain = &self.domain;
+        let files = [
+            domain.lock_file(),
+            domain.stages_lock_file(),
+            domain.joining_lock_file(),
+            domain.middleware_config(),
+        ];
+        let mut all = self.links.iter().map(|(at, _)| at).chain(&files);
+        if all.all(|file| file.symlink_metadata().is_ok()) {
+            return;
+        }
+        let again = self.make_again();
+        // An error that stays is said once.
+        if again.is_ok() || !self.stays_missing {
+            tracing::warn!(
+                ?again,
+                "files of the robot were removed while it ran, and are made again"
+            );
+        }
+        self.stays_missing = again.is_err();
+    }
+
+    fn make_again(&mut self) -> Result<(), DomainError> {
+        let domain = &self.domain;
+        make_directory(domain)?;
+        if !domain.lock_file().exists() {
+            self.lock = lock(domain)?;
+        }
+        if let Some((_, bus)) = &self.bus {
+            bus.restore_config()?;
+        }
+        for (at, run) in &self.links {
+            remove_file(at)?;
+            symlink(run, at).map_err(failed("make", at))?;
+        }
+        // A consumer that waits for the last of them finds all others.
+        for file in [domain.stages_lock_file(), domain.joining_lock_file()] {
+            let made = File::options().create(true).append(true).open(&file);
+            made.map_err(failed("make", &file))?;
+        }
+        Ok(())
+    }
 }
 
 impl Drop for DomainLock {
     fn drop(&mut self) {
         // The lock is removed last, with its directory; a process that waits for the lock then makes its own.
         let _ = self.clear();
-        let domain = &self.domain;
-        let _ = remove_run(domain);
-        for file in [domain.stages_lock_file(), domain.joining_lock_file(), domain.lock_file()] {
-            let _ = fs::remove_file(file);
-        }
-        let _ = fs::remove_dir(self.domain.directory());
+        remove_directory_of(&self.domain);
     }
+}
+
+/// Remove all files of a domain whose stages have ended. A supervisor that hangs ends like this.
+pub(crate) fn remove_all(domain: &Domain) {
+    let _ = wipe(domain);
+    remove_directory_of(domain);
+}
+
+fn remove_directory_of(domain: &Domain) {
+    let _ = remove_run(domain);
+    for file in [domain.stages_lock_file(), domain.joining_lock_file(), domain.lock_file()] {
+        let _ = fs::remove_file(file);
+    }
+    let _ = fs::remove_dir(domain.directory());
+}
+
+/// Claim the robot. A killed supervisor holds its claim until the kernel has removed the process.
+fn claim(domain: &Domain) -> Result<Option<Claim>, DomainError> {
+    let began = Instant::now();
+    loop {
+        match Claim::make(domain) {
+            Ok(claim) => return Ok(Some(claim)),
+            Err(_) if began.elapsed() < LAST_HOLDER_ENDS => thread::park_timeout(orphans::RETRY),
+            Err(_) => break,
+        }
+    }
+    let Ok(Some(process)) = domain.supervisor() else {
+        tracing::warn!(
+            "another user has the name of the robot's claim: without its directory the robot is not found"
+        );
+        return Ok(None);
+    };
+    Err(DomainError::Supervised { robot: domain.robot.to_string(), holder: process.to_string() })
 }
 
 fn make_directory(domain: &Domain) -> Result<(), DomainError> {

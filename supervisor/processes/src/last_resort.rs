@@ -2,11 +2,12 @@
 //! supervisor's loop does not react to signals then.
 //!
 //! A separate thread receives the signals too. If the loop makes no iteration for [`STUCK`] after a signal, the thread ends the
-//! stages and the process. The robot stands by then: its link stops it when the supervisor is silent, and a command expires if no
-//! other follows.
+//! stages and the process, and removes their files. The robot stands by then: its link stops it when the supervisor is silent, and a
+//! command expires if no other follows.
 
 use std::{
     fs,
+    io::Write as _,
     os::fd::AsFd as _,
     sync::{
         Arc,
@@ -17,16 +18,24 @@ use std::{
 };
 
 use common::{
+    domain::Domain,
     poll,
     signals::{Signals, exit_at_once},
 };
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::{
+    process::{Pid, Signal, kill_process},
+    thread::gettid,
+};
+
+use crate::domain;
 
 /// The time without an iteration after which the loop hangs; a healthy one turns five times a second.
 const STUCK: Duration = Duration::from_secs(2);
 const GRACE: Duration = Duration::from_millis(300);
 /// The exit code of a run that ends like this, which is that of any run that failed.
 const FAILED: u8 = 1;
+
+const HANGS: &str = "the supervisor hangs, perhaps in a file of the bus that was changed; the stages and the run are ended";
 
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
@@ -47,15 +56,17 @@ impl Turns {
         self.ended.store(true, Ordering::Relaxed);
     }
 
-    /// Wait until the loop has not turned for [`STUCK`]. Returns false when it has ended.
-    fn are_stuck(&self) -> bool {
-        let (mut seen, mut stuck) = (0, Duration::ZERO);
+    /// Wait until the loop of `thread` has not turned for [`STUCK`]. Returns false when it has ended.
+    fn are_stuck(&self, thread: Pid) -> bool {
+        let (mut seen, mut stuck, mut waited) = (0, Duration::ZERO, processor_awaited(thread));
         while !self.ended.load(Ordering::Relaxed) {
             let now = self.count.load(Ordering::Relaxed);
             if now != seen {
-                (seen, stuck) = (now, Duration::ZERO);
+                (seen, stuck, waited) = (now, Duration::ZERO, processor_awaited(thread));
             }
-            if stuck >= STUCK {
+            // A loop that waits for a processor does not hang.
+            let waits = processor_awaited(thread).saturating_sub(waited);
+            if stuck.saturating_sub(waits) >= STUCK {
                 return true;
             }
             let began = Instant::now();
@@ -67,23 +78,31 @@ impl Turns {
     }
 }
 
-/// Watch `turns` from the first of `signals` on.
-pub fn watch(mut signals: Signals, turns: Turns) {
+/// The time for which `thread` was ready to run and other processes ran; zero where the kernel does not count it.
+fn processor_awaited(thread: Pid) -> Duration {
+    let counts = fs::read_to_string(format!("/proc/self/task/{thread}/schedstat"));
+    let waited = counts.ok().and_then(|counts| counts.split(' ').nth(1)?.parse().ok());
+    Duration::from_nanos(waited.unwrap_or_default())
+}
+
+/// Watch the `turns` of the loop of this thread, the supervisor of `domain`, from the first of `signals` on.
+pub fn watch(mut signals: Signals, turns: Turns, domain: Domain) {
+    let watched = gettid();
     thread::spawn(move || {
         while !signals.came() {
             if poll::readable(&[signals.as_fd()], None).is_err() {
                 return;
             }
         }
-        if !turns.are_stuck() {
+        if !turns.are_stuck(watched) {
             return;
         }
-        tracing::error!(
-            "the supervisor hangs, perhaps in a file of the bus that was changed; the stages and the run are ended"
-        );
+        tracing::error!("{HANGS}");
+        let _ = writeln!(std::io::stderr(), "firsthand: {HANGS}");
         end_children(Signal::TERM);
         thread::park_timeout(GRACE);
         end_children(Signal::KILL);
+        domain::remove_all(&domain);
         exit_at_once(FAILED);
     });
 }

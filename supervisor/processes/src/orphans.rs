@@ -24,7 +24,7 @@ const STOP_GRACE: Duration = Duration::from_secs(2);
 const KILLED: Duration = Duration::from_secs(1);
 const JOINED_WITHIN: Duration = Duration::from_millis(300);
 /// Pause between attempts to lock. A file lock has no descriptor to wait on.
-const RETRY: Duration = Duration::from_millis(10);
+pub(crate) const RETRY: Duration = Duration::from_millis(10);
 
 /// Wait until no stage runs in the domain, because its files are removed next. No stage can join while the result is held.
 pub(crate) fn wait_for(domain: &Domain) -> Result<File, DomainError> {

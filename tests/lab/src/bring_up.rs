@@ -181,7 +181,7 @@ fn one(arguments: &Arguments, number: u64) -> Result<(bool, String)> {
     let directory = arguments.out.join(number.to_string());
     fs::create_dir_all(&directory).or_cannot_file("make", &directory)?;
     let mut simulator =
-        Simulator::start(robot::firsthand(&[]), &directory, &mission, Pace::Rate(1.0))?;
+        Simulator::start(robot::firsthand(&[]), &directory, &mission, Pace::Rate(1.0), None)?;
     let stated = directory.join("stated.toml");
     fs::write(&stated, &text).or_cannot_file("write", &stated)?;
     let address = format!("robot.address='udp://{}'", simulator.address());

@@ -6,7 +6,7 @@ use common::{
     clock::MissionTime,
     driver::counts::WheelCounts,
     mission::{Mission, Response},
-    samples::Cause,
+    samples::{Cause, Rest},
 };
 
 use super::monitor::{Condition, Counts, Moment, Monitor, Observation};
@@ -35,6 +35,8 @@ pub struct StopMonitor {
     driven: f64,
     told_to_stand: Option<MissionTime>,
     frame: Option<(WheelCounts, MissionTime)>,
+    /// Whether the newest two frames show motion.
+    moves: bool,
     moving: Duration,
     resting: Duration,
     method: usize,
@@ -80,6 +82,7 @@ impl StopMonitor {
         } else {
             Duration::ZERO
         };
+        self.moves = moves;
         let comes_to_rest = self.comes_to_rest();
         let due = |told: MissionTime| now.since(told).saturating_sub(gap) >= comes_to_rest;
         if !moves {
@@ -90,6 +93,7 @@ impl StopMonitor {
     }
 
     const fn not_heard(&mut self) {
+        self.moves = false;
         self.moving = Duration::ZERO;
         self.resting = Duration::ZERO;
     }
@@ -99,8 +103,14 @@ impl StopMonitor {
         Duration::from_secs_f64(STOPS_ARE_LOST_S + self.response.dead_time_s() + brakes_s)
     }
 
-    pub fn is_at_rest(&self) -> bool {
-        self.resting >= AT_REST_AFTER
+    /// Nothing is known without two usable frames, of which the newer is no older than they may lie apart.
+    pub fn rest(&self, now: MissionTime) -> Rest {
+        match self.frame {
+            Some((_, then)) if now.since(then) > self.longest_gap => Rest::Unknown,
+            _ if self.resting >= AT_REST_AFTER => Rest::AtRest,
+            _ if self.moves => Rest::Moving,
+            _ => Rest::Unknown,
+        }
     }
 
     /// It grows on after the last method, when the first follows.
@@ -133,6 +143,7 @@ impl Monitor for StopMonitor {
             driven: 0.0,
             told_to_stand: None,
             frame: None,
+            moves: false,
             moving: Duration::ZERO,
             resting: Duration::ZERO,
             method: 0,

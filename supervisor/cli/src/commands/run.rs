@@ -8,11 +8,12 @@ use common::{
     clock::Pace,
     domain::RobotName,
     mission::{Mission, Protocol},
+    signals::Signals,
     start::become_child,
 };
 use link::transport::SPEAKS_ROS2;
 use mission_control::{
-    Finished, Options,
+    Finished, Options, Progress,
     outcome::{Ending, Outcome},
     recovery::{self, RecoveredRun},
 };
@@ -197,6 +198,7 @@ pub(super) fn refuse_unspoken(mission: &Mission) -> Result<(), Refused> {
 }
 
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let signals = mission_control::end_signals()?;
     if let Some(parent) = arguments.parent {
         become_child("firsthand", parent)?;
     }
@@ -214,20 +216,23 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let (mut line, title) = (ProgressLine::new(LINE_EVERY), title(&options));
     // The journal gets no progress, because the status of the service has it.
     let may_stay = !logging::to_journal();
+    let mut lock = None;
     let mut recorder = None;
-    let mut attach = || {
+    let mut attach = |signals: &Signals| {
         if !arguments.no_record {
-            recorder = RunRecorder::start(&options, arguments.disk_budget);
+            recorder = RunRecorder::start(&options, arguments.disk_budget, signals);
         }
     };
     let (heard, listener) = Hearer::with_listener();
-    let ran = mission_control::run(&options, &mut attach, listener, &mut |progress| {
+    let mut show = |progress: &Progress<'_>| {
         line.update(&title, || progress.to_string(), may_stay);
-    });
+    };
+    let ran = mission_control::run(&options, signals, &mut lock, &mut attach, listener, &mut show);
     let (finished, still_moving) = match ran {
         Ok(ran) => ran,
         Err(error) => {
             drop(recorder);
+            drop(lock);
             made_for_nothing();
             return Err(error.into());
         }
@@ -245,11 +250,12 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         write_stderr(
             "firsthand: THE ROBOT MOVES although it was told to stand by every method; its link goes on telling it; Ctrl-C leaves it\n",
         );
-        let now = if robot.watch()? { "rests" } else { "was left while it moved" };
-        write_stderr(&format!("firsthand: the robot {now}\n"));
+        let did = robot.watch()?;
+        write_stderr(&format!("firsthand: the robot {did}\n"));
     }
     // On a busy machine the recorder may need seconds for its last chunks.
     drop(recorder);
+    drop(lock);
     if may_be_removed {
         let _ = fs::remove_dir_all(directory);
     } else {

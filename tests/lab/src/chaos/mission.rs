@@ -182,7 +182,7 @@ pub fn robot(
     fs::create_dir(directory).or_cannot("make a directory")?;
     let mut mission = Mission { seed, ..options.loaded.clone() };
     mission.simulation.ignores_time |= ignores_time;
-    Ok(Simulator::start(firsthand(&[]), directory, &mission, options.pace)?)
+    Ok(Simulator::start(firsthand(&[]), directory, &mission, options.pace, None)?)
 }
 
 /// Attack one generation of the supervisor. Returns its standard output.

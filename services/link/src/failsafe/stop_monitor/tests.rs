@@ -16,6 +16,11 @@ struct Watch {
     does_not_stop: bool,
 }
 
+/// The time of the last frame that [`told_to_stand`] gives.
+fn last() -> MissionTime {
+    MissionTime::from_seconds(41.0 * PERIOD)
+}
+
 /// Stop a robot at 1 s whose wheels then turn at `speed(seconds since)` counts/s. Returns the seconds after which the monitor found
 /// that it does not stop.
 fn told_to_stand(speed: impl Fn(f64) -> f64) -> (Watch, Option<f64>) {
@@ -47,21 +52,21 @@ fn told_to_stand(speed: impl Fn(f64) -> f64) -> (Watch, Option<f64>) {
 fn a_robot_that_comes_to_rest_half_a_second_after_it_was_told_to_obeys() {
     let (watch, did_not_stop) = told_to_stand(|since| if since < 0.5 { 560.0 } else { 0.0 });
     assert_eq!(did_not_stop, None);
-    assert!(watch.monitor.is_at_rest());
+    assert_eq!(watch.monitor.rest(last()), Rest::AtRest);
 }
 
 #[test]
 fn a_robot_that_rolls_on_disobeys_within_one_and_a_half_seconds_and_is_not_at_rest() {
     let (watch, did_not_stop) = told_to_stand(|_| 560.0);
     assert!(did_not_stop.unwrap() < 1.5, "{did_not_stop:?}");
-    assert!(!watch.monitor.is_at_rest());
+    assert_eq!(watch.monitor.rest(last()), Rest::Moving);
 }
 
 #[test]
 fn a_robot_that_did_not_obey_does_when_it_has_been_seen_at_rest() {
     let (watch, did_not_stop) = told_to_stand(|since| if since < 3.0 { 560.0 } else { 0.0 });
     assert!(did_not_stop.is_some() && !watch.does_not_stop);
-    assert!(watch.monitor.is_at_rest());
+    assert_eq!(watch.monitor.rest(last()), Rest::AtRest);
 }
 
 #[test]
@@ -74,12 +79,12 @@ fn a_robot_that_is_stopped_before_it_obeys_a_command_to_drive_is_not_at_rest_unt
         for frame in -4..=0 {
             stop_monitor.heard([0; 2], time(frame));
         }
-        assert!(stop_monitor.is_at_rest());
+        assert_eq!(stop_monitor.rest(time(0)), Rest::AtRest);
         stop_monitor.commanded([900, 900], MissionTime::from_seconds(1.01));
         stop_monitor.commanded([0, 0], MissionTime::from_seconds(1.02));
         let known = (1..6).map(time).find(|now| {
             stop_monitor.heard([0; 2], *now);
-            stop_monitor.is_at_rest()
+            stop_monitor.rest(*now) == Rest::AtRest
         });
         assert!(known.unwrap().seconds() - 1.02 >= 0.35, "{period}: {known:?}");
     }
@@ -92,7 +97,37 @@ fn encoders_that_tremble_are_at_rest() {
         let now = MissionTime::from_seconds(f64::from(tick) * PERIOD);
         stop_monitor.heard([10 + 3 * (tick % 2) as u16, 7], now);
     }
-    assert!(stop_monitor.is_at_rest());
+    assert_eq!(stop_monitor.rest(MissionTime::from_seconds(3.0 * PERIOD)), Rest::AtRest);
+}
+
+#[test]
+fn whether_a_robot_rests_or_moves_is_not_known_without_two_new_frames_that_can_be_used() {
+    let at = |frame: i32| MissionTime::from_seconds(f64::from(frame) * PERIOD);
+    for (speed, seen) in [(0, Rest::AtRest), (100, Rest::Moving)] {
+        let mut monitor = stop_monitor();
+        assert_eq!(monitor.rest(at(0)), Rest::Unknown, "before any frame");
+        let hear = |monitor: &mut StopMonitor, frame: i32| {
+            monitor.heard([(speed * frame) as u16; 2], at(frame));
+            monitor.rest(at(frame))
+        };
+        assert_eq!(hear(&mut monitor, 0), Rest::Unknown, "one frame");
+        for frame in 1..4 {
+            hear(&mut monitor, frame);
+        }
+        assert_eq!(hear(&mut monitor, 4), seen);
+        assert_eq!(monitor.rest(at(5)), seen, "a frame late");
+        assert_eq!(monitor.rest(at(7)), Rest::Unknown, "frames end");
+        for frame in [7, 10, 13] {
+            assert_eq!(hear(&mut monitor, frame), Rest::Unknown, "frames too far apart");
+        }
+        for frame in 14..17 {
+            hear(&mut monitor, frame);
+        }
+        assert_eq!(hear(&mut monitor, 17), seen);
+        let implausible = Observation::Motor([0; 2].into(), Counts::Implausible);
+        monitor.observe(&implausible, Moment::default());
+        assert_eq!(monitor.rest(at(17)), Rest::Unknown, "a frame that cannot be used");
+    }
 }
 
 #[test]

@@ -46,14 +46,18 @@ pub(in crate::commands) fn carry_out(
     let place = options.directory.display();
     let title = format!("{title}: everything of this run is in {place}");
     let mut line = ProgressLine::new(LINE_EVERY);
+    let mut lock = None;
     let mut recorder = None;
     let ran = mission_control::run(
         &options,
-        &mut || recorder = RunRecorder::start(&options, None),
+        mission_control::end_signals()?,
+        &mut lock,
+        &mut |signals| recorder = RunRecorder::start(&options, None, signals),
         Box::new(|_| {}),
         &mut |progress| line.update(&title, || shown(progress), true),
     );
     drop(recorder);
+    drop(lock);
     line.end();
     let (finished, still_moving) = ran?;
     if still_moving.is_some() {

@@ -1,8 +1,8 @@
 //! The recorder of a run: a consumer in a process of its own, without which the mission goes on.
 
-use std::{fs::File, process::Stdio, time::Duration};
+use std::{fs::File, io, os::fd::AsFd as _, process::Stdio, time::Duration};
 
-use common::{clock::Pace, poll};
+use common::{clock::Pace, poll, signals::Signals};
 use mission_control::Options;
 use processes::process::{Process, firsthand};
 
@@ -25,14 +25,18 @@ pub(crate) struct RunRecorder {
 }
 
 impl RunRecorder {
-    /// Waits until the recorder is attached. None if it cannot be started, which is logged.
-    pub(crate) fn start(options: &Options, budget: Option<DiskBudget>) -> Option<Self> {
-        Self::spawn(options, budget)
+    /// Waits until the recorder is attached, or one of `signals` comes. None if it cannot be started, which is logged.
+    pub(crate) fn start(
+        options: &Options,
+        budget: Option<DiskBudget>,
+        signals: &Signals,
+    ) -> Option<Self> {
+        Self::spawn(options, budget, signals)
             .inspect_err(|error| tracing::error!(%error, "nothing is recorded"))
             .ok()
     }
 
-    fn spawn(options: &Options, budget: Option<DiskBudget>) -> std::io::Result<Self> {
+    fn spawn(options: &Options, budget: Option<DiskBudget>, signals: &Signals) -> io::Result<Self> {
         let directory = &options.directory;
         let log = File::options().create(true).append(true).open(directory.join("recorder.log"))?;
         let mut command = firsthand(&["record", "--robot", &options.robot.to_string()]);
@@ -46,14 +50,16 @@ impl RunRecorder {
         command.stdout(Stdio::piped()).stderr(log);
         let mut process = Process::spawn(command)?;
         let [attached_within, ends_within] = patience(options.pace);
-        let said = process.take_stdout();
-        let readable = said.map(|said| poll::is_readable(said, attached_within));
-        let attached = readable.transpose()?.unwrap_or_default();
+        let said = process.take_stdout().ok_or(io::ErrorKind::BrokenPipe)?;
+        let awaited = [said.as_fd(), signals.as_fd()];
+        let attached = poll::readable(&awaited, Some(attached_within))?.first() == Some(&true);
         if !attached {
             tracing::warn!(
                 "the recorder is not attached yet; what is published now is not recorded"
             );
         }
+        // One that is stopped before it is attached has recorded nothing.
+        let ends_within = if attached || !signals.pending() { ends_within } else { Duration::ZERO };
         Ok(Self { process, ends_within })
     }
 }

@@ -1,0 +1,56 @@
+//! Tests of signals that come while a run starts: the run ends with a summary, and leaves nothing.
+
+use std::{fs, path::Path, process::Stdio};
+
+use rustix::process::Signal;
+
+use crate::support::{
+    assert_nothing_left, directory_of, domain, firsthand, processes, processes_of, signal_process,
+    wait_until,
+};
+
+/// End a run of `robot` as soon as `is_there` says so of its directory of runs.
+fn ends(robot: &str, is_there: impl Fn(&Path) -> bool) {
+    let runs = directory_of(robot);
+    let mut run = firsthand(&["run", "open-room", "--robot", robot, "--pace", "1", "--runs"]);
+    let run = run.arg(runs.path()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    wait_until("it is there", || is_there(runs.path()));
+    signal_process(run.id(), Signal::TERM);
+    let output = run.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let said = [output.stdout, output.stderr].concat();
+    let said = String::from_utf8_lossy(&said);
+    assert!(said.contains("stopped by a signal"), "{said}");
+    assert_nothing_left(robot);
+    // The robot never drove.
+    let left: Vec<_> = fs::read_dir(runs.path()).unwrap().collect();
+    assert!(left.is_empty(), "{left:?}");
+}
+
+/// The process of `robot` whose command line contains `word`.
+fn process(robot: &str, word: &str) -> Option<u32> {
+    let lines = processes_of(robot);
+    let line = lines.iter().find(|line| line.contains(word))?;
+    processes(line).first().map(|(pid, _)| *pid)
+}
+
+#[test]
+fn a_signal_at_any_moment_of_a_start_ends_the_run_with_a_summary_and_leaves_nothing() {
+    ends("st-log", |runs| runs.join("open-room-001/supervisor.log").exists());
+    ends("st-claim", |_| domain("st-claim").is_supervised());
+    ends("st-bus", |_| domain("st-bus").middleware_config().exists());
+    ends("st-robot", |_| process("st-robot", "x80-sim.checkpoint").is_some());
+    ends("st-recorder", |_| process("st-recorder", "firsthand record").is_some());
+    ends("st-stage", |_| process("st-stage", "stage planner").is_some());
+}
+
+#[test]
+fn a_signal_ends_a_run_whose_robot_or_recorder_gets_no_processor_while_it_starts() {
+    for (robot, word) in [("st-no-robot", "x80-sim.checkpoint"), ("st-no-rec", "firsthand record")]
+    {
+        ends(robot, |_| {
+            let child = process(robot, word);
+            child.inspect(|&child| signal_process(child, Signal::STOP)).is_some()
+        });
+    }
+}
