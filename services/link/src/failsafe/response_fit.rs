@@ -34,7 +34,7 @@ const LEAST_M: f64 = 0.04;
 const UNEXPLAINED: f64 = 0.25;
 
 /// How much later motions are looked for: in 240 recorded missions of robots that were as stated nothing was later, and
-/// of of those whose frames were 0.5 s late five in six were found, at the median after 1.6 s.
+/// of those whose frames were 0.5 s late five in six were found, at the median after 1.6 s.
 const LATER_STEP_S: f64 = 0.1;
 const LATER_STEPS: u32 = 20;
 const LEAST_LATER_S: f64 = 0.25;
