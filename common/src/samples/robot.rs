@@ -239,6 +239,8 @@ wire_enum! {
         InfraredSilent = 21 "infrared ranger silent",
         AnotherCommander = 22 "another commander",
         BaseSlow = 23 "base slower than stated",
+        /// Its readings may not be those of the present: the robot drives slowly, which shows it.
+        RangeDoubtful = 24 "ranging sensor doubtful",
     }
 }
 

@@ -15,6 +15,7 @@ pub mod presence;
 pub mod range;
 mod response_fit;
 pub mod restart;
+mod scan_motion;
 pub mod staleness;
 pub mod stop_monitor;
 pub mod streams;
@@ -197,7 +198,7 @@ pub const TABLE: &[Rule] = &[
     },
     Rule {
         cause: Cause::RangeImplausible,
-        when: "the front sonar says the same within 1 cm while the robot drives 0.4 m or turns by 90 degrees, another sensor while it turns by 90 degrees on the spot; or the front sonar hears nothing more than 4 times in a row of a surface nearer than 0.45 m that the two infrared rangers beside it see within 12 degrees of square; `link.log` names the sensor",
+        when: "the front sonar says the same within 1 cm to either side while the robot drives 0.4 m or turns by 90 degrees, another sensor while it turns by 90 degrees on the spot, or within 7 cm for 1.8 times as much; two of three readings do not follow from those before; scans change as if they were 0.3 s late or more, or the robot stood; or the front sonar hears nothing more than 4 times in a row of a surface nearer than 0.45 m that the two infrared rangers beside it see within 12 degrees of square; `link.log` names the sensor",
         action: Action::Stop,
         clears: Clears::OnResume { or_after: Some(range::CHANGES) },
         monitor: |all| &all.range,
@@ -222,6 +223,13 @@ pub const TABLE: &[Rule] = &[
         action: Action::Stop,
         clears: Clears::WithCondition,
         monitor: |all| &all.staleness,
+    },
+    Rule {
+        cause: Cause::RangeDoubtful,
+        when: "half of what makes a ranging sensor implausible; a robot that goes slowly shows whether it is; `link.log` names the sensor",
+        action: Action::Slow,
+        clears: Clears::After(range::CHANGES),
+        monitor: |all| &all.range,
     },
     Rule {
         cause: Cause::InfraredSilent,

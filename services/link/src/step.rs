@@ -104,6 +104,8 @@ pub struct Link {
     due: u32,
     tally: Tally,
     refused_ns: Option<u64>,
+    /// The newest stamp of motion, and when it came.
+    stamped: Option<(i64, MissionTime)>,
 }
 
 impl Link {
@@ -135,6 +137,7 @@ impl Link {
             due: 0,
             tally: Tally::default(),
             refused_ns: None,
+            stamped: None,
         }
     }
 

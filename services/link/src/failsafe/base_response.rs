@@ -53,7 +53,7 @@ impl BaseResponse {
             false => "until then it drives at half speed, because it stops later than stated",
         };
         Some(format!(
-            "the base answers after {:.2} s and accelerates at {acceleration_m_s2} m/s^2, and {:.2} s and {} m/s^2 are stated: give delay_s = {delay_s:.2} and acceleration_m_s2 = {acceleration_m_s2} in [robot.response]; {until_then}",
+            "the base answers after {:.2} s and accelerates at {acceleration_m_s2} m/s^2, and {:.2} s and {} m/s^2 are stated: look for what delays commands or frames, or give delay_s = {delay_s:.2} and acceleration_m_s2 = {acceleration_m_s2} in [robot.response]; {until_then}",
             self.found?.dead_time_s(),
             stated.dead_time_s(),
             stated.acceleration_m_s2,

@@ -4,7 +4,7 @@ use std::{fmt, time::Duration};
 
 use common::{
     clock::{MissionTime, Pace},
-    driver::{Commander, counts::WheelCounts},
+    driver::{Commander, LaserScan, counts::WheelCounts},
     mission::{Mission, Response},
     samples::{Cause, CommandSample, HoldReason, Order, RangeReading},
 };
@@ -48,6 +48,8 @@ pub enum Observation<'a> {
     Batteries([f64; 3]),
     /// Readings of ranging sensors came.
     Readings(&'a [RangeReading]),
+    /// A scan came that says it was measured at this mission time, seconds, in the middle of its beams.
+    Scan(&'a LaserScan, f64),
     /// The base responds so, and not as it is stated to.
     Responds(Response),
     /// A sender other than the link told the robot something.

@@ -62,6 +62,8 @@ pub(crate) const JUMPS_WITHIN: Duration = Duration::from_secs(2);
 pub(crate) const CALM: Duration = Duration::from_secs(2);
 /// So often it ends by itself: a faulty robot's counts may jump only while it moves.
 const MOST_RECOVERIES: u32 = 2;
+/// Time between looks for a delay.
+const LOOK_EVERY: Duration = Duration::from_millis(500);
 pub(crate) const GIVEN_UP_AFTER: Duration = Duration::from_secs(10);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -191,6 +193,8 @@ pub struct Odometry {
     jumps: VecDeque<MissionTime>,
     recoveries: u32,
     suspicion: Option<(Suspicion, MissionTime)>,
+    /// When a delay was looked for.
+    looked: MissionTime,
     ordered_to_drive: bool,
     /// A bring-up looks for wheels that do not turn as commanded: its robot goes on, slowly and for a minute.
     is_bring_up: bool,
@@ -317,6 +321,20 @@ impl Odometry {
             self.suspicion.get_or_insert((suspicion, now));
         }
         self.look_for_explanation(now);
+        self.look_for_delay(now);
+    }
+
+    /// Frames or commands that come later than stated make a base that answers later.
+    fn look_for_delay(&mut self, now: MissionTime) {
+        if self.suspicion.is_some() || self.is_bring_up || now.since(self.looked) < LOOK_EVERY {
+            return;
+        }
+        self.looked = now;
+        if let Some(found) = self.fit.later(self.response, self.steers) {
+            self.adopt(found);
+            self.found = Some(found);
+            self.clear_evidence();
+        }
     }
 
     /// A suspicion ends when a response explains the motion that raised it, because the motion after it, until the robot stands, tells
@@ -425,6 +443,7 @@ impl Monitor for Odometry {
             jumps: VecDeque::new(),
             recoveries: 0,
             suspicion: None,
+            looked: MissionTime::default(),
             ordered_to_drive: false,
             is_bring_up: mission
                 .planner

@@ -206,6 +206,18 @@ const CASES: &[(Break, Action, Cause)] = &[
         Action::Stop,
         Cause::RangeImplausible,
     ),
+    (
+        |it| {
+            for tick in 0..10 {
+                let reading = front(RangeStatus::Measured, 100 + 6 * (tick % 2));
+                it.monitors.range.observe(&Observation::Readings(&reading), now());
+                let motor = Observation::Motor([120 * tick; 2].into(), Counts::Follow);
+                it.monitors.range.observe(&motor, now());
+            }
+        },
+        Action::Slow,
+        Cause::RangeDoubtful,
+    ),
     (|it| it.monitors.staleness = fresh(None), Action::Stop, Cause::CommandStale),
     (
         |it| it.monitors.staleness = fresh(Some(command(LIMIT_MS * MS + MOMENT_NS, 0, 0))),

@@ -5,7 +5,7 @@ use std::time::Duration;
 use common::{
     clock::MissionTime,
     driver::{Heard, Motion, counts::WheelCounts},
-    samples::PowerSample,
+    samples::{PowerSample, Sweep},
     wire::COUNT_CYCLE,
 };
 
@@ -163,6 +163,19 @@ impl Link {
 
     /// `own_wire` is the time at which readings came that did not come with the robot's motion.
     fn take_readings(&mut self, heard: &mut Heard, own_wire: Option<MissionTime>, now_ns: u64) {
+        if let Some(stamp_ns) = heard.motion.and_then(|motion| motion.stamp_ns) {
+            self.stamped = Some((stamp_ns, self.now));
+        }
+        for scan in &heard.scans {
+            let came_s = own_wire.unwrap_or(self.now).seconds();
+            let Sweep { first_beam_ns, beam_ns, .. } = scan.sweep;
+            let (first_s, age_ns) = match (scan.stamp_ns, self.stamped) {
+                (Some(scan_ns), Some((motion_ns, at))) => (at.seconds(), scan_ns - motion_ns),
+                _ => (came_s, first_beam_ns),
+            };
+            let middle_ns = age_ns + beam_ns.abs() * scan.beams.len() as i64 / 2;
+            self.observe(Observation::Scan(scan, first_s + middle_ns as f64 * 1e-9), now_ns);
+        }
         let readings = self.sensors.take_heard(heard, own_wire);
         if !readings.is_empty() {
             self.observe(Observation::Readings(&readings), now_ns);

@@ -11,6 +11,7 @@ mod words;
 
 const LATE: Duration = Duration::from_secs(2);
 const LATE_FROM_BOOT: Duration = Duration::from_millis(500);
+const RANGE_LATE: Duration = Duration::from_secs(1);
 const OLD: Duration = Duration::from_secs(3);
 const AGAIN_EVERY: Duration = Duration::from_secs(2);
 /// Period of slow messages: three a second.
@@ -39,6 +40,10 @@ pub struct FaultInjector {
     words: Words,
     base: Option<Said>,
     readings: Readings,
+    /// Messages with readings, oldest first.
+    ranged: VecDeque<(Duration, Said)>,
+    /// Whether the newest message with wheels says that one turns.
+    turns: bool,
     /// Messages with wheels of the last seconds, oldest first.
     kept: VecDeque<Late>,
     next_again: Duration,
@@ -63,6 +68,8 @@ impl FaultInjector {
             words: Words::of(protocol),
             base: None,
             readings: Readings::default(),
+            ranged: VecDeque::new(),
+            turns: false,
             kept: VecDeque::new(),
             next_again: Duration::ZERO,
             next_slow: [Duration::ZERO; 256],
@@ -80,7 +87,14 @@ impl FaultInjector {
     pub fn report(&mut self, bytes: &[u8], now: Duration) -> Vec<Late> {
         let (mut out, mut more) = (Vec::new(), Vec::new());
         for said in self.words.said(bytes) {
-            if said.wheels(&said).is_some() {
+            if said.readings().is_some() {
+                self.ranged.push_back((now, said.clone()));
+                if self.ranged.len() > MOST_KEPT {
+                    self.ranged.pop_front();
+                }
+            }
+            if let Some(wheels) = said.wheels(&said) {
+                self.turns = wheels.speeds != [0.0; 2];
                 if !self.faulty {
                     self.base = Some(said.clone());
                 }
@@ -102,7 +116,9 @@ impl FaultInjector {
         }
         let at = match self.fault {
             RobotFault::FramesLate if self.faulty => now + LATE,
-            RobotFault::LateFromBoot if self.faulty => now + LATE_FROM_BOOT,
+            RobotFault::LateFromBoot | RobotFault::LateMidway if self.faulty => {
+                now + LATE_FROM_BOOT
+            }
             _ => now,
         };
         let first = (!out.is_empty()).then_some(Late { at, bytes: out });
@@ -181,9 +197,25 @@ impl FaultInjector {
             }
             F::MotorOnes => said.with_data(0xff),
             F::MotorZeros => said.with_data(0),
-            F::RangeInvalid | F::RangeMissing | F::RangeStuck | F::RangeSilent | F::RangeFrozen => {
-                said.with_readings(self.fault, &self.readings)
+            F::RangeLate => {
+                let is_old = |(at, old): &&(Duration, Said)| {
+                    *at + RANGE_LATE <= now && old.readings() == said.readings()
+                };
+                let old = self.ranged.iter().rfind(is_old).filter(|_| said.readings().is_some());
+                match old {
+                    Some((_, old)) => said.with_readings_of(old),
+                    None => said.bytes(),
+                }
             }
+            F::RangeDeaf if !self.turns => said.bytes(),
+            F::RangeInvalid
+            | F::RangeMissing
+            | F::RangeStuck
+            | F::RangeSilent
+            | F::RangeFrozen
+            | F::RangeNear
+            | F::RangeRandom
+            | F::RangeDeaf => said.with_readings(self.fault, &self.readings, &mut self.chance),
             fault => {
                 let base = self.base.get_or_insert_with(|| said.clone());
                 self.began.get_or_insert(now);

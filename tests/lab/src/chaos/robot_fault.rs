@@ -88,6 +88,11 @@ faults! {
     RangeFrozen "range-frozen" RestsLater: "the last ultrasonic bytes that are distances repeat for ever", "the last ranges and scan repeat for ever";
     LateFromBoot "late-from-boot" Unharmed: "from its start on, all frames come 0.5 s late", "all lines come 0.5 s late";
     HeldWheels "held-wheels" EndsAtRest: "the wheels stand, and their motors draw the current of held ones", "the wheels stand and are said to be held";
+    RangeLate "range-late" Unharmed: "ultrasonic and infrared readings come 1 s late", "ranges and scans come 1 s late";
+    RangeNear "range-near" Unharmed: "the last ultrasonic bytes that are distances repeat within 3 cm", "the last ranges repeat within 3 cm, the last scan within 0.5 %";
+    RangeRandom "range-random" Unharmed: "random ultrasonic bytes", "random ranges and beams";
+    RangeDeaf "range-deaf" Unharmed: "every ultrasonic byte is 255 while a wheel turns", "every range and beam is null while a wheel turns";
+    LateMidway "late-midway" Unharmed: "all frames come 0.5 s late", "all lines come 0.5 s late";
     Garbage "garbage" Rests: NOTHING, "half of each line is missing, so none is JSON";
 }
 

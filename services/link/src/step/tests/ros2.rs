@@ -130,8 +130,9 @@ impl Scene {
             .f32(step);
         writer.f32(0.0).f32(0.1).f32(0.12).f32(3.5).length(360);
         let noise = if self.sees { self.ms as f32 * 1e-6 } else { 0.0 };
-        (0..360).for_each(|_| {
-            writer.f32(2.0 + noise);
+        // Fewer beams than show whether they follow the motion, which they do not.
+        (0..360).for_each(|beam| {
+            writer.f32(if beam % 30 == 0 { 2.0 + noise } else { f32::INFINITY });
         });
         writer.length(0).take()
     }

@@ -261,3 +261,33 @@ fn a_robot_that_speaks_lines_of_json_keeps_its_speed_until_it_brakes_or_stands_w
     let held = passed[0].bytes.windows(18).any(|word| word == b"\"held\":[true,true]");
     assert!(held);
 }
+
+#[test]
+fn late_readings_are_those_of_a_second_ago_while_wheels_are_those_of_now() {
+    let mut injector = FaultInjector::new(RobotFault::RangeLate, Protocol::X80, 1);
+    let said = |cm: u8, counts: u16| {
+        let mut bytes = Vec::new();
+        let motor = MotorSensors { encoders: [encoder(counts); 2], ..MotorSensors::default() };
+        let standard =
+            StandardSensors { ultrasonic: [cm; 6], human: [2048; 4], ..StandardSensors::default() };
+        Report::Motor(motor).encode(Addressing::Numbered, &mut bytes);
+        Report::Standard(standard).encode(Addressing::Numbered, &mut bytes);
+        bytes
+    };
+    injector.report(&said(90, 0), at(1.0));
+    injector.begin();
+    let passed = injector.report(&said(80, 50), at(1.5));
+    assert_eq!((sonar(&passed), counts(&passed)), (Some(80), Some([50; 2])));
+    let passed = injector.report(&said(50, 100), at(2.1));
+    assert_eq!((sonar(&passed), counts(&passed)), (Some(90), Some([100; 2])));
+}
+
+#[test]
+fn readings_stay_near_are_random_or_silent_in_motion_as_their_faults_say() {
+    for _ in 0..50 {
+        let told = |fault| sonar(&faulted(fault, [300, 500]).1).unwrap();
+        assert!((87..=93).contains(&told(RobotFault::RangeNear)));
+        assert!((3..=254).contains(&told(RobotFault::RangeRandom)));
+        assert_eq!(told(RobotFault::RangeDeaf), 255);
+    }
+}

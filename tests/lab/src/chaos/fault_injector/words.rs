@@ -11,7 +11,7 @@ use common::{
     },
 };
 
-use crate::chaos::robot_fault::RobotFault;
+use crate::{chaos::robot_fault::RobotFault, random::Random};
 
 /// The stuck echo of a sonar, centimetres, and the stuck range of a robot that speaks lines of JSON, metres.
 pub const STUCK_CM: u8 = 8;
@@ -134,6 +134,31 @@ impl Said {
         }
     }
 
+    /// The kind of message by its readings; none without any.
+    pub fn readings(&self) -> Option<u8> {
+        match self {
+            Self::Frame { did, .. } => {
+                Some(*did).filter(|did| matches!(*did, did::CUSTOM | did::STANDARD))
+            }
+            Self::Line(report) => {
+                let kind =
+                    u8::from(report.scan.is_some()) + 2 * u8::from(!report.ranges.is_empty());
+                Some(kind).filter(|kind| *kind > 0)
+            }
+        }
+    }
+
+    /// The message with the readings of `old`, of the same kind.
+    pub fn with_readings_of(self, old: &Self) -> Vec<u8> {
+        match (self, old) {
+            (Self::Line(report), Self::Line(old)) => {
+                let (ranges, scan) = (old.ranges.clone(), old.scan.clone());
+                line(&json_wire::Report { ranges, scan, ..report })
+            }
+            (_, old) => old.bytes(),
+        }
+    }
+
     /// The sensor stream to which the message belongs; none for an answer.
     pub fn stream(&self) -> Option<u8> {
         match self {
@@ -209,10 +234,15 @@ impl Said {
     }
 
     /// The message with the readings of `fault`, whose robot read `newest` before; none if no readings come.
-    pub fn with_readings(mut self, fault: RobotFault, newest: &Readings) -> Vec<u8> {
+    pub fn with_readings(
+        mut self,
+        fault: RobotFault,
+        newest: &Readings,
+        chance: &mut Random,
+    ) -> Vec<u8> {
         let (echo, range) = match fault {
             RobotFault::RangeStuck => (STUCK_CM, Some(STUCK_M)),
-            RobotFault::RangeSilent => (NOTHING, None),
+            RobotFault::RangeSilent | RobotFault::RangeDeaf => (NOTHING, None),
             _ => (0, Some(NO_READING)),
         };
         match (&mut self, fault) {
@@ -220,19 +250,35 @@ impl Said {
                 return Vec::new();
             }
             (Self::Frame { did: did::STANDARD, data, .. }, _) => {
-                let frozen = fault == RobotFault::RangeFrozen;
-                let told = if frozen { newest.ultrasonic } else { [echo; ULTRASONIC] };
+                let told = newest.ultrasonic.map(|newest| match fault {
+                    RobotFault::RangeFrozen => newest,
+                    RobotFault::RangeNear => (newest + chance.below(7) as u8).clamp(6, 253) - 3,
+                    RobotFault::RangeRandom => 3 + chance.below(252) as u8,
+                    _ => echo,
+                });
                 data.iter_mut().zip(told).for_each(|(byte, told)| *byte = told);
             }
             (Self::Frame { .. }, _) => {}
             (Self::Line(report), RobotFault::RangeMissing) => {
                 (report.ranges, report.scan) = (BTreeMap::new(), None);
             }
-            (Self::Line(report), RobotFault::RangeFrozen) => {
+            (Self::Line(report), RobotFault::RangeFrozen | RobotFault::RangeNear) => {
                 if !report.ranges.is_empty() {
                     report.ranges.clone_from(&newest.ranges);
                 }
                 report.scan = report.scan.take().and(newest.scan.clone());
+                if fault == RobotFault::RangeNear {
+                    let ranges = report.ranges.values_mut().flatten();
+                    ranges.for_each(|range| *range += chance.within(-0.03, 0.03));
+                    let beams = report.scan.iter_mut().flatten().flatten();
+                    beams.for_each(|beam| *beam *= chance.within(0.995, 1.005) as f32);
+                }
+            }
+            (Self::Line(report), RobotFault::RangeRandom) => {
+                let mut random = || chance.within(0.2, 2.5);
+                report.ranges.values_mut().for_each(|range| *range = Some(random()));
+                let beams = report.scan.iter_mut().flatten();
+                beams.for_each(|beam| *beam = Some(random() as f32));
             }
             (Self::Line(report), _) => {
                 report.ranges.values_mut().for_each(|told| *told = range);
