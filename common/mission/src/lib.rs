@@ -64,8 +64,8 @@ pub use response::{ModelledSpeed, Response, ResponseKeys};
 pub use robot::{BatteryLimits, Body, Channel, Model, Protocol, RobotConfig, Steering};
 pub use ros2::Ros2Topics;
 pub use sensor::{
-    INFRARED_RANGERS, MOST_BEAMS, MOST_SENSORS, Rplidar, SONARS, Sensor, SensorKind, SensorModel,
-    SensorRow, Sensors, SonarConfig,
+    INFRARED_RANGERS, MOST_BEAMS, MOST_LASERS, MOST_SENSORS, Rplidar, SONARS, Sensor, SensorKind,
+    SensorModel, SensorRow, Sensors, SonarConfig,
 };
 pub use simulation::{
     BatteryPhysics, Block, BlockedWheels, Heights, InfraredPhysics, LaserTiming, Move, Physics,
@@ -353,17 +353,39 @@ impl Mission {
         sensor::table(&rows, *rate_hz, &self.sonar, self.sensor_set())
     }
 
-    pub fn laser(&self) -> Option<(usize, Sensor)> {
-        let mut rows = self.sensor_table().into_iter().enumerate();
-        rows.find(|(_, sensor)| sensor.kind == SensorKind::Scan)
+    /// The lasers and their rows.
+    pub fn lasers(&self) -> Vec<(usize, Sensor)> {
+        let rows = self.sensor_table().into_iter().enumerate();
+        rows.filter(|(_, sensor)| sensor.kind == SensorKind::Scan).collect()
     }
 
-    /// The laser with a wire of its own and its row. Its scans do not come with the robot's frames.
-    pub fn rplidar(&self) -> Option<(usize, Sensor, Rplidar)> {
-        let (row, sensor) = self.laser()?;
-        let has_address = self.robot.sensors.get(row)?.address.is_some();
-        let product = sensor.model.rplidar()?;
-        (has_address || !self.robot.protocol().has_scans()).then_some((row, sensor, product))
+    /// The laser by whose scans the robot knows where it is: of those that the mission uses the first one with the widest view.
+    pub fn laser(&self) -> Option<(usize, Sensor)> {
+        self.lasers().into_iter().rev().max_by(|(_, a), (_, b)| {
+            a.used.cmp(&b.used).then(a.field_of_view_deg.total_cmp(&b.field_of_view_deg))
+        })
+    }
+
+    /// Those whose scans come with the robot's frames, and not on wires of their own.
+    pub fn lasers_of_base(&self) -> Vec<(usize, Sensor)> {
+        let mut lasers = self.lasers();
+        lasers.retain(|(row, sensor)| self.rplidar(*row, sensor).is_none());
+        lasers
+    }
+
+    /// The lasers with wires of their own.
+    pub fn rplidars(&self) -> Vec<(usize, Sensor, Rplidar)> {
+        let with_product = |(row, sensor)| {
+            let product = self.rplidar(row, &sensor)?;
+            Some((row, sensor, product))
+        };
+        self.lasers().into_iter().filter_map(with_product).collect()
+    }
+
+    fn rplidar(&self, row: usize, sensor: &Sensor) -> Option<Rplidar> {
+        let written = self.robot.sensors.get(row)?;
+        let has_wire = written.address.is_some() || !self.robot.protocol().has_scans();
+        sensor.model.rplidar().filter(|_| has_wire)
     }
 
     pub fn front_row(&self) -> usize {

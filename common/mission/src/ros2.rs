@@ -5,7 +5,7 @@ keys! {
     Ros2Topics {
         /// `nav_msgs/Odometry`.
         odom: String = "/odom".to_owned(),
-        /// `sensor_msgs/LaserScan`.
+        /// `sensor_msgs/LaserScan` of a robot with one laser.
         scan: String = "/scan".to_owned(),
         /// `geometry_msgs/Twist`.
         cmd_vel: String = "/cmd_vel".to_owned(),
@@ -15,7 +15,7 @@ keys! {
         battery: String = "/battery_state".to_owned(),
         /// `sensor_msgs/Imu`; none by default.
         imu: Option<String>,
-        /// `sensor_msgs/Range` of sonars and infrared rangers, by the names of their rows.
+        /// `sensor_msgs/Range` of sonars and infrared rangers, and `sensor_msgs/LaserScan` of lasers, by the names of their rows.
         ranges: BTreeMap<String, String>,
     }
 }

@@ -10,8 +10,8 @@
 //! An infrared ray is as thin as a cell and ends at a surface of any angle: passed cells are free, the last one is occupied, and silence
 //! is no evidence against that.
 //!
-//! A laser that looks over or through a thing is no evidence against it, so beside it the other rangers have a grid of their own, and a
-//! cell of either is hazard. An echo whose range the laser confirms is put where the laser sees the thing. So glass that the laser sees
+//! A laser that looks over or through a thing is no evidence against it, so each laser, and beside lasers the other rangers, have a grid
+//! of their own, and a cell of any is hazard. An echo whose range the laser confirms is put where the laser sees the thing. So glass that the laser sees
 //! only squarely stays by its echoes.
 //!
 //! No ranger is evidence against a thing that the body touched: all may look over it.

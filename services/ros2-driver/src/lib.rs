@@ -55,7 +55,6 @@ pub struct Ros2 {
     stamped: bool,
     topics: Topics,
     table: Vec<Sensor>,
-    laser: Option<(usize, Sensor)>,
     told_of_scan_stamp: bool,
     odometry: odometry::Odometry,
     gyro: Gyro,
@@ -74,7 +73,6 @@ impl Ros2 {
             stamped: mission.robot.ros2.stamped,
             topics: Topics::of(mission),
             table: mission.sensor_table(),
-            laser: mission.laser(),
             told_of_scan_stamp: false,
             odometry: odometry::Odometry::default(),
             gyro: Gyro::default(),
@@ -114,12 +112,12 @@ impl Ros2 {
     ) -> Result<(), String> {
         match content {
             Content::Odometry => self.take_odometry(&Odometry::read(payload)?, heard),
-            Content::Scan => {
+            Content::Scan(row) => {
                 let mut scan = Scan::read(payload).map_err(|error| error.to_string())?;
-                if self.laser.as_ref().is_some_and(|(_, sensor)| sensor.is_upside_down) {
+                if self.table.get(row).is_some_and(|sensor| sensor.is_upside_down) {
                     scan.turn_over();
                 }
-                self.take_scan(&scan, heard)
+                self.take_scan(row, &scan, heard)
             }
             Content::Range(row) => {
                 let range = read_range(payload).map_err(|error| error.to_string())?;
@@ -185,9 +183,9 @@ impl Ros2 {
         Ok(())
     }
 
-    fn take_scan(&mut self, scan: &Scan, heard: &mut Heard) -> Result<(), String> {
-        let Some((row, sensor)) = &self.laser else {
-            return Err("a scan, and the mission has no laser; add a row of kind scan".to_owned());
+    fn take_scan(&mut self, row: usize, scan: &Scan, heard: &mut Heard) -> Result<(), String> {
+        let Some(sensor) = self.table.get(row) else {
+            return Ok(());
         };
         let (beams, most_s) = (scan.ranges.len(), LONGEST_SWEEP_NS as f64 / 1e9);
         let beam_s = f64::from(scan.beam_s);
@@ -218,7 +216,7 @@ impl Ros2 {
         }
         let sweep = if is_stated { sweep } else { Sweep::default() };
         let stamp_ns = is_stated.then_some(scan.stamp_ns);
-        heard.scans.push(LaserScan { row: *row, beams, sweep, stamp_ns });
+        heard.scans.push(LaserScan { row, beams, sweep, stamp_ns });
         Ok(())
     }
 }

@@ -335,6 +335,29 @@ fn the_missions_names_are_those_of_its_topics() {
 }
 
 #[test]
+fn each_of_several_lasers_has_a_topic_of_its_own_and_its_scan_is_that_of_its_row() {
+    let row = |name: &str, turned: u32| {
+        format!(
+            "[[robot.sensor]]\nname = '{name}'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nroll_deg = {turned}\nmodel = 'lds-02'\n"
+        )
+    };
+    let extra = format!(
+        "robot.ros2.ranges = {{ back = '/b', front = '/f' }}\n{}{}",
+        row("front", 0),
+        row("back", 180)
+    );
+    let mut driver = driver(&extra);
+    let ranges: Vec<f32> = (0..360_u16).map(|beam| 1.0 + f32::from(beam) / 100.0).collect();
+    let scan = scan_of(-std::f32::consts::PI, 1.0_f32.to_radians(), &ranges);
+    let names: Vec<_> = driver.topics.heard.iter().map(|(_, topic)| topic.dds_name()).collect();
+    assert_eq!(names[..4], ["rt/odom", "rt/f", "rt/b", "rt/battery_state"]);
+    for (topic, row, second) in [(1, 0, 1.01), (2, 1, 4.59)] {
+        let scan = said(&mut driver, topic, &scan).scans.remove(0);
+        assert_eq!((scan.row, scan.beams[1]), (row, second));
+    }
+}
+
+#[test]
 fn the_counts_of_a_link_that_is_started_again_go_on_where_they_were_and_take_what_was_driven_meanwhile()
  {
     let mut first = driver("");

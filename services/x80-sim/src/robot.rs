@@ -76,10 +76,9 @@ pub struct Robot {
     /// None for an X80.
     json: Option<JsonWords>,
     arduino: Option<ArduinoWords>,
-    /// Its scans come with the robot's frames.
-    laser: Option<Laser>,
+    /// Their scans come with the robot's frames.
+    lasers: Vec<Laser>,
     rplidar: Option<Rplidar>,
-    scan: Vec<Option<f32>>,
 }
 
 impl Robot {
@@ -135,9 +134,8 @@ impl Robot {
             json: (mission.robot.protocol() == Protocol::Json).then(|| JsonWords::new(mission)),
             arduino: (mission.robot.protocol() == Protocol::Arduino)
                 .then(|| ArduinoWords::new(mission)),
-            laser: Laser::new(mission, seed).filter(|_| rplidar.is_none()),
+            lasers: Laser::all(mission, seed),
             rplidar,
-            scan: Vec::new(),
         };
         robot.least_clearance = robot.body.clearance();
         robot.measure();
@@ -369,7 +367,7 @@ impl Robot {
                 self.step(span / steps);
                 self.time = from + span * step as f64 / steps;
                 let own = self.rplidar.as_mut().map(|rplidar| &mut rplidar.laser);
-                if let Some(laser) = self.laser.as_mut().or(own) {
+                for laser in self.lasers.iter_mut().chain(own) {
                     laser.follow(self.time, self.body.pose());
                 }
             }
@@ -464,12 +462,8 @@ impl Robot {
         self.motor.pots = [sensors::MIDDLE; 6];
         (self.standard, self.custom) =
             self.ranging.measure(&self.world, &self.body, self.time, &self.physics);
-        if let Some(laser) = &mut self.laser
-            && self.tick.is_multiple_of(laser.every_ticks())
-        {
-            self.scan = laser.scan(&self.world, self.body.pose(), self.time);
-        } else {
-            self.scan.clear();
+        for laser in &mut self.lasers {
+            laser.measure(&self.world, self.body.pose(), (self.tick, self.time));
         }
     }
 
@@ -488,8 +482,7 @@ impl Robot {
     fn write(&self, due: [bool; 3], out: &mut Vec<u8>) {
         if let Some(json) = &self.json {
             let sensors = (&self.standard, &self.custom, &self.motor);
-            let stated = self.laser.as_ref().and_then(Laser::stated);
-            out.extend(json.report(sensors, (&self.scan, stated), &self.motors));
+            out.extend(json.report(sensors, &self.lasers, &self.motors));
             return;
         }
         if self.arduino.is_some() {

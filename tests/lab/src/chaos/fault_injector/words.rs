@@ -95,11 +95,13 @@ pub struct Readings {
     ultrasonic: [u8; ULTRASONIC],
     ranges: BTreeMap<String, Option<f64>>,
     scan: Option<Vec<Option<f32>>>,
+    scans: BTreeMap<String, json_wire::Scan>,
 }
 
 impl Default for Readings {
     fn default() -> Self {
-        Self { ultrasonic: [FROZEN_CM; ULTRASONIC], ranges: BTreeMap::new(), scan: None }
+        let (ranges, scans) = Default::default();
+        Self { ultrasonic: [FROZEN_CM; ULTRASONIC], ranges, scan: None, scans }
     }
 }
 
@@ -116,6 +118,7 @@ impl Readings {
             Said::Frame { .. } => {}
             Said::Line(report) => {
                 self.ranges.extend(report.ranges.clone());
+                self.scans.extend(report.scans.clone());
                 self.scan = report.scan.clone().or(self.scan.take());
             }
         }
@@ -141,7 +144,10 @@ impl Said {
                 Some(*did).filter(|did| matches!(*did, did::MOTOR | did::CUSTOM | did::STANDARD))
             }
             Self::Line(report) if report.wheels.is_some() => Some(0),
-            Self::Line(report) => (report.scan.is_some() || !report.ranges.is_empty()).then_some(1),
+            Self::Line(report) => {
+                let scans = report.scan.is_some() || !report.scans.is_empty();
+                (scans || !report.ranges.is_empty()).then_some(1)
+            }
         }
     }
 
@@ -227,17 +233,22 @@ impl Said {
             (Self::Frame { .. }, _) => {}
             (Self::Line(report), RobotFault::RangeMissing) => {
                 (report.ranges, report.scan) = (BTreeMap::new(), None);
+                report.scans.clear();
             }
             (Self::Line(report), RobotFault::RangeFrozen) => {
                 if !report.ranges.is_empty() {
                     report.ranges.clone_from(&newest.ranges);
                 }
                 report.scan = report.scan.take().and(newest.scan.clone());
+                if !report.scans.is_empty() {
+                    report.scans.clone_from(&newest.scans);
+                }
             }
             (Self::Line(report), _) => {
                 report.ranges.values_mut().for_each(|told| *told = range);
                 let beams = report.scan.iter_mut().flatten();
-                beams.for_each(|beam| *beam = range.map(|range| range as f32));
+                let named = report.scans.values_mut().flat_map(|scan| &mut scan.ranges);
+                beams.chain(named).for_each(|beam| *beam = range.map(|range| range as f32));
             }
         }
         self.bytes()
