@@ -93,7 +93,7 @@ topics! {
     BASE_RESPONSE: Topic<BaseResponseSample> {
         name: "base_response", writer: "link", rate: Rate::WhenItHappens,
     }
-    /// Wheels are held although they were told to turn: where something touches the body.
+    /// Wheels are held although they were told to turn, or a bumper or a cliff sensor feels something: where.
     CONTACT: Topic<ContactSample> {
         name: "contact", writer: "link", rate: Rate::WhenItHappens,
     }

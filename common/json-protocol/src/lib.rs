@@ -46,6 +46,9 @@ pub struct Report {
     /// Scans by the names of the mission's rows, where there are several lasers.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub scans: BTreeMap<String, Scan>,
+    /// What bumpers and cliff sensors feel, by the names of the mission's rows; one that is left out feels what it felt before.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub touched: BTreeMap<String, bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub battery_v: Option<f64>,
 }

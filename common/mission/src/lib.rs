@@ -50,6 +50,7 @@ mod ros2;
 mod sensor;
 mod simulation;
 pub mod sonar;
+mod touch;
 
 use std::path::PathBuf;
 
@@ -68,9 +69,10 @@ pub use sensor::{
     SensorModel, SensorRow, Sensors, SonarConfig,
 };
 pub use simulation::{
-    BatteryPhysics, Block, BlockedWheels, Heights, InfraredPhysics, LaserTiming, Move, Physics,
-    Radio, Ranger, Realism, Simulation, SonarPhysics, Thing, WheelPhysics,
+    BatteryPhysics, Block, BlockedWheels, Heights, Hole, InfraredPhysics, LaserTiming, Move,
+    Physics, Radio, Ranger, Realism, Simulation, SonarPhysics, Thing, WheelPhysics,
 };
+pub use touch::{MOST_TOUCHES, TouchKind, TouchRow};
 
 use crate::{
     geometry::Shapes,
@@ -351,6 +353,50 @@ impl Mission {
             Model::Kobuki | Model::Create3 => sensor::laser(SensorModel::RplidarA1, 0.0, 0.0),
         };
         sensor::table(&rows, *rate_hz, &self.sonar, self.sensor_set())
+    }
+
+    /// Bumpers and cliff sensors: those that are written, or else the model's. A robot says what they feel by their names.
+    pub fn touches(&self) -> Vec<TouchRow> {
+        use TouchKind::{Bumper, Cliff};
+        match self.robot.model {
+            _ if !self.robot.touches.is_empty() => self.robot.touches.clone(),
+            _ if !self.robot.protocol().has_scans() => Vec::new(),
+            // Source of the bearings: the user guide's drawing, nominal.
+            Model::Kobuki => touch::rows(
+                60.0,
+                &[
+                    ("bumper-left", Bumper, 60.0),
+                    ("bumper-center", Bumper, 0.0),
+                    ("bumper-right", Bumper, -60.0),
+                    ("cliff-left", Cliff, 60.0),
+                    ("cliff-center", Cliff, 0.0),
+                    ("cliff-right", Cliff, -60.0),
+                ],
+            ),
+            // The frames of a Create 3's hazards; the bearings are nominal.
+            Model::Create3 | Model::TurtleBot4 => touch::rows(
+                36.0,
+                &[
+                    ("bump-left", Bumper, 72.0),
+                    ("bump-front-left", Bumper, 36.0),
+                    ("bump-front-center", Bumper, 0.0),
+                    ("bump-front-right", Bumper, -36.0),
+                    ("bump-right", Bumper, -72.0),
+                    ("cliff-side-left", Cliff, 60.0),
+                    ("cliff-front-left", Cliff, 15.0),
+                    ("cliff-front-right", Cliff, -15.0),
+                    ("cliff-side-right", Cliff, -60.0),
+                ],
+            ),
+            _ => Vec::new(),
+        }
+    }
+
+    /// The ROS topic of [`ros2::Ros2Topics::hazards`].
+    pub fn hazards_topic(&self) -> Option<String> {
+        let is_create = matches!(self.robot.model, Model::Create3 | Model::TurtleBot4);
+        let default = is_create.then(|| "/hazard_detection".to_owned());
+        self.robot.ros2.hazards.clone().or(default)
     }
 
     /// The lasers and their rows.

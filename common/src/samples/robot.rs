@@ -165,7 +165,7 @@ payloads! {
 }
 
 payloads! {
-    /// Held wheels stand by their encoders, and their motors draw a high current.
+    /// Held wheels stand by their encoders, and their motors draw a high current. Without a held wheel a bumper or a cliff sensor felt it.
     #[derive(Serialize, Deserialize)]
     "firsthand.Contact" ContactSample {
         /// Direction of the touch from the body's centre, radians counter-clockwise from the robot's axis.
@@ -225,6 +225,8 @@ wire_enum! {
         InfraredSilent = 21 "infrared ranger silent",
         AnotherCommander = 22 "another commander",
         BaseSlow = 23 "base slower than stated",
+        /// A bumper is pressed, or a cliff sensor sees no floor.
+        Felt = 24 "bumper or cliff sensor",
     }
 }
 

@@ -10,7 +10,7 @@ use common::{
     },
     json_wire::{Lines, Order, Report, Scan, line, parse},
     kinematics::Twist,
-    mission::{Body, Mission, Sensor},
+    mission::{Body, Mission, Sensor, TouchRow},
     samples::{LONGEST_SWEEP_NS, RangeReading, Sweep},
 };
 
@@ -24,6 +24,7 @@ pub struct Json {
     lines: Lines,
     table: Vec<Sensor>,
     lasers: Vec<(usize, Sensor)>,
+    touches: Vec<TouchRow>,
     answered: Option<u64>,
     odometry: Odometry,
     tally: WireTally,
@@ -33,6 +34,7 @@ impl Json {
     pub fn new(mission: &Mission) -> Self {
         Self {
             lasers: mission.lasers_of_base(),
+            touches: mission.touches(),
             body: mission.body(),
             rate_hz: mission.robot.rate_hz,
             lines: Lines::default(),
@@ -47,6 +49,11 @@ impl Json {
     fn take(&mut self, report: &Report, heard: &mut Heard) -> Result<(), String> {
         let readings = self.readings_of(&report.ranges)?;
         let scans = self.scans_of(report)?;
+        let touched = report.touched.iter().map(|(name, feels)| {
+            let row = self.touches.iter().position(|row| row.name == *name);
+            Ok((row.ok_or_else(|| format!("no row of robot.touch is called {name:?}"))?, *feels))
+        });
+        let touched = touched.collect::<Result<Vec<_>, String>>()?;
         let turned = match (report.wheels, report.odometry) {
             (Some(_), Some(_)) => return Err("wheels and odometry: say one of them".to_owned()),
             (Some(turned), None) => Some(turned),
@@ -65,6 +72,7 @@ impl Json {
             heard.motion = Some(motion(&self.body, turned, speeds, held));
         }
         heard.scans.extend(scans);
+        heard.touched.extend(touched);
         if let Some(count) = report.heard {
             // A robot that has restarted counts from 0.
             let before = self.answered.replace(count).filter(|before| *before <= count);
@@ -335,6 +343,16 @@ mod tests {
             let refused = heard(&mut driver, said).refused.unwrap();
             assert!(refused.contains(why), "{refused}");
         }
+    }
+
+    #[test]
+    fn what_bumpers_feel_is_told_by_the_names_of_their_rows() {
+        let text = "target = [3, 0]\nrobot.model = 'kobuki'";
+        let mut driver = Json::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
+        let said = r#"{"touched":{"bumper-right":true,"cliff-left":false}}"#;
+        assert_eq!(heard(&mut driver, said).touched, [(2, true), (3, false)]);
+        let refused = heard(&mut driver, r#"{"touched":{"nose":true}}"#).refused.unwrap();
+        assert!(refused.contains("no row of robot.touch is called \"nose\""), "{refused}");
     }
 
     #[test]

@@ -197,17 +197,20 @@ pub(crate) struct Touch {
     pub(crate) axis: DVec2,
     /// Half the arc, radians.
     pub(crate) half_width: f64,
+    /// By a bumper or a cliff sensor, and not by held wheels.
+    pub(crate) is_felt: bool,
 }
 
 impl Touch {
     /// None if it is not known where the body is touched. The sample, from shared memory, may hold anything.
     pub(crate) fn of(pose: Pose2, contact: &ContactSample) -> Option<Self> {
-        let &ContactSample { bearing_rad, half_width_rad, .. } = contact;
+        let &ContactSample { bearing_rad, half_width_rad, left, right, .. } = contact;
         let usable = bearing_rad.is_finite() && half_width_rad > 0.0 && half_width_rad <= PI;
         usable.then(|| Self {
             robot: pose.position,
             axis: DVec2::from_angle(pose.heading + bearing_rad),
             half_width: half_width_rad,
+            is_felt: left == 0 && right == 0,
         })
     }
 }

@@ -26,15 +26,15 @@ use common::{
     },
     geometry::wrap_angle,
     kinematics::{Twist, WheelSpeeds},
-    mission::{Body, Mission, Sensor},
+    mission::{Body, Mission, Sensor, TouchRow},
     samples::{LONGEST_SWEEP_NS, Sweep},
 };
 
 use self::{
     gyro::Gyro,
     messages::{
-        Imu, NO_GROWTH, Odometry, Scan, is_repeated, read_moves, read_range, read_voltage,
-        write_twist,
+        Imu, NO_GROWTH, Odometry, Scan, is_repeated, read_bool, read_hazards, read_moves,
+        read_range, read_voltage, write_twist,
     },
     topics::{Content, Topics},
 };
@@ -55,6 +55,7 @@ pub struct Ros2 {
     stamped: bool,
     topics: Topics,
     table: Vec<Sensor>,
+    touches: Vec<TouchRow>,
     told_of_scan_stamp: bool,
     odometry: odometry::Odometry,
     gyro: Gyro,
@@ -73,6 +74,7 @@ impl Ros2 {
             stamped: mission.robot.ros2.stamped,
             topics: Topics::of(mission),
             table: mission.sensor_table(),
+            touches: mission.touches(),
             told_of_scan_stamp: false,
             odometry: odometry::Odometry::default(),
             gyro: Gyro::default(),
@@ -133,6 +135,18 @@ impl Ros2 {
                 Ok(())
             }
             Content::Imu => self.gyro.take(Imu::read(payload)?),
+            Content::Touch(row) => {
+                let feels = read_bool(payload).map_err(|error| error.to_string())?;
+                heard.touched.push((row, feels));
+                Ok(())
+            }
+            Content::Hazards => {
+                let frames = read_hazards(payload).map_err(|error| error.to_string())?;
+                let feels =
+                    |row: &TouchRow| frames.iter().any(|frame| frame.replace('_', "-") == row.name);
+                heard.touched.extend(self.touches.iter().map(feels).enumerate());
+                Ok(())
+            }
             Content::Command => {
                 let (&number, payload) =
                     payload.split_first_chunk().ok_or("a command without its writer")?;

@@ -12,6 +12,10 @@ pub enum Content {
     /// The sensor in this row of the mission.
     Range(usize),
     Imu,
+    /// The bumper or cliff sensor in this row of the mission.
+    Touch(usize),
+    /// All of them that feel something.
+    Hazards,
     /// Another sender's. The number of its writer stands before the payload.
     Command,
 }
@@ -49,6 +53,16 @@ impl Topics {
         }
         if let Some(imu) = &topics.imu {
             heard.push((Content::Imu, Topic::new(imu, "sensor_msgs::msg::dds_::Imu_")));
+        }
+        for (row, touch) in mission.touches().iter().enumerate() {
+            if let Some(name) = topics.ranges.get(&touch.name) {
+                heard.push((Content::Touch(row), Topic::new(name, "std_msgs::msg::dds_::Bool_")));
+            }
+        }
+        if let Some(hazards) = mission.hazards_topic() {
+            let hazards =
+                Topic::new(&hazards, "irobot_create_msgs::msg::dds_::HazardDetectionVector_");
+            heard.push((Content::Hazards, hazards));
         }
         let command = Topic::new(&topics.cmd_vel, command);
         heard.push((Content::Command, command.clone()));

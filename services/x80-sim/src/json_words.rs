@@ -72,6 +72,7 @@ impl JsonWords {
         &self,
         (standard, custom, motor): (&StandardSensors, &CustomSensors, &MotorSensors),
         lasers: &[Laser],
+        touched: BTreeMap<String, bool>,
         motors: &[Motor; 6],
     ) -> Vec<u8> {
         let of = |value: &dyn Fn(usize) -> f64| {
@@ -111,6 +112,7 @@ impl JsonWords {
             scan_age_s,
             scan_time_s,
             scans,
+            touched,
         };
         line(&report)
     }

@@ -45,26 +45,20 @@ impl Laser {
     /// Those whose scans come with the robot's frames; their noise follows from `seed`.
     pub(crate) fn all(mission: &Mission, seed: u64) -> Vec<Self> {
         let (lasers, timing) = (mission.lasers_of_base(), mission.simulation.physics().laser);
-        let nth = |(nth, (_, sensor))| Self {
-            sensor,
-            timing,
-            poses: VecDeque::new(),
-            noise: Noise::of_nth(seed, Source::Laser, nth),
-            scan: Vec::new(),
-        };
-        lasers.into_iter().enumerate().map(nth).collect()
+        let laser = |(nth, (_, sensor))| Self::new(sensor, timing, (seed, nth));
+        lasers.into_iter().enumerate().map(laser).collect()
     }
 
     /// One that says each measurement by itself, up to a tick late.
     pub(crate) fn with_own_wire(sensor: Sensor, mission: &Mission, seed: u64) -> Self {
         let timing = mission.simulation.physics().laser;
-        Self {
-            sensor,
-            timing: LaserTiming { delay_s: 0.0, sweep_s: 1.0 / mission.robot.rate_hz, ..timing },
-            poses: VecDeque::new(),
-            noise: Noise::new(seed, Source::Laser),
-            scan: Vec::new(),
-        }
+        let timing = LaserTiming { delay_s: 0.0, sweep_s: 1.0 / mission.robot.rate_hz, ..timing };
+        Self::new(sensor, timing, (seed, 0))
+    }
+
+    fn new(sensor: Sensor, timing: LaserTiming, (seed, nth): (u64, usize)) -> Self {
+        let noise = Noise::of_nth(seed, Source::Laser, nth);
+        Self { sensor, timing, poses: VecDeque::new(), noise, scan: Vec::new() }
     }
 
     /// Measure for this tick, if the laser does.

@@ -31,7 +31,9 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     )?;
     let topics = &robot.ros2;
     let named = [&topics.odom, &topics.scan, &topics.cmd_vel, &topics.battery];
-    for name in named.into_iter().chain(&topics.imu).chain(topics.ranges.values()) {
+    for name in
+        named.into_iter().chain(&topics.imu).chain(&topics.hazards).chain(topics.ranges.values())
+    {
         let remedy = "use letters, digits and '_' between slashes, as in \"/robot/odom\"";
         refuse_if(!is_topic(name), "robot.ros2", format!("{name:?} is no topic of ROS"), remedy)?;
     }
@@ -47,7 +49,9 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
         return Err(objection("robot.ros2", problem, remedy));
     }
     for name in topics.ranges.keys() {
-        let is_other = !table.iter().any(|row| row.name == *name);
+        let touches = mission.touches();
+        let is_other = !table.iter().any(|row| row.name == *name)
+            && !touches.iter().any(|row| row.name == *name);
         let problem = format!("robot.ros2.ranges names {name:?}, and no sensor is called so");
         refuse_if(is_other, "robot.ros2", problem, "give the name of a row of robot.sensor")?;
     }

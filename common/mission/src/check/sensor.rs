@@ -65,16 +65,20 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     Err(objection("sensors", format!("robot.sensor lacks {lacks}"), "add a row, or give \"all\""))
 }
 
-fn row(row: &SensorRow, rate_hz: f64) -> Result<(), Objection> {
+pub(super) fn name(key: &'static str, name: &str) -> Result<(), Objection> {
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '-';
-    let SensorRow { name, kind, roll_deg, .. } = row;
-    let is_scan = *kind == SensorKind::Scan;
     refuse_if(
         name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(plain),
-        KEY,
+        key,
         format!("{name:?} is no name of a sensor"),
         format!("use letters, digits and '-', at most {LONGEST_NAME}"),
-    )?;
+    )
+}
+
+fn row(row: &SensorRow, rate_hz: f64) -> Result<(), Objection> {
+    let SensorRow { name, kind, roll_deg, .. } = row;
+    let is_scan = *kind == SensorKind::Scan;
+    self::name(KEY, name)?;
     all_within([
         (KEY, row.forward_m, -5.0..=5.0, "m of forward_m"),
         (KEY, row.bearing_deg, -180.0..=180.0, "degrees of bearing_deg"),

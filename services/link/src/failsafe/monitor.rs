@@ -46,6 +46,8 @@ pub enum Observation<'a> {
     Batteries([f64; 3]),
     /// Readings of ranging sensors came.
     Readings(&'a [RangeReading]),
+    /// Rows of bumpers and cliff sensors, and whether they feel something.
+    Touched(&'a [(usize, bool)]),
     /// The base responds so, and not as it is stated to.
     Responds(Response),
     /// A sender other than the link told the robot something.

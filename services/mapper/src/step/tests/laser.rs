@@ -112,6 +112,21 @@ fn what_one_laser_sees_is_hazard_though_another_looks_over_it_and_both_scan_grou
     assert!(!mapper.is_hazard(0.8, 0.0) && mapper.is_hazard(-1.2, 0.0));
 }
 
+#[test]
+fn what_a_bumper_felt_stays_though_the_laser_looks_over_it_and_the_pose_is_on_it_later() {
+    let mut mapper = mapper();
+    let contact = ContactSample { half_width_rad: 0.5, ..ContactSample::default() };
+    let pose = |tick, x| at(tick, x, 0.0, 0.0);
+    mapper.give(Tick { pose: pose(0, 0.0), contact: Some(contact), ..Tick::default() });
+    assert!(mapper.is_hazard(0.2, 0.0));
+    for tick in 1..20 {
+        let scan = Scan { beams: vec![2.0; 360], ..Scan::default() };
+        let x = if tick < 10 { 0.15 } else { -0.5 };
+        mapper.give(Tick { pose: pose(tick, x), scans: vec![scan], ..Tick::default() });
+    }
+    assert!(mapper.is_hazard(0.2, 0.0) && !mapper.is_hazard(0.5, 0.0));
+}
+
 /// The least y that is hazard before the wall y = 1.25, for several x, by a laser with this row that is mounted at `at`, metres ahead
 /// of and to the left of the robot's centre, and whose middle beam looks to `looks_deg`.
 fn wall_of(row: &str, at: DVec2, looks_deg: f64) -> Vec<f64> {

@@ -76,6 +76,7 @@ fn frames<T>(decoder: &mut Decoder, bytes: &[u8], of: impl Fn(&Frame<'_>) -> T) 
     all
 }
 
+#[allow(clippy::large_enum_variant, reason = "one is held at a time")]
 #[derive(Clone, Debug)]
 pub enum Said {
     Frame { rid: u8, did: u8, data: Vec<u8> },
