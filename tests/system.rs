@@ -9,6 +9,7 @@ mod support;
 mod arduino_robot;
 mod bad_input;
 mod blocked_starts;
+mod bumpers;
 mod calibration;
 mod chaos;
 mod console;

@@ -138,6 +138,8 @@ pub struct Heard {
     /// The rows of the sensors are those of the mission's table. Others are ignored.
     pub readings: Vec<RangeReading>,
     pub scans: Vec<LaserScan>,
+    /// Rows of [`crate::mission::Mission::touches`], and whether they feel something.
+    pub touched: Vec<(usize, bool)>,
     /// The link says which batteries are low.
     pub power: Option<PowerSample>,
     pub surroundings: Option<SurroundingsSample>,

@@ -32,7 +32,8 @@ const FIELD_RATE: Rate = Rate::OnChange {
 /// A recorder that was not scheduled for long still learns of each generation from the rosters that wait for it.
 const ROSTERS: Limits = Limits { buffer: Limits::MAP.recorder_buffer, ..Limits::MAP };
 
-/// The memory for the most beams is that of 1,024 small scans: a recorder that is not scheduled for 1.6 s loses none at 40 Hz.
+/// The memory for the most beams is that of 1,024 small scans: a recorder that is not scheduled for 1.6 s loses none of one laser at
+/// 40 Hz.
 const SCANS: Limits = Limits { buffer: 16, recorder_buffer: 64, ..Limits::slices(MOST_BEAMS) };
 
 /// The most bytes of a `wire` sample; longer data take several.
@@ -76,7 +77,7 @@ topics! {
     RANGES: Topic<RangesHeader, RangeReading> {
         name: "ranges", writer: "link", rate: Rate::EachTick, limits: Limits::slices(MOST_SENSORS),
     }
-    /// The beams of the laser.
+    /// The beams of a laser, a sample for each laser that measured.
     SCAN: Topic<ScanHeader, f32> {
         name: "scan", writer: "link", rate: Rate::WhenItHappens, limits: SCANS,
     }
@@ -92,7 +93,7 @@ topics! {
     BASE_RESPONSE: Topic<BaseResponseSample> {
         name: "base_response", writer: "link", rate: Rate::WhenItHappens,
     }
-    /// Wheels are held although they were told to turn: where something touches the body.
+    /// Wheels are held although they were told to turn, or a bumper or a cliff sensor feels something: where.
     CONTACT: Topic<ContactSample> {
         name: "contact", writer: "link", rate: Rate::WhenItHappens,
     }

@@ -43,8 +43,25 @@ pub struct Report {
     /// Time that the scan took, from its first beam to its last.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scan_time_s: Option<f64>,
+    /// Scans by the names of the mission's rows, where there are several lasers.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub scans: BTreeMap<String, Scan>,
+    /// What bumpers and cliff sensors feel, by the names of the mission's rows; one that is left out feels what it felt before.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub touched: BTreeMap<String, bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub battery_v: Option<f64>,
+}
+
+/// As `scan`, `scan_age_s` and `scan_time_s` of a [`Report`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Scan {
+    pub ranges: Vec<Option<f32>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub age_s: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time_s: Option<f64>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

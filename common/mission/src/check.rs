@@ -8,6 +8,7 @@ mod ros2;
 mod sensor;
 mod shapes;
 mod simulation;
+mod touch;
 
 use std::{
     fs::{self, File},
@@ -163,6 +164,7 @@ impl Checker {
         ])?;
         robot::check(mission)?;
         sensor::check(mission)?;
+        touch::check(mission)?;
         ros2::check(mission)?;
         arduino::check(mission)?;
         stages(mission)?;

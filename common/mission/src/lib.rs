@@ -50,6 +50,7 @@ mod ros2;
 mod sensor;
 mod simulation;
 pub mod sonar;
+mod touch;
 
 use std::path::PathBuf;
 
@@ -64,13 +65,14 @@ pub use response::{ModelledSpeed, Response, ResponseKeys};
 pub use robot::{BatteryLimits, Body, Channel, Model, Protocol, RobotConfig, Steering};
 pub use ros2::Ros2Topics;
 pub use sensor::{
-    INFRARED_RANGERS, MOST_BEAMS, MOST_SENSORS, Rplidar, SONARS, Sensor, SensorKind, SensorModel,
-    SensorRow, Sensors, SonarConfig,
+    INFRARED_RANGERS, MOST_BEAMS, MOST_LASERS, MOST_SENSORS, Rplidar, SONARS, Sensor, SensorKind,
+    SensorModel, SensorRow, Sensors, SonarConfig,
 };
 pub use simulation::{
-    BatteryPhysics, Block, BlockedWheels, Heights, InfraredPhysics, LaserTiming, Move, Physics,
-    Radio, Ranger, Realism, Simulation, SonarPhysics, Thing, WheelPhysics,
+    BatteryPhysics, Block, BlockedWheels, Heights, Hole, InfraredPhysics, LaserTiming, Move,
+    Physics, Radio, Ranger, Realism, Simulation, SonarPhysics, Thing, WheelPhysics,
 };
+pub use touch::{MOST_TOUCHES, TouchKind, TouchRow};
 
 use crate::{
     geometry::Shapes,
@@ -356,17 +358,83 @@ impl Mission {
         sensor::table(&rows, *rate_hz, &self.sonar, self.sensor_set())
     }
 
-    pub fn laser(&self) -> Option<(usize, Sensor)> {
-        let mut rows = self.sensor_table().into_iter().enumerate();
-        rows.find(|(_, sensor)| sensor.kind == SensorKind::Scan)
+    /// Bumpers and cliff sensors: those that are written, or else the model's. A robot says what they feel by their names.
+    pub fn touches(&self) -> Vec<TouchRow> {
+        use TouchKind::{Bumper, Cliff};
+        match self.robot.model {
+            _ if !self.robot.touches.is_empty() => self.robot.touches.clone(),
+            _ if !self.robot.protocol().has_scans() => Vec::new(),
+            // Source of the bearings: the user guide's drawing, nominal.
+            Model::Kobuki => touch::rows(
+                60.0,
+                &[
+                    ("bumper-left", Bumper, 60.0),
+                    ("bumper-center", Bumper, 0.0),
+                    ("bumper-right", Bumper, -60.0),
+                    ("cliff-left", Cliff, 60.0),
+                    ("cliff-center", Cliff, 0.0),
+                    ("cliff-right", Cliff, -60.0),
+                ],
+            ),
+            // The frames of a Create 3's hazards; the bearings are nominal.
+            Model::Create3 | Model::TurtleBot4 => touch::rows(
+                36.0,
+                &[
+                    ("bump-left", Bumper, 72.0),
+                    ("bump-front-left", Bumper, 36.0),
+                    ("bump-front-center", Bumper, 0.0),
+                    ("bump-front-right", Bumper, -36.0),
+                    ("bump-right", Bumper, -72.0),
+                    ("cliff-side-left", Cliff, 60.0),
+                    ("cliff-front-left", Cliff, 15.0),
+                    ("cliff-front-right", Cliff, -15.0),
+                    ("cliff-side-right", Cliff, -60.0),
+                ],
+            ),
+            _ => Vec::new(),
+        }
     }
 
-    /// The laser with a wire of its own and its row. Its scans do not come with the robot's frames.
-    pub fn rplidar(&self) -> Option<(usize, Sensor, Rplidar)> {
-        let (row, sensor) = self.laser()?;
-        let has_address = self.robot.sensors.get(row)?.address.is_some();
-        let product = sensor.model.rplidar()?;
-        (has_address || !self.robot.protocol().has_scans()).then_some((row, sensor, product))
+    /// The ROS topic of [`ros2::Ros2Topics::hazards`].
+    pub fn hazards_topic(&self) -> Option<String> {
+        let is_create = matches!(self.robot.model, Model::Create3 | Model::TurtleBot4);
+        let default = is_create.then(|| "/hazard_detection".to_owned());
+        self.robot.ros2.hazards.clone().or(default)
+    }
+
+    /// The lasers and their rows.
+    pub fn lasers(&self) -> Vec<(usize, Sensor)> {
+        let rows = self.sensor_table().into_iter().enumerate();
+        rows.filter(|(_, sensor)| sensor.kind == SensorKind::Scan).collect()
+    }
+
+    /// The laser by whose scans the robot knows where it is: of those that the mission uses the first one with the widest view.
+    pub fn laser(&self) -> Option<(usize, Sensor)> {
+        self.lasers().into_iter().rev().max_by(|(_, a), (_, b)| {
+            a.used.cmp(&b.used).then(a.field_of_view_deg.total_cmp(&b.field_of_view_deg))
+        })
+    }
+
+    /// Those whose scans come with the robot's frames, and not on wires of their own.
+    pub fn lasers_of_base(&self) -> Vec<(usize, Sensor)> {
+        let mut lasers = self.lasers();
+        lasers.retain(|(row, sensor)| self.rplidar(*row, sensor).is_none());
+        lasers
+    }
+
+    /// The lasers with wires of their own.
+    pub fn rplidars(&self) -> Vec<(usize, Sensor, Rplidar)> {
+        let with_product = |(row, sensor)| {
+            let product = self.rplidar(row, &sensor)?;
+            Some((row, sensor, product))
+        };
+        self.lasers().into_iter().filter_map(with_product).collect()
+    }
+
+    fn rplidar(&self, row: usize, sensor: &Sensor) -> Option<Rplidar> {
+        let written = self.robot.sensors.get(row)?;
+        let has_wire = written.address.is_some() || !self.robot.protocol().has_scans();
+        sensor.model.rplidar().filter(|_| has_wire)
     }
 
     pub fn front_row(&self) -> usize {

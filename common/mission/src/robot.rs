@@ -8,6 +8,7 @@ use crate::{
     response::{Response, ResponseKeys},
     ros2::Ros2Topics,
     sensor::SensorRow,
+    touch::TouchRow,
 };
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -117,6 +118,9 @@ keys! {
         /// At most [`crate::MOST_SENSORS`] rows; without any those of the X80.
         #[serde(rename = "sensor", skip_serializing_if = "Vec::is_empty")]
         sensors: Vec<SensorRow>,
+        /// At most [`crate::MOST_TOUCHES`] bumpers and cliff sensors; without any those of the model: [`crate::Mission::touches`].
+        #[serde(rename = "touch", skip_serializing_if = "Vec::is_empty")]
+        touches: Vec<TouchRow>,
     }
 }
 

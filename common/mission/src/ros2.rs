@@ -5,7 +5,7 @@ keys! {
     Ros2Topics {
         /// `nav_msgs/Odometry`.
         odom: String = "/odom".to_owned(),
-        /// `sensor_msgs/LaserScan`.
+        /// `sensor_msgs/LaserScan` of a robot with one laser.
         scan: String = "/scan".to_owned(),
         /// `geometry_msgs/Twist`.
         cmd_vel: String = "/cmd_vel".to_owned(),
@@ -15,7 +15,11 @@ keys! {
         battery: String = "/battery_state".to_owned(),
         /// `sensor_msgs/Imu`; none by default.
         imu: Option<String>,
-        /// `sensor_msgs/Range` of sonars and infrared rangers, by the names of their rows.
+        /// `irobot_create_msgs/HazardDetectionVector`, whose frames are the names of the rows of `robot.touch`; by default that of a
+        /// Create 3.
+        hazards: Option<String>,
+        /// `sensor_msgs/Range` of sonars and infrared rangers, `sensor_msgs/LaserScan` of lasers, and
+        /// `std_msgs/Bool` of bumpers and cliff sensors, by the names of their rows.
         ranges: BTreeMap<String, String>,
     }
 }

@@ -10,7 +10,9 @@ use crate::sonar::Mount;
 
 /// The limit also holds for the readings in a sample of `ranges`.
 pub const MOST_SENSORS: usize = 16;
+/// Of all lasers together.
 pub const MOST_BEAMS: usize = 16_384;
+pub const MOST_LASERS: usize = 4;
 pub const INFRARED_RANGERS: usize = 7;
 pub const SONARS: usize = 6;
 
@@ -178,6 +180,8 @@ pub struct SensorRow {
     /// 180 for a laser that is mounted upside down, otherwise 0.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub roll_deg: f64,
+    /// A laser's, above the ground, which the simulator alone reads; by default `simulation.heights.infrared_m`.
+    pub height_m: Option<f64>,
     /// The default is the model's; a ray has none.
     pub field_of_view_deg: Option<f64>,
     /// The default is the model's.
@@ -221,6 +225,7 @@ pub struct Sensor {
     /// A sensor that is no laser has 1.
     pub beams: usize,
     pub is_upside_down: bool,
+    pub height_m: Option<f64>,
     pub every_ticks: u64,
     pub model: SensorModel,
     pub used: bool,
@@ -243,6 +248,7 @@ impl Sensor {
             reach_m: row.reach_m.unwrap_or(product.reach_m),
             every_ticks: row.rate_hz.map_or(1.0, |hz| (rate_hz / hz).round().max(1.0)) as u64,
             is_upside_down: row.roll_deg != 0.0,
+            height_m: row.height_m,
             beams: row.beams.map_or(product.beams, usize::from),
             model,
             used: false,
@@ -364,6 +370,7 @@ fn row(name: impl Into<String>, kind: SensorKind, forward_m: f64, bearing_deg: f
         bearing_deg,
         turned_deg: 0.0,
         roll_deg: 0.0,
+        height_m: None,
         field_of_view_deg: None,
         reach_m: None,
         beams: None,
@@ -490,6 +497,18 @@ mod tests {
         assert_eq!(mirrored("field_of_view_deg = 180", 5), [4, 3, 2, 1, 0]);
         // From behind over right, ahead and left.
         assert_eq!(mirrored("field_of_view_deg = 360", 4), [0, 3, 2, 1]);
+    }
+
+    #[test]
+    fn of_several_lasers_the_first_with_the_widest_view_that_is_used_says_where_the_robot_is() {
+        let laser = |name: &str, view_deg: u32| {
+            format!(
+                "[[robot.sensor]]\nname = '{name}'\nkind = 'scan'\nforward_m = 0.1\nbearing_deg = 0\nfield_of_view_deg = {view_deg}\n"
+            )
+        };
+        let rows = [laser("narrow", 90), laser("wide", 180), laser("other", 180)].concat();
+        let mission = mission(&format!("robot.protocol = 'json'\n{rows}"));
+        assert_eq!((mission.laser().unwrap().0, mission.lasers().len()), (1, 3));
     }
 
     #[test]

@@ -29,6 +29,10 @@ keys! {
         ring: Vec<Ranger>,
         #[serde(rename = "thing", skip_serializing_if = "Vec::is_empty")]
         things: Vec<Thing>,
+        #[serde(rename = "hole", skip_serializing_if = "Vec::is_empty")]
+        holes: Vec<Hole>,
+        /// A contact does not end the mission.
+        goes_on_after_contact: bool,
         #[serde(rename = "block", skip_serializing_if = "Vec::is_empty")]
         blocks: Vec<Block>,
     }
@@ -81,6 +85,22 @@ pub struct Thing {
     /// Positions in order of time, with straight lines between them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub moves: Vec<Move>,
+}
+
+/// A rectangle without floor. A wheel over it is a contact.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Hole {
+    /// Its middle.
+    pub at: DVec2,
+    /// Along x and y.
+    pub size_m: DVec2,
+}
+
+impl Hole {
+    pub fn contains(&self, point: DVec2) -> bool {
+        (2.0 * (point - self.at)).abs().cmplt(self.size_m).all()
+    }
 }
 
 /// A block keeps wheels from turning for a while, for example a cable around an axle.

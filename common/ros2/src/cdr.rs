@@ -78,7 +78,8 @@ impl<'a> Reader<'a> {
         Ok(str::from_utf8(text).unwrap_or_default())
     }
 
-    fn length(&mut self, most: usize) -> Result<usize, Malformed> {
+    /// Fails if it is more than `most`.
+    pub fn length(&mut self, most: usize) -> Result<usize, Malformed> {
         let length = self.u32()?;
         usize::try_from(length)
             .ok()

@@ -169,7 +169,7 @@ payloads! {
 }
 
 payloads! {
-    /// Held wheels stand by their encoders, and their motors draw a high current.
+    /// Held wheels stand by their encoders, and their motors draw a high current. Without a held wheel a bumper or a cliff sensor felt it.
     #[derive(Serialize, Deserialize)]
     "firsthand.Contact" ContactSample {
         /// Direction of the touch from the body's centre, radians counter-clockwise from the robot's axis.
@@ -241,6 +241,8 @@ wire_enum! {
         BaseSlow = 23 "base slower than stated",
         /// Its readings may not be those of the present: the robot drives slowly, which shows it.
         RangeDoubtful = 24 "ranging sensor doubtful",
+        /// A bumper is pressed, or a cliff sensor sees no floor.
+        Felt = 25 "bumper or cliff sensor",
     }
 }
 

@@ -8,9 +8,9 @@ use common::{
         odometry::{Odometry, motion, twist, wheel_speeds},
         range_reading,
     },
-    json_wire::{Lines, Order, Report, line, parse},
+    json_wire::{Lines, Order, Report, Scan, line, parse},
     kinematics::Twist,
-    mission::{Body, Mission, Sensor},
+    mission::{Body, Mission, Sensor, TouchRow},
     samples::{LONGEST_SWEEP_NS, RangeReading, Sweep},
 };
 
@@ -23,7 +23,8 @@ pub struct Json {
     rate_hz: f64,
     lines: Lines,
     table: Vec<Sensor>,
-    laser: Option<(usize, Sensor)>,
+    lasers: Vec<(usize, Sensor)>,
+    touches: Vec<TouchRow>,
     answered: Option<u64>,
     odometry: Odometry,
     tally: WireTally,
@@ -32,7 +33,8 @@ pub struct Json {
 impl Json {
     pub fn new(mission: &Mission) -> Self {
         Self {
-            laser: mission.laser(),
+            lasers: mission.lasers_of_base(),
+            touches: mission.touches(),
             body: mission.body(),
             rate_hz: mission.robot.rate_hz,
             lines: Lines::default(),
@@ -46,7 +48,12 @@ impl Json {
     /// A refused report has no effect; the error says why.
     fn take(&mut self, report: &Report, heard: &mut Heard) -> Result<(), String> {
         let readings = self.readings_of(&report.ranges)?;
-        let scan = self.scan_of(report)?;
+        let scans = self.scans_of(report)?;
+        let touched = report.touched.iter().map(|(name, feels)| {
+            let row = self.touches.iter().position(|row| row.name == *name);
+            Ok((row.ok_or_else(|| format!("no row of robot.touch is called {name:?}"))?, *feels))
+        });
+        let touched = touched.collect::<Result<Vec<_>, String>>()?;
         let turned = match (report.wheels, report.odometry) {
             (Some(_), Some(_)) => return Err("wheels and odometry: say one of them".to_owned()),
             (Some(turned), None) => Some(turned),
@@ -64,7 +71,8 @@ impl Json {
             let held = report.held.unwrap_or_default();
             heard.motion = Some(motion(&self.body, turned, speeds, held));
         }
-        heard.scans.extend(scan);
+        heard.scans.extend(scans);
+        heard.touched.extend(touched);
         if let Some(count) = report.heard {
             // A robot that has restarted counts from 0.
             let before = self.answered.replace(count).filter(|before| *before <= count);
@@ -93,35 +101,51 @@ impl Json {
         ranges.iter().map(reading).collect()
     }
 
-    fn scan_of(&self, report: &Report) -> Result<Option<LaserScan>, String> {
-        let Some(beams) = &report.scan else {
-            return Ok(None);
-        };
-        let Some((row, sensor)) = &self.laser else {
-            return Err("a scan, and the mission has no laser: add a row of kind scan".to_owned());
-        };
-        if beams.len() != sensor.beams {
-            let (came, want) = (beams.len(), sensor.beams);
-            return Err(format!("a scan of {came} beams, and the mission's laser has {want}"));
-        }
-        let nanoseconds = |word: &str, seconds: Option<f64>| {
-            let ns = seconds.unwrap_or_default() * 1e9;
-            match (0.0..=LONGEST_SWEEP_NS as f64).contains(&ns) {
-                true => Ok(ns.round() as i64),
-                false => Err(format!("{word} is not 0 to 2 s: say seconds")),
-            }
-        };
-        let beam_ns = nanoseconds("scan_time_s", report.scan_time_s)? / beams.len().max(1) as i64;
-        // The first beam that an upside-down laser measures is not the first of its row, and the others follow the other way around.
-        let sweep = Sweep {
-            first_beam_ns: -nanoseconds("scan_age_s", report.scan_age_s)?,
-            beam_ns: if sensor.is_upside_down { -beam_ns } else { beam_ns },
-            first_beam: sensor.mirrored(0) as u64,
-        };
-        let mut beams: Vec<_> = beams.iter().map(|range| beam(sensor, *range)).collect();
-        sensor.mirror(&mut beams);
-        Ok(Some(LaserScan { row: *row, beams, sweep, stamp_ns: None }))
+    fn scans_of(&self, report: &Report) -> Result<Vec<LaserScan>, String> {
+        let only = report.scan.as_ref().map(|beams| {
+            let [laser] = &self.lasers[..] else {
+                return Err(format!(
+                    "a scan, and the mission has {} lasers: add a row of kind scan, or say scans by the names of rows",
+                    self.lasers.len()
+                ));
+            };
+            scan_of(laser, beams, [report.scan_age_s, report.scan_time_s])
+        });
+        let named = report.scans.iter().map(|(name, Scan { ranges, age_s, time_s })| {
+            let laser = self.lasers.iter().find(|(_, sensor)| sensor.name == *name);
+            let laser = laser.ok_or_else(|| format!("no laser is called {name:?}"))?;
+            scan_of(laser, ranges, [*age_s, *time_s])
+        });
+        only.into_iter().chain(named).collect()
     }
+}
+
+fn scan_of(
+    (row, sensor): &(usize, Sensor),
+    beams: &[Option<f32>],
+    [age_s, time_s]: [Option<f64>; 2],
+) -> Result<LaserScan, String> {
+    if beams.len() != sensor.beams {
+        let (came, name, want) = (beams.len(), &sensor.name, sensor.beams);
+        return Err(format!("a scan of {came} beams, and {name:?} has {want}"));
+    }
+    let nanoseconds = |word: &str, seconds: Option<f64>| {
+        let ns = seconds.unwrap_or_default() * 1e9;
+        match (0.0..=LONGEST_SWEEP_NS as f64).contains(&ns) {
+            true => Ok(ns.round() as i64),
+            false => Err(format!("the {word} of a scan is not 0 to 2 s: say seconds")),
+        }
+    };
+    let beam_ns = nanoseconds("time", time_s)? / beams.len().max(1) as i64;
+    // The first beam that an upside-down laser measures is not the first of its row, and the others follow the other way around.
+    let sweep = Sweep {
+        first_beam_ns: -nanoseconds("age", age_s)?,
+        beam_ns: if sensor.is_upside_down { -beam_ns } else { beam_ns },
+        first_beam: sensor.mirrored(0) as u64,
+    };
+    let mut beams: Vec<_> = beams.iter().map(|range| beam(sensor, *range)).collect();
+    sensor.mirror(&mut beams);
+    Ok(LaserScan { row: *row, beams, sweep, stamp_ns: None })
 }
 
 impl Driver for Json {
@@ -311,6 +335,44 @@ mod tests {
         for wrong in ["\"scan_age_s\":-0.1", "\"scan_time_s\":2.1", "\"scan_age_s\":200"] {
             assert_eq!(sweep(&format!(",{wrong}")), None, "{wrong}");
         }
+    }
+
+    #[test]
+    fn scans_of_several_lasers_are_told_apart_by_the_names_of_their_rows() {
+        let row = |name: &str| {
+            format!(
+                "[[robot.sensor]]\nname = '{name}'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nbeams = 3\n"
+            )
+        };
+        let text =
+            format!("target = [3, 0]\nrobot.protocol = 'json'\n{}{}", row("front"), row("back"));
+        let mut driver = Json::new(&Mission::parse(&text, Path::new("m.toml")).unwrap());
+        let said =
+            r#"{"scans":{"back":{"ranges":[1,2,3],"age_s":0.2},"front":{"ranges":[4,5,6]}}}"#;
+        let scans = heard(&mut driver, said).scans;
+        let told = |scan: &LaserScan| (scan.row, scan.beams[0], scan.sweep.first_beam_ns);
+        assert_eq!(
+            scans.iter().map(told).collect::<Vec<_>>(),
+            [(1, 1.0, -200_000_000), (0, 4.0, 0)]
+        );
+        for (said, why) in [
+            (r#"{"scan":[1,2,3]}"#, "by the names of rows"),
+            (r#"{"scans":{"left":{"ranges":[1,2,3]}}}"#, "no laser is called \"left\""),
+            (r#"{"scans":{"back":{"ranges":[1,2]}}}"#, "\"back\" has 3"),
+        ] {
+            let refused = heard(&mut driver, said).refused.unwrap();
+            assert!(refused.contains(why), "{refused}");
+        }
+    }
+
+    #[test]
+    fn what_bumpers_feel_is_told_by_the_names_of_their_rows() {
+        let text = "target = [3, 0]\nrobot.model = 'kobuki'";
+        let mut driver = Json::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
+        let said = r#"{"touched":{"bumper-right":true,"cliff-left":false}}"#;
+        assert_eq!(heard(&mut driver, said).touched, [(2, true), (3, false)]);
+        let refused = heard(&mut driver, r#"{"touched":{"nose":true}}"#).refused.unwrap();
+        assert!(refused.contains("no row of robot.touch is called \"nose\""), "{refused}");
     }
 
     #[test]

@@ -38,5 +38,5 @@ pub fn sensors(mission: &Mission) -> Vec<SensorWire> {
         line: Line { baud: product.baud, lowers_dtr: product.stands_by_dtr },
         driver: Box::new(rplidar_driver::Rplidar::new(row, sensor, product)),
     };
-    mission.rplidar().into_iter().map(wire).collect()
+    mission.rplidars().into_iter().map(wire).collect()
 }

@@ -19,6 +19,7 @@ mod scan_motion;
 pub mod staleness;
 pub mod stop_monitor;
 pub mod streams;
+pub mod touch;
 mod undetected_surface;
 pub(crate) mod wheel_shares;
 
@@ -67,6 +68,7 @@ monitors! {
     staleness: staleness::Staleness,
     stop: stop_monitor::StopMonitor,
     streams: streams::Streams,
+    touch: touch::Touches,
 }
 
 /// A row of the table.
@@ -188,6 +190,13 @@ pub const TABLE: &[Rule] = &[
         action: Action::Stop,
         clears: Clears::WithCondition,
         monitor: |all| &all.odometry,
+    },
+    Rule {
+        cause: Cause::Felt,
+        when: "a bumper of `robot.touch` is pressed, or a cliff sensor sees no floor; the robot stands for 0.5 s, or as long as it needs by its `robot.response`, then `contact` says where, and it goes no nearer while that lasts; `link.log` names the row",
+        action: Action::Stop,
+        clears: Clears::WithCondition,
+        monitor: |all| &all.touch,
     },
     Rule {
         cause: Cause::RangeSilent,

@@ -332,6 +332,9 @@ impl Link {
             let capture_ns = self.now.0;
             TurnSample { capture_ns, sequence, turn_rad, variance_rad2, ..TurnSample::default() }
         });
+        let monitors = &mut self.failsafe.monitors;
+        let contact = monitors.odometry.take_contact();
+        let contact = contact.or_else(|| monitors.touch.take_contact(self.now));
         let effect = Effect::Tick {
             tick: self.open_number(),
             time: self.now,
@@ -340,7 +343,7 @@ impl Link {
             turn,
             wheels,
             endless,
-            contact: self.failsafe.monitors.odometry.take_contact(),
+            contact,
             response: self.failsafe.monitors.base.sample().map(Box::new),
         };
         self.open = Some(OpenTick { effect, began_ns: now_ns, given_ns: None });
@@ -374,7 +377,8 @@ impl Link {
         let counts = match CommandState::from_byte(command.state) {
             CommandState::Driving => {
                 let reached = self.trim.as_ref().map_or(1.0, SpeedTrim::share);
-                self.speeds.of(command, share / reached, &self.wheels)
+                let permitted = self.monitors().touch.permitted(command, self.now);
+                self.speeds.of(&permitted, share / reached, &self.wheels)
             }
             CommandState::Halt | CommandState::Arrived => [0, 0],
         };

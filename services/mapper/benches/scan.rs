@@ -8,7 +8,7 @@ use common::{
     mission::{Mission, MissionError},
     samples::{PoseSample, Stamp},
 };
-use mapper::step::{Input, Mapper, Tick};
+use mapper::step::{Input, Mapper, Scan, Tick};
 
 /// A Jackal with a UST-10LX, in 12 m times 12 m of cells of 5 cm.
 const MISSION: &str = "target = [4, 0]\nrobot.model = 'jackal'\nrobot.rate_hz = 20\nperimeter = { width_m = 12.0, cells = 240 }";
@@ -23,7 +23,8 @@ fn main() -> Result<(), MissionError> {
             let x_m = 0.5 * (tick as f64 * 0.004).sin();
             let stamp = Stamp { tick, ..Stamp::default() };
             let pose = PoseSample { stamp, x_m, ..PoseSample::default() };
-            let input = Input::Tick(Tick { pose, scan: scan(x_m, tick), ..Tick::default() });
+            let scans = vec![Scan { beams: scan(x_m, tick), ..Scan::default() }];
+            let input = Input::Tick(Tick { pose, scans, ..Tick::default() });
             let began = Instant::now();
             mapper.step(input, MissionTime(tick * 50_000_000));
             began.elapsed().as_secs_f64() * 1e6

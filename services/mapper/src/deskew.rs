@@ -9,14 +9,13 @@
 
 use std::{collections::VecDeque, f64::consts::TAU, time::Duration};
 
-use common::{
-    geometry::wrap_angle,
-    kinematics::Pose2,
-    samples::{PoseSample, Sweep},
-};
+use common::{geometry::wrap_angle, kinematics::Pose2, samples::PoseSample};
 use glam::DVec2;
 
-use crate::reading::{Fan, Rows};
+use crate::{
+    reading::{Fan, Rows},
+    step::Scan,
+};
 
 const KEPT: Duration = Duration::from_secs(3);
 /// At a rate of 50 Hz they span [`KEPT`].
@@ -72,15 +71,14 @@ impl Poses {
         })
     }
 
-    /// The robot when the middle beam was measured, that time, and the beams as seen from there. None if the robot's pose at the time
-    /// of a beam is not known.
+    /// The beams of a scan of the tick with this pose, as seen from where the robot was when the middle one was measured. None if the
+    /// robot's pose at the time of a beam is not known.
     pub(crate) fn scan_at_once(
         &self,
         rows: &Rows,
         pose: &PoseSample,
-        beams: Vec<f32>,
-        sweep: Sweep,
-    ) -> Option<(PoseSample, u64, Vec<f32>)> {
+        Scan { row, beams, sweep }: Scan,
+    ) -> Option<Placed> {
         if !sweep.is_plausible(beams.len()) {
             return None;
         }
@@ -101,15 +99,24 @@ impl Poses {
             _ => {
                 let seen_from = |beam| {
                     let robot = robot_at(sweep.beam_time_ns(beam, beams.len()))?;
-                    rows.scan(robot, &beams)
+                    rows.scan(row, robot, &beams)
                 };
-                at_once(&rows.scan(robot, &beams)?, seen_from)?
+                at_once(&rows.scan(row, robot, &beams)?, seen_from)?
             }
         };
         let Pose2 { position, heading } = robot;
         let robot = PoseSample { x_m: position.x, y_m: position.y, heading_rad: heading, ..*pose };
-        Some((robot, capture_ns, beams))
+        Some(Placed { row, robot, capture_ns, beams })
     }
+}
+
+/// A scan whose beams were measured at once, with the robot then.
+#[derive(Clone, Debug)]
+pub(crate) struct Placed {
+    pub(crate) row: usize,
+    pub(crate) robot: PoseSample,
+    pub(crate) capture_ns: u64,
+    pub(crate) beams: Vec<f32>,
 }
 
 fn time_ns(pose: &PoseSample) -> i64 {

@@ -10,8 +10,8 @@
 //! An infrared ray is as thin as a cell and ends at a surface of any angle: passed cells are free, the last one is occupied, and silence
 //! is no evidence against that.
 //!
-//! A laser that looks over or through a thing is no evidence against it, so beside it the other rangers have a grid of their own, and a
-//! cell of either is hazard. An echo whose range the laser confirms is put where the laser sees the thing. So glass that the laser sees
+//! A laser that looks over or through a thing is no evidence against it, so each laser, and beside lasers the other rangers, have a grid
+//! of their own, and a cell of any is hazard. An echo whose range the laser confirms is put where the laser sees the thing. So glass that the laser sees
 //! only squarely stays by its echoes.
 //!
 //! No ranger is evidence against a thing that the body touched: all may look over it.
@@ -42,6 +42,8 @@ const OCCUPIED: u8 = 1;
 const SEEN: u8 = 2;
 /// Flag: the body touched the obstacle, which no ranger may see.
 const TOUCHED: u8 = 4;
+/// Flag: a bumper or a cliff sensor felt the obstacle, which stays though the pose is on it later: wheels slip.
+const FELT: u8 = 8;
 
 /// A cell crossed by the axis beyond this angle is beside the sensor and not of the beam, radians.
 const WIDEST_SLACK_RAD: f64 = 1.0;
@@ -84,7 +86,7 @@ pub(crate) struct EvidenceGrid {
     /// Scanned from [`SCANNED`] down to [`POINTED_ENOUGH`]; below that, how often the sonar was pointed at the cell in vain.
     #[serde(with = "serde_bytes")]
     looks: Vec<u8>,
-    /// The flags [`OCCUPIED`], [`SEEN`] and [`TOUCHED`].
+    /// The flags [`OCCUPIED`], [`SEEN`], [`TOUCHED`] and [`FELT`].
     #[serde(with = "serde_bytes")]
     occupied: Vec<u8>,
     /// The mission says it again to the next process.
@@ -262,7 +264,7 @@ impl EvidenceGrid {
         })
     }
 
-    /// A robot stands here: no obstacle does, and no sensor can scan the ground that it touches.
+    /// A robot stands here: no obstacle does but what a bumper felt, and no sensor can scan the ground that it touches.
     pub(crate) fn stand(&mut self, robot: DVec2) {
         let Ground { lattice, radius } = self.ground;
         let touches = radius + lattice.resolution_m;
@@ -272,7 +274,9 @@ impl EvidenceGrid {
                 continue;
             }
             self.scan(cell);
-            if distance <= radius - sonar::RIM_M && self.weight_of(lattice.index(cell)) > 0 {
+            let index = lattice.index(cell);
+            let is_felt = self.occupied[index] & FELT != 0;
+            if distance <= radius - sonar::RIM_M && self.weight_of(index) > 0 && !is_felt {
                 self.set(cell, 0);
             }
         }
@@ -345,7 +349,7 @@ impl EvidenceGrid {
                 let index = lattice.index(cell);
                 self.side[index] = side_of(touch.axis);
                 self.set(cell, sonar::MOST);
-                self.occupied[index] |= TOUCHED;
+                self.occupied[index] |= if touch.is_felt { TOUCHED | FELT } else { TOUCHED };
                 self.news.window = self.news.window.including(cell);
             }
         }
@@ -391,7 +395,7 @@ impl EvidenceGrid {
             self.news.flips.push(Flip { cell, occupied });
         }
         if !occupied {
-            self.occupied[index] &= !(SEEN | TOUCHED);
+            self.occupied[index] &= !(SEEN | TOUCHED | FELT);
         }
     }
 

@@ -19,9 +19,10 @@ use crate::{
 /// The evidence, and the cells that it forbids to the body's centre.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct EvidenceMap {
+    /// Of the first laser; without one of all sensors.
     evidence: EvidenceGrid,
-    /// Evidence of sonars and infrared rangers beside a laser, which looks over or through things; none without both.
-    unseen: Option<Box<EvidenceGrid>>,
+    /// Of each further laser, and then of the sonars and infrared rangers beside lasers: a laser looks over or through what others see.
+    others: Vec<EvidenceGrid>,
     pub(crate) beams: ClearBeams,
     /// Recomputed from the evidence, so not saved.
     #[serde(skip)]
@@ -30,7 +31,7 @@ pub(crate) struct EvidenceMap {
 
 impl EvidenceMap {
     fn grids(&mut self) -> impl Iterator<Item = &mut EvidenceGrid> {
-        std::iter::once(&mut self.evidence).chain(self.unseen.as_deref_mut())
+        std::iter::once(&mut self.evidence).chain(&mut self.others)
     }
 }
 
@@ -42,6 +43,8 @@ pub(crate) struct Evidential {
     under: Vec<Option<u32>>,
     map_within: f64,
     sonars: usize,
+    /// Their rows.
+    lasers: Vec<usize>,
     beside_laser: bool,
 }
 
@@ -60,6 +63,7 @@ impl Evidential {
             ground: Ground { lattice, radius },
             map_within: mission.map_within_m(),
             sonars: rows.cones(),
+            lasers: rows.lasers(),
             beside_laser: rows.are_beside_laser(),
         }
     }
@@ -72,23 +76,29 @@ impl Evidential {
     pub(crate) fn empty(&self) -> EvidenceMap {
         let evidence = EvidenceGrid::new(self.ground);
         EvidenceMap {
-            unseen: self.beside_laser.then(|| Box::new(evidence.clone())),
+            others: vec![evidence.clone(); self.others()],
             evidence,
             beams: ClearBeams::default(),
             inflation: Inflation::new(&self.geometry),
         }
     }
 
-    pub(crate) const fn saved_bytes(&self) -> usize {
-        let grids = if self.beside_laser { 2 } else { 1 };
-        4 * grids * self.geometry.lattice.area() + ClearBeams::SAVED_BYTES + 128
+    fn further_lasers(&self) -> usize {
+        self.lasers.len().saturating_sub(1)
+    }
+
+    fn others(&self) -> usize {
+        self.further_lasers() + usize::from(self.beside_laser)
+    }
+
+    pub(crate) fn saved_bytes(&self) -> usize {
+        4 * (1 + self.others()) * self.geometry.lattice.area() + ClearBeams::SAVED_BYTES + 128
     }
 
     /// Fails for the map of another mission.
     pub(crate) fn complete(&self, map: &mut EvidenceMap) -> Result<(), ForeignState> {
         let lattice = self.geometry.lattice;
-        let fits = map.unseen.is_some() == self.beside_laser
-            && map.grids().all(|grid| grid.fits(&lattice));
+        let fits = map.others.len() == self.others() && map.grids().all(|grid| grid.fits(&lattice));
         if !fits {
             return Err(ForeignState);
         }
@@ -103,30 +113,36 @@ impl Evidential {
         Ok(())
     }
 
-    /// Take a scan and the readings of a robot at `robot`, whose wheels had rolled the first of these ways before, and the second now.
+    /// Take scans, each with the row of its laser, and the readings of a robot at `robot`, whose wheels had rolled the first of these ways before, and the second now.
     /// Returns the grid's window that may look different, and whether there is a new obstacle.
-    pub(crate) fn take(
+    pub(crate) fn take<'a>(
         &self,
         map: &mut EvidenceMap,
         robot: DVec2,
         [before_m, rolled_m]: [f64; 2],
-        (scan, rays, beams): (
-            Option<Fan<'_>>,
+        (scans, rays, beams): (
+            impl Iterator<Item = (usize, Fan<'a>)>,
             impl Iterator<Item = Ray>,
             impl Iterator<Item = Reading>,
         ),
     ) -> (Window, bool) {
         let steps = (rolled_m / STEP_M).floor() - (before_m / STEP_M).floor();
         if steps >= 1.0 {
-            map.evidence.grow_stale(steps as u8);
+            let by_lasers = map.grids().take(1 + self.further_lasers());
+            by_lasers.for_each(|grid| grid.grow_stale(steps as u8));
         }
-        // The scan first, and then the rays: what they show explains echoes.
-        if let Some(fan) = scan {
-            map.evidence.take_scan(&fan, robot);
+        // The scans first, and then the rays: what they show explains echoes.
+        for (row, fan) in scans {
+            let laser = self.lasers.iter().position(|laser| *laser == row);
+            if let Some(grid) = laser.and_then(|laser| map.grids().nth(laser)) {
+                grid.take_scan(&fan, robot);
+            }
         }
-        let (grid, by_laser) = match &mut map.unseen {
-            Some(unseen) => (unseen.as_mut(), Some(&map.evidence)),
-            None => (&mut map.evidence, None),
+        let (grid, by_lasers): (_, Vec<&EvidenceGrid>) = match map.others.split_last_mut() {
+            Some((own, further)) if self.beside_laser => {
+                (own, std::iter::once(&map.evidence).chain(&*further).collect())
+            }
+            _ => (&mut map.evidence, Vec::new()),
         };
         for ray in rays {
             map.beams.take_ray(&ray, rolled_m);
@@ -134,7 +150,7 @@ impl Evidential {
         }
         for reading in beams {
             map.beams.take(self.sonars, &reading, rolled_m);
-            let seen = by_laser.filter(|seen| seen.explains(&reading));
+            let seen = by_lasers.iter().copied().find(|seen| seen.explains(&reading));
             grid.take(&reading, self.map_within, seen, robot);
         }
         self.follow(map)
@@ -174,7 +190,9 @@ impl Evidential {
         let hazard = map.inflation.is_hazard(grid.index(cell)) && !is_target;
         let under = |along: u32| self.under[along as usize];
         let under = under(cell.col).zip(under(cell.row)).map(|(col, row)| Cell { col, row });
-        let is_scanned = |under| map.evidence.is_scanned(lattice.index(under));
+        let further = map.others.iter().take(self.further_lasers());
+        let mut by_lasers = std::iter::once(&map.evidence).chain(further);
+        let is_scanned = |under| by_lasers.any(|grid| grid.is_scanned(lattice.index(under)));
         match (hazard, under.is_some_and(is_scanned)) {
             (true, true) => CellState::Margin,
             (true, false) => CellState::Sensed,

@@ -20,9 +20,8 @@ const CONTACT_M: f64 = 0.04;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Rows {
+    /// None for a row that the mission does not use.
     rows: Vec<Option<Row>>,
-    /// The bearing of the first beam from the laser's own, the angle from beam to beam, and the row; none if unused.
-    laser: Option<((f64, f64), Row)>,
     front: u8,
 }
 
@@ -31,6 +30,8 @@ struct Row {
     mount: Mount,
     reach_m: f64,
     kind: SensorKind,
+    /// The bearing of the first beam from the laser's own, and the angle from beam to beam.
+    fan: (f64, f64),
     /// None for other kinds.
     cone: Option<SonarModel>,
 }
@@ -42,11 +43,11 @@ impl Rows {
                 mount: sensor.mount,
                 reach_m: sensor.reach_m,
                 kind: sensor.kind,
+                fan: sensor.fan(),
                 cone: (sensor.kind == SensorKind::Cone).then(|| SonarModel::of(&sensor)),
             })
         };
         Self {
-            laser: mission.laser().and_then(|(_, laser)| Some((laser.fan(), row(laser)?))),
             rows: mission.sensor_table().into_iter().map(row).collect(),
             front: mission.front_row() as u8,
         }
@@ -56,9 +57,19 @@ impl Rows {
         self.rows.iter().flatten().filter(|row| row.cone.is_some()).count()
     }
 
+    /// The rows of lasers.
+    pub(crate) fn lasers(&self) -> Vec<usize> {
+        (0..self.rows.len()).filter(|row| self.laser(*row).is_some()).collect()
+    }
+
+    fn laser(&self, row: usize) -> Option<Row> {
+        let row = *self.rows.get(row)?;
+        row.filter(|row| row.kind == SensorKind::Scan)
+    }
+
     pub(crate) fn are_beside_laser(&self) -> bool {
         let is_other = |row: &Row| row.kind != SensorKind::Scan;
-        self.laser.is_some() && self.rows.iter().flatten().any(is_other)
+        !self.lasers().is_empty() && self.rows.iter().flatten().any(is_other)
     }
 
     /// None if the mission does not use it. The sample, from shared memory, may hold anything.
@@ -66,20 +77,17 @@ impl Rows {
         *self.rows.get(usize::from(reading.sensor))?
     }
 
-    pub(crate) const fn has_laser(&self) -> bool {
-        self.laser.is_some()
-    }
-
     pub(crate) fn uses_row(&self, row: u64) -> bool {
         usize::try_from(row).is_ok_and(|row| self.rows.get(row).is_some_and(Option::is_some))
     }
 
     /// None without beams.
-    pub(crate) fn scan<'a>(&self, robot: Pose2, beams: &'a [f32]) -> Option<Fan<'a>> {
-        let ((first, step_rad), row) = self.laser.filter(|_| !beams.is_empty())?;
-        let mount = row.mount.on(robot);
+    pub(crate) fn scan<'a>(&self, row: usize, robot: Pose2, beams: &'a [f32]) -> Option<Fan<'a>> {
+        let Row { mount, reach_m, fan: (first, step_rad), .. } =
+            self.laser(row).filter(|_| !beams.is_empty())?;
+        let mount = mount.on(robot);
         let first_rad = mount.heading + first;
-        Some(Fan { origin: mount.position, first_rad, step_rad, reach_m: row.reach_m, beams })
+        Some(Fan { origin: mount.position, first_rad, step_rad, reach_m, beams })
     }
 
     pub(crate) fn uses(&self, reading: &RangeReading) -> bool {
@@ -189,17 +197,20 @@ pub(crate) struct Touch {
     pub(crate) axis: DVec2,
     /// Half the arc, radians.
     pub(crate) half_width: f64,
+    /// By a bumper or a cliff sensor, and not by held wheels.
+    pub(crate) is_felt: bool,
 }
 
 impl Touch {
     /// None if it is not known where the body is touched. The sample, from shared memory, may hold anything.
     pub(crate) fn of(pose: Pose2, contact: &ContactSample) -> Option<Self> {
-        let &ContactSample { bearing_rad, half_width_rad, .. } = contact;
+        let &ContactSample { bearing_rad, half_width_rad, left, right, .. } = contact;
         let usable = bearing_rad.is_finite() && half_width_rad > 0.0 && half_width_rad <= PI;
         usable.then(|| Self {
             robot: pose.position,
             axis: DVec2::from_angle(pose.heading + bearing_rad),
             half_width: half_width_rad,
+            is_felt: left == 0 && right == 0,
         })
     }
 }

@@ -1,4 +1,4 @@
-//! The scan matcher: the robot's pose by its laser.
+//! The scan matcher: the robot's pose by its laser, of several by the first with the widest view.
 //!
 //! A scan is laid so that its points lie on lines through the points of a reference scan (point-to-line matching, Censi 2008): an
 //! earlier one at its matched pose, replaced when the robot has gone so far that it sees other things. The search begins at dead
@@ -17,7 +17,10 @@ use common::{
 use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
-use crate::reading::{Fan, Rows};
+use crate::{
+    deskew::Placed,
+    reading::{Fan, Rows},
+};
 
 /// Deviation of a point from its line, metres: the noise of a laser, and of the line.
 const POINT_M: f64 = 0.02;
@@ -75,6 +78,8 @@ struct Line {
 
 #[derive(Clone, Debug)]
 pub(crate) struct ScanMatcher {
+    /// Of the laser.
+    row: usize,
     /// Published matches are so far apart.
     every_ticks: u64,
     /// Matches that share their errors.
@@ -85,36 +90,41 @@ impl ScanMatcher {
     pub(crate) fn new(mission: &Mission) -> Self {
         let rate_hz = mission.robot.rate_hz;
         let every_ticks = (rate_hz / MOST_FIXES_HZ).ceil().max(1.0) as u64;
-        let scans = mission.laser().map_or(1, |(_, laser)| laser.every_ticks.max(1));
+        let (row, scans) = match mission.laser() {
+            Some((row, laser)) => (row, laser.every_ticks.max(1)),
+            None => (0, 1),
+        };
         let fixes_hz = rate_hz / every_ticks.max(scans) as f64;
-        Self { every_ticks, shared: (SHARED_S * fixes_hz).max(1.0) }
+        Self { row, every_ticks, shared: (SHARED_S * fixes_hz).max(1.0) }
     }
 
     pub(crate) const fn publishes(&self, tick: u64) -> bool {
         tick.is_multiple_of(self.every_ticks)
     }
 
-    /// Match `beams`, taken at `reckoned` by dead reckoning, with the reference, replaced if necessary. None if too little of the
-    /// reference is seen.
+    /// Match the laser's scan, if it is among `scans`, with the reference, replaced if necessary. None if too little of the reference is
+    /// seen.
     pub(crate) fn step(
         &self,
         rows: &Rows,
         reference: &mut Option<Reference>,
-        reckoned: &PoseSample,
-        beams: &[f32],
+        scans: &[Placed],
     ) -> Option<FixSample> {
+        let row = self.row;
+        let Placed { robot: reckoned, capture_ns, beams, .. } =
+            scans.iter().find(|scan| scan.row == row)?;
         let robot = reckoned.pose();
-        let fan = rows.scan(robot, beams)?;
+        let fan = rows.scan(row, robot, beams)?;
         let Some(held) = reference else {
             *reference = Some(Reference::new(&fan, robot, covariance_of(reckoned)));
             return None;
         };
         if held.lines.is_empty() {
             let saved = std::mem::take(&mut held.beams);
-            let fan = rows.scan(held.pose, &saved)?;
+            let fan = rows.scan(row, held.pose, &saved)?;
             *held = Reference::new(&fan, held.pose, held.covariance);
         }
-        let seen_from = rows.scan(held.pose, beams)?;
+        let seen_from = rows.scan(row, held.pose, beams)?;
         let found = held.matched(&fan, &seen_from, robot);
         let (pose, matched, share) = match found {
             Some(found) => found,
@@ -124,6 +134,7 @@ impl ScanMatcher {
         let fix = found.map(|_| {
             let all = (matched + variances(LEAST)) * self.shared + of_reference;
             FixSample {
+                capture_ns: *capture_ns,
                 x_m: pose.position.x,
                 y_m: pose.position.y,
                 heading_rad: pose.heading,
@@ -149,7 +160,7 @@ impl ScanMatcher {
                 Some(_) => of_reference + matched + variances(OF_REFERENCE),
                 None => covariance_of(reckoned),
             };
-            let fan = rows.scan(pose, beams)?;
+            let fan = rows.scan(row, pose, beams)?;
             *reference = Some(Reference::new(&fan, pose, covariance));
         }
         fix
@@ -306,7 +317,9 @@ mod tests {
             let Pose2 { position, heading } = robot;
             let (x_m, y_m) = (position.x, position.y);
             let reckoned = PoseSample { x_m, y_m, heading_rad: heading, ..PoseSample::default() };
-            self.0.step(&self.1, reference, &reckoned, beams)
+            let beams = beams.to_vec();
+            let scan = Placed { row: 0, robot: reckoned, capture_ns: 0, beams };
+            self.0.step(&self.1, reference, &[scan])
         }
     }
 

@@ -10,7 +10,7 @@ use common::{
     readers,
     samples::{
         ContactSample, DirectiveSample, FaultKind, PoseSample, RangeReading, RangesHeader,
-        ScanHeader, Sweep,
+        ScanHeader,
     },
     shell::{Context, Process, Progress},
     stage::Runner,
@@ -22,7 +22,7 @@ use common::{
 
 use crate::{
     stage::Entry,
-    step::{Input, Mapper, Tick},
+    step::{Input, Mapper, Scan, Tick},
 };
 
 /// Mission time after which the whole map is published again.
@@ -67,7 +67,8 @@ pub struct Shell {
     inputs: Inputs,
     runner: Runner<Mapper>,
     ranges: OfTick<Vec<RangeReading>>,
-    scan: OfTick<(Vec<f32>, Sweep)>,
+    /// Those of the newest tick, each with it.
+    scans: Vec<(u64, Scan)>,
     contact: OfTick<Option<ContactSample>>,
     last_keyframe: Option<MissionTime>,
 }
@@ -86,8 +87,8 @@ impl Process for Shell {
         if version > 1 {
             tracing::info!(version, "the belief is restored");
         }
-        let (ranges, scan, contact) = Default::default();
-        Ok(Self { inputs, runner, ranges, scan, contact, last_keyframe: None })
+        let (ranges, scans, contact) = Default::default();
+        Ok(Self { inputs, runner, ranges, scans, contact, last_keyframe: None })
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {
@@ -103,25 +104,28 @@ impl Process for Shell {
                 let used = readings.filter(|reading| mapper.uses(reading)).collect();
                 Ok(Some((slice.header().stamp.tick, used)))
             })?;
-            let (scan, sweep) = self.scan.take(tick, || {
-                let Some(slice) = inputs.scan.next_slice()? else {
-                    return Ok(None);
-                };
+            self.scans.retain(|(of, _)| *of >= tick);
+            while self.scans.last().is_none_or(|(newest, _)| *newest == tick)
+                && let Some(slice) = inputs.scan.next_slice()?
+            {
                 let header = slice.header();
-                let most = if mapper.uses_row(header.sensor) { MOST_BEAMS } else { 0 };
-                let beams = slice.iter().take(most).copied().collect();
-                Ok(Some((header.stamp.tick, (beams, header.sweep()))))
-            })?;
+                let (of, row) = (header.stamp.tick, header.sensor as usize);
+                // A repeated tick has its scans again.
+                let is_held = self.scans.iter().any(|(held, scan)| (*held, scan.row) == (of, row));
+                if of >= tick && !is_held && mapper.uses_row(header.sensor) {
+                    let beams = slice.iter().take(MOST_BEAMS).copied().collect();
+                    self.scans.push((of, Scan { row, beams, sweep: header.sweep() }));
+                }
+            }
+            let own = self.scans.extract_if(.., |(of, _)| *of == tick);
+            let scans = own.map(|(_, scan)| scan).collect();
             let contact = self.contact.take(tick, || {
                 let sample = inputs.contact.next_sample()?;
                 Ok(sample.map(|sample| (sample.stamp.tick, Some(sample))))
             })?;
             let target = self.inputs.target.next(tick)?.map(|sample| sample.target.position());
             let target = target.filter(|target| *target != self.runner.stage.target());
-            if sweep != Sweep::default() && !scan.is_empty() {
-                self.step(Input::Sweep(tick, sweep))?;
-            }
-            self.step(Input::Tick(Tick { pose, ranges, scan, contact, target }))?;
+            self.step(Input::Tick(Tick { pose, ranges, scans, contact, target }))?;
         }
         if let Some(DirectiveSample { epoch, .. }) = self.inputs.directive.newest()?
             && self.step(Input::Reset { epoch })?

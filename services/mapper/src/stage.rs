@@ -59,8 +59,8 @@ impl Stage for Mapper {
             Entry::Step(input, at) => {
                 out.at = at;
                 let change = self.step(input.clone(), at.time);
-                // A belief that a fault made wrong is wrong in its journal, too, and a sweep belongs to the next input.
-                if change != Change::None || matches!(input, Input::Fault(_) | Input::Sweep(..)) {
+                // A belief that a fault made wrong is wrong in its journal, too.
+                if change != Change::None || matches!(input, Input::Fault(_)) {
                     out.append(&input)?;
                 }
                 change

@@ -7,7 +7,6 @@ use common::{
     clock::MissionTime,
     geometry::Shapes,
     grid::{Cell, CellState, GridFrame, Part, Window},
-    kinematics::Pose2,
     mission::{Method, Mission},
     samples::{
         ContactSample, FaultKind, FixSample, GridHeader, PoseSample, RangeReading, Sweep, name,
@@ -18,7 +17,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    deskew::Poses,
+    deskew::{Placed, Poses},
     evidential::{EvidenceMap, Evidential},
     fault,
     reading::{Rows, Touch},
@@ -36,8 +35,6 @@ pub enum Input {
     },
     /// An operator's; it acts from the next tick on.
     Fault(FaultKind),
-    /// The beams of this tick's scan, which follows, were measured at these times; otherwise at the tick.
-    Sweep(u64, Sweep),
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -45,12 +42,21 @@ pub struct Tick {
     pub pose: PoseSample,
     /// None if none came.
     pub ranges: Vec<RangeReading>,
-    /// Metres; none if none came.
-    pub scan: Vec<f32>,
+    /// Those that came, at most one of a laser.
+    pub scans: Vec<Scan>,
     /// Something holds the wheels at this tick.
     pub contact: Option<ContactSample>,
     /// It holds from this tick on, metres; none if unchanged.
     pub target: Option<DVec2>,
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Scan {
+    /// The laser's, in the mission's table.
+    pub row: usize,
+    /// Metres.
+    pub beams: Vec<f32>,
+    pub sweep: Sweep,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -154,10 +160,8 @@ pub struct Mapper {
     half_track: f64,
     matcher: ScanMatcher,
     poses: Poses,
-    /// The newest scan's that were not measured at their tick.
-    sweep: Option<(u64, Sweep)>,
     fix: Option<FixSample>,
-    /// Of the laser; 0 without one.
+    /// Of all lasers.
     beams: usize,
     belief: Belief,
 }
@@ -185,9 +189,8 @@ impl Mapper {
             half_track: mission.body().track_m / 2.0,
             matcher: ScanMatcher::new(mission),
             poses: Poses::default(),
-            sweep: None,
             fix: None,
-            beams: mission.laser().map_or(0, |(_, laser)| laser.beams),
+            beams: mission.lasers().iter().map(|(_, laser)| laser.beams).sum(),
             belief: Belief {
                 cells: vec![CellState::Free as u8; frame.area()],
                 version: 1,
@@ -241,10 +244,6 @@ impl Mapper {
                 self.belief.fault = fault;
                 Change::None
             }
-            Input::Sweep(tick, sweep) => {
-                self.sweep = Some((tick, sweep));
-                Change::None
-            }
         }
     }
 
@@ -270,7 +269,7 @@ impl Mapper {
         self.belief.target
     }
 
-    pub const fn saved_bytes(&self) -> usize {
+    pub fn saved_bytes(&self) -> usize {
         let evidence = match self.belief.sensed {
             Sensed::Hits => 0,
             Sensed::Evidence(_) => self.evidential.saved_bytes(),
@@ -342,29 +341,29 @@ impl Mapper {
     /// Map readings and contact. Returns the changed window. A tick given twice is mapped once.
     fn tick(
         &mut self,
-        Tick { pose, ranges, scan, contact, target }: Tick,
+        Tick { pose, ranges, scans, contact, target }: Tick,
         now: MissionTime,
     ) -> Window {
         let moved = target.map_or(Window::default(), |target| self.move_target(target));
-        if self.rows.has_laser() {
+        if self.beams > 0 {
             self.poses.add(&pose);
         }
-        let sweep = self.sweep.take().filter(|(tick, _)| *tick == pose.stamp.tick);
         let changed = if self.belief.tick == Some(pose.stamp.tick) {
             moved
         } else {
             // A scan whose place is not known is left out.
-            let (scanned_at, capture_ns, scan) = match sweep {
-                Some((_, sweep)) => self.poses.scan_at_once(&self.rows, &pose, scan, sweep),
-                None => Some((pose, now.0, scan)),
-            }
-            .unwrap_or_default();
-            let reference = &mut self.belief.reference;
-            let fix = self.matcher.step(&self.rows, reference, &scanned_at, &scan);
+            let placed = |scan: Scan| match scan {
+                Scan { row, beams, sweep } if sweep == Sweep::default() => {
+                    Some(Placed { row, robot: pose, capture_ns: now.0, beams })
+                }
+                scan => self.poses.scan_at_once(&self.rows, &pose, scan),
+            };
+            let scans: Vec<_> = scans.into_iter().filter_map(placed).collect();
+            let fix = self.matcher.step(&self.rows, &mut self.belief.reference, &scans);
             let fix = fix.filter(|_| self.matcher.publishes(pose.stamp.tick));
             let source = name("scan");
-            self.fix = fix.map(|fix| FixSample { capture_ns, source, ..fix });
-            moved.union(self.map(&pose, (&ranges, scanned_at.pose(), &scan), contact.as_ref()))
+            self.fix = fix.map(|fix| FixSample { source, ..fix });
+            moved.union(self.map(&pose, (&ranges, &scans), contact.as_ref()))
         };
         self.belief.version += u64::from(changed.area() > 0);
         changed
@@ -373,7 +372,7 @@ impl Mapper {
     fn map(
         &mut self,
         pose: &PoseSample,
-        (ranges, scanned_at, scan): (&[RangeReading], Pose2, &[f32]),
+        (ranges, scans): (&[RangeReading], &[Placed]),
         contact: Option<&ContactSample>,
     ) -> Window {
         let (belief, robot) = (&mut self.belief, pose.pose());
@@ -382,7 +381,7 @@ impl Mapper {
         belief.rolled += belief.robot.distance(robot.position)
             + self.half_track * (robot.heading - belief.heading).abs();
         (belief.robot, belief.heading) = (robot.position, robot.heading);
-        let (ranges, scan) = if self.sensing { (ranges, scan) } else { (&[][..], &[][..]) };
+        let (ranges, scans) = if self.sensing { (ranges, scans) } else { (&[][..], &[][..]) };
         let (seen, is_event) = match &mut belief.sensed {
             // Hazard where the front sonar hears an obstacle.
             Sensed::Hits => {
@@ -393,8 +392,10 @@ impl Mapper {
             }
             Sensed::Evidence(map) => {
                 let (rows, rolled_m) = (&self.rows, [before_m, belief.rolled]);
-                let fan = rows.scan(scanned_at, scan);
-                let readings = (fan, rows.rays(robot, ranges), rows.beams(robot, ranges));
+                let fans = scans.iter().filter_map(|Placed { row, robot, beams, .. }| {
+                    Some((*row, rows.scan(*row, robot.pose(), beams)?))
+                });
+                let readings = (fans, rows.rays(robot, ranges), rows.beams(robot, ranges));
                 let (window, is_event) =
                     self.evidential.take(map, robot.position, rolled_m, readings);
                 (self.redraw(window), is_event)

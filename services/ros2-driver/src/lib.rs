@@ -26,15 +26,15 @@ use common::{
     },
     geometry::wrap_angle,
     kinematics::{Twist, WheelSpeeds},
-    mission::{Body, Mission, Sensor},
+    mission::{Body, Mission, Sensor, TouchRow},
     samples::{LONGEST_SWEEP_NS, Sweep},
 };
 
 use self::{
     gyro::Gyro,
     messages::{
-        Imu, NO_GROWTH, Odometry, Scan, is_repeated, read_moves, read_range, read_voltage,
-        write_twist,
+        Imu, NO_GROWTH, Odometry, Scan, is_repeated, read_bool, read_hazards, read_moves,
+        read_range, read_voltage, write_twist,
     },
     topics::{Content, Topics},
 };
@@ -55,7 +55,7 @@ pub struct Ros2 {
     stamped: bool,
     topics: Topics,
     table: Vec<Sensor>,
-    laser: Option<(usize, Sensor)>,
+    touches: Vec<TouchRow>,
     told_of_scan_stamp: bool,
     odometry: odometry::Odometry,
     gyro: Gyro,
@@ -74,7 +74,7 @@ impl Ros2 {
             stamped: mission.robot.ros2.stamped,
             topics: Topics::of(mission),
             table: mission.sensor_table(),
-            laser: mission.laser(),
+            touches: mission.touches(),
             told_of_scan_stamp: false,
             odometry: odometry::Odometry::default(),
             gyro: Gyro::default(),
@@ -114,12 +114,12 @@ impl Ros2 {
     ) -> Result<(), String> {
         match content {
             Content::Odometry => self.take_odometry(&Odometry::read(payload)?, heard),
-            Content::Scan => {
+            Content::Scan(row) => {
                 let mut scan = Scan::read(payload).map_err(|error| error.to_string())?;
-                if self.laser.as_ref().is_some_and(|(_, sensor)| sensor.is_upside_down) {
+                if self.table.get(row).is_some_and(|sensor| sensor.is_upside_down) {
                     scan.turn_over();
                 }
-                self.take_scan(&scan, heard)
+                self.take_scan(row, &scan, heard)
             }
             Content::Range(row) => {
                 let range = read_range(payload).map_err(|error| error.to_string())?;
@@ -137,6 +137,18 @@ impl Ros2 {
                 Ok(())
             }
             Content::Imu => self.gyro.take(Imu::read(payload)?),
+            Content::Touch(row) => {
+                let feels = read_bool(payload).map_err(|error| error.to_string())?;
+                heard.touched.push((row, feels));
+                Ok(())
+            }
+            Content::Hazards => {
+                let frames = read_hazards(payload).map_err(|error| error.to_string())?;
+                let feels =
+                    |row: &TouchRow| frames.iter().any(|frame| frame.replace('_', "-") == row.name);
+                heard.touched.extend(self.touches.iter().map(feels).enumerate());
+                Ok(())
+            }
             Content::Command => {
                 let (&number, payload) =
                     payload.split_first_chunk().ok_or("a command without its writer")?;
@@ -187,9 +199,9 @@ impl Ros2 {
         Ok(())
     }
 
-    fn take_scan(&mut self, scan: &Scan, heard: &mut Heard) -> Result<(), String> {
-        let Some((row, sensor)) = &self.laser else {
-            return Err("a scan, and the mission has no laser; add a row of kind scan".to_owned());
+    fn take_scan(&mut self, row: usize, scan: &Scan, heard: &mut Heard) -> Result<(), String> {
+        let Some(sensor) = self.table.get(row) else {
+            return Ok(());
         };
         let (beams, most_s) = (scan.ranges.len(), LONGEST_SWEEP_NS as f64 / 1e9);
         let beam_s = f64::from(scan.beam_s);
@@ -222,7 +234,7 @@ impl Ros2 {
         }
         let sweep = if is_stated { sweep } else { Sweep::default() };
         let stamp_ns = is_stated.then_some(scan.stamp_ns);
-        heard.scans.push(LaserScan { row: *row, beams, sweep, stamp_ns });
+        heard.scans.push(LaserScan { row, beams, sweep, stamp_ns });
         Ok(())
     }
 }

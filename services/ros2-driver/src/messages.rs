@@ -7,6 +7,7 @@ use ros2::{
 };
 
 const COVARIANCE: usize = 36;
+const MOST_HAZARDS: usize = 64;
 
 /// A rotation's or a turn rate's; the first number is [`NOT_STATED`] if the quantity is not stated.
 const COVARIANCE_3: usize = 9;
@@ -166,6 +167,28 @@ pub fn read_range(payload: &[u8]) -> Result<f64, Malformed> {
         range if range > most_m => f64::INFINITY,
         range => range.into(),
     })
+}
+
+/// Fails if `payload` is no `std_msgs/Bool`.
+pub fn read_bool(payload: &[u8]) -> Result<bool, Malformed> {
+    Ok(Reader::new(payload)?.u8()? != 0)
+}
+
+/// The frames of the bumpers and cliff sensors that feel something. Fails if `payload` is no
+/// `irobot_create_msgs/HazardDetectionVector`.
+pub fn read_hazards(payload: &[u8]) -> Result<Vec<String>, Malformed> {
+    const BUMP_AND_CLIFF: [u8; 2] = [1, 2];
+    let mut reader = Reader::new(payload)?;
+    reader.header()?;
+    let mut frames = Vec::new();
+    for _ in 0..reader.length(MOST_HAZARDS)? {
+        let (_, frame) = reader.header()?;
+        let frame = frame.to_owned();
+        if BUMP_AND_CLIFF.contains(&reader.u8()?) {
+            frames.push(frame);
+        }
+    }
+    Ok(frames)
 }
 
 /// No number if a `sensor_msgs/BatteryState` does not measure it. Fails if `payload` is none.

@@ -339,6 +339,57 @@ fn the_missions_names_are_those_of_its_topics() {
 }
 
 #[test]
+fn each_of_several_lasers_has_a_topic_of_its_own_and_its_scan_is_that_of_its_row() {
+    let row = |name: &str, turned: u32| {
+        format!(
+            "[[robot.sensor]]\nname = '{name}'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nroll_deg = {turned}\nmodel = 'lds-02'\n"
+        )
+    };
+    let extra = format!(
+        "robot.ros2.ranges = {{ back = '/b', front = '/f' }}\n{}{}",
+        row("front", 0),
+        row("back", 180)
+    );
+    let mut driver = driver(&extra);
+    let ranges: Vec<f32> = (0..360_u16).map(|beam| 1.0 + f32::from(beam) / 100.0).collect();
+    let scan = scan_of(-std::f32::consts::PI, 1.0_f32.to_radians(), &ranges);
+    let names: Vec<_> = driver.topics.heard.iter().map(|(_, topic)| topic.dds_name()).collect();
+    assert_eq!(names[..4], ["rt/odom", "rt/f", "rt/b", "rt/battery_state"]);
+    for (topic, row, second) in [(1, 0, 1.01), (2, 1, 4.59)] {
+        let scan = said(&mut driver, topic, &scan).scans.remove(0);
+        assert_eq!((scan.row, scan.beams[1]), (row, second));
+    }
+}
+
+#[test]
+fn bumpers_are_heard_as_hazards_of_a_create_or_each_by_a_topic_of_its_own() {
+    let hazards = |all: &[(u8, &str)]| {
+        let mut payload = ros2::cdr::Writer::default();
+        payload.header(0, "base_link").length(all.len());
+        for (kind, frame) in all {
+            payload.header(0, frame).u8(*kind);
+        }
+        payload.take()
+    };
+    let create = ROBOT.replace("turtlebot3-burger", "turtlebot4");
+    let mut driver = Ros2::new(&Mission::parse(&create, Path::new("m.toml")).unwrap());
+    let names: Vec<_> = driver.topics.heard.iter().map(|(_, topic)| topic.dds_name()).collect();
+    assert_eq!(names[3], "rt/hazard_detection");
+    let mut feel = |all: &[(u8, &str)]| {
+        let touched = said(&mut driver, 3, &hazards(all)).touched;
+        assert_eq!(touched.len(), 9);
+        let rows = touched.into_iter().filter(|(_, feels)| *feels).map(|(row, _)| row);
+        rows.collect::<Vec<_>>()
+    };
+    assert_eq!(feel(&[(1, "bump_left"), (3, "base"), (2, "cliff_front_right")]), [0, 7]);
+    assert_eq!(feel(&[(0, "bump_left")]), [] as [usize; 0], "a limit of backing up is no bump");
+    let row = "robot.ros2.ranges = { nose = '/bump' }\n[[robot.touch]]\nname = 'nose'\nkind = 'bumper'\nbearing_deg = 0\n";
+    let mut driver = self::driver(row);
+    assert_eq!(said(&mut driver, 3, &[0, 1, 0, 0, 1]).touched, [(0, true)]);
+    assert!(said(&mut driver, 3, &[0, 1, 0, 0]).refused.is_some());
+}
+
+#[test]
 fn the_counts_of_a_link_that_is_started_again_go_on_where_they_were_and_take_what_was_driven_meanwhile()
  {
     let mut first = driver("");

@@ -1,16 +1,21 @@
 //! THE table of a robot's topics that the link reads and writes.
 
-use common::mission::Mission;
+use common::mission::{Mission, SensorKind};
 use ros2::topic::Topic;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
     Odometry,
-    Scan,
+    /// The laser in this row of the mission.
+    Scan(usize),
     Battery,
     /// The sensor in this row of the mission.
     Range(usize),
     Imu,
+    /// The bumper or cliff sensor in this row of the mission.
+    Touch(usize),
+    /// All of them that feel something.
+    Hazards,
     /// Another sender's. The number of its writer stands before the payload.
     Command,
 }
@@ -31,20 +36,33 @@ impl Topics {
         };
         let odometry = Topic::new(&topics.odom, "nav_msgs::msg::dds_::Odometry_");
         let mut heard = vec![(Content::Odometry, odometry)];
-        if mission.laser().is_some() {
-            let scan = Topic::new(&topics.scan, "sensor_msgs::msg::dds_::LaserScan_");
-            heard.push((Content::Scan, scan));
+        for (row, laser) in mission.lasers_of_base() {
+            let name = topics.ranges.get(&laser.name).unwrap_or(&topics.scan);
+            let scan = Topic::new(name, "sensor_msgs::msg::dds_::LaserScan_");
+            heard.push((Content::Scan(row), scan));
         }
         let battery = Topic::new(&topics.battery, "sensor_msgs::msg::dds_::BatteryState_");
         heard.push((Content::Battery, battery));
         for (row, sensor) in mission.sensor_table().iter().enumerate() {
-            if let Some(name) = topics.ranges.get(&sensor.name) {
+            if sensor.kind != SensorKind::Scan
+                && let Some(name) = topics.ranges.get(&sensor.name)
+            {
                 let range = Topic::new(name, "sensor_msgs::msg::dds_::Range_");
                 heard.push((Content::Range(row), range));
             }
         }
         if let Some(imu) = &topics.imu {
             heard.push((Content::Imu, Topic::new(imu, "sensor_msgs::msg::dds_::Imu_")));
+        }
+        for (row, touch) in mission.touches().iter().enumerate() {
+            if let Some(name) = topics.ranges.get(&touch.name) {
+                heard.push((Content::Touch(row), Topic::new(name, "std_msgs::msg::dds_::Bool_")));
+            }
+        }
+        if let Some(hazards) = mission.hazards_topic() {
+            let hazards =
+                Topic::new(&hazards, "irobot_create_msgs::msg::dds_::HazardDetectionVector_");
+            heard.push((Content::Hazards, hazards));
         }
         let command = Topic::new(&topics.cmd_vel, command);
         heard.push((Content::Command, command.clone()));

@@ -12,7 +12,7 @@ fn rplidar(set: &str) -> Rplidar {
         "target = [3, 0]\nrobot.counts_per_turn = 1320\nrobot.protocol = 'arduino'\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nmodel = 'rplidar-a1'\nforward_m = 0\nbearing_deg = 0\nbeams = 36\n{set}"
     );
     let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
-    let (row, sensor, product) = mission.rplidar().unwrap();
+    let (row, sensor, product) = mission.rplidars().remove(0);
     Rplidar::new(row, sensor, product)
 }
 

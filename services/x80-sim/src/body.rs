@@ -35,6 +35,7 @@ pub struct Body {
     pose: Pose2,
     clearance: f64,
     touching: bool,
+    over_hole: bool,
     contacts: u64,
 }
 
@@ -54,6 +55,7 @@ impl Body {
             pose,
             clearance: 0.0,
             touching: false,
+            over_hole: false,
             contacts: 0,
         };
         it.clearance = it.clearance_in(world);
@@ -86,6 +88,13 @@ impl Body {
         self.contacts
     }
 
+    /// The bearing of what it touches now, radians counter-clockwise from its axis.
+    pub fn touched_at(&self, world: &World) -> Option<f64> {
+        let is_near = self.clearance <= RELEASE_M;
+        let (_, outward) = is_near.then(|| self.nearest(world)).flatten()?;
+        Some(self.pose.axis().angle_to(-outward?))
+    }
+
     /// Metres from its surface to the nearest thing at its last place.
     pub fn clearance(&self) -> f64 {
         self.clearance
@@ -112,6 +121,11 @@ impl Body {
         let clear = self.clearance > RELEASE_M;
         self.contacts += u64::from(touched && !self.touching);
         self.touching = touched || (self.touching && !clear);
+        let aside = self.track / 2.0 * self.pose.axis().perp();
+        let over_hole =
+            [aside, -aside].into_iter().any(|wheel| world.is_hole(self.pose.position + wheel));
+        self.contacts += u64::from(over_hole && !self.over_hole);
+        self.over_hole = over_hole;
         let middle = DVec2::from_angle(before.heading + step.omega / 2.0);
         touched.then(|| (self.pose.position - before.position).dot(middle))
     }

@@ -1,10 +1,10 @@
 //! Lines of JSON for a simulated robot: orders become commands of a simulated X80's boards, and their readings become
 //! reports.
 
-use std::f64::consts::TAU;
+use std::{collections::BTreeMap, f64::consts::TAU};
 
 use common::{
-    json_wire::{Order, Report, line},
+    json_wire::{Order, Report, Scan, line},
     mission::{Mission, Sensor, SensorKind},
     wire::{
         Command, CustomSensors, Echo, Feedback, INFRARED_LIVE_AD, MOTOR_SCALE_V, Mode,
@@ -14,6 +14,7 @@ use common::{
 
 use crate::{
     drivetrain::{OnChannel, velocity},
+    laser::Laser,
     motor::Motor,
     sensors::STALL_CURRENT,
 };
@@ -70,7 +71,8 @@ impl JsonWords {
     pub(crate) fn report(
         &self,
         (standard, custom, motor): (&StandardSensors, &CustomSensors, &MotorSensors),
-        (scan, timing): (&[Option<f32>], Option<[f64; 2]>),
+        lasers: &[Laser],
+        touched: BTreeMap<String, bool>,
         motors: &[Motor; 6],
     ) -> Vec<u8> {
         let of = |value: &dyn Fn(usize) -> f64| {
@@ -91,7 +93,13 @@ impl JsonWords {
             };
             Some((sensor.name.clone(), range))
         });
-        let timing = timing.filter(|_| !scan.is_empty());
+        let said = |laser: &Laser| Some((laser.name().to_owned(), laser.said()?));
+        let mut scans: BTreeMap<_, _> = lasers.iter().filter_map(said).collect();
+        let only = if lasers.len() == 1 { scans.pop_first() } else { None };
+        let (scan, [scan_age_s, scan_time_s]) = match only {
+            Some((_, Scan { ranges, age_s, time_s })) => (Some(ranges), [age_s, time_s]),
+            None => (None, [None; 2]),
+        };
         let report = Report {
             heard: Some(self.heard),
             wheels: Some(of(&|channel| turned(motor, motors, channel))),
@@ -100,9 +108,11 @@ impl JsonWords {
             ranges: ranges.collect(),
             battery_v: Some(volts(standard.motor_battery, MOTOR_SCALE_V)),
             odometry: None,
-            scan: (!scan.is_empty()).then(|| scan.to_vec()),
-            scan_age_s: timing.map(|[age_s, _]| age_s),
-            scan_time_s: timing.map(|[_, time_s]| time_s),
+            scan,
+            scan_age_s,
+            scan_time_s,
+            scans,
+            touched,
         };
         line(&report)
     }

@@ -8,6 +8,7 @@ use std::collections::VecDeque;
 
 use common::{
     geometry::Light,
+    json_wire::Scan,
     kinematics::Pose2,
     mission::{LaserTiming, Mission, Sensor},
 };
@@ -36,31 +37,48 @@ pub(crate) struct Laser {
     /// The body's newest poses with their times, seconds, as far back as a scan goes.
     poses: VecDeque<(f64, Pose2)>,
     noise: Noise,
+    /// The scan of this tick; empty without one. Metres: none for nothing in reach, less than 0 for no reading.
+    scan: Vec<Option<f32>>,
 }
 
 impl Laser {
-    /// None without a laser; the noise follows from `seed`.
-    pub(crate) fn new(mission: &Mission, seed: u64) -> Option<Self> {
-        let (_, sensor) = mission.laser()?;
-        let mut timing = mission.simulation.physics().laser;
-        if mission.rplidar().is_some() {
-            // It says each measurement by itself, up to a tick late.
-            timing = LaserTiming { delay_s: 0.0, sweep_s: 1.0 / mission.robot.rate_hz, ..timing };
-        }
-        let noise = Noise::new(seed, Source::Laser);
-        Some(Self { sensor, timing, poses: VecDeque::new(), noise })
+    /// Those whose scans come with the robot's frames; their noise follows from `seed`.
+    pub(crate) fn all(mission: &Mission, seed: u64) -> Vec<Self> {
+        let (lasers, timing) = (mission.lasers_of_base(), mission.simulation.physics().laser);
+        let laser = |(nth, (_, sensor))| Self::new(sensor, timing, (seed, nth));
+        lasers.into_iter().enumerate().map(laser).collect()
     }
 
-    pub(crate) const fn every_ticks(&self) -> u64 {
-        self.sensor.every_ticks
+    /// One that says each measurement by itself, up to a tick late.
+    pub(crate) fn with_own_wire(sensor: Sensor, mission: &Mission, seed: u64) -> Self {
+        let timing = mission.simulation.physics().laser;
+        let timing = LaserTiming { delay_s: 0.0, sweep_s: 1.0 / mission.robot.rate_hz, ..timing };
+        Self::new(sensor, timing, (seed, 0))
     }
 
-    /// The age of a scan's first beam and the time from it to the last when the scan is sent, seconds, as the robot states them; none if
-    /// it does not.
-    pub(crate) fn stated(&self) -> Option<[f64; 2]> {
+    fn new(sensor: Sensor, timing: LaserTiming, (seed, nth): (u64, usize)) -> Self {
+        let noise = Noise::of_nth(seed, Source::Laser, nth);
+        Self { sensor, timing, poses: VecDeque::new(), noise, scan: Vec::new() }
+    }
+
+    /// Measure for this tick, if the laser does.
+    pub(crate) fn measure(&mut self, world: &World, pose: Pose2, (tick, time): (u64, f64)) {
+        self.scan = match tick.is_multiple_of(self.sensor.every_ticks) {
+            true => self.scan(world, pose, time),
+            false => Vec::new(),
+        };
+    }
+
+    pub(crate) fn name(&self) -> &str {
+        &self.sensor.name
+    }
+
+    /// The scan of this tick with the times that the robot states.
+    pub(crate) fn said(&self) -> Option<Scan> {
         let LaserTiming { delay_s, sweep_s, stated_share } = self.timing;
         let stated = [delay_s + sweep_s, sweep_s].map(|seconds| stated_share * seconds);
-        (stated[0] > 0.0).then_some(stated)
+        let [age_s, time_s] = stated.map(|seconds| (stated[0] > 0.0).then_some(seconds));
+        (!self.scan.is_empty()).then(|| Scan { ranges: self.scan.clone(), age_s, time_s })
     }
 
     /// Note where the body is at `time`, seconds.
@@ -88,7 +106,8 @@ impl Laser {
     /// What a robot at `pose` has in the laser's reach, and a little more for poses before.
     pub(crate) fn near(&self, world: &World, pose: Pose2) -> Vec<Solid> {
         let position = self.sensor.mount.on(pose).position;
-        world.near(position, self.sensor.reach_m + self.went_m(), world.heights().infrared_m)
+        let height_m = self.sensor.height_m.unwrap_or(world.heights().infrared_m);
+        world.near(position, self.sensor.reach_m + self.went_m(), height_m)
     }
 
     /// The way that the robot makes at most during a scan, until it is sent.
@@ -163,7 +182,7 @@ mod tests {
             Path::new("m.toml"),
         )
         .unwrap();
-        let mut laser = Laser::new(&mission, 1).unwrap();
+        let mut laser = Laser::all(&mission, 1).remove(0);
         let scan = laser.scan(&World::new(&mission), Pose2::default(), 0.0);
         assert_eq!(scan.len(), 360);
         // The first beam looks back; the laser is 64 mm behind the centre, its deviation 5 cm at 2 m.
@@ -178,7 +197,7 @@ mod tests {
      {
         let text = "target = [0, -5]\nrobot.model = 'turtlebot4'\nworld.wall = [{ points = [[-2, 1], [2, 1]] }, { points = [[2, -2], [2, 2]] }]\n";
         let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
-        let mut laser = Laser::new(&mission, 1).unwrap();
+        let mut laser = Laser::all(&mission, 1).remove(0);
         let scan = laser.scan(&World::new(&mission), Pose2::default(), 0.0);
         // The middle beam looks to the left. The laser is 40 mm behind the centre; its deviation is 1.5 cm at 2 m.
         let at = |degrees: usize| f64::from(scan[(degrees + 180 + 270) % 360].unwrap());
@@ -194,7 +213,7 @@ mod tests {
                 "target = [0, -5]\nrobot.protocol = 'json'\nworld.wall = [{{ points = [[-2, 1], [2, 1]] }}]\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nroll_deg = {roll_deg}\n"
             );
             let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
-            Laser::new(&mission, 1).unwrap().scan(&World::new(&mission), Pose2::default(), 0.0)
+            Laser::all(&mission, 1).remove(0).scan(&World::new(&mission), Pose2::default(), 0.0)
         };
         let mut turned = scan(180.0);
         assert!(turned[180].is_some() && turned[900].is_none());
@@ -203,13 +222,36 @@ mod tests {
     }
 
     #[test]
+    fn each_of_several_lasers_measures_from_its_own_place_and_height_with_noise_of_its_own() {
+        let row = |name: &str, keys: &str| {
+            format!(
+                "[[robot.sensor]]\nname = '{name}'\nkind = 'scan'\nforward_m = 0.2\nbeams = 3\n{keys}\n"
+            )
+        };
+        let text = format!(
+            "target = [0, -5]\nrobot.protocol = 'json'\nworld.wall = [{{ points = [[2, -9], [2, 9]] }}, {{ points = [[-1, -9], [-1, 9]] }}]\nworld.box = [{{ at = [1, 0], size_m = [0.2, 2], top_m = 0.12 }}]\n{}{}{}",
+            row("low", "bearing_deg = 0\nheight_m = 0.05"),
+            row("high", "bearing_deg = 0"),
+            row("back", "bearing_deg = 180")
+        );
+        let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+        let world = World::new(&mission);
+        let ahead = |laser: &mut Laser| {
+            laser.measure(&world, Pose2::default(), (0, 0.0));
+            f64::from(laser.said().unwrap().ranges[1].unwrap())
+        };
+        let ranges: Vec<_> = Laser::all(&mission, 1).iter_mut().map(ahead).collect();
+        let true_m = [0.7, 1.8, 0.8];
+        assert!(ranges.iter().zip(true_m).all(|(it, is)| (it - is).abs() < 0.1), "{ranges:?}");
+        assert_ne!(ranges[0] - 0.7, ranges[1] - 1.8);
+    }
+
+    #[test]
     fn a_late_laser_that_turns_measures_each_beam_from_where_the_robot_was_then() {
         let text = "target = [3, 0]\nrobot.model = 'kobuki'\nworld.wall = [{ points = [[5, -9], [5, 9]] }]\n\
             simulation.laser = { delay_s = 0.2, sweep_s = 0.1 }\n";
         let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
-        let mut laser = Laser::new(&mission, 1).unwrap();
-        let [age_s, time_s] = laser.stated().unwrap();
-        assert!((age_s - 0.3).abs() < 1e-9 && time_s == 0.1);
+        let mut laser = Laser::all(&mission, 1).remove(0);
         // The robot goes along x at 1 m/s.
         let at = |time: f64| Pose2 { position: DVec2::new(time, 0.0), heading: 0.0 };
         (0..=300).map(|step| f64::from(step) / 100.0).for_each(|s| laser.follow(s, at(s)));
@@ -217,13 +259,18 @@ mod tests {
         // The 180th of 360 beams looks ahead: it was measured 0.25 s before, from 64 mm behind the centre.
         assert!((scan[180].unwrap() - (5.0 - 2.75 + 0.064)).abs() < 0.15, "{:?}", scan[180]);
         assert!(laser.poses.len() < 40);
+        laser.measure(&World::new(&mission), at(3.0), (0, 3.0));
+        let Scan { age_s: Some(age_s), time_s: Some(time_s), .. } = laser.said().unwrap() else {
+            panic!("no times");
+        };
+        assert!((age_s - 0.3).abs() < 1e-9 && time_s == 0.1);
     }
 
     /// The readings of a UST-10LX on a Jackal at the origin in a world, by the angle of the beam, degrees from straight ahead.
     fn reading(shapes: &str) -> impl Fn(f64) -> Option<f32> + use<> {
         let text = format!("target = [0, -5]\nrobot.model = 'jackal'\n{shapes}");
         let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
-        let mut laser = Laser::new(&mission, 1).unwrap();
+        let mut laser = Laser::all(&mission, 1).remove(0);
         let forward_m = laser.sensor.mount.forward_m;
         let scan = laser.scan(
             &World::new(&mission),

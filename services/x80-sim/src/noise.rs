@@ -20,7 +20,12 @@ pub struct Noise(Pcg64);
 impl Noise {
     /// Each run with `seed` has the same stream.
     pub fn new(seed: u64, source: Source) -> Self {
-        Self(Pcg64::new(u128::from(seed), source as u128))
+        Self::of_nth(seed, source, 0)
+    }
+
+    /// The stream of one among several sources of a kind.
+    pub fn of_nth(seed: u64, source: Source, nth: usize) -> Self {
+        Self(Pcg64::new(u128::from(seed) | (nth as u128) << 64, source as u128))
     }
 
     /// A number in [0, 1).

@@ -1,15 +1,18 @@
 //! The robot as a pure state machine: commands in, mission time forward, frames out.
 
 use common::{
+    geometry::wrap_angle,
     ground_truth::GroundTruthTick,
     json_wire::Order,
     kinematics::Twist,
-    mission::{Block, BlockedWheels, Mission, Physics, Protocol},
+    mission::{Block, BlockedWheels, Mission, Physics, Protocol, TouchKind, TouchRow},
     wire::{
         Addressing, COUNT_CYCLE, Command, CustomSensors, Frame, Motion, MotorSensors, Report,
         StandardSensors, SystemSignal,
     },
 };
+
+use glam::DVec2;
 
 use crate::{
     arduino_words::{ArduinoWords, Request},
@@ -76,10 +79,14 @@ pub struct Robot {
     /// None for an X80.
     json: Option<JsonWords>,
     arduino: Option<ArduinoWords>,
-    /// Its scans come with the robot's frames.
-    laser: Option<Laser>,
+    /// Their scans come with the robot's frames.
+    lasers: Vec<Laser>,
     rplidar: Option<Rplidar>,
-    scan: Vec<Option<f32>>,
+    touches: Vec<TouchRow>,
+    /// What each has felt since the last tick.
+    felt: Vec<bool>,
+    /// As `felt` at the last tick.
+    told: Vec<bool>,
 }
 
 impl Robot {
@@ -135,9 +142,11 @@ impl Robot {
             json: (mission.robot.protocol() == Protocol::Json).then(|| JsonWords::new(mission)),
             arduino: (mission.robot.protocol() == Protocol::Arduino)
                 .then(|| ArduinoWords::new(mission)),
-            laser: Laser::new(mission, seed).filter(|_| rplidar.is_none()),
+            lasers: Laser::all(mission, seed),
             rplidar,
-            scan: Vec::new(),
+            felt: Vec::new(),
+            told: Vec::new(),
+            touches: mission.touches(),
         };
         robot.least_clearance = robot.body.clearance();
         robot.measure();
@@ -367,9 +376,10 @@ impl Robot {
             let from = self.time;
             for step in 1..=steps as u64 {
                 self.step(span / steps);
+                self.feel();
                 self.time = from + span * step as f64 / steps;
                 let own = self.rplidar.as_mut().map(|rplidar| &mut rplidar.laser);
-                if let Some(laser) = self.laser.as_mut().or(own) {
+                for laser in self.lasers.iter_mut().chain(own) {
                     laser.follow(self.time, self.body.pose());
                 }
             }
@@ -453,6 +463,24 @@ impl Robot {
         self.measure();
     }
 
+    fn feel(&mut self) {
+        let (pose, at) = (self.body.pose(), self.body.touched_at(&self.world));
+        self.felt.resize(self.touches.len(), false);
+        for (row, felt) in self.touches.iter().zip(&mut self.felt) {
+            let bearing = row.bearing_deg.to_radians();
+            *felt |= match row.kind {
+                TouchKind::Bumper => at.is_some_and(|at| {
+                    wrap_angle(at - bearing).abs() <= row.wide_deg.to_radians() / 2.0
+                }),
+                TouchKind::Cliff => {
+                    let along = DVec2::from_angle(pose.heading + bearing);
+                    let forward_m = row.forward_m.unwrap_or(self.body.radius());
+                    self.world.is_hole(pose.position + forward_m * along)
+                }
+            };
+        }
+    }
+
     /// Noise of sensors is drawn only here.
     fn measure(&mut self) {
         let noise = self.physics.wheels.count_noise;
@@ -464,12 +492,10 @@ impl Robot {
         self.motor.pots = [sensors::MIDDLE; 6];
         (self.standard, self.custom) =
             self.ranging.measure(&self.world, &self.body, self.time, &self.physics);
-        if let Some(laser) = &mut self.laser
-            && self.tick.is_multiple_of(laser.every_ticks())
-        {
-            self.scan = laser.scan(&self.world, self.body.pose(), self.time);
-        } else {
-            self.scan.clear();
+        self.told = std::mem::take(&mut self.felt);
+        self.feel();
+        for laser in &mut self.lasers {
+            laser.measure(&self.world, self.body.pose(), (self.tick, self.time));
         }
     }
 
@@ -488,8 +514,9 @@ impl Robot {
     fn write(&self, due: [bool; 3], out: &mut Vec<u8>) {
         if let Some(json) = &self.json {
             let sensors = (&self.standard, &self.custom, &self.motor);
-            let stated = self.laser.as_ref().and_then(Laser::stated);
-            out.extend(json.report(sensors, (&self.scan, stated), &self.motors));
+            let touched = self.touches.iter().map(|row| row.name.clone()).zip(self.told.clone());
+            let touched = touched.collect();
+            out.extend(json.report(sensors, &self.lasers, touched, &self.motors));
             return;
         }
         if self.arduino.is_some() {

@@ -24,8 +24,8 @@ pub(crate) struct Rplidar {
 impl Rplidar {
     /// None if the robot has no laser with a wire of its own; the noise follows from `seed`.
     pub(crate) fn new(mission: &Mission, seed: u64) -> Option<Self> {
-        let (_, _, product) = mission.rplidar()?;
-        let laser = Laser::new(mission, seed)?;
+        let (_, sensor, product) = mission.rplidars().into_iter().next()?;
+        let laser = Laser::with_own_wire(sensor, mission, seed);
         Some(Self { laser, product, requests: Requests::default(), next_s: None, turn: 0.0 })
     }
 

@@ -58,7 +58,7 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result<(), SimError> {
         options;
     let way = Way::open(transport, listen, own_user_only)?;
     tracing::info!(address = way.address(), %pace, "a simulated X80 listens");
-    let laser_way = match (mission.rplidar(), transport) {
+    let laser_way = match (mission.rplidars().first(), transport) {
         (None, _) | (_, Transport::Udp) => None,
         _ => Some(Way::open(transport, SocketAddr::new(listen.ip(), 0), own_user_only)?),
     };

@@ -2,7 +2,7 @@
 
 use common::{
     geometry::{Box2, Profile, Shapes, Wall, nearest_on_segment},
-    mission::{Heights, Mission, Thing},
+    mission::{Heights, Hole, Mission, Thing},
 };
 use glam::DVec2;
 
@@ -106,6 +106,7 @@ fn solids_of(shapes: &Shapes) -> Vec<Solid> {
 pub struct World {
     standing: Vec<Solid>,
     things: Vec<Visitor>,
+    holes: Vec<Hole>,
     heights: Heights,
 }
 
@@ -129,6 +130,7 @@ impl World {
         let mut world = Self {
             standing: solids_of(&mission.world),
             things: mission.simulation.things.iter().map(visitor).collect(),
+            holes: mission.simulation.holes.clone(),
             heights: mission.simulation.physics().heights,
         };
         world.advance(0.0, DVec2::ZERO, mission.body().radius_m);
@@ -144,6 +146,10 @@ impl World {
                 && visitor.thing.until_s.is_none_or(|until| time < until);
             visitor.present = due && (visitor.present || visitor.is_clear_of(centre, radius));
         }
+    }
+
+    pub fn is_hole(&self, point: DVec2) -> bool {
+        self.holes.iter().any(|hole| hole.contains(point))
     }
 
     pub fn heights(&self) -> &Heights {

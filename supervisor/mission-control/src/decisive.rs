@@ -43,12 +43,13 @@ impl Timeout {
     }
 }
 
-/// The first event of a run that the supervisor saw end with `ending`. `stall` is the tick and the ending of the stall at
+/// The first event of a run that the supervisor saw end with `ending`. `contact` is the one that ends it, `stall` the tick and the ending of the stall at
 /// which no recovery step was left.
 pub(crate) fn first(
     ending: Ending,
     record: &Record,
     truth: &[GroundTruthTick],
+    contact: Option<&GroundTruthTick>,
     timeout: Timeout,
     stall: Option<(u64, Ending)>,
 ) -> Decided {
@@ -57,8 +58,7 @@ pub(crate) fn first(
         return undecided(ending);
     }
     let poses = &record.poses;
-    let contact = first_contact(truth)
-        .map(|contact| (tick_of(contact, poses), touched([contact.x, contact.y])));
+    let contact = contact.map(|contact| (tick_of(contact, poses), touched([contact.x, contact.y])));
     let arrival = record.arrival.map(|command| (command.stamp.tick, reached(command.distance_m)));
     let late = timeout.tick(poses, truth);
     let late = late.map(|tick| (tick, timeout.deadline.timed_out()));
@@ -167,6 +167,7 @@ mod tests {
                 Ending::failed(seen, ""),
                 &record,
                 &truth,
+                first_contact(&truth),
                 TIMEOUT,
                 (ticks == 18).then(|| (15, Ending::failed(Unreachable, ""))),
             );

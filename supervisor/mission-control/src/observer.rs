@@ -160,7 +160,10 @@ impl Observer {
         }
         // Poses are computed from the link's samples, so these are read last.
         while let Some(contact) = self.contact.next_sample()? {
-            push(&mut record.contacts, contact.stamp.tick, MOST_CONTACTS);
+            // What a bumper feels holds no wheel: the robot goes around it by itself.
+            if contact.left + contact.right > 0 {
+                push(&mut record.contacts, contact.stamp.tick, MOST_CONTACTS);
+            }
         }
         while let Some(link) = self.link.next_sample()? {
             stages.on_output(topics::LINK.spec().writer, link.stamp.tick);

@@ -119,10 +119,12 @@ pub fn run<'a>(
     let mut targets = supervisor.targets.clone();
     targets.compare(&record, &truth, allowed_m(&options.mission));
     record.arrival.take_if(|_| !targets.is_last());
+    let goes_on = options.mission.simulation.goes_on_after_contact;
     let decided = decisive::first(
         ending,
         &record,
         &truth,
+        decisive::first_contact(&truth).filter(|_| !goes_on),
         Timeout { deadline, by_robot: supervisor.clock.in_ticks() },
         end_by_stall,
     );

@@ -303,7 +303,8 @@ impl<'a> Supervisor<'a> {
             distance_m: newest_m.unwrap_or(command.distance_m),
             since: *self.arrived.get_or_insert(now),
         });
-        let collision = decisive::first_contact(self.robot.truth());
+        let goes_on = self.options.mission.simulation.goes_on_after_contact;
+        let collision = decisive::first_contact(self.robot.truth()).filter(|_| !goes_on);
         let time = self.mission_time();
         let stopped = self.decision.reason == HoldReason::Operator;
         self.state_file.state.operator_stopped_s += self.stop_clock.passed_s(stopped, time);

@@ -1,5 +1,5 @@
 use super::objection::{Objection, objection, refuse_if};
-use crate::{Mission, Protocol, SensorKind, address::Address};
+use crate::{Mission, Protocol, Sensor, SensorKind, address::Address};
 
 const LONGEST_TOPIC: usize = 200;
 
@@ -31,20 +31,28 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     )?;
     let topics = &robot.ros2;
     let named = [&topics.odom, &topics.scan, &topics.cmd_vel, &topics.battery];
-    for name in named.into_iter().chain(&topics.imu).chain(topics.ranges.values()) {
+    for name in
+        named.into_iter().chain(&topics.imu).chain(&topics.hazards).chain(topics.ranges.values())
+    {
         let remedy = "use letters, digits and '_' between slashes, as in \"/robot/odom\"";
         refuse_if(!is_topic(name), "robot.ros2", format!("{name:?} is no topic of ROS"), remedy)?;
     }
     let table = mission.sensor_table();
-    let rangers = || table.iter().filter(|sensor| sensor.kind != SensorKind::Scan);
-    if let Some(silent) = rangers().find(|sensor| !topics.ranges.contains_key(&sensor.name)) {
+    let lasers = mission.lasers_of_base();
+    let is_named = |sensor: &Sensor| topics.ranges.contains_key(&sensor.name);
+    // A single laser has `robot.ros2.scan`.
+    let lasers = lasers.iter().map(|(_, laser)| laser).filter(|_| lasers.len() > 1);
+    let mut rangers = table.iter().filter(|sensor| sensor.kind != SensorKind::Scan).chain(lasers);
+    if let Some(silent) = rangers.find(|sensor| !is_named(sensor)) {
         let problem = format!("no topic is that of the sensor {:?}", silent.name);
         let remedy = "name it in robot.ros2.ranges, or give other rows of robot.sensor";
         return Err(objection("robot.ros2", problem, remedy));
     }
     for name in topics.ranges.keys() {
-        let is_other = !rangers().any(|row| row.name == *name);
-        let problem = format!("robot.ros2.ranges names {name:?}, and no sonar or ray is called so");
+        let touches = mission.touches();
+        let is_other = !table.iter().any(|row| row.name == *name)
+            && !touches.iter().any(|row| row.name == *name);
+        let problem = format!("robot.ros2.ranges names {name:?}, and no sensor is called so");
         refuse_if(is_other, "robot.ros2", problem, "give the name of a row of robot.sensor")?;
     }
     Ok(())
@@ -90,6 +98,15 @@ mod tests {
         }
         let named = refusal(&format!("{at}robot.ros2.ranges = {{ nose = '/nose' }}"));
         assert!(named.contains("\"nose\""), "{named}");
+        let laser = |name: &str| {
+            format!(
+                "[[robot.sensor]]\nname = '{name}'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\n"
+            )
+        };
+        let two = |set: &str| format!("{at}{set}\n{}{}", laser("front"), laser("back"));
+        assert!(refusal(&two("robot.ros2.ranges = { front = '/f' }")).contains("sensor \"back\""));
+        let named = two("robot.ros2.ranges = { front = '/f', back = '/b' }");
+        Mission::parse(&named, Path::new("m.toml")).unwrap();
         let x80 = at.replace("turtlebot3-burger", "x80");
         assert!(refusal(&x80).contains("no topic is that of the sensor \"front\""));
     }

@@ -1,7 +1,7 @@
 use super::objection::{Objection, all_within, objection, refuse_if};
 use crate::{
-    INFRARED_RANGERS, MOST_BEAMS, MOST_SENSORS, Method, Mission, Protocol, SONARS, SensorKind,
-    SensorRow, Sensors, SonarConfig, address::Address,
+    INFRARED_RANGERS, MOST_BEAMS, MOST_LASERS, MOST_SENSORS, Method, Mission, Protocol, SONARS,
+    SensorKind, SensorRow, Sensors, SonarConfig, address::Address,
 };
 
 const KEY: &str = "robot.sensor";
@@ -34,9 +34,13 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     }
     let written = |kind| rows.iter().filter(|row| row.kind == kind).count();
     let lasers = written(SensorKind::Scan);
-    refuse_if(lasers > 1, KEY, "two rows are lasers", "keep one")?;
+    let problem = format!("{lasers} rows are lasers, and a robot has at most {MOST_LASERS}");
+    refuse_if(lasers > MOST_LASERS, KEY, problem, "remove some")?;
+    let beams: usize = mission.lasers().iter().map(|(_, laser)| laser.beams).sum();
+    let problem = format!("the lasers have {beams} beams, and together {MOST_BEAMS} are the most");
+    refuse_if(beams > MOST_BEAMS, KEY, problem, "give some of them fewer beams")?;
     refuse_if(
-        speaks_x80 && lasers > 0 && mission.rplidar().is_none(),
+        speaks_x80 && !mission.lasers_of_base().is_empty(),
         KEY,
         "the boards of an X80 have no laser",
         "remove it, give it the model rplidar-a1 or rplidar-c1, or give robot.protocol = \"json\" or \"ros2\"",
@@ -61,16 +65,20 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     Err(objection("sensors", format!("robot.sensor lacks {lacks}"), "add a row, or give \"all\""))
 }
 
-fn row(row: &SensorRow, rate_hz: f64) -> Result<(), Objection> {
+pub(super) fn name(key: &'static str, name: &str) -> Result<(), Objection> {
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '-';
-    let SensorRow { name, kind, roll_deg, .. } = row;
-    let is_scan = *kind == SensorKind::Scan;
     refuse_if(
         name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(plain),
-        KEY,
+        key,
         format!("{name:?} is no name of a sensor"),
         format!("use letters, digits and '-', at most {LONGEST_NAME}"),
-    )?;
+    )
+}
+
+fn row(row: &SensorRow, rate_hz: f64) -> Result<(), Objection> {
+    let SensorRow { name, kind, roll_deg, .. } = row;
+    let is_scan = *kind == SensorKind::Scan;
+    self::name(KEY, name)?;
     all_within([
         (KEY, row.forward_m, -5.0..=5.0, "m of forward_m"),
         (KEY, row.bearing_deg, -180.0..=180.0, "degrees of bearing_deg"),
@@ -88,6 +96,9 @@ fn row(row: &SensorRow, rate_hz: f64) -> Result<(), Objection> {
         format!("roll_deg is {roll_deg} of {name:?}"),
         "give 180 for a laser that is mounted upside down, and nothing for other sensors",
     )?;
+    all_within([(KEY, row.height_m.unwrap_or_default(), 0.0..=5.0, "m of height_m")])?;
+    let has_height = row.height_m.is_some();
+    refuse_if(has_height && !is_scan, KEY, "only a laser has a height_m", "remove it")?;
     if let Some(model) = row.model {
         let problem = format!("{model:?} is no {kind:?}");
         let is_other = model.product().kind != *kind;
@@ -113,11 +124,18 @@ fn row(row: &SensorRow, rate_hz: f64) -> Result<(), Objection> {
     ])
 }
 
-/// An RPLIDAR beside the robot's wire.
+/// RPLIDARs beside the robot's wire.
 fn wire(mission: &Mission) -> Result<(), Objection> {
     let is_real = mission.robot.address.is_some();
+    let rplidars = mission.rplidars();
+    refuse_if(
+        rplidars.len() > 1 && !is_real,
+        KEY,
+        format!("{} lasers have lines of their own, and a simulated robot has one", rplidars.len()),
+        "keep one, or give robot.protocol = \"json\", whose robot has the others",
+    )?;
     for row in &mission.robot.sensors {
-        let own = mission.rplidar().filter(|(_, sensor, _)| sensor.name == row.name);
+        let own = rplidars.iter().find(|(_, sensor, _)| sensor.name == row.name);
         let (name, has_address) = (&row.name, row.address.is_some());
         refuse_if(
             has_address && own.is_none(),
@@ -222,6 +240,33 @@ mod tests {
     }
 
     #[test]
+    fn a_robot_has_up_to_4_lasers_with_16384_beams_together_and_one_simulated_line_for_them() {
+        let laser = |name: &str, keys: &str| {
+            format!(
+                "[[robot.sensor]]\nname = '{name}'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\n{keys}\n"
+            )
+        };
+        let many = |count: usize, protocol: &str, keys: &str| {
+            let rows: String = (0..count).map(|nth| laser(&format!("l{nth}"), keys)).collect();
+            format!("robot.counts_per_turn = 1320\nrobot.protocol = '{protocol}'\n{rows}")
+        };
+        for good in [many(4, "json", "height_m = 0.1"), many(1, "arduino", "model = 'rplidar-a1'")]
+        {
+            let text = format!("target = [3, 0]\n{good}");
+            crate::Mission::parse(&text, std::path::Path::new("m.toml")).unwrap();
+        }
+        for (text, problem) in [
+            (many(5, "json", ""), "5 rows are lasers"),
+            (many(2, "json", "beams = 9000"), "18000 beams"),
+            (many(2, "arduino", "model = 'rplidar-a1'"), "2 lasers have lines of their own"),
+            (many(1, "json", "height_m = -1"), "height_m"),
+        ] {
+            let refusal = refusal(&text);
+            assert!(refusal.contains(problem), "{text}: {refusal}");
+        }
+    }
+
+    #[test]
     fn an_rplidar_has_an_address_of_its_own_beside_a_real_robot_and_none_beside_a_simulated_one() {
         let mission = |robot: &str, row: &str| {
             let counts = if robot.contains("x80") { "" } else { "robot.counts_per_turn = 1320\n" };
@@ -243,7 +288,7 @@ mod tests {
         ] {
             let text = mission(robot, row);
             let mission = crate::Mission::parse(&text, std::path::Path::new("m.toml")).unwrap();
-            assert_eq!(mission.rplidar().is_some(), own, "{text}");
+            assert_eq!(!mission.rplidars().is_empty(), own, "{text}");
         }
         for (robot, row, problem) in [
             ("'x80'", "", "no laser"),

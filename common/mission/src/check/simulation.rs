@@ -22,6 +22,17 @@ impl Checker {
         for thing in &simulation.things {
             self.thing(thing)?;
         }
+        let are_many = simulation.holes.len() > MAX_THINGS;
+        refuse_if(
+            are_many,
+            "simulation.hole",
+            format!("more than {MAX_THINGS} holes"),
+            "give fewer",
+        )?;
+        for hole in &simulation.holes {
+            point("simulation.hole", hole.at)?;
+            point("simulation.hole", hole.size_m)?;
+        }
         let problem = format!("more than {MAX_BLOCKS} blocks of wheels");
         let are_many = simulation.blocks.len() > MAX_BLOCKS;
         refuse_if(are_many, "simulation.block", problem, "give fewer")?;

@@ -50,6 +50,8 @@ pub enum Observation<'a> {
     Readings(&'a [RangeReading]),
     /// A scan came that says it was measured at this mission time, seconds, in the middle of its beams.
     Scan(&'a LaserScan, f64),
+    /// Rows of bumpers and cliff sensors, and whether they feel something.
+    Touched(&'a [(usize, bool)]),
     /// The base responds so, and not as it is stated to.
     Responds(Response),
     /// A sender other than the link told the robot something.

@@ -71,6 +71,11 @@ fn well() -> Failsafe {
     failsafe
 }
 
+fn kobuki() -> Mission {
+    let text = "target = [3, 0]\nrobot.model = 'kobuki'";
+    Mission::parse(text, Path::new("m.toml")).unwrap()
+}
+
 type Break = fn(&mut Failsafe);
 
 fn directive(failsafe: &mut Failsafe, order: Order, reason: HoldReason) {
@@ -185,6 +190,15 @@ const CASES: &[(Break, Action, Cause)] = &[
     ),
     (|it| jumps(it, now()), Action::Stop, Cause::OdometryImplausible),
     (wheels_are_held, Action::Stop, Cause::WheelsHeld),
+    (
+        |it| {
+            it.monitors.touch = touch::Touches::new(&kobuki());
+            it.monitors.touch.observe(&Observation::Commanded([100; 2]), now());
+            it.observe(&Observation::Touched(&[(0, true)]), now());
+        },
+        Action::Stop,
+        Cause::Felt,
+    ),
     (
         |it| {
             let reading = front(RangeStatus::Nothing, 255);

@@ -105,6 +105,9 @@ impl Link {
         }
         self.take_power(&heard, now_ns, effects);
         self.take_readings(&mut heard, None, now_ns);
+        if !heard.touched.is_empty() {
+            self.observe(Observation::Touched(&heard.touched), now_ns);
+        }
         if heard.anything && self.failsafe.monitors.presence.heard(now_ns) {
             let again = self.losses() > 0;
             self.observe(Observation::Found { again }, now_ns);

@@ -21,7 +21,13 @@ impl Mapper {
 
     fn touch(&mut self, bearing_rad: f64) {
         let half_width_rad = 0.8;
-        let contact = ContactSample { bearing_rad, half_width_rad, ..ContactSample::default() };
+        let contact = ContactSample {
+            bearing_rad,
+            half_width_rad,
+            left: 1,
+            right: 1,
+            ..ContactSample::default()
+        };
         assert!(self.give(Tick { contact: Some(contact), ..Tick::default() }).area() > 0);
     }
 

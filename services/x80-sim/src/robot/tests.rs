@@ -427,3 +427,30 @@ fn a_robot_that_speaks_lines_of_json_says_that_its_wheels_are_held_before_a_wall
     assert_eq!(held[1..8], [Some([false; 2]); 7], "it rolls");
     assert_eq!(held[19], Some([true; 2]), "it stands before the wall");
 }
+
+#[test]
+fn a_bumper_feels_what_the_body_touches_on_its_side_and_a_cliff_sensor_where_there_is_no_floor() {
+    let felt = |world: &str, wheels: [f64; 2]| {
+        let text = format!("target = [0, -5]\nrobot.model = 'kobuki'\n{world}");
+        let mut robot = Robot::new(&Mission::parse(&text, Path::new("m.toml")).unwrap());
+        let mut said = Vec::new();
+        robot.on_order(&Order::Hello { rate_hz: 7.0 }, &mut said);
+        for _ in 0..14 {
+            let drive = Order::Drive { wheels, twist: [0.0; 2], for_s: 0.5 };
+            robot.on_order(&drive, &mut said);
+            robot.advance_to_next_tick();
+        }
+        said.clear();
+        robot.stream(&mut said);
+        let report: common::json_wire::Report = common::json_wire::parse(&said).unwrap();
+        let names = report.touched.into_iter().filter(|(_, feels)| *feels).map(|(name, _)| name);
+        names.collect::<Vec<_>>().join(" ")
+    };
+    let board = "world.box = [{ at = [0.5, 0], size_m = [0.2, 2], top_m = 0.1 }]";
+    assert_eq!(felt(board, [8.0, 8.0]), "bumper-center");
+    assert_eq!(felt(board, [0.0, 0.0]), "");
+    let post = "world.drum = [{ at = [0.4, 0.17], radius_m = 0.05 }]";
+    assert_eq!(felt(post, [8.0, 8.0]), "bumper-left");
+    let hole = "simulation.hole = [{ at = [0.4, 0], size_m = [0.4, 0.1] }]";
+    assert_eq!(felt(hole, [2.0, 2.0]), "cliff-center");
+}

@@ -79,7 +79,7 @@ impl Endpoints {
         for row in TABLE {
             match row.accepted_by {
                 // The topics of sensors are opened for each robot.
-                None if matches!(row.id, Id::Range(_) | Id::Scan) => {}
+                None if matches!(row.id, Id::Range(_) | Id::Scan(_)) => {}
                 None => endpoints.write_to(row.id, row, "")?,
                 Some(by) if accepted.contains(&by) => {
                     let topic = endpoints.topic(row, "");
@@ -102,7 +102,7 @@ impl Endpoints {
         sensors: impl Iterator<Item = (Id, &'a str)>,
     ) -> io::Result<()> {
         // The topics of the sensors of the robot before are closed.
-        self.writers.retain(|id, _| !matches!(id, Id::Range(_) | Id::Scan));
+        self.writers.retain(|id, _| !matches!(id, Id::Range(_) | Id::Scan(_)));
         for (id, sensor) in sensors {
             if let Some(row) = spec(id) {
                 self.write_to(id, row, sensor)?;
@@ -195,6 +195,7 @@ impl Endpoints {
 /// The name of the topic of `row` below `namespace`, from the root.
 pub(crate) fn topic_name(namespace: &str, row: &Spec, sensor: &str) -> String {
     let name = row.name.replace("SENSOR", &ros_name(sensor));
+    let name = name.trim_end_matches('/');
     match namespace.trim_matches('/') {
         "" => format!("/{name}"),
         namespace => format!("/{namespace}/{name}"),

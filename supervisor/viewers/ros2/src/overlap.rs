@@ -1,6 +1,10 @@
 //! Whether the bridge would publish a topic that the robot's own link reads: the link would take it for its robot's.
 
-use common::{address::Address, mission::Mission, run::Run};
+use common::{
+    address::Address,
+    mission::{Mission, Sensor},
+    run::Run,
+};
 use ros2::topic::Topic;
 
 use crate::{
@@ -23,7 +27,7 @@ pub(crate) fn overlap<'a>(
     let read: Vec<_> = read(&run.mission).collect();
     let written = TABLE
         .iter()
-        .filter(|row| row.accepted_by.is_none() && !matches!(row.id, Id::Range(_) | Id::Scan))
+        .filter(|row| row.accepted_by.is_none() && !matches!(row.id, Id::Range(_) | Id::Scan(_)))
         .map(|row| topic_name(namespace, row, ""));
     let sensed = sensors.filter_map(|(id, sensor)| Some(topic_name(namespace, spec(id)?, sensor)));
     written.chain(sensed).find(|name| read.contains(name))
@@ -32,7 +36,9 @@ pub(crate) fn overlap<'a>(
 /// The names of the topics that a link reads as its robot's.
 fn read(mission: &Mission) -> impl Iterator<Item = String> {
     let topics = &mission.robot.ros2;
-    let scan = mission.laser().is_some().then_some(&topics.scan);
+    let lasers = mission.lasers_of_base();
+    let is_unnamed = |(_, laser): &(usize, Sensor)| !topics.ranges.contains_key(&laser.name);
+    let scan = lasers.iter().any(is_unnamed).then_some(&topics.scan);
     let further = topics.imu.iter().chain(scan).chain(topics.ranges.values());
     [&topics.odom, &topics.battery].into_iter().chain(further).map(|name| Topic::new(name, "").name)
 }
@@ -49,7 +55,7 @@ mod tests {
             "target = [3, 0]\nrobot.model = 'turtlebot3-burger'\nrobot.protocol = 'ros2'\nrobot.address = 'ros2:7'\n{keys}"
         );
         let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
-        let sensors = [(Id::Scan, "laser"), (Id::Range(1), "nose-1")];
+        let sensors = [(Id::Scan(0), ""), (Id::Range(1), "nose-1")];
         let run = Run {
             robot: "x80".parse().unwrap(),
             address: Address::Ros2(Some(7)),

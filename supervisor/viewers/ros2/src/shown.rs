@@ -64,8 +64,10 @@ impl Shown {
     /// The topics of the sensors that the mission uses.
     pub(crate) fn sensor_topics(&self) -> impl Iterator<Item = (Id, &str)> {
         let used = self.sensors.iter().enumerate().filter(|(_, sensor)| sensor.used);
-        used.map(|(row, sensor)| match sensor.kind {
-            SensorKind::Scan => (Id::Scan, ""),
+        let is_scan = |(_, sensor): &(usize, &Sensor)| sensor.kind == SensorKind::Scan;
+        let is_alone = used.clone().filter(is_scan).count() == 1;
+        used.map(move |(row, sensor)| match sensor.kind {
+            SensorKind::Scan => (Id::Scan(row), if is_alone { "" } else { &sensor.name }),
             _ => (Id::Range(row), sensor.name.as_str()),
         })
     }
@@ -140,7 +142,7 @@ impl Shown {
             let fan = [header.first_rad - sensor.mount.looks_rad(), header.step_rad];
             let limits = [sensor.model.least_m(), header.reach_m];
             let header = Header(now_ns, &sensor.name);
-            sink(Id::Scan, messages::scan(header, fan, limits, period_s, beams));
+            sink(Id::Scan(row), messages::scan(header, fan, limits, period_s, beams));
         }
     }
 

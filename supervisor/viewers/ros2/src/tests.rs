@@ -214,6 +214,29 @@ fn the_frame_of_a_laser_is_where_it_is_mounted_and_its_beams_are_told_in_that_fr
 }
 
 #[test]
+fn the_scan_of_a_single_laser_is_the_topic_scan_and_those_of_several_have_the_names_of_their_rows()
+{
+    let row = |name: &str| {
+        format!(
+            "[[robot.sensor]]\nname = '{name}'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\n"
+        )
+    };
+    for (names, topics) in [
+        (&["front"][..], &["/r/scan"][..]),
+        (&["front-1", "back"], &["/r/scan/front_1", "/r/scan/back"]),
+    ] {
+        let rows: String = names.iter().map(|name| row(name)).collect();
+        let text = format!("target = [4, 0]\nrobot.protocol = 'json'\n{rows}");
+        let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+        let shown = Shown::new("r".to_owned(), mission);
+        let named = shown.sensor_topics().map(|(id, sensor)| {
+            crate::endpoints::topic_name("r", crate::topics::spec(id).unwrap(), sensor)
+        });
+        assert!(named.eq(topics.iter().copied()), "{names:?}");
+    }
+}
+
+#[test]
 fn a_map_is_published_whole_and_then_by_what_changes_and_says_what_nobody_looked_at() {
     let frame = GridFrame { cells: 10, resolution_m: 0.1, centre: DVec2::ZERO };
     let mut cells = vec![CellState::Free as u8; 100];

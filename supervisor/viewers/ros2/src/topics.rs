@@ -14,8 +14,9 @@ pub(crate) enum Id {
     MapUpdates,
     Path,
     Field,
-    Scan,
     /// The sensor in this row of the mission; in the table, any.
+    Scan(usize),
+    /// Likewise.
     Range(usize),
     Battery,
     Diagnostics,
@@ -88,8 +89,8 @@ table! {
         "the way along the field from the robot to its target";
     Id::Field => "field", visualization_msgs / MarkerArray, false, None,
         "the field's directions, one for several cells, and the targets";
-    Id::Scan => "scan", sensor_msgs / LaserScan, false, None,
-        "the beams of the laser";
+    Id::Scan(0) => "scan/SENSOR", sensor_msgs / LaserScan, false, None,
+        "the beams of each laser that the mission uses; `scan` of one alone";
     Id::Range(0) => "range/SENSOR", sensor_msgs / Range, false, None,
         "each sonar and infrared ranger that the mission uses; infinite for nothing";
     Id::Battery => "battery_state", sensor_msgs / BatteryState, false, None,
@@ -106,6 +107,10 @@ table! {
 
 /// The row of `id`.
 pub(crate) fn spec(id: Id) -> Option<&'static Spec> {
-    let id = if let Id::Range(_) = id { Id::Range(0) } else { id };
+    let id = match id {
+        Id::Range(_) => Id::Range(0),
+        Id::Scan(_) => Id::Scan(0),
+        id => id,
+    };
     TABLE.iter().find(|spec| spec.id == id)
 }

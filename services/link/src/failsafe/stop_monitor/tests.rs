@@ -154,7 +154,7 @@ fn a_robot_that_another_host_moves_and_whose_frames_it_takes_does_not_stop() {
     for frame in 0..8_u16 {
         let now = MissionTime::from_seconds(4.0 * PERIOD * f64::from(frame));
         monitor.heard([100 * frame; 2], now);
-        assert!(!monitor.is_at_rest());
+        assert_ne!(monitor.rest(now), Rest::AtRest);
     }
     assert_eq!(monitor.condition(Cause::RobotDoesNotStop, Moment::default()), Condition::Holds);
 }

@@ -158,7 +158,7 @@ impl Scene {
                 self.pose[2] += turn;
             }
             if self.scans && self.ms.is_multiple_of(100) {
-                self.say(Content::Scan, &self.scan());
+                self.say(Content::Scan(0), &self.scan());
             }
             if self.odometry {
                 self.say(Content::Imu, &self.imu());

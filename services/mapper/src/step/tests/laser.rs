@@ -1,5 +1,7 @@
 //! Tests of a laser beside a sonar.
 
+use common::kinematics::Pose2;
+
 use super::*;
 
 /// The robot's laser has 360 beams around its centre, its sonar looks ahead from 0.2 m.
@@ -17,11 +19,10 @@ fn sense(mapper: &mut Mapper, tick: u64, wall: f64, echo: f64) {
         if ahead > 0.1 { (wall / ahead) as f32 } else { f32::INFINITY }
     };
     let sonar = RangeReading { sensor: 1, ..super::echo(echo) };
-    let scan = (0..360).map(beam).collect();
     mapper.give(Tick {
         pose: at(tick, 0.0, 0.0, 0.0),
         ranges: vec![sonar],
-        scan,
+        scans: vec![Scan { beams: (0..360).map(beam).collect(), ..Scan::default() }],
         ..Tick::default()
     });
 }
@@ -71,6 +72,61 @@ fn a_pane_of_glass_stays_though_the_laser_looks_through_it_at_a_slant() {
     assert!(mapper.is_hazard(0.6, 0.0));
 }
 
+#[test]
+fn what_one_laser_sees_is_hazard_though_another_looks_over_it_and_both_scan_ground() {
+    let row = |name: &str, keys: &str| {
+        format!(
+            "[[robot.sensor]]\nname = '{name}'\nkind = 'scan'\nforward_m = 0\nbearing_deg = {keys}\nbeams = 181\nfield_of_view_deg = 180\n"
+        )
+    };
+    let text = format!(
+        "target = [2, 0]\nrobot.model = 'kobuki'\nperimeter = {{ width_m = 5, cells = 50 }}\n{}{}{}",
+        row("low", "0"),
+        row("high", "0"),
+        row("back", "180")
+    );
+    let mut mapper = mapper_of(&text);
+    let scan = |row: usize, range: f32| Scan { row, beams: vec![range; 181], ..Scan::default() };
+    for tick in 0..10 {
+        let scans = vec![scan(0, 0.8), scan(1, 2.0), scan(2, 1.2)];
+        mapper.give(Tick { pose: at(tick, 0.0, 0.0, 0.0), scans, ..Tick::default() });
+    }
+    assert!(
+        mapper.is_hazard(0.8, 0.0) && mapper.is_hazard(1.8, 0.0) && mapper.is_hazard(-1.2, 0.0)
+    );
+    assert!(!mapper.is_hazard(-0.8, 0.0));
+    let frame = mapper.frame();
+    let state = |x: f64| {
+        let cell = frame.cell_at(DVec2::new(x, 0.0)).unwrap();
+        CellState::from_byte(mapper.state().cells()[frame.index(cell)])
+    };
+    assert_eq!([state(-0.6), state(0.4), state(1.4)], [CellState::Scanned; 3]);
+    let mut restarted = mapper_of(&text);
+    restarted.restore(mapper.state().clone()).unwrap();
+    assert!(restarted.is_hazard(0.8, 0.0) && restarted.is_hazard(-1.2, 0.0));
+    // The low thing is gone.
+    for tick in 10..14 {
+        let scans = vec![scan(0, 2.0), scan(1, 2.0)];
+        mapper.give(Tick { pose: at(tick, 0.0, 0.0, 0.0), scans, ..Tick::default() });
+    }
+    assert!(!mapper.is_hazard(0.8, 0.0) && mapper.is_hazard(-1.2, 0.0));
+}
+
+#[test]
+fn what_a_bumper_felt_stays_though_the_laser_looks_over_it_and_the_pose_is_on_it_later() {
+    let mut mapper = mapper();
+    let contact = ContactSample { half_width_rad: 0.5, ..ContactSample::default() };
+    let pose = |tick, x| at(tick, x, 0.0, 0.0);
+    mapper.give(Tick { pose: pose(0, 0.0), contact: Some(contact), ..Tick::default() });
+    assert!(mapper.is_hazard(0.2, 0.0));
+    for tick in 1..20 {
+        let scan = Scan { beams: vec![2.0; 360], ..Scan::default() };
+        let x = if tick < 10 { 0.15 } else { -0.5 };
+        mapper.give(Tick { pose: pose(tick, x), scans: vec![scan], ..Tick::default() });
+    }
+    assert!(mapper.is_hazard(0.2, 0.0) && !mapper.is_hazard(0.5, 0.0));
+}
+
 /// The least y that is hazard before the wall y = 1.25, for several x, by a laser with this row that is mounted at `at`, metres ahead
 /// of and to the left of the robot's centre, and whose middle beam looks to `looks_deg`.
 fn wall_of(row: &str, at: DVec2, looks_deg: f64) -> Vec<f64> {
@@ -89,7 +145,8 @@ fn wall_of(row: &str, at: DVec2, looks_deg: f64) -> Vec<f64> {
     let Pose2 { position, heading } = robot;
     for tick in 0..5 {
         let pose = super::at(tick, position.x, position.y, heading);
-        mapper.give(Tick { pose, scan: (0..360).map(beam).collect(), ..Tick::default() });
+        let scan = Scan { beams: (0..360).map(beam).collect(), ..Scan::default() };
+        mapper.give(Tick { pose, scans: vec![scan], ..Tick::default() });
     }
     let before = |x: f64| {
         let mut ys = (0..70).map(|step| 0.525 + 0.05 * f64::from(step) / 2.0);
@@ -155,11 +212,8 @@ fn a_scan_is_matched_and_mapped_where_it_was_taken_however_late_it_is_and_howeve
             let mut pose = at(tick, position.x, position.y, heading);
             (pose.map_from_odom, pose.v_m_s) = ([moved.x, moved.y, 0.0], 0.5);
             pose.stamp.stamp_ns = tick * 100_000_000;
-            if sweep != Sweep::default() {
-                mapper.step(Input::Sweep(tick, sweep), pose.stamp.time());
-            }
-            let scan = scan_in_room(s, sweep);
-            mapper.give(Tick { pose, scan, ..Tick::default() });
+            let scans = vec![Scan { beams: scan_in_room(s, sweep), sweep, row: 0 }];
+            mapper.give(Tick { pose, scans, ..Tick::default() });
             let Some(fix) = mapper.take_fix() else {
                 assert!(tick < 15, "{sweep:?} {tick}");
                 continue;
@@ -191,10 +245,10 @@ fn a_scan_of_impossible_times_is_left_out() {
         let mut mapper = mapper();
         let before = mapper.state().cells().to_vec();
         for tick in 1..4 {
-            mapper.step(Input::Sweep(tick, sweep), MissionTime(0));
             let mut pose = at(tick, 0.0, 0.0, 0.0);
             (pose.stamp.stamp_ns, pose.v_m_s) = (tick * 100_000_000, 0.3);
-            mapper.give(Tick { pose, scan: vec![1.0; 360], ..Tick::default() });
+            let scans = vec![Scan { beams: vec![1.0; 360], sweep, row: 0 }];
+            mapper.give(Tick { pose, scans, ..Tick::default() });
             assert!(mapper.take_fix().is_none());
         }
         assert_eq!(mapper.state().cells(), before, "{sweep:?}");

@@ -76,6 +76,7 @@ fn frames<T>(decoder: &mut Decoder, bytes: &[u8], of: impl Fn(&Frame<'_>) -> T) 
     all
 }
 
+#[allow(clippy::large_enum_variant, reason = "one is held at a time")]
 #[derive(Clone, Debug)]
 pub enum Said {
     Frame { rid: u8, did: u8, data: Vec<u8> },
@@ -95,11 +96,13 @@ pub struct Readings {
     ultrasonic: [u8; ULTRASONIC],
     ranges: BTreeMap<String, Option<f64>>,
     scan: Option<Vec<Option<f32>>>,
+    scans: BTreeMap<String, json_wire::Scan>,
 }
 
 impl Default for Readings {
     fn default() -> Self {
-        Self { ultrasonic: [FROZEN_CM; ULTRASONIC], ranges: BTreeMap::new(), scan: None }
+        let (ranges, scans) = Default::default();
+        Self { ultrasonic: [FROZEN_CM; ULTRASONIC], ranges, scan: None, scans }
     }
 }
 
@@ -116,6 +119,7 @@ impl Readings {
             Said::Frame { .. } => {}
             Said::Line(report) => {
                 self.ranges.extend(report.ranges.clone());
+                self.scans.extend(report.scans.clone());
                 self.scan = report.scan.clone().or(self.scan.take());
             }
         }
@@ -166,7 +170,10 @@ impl Said {
                 Some(*did).filter(|did| matches!(*did, did::MOTOR | did::CUSTOM | did::STANDARD))
             }
             Self::Line(report) if report.wheels.is_some() => Some(0),
-            Self::Line(report) => (report.scan.is_some() || !report.ranges.is_empty()).then_some(1),
+            Self::Line(report) => {
+                let scans = report.scan.is_some() || !report.scans.is_empty();
+                (scans || !report.ranges.is_empty()).then_some(1)
+            }
         }
     }
 
@@ -261,12 +268,16 @@ impl Said {
             (Self::Frame { .. }, _) => {}
             (Self::Line(report), RobotFault::RangeMissing) => {
                 (report.ranges, report.scan) = (BTreeMap::new(), None);
+                report.scans.clear();
             }
             (Self::Line(report), RobotFault::RangeFrozen | RobotFault::RangeNear) => {
                 if !report.ranges.is_empty() {
                     report.ranges.clone_from(&newest.ranges);
                 }
                 report.scan = report.scan.take().and(newest.scan.clone());
+                if !report.scans.is_empty() {
+                    report.scans.clone_from(&newest.scans);
+                }
                 if fault == RobotFault::RangeNear {
                     let ranges = report.ranges.values_mut().flatten();
                     ranges.for_each(|range| *range += chance.within(-0.03, 0.03));
@@ -283,7 +294,8 @@ impl Said {
             (Self::Line(report), _) => {
                 report.ranges.values_mut().for_each(|told| *told = range);
                 let beams = report.scan.iter_mut().flatten();
-                beams.for_each(|beam| *beam = range.map(|range| range as f32));
+                let named = report.scans.values_mut().flat_map(|scan| &mut scan.ranges);
+                beams.chain(named).for_each(|beam| *beam = range.map(|range| range as f32));
             }
         }
         self.bytes()

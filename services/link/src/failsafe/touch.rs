@@ -1,0 +1,153 @@
+//! Bumpers and cliff sensors: the robot stands when one begins to feel something, and then goes no nearer while it does.
+//!
+//! The contact is given when the robot rests. Its wheels may slip before, so a place that was told earlier would be under the body.
+
+use std::{f64::consts::PI, ops::RangeInclusive, time::Duration};
+
+use common::{
+    clock::MissionTime,
+    mission::{Mission, TouchRow},
+    samples::{Cause, CommandSample, ContactSample},
+};
+
+use super::monitor::{Condition, Moment, Monitor, Observation};
+
+/// The robot stands for this, or as long as its response needs from top speed.
+const STANDS_FOR: Duration = Duration::from_millis(500);
+/// Half the arc that is mapped, radians: the robot can get around it, and it has a cell of the map.
+const HALF_WIDTH: RangeInclusive<f64> = PI / 12.0..=PI / 6.0;
+
+#[derive(Clone, Debug)]
+pub struct Touches {
+    rows: Vec<TouchRow>,
+    feel: Vec<bool>,
+    stands_for: Duration,
+    /// A robot that stands, or is carried, touches nothing by its own motion.
+    moves: bool,
+    /// The row that began to feel something last, and when.
+    newest: Option<(usize, MissionTime)>,
+    is_told: bool,
+}
+
+impl Touches {
+    fn take(&mut self, touched: &[(usize, bool)], now: MissionTime) {
+        for &(row, feels) in touched {
+            let Some(felt) = self.feel.get_mut(row) else {
+                continue;
+            };
+            let before = std::mem::replace(felt, feels);
+            if feels && !before && self.moves && !self.stands(now) {
+                (self.newest, self.is_told) = (Some((row, now)), false);
+            }
+        }
+    }
+
+    fn stands(&self, now: MissionTime) -> bool {
+        self.newest.is_some_and(|(_, since)| now.since(since) < self.stands_for)
+    }
+
+    /// The contact at which the robot has come to rest; the next call gives none.
+    pub(crate) fn take_contact(&mut self, now: MissionTime) -> Option<ContactSample> {
+        let (row, _) = self.newest.filter(|_| !self.is_told && !self.stands(now))?;
+        self.is_told = true;
+        let TouchRow { bearing_deg, wide_deg, .. } = self.rows[row];
+        let half_width = wide_deg.to_radians() / 2.0;
+        Some(ContactSample {
+            bearing_rad: bearing_deg.to_radians(),
+            half_width_rad: half_width.clamp(*HALF_WIDTH.start(), *HALF_WIDTH.end()),
+            ..ContactSample::default()
+        })
+    }
+
+    /// The command, or what of it leads no nearer to what is felt: a turn on the spot. In lockstep the robot also stands by it. No car
+    /// has a word for a touch.
+    pub(crate) fn permitted(&self, command: &CommandSample, now: MissionTime) -> CommandSample {
+        let CommandSample { left_rad_s: left, right_rad_s: right, .. } = *command;
+        let felt = self.rows.iter().zip(&self.feel).filter(|(_, feels)| **feels);
+        let mut towards = felt.map(|(row, _)| (left + right) * row.bearing_deg.to_radians().cos());
+        let turn = if self.stands(now) {
+            0.0
+        } else if towards.any(|towards| towards > 1e-6) {
+            (right - left) / 2.0
+        } else {
+            return *command;
+        };
+        CommandSample { left_rad_s: -turn, right_rad_s: turn, ..*command }
+    }
+}
+
+impl Monitor for Touches {
+    fn new(mission: &Mission) -> Self {
+        let (body, rows) = (mission.body(), mission.touches());
+        let brakes_s = body.top_speed_m_s / body.response.acceleration_m_s2;
+        let rests_after = Duration::from_secs_f64(body.response.dead_time_s() + brakes_s);
+        Self {
+            feel: vec![false; rows.len()],
+            rows,
+            stands_for: STANDS_FOR.max(rests_after),
+            moves: false,
+            newest: None,
+            is_told: false,
+        }
+    }
+
+    fn observe(&mut self, what: &Observation<'_>, now: Moment) {
+        match *what {
+            Observation::Commanded(counts) => self.moves = counts != [0, 0],
+            Observation::Touched(touched) => self.take(touched, now.time),
+            _ => {}
+        }
+    }
+
+    fn condition(&self, _: Cause, now: Moment) -> Condition {
+        self.stands(now.time).into()
+    }
+
+    fn explain(&self, _: Cause, _: Moment) -> Option<String> {
+        let (row, _) = self.newest?;
+        let name = &self.rows[row].name;
+        Some(format!("{name} feels something: the robot stands, and then goes around it"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    fn touches() -> Touches {
+        let text = "target = [3, 0]\nrobot.model = 'kobuki'";
+        let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
+        Touches { moves: true, ..Touches::new(&mission) }
+    }
+
+    fn speeds(touches: &Touches, wheels: [f64; 2], s: f64) -> [f64; 2] {
+        let [left_rad_s, right_rad_s] = wheels;
+        let command = CommandSample { left_rad_s, right_rad_s, ..CommandSample::default() };
+        let permitted = touches.permitted(&command, MissionTime::from_seconds(s));
+        [permitted.left_rad_s, permitted.right_rad_s]
+    }
+
+    #[test]
+    fn a_robot_stands_at_a_touch_then_turns_and_backs_but_goes_no_nearer_until_it_is_over() {
+        let mut touches = touches();
+        assert_eq!(speeds(&touches, [2.0, 4.0], 0.0), [2.0, 4.0]);
+        touches.take(&[(0, false), (1, true)], MissionTime::from_seconds(1.0));
+        assert_eq!(speeds(&touches, [-2.0, -2.0], 1.1).map(f64::abs), [0.0; 2]);
+        assert!(touches.take_contact(MissionTime::from_seconds(1.4)).is_none(), "it still slips");
+        let contact = touches.take_contact(MissionTime::from_seconds(3.0)).unwrap();
+        assert_eq!((contact.bearing_rad, contact.left, contact.right), (0.0, 0, 0));
+        assert!((contact.half_width_rad - PI / 6.0).abs() < 1e-9);
+        assert!(touches.take_contact(MissionTime::from_seconds(3.1)).is_none());
+        assert_eq!(speeds(&touches, [2.0, 4.0], 3.1), [-1.0, 1.0]);
+        assert_eq!(speeds(&touches, [-2.0, -2.0], 3.1), [-2.0; 2]);
+        // It goes on to feel the same, and then nothing.
+        touches.take(&[(1, true)], MissionTime::from_seconds(3.2));
+        assert!(touches.take_contact(MissionTime::from_seconds(9.0)).is_none());
+        touches.take(&[(1, false), (9, true)], MissionTime::from_seconds(9.1));
+        touches.moves = false;
+        touches.take(&[(3, true), (3, false)], MissionTime::from_seconds(9.1));
+        assert_eq!(speeds(&touches, [2.0, 4.0], 9.1), [2.0, 4.0]);
+    }
+}
