@@ -1,12 +1,12 @@
 //! `firsthand field MAP`: the harmonic field of a map, without a robot.
 
 use std::{
+    collections::BTreeMap,
     fmt,
     fs::File,
     io::{self, BufWriter, Write},
     num::NonZeroUsize,
     path::{Path, PathBuf},
-    str::FromStr,
     time::Instant,
 };
 
@@ -28,8 +28,8 @@ pub struct Arguments {
     /// A ROS map_server YAML, a PGM or PNG image (light is free), or a MovingAI .map.
     map: PathBuf,
     /// The target's column and row, from 0; row 0 is the top of the map.
-    #[arg(long, value_name = "COL,ROW")]
-    target_cell: TargetCell,
+    #[arg(long, value_name = "COL,ROW", value_parser = cell)]
+    target_cell: Cell,
     /// The screening length, in cells: in it u falls by a further factor of e. Without it there is no screening.
     #[arg(long, value_name = "LENGTH", allow_negative_numbers = true)]
     screening_cells: Option<f64>,
@@ -50,18 +50,11 @@ pub struct Arguments {
     threads: NonZeroUsize,
 }
 
-#[derive(Clone, Copy, Debug)]
-struct TargetCell(Cell);
-
-impl FromStr for TargetCell {
-    type Err = &'static str;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let number = |text: &str| text.trim().parse::<usize>().ok();
-        text.split_once(',')
-            .and_then(|(col, row)| Some(Self(Cell::new(number(col)?, number(row)?))))
-            .ok_or("a cell is its column and its row, from 0: 120,45")
-    }
+fn cell(text: &str) -> Result<Cell, &'static str> {
+    let number = |text: &str| text.trim().parse::<usize>().ok();
+    text.split_once(',')
+        .and_then(|(col, row)| Some(Cell::new(number(col)?, number(row)?)))
+        .ok_or("a cell is its column and its row, from 0: 120,45")
 }
 
 pub fn main(arguments: &Arguments) -> Result {
@@ -84,7 +77,7 @@ pub fn main(arguments: &Arguments) -> Result {
 }
 
 fn domain(arguments: &Arguments, map: &Map) -> Result<Domain> {
-    let target = arguments.target_cell.0;
+    let target = arguments.target_cell;
     let screening = arguments.screening_cells.map_or(Screening::None, Screening::cells);
     let domain = Domain::new(map.cols, map.rows, map.blocked.clone(), target)
         .and_then(|domain| domain.with_screening(&screening));
@@ -140,31 +133,23 @@ struct Report {
     method: &'static str,
     repeats: usize,
     threads: usize,
-    setup_ms: f64,
-    solve_ms: f64,
-    verify_ms: f64,
+    /// The least time of each phase, and the median over the repeats.
     #[serde(flatten)]
-    medians: Option<Medians>,
+    times_ms: BTreeMap<String, f64>,
     worst_residual: f64,
     log10_u_min: f64,
     /// Memory of the process when the field was solved: map, solver and field, not the output files.
     peak_memory_bytes: Option<u64>,
 }
 
-#[derive(Debug, Serialize)]
-struct Medians {
-    setup_ms_median: f64,
-    solve_ms_median: f64,
-    verify_ms_median: f64,
-}
-
 impl Report {
     fn of(arguments: &Arguments, field: &Field, runs: &[Times]) -> Self {
-        let ms = |phase: usize| runs.iter().map(move |run| run[phase]);
-        let [setup_ms, solve_ms, verify_ms] =
-            [0, 1, 2].map(|phase| ms(phase).fold(f64::INFINITY, f64::min));
-        let medians = [0, 1, 2].map(|phase| median(ms(phase)).unwrap_or_default());
-        let [setup_ms_median, solve_ms_median, verify_ms_median] = medians;
+        let mut times_ms = BTreeMap::new();
+        for (phase, name) in ["setup_ms", "solve_ms", "verify_ms"].into_iter().enumerate() {
+            let ms = || runs.iter().map(|run| run[phase]);
+            times_ms.insert(name.to_owned(), ms().fold(f64::INFINITY, f64::min));
+            times_ms.extend(median(ms()).map(|median| (format!("{name}_median"), median)));
+        }
         let verification = field.verification();
         Self {
             rows: field.height(),
@@ -175,14 +160,7 @@ impl Report {
             method: verification.method.name(),
             repeats: runs.len(),
             threads: arguments.threads.get(),
-            setup_ms,
-            solve_ms,
-            verify_ms,
-            medians: (runs.len() > 1).then_some(Medians {
-                setup_ms_median,
-                solve_ms_median,
-                verify_ms_median,
-            }),
+            times_ms,
             worst_residual: verification.worst_residual,
             log10_u_min: field.log10_u_min(),
             peak_memory_bytes: kibibytes("self", "VmHWM").map(|kib| kib * 1024),
@@ -207,25 +185,8 @@ impl fmt::Display for Report {
             "u down to 1e{:.1} {screening}, worst relative residual {:.1e}",
             self.log10_u_min, self.worst_residual
         )?;
-        writeln!(
-            f,
-            "{}: set-up {:.2} ms, solve {:.2} ms, verification {:.2} ms{}",
-            self.method,
-            self.setup_ms,
-            self.solve_ms,
-            self.verify_ms,
-            if self.repeats > 1 { " at least" } else { "" }
-        )?;
-        if let Some(medians) = &self.medians {
-            writeln!(
-                f,
-                "median of {}: set-up {:.2} ms, solve {:.2} ms, verification {:.2} ms",
-                self.repeats,
-                medians.setup_ms_median,
-                medians.solve_ms_median,
-                medians.verify_ms_median
-            )?;
-        }
+        let times = self.times_ms.iter().map(|(name, ms)| format!("{name} {ms:.2}"));
+        writeln!(f, "{}: {}", self.method, times.collect::<Vec<_>>().join(", "))?;
         if let Some(bytes) = self.peak_memory_bytes {
             writeln!(f, "peak memory {:.1} MB", bytes as f64 * 1e-6)?;
         }

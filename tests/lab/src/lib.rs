@@ -61,7 +61,6 @@ enum Command {
 #[derive(Debug, Subcommand)]
 enum Bench {
     Tick(tick::Arguments),
-    Field(field::Arguments),
     Chaos(Box<chaos::Arguments>),
     BringUp(bring_up::Arguments),
     Consumer(chaos::consumer_process::Arguments),
@@ -77,9 +76,7 @@ fn execute(arguments: &Arguments) -> error::Result<ExitCode> {
     let done = match &arguments.command {
         Command::Evaluate(arguments) => evaluate::main(arguments),
         Command::Experiments(arguments) => experiments::main(arguments),
-        Command::Field(arguments) | Command::Bench(Bench::Field(arguments)) => {
-            field::main(arguments)
-        }
+        Command::Field(arguments) => field::main(arguments),
         Command::Stage(arguments) => baselines::process::main(arguments),
         Command::Bench(Bench::Tick(arguments)) => tick::main(arguments),
         Command::Bench(Bench::Chaos(arguments)) => return chaos::main(arguments),

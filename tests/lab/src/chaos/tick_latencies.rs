@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 use summary::{Quantiles, Summary};
 
-use crate::missions::statistics::quantile;
+use crate::missions::statistics::median;
 
 /// Median and 99 % quantile of the ticks of each mission, microseconds.
 #[derive(Debug, Default, Serialize)]
@@ -28,22 +28,17 @@ impl TickLatencies {
     }
 }
 
-/// The median of the missions' values at `place`; NaN without missions.
-fn median(missions: &[[f64; 2]], place: usize) -> f64 {
-    quantile(missions.iter().map(|values| values[place]), 0.5).unwrap_or(f64::NAN)
-}
-
 impl fmt::Display for TickLatencies {
     fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [with, without] = [&self.with_us, &self.without_us];
+        let middle = |missions: &[[f64; 2]]| {
+            [0, 1].map(|place| median(missions.iter().map(|it| it[place])).unwrap_or(f64::NAN))
+        };
+        let ([p50, p99], [calm_p50, calm_p99]) = (middle(&self.with_us), middle(&self.without_us));
         write!(
             to,
-            "a tick, p50 and p99, medians of {} missions: {:.0} and {:.0} us with consumers that are hit, {:.0} and {:.0} us without any",
-            with.len(),
-            median(with, 0),
-            median(with, 1),
-            median(without, 0),
-            median(without, 1)
+            "a tick, p50 and p99, medians of {} missions: {p50:.0} and {p99:.0} us with consumers that are hit, \
+             {calm_p50:.0} and {calm_p99:.0} us without any",
+            self.with_us.len(),
         )
     }
 }

@@ -11,7 +11,7 @@ use crate::{
         Setting,
         page::Page,
         results::Results,
-        row::{Latency, OUTCOMES, Outcome, Row},
+        row::{OUTCOMES, Outcome, Row},
         runner,
         statistics::{Estimate, mean, median, paired_difference, share},
     },
@@ -31,17 +31,6 @@ const METRICS: [Metric; 9] = [
     ("median_f_ps_m2", "median f_ps, m2", 4),
     ("median_f_vs_m_s2", "median f_vs, m/s2", 3),
     ("median_look_share", "median share of looking", 3),
-];
-
-type Latencies = [(&'static str, [fn(&Latency) -> Option<f64>; 3]); 2];
-
-/// A duration's name; its median, 99 % quantile and longest of a mission, microseconds.
-const LATENCIES: Latencies = [
-    ("tick", [|it| it.tick_p50_us, |it| it.tick_p99_us, |it| it.tick_max_us]),
-    (
-        "full solve",
-        [|it| it.full_solve_p50_us, |it| it.full_solve_p99_us, |it| it.full_solve_max_us],
-    ),
 ];
 
 struct Totals<'a> {
@@ -80,14 +69,6 @@ impl<'a> Totals<'a> {
             object[*key] = value.into();
         }
         object
-    }
-
-    /// Name and value of the metrics that are known.
-    fn metrics(&self) -> impl Iterator<Item = (&'static str, String)> {
-        METRICS.iter().zip(self.metrics).filter_map(|(&(_, name, digits), value)| {
-            let value = value?;
-            Some((name, format!("{value:.digits$}")))
-        })
     }
 }
 
@@ -181,7 +162,7 @@ impl<'a> Report<'a> {
         object
     }
 
-    /// A table in text, with 95 % intervals.
+    /// The totals with Wilson's 95 % intervals, and the comparisons.
     pub fn text(&self) -> String {
         let mut text = String::new();
         // Writing to a String cannot fail.
@@ -192,8 +173,8 @@ impl<'a> Report<'a> {
                     let _ = writeln!(text, "  {name:<12} {share}");
                 }
             }
-            for (name, value) in totals.metrics() {
-                let _ = writeln!(text, "  {name:<26} {value}");
+            for ((_, name, digits), value) in METRICS.iter().zip(totals.metrics) {
+                let _ = value.map(|value| writeln!(text, "  {name:<26} {value:.digits$}"));
             }
         }
         for comparison in &self.comparisons {
@@ -205,38 +186,9 @@ impl<'a> Report<'a> {
 
     /// Write the page; pictures are beside it, as [`runner::picture`] says. `command` reproduces the results.
     pub fn save_page(&self, command: &str) -> Result<PathBuf> {
-        let Results { directory, rows, latencies } = self.results;
+        let Results { directory, rows, .. } = self.results;
         let mut page = Page::new("Evaluation", command);
-        let titles = ["setting", "missions"].iter().chain(&OUTCOMES);
-        let titles = titles.chain(&["metrics of the successes"]).map(|&it| it.to_owned());
-        let totals = self.totals.iter().map(|totals| {
-            let metrics: Vec<_> =
-                totals.metrics().map(|(name, value)| format!("{name} {value}")).collect();
-            let mut cells = vec![totals.setting.to_owned(), totals.count.to_string()];
-            cells.extend(totals.shares.map(|share| share.to_string()));
-            cells.push(metrics.join("\n"));
-            cells
-        });
-        page.table([titles.collect()].into_iter().chain(totals));
-        page.text("Shares with Wilson's 95 % intervals.");
-        self.comparisons.iter().for_each(|comparison| page.text(&comparison.text()));
-        if !latencies.rows.is_empty() {
-            page.heading("Latencies");
-            page.text("Microseconds of this machine, medians over the missions; each mission is in latencies.csv.");
-            let titles = ["setting", "of a", "median", "99 %", "longest"].map(str::to_owned);
-            let medians = self.totals.iter().flat_map(|totals| {
-                LATENCIES.map(|(name, columns)| {
-                    let over = |column: fn(&Latency) -> Option<f64>| {
-                        let its = latencies.rows.iter().filter(|it| it.setting == totals.setting);
-                        let value = median(its.filter_map(column));
-                        value.map_or(String::new(), |value| format!("{value:.0}"))
-                    };
-                    [vec![totals.setting.to_owned(), name.to_owned()], columns.map(over).to_vec()]
-                        .concat()
-                })
-            });
-            page.table([titles.to_vec()].into_iter().chain(medians));
-        }
+        page.table(&self.text());
         for outcome in OUTCOMES.into_iter().skip(1) {
             let failures: Vec<_> =
                 rows.rows.iter().filter(|row| row.outcome_name() == outcome).collect();

@@ -6,7 +6,7 @@ use crate::error::{OrCannot as _, Result};
 
 const PAGE_FILE: &str = "index.html";
 const STYLE: &str = "body{font:15px/1.5 sans-serif;max-width:1200px;margin:2em auto;padding:0 1em;color:#1f2933}\
-table{border-collapse:collapse;display:block;overflow-x:auto}td,th{border:1px solid #cbd2d9;padding:.3em .6em;text-align:left;vertical-align:top}\
+pre{overflow-x:auto}\
 code{overflow-wrap:anywhere}figure{display:inline-block;width:min(100%,570px);margin:.5em .2em;vertical-align:top}img{width:100%}";
 
 pub struct Page(String);
@@ -30,17 +30,9 @@ impl Page {
         self.0 += &format!("<p>{}</p>\n", escaped(text));
     }
 
-    /// A table; the first row holds the titles. A line feed in a cell begins a line.
-    pub fn table(&mut self, rows: impl IntoIterator<Item = Vec<String>>) {
-        self.0 += "<table>";
-        for (row, tag) in rows.into_iter().zip(["th"].into_iter().chain(std::iter::repeat("td"))) {
-            let cells = row.iter().map(|cell| {
-                let lines: Vec<_> = cell.lines().map(escaped).collect();
-                format!("<{tag}>{}</{tag}>", lines.join("<br>"))
-            });
-            self.0 += &format!("<tr>{}</tr>\n", cells.collect::<String>());
-        }
-        self.0 += "</table>\n";
+    /// Text whose lines and columns stay as they are.
+    pub fn table(&mut self, text: &str) {
+        self.0 += &format!("<pre>{}</pre>\n", escaped(text));
     }
 
     /// A picture, if there is one, and a link to the page of its run. Both files are beside the page.

@@ -51,19 +51,6 @@ pub fn paired_difference(gained: usize, lost: usize, n: usize) -> Estimate {
     Estimate { value, low: (middle - half).max(-1.0), high: (middle + half).min(1.0) }
 }
 
-/// The value that `share` of all values do not exceed; none without values.
-pub fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
-    let values = sorted(values)?;
-    values.get(((values.len() - 1) as f64 * share).round() as usize).copied()
-}
-
-/// None without values.
-fn sorted(values: impl IntoIterator<Item = f64>) -> Option<Vec<f64>> {
-    let mut values: Vec<f64> = values.into_iter().collect();
-    values.sort_by(f64::total_cmp);
-    (!values.is_empty()).then_some(values)
-}
-
 pub fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     Some(Spread::of(values)?.median)
 }
@@ -78,9 +65,11 @@ pub struct Spread {
 impl Spread {
     /// The quartiles, linear between neighbours; none without values.
     pub fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
-        let values = sorted(values)?;
+        let mut values: Vec<f64> = values.collect();
+        values.sort_by(f64::total_cmp);
+        let last = values.len().checked_sub(1)?;
         let at = |share: f64| {
-            let place = share * (values.len() - 1) as f64;
+            let place = share * last as f64;
             let (below, above) = (values[place.floor() as usize], values[place.ceil() as usize]);
             below + (above - below) * place.fract()
         };
