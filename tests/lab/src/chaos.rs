@@ -11,7 +11,7 @@
 //! | `series` | the state that the missions share |
 //! | `attack`, `subscriptions` | the attacker of one mission; its readers on the bus |
 //! | `kind`, `recovery` | how a process is hit; the recovery until its successor works |
-//! | `consumer`, `consumer_process`, `consumers`, `terminal` | consumers that are hit and restarted, and end with chaos; a terminal for one that draws |
+//! | `consumer`, `consumer_process`, `consumers` | consumers that are hit and restarted, and end with chaos |
 //! | `changes` | targets that change meanwhile |
 //! | `replays` | replays of the missions' recordings |
 //! | `resources`, `leftovers` | resources of a process; files and processes that outlived a mission |
@@ -43,7 +43,6 @@ mod series;
 mod signals;
 mod stop_time_table;
 mod subscriptions;
-mod terminal;
 mod tick_latencies;
 
 pub use options::{Arguments, Options};

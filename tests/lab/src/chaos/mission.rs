@@ -36,27 +36,16 @@ pub fn command(
     let Options { asked, set, .. } = options;
     let mut command = robot::mission("run", &asked.mission, &asked.robot, set);
     command.args(["--pace", pace, "--seed", &seed.to_string(), "--out"]).arg(out);
-    if !records {
-        command.arg("--no-record");
-    }
-    child(command, out)
-}
-
-fn resume(directory: &Path, records: bool) -> Result<Command> {
-    let mut command = firsthand(&["run", "--json", "--resume"]);
-    command.arg(directory);
-    if !records {
-        command.arg("--no-record");
-    }
-    child(command, directory)
+    child(command, out, records)
 }
 
 /// Make `command` a child that ends with this process. Its standard output is piped; its standard error goes to a file
 /// beside the run's directory.
-fn child(mut command: Command, directory: &Path) -> Result<Command> {
+fn child(mut command: Command, directory: &Path, records: bool) -> Result<Command> {
     let stderr = directory.with_extension("stderr");
     let stderr = File::options().create(true).append(true).open(stderr);
     let stderr = stderr.or_cannot("write a mission's standard error")?;
+    command.args((!records).then_some("--no-record"));
     command.args(["--parent", &std::process::id().to_string()]);
     command.stdout(Stdio::piped()).stderr(stderr);
     Ok(command)
@@ -104,47 +93,46 @@ pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Resu
         if !attack.supervisor_is_down() || !summary.is_empty() || began.elapsed() >= PATIENCE {
             break error::summary(&summary, &summary)?;
         }
-        start = resume(&directory, options.records())?;
+        start = firsthand(&["run", "--json", "--resume"]);
+        start.arg(&directory);
+        start = child(start, &directory, options.records())?;
     };
     attack.end(series, robot.as_ref())?;
-    let undisturbed_error_m = undisturbed.pose_error_m.unwrap_or_default();
     let kills = series.report.kills() - before;
     let mut end = End {
         seed,
         outcome: summary.outcome,
         reason: summary.reason.clone(),
         collisions: summary.collisions.unwrap_or_default(),
-        pose_excess_m: summary.pose_error_m.unwrap_or_default() - undisturbed_error_m,
+        pose_excess_m: summary.pose_error_m.unwrap_or_default(),
         stopping_time_s: summary.stopping_time_s.unwrap_or_default(),
-        pose_allowance_m: pose_allowance_m(&options.loaded, kills, &summary),
+        // An undisturbed robot whose target does not change takes another way.
+        pose_allowance_m: match asked.targets {
+            true => f64::INFINITY,
+            false => pose_allowance_m(&options.loaded, kills, &summary),
+        },
         kills,
         healthy_aborted: attack.healthy_aborted(&deaths(&directory)),
     };
-    let mut all_truth = Vec::new();
+    let mut truth = Vec::new();
     if let Some(mut robot) = robot {
         robot.stop()?;
-        let truth = robot.truth();
-        all_truth = truth.to_vec();
+        truth = robot.truth().to_vec();
         let last = truth.last();
         end.collisions = last.map_or(0, |tick| tick.contacts);
         end.stopping_time_s = last.map_or(0.0, |tick| tick.stopping_time_s);
-        let error = attack.pose_error(truth).unwrap_or(f64::INFINITY);
-        end.pose_excess_m = error - undisturbed_error_m;
+        end.pose_excess_m = attack.pose_error(&truth).unwrap_or(f64::INFINITY);
     }
-    if options.asked.targets {
-        // The undisturbed robot took another way.
-        end.pose_allowance_m = f64::INFINITY;
-    }
+    end.pose_excess_m -= undisturbed.pose_error_m.unwrap_or_default();
     let mut right = series.report.add_mission(&end);
     if let Some(operator) = operator {
-        right &= series.report.targets().add(seed, operator, &summary, &all_truth);
+        right &= series.report.targets().add(seed, operator, &summary, &truth);
     }
     if options.asked.only_consumers {
         series.report.tick_latencies().add(undisturbed, &summary);
     }
     if options.asked.replay {
-        let (hit, others) = attack.hit_recordings();
-        right &= series.report.replays().add(seed, &directory, hit, &others);
+        right &= series.report.replays().add(seed, &directory, &attack.consumers);
     }
     if right {
         fs::remove_dir_all(&files).or_cannot("remove its directory")?;

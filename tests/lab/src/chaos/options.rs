@@ -8,7 +8,7 @@ use console::missions;
 
 use crate::{
     chaos::{
-        consumer::{Consumer, GivenConsumer},
+        consumer::Consumer,
         robot_fault::{RobotFault, TABLE},
     },
     error::{OrCannot as _, Result},
@@ -33,13 +33,13 @@ pub struct Arguments {
     /// of its own, and mission time is wall-clock.
     #[arg(long, conflicts_with = "pace")]
     pub include_supervisor: bool,
-    /// Kill and freeze consumers too, one in two signals: the run's own recorder, another one, `top` (without terminals
-    /// `hz`) and `logs -f`.
+    /// Kill and freeze consumers too, one in two signals: the run's own recorder, another one, `topic hz` and
+    /// `logs -f`.
     #[arg(long, conflicts_with = "robot_faults")]
     pub include_consumers: bool,
     /// Kill and freeze a consumer of yours: a program and its arguments, without a shell. As often as needed.
     #[arg(long, value_name = "COMMAND", conflicts_with = "robot_faults")]
-    pub consumer: Vec<GivenConsumer>,
+    pub consumer: Vec<Consumer>,
     /// Hit consumers only, and compare ticks with those of the same missions without any.
     #[arg(long, conflicts_with_all = ["include_startup", "include_supervisor", "freeze_all"])]
     pub only_consumers: bool,
@@ -147,9 +147,14 @@ impl Options {
         self.asked.replay || self.asked.include_consumers
     }
 
-    pub fn consumers(&self) -> Vec<Consumer> {
-        let own = if self.asked.include_consumers { Consumer::own() } else { Vec::new() };
-        let given = self.asked.consumer.iter().cloned().map(Consumer::Given);
-        own.into_iter().chain(given).collect()
+    /// The consumers to hit; none stands for the run's own recorder.
+    pub fn consumers(&self) -> Result<Vec<Option<Consumer>>> {
+        let mut consumers = Vec::new();
+        if self.asked.include_consumers {
+            consumers.push(None);
+            consumers.extend(Consumer::own(&self.asked.robot)?.map(Some));
+        }
+        consumers.extend(self.asked.consumer.iter().cloned().map(Some));
+        Ok(consumers)
     }
 }

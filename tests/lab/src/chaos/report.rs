@@ -3,10 +3,12 @@
 use std::{collections::BTreeMap, fmt};
 
 use common::{latency::Histogram, topics::SUPERVISOR};
+use console::table::Table;
 use serde::{Serialize, Serializer};
+use summary::Quantiles;
 
 use crate::chaos::{
-    changes::Changes, kind::Kind, replays::Replays, resources::Resources,
+    changes::Changes, kind::Kind, replays::Replays, resources::Resources, signals::Row,
     tick_latencies::TickLatencies,
 };
 use mission_control::outcome::Outcome;
@@ -17,7 +19,7 @@ pub const EVERYTHING: &str = "everything";
 
 const NAMED: usize = 20;
 
-/// The result of all missions under attack. Times in milliseconds.
+/// The result of all missions under attack.
 #[derive(Debug, Default, Serialize)]
 pub struct Report {
     missions: u64,
@@ -30,7 +32,7 @@ pub struct Report {
     kills: BTreeMap<&'static str, BTreeMap<Kind, u32>>,
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     consumers: BTreeMap<String, ConsumerCounts>,
-    recovery_ms: BTreeMap<&'static str, Recovery>,
+    recovery_us: BTreeMap<String, Recovery>,
     /// Largest pose error at the end beyond the same seed's undisturbed run, metres, and the signals of that mission.
     worst_pose_excess_m: f64,
     worst_pose_kills: u32,
@@ -130,8 +132,18 @@ impl Report {
         *self.kills.entry(stage).or_default().entry(kind).or_default() += 1;
     }
 
-    pub fn recovery(&mut self, stage: &'static str) -> &mut Recovery {
-        self.recovery_ms.entry(stage).or_default()
+    /// Count the times of a signal whose measurement is complete.
+    pub fn add_recovery(&mut self, row: &Row) {
+        let record = |histogram: &mut Histogram, ms: Option<f64>| {
+            ms.into_iter().for_each(|ms| histogram.record((ms * 1e6) as u64));
+        };
+        let recovery = self.recovery_us.entry(row.stage.clone()).or_default();
+        if row.kind == Kind::Freeze {
+            record(&mut recovery.after_freeze, row.ready_ms);
+        } else {
+            record(&mut recovery.ready, row.ready_ms);
+            record(&mut recovery.output, row.first_output_ms);
+        }
     }
 
     /// Count a mission. Returns whether it reached the target without a contact, and knew its pose.
@@ -206,31 +218,15 @@ impl Report {
     }
 }
 
-#[derive(Serialize)]
-struct Quantiles {
-    p50: Option<f64>,
-    p99: Option<f64>,
-    max: Option<f64>,
-}
-
-impl Quantiles {
-    fn of(histogram: &Histogram) -> Self {
-        let ms = |share| histogram.quantile_us(share).map(|us| us / 1e3);
-        Self { p50: ms(0.5), p99: ms(0.99), max: ms(1.0) }
-    }
-}
-
-impl fmt::Display for Quantiles {
-    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (self.p50, self.p99, self.max) {
-            (Some(p50), Some(p99), Some(max)) => to.pad(&format!("{p50:.1} {p99:.1} {max:.1}")),
-            _ => to.pad("-"),
-        }
-    }
-}
-
 fn quantiles<S: Serializer>(histogram: &Histogram, to: S) -> Result<S::Ok, S::Error> {
-    Quantiles::of(histogram).serialize(to)
+    Quantiles::from(histogram).serialize(to)
+}
+
+/// The quantiles in milliseconds.
+fn ms(histogram: &Histogram) -> String {
+    let quantiles = [0.5, 0.99, 1.0].map(|share| histogram.quantile_us(share));
+    let ms = quantiles.iter().flatten().map(|us| format!("{:.1}", us / 1e3));
+    ms.collect::<Vec<_>>().join(" ")
 }
 
 impl fmt::Display for Report {
@@ -252,25 +248,18 @@ impl fmt::Display for Report {
         for left in &self.left_behind {
             writeln!(to, "  left behind {left}")?;
         }
-        writeln!(
-            to,
-            "{:<16} {:>6} {:>22} {:>22} {:>22}",
-            "stage", "hit", "ready, ms", "frozen, ms", "a tick's output, ms"
-        )?;
+        let mut table =
+            Table::new(["stage", ">hit", ">ready, ms", ">frozen, ms", ">a tick's output, ms"]);
         let nothing = Recovery::default();
         let stages = TABLE.iter().map(|stage| stage.name);
         let hit_supervisor = self.kills.contains_key(SUPERVISOR).then_some(SUPERVISOR);
         for name in stages.chain(hit_supervisor) {
             let hit: u32 = self.kills.get(name).map_or(0, |kinds| kinds.values().sum());
-            let recovery = self.recovery_ms.get(name).unwrap_or(&nothing);
-            writeln!(
-                to,
-                "{name:<16} {hit:>6} {:>22} {:>22} {:>22}",
-                Quantiles::of(&recovery.ready),
-                Quantiles::of(&recovery.after_freeze),
-                Quantiles::of(&recovery.output)
-            )?;
+            let Recovery { ready, after_freeze, output } =
+                self.recovery_us.get(name).unwrap_or(&nothing);
+            table.row([&name, &hit, &ms(ready), &ms(after_freeze), &ms(output)]);
         }
+        write!(to, "{table}")?;
         let mut kinds: BTreeMap<Kind, u32> = BTreeMap::new();
         for (&kind, &count) in self.kills.values().flatten() {
             *kinds.entry(kind).or_default() += count;

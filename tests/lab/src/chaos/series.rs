@@ -27,7 +27,9 @@ impl<'a> Series<'a> {
         })
     }
 
+    /// Keep a signal whose measurement is complete.
     pub fn keep(&mut self, row: &Row) -> Result {
+        self.report.add_recovery(row);
         self.signals.as_mut().map_or(Ok(()), |file| file.add(row))
     }
 

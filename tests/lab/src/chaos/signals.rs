@@ -17,7 +17,7 @@ use crate::{
 pub const FILE_NAME: &str = "signals.csv";
 
 /// A signal. A value that was not measured is an empty cell.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     pub mission: u64,
     /// Mission time of the newest wheel sample that was read before the signal, seconds.
@@ -41,30 +41,6 @@ pub struct Row {
     /// The distance from the newest pose to the true one when the row was written, metres. It is known only if the robot is a process
     /// of its own, whose ground truth is read during the mission.
     pub pose_error_m: Option<f64>,
-}
-
-impl Row {
-    pub fn new(
-        mission: u64,
-        time_s: Option<f64>,
-        stage: &str,
-        kind: Kind,
-        generation: Option<u32>,
-    ) -> Self {
-        Self {
-            mission,
-            time_s,
-            stage: stage.to_owned(),
-            kind,
-            generation,
-            start_up: kind == Kind::KillAtStart,
-            noticed_ms: None,
-            ready_ms: None,
-            first_output_ms: None,
-            rest_ms: None,
-            pose_error_m: None,
-        }
-    }
 }
 
 /// Milliseconds since `at`, to the microsecond.
@@ -109,10 +85,19 @@ mod tests {
         let directory = folder.path().join("results");
         let mut file = SignalsFile::create(&directory).unwrap();
         assert_eq!(read(&directory.join(FILE_NAME)), []);
-        let plain = Row::new(3, Some(1.25), "mapper", Kind::KillAtStart, Some(4));
+        let plain = Row {
+            mission: 3,
+            time_s: Some(1.25),
+            stage: "mapper".to_owned(),
+            kind: Kind::KillAtStart,
+            generation: Some(4),
+            start_up: true,
+            ..Row::default()
+        };
         let odd = Row {
             noticed_ms: Some(0.125),
-            ..Row::new(3, None, "sh -c 'a, \"b\"\n'", Kind::Freeze, None)
+            stage: "sh -c 'a, \"b\"\n'".to_owned(),
+            ..Row::default()
         };
         for row in [&plain, &odd] {
             file.add(row).unwrap();
