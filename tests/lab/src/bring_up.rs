@@ -54,12 +54,13 @@ impl Fault {
         self.parts.split(';')
     }
 
-    fn keys(&self, random: &mut Random) -> String {
+    fn keys(&self, random: &mut Random) -> Vec<String> {
         let ranges = [self.from.zip(self.to), self.or_from.zip(self.or_to)];
-        ranges[random.below(2)].map_or(self.keys.clone(), |(from, to)| {
+        let keys = ranges[random.below(2)].map_or(self.keys.clone(), |(from, to)| {
             let value = (random.within(from, to) * 1e4).round() / 1e4;
             self.keys.replace("VALUE", &value.to_string())
-        })
+        });
+        keys.split(';').map(str::to_owned).collect()
     }
 }
 
@@ -116,9 +117,7 @@ fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, Str
             faults.push(fault);
         }
     }
-    let keys: Vec<String> = faults.iter().map(|fault| fault.keys(&mut random)).collect();
-    let keys: Vec<String> =
-        keys.iter().flat_map(|keys| keys.split(';')).map(str::to_owned).collect();
+    let keys: Vec<_> = faults.iter().flat_map(|fault| fault.keys(&mut random)).collect();
     let mission = missions::parsed(&text, "bring-up", &keys)?;
     let directory = arguments.out.join(number.to_string());
     fs::create_dir_all(&directory).or_cannot_file("make", &directory)?;

@@ -9,11 +9,10 @@ use std::{
 
 use clap::Args;
 use common::mission::Mission;
-use console::output::{print_text, write_stderr};
+use console::output::write_stderr;
 use glam::DVec2;
 use processes::planner_executable;
 
-use self::report::Report;
 use crate::{
     baselines::process::BASELINES,
     error::Result,
@@ -123,13 +122,10 @@ pub fn main(arguments: &Arguments) -> Result {
     };
     runner::run(&plan, &mut results, "evaluation")?;
     results.sort()?;
-    let report = Report::new(&plan.settings, &results);
-    let page = report.save_page(&described)?;
-    Ok(print_text(&if arguments.json {
-        format!("{}\n", report.object())
-    } else {
-        format!("{}rows and pictures: {}\n", report.text(), page.display())
-    })?)
+    let report = report::report(&plan.settings, &results.rows.rows);
+    let page = report::save_page(&results, &report, &described)?;
+    write_stderr(&format!("rows and pictures: {}\n", page.display()));
+    crate::print(&report, arguments.json)
 }
 
 /// `N` numbers between commas, none beyond 1000 km.

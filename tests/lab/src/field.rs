@@ -1,8 +1,6 @@
 //! `firsthand field MAP`: the harmonic field of a map, without a robot.
 
 use std::{
-    collections::BTreeMap,
-    fmt,
     fs::File,
     io::{self, BufWriter, Write},
     num::NonZeroUsize,
@@ -10,15 +8,18 @@ use std::{
     time::Instant,
 };
 
-use crate::{error::Result, missions::statistics::median};
+use crate::{
+    error::Result,
+    missions::statistics::{median, rounded},
+};
 use clap::Args;
 use common::{process_status::kibibytes, samples::FieldCell};
 use harmonic::{Cancellation, Cell, Domain, Field, Phase, Screening, Settings, SolveError, Solver};
 use maps::Map;
 use picture::FieldOnMap;
-use serde::Serialize;
+use serde_json::{Value, json};
 
-use console::{failure::Refused, output::print};
+use console::failure::Refused;
 
 /// Solve the harmonic field of a map: numbers for NumPy, a picture, how long it took.
 ///
@@ -66,14 +67,14 @@ pub fn main(arguments: &Arguments) -> Result {
     for _ in 1..arguments.repeat.get() {
         runs.push(solve(&domain, arguments.threads).map_err(failed)?.1);
     }
-    let report = Report::of(arguments, &first, &runs);
+    let report = report(arguments, &first, &runs);
     if let Some(file) = &arguments.out {
         write(file, |to| write_array(to, &first))?;
     }
     if let Some(file) = &arguments.picture {
         write(file, |to| to.write_all(draw(&map, &first).as_bytes()))?;
     }
-    Ok(print(&report, arguments.json)?)
+    crate::print(&report, arguments.json)
 }
 
 fn domain(arguments: &Arguments, map: &Map) -> Result<Domain> {
@@ -122,76 +123,33 @@ fn solve(domain: &Domain, threads: NonZeroUsize) -> Result<(Field, Times), Solve
     Ok((field, times))
 }
 
-/// The object of `field --json`. Times are in milliseconds.
-#[derive(Debug, Serialize)]
-struct Report {
-    rows: usize,
-    cols: usize,
-    target: [usize; 2],
-    screening_cells: Option<f64>,
-    reachable: usize,
-    method: &'static str,
-    repeats: usize,
-    threads: usize,
-    /// The least time of each phase, and the median over the repeats.
-    #[serde(flatten)]
-    times_ms: BTreeMap<String, f64>,
-    worst_residual: f64,
-    log10_u_min: f64,
-    /// Memory of the process when the field was solved: map, solver and field, not the output files.
-    peak_memory_bytes: Option<u64>,
-}
-
-impl Report {
-    fn of(arguments: &Arguments, field: &Field, runs: &[Times]) -> Self {
-        let mut times_ms = BTreeMap::new();
-        for (phase, name) in ["setup_ms", "solve_ms", "verify_ms"].into_iter().enumerate() {
-            let ms = || runs.iter().map(|run| run[phase]);
-            times_ms.insert(name.to_owned(), ms().fold(f64::INFINITY, f64::min));
-            times_ms.extend(median(ms()).map(|median| (format!("{name}_median"), median)));
-        }
-        let verification = field.verification();
-        Self {
-            rows: field.height(),
-            cols: field.width(),
-            target: [field.target().col, field.target().row],
-            screening_cells: arguments.screening_cells,
-            reachable: verification.reachable,
-            method: verification.method.name(),
-            repeats: runs.len(),
-            threads: arguments.threads.get(),
-            times_ms,
-            worst_residual: verification.worst_residual,
-            log10_u_min: field.log10_u_min(),
-            peak_memory_bytes: kibibytes("self", "VmHWM").map(|kib| kib * 1024),
-        }
+/// The object of `field --json`. Each phase has its least time and the median over the repeats, in milliseconds.
+fn report(arguments: &Arguments, field: &Field, runs: &[Times]) -> Value {
+    let verification = field.verification();
+    let mut report = json!({
+        "rows": field.height(),
+        "cols": field.width(),
+        "target": [field.target().col, field.target().row],
+        "reachable": verification.reachable,
+        "method": verification.method.name(),
+        "repeats": runs.len(),
+        "threads": arguments.threads,
+        "worst_residual": verification.worst_residual,
+        "log10_u_min": field.log10_u_min(),
+    });
+    if let Some(length) = arguments.screening_cells {
+        report["screening_cells"] = length.into();
     }
-}
-
-impl fmt::Display for Report {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [col, row] = self.target;
-        writeln!(
-            f,
-            "{} x {} cells, {} of them lead to the target at {col},{row}",
-            self.cols, self.rows, self.reachable
-        )?;
-        let screening = self.screening_cells.map_or_else(
-            || "without screening".to_owned(),
-            |cells| format!("with a screening length of {cells} cells"),
-        );
-        writeln!(
-            f,
-            "u down to 1e{:.1} {screening}, worst relative residual {:.1e}",
-            self.log10_u_min, self.worst_residual
-        )?;
-        let times = self.times_ms.iter().map(|(name, ms)| format!("{name} {ms:.2}"));
-        writeln!(f, "{}: {}", self.method, times.collect::<Vec<_>>().join(", "))?;
-        if let Some(bytes) = self.peak_memory_bytes {
-            writeln!(f, "peak memory {:.1} MB", bytes as f64 * 1e-6)?;
-        }
-        Ok(())
+    for (phase, name) in ["setup_ms", "solve_ms", "verify_ms"].into_iter().enumerate() {
+        let ms = || runs.iter().map(|run| run[phase]);
+        report[name] = rounded(ms().fold(f64::INFINITY, f64::min)).into();
+        report[format!("{name}_median")] = median(ms()).map(rounded).into();
     }
+    // Memory of the process when the field is solved: map, solver and field, not the output files.
+    if let Some(peak) = kibibytes("self", "VmHWM") {
+        report["peak_memory_bytes"] = (peak * 1024).into();
+    }
+    report
 }
 
 fn write(

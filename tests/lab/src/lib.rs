@@ -37,6 +37,7 @@ mod worlds;
 use std::process::{ExitCode, Termination as _};
 
 use clap::{Parser, Subcommand};
+use serde::Serialize;
 
 /// Measure robots: missions on many worlds, the paper's experiments, random faults, ticks, fields.
 #[derive(Debug, Parser)]
@@ -65,6 +66,16 @@ enum Bench {
     BringUp(bring_up::Arguments),
     Consumer(chaos::consumer_process::Arguments),
     Sources(sources::Arguments),
+}
+
+/// The keys and values of a report's JSON as TOML, for people.
+fn text(report: &impl Serialize) -> String {
+    toml::to_string(report).unwrap_or_else(|error| error.to_string())
+}
+
+fn print(report: &impl Serialize, json: bool) -> error::Result {
+    let text = if json { serde_json::to_string(report)? } else { text(report) };
+    Ok(console::output::print_text(&format!("{text}\n"))?)
 }
 
 /// The main function of the executable.

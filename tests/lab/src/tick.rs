@@ -19,7 +19,7 @@ mod regime;
 mod report;
 
 use common::{domain::RobotName, latency::Histogram};
-use console::{missions, output::print};
+use console::missions;
 use processes::process::{Process, firsthand};
 
 pub use options::Arguments;
@@ -47,7 +47,7 @@ pub fn main(arguments: &Arguments) -> Result {
     let regimes = Regime::all(arguments.rate, arguments.pace, rate_hz);
     let reports: Result<Vec<_>> =
         regimes.into_iter().map(|regime| measure(regime, arguments, &robot, rate_hz)).collect();
-    reports?.iter().try_for_each(|report| Ok(print(report, arguments.json)?))
+    reports?.iter().try_for_each(|report| crate::print(report, arguments.json))
 }
 
 /// Measure missions of `robot` and hops, in turn. The mission has `rate_hz` ticks in a mission second.

@@ -60,8 +60,10 @@ impl Map<'_> {
     }
 
     /// The cell so many columns and rows from `cell`, if it is free.
-    pub fn free_neighbour(&self, cell: Cell, step: [i32; 2]) -> Option<Cell> {
-        moved(cell, step).filter(|&next| self.is_free(next))
+    pub fn free_neighbour(&self, cell: Cell, [cols, rows]: [i32; 2]) -> Option<Cell> {
+        let col = cell.col.checked_add_signed(cols)?;
+        let row = cell.row.checked_add_signed(rows)?;
+        Some(Cell { col, row }).filter(|&next| self.is_free(next))
     }
 
     /// The last free point before a hazard on the straight line between two points (metres); none if the line is free.
@@ -84,11 +86,6 @@ impl Map<'_> {
         let centres = free.map(|cell| self.frame.centre_of(cell));
         centres.min_by(|a, b| a.distance(point).total_cmp(&b.distance(point)))
     }
-}
-
-fn moved(cell: Cell, [cols, rows]: [i32; 2]) -> Option<Cell> {
-    let col = cell.col.checked_add_signed(cols)?;
-    Some(Cell { col, row: cell.row.checked_add_signed(rows)? })
 }
 
 #[cfg(test)]

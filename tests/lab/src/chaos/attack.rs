@@ -23,7 +23,6 @@ use crate::chaos::{
     kind::Kind,
     recovery::PendingRecovery,
     report::{EVERYTHING, Report},
-    resources::Resources,
     series::Series,
     signals::Row,
     subscriptions::{POLL, Subscriptions},
@@ -55,8 +54,6 @@ pub struct Attack {
     frozen: Vec<(&'static str, u32)>,
     hits: Vec<(&'static str, Instant)>,
     pose: Option<PoseSample>,
-    /// The supervisor's resources when its robot began to drive, and at the last check.
-    resources: Option<[Resources; 2]>,
 }
 
 impl Attack {
@@ -76,7 +73,6 @@ impl Attack {
         self.supervisor_hit = false;
         self.driving = false;
         self.entries.clear();
-        self.resources = None;
         // The stages of a supervisor that was hit end with it.
         let is_stage = |recovery: &mut PendingRecovery| recovery.stage != SUPERVISOR;
         let ended = self.pending.extract_if(.., is_stage);
@@ -112,29 +108,34 @@ impl Attack {
                 next = Instant::now() + pause;
             }
             self.consumers.maintain(&mut series.report)?;
-            self.keep_measured(series, robot.as_deref())?;
-        }
-        if let Some([first, last]) = self.resources {
-            series.report.add_growth(first, last);
+            self.keep_measured(series)?;
         }
         Ok(())
     }
 
     /// Write the rows of the signals whose measurement is complete.
-    fn keep_measured(&mut self, series: &mut Series<'_>, robot: Option<&Simulator>) -> Result {
-        for mut row in std::mem::take(&mut self.measured) {
-            row.pose_error_m = robot.and_then(|robot| self.pose_error(robot.truth()));
-            series.keep(&row)?;
-        }
-        Ok(())
+    fn keep_measured(&mut self, series: &mut Series<'_>) -> Result {
+        self.measured.drain(..).try_for_each(|row| series.keep(&row))
     }
 
     /// Note that the mission is over, and end all measurements.
-    pub fn end(&mut self, series: &mut Series<'_>, robot: Option<&Simulator>) -> Result {
+    pub fn end(&mut self, series: &mut Series<'_>) -> Result {
         self.consumers.end();
         let pending = self.pending.drain(..);
         self.measured.extend(pending.map(|recovery| recovery.row));
-        self.keep_measured(series, robot)
+        self.keep_measured(series)
+    }
+
+    /// Count a signal to a stage, the supervisor or all, and begin its row.
+    fn count(
+        &self,
+        report: &mut Report,
+        stage: &'static str,
+        kind: Kind,
+        generation: Option<u32>,
+    ) -> Row {
+        report.hit(stage, kind);
+        self.row(stage, kind, generation)
     }
 
     /// The row of a signal of `kind` that is sent to a generation of `stage` now.
@@ -191,13 +192,6 @@ impl Attack {
             self.entries_read = Some(Instant::now());
             if self.driving {
                 self.on_supervisor_sign(true);
-                // Resources of ended processes are freed once their successors work.
-                if self.pending.is_empty()
-                    && let Some(resources) = Resources::of(self.supervisor)
-                {
-                    let [first, _] = self.resources.unwrap_or([resources; 2]);
-                    self.resources = Some([first, resources]);
-                }
             }
         }
         while let Some(health) = subscriptions.health.next_sample()? {
@@ -207,9 +201,6 @@ impl Attack {
         }
         while let Some(sample) = subscriptions.wheels.next_sample()? {
             self.time = Some(sample.stamp.time());
-            if sample.left_counts_per_s == 0 && sample.right_counts_per_s == 0 {
-                self.pending.iter_mut().for_each(PendingRecovery::rests);
-            }
             let writer = topics::WHEELS.spec().writer;
             self.on_sign(writer, sample.stamp.generation, false);
         }
@@ -262,8 +253,7 @@ impl Attack {
         for process in all.into_iter().rev() {
             send(process, Signal::CONT);
         }
-        report.hit(EVERYTHING, Kind::FreezeAll);
-        let row = self.row(EVERYTHING, Kind::FreezeAll, None);
+        let row = self.count(report, EVERYTHING, Kind::FreezeAll, None);
         self.measured.push(row);
         // The pause does not count as time of recovery.
         for recovery in &mut self.pending {
@@ -285,8 +275,7 @@ impl Attack {
         if options.asked.include_supervisor && schedule.supervisor() {
             let kind = schedule.supervisor_kind();
             if !self.supervisor_is_down() && send(self.supervisor, kind.signal()) {
-                report.hit(SUPERVISOR, kind);
-                let row = self.row(SUPERVISOR, kind, None);
+                let row = self.count(report, SUPERVISOR, kind, None);
                 self.pending.push(PendingRecovery::new(SUPERVISOR, 0, row));
                 self.supervisor_hit = true;
                 self.driving = false;
@@ -316,12 +305,11 @@ impl Attack {
         if recovering || lately >= MOST_HITS || !send(entry.pid, kind.signal()) {
             return Ok(());
         }
-        report.hit(stage, kind);
         if kind == Kind::Freeze {
             self.frozen.push((stage, entry.generation));
         }
         self.hits.push((stage, Instant::now()));
-        let row = self.row(stage, kind, Some(entry.generation));
+        let row = self.count(report, stage, kind, Some(entry.generation));
         let mut recovery = PendingRecovery::new(stage, entry.generation, row);
         recovery.startup_hit =
             startup_hit.filter(|_| options.asked.include_startup && kind != Kind::Freeze);
@@ -346,9 +334,8 @@ impl Attack {
             self.pending[place].startup_hit = None;
             if send(entry.pid, Signal::KILL) {
                 let stage = self.pending[place].stage;
-                report.hit(stage, Kind::KillAtStart);
                 self.hits.push((stage, Instant::now()));
-                let row = self.row(stage, Kind::KillAtStart, Some(entry.generation));
+                let row = self.count(report, stage, Kind::KillAtStart, Some(entry.generation));
                 let next = PendingRecovery::new(stage, entry.generation, row);
                 self.measured.push(std::mem::replace(&mut self.pending[place], next).row);
             }

@@ -166,11 +166,3 @@ impl Changes {
         self.wrong.is_empty()
     }
 }
-
-impl std::fmt::Display for Changes {
-    fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let counts: Vec<_> = self.counts.iter().map(|(what, it)| format!("{it} {what}")).collect();
-        write!(to, "changes of the target: {}", counts.join(", "))?;
-        self.wrong.iter().try_for_each(|wrong| write!(to, "\n  {wrong}"))
-    }
-}

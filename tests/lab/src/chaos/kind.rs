@@ -29,15 +29,4 @@ impl Kind {
             Self::Freeze | Self::FreezeAll => Signal::STOP,
         }
     }
-
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Kill => "killed",
-            Self::KillAtStart => "killed at start",
-            Self::Crash => "crashed",
-            Self::Terminate => "terminated",
-            Self::Freeze => "frozen",
-            Self::FreezeAll => "all frozen together",
-        }
-    }
 }

@@ -99,8 +99,6 @@ fn parse_faults(names: &str) -> Result<Faults, String> {
 pub struct Options {
     pub asked: Arguments,
     pub loaded: Mission,
-    pub set: Vec<String>,
-    pub pace: Pace,
     /// Parent of the run directories. It is emptied after each mission.
     pub directory: PathBuf,
 }
@@ -113,13 +111,12 @@ impl Options {
     /// # Errors
     /// The mission cannot be loaded, or is none for chaos; options contradict each other.
     pub fn of(asked: &Arguments) -> Result<Self> {
-        let asked = asked.clone();
-        let mut set = asked.set.clone();
+        let mut asked = asked.clone();
         if asked.freeze_all {
             // The robot's clock goes on while its processes are frozen. A --set of the user comes later and wins.
-            set.insert(0, LONG_TIMEOUT.to_owned());
+            asked.set.insert(0, LONG_TIMEOUT.to_owned());
         }
-        let loaded = missions::load(&asked.mission, &set)?;
+        let loaded = missions::load(&asked.mission, &asked.set)?;
         let faulty = asked.robot_faults.is_some();
         if (asked.include_supervisor || faulty) && loaded.robot.address.is_some() {
             return Err("chaos brings its own robot; leave robot.address out".into());
@@ -136,11 +133,12 @@ impl Options {
         if asked.pace == Pace::Max {
             return Err("chaos needs a wall clock; give --pace R, 4 for four times as fast".into());
         }
-        let real_time = asked.include_supervisor || faulty;
-        let pace = if real_time { Pace::Rate(1.0) } else { asked.pace };
+        if asked.include_supervisor || faulty {
+            asked.pace = Pace::Rate(1.0);
+        }
         let directory = env::temp_dir().join(format!("firsthand-chaos-{}", process::id()));
         fs::create_dir(&directory).or_cannot_file("make", &directory)?;
-        Ok(Self { asked, loaded, set, pace, directory })
+        Ok(Self { asked, loaded, directory })
     }
 
     pub fn records(&self) -> bool {

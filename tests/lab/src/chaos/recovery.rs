@@ -24,10 +24,6 @@ impl PendingRecovery {
         self.row.noticed_ms.get_or_insert_with(|| ms_since(self.at));
     }
 
-    pub fn rests(&mut self) {
-        self.row.rest_ms.get_or_insert_with(|| ms_since(self.at));
-    }
-
     /// Note a sign of the successor: a ready beat, or a sample of a tick, which completes the measurement.
     pub fn sign(&mut self, beat: bool) -> bool {
         let took_ms = ms_since(self.at);

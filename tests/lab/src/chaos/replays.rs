@@ -1,7 +1,7 @@
 //! Replays of the missions' recordings: whether every generation of every stage is bit-equal.
 
 use std::{
-    fmt, fs,
+    fs,
     path::{Path, PathBuf},
 };
 
@@ -33,10 +33,10 @@ struct Counts {
 pub struct Replays {
     #[serde(flatten)]
     whole: Counts,
-    /// Results of recordings whose recorders were hit, or attached during a mission.
-    partial: Counts,
     /// Generations that differ or could not be replayed, and recordings that could not be read, with reasons.
     wrong: Vec<String>,
+    /// Results of recordings whose recorders were hit, or attached during a mission.
+    partial: Counts,
 }
 
 impl Counts {
@@ -101,26 +101,4 @@ fn recordings(directory: &Path) -> impl Iterator<Item = PathBuf> {
     let entries = fs::read_dir(directory).into_iter().flatten().flatten();
     let files = entries.map(|entry| entry.path());
     files.filter(|file| file.extension().is_some_and(|extension| extension == "mcap"))
-}
-
-impl fmt::Display for Counts {
-    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { recordings, equal, without_step, compared, cut, not_begun, not_replayed } = self;
-        write!(
-            to,
-            "{recordings} recordings ({cut} cut off, {not_begun} without their beginning): {equal} generations bit-equal in \
-             {compared} samples, {without_step} ended before their first step, {not_replayed} not replayed"
-        )
-    }
-}
-
-impl fmt::Display for Replays {
-    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { whole, partial, wrong } = self;
-        writeln!(to, "replayed {whole}; {} are wrong", wrong.len())?;
-        if partial.recordings > 0 {
-            writeln!(to, "recorders hit, or attached in mid mission: {partial}")?;
-        }
-        wrong.iter().try_for_each(|wrong| writeln!(to, "  {wrong}"))
-    }
 }

@@ -1,16 +1,16 @@
 //! Tick latencies of missions whose consumers were hit, and of the same missions without consumers.
 
-use std::fmt;
-
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use summary::{Quantiles, Summary};
 
 use crate::missions::statistics::median;
 
-/// Median and 99 % quantile of the ticks of each mission, microseconds.
+/// Median and 99 % quantile of the ticks of each mission, microseconds; the medians over all missions are written.
 #[derive(Debug, Default, Serialize)]
 pub struct TickLatencies {
+    #[serde(serialize_with = "medians")]
     with_us: Vec<[f64; 2]>,
+    #[serde(serialize_with = "medians")]
     without_us: Vec<[f64; 2]>,
 }
 
@@ -28,19 +28,10 @@ impl TickLatencies {
     }
 }
 
-impl fmt::Display for TickLatencies {
-    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let middle = |missions: &[[f64; 2]]| {
-            [0, 1].map(|place| median(missions.iter().map(|it| it[place])).unwrap_or(f64::NAN))
-        };
-        let ([p50, p99], [calm_p50, calm_p99]) = (middle(&self.with_us), middle(&self.without_us));
-        write!(
-            to,
-            "a tick, p50 and p99, medians of {} missions: {p50:.0} and {p99:.0} us with consumers that are hit, \
-             {calm_p50:.0} and {calm_p99:.0} us without any",
-            self.with_us.len(),
-        )
-    }
+/// The medians of the missions' values.
+fn medians<S: Serializer>(missions: &[[f64; 2]], to: S) -> Result<S::Ok, S::Error> {
+    let middle = |place: usize| median(missions.iter().map(|it| it[place])).unwrap_or(f64::NAN);
+    [middle(0), middle(1)].serialize(to)
 }
 
 #[cfg(test)]
@@ -58,8 +49,7 @@ mod tests {
             latencies.add(&summary(us, 2.0 * us), &summary(us + 1.0, 3.0 * us));
         }
         latencies.add(&summary(900.0, 900.0), &Summary::default());
-        let said = latencies.to_string();
-        assert!(said.contains("3 missions: 21 and 60 us with"), "{said}");
-        assert!(said.contains("20 and 40 us without"), "{said}");
+        let written = serde_json::json!({ "with_us": [21.0, 60.0], "without_us": [20.0, 40.0] });
+        assert_eq!(serde_json::to_value(&latencies).unwrap(), written);
     }
 }

@@ -204,7 +204,7 @@ impl<'a> Report<'a> {
                 if row.seed == pictured_seed || !row.is_success() {
                     let Row { setting, seed, .. } = row;
                     let caption = format!("{setting}, seed {seed}: {}", row.outcome_name());
-                    page.figure(&caption, Some(&picture(row)), None);
+                    page.figure(&caption, directory, &picture(row));
                 }
             }
         }

@@ -35,16 +35,19 @@ impl Page {
         self.0 += &format!("<pre>{}</pre>\n", escaped(text));
     }
 
-    /// A picture, if there is one, and a link to the page of its run. Both files are beside the page.
-    pub fn figure(&mut self, caption: &str, picture: Option<&Path>, page: Option<&Path>) {
-        let path = |path: &Path| escaped(&path.to_string_lossy());
-        let picture = picture.map(path).map_or(String::new(), |file| {
-            format!("<img loading=\"lazy\" src=\"{file}\" alt=\"{file}\">")
+    /// A picture and a link to the page of its run, in so far as there are these files of `directory`, in which the page will be.
+    pub fn figure(&mut self, caption: &str, directory: &Path, picture: &Path) {
+        let shown = |file: &Path, show: fn(String) -> String| {
+            let there = Some(file).filter(|file| directory.join(file).exists());
+            there.map(|file| show(escaped(&file.to_string_lossy()))).unwrap_or_default()
+        };
+        let image =
+            shown(picture, |file| format!("<img loading=\"lazy\" src=\"{file}\" alt=\"{file}\">"));
+        let page = shown(&picture.with_extension("html"), |file| {
+            format!("<a href=\"{file}\">its page</a>")
         });
-        let page = page.map(path);
-        let page = page.map_or(String::new(), |file| format!("<a href=\"{file}\">its page</a>"));
         let caption = escaped(caption);
-        self.0 += &format!("<figure><figcaption>{caption}</figcaption>{picture}{page}</figure>\n");
+        self.0 += &format!("<figure><figcaption>{caption}</figcaption>{image}{page}</figure>\n");
     }
 
     /// Write the page into `directory`. Returns its path.

@@ -1,7 +1,5 @@
 //! Shares, differences of shares and their confidence intervals; medians and means.
 
-use std::fmt;
-
 use serde::Serialize;
 
 /// Quantile of the normal distribution for 95 %.
@@ -13,18 +11,6 @@ pub struct Estimate {
     pub value: f64,
     pub low: f64,
     pub high: f64,
-}
-
-impl fmt::Display for Estimate {
-    /// Write the estimate, for example as `.620 [.564, .673]`, or with signs as `{:+}`.
-    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { value, low, high } = self;
-        if to.sign_plus() {
-            write!(to, "{value:+.3} [{low:+.3}, {high:+.3}]")
-        } else {
-            write!(to, "{value:.3} [{low:.3}, {high:.3}]")
-        }
-    }
 }
 
 /// The share of `hits` in `n`, with Wilson's interval (Wilson 1927).
@@ -75,6 +61,11 @@ impl Spread {
         };
         Some(Self { low: at(0.25), median: at(0.5), high: at(0.75) })
     }
+}
+
+/// To a thousandth, for people.
+pub fn rounded(value: f64) -> f64 {
+    (value * 1e3).round() / 1e3
 }
 
 pub fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {

@@ -99,22 +99,23 @@ fn files_of(folder: &Path) -> io::Result<Vec<PathBuf>> {
 type Reader = fn(&mut Found, &Path, Asked) -> Result;
 
 /// The kinds of files, by the ends of their names.
-const READERS: [(&str, Reader); 6] = [
-    (".toml", |found, file, asked| {
+const READERS: [(&[&str], Reader); 4] = [
+    (&[".toml"], |found, file, asked| {
         let mission = Mission::load(file)?.with_calibration()?;
         found.add(Trial::of_mission(mission.name.clone(), mission, asked.swept_m));
         Ok(())
     }),
-    (".world", |found, file, asked| add_barn(found, vec![barn::gazebo(file)?], asked)),
-    ("cylinders.csv", |found, file, asked| add_barn(found, barn::table(file)?, asked)),
-    (".csv.gz", |found, file, asked| add_barn(found, barn::table(file)?, asked)),
-    (".yaml", add_map),
-    (".yml", add_map),
+    (&[".world"], |found, file, asked| add_barn(found, vec![barn::gazebo(file)?], asked)),
+    (&["cylinders.csv", ".csv.gz"], |found, file, asked| {
+        add_barn(found, barn::table(file)?, asked)
+    }),
+    (&[".yaml", ".yml"], add_map),
 ];
 
 fn reader_of(file: &Path) -> Option<Reader> {
     let name = file.file_name()?.to_string_lossy();
-    READERS.iter().find(|(end, _)| name.ends_with(end)).map(|(_, reader)| *reader)
+    let reads = |(ends, _): &&(&[&str], Reader)| ends.iter().any(|end| name.ends_with(end));
+    READERS.iter().find(reads).map(|(_, reader)| *reader)
 }
 
 fn add_barn(found: &mut Found, worlds: Vec<barn::World>, asked: Asked) -> Result {
