@@ -92,7 +92,10 @@ pub fn main(arguments: &Arguments) -> Result {
     };
     in_parallel((0..all).collect(), arguments.jobs.max(1), one, |(is_right, line)| {
         right += u64::from(is_right);
-        Ok(if !is_right { print_text(&format!("{line}\n")) } else { Ok(()) }?)
+        if !is_right {
+            print_text(&format!("{line}\n"))?;
+        }
+        Ok(())
     })?;
     print_text(&format!("{right} of {all} robots were told right\n"))?;
     (right == all).then_some(()).ok_or_else(|| "a fault was missed or invented".into())

@@ -32,7 +32,8 @@ impl Page {
 
     /// Text whose lines and columns stay as they are.
     pub fn table(&mut self, text: &str) {
-        self.0 += &format!("<pre>{}</pre>\n", escaped(text));
+        let lines: Vec<_> = text.lines().map(escaped).collect();
+        self.0 += &format!("<pre>{}</pre>\n", lines.join("\n"));
     }
 
     /// A picture and a link to the page of its run, in so far as there are these files of `directory`, in which the page will be.
