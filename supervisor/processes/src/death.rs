@@ -108,7 +108,7 @@ fn nanoseconds(seconds: f64) -> u64 {
 }
 
 /// The end of a stage's log, from the beginning of a line; empty if there is none.
-pub(crate) fn log_tail(log: &Path, since: u64) -> String {
+pub fn log_tail(log: &Path, since: u64) -> String {
     let read = || -> io::Result<Vec<u8>> {
         let mut file = File::open(log)?;
         let end = file.metadata()?.len();

@@ -1,15 +1,17 @@
 //! `firsthand bring-up` of simulated robots that were assembled with faults: what it names, and what it names of right ones.
 
-use std::{collections::BTreeSet, fs, path::PathBuf, process::Stdio, sync::Mutex, time::Duration};
+use std::{collections::BTreeSet, fs, path::PathBuf, process::Stdio, time::Duration};
 
 use clap::Args;
 use common::clock::Pace;
 use console::{missions, output::print_text};
 use mission_control::simulator::Simulator;
 use serde::Deserialize;
+use serde_json::Value;
 
 use crate::{
     error::{OrCannot as _, Result},
+    missions::runner::in_parallel,
     random::Random,
     robot,
 };
@@ -33,74 +35,34 @@ pub struct Arguments {
     out: PathBuf,
 }
 
-/// A fault: its name, the parts of which one must be found wrong, and the keys that the robot has instead of the stated ones.
-type Fault = (&'static str, &'static [&'static str], fn(&mut Random) -> Vec<String>);
-
-fn laser(keys: &str) -> Vec<String> {
-    vec![format!("robot.sensor=[{{name='laser',kind='scan',model='rplidar-a1',{keys}}}]")]
+/// A fault of the table `faults.csv`: the parts of which one must be found wrong, and the keys that the robot has instead of the
+/// stated ones, in which VALUE is a number from one of two ranges.
+#[derive(Debug, Deserialize)]
+struct Fault {
+    robot: String,
+    name: String,
+    parts: String,
+    keys: String,
+    from: Option<f64>,
+    to: Option<f64>,
+    or_from: Option<f64>,
+    or_to: Option<f64>,
 }
 
-fn either(random: &mut Random, from: f64, to: f64) -> f64 {
-    random.within(from, to) * if random.below(2) == 0 { 1.0 } else { -1.0 }
+impl Fault {
+    fn parts(&self) -> impl Iterator<Item = &str> {
+        self.parts.split(';')
+    }
+
+    fn keys(&self, random: &mut Random) -> Vec<String> {
+        let ranges = [self.from.zip(self.to), self.or_from.zip(self.or_to)];
+        let keys = ranges[random.below(2)].map_or(self.keys.clone(), |(from, to)| {
+            let value = (random.within(from, to) * 1e4).round() / 1e4;
+            self.keys.replace("VALUE", &value.to_string())
+        });
+        keys.split(';').map(str::to_owned).collect()
+    }
 }
-
-const OF_X80: &[Fault] = &[
-    ("wheels swapped", &["motors"], |_| {
-        vec![
-            "robot.left={channel=1,reversed=false}".into(),
-            "robot.right={channel=0,reversed=true}".into(),
-        ]
-    }),
-    ("left motor reversed", &["motors", "wheels"], |_| {
-        vec!["robot.left={channel=0,reversed=false}".into()]
-    }),
-    ("right motor reversed", &["motors", "wheels"], |_| {
-        vec!["robot.right={channel=1,reversed=true}".into()]
-    }),
-    ("both motors reversed", &["motors"], |_| {
-        vec![
-            "robot.left={channel=0,reversed=false}".into(),
-            "robot.right={channel=1,reversed=true}".into(),
-        ]
-    }),
-    ("counts per turn", &["wheel size"], |random| {
-        vec![format!("robot.counts_per_turn={:.0}", 1200.0 * [0.63, 1.5][random.below(2)])]
-    }),
-    ("a late base", &["response"], |random| {
-        vec![format!("robot.response.delay_s={:.2}", random.within(0.2, 0.4))]
-    }),
-];
-
-const OF_LASER: &[Fault] = &[
-    ("laser's yaw", &["laser"], |random| {
-        laser(&format!(
-            "forward_m=0.05,bearing_deg=0.0,turned_deg={:.1}",
-            either(random, 6.0, 120.0)
-        ))
-    }),
-    ("laser upside down", &["laser"], |_| laser("forward_m=0.05,bearing_deg=0.0,roll_deg=180")),
-    ("laser's place", &["laser"], |random| {
-        laser(&format!("forward_m={:.2},bearing_deg=0.0", random.within(-0.15, -0.05)))
-    }),
-    ("laser's delay", &["laser"], |random| {
-        vec![format!(
-            "simulation.laser={{delay_s={:.2},stated_share=0.0}}",
-            random.within(0.1, 0.3)
-        )]
-    }),
-    ("track", &["track"], |random| {
-        vec![format!("robot.track_m={:.3}", 0.23 * (1.0 + either(random, 0.08, 0.2)))]
-    }),
-    ("wheel radius", &["wheel size"], |random| {
-        vec![format!("robot.wheel_radius_m={:.4}", 0.0352 * (1.0 + either(random, 0.08, 0.15)))]
-    }),
-    ("wheel ratio", &["wheel ratio"], |random| {
-        vec![format!("simulation.wheels.diameter_ratio={:.3}", 1.0 + either(random, 0.05, 0.08))]
-    }),
-    ("a late base", &["response"], |random| {
-        vec![format!("robot.response.delay_s={:.2}", random.within(0.2, 0.4))]
-    }),
-];
 
 const ROOM: &str = "target = [0.8, 0]\nsensors = 'all'\nsimulation.realism = 'measured'\n[perimeter]\nwidth_m = 8.0\ncentre = [0.0, 0.0]\n";
 const X80: &str = "[robot]\nmodel = 'x80'\n";
@@ -118,65 +80,47 @@ fn walls(random: &mut Random) -> String {
     format!("[[world.wall]]\npoints = [{}]\n", corners.join(", "))
 }
 
-#[derive(Deserialize)]
-struct Found {
-    part: String,
-    verdict: String,
-}
-
-#[derive(Deserialize)]
-struct Said {
-    findings: Vec<Found>,
-}
-
 pub fn main(arguments: &Arguments) -> Result {
     robot::path()?;
     fs::create_dir_all(&arguments.out).or_cannot_file("make", &arguments.out)?;
+    let table = csv::Reader::from_reader(include_str!("bring_up/faults.csv").as_bytes());
+    let table: Vec<Fault> = table.into_deserialize().collect::<Result<_, _>>()?;
     let all = arguments.faulty + arguments.right;
-    let next = Mutex::new(0..all);
-    let lines = Mutex::new(Vec::new());
-    std::thread::scope(|scope| {
-        for _ in 0..arguments.jobs.max(1) {
-            scope.spawn(|| {
-                while let Some(number) = next.lock().ok().and_then(|mut next| next.next()) {
-                    let told = one(arguments, number)
-                        .unwrap_or_else(|why| (false, format!("failed: {why}")));
-                    if let Ok(mut lines) = lines.lock() {
-                        lines.push(told);
-                    }
-                }
-            });
+    let mut right = 0;
+    let one = |number: &u64, _| {
+        one(arguments, &table, *number).unwrap_or_else(|why| (false, format!("failed: {why}")))
+    };
+    in_parallel((0..all).collect(), arguments.jobs.max(1), one, |(is_right, line)| {
+        right += u64::from(is_right);
+        if !is_right {
+            print_text(&format!("{line}\n"))?;
         }
-    });
-    let lines = lines.into_inner().or_cannot("read the results")?;
-    for (_, line) in lines.iter().filter(|it| !it.0) {
-        print_text(&format!("{line}\n"))?;
-    }
-    let right = lines.iter().filter(|it| it.0).count();
+        Ok(())
+    })?;
     print_text(&format!("{right} of {all} robots were told right\n"))?;
-    (right as u64 == all).then_some(()).ok_or_else(|| "a fault was missed or invented".into())
+    (right == all).then_some(()).ok_or_else(|| "a fault was missed or invented".into())
 }
 
 /// Whether the bring-up of a robot named its faults and no other, and what it said.
-fn one(arguments: &Arguments, number: u64) -> Result<(bool, String)> {
+fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, String)> {
     let mut random = Random::of_world(arguments.seed, 0, number);
-    let (body, table) = if number.is_multiple_of(2) { (X80, OF_X80) } else { (KOBUKI, OF_LASER) };
+    let (robot, body) = [("x80", X80), ("kobuki", KOBUKI)][(number % 2) as usize];
     let text = format!("seed = {}\n{ROOM}{body}{}", number + 1, walls(&mut random));
     // Two faults of wheels that hide each other are not drawn; lasers have two now and then.
-    let count = match (number < arguments.faulty, table.len() == OF_LASER.len()) {
+    let count = match (number < arguments.faulty, robot) {
         (false, _) => 0,
-        (true, true) => 1 + random.below(2),
-        (true, false) => 1,
+        (true, "kobuki") => 1 + random.below(2),
+        (true, _) => 1,
     };
+    let table: Vec<&Fault> = table.iter().filter(|fault| fault.robot == robot).collect();
     let mut faults: Vec<&Fault> = Vec::new();
     while faults.len() < count {
-        let fault = &table[random.below(table.len())];
-        let same = |it: &&Fault| it.1 == fault.1;
-        if !faults.iter().any(same) {
+        let fault = table[random.below(table.len())];
+        if !faults.iter().any(|it| it.parts == fault.parts) {
             faults.push(fault);
         }
     }
-    let keys: Vec<String> = faults.iter().flat_map(|fault| fault.2(&mut random)).collect();
+    let keys: Vec<_> = faults.iter().flat_map(|fault| fault.keys(&mut random)).collect();
     let mission = missions::parsed(&text, "bring-up", &keys)?;
     let directory = arguments.out.join(number.to_string());
     fs::create_dir_all(&directory).or_cannot_file("make", &directory)?;
@@ -200,17 +144,15 @@ fn one(arguments: &Arguments, number: u64) -> Result<(bool, String)> {
     }
     let _ = child.kill();
     let output = child.wait_with_output()?;
-    let said: Said = serde_json::from_slice(&output.stdout)
+    let said: Value = serde_json::from_slice(&output.stdout)
         .map_err(|_| format!("robot {number} gave no findings; see {}", directory.display()))?;
-    let wrong: BTreeSet<&str> = said
-        .findings
-        .iter()
-        .filter(|it| it.verdict == "WRONG")
-        .map(|it| it.part.as_str())
-        .collect();
-    let found = faults.iter().all(|fault| fault.1.iter().any(|part| wrong.contains(part)));
-    let invented = wrong.iter().any(|part| !faults.iter().any(|fault| fault.1.contains(part)));
-    let names: Vec<_> = faults.iter().map(|fault| fault.0).collect();
+    let findings = said["findings"].as_array().into_iter().flatten();
+    let wrong = findings.filter(|it| it["verdict"] == "WRONG");
+    let wrong: BTreeSet<&str> = wrong.filter_map(|it| it["part"].as_str()).collect();
+    let found = faults.iter().all(|fault| fault.parts().any(|part| wrong.contains(part)));
+    let invented =
+        wrong.iter().any(|part| !faults.iter().any(|fault| fault.parts().any(|it| it == *part)));
+    let names: Vec<_> = faults.iter().map(|fault| &*fault.name).collect();
     let line =
         format!("robot {number}: {} ({}): found {wrong:?}", names.join(", "), keys.join(" "));
     Ok((found && !invented, line))

@@ -11,10 +11,10 @@
 //! | `series` | the state that the missions share |
 //! | `attack`, `subscriptions` | the attacker of one mission; its readers on the bus |
 //! | `kind`, `recovery` | how a process is hit; the recovery until its successor works |
-//! | `consumer`, `consumer_process`, `consumers`, `terminal` | consumers that are hit and restarted, and end with chaos; a terminal for one that draws |
+//! | `consumer`, `consumer_process`, `consumers` | consumers that are hit and restarted, and end with chaos |
 //! | `changes` | targets that change meanwhile |
 //! | `replays` | replays of the missions' recordings |
-//! | `resources`, `leftovers` | resources of a process; files and processes that outlived a mission |
+//! | `leftovers` | files and processes that outlived a mission |
 //! | `report` | the result of all missions |
 //! | `signals` | the table of signals, THE file format |
 //! | `robot_fault` | THE table of robot faults |
@@ -35,7 +35,6 @@ mod proxy;
 mod recovery;
 mod replays;
 mod report;
-mod resources;
 mod robot_fault;
 mod robot_faults;
 mod schedule;
@@ -43,7 +42,6 @@ mod series;
 mod signals;
 mod stop_time_table;
 mod subscriptions;
-mod terminal;
 mod tick_latencies;
 
 pub use options::{Arguments, Options};
@@ -131,13 +129,13 @@ fn run(options: &Options) -> Result<Report> {
     let began = Instant::now();
     let mut series = Series::new(options)?;
     while !series.is_over() {
-        let seed = options.asked.seed + series.report.missions();
+        let seed = options.asked.seed + series.report.missions;
         let undisturbed = mission::undisturbed(options, seed)?;
         mission::attack(&mut series, seed, &undisturbed)?;
         let left = leftovers::find(&options.asked.robot, &options.directory);
         let report = &mut series.report;
-        report.left_behind(left);
-        let (kills, missions) = (report.signals(), report.missions());
+        report.left_behind(&left);
+        let (kills, missions) = (report.signals(), report.missions);
         write_stderr(&format!("{kills} of {} signals, {missions} missions\n", options.asked.kills));
     }
     series.report.took_s = began.elapsed().as_secs_f64();

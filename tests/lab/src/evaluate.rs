@@ -9,11 +9,10 @@ use std::{
 
 use clap::Args;
 use common::mission::Mission;
-use console::output::{print_text, write_stderr};
+use console::output::write_stderr;
 use glam::DVec2;
 use processes::planner_executable;
 
-use self::report::Report;
 use crate::{
     baselines::process::BASELINES,
     error::Result,
@@ -21,9 +20,12 @@ use crate::{
         HARMONIC, Setting,
         results::Results,
         runner::{self, NoiseSeeds, Plan},
-        trial::BodySize,
+        trial::swept_m,
     },
-    worlds::{self, Ends, Worlds},
+    worlds::{
+        self, Asked, Worlds,
+        ends::{self, Ends},
+    },
 };
 
 /// Run missions on many worlds and count successes by the ground truth, with 95 % intervals, a picture and a page of every failure.
@@ -90,9 +92,6 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Free ground on both sides of the body in the narrowest way of a world, metres.
-const MARGIN_M: f64 = 0.05;
-
 pub fn main(arguments: &Arguments) -> Result {
     let settings = settings(arguments)?;
     let described = described(arguments, &settings);
@@ -103,10 +102,10 @@ pub fn main(arguments: &Arguments) -> Result {
         heading: heading_deg.to_radians(),
         target: target.into(),
     });
-    let body = body(&arguments.robot, &arguments.set)?;
+    let swept_m = narrowest_m(&arguments.robot, &arguments.set)?;
+    let asked = Asked { count: arguments.count, seed, ends, swept_m };
     // A world that is damaged is no error of the mission on the command line.
-    let found = worlds::find(&arguments.worlds, arguments.count, seed, ends, &body)
-        .map_err(|error| error.to_string())?;
+    let found = worlds::find(&arguments.worlds, asked).map_err(|error| error.to_string())?;
     write_stderr(&format!(
         "{} worlds, each crossed by the body on a grid of 5 cm ({} others were left out)\n",
         found.trials.len(),
@@ -121,24 +120,19 @@ pub fn main(arguments: &Arguments) -> Result {
         pictured_seed: None,
         calibrates: arguments.calibrate,
     };
-    runner::run(&plan, &mut results, "")?;
+    runner::run(&plan, &mut results, "evaluation")?;
     results.sort()?;
-    let report = Report::new(&plan.settings, &results);
-    let page = report.save_page(&described)?;
-    Ok(print_text(&if arguments.json {
-        format!("{}\n", report.object())
-    } else {
-        format!("{}rows and pictures: {}\n", report.text(), page.display())
-    })?)
+    let report = report::report(&plan.settings, &results.rows.rows);
+    let page = report::save_page(&results, &report, &described)?;
+    write_stderr(&format!("rows and pictures: {}\n", page.display()));
+    crate::print(&report, arguments.json)
 }
 
 /// `N` numbers between commas, none beyond 1000 km.
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
-    let parsed: Result<Vec<f64>, _> = text.split(',').map(|it| it.trim().parse()).collect();
-    let numbers = parsed.ok().and_then(|it| <[f64; N]>::try_from(it).ok());
-    numbers
-        .filter(|numbers| numbers.iter().all(|number| number.abs() <= 1e6))
-        .ok_or_else(|| format!("give {N} numbers with commas between them"))
+    let parsed: Option<Vec<f64>> = text.split(',').map(ends::number).collect();
+    let numbers = parsed.and_then(|it| it.try_into().ok());
+    numbers.ok_or_else(|| format!("give {N} numbers with commas between them"))
 }
 
 /// The command that gives these rows.
@@ -209,11 +203,10 @@ fn settings(arguments: &Arguments) -> Result<Vec<Setting>> {
     Ok(settings)
 }
 
-/// The body that must fit through every world, by the robot's model and the changes in `set`.
-fn body(robot: &str, set: &[String]) -> Result<BodySize> {
+/// Half the width of the narrowest way for the robot's model with the changes in `set`, metres.
+fn narrowest_m(robot: &str, set: &[String]) -> Result<f64> {
     let radius = set.iter().rfind(|assignment| assignment.starts_with("robot.radius_m"));
     let radius = radius.map_or("", String::as_str);
     let text = format!("target = [1, 0]\nrobot.model = '{robot}'\n{radius}");
-    let radius_m = Mission::parse(&text, Path::new("--robot"))?.body().radius_m;
-    Ok(BodySize { radius_m, margin_m: MARGIN_M })
+    Ok(swept_m(&Mission::parse(&text, Path::new("--robot"))?))
 }

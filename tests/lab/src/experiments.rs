@@ -82,7 +82,7 @@ pub fn main(arguments: &Arguments) -> Result {
             pictured_seed: Some(FIRST_SEED),
             jobs: arguments.jobs,
         };
-        runner::run(&plan, &mut results, &format!("{method}: "))?;
+        runner::run(&plan, &mut results, method)?;
     }
     results.sort()?;
     let report = Report::new(&chosen, &results.rows.rows)?;

@@ -1,24 +1,25 @@
 //! `firsthand field MAP`: the harmonic field of a map, without a robot.
 
 use std::{
-    fmt,
     fs::File,
     io::{self, BufWriter, Write},
     num::NonZeroUsize,
     path::{Path, PathBuf},
-    str::FromStr,
     time::Instant,
 };
 
-use crate::{error::Result, missions::statistics::median};
+use crate::{
+    error::Result,
+    missions::statistics::{median, rounded},
+};
 use clap::Args;
 use common::{process_status::kibibytes, samples::FieldCell};
 use harmonic::{Cancellation, Cell, Domain, Field, Phase, Screening, Settings, SolveError, Solver};
 use maps::Map;
 use picture::FieldOnMap;
-use serde::Serialize;
+use serde_json::{Value, json};
 
-use console::{failure::Refused, output::print};
+use console::failure::Refused;
 
 /// Solve the harmonic field of a map: numbers for NumPy, a picture, how long it took.
 ///
@@ -28,8 +29,8 @@ pub struct Arguments {
     /// A ROS map_server YAML, a PGM or PNG image (light is free), or a MovingAI .map.
     map: PathBuf,
     /// The target's column and row, from 0; row 0 is the top of the map.
-    #[arg(long, value_name = "COL,ROW")]
-    target_cell: TargetCell,
+    #[arg(long, value_name = "COL,ROW", value_parser = cell)]
+    target_cell: Cell,
     /// The screening length, in cells: in it u falls by a further factor of e. Without it there is no screening.
     #[arg(long, value_name = "LENGTH", allow_negative_numbers = true)]
     screening_cells: Option<f64>,
@@ -50,18 +51,11 @@ pub struct Arguments {
     threads: NonZeroUsize,
 }
 
-#[derive(Clone, Copy, Debug)]
-struct TargetCell(Cell);
-
-impl FromStr for TargetCell {
-    type Err = &'static str;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let number = |text: &str| text.trim().parse::<usize>().ok();
-        text.split_once(',')
-            .and_then(|(col, row)| Some(Self(Cell::new(number(col)?, number(row)?))))
-            .ok_or("a cell is its column and its row, from 0: 120,45")
-    }
+fn cell(text: &str) -> Result<Cell, &'static str> {
+    let number = |text: &str| text.trim().parse::<usize>().ok();
+    text.split_once(',')
+        .and_then(|(col, row)| Some(Cell::new(number(col)?, number(row)?)))
+        .ok_or("a cell is its column and its row, from 0: 120,45")
 }
 
 pub fn main(arguments: &Arguments) -> Result {
@@ -73,18 +67,18 @@ pub fn main(arguments: &Arguments) -> Result {
     for _ in 1..arguments.repeat.get() {
         runs.push(solve(&domain, arguments.threads).map_err(failed)?.1);
     }
-    let report = Report::of(arguments, &first, &runs);
+    let report = report(arguments, &first, &runs);
     if let Some(file) = &arguments.out {
         write(file, |to| write_array(to, &first))?;
     }
     if let Some(file) = &arguments.picture {
         write(file, |to| to.write_all(draw(&map, &first).as_bytes()))?;
     }
-    Ok(print(&report, arguments.json)?)
+    crate::print(&report, arguments.json)
 }
 
 fn domain(arguments: &Arguments, map: &Map) -> Result<Domain> {
-    let target = arguments.target_cell.0;
+    let target = arguments.target_cell;
     let screening = arguments.screening_cells.map_or(Screening::None, Screening::cells);
     let domain = Domain::new(map.cols, map.rows, map.blocked.clone(), target)
         .and_then(|domain| domain.with_screening(&screening));
@@ -129,108 +123,33 @@ fn solve(domain: &Domain, threads: NonZeroUsize) -> Result<(Field, Times), Solve
     Ok((field, times))
 }
 
-/// The object of `field --json`. Times are in milliseconds.
-#[derive(Debug, Serialize)]
-struct Report {
-    rows: usize,
-    cols: usize,
-    target: [usize; 2],
-    screening_cells: Option<f64>,
-    reachable: usize,
-    method: &'static str,
-    repeats: usize,
-    threads: usize,
-    setup_ms: f64,
-    solve_ms: f64,
-    verify_ms: f64,
-    #[serde(flatten)]
-    medians: Option<Medians>,
-    worst_residual: f64,
-    log10_u_min: f64,
-    /// Memory of the process when the field was solved: map, solver and field, not the output files.
-    peak_memory_bytes: Option<u64>,
-}
-
-#[derive(Debug, Serialize)]
-struct Medians {
-    setup_ms_median: f64,
-    solve_ms_median: f64,
-    verify_ms_median: f64,
-}
-
-impl Report {
-    fn of(arguments: &Arguments, field: &Field, runs: &[Times]) -> Self {
-        let ms = |phase: usize| runs.iter().map(move |run| run[phase]);
-        let [setup_ms, solve_ms, verify_ms] =
-            [0, 1, 2].map(|phase| ms(phase).fold(f64::INFINITY, f64::min));
-        let medians = [0, 1, 2].map(|phase| median(ms(phase)).unwrap_or_default());
-        let [setup_ms_median, solve_ms_median, verify_ms_median] = medians;
-        let verification = field.verification();
-        Self {
-            rows: field.height(),
-            cols: field.width(),
-            target: [field.target().col, field.target().row],
-            screening_cells: arguments.screening_cells,
-            reachable: verification.reachable,
-            method: verification.method.name(),
-            repeats: runs.len(),
-            threads: arguments.threads.get(),
-            setup_ms,
-            solve_ms,
-            verify_ms,
-            medians: (runs.len() > 1).then_some(Medians {
-                setup_ms_median,
-                solve_ms_median,
-                verify_ms_median,
-            }),
-            worst_residual: verification.worst_residual,
-            log10_u_min: field.log10_u_min(),
-            peak_memory_bytes: kibibytes("self", "VmHWM").map(|kib| kib * 1024),
-        }
+/// The object of `field --json`. Each phase has its least time and the median over the repeats, in milliseconds.
+fn report(arguments: &Arguments, field: &Field, runs: &[Times]) -> Value {
+    let verification = field.verification();
+    let mut report = json!({
+        "rows": field.height(),
+        "cols": field.width(),
+        "target": [field.target().col, field.target().row],
+        "reachable": verification.reachable,
+        "method": verification.method.name(),
+        "repeats": runs.len(),
+        "threads": arguments.threads,
+        "worst_residual": verification.worst_residual,
+        "log10_u_min": field.log10_u_min(),
+    });
+    if let Some(length) = arguments.screening_cells {
+        report["screening_cells"] = length.into();
     }
-}
-
-impl fmt::Display for Report {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [col, row] = self.target;
-        writeln!(
-            f,
-            "{} x {} cells, {} of them lead to the target at {col},{row}",
-            self.cols, self.rows, self.reachable
-        )?;
-        let screening = self.screening_cells.map_or_else(
-            || "without screening".to_owned(),
-            |cells| format!("with a screening length of {cells} cells"),
-        );
-        writeln!(
-            f,
-            "u down to 1e{:.1} {screening}, worst relative residual {:.1e}",
-            self.log10_u_min, self.worst_residual
-        )?;
-        writeln!(
-            f,
-            "{}: set-up {:.2} ms, solve {:.2} ms, verification {:.2} ms{}",
-            self.method,
-            self.setup_ms,
-            self.solve_ms,
-            self.verify_ms,
-            if self.repeats > 1 { " at least" } else { "" }
-        )?;
-        if let Some(medians) = &self.medians {
-            writeln!(
-                f,
-                "median of {}: set-up {:.2} ms, solve {:.2} ms, verification {:.2} ms",
-                self.repeats,
-                medians.setup_ms_median,
-                medians.solve_ms_median,
-                medians.verify_ms_median
-            )?;
-        }
-        if let Some(bytes) = self.peak_memory_bytes {
-            writeln!(f, "peak memory {:.1} MB", bytes as f64 * 1e-6)?;
-        }
-        Ok(())
+    for (phase, name) in ["setup_ms", "solve_ms", "verify_ms"].into_iter().enumerate() {
+        let ms = || runs.iter().map(|run| run[phase]);
+        report[name] = rounded(ms().fold(f64::INFINITY, f64::min)).into();
+        report[format!("{name}_median")] = median(ms()).map(rounded).into();
     }
+    // Memory of the process when the field is solved: map, solver and field, not the output files.
+    if let Some(peak) = kibibytes("self", "VmHWM") {
+        report["peak_memory_bytes"] = (peak * 1024).into();
+    }
+    report
 }
 
 fn write(

@@ -39,6 +39,7 @@ mod worlds;
 use std::process::{ExitCode, Termination as _};
 
 use clap::{Parser, Subcommand};
+use serde::Serialize;
 
 /// Measure robots: missions on many worlds, the paper's experiments, random faults, ticks, fields.
 #[derive(Debug, Parser)]
@@ -64,11 +65,20 @@ enum Command {
 #[derive(Debug, Subcommand)]
 enum Bench {
     Tick(tick::Arguments),
-    Field(field::Arguments),
     Chaos(Box<chaos::Arguments>),
     BringUp(bring_up::Arguments),
     Consumer(chaos::consumer_process::Arguments),
     Sources(sources::Arguments),
+}
+
+/// The keys and values of a report's JSON as TOML, for people.
+fn text(report: &impl Serialize) -> String {
+    toml::to_string(report).unwrap_or_else(|error| error.to_string())
+}
+
+fn print(report: &impl Serialize, json: bool) -> error::Result {
+    let text = if json { serde_json::to_string(report)? } else { text(report) };
+    Ok(console::output::print_text(&format!("{text}\n"))?)
 }
 
 /// The main function of the executable.
@@ -80,10 +90,8 @@ fn execute(arguments: &Arguments) -> error::Result<ExitCode> {
     let done = match &arguments.command {
         Command::Evaluate(arguments) => evaluate::main(arguments),
         Command::Experiments(arguments) => experiments::main(arguments),
-        Command::Field(arguments) | Command::Bench(Bench::Field(arguments)) => {
-            field::main(arguments)
-        }
         Command::Certify(arguments) => certify::main(arguments),
+        Command::Field(arguments) => field::main(arguments),
         Command::Stage(arguments) => baselines::process::main(arguments),
         Command::Bench(Bench::Tick(arguments)) => tick::main(arguments),
         Command::Bench(Bench::Chaos(arguments)) => return chaos::main(arguments),

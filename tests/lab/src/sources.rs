@@ -1,7 +1,6 @@
 //! Simulated sources of fixes and turns: a camera and a gyro that see a simulated robot by the ground truth of its run.
 
 use std::{
-    collections::VecDeque,
     fs::File,
     io::{self, BufRead as _, BufReader},
     path::PathBuf,
@@ -56,18 +55,7 @@ const GYRO_SCALE: f64 = 1.005;
 /// Poses and ticks of the ground truth that wait for each other, at most.
 const WAITING: usize = 64;
 
-#[derive(Clone, Copy, Debug, Default)]
-struct Published {
-    fixes: u64,
-    turns: u64,
-}
-
 pub fn main(arguments: &Arguments) -> Result {
-    let Published { fixes, turns } = publish(arguments)?;
-    Ok(print_text(&format!("published {fixes} fixes and {turns} turns\n"))?)
-}
-
-fn publish(arguments: &Arguments) -> Result<Published> {
     let open = |bus: &Bus| {
         let writers = (bus.writer(&topics::FIX, 1)?, bus.writer(&topics::TURN, 1)?);
         Ok((bus.reader(&topics::POSE)?, writers))
@@ -80,9 +68,11 @@ fn publish(arguments: &Arguments) -> Result<Published> {
             Event::Connected => source.file = None,
             Event::Samples((poses, writers)) => source.take(poses, writers)?,
             Event::Nothing => {}
-            Event::Disconnected => return Ok(source.published),
+            Event::Disconnected => break,
         }
     }
+    let Source { fixes, turns, .. } = source;
+    Ok(print_text(&format!("published {fixes} fixes and {turns} turns\n"))?)
 }
 
 /// The writers of fixes and of turns.
@@ -94,11 +84,13 @@ struct Source<'a> {
     file: Option<BufReader<File>>,
     /// The beginning of an incomplete line.
     line: String,
-    truth: VecDeque<GroundTruthTick>,
-    poses: VecDeque<PoseSample>,
+    truth: Vec<GroundTruthTick>,
+    poses: Vec<PoseSample>,
     next_fix_s: f64,
     turned: Option<(f64, f64)>,
-    published: Published,
+    /// Published ones.
+    fixes: u64,
+    turns: u64,
 }
 
 impl<'a> Source<'a> {
@@ -108,40 +100,40 @@ impl<'a> Source<'a> {
             chance: Random::new(arguments.seed, 23),
             file: None,
             line: String::new(),
-            truth: VecDeque::new(),
-            poses: VecDeque::new(),
+            truth: Vec::new(),
+            poses: Vec::new(),
             next_fix_s: 0.0,
             turned: None,
-            published: Published::default(),
+            fixes: 0,
+            turns: 0,
         }
     }
 
     fn take(&mut self, poses: &mut Reader<PoseSample>, writers: &mut Writers) -> Result {
         while let Some(pose) = poses.next_sample()? {
-            self.poses.push_back(pose);
+            self.poses.push(pose);
         }
         self.read_truth().or_cannot("read the ground truth of the run")?;
         // A pose tells the mission time of the ground truth with the same counts.
-        let mut waiting = VecDeque::new();
-        while let Some(pose) = self.poses.pop_front() {
-            match self.truth.iter().position(|truth| truth.is_of(&pose)) {
-                Some(at) => {
-                    waiting.clear();
-                    let truth = self.truth[at];
-                    self.truth.drain(..=at);
-                    self.measure(&pose, &truth, writers)?;
-                }
-                None => waiting.push_back(pose),
-            }
+        for pose in std::mem::take(&mut self.poses) {
+            let Some(at) = self.truth.iter().position(|truth| truth.is_of(&pose)) else {
+                self.poses.push(pose);
+                continue;
+            };
+            let truth = self.truth[at];
+            self.truth.drain(..=at);
+            self.poses.clear();
+            self.measure(&pose, &truth, writers)?;
         }
-        waiting.drain(..waiting.len().saturating_sub(WAITING));
-        self.poses = waiting;
+        self.poses.drain(..self.poses.len().saturating_sub(WAITING));
         Ok(())
     }
 
     fn read_truth(&mut self) -> io::Result<()> {
         if self.file.is_none() {
-            self.file = self.open()?.map(BufReader::new);
+            // The simulated robot may not have written it yet.
+            let file = File::open(self.arguments.run.join(GROUND_TRUTH));
+            self.file = file.ok().map(BufReader::new);
         }
         let Some(file) = &mut self.file else { return Ok(()) };
         while file.read_line(&mut self.line)? > 0 && self.line.ends_with('\n') {
@@ -152,25 +144,17 @@ impl<'a> Source<'a> {
         Ok(())
     }
 
-    /// The ground truth of the run; none before the simulated robot has written it.
-    fn open(&self) -> io::Result<Option<File>> {
-        match File::open(self.arguments.run.join(GROUND_TRUTH)) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-            opened => opened.map(Some),
-        }
-    }
-
     fn measure(
         &mut self,
         pose: &PoseSample,
         truth: &GroundTruthTick,
         writers: &mut Writers,
     ) -> Result {
-        let Arguments { fixes, fix_error, jumps, gyro, .. } = *self.arguments;
+        let Arguments { fixes: rate_hz, fix_error, jumps, gyro, .. } = *self.arguments;
         let (tick, time) = (pose.stamp.tick, pose.stamp.time());
         let now_s = time.seconds();
-        if fixes > 0.0 && now_s >= self.next_fix_s {
-            self.next_fix_s = now_s + 1.0 / fixes;
+        if rate_hz > 0.0 && now_s >= self.next_fix_s {
+            self.next_fix_s = now_s + 1.0 / rate_hz;
             let direction = std::f64::consts::TAU * self.chance.share();
             let off = if self.chance.share() < jumps { 1.0 } else { 0.0 };
             let variance = fix_error * fix_error;
@@ -184,7 +168,7 @@ impl<'a> Source<'a> {
                 ..FixSample::default()
             };
             writers.0.publish(tick, time, fix)?;
-            self.published.fixes += 1;
+            self.fixes += 1;
         }
         if let Some(noise) = gyro {
             let (before_s, heading) =
@@ -193,7 +177,7 @@ impl<'a> Source<'a> {
             let deviation = noise.to_radians() * seconds.max(0.0).sqrt();
             let turn = TurnSample {
                 capture_ns: time.0,
-                sequence: self.published.turns,
+                sequence: self.turns,
                 turn_rad: (truth.heading - heading) * GYRO_SCALE
                     + GYRO_BIAS_DEG_S.to_radians() * seconds
                     + deviation * self.normal(),
@@ -201,7 +185,7 @@ impl<'a> Source<'a> {
                 ..TurnSample::default()
             };
             writers.1.publish(tick, time, turn)?;
-            self.published.turns += 1;
+            self.turns += 1;
         }
         Ok(())
     }

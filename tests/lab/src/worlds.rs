@@ -2,7 +2,7 @@
 
 mod barn;
 mod corridors;
-mod ends;
+pub mod ends;
 mod files;
 mod floor;
 mod furnished;
@@ -13,11 +13,10 @@ mod traps;
 
 use std::{convert::Infallible, fmt, path::PathBuf, str::FromStr};
 
-pub use self::ends::Ends;
-use self::{corridors::Bends, files::Asked, rooms::Doors};
+use self::{corridors::Bends, ends::Ends, rooms::Doors};
 use crate::{
     error::Result,
-    missions::trial::{BodySize, Rules, Scene, Trial},
+    missions::trial::{Rules, Scene, Trial},
     random::Random,
 };
 
@@ -88,52 +87,52 @@ pub struct Found {
 }
 
 impl Found {
-    /// Add the trial `world` in `scene`, if `body` can cross the world.
-    fn add(&mut self, world: String, scene: &Scene, rules: Rules, body: &BodySize) -> Result {
-        self.add_solvable(Trial::new(world, scene, rules, body)?);
-        Ok(())
-    }
-
-    fn add_solvable(&mut self, trial: Option<Trial>) {
+    /// Add a trial, or count that there is none.
+    fn add(&mut self, trial: Option<Trial>) {
         self.unsolvable += usize::from(trial.is_none());
         self.trials.extend(trial);
     }
 }
 
-/// `count` trials of `worlds` under `seed`; without a count all files. `ends` are only for maps.
-pub fn find(
-    worlds: &Worlds,
-    count: Option<usize>,
-    seed: u64,
-    ends: Option<Ends>,
-    body: &BodySize,
-) -> Result<Found> {
+#[derive(Clone, Copy, Debug)]
+pub struct Asked {
+    /// Number of worlds; without it a hundred that are drawn, all files, and ten on each map without tests.
+    pub count: Option<usize>,
+    pub seed: u64,
+    /// Start and target, for maps only.
+    pub ends: Option<Ends>,
+    /// Half the width of the narrowest way, metres.
+    pub swept_m: f64,
+}
+
+pub fn find(worlds: &Worlds, asked: Asked) -> Result<Found> {
     let found = match worlds {
-        Worlds::Drawn(_) if ends.is_some() => return Err(NO_MAP.into()),
-        Worlds::Drawn(kind) => draw_until(count.unwrap_or(100), seed, kind, body)?,
-        Worlds::Path(path) => files::read(path, Asked { count, seed, ends }, body)?,
+        Worlds::Drawn(_) if asked.ends.is_some() => return Err(NO_MAP.into()),
+        Worlds::Drawn(kind) => draw(kind, asked)?,
+        Worlds::Path(path) => files::read(path, asked)?,
     };
     if found.trials.is_empty() {
-        let swept_m = body.swept_m();
         return Err(format!(
-            "none of the worlds can be crossed by a body of {swept_m:.2} m around its centre; give others, or a smaller robot"
+            "none of the worlds can be crossed by a body of {:.2} m around its centre; give others, or a smaller robot",
+            asked.swept_m
         )
         .into());
     }
     Ok(found)
 }
 
-/// Draw worlds until `count` of them are solvable.
-fn draw_until(count: usize, seed: u64, kind: &Kind, body: &BodySize) -> Result<Found> {
-    let Kind { stream, name, draw, rules } = kind;
+/// Draw worlds until enough of them are solvable.
+fn draw(&Kind { stream, name, draw, rules }: &Kind, asked: Asked) -> Result<Found> {
+    let (count, seed) = (asked.count.unwrap_or(100), asked.seed);
     let mut found = Found::default();
     for drawn in 0..MOST_FAILURES + count as u64 {
         let number = found.trials.len();
         if number >= count {
             break;
         }
-        let scene = draw(&mut Random::of_world(seed, *stream, drawn), number);
-        found.add(format!("{name}-{seed}-{number:04}"), &scene, *rules, body)?;
+        let scene = draw(&mut Random::of_world(seed, stream, drawn), number);
+        let world = format!("{name}-{seed}-{number:04}");
+        found.add(Trial::new(world, &scene, rules, asked.swept_m)?);
     }
     Ok(found)
 }
@@ -144,13 +143,13 @@ mod tests {
 
     use super::*;
 
-    const BODY: BodySize = BodySize { radius_m: 0.19, margin_m: 0.05 };
+    const ASKED: Asked = Asked { count: Some(6), seed: 3, ends: None, swept_m: 0.24 };
 
     #[test]
     fn a_seed_gives_the_same_worlds_and_another_others() {
         for worlds in KINDS.iter().map(Worlds::Drawn) {
             let missions = |seed| -> Vec<Mission> {
-                let found = find(&worlds, Some(6), seed, None, &BODY).unwrap();
+                let found = find(&worlds, Asked { seed, ..ASKED }).unwrap();
                 found.trials.into_iter().map(|trial| trial.mission).collect()
             };
             assert_eq!(missions(1), missions(1), "{worlds:?}");
@@ -161,14 +160,14 @@ mod tests {
     #[test]
     fn every_world_can_be_crossed_and_nothing_stands_in_the_robot() {
         for worlds in KINDS.iter().map(Worlds::Drawn) {
-            for trial in find(&worlds, Some(20), 3, None, &BODY).unwrap().trials {
+            for trial in find(&worlds, Asked { count: Some(20), ..ASKED }).unwrap().trials {
                 let mission = &trial.mission;
                 let name = &trial.world;
                 assert!(trial.shortest_m >= mission.target.length() - 1e-9, "{name}");
                 assert!(trial.shortest_m < 5.0 * mission.target.length(), "{name}");
                 let touched = Heights::preset(Realism::default()).touched(&mission.world);
                 for place in [glam::DVec2::ZERO, mission.target] {
-                    assert!(touched.clearance(place) > BODY.radius_m, "{name}");
+                    assert!(touched.clearance(place) > 0.19, "{name}");
                 }
             }
         }

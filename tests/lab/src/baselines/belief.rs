@@ -44,8 +44,8 @@ impl Map<'_> {
     /// Whether `cell` is in the map and not a hazard. It may be unknown.
     pub fn is_free(&self, cell: Cell) -> bool {
         let inside = cell.col < self.frame.cells && cell.row < self.frame.cells;
-        let byte = inside.then(|| self.cells.get(self.frame.index(cell)).copied());
-        byte.flatten().is_some_and(|byte| !CellState::from_byte(byte).is_hazard())
+        let byte = self.cells.get(self.frame.index(cell)).filter(|_| inside);
+        byte.is_some_and(|&byte| !CellState::from_byte(byte).is_hazard())
     }
 
     pub fn free_cell_at(&self, point: DVec2) -> Option<Cell> {
@@ -60,8 +60,10 @@ impl Map<'_> {
     }
 
     /// The cell so many columns and rows from `cell`, if it is free.
-    pub fn free_neighbour(&self, cell: Cell, step: [i32; 2]) -> Option<Cell> {
-        moved(cell, step).filter(|&next| self.is_free(next))
+    pub fn free_neighbour(&self, cell: Cell, [cols, rows]: [i32; 2]) -> Option<Cell> {
+        let col = cell.col.checked_add_signed(cols)?;
+        let row = cell.row.checked_add_signed(rows)?;
+        Some(Cell { col, row }).filter(|&next| self.is_free(next))
     }
 
     /// The last free point before a hazard on the straight line between two points (metres); none if the line is free.
@@ -80,35 +82,10 @@ impl Map<'_> {
 
     /// The middle of the free cell nearest to `point` (metres); none without a free cell.
     pub fn nearest_free(&self, point: DVec2) -> Option<DVec2> {
-        let last = f64::from(self.frame.cells) - 1.0;
-        let middle = self.frame.to_cells(point).round();
-        let middle = middle.clamp(DVec2::ZERO, DVec2::splat(last));
-        let middle = Cell { col: middle.x as u32, row: middle.y as u32 };
-        let mut nearest: Option<(f64, DVec2)> = None;
-        // The search goes in squares of growing size, until all cells of a square are farther than the nearest one so far.
-        for reach in 0..self.frame.cells as i32 {
-            let edge = f64::from(reach) - 1.0;
-            if nearest.is_some_and(|(distance, _)| edge * self.frame.resolution_m > distance) {
-                break;
-            }
-            for (cols, rows) in (-reach..=reach).flat_map(|rows| {
-                let stride = if rows.abs() == reach { 1 } else { 2 * reach as usize };
-                (-reach..=reach).step_by(stride.max(1)).map(move |cols| (cols, rows))
-            }) {
-                let cell = self.free_neighbour(middle, [cols, rows]);
-                let centre = cell.map(|cell| self.frame.centre_of(cell));
-                let found = centre.map(|centre| (centre.distance(point), centre));
-                let least = nearest.map_or(f64::INFINITY, |(least, _)| least);
-                nearest = found.filter(|(distance, _)| *distance < least).or(nearest);
-            }
-        }
-        nearest.map(|(_, centre)| centre)
+        let free = self.frame.whole().cells().filter(|&cell| self.is_free(cell));
+        let centres = free.map(|cell| self.frame.centre_of(cell));
+        centres.min_by(|a, b| a.distance(point).total_cmp(&b.distance(point)))
     }
-}
-
-fn moved(cell: Cell, [cols, rows]: [i32; 2]) -> Option<Cell> {
-    let col = cell.col.checked_add_signed(cols)?;
-    Some(Cell { col, row: cell.row.checked_add_signed(rows)? })
 }
 
 #[cfg(test)]

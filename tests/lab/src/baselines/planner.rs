@@ -82,11 +82,11 @@ impl<P: Planner> Baseline<P> {
             Way::Unknown => (GuidanceStatus::Waiting, DVec2::ZERO, 0.0),
             Way::To(point) => (GuidanceStatus::Along, toward(point), f64::INFINITY),
             Way::Out(point) => (GuidanceStatus::WayOut, toward(point), WAY_OUT_M_S),
-            // An echo may have been false: the robot looks around once before the map is reset, as with the harmonic planner.
-            Way::None if self.looks_around => {
-                (GuidanceStatus::Unreachable, pose.axis().perp(), 0.0)
+            Way::None => {
+                // An echo may have been false: the robot looks around once before the map is reset, as with the harmonic planner.
+                let turn = if self.looks_around { pose.axis().perp() } else { DVec2::ZERO };
+                (GuidanceStatus::Unreachable, turn, 0.0)
             }
-            Way::None => (GuidanceStatus::Unreachable, DVec2::ZERO, 0.0),
         };
         GuidanceSample {
             ex: direction.x,

@@ -64,8 +64,7 @@ pub struct Shell<P> {
     inputs: Inputs,
     out: Outputs,
     baseline: Baseline<P>,
-    latest_pose: Option<PoseSample>,
-    answered: Option<u64>,
+    latest: Option<PoseSample>,
 }
 
 impl<P: Planner> Process for Shell<P> {
@@ -82,36 +81,28 @@ impl<P: Planner> Process for Shell<P> {
             tracing::info!(state = ?baseline.planner, "restored");
         }
         let out = Outputs::without_inputs(context)?;
-        Ok(Self { inputs, out, baseline, latest_pose: None, answered: None })
+        Ok(Self { inputs, out, baseline, latest: None })
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {
-        let mut asked = false;
         while let Some(grid) = self.inputs.grid.next_slice()? {
             let header = grid.header();
             if !self.baseline.belief.follow(header, &grid) {
                 tracing::warn!(version = header.part.version, "missed a grid version");
                 continue;
             }
-            // The whole map, published again after the tick to which it belongs, asks for nothing; a tick that is given
-            // again was not answered to the end.
-            asked |= header.part.keyframe == 0 || self.answered != Some(header.stamp.tick);
             self.out.at = Progress::of(&header.stamp);
-        }
-        let tick = self.out.at.tick;
-        if asked {
-            // The pose of the tick was published before the grid was.
-            self.latest_pose = self.inputs.pose.newest()?.or(self.latest_pose);
+            let tick = header.stamp.tick;
+            // The pose of a tick is published before its grid. A grid for new readers may be of a tick that is answered.
+            self.latest = self.inputs.pose.newest()?.or(self.latest);
             if let Some(target) = self.inputs.target.next(tick)? {
                 self.baseline.send_to(target);
             }
-        }
-        // A grid for new readers may be of a tick that is over.
-        if let Some(pose) = self.latest_pose.filter(|pose| asked && pose.stamp.tick == tick) {
-            let guidance = self.baseline.guidance(&pose);
-            self.out.save(&self.baseline.planner)?;
-            self.out.publish(&GUIDANCE, guidance)?;
-            self.answered = Some(tick);
+            if let Some(pose) = self.latest.take_if(|pose| pose.stamp.tick == tick) {
+                let guidance = self.baseline.guidance(&pose);
+                self.out.save(&self.baseline.planner)?;
+                self.out.publish(&GUIDANCE, guidance)?;
+            }
         }
         Ok(self.out.at)
     }

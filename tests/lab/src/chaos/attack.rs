@@ -1,9 +1,6 @@
 //! The attacker of one mission: sends signals, and waits for the successors to work.
 
-use std::{
-    path::PathBuf,
-    time::{Duration, Instant},
-};
+use std::time::{Duration, Instant};
 
 use common::{
     clock::MissionTime,
@@ -24,9 +21,8 @@ use processes::{
 use crate::chaos::{
     consumers::Consumers,
     kind::Kind,
-    recovery::{PendingRecovery, StartupHit},
+    recovery::PendingRecovery,
     report::{EVERYTHING, Report},
-    resources::Resources,
     series::Series,
     signals::Row,
     subscriptions::{POLL, Subscriptions},
@@ -43,8 +39,10 @@ const MOST_HITS: usize = HOLD_AFTER - 4;
 pub struct Attack {
     seed: u64,
     time: Option<MissionTime>,
-    consumers: Consumers,
+    pub consumers: Consumers,
     entries: Vec<RosterEntry>,
+    /// The time when they were read.
+    entries_read: Option<Instant>,
     supervisor: u32,
     /// Whether the supervisor was hit. Later samples of it and its stages are no sign of its successor.
     supervisor_hit: bool,
@@ -56,8 +54,6 @@ pub struct Attack {
     frozen: Vec<(&'static str, u32)>,
     hits: Vec<(&'static str, Instant)>,
     pose: Option<PoseSample>,
-    /// The supervisor's resources when its robot began to drive, and at the last check.
-    resources: Option<[Resources; 2]>,
 }
 
 impl Attack {
@@ -77,7 +73,6 @@ impl Attack {
         self.supervisor_hit = false;
         self.driving = false;
         self.entries.clear();
-        self.resources = None;
         // The stages of a supervisor that was hit end with it.
         let is_stage = |recovery: &mut PendingRecovery| recovery.stage != SUPERVISOR;
         let ended = self.pending.extract_if(.., is_stage);
@@ -97,12 +92,15 @@ impl Attack {
         while child.try_reap().or_cannot("reap")?.is_none() && began.elapsed() < patience {
             // An overdue hit waits for the robot to drive.
             let due = next.checked_duration_since(Instant::now());
-            let timeout = due.unwrap_or(POLL).min(self.time_to_startup_hit());
+            let startup_hit = self.next_startup_hit();
+            let startup_hit =
+                startup_hit.map_or(POLL, |(at, ..)| at.saturating_duration_since(Instant::now()));
+            let timeout = due.unwrap_or(POLL).min(startup_hit);
             subscriptions.roster.waiter.wait(timeout.min(POLL))?;
             if let Some(robot) = &mut robot {
                 robot.poll()?;
             }
-            self.read(&mut subscriptions, &mut series.report)?;
+            self.read(&mut subscriptions)?;
             self.hit_starting(&mut series.report);
             if Instant::now() >= next && self.driving && !series.is_over() {
                 let pause = series.schedule.pause();
@@ -110,41 +108,47 @@ impl Attack {
                 next = Instant::now() + pause;
             }
             self.consumers.maintain(&mut series.report)?;
-            self.keep_measured(series, robot.as_deref())?;
-        }
-        if let Some([first, last]) = self.resources {
-            series.report.add_growth(first, last);
+            self.keep_measured(series)?;
         }
         Ok(())
     }
 
     /// Write the rows of the signals whose measurement is complete.
-    fn keep_measured(&mut self, series: &mut Series<'_>, robot: Option<&Simulator>) -> Result {
-        for mut row in std::mem::take(&mut self.measured) {
-            row.pose_error_m = robot.and_then(|robot| self.pose_error(robot.truth()));
-            series.keep(&row)?;
-        }
-        Ok(())
+    fn keep_measured(&mut self, series: &mut Series<'_>) -> Result {
+        self.measured.drain(..).try_for_each(|row| series.keep(&row))
     }
 
     /// Note that the mission is over, and end all measurements.
-    pub fn end(&mut self, series: &mut Series<'_>, robot: Option<&Simulator>) -> Result {
+    pub fn end(&mut self, series: &mut Series<'_>) -> Result {
         self.consumers.end();
         let pending = self.pending.drain(..);
         self.measured.extend(pending.map(|recovery| recovery.row));
-        self.keep_measured(series, robot)
+        self.keep_measured(series)
+    }
+
+    /// Count a signal to a stage, the supervisor or all, and begin its row.
+    fn count(
+        &self,
+        report: &mut Report,
+        stage: &'static str,
+        kind: Kind,
+        generation: Option<u32>,
+    ) -> Row {
+        report.hit(stage, kind);
+        self.row(stage, kind, generation)
     }
 
     /// The row of a signal of `kind` that is sent to a generation of `stage` now.
     fn row(&self, stage: &str, kind: Kind, generation: Option<u32>) -> Row {
-        let time_s = self.time.map(MissionTime::seconds);
-        Row::new(self.seed, time_s, stage, kind, generation)
-    }
-
-    /// The recordings of the run's recorder that was hit, and those of other recorders.
-    pub fn hit_recordings(&self) -> (&[PathBuf], Vec<PathBuf>) {
-        let consumers = &self.consumers;
-        (consumers.hit_recordings(), consumers.other_recordings())
+        Row {
+            mission: self.seed,
+            time_s: self.time.map(MissionTime::seconds),
+            stage: stage.to_owned(),
+            kind,
+            generation,
+            start_up: kind == Kind::KillAtStart,
+            ..Row::default()
+        }
     }
 
     /// Whether the supervisor was hit and has no working successor yet.
@@ -174,78 +178,61 @@ impl Attack {
     }
 
     /// Read new samples, which show the stages that run, beat and publish.
-    fn read(&mut self, subscriptions: &mut Subscriptions, report: &mut Report) -> Result {
+    fn read(&mut self, subscriptions: &mut Subscriptions) -> Result {
         while let Some(death) = subscriptions.deaths.next_sample()? {
-            let (stage, generation) = (name_str(&death.stage), death.generation);
-            let mut pending = self.pending.iter_mut();
-            if let Some(recovery) = pending
-                .find(|recovery| recovery.stage == stage && recovery.generation == generation)
-            {
-                recovery.noticed();
-            }
+            let is_its = |it: &&mut PendingRecovery| {
+                it.stage == name_str(&death.stage) && it.generation == death.generation
+            };
+            self.pending.iter_mut().filter(is_its).for_each(PendingRecovery::noticed);
         }
         while let Some(entries) = subscriptions.roster.samples.next_slice()? {
             self.driving = Order::from_byte(entries.header().order) == Order::Drive;
             self.supervisor = entries.header().supervisor_pid;
             self.entries = entries.to_vec();
+            self.entries_read = Some(Instant::now());
             if self.driving {
-                self.on_supervisor_sign(true, report);
-                // Resources of ended processes are freed once their successors work.
-                if self.pending.is_empty()
-                    && let Some(resources) = Resources::of(self.supervisor)
-                {
-                    let [first, _] = self.resources.unwrap_or([resources; 2]);
-                    self.resources = Some([first, resources]);
-                }
+                self.on_supervisor_sign(true);
             }
         }
         while let Some(health) = subscriptions.health.next_sample()? {
             if HealthState::from_byte(health.state) == HealthState::Ready {
-                self.on_sign(name_str(&health.stage), health.stamp.generation, true, report);
+                self.on_sign(name_str(&health.stage), health.stamp.generation, true);
             }
         }
         while let Some(sample) = subscriptions.wheels.next_sample()? {
             self.time = Some(sample.stamp.time());
-            if sample.left_counts_per_s == 0 && sample.right_counts_per_s == 0 {
-                self.pending.iter_mut().for_each(PendingRecovery::rests);
-            }
             let writer = topics::WHEELS.spec().writer;
-            self.on_sign(writer, sample.stamp.generation, false, report);
+            self.on_sign(writer, sample.stamp.generation, false);
         }
         while let Some(sample) = subscriptions.pose.next_sample()? {
             let writer = topics::POSE.spec().writer;
-            self.on_sign(writer, sample.stamp.generation, false, report);
+            self.on_sign(writer, sample.stamp.generation, false);
             self.pose = Some(sample);
         }
         for (writer, reader) in &mut subscriptions.outputs {
             while let Some(sample) = reader.next_sample()? {
-                self.on_sign(writer, sample.stamp().generation, false, report);
+                self.on_sign(writer, sample.stamp().generation, false);
                 if *writer == topics::COMMAND.spec().writer {
-                    self.on_supervisor_sign(false, report);
+                    self.on_supervisor_sign(false);
                 }
             }
         }
         Ok(())
     }
 
-    fn on_supervisor_sign(&mut self, beat: bool, report: &mut Report) {
+    fn on_supervisor_sign(&mut self, beat: bool) {
         if !self.supervisor_hit {
-            self.on_sign(SUPERVISOR, NEWEST, beat, report);
+            self.on_sign(SUPERVISOR, NEWEST, beat);
         }
     }
 
     /// Note a sign of work of a generation of `stage`: a ready beat, or a sample of a tick.
-    fn on_sign(&mut self, stage: &str, generation: u32, beat: bool, report: &mut Report) {
-        let awaited = |recovery: &PendingRecovery| {
-            recovery.stage == stage && generation > recovery.generation
+    fn on_sign(&mut self, stage: &str, generation: u32, beat: bool) {
+        let complete = |recovery: &mut PendingRecovery| {
+            recovery.stage == stage && generation > recovery.generation && recovery.sign(beat)
         };
-        let Some(at) = self.pending.iter().position(awaited) else {
-            return;
-        };
-        let pending = &mut self.pending[at];
-        if pending.sign(beat, report.recovery(pending.stage)) {
-            self.measured.push(self.pending.remove(at).row);
-        }
+        let complete = self.pending.extract_if(.., complete);
+        self.measured.extend(complete.map(|recovery| recovery.row));
     }
 
     /// Freeze supervisor and stages together, and thaw them after `pause`.
@@ -255,24 +242,18 @@ impl Attack {
             self.frozen.contains(&(name_str(&entry.stage), entry.generation))
         };
         let stages = self.entries.iter().filter(|entry| !hangs(entry));
-        let stages = stages.map(|entry| entry.pid);
         // The supervisor is frozen first: it must not see frozen stages.
-        let all: Vec<u32> = std::iter::once(self.supervisor).chain(stages).collect();
-        let all: Vec<Pid> = all
-            .iter()
-            .filter_map(|pid| Pid::from_raw(pid.cast_signed()))
-            .filter(|pid| kill_process(*pid, Kind::FreezeAll.signal()).is_ok())
-            .collect();
+        let all = std::iter::once(self.supervisor).chain(stages.map(|entry| entry.pid));
+        let all: Vec<u32> = all.filter(|&process| send(process, Signal::STOP)).collect();
         let began = Instant::now();
         while let Some(left) = pause.checked_sub(began.elapsed()) {
             std::thread::park_timeout(left);
         }
         // The supervisor is thawed last.
-        for pid in all.iter().rev() {
-            let _ = kill_process(*pid, Signal::CONT);
+        for process in all.into_iter().rev() {
+            send(process, Signal::CONT);
         }
-        report.hit(EVERYTHING, Kind::FreezeAll);
-        let row = self.row(EVERYTHING, Kind::FreezeAll, None);
+        let row = self.count(report, EVERYTHING, Kind::FreezeAll, None);
         self.measured.push(row);
         // The pause does not count as time of recovery.
         for recovery in &mut self.pending {
@@ -288,15 +269,14 @@ impl Attack {
         {
             let supervisor = self.supervisor;
             let hit = self.consumers.hit(index, kind, pause, supervisor, report)?;
-            self.measured.extend(hit.map(|hit| self.row(&hit.name, kind, hit.generation)));
+            self.measured.extend(hit.map(|(name, starts)| self.row(&name, kind, starts)));
             return Ok(());
         }
         if options.asked.include_supervisor && schedule.supervisor() {
             let kind = schedule.supervisor_kind();
-            if !self.supervisor_is_down() && send(self.supervisor, kind) {
-                report.hit(SUPERVISOR, kind);
-                let row = self.row(SUPERVISOR, kind, None);
-                self.pending.push(PendingRecovery::new(SUPERVISOR, 0, StartupHit::None, row));
+            if !self.supervisor_is_down() && send(self.supervisor, kind.signal()) {
+                let row = self.count(report, SUPERVISOR, kind, None);
+                self.pending.push(PendingRecovery::new(SUPERVISOR, 0, row));
                 self.supervisor_hit = true;
                 self.driving = false;
             }
@@ -322,53 +302,48 @@ impl Attack {
         let recovering = self.pending.iter().any(|recovery| recovery.stage == stage);
         self.hits.retain(|(_, at)| at.elapsed() < HOLD_WINDOW);
         let lately = self.hits.iter().filter(|(hit, _)| *hit == stage).count();
-        if recovering || lately >= MOST_HITS || !send(entry.pid, kind) {
+        if recovering || lately >= MOST_HITS || !send(entry.pid, kind.signal()) {
             return Ok(());
         }
-        report.hit(stage, kind);
         if kind == Kind::Freeze {
             self.frozen.push((stage, entry.generation));
         }
         self.hits.push((stage, Instant::now()));
-        let startup_hit = match startup_hit {
-            Some(after) if options.asked.include_startup && kind != Kind::Freeze => {
-                StartupHit::After(after)
-            }
-            _ => StartupHit::None,
-        };
-        let generation = entry.generation;
-        let row = self.row(stage, kind, Some(generation));
-        self.pending.push(PendingRecovery::new(stage, generation, startup_hit, row));
+        let row = self.count(report, stage, kind, Some(entry.generation));
+        let mut recovery = PendingRecovery::new(stage, entry.generation, row);
+        recovery.startup_hit =
+            startup_hit.filter(|_| options.asked.include_startup && kind != Kind::Freeze);
+        self.pending.push(recovery);
         Ok(())
     }
 
-    /// Time until a successor is to be hit in its start-up.
-    fn time_to_startup_hit(&self) -> Duration {
-        let times = self.pending.iter();
-        let times = times.filter_map(PendingRecovery::time_to_startup_hit);
-        times.min().unwrap_or(Duration::MAX)
+    /// The next hit of a successor in its start-up: its time, its place among the pending recoveries, and the process.
+    fn next_startup_hit(&self) -> Option<(Instant, usize, RosterEntry)> {
+        let read = self.entries_read?;
+        let hits = self.pending.iter().enumerate().filter_map(|(place, recovery)| {
+            let (at, entry) = recovery.startup_hit(&self.entries, read)?;
+            Some((at, place, entry))
+        });
+        hits.min_by_key(|hit| hit.0)
     }
 
     fn hit_starting(&mut self, report: &mut Report) {
-        for recovery in &mut self.pending {
-            recovery.schedule_startup_hit(&self.entries);
-            let Some((process, generation)) = recovery.take_due_startup_hit() else {
-                continue;
-            };
-            if send(process, Kind::KillAtStart) {
-                let stage = recovery.stage;
-                report.hit(stage, Kind::KillAtStart);
+        while let Some((at, place, entry)) = self.next_startup_hit()
+            && at <= Instant::now()
+        {
+            self.pending[place].startup_hit = None;
+            if send(entry.pid, Signal::KILL) {
+                let stage = self.pending[place].stage;
                 self.hits.push((stage, Instant::now()));
-                let time_s = self.time.map(MissionTime::seconds);
-                let row = Row::new(self.seed, time_s, stage, Kind::KillAtStart, Some(generation));
-                let next = PendingRecovery::new(stage, generation, StartupHit::None, row);
-                self.measured.push(std::mem::replace(recovery, next).row);
+                let row = self.count(report, stage, Kind::KillAtStart, Some(entry.generation));
+                let next = PendingRecovery::new(stage, entry.generation, row);
+                self.measured.push(std::mem::replace(&mut self.pending[place], next).row);
             }
         }
     }
 }
 
 /// Whether the signal reached a process.
-fn send(pid: u32, kind: Kind) -> bool {
-    Pid::from_raw(pid.cast_signed()).is_some_and(|pid| kill_process(pid, kind.signal()).is_ok())
+fn send(pid: u32, signal: Signal) -> bool {
+    Pid::from_raw(pid.cast_signed()).is_some_and(|pid| kill_process(pid, signal).is_ok())
 }

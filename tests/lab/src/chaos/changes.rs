@@ -1,8 +1,8 @@
-//! Targets that change every few seconds while a mission is attacked, as an operator sends them; and whether the run reported
-//! the
+//! Targets that change every few seconds while a mission is attacked, as an operator sends them; and whether the run reported the
 //! outcome of each.
 
 use std::{
+    collections::BTreeMap,
     f64::consts::TAU,
     process::Stdio,
     sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel},
@@ -30,17 +30,14 @@ const REACHED_WITHIN_M: f64 = 0.5;
 
 #[derive(Debug, Default, Serialize)]
 pub struct Changes {
-    asked: u64,
-    /// Requests that the supervisor confirmed.
-    taken: u64,
-    refused: u64,
-    /// Requests without an answer, because the supervisor was hit.
-    unanswered: u64,
-    reached: u64,
-    replaced: u64,
+    /// Requests: taken (the supervisor confirmed them), refused, unanswered (the supervisor was hit). Targets: reached, replaced.
+    #[serde(flatten)]
+    counts: Counts,
     /// Targets that were accepted and not reported, or not reached.
     wrong: Vec<String>,
 }
+
+type Counts = BTreeMap<&'static str, u64>;
 
 /// Sends a robot elsewhere until it is told to stop.
 pub struct Operator {
@@ -50,7 +47,7 @@ pub struct Operator {
 
 #[derive(Debug, Default)]
 struct Sent {
-    counts: [u64; 4],
+    counts: Counts,
     taken: Vec<[f64; 2]>,
 }
 
@@ -71,7 +68,8 @@ impl Operator {
 fn send(robot: &RobotName, mission: &Mission, seed: u64, stopped: &Receiver<()>) -> Sent {
     let mut random = Random::new(seed, 11);
     let mut sent = Sent::default();
-    while sent.taken.len() < 2 * MOST_CHANGES && sent.counts[1] < MOST_CHANGES as u64 {
+    let mut changes = 0;
+    while changes < MOST_CHANGES {
         let pause = Duration::from_secs_f64(random.within(PAUSE_S[0], PAUSE_S[1]));
         if stopped.recv_timeout(pause) != Err(RecvTimeoutError::Timeout) {
             break;
@@ -91,14 +89,15 @@ fn send(robot: &RobotName, mission: &Mission, seed: u64, stopped: &Receiver<()>)
         if said.contains("[not-running]") {
             continue;
         }
-        sent.counts[0] += 1;
-        if output.status.success() {
-            sent.counts[1] += 1;
+        let answer = match output.status.success() {
+            true => "taken",
+            false if said.contains("refuses") => "refused",
+            false => "unanswered",
+        };
+        *sent.counts.entry(answer).or_default() += 1;
+        if answer == "taken" {
+            changes += 1;
             sent.taken.extend(places);
-        } else if said.contains("refuses") {
-            sent.counts[2] += 1;
-        } else {
-            sent.counts[3] += 1;
         }
     }
     sent
@@ -133,11 +132,9 @@ impl Changes {
     ) -> bool {
         let sent = operator.end();
         let before = self.wrong.len();
-        let [asked, taken, refused, unanswered] = sent.counts;
-        self.asked += asked;
-        self.taken += taken;
-        self.refused += refused;
-        self.unanswered += unanswered;
+        for (what, count) in sent.counts {
+            *self.counts.entry(what).or_default() += count;
+        }
         for [x, y] in sent.taken {
             if !summary.targets.iter().any(|told| (told.x_m, told.y_m) == (x, y)) {
                 self.wrong.push(format!("seed {seed}: ({x}, {y}) was taken and is not told of"));
@@ -152,13 +149,15 @@ impl Changes {
                 let off = |tick: &GroundTruthTick| (tick.x - x_m).hypot(tick.y - y_m);
                 truth.is_empty() || truth.iter().any(|tick| off(tick) <= REACHED_WITHIN_M)
             };
-            match outcome {
-                TargetOutcome::Replaced => self.replaced += 1,
-                TargetOutcome::Reached | TargetOutcome::ReachedUnsure if was_there() => {
-                    self.reached += 1;
+            let came = match outcome {
+                TargetOutcome::Replaced => "replaced",
+                TargetOutcome::Reached | TargetOutcome::ReachedUnsure if was_there() => "reached",
+                _ => {
+                    self.wrong.push(format!("seed {seed}: target {number}: {outcome:?}"));
+                    continue;
                 }
-                _ => self.wrong.push(format!("seed {seed}: target {number}: {outcome:?}")),
-            }
+            };
+            *self.counts.entry(came).or_default() += 1;
         }
         self.wrong.len() == before
     }
@@ -169,17 +168,5 @@ impl Changes {
 
     pub const fn is_right(&self) -> bool {
         self.wrong.is_empty()
-    }
-}
-
-impl std::fmt::Display for Changes {
-    fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { asked, taken, refused, unanswered, reached, replaced, wrong } = self;
-        write!(
-            to,
-            "targets changed {asked} times: {taken} taken, {refused} refused, {unanswered} without an answer; {reached} targets \
-             reached, {replaced} replaced"
-        )?;
-        wrong.iter().try_for_each(|wrong| write!(to, "\n  {wrong}"))
     }
 }

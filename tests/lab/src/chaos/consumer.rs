@@ -1,40 +1,28 @@
-//! The consumers that are hit beside the stages, and the command of each.
+//! A consumer that is hit beside the stages, and its command.
 
 use std::{
     path::{Path, PathBuf},
-    process::Command,
+    process::{Command, Stdio},
     str::FromStr,
 };
 
 use common::domain::RobotName;
 use processes::{executable, process};
 
-use crate::{chaos::terminal, robot};
+use crate::{error::Refused, robot};
 
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Consumer {
-    /// The recorder that the run itself starts. It is not restarted within its run.
-    RunRecorder,
-    /// Another `firsthand record`.
-    Record,
-    /// `firsthand top`, on a terminal of its own.
-    Top,
-    /// `firsthand topic hz`.
-    Hz,
-    /// `firsthand logs -f`.
-    Logs,
-    Given(GivenConsumer),
-}
+/// The name of the recorder among the consumers.
+pub const RECORD: &str = "record";
 
-/// A user's consumer: a command without a shell.
+/// A program that reads from the bus: a subcommand of `firsthand`, or a user's command without a shell.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct GivenConsumer {
-    command: String,
+pub struct Consumer {
+    pub name: String,
     program: PathBuf,
     arguments: Vec<String>,
 }
 
-impl FromStr for GivenConsumer {
+impl FromStr for Consumer {
     type Err = String;
 
     fn from_str(command: &str) -> Result<Self, String> {
@@ -57,55 +45,28 @@ impl FromStr for GivenConsumer {
                  arguments, in quotes where they contain spaces (no shell reads them)"
             )
         })?;
-        Ok(Self { command: command.to_owned(), program, arguments })
+        Ok(Self { name: command.to_owned(), program, arguments })
     }
 }
 
 impl Consumer {
-    /// The consumers of `firsthand`. Without terminals `hz` replaces `top`.
-    pub fn own() -> Vec<Self> {
-        let shows = match terminal::open() {
-            Ok(_) => Self::Top,
-            Err(_) => Self::Hz,
+    /// The subcommands of `firsthand` for `robot`.
+    pub fn own(robot: &RobotName) -> Result<[Self; 3], Refused> {
+        let program = robot::path()?;
+        let own = |(name, words): (&str, &str)| Self {
+            name: name.to_owned(),
+            program: program.clone(),
+            arguments: format!("{words} --robot {robot}").split(' ').map(str::to_owned).collect(),
         };
-        vec![Self::RunRecorder, Self::Record, shows, Self::Logs]
+        Ok([(RECORD, "record"), ("hz", "topic hz"), ("logs -f", "logs --follow")].map(own))
     }
 
-    pub fn name(&self) -> &str {
-        match self {
-            Self::RunRecorder => "run's recorder",
-            Self::Record => "record",
-            Self::Top => "top",
-            Self::Hz => "hz",
-            Self::Logs => "logs -f",
-            Self::Given(given) => &given.command,
-        }
-    }
-
-    /// The command that starts the consumer for `robot`; a recorder writes into `recording`. None for the run's own
-    /// recorder.
-    pub fn command(&self, robot: &RobotName, recording: &Path) -> Option<Command> {
-        let own: &[&str] = match self {
-            Self::RunRecorder => return None,
-            Self::Record => &["record"],
-            Self::Top => &["top"],
-            Self::Hz => &["topic", "hz"],
-            Self::Logs => &["logs", "--follow"],
-            Self::Given(_) => &[],
-        };
-        // The subcommand executes the program, and ends with its parent.
-        let mut command =
-            process::firsthand(&["bench", "consumer", &std::process::id().to_string()]);
-        if let Self::Given(given) = self {
-            command.arg(&given.program).args(&given.arguments);
-        } else {
-            command.arg(robot::path().unwrap_or_default()).args(own);
-            command.args(["--robot", &robot.to_string()]);
-        }
-        if *self == Self::Record {
-            command.arg("--out").arg(recording);
-        }
-        Some(command)
+    /// The command that starts the consumer, which ends with this process.
+    pub fn command(&self) -> Command {
+        let own = std::process::id().to_string();
+        let mut command = process::firsthand(&["bench", "consumer", &own]);
+        command.arg(&self.program).args(&self.arguments).stdout(Stdio::null());
+        command
     }
 }
 
@@ -125,19 +86,19 @@ mod tests {
             (" \t", "nothing in it"),
             ("sh\0x", "zero byte"),
         ] {
-            let error = command.parse::<GivenConsumer>().unwrap_err();
+            let error = command.parse::<Consumer>().unwrap_err();
             assert!(error.contains(problem) && error.contains("give a program"), "{error}");
         }
     }
 
     #[test]
     fn a_command_is_its_program_and_its_words_and_nothing_is_expanded() {
-        let given: GivenConsumer =
+        let given: Consumer =
             "sh -c 'exit  1' \"d 'e\" f\\ g '' $HOME *.rs | `id`".parse().unwrap();
         assert!(given.program.is_absolute() && given.program.ends_with("sh"));
         let words = ["-c", "exit  1", "d 'e", "f g", "", "$HOME", "*.rs", "|", "`id`"];
         assert_eq!(given.arguments, words);
-        let given: GivenConsumer = "sh -c 'exit 1'".parse().unwrap();
-        assert_eq!(Consumer::Given(given).name(), "sh -c 'exit 1'");
+        let given: Consumer = "sh -c 'exit 1'".parse().unwrap();
+        assert_eq!(given.name, "sh -c 'exit 1'");
     }
 }

@@ -3,40 +3,37 @@
 use std::{
     ffi::OsStr,
     fs::{self, File},
-    io::{Read as _, Seek as _, SeekFrom},
     os::unix::ffi::OsStrExt as _,
     path::{Path, PathBuf},
-    process::Stdio,
     time::{Duration, Instant},
 };
 
-use common::domain::RobotName;
-use processes::process::Process;
+use processes::{death::log_tail, process::Process};
 use rustix::process::{Pid, Signal, kill_process_group};
 
-use crate::chaos::{consumer::Consumer, kind::Kind, options::Options, report::Report, terminal};
+use crate::chaos::{
+    consumer::{Consumer, RECORD},
+    kind::Kind,
+    options::Options,
+    report::Report,
+};
 use crate::error::{OrCannot as _, Result};
 
 /// The time for a consumer to end. A recorder writes its last chunk within milliseconds; a user's program may take longer.
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
-const LONGEST_LINE: u64 = 500;
 
 #[derive(Default)]
 pub struct Consumers {
     all: Vec<Running>,
-    setting: Option<Setting>,
-    /// Recordings of the run's own recorder that was hit.
-    hit_recordings: Vec<PathBuf>,
-}
-
-struct Setting {
-    robot: RobotName,
     /// Directory of recordings and of the consumers' standard error.
-    directory: PathBuf,
+    pub directory: PathBuf,
+    /// Recordings of the run's own recorder that was hit.
+    pub hit_recordings: Vec<PathBuf>,
 }
 
 struct Running {
-    consumer: Consumer,
+    /// None for the recorder that the run itself starts. It is not restarted within its run.
+    consumer: Option<Consumer>,
     /// The process; none if it ended by itself, and for the run's recorder except while that is frozen.
     process: Option<Process>,
     starts: u32,
@@ -44,53 +41,23 @@ struct Running {
     said: PathBuf,
 }
 
-pub struct Hit {
-    pub name: String,
-    /// The number of starts in this mission; none for the run's recorder.
-    pub generation: Option<u32>,
-}
-
 impl Consumers {
     /// Start all. Their files go into the new `directory`.
     pub fn start(options: &Options, directory: PathBuf, report: &mut Report) -> Result<Self> {
-        let consumers = options.consumers();
-        if consumers.is_empty() {
-            return Ok(Self::default());
-        }
         fs::create_dir(&directory).or_cannot("make a directory")?;
-        let setting = Setting { robot: options.asked.robot.clone(), directory };
         let mut all = Vec::new();
-        for (place, consumer) in consumers.into_iter().enumerate() {
-            let mut running = Running {
-                consumer,
-                process: None,
-                starts: 0,
-                frozen_until: None,
-                said: setting.directory.join(format!("stderr-{place}")),
-            };
-            running.start(&setting, report)?;
+        for (place, consumer) in options.consumers()?.into_iter().enumerate() {
+            let said = directory.join(format!("stderr-{place}"));
+            let mut running =
+                Running { consumer, process: None, starts: 0, frozen_until: None, said };
+            running.start(&directory, report)?;
             all.push(running);
         }
-        Ok(Self { all, setting: Some(setting), hit_recordings: Vec::new() })
+        Ok(Self { all, directory, hit_recordings: Vec::new() })
     }
 
     pub fn len(&self) -> usize {
         self.all.len()
-    }
-
-    pub fn hit_recordings(&self) -> &[PathBuf] {
-        &self.hit_recordings
-    }
-
-    pub fn other_recordings(&self) -> Vec<PathBuf> {
-        let directory = self.setting.as_ref().map(|setting| &setting.directory);
-        let entries = directory.and_then(|directory| fs::read_dir(directory).ok());
-        let files = entries.into_iter().flatten().flatten();
-        let files = files.map(|entry| entry.path());
-        let mut recordings: Vec<_> =
-            files.filter(|file| file.extension() == Some(OsStr::new("mcap"))).collect();
-        recordings.sort();
-        recordings
     }
 
     /// Thaw the frozen consumers whose pause is over; count those that ended by themselves.
@@ -99,26 +66,24 @@ impl Consumers {
             if running.frozen_until.is_some_and(|until| Instant::now() >= until) {
                 running.thaw();
             }
-            if running.consumer != Consumer::RunRecorder
+            if running.consumer.is_some()
                 && let Some(process) = &mut running.process
                 && let Some(cause) = process.try_reap().or_cannot("reap")?
             {
                 running.process = None;
                 running.frozen_until = None;
-                let said = last_line(&running.said);
-                let counts = report.consumer(running.consumer.name());
+                let said = log_tail(&running.said, 0);
+                let counts = report.consumer(running.name());
                 counts.ended_by_itself += 1;
-                counts.last_end = Some(match said {
-                    Some(said) => format!("{cause}: {said}"),
-                    None => cause.to_string(),
-                });
+                counts.last_end = Some(format!("{cause}: {}", said.lines().last().unwrap_or("-")));
             }
         }
         Ok(())
     }
 
-    /// Hit the consumer at `index`: kill and restart it, or freeze it for `pause`. Returns none if no signal was sent, because
-    /// it is frozen already, or had ended by itself and is restarted. `supervisor` is the run's process.
+    /// Hit the consumer at `index`: kill and restart it, or freeze it for `pause`. Returns its name and the number of its starts in this
+    /// mission, or none if no signal was sent, because it is frozen already, or had ended by itself and is restarted. `supervisor` is the
+    /// run's process.
     pub fn hit(
         &mut self,
         index: usize,
@@ -126,32 +91,25 @@ impl Consumers {
         pause: Duration,
         supervisor: u32,
         report: &mut Report,
-    ) -> Result<Option<Hit>> {
-        let (Some(running), Some(setting)) = (self.all.get_mut(index), &self.setting) else {
-            return Ok(None);
-        };
-        if kind == Kind::Freeze && running.frozen_until.is_some() {
+    ) -> Result<Option<(String, Option<u32>)>> {
+        let freezes = kind == Kind::Freeze;
+        let Some(running) = self.all.get_mut(index) else { return Ok(None) };
+        if freezes && running.frozen_until.is_some() {
             return Ok(None);
         }
-        let generation = if running.consumer == Consumer::RunRecorder {
+        let starts = running.consumer.is_some().then_some(running.starts);
+        if starts.is_none() {
             running.thaw();
-            let Some((recorder, recording)) = run_recorder(supervisor) else {
-                return Ok(None);
-            };
-            recorder.signal(kind.signal());
+            let Some((recorder, recording)) = run_recorder(supervisor) else { return Ok(None) };
             self.hit_recordings.push(recording);
             running.process = Some(recorder);
-            None
-        } else {
-            let Some(process) = &running.process else {
-                running.start(setting, report)?;
-                return Ok(None);
-            };
-            signal_all(process, kind.signal());
-            Some(running.starts)
-        };
-        let name = running.consumer.name().to_owned();
-        if kind == Kind::Freeze {
+        } else if running.process.is_none() {
+            running.start(&self.directory, report)?;
+            return Ok(None);
+        }
+        running.signal(kind.signal());
+        let name = running.name().to_owned();
+        if freezes {
             running.frozen_until = Some(Instant::now() + pause);
             report.consumer(&name).frozen += 1;
         } else {
@@ -159,83 +117,61 @@ impl Consumers {
             running.process = None;
             running.frozen_until = None;
             report.consumer(&name).killed += 1;
-            running.start(setting, report)?;
+            running.start(&self.directory, report)?;
         }
-        Ok(Some(Hit { name, generation }))
+        Ok(Some((name, starts)))
     }
 
     /// Note that the mission is over, and let all consumers write their files and end.
     pub fn end(&mut self) {
         for running in &mut self.all {
             running.thaw();
-            if let Some(process) = &running.process {
-                signal_all(process, Signal::TERM);
-            }
+            running.signal(Signal::TERM);
         }
-        for running in &mut self.all {
-            if let Some(mut process) = running.process.take() {
-                process.end(ENDS_WITHIN);
-            }
+        for process in self.all.iter_mut().filter_map(|running| running.process.as_mut()) {
+            process.end(ENDS_WITHIN);
         }
+        self.all.clear();
     }
 }
 
 impl Running {
+    fn name(&self) -> &str {
+        self.consumer.as_ref().map_or("run's recorder", |consumer| &consumer.name)
+    }
+
     /// Start or restart the consumer, unless it is the run's own recorder.
-    fn start(&mut self, setting: &Setting, report: &mut Report) -> Result {
-        let Setting { robot, directory } = setting;
-        let recording = directory.join(format!("record-{}.mcap", self.starts + 1));
-        let Some(mut command) = self.consumer.command(robot, &recording) else {
-            return Ok(());
-        };
-        let said = File::options().create(true).append(true).open(&self.said);
-        let said = said.or_cannot("write what a consumer says")?;
-        if self.consumer == Consumer::Top {
-            let (reads, draws) = terminal::open().or_cannot("open a terminal")?;
-            terminal::read_all(reads);
-            let typed = draws.try_clone().or_cannot("open a terminal")?;
-            command.stdin(typed).stdout(draws);
-        } else {
-            command.stdout(Stdio::null());
-        }
-        command.stderr(said);
-        self.process = Some(Process::spawn(command).or_cannot("start a consumer")?);
+    fn start(&mut self, directory: &Path, report: &mut Report) -> Result {
+        let Some(consumer) = &self.consumer else { return Ok(()) };
+        let mut command = consumer.command();
         self.starts += 1;
-        report.consumer(self.consumer.name()).started += 1;
+        if consumer.name == RECORD {
+            command.arg("--out").arg(directory.join(format!("record-{}.mcap", self.starts)));
+        }
+        let said = File::options().create(true).append(true).open(&self.said);
+        command.stderr(said.or_cannot("write what a consumer says")?);
+        self.process = Some(Process::spawn(command).or_cannot("start a consumer")?);
+        report.consumer(self.name()).started += 1;
         Ok(())
     }
 
-    fn thaw(&mut self) {
-        if self.frozen_until.take().is_none() {
-            return;
-        }
-        if self.consumer == Consumer::RunRecorder {
-            // The recorder is a child of the run, which reaps it.
-            if let Some(recorder) = self.process.take() {
-                recorder.signal(Signal::CONT);
-            }
-        } else if let Some(process) = &self.process {
-            signal_all(process, Signal::CONT);
+    /// Signal the process, if it is not reaped yet, and those that it started.
+    fn signal(&self, signal: Signal) {
+        let process = self.process.as_ref();
+        if let Some(pid) = process.and_then(|it| Pid::from_raw(it.id().cast_signed())) {
+            // A process that has ended needs no signal.
+            let _ = kill_process_group(pid, signal);
         }
     }
-}
 
-fn last_line(said: &Path) -> Option<String> {
-    let mut file = File::open(said).ok()?;
-    let length = file.metadata().ok()?.len();
-    file.seek(SeekFrom::Start(length.saturating_sub(LONGEST_LINE))).ok()?;
-    let mut end = Vec::new();
-    file.take(LONGEST_LINE).read_to_end(&mut end).ok()?;
-    let end = String::from_utf8_lossy(&end);
-    let last = end.lines().rfind(|line| !line.trim().is_empty());
-    last.map(str::to_owned)
-}
-
-/// Signal a child that is not reaped yet, and the processes that it started.
-fn signal_all(process: &Process, signal: Signal) {
-    if let Some(pid) = Pid::from_raw(process.id().cast_signed()) {
-        // A process that has ended needs no signal.
-        let _ = kill_process_group(pid, signal);
+    fn thaw(&mut self) {
+        if self.frozen_until.take().is_some() {
+            self.signal(Signal::CONT);
+        }
+        if self.consumer.is_none() {
+            // The recorder is a child of the run, which reaps it.
+            self.process = None;
+        }
     }
 }
 

@@ -3,9 +3,10 @@
 use rustix::process::Signal;
 use serde::{Deserialize, Serialize};
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
+    #[default]
     Kill,
     /// SIGKILL in the first milliseconds of a generation.
     KillAtStart,
@@ -26,17 +27,6 @@ impl Kind {
             Self::Crash => Signal::ABORT,
             Self::Terminate => Signal::TERM,
             Self::Freeze | Self::FreezeAll => Signal::STOP,
-        }
-    }
-
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Kill => "killed",
-            Self::KillAtStart => "killed at start",
-            Self::Crash => "crashed",
-            Self::Terminate => "terminated",
-            Self::Freeze => "frozen",
-            Self::FreezeAll => "all frozen together",
         }
     }
 }

@@ -12,7 +12,11 @@ use common::{clock::Pace, mission::Mission};
 use serde_json::Value;
 
 use crate::chaos::{
-    attack::Attack, changes::Operator, consumers::Consumers, options::Options, report::End,
+    attack::Attack,
+    changes::Operator,
+    consumers::Consumers,
+    options::{Arguments, Options},
+    report::End,
     series::Series,
 };
 use crate::{
@@ -33,30 +37,19 @@ pub fn command(
     out: &Path,
     records: bool,
 ) -> Result<Command> {
-    let Options { asked, set, .. } = options;
-    let mut command = robot::mission("run", &asked.mission, &asked.robot, set);
+    let Arguments { mission, robot, set, .. } = &options.asked;
+    let mut command = robot::mission("run", mission, robot, set);
     command.args(["--pace", pace, "--seed", &seed.to_string(), "--out"]).arg(out);
-    if !records {
-        command.arg("--no-record");
-    }
-    child(command, out)
-}
-
-fn resume(directory: &Path, records: bool) -> Result<Command> {
-    let mut command = firsthand(&["run", "--json", "--resume"]);
-    command.arg(directory);
-    if !records {
-        command.arg("--no-record");
-    }
-    child(command, directory)
+    child(command, out, records)
 }
 
 /// Make `command` a child that ends with this process. Its standard output is piped; its standard error goes to a file
 /// beside the run's directory.
-fn child(mut command: Command, directory: &Path) -> Result<Command> {
+fn child(mut command: Command, directory: &Path, records: bool) -> Result<Command> {
     let stderr = directory.with_extension("stderr");
     let stderr = File::options().create(true).append(true).open(stderr);
     let stderr = stderr.or_cannot("write a mission's standard error")?;
+    command.args((!records).then_some("--no-record"));
     command.args(["--parent", &std::process::id().to_string()]);
     command.stdout(Stdio::piped()).stderr(stderr);
     Ok(command)
@@ -65,7 +58,7 @@ fn child(mut command: Command, directory: &Path) -> Result<Command> {
 /// The summary of the mission without an attack, to compare with. If ticks are compared, it runs at the same pace.
 pub fn undisturbed(options: &Options, seed: u64) -> Result<Summary> {
     let directory = options.directory.join("undisturbed");
-    let pace = if options.asked.only_consumers { options.pace } else { Pace::Max };
+    let pace = if options.asked.only_consumers { options.asked.pace } else { Pace::Max };
     let output = command(options, seed, &pace.to_string(), &directory, false)?
         .output()
         .or_cannot("start a mission")?;
@@ -86,7 +79,7 @@ pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Resu
         .then(|| robot(options, seed, &files.join("robot"), false))
         .transpose()?;
     let mut start =
-        command(options, seed, &options.pace.to_string(), &directory, options.records())?;
+        command(options, seed, &options.asked.pace.to_string(), &directory, options.records())?;
     if let Some(robot) = &robot {
         let address = robot.address();
         start.args(["--set", &format!("robot.address='udp://{address}'")]);
@@ -99,52 +92,54 @@ pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Resu
     let mut attack = Attack::new(seed, consumers);
     let began = Instant::now();
     let summary = loop {
-        let summary = one_supervisor(series, start, robot.as_mut(), &mut attack)?;
+        let mut supervisor = Process::spawn(start).or_cannot("start a mission")?;
+        let summary = read_stdout(&mut supervisor);
+        let attacked = attack.run(series, &mut supervisor, robot.as_mut(), PATIENCE);
+        supervisor.end(Duration::from_secs(2));
+        let summary = summary.join().unwrap_or_default();
+        attacked?;
         // A supervisor that was hit leaves no summary, unless the run had just ended.
         if !attack.supervisor_is_down() || !summary.is_empty() || began.elapsed() >= PATIENCE {
             break error::summary(&summary, &summary)?;
         }
-        start = resume(&directory, options.records())?;
+        start = firsthand(&["run", "--json", "--resume"]);
+        start.arg(&directory);
+        start = child(start, &directory, options.records())?;
     };
-    attack.end(series, robot.as_ref())?;
-    let undisturbed_error_m = undisturbed.pose_error_m.unwrap_or_default();
+    attack.end(series)?;
     let kills = series.report.kills() - before;
     let mut end = End {
         seed,
         outcome: summary.outcome,
         reason: summary.reason.clone(),
         collisions: summary.collisions.unwrap_or_default(),
-        pose_excess_m: summary.pose_error_m.unwrap_or_default() - undisturbed_error_m,
-        stopping_time_s: summary.stopping_time_s.unwrap_or_default(),
-        pose_allowance_m: pose_allowance_m(&options.loaded, kills, &summary),
-        kills,
+        pose_excess_m: summary.pose_error_m.unwrap_or_default(),
+        // An undisturbed robot whose target does not change takes another way.
+        pose_allowance_m: match asked.targets {
+            true => f64::INFINITY,
+            false => pose_allowance_m(&options.loaded, kills, &summary),
+        },
         healthy_aborted: attack.healthy_aborted(&deaths(&directory)),
     };
-    let mut all_truth = Vec::new();
+    let mut truth = Vec::new();
     if let Some(mut robot) = robot {
         robot.stop()?;
-        let truth = robot.truth();
-        all_truth = truth.to_vec();
-        let last = truth.last();
-        end.collisions = last.map_or(0, |tick| tick.contacts);
-        end.stopping_time_s = last.map_or(0.0, |tick| tick.stopping_time_s);
-        let error = attack.pose_error(truth).unwrap_or(f64::INFINITY);
-        end.pose_excess_m = error - undisturbed_error_m;
+        truth = robot.truth().to_vec();
+        end.collisions = truth.last().map_or(0, |tick| tick.contacts);
+        end.pose_excess_m = attack.pose_error(&truth).unwrap_or(f64::INFINITY);
     }
-    if options.asked.targets {
-        // The undisturbed robot took another way.
-        end.pose_allowance_m = f64::INFINITY;
-    }
+    end.pose_excess_m -= undisturbed.pose_error_m.unwrap_or_default();
     let mut right = series.report.add_mission(&end);
     if let Some(operator) = operator {
-        right &= series.report.targets().add(seed, operator, &summary, &all_truth);
+        right &=
+            series.report.targets.get_or_insert_default().add(seed, operator, &summary, &truth);
     }
     if options.asked.only_consumers {
-        series.report.tick_latencies().add(undisturbed, &summary);
+        series.report.tick_latencies.get_or_insert_default().add(undisturbed, &summary);
     }
     if options.asked.replay {
-        let (hit, others) = attack.hit_recordings();
-        right &= series.report.replays().add(seed, &directory, hit, &others);
+        right &=
+            series.report.replays.get_or_insert_default().add(seed, &directory, &attack.consumers);
     }
     if right {
         fs::remove_dir_all(&files).or_cannot("remove its directory")?;
@@ -182,22 +177,7 @@ pub fn robot(
     fs::create_dir(directory).or_cannot("make a directory")?;
     let mut mission = Mission { seed, ..options.loaded.clone() };
     mission.simulation.ignores_time |= ignores_time;
-    Ok(Simulator::start(firsthand(&[]), directory, &mission, options.pace, None)?)
-}
-
-/// Attack one generation of the supervisor. Returns its standard output.
-fn one_supervisor(
-    series: &mut Series<'_>,
-    start: Command,
-    robot: Option<&mut Simulator>,
-    attack: &mut Attack,
-) -> Result<Vec<u8>> {
-    let mut child = Process::spawn(start).or_cannot("start a mission")?;
-    let summary = read_stdout(&mut child);
-    let attacked = attack.run(series, &mut child, robot, PATIENCE);
-    child.end(Duration::from_secs(2));
-    let summary = summary.join().unwrap_or_default();
-    attacked.map(|()| summary)
+    Ok(Simulator::start(firsthand(&[]), directory, &mission, options.asked.pace, None)?)
 }
 
 /// Read the standard output to the end in a thread, because a long summary would fill the pipe.

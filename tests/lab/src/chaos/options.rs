@@ -8,7 +8,7 @@ use console::missions;
 
 use crate::{
     chaos::{
-        consumer::{Consumer, GivenConsumer},
+        consumer::Consumer,
         robot_fault::{RobotFault, TABLE},
     },
     error::{OrCannot as _, Result},
@@ -33,13 +33,13 @@ pub struct Arguments {
     /// of its own, and mission time is wall-clock.
     #[arg(long, conflicts_with = "pace")]
     pub include_supervisor: bool,
-    /// Kill and freeze consumers too, one in two signals: the run's own recorder, another one, `top` (without terminals
-    /// `hz`) and `logs -f`.
+    /// Kill and freeze consumers too, one in two signals: the run's own recorder, another one, `topic hz` and
+    /// `logs -f`.
     #[arg(long, conflicts_with = "robot_faults")]
     pub include_consumers: bool,
     /// Kill and freeze a consumer of yours: a program and its arguments, without a shell. As often as needed.
     #[arg(long, value_name = "COMMAND", conflicts_with = "robot_faults")]
-    pub consumer: Vec<GivenConsumer>,
+    pub consumer: Vec<Consumer>,
     /// Hit consumers only, and compare ticks with those of the same missions without any.
     #[arg(long, conflicts_with_all = ["include_startup", "include_supervisor", "freeze_all"])]
     pub only_consumers: bool,
@@ -99,8 +99,6 @@ fn parse_faults(names: &str) -> Result<Faults, String> {
 pub struct Options {
     pub asked: Arguments,
     pub loaded: Mission,
-    pub set: Vec<String>,
-    pub pace: Pace,
     /// Parent of the run directories. It is emptied after each mission.
     pub directory: PathBuf,
 }
@@ -113,13 +111,12 @@ impl Options {
     /// # Errors
     /// The mission cannot be loaded, or is none for chaos; options contradict each other.
     pub fn of(asked: &Arguments) -> Result<Self> {
-        let asked = asked.clone();
-        let mut set = asked.set.clone();
+        let mut asked = asked.clone();
         if asked.freeze_all {
             // The robot's clock goes on while its processes are frozen. A --set of the user comes later and wins.
-            set.insert(0, LONG_TIMEOUT.to_owned());
+            asked.set.insert(0, LONG_TIMEOUT.to_owned());
         }
-        let loaded = missions::load(&asked.mission, &set)?;
+        let loaded = missions::load(&asked.mission, &asked.set)?;
         let faulty = asked.robot_faults.is_some();
         if (asked.include_supervisor || faulty) && loaded.robot.address.is_some() {
             return Err("chaos brings its own robot; leave robot.address out".into());
@@ -136,20 +133,26 @@ impl Options {
         if asked.pace == Pace::Max {
             return Err("chaos needs a wall clock; give --pace R, 4 for four times as fast".into());
         }
-        let real_time = asked.include_supervisor || faulty;
-        let pace = if real_time { Pace::Rate(1.0) } else { asked.pace };
+        if asked.include_supervisor || faulty {
+            asked.pace = Pace::Rate(1.0);
+        }
         let directory = env::temp_dir().join(format!("firsthand-chaos-{}", process::id()));
         fs::create_dir(&directory).or_cannot_file("make", &directory)?;
-        Ok(Self { asked, loaded, set, pace, directory })
+        Ok(Self { asked, loaded, directory })
     }
 
     pub fn records(&self) -> bool {
         self.asked.replay || self.asked.include_consumers
     }
 
-    pub fn consumers(&self) -> Vec<Consumer> {
-        let own = if self.asked.include_consumers { Consumer::own() } else { Vec::new() };
-        let given = self.asked.consumer.iter().cloned().map(Consumer::Given);
-        own.into_iter().chain(given).collect()
+    /// The consumers to hit; none stands for the run's own recorder.
+    pub fn consumers(&self) -> Result<Vec<Option<Consumer>>> {
+        let mut consumers = Vec::new();
+        if self.asked.include_consumers {
+            consumers.push(None);
+            consumers.extend(Consumer::own(&self.asked.robot)?.map(Some));
+        }
+        consumers.extend(self.asked.consumer.iter().cloned().map(Some));
+        Ok(consumers)
     }
 }

@@ -1,30 +1,26 @@
 //! Replays of the missions' recordings: whether every generation of every stage is bit-equal.
 
 use std::{
-    fmt, fs,
+    fs,
     path::{Path, PathBuf},
 };
 
 use recording::{
     End, Recording, RecordingError,
-    replay::{Options, Report, replay},
+    replay::{Options, replay},
 };
 use serde::Serialize;
 
-/// Recordings, their generations whose outputs are equal to the bit, those that ended before their first step, and compared samples.
+use crate::chaos::consumers::Consumers;
+
 #[derive(Debug, Default, Serialize)]
 struct Counts {
     recordings: u64,
+    /// Generations whose outputs are equal to the bit, and those that ended before their first step.
     equal: u64,
     without_step: u64,
+    /// Compared samples.
     compared: u64,
-}
-
-/// Results of recordings whose recorders were hit, or attached during a mission.
-#[derive(Debug, Default, Serialize)]
-struct Partial {
-    #[serde(flatten)]
-    counts: Counts,
     /// Recordings that end before their recorder did.
     cut: u64,
     /// Recordings that do not name their run, because the recorder was killed before it had written that.
@@ -36,20 +32,41 @@ struct Partial {
 #[derive(Debug, Default, Serialize)]
 pub struct Replays {
     #[serde(flatten)]
-    counts: Counts,
+    whole: Counts,
     /// Generations that differ or could not be replayed, and recordings that could not be read, with reasons.
     wrong: Vec<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    partial: Option<Partial>,
+    /// Results of recordings whose recorders were hit, or attached during a mission.
+    partial: Counts,
 }
 
 impl Counts {
-    fn add(&mut self, report: &Report) {
-        for found in report.stages.values() {
+    /// Replay `file`, as far as it goes if it may be `partial`. Add what is wrong.
+    fn add(
+        &mut self,
+        file: &Path,
+        partial: bool,
+        wrong: &mut Vec<String>,
+    ) -> Result<(), RecordingError> {
+        self.recordings += 1;
+        let recording = match Recording::open(file) {
+            Err(_) if partial => {
+                self.not_begun += 1;
+                return Ok(());
+            }
+            opened => opened?,
+        };
+        self.cut += u64::from(recording.end != End::Complete);
+        let report = replay(&recording, &Options::default())?;
+        for (stage, found) in &report.stages {
             self.equal += found.equal;
             self.without_step += found.without_step;
             self.compared += found.compared;
+            self.not_replayed += found.not_replayed.len() as u64;
+            let not = found.not_replayed.iter().filter(|_| !partial);
+            wrong.extend(not.map(|(number, why)| format!("{stage} generation {number}: {why}")));
         }
+        wrong.extend(report.difference.map(|difference| difference.to_string()));
+        Ok(())
     }
 }
 
@@ -62,102 +79,30 @@ impl Replays {
         self.wrong.is_empty()
     }
 
-    /// Replay the recordings of the mission in `directory`. Returns whether all is bit-equal. Recordings among `hit` and
-    /// `others` are replayed only as far as they go.
-    pub fn add(
-        &mut self,
-        seed: u64,
-        directory: &Path,
-        hit: &[PathBuf],
-        others: &[PathBuf],
-    ) -> bool {
-        let before = self.wrong.len();
-        let entries = fs::read_dir(directory).into_iter().flatten().flatten();
-        let files: Vec<_> = entries.map(|entry| entry.path()).collect();
-        let (hit, whole): (Vec<_>, Vec<_>) = files
-            .iter()
-            .filter(|file| file.extension().is_some_and(|extension| extension == "mcap"))
-            .partition(|file| hit.contains(file));
+    /// Replay the recordings of the mission in `directory` and of its `consumers`. Returns whether all is bit-equal.
+    pub fn add(&mut self, seed: u64, directory: &Path, consumers: &Consumers) -> bool {
         let mut wrong = Vec::new();
-        if hit.is_empty() && whole.is_empty() {
+        let own =
+            recordings(directory).map(|file| (consumers.hit_recordings.contains(&file), file));
+        let own: Vec<_> = own.collect();
+        if own.is_empty() {
             wrong.push("nothing was recorded".to_owned());
         }
-        for file in whole {
-            self.counts.recordings += 1;
-            if let Err(error) = self.replay(file, &mut wrong) {
+        let others = recordings(&consumers.directory).map(|file| (true, file));
+        for (partial, file) in own.into_iter().chain(others) {
+            let counts = if partial { &mut self.partial } else { &mut self.whole };
+            if let Err(error) = counts.add(&file, partial, &mut wrong) {
                 wrong.push(error.to_string());
             }
         }
-        for file in hit.into_iter().chain(others) {
-            if let Err(error) = self.replay_partial(file, &mut wrong) {
-                wrong.push(error.to_string());
-            }
-        }
+        let all_equal = wrong.is_empty();
         self.wrong.extend(wrong.into_iter().map(|wrong| format!("seed {seed}: {wrong}")));
-        self.wrong.len() == before
-    }
-
-    /// Replay a recording that may be incomplete.
-    fn replay_partial(
-        &mut self,
-        file: &Path,
-        wrong: &mut Vec<String>,
-    ) -> Result<(), RecordingError> {
-        let partial = self.partial.get_or_insert_default();
-        partial.counts.recordings += 1;
-        let Ok(recording) = Recording::open(file) else {
-            partial.not_begun += 1;
-            return Ok(());
-        };
-        partial.cut += u64::from(recording.end != End::Complete);
-        let report = replay(&recording, &Options::default())?;
-        partial.not_replayed += report.not_replayed() as u64;
-        partial.counts.add(&report);
-        wrong.extend(report.difference.map(|difference| difference.to_string()));
-        Ok(())
-    }
-
-    fn replay(&mut self, file: &Path, wrong: &mut Vec<String>) -> Result<(), RecordingError> {
-        let report = replay(&Recording::open(file)?, &Options::default())?;
-        self.counts.add(&report);
-        for (stage, found) in &report.stages {
-            for (generation, why) in &found.not_replayed {
-                wrong.push(format!("{stage} generation {generation}: {why}"));
-            }
-        }
-        wrong.extend(report.difference.map(|difference| difference.to_string()));
-        Ok(())
+        all_equal
     }
 }
 
-impl fmt::Display for Replays {
-    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(
-            to,
-            "replayed {} recordings: {} generations bit-equal in {} samples, {} ended before their first step, {} not",
-            self.counts.recordings,
-            self.counts.equal,
-            self.counts.compared,
-            self.counts.without_step,
-            self.wrong.len()
-        )?;
-        if let Some(partial) = &self.partial {
-            writeln!(
-                to,
-                "recorders hit, or attached in mid mission: {} recordings ({} cut off, {} without their beginning): {} generations bit-equal in {} \
-                 samples, {} ended before their first step, {} recorded in part and not replayed",
-                partial.counts.recordings,
-                partial.cut,
-                partial.not_begun,
-                partial.counts.equal,
-                partial.counts.compared,
-                partial.counts.without_step,
-                partial.not_replayed
-            )?;
-        }
-        for wrong in &self.wrong {
-            writeln!(to, "  {wrong}")?;
-        }
-        Ok(())
-    }
+fn recordings(directory: &Path) -> impl Iterator<Item = PathBuf> {
+    let entries = fs::read_dir(directory).into_iter().flatten().flatten();
+    let files = entries.map(|entry| entry.path());
+    files.filter(|file| file.extension().is_some_and(|extension| extension == "mcap"))
 }

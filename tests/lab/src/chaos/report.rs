@@ -2,54 +2,49 @@
 
 use std::{collections::BTreeMap, fmt};
 
-use common::{latency::Histogram, topics::SUPERVISOR};
+use common::latency::Histogram;
 use serde::{Serialize, Serializer};
 
 use crate::chaos::{
-    Judged, changes::Changes, kind::Kind, replays::Replays, resources::Resources,
+    Judged, changes::Changes, kind::Kind, replays::Replays, signals::Row,
     tick_latencies::TickLatencies,
 };
+use crate::missions::statistics::rounded;
 use mission_control::outcome::Outcome;
-use processes::stages::TABLE;
 
 /// The name for supervisor and stages together.
 pub const EVERYTHING: &str = "everything";
 
-const NAMED: usize = 20;
-
-/// The result of all missions under attack. Times in milliseconds.
+/// The result of all missions under attack.
 #[derive(Debug, Default, Serialize)]
 pub struct Report {
-    missions: u64,
+    pub missions: u64,
     reached: u64,
     collisions: u64,
     /// Missions that did not reach the target, touched something or lost the pose: seeds and reasons.
     wrong: Vec<String>,
     /// Stages that the supervisor aborted as hung although no signal had frozen them, or one had frozen all processes.
     healthy_aborted: u64,
+    /// Signals of each kind to stages and supervisor, of all and of each.
+    kinds: BTreeMap<Kind, u32>,
     kills: BTreeMap<&'static str, BTreeMap<Kind, u32>>,
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     consumers: BTreeMap<String, ConsumerCounts>,
-    recovery_ms: BTreeMap<&'static str, Recovery>,
-    /// Largest pose error at the end beyond the same seed's undisturbed run, metres, and the signals of that mission.
+    recovery_ms: BTreeMap<String, Recovery>,
+    /// Largest pose error at the end beyond the same seed's undisturbed run, metres.
     worst_pose_excess_m: f64,
-    worst_pose_kills: u32,
-    /// Longest time that a wheel turned after the last command the robot had received, mission seconds.
-    longest_stopping_time_s: f64,
     /// Files, shared memory and processes that outlived a mission.
     pub leftovers: usize,
-    /// The first leftovers, with the missions that left them.
+    /// These leftovers, with the missions that left them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     left_behind: Vec<String>,
-    /// Largest growth of a supervisor's resources from its robot's departure to its end.
-    supervisor_growth: Resources,
     #[serde(skip_serializing_if = "Option::is_none")]
-    replays: Option<Replays>,
+    pub replays: Option<Replays>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    targets: Option<Changes>,
+    pub targets: Option<Changes>,
     /// Ticks with and without consumers, if nothing else is hit.
     #[serde(skip_serializing_if = "Option::is_none")]
-    tick_latencies: Option<TickLatencies>,
+    pub tick_latencies: Option<TickLatencies>,
     pub took_s: f64,
 }
 
@@ -63,20 +58,6 @@ pub struct ConsumerCounts {
     /// The last such end, and the last line of its standard error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub last_end: Option<String>,
-}
-
-impl fmt::Display for ConsumerCounts {
-    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { killed, frozen, started, ended_by_itself, last_end } = self;
-        write!(
-            to,
-            "{killed} killed, {frozen} frozen, {started} started, {ended_by_itself} ended by themselves"
-        )?;
-        match last_end {
-            Some(last) => write!(to, " ({last})"),
-            None => Ok(()),
-        }
-    }
 }
 
 /// Times from the signal to the successor.
@@ -101,17 +82,11 @@ pub struct End {
     pub collisions: u64,
     pub pose_excess_m: f64,
     pub pose_allowance_m: f64,
-    pub stopping_time_s: f64,
-    pub kills: u32,
     /// Stages aborted as hung that were not frozen alone.
     pub healthy_aborted: Vec<String>,
 }
 
 impl Report {
-    pub const fn missions(&self) -> u64 {
-        self.missions
-    }
-
     pub fn signals(&self) -> u32 {
         let consumers = self.consumers.values();
         let to_consumers: u32 = consumers.map(|counts| counts.killed + counts.frozen).sum();
@@ -123,26 +98,36 @@ impl Report {
     }
 
     pub fn kills(&self) -> u32 {
-        self.kills.values().flat_map(BTreeMap::values).sum()
+        self.kinds.values().sum()
     }
 
     pub fn hit(&mut self, stage: &'static str, kind: Kind) {
+        *self.kinds.entry(kind).or_default() += 1;
         *self.kills.entry(stage).or_default().entry(kind).or_default() += 1;
     }
 
-    pub fn recovery(&mut self, stage: &'static str) -> &mut Recovery {
-        self.recovery_ms.entry(stage).or_default()
+    /// Count the times of a signal whose measurement is complete.
+    pub fn add_recovery(&mut self, row: &Row) {
+        let record = |histogram: &mut Histogram, ms: Option<f64>| {
+            ms.into_iter().for_each(|ms| histogram.record((ms * 1e6) as u64));
+        };
+        if row.ready_ms.is_none() {
+            return;
+        }
+        let recovery = self.recovery_ms.entry(row.stage.clone()).or_default();
+        if row.kind == Kind::Freeze {
+            record(&mut recovery.after_freeze, row.ready_ms);
+        } else {
+            record(&mut recovery.ready, row.ready_ms);
+            record(&mut recovery.output, row.first_output_ms);
+        }
     }
 
     /// Count a mission. Returns whether it reached the target without a contact, and knew its pose.
     pub fn add_mission(&mut self, end: &End) -> bool {
         self.missions += 1;
         self.collisions += end.collisions;
-        self.longest_stopping_time_s = self.longest_stopping_time_s.max(end.stopping_time_s);
-        if end.pose_excess_m > self.worst_pose_excess_m {
-            self.worst_pose_excess_m = end.pose_excess_m;
-            self.worst_pose_kills = end.kills;
-        }
+        self.worst_pose_excess_m = self.worst_pose_excess_m.max(end.pose_excess_m);
         let reached = matches!(end.outcome, Outcome::Reached | Outcome::ReachedUnsure);
         self.reached += u64::from(reached);
         let (seed, excess, allowance) = (end.seed, end.pose_excess_m, end.pose_allowance_m);
@@ -166,25 +151,6 @@ impl Report {
         self.wrong.len() == before
     }
 
-    pub fn replays(&mut self) -> &mut Replays {
-        self.replays.get_or_insert_default()
-    }
-
-    pub fn targets(&mut self) -> &mut Changes {
-        self.targets.get_or_insert_default()
-    }
-
-    pub fn tick_latencies(&mut self) -> &mut TickLatencies {
-        self.tick_latencies.get_or_insert_default()
-    }
-
-    /// Count the growth of a supervisor that held `first` when its robot began to drive, and `last` at its end.
-    pub fn add_growth(&mut self, first: Resources, last: Resources) {
-        let most = &mut self.supervisor_growth;
-        most.descriptors = most.descriptors.max(last.descriptors - first.descriptors);
-        most.memory_kib = most.memory_kib.max(last.memory_kib - first.memory_kib);
-    }
-
     /// Whether every mission reached the target without a contact and knew its pose. The files of other missions stay.
     pub fn is_right(&self) -> bool {
         let replayed = self.replays.as_ref().is_none_or(Replays::all_equal);
@@ -197,8 +163,7 @@ impl Report {
         let targets = self.targets.as_ref().map_or(&[][..], Changes::wrong);
         let mut lost = [&self.wrong[..], replays, targets, &self.left_behind].into_iter().flatten();
         let count = self.wrong.len() + replays.len() + targets.len() + self.leftovers;
-        let moved =
-            || format!("wheels at rest {:.2} s after a command", self.longest_stopping_time_s);
+        let moved = || format!("a pose {:.3} m worse than undisturbed", self.worst_pose_excess_m);
         Judged {
             tried: self.signals().into(),
             lost: count as u64 + self.healthy_aborted,
@@ -206,13 +171,10 @@ impl Report {
         }
     }
 
-    pub fn left_behind(&mut self, found: Vec<String>) {
+    pub fn left_behind(&mut self, found: &[String]) {
         self.leftovers += found.len();
-        let missing = NAMED.saturating_sub(self.left_behind.len());
         let missions = self.missions;
-        let named = found.into_iter().take(missing);
-        let named = named.map(|what| format!("by mission {missions}: {what}"));
-        self.left_behind.extend(named);
+        self.left_behind.extend(found.iter().map(|what| format!("by mission {missions}: {what}")));
     }
 
     pub fn is_clean(&self) -> bool {
@@ -220,105 +182,14 @@ impl Report {
     }
 }
 
-#[derive(Serialize)]
-struct Quantiles {
-    p50: Option<f64>,
-    p99: Option<f64>,
-    max: Option<f64>,
-}
-
-impl Quantiles {
-    fn of(histogram: &Histogram) -> Self {
-        let ms = |share| histogram.quantile_us(share).map(|us| us / 1e3);
-        Self { p50: ms(0.5), p99: ms(0.99), max: ms(1.0) }
-    }
-}
-
-impl fmt::Display for Quantiles {
-    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (self.p50, self.p99, self.max) {
-            (Some(p50), Some(p99), Some(max)) => to.pad(&format!("{p50:.1} {p99:.1} {max:.1}")),
-            _ => to.pad("-"),
-        }
-    }
-}
-
+/// Median, 99 % quantile and maximum in milliseconds; nothing if nothing was measured.
 fn quantiles<S: Serializer>(histogram: &Histogram, to: S) -> Result<S::Ok, S::Error> {
-    Quantiles::of(histogram).serialize(to)
+    let us = [0.5, 0.99, 1.0].into_iter().filter_map(|share| histogram.quantile_us(share));
+    us.map(|us| rounded(us / 1e3)).collect::<Vec<_>>().serialize(to)
 }
 
 impl fmt::Display for Report {
     fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(
-            to,
-            "{} signals in {} missions, {:.0} s: {} reached, {} collisions, {} healthy stages aborted, {} leftovers",
-            self.signals(),
-            self.missions,
-            self.took_s,
-            self.reached,
-            self.collisions,
-            self.healthy_aborted,
-            self.leftovers
-        )?;
-        for wrong in &self.wrong {
-            writeln!(to, "  {wrong}")?;
-        }
-        for left in &self.left_behind {
-            writeln!(to, "  left behind {left}")?;
-        }
-        writeln!(
-            to,
-            "{:<16} {:>6} {:>22} {:>22} {:>22}",
-            "stage", "hit", "ready, ms", "frozen, ms", "a tick's output, ms"
-        )?;
-        let nothing = Recovery::default();
-        let stages = TABLE.iter().map(|stage| stage.name);
-        let hit_supervisor = self.kills.contains_key(SUPERVISOR).then_some(SUPERVISOR);
-        for name in stages.chain(hit_supervisor) {
-            let hit: u32 = self.kills.get(name).map_or(0, |kinds| kinds.values().sum());
-            let recovery = self.recovery_ms.get(name).unwrap_or(&nothing);
-            writeln!(
-                to,
-                "{name:<16} {hit:>6} {:>22} {:>22} {:>22}",
-                Quantiles::of(&recovery.ready),
-                Quantiles::of(&recovery.after_freeze),
-                Quantiles::of(&recovery.output)
-            )?;
-        }
-        let mut kinds: BTreeMap<Kind, u32> = BTreeMap::new();
-        for (&kind, &count) in self.kills.values().flatten() {
-            *kinds.entry(kind).or_default() += count;
-        }
-        let kinds: Vec<_> =
-            kinds.iter().map(|(kind, count)| format!("{count} {}", kind.as_str())).collect();
-        writeln!(to, "(p50, p99, max) {}", kinds.join(", "))?;
-        for (name, counts) in &self.consumers {
-            writeln!(to, "consumer {name}: {counts}")?;
-        }
-        writeln!(
-            to,
-            "pose error beyond the undisturbed run at most {:.4} m ({} signals in that mission)",
-            self.worst_pose_excess_m, self.worst_pose_kills
-        )?;
-        writeln!(
-            to,
-            "a wheel turned at most {:.2} s of mission time after the last command",
-            self.longest_stopping_time_s
-        )?;
-        let Resources { descriptors, memory_kib } = self.supervisor_growth;
-        writeln!(
-            to,
-            "a supervisor grew by at most {descriptors} descriptors and {memory_kib} KiB"
-        )?;
-        if let Some(targets) = &self.targets {
-            writeln!(to, "{targets}")?;
-        }
-        if let Some(ticks) = &self.tick_latencies {
-            writeln!(to, "{ticks}")?;
-        }
-        match &self.replays {
-            Some(replays) => write!(to, "{replays}"),
-            None => Ok(()),
-        }
+        to.write_str(&crate::text(self))
     }
 }

@@ -1,10 +1,12 @@
 //! The state that the missions of one chaos share.
 
+use std::fs::File;
+
 use crate::chaos::{
     options::Options,
     report::Report,
     schedule::Schedule,
-    signals::{Row, SignalsFile},
+    signals::{self, Row},
 };
 use crate::error::Result;
 
@@ -13,7 +15,7 @@ pub struct Series<'a> {
     pub schedule: Schedule,
     pub report: Report,
     /// The table of signals; none if no results are written.
-    pub signals: Option<SignalsFile>,
+    pub signals: Option<csv::Writer<File>>,
 }
 
 impl<'a> Series<'a> {
@@ -23,12 +25,14 @@ impl<'a> Series<'a> {
             options,
             schedule: Schedule::new(options.asked.seed),
             report: Report::default(),
-            signals: out.map(SignalsFile::create).transpose()?,
+            signals: out.map(signals::create).transpose()?,
         })
     }
 
+    /// Keep a signal whose measurement is complete.
     pub fn keep(&mut self, row: &Row) -> Result {
-        self.signals.as_mut().map_or(Ok(()), |file| file.add(row))
+        self.report.add_recovery(row);
+        self.signals.as_mut().map_or(Ok(()), |file| signals::add(row, file))
     }
 
     pub fn is_over(&self) -> bool {

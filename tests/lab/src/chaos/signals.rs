@@ -3,7 +3,7 @@
 
 use std::{
     fs::{self, File},
-    path::{Path, PathBuf},
+    path::Path,
     time::Instant,
 };
 
@@ -17,7 +17,7 @@ use crate::{
 pub const FILE_NAME: &str = "signals.csv";
 
 /// A signal. A value that was not measured is an empty cell.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     pub mission: u64,
     /// Mission time of the newest wheel sample that was read before the signal, seconds.
@@ -36,35 +36,6 @@ pub struct Row {
     pub ready_ms: Option<f64>,
     /// The time from the signal until the successor's first sample of a tick was read, milliseconds. For stages and the supervisor.
     pub first_output_ms: Option<f64>,
-    /// The time from the signal until the first sample in which no wheel turned, milliseconds; none if the first output was earlier.
-    pub rest_ms: Option<f64>,
-    /// The distance from the newest pose to the true one when the row was written, metres. It is known only if the robot is a process
-    /// of its own, whose ground truth is read during the mission.
-    pub pose_error_m: Option<f64>,
-}
-
-impl Row {
-    pub fn new(
-        mission: u64,
-        time_s: Option<f64>,
-        stage: &str,
-        kind: Kind,
-        generation: Option<u32>,
-    ) -> Self {
-        Self {
-            mission,
-            time_s,
-            stage: stage.to_owned(),
-            kind,
-            generation,
-            start_up: kind == Kind::KillAtStart,
-            noticed_ms: None,
-            ready_ms: None,
-            first_output_ms: None,
-            rest_ms: None,
-            pose_error_m: None,
-        }
-    }
 }
 
 /// Milliseconds since `at`, to the microsecond.
@@ -72,26 +43,19 @@ pub fn ms_since(at: Instant) -> f64 {
     (at.elapsed().as_secs_f64() * 1e6).round() / 1e3
 }
 
-#[derive(Debug)]
-pub struct SignalsFile {
-    path: PathBuf,
-    writer: csv::Writer<File>,
+/// The file in `directory`, without rows.
+pub fn create(directory: &Path) -> Result<csv::Writer<File>> {
+    let path = directory.join(FILE_NAME);
+    fs::create_dir_all(directory).or_cannot_file("make the directory of", &path)?;
+    let file = File::create_new(&path);
+    let file = file.map_err(|error| format!("{error}; give another directory"));
+    Ok(csv::Writer::from_writer(file.or_cannot_file("make", &path)?))
 }
 
-impl SignalsFile {
-    pub fn create(directory: &Path) -> Result<Self> {
-        let path = directory.join(FILE_NAME);
-        fs::create_dir_all(directory).or_cannot_file("make the directory of", &path)?;
-        let file = File::create_new(&path);
-        let file = file.map_err(|error| format!("{error}; give another directory"));
-        let writer = csv::Writer::from_writer(file.or_cannot_file("make", &path)?);
-        Ok(Self { path, writer })
-    }
-
-    pub fn add(&mut self, row: &Row) -> Result {
-        self.writer.serialize(row).or_cannot_file("write", &self.path)?;
-        self.writer.flush().or_cannot_file("write", &self.path)
-    }
+/// Write a row, so that others can read it at once.
+pub fn add(row: &Row, to: &mut csv::Writer<File>) -> Result {
+    to.serialize(row).or_cannot_file("write", Path::new(FILE_NAME))?;
+    to.flush().or_cannot_file("write", Path::new(FILE_NAME))
 }
 
 #[cfg(test)]
@@ -107,29 +71,38 @@ mod tests {
     fn rows_are_in_the_file_as_soon_as_they_are_added_and_are_read_as_they_were() {
         let folder = tempfile::tempdir().unwrap();
         let directory = folder.path().join("results");
-        let mut file = SignalsFile::create(&directory).unwrap();
+        let mut file = create(&directory).unwrap();
         assert_eq!(read(&directory.join(FILE_NAME)), []);
-        let plain = Row::new(3, Some(1.25), "mapper", Kind::KillAtStart, Some(4));
+        let plain = Row {
+            mission: 3,
+            time_s: Some(1.25),
+            stage: "mapper".to_owned(),
+            kind: Kind::KillAtStart,
+            generation: Some(4),
+            start_up: true,
+            ..Row::default()
+        };
         let odd = Row {
             noticed_ms: Some(0.125),
-            ..Row::new(3, None, "sh -c 'a, \"b\"\n'", Kind::Freeze, None)
+            stage: "sh -c 'a, \"b\"\n'".to_owned(),
+            ..Row::default()
         };
         for row in [&plain, &odd] {
-            file.add(row).unwrap();
+            add(row, &mut file).unwrap();
         }
         // Another process reads the file like this while it is written.
         assert_eq!(read(&directory.join(FILE_NAME)), [plain, odd]);
         let text = fs::read_to_string(directory.join(FILE_NAME)).unwrap();
         let columns = "mission,time_s,stage,kind,generation,start_up,noticed_ms,";
         assert!(text.starts_with(columns), "{text}");
-        assert!(text.contains("\n3,1.25,mapper,kill_at_start,4,true,,,,,\n"), "{text}");
+        assert!(text.contains("\n3,1.25,mapper,kill_at_start,4,true,,,\n"), "{text}");
     }
 
     #[test]
     fn results_that_are_there_are_not_written_over() {
         let folder = tempfile::tempdir().unwrap();
-        SignalsFile::create(folder.path()).unwrap();
-        let refused = SignalsFile::create(folder.path()).unwrap_err().to_string();
+        create(folder.path()).unwrap();
+        let refused = create(folder.path()).unwrap_err().to_string();
         let named = folder.path().join(FILE_NAME);
         assert!(refused.contains(named.to_str().unwrap()), "{refused}");
     }

@@ -1,7 +1,7 @@
 //! The result of each setting over all its missions, the differences of two settings on the same missions, and the page with every
 //! failure, its picture and its own page.
 
-use std::{collections::BTreeMap, fmt::Write as _, path::PathBuf};
+use std::{collections::BTreeMap, path::PathBuf};
 
 use serde_json::{Value, json};
 
@@ -11,248 +11,113 @@ use crate::{
         Setting,
         page::Page,
         results::Results,
-        row::{Latency, OUTCOMES, Outcome, Row},
+        row::{OUTCOMES, Outcome, Row},
         runner,
-        statistics::{Estimate, mean, median, paired_difference, share},
+        statistics::{Estimate, mean, median, paired_difference, rounded, share},
     },
 };
 
-/// A metric beside the shares: key, name and digits. With `median_` the key is of the median of a column over the successes,
-/// otherwise of the mean over all missions.
-type Metric = (&'static str, &'static str, usize);
-
-const METRICS: [Metric; 9] = [
-    ("median_time_s", "median time, s", 1),
-    ("median_k", "median K", 2),
-    ("spl", "SPL", 3),
-    ("barn_score", "BARN score", 3),
-    ("median_clearance_m", "median least clearance, m", 3),
-    ("median_p_o", "median p_o", 3),
-    ("median_f_ps_m2", "median f_ps, m2", 4),
-    ("median_f_vs_m_s2", "median f_vs, m/s2", 3),
-    ("median_look_share", "median share of looking", 3),
+/// Metrics beside the shares. With `median_` the key is of the median of a column over the successes, otherwise of the mean over all
+/// missions.
+const METRICS: [&str; 9] = [
+    "median_time_s",
+    "median_k",
+    "spl",
+    "barn_score",
+    "median_clearance_m",
+    "median_p_o",
+    "median_f_ps_m2",
+    "median_f_vs_m_s2",
+    "median_look_share",
 ];
 
-type Latencies = [(&'static str, [fn(&Latency) -> Option<f64>; 3]); 2];
-
-/// A duration's name; its median, 99 % quantile and longest of a mission, microseconds.
-const LATENCIES: Latencies = [
-    ("tick", [|it| it.tick_p50_us, |it| it.tick_p99_us, |it| it.tick_max_us]),
-    (
-        "full solve",
-        [|it| it.full_solve_p50_us, |it| it.full_solve_p99_us, |it| it.full_solve_max_us],
-    ),
-];
-
-struct Totals<'a> {
-    setting: &'a str,
-    count: usize,
-    /// Shares of all missions, in the order of [`OUTCOMES`].
-    shares: [Estimate; OUTCOMES.len()],
-    metrics: [Option<f64>; METRICS.len()],
+/// The first setting; `versus` has the others, each with its differences from the first.
+pub fn report(settings: &[Setting], rows: &[Row]) -> Value {
+    let mut report = totals(&settings[0].name, rows);
+    let others = settings.iter().skip(1);
+    let others = others.map(|other| versus(&settings[0].name, &other.name, rows));
+    let others: Vec<Value> = others.collect();
+    if !others.is_empty() {
+        report["versus"] = others.into();
+    }
+    report
 }
 
-impl<'a> Totals<'a> {
-    fn of(setting: &'a str, rows: &[Row]) -> Self {
-        let rows: Vec<&Row> = rows.iter().filter(|row| row.setting == setting).collect();
-        let ended = |name| rows.iter().filter(|row| row.outcome_name() == name).count();
-        let value = |key: &str| match key.strip_prefix("median_") {
+/// Shares of all missions with their 95 % intervals, and the metrics that are known.
+fn totals(setting: &str, rows: &[Row]) -> Value {
+    let rows: Vec<&Row> = rows.iter().filter(|row| row.setting == setting).collect();
+    let mut totals = json!({ "setting": setting, "count": rows.len() });
+    for name in OUTCOMES {
+        let hits = rows.iter().filter(|row| row.outcome_name() == name).count();
+        let share = share(hits, rows.len());
+        totals[name] = share.value.into();
+        totals["intervals"][name] = interval(share).into();
+    }
+    for key in METRICS {
+        let value = match key.strip_prefix("median_") {
             Some(column) => {
                 let successes = rows.iter().filter(|row| row.is_success());
                 median(successes.filter_map(|row| row.number(column)))
             }
             None => mean(rows.iter().filter_map(|row| row.number(key))),
         };
-        Self {
-            setting,
-            count: rows.len(),
-            shares: OUTCOMES.map(|name| share(ended(name), rows.len())),
-            metrics: METRICS.map(|(key, ..)| value(key)),
+        if let Some(value) = value {
+            totals[key] = value.into();
         }
     }
-
-    fn object(&self) -> Value {
-        let mut object = json!({ "setting": self.setting, "count": self.count });
-        for (name, share) in OUTCOMES.iter().zip(&self.shares) {
-            object[*name] = share.value.into();
-        }
-        for ((key, ..), value) in METRICS.iter().zip(self.metrics) {
-            object[*key] = value.into();
-        }
-        object
-    }
-
-    /// Name and value of the metrics that are known.
-    fn metrics(&self) -> impl Iterator<Item = (&'static str, String)> {
-        METRICS.iter().zip(self.metrics).filter_map(|(&(_, name, digits), value)| {
-            let value = value?;
-            Some((name, format!("{value:.digits$}")))
-        })
-    }
+    totals
 }
 
-/// The differences of the second setting from the first on the same worlds with the same noise.
-struct Comparison<'a> {
-    from: &'a str,
-    to: &'a str,
-    pairs: usize,
-    success: Estimate,
-    collision: Estimate,
-    /// Median ratio of the second's time to the first's, over missions in which both succeeded.
-    time_ratio: Option<f64>,
+fn interval(of: Estimate) -> Vec<f64> {
+    [of.low, of.high].map(rounded).to_vec()
 }
 
-impl<'a> Comparison<'a> {
-    fn of(from: &'a str, to: &'a str, rows: &[Row]) -> Self {
-        let of = |setting| -> BTreeMap<_, &Row> {
-            let its = rows.iter().filter(|row| row.setting == setting);
-            its.map(|row| ((&row.world, row.seed), row)).collect()
-        };
-        let (first, second) = (of(from), of(to));
-        let pairs: Vec<(&Row, &Row)> =
-            first.iter().filter_map(|(key, row)| Some((*row, *second.get(key)?))).collect();
-        let count = |outcome, counts: fn(bool, bool) -> bool| {
-            let has = |row: &Row| row.outcome == outcome;
-            pairs.iter().filter(|(a, b)| counts(has(a), has(b))).count()
-        };
-        let change = |outcome| {
-            let (gained, lost) = (count(outcome, |a, b| b && !a), count(outcome, |a, b| a && !b));
-            paired_difference(gained, lost, pairs.len())
-        };
-        let both = pairs.iter().filter(|(a, b)| a.is_success() && b.is_success());
-        Self {
-            from,
-            to,
-            pairs: pairs.len(),
-            success: change(Outcome::Success),
-            collision: change(Outcome::Collision),
-            time_ratio: median(both.map(|(a, b)| b.time_s / a.time_s.max(1e-9))),
-        }
+/// The differences of the setting `to` from the setting `from` on the same worlds with the same noise.
+fn versus(from: &str, to: &str, rows: &[Row]) -> Value {
+    let of = |setting| -> BTreeMap<_, &Row> {
+        let its = rows.iter().filter(|row| row.setting == setting);
+        its.map(|row| ((&row.world, row.seed), row)).collect()
+    };
+    let (first, second) = (of(from), of(to));
+    let pairs: Vec<(&Row, &Row)> =
+        first.iter().filter_map(|(key, row)| Some((*row, *second.get(key)?))).collect();
+    let change = |outcome| {
+        let has = |row: &Row| row.outcome == outcome;
+        let gained = pairs.iter().filter(|(a, b)| has(b) && !has(a)).count();
+        let lost = pairs.iter().filter(|(a, b)| has(a) && !has(b)).count();
+        let change = paired_difference(gained, lost, pairs.len());
+        [vec![rounded(change.value)], interval(change)].concat()
+    };
+    let both = pairs.iter().filter(|(a, b)| a.is_success() && b.is_success());
+    let mut versus = json!({
+        "totals": totals(to, rows),
+        "pairs": pairs.len(),
+        "success_change": change(Outcome::Success),
+        "collision_change": change(Outcome::Collision),
+    });
+    // The median ratio of the times, over missions in which both succeeded.
+    if let Some(ratio) = median(both.map(|(a, b)| b.time_s / a.time_s.max(1e-9))) {
+        versus["time_ratio"] = ratio.into();
     }
-
-    fn text(&self) -> String {
-        let Self { from, to, pairs, success, collision, time_ratio } = self;
-        let ratio = time_ratio.map_or(String::new(), |ratio| format!(", time x {ratio:.2}"));
-        format!(
-            "{to} against {from}, {pairs} pairs: success {success:+}, collision {collision:+}{ratio}"
-        )
-    }
-
-    fn object(&self, totals: &Totals<'_>) -> Value {
-        let interval = |of: Estimate| [of.value, of.low, of.high];
-        json!({
-            "totals": totals.object(),
-            "pairs": self.pairs,
-            "success_change": interval(self.success),
-            "collision_change": interval(self.collision),
-            "time_ratio": self.time_ratio,
-        })
-    }
+    versus
 }
 
-/// The totals of every setting, and the comparisons of each but the first with the first.
-pub struct Report<'a> {
-    results: &'a Results,
-    totals: Vec<Totals<'a>>,
-    comparisons: Vec<Comparison<'a>>,
-}
-
-impl<'a> Report<'a> {
-    pub fn new(settings: &'a [Setting], results: &'a Results) -> Self {
-        let rows = &results.rows.rows;
-        let names = settings.iter().map(|setting| &*setting.name);
-        let others = names.clone().skip(1);
-        Self {
-            results,
-            totals: names.map(|name| Totals::of(name, rows)).collect(),
-            comparisons: others.map(|to| Comparison::of(&settings[0].name, to, rows)).collect(),
+/// Write the page; pictures are beside it, as [`runner::picture`] says. `command` reproduces the results.
+pub fn save_page(results: &Results, report: &Value, command: &str) -> Result<PathBuf> {
+    let Results { directory, rows, .. } = results;
+    let mut page = Page::new("Evaluation", command);
+    page.table(&crate::text(report));
+    for outcome in OUTCOMES.into_iter().skip(1) {
+        let failures: Vec<_> =
+            rows.rows.iter().filter(|row| row.outcome_name() == outcome).collect();
+        if !failures.is_empty() {
+            page.heading(&format!("{outcome} ({})", failures.len()));
+        }
+        for row in failures {
+            let Row { world, seed, setting, reason, .. } = row;
+            let caption = format!("{world}, seed {seed}, {setting}: {reason}");
+            page.figure(&caption, directory, &runner::picture(row));
         }
     }
-
-    /// The first setting; `versus` has the others.
-    pub fn object(&self) -> Value {
-        let mut totals = self.totals.iter();
-        let mut object = totals.next().map(Totals::object).unwrap_or_default();
-        let others = totals.zip(&self.comparisons).map(|(totals, it)| it.object(totals));
-        let others: Vec<Value> = others.collect();
-        if !others.is_empty() {
-            object["versus"] = others.into();
-        }
-        object
-    }
-
-    /// A table in text, with 95 % intervals.
-    pub fn text(&self) -> String {
-        let mut text = String::new();
-        // Writing to a String cannot fail.
-        for totals in &self.totals {
-            let _ = writeln!(text, "{}: {} missions", totals.setting, totals.count);
-            for (name, share) in OUTCOMES.iter().zip(totals.shares) {
-                if share.value > 0.0 || *name == "collision" {
-                    let _ = writeln!(text, "  {name:<12} {share}");
-                }
-            }
-            for (name, value) in totals.metrics() {
-                let _ = writeln!(text, "  {name:<26} {value}");
-            }
-        }
-        for comparison in &self.comparisons {
-            text += &comparison.text();
-            text.push('\n');
-        }
-        text
-    }
-
-    /// Write the page; pictures are beside it, as [`runner::picture`] says. `command` reproduces the results.
-    pub fn save_page(&self, command: &str) -> Result<PathBuf> {
-        let Results { directory, rows, latencies } = self.results;
-        let mut page = Page::new("Evaluation", command);
-        let titles = ["setting", "missions"].iter().chain(&OUTCOMES);
-        let titles = titles.chain(&["metrics of the successes"]).map(|&it| it.to_owned());
-        let totals = self.totals.iter().map(|totals| {
-            let metrics: Vec<_> =
-                totals.metrics().map(|(name, value)| format!("{name} {value}")).collect();
-            let mut cells = vec![totals.setting.to_owned(), totals.count.to_string()];
-            cells.extend(totals.shares.map(|share| share.to_string()));
-            cells.push(metrics.join("\n"));
-            cells
-        });
-        page.table([titles.collect()].into_iter().chain(totals));
-        page.text("Shares with Wilson's 95 % intervals.");
-        self.comparisons.iter().for_each(|comparison| page.text(&comparison.text()));
-        if !latencies.rows.is_empty() {
-            page.heading("Latencies");
-            page.text("Microseconds of this machine, medians over the missions; each mission is in latencies.csv.");
-            let titles = ["setting", "of a", "median", "99 %", "longest"].map(str::to_owned);
-            let medians = self.totals.iter().flat_map(|totals| {
-                LATENCIES.map(|(name, columns)| {
-                    let over = |column: fn(&Latency) -> Option<f64>| {
-                        let its = latencies.rows.iter().filter(|it| it.setting == totals.setting);
-                        let value = median(its.filter_map(column));
-                        value.map_or(String::new(), |value| format!("{value:.0}"))
-                    };
-                    [vec![totals.setting.to_owned(), name.to_owned()], columns.map(over).to_vec()]
-                        .concat()
-                })
-            });
-            page.table([titles.to_vec()].into_iter().chain(medians));
-        }
-        for outcome in OUTCOMES.into_iter().skip(1) {
-            let failures: Vec<_> =
-                rows.rows.iter().filter(|row| row.outcome_name() == outcome).collect();
-            if !failures.is_empty() {
-                page.heading(&format!("{outcome} ({})", failures.len()));
-            }
-            for row in failures {
-                let picture = runner::picture(row);
-                let own_page = picture.with_extension("html");
-                let there = [&picture, &own_page]
-                    .map(|file| directory.join(file).exists().then_some(&**file));
-                let Row { world, seed, setting, reason, .. } = row;
-                let caption = format!("{world}, seed {seed}, {setting}: {reason}");
-                page.figure(&caption, there[0], there[1]);
-            }
-        }
-        page.save(directory)
-    }
+    page.save(directory)
 }

@@ -20,20 +20,16 @@ use crate::{
     },
 };
 
-/// The figures of missions that arrived: key, title and digits.
-const FIGURES: [(&str, &str, usize); 7] = [
-    ("time_s", "time, s", 1),
-    ("path_m", "path, m", 2),
-    ("k", "K", 2),
-    ("clearance_m", "clearance, m", 2),
-    ("safety_events", "safety events", 0),
-    ("sonar_unavailable", "sonar unavailable", 2),
-    ("wheel_range_rad_s", "wheel range, rad/s", 2),
+/// The figures of missions that arrived, with their digits.
+const FIGURES: [(&str, usize); 7] = [
+    ("time_s", 1),
+    ("path_m", 2),
+    ("k", 2),
+    ("clearance_m", 2),
+    ("safety_events", 0),
+    ("sonar_unavailable", 2),
+    ("wheel_range_rad_s", 2),
 ];
-const TITLES: [&str; 7] =
-    ["experiment", "method", "arrived", "touched", "wrong place", "other", "paper, s"];
-const COLUMNS: usize = TITLES.len() + FIGURES.len();
-
 /// The missions of an experiment by one method.
 struct Findings<'a> {
     experiment: &'a Experiment,
@@ -67,26 +63,35 @@ impl Findings<'_> {
         [arrived, touched, wrong_place, self.rows.len() - arrived - touched - wrong_place]
     }
 
-    fn cells(&self) -> [String; COLUMNS] {
+    fn add_to(&self, table: &mut Table<14>) {
         let [arrived, touched, wrong_place, others] = self.counts();
         let Experiment { name, reported_time_s, .. } = self.experiment;
-        let mut cells = vec![
-            name.clone(),
-            self.method.to_owned(),
-            format!("{arrived}/{}", self.rows.len()),
-            touched.to_string(),
-            wrong_place.to_string(),
-            others.to_string(),
-            reported_time_s.map_or("-".to_owned(), |time| format!("{time:.0}")),
-        ];
+        let arrived = format!("{arrived}/{}", self.rows.len());
+        let paper = reported_time_s.map_or("-".to_owned(), |time| format!("{time:.0}"));
         // The median and the middle half, like `51.2 (48.0-55.1)`.
-        cells.extend(FIGURES.map(|(figure, _, digits)| match self.spread(figure) {
-            None => "-".to_owned(),
-            Some(Spread { low, median, high }) => {
-                format!("{median:.digits$} ({low:.digits$}-{high:.digits$})")
-            }
-        }));
-        std::array::from_fn(|column| std::mem::take(&mut cells[column]))
+        let [time, path, k, clearance, events, sonar, wheels] =
+            FIGURES.map(|(figure, digits)| match self.spread(figure) {
+                None => "-".to_owned(),
+                Some(Spread { low, median, high }) => {
+                    format!("{median:.digits$} ({low:.digits$}-{high:.digits$})")
+                }
+            });
+        table.row([
+            name,
+            &self.method,
+            &arrived,
+            &touched,
+            &wrong_place,
+            &others,
+            &paper,
+            &time,
+            &path,
+            &k,
+            &clearance,
+            &events,
+            &sonar,
+            &wheels,
+        ]);
     }
 
     fn object(&self) -> Value {
@@ -123,13 +128,6 @@ pub struct Report<'a> {
     experiments: &'a [Experiment],
     findings: Vec<Findings<'a>>,
     expectations: Vec<Expectation>,
-}
-
-fn titles() -> [&'static str; COLUMNS] {
-    std::array::from_fn(|column| match TITLES.get(column) {
-        Some(title) => title,
-        None => FIGURES[column - TITLES.len()].1,
-    })
 }
 
 impl<'a> Report<'a> {
@@ -198,17 +196,7 @@ impl<'a> Report<'a> {
         pictured_seed: u64,
     ) -> Result<PathBuf> {
         let mut page = Page::new("The paper's experiments", command);
-        page.text("Medians and, in brackets, the middle half of the missions that arrived.");
-        let titles = titles().map(str::to_owned);
-        let cells = self.findings.iter().map(Findings::cells);
-        page.table([titles].into_iter().chain(cells).map(|cells| cells.to_vec()));
-        let titles = ["experiment", "method", "the paper says", "found", "holds"];
-        let claims = self.expectations.iter().map(|it| {
-            let holds = if it.holds { "yes" } else { "no" };
-            [&*it.experiment, it.method, &it.claim, &format!("{:.2}", it.found), holds]
-                .map(str::to_owned)
-        });
-        page.table([titles.map(str::to_owned)].into_iter().chain(claims).map(|it| it.to_vec()));
+        page.table(&self.text());
         for Experiment { name, title, reported, .. } in self.experiments {
             page.heading(&format!("{name}: {title}"));
             page.text(&format!("The paper: {reported}."));
@@ -216,7 +204,7 @@ impl<'a> Report<'a> {
                 if row.seed == pictured_seed || !row.is_success() {
                     let Row { setting, seed, .. } = row;
                     let caption = format!("{setting}, seed {seed}: {}", row.outcome_name());
-                    page.figure(&caption, Some(&picture(row)), None);
+                    page.figure(&caption, directory, &picture(row));
                 }
             }
         }
@@ -225,10 +213,23 @@ impl<'a> Report<'a> {
 
     /// The table, and the claims that hold.
     pub fn text(&self) -> String {
-        let mut table = Table::new(titles());
-        self.findings
-            .iter()
-            .for_each(|findings| table.row(findings.cells().each_ref().map(|cell| cell as _)));
+        let mut table = Table::new([
+            "experiment",
+            "method",
+            "arrived",
+            "touched",
+            "wrong place",
+            "other",
+            "paper, s",
+            "time, s",
+            "path, m",
+            "K",
+            "clearance, m",
+            "safety events",
+            "sonar unavailable",
+            "wheel range, rad/s",
+        ]);
+        self.findings.iter().for_each(|findings| findings.add_to(&mut table));
         let mut text = format!("{table}medians and the middle half of the missions that arrived\n");
         for Expectation { experiment, method, claim, found, holds } in &self.expectations {
             let holds = if *holds { "holds" } else { "does not hold" };

@@ -5,11 +5,9 @@ use serde::{Deserialize, de::DeserializeOwned};
 
 use crate::{
     error::{Refused, Result},
-    missions::trial::{BodySize, Trial},
+    missions::trial::{Trial, swept_m},
 };
 
-/// Free ground on both sides of the body in the narrowest passage of a world, metres.
-const MARGIN_M: f64 = 0.05;
 /// Without sensing the drum at this place is not known, metres. A robot without sensing touches unknown things on its path; the
 /// field of the other drums does not lead past this one.
 const UNKNOWN_AT_M: [f64; 2] = [2.3, -1.7];
@@ -87,8 +85,8 @@ impl Experiment {
             mission.known = mission.world.clone();
             mission.known.drums.retain(|drum| drum.at.to_array() != UNKNOWN_AT_M);
         }
-        let body = BodySize { radius_m: mission.body().radius_m, margin_m: MARGIN_M };
-        let trial = Trial::of_mission(self.name.clone(), mission, &body);
+        let swept_m = swept_m(&mission);
+        let trial = Trial::of_mission(self.name.clone(), mission, swept_m);
         let unsolvable = || {
             format!(
                 "experiment {}: the robot cannot get to the target; change the obstacles of its mission",

@@ -6,7 +6,7 @@ use crate::error::{OrCannot as _, Result};
 
 const PAGE_FILE: &str = "index.html";
 const STYLE: &str = "body{font:15px/1.5 sans-serif;max-width:1200px;margin:2em auto;padding:0 1em;color:#1f2933}\
-table{border-collapse:collapse;display:block;overflow-x:auto}td,th{border:1px solid #cbd2d9;padding:.3em .6em;text-align:left;vertical-align:top}\
+pre{overflow-x:auto}\
 code{overflow-wrap:anywhere}figure{display:inline-block;width:min(100%,570px);margin:.5em .2em;vertical-align:top}img{width:100%}";
 
 pub struct Page(String);
@@ -30,29 +30,25 @@ impl Page {
         self.0 += &format!("<p>{}</p>\n", escaped(text));
     }
 
-    /// A table; the first row holds the titles. A line feed in a cell begins a line.
-    pub fn table(&mut self, rows: impl IntoIterator<Item = Vec<String>>) {
-        self.0 += "<table>";
-        for (row, tag) in rows.into_iter().zip(["th"].into_iter().chain(std::iter::repeat("td"))) {
-            let cells = row.iter().map(|cell| {
-                let lines: Vec<_> = cell.lines().map(escaped).collect();
-                format!("<{tag}>{}</{tag}>", lines.join("<br>"))
-            });
-            self.0 += &format!("<tr>{}</tr>\n", cells.collect::<String>());
-        }
-        self.0 += "</table>\n";
+    /// Text whose lines and columns stay as they are.
+    pub fn table(&mut self, text: &str) {
+        let lines: Vec<_> = text.lines().map(escaped).collect();
+        self.0 += &format!("<pre>{}</pre>\n", lines.join("\n"));
     }
 
-    /// A picture, if there is one, and a link to the page of its run. Both files are beside the page.
-    pub fn figure(&mut self, caption: &str, picture: Option<&Path>, page: Option<&Path>) {
-        let path = |path: &Path| escaped(&path.to_string_lossy());
-        let picture = picture.map(path).map_or(String::new(), |file| {
-            format!("<img loading=\"lazy\" src=\"{file}\" alt=\"{file}\">")
+    /// A picture and a link to the page of its run, in so far as there are these files of `directory`, in which the page will be.
+    pub fn figure(&mut self, caption: &str, directory: &Path, picture: &Path) {
+        let shown = |file: &Path, show: fn(String) -> String| {
+            let there = Some(file).filter(|file| directory.join(file).exists());
+            there.map(|file| show(escaped(&file.to_string_lossy()))).unwrap_or_default()
+        };
+        let image =
+            shown(picture, |file| format!("<img loading=\"lazy\" src=\"{file}\" alt=\"{file}\">"));
+        let page = shown(&picture.with_extension("html"), |file| {
+            format!("<a href=\"{file}\">its page</a>")
         });
-        let page = page.map(path);
-        let page = page.map_or(String::new(), |file| format!("<a href=\"{file}\">its page</a>"));
         let caption = escaped(caption);
-        self.0 += &format!("<figure><figcaption>{caption}</figcaption>{picture}{page}</figure>\n");
+        self.0 += &format!("<figure><figcaption>{caption}</figcaption>{image}{page}</figure>\n");
     }
 
     /// Write the page into `directory`. Returns its path.

@@ -83,7 +83,7 @@ pub fn picture(row: &Row) -> PathBuf {
         .join(name.replace(|c: char| !(c.is_ascii_alphanumeric() || "-_.".contains(c)), "_"))
 }
 
-/// Run all missions of `plan` whose rows are not in `results` yet. A line on standard error, which begins with `title`, shows how far.
+/// Run all missions of `plan` whose rows are not in `results` yet. Lines on standard error below `title` show how far.
 ///
 /// # Errors
 /// A file cannot be written, or `firsthand` does not start.
@@ -113,46 +113,56 @@ pub fn run(plan: &Plan, results: &mut Results, title: &str) -> Result {
         }
     }
     let first = all - left.len();
-    let queue = Mutex::new(left.into_iter());
-    let (give, rows) = channel();
     let processors = || thread::available_parallelism().map_or(1, NonZero::get);
+    let threads = plan.jobs.map_or_else(processors, NonZero::get);
+    let (began, mut ended, mut line) = (Instant::now(), 0, ProgressLine::new(LINE_EVERY));
+    let run = |job: &Job<'_>, thread| {
+        let ended = match job.run(thread) {
+            Ok((row, _)) if row.outcome == Outcome::Aborted => job.run(thread),
+            ended => ended,
+        };
+        ended.map_err(|error| error.to_string())
+    };
+    let kept = in_parallel(left, threads, run, |given| {
+        let (row, latency) = given?;
+        // Latencies are written first, so that a mission with a row has both.
+        latency.map_or(Ok(()), |latency| results.latencies.add(latency))?;
+        results.rows.add(row)?;
+        ended += 1;
+        let shown = || {
+            let each_s = began.elapsed().as_secs_f64() / ended as f64;
+            let left_s = each_s * (all - first - ended) as f64;
+            format!("{} of {all} missions, {left_s:.0} s left", first + ended)
+        };
+        line.update(title, shown, true);
+        Ok(())
+    });
+    line.end();
+    kept
+}
+
+/// Do `jobs` by so many numbered threads, and take their results as they come.
+///
+/// # Errors
+/// A result cannot be taken; then no other job begins.
+pub fn in_parallel<Job: Send, Done: Send>(
+    jobs: Vec<Job>,
+    threads: usize,
+    work: impl Fn(&Job, usize) -> Done + Sync,
+    take: impl FnMut(Done) -> Result,
+) -> Result {
+    let (queue, (give, results)) = (Mutex::new(jobs.into_iter()), channel());
     thread::scope(|scope| {
-        for worker in 0..plan.jobs.map_or_else(processors, NonZero::get) {
-            let (give, queue) = (give.clone(), &queue);
+        for number in 0..threads {
+            let (give, queue, work) = (give.clone(), &queue, &work);
             scope.spawn(move || {
-                while let Some(job) = queue.lock().ok().and_then(|mut queue| queue.next()) {
-                    let ended = match job.run(worker) {
-                        Ok((row, _)) if row.outcome == Outcome::Aborted => job.run(worker),
-                        ended => ended,
-                    };
-                    if give.send(ended.map_err(|error| error.to_string())).is_err() {
-                        return;
-                    }
-                }
+                while let Some(job) = queue.lock().ok().and_then(|mut queue| queue.next())
+                    && give.send(work(&job, number)).is_ok()
+                {}
             });
         }
         drop(give);
-        let (began, mut line) = (Instant::now(), ProgressLine::new(LINE_EVERY));
-        let keep = || {
-            for (ended, given) in (1..).zip(rows) {
-                let (row, latency) = given?;
-                // Latencies are written first, so that a mission with a row has both.
-                latency.map_or(Ok(()), |latency| results.latencies.add(latency))?;
-                results.rows.add(row)?;
-                if line.is_due() {
-                    line.begin();
-                    let each_s = began.elapsed().as_secs_f64() / f64::from(ended);
-                    let ended = first + ended as usize;
-                    let left_s = each_s * (all - ended) as f64;
-                    let shown = format!("{title}{ended} of {all} missions, {left_s:.0} s left");
-                    line.show(&shown, true);
-                }
-            }
-            Ok(())
-        };
-        let kept = keep();
-        line.end();
-        kept
+        results.into_iter().try_for_each(take)
     })
 }
 

@@ -1,7 +1,5 @@
 //! Shares, differences of shares and their confidence intervals; medians and means.
 
-use std::fmt;
-
 use serde::Serialize;
 
 /// Quantile of the normal distribution for 95 %.
@@ -13,18 +11,6 @@ pub struct Estimate {
     pub value: f64,
     pub low: f64,
     pub high: f64,
-}
-
-impl fmt::Display for Estimate {
-    /// Write the estimate, for example as `.620 [.564, .673]`, or with signs as `{:+}`.
-    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { value, low, high } = self;
-        if to.sign_plus() {
-            write!(to, "{value:+.3} [{low:+.3}, {high:+.3}]")
-        } else {
-            write!(to, "{value:.3} [{low:.3}, {high:.3}]")
-        }
-    }
 }
 
 /// The share of `hits` in `n`, with Wilson's interval (Wilson 1927).
@@ -74,19 +60,6 @@ pub fn paired_difference(gained: usize, lost: usize, n: usize) -> Estimate {
     Estimate { value, low: (middle - half).max(-1.0), high: (middle + half).min(1.0) }
 }
 
-/// The value that `share` of all values do not exceed; none without values.
-pub fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
-    let values = sorted(values)?;
-    values.get(((values.len() - 1) as f64 * share).round() as usize).copied()
-}
-
-/// None without values.
-fn sorted(values: impl IntoIterator<Item = f64>) -> Option<Vec<f64>> {
-    let mut values: Vec<f64> = values.into_iter().collect();
-    values.sort_by(f64::total_cmp);
-    (!values.is_empty()).then_some(values)
-}
-
 pub fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     Some(Spread::of(values)?.median)
 }
@@ -101,14 +74,21 @@ pub struct Spread {
 impl Spread {
     /// The quartiles, linear between neighbours; none without values.
     pub fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
-        let values = sorted(values)?;
+        let mut values: Vec<f64> = values.collect();
+        values.sort_by(f64::total_cmp);
+        let last = values.len().checked_sub(1)?;
         let at = |share: f64| {
-            let place = share * (values.len() - 1) as f64;
+            let place = share * last as f64;
             let (below, above) = (values[place.floor() as usize], values[place.ceil() as usize]);
             below + (above - below) * place.fract()
         };
         Some(Self { low: at(0.25), median: at(0.5), high: at(0.75) })
     }
+}
+
+/// To a thousandth, for people.
+pub fn rounded(value: f64) -> f64 {
+    (value * 1e3).round() / 1e3
 }
 
 pub fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {

@@ -15,8 +15,15 @@ use report::shortest_path::{ShortestPath, shortest_path};
 const WIDTH_STEP_M: f64 = 0.1;
 /// Free ground between the things of a world and the perimeter, metres.
 const RIM_M: f64 = 0.6;
+/// Free ground on both sides of the body in the narrowest way of a world, metres.
+const MARGIN_M: f64 = 0.05;
 /// Mission seconds allowed beside those of [`Rules::most_s`], to turn before the clock starts.
 const BEFORE_CLOCK_S: f64 = 20.0;
+
+/// Half the width of the narrowest passage for the robot of `mission`, metres.
+pub fn swept_m(mission: &Mission) -> f64 {
+    mission.body().radius_m + MARGIN_M
+}
 
 /// The rules by which the ground truth judges a mission.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,15 +73,10 @@ pub struct Trial {
 }
 
 impl Trial {
-    /// The trial `world` in `scene`, if a body of `radius_m` can get from start to target with `margin_m` to spare.
-    pub fn new(
-        world: String,
-        scene: &Scene,
-        rules: Rules,
-        body: &BodySize,
-    ) -> Result<Option<Self>> {
+    /// The trial `world` in `scene`, if the body can get from start to target with `swept_m` around its centre.
+    pub fn new(world: String, scene: &Scene, rules: Rules, swept_m: f64) -> Result<Option<Self>> {
         let touched = Heights::preset(Realism::default()).touched(&scene.shapes);
-        let Some(shortest_m) = body.shortest_m(&touched, scene.start, scene.target) else {
+        let Some(shortest_m) = shortest_m(&touched, scene.start, scene.target, swept_m) else {
             return Ok(None);
         };
         let mut mission = mission(&world, scene)?;
@@ -85,33 +87,18 @@ impl Trial {
     }
 
     /// The trial `world` of an unchanged `mission`, if a body can get from start to target in its world.
-    pub fn of_mission(world: String, mission: Mission, body: &BodySize) -> Option<Self> {
+    pub fn of_mission(world: String, mission: Mission, swept_m: f64) -> Option<Self> {
         let start = mission.start_pose().position;
-        let shortest_m = body.shortest_m(&mission.obstacles(), start, mission.target)?;
+        let shortest_m = shortest_m(&mission.obstacles(), start, mission.target, swept_m)?;
         Some(Self { world, mission, shortest_m, rules: Rules::PLAIN })
     }
 }
 
-/// The body for which a world must be solvable.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BodySize {
-    pub radius_m: f64,
-    /// Free ground that must be left on both sides, metres.
-    pub margin_m: f64,
-}
-
-impl BodySize {
-    /// Half the width of the narrowest passage, metres.
-    pub fn swept_m(&self) -> f64 {
-        self.radius_m + self.margin_m
-    }
-
-    /// The length of the shortest path between `shapes`, metres; none if there is none.
-    fn shortest_m(&self, shapes: &Shapes, start: DVec2, target: DVec2) -> Option<f64> {
-        match shortest_path(shapes, start, target, self.swept_m()) {
-            ShortestPath::Found(shortest_m) => Some(shortest_m),
-            ShortestPath::None | ShortestPath::TooLarge => None,
-        }
+/// The length of the shortest path between `shapes` that stays `swept_m` away from them, metres; none if there is none.
+fn shortest_m(shapes: &Shapes, start: DVec2, target: DVec2, swept_m: f64) -> Option<f64> {
+    match shortest_path(shapes, start, target, swept_m) {
+        ShortestPath::Found(shortest_m) => Some(shortest_m),
+        ShortestPath::None | ShortestPath::TooLarge => None,
     }
 }
 

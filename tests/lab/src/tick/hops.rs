@@ -6,31 +6,28 @@
 use std::time::{Duration, Instant};
 
 use common::{
-    bus::{Author, Bus, BusError},
+    bus::{Author, Bus, BusError, Payload, Stamped, Topic},
     clock::{MissionTime, monotonic_ns},
     domain::{Domain, RobotName},
     latency::Histogram,
-    samples::{CommandSample, GridHeader, GuidanceSample, PoseSample, WheelSample},
+    samples::WheelSample,
     signals::{SIGTERM, Signals},
     start::become_child,
-    topics::{self, AnyTopic},
+    topics,
     waiter::Waiter,
 };
-use processes::{
-    domain::DomainLock,
-    process::{Process, firsthand},
-};
+use processes::domain::DomainLock;
 
 use crate::error::{LOST, LOST_SAMPLE, OrCannot as _, Result};
 
 /// Cells of the smallest map. No forwarder reads it.
 const CELLS: usize = 64;
 /// The forwarders, by the stage that each stands for.
-pub const PLACES: [&str; 4] = ["dead-reckoning", "mapper", "planner", "controller"];
+const PLACES: [&str; 4] = ["dead-reckoning", "mapper", "planner", "controller"];
 /// Pause between samples to forwarders that may not have started yet.
 const SEND_AGAIN: Duration = Duration::from_millis(20);
 /// Trips before the measurement, which map all memory.
-pub const WARM_UP: u64 = 200;
+const WARM_UP: u64 = 200;
 
 /// Send `trips` samples around the forwarders, one every `period`, or back to back; those that warm up are always back to
 /// back.
@@ -41,13 +38,9 @@ pub fn measure(robot: &RobotName, trips: u64, period: Option<Duration>) -> Resul
     let mut end = bus.reader(&topics::COMMAND)?;
     let mut waiter = Waiter::default();
     waiter.on(bus.wakeup(&topics::COMMAND)?);
-    let own = std::process::id().to_string();
     let mut forwarders = Vec::new();
     for place in PLACES {
-        let arguments = ["bench", "tick", "--forwarder", place, "--supervisor", &own];
-        let mut command = firsthand(&arguments);
-        command.args(["--robot", &robot.to_string()]);
-        let forwarder = Process::spawn(command).or_cannot("start a forwarder")?;
+        let forwarder = super::start(place, robot)?;
         if let Some(writers) = bus.writers() {
             let author = Author { process: forwarder.id(), generation: 1 };
             writers.name([(place.to_owned(), author)]);
@@ -107,40 +100,30 @@ pub fn run_forwarder(robot: &RobotName, place: &str, supervisor: u32) -> Result 
 /// Forwards all new samples.
 type Forward = Box<dyn FnMut() -> Result<(), BusError>>;
 
-/// A wake-up of the waiter on `$from`, and a closure that publishes on `$to` for each of its samples, in the same tick.
-macro_rules! forward {
-    ($bus:ident, $from:ident $next:ident $($header:ident)?, $writer:expr, $publish:ident $payload:expr $(, $cells:expr)?) => {{
-        let (mut from, mut to) = ($bus.reader(&topics::$from)?, $writer?);
-        let forward = move || {
-            while let Some(sample) = from.$next()? {
-                let tick = sample$(.$header())?.stamp.tick;
-                to.$publish(tick, MissionTime::default(), $payload $(, $cells)?)?;
-            }
-            Ok(())
-        };
-        (&topics::$from, Box::new(forward))
-    }};
+fn forwarder(bus: &Bus, place: &str, waiter: &mut Waiter) -> Result<Forward> {
+    match place {
+        "dead-reckoning" => forward(bus, waiter, &topics::WHEELS, &topics::POSE),
+        "mapper" => forward(bus, waiter, &topics::POSE, &topics::GRID),
+        "planner" => forward(bus, waiter, &topics::GRID, &topics::GUIDANCE),
+        "controller" => forward(bus, waiter, &topics::GUIDANCE, &topics::COMMAND),
+        _ => Err(format!("no forwarder stands for {place:?}").into()),
+    }
 }
 
-fn forwarder(bus: &Bus, place: &str, waiter: &mut Waiter) -> Result<Forward> {
-    let (wakes, forward): (&dyn AnyTopic, Forward) = match PLACES
-        .iter()
-        .position(|name| *name == place)
-    {
-        Some(0) => {
-            forward!(bus, WHEELS next_sample, bus.writer(&topics::POSE, 1), publish PoseSample::default())
+/// Wake `waiter` on samples of `from`, for each of which the result publishes one of `to`, in the same tick.
+fn forward<H: Stamped, E: Payload, To: Stamped + Default, ToE: Payload>(
+    bus: &Bus,
+    waiter: &mut Waiter,
+    from: &Topic<H, E>,
+    to: &Topic<To, ToE>,
+) -> Result<Forward> {
+    waiter.on(bus.wakeup(from)?);
+    let (mut from, mut to) = (bus.reader(from)?, bus.slice_writer(to, 1, CELLS)?);
+    Ok(Box::new(move || {
+        while let Some(sample) = from.next_slice()? {
+            let tick = sample.header().stamp().tick;
+            to.publish_slice(tick, MissionTime::default(), To::default(), &[])?;
         }
-        Some(1) => {
-            forward!(bus, POSE next_sample, bus.slice_writer(&topics::GRID, 1, CELLS), publish_slice GridHeader::default(), &[])
-        }
-        Some(2) => {
-            forward!(bus, GRID next_slice header, bus.writer(&topics::GUIDANCE, 1), publish GuidanceSample::default())
-        }
-        Some(_) => {
-            forward!(bus, GUIDANCE next_sample, bus.writer(&topics::COMMAND, 1), publish CommandSample::default())
-        }
-        None => return Err(format!("no forwarder stands for {place:?}").into()),
-    };
-    waiter.on(bus.wakeup(wakes)?);
-    Ok(forward)
+        Ok(())
+    }))
 }

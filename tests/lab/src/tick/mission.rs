@@ -1,4 +1,4 @@
-//! A mission whose ticks are measured.
+//! A mission whose ticks are measured, and its consumers: each a process that reads every sample of grid and field.
 
 use std::{
     process::{Output, Stdio},
@@ -7,11 +7,17 @@ use std::{
     time::Duration,
 };
 
-use common::{clock::Pace, domain::RobotName};
+use common::{
+    clock::Pace,
+    domain::{Domain, RobotName},
+    follower::{Event, Follower},
+    signals::{SIGTERM, Signals},
+    start::become_child,
+    topics,
+};
 use summary::Quantiles;
 
 use super::{
-    consumers,
     options::Arguments,
     process_set::{ProcessSet, Used},
 };
@@ -30,7 +36,10 @@ pub struct Ticks {
     pub used: Option<Used>,
 }
 
+pub const CONSUMER: &str = "consumer";
 const LOOK_EVERY: Duration = Duration::from_secs(1);
+/// How often a consumer looks whether it is asked to stop.
+const STOPS_WITHIN: Duration = Duration::from_millis(100);
 
 pub fn measure(arguments: &Arguments, robot: &RobotName, pace: Pace) -> Result<Ticks> {
     let directory = tempfile::Builder::new().prefix("firsthand-latency-").tempdir();
@@ -41,7 +50,8 @@ pub fn measure(arguments: &Arguments, robot: &RobotName, pace: Pace) -> Result<T
         command.arg("--no-record");
     }
     // The consumers wait for the bus, and follow it. They do not belong to the mission's processes.
-    let _consumers = consumers::start(robot, arguments.consumers)?;
+    let consumers = (0..arguments.consumers).map(|_| super::start(CONSUMER, robot));
+    let _consumers = consumers.collect::<Result<Vec<_>>>()?;
     let run = command
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -70,4 +80,21 @@ fn ticks(output: &Output, used: Option<Used>) -> Result<Ticks> {
         return Err(error::NOTHING.into());
     };
     Ok(Ticks { count: summary.ticks, p50_us, p99_us, max_us, used })
+}
+
+/// Be a consumer of `robot` until `supervisor` ends it.
+pub fn consume(robot: &RobotName, supervisor: u32) -> Result {
+    let mut terminated = Signals::catch(&[SIGTERM]).or_cannot("catch SIGTERM")?;
+    become_child(CONSUMER, supervisor)?;
+    let domain = Domain::of(robot.clone());
+    let mut follower = Follower::new(domain, CONSUMER, &topics::GRID, |bus| {
+        Ok((bus.reader(&topics::GRID)?, bus.reader(&topics::FIELD)?))
+    });
+    while !terminated.came() {
+        if let Event::Samples((grids, fields)) = follower.wait(STOPS_WITHIN)? {
+            while grids.next_slice()?.is_some() {}
+            while fields.next_slice()?.is_some() {}
+        }
+    }
+    Ok(())
 }

@@ -32,21 +32,15 @@ pub struct Arguments {
     /// Number of processes of ordinary priority that compute meanwhile, without end.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=1000))]
     pub busy: u32,
-    /// Be such a process.
-    #[arg(long, hide = true, requires = "supervisor")]
-    pub spin: bool,
-    /// Be a consumer of this robot.
-    #[arg(long, hide = true, requires = "supervisor", requires = "robot")]
-    pub consumer: bool,
     /// One line of JSON.
     #[arg(long)]
     pub json: bool,
     /// Name of the robot, which also names its shared memory.
     #[arg(long)]
     pub robot: Option<RobotName>,
-    /// Be the forwarder that stands for this stage.
+    /// Be one of the processes beside a measurement: busy, a consumer, or the forwarder that stands for this stage.
     #[arg(long, hide = true, requires = "supervisor", requires = "robot")]
-    pub forwarder: Option<String>,
+    pub role: Option<String>,
     /// The parent process: this one stops when it ends.
     #[arg(long, hide = true)]
     pub supervisor: Option<u32>,

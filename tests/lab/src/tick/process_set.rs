@@ -1,14 +1,17 @@
 //! Resources of a process and its descendants, from `/proc`.
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::BTreeSet,
     fs,
     time::{Duration, Instant},
 };
 
 use common::process_status;
+use serde::Serialize;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+use crate::robot::processes;
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Used {
     /// Voluntary context switches of all threads in a second: each wait ends with a wakeup.
     pub wakeups_per_s: f64,
@@ -26,14 +29,10 @@ pub struct ProcessSet {
     pss_kib: u64,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 struct Counts {
     at: Instant,
-    processes: BTreeMap<u32, Count>,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Count {
+    processes: BTreeSet<u32>,
     waits: u64,
     cpu: Duration,
 }
@@ -45,20 +44,16 @@ impl ProcessSet {
 
     /// Count now. Counting begins anew whenever a process has started, and stops when the first has ended.
     pub fn look(&mut self) {
-        let all = descendants(self.root);
-        let processes: BTreeMap<_, _> =
-            all.iter().filter_map(|&process| Some((process, Count::of(process)?))).collect();
-        let counts = Counts { at: Instant::now(), processes };
-        let known = self.first.as_ref().map(|first| &first.processes);
-        let started = known.is_none_or(|known| all.iter().any(|one| !known.contains_key(one)));
-        let ended = known.is_some_and(|known| known.keys().any(|one| !all.contains(one)));
-        if started {
-            // Memory is read only once, because that takes a process some of its time.
-            self.pss_kib = all.iter().filter_map(|&process| pss_kib(process)).sum();
-            self.first = Some(counts);
-            self.last = None;
-        } else if !ended {
-            self.last = Some(counts);
+        let now = Counts::of(self.root);
+        match &self.first {
+            Some(first) if now.processes == first.processes => self.last = Some(now),
+            Some(first) if now.processes.is_subset(&first.processes) => {}
+            _ => {
+                // Memory is read only once, because that takes a process some of its time.
+                self.pss_kib = now.processes.iter().filter_map(|&process| pss_kib(process)).sum();
+                self.first = Some(now);
+                self.last = None;
+            }
         }
     }
 
@@ -66,51 +61,44 @@ impl ProcessSet {
     pub fn used(&self) -> Option<Used> {
         let (first, last) = (self.first.as_ref()?, self.last.as_ref()?);
         let over = (last.at - first.at).as_secs_f64();
-        let (mut waits, mut cpu) = (0, Duration::ZERO);
-        for (process, now) in &last.processes {
-            let then = first.processes.get(process)?;
-            waits += now.waits.saturating_sub(then.waits);
-            cpu += now.cpu.saturating_sub(then.cpu);
-        }
         Some(Used {
-            wakeups_per_s: waits as f64 / over,
-            cpu_share: cpu.as_secs_f64() / over,
+            wakeups_per_s: last.waits.saturating_sub(first.waits) as f64 / over,
+            cpu_share: last.cpu.saturating_sub(first.cpu).as_secs_f64() / over,
             pss_mib: self.pss_kib as f64 / 1024.0,
         })
     }
 }
 
-impl Count {
-    fn of(process: u32) -> Option<Self> {
-        let mut waits = 0;
-        for thread in fs::read_dir(format!("/proc/{process}/task")).ok()?.flatten() {
-            let thread = format!("{process}/task/{}", thread.file_name().display());
-            let switches = process_status::field(&thread, "voluntary_ctxt_switches")?;
-            waits += switches.parse::<u64>().ok()?;
+impl Counts {
+    /// The counts of `root` and of every process that descends from it.
+    fn of(root: u32) -> Self {
+        let mut counts =
+            Self { at: Instant::now(), processes: BTreeSet::new(), waits: 0, cpu: Duration::ZERO };
+        for process in processes().filter(|&process| descends_from(process, root)) {
+            if let (Some(waits), Some(cpu)) =
+                (waits(process), process_status::processor_time(process))
+            {
+                counts.processes.insert(process);
+                counts.waits += waits;
+                counts.cpu += cpu;
+            }
         }
-        Some(Self { waits, cpu: process_status::processor_time(process)? })
+        counts
     }
 }
 
-/// `root` and every process that descends from it.
-fn descendants(root: u32) -> BTreeSet<u32> {
-    let parent = |process: u32| process_status::field(&process.to_string(), "PPid")?.parse().ok();
-    let parents: Vec<(u32, u32)> =
-        crate::robot::processes().filter_map(|process| Some((process, parent(process)?))).collect();
-    let mut found: BTreeSet<u32> =
-        parents.iter().map(|(process, _)| *process).filter(|process| *process == root).collect();
-    loop {
-        let more: Vec<u32> = parents
-            .iter()
-            .filter(|(process, _)| !found.contains(process))
-            .filter(|(_, parent)| found.contains(parent))
-            .map(|(process, _)| *process)
-            .collect();
-        if more.is_empty() {
-            return found;
-        }
-        found.extend(more);
-    }
+fn waits(process: u32) -> Option<u64> {
+    let threads = fs::read_dir(format!("/proc/{process}/task")).ok()?.flatten();
+    let waits = |thread: fs::DirEntry| {
+        let thread = format!("{process}/task/{}", thread.file_name().display());
+        process_status::field(&thread, "voluntary_ctxt_switches")?.parse::<u64>().ok()
+    };
+    threads.map(waits).sum()
+}
+
+fn descends_from(process: u32, root: u32) -> bool {
+    let parent = |process: &u32| process_status::field(&process.to_string(), "PPid")?.parse().ok();
+    std::iter::successors(Some(process), parent).any(|it| it == root)
 }
 
 fn pss_kib(process: u32) -> Option<u64> {
@@ -142,7 +130,7 @@ mod tests {
         let mut set = ProcessSet::of(shell.id());
         set.look();
         assert_eq!(set.used(), None, "nothing to compare with");
-        assert_eq!(descendants(shell.id()).len(), 2);
+        assert_eq!(Counts::of(shell.id()).processes.len(), 2);
         set.look();
         let used = set.used().unwrap();
         assert!(used.pss_mib > 0.1, "{used:?}");

@@ -4,46 +4,48 @@ use std::{fmt, time::Duration};
 
 use common::clock::Pace;
 
+/// Ticks a second; none if they follow each other at once.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Regime {
-    BackToBack,
-    Rate { hz: f64 },
-}
+pub struct Regime(Option<f64>);
+
+/// Trips of a round that follow each other without a pause.
+const TRIPS: u64 = 2000;
+/// Trips of a round with the pause of a tick between them.
+const PACED_TRIPS: u64 = 50;
 
 impl Regime {
     /// The regimes to measure a mission in that has `rate_hz` ticks in a mission second: the one that is asked for, or back to back
     /// and at the robot's rate.
     pub fn all(asked_hz: Option<f64>, pace: Option<Pace>, rate_hz: f64) -> Vec<Self> {
         match (asked_hz, pace) {
-            (Some(hz), _) => vec![Self::Rate { hz }],
-            (None, Some(Pace::Max)) => vec![Self::BackToBack],
-            (None, Some(Pace::Rate(rate))) => vec![Self::Rate { hz: rate * rate_hz }],
-            (None, None) => vec![Self::BackToBack, Self::Rate { hz: rate_hz }],
+            (Some(_), _) => vec![Self(asked_hz)],
+            (None, Some(Pace::Max)) => vec![Self(None)],
+            (None, Some(Pace::Rate(rate))) => vec![Self(Some(rate * rate_hz))],
+            (None, None) => vec![Self(None), Self(Some(rate_hz))],
         }
     }
 
     /// The pace that gives a mission with `rate_hz` ticks in a mission second this regime.
     pub fn pace(self, rate_hz: f64) -> Pace {
-        match self {
-            Self::BackToBack => Pace::Max,
-            Self::Rate { hz } => Pace::Rate(hz / rate_hz),
-        }
+        self.0.map_or(Pace::Max, |hz| Pace::Rate(hz / rate_hz))
     }
 
     /// Time from tick to tick; none if they follow at once.
     pub fn period(self) -> Option<Duration> {
-        match self {
-            Self::BackToBack => None,
-            Self::Rate { hz } => Some(Duration::from_secs_f64(1.0 / hz)),
-        }
+        Some(Duration::from_secs_f64(1.0 / self.0?))
+    }
+
+    /// Trips of the bare hops in a round.
+    pub const fn trips(self) -> u64 {
+        if self.0.is_some() { PACED_TRIPS } else { TRIPS }
     }
 }
 
 impl fmt::Display for Regime {
     fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::BackToBack => to.write_str("back to back"),
-            Self::Rate { hz } => write!(to, "at {hz} Hz"),
+        match self.0 {
+            None => to.write_str("back to back"),
+            Some(hz) => write!(to, "at {hz} Hz"),
         }
     }
 }
@@ -74,7 +76,7 @@ mod tests {
         assert_eq!(regime.period(), Some(Duration::from_secs_f64(1.0 / 7.0)));
         assert_eq!(regime.to_string(), "at 7 Hz");
         assert_eq!(Regime::all(None, Some(Pace::Rate(2.0)), 3.5), [regime]);
-        let at_once = Regime::BackToBack;
+        let at_once = Regime(None);
         assert_eq!(Regime::all(None, Some(Pace::Max), 7.0), [at_once]);
         assert_eq!(Regime::all(None, None, 7.0), [at_once, regime]);
         assert_eq!((at_once.pace(7.0), at_once.period()), (Pace::Max, None));

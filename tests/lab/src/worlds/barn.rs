@@ -21,17 +21,12 @@ use crate::{
 
 const START: DVec2 = DVec2::new(-2.25, 3.0);
 const GOAL: DVec2 = DVec2::new(-2.25, 13.0);
-/// Distance from the goal within which a robot has succeeded, metres.
-const SUCCESS_WITHIN_M: f64 = 1.0;
 /// The walls left and right and the wall behind the start, metres; the far side is open.
 const SIDES_M: [f64; 2] = [-4.425, -0.075];
 const BEHIND_M: f64 = 0.075;
 const SIDES_END_M: f64 = 9.6;
 /// Most bytes of a file. A world file has some hundred kilobytes, the table of all worlds one megabyte.
 const LONGEST: u64 = 64 << 20;
-/// Seconds allowed from the clock's start.
-const MOST_S: f64 = 100.0;
-
 #[derive(Deserialize)]
 struct Cylinder {
     world: u32,
@@ -115,9 +110,9 @@ fn scene(drums: Vec<Drum>) -> Scene {
 
 /// The rules of the challenge.
 pub const RULES: Rules = Rules {
-    success_within_m: SUCCESS_WITHIN_M,
+    success_within_m: 1.0,
     clock_after_departure: true,
-    most_s: Some(MOST_S),
+    most_s: Some(100.0),
     scored: true,
     optimal_time_s: None,
 };

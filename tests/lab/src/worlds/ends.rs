@@ -6,7 +6,7 @@
 //!
 //! and `initial_pose_y`, `initial_pose_a` (radians), `goal_pose_x`, `goal_pose_y`. The heading at the goal is not used.
 
-use std::{fs::File, io::Read as _, path::Path};
+use std::{collections::BTreeMap, fs::File, io::Read as _, path::Path};
 
 use glam::DVec2;
 
@@ -40,48 +40,46 @@ pub fn read(file: &Path) -> Result<Vec<Ends>> {
     parse(&text).map_err(|problem| malformed(file, problem))
 }
 
+/// A number of metres or radians, none beyond 1000 km.
+pub fn number(text: &str) -> Option<f64> {
+    text.trim().parse().ok().filter(|number: &f64| number.abs() <= 1e6)
+}
+
 fn parse(text: &str) -> Result<Vec<Ends>, String> {
-    let mut tests: Vec<[Option<f64>; KEYS.len()]> = Vec::new();
-    for (line, (key, value)) in (1..).zip(text.lines()).filter_map(argument) {
-        let Some(key) = KEYS.iter().position(|name| *name == key) else {
+    let mut tests: Vec<BTreeMap<&str, f64>> = Vec::new();
+    for (line, text) in (1..).zip(text.lines()) {
+        let Some((key, value)) = argument(text).filter(|(key, _)| KEYS.contains(key)) else {
             continue;
         };
-        let parsed = value.trim().parse().ok();
-        let number = parsed.filter(|number: &f64| number.abs() <= 1e6);
-        if number.is_none() {
-            let key = KEYS[key];
-            return Err(format!("line {line}: {key} is {value:?}; give metres or radians"));
+        let number = number(value)
+            .ok_or_else(|| format!("line {line}: {key} is {value:?}; give metres or radians"))?;
+        if tests.last().is_none_or(|test| test.contains_key(key)) {
+            tests.push(BTreeMap::new());
         }
-        if tests.last().is_none_or(|test| test[key].is_some()) {
-            tests.push([None; KEYS.len()]);
-        }
-        if let Some(test) = tests.last_mut() {
-            test[key] = number;
-        }
+        tests.last_mut().map(|test| test.insert(key, number));
     }
     if tests.is_empty() {
         return Err("no <arg name=\"initial_pose_x\" default=\"...\"/>; give MRPB's tests, or remove the file to have starts and targets drawn".to_owned());
     }
-    let complete = |(number, test): (usize, [Option<f64>; KEYS.len()])| {
-        if let [Some(x), Some(y), Some(heading), Some(to_x), Some(to_y)] = test {
-            return Ok(Ends { start: DVec2::new(x, y), heading, target: DVec2::new(to_x, to_y) });
-        }
-        let missing = KEYS.iter().zip(test).find(|(_, value)| value.is_none());
-        let key = missing.map_or("a key", |(key, _)| key);
-        Err(format!("test {number} has no {key}; add it"))
+    let complete = |(number, test): (usize, &BTreeMap<&str, f64>)| {
+        let value = |key: &str| {
+            test.get(key).copied().ok_or_else(|| format!("test {number} has no {key}; add it"))
+        };
+        let [x, y, heading, to_x, to_y] = KEYS.map(value);
+        Ok(Ends { start: DVec2::new(x?, y?), heading: heading?, target: DVec2::new(to_x?, to_y?) })
     };
-    (1..).zip(tests).map(complete).collect()
+    (1..).zip(&tests).map(complete).collect()
 }
 
-/// Name and value of the `<arg>` in a numbered line.
-fn argument((line, text): (usize, &str)) -> Option<(usize, (&str, &str))> {
+/// Name and value of the `<arg>` in a line.
+fn argument(line: &str) -> Option<(&str, &str)> {
     let of = |key: &str| {
-        let (_, after) = text.split_once(key)?;
+        let (_, after) = line.split_once(key)?;
         let (_, quoted) = after.split_once('"')?;
         Some(quoted.split_once('"')?.0)
     };
-    text.trim_start().starts_with("<arg").then_some(())?;
-    Some((line, (of("name=")?, of("default=")?)))
+    line.trim_start().starts_with("<arg").then_some(())?;
+    Some((of("name=")?, of("default=")?))
 }
 
 #[cfg(test)]

@@ -10,13 +10,13 @@ use std::{
 use common::mission::Mission;
 
 use super::{
-    Found, NO_MAP, barn,
+    Asked, Found, NO_MAP, barn,
     ends::{self, Ends},
     floor::Floor,
 };
 use crate::{
     error::{Failure, Result},
-    missions::trial::{BodySize, Rules, Scene, Trial},
+    missions::trial::{Rules, Scene, Trial},
     random::Random,
 };
 
@@ -38,17 +38,9 @@ pub fn malformed(file: &Path, problem: impl Display) -> Failure {
     format!("{}: {problem}", file.display()).into()
 }
 
-#[derive(Clone, Copy, Debug)]
-pub struct Asked {
-    /// Number of worlds; without it all, and ten on each map without tests.
-    pub count: Option<usize>,
-    pub seed: u64,
-    pub ends: Option<Ends>,
-}
-
 /// The worlds of a file, or of all world files in a folder and its subfolders, sorted by name; the requested number, evenly
 /// spread.
-pub fn read(path: &Path, asked: Asked, body: &BodySize) -> Result<Found> {
+pub fn read(path: &Path, asked: Asked) -> Result<Found> {
     let mut files = vec![path.to_path_buf()];
     if path.is_dir() {
         files = files_of(path).map_err(unreadable(path))?;
@@ -61,7 +53,7 @@ pub fn read(path: &Path, asked: Asked, body: &BodySize) -> Result<Found> {
                 "not a world; give a mission (.toml), a ROS map (.yaml), a BARN .world or a table of its cylinders (cylinders.csv, .csv.gz)",
             ));
         };
-        add(&mut found, file, asked, body)?;
+        add(&mut found, file, asked)?;
     }
     let is_map = |file: &PathBuf| file.extension().is_some_and(|it| it == "yaml" || it == "yml");
     if asked.ends.is_some() && !files.iter().any(is_map) {
@@ -104,42 +96,37 @@ fn files_of(folder: &Path) -> io::Result<Vec<PathBuf>> {
 }
 
 /// Adds the worlds of a file.
-type Reader = fn(&mut Found, &Path, Asked, &BodySize) -> Result;
+type Reader = fn(&mut Found, &Path, Asked) -> Result;
 
 /// The kinds of files, by the ends of their names.
-const READERS: [(&str, Reader); 6] = [
-    (".toml", |found, file, _, body| {
+const READERS: [(&[&str], Reader); 4] = [
+    (&[".toml"], |found, file, asked| {
         let mission = Mission::load(file)?.with_calibration()?;
-        found.add_solvable(Trial::of_mission(mission.name.clone(), mission, body));
+        found.add(Trial::of_mission(mission.name.clone(), mission, asked.swept_m));
         Ok(())
     }),
-    (".world", |found, file, _, body| add_barn(found, [barn::gazebo(file)?], body)),
-    ("cylinders.csv", add_table),
-    (".csv.gz", add_table),
-    (".yaml", add_map),
-    (".yml", add_map),
+    (&[".world"], |found, file, asked| add_barn(found, vec![barn::gazebo(file)?], asked)),
+    (&["cylinders.csv", ".csv.gz"], |found, file, asked| {
+        add_barn(found, barn::table(file)?, asked)
+    }),
+    (&[".yaml", ".yml"], add_map),
 ];
 
 fn reader_of(file: &Path) -> Option<Reader> {
     let name = file.file_name()?.to_string_lossy();
-    READERS.iter().find(|(end, _)| name.ends_with(end)).map(|(_, reader)| *reader)
+    let reads = |(ends, _): &&(&[&str], Reader)| ends.iter().any(|end| name.ends_with(end));
+    READERS.iter().find(reads).map(|(_, reader)| *reader)
 }
 
-fn add_table(found: &mut Found, file: &Path, _: Asked, body: &BodySize) -> Result {
-    add_barn(found, barn::table(file)?, body)
-}
-
-fn add_barn(
-    found: &mut Found,
-    worlds: impl IntoIterator<Item = barn::World>,
-    body: &BodySize,
-) -> Result {
-    let mut worlds = worlds.into_iter();
-    worlds.try_for_each(|(world, scene, rules)| found.add(world, &scene, rules, body))
+fn add_barn(found: &mut Found, worlds: Vec<barn::World>, asked: Asked) -> Result {
+    for (world, scene, rules) in worlds {
+        found.add(Trial::new(world, &scene, rules, asked.swept_m)?);
+    }
+    Ok(())
 }
 
 /// A ROS map as worlds: with the given ends, or its tests, or drawn ones.
-fn add_map(found: &mut Found, file: &Path, asked: Asked, body: &BodySize) -> Result {
+fn add_map(found: &mut Found, file: &Path, asked: Asked) -> Result {
     let floor = Floor::load(file)?;
     // The name is that of the file, or of its folder if the file is called `map`, as in MRPB.
     let mut name = file.file_stem().unwrap_or_default();
@@ -153,7 +140,7 @@ fn add_map(found: &mut Found, file: &Path, asked: Asked, body: &BodySize) -> Res
         None => {
             let count = asked.count.unwrap_or(DRAWN) as u64;
             let streams = (0..count).map(|number| Random::of_world(asked.seed, DRAWN_KIND, number));
-            floor.draw(streams, body.swept_m())
+            floor.draw(streams, asked.swept_m)
         }
     };
     for (number, Ends { start, heading, target }) in (1..).zip(ends) {
@@ -164,7 +151,8 @@ fn add_map(found: &mut Found, file: &Path, asked: Asked, body: &BodySize) -> Res
             continue;
         }
         let scene = Scene { shapes, things: Vec::new(), start, heading, target };
-        found.add(format!("{}-{number}", name.display()), &scene, Rules::PLAIN, body)?;
+        let world = format!("{}-{number}", name.display());
+        found.add(Trial::new(world, &scene, Rules::PLAIN, asked.swept_m)?);
     }
     Ok(())
 }
@@ -175,8 +163,7 @@ mod tests {
 
     use super::*;
 
-    const BODY: BodySize = BodySize { radius_m: 0.19, margin_m: 0.05 };
-    const ALL: Asked = Asked { count: None, seed: 1, ends: None };
+    const ALL: Asked = Asked { count: None, seed: 1, ends: None, swept_m: 0.24 };
 
     fn names(found: &Found) -> Vec<&str> {
         found.trials.iter().map(|trial| &*trial.world).collect()
@@ -207,20 +194,20 @@ mod tests {
             fs::write(file, "target = [2, 0]").unwrap();
         }
         let count = Some(3);
-        let found = read(folder.path(), Asked { count, ..ALL }, &BODY).unwrap();
+        let found = read(folder.path(), Asked { count, ..ALL }).unwrap();
         assert_eq!(names(&found), ["m3", "m6", "m9"]);
     }
 
     #[test]
     fn a_map_is_a_world_with_the_ends_given_those_of_its_tests_or_drawn_ones() {
         let folder = hall();
-        let drawn = read(folder.path(), ALL, &BODY).unwrap();
+        let drawn = read(folder.path(), ALL).unwrap();
         assert_eq!(drawn.trials.len(), DRAWN);
 
         let ends =
             Ends { start: DVec2::new(11.0, 21.0), heading: 0.0, target: DVec2::new(15.0, 22.0) };
         let asked = Asked { ends: Some(ends), ..ALL };
-        let given = read(folder.path(), asked, &BODY).unwrap();
+        let given = read(folder.path(), asked).unwrap();
         let mission = &given.trials[0].mission;
         assert_eq!(mission.target, DVec2::new(4.0, 1.0));
         let left_m = mission.world.clearance(DVec2::ZERO);
@@ -236,7 +223,7 @@ mod tests {
             value("goal_pose_y", 22.0),
         ];
         fs::write(folder.path().join(TESTS_FILE), tests.concat()).unwrap();
-        let tested = read(folder.path(), ALL, &BODY).unwrap();
+        let tested = read(folder.path(), ALL).unwrap();
         assert_eq!(names(&tested), ["hall-1"]);
         assert_eq!(&tested.trials[0].mission, mission);
     }
@@ -244,7 +231,7 @@ mod tests {
     #[test]
     fn what_cannot_be_a_world_is_refused_with_the_file_or_the_option() {
         let folder = hall();
-        let refused = |path: &Path, asked| read(path, asked, &BODY).unwrap_err().to_string();
+        let refused = |path: &Path, asked| read(path, asked).unwrap_err().to_string();
         let image = refused(&folder.path().join("hall.pgm"), ALL);
         assert!(image.contains("hall.pgm") && image.contains(".yaml"), "{image}");
 
