@@ -17,6 +17,7 @@ mod response_fit;
 pub mod restart;
 mod scan_motion;
 pub mod staleness;
+pub mod stop_distance;
 pub mod stop_monitor;
 pub mod streams;
 pub mod touch;

@@ -32,7 +32,7 @@ const BANDS_M: [f64; 2] = [0.0202, 0.0702];
 /// Staying readings, 1.1 s at 7 Hz: fewer may be chance.
 const READINGS: u32 = 8;
 /// Way, metres, or turn, radians, that must change a reading. Fractions of both add up.
-const WAY_M: f64 = 0.4;
+pub(crate) const WAY_M: f64 = 0.4;
 const TURN_RAD: f64 = std::f64::consts::FRAC_PI_2;
 /// So much of these, in twice as many readings, is sure in the wider band.
 const SURE: f64 = 1.8;

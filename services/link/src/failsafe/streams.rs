@@ -20,8 +20,8 @@ use crate::backoff::Backoff;
 
 /// All of so many intervals but the two shortest must be too long for a slow robot. A radio that is out half of the time gives more
 /// short ones.
-const INTERVALS: usize = 9;
-const SHORT_ONES: usize = 2;
+pub(crate) const INTERVALS: usize = 9;
+pub(crate) const SHORT_ONES: usize = 2;
 const FIRST_PAUSE: Duration = Duration::from_secs(1);
 const LONGEST_PAUSE: Duration = Duration::from_secs(8);
 

@@ -2,6 +2,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use common::mission::Mission;
+use link::failsafe::stop_distance;
 
 use console::{
     failure::Failure,
@@ -9,7 +10,8 @@ use console::{
     output::{print_text, write_stderr},
 };
 
-/// Check a mission file. An error is reported with its line, its key and the remedy.
+/// Check a mission file. An error is reported with its line, its key and the remedy; of a mission without one, the way from each fault to
+/// rest is printed.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// A mission file.
@@ -23,12 +25,17 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
         write_stderr(&format!("firsthand: {remark}\n"));
     }
     let frame = mission.grid_frame();
-    Ok(print_text(&format!(
-        "{}: {} m to the target, {} x {} cells of {:.3} m\n",
+    let mut text = format!(
+        "{}: {} m to the target, {} x {} cells of {:.3} m\nFrom a fault to rest, at most, at {} m/s:\n",
         mission.name,
         mission.target.length(),
         frame.cells,
         frame.cells,
-        frame.resolution_m
-    ))?)
+        frame.resolution_m,
+        mission.speed_m_s()
+    );
+    for (cause, noticed_s, way_m) in stop_distance::from_faults(&mission) {
+        text += &format!("  {:<28} {way_m:.2} m (known after {noticed_s:.2} s)\n", cause.name());
+    }
+    Ok(print_text(&text)?)
 }
