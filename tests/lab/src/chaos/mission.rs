@@ -69,24 +69,22 @@ pub fn undisturbed(options: &Options, seed: u64) -> Result<Summary> {
 /// Attack the mission, and report. Its files stay if something was wrong.
 pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Result {
     let options = series.options;
+    let asked = &options.asked;
     let before = series.report.kills();
     let files = options.directory.join(format!("seed-{seed}"));
     fs::create_dir(&files).or_cannot("make a directory")?;
     let directory = files.join("run");
-    let mut robot = options
-        .asked
+    let mut robot = asked
         .include_supervisor
         .then(|| robot(options, seed, &files.join("robot"), false))
         .transpose()?;
-    let mut start =
-        command(options, seed, &options.asked.pace.to_string(), &directory, options.records())?;
+    let mut start = command(options, seed, &asked.pace.to_string(), &directory, options.records())?;
     if let Some(robot) = &robot {
         let address = robot.address();
         start.args(["--set", &format!("robot.address='udp://{address}'")]);
     }
     let consumers = files.join("consumers");
     let consumers = Consumers::start(options, consumers, &mut series.report)?;
-    let asked = &options.asked;
     let operator =
         asked.targets.then(|| Operator::start(asked.robot.clone(), &options.loaded, seed));
     let mut attack = Attack::new(seed, consumers);
@@ -134,10 +132,10 @@ pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Resu
         right &=
             series.report.targets.get_or_insert_default().add(seed, operator, &summary, &truth);
     }
-    if options.asked.only_consumers {
+    if asked.only_consumers {
         series.report.tick_latencies.get_or_insert_default().add(undisturbed, &summary);
     }
-    if options.asked.replay {
+    if asked.replay {
         right &=
             series.report.replays.get_or_insert_default().add(seed, &directory, &attack.consumers);
     }

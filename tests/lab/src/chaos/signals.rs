@@ -54,8 +54,8 @@ pub fn create(directory: &Path) -> Result<csv::Writer<File>> {
 
 /// Write a row, so that others can read it at once.
 pub fn add(row: &Row, to: &mut csv::Writer<File>) -> Result {
-    to.serialize(row).or_cannot_file("write", Path::new(FILE_NAME))?;
-    to.flush().or_cannot_file("write", Path::new(FILE_NAME))
+    to.serialize(row).or_cannot("write signals.csv")?;
+    to.flush().or_cannot("write signals.csv")
 }
 
 #[cfg(test)]
