@@ -242,6 +242,7 @@ impl Odometry {
         self.response = response;
         let change = response.acceleration_m_s2 * self.counts_per_m;
         self.reached = [(); 2].map(|()| ModelledSpeed::new(0.0, change));
+        self.shares.adopt(response);
     }
 
     pub(crate) fn wheel_ratio(&self) -> WheelRatio {

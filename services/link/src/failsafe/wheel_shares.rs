@@ -8,7 +8,7 @@
 
 use common::{
     driver::counts::WheelCounts,
-    mission::{Body, Mission, ModelledSpeed},
+    mission::{Body, Mission, ModelledSpeed, Response},
 };
 
 /// So much of the sums is left after each further metre: 3 m are remembered.
@@ -17,6 +17,11 @@ const LEFT_AFTER_A_METRE: f64 = 0.72;
 const LEAST_M: f64 = 0.6;
 /// A wheel that counts less than this share of its commanded way in a tick is held, or dead: other monitors judge it.
 const TURNS: f64 = 0.25;
+
+/// A base that still gains or loses speed says nothing of its encoders. Of so many ticks the least way, by the model and by the counts, is
+/// this share of the greatest.
+const STEADY: usize = 3;
+const AGREE: f64 = 0.85;
 
 /// Sums over ticks.
 #[derive(Clone, Copy, Debug, Default)]
@@ -73,6 +78,8 @@ pub(crate) struct WheelShares {
     /// None for a car, which has one driven wheel.
     wheels: Option<[ModelledSpeed; 2]>,
     sums: Sums,
+    /// The modelled and counted ways of the newest ticks, oldest first.
+    newest: [[[f64; 2]; 2]; STEADY],
     frame: Option<(WheelCounts, f64)>,
     longest_gap_s: f64,
 }
@@ -89,6 +96,7 @@ impl WheelShares {
             metres_per_count,
             wheels: steering.is_none().then(|| [wheel.clone(), wheel]),
             sums: Sums::default(),
+            newest: [[[0.0; 2]; 2]; STEADY],
             frame: None,
             longest_gap_s: 2.0 / mission.robot.rate_hz,
         }
@@ -117,8 +125,31 @@ impl WheelShares {
         {
             let rolled = counts.since(before);
             let metres = |counts: [f64; 2]| counts.map(|count| count * self.metres_per_count);
-            self.sums.add(metres(told), metres(rolled));
+            let now = [metres(told), metres(rolled)];
+            self.newest.rotate_left(1);
+            self.newest[STEADY - 1] = now;
+            if self.is_steady() {
+                self.sums.add(now[0], now[1]);
+            }
         }
+    }
+
+    fn is_steady(&self) -> bool {
+        let steady = |kind: usize, wheel: usize| {
+            let ways = self.newest.map(|tick| tick[kind][wheel]);
+            let along = ways.map(|way| way * ways[STEADY - 1].signum());
+            let least = along.into_iter().fold(f64::INFINITY, f64::min);
+            least >= AGREE * along.into_iter().fold(0.0, f64::max)
+        };
+        [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter().all(|(kind, wheel)| steady(kind, wheel))
+    }
+
+    /// Respond to commands by `response` from now on.
+    pub(crate) fn adopt(&mut self, response: Response) {
+        let change = response.acceleration_m_s2 / self.metres_per_count;
+        let wheel = ModelledSpeed::new(response.dead_time_s(), change);
+        self.wheels = self.wheels.take().map(|_| [wheel.clone(), wheel]);
+        self.sums = Sums::default();
     }
 
     pub(crate) fn ratio(&self) -> WheelRatio {
@@ -134,13 +165,13 @@ mod tests {
 
     const PERIOD_S: f64 = 1.0 / 7.0;
 
-    /// The ratio after 8 s of a robot whose wheels reach `reached` of their speeds and count `counted` of that.
+    /// The ratio after 16 s of a robot whose wheels reach `reached` of their speeds and count `counted` of that.
     fn ratio(reached: f64, counted: [f64; 2], told: impl Fn(usize) -> [i16; 2]) -> WheelRatio {
         let mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
         let mut shares = WheelShares::new(&mission);
         let mut wheels = shares.wheels.clone().unwrap();
         let mut rolled = [0.0; 2];
-        for tick in 0..56 {
+        for tick in 0..112 {
             let now_s = tick as f64 * PERIOD_S;
             shares.rolled(WheelCounts::Endless(rolled.map(f64::round)), now_s);
             let told = told(tick);
