@@ -5,7 +5,9 @@
 
 use std::collections::VecDeque;
 
-use common::samples::{CommandSample, CommandState, PoseSample, TargetPoint, TargetSample};
+use common::samples::{
+    CommandSample, CommandState, DirectiveSample, HoldReason, PoseSample, TargetPoint, TargetSample,
+};
 use ros2::cdr::{Reader, Writer};
 
 use crate::{
@@ -80,6 +82,8 @@ struct Goal {
     point: TargetPoint,
     /// The number of the goal's target, once the supervisor has published it.
     number: Option<u64>,
+    /// The robot waits although it did not arrive. Its arrival may still be read: it waits if it is told so again.
+    waits: bool,
     /// The number of the newest target that is older than the goal.
     after: u64,
     status: Status,
@@ -128,7 +132,15 @@ impl Server {
         }
         let Sent { id, point } = sent;
         let status = Status::Executing;
-        self.goals.push_back(Goal { id, at_ns: now_ns, point, number: None, after, status });
+        self.goals.push_back(Goal {
+            id,
+            at_ns: now_ns,
+            point,
+            number: None,
+            waits: false,
+            after,
+            status,
+        });
         self.is_changed = true;
     }
 
@@ -166,6 +178,16 @@ impl Server {
         let goal = self.goals.back().filter(|goal| goal.number == Some(command.target_number));
         if has_arrived && goal.is_some_and(|goal| goal.status == Status::Executing) {
             self.end(Status::Succeeded);
+        }
+    }
+
+    /// A run that stays gives up a target, and then waits for the next one.
+    pub(crate) fn directive(&mut self, directive: &DirectiveSample) {
+        if HoldReason::from_byte(directive.reason) == HoldReason::Waiting
+            && let Some(goal) = self.goals.back_mut().filter(|goal| goal.number.is_some())
+            && std::mem::replace(&mut goal.waits, true)
+        {
+            self.end(Status::Aborted);
         }
     }
 

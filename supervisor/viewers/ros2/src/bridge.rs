@@ -223,6 +223,7 @@ impl Bridge {
             match &sample {
                 Sample::Target(target) => goals.target(target),
                 Sample::Command(command) => goals.command(command),
+                Sample::Directive(directive) => goals.directive(directive),
                 Sample::Request(request)
                     if RequestKind::from_byte(request.kind) == RequestKind::Stop =>
                 {

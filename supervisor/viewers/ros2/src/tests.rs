@@ -9,8 +9,8 @@ use common::{
     grid::{Cell, CellState, GridFrame, Part},
     mission::Mission,
     samples::{
-        CommandSample, CommandState, FieldCell, FieldHeader, GridHeader, PoseSample, ScanHeader,
-        TargetPoint, TargetSample,
+        CommandSample, CommandState, DirectiveSample, FieldCell, FieldHeader, GridHeader,
+        HoldReason, PoseSample, ScanHeader, TargetPoint, TargetSample,
     },
 };
 use glam::DVec2;
@@ -140,6 +140,22 @@ fn a_goal_of_the_action_ends_when_the_robot_is_sent_elsewhere() {
     let sent = Server::read_goal(&call(2, &goal("map")[4..])).unwrap();
     goals.accept(sent, goals.newest_target(), 8);
     assert_eq!((state(&goals, 1), state(&goals, 2)), (Some(Status::Aborted as u8), None));
+}
+
+#[test]
+fn a_goal_of_the_action_whose_target_is_given_up_ends_though_the_run_stays() {
+    let waits =
+        DirectiveSample { reason: HoldReason::Waiting.into(), ..DirectiveSample::default() };
+    let mut goals = with_a_goal();
+    goals.directive(&waits);
+    assert_eq!(state(&goals, 1), None, "its arrival may still be read");
+    goals.directive(&waits);
+    assert_eq!(state(&goals, 1), Some(Status::Aborted as u8));
+    let mut goals = with_a_goal();
+    goals.directive(&waits);
+    goals.command(&arrival(5));
+    goals.directive(&waits);
+    assert_eq!(state(&goals, 1), Some(Status::Succeeded as u8));
 }
 
 #[test]
