@@ -32,7 +32,7 @@ pub struct Arguments {
     /// Where to listen. The protocol has no authentication: whoever reaches the address can watch the robot. Nobody can send it anything.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8765")]
     listen: SocketAddr,
-    /// The origin of a viewer's web page, such as https://lichtblick.example. Pages of other origins are refused; programs that are no
+    /// The origin of a viewer's web page, such as `https://lichtblick.example`. Pages of other origins are refused; programs that are no
     /// browsers are not.
     #[arg(long = "origin", value_name = "ORIGIN", default_value = gate::FOXGLOVE)]
     origins: Vec<String>,
