@@ -53,6 +53,17 @@ impl Mission {
         };
         let tree = DeTable::parse(text).map_err(|error| syntax(&error))?;
         let mut mission: Self = toml::from_str(text).map_err(|error| syntax(&error))?;
+        if let Ok(read) = toml::Value::try_from(&mission)
+            && let Some((start, key, problem)) = dropped("", tree.get_ref(), &read)
+        {
+            return Err(MissionError::Value {
+                file: origin.to_path_buf(),
+                line: line_of(text, start),
+                key,
+                problem,
+                remedy: "leave the others out".to_owned(),
+            });
+        }
         if !tree.get_ref().contains_key("target") {
             mission.target = match mission.targets.first() {
                 Some(first) => first.at,
@@ -111,6 +122,34 @@ fn remarks(text: &str, origin: &Path, tree: &DeTable<'_>, mission: &Mission) -> 
         remark("robot.calibration", text.to_owned())
     });
     car.into_iter().chain(twice).collect()
+}
+
+/// A list in the file that is longer than what was `read` of it: where it is, its key, and the problem.
+fn dropped(key: &str, file: &DeTable<'_>, read: &toml::Value) -> Option<(usize, String, String)> {
+    file.iter().find_map(|(name, value)| {
+        let key = if key.is_empty() { name.to_string() } else { format!("{key}.{name}") };
+        dropped_of(&key, name.span().start, value.get_ref(), read.get(&**name.get_ref())?)
+    })
+}
+
+fn dropped_of(
+    key: &str,
+    start: usize,
+    file: &DeValue<'_>,
+    read: &toml::Value,
+) -> Option<(usize, String, String)> {
+    match (file, read) {
+        (DeValue::Table(file), read) => dropped(key, file, read),
+        (DeValue::Array(file), toml::Value::Array(read)) if file.len() > read.len() => {
+            let (has, takes) = (file.len(), read.len());
+            Some((start, key.to_owned(), format!("{has} values are given, and {takes} are read")))
+        }
+        (DeValue::Array(file), toml::Value::Array(read)) => file
+            .iter()
+            .zip(read)
+            .find_map(|(file, read)| dropped_of(key, file.span().start, file.get_ref(), read)),
+        _ => None,
+    }
 }
 
 /// Lines count from 1.

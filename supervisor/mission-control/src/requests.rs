@@ -141,7 +141,13 @@ impl Supervisor<'_> {
 
     fn on_new_target(&mut self) {
         let sample = self.targets.sample();
-        tracing::info!(number = sample.number, last = sample.last, target = ?sample.target, "the robot is sent to its next target");
+        tracing::info!(
+            number = sample.number,
+            last = sample.last,
+            x_m = sample.target.x_m,
+            y_m = sample.target.y_m,
+            "the robot is sent to its next target"
+        );
         self.bus.observer.record.target_number = sample.number;
         self.bus.observer.record.arrival = None;
         self.arrived = None;

@@ -95,7 +95,6 @@ pub struct Arguments {
 pub fn main(arguments: &Arguments) -> Result {
     let settings = settings(arguments)?;
     let described = described(arguments, &settings);
-    let mut results = Results::open(&arguments.out, &described, arguments.resume)?;
     let Arguments { start, target, seed, .. } = *arguments;
     let ends = start.zip(target).map(|([x, y, heading_deg], target)| Ends {
         start: DVec2::new(x, y),
@@ -106,6 +105,8 @@ pub fn main(arguments: &Arguments) -> Result {
     let asked = Asked { count: arguments.count, seed, ends, swept_m };
     // A world that is damaged is no error of the mission on the command line.
     let found = worlds::find(&arguments.worlds, asked).map_err(|error| error.to_string())?;
+    // A refused world leaves no directory behind.
+    let mut results = Results::open(&arguments.out, &described, arguments.resume)?;
     write_stderr(&format!(
         "{} worlds, each crossed by the body on a grid of 5 cm ({} others were left out)\n",
         found.trials.len(),

@@ -130,3 +130,18 @@ fn a_footprint_makes_the_radius_that_covers_it_and_a_radius_alone_makes_a_disc()
     let outline = parse("footprint = [[1, 0], [2, 0], [2, 1]]").unwrap_err().to_string();
     assert!(outline.contains("robot.footprint"), "{outline}");
 }
+
+#[test]
+fn no_number_of_a_list_that_is_too_long_is_dropped_in_silence() {
+    for (text, key) in [
+        ("target = [1, 2, 3]", "target"),
+        ("target = [1, 2]\nperimeter.centre = [0, 0, 1]", "perimeter.centre"),
+        ("target = [1, 2]\n[[world.wall]]\npoints = [[1, 1], [2, 2, 0]]", "world.wall.points"),
+    ] {
+        let refused = Mission::parse(text, Path::new("m.toml")).unwrap_err().to_string();
+        assert!(
+            refused.contains(&format!("{key}: 3 values are given, and 2 are read")),
+            "{refused}"
+        );
+    }
+}

@@ -44,7 +44,7 @@ pub(crate) struct Arguments {
     #[arg(long, default_value = "max")]
     pace: Pace,
     /// Seed of everything random in the simulation, instead of the mission's.
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     seed: Option<u64>,
     /// The directory of logs, checkpoints, summary and picture; by default a new one below --runs.
     #[arg(long, value_name = "DIR")]
