@@ -14,7 +14,7 @@ use common::{
 /// So much of the sums is left after each further metre: 3 m are remembered.
 const LEFT_AFTER_A_METRE: f64 = 0.72;
 /// The wheels must have been told to roll so far, metres.
-const LEAST_M: f64 = 0.6;
+const LEAST_M: f64 = 1.0;
 /// A wheel that counts less than this share of its commanded way in a tick is held, or dead: other monitors judge it.
 const TURNS: f64 = 0.25;
 
@@ -22,6 +22,8 @@ const TURNS: f64 = 0.25;
 /// this share of the greatest.
 const STEADY: usize = 3;
 const AGREE: f64 = 0.85;
+/// A slower wheel, by its share of the top speed, says little: what the model leaves out is a large part of its way.
+const LEAST_SPEED: f64 = 0.15;
 
 /// Sums over ticks.
 #[derive(Clone, Copy, Debug, Default)]
@@ -75,6 +77,7 @@ impl WheelRatio {
 #[derive(Clone, Debug)]
 pub(crate) struct WheelShares {
     metres_per_count: f64,
+    top_speed_m_s: f64,
     /// None for a car, which has one driven wheel.
     wheels: Option<[ModelledSpeed; 2]>,
     sums: Sums,
@@ -86,7 +89,7 @@ pub(crate) struct WheelShares {
 
 impl WheelShares {
     pub(crate) fn new(mission: &Mission) -> Self {
-        let Body { response, steering, .. } = mission.body();
+        let Body { response, steering, top_speed_m_s, .. } = mission.body();
         let metres_per_count = mission.body().metres_per_count();
         let wheel = ModelledSpeed::new(
             response.dead_time_s(),
@@ -94,6 +97,7 @@ impl WheelShares {
         );
         Self {
             metres_per_count,
+            top_speed_m_s,
             wheels: steering.is_none().then(|| [wheel.clone(), wheel]),
             sums: Sums::default(),
             newest: [[[0.0; 2]; 2]; STEADY],
@@ -128,18 +132,18 @@ impl WheelShares {
             let now = [metres(told), metres(rolled)];
             self.newest.rotate_left(1);
             self.newest[STEADY - 1] = now;
-            if self.is_steady() {
+            if self.is_steady(LEAST_SPEED * self.top_speed_m_s * (now_s - then_s)) {
                 self.sums.add(now[0], now[1]);
             }
         }
     }
 
-    fn is_steady(&self) -> bool {
+    fn is_steady(&self, least_m: f64) -> bool {
         let steady = |kind: usize, wheel: usize| {
             let ways = self.newest.map(|tick| tick[kind][wheel]);
             let along = ways.map(|way| way * ways[STEADY - 1].signum());
             let least = along.into_iter().fold(f64::INFINITY, f64::min);
-            least >= AGREE * along.into_iter().fold(0.0, f64::max)
+            least >= least_m && least >= AGREE * along.into_iter().fold(0.0, f64::max)
         };
         [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter().all(|(kind, wheel)| steady(kind, wheel))
     }
