@@ -21,7 +21,7 @@ const TURNS: f64 = 0.25;
 /// A base that still gains or loses speed says nothing of its encoders. Of so many ticks the least way, by the model and by the counts, is
 /// this share of the greatest.
 const STEADY: usize = 3;
-const AGREE: f64 = 0.85;
+const AGREE: f64 = 0.75;
 /// A slower wheel, by its share of the top speed, says little: what the model leaves out is a large part of its way.
 const LEAST_SPEED: f64 = 0.15;
 
