@@ -122,7 +122,7 @@ fn chaos_that_is_killed_keeps_its_rows_and_its_consumers_end_with_it() {
     let table = rows();
     let columns = |row: &str| row.matches(',').count();
     assert!(table.ends_with('\n') && table.lines().all(|row| columns(row) == 8), "{table}");
-    let left = std::env::temp_dir().join(format!("firsthand-chaos-{}", chaos.id()));
+    let left = std::env::temp_dir().join(format!("firsthand-chaos-{}-chd-cut", chaos.id()));
     let marks = ["chd-cut", left.to_str().unwrap()];
     support::wait_until("all have ended", || marks.iter().all(|mark| processes(mark).is_empty()));
     fs::remove_dir_all(left).unwrap();

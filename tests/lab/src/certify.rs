@@ -106,6 +106,7 @@ pub fn main(arguments: &Arguments) -> Result {
     let asked = |part: &&Part| {
         arguments.parts.is_empty() || arguments.parts.iter().any(|name| name == part.name)
     };
+    let before = rows.len();
     for part in PARTS.iter().filter(asked) {
         write_stderr(&format!("{}: {}\n", part.name, part.what));
         for row in both(part, arguments.share, rows.len() as u64)? {
@@ -119,7 +120,11 @@ pub fn main(arguments: &Arguments) -> Result {
         let page = arguments.out.join("certificate.md");
         fs::write(&page, certificate(&rows)).or_cannot_file("write", &page)?;
     }
-    console::output::print_text(&certificate(&rows)).or_cannot("print")
+    console::output::print_text(&certificate(&rows)).or_cannot("print")?;
+    match rows[before..].iter().map(|row| row.lost).sum::<u64>() {
+        0 => Ok(()),
+        lost => Err(format!("{lost} were lost now; see {}", file.display()).into()),
+    }
 }
 
 /// The two robots at once. A row's number is its seed's, so that no seed is tried twice.

@@ -136,7 +136,8 @@ impl Options {
         if asked.include_supervisor || faulty {
             asked.pace = Pace::Rate(1.0);
         }
-        let directory = env::temp_dir().join(format!("firsthand-chaos-{}", process::id()));
+        let name = format!("firsthand-chaos-{}-{}", process::id(), asked.robot);
+        let directory = env::temp_dir().join(name);
         fs::create_dir(&directory).or_cannot_file("make", &directory)?;
         Ok(Self { asked, loaded, directory })
     }
