@@ -131,7 +131,7 @@ pub(crate) struct StallWatch {
     relocations: u64,
     tick: Option<u64>,
     stalls: Vec<StallSample>,
-    /// Those of targets that were given up while the run went on.
+    /// The number of stalls up to the newest target that was given up while the run went on.
     settled: usize,
 }
 

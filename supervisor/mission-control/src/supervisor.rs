@@ -332,7 +332,7 @@ impl<'a> Supervisor<'a> {
         self.clock.now(self.bus.observer.record.pose.as_ref(), self.robot.truth().last())
     }
 
-    /// That of the current target; a robot that waits for one has any time.
+    /// The deadline of the current target; a robot that waits for a target has any time.
     pub(crate) const fn deadline(&self) -> Deadline {
         let timeout_s = match self.targets.waits() {
             true => f64::INFINITY,

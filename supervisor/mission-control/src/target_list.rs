@@ -103,7 +103,7 @@ impl TargetList {
         self.waits
     }
 
-    /// That of the newest target, if the robot waits for the next one.
+    /// The outcome of the newest target, if the robot waits for the next one.
     pub(crate) fn outcome_while_waiting(&self) -> Option<Outcome> {
         let tried = |it: &&Stored| it.result.outcome != TargetOutcome::NotTried;
         let newest = self.results.iter().rfind(tried).map(|it| it.result.outcome);
