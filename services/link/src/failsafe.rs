@@ -81,9 +81,15 @@ pub struct Rule {
     pub action: Action,
     /// The clearing condition.
     pub clears: Clears,
+    /// The longest time from the fault until the link tells the robot to stand, or its last command is over, seconds; none where nothing
+    /// bounds it, or an operator or another commander acts.
+    known_within_s: Option<fn(&Mission) -> f64>,
     /// The monitor that says whether the cause applies.
     monitor: fn(&Monitors) -> &dyn Monitor,
 }
+
+/// Without frames there are no ticks, and without ticks no commands.
+const LIMIT: Option<fn(&Mission) -> f64> = Some(|mission| mission.robot.command_limit_s);
 
 /// All rules, the worst action first. Of the rules with the same action, the first that applies is reported.
 pub const TABLE: &[Rule] = &[
@@ -92,6 +98,7 @@ pub const TABLE: &[Rule] = &[
         when: "the supervisor ends the mission",
         action: Action::End,
         clears: Clears::WithCondition,
+        known_within_s: None,
         monitor: |all| &all.orders,
     },
     Rule {
@@ -99,6 +106,7 @@ pub const TABLE: &[Rule] = &[
         when: "the boards' or the motors' battery has given less than 10/11 of its `robot.low_battery_v` for 2 s",
         action: Action::End,
         clears: Clears::OnNewMission,
+        known_within_s: Some(|_| battery::EMPTY_AFTER.as_secs_f64()),
         monitor: |all| &all.battery,
     },
     Rule {
@@ -106,6 +114,7 @@ pub const TABLE: &[Rule] = &[
         when: "commands and encoders have disagreed for 10 s; `link.log` says how",
         action: Action::End,
         clears: Clears::OnNewMission,
+        known_within_s: None,
         monitor: |all| &all.odometry,
     },
     Rule {
@@ -113,6 +122,7 @@ pub const TABLE: &[Rule] = &[
         when: "another node has published on `robot.ros2.cmd_vel` within 1 s: that the robot moves, or for 2 s that it stands; or the robot has acknowledged 6 commands within 2 s that the link did not send, or an X80 for 4 s those that it did while a fifth of its motor frames went elsewhere; `link.log` says which. It is told to stand after each command of the other",
         action: Action::Stop,
         clears: Clears::WithCondition,
+        known_within_s: None,
         monitor: |all| &all.commander,
     },
     Rule {
@@ -120,6 +130,7 @@ pub const TABLE: &[Rule] = &[
         when: "it was told to stand, and when it should rest by its `robot.response` (an X80 after 0.6 s) its encoders say for 0.5 s that it moves; its other methods are tried in turn",
         action: Action::Stop,
         clears: Clears::After(Duration::from_millis(500)),
+        known_within_s: None,
         monitor: |all| &all.stop,
     },
     Rule {
@@ -127,6 +138,7 @@ pub const TABLE: &[Rule] = &[
         when: "`firsthand stop`, until `firsthand resume`",
         action: Action::Stop,
         clears: Clears::WithCondition,
+        known_within_s: None,
         monitor: |all| &all.orders,
     },
     Rule {
@@ -134,6 +146,7 @@ pub const TABLE: &[Rule] = &[
         when: "a stage died again and again, until `firsthand stage restart NAME`",
         action: Action::Stop,
         clears: Clears::WithCondition,
+        known_within_s: None,
         monitor: |all| &all.orders,
     },
     Rule {
@@ -141,6 +154,7 @@ pub const TABLE: &[Rule] = &[
         when: "the supervisor has not said drive: the stages start, or the robot waits for a target",
         action: Action::Stop,
         clears: Clears::WithCondition,
+        known_within_s: None,
         monitor: |all| &all.orders,
     },
     Rule {
@@ -148,6 +162,7 @@ pub const TABLE: &[Rule] = &[
         when: "it has said nothing for 2 s, which it does five times a second",
         action: Action::Stop,
         clears: Clears::WithCondition,
+        known_within_s: Some(|_| orders::SUPERVISOR_SILENT.as_secs_f64()),
         monitor: |all| &all.orders,
     },
     Rule {
@@ -155,6 +170,7 @@ pub const TABLE: &[Rule] = &[
         when: "it has said nothing for three times `robot.command_limit_s`, or the wire is down",
         action: Action::Stop,
         clears: Clears::WithCondition,
+        known_within_s: LIMIT,
         monitor: |all| &all.presence,
     },
     Rule {
@@ -162,6 +178,7 @@ pub const TABLE: &[Rule] = &[
         when: "it was lost and has just been found, or it acknowledges later than `robot.command_limit_s` what it is sent; every 2 s it is sent nothing for that time and 0.4 s, to see whether it still does",
         action: Action::Stop,
         clears: Clears::WithCondition,
+        known_within_s: None,
         monitor: |all| &all.latency,
     },
     Rule {
@@ -169,6 +186,7 @@ pub const TABLE: &[Rule] = &[
         when: "it answers, and no motor frame has come for three times `robot.command_limit_s`; they are asked for",
         action: Action::Stop,
         clears: Clears::WithCondition,
+        known_within_s: LIMIT,
         monitor: |all| &all.streams,
     },
     Rule {
@@ -176,6 +194,9 @@ pub const TABLE: &[Rule] = &[
         when: "they come less often than every `robot.command_limit_s`, which commands last for: let the robot send faster, or raise it",
         action: Action::Stop,
         clears: Clears::WithCondition,
+        known_within_s: Some(|mission| {
+            mission.robot.command_limit_s * (streams::INTERVALS - streams::SHORT_ONES) as f64
+        }),
         monitor: |all| &all.streams,
     },
     Rule {
@@ -183,6 +204,9 @@ pub const TABLE: &[Rule] = &[
         when: "0.55 s of motion that was commanded and due by `robot.response` with less than a quarter of it in the encoders, or 1 s of motion that was not commanded, and no other response explains what they say, until the robot restarts, or 3 jumps within 2 s; `link.log` says which",
         action: Action::Stop,
         clears: Clears::OnResume { or_after: Some(odometry::CALM) },
+        known_within_s: Some(|mission| {
+            mission.body().response.dead_time_s() + odometry::SUSPECTED_AFTER.as_secs_f64()
+        }),
         monitor: |all| &all.odometry,
     },
     Rule {
@@ -190,6 +214,9 @@ pub const TABLE: &[Rule] = &[
         when: "0.4 s of commanded motion with less than a quarter of it in the encoders, and a motor current of `robot.held_current_ad` or more; the robot stands for 0.5 s, `contact` says where it is touched, and the supervisor takes it for a stall",
         action: Action::Stop,
         clears: Clears::WithCondition,
+        known_within_s: Some(|mission| {
+            mission.body().response.dead_time_s() + contact::HELD_AFTER.as_secs_f64()
+        }),
         monitor: |all| &all.odometry,
     },
     Rule {
@@ -197,6 +224,7 @@ pub const TABLE: &[Rule] = &[
         when: "a bumper of `robot.touch` is pressed, or a cliff sensor sees no floor; the robot stands for 0.5 s, or as long as it needs by its `robot.response`, then `contact` says where, and it goes no nearer while that lasts; `link.log` names the row",
         action: Action::Stop,
         clears: Clears::WithCondition,
+        known_within_s: None,
         monitor: |all| &all.touch,
     },
     Rule {
@@ -204,6 +232,9 @@ pub const TABLE: &[Rule] = &[
         when: "a sensor that the mission uses has given no valid reading for three times `robot.command_limit_s`, and it is not a single infrared ranger without which the robot goes on; `link.log` names it. Nothing in range is a reading",
         action: Action::Stop,
         clears: Clears::WithCondition,
+        known_within_s: Some(|mission| {
+            mission.robot.command_limit_s * f64::from(presence::SILENT_LIMITS)
+        }),
         monitor: |all| &all.streams,
     },
     Rule {
@@ -211,6 +242,7 @@ pub const TABLE: &[Rule] = &[
         when: "the front sonar says the same within 1 cm to either side while the robot drives 0.4 m or turns by 90 degrees, another sensor while it turns by 90 degrees on the spot, or within 7 cm for 1.8 times as much; two of three readings do not follow from those before; scans change as if they were 0.3 s late or more, or the robot stood; or the front sonar hears nothing more than 4 times in a row of a surface nearer than 0.45 m that the two infrared rangers beside it see within 12 degrees of square; `link.log` names the sensor",
         action: Action::Stop,
         clears: Clears::OnResume { or_after: Some(range::CHANGES) },
+        known_within_s: Some(|mission| range::WAY_M / mission.speed_m_s()),
         monitor: |all| &all.range,
     },
     Rule {
@@ -218,6 +250,7 @@ pub const TABLE: &[Rule] = &[
         when: "the newest command's tick began more than `robot.command_limit_s` ago, or there is none",
         action: Action::Stop,
         clears: Clears::WithCondition,
+        known_within_s: LIMIT,
         monitor: |all| &all.staleness,
     },
     Rule {
@@ -225,6 +258,7 @@ pub const TABLE: &[Rule] = &[
         when: "the command or its guidance was computed from a pose older than that",
         action: Action::Stop,
         clears: Clears::WithCondition,
+        known_within_s: LIMIT,
         monitor: |all| &all.staleness,
     },
     Rule {
@@ -232,6 +266,7 @@ pub const TABLE: &[Rule] = &[
         when: "the command follows a guidance older than that",
         action: Action::Stop,
         clears: Clears::WithCondition,
+        known_within_s: LIMIT,
         monitor: |all| &all.staleness,
     },
     Rule {
@@ -239,6 +274,7 @@ pub const TABLE: &[Rule] = &[
         when: "half of what makes a ranging sensor implausible; a robot that goes slowly shows whether it is; `link.log` names the sensor",
         action: Action::Slow,
         clears: Clears::After(range::CHANGES),
+        known_within_s: None,
         monitor: |all| &all.range,
     },
     Rule {
@@ -246,6 +282,7 @@ pub const TABLE: &[Rule] = &[
         when: "one infrared ranger has given no valid reading for so long, and it looks aside or back, or into the cone of a sonar that the mission uses; `link.log` names it",
         action: Action::Slow,
         clears: Clears::WithCondition,
+        known_within_s: None,
         monitor: |all| &all.streams,
     },
     Rule {
@@ -253,6 +290,7 @@ pub const TABLE: &[Rule] = &[
         when: "its wheels have shown that it answers later or accelerates more slowly than `robot.response` says, until planner and controller go by what was found; by the paper's method and with a planner of another executable until the next mission; `link.log` says how",
         action: Action::Slow,
         clears: Clears::WithCondition,
+        known_within_s: None,
         monitor: |all| &all.base,
     },
     Rule {
@@ -260,6 +298,7 @@ pub const TABLE: &[Rule] = &[
         when: "the boards' or the motors' battery gives less than its `robot.low_battery_v`, and then less than 0.3 V more",
         action: Action::Slow,
         clears: Clears::WithCondition,
+        known_within_s: None,
         monitor: |all| &all.battery,
     },
 ];
