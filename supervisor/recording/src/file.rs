@@ -69,7 +69,8 @@ impl RecordingFile {
         let options = WriteOptions::new()
             .profile("")
             .library(concat!("firsthand ", env!("CARGO_PKG_VERSION")))
-            .compression(Some(Compression::Lz4))
+            .compression(Some(Compression::Zstd))
+            .compression_threads(0)
             .chunk_size(Some(CHUNK_BYTES))
             // A chunk is written in one piece when it is complete, and never changed.
             .disable_seeking(true);

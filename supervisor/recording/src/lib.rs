@@ -1,7 +1,7 @@
 //! Recordings: all samples of a robot's bus in one file, written by a consumer, read by reports and replays.
 //!
 //! # The file
-//! MCAP, in chunks compressed with LZ4; each chunk is written whole, at least once a second. A recorder that is killed
+//! MCAP, in chunks compressed with Zstandard; each chunk is written whole, at least once a second. A recorder that is killed
 //! leaves a file that ends after its last whole chunk.
 //!
 //! - A channel for each topic of the table that its column `logged` names, under the topic's name. A message is one
