@@ -81,8 +81,8 @@ pub struct Rule {
     pub action: Action,
     /// The clearing condition.
     pub clears: Clears,
-    /// The longest time from the fault until the link tells the robot to stand, or its last command is over, seconds; none where nothing
-    /// bounds it, or an operator or another commander acts.
+    /// The longest time from the fault until the link tells the robot to stand, or its last command is over, seconds; from the operator's
+    /// stop if the robot does not follow that. None where nothing bounds it, or an operator or another commander acts.
     known_within_s: Option<fn(&Mission) -> f64>,
     /// The monitor that says whether the cause applies.
     monitor: fn(&Monitors) -> &dyn Monitor,
@@ -130,7 +130,7 @@ pub const TABLE: &[Rule] = &[
         when: "it was told to stand, and when it should rest by its `robot.response` (an X80 after 0.6 s) its encoders say for 0.5 s that it moves; its other methods are tried in turn",
         action: Action::Stop,
         clears: Clears::After(Duration::from_millis(500)),
-        known_within_s: None,
+        known_within_s: Some(stop_monitor::known_within_s),
         monitor: |all| &all.stop,
     },
     Rule {
@@ -205,7 +205,7 @@ pub const TABLE: &[Rule] = &[
         action: Action::Stop,
         clears: Clears::OnResume { or_after: Some(odometry::CALM) },
         known_within_s: Some(|mission| {
-            mission.body().response.dead_time_s() + odometry::SUSPECTED_AFTER.as_secs_f64()
+            mission.body().response.dead_time_s() + odometry::STILL_AFTER.as_secs_f64()
         }),
         monitor: |all| &all.odometry,
     },
@@ -242,7 +242,7 @@ pub const TABLE: &[Rule] = &[
         when: "the front sonar says the same within 1 cm to either side while the robot drives 0.4 m or turns by 90 degrees, another sensor while it turns by 90 degrees on the spot, or within 7 cm for 1.8 times as much; two of three readings do not follow from those before; scans change as if they were 0.3 s late or more, or the robot stood; or the front sonar hears nothing more than 4 times in a row of a surface nearer than 0.45 m that the two infrared rangers beside it see within 12 degrees of square; `link.log` names the sensor",
         action: Action::Stop,
         clears: Clears::OnResume { or_after: Some(range::CHANGES) },
-        known_within_s: Some(|mission| range::WAY_M / mission.speed_m_s()),
+        known_within_s: Some(range::known_within_s),
         monitor: |all| &all.range,
     },
     Rule {

@@ -32,7 +32,7 @@ const BANDS_M: [f64; 2] = [0.0202, 0.0702];
 /// Staying readings, 1.1 s at 7 Hz: fewer may be chance.
 const READINGS: u32 = 8;
 /// Way, metres, or turn, radians, that must change a reading. Fractions of both add up.
-pub(crate) const WAY_M: f64 = 0.4;
+const WAY_M: f64 = 0.4;
 const TURN_RAD: f64 = std::f64::consts::FRAC_PI_2;
 /// So much of these, in twice as many readings, is sure in the wider band.
 const SURE: f64 = 1.8;
@@ -49,6 +49,11 @@ const FOLLOWS_RAD: f64 = 0.12;
 const ODD_SHARES: [f64; 2] = [0.5, 0.72];
 /// The cause clears after readings changed for so long.
 pub(crate) const CHANGES: Duration = Duration::from_secs(2);
+
+/// Until a reading that stays is known to be stuck, seconds, at full speed.
+pub(crate) fn known_within_s(mission: &Mission) -> f64 {
+    (WAY_M / mission.speed_m_s()).max(f64::from(READINGS) / mission.robot.rate_hz)
+}
 
 /// A reading and the way and heading by the wheels, metres and radians.
 type Value = [f64; 3];

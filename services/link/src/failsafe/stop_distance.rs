@@ -1,19 +1,46 @@
-//! How far the robot goes from a fault until it rests, at its full speed: the time until the link knows of the fault, and the base's way
-//! to stop. What no time bounds, or an operator or another commander does, is not here.
+//! How far the robot goes, and for how long it moves, from a fault until it rests, at its full speed: the time until the link knows of the
+//! fault, and the base's way to stop. What no time bounds, or another commander does, is not here.
 
-use common::{mission::Mission, samples::Cause};
+use common::{ground_truth::GroundTruthTick, mission::Mission, samples::Cause};
 
-use super::{Rule, TABLE};
+use super::{TABLE, rule};
 
-/// Each cause that stops the robot for which the time is bounded: that time, seconds, and the way from the fault to rest, metres.
-pub fn from_faults(mission: &Mission) -> Vec<(Cause, f64, f64)> {
-    let response = mission.body().response;
-    let row = |rule: &Rule| {
-        let known_s = rule.known_within_s?(mission);
-        let after_s = known_s + response.dead_time_s();
-        Some((rule.cause, known_s, response.way_to_stop_m(mission.speed_m_s(), after_s)))
-    };
-    TABLE.iter().filter_map(row).collect()
+/// The most of each, from a fault.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stop {
+    /// Until the link knows of it: it tells the robot to stand, or its last command is over.
+    pub known_s: f64,
+    /// Until wheels rest.
+    pub rest_s: f64,
+    pub way_m: f64,
+}
+
+impl Stop {
+    /// The stop of a robot whose fault is known after `known_s`.
+    pub fn known_after(known_s: f64, mission: &Mission) -> Self {
+        let (response, speed) = (mission.body().response, mission.speed_m_s());
+        let turns_s = mission.turn_rad_s() / response.turn_acceleration_rad_s2;
+        let brakes_s = turns_s.max(speed / response.acceleration_m_s2);
+        // A lag leaves of the speed what is called rest after so many time constants.
+        let lags_s = response.lag_s * (speed / GroundTruthTick::AT_REST_M_S).ln().max(0.0);
+        Self {
+            known_s,
+            rest_s: known_s + response.delay_s + lags_s + brakes_s,
+            way_m: response.way_to_stop_m(speed, known_s + response.dead_time_s()),
+        }
+    }
+
+    /// The stop by `cause`; none if no time bounds it.
+    pub fn by(cause: Cause, mission: &Mission) -> Option<Self> {
+        let known_s = rule(cause)?.known_within_s?(mission);
+        Some(Self::known_after(known_s, mission))
+    }
+}
+
+/// Each cause that stops the robot for which the time is bounded.
+pub fn from_faults(mission: &Mission) -> Vec<(Cause, Stop)> {
+    let causes = TABLE.iter().map(|rule| rule.cause);
+    causes.filter_map(|cause| Some((cause, Stop::by(cause, mission)?))).collect()
 }
 
 #[cfg(test)]
@@ -22,20 +49,35 @@ mod tests {
 
     use super::*;
 
+    fn stale(text: &str) -> Stop {
+        let text = format!("target = [3, 0]\ncontroller.turn_rad_s = 0.8\n{text}");
+        let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+        Stop::by(Cause::CommandStale, &mission).unwrap()
+    }
+
     #[test]
     fn the_way_from_a_fault_to_rest_grows_with_the_speed_the_limit_of_commands_and_a_heavier_base()
     {
-        let way = |text: &str| {
-            let text = format!("target = [3, 0]\n{text}");
-            let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
-            let ways = from_faults(&mission);
-            ways.into_iter().find(|(cause, ..)| *cause == Cause::CommandStale).unwrap().2
-        };
+        let way = |text| stale(text).way_m;
         let usual = way("controller.speed_m_s = 0.4");
         assert!((usual - 0.4 * (0.25 + 0.15)).abs() < 1e-9, "{usual}");
         assert!(way("controller.speed_m_s = 0.6") > usual);
         assert!(way("controller.speed_m_s = 0.4\nrobot.command_limit_s = 0.5") > usual);
         let heavy = way("controller.speed_m_s = 0.4\nrobot.response.acceleration_m_s2 = 0.6");
         assert!((heavy - usual - 0.4 * 0.4 / 1.2).abs() < 1e-9, "{heavy}");
+    }
+
+    #[test]
+    fn the_time_from_a_fault_to_rest_grows_with_the_delay_the_lag_and_a_heavier_base() {
+        let rest = |response: &str| {
+            stale(&format!("controller.speed_m_s = 0.4\nrobot.response = {{ {response} }}")).rest_s
+        };
+        let light = rest("delay_s = 0.1, lag_s = 0.0");
+        assert!((light - 0.35).abs() < 1e-9, "{light}");
+        assert!((rest("delay_s = 0.3, lag_s = 0.0") - light - 0.2).abs() < 1e-9);
+        // The speed falls to a fortieth.
+        assert!((rest("delay_s = 0.1, lag_s = 0.1") - light - 0.1 * 40_f64.ln()).abs() < 1e-9);
+        let heavy = rest("delay_s = 0.1, lag_s = 0.0, acceleration_m_s2 = 0.5");
+        assert!((heavy - light - 0.8).abs() < 1e-9, "{heavy}");
     }
 }

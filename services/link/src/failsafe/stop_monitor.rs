@@ -26,6 +26,16 @@ const AT_REST_AFTER: Duration = Duration::from_millis(200);
 const LONGEST_GAP: Duration = Duration::from_secs(1);
 const NEXT_METHOD_AFTER: Duration = Duration::from_millis(300);
 
+/// Until a robot that does not stop at full speed is told by its next method, seconds. It moves in whole intervals between frames.
+pub(crate) fn known_within_s(mission: &Mission) -> f64 {
+    let comes_to_rest = comes_to_rest_s(mission.body().response, mission.speed_m_s());
+    comes_to_rest + DOES_NOT_STOP_AFTER.as_secs_f64() + 2.0 / mission.robot.rate_hz
+}
+
+fn comes_to_rest_s(response: Response, speed_m_s: f64) -> f64 {
+    STOPS_ARE_LOST_S + response.dead_time_s() + speed_m_s / response.acceleration_m_s2
+}
+
 #[derive(Clone, Debug)]
 pub struct StopMonitor {
     counts_per_m: f64,
@@ -99,8 +109,7 @@ impl StopMonitor {
     }
 
     fn comes_to_rest(&self) -> Duration {
-        let brakes_s = self.driven / self.counts_per_m / self.response.acceleration_m_s2;
-        Duration::from_secs_f64(STOPS_ARE_LOST_S + self.response.dead_time_s() + brakes_s)
+        Duration::from_secs_f64(comes_to_rest_s(self.response, self.driven / self.counts_per_m))
     }
 
     /// Nothing is known without two usable frames, of which the newer is no older than they may lie apart.

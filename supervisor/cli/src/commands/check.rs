@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use common::mission::Mission;
-use link::failsafe::stop_distance;
+use link::failsafe::stop_distance::{self, Stop};
 
 use console::{
     failure::Failure,
@@ -34,8 +34,11 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
         frame.resolution_m,
         mission.speed_m_s()
     );
-    for (cause, noticed_s, way_m) in stop_distance::from_faults(&mission) {
-        text += &format!("  {:<28} {way_m:.2} m (known after {noticed_s:.2} s)\n", cause.name());
+    for (cause, Stop { known_s, rest_s, way_m }) in stop_distance::from_faults(&mission) {
+        text += &format!(
+            "  {:<28} {way_m:.2} m in {rest_s:.2} s (known after {known_s:.2} s)\n",
+            cause.name()
+        );
     }
     Ok(print_text(&text)?)
 }

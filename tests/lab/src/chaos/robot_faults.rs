@@ -26,7 +26,7 @@ use crate::chaos::{
     mission,
     options::{Faults, Options},
     proxy::Proxy,
-    robot_fault::RobotFault,
+    robot_fault::{Promise, RobotFault},
     stop_time_table::{Entry, StopTimeTable},
 };
 use crate::{
@@ -131,6 +131,10 @@ impl Observed {
         let began = Instant::now();
         let (least, more) = FAULT_AFTER_S;
         let fault_after_s = least + more * Random::new(seed, 17 + fault as u128).share();
+        let watched = match fault.row().promise {
+            Promise::Unharmed | Promise::EndsAtRest => WATCHED_ON_ITS_WAY,
+            _ => WATCHED,
+        };
         let (mut departed, mut stop) = (None, None);
         // The process leaves the bus of the mission before, which that mission may have left behind.
         let robot_domain = Domain::of(options.asked.robot.clone());
@@ -146,10 +150,6 @@ impl Observed {
             }
             self.ended_by_itself =
                 child.try_reap().or_cannot("reap")?.is_some() && !fault.is_kill();
-            let watched = match fault.row().promise.rest_within_s() {
-                Some(_) => WATCHED,
-                None => WATCHED_ON_ITS_WAY,
-            };
             let patience = self.fault_began.map_or(began + DEPARTS_WITHIN, |(at, _)| at + watched);
             if self.ended_by_itself || Instant::now() >= patience {
                 break;
@@ -229,6 +229,7 @@ impl Observed {
         let mut entry = Entry {
             fault,
             seed,
+            promised_s: fault.row().promise.rest_within_s(&options.loaded),
             fault_began: false,
             last_moving_s: None,
             rest_s: None,

@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, fmt};
 use serde::Serialize;
 
 use crate::chaos::Judged;
-use crate::chaos::robot_fault::{Promise, REST_AT_ONCE_S, REST_LATER_S, REST_WITHIN_S, RobotFault};
+use crate::chaos::robot_fault::{Promise, RobotFault};
 
 /// The least time from the last tick in which a wheel turned to the end of a mission that ends at rest, seconds.
 const AT_REST_BEFORE_S: f64 = 0.15;
@@ -14,6 +14,8 @@ const AT_REST_BEFORE_S: f64 = 0.15;
 pub struct Entry {
     pub fault: RobotFault,
     pub seed: u64,
+    /// The greatest time from the fault to the last command that moves a wheel and to rest, seconds; none if the robot may go on.
+    pub promised_s: Option<f64>,
     /// Whether the fault began: a mission may end before.
     pub fault_began: bool,
     /// The time from the fault to the link's last command that moves a wheel, seconds.
@@ -33,12 +35,11 @@ pub struct Entry {
 
 impl Entry {
     pub fn is_kept(&self) -> bool {
-        let promise = self.fault.row().promise;
         let unharmed = self.fault_began && self.collisions == 0 && self.outcome != "wrong_place";
-        let Some(limit_s) = promise.rest_within_s() else {
+        let Some(limit_s) = self.promised_s else {
             let rests =
                 self.rest_s.is_some_and(|rest_s| rest_s + AT_REST_BEFORE_S <= self.watched_s);
-            return unharmed && (rests || promise != Promise::EndsAtRest);
+            return unharmed && (rests || self.fault.row().promise != Promise::EndsAtRest);
         };
         let within = |seconds: Option<f64>| seconds.is_some_and(|seconds| seconds <= limit_s);
         unharmed && within(self.last_moving_s) && within(self.rest_s) && !self.reason.is_empty()
@@ -74,8 +75,8 @@ impl fmt::Display for StopTimeTable {
     fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             to,
-            "{:<17} {:>14} {:>11} {:>8} {:>8} {:>9}  outcome: reason",
-            "robot", "last command", "at rest", "way", "touches", "kept"
+            "{:<17} {:>14} {:>11} {:>9} {:>8} {:>8} {:>9}  outcome: reason",
+            "robot", "last command", "at rest", "promised", "way", "touches", "kept"
         )?;
         let mut kinds: BTreeMap<RobotFault, Vec<&Entry>> = BTreeMap::new();
         for entry in &self.entries {
@@ -99,27 +100,15 @@ impl fmt::Display for StopTimeTable {
                 format!("{}: {reason}", entry.outcome)
             });
             let name = fault.row().name;
+            let promised = entries[0].promised_s;
+            let promised = promised.map_or("-".to_owned(), |seconds| format!("{seconds:.2} s"));
             writeln!(
                 to,
-                "{name:<17} {last:>14} {rest:>11} {way:>8} {touches:>8} {kept:>9}  {told}"
+                "{name:<17} {last:>14} {rest:>11} {promised:>9} {way:>8} {touches:>8} {kept:>9}  {told}"
             )?;
         }
-        writeln!(
-            to,
-            "Times and ways are from the fault, the longest of each kind; at most {REST_WITHIN_S} s, {REST_LATER_S} s: {}, or \
-             {REST_AT_ONCE_S} s: {}; except where the robot may go on unharmed: {}, {}.",
-            names(Promise::RestsLater),
-            names(Promise::RestsAtOnce),
-            names(Promise::Unharmed),
-            names(Promise::EndsAtRest)
-        )
+        writeln!(to, "Times and ways are from the fault, the longest of each kind.")
     }
-}
-
-fn names(promise: Promise) -> String {
-    let table = crate::chaos::robot_fault::TABLE.iter();
-    let names: Vec<_> = table.filter(|row| row.promise == promise).map(|row| row.name).collect();
-    names.join(", ")
 }
 
 /// The longest time of all; marked as a lower bound if the robot still moved at the end of the watch.
@@ -128,7 +117,7 @@ fn longest(entries: &[&Entry], time: impl Fn(&Entry) -> Option<f64>) -> String {
     const STILL_S: f64 = 0.5;
     let moving = |entry: &Entry| {
         let longest = time(entry)?;
-        let still = longest > REST_WITHIN_S && longest + STILL_S >= entry.watched_s;
+        let still = longest + STILL_S >= entry.watched_s;
         Some((longest, still))
     };
     let times = entries.iter().filter_map(|entry| moving(entry));
@@ -147,6 +136,7 @@ mod tests {
         Entry {
             fault,
             seed: 1,
+            promised_s: matches!(fault.row().promise, Promise::Rests(_)).then_some(2.0),
             fault_began: true,
             last_moving_s: Some(0.7),
             rest_s: Some(0.9),
@@ -188,7 +178,7 @@ mod tests {
         let text = table.to_string();
         let row = text.lines().nth(1).unwrap_or_default();
         let words: Vec<_> = row.split_whitespace().collect();
-        let want = "silence > 9.90 s 0.90 s 0.12 m 0 1 of 2 goes on: robot lost";
+        let want = "silence > 9.90 s 0.90 s 2.00 s 0.12 m 0 1 of 2 goes on: robot lost";
         assert_eq!(words.join(" "), want);
     }
 }
