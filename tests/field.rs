@@ -131,21 +131,17 @@ fn guidance_in_the_file_is_uphill_with_y_down_and_of_unit_length() {
 }
 
 #[test]
-fn the_report_tells_size_reach_method_and_times() {
+fn the_report_tells_size_reach_method_and_time() {
     let directory = tempfile::tempdir().unwrap();
     let map = write_map(directory.path());
-    let report = report(&map, &["--target-cell", "3,12", "--repeat", "3", "--threads", "2"]);
+    let report = report(&map, &["--target-cell", "3,12"]);
     let free = rooms().concat().matches('.').count() as u64;
     assert_eq!(report["rows"], 16);
     assert_eq!(report["cols"], 24);
     assert_eq!(report["reachable"], free - 1, "all but the closet");
     assert_eq!(report["target"], serde_json::json!([3, 12]));
     assert!(!report["method"].as_str().unwrap().is_empty());
-    for phase in ["setup_ms", "solve_ms", "verify_ms"] {
-        let least = report[phase].as_f64().unwrap();
-        let median = report[format!("{phase}_median")].as_f64().unwrap();
-        assert!(0.0 <= least && least <= median, "{phase}: {least}, {median}");
-    }
+    assert!(report["solve_ms"].as_f64().unwrap() > 0.0);
     assert!(report["worst_residual"].as_f64().unwrap() < 1e-2);
     assert!(report["log10_u_min"].as_f64().unwrap() < 0.0);
     assert!(report["peak_memory_bytes"].as_u64().unwrap() > 100_000);

@@ -329,7 +329,7 @@ fn a_latency_measurement_removes_no_directory_but_its_own() {
     // This is another robot of this user, whose directory is below the removed one.
     let run = Run::under_way("mach-lat", "open-room", &SLOW, 0.3);
     let tick = ["bench", "tick", "--robot", support::suite(), "--rounds", "1", "--json"];
-    support::printed(&[&tick[..], &["--pace", "max"]].concat());
+    support::printed(&[&tick[..], &["--rate", "max"]].concat());
     let root = fs::metadata(support::domain("mach-lat").directory()).unwrap();
     assert!(root.is_dir() && root.uid() == user);
     assert!(run.status().is_some());

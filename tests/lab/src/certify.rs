@@ -2,22 +2,16 @@
 //! robots at once. `rows.csv` has a row for each robot of each run and is added to, so that a large number may take many nights;
 //! `certificate.md` is written again from all rows.
 
-use std::{
-    collections::BTreeMap,
-    fs::{self, OpenOptions},
-    path::PathBuf,
-    thread,
-    time::Instant,
-};
+use std::{collections::BTreeMap, fs, path::PathBuf, thread, time::Instant};
 
-use clap::{Args, Parser as _};
-use console::output::write_stderr;
+use clap::{Args, Parser as _, builder::PossibleValuesParser};
+use console::output::{print_text, write_stderr};
 use serde::{Deserialize, Serialize};
 
 use crate::{
     chaos::{self, Judged},
     error::{OrCannot as _, Result},
-    missions::statistics::most_by_95_percent,
+    missions::{results::Table, runner::in_parallel, statistics::most_by_95_percent},
 };
 
 /// Try robots with signals and faults, and write what was lost to a page, with bounds at 95 %.
@@ -30,7 +24,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 0.001)]
     share: f64,
     /// The parts, with commas; by default all.
-    #[arg(long, value_delimiter = ',')]
+    #[arg(long, value_delimiter = ',', value_parser = PossibleValuesParser::new(PARTS.iter().map(|part| part.name)))]
     parts: Vec<String>,
 }
 
@@ -40,7 +34,7 @@ struct Part {
     /// Of the whole certificate, over both robots.
     whole: u32,
     /// Options of `firsthand bench chaos`, without numbers.
-    options: &'static [&'static str],
+    options: &'static str,
 }
 
 const PARTS: &[Part] = &[
@@ -48,31 +42,31 @@ const PARTS: &[Part] = &[
         name: "signals",
         what: "kills and freezes of stages, successors as they start, and the supervisor",
         whole: 10_000,
-        options: &["--include-startup", "--include-supervisor"],
+        options: "--include-startup --include-supervisor",
     },
     Part {
         name: "consumers",
         what: "the same of stages and consumers; every generation is replayed",
         whole: 2000,
-        options: &["--include-consumers", "--replay"],
+        options: "--include-consumers --replay",
     },
     Part {
         name: "machine",
         what: "freezes of all processes, while the target changes",
         whole: 1000,
-        options: &["--freeze-all", "--targets"],
+        options: "--freeze-all --targets",
     },
     Part {
         name: "faults-x80",
         what: "missions with a fault of the robot, an X80",
         whole: 500,
-        options: &["--robot-faults"],
+        options: "--robot-faults",
     },
     Part {
         name: "faults-json",
         what: "missions with a fault of the robot, which speaks lines of JSON and has a laser",
         whole: 500,
-        options: &["--robot-faults", "--set", "robot={model='kobuki',protocol='json',rate_hz=10}"],
+        options: "--robot-faults --set robot={model='kobuki',protocol='json',rate_hz=10}",
     },
 ];
 
@@ -90,54 +84,26 @@ struct Row {
 }
 
 pub fn main(arguments: &Arguments) -> Result {
-    let known = |name: &String| PARTS.iter().any(|part| part.name == name);
-    if let Some(unknown) = arguments.parts.iter().find(|name| !known(name)) {
-        let all: Vec<_> = PARTS.iter().map(|part| part.name).collect();
-        return Err(format!("no part {unknown:?}; give some of {}", all.join(", ")).into());
-    }
-    fs::create_dir_all(&arguments.out).or_cannot_file("make", &arguments.out)?;
-    let file = arguments.out.join("rows.csv");
-    let mut rows: Vec<Row> = match csv::Reader::from_path(&file) {
-        Ok(mut reader) => {
-            reader.deserialize().collect::<Result<_, _>>().or_cannot_file("read", &file)?
-        }
-        Err(_) => Vec::new(),
-    };
-    let asked = |part: &&Part| {
-        arguments.parts.is_empty() || arguments.parts.iter().any(|name| name == part.name)
-    };
-    let before = rows.len();
-    for part in PARTS.iter().filter(asked) {
+    let Arguments { out, share, parts } = arguments;
+    fs::create_dir_all(out).or_cannot_file("make", out)?;
+    let mut rows = Table::open(out.join("rows.csv"))?;
+    let before = rows.rows.len();
+    let is_asked = |part: &&Part| parts.is_empty() || parts.iter().any(|name| name == part.name);
+    for part in PARTS.iter().filter(is_asked) {
         write_stderr(&format!("{}: {}\n", part.name, part.what));
-        for row in both(part, arguments.share, rows.len() as u64)? {
-            let is_new = !file.exists();
-            let to = OpenOptions::new().append(true).create(true).open(&file);
-            let to = to.or_cannot_file("open", &file)?;
-            let mut writer = csv::WriterBuilder::new().has_headers(is_new).from_writer(to);
-            writer.serialize(&row).or_cannot_file("write", &file)?;
-            rows.push(row);
-        }
-        let page = arguments.out.join("certificate.md");
-        fs::write(&page, certificate(&rows)).or_cannot_file("write", &page)?;
+        // A row's number is its seed's, so that no seed is tried twice.
+        let number = rows.rows.len() as u64;
+        let tried =
+            |number: &u64, _| one(part, share / 2.0, *number).map_err(|error| error.to_string());
+        in_parallel(vec![number, number + 1], 2, tried, |row| rows.add(row?))?;
+        let page = out.join("certificate.md");
+        fs::write(&page, certificate(&rows.rows)).or_cannot_file("write", &page)?;
     }
-    console::output::print_text(&certificate(&rows)).or_cannot("print")?;
-    match rows[before..].iter().map(|row| row.lost).sum::<u64>() {
+    print_text(&certificate(&rows.rows))?;
+    match rows.rows[before..].iter().map(|row| row.lost).sum::<u64>() {
         0 => Ok(()),
-        lost => Err(format!("{lost} were lost now; see {}", file.display()).into()),
+        lost => Err(format!("{lost} were lost now; see rows.csv in {}", out.display()).into()),
     }
-}
-
-/// The two robots at once. A row's number is its seed's, so that no seed is tried twice.
-fn both(part: &Part, share: f64, number: u64) -> Result<Vec<Row>> {
-    let told = |number| one(part, share / 2.0, number).map_err(|error| error.to_string());
-    thread::scope(|scope| {
-        let robots = [number, number + 1].map(|number| scope.spawn(move || told(number)));
-        let ended = robots.into_iter().map(|robot| match robot.join() {
-            Ok(row) => Ok(row?),
-            Err(_) => Err("a part of the certificate panicked".into()),
-        });
-        ended.collect()
-    })
 }
 
 #[derive(Debug, clap::Parser)]
@@ -150,16 +116,13 @@ fn one(part: &Part, share: f64, number: u64) -> Result<Row> {
     let began = Instant::now();
     let many = (f64::from(part.whole) * share).ceil().max(1.0);
     let seed = 1 + number * 10_000;
-    let count = match part.options.contains(&"--robot-faults") {
-        true => ["--missions".to_owned(), (many / chaos::FAULTS as f64).ceil().to_string()],
-        false => ["--kills".to_owned(), many.to_string()],
+    let count = match part.options.contains("--robot-faults") {
+        true => format!("--missions {}", (many / chaos::FAULTS as f64).ceil()),
+        false => format!("--kills {many}"),
     };
-    let words = part.options.iter().map(|word| (*word).to_owned()).chain(count);
-    let robot = format!("certify-{number}");
-    let words: Vec<String> =
-        words.chain(["--seed".to_owned(), seed.to_string(), "--robot".to_owned(), robot]).collect();
-    let asked = Chaos::try_parse_from([String::new()].iter().chain(&words)).or_cannot("try")?.asked;
-    let Judged { tried, lost, worst } = chaos::judge(&asked)?;
+    let words = format!("chaos {} {count} --seed {seed} --robot certify-{number}", part.options);
+    let asked = Chaos::try_parse_from(words.split(' ')).or_cannot("try")?.asked;
+    let Judged { tried, lost, worst, .. } = chaos::judge(&asked)?;
     Ok(Row {
         part: part.name.to_owned(),
         seed,
@@ -169,7 +132,7 @@ fn one(part: &Part, share: f64, number: u64) -> Result<Row> {
         took_s: began.elapsed().as_secs_f64(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         processors: thread::available_parallelism().map_or(0, usize::from),
-        command: format!("firsthand bench chaos {}", words.join(" ")),
+        command: format!("firsthand bench {words}"),
     })
 }
 
@@ -220,8 +183,8 @@ mod tests {
     #[test]
     fn every_part_is_a_chaos_that_its_options_allow() {
         for part in PARTS {
-            let words = ["", "--seed", "1"].iter().chain(part.options);
-            assert!(Chaos::try_parse_from(words).is_ok(), "{}", part.name);
+            let words = format!("chaos --seed 1 {}", part.options);
+            assert!(Chaos::try_parse_from(words.split(' ')).is_ok(), "{}", part.name);
         }
     }
 }

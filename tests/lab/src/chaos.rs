@@ -6,12 +6,10 @@
 //! | module | holds |
 //! |---|---|
 //! | [`Options`] | the mission that is attacked, and the kinds of attack |
-//! | `schedule` | the seeded schedule of signals |
+//! | `schedule` | the seeded schedule of signals, and their kinds |
 //! | `mission` | one mission, undisturbed and attacked |
-//! | `series` | the state that the missions share |
-//! | `attack`, `subscriptions` | the attacker of one mission; its readers on the bus |
-//! | `kind`, `recovery` | how a process is hit; the recovery until its successor works |
-//! | `consumer`, `consumer_process`, `consumers` | consumers that are hit and restarted, and end with chaos |
+//! | `attack` | the attacker of one mission, and its readers on the bus |
+//! | [`consumers`] | consumers that are hit and restarted, and end with chaos |
 //! | `changes` | targets that change meanwhile |
 //! | `replays` | replays of the missions' recordings |
 //! | `leftovers` | files and processes that outlived a mission |
@@ -23,109 +21,84 @@
 
 mod attack;
 mod changes;
-mod consumer;
-pub mod consumer_process;
-mod consumers;
+pub mod consumers;
 mod fault_injector;
-mod kind;
 mod leftovers;
 mod mission;
 mod options;
 mod proxy;
-mod recovery;
 mod replays;
 mod report;
 mod robot_fault;
 mod robot_faults;
 mod schedule;
-mod series;
 mod signals;
 mod stop_time_table;
-mod subscriptions;
-mod tick_latencies;
 
 pub use options::{Arguments, Options};
 
 use std::{fmt::Display, fs, process::ExitCode, time::Instant};
 
-use console::output::{print, write_stderr};
+use console::output::{print_text, write_stderr};
 use serde::Serialize;
 
 use crate::error::Result;
-use report::Report;
-use series::Series;
-use stop_time_table::StopTimeTable;
+use report::Series;
 
 /// The exit code if a mission did not arrive, touched something, lost its pose, aborted a healthy stage, or left something
 /// behind; or if a robot with a fault did not come to rest in time.
 const NOT_CLEAN: u8 = 8;
 
-pub fn main(arguments: &Arguments) -> Result<ExitCode> {
-    let options = Options::of(arguments)?;
-    if arguments.robot_faults.is_some() {
-        let kept = |table: &StopTimeTable| [table.is_kept(); 2];
-        return finish(&options, robot_faults::run(&options), kept);
-    }
-    let ended = run(&options);
-    if let (Some(out), Ok(_)) = (&arguments.out, &ended) {
-        let table = out.join(signals::FILE_NAME);
-        write_stderr(&format!("results: {}\n", table.display()));
-    }
-    finish(&options, ended, |report: &Report| [report.is_right(), report.is_clean()])
-}
-
 /// The number of kinds of robot faults.
 pub const FAULTS: usize = robot_fault::TABLE.len();
 
-/// What a chaos tried, what went wrong, and the worst case in words.
+/// What a chaos tried, what went wrong, the worst case in words, and the whole result as text.
 #[derive(Debug)]
 pub struct Judged {
     pub tried: u64,
     pub lost: u64,
     pub worst: String,
+    text: String,
+}
+
+/// A result for people, or as a line of JSON.
+fn text(result: &(impl Display + Serialize), json: bool) -> Result<String> {
+    Ok(if json { serde_json::to_string(result)? + "\n" } else { result.to_string() })
+}
+
+pub fn main(arguments: &Arguments) -> Result<ExitCode> {
+    let judged = judge(arguments)?;
+    print_text(&judged.text)?;
+    Ok(ExitCode::from(if judged.lost == 0 { 0 } else { NOT_CLEAN }))
 }
 
 /// Run and judge without printing. The missions' directory stays if something went wrong.
 pub fn judge(arguments: &Arguments) -> Result<Judged> {
     let options = Options::of(arguments)?;
-    let judged = match arguments.robot_faults {
-        Some(_) => robot_faults::run(&options)?.judged(),
-        None => run(&options)?.judged(),
-    };
-    if judged.lost == 0 {
-        fs::remove_dir_all(&options.directory)?;
-    }
-    Ok(judged)
-}
-
-/// Print the result of all missions. Their directory stays if something went wrong. `judge` says of a result whether all missions were
-/// right, and whether the command succeeded.
-fn finish<R: Display + Serialize>(
-    options: &Options,
-    ended: Result<R>,
-    judge: fn(&R) -> [bool; 2],
-) -> Result<ExitCode> {
     let directory = options.directory.display();
-    let result = match ended {
-        Ok(result) => result,
-        // An empty directory is of no use.
-        Err(error) if fs::remove_dir(&options.directory).is_ok() => return Err(error),
-        Err(error) => return Err(format!("{error}; see {directory}").into()),
+    let judged = match arguments.robot_faults {
+        Some(_) => robot_faults::run(&options).and_then(|table| table.judged(arguments.json)),
+        None => run(&options).and_then(|report| report.judged(arguments.json)),
     };
-    let [right, clean] = judge(&result);
-    if right {
-        fs::remove_dir_all(&options.directory)?;
-    } else {
-        write_stderr(&format!(
-            "firsthand: the files of the missions that went wrong are in {directory}\n"
-        ));
+    match judged {
+        Ok(judged) if judged.lost == 0 => {
+            fs::remove_dir_all(&options.directory)?;
+            Ok(judged)
+        }
+        Ok(judged) => {
+            write_stderr(&format!(
+                "firsthand: the files of the missions that went wrong are in {directory}\n"
+            ));
+            Ok(judged)
+        }
+        // An empty directory is of no use.
+        Err(error) if fs::remove_dir(&options.directory).is_ok() => Err(error),
+        Err(error) => Err(format!("{error}; see {directory}").into()),
     }
-    print(&result, options.asked.json)?;
-    Ok(ExitCode::from(if clean { 0 } else { NOT_CLEAN }))
 }
 
 /// Attack missions, one after the other, until enough signals are sent.
-fn run(options: &Options) -> Result<Report> {
+fn run(options: &Options) -> Result<report::Report> {
     let began = Instant::now();
     let mut series = Series::new(options)?;
     while !series.is_over() {

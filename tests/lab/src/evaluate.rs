@@ -18,7 +18,7 @@ use crate::{
     error::Result,
     missions::{
         HARMONIC, Setting,
-        results::Results,
+        results::{self, Results},
         runner::{self, NoiseSeeds, Plan},
         trial::swept_m,
     },
@@ -94,7 +94,7 @@ pub struct Arguments {
 
 pub fn main(arguments: &Arguments) -> Result {
     let settings = settings(arguments)?;
-    let described = described(arguments, &settings);
+    let described = results::command()?;
     let Arguments { start, target, seed, .. } = *arguments;
     let ends = start.zip(target).map(|([x, y, heading_deg], target)| Ends {
         start: DVec2::new(x, y),
@@ -136,39 +136,20 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     numbers.ok_or_else(|| format!("give {N} numbers with commas between them"))
 }
 
-/// The command that gives these rows.
-fn described(arguments: &Arguments, settings: &[Setting]) -> String {
-    let Arguments { worlds, seed, repeats, robot, .. } = arguments;
-    let count = arguments.count.map_or(String::new(), |count| format!(" --count {count}"));
-    let ends = arguments.start.zip(arguments.target);
-    let ends = ends.map_or(String::new(), |([x, y, deg], [to_x, to_y])| {
-        format!(" --start {x},{y},{deg} --target {to_x},{to_y}")
-    });
-    let calibrate = if arguments.calibrate { " --calibrate" } else { "" };
-    let settings: Vec<_> =
-        settings.iter().map(|it| format!("{}: {}", it.name, it.set.join(" "))).collect();
-    let settings = settings.join("; ");
-    format!(
-        "firsthand evaluate --worlds {worlds}{ends}{count} --seed {seed} --repeats {repeats} --robot {robot}{calibrate} [{settings}]"
-    )
-}
-
 /// The methods to compare, each as a name and its assignments: each method with each of the sensors, but the paper's method
 /// once, because it has only the sonar.
 fn methods(arguments: &Arguments) -> Vec<(String, Vec<String>)> {
-    let mut methods = Vec::new();
-    for method in &arguments.method {
+    let with_sensors = |method: &String| -> Vec<(String, Vec<String>)> {
         let set = format!("method='{method}'");
         if arguments.sensors.is_empty() || method == "paper" {
-            methods.push((method.clone(), vec![set]));
-            continue;
+            return vec![(method.clone(), vec![set])];
         }
-        for sensors in &arguments.sensors {
-            let sensed = format!("sensors='{sensors}'");
-            methods.push((format!("{method} {sensors}"), vec![set.clone(), sensed]));
-        }
-    }
-    methods
+        let sensed = |sensors: &String| {
+            (format!("{method} {sensors}"), vec![set.clone(), format!("sensors='{sensors}'")])
+        };
+        arguments.sensors.iter().map(sensed).collect()
+    };
+    arguments.method.iter().flat_map(with_sensors).collect()
 }
 
 /// The settings to compare, each planner by each method; the others are compared with the first.
@@ -178,18 +159,18 @@ fn settings(arguments: &Arguments) -> Result<Vec<Setting>> {
     let methods = methods(arguments);
     let mut settings = Vec::new();
     for planner in planners {
-        let mut executable = None;
-        if planner != HARMONIC {
+        let is_own = planner == HARMONIC;
+        if !is_own {
             // A missing executable is reported before anything starts.
             planner_executable::find_planner(Path::new(planner), BASELINES)?;
-            let value = toml::Value::from(&**planner);
-            executable = Some(format!("planner.executable={value}"));
         }
         for (method, chosen) in &methods {
             let mut set = [&common, &*arguments.set, chosen].concat();
-            set.extend(executable.clone());
+            if !is_own {
+                set.push(format!("planner.executable={}", toml::Value::from(&**planner)));
+            }
             let name = match (&planners[..], &methods[..]) {
-                ([_], _) if planner == HARMONIC => method.clone(),
+                ([_], _) if is_own => method.clone(),
                 (_, [_]) => planner.clone(),
                 _ => format!("{planner} {method}"),
             };

@@ -4,7 +4,7 @@
 //! | module | holds |
 //! |---|---|
 //! | `table` | the tables `table.csv`, experiments with their missions and the paper's report of each, and `claims.csv`, the paper's claims |
-//! | `report` | the results as text, a page and JSON objects |
+//! | `report` | the results as JSON objects and a page |
 
 mod report;
 mod table;
@@ -12,17 +12,16 @@ mod table;
 use std::{num::NonZero, path::PathBuf};
 
 use clap::Args;
-use console::output::print_text;
+use console::output::write_stderr;
 
 use crate::{
     error::Result,
     missions::{
         HARMONIC, Setting,
-        results::Results,
+        results::{self, Results},
         runner::{self, NoiseSeeds, Plan},
     },
 };
-use report::Report;
 use table::METHODS;
 
 /// Repeat the paper's experiments with its method and with the default one, and compare the results with those of the paper.
@@ -60,12 +59,7 @@ const OUTAGE: &str = "simulation.radio.outage_share=0.2";
 pub fn main(arguments: &Arguments) -> Result {
     let Arguments { seeds, realism, .. } = arguments;
     let chosen = table::named(&arguments.only)?;
-    let names: Vec<_> = chosen.iter().map(|it| &*it.name).collect();
-    // The command that gives these rows.
-    let described = format!(
-        "firsthand experiments --seeds {seeds} --only {} --realism {realism}",
-        names.join(",")
-    );
+    let described = results::command()?;
     let mut results = Results::open(&arguments.out, &described, arguments.resume)?;
     for (method, own) in METHODS {
         let mut set: Vec<_> = own.iter().map(|&text| text.to_owned()).collect();
@@ -85,11 +79,9 @@ pub fn main(arguments: &Arguments) -> Result {
         runner::run(&plan, &mut results, method)?;
     }
     results.sort()?;
-    let report = Report::new(&chosen, &results.rows.rows)?;
-    let page = report.save_page(&results.directory, &described, FIRST_SEED)?;
-    Ok(print_text(&if arguments.json {
-        report.objects().map(|object| format!("{object}\n")).collect()
-    } else {
-        format!("{}rows and pictures: {}\n", report.text(), page.display())
-    })?)
+    let report = report::report(&chosen, &results.rows.rows)?;
+    let all = (&results.rows.rows[..], &report[..]);
+    let page = report::save_page(&results.directory, &chosen, all, &described, FIRST_SEED)?;
+    write_stderr(&format!("rows and pictures: {}\n", page.display()));
+    report.iter().try_for_each(|object| crate::print(object, arguments.json))
 }

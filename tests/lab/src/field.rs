@@ -3,18 +3,14 @@
 use std::{
     fs::File,
     io::{self, BufWriter, Write},
-    num::NonZeroUsize,
     path::{Path, PathBuf},
-    time::Instant,
+    time::{Duration, Instant},
 };
 
-use crate::{
-    error::Result,
-    missions::statistics::{median, rounded},
-};
+use crate::{error::Result, missions::statistics::rounded};
 use clap::Args;
 use common::{process_status::kibibytes, samples::FieldCell};
-use harmonic::{Cancellation, Cell, Domain, Field, Phase, Screening, Settings, SolveError, Solver};
+use harmonic::{Cancellation, Cell, Domain, Field, Screening, Settings, SolveError, Solver};
 use maps::Map;
 use picture::FieldOnMap;
 use serde_json::{Value, json};
@@ -43,12 +39,6 @@ pub struct Arguments {
     /// Print one line of JSON at the end, and nothing else on standard output.
     #[arg(long)]
     json: bool,
-    /// Solve K times, each time from scratch, and give the least and the median time.
-    #[arg(long, value_name = "K", default_value = "1")]
-    repeat: NonZeroUsize,
-    /// Threads a solve may use; the field is the same.
-    #[arg(long, value_name = "T", default_value = "1")]
-    threads: NonZeroUsize,
 }
 
 fn cell(text: &str) -> Result<Cell, &'static str> {
@@ -61,18 +51,15 @@ fn cell(text: &str) -> Result<Cell, &'static str> {
 pub fn main(arguments: &Arguments) -> Result {
     let map = maps::load(&arguments.map)?;
     let domain = domain(arguments, &map)?;
-    let failed = |cause| format!("{}: {cause}", arguments.map.display());
-    let (first, times) = solve(&domain, arguments.threads).map_err(failed)?;
-    let mut runs = vec![times];
-    for _ in 1..arguments.repeat.get() {
-        runs.push(solve(&domain, arguments.threads).map_err(failed)?.1);
-    }
-    let report = report(arguments, &first, &runs);
+    let began = Instant::now();
+    let field = Solver::new(Settings::default()).solve(&domain, &Cancellation::new());
+    let field = field.map_err(|cause| format!("{}: {cause}", arguments.map.display()))?;
+    let report = report(arguments, &field, began.elapsed());
     if let Some(file) = &arguments.out {
-        write(file, |to| write_array(to, &first))?;
+        write(file, |to| write_array(to, &field))?;
     }
     if let Some(file) = &arguments.picture {
-        write(file, |to| to.write_all(draw(&map, &first).as_bytes()))?;
+        write(file, |to| to.write_all(draw(&map, &field).as_bytes()))?;
     }
     crate::print(&report, arguments.json)
 }
@@ -101,30 +88,7 @@ fn domain(arguments: &Arguments, map: &Map) -> Result<Domain> {
     })
 }
 
-/// The times that set-up, solve and verification took, summed over their attempts, milliseconds.
-type Times = [f64; 3];
-
-fn solve(domain: &Domain, threads: NonZeroUsize) -> Result<(Field, Times), SolveError> {
-    let mut solver = Solver::new(Settings { threads, ..Settings::default() });
-    let mut times = Times::default();
-    let mut last = Instant::now();
-    let field = solver.solve_observed(domain, &Cancellation::new(), &mut |phase| {
-        let now = Instant::now();
-        let took = now - std::mem::replace(&mut last, now);
-        let phase = match phase {
-            Phase::SetUp => 0,
-            Phase::Cycled | Phase::Solved => 1,
-            Phase::Verified => 2,
-            // A phase this program does not know is no reason to fail.
-            _ => return,
-        };
-        times[phase] += took.as_secs_f64() * 1e3;
-    })?;
-    Ok((field, times))
-}
-
-/// The object of `field --json`. Each phase has its least time and the median over the repeats, in milliseconds.
-fn report(arguments: &Arguments, field: &Field, runs: &[Times]) -> Value {
+fn report(arguments: &Arguments, field: &Field, took: Duration) -> Value {
     let verification = field.verification();
     let mut report = json!({
         "rows": field.height(),
@@ -132,18 +96,12 @@ fn report(arguments: &Arguments, field: &Field, runs: &[Times]) -> Value {
         "target": [field.target().col, field.target().row],
         "reachable": verification.reachable,
         "method": verification.method.name(),
-        "repeats": runs.len(),
-        "threads": arguments.threads,
         "worst_residual": verification.worst_residual,
         "log10_u_min": field.log10_u_min(),
+        "solve_ms": rounded(took.as_secs_f64() * 1e3),
     });
     if let Some(length) = arguments.screening_cells {
         report["screening_cells"] = length.into();
-    }
-    for (phase, name) in ["setup_ms", "solve_ms", "verify_ms"].into_iter().enumerate() {
-        let ms = || runs.iter().map(|run| run[phase]);
-        report[name] = rounded(ms().fold(f64::INFINITY, f64::min)).into();
-        report[format!("{name}_median")] = median(ms()).map(rounded).into();
     }
     // Memory of the process when the field is solved: map, solver and field, not the output files.
     if let Some(peak) = kibibytes("self", "VmHWM") {

@@ -67,7 +67,7 @@ enum Bench {
     Tick(tick::Arguments),
     Chaos(Box<chaos::Arguments>),
     BringUp(bring_up::Arguments),
-    Consumer(chaos::consumer_process::Arguments),
+    Consumer(chaos::consumers::Arguments),
     Sources(sources::Arguments),
 }
 
@@ -96,7 +96,7 @@ fn execute(arguments: &Arguments) -> error::Result<ExitCode> {
         Command::Bench(Bench::Tick(arguments)) => tick::main(arguments),
         Command::Bench(Bench::Chaos(arguments)) => return chaos::main(arguments),
         Command::Bench(Bench::BringUp(arguments)) => bring_up::main(arguments),
-        Command::Bench(Bench::Consumer(arguments)) => chaos::consumer_process::main(arguments),
+        Command::Bench(Bench::Consumer(arguments)) => chaos::consumers::main(arguments),
         Command::Bench(Bench::Sources(arguments)) => sources::main(arguments),
     };
     Ok(done?.report())

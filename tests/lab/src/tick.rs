@@ -6,27 +6,65 @@
 //! | `hops` | five bare hops between processes |
 //! | `busy` | processes that compute meanwhile |
 //! | `mission` | a mission whose ticks are measured, and its consumers |
-//! | `regime` | how ticks follow each other |
 //! | `process_set` | resources of a process and its descendants |
-//! | `report` | the result, as it is printed |
 
 mod busy;
 mod hops;
 mod mission;
-mod options;
 mod process_set;
-mod regime;
-mod report;
 
-use common::{domain::RobotName, latency::Histogram};
+use std::{fmt, time::Duration};
+
+use clap::Args;
+use common::{clock::Pace, domain::RobotName, latency::Histogram};
 use console::missions;
+use process_set::Used;
 use processes::process::{Process, firsthand};
+use serde::Serialize;
+use summary::Quantiles;
 
-pub use options::Arguments;
-use regime::Regime;
-use report::Report;
+use crate::{
+    error::{NOTHING, OrCannot as _, Result},
+    missions::statistics::{median, rounded},
+};
 
-use crate::error::{NOTHING, OrCannot as _, Result};
+/// Measure a tick, datagram in to datagram out, and five bare hops between processes, back to back and at the robot's rate.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// The mission whose ticks are measured.
+    #[arg(default_value = "obstacle-course")]
+    mission: String,
+    /// Measure only at so many ticks a second, or back to back: max.
+    #[arg(long, value_name = "HZ", value_parser = parse_hz)]
+    rate: Option<Regime>,
+    /// Number of rounds, each of which measures both, because a shared machine has good and bad moments.
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    rounds: u32,
+    /// Set a key of the mission, as often as needed.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Do not record the missions meanwhile; `run` does.
+    #[arg(long)]
+    no_record: bool,
+    /// Number of processes that read grid and field of the missions meanwhile.
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(0..=16))]
+    consumers: u32,
+    /// Number of processes of ordinary priority that compute meanwhile, without end.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=1000))]
+    busy: u32,
+    /// One line of JSON.
+    #[arg(long)]
+    json: bool,
+    /// Name of the robot, which also names its shared memory.
+    #[arg(long)]
+    robot: Option<RobotName>,
+    /// Be one of the processes beside a measurement: busy, a consumer, or the forwarder that stands for this stage.
+    #[arg(long, hide = true, requires = "supervisor", requires = "robot")]
+    role: Option<String>,
+    /// The parent process: this one stops when it ends.
+    #[arg(long, hide = true)]
+    supervisor: Option<u32>,
+}
 
 /// Measure, or be one of the processes that a measurement starts.
 pub fn main(arguments: &Arguments) -> Result {
@@ -44,10 +82,11 @@ pub fn main(arguments: &Arguments) -> Result {
     let rate_hz = missions::load(&arguments.mission, &arguments.set)?.robot.rate_hz;
     let busy = (0..arguments.busy).map(|_| start(busy::ROLE, &robot));
     let _busy = busy.collect::<Result<Vec<_>>>()?;
-    let regimes = Regime::all(arguments.rate, arguments.pace, rate_hz);
-    let reports: Result<Vec<_>> =
-        regimes.into_iter().map(|regime| measure(regime, arguments, &robot, rate_hz)).collect();
-    reports?.iter().try_for_each(|report| crate::print(report, arguments.json))
+    let both = || vec![Regime(None), Regime(Some(rate_hz))];
+    let regimes = arguments.rate.map_or_else(both, |regime| vec![regime]);
+    let reports = regimes.into_iter().map(|regime| measure(regime, arguments, &robot, rate_hz));
+    let reports = reports.collect::<Result<Vec<_>>>()?;
+    reports.iter().try_for_each(|report| crate::print(report, arguments.json))
 }
 
 /// Measure missions of `robot` and hops, in turn. The mission has `rate_hz` ticks in a mission second.
@@ -57,13 +96,17 @@ fn measure(
     robot: &RobotName,
     rate_hz: f64,
 ) -> Result<Report> {
-    let (mut hops, mut rounds) = (Histogram::default(), Vec::new());
+    let (mut hops, mut rounds) = (Histogram::default(), (Vec::new(), Vec::new()));
+    let period = regime.period();
+    let trips = if period.is_some() { PACED_TRIPS } else { TRIPS };
     for _ in 0..arguments.rounds {
-        let round = hops::measure(robot, regime.trips(), regime.period())?;
+        let round = hops::measure(robot, trips, period)?;
         hops.add(round.counts(), round.max_ns());
-        rounds.push(mission::measure(arguments, robot, regime.pace(rate_hz))?);
+        let (ticks, used) = mission::measure(arguments, robot, regime.pace(rate_hz))?;
+        rounds.0.push(ticks);
+        rounds.1.extend(used);
     }
-    Report::new(regime, &hops, &rounds).ok_or_else(|| NOTHING.into())
+    Report::new(regime, &hops, &rounds)
 }
 
 /// Start this program as the process `role` beside a measurement of `robot`. It ends when it is dropped.
@@ -71,4 +114,140 @@ fn start(role: &str, robot: &RobotName) -> Result<Process> {
     let (own, robot) = (std::process::id().to_string(), robot.to_string());
     let beside = ["bench", "tick", "--role", role, "--supervisor", &own, "--robot", &robot];
     Process::spawn(firsthand(&beside)).or_cannot("start a process beside the measurement")
+}
+
+/// Ticks a second; none if they follow each other at once. Their cost depends on it: caches are warm or cold, cores awake or asleep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Regime(Option<f64>);
+
+/// Trips of a round that follow each other without a pause.
+const TRIPS: u64 = 2000;
+/// Trips of a round with the pause of a tick between them.
+const PACED_TRIPS: u64 = 50;
+
+impl Regime {
+    /// The pace that gives a mission with `rate_hz` ticks in a mission second this regime.
+    fn pace(self, rate_hz: f64) -> Pace {
+        self.0.map_or(Pace::Max, |hz| Pace::Rate(hz / rate_hz))
+    }
+
+    /// Time from tick to tick; none if they follow at once.
+    fn period(self) -> Option<Duration> {
+        Some(Duration::from_secs_f64(1.0 / self.0?))
+    }
+}
+
+impl fmt::Display for Regime {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            None => to.write_str("back to back"),
+            Some(hz) => write!(to, "at {hz} Hz"),
+        }
+    }
+}
+
+const SLOWEST_HZ: f64 = 0.1;
+/// A tick takes up to a millisecond, so faster is back to back.
+const FASTEST_HZ: f64 = 1000.0;
+
+fn parse_hz(text: &str) -> Result<Regime, String> {
+    match text.parse() {
+        _ if text == "max" => Ok(Regime(None)),
+        Ok(hz) if (SLOWEST_HZ..=FASTEST_HZ).contains(&hz) => Ok(Regime(Some(hz))),
+        _ => Err(format!(
+            "{text} is no rate; give ticks a second, {SLOWEST_HZ} to {FASTEST_HZ}, or max"
+        )),
+    }
+}
+
+/// What was measured beside each other, microseconds.
+#[derive(Debug, Serialize)]
+struct Times {
+    of: &'static str,
+    count: u64,
+    p50_us: f64,
+    p99_us: f64,
+    max_us: f64,
+}
+
+impl Times {
+    /// None if nothing was measured.
+    fn new(of: &'static str, count: u64, quantiles: Quantiles) -> Result<Self> {
+        match quantiles {
+            Quantiles { p50: Some(p50), p99: Some(p99), max: Some(max) } => {
+                let [p50_us, p99_us, max_us] = [p50, p99, max].map(rounded);
+                Ok(Self { of, count, p50_us, p99_us, max_us })
+            }
+            _ => Err(NOTHING.into()),
+        }
+    }
+}
+
+#[derive(Debug, Serialize)]
+struct Report {
+    regime: String,
+    /// Ratio of the medians, tick to bare hops.
+    ratio: f64,
+    ratio_p99: f64,
+    /// Resources of all processes of the mission and the simulated robot; none for a mission of a second or two.
+    #[serde(flatten)]
+    used: Option<Used>,
+    /// The bare hops, and the tick.
+    times: [Times; 2],
+}
+
+impl Report {
+    /// The medians of the rounds' quantiles count, because the load of a shared machine changes.
+    fn new(
+        regime: Regime,
+        hops: &Histogram,
+        (rounds, used): &(Vec<Times>, Vec<Used>),
+    ) -> Result<Self> {
+        let hops = Times::new("five bare hops on the bus", hops.total(), hops.into())?;
+        let quantiles = Quantiles {
+            p50: median(rounds.iter().map(|round| round.p50_us)),
+            p99: median(rounds.iter().map(|round| round.p99_us)),
+            max: rounds.iter().map(|round| round.max_us).reduce(f64::max),
+        };
+        let count = rounds.iter().map(|round| round.count).sum();
+        let tick = Times::new("a tick, datagram in to datagram out", count, quantiles)?;
+        let middle = |of: fn(&Used) -> f64| median(used.iter().map(of)).map(rounded);
+        let used = || {
+            Some(Used {
+                wakeups_per_s: middle(|used| used.wakeups_per_s)?,
+                cpu_share: middle(|used| used.cpu_share)?,
+                pss_mib: middle(|used| used.pss_mib)?,
+            })
+        };
+        Ok(Self {
+            regime: regime.to_string(),
+            ratio: rounded(tick.p50_us / hops.p50_us),
+            ratio_p99: rounded(tick.p99_us / hops.p99_us),
+            used: used(),
+            times: [hops, tick],
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rate_asked_for_is_a_pace_of_the_mission_and_a_period_of_the_hops() {
+        let regime = parse_hz("7").unwrap();
+        assert_eq!(regime.pace(3.5), Pace::Rate(2.0));
+        assert_eq!(regime.period(), Some(Duration::from_secs_f64(1.0 / 7.0)));
+        assert_eq!(regime.to_string(), "at 7 Hz");
+        let at_once = parse_hz("max").unwrap();
+        assert_eq!((at_once.pace(7.0), at_once.period()), (Pace::Max, None));
+        assert_eq!(at_once.to_string(), "back to back");
+    }
+
+    #[test]
+    fn a_rate_that_is_none_is_refused() {
+        for text in ["0", "-7", "nan", "inf", "1e9", "seven", ""] {
+            assert!(parse_hz(text).is_err(), "{text}");
+        }
+    }
 }

@@ -11,7 +11,7 @@ mod rooms;
 mod shapes;
 mod traps;
 
-use std::{convert::Infallible, fmt, path::PathBuf, str::FromStr};
+use std::{convert::Infallible, path::PathBuf, str::FromStr};
 
 use self::{corridors::Bends, ends::Ends, rooms::Doors};
 use crate::{
@@ -66,16 +66,6 @@ impl FromStr for Worlds {
     fn from_str(text: &str) -> Result<Self, Infallible> {
         let drawn = KINDS.iter().find(|kind| kind.name == text);
         Ok(drawn.map_or_else(|| Self::Path(text.into()), Self::Drawn))
-    }
-}
-
-/// The name that [`FromStr`] reads.
-impl fmt::Display for Worlds {
-    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Drawn(kind) => to.write_str(kind.name),
-            Self::Path(path) => path.display().fmt(to),
-        }
     }
 }
 

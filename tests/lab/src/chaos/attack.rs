@@ -3,34 +3,37 @@
 use std::time::{Duration, Instant};
 
 use common::{
+    bus::{AnyReader, AnyTopic, Bus, BusError, Reader},
     clock::MissionTime,
+    domain::Domain,
     ground_truth::GroundTruthTick,
-    samples::{HealthState, Order, PoseSample, RosterEntry, StageState, name_str},
+    roster::Roster,
+    samples::{
+        DeathSample, HealthSample, HealthState, Order, PoseSample, RosterEntry, RosterHeader,
+        StageState, WheelSample, name_str,
+    },
     topics::{self, SUPERVISOR},
 };
-use rustix::process::{Pid, Signal, kill_process};
-use serde_json::Value;
-
 use mission_control::simulator::Simulator;
 use processes::{
     policy::{HOLD_AFTER, HOLD_WINDOW},
     process::Process,
     stages,
 };
+use rustix::process::{Pid, Signal, kill_process};
+use serde_json::Value;
 
-use crate::chaos::{
+use super::{
     consumers::Consumers,
-    kind::Kind,
-    recovery::PendingRecovery,
-    report::{EVERYTHING, Report},
-    series::Series,
-    signals::Row,
-    subscriptions::{POLL, Subscriptions},
+    options::Options,
+    report::{EVERYTHING, Report, Series},
+    schedule::Kind,
+    signals::{Row, ms_since},
 };
 use crate::error::{OrCannot as _, Result};
 
-/// The generation that stands for the samples of a supervisor, whose successor has a bus of its own.
-const NEWEST: u32 = u32::MAX;
+/// Wait for the bus between checks of the processes.
+const POLL: Duration = Duration::from_millis(50);
 /// Signals to one stage within the window of the hold rule. A stage that dies more often is held until an operator releases
 /// it, and chaos has no operator. A second signal may follow in the start-up, and each may be counted late.
 const MOST_HITS: usize = HOLD_AFTER - 4;
@@ -74,7 +77,7 @@ impl Attack {
         self.driving = false;
         self.entries.clear();
         // The stages of a supervisor that was hit end with it.
-        let is_stage = |recovery: &mut PendingRecovery| recovery.stage != SUPERVISOR;
+        let is_stage = |recovery: &mut PendingRecovery| recovery.row.stage != SUPERVISOR;
         let ended = self.pending.extract_if(.., is_stage);
         self.measured.extend(ended.map(|recovery| recovery.row));
         let mut subscriptions = loop {
@@ -115,7 +118,7 @@ impl Attack {
 
     /// Write the rows of the signals whose measurement is complete.
     fn keep_measured(&mut self, series: &mut Series<'_>) -> Result {
-        self.measured.drain(..).try_for_each(|row| series.keep(&row))
+        self.measured.drain(..).try_for_each(|row| series.keep(row))
     }
 
     /// Note that the mission is over, and end all measurements.
@@ -124,18 +127,6 @@ impl Attack {
         let pending = self.pending.drain(..);
         self.measured.extend(pending.map(|recovery| recovery.row));
         self.keep_measured(series)
-    }
-
-    /// Count a signal to a stage, the supervisor or all, and begin its row.
-    fn count(
-        &self,
-        report: &mut Report,
-        stage: &'static str,
-        kind: Kind,
-        generation: Option<u32>,
-    ) -> Row {
-        report.hit(stage, kind);
-        self.row(stage, kind, generation)
     }
 
     /// The row of a signal of `kind` that is sent to a generation of `stage` now.
@@ -153,7 +144,11 @@ impl Attack {
 
     /// Whether the supervisor was hit and has no working successor yet.
     pub fn supervisor_is_down(&self) -> bool {
-        self.pending.iter().any(|recovery| recovery.stage == SUPERVISOR)
+        self.is_recovering(SUPERVISOR)
+    }
+
+    fn is_recovering(&self, stage: &str) -> bool {
+        self.pending.iter().any(|recovery| recovery.row.stage == stage)
     }
 
     /// Stages that the supervisor aborted as hung, by the `deaths` of the run, although they were not frozen alone.
@@ -180,10 +175,11 @@ impl Attack {
     /// Read new samples, which show the stages that run, beat and publish.
     fn read(&mut self, subscriptions: &mut Subscriptions) -> Result {
         while let Some(death) = subscriptions.deaths.next_sample()? {
-            let is_its = |it: &&mut PendingRecovery| {
-                it.stage == name_str(&death.stage) && it.generation == death.generation
-            };
-            self.pending.iter_mut().filter(is_its).for_each(PendingRecovery::noticed);
+            for PendingRecovery { row, at, .. } in &mut self.pending {
+                if row.stage == name_str(&death.stage) && row.generation == Some(death.generation) {
+                    row.noticed_ms.get_or_insert_with(|| ms_since(*at));
+                }
+            }
         }
         while let Some(entries) = subscriptions.roster.samples.next_slice()? {
             self.driving = Order::from_byte(entries.header().order) == Order::Drive;
@@ -222,16 +218,21 @@ impl Attack {
 
     fn on_supervisor_sign(&mut self, beat: bool) {
         if !self.supervisor_hit {
-            self.on_sign(SUPERVISOR, NEWEST, beat);
+            // Its successor has a bus of its own.
+            self.on_sign(SUPERVISOR, 0, beat);
         }
     }
 
     /// Note a sign of work of a generation of `stage`: a ready beat, or a sample of a tick.
     fn on_sign(&mut self, stage: &str, generation: u32, beat: bool) {
-        let complete = |recovery: &mut PendingRecovery| {
-            recovery.stage == stage && generation > recovery.generation && recovery.sign(beat)
-        };
-        let complete = self.pending.extract_if(.., complete);
+        let complete = self.pending.extract_if(.., |PendingRecovery { row, at, .. }| {
+            if row.stage != stage || Some(generation) <= row.generation {
+                return false;
+            }
+            row.ready_ms.get_or_insert_with(|| ms_since(*at));
+            row.first_output_ms = (!beat).then(|| ms_since(*at));
+            !beat
+        });
         self.measured.extend(complete.map(|recovery| recovery.row));
     }
 
@@ -253,8 +254,8 @@ impl Attack {
         for process in all.into_iter().rev() {
             send(process, Signal::CONT);
         }
-        let row = self.count(report, EVERYTHING, Kind::FreezeAll, None);
-        self.measured.push(row);
+        report.hit(EVERYTHING, Kind::FreezeAll);
+        self.measured.push(self.row(EVERYTHING, Kind::FreezeAll, None));
         // The pause does not count as time of recovery.
         for recovery in &mut self.pending {
             recovery.at += began.elapsed();
@@ -264,19 +265,16 @@ impl Attack {
     /// Hit a consumer, the supervisor, or a running stage without a pending recovery.
     fn hit(&mut self, series: &mut Series<'_>) -> Result {
         let Series { options, schedule, report, .. } = series;
-        if let Some((index, kind, pause)) =
-            schedule.consumer(self.consumers.len(), options.asked.only_consumers)
-        {
-            let supervisor = self.supervisor;
-            let hit = self.consumers.hit(index, kind, pause, supervisor, report)?;
-            self.measured.extend(hit.map(|(name, starts)| self.row(&name, kind, starts)));
+        if let Some((index, kind, pause)) = schedule.consumer(self.consumers.len()) {
+            let hit = self.consumers.hit(index, kind, pause, report)?;
+            self.measured.extend(hit.map(|(name, starts)| self.row(&name, kind, Some(starts))));
             return Ok(());
         }
         if options.asked.include_supervisor && schedule.supervisor() {
             let kind = schedule.supervisor_kind();
             if !self.supervisor_is_down() && send(self.supervisor, kind.signal()) {
-                let row = self.count(report, SUPERVISOR, kind, None);
-                self.pending.push(PendingRecovery::new(SUPERVISOR, 0, row));
+                report.hit(SUPERVISOR, kind);
+                self.pending.push(PendingRecovery::new(self.row(SUPERVISOR, kind, None)));
                 self.supervisor_hit = true;
                 self.driving = false;
             }
@@ -288,10 +286,8 @@ impl Attack {
             self.freeze_all(pause, report);
             return Ok(());
         }
-        let Some(stage) = stages::find(schedule.stage()).map(|stage| stage.name) else {
-            return Ok(());
-        };
-        let (kind, startup_hit) = (schedule.kind(), schedule.startup_hit());
+        let (stage, kind) = (schedule.stage(), schedule.kind());
+        let startup_hit = schedule.startup_hit();
         let running = |entry: &&RosterEntry| {
             name_str(&entry.stage) == stage
                 && StageState::from_byte(entry.state) == StageState::Running
@@ -299,18 +295,17 @@ impl Attack {
         let Some(entry) = self.entries.iter().find(running) else {
             return Ok(());
         };
-        let recovering = self.pending.iter().any(|recovery| recovery.stage == stage);
         self.hits.retain(|(_, at)| at.elapsed() < HOLD_WINDOW);
         let lately = self.hits.iter().filter(|(hit, _)| *hit == stage).count();
-        if recovering || lately >= MOST_HITS || !send(entry.pid, kind.signal()) {
+        if self.is_recovering(stage) || lately >= MOST_HITS || !send(entry.pid, kind.signal()) {
             return Ok(());
         }
         if kind == Kind::Freeze {
             self.frozen.push((stage, entry.generation));
         }
         self.hits.push((stage, Instant::now()));
-        let row = self.count(report, stage, kind, Some(entry.generation));
-        let mut recovery = PendingRecovery::new(stage, entry.generation, row);
+        report.hit(stage, kind);
+        let mut recovery = PendingRecovery::new(self.row(stage, kind, Some(entry.generation)));
         recovery.startup_hit =
             startup_hit.filter(|_| options.asked.include_startup && kind != Kind::Freeze);
         self.pending.push(recovery);
@@ -321,8 +316,14 @@ impl Attack {
     fn next_startup_hit(&self) -> Option<(Instant, usize, RosterEntry)> {
         let read = self.entries_read?;
         let hits = self.pending.iter().enumerate().filter_map(|(place, recovery)| {
-            let (at, entry) = recovery.startup_hit(&self.entries, read)?;
-            Some((at, place, entry))
+            let after = recovery.startup_hit?;
+            let entry = self.entries.iter().find(|entry| {
+                name_str(&entry.stage) == recovery.row.stage
+                    && Some(entry.generation) > recovery.row.generation
+                    && entry.pid != 0
+            })?;
+            let age = Duration::from_nanos(entry.uptime_ns);
+            Some((read + after.saturating_sub(age), place, *entry))
         });
         hits.min_by_key(|hit| hit.0)
     }
@@ -332,11 +333,13 @@ impl Attack {
             && at <= Instant::now()
         {
             self.pending[place].startup_hit = None;
-            if send(entry.pid, Signal::KILL) {
-                let stage = self.pending[place].stage;
+            if let Some(stage) = stages::find(name_str(&entry.stage)).map(|stage| stage.name)
+                && send(entry.pid, Signal::KILL)
+            {
                 self.hits.push((stage, Instant::now()));
-                let row = self.count(report, stage, Kind::KillAtStart, Some(entry.generation));
-                let next = PendingRecovery::new(stage, entry.generation, row);
+                report.hit(stage, Kind::KillAtStart);
+                let row = self.row(stage, Kind::KillAtStart, Some(entry.generation));
+                let next = PendingRecovery::new(row);
                 self.measured.push(std::mem::replace(&mut self.pending[place], next).row);
             }
         }
@@ -344,6 +347,57 @@ impl Attack {
 }
 
 /// Whether the signal reached a process.
-fn send(pid: u32, signal: Signal) -> bool {
+pub fn send(pid: u32, signal: Signal) -> bool {
     Pid::from_raw(pid.cast_signed()).is_some_and(|pid| kill_process(pid, signal).is_ok())
+}
+
+/// The recovery of a stage or the supervisor that was hit, until its successor works.
+struct PendingRecovery {
+    row: Row,
+    at: Instant,
+    /// The time after its start at which the successor is to be hit too.
+    startup_hit: Option<Duration>,
+}
+
+impl PendingRecovery {
+    fn new(row: Row) -> Self {
+        Self { row, at: Instant::now(), startup_hit: None }
+    }
+}
+
+/// The attacker's readers on the bus of one generation of the supervisor.
+struct Subscriptions {
+    roster: Roster,
+    deaths: Reader<DeathSample>,
+    health: Reader<HealthSample>,
+    wheels: Reader<WheelSample>,
+    pose: Reader<PoseSample>,
+    /// The other outputs of a tick, each with its writer.
+    outputs: Vec<(&'static str, Box<dyn AnyReader>)>,
+}
+
+impl Subscriptions {
+    /// Join the bus. None if the bus is not of `supervisor`: a killed supervisor leaves its bus, and its successor removes it.
+    fn join(options: &Options, supervisor: u32) -> Result<Option<Self>> {
+        let bus = Bus::join(&Domain::of(options.asked.robot.clone()), "chaos")?;
+        let mut roster = Roster::open(&bus)?;
+        roster.waiter.on(bus.wakeup(&topics::DEATHS)?);
+        roster.waiter.on(bus.wakeup(&topics::HEALTH)?);
+        roster.waiter.on(bus.wakeup(&topics::COMMAND)?);
+        let outputs: [&dyn AnyTopic; 3] = [&topics::GRID, &topics::GUIDANCE, &topics::COMMAND];
+        let outputs = outputs.iter().map(|it| Ok((it.spec().writer, it.any_reader(&bus)?)));
+        let mut subscriptions = Self {
+            roster,
+            deaths: bus.reader(&topics::DEATHS)?,
+            health: bus.reader(&topics::HEALTH)?,
+            wheels: bus.reader(&topics::WHEELS)?,
+            pose: bus.reader(&topics::POSE)?,
+            outputs: outputs.collect::<Result<_, BusError>>()?,
+        };
+        let of_supervisor = |header: &RosterHeader, _: &[RosterEntry]| {
+            (header.supervisor_pid == supervisor).then_some(())
+        };
+        let found = subscriptions.roster.find(2 * topics::RESTATE, of_supervisor)?;
+        Ok(found.map(|()| subscriptions))
+    }
 }

@@ -33,8 +33,6 @@ pub struct Changes {
     /// Requests: taken (the supervisor confirmed them), refused, unanswered (the supervisor was hit). Targets: reached, replaced.
     #[serde(flatten)]
     counts: Counts,
-    /// Targets that were accepted and not reported, or not reached.
-    wrong: Vec<String>,
 }
 
 type Counts = BTreeMap<&'static str, u64>;
@@ -121,29 +119,28 @@ fn place(mission: &Mission, random: &mut Random) -> [f64; 2] {
 }
 
 impl Changes {
-    /// Count the mission `seed` with the changes of `operator`. Returns whether every target was reached in truth or its outcome
-    /// reported.
+    /// Count a mission with the changes of `operator`. Adds to `wrong` targets that were accepted and not reported, or not reached in
+    /// truth.
     pub fn add(
         &mut self,
-        seed: u64,
         operator: Operator,
         summary: &Summary,
         truth: &[GroundTruthTick],
-    ) -> bool {
+        wrong: &mut Vec<String>,
+    ) {
         let sent = operator.end();
-        let before = self.wrong.len();
         for (what, count) in sent.counts {
             *self.counts.entry(what).or_default() += count;
         }
         for [x, y] in sent.taken {
             if !summary.targets.iter().any(|told| (told.x_m, told.y_m) == (x, y)) {
-                self.wrong.push(format!("seed {seed}: ({x}, {y}) was taken and is not told of"));
+                wrong.push(format!("({x}, {y}) was taken and is not told of"));
             }
         }
         for (nth, target) in (1..).zip(&summary.targets) {
             let TargetResult { number, x_m, y_m, outcome, .. } = *target;
             if number != nth {
-                self.wrong.push(format!("seed {seed}: target {nth} is called {number}"));
+                wrong.push(format!("target {nth} is called {number}"));
             }
             let was_there = || {
                 let off = |tick: &GroundTruthTick| (tick.x - x_m).hypot(tick.y - y_m);
@@ -153,20 +150,11 @@ impl Changes {
                 TargetOutcome::Replaced => "replaced",
                 TargetOutcome::Reached | TargetOutcome::ReachedUnsure if was_there() => "reached",
                 _ => {
-                    self.wrong.push(format!("seed {seed}: target {number}: {outcome:?}"));
+                    wrong.push(format!("target {number}: {outcome:?}"));
                     continue;
                 }
             };
             *self.counts.entry(came).or_default() += 1;
         }
-        self.wrong.len() == before
-    }
-
-    pub fn wrong(&self) -> &[String] {
-        &self.wrong
-    }
-
-    pub const fn is_right(&self) -> bool {
-        self.wrong.is_empty()
     }
 }

@@ -1,23 +1,29 @@
-//! The consumers of one mission: processes that are hit and restarted.
+//! The consumers of one mission: processes that are hit and restarted, and end with chaos.
 
 use std::{
-    ffi::OsStr,
+    ffi::OsString,
     fs::{self, File},
-    os::unix::ffi::OsStrExt as _,
+    os::unix::process::CommandExt as _,
     path::{Path, PathBuf},
+    process::{Command, Stdio},
+    str::FromStr,
     time::{Duration, Instant},
 };
 
-use processes::{death::log_tail, process::Process};
+use clap::Args;
+use common::{domain::RobotName, start::become_child};
+use processes::{
+    death::log_tail,
+    executable,
+    process::{self, Process},
+};
 use rustix::process::{Pid, Signal, kill_process_group};
 
-use crate::chaos::{
-    consumer::{Consumer, RECORD},
-    kind::Kind,
-    options::Options,
-    report::Report,
+use super::{options::Options, report::Report, schedule::Kind};
+use crate::{
+    error::{OrCannot as _, Refused, Result},
+    robot,
 };
-use crate::error::{OrCannot as _, Result};
 
 /// The time for a consumer to end. A recorder writes its last chunk within milliseconds; a user's program may take longer.
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
@@ -27,14 +33,11 @@ pub struct Consumers {
     all: Vec<Running>,
     /// Directory of recordings and of the consumers' standard error.
     pub directory: PathBuf,
-    /// Recordings of the run's own recorder that was hit.
-    pub hit_recordings: Vec<PathBuf>,
 }
 
 struct Running {
-    /// None for the recorder that the run itself starts. It is not restarted within its run.
-    consumer: Option<Consumer>,
-    /// The process; none if it ended by itself, and for the run's recorder except while that is frozen.
+    consumer: Consumer,
+    /// None if it ended by itself.
     process: Option<Process>,
     starts: u32,
     frozen_until: Option<Instant>,
@@ -53,7 +56,7 @@ impl Consumers {
             running.start(&directory, report)?;
             all.push(running);
         }
-        Ok(Self { all, directory, hit_recordings: Vec::new() })
+        Ok(Self { all, directory })
     }
 
     pub fn len(&self) -> usize {
@@ -66,14 +69,13 @@ impl Consumers {
             if running.frozen_until.is_some_and(|until| Instant::now() >= until) {
                 running.thaw();
             }
-            if running.consumer.is_some()
-                && let Some(process) = &mut running.process
+            if let Some(process) = &mut running.process
                 && let Some(cause) = process.try_reap().or_cannot("reap")?
             {
                 running.process = None;
                 running.frozen_until = None;
                 let said = log_tail(&running.said, 0);
-                let counts = report.consumer(running.name());
+                let counts = report.consumer(&running.consumer.name);
                 counts.ended_by_itself += 1;
                 counts.last_end = Some(format!("{cause}: {}", said.lines().last().unwrap_or("-")));
             }
@@ -82,44 +84,36 @@ impl Consumers {
     }
 
     /// Hit the consumer at `index`: kill and restart it, or freeze it for `pause`. Returns its name and the number of its starts in this
-    /// mission, or none if no signal was sent, because it is frozen already, or had ended by itself and is restarted. `supervisor` is the
-    /// run's process.
+    /// mission, or none if no signal was sent, because it is frozen already, or had ended by itself and is restarted.
     pub fn hit(
         &mut self,
         index: usize,
         kind: Kind,
         pause: Duration,
-        supervisor: u32,
         report: &mut Report,
-    ) -> Result<Option<(String, Option<u32>)>> {
+    ) -> Result<Option<(String, u32)>> {
         let freezes = kind == Kind::Freeze;
         let Some(running) = self.all.get_mut(index) else { return Ok(None) };
-        if freezes && running.frozen_until.is_some() {
-            return Ok(None);
-        }
-        let starts = running.consumer.is_some().then_some(running.starts);
-        if starts.is_none() {
-            running.thaw();
-            let Some((recorder, recording)) = run_recorder(supervisor) else { return Ok(None) };
-            self.hit_recordings.push(recording);
-            running.process = Some(recorder);
-        } else if running.process.is_none() {
+        if running.process.is_none() {
             running.start(&self.directory, report)?;
             return Ok(None);
         }
+        if freezes && running.frozen_until.is_some() {
+            return Ok(None);
+        }
+        let hit = (running.consumer.name.clone(), running.starts);
         running.signal(kind.signal());
-        let name = running.name().to_owned();
         if freezes {
             running.frozen_until = Some(Instant::now() + pause);
-            report.consumer(&name).frozen += 1;
+            report.consumer(&hit.0).frozen += 1;
         } else {
             // Dropping the process reaps it.
             running.process = None;
             running.frozen_until = None;
-            report.consumer(&name).killed += 1;
+            report.consumer(&hit.0).killed += 1;
             running.start(&self.directory, report)?;
         }
-        Ok(Some((name, starts)))
+        Ok(Some(hit))
     }
 
     /// Note that the mission is over, and let all consumers write their files and end.
@@ -136,22 +130,16 @@ impl Consumers {
 }
 
 impl Running {
-    fn name(&self) -> &str {
-        self.consumer.as_ref().map_or("run's recorder", |consumer| &consumer.name)
-    }
-
-    /// Start or restart the consumer, unless it is the run's own recorder.
     fn start(&mut self, directory: &Path, report: &mut Report) -> Result {
-        let Some(consumer) = &self.consumer else { return Ok(()) };
-        let mut command = consumer.command();
+        let mut command = self.consumer.command();
         self.starts += 1;
-        if consumer.name == RECORD {
+        if self.consumer.name == RECORD {
             command.arg("--out").arg(directory.join(format!("record-{}.mcap", self.starts)));
         }
         let said = File::options().create(true).append(true).open(&self.said);
         command.stderr(said.or_cannot("write what a consumer says")?);
         self.process = Some(Process::spawn(command).or_cannot("start a consumer")?);
-        report.consumer(self.name()).started += 1;
+        report.consumer(&self.consumer.name).started += 1;
         Ok(())
     }
 
@@ -168,31 +156,118 @@ impl Running {
         if self.frozen_until.take().is_some() {
             self.signal(Signal::CONT);
         }
-        if self.consumer.is_none() {
-            // The recorder is a child of the run, which reaps it.
-            self.process = None;
-        }
     }
 }
 
-/// The recorder that the run of `supervisor` started, and the file that it writes.
-fn run_recorder(supervisor: u32) -> Option<(Process, PathBuf)> {
-    let supervisor = supervisor.to_string();
-    for pid in crate::robot::processes() {
-        let line = crate::robot::command_line(pid);
-        let words: Vec<&[u8]> = line.split(|&byte| byte == 0).collect();
-        let after = |name: &str| {
-            let at = words.iter().position(|word| *word == name.as_bytes())?;
-            words.get(at + 1)
+/// The name of the recorder among the consumers.
+const RECORD: &str = "record";
+
+/// A program that reads from the bus: a subcommand of `firsthand`, or a user's command without a shell.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Consumer {
+    name: String,
+    program: PathBuf,
+    arguments: Vec<String>,
+}
+
+impl FromStr for Consumer {
+    type Err = String;
+
+    fn from_str(command: &str) -> Result<Self, String> {
+        let found = || {
+            // No program takes such a word.
+            if command.contains('\0') {
+                return Err("it contains a zero byte".to_owned());
+            }
+            let words =
+                shlex::split(command).ok_or("it ends within quotes or after a backslash")?;
+            let mut words = words.into_iter();
+            let program = words.next().ok_or("there is nothing in it")?;
+            let found = executable::find(Path::new(&program));
+            let found = found.map_err(|problem| format!("{program}: {problem}"))?;
+            Ok((found, words.collect()))
         };
-        let is_its = words.get(1) == Some(&&b"record"[..])
-            && after("--supervisor").is_some_and(|word| *word == supervisor.as_bytes());
-        if is_its
-            && let Some(recording) = after("--out")
-            && let Ok(process) = Process::adopt(pid, "recorder")
-        {
-            return Some((process, Path::new(OsStr::from_bytes(recording)).to_path_buf()));
+        let (program, arguments) = found().map_err(|problem: String| {
+            format!(
+                "the consumer {command:?} cannot be started: {problem}; give a program, by its path or by a name on PATH, and its \
+                 arguments, in quotes where they contain spaces (no shell reads them)"
+            )
+        })?;
+        Ok(Self { name: command.to_owned(), program, arguments })
+    }
+}
+
+impl Consumer {
+    /// The subcommands of `firsthand` for `robot`.
+    pub fn own(robot: &RobotName) -> Result<[Self; 3], Refused> {
+        let program = robot::path()?;
+        let own = |(name, words): (&str, &str)| Self {
+            name: name.to_owned(),
+            program: program.clone(),
+            arguments: format!("{words} --robot {robot}").split(' ').map(str::to_owned).collect(),
+        };
+        Ok([(RECORD, "record"), ("hz", "topic hz"), ("logs -f", "logs --follow")].map(own))
+    }
+
+    /// The command that starts the consumer, which ends with this process.
+    fn command(&self) -> Command {
+        let own = std::process::id().to_string();
+        let mut command = process::firsthand(&["bench", "consumer", &own]);
+        command.arg(&self.program).args(&self.arguments).stdout(Stdio::null());
+        command
+    }
+}
+
+/// Become a program that ends with the process PARENT.
+#[derive(Debug, Args)]
+#[command(hide = true)]
+pub struct Arguments {
+    /// The parent.
+    parent: u32,
+    /// The program and its arguments.
+    #[arg(required = true, trailing_var_arg = true, allow_hyphen_values = true)]
+    words: Vec<OsString>,
+}
+
+pub fn main(arguments: &Arguments) -> Result {
+    // The kernel signals the end of the parent to this process also after it executes another program.
+    become_child("consumer", arguments.parent)?;
+    let Some((program, words)) = arguments.words.split_first() else {
+        return Err("give a program".into());
+    };
+    let error = Command::new(program).args(words).exec();
+    Err(format!("cannot execute {}: {error}", program.display()).into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_without_a_program_is_refused_with_what_is_wrong_and_the_remedy() {
+        for (command, problem) in [
+            ("no-such-logger x80", "no-such-logger: "),
+            ("./no/such/logger", "./no/such/logger: "),
+            ("/tmp x", "/tmp: "),
+            ("sh 'x", "ends within quotes"),
+            ("sh \"x\\", "ends within quotes"),
+            ("sh \\", "ends within quotes"),
+            (" \t", "nothing in it"),
+            ("sh\0x", "zero byte"),
+        ] {
+            let error = command.parse::<Consumer>().unwrap_err();
+            assert!(error.contains(problem) && error.contains("give a program"), "{error}");
         }
     }
-    None
+
+    #[test]
+    fn a_command_is_its_program_and_its_words_and_nothing_is_expanded() {
+        let given: Consumer =
+            "sh -c 'exit  1' \"d 'e\" f\\ g '' $HOME *.rs | `id`".parse().unwrap();
+        assert!(given.program.is_absolute() && given.program.ends_with("sh"));
+        let words = ["-c", "exit  1", "d 'e", "f g", "", "$HOME", "*.rs", "|", "`id`"];
+        assert_eq!(given.arguments, words);
+        let given: Consumer = "sh -c 'exit 1'".parse().unwrap();
+        assert_eq!(given.name, "sh -c 'exit 1'");
+    }
 }

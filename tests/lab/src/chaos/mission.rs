@@ -4,7 +4,6 @@ use std::{
     fs::{self, File},
     path::Path,
     process::{Command, Stdio},
-    thread::JoinHandle,
     time::{Duration, Instant},
 };
 
@@ -16,14 +15,13 @@ use crate::chaos::{
     changes::Operator,
     consumers::Consumers,
     options::{Arguments, Options},
-    report::End,
-    series::Series,
+    report::Series,
 };
 use crate::{
-    error::{self, OrCannot as _, Result},
+    error::{OrCannot as _, Result},
     robot::{self, firsthand},
 };
-use mission_control::simulator::Simulator;
+use mission_control::{outcome::Outcome, recovery::SUMMARY, simulator::Simulator};
 use processes::{DEATHS, process::Process};
 use summary::Summary;
 
@@ -51,19 +49,22 @@ fn child(mut command: Command, directory: &Path, records: bool) -> Result<Comman
     let stderr = stderr.or_cannot("write a mission's standard error")?;
     command.args((!records).then_some("--no-record"));
     command.args(["--parent", &std::process::id().to_string()]);
-    command.stdout(Stdio::piped()).stderr(stderr);
+    command.stdout(Stdio::null()).stderr(stderr);
     Ok(command)
 }
 
-/// The summary of the mission without an attack, to compare with. If ticks are compared, it runs at the same pace.
+/// The summary of the mission without an attack, to compare with.
 pub fn undisturbed(options: &Options, seed: u64) -> Result<Summary> {
     let directory = options.directory.join("undisturbed");
-    let pace = if options.asked.only_consumers { options.asked.pace } else { Pace::Max };
-    let output = command(options, seed, &pace.to_string(), &directory, false)?
-        .output()
-        .or_cannot("start a mission")?;
+    let mut command = command(options, seed, &Pace::Max.to_string(), &directory, false)?;
+    command.status().or_cannot("start a mission")?;
+    let summary = summary(&directory).ok_or_else(|| no_summary(&directory))?;
     fs::remove_dir_all(directory).or_cannot("remove its directory")?;
-    error::summary(&output.stdout, &output.stdout)
+    Ok(summary)
+}
+
+fn no_summary(directory: &Path) -> String {
+    format!("a mission gave no summary; see {}", directory.with_extension("stderr").display())
 }
 
 /// Attack the mission, and report. Its files stay if something was wrong.
@@ -91,57 +92,63 @@ pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Resu
     let began = Instant::now();
     let summary = loop {
         let mut supervisor = Process::spawn(start).or_cannot("start a mission")?;
-        let summary = read_stdout(&mut supervisor);
         let attacked = attack.run(series, &mut supervisor, robot.as_mut(), PATIENCE);
         supervisor.end(Duration::from_secs(2));
-        let summary = summary.join().unwrap_or_default();
         attacked?;
+        let summary = summary(&directory);
         // A supervisor that was hit leaves no summary, unless the run had just ended.
-        if !attack.supervisor_is_down() || !summary.is_empty() || began.elapsed() >= PATIENCE {
-            break error::summary(&summary, &summary)?;
+        if !attack.supervisor_is_down() || summary.is_some() || began.elapsed() >= PATIENCE {
+            break summary.ok_or_else(|| no_summary(&directory))?;
         }
         start = firsthand(&["run", "--json", "--resume"]);
         start.arg(&directory);
         start = child(start, &directory, options.records())?;
     };
     attack.end(series)?;
-    let kills = series.report.kills() - before;
-    let mut end = End {
-        seed,
-        outcome: summary.outcome,
-        reason: summary.reason.clone(),
-        collisions: summary.collisions.unwrap_or_default(),
-        pose_excess_m: summary.pose_error_m.unwrap_or_default(),
-        // An undisturbed robot whose target does not change takes another way.
-        pose_allowance_m: match asked.targets {
-            true => f64::INFINITY,
-            false => pose_allowance_m(&options.loaded, kills, &summary),
-        },
-        healthy_aborted: attack.healthy_aborted(&deaths(&directory)),
-    };
-    let mut truth = Vec::new();
-    if let Some(mut robot) = robot {
+    let report = &mut series.report;
+    let kills = report.kills() - before;
+    let mut truth = &[][..];
+    let mut collisions = summary.collisions.unwrap_or_default();
+    let mut excess_m = summary.pose_error_m.unwrap_or_default();
+    if let Some(robot) = &mut robot {
         robot.stop()?;
-        truth = robot.truth().to_vec();
-        end.collisions = truth.last().map_or(0, |tick| tick.contacts);
-        end.pose_excess_m = attack.pose_error(&truth).unwrap_or(f64::INFINITY);
+        truth = robot.truth();
+        collisions = truth.last().map_or(0, |tick| tick.contacts);
+        excess_m = attack.pose_error(truth).unwrap_or(f64::INFINITY);
     }
-    end.pose_excess_m -= undisturbed.pose_error_m.unwrap_or_default();
-    let mut right = series.report.add_mission(&end);
+    excess_m -= undisturbed.pose_error_m.unwrap_or_default();
+    report.missions += 1;
+    report.collisions += collisions;
+    report.worst_pose_excess_m = report.worst_pose_excess_m.max(excess_m);
+    let mut wrong = Vec::new();
+    match summary.outcome {
+        Outcome::Reached | Outcome::ReachedUnsure => report.reached += 1,
+        outcome => wrong.push(format!("{}: {}", outcome.as_str(), summary.reason)),
+    }
+    if collisions > 0 {
+        wrong.push(format!("touched something {collisions} times"));
+    }
+    let aborted = attack.healthy_aborted(&deaths(&directory));
+    report.healthy_aborted += aborted.len() as u64;
+    wrong.extend(aborted.iter().map(|stage| format!("aborted although healthy: {stage}")));
+    let allowance_m = pose_allowance_m(&options.loaded, kills, &summary);
+    // An undisturbed robot whose target does not change takes another way.
+    if excess_m > allowance_m && !asked.targets {
+        wrong.push(format!(
+            "pose off by {excess_m:.4} m more than undisturbed, of {allowance_m:.4} m allowed"
+        ));
+    }
     if let Some(operator) = operator {
-        right &=
-            series.report.targets.get_or_insert_default().add(seed, operator, &summary, &truth);
-    }
-    if asked.only_consumers {
-        series.report.tick_latencies.get_or_insert_default().add(undisturbed, &summary);
+        report.targets.get_or_insert_default().add(operator, &summary, truth, &mut wrong);
     }
     if asked.replay {
-        right &=
-            series.report.replays.get_or_insert_default().add(seed, &directory, &attack.consumers);
+        let replays = report.replays.get_or_insert_default();
+        replays.add(&directory, asked.include_consumers, &attack.consumers, &mut wrong);
     }
-    if right {
+    if wrong.is_empty() {
         fs::remove_dir_all(&files).or_cannot("remove its directory")?;
     }
+    report.wrong.extend(wrong.iter().map(|what| format!("seed {seed}: {what}")));
     Ok(())
 }
 
@@ -178,14 +185,7 @@ pub fn robot(
     Ok(Simulator::start(firsthand(&[]), directory, &mission, options.asked.pace, None)?)
 }
 
-/// Read the standard output to the end in a thread, because a long summary would fill the pipe.
-pub fn read_stdout(child: &mut Process) -> JoinHandle<Vec<u8>> {
-    let stdout = child.take_stdout();
-    std::thread::spawn(move || {
-        let mut text = Vec::new();
-        if let Some(mut stdout) = stdout {
-            let _ = std::io::Read::read_to_end(&mut stdout, &mut text);
-        }
-        text
-    })
+/// The summary of the run in `directory`; none before its end.
+pub fn summary(directory: &Path) -> Option<Summary> {
+    serde_json::from_slice(&fs::read(directory.join(SUMMARY)).ok()?).ok()
 }

@@ -6,13 +6,8 @@ use clap::Args;
 use common::{clock::Pace, domain::RobotName, mission::Mission};
 use console::missions;
 
-use crate::{
-    chaos::{
-        consumer::Consumer,
-        robot_fault::{RobotFault, TABLE},
-    },
-    error::{OrCannot as _, Result},
-};
+use super::{consumers::Consumer, robot_fault::RobotFault};
+use crate::error::{OrCannot as _, Result};
 
 /// Send random signals to random stages at random times, mission after mission, and report.
 #[derive(Clone, Debug, Args)]
@@ -33,21 +28,17 @@ pub struct Arguments {
     /// of its own, and mission time is wall-clock.
     #[arg(long, conflicts_with = "pace")]
     pub include_supervisor: bool,
-    /// Kill and freeze consumers too, one in two signals: the run's own recorder, another one, `topic hz` and
-    /// `logs -f`.
+    /// Kill and freeze consumers too, one in two signals: a recorder beside the run's own, `topic hz` and `logs -f`.
     #[arg(long, conflicts_with = "robot_faults")]
     pub include_consumers: bool,
     /// Kill and freeze a consumer of yours: a program and its arguments, without a shell. As often as needed.
     #[arg(long, value_name = "COMMAND", conflicts_with = "robot_faults")]
     pub consumer: Vec<Consumer>,
-    /// Hit consumers only, and compare ticks with those of the same missions without any.
-    #[arg(long, conflicts_with_all = ["include_startup", "include_supervisor", "freeze_all"])]
-    pub only_consumers: bool,
     /// Freeze supervisor and stages together too, for 0.3 to 1.5 s, one in two signals, as if the machine stood still.
     #[arg(long)]
     pub freeze_all: bool,
     /// Send the robot elsewhere every few seconds. Each target must be reached by the ground truth, or told to be replaced.
-    #[arg(long, conflicts_with_all = ["only_consumers", "robot_faults"])]
+    #[arg(long, conflicts_with = "robot_faults")]
     pub targets: bool,
     /// Record the missions, and replay every generation of every stage, which must be equal to the bit.
     #[arg(long)]
@@ -67,32 +58,16 @@ pub struct Arguments {
     /// Instead of signals, put a fault into the robot's frames from a random moment on, mission after mission: all faults, or
     /// those named. The stop-time table at the end has the time from each fault to the last moving command and to wheels at rest.
     #[arg(
-        long, value_name = "FAULT,...", num_args = 0..=1, require_equals = true, default_missing_value = "all",
-        value_parser = parse_faults, conflicts_with_all = ["kills", "include_startup", "include_supervisor", "pace"]
+        long, value_name = "FAULT,...", num_args = 0.., require_equals = true, value_delimiter = ',',
+        conflicts_with_all = ["kills", "include_startup", "include_supervisor", "pace"]
     )]
-    pub robot_faults: Option<Faults>,
+    pub robot_faults: Option<Vec<RobotFault>>,
     /// Missions for each fault.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..), requires = "robot_faults")]
     pub missions: u32,
     /// One line of JSON.
     #[arg(long)]
     pub json: bool,
-}
-
-#[derive(Clone, Debug)]
-pub struct Faults(pub Vec<RobotFault>);
-
-fn parse_faults(names: &str) -> Result<Faults, String> {
-    if names == "all" {
-        return Ok(Faults(TABLE.iter().map(|row| row.fault).collect()));
-    }
-    let named = |name: &str| {
-        RobotFault::named(name).ok_or_else(|| {
-            let all: Vec<_> = TABLE.iter().map(|row| row.name).collect();
-            format!("no robot fault {name:?}; give some of {}", all.join(", "))
-        })
-    };
-    names.split(',').map(named).collect::<Result<_, _>>().map(Faults)
 }
 
 /// The mission that is attacked, and the kinds of attack.
@@ -127,9 +102,6 @@ impl Options {
                     .into(),
             );
         }
-        if asked.only_consumers && !asked.include_consumers && asked.consumer.is_empty() {
-            return Err("--only-consumers hits nothing; give --include-consumers, or --consumer and your command, too".into());
-        }
         if asked.pace == Pace::Max {
             return Err("chaos needs a wall clock; give --pace R, 4 for four times as fast".into());
         }
@@ -146,14 +118,12 @@ impl Options {
         self.asked.replay || self.asked.include_consumers
     }
 
-    /// The consumers to hit; none stands for the run's own recorder.
-    pub fn consumers(&self) -> Result<Vec<Option<Consumer>>> {
-        let mut consumers = Vec::new();
+    /// The consumers to hit.
+    pub fn consumers(&self) -> Result<Vec<Consumer>> {
+        let mut consumers = self.asked.consumer.clone();
         if self.asked.include_consumers {
-            consumers.push(None);
-            consumers.extend(Consumer::own(&self.asked.robot)?.map(Some));
+            consumers.extend(Consumer::own(&self.asked.robot)?);
         }
-        consumers.extend(self.asked.consumer.iter().cloned().map(Some));
         Ok(consumers)
     }
 }

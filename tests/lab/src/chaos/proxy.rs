@@ -5,8 +5,8 @@ use std::{
     net::{Ipv4Addr, SocketAddr, UdpSocket},
     os::fd::AsFd as _,
     sync::{
-        Arc, Mutex, PoisonError,
-        atomic::{AtomicBool, Ordering},
+        Arc,
+        atomic::{AtomicBool, AtomicU64, Ordering::Relaxed},
     },
     thread::JoinHandle,
     time::{Duration, Instant},
@@ -14,7 +14,7 @@ use std::{
 
 use common::{mission::Protocol, poll};
 
-use crate::chaos::{
+use super::{
     fault_injector::{FaultInjector, Late},
     robot_fault::RobotFault,
 };
@@ -29,12 +29,14 @@ const MOST_HELD: usize = 16_384;
 struct Shared {
     faulty: AtomicBool,
     ends: AtomicBool,
-    last_moving: Mutex<Option<Instant>>,
+    /// The time from the proxy's start to the host's newest order that turns a wheel.
+    last_moving_ns: AtomicU64,
 }
 
 #[derive(Debug)]
 pub struct Proxy {
-    address: SocketAddr,
+    pub address: SocketAddr,
+    began: Instant,
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
 }
@@ -49,43 +51,32 @@ impl Proxy {
     ) -> Result<Self> {
         let (front, back) = sockets(robot).or_cannot("open the proxy's sockets")?;
         let address = front.local_addr().or_cannot("name the proxy")?;
-        let shared = Arc::new(Shared::default());
-        let mut wire = Wire {
-            front,
-            back,
-            host: None,
-            injector: FaultInjector::new(fault, protocol, seed),
-            held: Vec::new(),
-            began: Instant::now(),
-            shared: Arc::clone(&shared),
-        };
+        let (began, shared) = (Instant::now(), Arc::new(Shared::default()));
+        let injector = FaultInjector::new(fault, protocol, seed);
+        let (host, held) = (None, Vec::new());
+        let mut wire = Wire { front, back, host, injector, held, began, shared: shared.clone() };
         let thread = std::thread::spawn(move || {
-            while !wire.shared.ends.load(Ordering::Relaxed) {
+            while !wire.shared.ends.load(Relaxed) {
                 // A datagram that cannot be sent, for example before the other end listens, is lost, as on a radio.
                 let _ = wire.turn();
             }
         });
-        Ok(Self { address, shared, thread: Some(thread) })
-    }
-
-    pub const fn address(&self) -> SocketAddr {
-        self.address
+        Ok(Self { address, began, shared, thread: Some(thread) })
     }
 
     pub fn begin_fault(&self) {
-        self.shared.faulty.store(true, Ordering::Relaxed);
+        self.shared.faulty.store(true, Relaxed);
     }
 
-    /// The time when the host last ordered a wheel to turn.
-    pub fn last_moving(&self) -> Option<Instant> {
-        let last = self.shared.last_moving.lock();
-        *last.unwrap_or_else(PoisonError::into_inner)
+    /// The time when the host last ordered a wheel to turn; that of the proxy's start if it did not.
+    pub fn last_moving(&self) -> Instant {
+        self.began + Duration::from_nanos(self.shared.last_moving_ns.load(Relaxed))
     }
 }
 
 impl Drop for Proxy {
     fn drop(&mut self) {
-        self.shared.ends.store(true, Ordering::Relaxed);
+        self.shared.ends.store(true, Relaxed);
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
@@ -119,33 +110,26 @@ impl Wire {
         let due = self.held.iter().map(|late| late.at.saturating_sub(now));
         let timeout = due.min().unwrap_or(LOOK).min(LOOK);
         poll::readable(&[self.front.as_fd(), self.back.as_fd()], Some(timeout))?;
-        if self.shared.faulty.load(Ordering::Relaxed) {
+        if self.shared.faulty.load(Relaxed) {
             self.injector.begin();
         }
+        let now = self.began.elapsed();
         let mut buffer = [0; 65_536];
         while let Ok((length, host)) = self.front.recv_from(&mut buffer) {
             self.host = Some(host);
-            let shared = &self.shared;
-            let mut moves = || {
-                let last = shared.last_moving.lock();
-                *last.unwrap_or_else(PoisonError::into_inner) = Some(Instant::now());
-            };
+            let moving = &self.shared.last_moving_ns;
+            let mut moves = || moving.store(now.as_nanos() as u64, Relaxed);
             let bytes = self.injector.order(&buffer[..length], &mut moves);
             if !bytes.is_empty() {
                 let _ = self.back.send(&bytes);
             }
         }
-        let now = self.began.elapsed();
         while let Ok(length) = self.back.recv(&mut buffer) {
-            let passed = self.injector.report(&buffer[..length], now);
-            self.held.extend(passed);
+            self.held.extend(self.injector.report(&buffer[..length], now));
         }
         self.held.truncate(MOST_HELD);
-        let (due, held) = self.held.drain(..).partition(|late| late.at <= now);
-        self.held = held;
-        let due: Vec<Late> = due;
-        if let Some(host) = self.host {
-            for late in due {
+        for late in self.held.extract_if(.., |late| late.at <= now) {
+            if let Some(host) = self.host {
                 let _ = self.front.send_to(&late.bytes, host);
             }
         }

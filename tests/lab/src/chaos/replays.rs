@@ -33,9 +33,7 @@ struct Counts {
 pub struct Replays {
     #[serde(flatten)]
     whole: Counts,
-    /// Generations that differ or could not be replayed, and recordings that could not be read, with reasons.
-    wrong: Vec<String>,
-    /// Results of recordings whose recorders were hit, or attached during a mission.
+    /// Results of recordings whose recorders were hit, attached during a mission, or competed with those that are started again.
     partial: Counts,
 }
 
@@ -71,33 +69,26 @@ impl Counts {
 }
 
 impl Replays {
-    pub fn wrong(&self) -> &[String] {
-        &self.wrong
-    }
-
-    pub const fn all_equal(&self) -> bool {
-        self.wrong.is_empty()
-    }
-
-    /// Replay the recordings of the mission in `directory` and of its `consumers`. Returns whether all is bit-equal.
-    pub fn add(&mut self, seed: u64, directory: &Path, consumers: &Consumers) -> bool {
-        let mut wrong = Vec::new();
-        let own =
-            recordings(directory).map(|file| (consumers.hit_recordings.contains(&file), file));
-        let own: Vec<_> = own.collect();
+    /// Replay the recordings of the mission in `directory` and of its `consumers`. Adds to `wrong` generations that differ or could not
+    /// be replayed, and recordings that could not be read, with reasons.
+    pub fn add(
+        &mut self,
+        directory: &Path,
+        hits_recorders: bool,
+        consumers: &Consumers,
+        wrong: &mut Vec<String>,
+    ) {
+        let own: Vec<_> = recordings(directory).map(|file| (hits_recorders, file)).collect();
         if own.is_empty() {
             wrong.push("nothing was recorded".to_owned());
         }
         let others = recordings(&consumers.directory).map(|file| (true, file));
         for (partial, file) in own.into_iter().chain(others) {
             let counts = if partial { &mut self.partial } else { &mut self.whole };
-            if let Err(error) = counts.add(&file, partial, &mut wrong) {
+            if let Err(error) = counts.add(&file, partial, wrong) {
                 wrong.push(error.to_string());
             }
         }
-        let all_equal = wrong.is_empty();
-        self.wrong.extend(wrong.into_iter().map(|wrong| format!("seed {seed}: {wrong}")));
-        all_equal
     }
 }
 

@@ -5,12 +5,18 @@ use std::{collections::BTreeMap, fmt};
 use common::latency::Histogram;
 use serde::{Serialize, Serializer};
 
-use crate::chaos::{
-    Judged, changes::Changes, kind::Kind, replays::Replays, signals::Row,
-    tick_latencies::TickLatencies,
+use super::{
+    Judged,
+    changes::Changes,
+    options::Options,
+    replays::Replays,
+    schedule::{Kind, Schedule},
+    signals::{self, Row},
 };
-use crate::missions::statistics::rounded;
-use mission_control::outcome::Outcome;
+use crate::{
+    error::Result,
+    missions::{results::Table, statistics::rounded},
+};
 
 /// The name for supervisor and stages together.
 pub const EVERYTHING: &str = "everything";
@@ -19,20 +25,20 @@ pub const EVERYTHING: &str = "everything";
 #[derive(Debug, Default, Serialize)]
 pub struct Report {
     pub missions: u64,
-    reached: u64,
-    collisions: u64,
-    /// Missions that did not reach the target, touched something or lost the pose: seeds and reasons.
-    wrong: Vec<String>,
+    pub reached: u64,
+    pub collisions: u64,
+    /// Missions that did not reach the target, touched something, lost the pose, did not tell of a target or were not replayed to the
+    /// bit: seeds and reasons.
+    pub wrong: Vec<String>,
     /// Stages that the supervisor aborted as hung although no signal had frozen them, or one had frozen all processes.
-    healthy_aborted: u64,
-    /// Signals of each kind to stages and supervisor, of all and of each.
-    kinds: BTreeMap<Kind, u32>,
+    pub healthy_aborted: u64,
+    /// Signals of each kind to each stage and the supervisor.
     kills: BTreeMap<&'static str, BTreeMap<Kind, u32>>,
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     consumers: BTreeMap<String, ConsumerCounts>,
     recovery_ms: BTreeMap<String, Recovery>,
     /// Largest pose error at the end beyond the same seed's undisturbed run, metres.
-    worst_pose_excess_m: f64,
+    pub worst_pose_excess_m: f64,
     /// Files, shared memory and processes that outlived a mission.
     pub leftovers: usize,
     /// These leftovers, with the missions that left them.
@@ -42,9 +48,6 @@ pub struct Report {
     pub replays: Option<Replays>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub targets: Option<Changes>,
-    /// Ticks with and without consumers, if nothing else is hit.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub tick_latencies: Option<TickLatencies>,
     pub took_s: f64,
 }
 
@@ -74,16 +77,35 @@ pub struct Recovery {
     pub output: Histogram,
 }
 
-#[derive(Debug)]
-pub struct End {
-    pub seed: u64,
-    pub outcome: Outcome,
-    pub reason: String,
-    pub collisions: u64,
-    pub pose_excess_m: f64,
-    pub pose_allowance_m: f64,
-    /// Stages aborted as hung that were not frozen alone.
-    pub healthy_aborted: Vec<String>,
+/// The state that the missions of one chaos share.
+pub struct Series<'a> {
+    pub options: &'a Options,
+    pub schedule: Schedule,
+    pub report: Report,
+    /// The table of signals; none if no results are written.
+    signals: Option<Table<Row>>,
+}
+
+impl<'a> Series<'a> {
+    pub fn new(options: &'a Options) -> Result<Self> {
+        let out = options.asked.out.as_deref();
+        Ok(Self {
+            options,
+            schedule: Schedule::new(options.asked.seed),
+            report: Report::default(),
+            signals: out.map(signals::create).transpose()?,
+        })
+    }
+
+    /// Keep a signal whose measurement is complete.
+    pub fn keep(&mut self, row: Row) -> Result {
+        self.report.add_recovery(&row);
+        self.signals.as_mut().map_or(Ok(()), |table| table.add(row))
+    }
+
+    pub fn is_over(&self) -> bool {
+        self.report.signals() >= self.options.asked.kills
+    }
 }
 
 impl Report {
@@ -98,11 +120,10 @@ impl Report {
     }
 
     pub fn kills(&self) -> u32 {
-        self.kinds.values().sum()
+        self.kills.values().flat_map(BTreeMap::values).sum()
     }
 
     pub fn hit(&mut self, stage: &'static str, kind: Kind) {
-        *self.kinds.entry(kind).or_default() += 1;
         *self.kills.entry(stage).or_default().entry(kind).or_default() += 1;
     }
 
@@ -123,62 +144,20 @@ impl Report {
         }
     }
 
-    /// Count a mission. Returns whether it reached the target without a contact, and knew its pose.
-    pub fn add_mission(&mut self, end: &End) -> bool {
-        self.missions += 1;
-        self.collisions += end.collisions;
-        self.worst_pose_excess_m = self.worst_pose_excess_m.max(end.pose_excess_m);
-        let reached = matches!(end.outcome, Outcome::Reached | Outcome::ReachedUnsure);
-        self.reached += u64::from(reached);
-        let (seed, excess, allowance) = (end.seed, end.pose_excess_m, end.pose_allowance_m);
-        let before = self.wrong.len();
-        if !reached {
-            let (outcome, reason) = (end.outcome.as_str(), &end.reason);
-            self.wrong.push(format!("seed {seed}: {outcome}: {reason}"));
-        }
-        if end.collisions > 0 {
-            self.wrong.push(format!("seed {seed}: touched something {} times", end.collisions));
-        }
-        self.healthy_aborted += end.healthy_aborted.len() as u64;
-        for stage in &end.healthy_aborted {
-            self.wrong.push(format!("seed {seed}: aborted although healthy: {stage}"));
-        }
-        if excess > allowance {
-            self.wrong.push(format!(
-                "seed {seed}: pose off by {excess:.4} m more than undisturbed, of {allowance:.4} m allowed"
-            ));
-        }
-        self.wrong.len() == before
-    }
-
-    /// Whether every mission reached the target without a contact and knew its pose. The files of other missions stay.
-    pub fn is_right(&self) -> bool {
-        let replayed = self.replays.as_ref().is_none_or(Replays::all_equal);
-        let told = self.targets.as_ref().is_none_or(Changes::is_right);
-        self.wrong.is_empty() && replayed && told
-    }
-
-    pub fn judged(&self) -> Judged {
-        let replays = self.replays.as_ref().map_or(&[][..], Replays::wrong);
-        let targets = self.targets.as_ref().map_or(&[][..], Changes::wrong);
-        let mut lost = [&self.wrong[..], replays, targets, &self.left_behind].into_iter().flatten();
-        let count = self.wrong.len() + replays.len() + targets.len() + self.leftovers;
-        let moved = || format!("a pose {:.3} m worse than undisturbed", self.worst_pose_excess_m);
-        Judged {
-            tried: self.signals().into(),
-            lost: count as u64 + self.healthy_aborted,
-            worst: lost.next().cloned().unwrap_or_else(moved),
-        }
-    }
-
     pub fn left_behind(&mut self, found: &[String]) {
         self.leftovers += found.len();
         let missions = self.missions;
         self.left_behind.extend(found.iter().map(|what| format!("by mission {missions}: {what}")));
     }
 
-    pub fn is_clean(&self) -> bool {
-        self.is_right() && self.leftovers == 0
+    pub fn judged(&self, json: bool) -> Result<Judged> {
+        let moved = || format!("a pose {:.3} m worse than undisturbed", self.worst_pose_excess_m);
+        Ok(Judged {
+            tried: self.signals().into(),
+            lost: (self.wrong.len() + self.leftovers) as u64,
+            worst: self.wrong.iter().chain(&self.left_behind).next().cloned().unwrap_or_else(moved),
+            text: super::text(self, json)?,
+        })
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use clap::ValueEnum;
 use common::{
     mission::{Mission, Protocol},
     samples::Cause,
@@ -29,7 +30,6 @@ pub enum Promise {
 
 #[derive(Debug)]
 pub struct Row {
-    pub fault: RobotFault,
     pub name: &'static str,
     /// The effect on an X80; [`NOTHING`] if the fault has no meaning there.
     pub x80: &'static str,
@@ -44,11 +44,10 @@ const LIKEWISE: &str = "likewise";
 macro_rules! faults {
     ($($fault:ident $name:literal $promise:ident $(($cause:ident))?: $x80:expr, $json:expr;)*) => {
         /// A fault of a robot's data. [`TABLE`] says what each does.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
         pub enum RobotFault { $($fault),* }
 
         pub static TABLE: &[Row] = &[$(Row {
-            fault: RobotFault::$fault,
             name: $name,
             promise: Promise::$promise $((Cause::$cause))?,
             x80: $x80,
@@ -84,7 +83,7 @@ faults! {
     SupervisorKilled "supervisor-killed" RestsAtOnce: "time limits are ignored; SIGKILL of the supervisor", LIKEWISE;
     AllKilled "all-killed" RestsAtOnce: "time limits are ignored; SIGKILL of all processes, then `firsthand stop`", LIKEWISE;
     RangeSilent "range-silent" Unharmed: "every ultrasonic byte is 255, nothing in range", "every range and beam is null, nothing in reach";
-    RangeFrozen "range-frozen" RestsLater(RangeImplausible): "the last ultrasonic bytes that are distances repeat for ever", "the last ranges and scan repeat for ever";
+    RangeFrozen "range-frozen" RestsLater(RangeImplausible): "the last ultrasonic bytes that are distances repeat for ever", "the last ranges that are distances, and the last scan, repeat for ever";
     LateFromBoot "late-from-boot" Unharmed: "from its start on, all frames come 0.5 s late", "all lines come 0.5 s late";
     HeldWheels "held-wheels" EndsAtRest: "the wheels stand, and their motors draw the current of held ones", "the wheels stand and are said to be held";
     RangeLate "range-late" Unharmed: "ultrasonic and infrared readings come 1 s late", "ranges and scans come 1 s late";
@@ -144,11 +143,6 @@ impl RobotFault {
     /// Whether the robot has the fault from its start on.
     pub const fn begins_at_boot(self) -> bool {
         matches!(self, Self::LateFromBoot)
-    }
-
-    pub fn named(name: &str) -> Option<Self> {
-        let row = TABLE.iter().find(|row| row.name == name)?;
-        Some(row.fault)
     }
 }
 

@@ -2,14 +2,13 @@
 
 use std::{
     fs,
-    net::SocketAddr,
     path::{Path, PathBuf},
     process::Stdio,
     time::{Duration, Instant},
 };
 
+use clap::ValueEnum as _;
 use common::{
-    bus::Reader,
     domain::Domain,
     follower::{Event, Follower},
     ground_truth::GroundTruthTick,
@@ -19,12 +18,13 @@ use common::{
 use console::output::write_stderr;
 use mission_control::{outcome::RIGHT_PLACE_M, simulator::Simulator};
 use processes::process::Process;
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::Signal;
 use summary::Summary;
 
 use crate::chaos::{
+    attack::send,
     mission,
-    options::{Faults, Options},
+    options::Options,
     proxy::Proxy,
     robot_fault::{Promise, RobotFault},
     stop_time_table::{Entry, StopTimeTable},
@@ -50,7 +50,8 @@ const LOOK: Duration = Duration::from_millis(10);
 pub fn run(options: &Options) -> Result<StopTimeTable> {
     let asked = &options.asked;
     let protocol = options.loaded.robot.protocol();
-    let faults = asked.robot_faults.iter().flat_map(|Faults(faults)| faults.iter().copied());
+    let named = asked.robot_faults.as_deref().filter(|named| !named.is_empty());
+    let faults = named.unwrap_or(RobotFault::value_variants()).iter().copied();
     let (faults, left_out): (Vec<_>, Vec<_>) =
         faults.partition(|fault| fault.has_meaning(protocol));
     if !left_out.is_empty() {
@@ -83,188 +84,148 @@ fn one(options: &Options, fault: RobotFault, seed: u64, files: &Path) -> Result<
     let mut robot = mission::robot(options, seed, &files.join("robot"), fault.is_kill())?;
     let protocol = options.loaded.robot.protocol();
     let proxy = Proxy::start(robot.address(), fault, protocol, seed)?;
-    let mut child = start(options, seed, proxy.address(), &files.join("run"))?;
-    let summary = mission::read_stdout(&mut child);
-    let mut observed = Observed::default();
-    let watched = observed.watch(options, fault, seed, &mut child, &mut robot, &proxy);
+    let mut start = mission::command(options, seed, "1", &files.join("run"), false)?;
+    start.args(["--set", &format!("robot.address='udp://{}'", proxy.address)]);
+    let mut child = Process::spawn(start).or_cannot("start a mission")?;
+    let observed = observe(options, fault, seed, &mut child, &mut robot, &proxy);
     // A frozen supervisor does not end in order.
     child.signal(Signal::CONT);
     child.end(END_GRACE);
-    let summary = summary.join().unwrap_or_default();
     robot.stop()?;
-    watched?;
-    Ok(observed.entry(options, fault, seed, robot.truth(), &summary))
-}
-
-fn start(options: &Options, seed: u64, robot: SocketAddr, directory: &Path) -> Result<Process> {
-    let mut start = mission::command(options, seed, "1", directory, false)?;
-    start.args(["--set", &format!("robot.address='udp://{robot}'")]);
-    Process::spawn(start).or_cannot("start a mission")
+    let summary = mission::summary(&files.join("run"));
+    Ok(entry(options, fault, seed, &observed?, robot.truth(), summary))
 }
 
 #[derive(Debug, Default)]
 struct Observed {
-    /// The time when the fault began, and the newest tick of the ground truth then.
+    /// The time when the fault began, and the ticks of the ground truth by then.
     fault_began: Option<(Instant, usize)>,
-    last_moving: Option<Instant>,
-    ended: Option<Instant>,
-    /// Whether the mission ended by itself before the fault.
+    /// The end of the watch, and the newest order before it that turns a wheel.
+    ended: Option<(Instant, Instant)>,
+    /// The ticks of the ground truth by then: the end of the run stops the robot.
+    ticks: usize,
+    /// Whether the mission ended by itself.
     ended_by_itself: bool,
     link: Option<LinkSample>,
-    /// The machine's time at the robot's mission time 0: the least estimate of all ticks, because a tick is read some time
-    /// after it is written.
-    epoch: Option<Instant>,
-    ticks: usize,
 }
 
-impl Observed {
-    /// Watch until the mission ends, or for as long as the fault needs.
-    fn watch(
-        &mut self,
-        options: &Options,
-        fault: RobotFault,
-        seed: u64,
-        child: &mut Process,
-        robot: &mut Simulator,
-        proxy: &Proxy,
-    ) -> Result {
-        let began = Instant::now();
-        let (least, more) = FAULT_AFTER_S;
-        let fault_after_s = least + more * Random::new(seed, 17 + fault as u128).share();
-        let watched = match fault.row().promise {
-            Promise::Unharmed | Promise::EndsAtRest => WATCHED_ON_ITS_WAY,
-            _ => WATCHED,
-        };
-        let (mut departed, mut stop) = (None, None);
-        // The process leaves the bus of the mission before, which that mission may have left behind.
-        let robot_domain = Domain::of(options.asked.robot.clone());
-        let mut link =
-            Follower::new(robot_domain, "chaos", &topics::LINK, |bus| bus.reader(&topics::LINK));
-        loop {
-            self.ended = Some(Instant::now());
-            self.last_moving = proxy.last_moving();
-            robot.poll()?;
-            self.take(robot.truth());
-            if let Ok(Event::Samples(reader)) = link.wait(Duration::ZERO) {
-                self.hear(reader)?;
+/// Observe the robot until the mission ends, or for as long as the fault needs.
+fn observe(
+    options: &Options,
+    fault: RobotFault,
+    seed: u64,
+    child: &mut Process,
+    robot: &mut Simulator,
+    proxy: &Proxy,
+) -> Result<Observed> {
+    let began = Instant::now();
+    let (least, more) = FAULT_AFTER_S;
+    let fault_after_s = least + more * Random::new(seed, 17 + fault as u128).share();
+    let watched = match fault.row().promise {
+        Promise::Unharmed | Promise::EndsAtRest => WATCHED_ON_ITS_WAY,
+        _ => WATCHED,
+    };
+    let mut observed = Observed::default();
+    let (mut departed_s, mut stop) = (None, None);
+    // The process leaves the bus of the mission before, which that mission may have left behind.
+    let robot_domain = Domain::of(options.asked.robot.clone());
+    let mut link =
+        Follower::new(robot_domain, "chaos", &topics::LINK, |bus| bus.reader(&topics::LINK));
+    loop {
+        observed.ended = Some((Instant::now(), proxy.last_moving()));
+        robot.poll()?;
+        observed.ticks = robot.truth().len();
+        if let Ok(Event::Samples(reader)) = link.wait(Duration::ZERO) {
+            while let Some(sample) = reader.next_sample()? {
+                observed.link = Some(sample);
             }
-            self.ended_by_itself =
-                child.try_reap().or_cannot("reap")?.is_some() && !fault.is_kill();
-            let patience = self.fault_began.map_or(began + DEPARTS_WITHIN, |(at, _)| at + watched);
-            if self.ended_by_itself || Instant::now() >= patience {
-                break;
-            }
-            let newest = robot.truth().last();
-            if departed.is_none() {
-                let gone = newest.filter(|tick| tick.x.hypot(tick.y) >= DEPARTED_M);
-                departed = gone.map(|tick| tick.time_s);
-            }
-            let due = |tick: &GroundTruthTick| {
-                departed.is_some_and(|departed| tick.time_s >= departed + fault_after_s)
-            };
-            if self.fault_began.is_none() && (fault.begins_at_boot() || newest.is_some_and(due)) {
-                proxy.begin_fault();
-                self.fault_began = Some((Instant::now(), self.ticks));
-                if fault.is_kill() {
-                    kill(fault, child, &directory(options, fault, seed));
-                }
-                if matches!(fault, RobotFault::DoesNotStop | RobotFault::AllKilled) {
-                    stop = Some(operator_stop(options)?);
-                }
-            }
-            std::thread::park_timeout(LOOK);
         }
-        if let Some(mut stop) = stop {
-            stop.end(END_GRACE);
+        observed.ended_by_itself =
+            child.try_reap().or_cannot("reap")?.is_some() && !fault.is_kill();
+        let patience = observed.fault_began.map_or(began + DEPARTS_WITHIN, |(at, _)| at + watched);
+        if observed.ended_by_itself || Instant::now() >= patience {
+            break;
         }
-        Ok(())
+        let newest = robot.truth().last();
+        let gone = newest.filter(|tick| tick.x.hypot(tick.y) >= DEPARTED_M);
+        departed_s = departed_s.or(gone.map(|tick| tick.time_s));
+        // It begins as a tick comes, so that times may count from that tick.
+        let due = newest
+            .zip(departed_s)
+            .is_some_and(|(tick, departed_s): (_, f64)| tick.time_s >= departed_s + fault_after_s);
+        if observed.fault_began.is_none() && (fault.begins_at_boot() || due) {
+            proxy.begin_fault();
+            observed.fault_began = Some((Instant::now(), observed.ticks));
+            if fault.is_kill() {
+                kill(fault, child, &directory(options, fault, seed));
+            }
+            if matches!(fault, RobotFault::DoesNotStop | RobotFault::AllKilled) {
+                stop = Some(operator_stop(options)?);
+            }
+        }
+        std::thread::park_timeout(LOOK);
     }
+    if let Some(mut stop) = stop {
+        stop.end(END_GRACE);
+    }
+    Ok(observed)
+}
 
-    fn take(&mut self, truth: &[GroundTruthTick]) {
-        let now = Instant::now();
-        for tick in truth.get(self.ticks..).unwrap_or_default() {
-            let since = Duration::try_from_secs_f64(tick.time_s).unwrap_or_default();
-            let epoch = now.checked_sub(since);
-            self.epoch = match (self.epoch, epoch) {
-                (Some(known), Some(epoch)) => Some(known.min(epoch)),
-                (known, epoch) => known.or(epoch),
-            };
-        }
-        self.ticks = truth.len();
+fn entry(
+    options: &Options,
+    fault: RobotFault,
+    seed: u64,
+    observed: &Observed,
+    truth: &[GroundTruthTick],
+    summary: Option<Summary>,
+) -> Entry {
+    let stopped = observed.link.filter(LinkSample::stopped);
+    let (mut outcome, reason) = if fault.is_kill() {
+        ("killed".to_owned(), fault.row().name.to_owned())
+    } else if observed.ended_by_itself {
+        summary.map(|it| (it.outcome.as_str().to_owned(), it.reason)).unwrap_or_default()
+    } else {
+        ("goes on".to_owned(), stopped.map_or("", |link| link.cause().name()).to_owned())
+    };
+    let target = options.loaded.target;
+    let is_wrong =
+        |tick: &GroundTruthTick| (tick.x - target.x).hypot(tick.y - target.y) > RIGHT_PLACE_M;
+    if outcome == "reached" && truth.last().is_some_and(is_wrong) {
+        outcome = "wrong_place".to_owned();
     }
-
-    fn hear(&mut self, link: &mut Reader<LinkSample>) -> Result {
-        while let Some(sample) = link.next_sample()? {
-            self.link = Some(sample);
-        }
-        Ok(())
-    }
-
-    fn entry(
-        &self,
-        options: &Options,
-        fault: RobotFault,
-        seed: u64,
-        truth: &[GroundTruthTick],
-        summary: &[u8],
-    ) -> Entry {
-        let stopped = self.link.filter(LinkSample::stopped);
-        let cause = stopped.map_or("", |link| link.cause().name());
-        let (mut outcome, mut reason) = if self.ended_by_itself {
-            let summary: Option<Summary> = serde_json::from_slice(summary).ok();
-            summary.map(|it| (it.outcome.as_str().to_owned(), it.reason)).unwrap_or_default()
-        } else {
-            ("goes on".to_owned(), cause.to_owned())
-        };
-        if fault.is_kill() {
-            (outcome, reason) = ("killed".to_owned(), fault.row().name.to_owned());
-        }
-        let last = truth.last();
-        let target = options.loaded.target;
-        let wrong =
-            last.is_some_and(|tick| (tick.x - target.x).hypot(tick.y - target.y) > RIGHT_PLACE_M);
-        if outcome == "reached" && wrong {
-            outcome = "wrong_place".to_owned();
-        }
-        let mut entry = Entry {
-            fault,
-            seed,
-            promised_s: fault.row().promise.rest_within_s(&options.loaded),
-            fault_began: false,
-            last_moving_s: None,
-            rest_s: None,
-            way_m: 0.0,
-            watched_s: 0.0,
-            collisions: 0,
-            outcome,
-            reason,
-        };
-        let (Some((began, tick)), Some(epoch), Some(ended)) =
-            (self.fault_began, self.epoch, self.ended)
-        else {
-            return entry;
-        };
-        let since_fault = |time: Instant| time.saturating_duration_since(began).as_secs_f64();
-        let at_time = |time_s: f64| {
-            epoch.checked_add(Duration::try_from_secs_f64(time_s).unwrap_or_default())
-        };
-        entry.fault_began = true;
-        entry.watched_s = since_fault(ended);
-        entry.last_moving_s = Some(self.last_moving.map_or(0.0, since_fault));
-        // The end of the run stops the robot, so only ticks before it count.
-        let counts = |tick: &&GroundTruthTick| at_time(tick.time_s).is_some_and(|at| at <= ended);
-        let track_m = options.loaded.body().track_m;
-        let mut watched = truth.get(tick..).unwrap_or_default().iter().filter(counts);
-        let along = watched.clone().zip(watched.clone().skip(1));
-        entry.way_m = along.map(|(from, to)| (to.x - from.x).hypot(to.y - from.y)).sum();
-        let moving = watched.clone().rfind(|tick| !is_at_rest(tick, track_m));
-        let moved_until = moving.and_then(|tick| at_time(tick.time_s));
-        entry.rest_s = Some(moved_until.map_or(0.0, since_fault));
-        let contacts = |tick: Option<&GroundTruthTick>| tick.map_or(0, |tick| tick.contacts);
-        let before = tick.checked_sub(1).and_then(|before| truth.get(before));
-        entry.collisions = contacts(watched.next_back()).saturating_sub(contacts(before));
-        entry
-    }
+    let mut entry = Entry {
+        fault,
+        seed,
+        promised_s: fault.row().promise.rest_within_s(&options.loaded),
+        fault_began: false,
+        last_moving_s: None,
+        rest_s: None,
+        way_m: 0.0,
+        watched_s: 0.0,
+        collisions: 0,
+        outcome,
+        reason,
+    };
+    let (Some((began, first)), Some((ended, moving))) = (observed.fault_began, observed.ended)
+    else {
+        return entry;
+    };
+    let since_fault = |time: Instant| time.saturating_duration_since(began).as_secs_f64();
+    entry.fault_began = true;
+    entry.watched_s = since_fault(ended);
+    entry.last_moving_s = Some(since_fault(moving));
+    let track_m = options.loaded.body().track_m;
+    // The tick before is the newest when the fault began.
+    let before = first.saturating_sub(1);
+    let watched = truth.get(before..observed.ticks).unwrap_or_default();
+    let ways = watched.windows(2).map(|two| (two[1].x - two[0].x).hypot(two[1].y - two[0].y));
+    entry.way_m = ways.sum();
+    let began_s = watched.first().map_or(0.0, |tick| tick.time_s);
+    let moving = watched.iter().skip(1).rfind(|tick| !is_at_rest(tick, track_m));
+    entry.rest_s = Some(moving.map_or(0.0, |tick| tick.time_s - began_s));
+    let contacts = |tick: Option<&GroundTruthTick>| tick.map_or(0, |tick| tick.contacts);
+    entry.collisions = contacts(watched.last()).saturating_sub(contacts(watched.first()));
+    entry
 }
 
 fn is_at_rest(tick: &GroundTruthTick, track_m: f64) -> bool {
@@ -279,24 +240,19 @@ fn directory(options: &Options, fault: RobotFault, seed: u64) -> PathBuf {
 fn kill(fault: RobotFault, supervisor: &Process, directory: &Path) {
     let run = directory.join("run");
     let run = run.to_string_lossy();
-    let lines =
-        processes().map(|pid| (pid, String::from_utf8_lossy(&command_line(pid)).into_owned()));
-    let others = lines.filter(|(pid, line)| *pid != std::process::id() && line.contains(&*run));
-    let others: Vec<_> = others.collect();
-    if fault == RobotFault::LinkKilled {
-        // A stopped supervisor starts no other link.
-        supervisor.signal(Signal::STOP);
-    } else {
-        supervisor.signal(Signal::KILL);
-    }
-    for (pid, line) in others {
+    // A stopped supervisor starts no other link.
+    supervisor.signal(match fault {
+        RobotFault::LinkKilled => Signal::STOP,
+        _ => Signal::KILL,
+    });
+    for pid in processes().filter(|pid| *pid != std::process::id()) {
+        let line = String::from_utf8_lossy(&command_line(pid)).into_owned();
         let is_hit = match fault {
             RobotFault::LinkKilled => line.split(['\0', ' ']).any(|word| word == "link"),
             fault => fault == RobotFault::AllKilled,
         };
-        if let Some(pid) = Pid::from_raw(pid as i32).filter(|_| is_hit) {
-            // A process that has ended needs no signal.
-            let _ = kill_process(pid, Signal::KILL);
+        if is_hit && line.contains(&*run) {
+            send(pid, Signal::KILL);
         }
     }
 }

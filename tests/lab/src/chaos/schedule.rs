@@ -1,10 +1,40 @@
-//! The schedule of signals: seeded, so that it can be repeated.
+//! The kinds of hits on a process, and their schedule: seeded, so that it can be repeated.
 
 use std::{ops::Range, time::Duration};
 
 use processes::stages::TABLE;
+use rustix::process::Signal;
+use serde::{Deserialize, Serialize};
 
-use crate::{chaos::kind::Kind, random::Random};
+use crate::random::Random;
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    #[default]
+    Kill,
+    /// SIGKILL in the first milliseconds of a generation.
+    KillAtStart,
+    /// SIGABRT, as after a panic that cannot unwind. SIGSEGV would not serve: Rust's runtime takes the first one for an overflow
+    /// of the stack, finds none, and goes on.
+    Crash,
+    Terminate,
+    /// SIGSTOP.
+    Freeze,
+    /// SIGSTOP to supervisor and stages together, SIGCONT a moment later.
+    FreezeAll,
+}
+
+impl Kind {
+    pub const fn signal(self) -> Signal {
+        match self {
+            Self::Kill | Self::KillAtStart => Signal::KILL,
+            Self::Crash => Signal::ABORT,
+            Self::Terminate => Signal::TERM,
+            Self::Freeze | Self::FreezeAll => Signal::STOP,
+        }
+    }
+}
 
 /// Mean time between two signals. Each stage gets one every two to three seconds, and is stable before.
 const MEAN_PAUSE: Duration = Duration::from_millis(500);
@@ -67,11 +97,10 @@ impl Schedule {
         Duration::from_secs_f64(self.0.within(start, end))
     }
 
-    /// The consumer to hit instead of a stage or the supervisor, `always` or sometimes; and the time for which it is frozen, or
-    /// none to kill it.
-    pub fn consumer(&mut self, count: usize, always: bool) -> Option<(usize, Kind, Duration)> {
+    /// The consumer to hit instead of a stage or the supervisor; and the time for which it is frozen, or none to kill it.
+    pub fn consumer(&mut self, count: usize) -> Option<(usize, Kind, Duration)> {
         // Without consumers the sequence of decisions is the same as before there were any.
-        if count == 0 || self.0.share() >= CONSUMER_SHARE && !always {
+        if count == 0 || self.0.share() >= CONSUMER_SHARE {
             return None;
         }
         let index = self.0.below(count);

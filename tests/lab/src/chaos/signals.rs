@@ -1,20 +1,17 @@
 //! `signals.csv`: a row for each signal, written when its last measurement is known. A chaos that is killed leaves the rows that are
 //! known by then.
 
-use std::{
-    fs::{self, File},
-    path::Path,
-    time::Instant,
-};
+use std::{fs, path::Path, time::Instant};
 
 use serde::{Deserialize, Serialize};
 
+use super::schedule::Kind;
 use crate::{
-    chaos::kind::Kind,
     error::{OrCannot as _, Result},
+    missions::results::Table,
 };
 
-pub const FILE_NAME: &str = "signals.csv";
+const FILE_NAME: &str = "signals.csv";
 
 /// A signal. A value that was not measured is an empty cell.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -44,18 +41,13 @@ pub fn ms_since(at: Instant) -> f64 {
 }
 
 /// The file in `directory`, without rows.
-pub fn create(directory: &Path) -> Result<csv::Writer<File>> {
+pub fn create(directory: &Path) -> Result<Table<Row>> {
     let path = directory.join(FILE_NAME);
     fs::create_dir_all(directory).or_cannot_file("make the directory of", &path)?;
-    let file = File::create_new(&path);
-    let file = file.map_err(|error| format!("{error}; give another directory"));
-    Ok(csv::Writer::from_writer(file.or_cannot_file("make", &path)?))
-}
-
-/// Write a row, so that others can read it at once.
-pub fn add(row: &Row, to: &mut csv::Writer<File>) -> Result {
-    to.serialize(row).or_cannot("write signals.csv")?;
-    to.flush().or_cannot("write signals.csv")
+    if path.exists() {
+        return Err(format!("{} exists; give another directory", path.display()).into());
+    }
+    Table::open(path)
 }
 
 #[cfg(test)]
@@ -88,7 +80,7 @@ mod tests {
             ..Row::default()
         };
         for row in [&plain, &odd] {
-            add(row, &mut file).unwrap();
+            file.add(row.clone()).unwrap();
         }
         // Another process reads the file like this while it is written.
         assert_eq!(read(&directory.join(FILE_NAME)), [plain, odd]);

@@ -1,11 +1,15 @@
 //! The stop-time table: how long robots moved after their fault.
 
-use std::{collections::BTreeMap, fmt};
+use std::fmt;
 
+use console::table::Table;
 use serde::Serialize;
 
-use crate::chaos::Judged;
-use crate::chaos::robot_fault::{Promise, RobotFault};
+use super::{
+    Judged,
+    robot_fault::{Promise, RobotFault},
+};
+use crate::error::Result;
 
 /// The least time from the last tick in which a wheel turned to the end of a mission that ends at rest, seconds.
 const AT_REST_BEFORE_S: f64 = 0.15;
@@ -52,78 +56,63 @@ pub struct StopTimeTable {
 }
 
 impl StopTimeTable {
-    pub fn is_kept(&self) -> bool {
-        self.entries.iter().all(Entry::is_kept)
-    }
-
-    pub fn judged(&self) -> Judged {
+    pub fn judged(&self, json: bool) -> Result<Judged> {
         let lost = self.entries.iter().filter(|entry| !entry.is_kept());
         let farthest = self.entries.iter().max_by(|a, b| a.way_m.total_cmp(&b.way_m));
         let worst = lost.clone().next().or(farthest);
-        Judged {
+        Ok(Judged {
             tried: self.entries.len() as u64,
             lost: lost.count() as u64,
             worst: worst.map_or(String::new(), |entry| {
                 let Entry { fault, seed, way_m, outcome, reason, .. } = entry;
                 format!("{} (seed {seed}): {way_m:.2} m, {outcome}: {reason}", fault.row().name)
             }),
-        }
+            text: super::text(self, json)?,
+        })
     }
 }
 
 impl fmt::Display for StopTimeTable {
     fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(
-            to,
-            "{:<17} {:>14} {:>11} {:>9} {:>8} {:>8} {:>9}  outcome: reason",
-            "robot", "last command", "at rest", "promised", "way", "touches", "kept"
-        )?;
-        let mut kinds: BTreeMap<RobotFault, Vec<&Entry>> = BTreeMap::new();
-        for entry in &self.entries {
-            kinds.entry(entry.fault).or_default().push(entry);
-        }
-        for (fault, entries) in kinds {
+        let mut table = Table::new([
+            "robot",
+            ">last command",
+            ">at rest",
+            ">promised",
+            ">way",
+            ">touches",
+            ">kept",
+            "outcome: reason",
+        ]);
+        for entries in self.entries.chunk_by(|one, next| one.fault == next.fault) {
             let kept = entries.iter().filter(|entry| entry.is_kept()).count();
-            let touches: u64 = entries.iter().map(|entry| entry.collisions).sum();
-            let last = longest(&entries, |entry| entry.last_moving_s);
-            let rest = longest(&entries, |entry| entry.rest_s);
             let way = entries.iter().map(|entry| entry.way_m).fold(0.0, f64::max);
-            let way = format!("{way:.2} m");
-            let kept = format!("{kept} of {}", entries.len());
             // The worst mission is shown.
-            let worst = entries.iter().find(|entry| !entry.is_kept());
-            let told = worst.or(entries.first()).map_or(String::new(), |entry| {
-                let reason = match &*entry.reason {
-                    "" => "no reason",
-                    reason => reason,
-                };
-                format!("{}: {reason}", entry.outcome)
-            });
-            let name = fault.row().name;
-            let promised = entries[0].promised_s;
-            let promised = promised.map_or("-".to_owned(), |seconds| format!("{seconds:.2} s"));
-            writeln!(
-                to,
-                "{name:<17} {last:>14} {rest:>11} {promised:>9} {way:>8} {touches:>8} {kept:>9}  {told}"
-            )?;
+            let told = entries.iter().find(|entry| !entry.is_kept()).unwrap_or(&entries[0]);
+            let reason = if told.reason.is_empty() { "no reason" } else { &told.reason };
+            table.row([
+                &told.fault.row().name,
+                &longest(entries, |entry| entry.last_moving_s),
+                &longest(entries, |entry| entry.rest_s),
+                &told.promised_s.map_or("-".to_owned(), |seconds| format!("{seconds:.2} s")),
+                &format!("{way:.2} m"),
+                &entries.iter().map(|entry| entry.collisions).sum::<u64>(),
+                &format!("{kept} of {}", entries.len()),
+                &format!("{}: {reason}", told.outcome),
+            ]);
         }
-        writeln!(to, "Times and ways are from the fault, the longest of each kind.")
+        writeln!(to, "{table}Times and ways are from the fault, the longest of each kind.")
     }
 }
 
 /// The longest time of all; marked as a lower bound if the robot still moved at the end of the watch.
-fn longest(entries: &[&Entry], time: impl Fn(&Entry) -> Option<f64>) -> String {
+fn longest(entries: &[Entry], time: impl Fn(&Entry) -> Option<f64>) -> String {
     /// A robot that moves until the end of the watch was last seen to move a tick or two before.
     const STILL_S: f64 = 0.5;
-    let moving = |entry: &Entry| {
-        let longest = time(entry)?;
-        let still = longest + STILL_S >= entry.watched_s;
-        Some((longest, still))
-    };
-    let times = entries.iter().filter_map(|entry| moving(entry));
+    let times = entries.iter().filter_map(|entry| Some((time(entry)?, entry.watched_s)));
     let longest = times.max_by(|a, b| a.0.total_cmp(&b.0));
-    longest.map_or("-".to_owned(), |(seconds, still)| {
-        let more = if still { "> " } else { "" };
+    longest.map_or("-".to_owned(), |(seconds, watched_s)| {
+        let more = if seconds + STILL_S >= watched_s { "> " } else { "" };
         format!("{more}{seconds:.2} s")
     })
 }
@@ -167,7 +156,8 @@ mod tests {
         ];
         for (entry, kept) in rows {
             assert_eq!(entry.is_kept(), kept, "{entry:?}");
-            assert_eq!(StopTimeTable { entries: vec![entry] }.is_kept(), kept);
+            let table = StopTimeTable { entries: vec![entry] };
+            assert_eq!(table.judged(true).unwrap().lost == 0, kept);
         }
     }
 

@@ -2,6 +2,7 @@
 //! missions end, sorted when all have ended.
 
 use std::{
+    env,
     fs::{self, File},
     path::{Path, PathBuf},
 };
@@ -14,6 +15,21 @@ use crate::error::{OrCannot as _, Refused, Result};
 
 /// The file of the command that gives the rows.
 const PLAN_FILE: &str = "plan.txt";
+
+/// The command of this process, which gives the rows, without what does not change them.
+pub fn command() -> Result<String> {
+    let mut words = vec!["firsthand".to_owned()];
+    let mut given = env::args().skip(1);
+    while let Some(word) = given.next() {
+        match &*word {
+            "--resume" | "--json" => {}
+            "--jobs" => drop(given.next()),
+            jobs if jobs.starts_with("--jobs=") => {}
+            _ => words.push(word),
+        }
+    }
+    shlex::try_join(words.iter().map(String::as_str)).or_cannot("write the command")
+}
 
 #[derive(Debug)]
 pub struct Results {
@@ -74,7 +90,7 @@ pub struct Table<R> {
     pub rows: Vec<R>,
 }
 
-impl<R: Record> Table<R> {
+impl<R: Serialize + DeserializeOwned> Table<R> {
     /// The table in `file`: with its rows, or empty.
     pub fn open(file: PathBuf) -> Result<Self> {
         let mut rows = Vec::new();
@@ -100,17 +116,19 @@ impl<R: Record> Table<R> {
         Ok(())
     }
 
+    fn save(&self) -> Result {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        self.rows.iter().try_for_each(|row| writer.serialize(row))?;
+        replace(&self.file, writer.into_inner()?).or_cannot_file("write", &self.file)
+    }
+}
+
+impl<R: Record> Table<R> {
     /// Sort the rows by world, seed and setting, and rewrite the file. If a mission has two rows, the later one stays.
     pub fn sort(&mut self) -> Result {
         self.rows.reverse();
         self.rows.sort_by_key(R::key);
         self.rows.dedup_by_key(|row| row.key());
         self.save()
-    }
-
-    fn save(&self) -> Result {
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        self.rows.iter().try_for_each(|row| writer.serialize(row))?;
-        replace(&self.file, writer.into_inner()?).or_cannot_file("write", &self.file)
     }
 }

@@ -1,7 +1,7 @@
 //! A mission whose ticks are measured, and its consumers: each a process that reads every sample of grid and field.
 
 use std::{
-    process::{Output, Stdio},
+    process::Stdio,
     sync::mpsc::{RecvTimeoutError, channel},
     thread,
     time::Duration,
@@ -15,10 +15,9 @@ use common::{
     start::become_child,
     topics,
 };
-use summary::Quantiles;
 
 use super::{
-    options::Arguments,
+    Arguments, Times,
     process_set::{ProcessSet, Used},
 };
 use crate::{
@@ -26,22 +25,17 @@ use crate::{
     robot,
 };
 
-#[derive(Debug)]
-pub struct Ticks {
-    pub count: u64,
-    pub p50_us: f64,
-    pub p99_us: f64,
-    pub max_us: f64,
-    /// Resources of its processes; none for a short mission.
-    pub used: Option<Used>,
-}
-
 pub const CONSUMER: &str = "consumer";
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 /// How often a consumer looks whether it is asked to stop.
 const STOPS_WITHIN: Duration = Duration::from_millis(100);
 
-pub fn measure(arguments: &Arguments, robot: &RobotName, pace: Pace) -> Result<Ticks> {
+/// The times of a mission's ticks, and the resources of its processes; none for a short mission.
+pub fn measure(
+    arguments: &Arguments,
+    robot: &RobotName,
+    pace: Pace,
+) -> Result<(Times, Option<Used>)> {
     let directory = tempfile::Builder::new().prefix("firsthand-latency-").tempdir();
     let directory = directory.or_cannot("make a directory for the mission")?;
     let mut command = robot::mission("run", &arguments.mission, robot, &arguments.set);
@@ -69,17 +63,9 @@ pub fn measure(arguments: &Arguments, robot: &RobotName, pace: Pace) -> Result<T
     };
     // The thread has ended, because it has sent its result.
     let _ = waiting.join();
-    ticks(&output, processes.used())
-}
-
-fn ticks(output: &Output, used: Option<Used>) -> Result<Ticks> {
     let summary = error::summary(&output.stdout, &output.stderr)?;
-    let Quantiles { p50: Some(p50_us), p99: Some(p99_us), max: Some(max_us) } =
-        summary.tick_latency_us
-    else {
-        return Err(error::NOTHING.into());
-    };
-    Ok(Ticks { count: summary.ticks, p50_us, p99_us, max_us, used })
+    let times = Times::new("a mission's ticks", summary.ticks, summary.tick_latency_us)?;
+    Ok((times, processes.used()))
 }
 
 /// Be a consumer of `robot` until `supervisor` ends it.

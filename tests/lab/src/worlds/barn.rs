@@ -71,17 +71,13 @@ pub fn gazebo(file: &Path) -> Result<World> {
     Ok((format!("barn-{name}"), scene(drums), RULES))
 }
 
-/// The cylinders of a world's models: each stands at the last `<pose>` before its radius. None without cylinders.
+/// The cylinders of a world's models: each stands at the first `<pose>` of its model. None without cylinders.
 fn cylinders(text: &str) -> Option<Vec<Drum>> {
+    let world = roxmltree::Document::parse(text).ok()?;
     let mut drums = Vec::new();
-    for model in text.split("<model ").skip(1) {
-        let model = model.split("</model>").next()?;
-        // The text of the first element of a name, whatever its attributes.
-        let element = |tag| {
-            let (_, after) = model.split_once(tag)?.1.split_once('>')?;
-            after.split('<').next()
-        };
-        let (Some(radius), Some(pose)) = (element("<radius"), element("<pose")) else {
+    for model in world.descendants().filter(|node| node.has_tag_name("model")) {
+        let text = |tag: &str| model.descendants().find(|node| node.has_tag_name(tag))?.text();
+        let (Some(radius), Some(pose)) = (text("radius"), text("pose")) else {
             continue;
         };
         let mut pose = pose.split_whitespace().map(str::parse);

@@ -6,7 +6,7 @@
 //!
 //! and `initial_pose_y`, `initial_pose_a` (radians), `goal_pose_x`, `goal_pose_y`. The heading at the goal is not used.
 
-use std::{collections::BTreeMap, fs::File, io::Read as _, path::Path};
+use std::{fs::File, io::Read as _, path::Path};
 
 use glam::DVec2;
 
@@ -46,40 +46,29 @@ pub fn number(text: &str) -> Option<f64> {
 }
 
 fn parse(text: &str) -> Result<Vec<Ends>, String> {
-    let mut tests: Vec<BTreeMap<&str, f64>> = Vec::new();
-    for (line, text) in (1..).zip(text.lines()) {
-        let Some((key, value)) = argument(text).filter(|(key, _)| KEYS.contains(key)) else {
-            continue;
-        };
-        let number = number(value)
-            .ok_or_else(|| format!("line {line}: {key} is {value:?}; give metres or radians"))?;
-        if tests.last().is_none_or(|test| test.contains_key(key)) {
-            tests.push(BTreeMap::new());
+    let text = format!("<tests>{text}</tests>");
+    let tests = roxmltree::Document::parse(&text).map_err(|cause| cause.to_string())?;
+    let mut values = Vec::new();
+    for node in tests.descendants() {
+        if let Some((key, value)) = node.attribute("name").zip(node.attribute("default"))
+            && KEYS.contains(&key)
+        {
+            let wrong = || format!("{key} is {value:?}; give metres or radians");
+            values.push((key, number(value).ok_or_else(wrong)?));
         }
-        tests.last_mut().map(|test| test.insert(key, number));
     }
-    if tests.is_empty() {
+    if values.is_empty() {
         return Err("no <arg name=\"initial_pose_x\" default=\"...\"/>; give MRPB's tests, or remove the file to have starts and targets drawn".to_owned());
     }
-    let complete = |(number, test): (usize, &BTreeMap<&str, f64>)| {
+    let ends = |(number, test): (usize, &[(&str, f64)])| {
         let value = |key: &str| {
-            test.get(key).copied().ok_or_else(|| format!("test {number} has no {key}; add it"))
+            let found = test.iter().find(|(name, _)| *name == key).map(|(_, value)| *value);
+            found.ok_or_else(|| format!("test {number} has no {key}; add it"))
         };
         let [x, y, heading, to_x, to_y] = KEYS.map(value);
         Ok(Ends { start: DVec2::new(x?, y?), heading: heading?, target: DVec2::new(to_x?, to_y?) })
     };
-    (1..).zip(&tests).map(complete).collect()
-}
-
-/// Name and value of the `<arg>` in a line.
-fn argument(line: &str) -> Option<(&str, &str)> {
-    let of = |key: &str| {
-        let (_, after) = line.split_once(key)?;
-        let (_, quoted) = after.split_once('"')?;
-        Some(quoted.split_once('"')?.0)
-    };
-    line.trim_start().starts_with("<arg").then_some(())?;
-    Some((of("name=")?, of("default=")?))
+    (1..).zip(values.chunks(KEYS.len())).map(ends).collect()
 }
 
 #[cfg(test)]
@@ -103,10 +92,10 @@ mod tests {
     fn a_damaged_file_is_refused_with_what_is_wrong() {
         for (text, named) in [
             (String::new(), "initial_pose_x"),
-            (TEST.replace("4.25", "wall"), "line 7"),
+            (TEST.replace("4.25", "wall"), "goal_pose_y"),
             (TEST.replace("4.25", "inf"), "goal_pose_y"),
             (TEST.replace("goal_pose_x", "goal"), "no goal_pose_x"),
-            ([TEST, &TEST[..TEST.len() / 2]].concat(), "test 2 has no "),
+            (TEST.replace("goal_pose_x\"", "goal_pose_x"), " at "),
         ] {
             let refused = parse(&text).unwrap_err();
             assert!(refused.contains(named), "{refused}");

@@ -118,7 +118,8 @@ impl Readings {
             }
             Said::Frame { .. } => {}
             Said::Line(report) => {
-                self.ranges.extend(report.ranges.clone());
+                let distances = report.ranges.iter().filter(|(_, range)| range.is_some());
+                self.ranges.extend(distances.map(|(name, range)| (name.clone(), *range)));
                 self.scans.extend(report.scans.clone());
                 self.scan = report.scan.clone().or(self.scan.take());
             }
@@ -270,32 +271,30 @@ impl Said {
                 (report.ranges, report.scan) = (BTreeMap::new(), None);
                 report.scans.clear();
             }
-            (Self::Line(report), RobotFault::RangeFrozen | RobotFault::RangeNear) => {
-                if !report.ranges.is_empty() {
-                    report.ranges.clone_from(&newest.ranges);
-                }
-                report.scan = report.scan.take().and(newest.scan.clone());
-                if !report.scans.is_empty() {
-                    report.scans.clone_from(&newest.scans);
-                }
-                if fault == RobotFault::RangeNear {
-                    let ranges = report.ranges.values_mut().flatten();
-                    ranges.for_each(|range| *range += chance.within(-0.03, 0.03));
-                    let beams = report.scan.iter_mut().flatten().flatten();
-                    beams.for_each(|beam| *beam *= chance.within(0.995, 1.005) as f32);
-                }
-            }
-            (Self::Line(report), RobotFault::RangeRandom) => {
-                let mut random = || chance.within(0.2, 2.5);
-                report.ranges.values_mut().for_each(|range| *range = Some(random()));
-                let beams = report.scan.iter_mut().flatten();
-                beams.for_each(|beam| *beam = Some(random() as f32));
-            }
             (Self::Line(report), _) => {
-                report.ranges.values_mut().for_each(|told| *told = range);
-                let beams = report.scan.iter_mut().flatten();
+                if matches!(fault, RobotFault::RangeFrozen | RobotFault::RangeNear) {
+                    for (name, range) in &mut report.ranges {
+                        *range = newest.ranges.get(name).copied().unwrap_or(*range);
+                    }
+                    report.scan = report.scan.take().and(newest.scan.clone());
+                    if !report.scans.is_empty() {
+                        report.scans.clone_from(&newest.scans);
+                    }
+                }
+                let mut told = |read: Option<f64>, is_beam: bool| match fault {
+                    RobotFault::RangeFrozen => read,
+                    RobotFault::RangeNear if is_beam => {
+                        read.map(|beam| beam * chance.within(0.995, 1.005))
+                    }
+                    RobotFault::RangeNear => read.map(|range| range + chance.within(-0.03, 0.03)),
+                    RobotFault::RangeRandom => Some(chance.within(0.2, 2.5)),
+                    _ => range,
+                };
+                report.ranges.values_mut().for_each(|range| *range = told(*range, false));
                 let named = report.scans.values_mut().flat_map(|scan| &mut scan.ranges);
-                beams.chain(named).for_each(|beam| *beam = range.map(|range| range as f32));
+                for beam in report.scan.iter_mut().flatten().chain(named) {
+                    *beam = told(beam.map(f64::from), true).map(|beam| beam as f32);
+                }
             }
         }
         self.bytes()
