@@ -79,7 +79,7 @@ fn consumers_that_are_killed_and_frozen_do_not_change_the_outcome_and_leave_noth
     let kills = ["--kills", "30", "--include-consumers", "--replay", "--consumer", &given];
     let report = chaos("chd-hit", &kills);
     assert_eq!(report["reached"], report["missions"], "{report}");
-    assert_eq!(report["leftovers"], 0, "{report}");
+    assert_eq!(report["leftovers"].as_array().map(Vec::len), Some(0), "{report}");
     let consumers = &report["consumers"];
     for name in ["record", "logs -f", &given] {
         let counts = &consumers[name];

@@ -107,8 +107,8 @@ fn run(options: &Options) -> Result<report::Report> {
         mission::attack(&mut series, seed, &undisturbed)?;
         let left = leftovers::find(&options.asked.robot, &options.directory);
         let report = &mut series.report;
-        report.left_behind(&left);
         let (kills, missions) = (report.signals(), report.missions);
+        report.leftovers.extend(left.iter().map(|what| format!("by mission {missions}: {what}")));
         write_stderr(&format!("{kills} of {} signals, {missions} missions\n", options.asked.kills));
     }
     series.report.took_s = began.elapsed().as_secs_f64();

@@ -46,7 +46,12 @@ pub fn processes() -> impl Iterator<Item = u32> {
     entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok())
 }
 
-/// The command line of `process`, a zero byte after each word; empty if it has ended.
-pub fn command_line(process: u32) -> Vec<u8> {
-    fs::read(format!("/proc/{process}/cmdline")).unwrap_or_default()
+/// The other processes and their command lines, a space after each word.
+pub fn command_lines() -> impl Iterator<Item = (u32, String)> {
+    let others = processes().filter(|process| *process != std::process::id());
+    others.map(|process| {
+        // It is empty if the process has ended.
+        let line = fs::read(format!("/proc/{process}/cmdline")).unwrap_or_default();
+        (process, String::from_utf8_lossy(&line).replace('\0', " "))
+    })
 }

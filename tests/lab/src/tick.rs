@@ -96,17 +96,17 @@ fn measure(
     robot: &RobotName,
     rate_hz: f64,
 ) -> Result<Report> {
-    let (mut hops, mut rounds) = (Histogram::default(), (Vec::new(), Vec::new()));
+    let (mut hops, mut rounds, mut used) = (Histogram::default(), Vec::new(), None);
     let period = regime.period();
     let trips = if period.is_some() { PACED_TRIPS } else { TRIPS };
     for _ in 0..arguments.rounds {
         let round = hops::measure(robot, trips, period)?;
         hops.add(round.counts(), round.max_ns());
-        let (ticks, used) = mission::measure(arguments, robot, regime.pace(rate_hz))?;
-        rounds.0.push(ticks);
-        rounds.1.extend(used);
+        let (ticks, its) = mission::measure(arguments, robot, regime.pace(rate_hz))?;
+        rounds.push(ticks);
+        used = its;
     }
-    Report::new(regime, &hops, &rounds)
+    Report::new(regime, &hops, &rounds, used)
 }
 
 /// Start this program as the process `role` beside a measurement of `robot`. It ends when it is dropped.
@@ -189,7 +189,7 @@ struct Report {
     /// Ratio of the medians, tick to bare hops.
     ratio: f64,
     ratio_p99: f64,
-    /// Resources of all processes of the mission and the simulated robot; none for a mission of a second or two.
+    /// Resources of all processes of the last mission and its simulated robot; none for a mission of a second or two.
     #[serde(flatten)]
     used: Option<Used>,
     /// The bare hops, and the tick.
@@ -198,11 +198,7 @@ struct Report {
 
 impl Report {
     /// The medians of the rounds' quantiles count, because the load of a shared machine changes.
-    fn new(
-        regime: Regime,
-        hops: &Histogram,
-        (rounds, used): &(Vec<Times>, Vec<Used>),
-    ) -> Result<Self> {
+    fn new(regime: Regime, hops: &Histogram, rounds: &[Times], used: Option<Used>) -> Result<Self> {
         let hops = Times::new("five bare hops on the bus", hops.total(), hops.into())?;
         let quantiles = Quantiles {
             p50: median(rounds.iter().map(|round| round.p50_us)),
@@ -211,19 +207,11 @@ impl Report {
         };
         let count = rounds.iter().map(|round| round.count).sum();
         let tick = Times::new("a tick, datagram in to datagram out", count, quantiles)?;
-        let middle = |of: fn(&Used) -> f64| median(used.iter().map(of)).map(rounded);
-        let used = || {
-            Some(Used {
-                wakeups_per_s: middle(|used| used.wakeups_per_s)?,
-                cpu_share: middle(|used| used.cpu_share)?,
-                pss_mib: middle(|used| used.pss_mib)?,
-            })
-        };
         Ok(Self {
             regime: regime.to_string(),
             ratio: rounded(tick.p50_us / hops.p50_us),
             ratio_p99: rounded(tick.p99_us / hops.p99_us),
-            used: used(),
+            used,
             times: [hops, tick],
         })
     }

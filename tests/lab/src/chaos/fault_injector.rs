@@ -17,7 +17,7 @@ const AGAIN_EVERY: Duration = Duration::from_secs(2);
 /// Period of slow messages: three a second.
 const SLOW: Duration = Duration::from_millis(333);
 const RUNS_COUNTS_S: f64 = 150.0;
-/// Messages with wheels that are stored: as many as come in [`OLD`] at ten times the usual rate.
+/// Messages that are stored: as many as come in [`OLD`] at ten times the usual rate.
 const MOST_KEPT: usize = 1024;
 
 /// Bytes for the host, and their time.
@@ -40,12 +40,10 @@ pub struct FaultInjector {
     words: Words,
     base: Option<Said>,
     readings: Readings,
-    /// Messages with readings, oldest first.
-    ranged: VecDeque<(Duration, Said)>,
     /// Whether the newest message with wheels says that one turns.
     turns: bool,
-    /// Messages with wheels of the last seconds, oldest first.
-    kept: VecDeque<Late>,
+    /// Messages with wheels or readings of the last seconds, oldest first.
+    kept: VecDeque<(Duration, Said)>,
     next_again: Duration,
     next_slow: [Duration; 256],
     moving: Option<Vec<u8>>,
@@ -68,7 +66,6 @@ impl FaultInjector {
             words: Words::of(protocol),
             base: None,
             readings: Readings::default(),
-            ranged: VecDeque::new(),
             turns: false,
             kept: VecDeque::new(),
             next_again: Duration::ZERO,
@@ -87,18 +84,12 @@ impl FaultInjector {
     pub fn report(&mut self, bytes: &[u8], now: Duration) -> Vec<Late> {
         let (mut out, mut more) = (Vec::new(), Vec::new());
         for said in self.words.said(bytes) {
-            if said.readings().is_some() {
-                self.ranged.push_back((now, said.clone()));
-                if self.ranged.len() > MOST_KEPT {
-                    self.ranged.pop_front();
-                }
-            }
+            self.keep(&said, now);
             if let Some(wheels) = said.wheels(&said) {
                 self.turns = wheels.speeds != [0.0; 2];
                 if !self.faulty {
                     self.base = Some(said.clone());
                 }
-                self.keep(&said, now);
             }
             if self.faulty {
                 out.extend(self.changed(said, now));
@@ -111,8 +102,10 @@ impl FaultInjector {
         }
         if self.faulty && self.fault == RobotFault::OldFrames && now >= self.next_again {
             self.next_again = now + AGAIN_EVERY;
-            let old = self.kept.iter().rfind(|kept| kept.at + OLD <= now);
-            more.extend(old.map(|old| Late { at: now, bytes: old.bytes.clone() }));
+            let is_old =
+                |(at, said): &&(Duration, Said)| *at + OLD <= now && said.wheels(said).is_some();
+            let old = self.kept.iter().rfind(is_old);
+            more.extend(old.map(|(_, old)| Late { at: now, bytes: old.bytes() }));
         }
         let at = match self.fault {
             RobotFault::FramesLate if self.faulty => now + LATE,
@@ -164,11 +157,11 @@ impl FaultInjector {
     }
 
     fn keep(&mut self, said: &Said, now: Duration) {
-        self.kept.push_back(Late { at: now, bytes: said.bytes() });
-        // One message that is older than [`OLD`] is left.
-        while self.kept.len() > MOST_KEPT
-            || self.kept.get(1).is_some_and(|next| next.at + OLD <= now)
-        {
+        if said.stream().is_none() {
+            return;
+        }
+        self.kept.push_back((now, said.clone()));
+        if self.kept.len() > MOST_KEPT {
             self.kept.pop_front();
         }
     }
@@ -201,7 +194,7 @@ impl FaultInjector {
                 let is_old = |(at, old): &&(Duration, Said)| {
                     *at + RANGE_LATE <= now && old.readings() == said.readings()
                 };
-                let old = self.ranged.iter().rfind(is_old).filter(|_| said.readings().is_some());
+                let old = self.kept.iter().rfind(is_old).filter(|_| said.readings().is_some());
                 match old {
                     Some((_, old)) => said.with_readings_of(old),
                     None => said.bytes(),

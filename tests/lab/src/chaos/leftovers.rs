@@ -10,7 +10,7 @@ use std::{
 use ::processes::STOP_GUARD;
 use common::domain::{Domain, RobotName, SHARED_MEMORY};
 
-use crate::robot::{command_line, processes};
+use crate::robot::command_lines;
 
 /// Longest time that a stop guard goes on after a mission.
 const GUARDS_END: Duration = Duration::from_secs(10);
@@ -40,10 +40,6 @@ pub fn find(robot: &RobotName, directory: &Path) -> Vec<String> {
 
 /// The processes with files in `directory`, and their command lines.
 fn lines(directory: &str) -> impl Iterator<Item = String> {
-    let others = processes().filter(|pid| *pid != std::process::id());
-    others.filter_map(move |pid| {
-        let line = String::from_utf8_lossy(&command_line(pid)).replace('\0', " ");
-        let is_of_mission = line.contains(directory);
-        is_of_mission.then(|| format!("process {pid}: {}", line.trim_end()))
-    })
+    let its = command_lines().filter(move |(_, line)| line.contains(directory));
+    its.map(|(process, line)| format!("process {process}: {}", line.trim_end()))
 }

@@ -129,7 +129,6 @@ pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Resu
         wrong.push(format!("touched something {collisions} times"));
     }
     let aborted = attack.healthy_aborted(&deaths(&directory));
-    report.healthy_aborted += aborted.len() as u64;
     wrong.extend(aborted.iter().map(|stage| format!("aborted although healthy: {stage}")));
     let allowance_m = pose_allowance_m(&options.loaded, kills, &summary);
     // An undisturbed robot whose target does not change takes another way.

@@ -30,8 +30,6 @@ pub struct Report {
     /// Missions that did not reach the target, touched something, lost the pose, did not tell of a target or were not replayed to the
     /// bit: seeds and reasons.
     pub wrong: Vec<String>,
-    /// Stages that the supervisor aborted as hung although no signal had frozen them, or one had frozen all processes.
-    pub healthy_aborted: u64,
     /// Signals of each kind to each stage and the supervisor.
     kills: BTreeMap<&'static str, BTreeMap<Kind, u32>>,
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
@@ -40,10 +38,7 @@ pub struct Report {
     /// Largest pose error at the end beyond the same seed's undisturbed run, metres.
     pub worst_pose_excess_m: f64,
     /// Files, shared memory and processes that outlived a mission.
-    pub leftovers: usize,
-    /// These leftovers, with the missions that left them.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    left_behind: Vec<String>,
+    pub leftovers: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub replays: Option<Replays>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -144,18 +139,12 @@ impl Report {
         }
     }
 
-    pub fn left_behind(&mut self, found: &[String]) {
-        self.leftovers += found.len();
-        let missions = self.missions;
-        self.left_behind.extend(found.iter().map(|what| format!("by mission {missions}: {what}")));
-    }
-
     pub fn judged(&self, json: bool) -> Result<Judged> {
         let moved = || format!("a pose {:.3} m worse than undisturbed", self.worst_pose_excess_m);
         Ok(Judged {
             tried: self.signals().into(),
-            lost: (self.wrong.len() + self.leftovers) as u64,
-            worst: self.wrong.iter().chain(&self.left_behind).next().cloned().unwrap_or_else(moved),
+            lost: (self.wrong.len() + self.leftovers.len()) as u64,
+            worst: self.wrong.iter().chain(&self.leftovers).next().cloned().unwrap_or_else(moved),
             text: super::text(self, json)?,
         })
     }

@@ -32,7 +32,7 @@ use crate::chaos::{
 use crate::{
     error::{OrCannot as _, Result},
     random::Random,
-    robot::{command_line, firsthand, processes},
+    robot::{command_lines, firsthand},
 };
 
 /// Time from the robot's departure to its fault, seconds: the least, and the width of the random range.
@@ -245,14 +245,13 @@ fn kill(fault: RobotFault, supervisor: &Process, directory: &Path) {
         RobotFault::LinkKilled => Signal::STOP,
         _ => Signal::KILL,
     });
-    for pid in processes().filter(|pid| *pid != std::process::id()) {
-        let line = String::from_utf8_lossy(&command_line(pid)).into_owned();
+    for (process, line) in command_lines().filter(|(_, line)| line.contains(&*run)) {
         let is_hit = match fault {
-            RobotFault::LinkKilled => line.split(['\0', ' ']).any(|word| word == "link"),
+            RobotFault::LinkKilled => line.split(' ').any(|word| word == "link"),
             fault => fault == RobotFault::AllKilled,
         };
-        if is_hit && line.contains(&*run) {
-            send(pid, Signal::KILL);
+        if is_hit {
+            send(process, Signal::KILL);
         }
     }
 }

@@ -9,7 +9,7 @@ use std::{
 use common::process_status;
 use serde::Serialize;
 
-use crate::robot::processes;
+use crate::{missions::statistics::rounded, robot::processes};
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Used {
@@ -62,9 +62,9 @@ impl ProcessSet {
         let (first, last) = (self.first.as_ref()?, self.last.as_ref()?);
         let over = (last.at - first.at).as_secs_f64();
         Some(Used {
-            wakeups_per_s: last.waits.saturating_sub(first.waits) as f64 / over,
-            cpu_share: last.cpu.saturating_sub(first.cpu).as_secs_f64() / over,
-            pss_mib: self.pss_kib as f64 / 1024.0,
+            wakeups_per_s: rounded(last.waits.saturating_sub(first.waits) as f64 / over),
+            cpu_share: rounded(last.cpu.saturating_sub(first.cpu).as_secs_f64() / over),
+            pss_mib: rounded(self.pss_kib as f64 / 1024.0),
         })
     }
 }

@@ -41,23 +41,16 @@ pub fn malformed(file: &Path, problem: impl Display) -> Failure {
 /// The worlds of a file, or of all world files in a folder and its subfolders, sorted by name; the requested number, evenly
 /// spread.
 pub fn read(path: &Path, asked: Asked) -> Result<Found> {
-    let mut files = vec![path.to_path_buf()];
-    if path.is_dir() {
-        files = files_of(path).map_err(unreadable(path))?;
-    }
     let mut found = Found::default();
-    for file in &files {
-        let Some(add) = reader_of(file) else {
-            return Err(malformed(
-                file,
-                "not a world; give a mission (.toml), a ROS map (.yaml), a BARN .world or a table of its cylinders (cylinders.csv, .csv.gz)",
-            ));
-        };
-        add(&mut found, file, asked)?;
-    }
-    let is_map = |file: &PathBuf| file.extension().is_some_and(|it| it == "yaml" || it == "yml");
-    if asked.ends.is_some() && !files.iter().any(is_map) {
-        return Err(NO_MAP.into());
+    if path.is_dir() {
+        for file in files_of(path).map_err(unreadable(path))? {
+            add(&mut found, &file, asked)?;
+        }
+    } else if !add(&mut found, path, asked)? {
+        return Err(malformed(
+            path,
+            "not a world; give a mission (.toml), a ROS map (.yaml), a BARN .world or a table of its cylinders (cylinders.csv, .csv.gz)",
+        ));
     }
     // In the results a world has the name of its file.
     let mut names = BTreeSet::new();
@@ -77,7 +70,7 @@ pub fn read(path: &Path, asked: Asked) -> Result<Found> {
     Ok(found)
 }
 
-/// The worlds in a folder and its subfolders, sorted by name.
+/// The files in a folder and its subfolders, sorted by name.
 fn files_of(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let entries = |folder: &Path| -> io::Result<Vec<PathBuf>> {
         fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect()
@@ -90,39 +83,37 @@ fn files_of(folder: &Path) -> io::Result<Vec<PathBuf>> {
             files.push(path);
         }
     }
-    files.retain(|file| reader_of(file).is_some() && !file.is_dir());
+    files.retain(|file| !file.is_dir());
     files.sort();
     Ok(files)
 }
 
-/// Adds the worlds of a file.
-type Reader = fn(&mut Found, &Path, Asked) -> Result;
-
-/// The kinds of files, by the ends of their names.
-const READERS: [(&[&str], Reader); 4] = [
-    (&[".toml"], |found, file, asked| {
+/// Add the worlds of a file, by the end of its name. Returns whether it is one of worlds.
+fn add(found: &mut Found, file: &Path, asked: Asked) -> Result<bool> {
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    let ends = |ends: &[&str]| ends.iter().any(|end| name.ends_with(end));
+    if ends(&[".yaml", ".yml"]) {
+        add_map(found, file, asked)?;
+        return Ok(true);
+    }
+    let worlds = if ends(&[".toml"]) {
         let mission = Mission::load(file)?.with_calibration()?;
         found.add(Trial::of_mission(mission.name.clone(), mission, asked.swept_m));
-        Ok(())
-    }),
-    (&[".world"], |found, file, asked| add_barn(found, vec![barn::gazebo(file)?], asked)),
-    (&["cylinders.csv", ".csv.gz"], |found, file, asked| {
-        add_barn(found, barn::table(file)?, asked)
-    }),
-    (&[".yaml", ".yml"], add_map),
-];
-
-fn reader_of(file: &Path) -> Option<Reader> {
-    let name = file.file_name()?.to_string_lossy();
-    let reads = |(ends, _): &&(&[&str], Reader)| ends.iter().any(|end| name.ends_with(end));
-    READERS.iter().find(reads).map(|(_, reader)| *reader)
-}
-
-fn add_barn(found: &mut Found, worlds: Vec<barn::World>, asked: Asked) -> Result {
+        Vec::new()
+    } else if ends(&[".world"]) {
+        vec![barn::gazebo(file)?]
+    } else if ends(&["cylinders.csv", ".csv.gz"]) {
+        barn::table(file)?
+    } else {
+        return Ok(false);
+    };
+    if asked.ends.is_some() {
+        return Err(NO_MAP.into());
+    }
     for (world, scene, rules) in worlds {
         found.add(Trial::new(world, &scene, rules, asked.swept_m)?);
     }
-    Ok(())
+    Ok(true)
 }
 
 /// A ROS map as worlds: with the given ends, or its tests, or drawn ones.
