@@ -31,13 +31,25 @@ fn an_invalid_mission_is_refused_with_line_key_and_remedy_by_check_and_run_alike
 
 #[test]
 fn what_is_not_there_or_cannot_be_is_named_with_what_there_is() {
-    let cases: [(&[&str], _, &[&str]); 15] = [
+    let cases: [(&[&str], _, &[&str]); 19] = [
         (&["run", "moon"], "unknown-mission", &["moon", "obstacle-course"]),
         (&["check", "/no/such/file.toml"], "mission", &["/no/such/file.toml"]),
         (
             &["stage", "warp", "--run", "/tmp", "--supervisor", "1"],
             "unknown-stage",
             &["warp", "dead-reckoning"],
+        ),
+        (&["stage", "kil"], "unknown-stage", &["kil", "did you mean `stage kill`", "mapper"]),
+        (&["check", "moon"], "unknown-mission", &["moon", "obstacle-course"]),
+        (
+            &["check", "trap", "--set", "planner.executable='/no/such/planner'"],
+            "planner-executable",
+            &["/no/such/planner"],
+        ),
+        (
+            &["run", "trap", "--set", "robot.address='serial:///dev/no-such-tty'"],
+            "no-device",
+            &["/dev/no-such-tty", "/dev/serial/by-id"],
         ),
         (&["stage", "restart", "wheel"], "unknown-stage", &["dead-reckoning"]),
         (&["stage", "fault", "wheel", "spin"], "unknown-stage", &["dead-reckoning"]),

@@ -96,6 +96,7 @@ fn echo_prints_every_topic_with_the_fields_of_its_layout() {
             "deaths",
             "stalls",
             "requests",
+            "orders",
             "faults",
         ]
         .contains(&name)

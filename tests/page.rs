@@ -9,8 +9,8 @@ use rustix::process::Signal;
 use serde_json::json;
 
 use crate::support::{
-    Browser, Run, assert_nothing_left, firsthand, has_browser, not_run, printed, refused,
-    signal_process,
+    Browser, Run, assert_nothing_left, firsthand, has_browser, not_run, operate as operate_robot,
+    printed, refused, signal_process,
 };
 
 /// `firsthand page` for a robot.
@@ -120,14 +120,24 @@ fn operate(robot: &str, width: u32) {
     browser.tap("resume", 0, 0);
     browser.wait_until(GOES);
 
-    // The browser scrubs back, and follows again.
+    // The browser scrubs back: the header stays that of now.
     browser.run("const time = document.getElementById('time'); time.value = time.min; time.dispatchEvent(new Event('input'))");
     browser.wait_until("document.getElementById('live').getAttribute('aria-pressed') === 'false'");
+    browser.wait_until("!document.getElementById('past').hidden");
+    browser.wait_until(&says("past", "You look at"));
+    operate_robot(robot, &["stop"]);
+    browser.wait_until(RESTS);
+    browser.wait_until("document.querySelector('header').className === 'bad'");
+    operate_robot(robot, &["resume"]);
+    browser.wait_until(GOES);
     browser.tap("live", 0, 0);
+    browser.wait_until("document.getElementById('past').hidden");
     browser.wait_until("document.getElementById('live').getAttribute('aria-pressed') === 'true'");
 
     page.signal(Signal::STOP);
     browser.wait_until(IS_LOST);
+    browser.wait_until(&says("status", "not known now"));
+    browser.wait_until("document.querySelector('header').className === 'bad'");
     page.signal(Signal::CONT);
     browser.wait_until(IS_THERE);
     browser.wait_until("document.body.classList.contains('drive')");
@@ -156,6 +166,52 @@ fn a_robot_is_watched_stopped_and_resumed_in_a_browser_that_loses_and_regains_it
         return not_run("the page in a window of a desk", "chromium and chromedriver are missing");
     }
     operate("page-desk", 1280);
+}
+
+/// Whether the middle of each of these elements is seen: in the window, and under nothing else.
+const SEEN: &str = "const hidden = ids.filter((id) => {
+  const box = document.getElementById(id).getBoundingClientRect();
+  const top = document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);
+  return !top || !document.getElementById(id).contains(top);
+});
+return hidden";
+
+#[test]
+fn actions_and_answers_are_in_view_at_every_size_without_scrolling() {
+    if !has_browser() {
+        return not_run("the page at four sizes", "chromium and chromedriver are missing");
+    }
+    let robot = "page-sizes";
+    let slow = ["--pace", "1", "--set", "timeout_s=600", "--set", "controller.speed_m_s=0.02"];
+    let mut run = Run::start(robot, "open-room", &slow);
+    run.wait_until_driving();
+    let page = Page::start(robot, "127.0.0.1:0");
+    let browser = Browser::open(1400);
+    browser.go(&page.drive);
+    browser.wait_until(GOES);
+    for (width, height) in [(360, 640), (1280, 720), (1366, 768), (1400, 900)] {
+        let size =
+            json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": false});
+        browser.command("Emulation.setDeviceMetricsOverride", &size);
+        let seen = |ids: &[&str], scrolled: &str, when: &str| {
+            browser.run(&format!("scrollTo(0, {scrolled})"));
+            let hidden = browser.run(&format!("const ids = {};\n{SEEN}", json!(ids)));
+            assert_eq!(hidden, json!([]), "{when} at {width} x {height}");
+        };
+        seen(&["stop", "resume", "chosen", "return", "play", "live"], "0", "before a choice");
+        browser.tap("map", 20, -30);
+        browser.wait_until("!document.getElementById('go').disabled");
+        seen(&["stop", "go", "waypoint", "clear", "chosen"], "0", "after a choice");
+        browser.tap("stop", 0, 0);
+        browser.wait_until(&says("answer", "stop: the robot rests"));
+        seen(&["stop", "answer", "status", "go"], "0", "after a stop");
+        seen(&["stop", "answer", "status"], "document.body.scrollHeight", "scrolled down");
+        browser.tap("resume", 0, 0);
+        browser.wait_until(GOES);
+        browser.tap("clear", 0, 0);
+    }
+    run.stop();
+    page.end(Signal::TERM);
 }
 
 #[test]

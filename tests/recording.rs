@@ -7,11 +7,17 @@ use std::{
     process::Stdio,
 };
 
-use common::{grid::CellState, poll, samples::name_str, topics};
+use common::{
+    grid::CellState,
+    poll,
+    samples::{RequestAnswer, RequestKind, name_str},
+    topics,
+};
 use recording::{
     End, Recording,
     replay::{Options, diff::diff, replay},
 };
+use rustix::process::Signal;
 
 use crate::support::{
     PATIENCE, Run, STAGES, assert_nothing_left, assert_refused, firsthand, golden, golden_of,
@@ -53,6 +59,64 @@ fn a_run_is_recorded_from_its_first_sample_and_every_stage_replays_to_the_bit() 
     assert_eq!(parting.first, None);
     assert_eq!(parting.ticks, ticks.len() as u64);
     assert_nothing_left("rec-whole");
+}
+
+#[test]
+fn every_order_that_was_answered_is_recorded_with_its_answer_though_its_process_has_ended() {
+    let slow = ["--pace", "1", "--set", "controller.speed_m_s=0.02", "--set", "timeout_s=600"];
+    let mut run = Run::start("rec-orders", "open-room", &slow);
+    run.wait_until_driving();
+    let mut asked = Vec::new();
+    for _ in 0..10 {
+        let words: [(&[&str], _); 4] = [
+            (&["stop"], RequestKind::Stop),
+            (&["resume"], RequestKind::Resume),
+            (&["goto", "1", "0"], RequestKind::Goto),
+            (&["stage", "restart", "planner"], RequestKind::Restart),
+        ];
+        for (words, kind) in words {
+            operate("rec-orders", words);
+            asked.push((kind, RequestAnswer::Taken));
+        }
+    }
+    refused(&["goto", "99", "0", "--robot", "rec-orders"], "target-outside", &[]);
+    asked.push((RequestKind::Goto, RequestAnswer::Outside));
+    run.signal(Signal::TERM);
+    let (_, _, directory) = run.finish_in();
+    let recording = open(directory.path());
+    let orders = recording.samples(&topics::ORDERS).unwrap().map(|order| order.unwrap().sample);
+    let orders: Vec<_> = orders.collect();
+    let answered: Vec<_> = orders
+        .iter()
+        .map(|order| (RequestKind::from_byte(order.kind), RequestAnswer::from_byte(order.answer)))
+        .collect();
+    assert_eq!(answered, asked);
+    let times = orders.windows(2).map(|pair| pair[1].stamp.stamp_ns - pair[0].stamp.stamp_ns);
+    assert!(times.min() > Some(0), "each has its mission time");
+    assert_eq!(recording.lost.get("orders"), None);
+    assert_nothing_left("rec-orders");
+}
+
+#[test]
+fn the_log_time_of_a_run_in_lockstep_is_mission_time() {
+    let (_, summary, directory) = Run::start("rec-times", "open-room", &[]).finish_in();
+    let recording = open(directory.path());
+    let mission_s = summary["mission_time_s"].as_f64().unwrap();
+    let pose = recording.samples(&topics::POSE).unwrap().map(Result::unwrap);
+    let began: std::collections::HashSet<u64> =
+        pose.map(|pose| pose.log_ns - pose.sample.stamp.stamp_ns).collect();
+    assert_eq!(began.len(), 1, "{began:?}");
+    let began_ns = began.into_iter().next().unwrap();
+    let mut drawn = 0;
+    for message in recording.messages(&[]).unwrap() {
+        let message = message.unwrap();
+        let at_s = (message.log_ns - began_ns) as f64 * 1e-9;
+        assert!((0.0..=mission_s + 1.0).contains(&at_s), "{at_s} s on {}", message.topic);
+        drawn += usize::from(&*message.topic == "foxglove/pose" && at_s > mission_s / 2.0);
+    }
+    assert!(drawn > 10, "{drawn} drawn poses in the second half of {mission_s} s");
+    let mut beats = recording.samples(&topics::HEALTH).unwrap().map(Result::unwrap);
+    assert!(beats.any(|beat| (beat.log_ns - began_ns) as f64 * 1e-9 > mission_s / 2.0));
 }
 
 #[test]

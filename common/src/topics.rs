@@ -175,7 +175,11 @@ topics! {
     }
     /// Requests of an operator: restart, stop, resume, targets.
     REQUESTS: Topic<RequestSample> {
-        name: "requests", writer: OPERATOR, rate: Rate::WhenItHappens,
+        name: "requests", writer: OPERATOR, rate: Rate::WhenItHappens, logged: No,
+    }
+    /// Each request with its answer. The process of an operator may end before others have read its request.
+    ORDERS: Topic<RequestSample> {
+        name: "orders", writer: SUPERVISOR, rate: Rate::WhenItHappens,
     }
     /// Requests of an operator to inject a fault into a stage; every stage reads it.
     FAULTS: Topic<FaultSample> {

@@ -24,6 +24,8 @@ pub enum Rate {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Logged {
     Yes,
+    /// Another topic has the same.
+    No,
     /// Only recordings with fields contain it, because fields take more space than all other topics together.
     WithFields,
 }

@@ -348,6 +348,8 @@ payloads! {
         /// A [`RequestKind`].
         kind: u8,
         target_count: u8,
+        /// A [`RequestAnswer`], in `orders`.
+        answer: u8,
         targets: [TargetPoint; MOST_TARGETS],
     }
 }

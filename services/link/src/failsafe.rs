@@ -33,10 +33,6 @@ use common::{
 
 use self::monitor::{Clears, Moment, Monitor, Observation};
 
-/// The share of its commanded speed at which a robot with a low battery drives. A battery lasts longer if the motors draw less
-/// current, but at still lower speeds wheels begin to stick.
-pub const SLOW_SHARE: f64 = 0.5;
-
 macro_rules! monitors {
     ($($name:ident: $monitor:ty,)*) => {
         /// The monitors of one robot.

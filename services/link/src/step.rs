@@ -27,7 +27,7 @@ use crate::{
     clock_rate::ClockRate,
     drivers,
     failsafe::{
-        Decision, Failsafe, Monitors, SLOW_SHARE,
+        Decision, Failsafe, Monitors,
         monitor::{Moment, Observation},
         presence::Absence,
         restart::RestartWatch,
@@ -370,10 +370,7 @@ impl Link {
         if decision.stops() {
             return;
         }
-        let share = match decision.action {
-            Action::Slow => SLOW_SHARE,
-            _ => 1.0,
-        };
+        let share = decision.action.speed_share();
         let counts = match CommandState::from_byte(command.state) {
             CommandState::Driving => {
                 let reached = self.trim.as_ref().map_or(1.0, SpeedTrim::share);

@@ -175,7 +175,8 @@ impl Shell {
         if let Some(target) = self.inputs.target.next(tick)? {
             self.has_target = true;
             let work = self.take(Taken::Target(target))?;
-            tracing::info!(number = target.number, target = ?target.target, ?work, "target");
+            let (number, at) = (target.number, target.target);
+            tracing::info!(number, x_m = at.x_m, y_m = at.y_m, ?work, "target");
         }
         Ok(())
     }

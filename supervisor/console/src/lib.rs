@@ -5,6 +5,7 @@
 //! | [`output`], [`stream`] | standard output, once or going on |
 //! | [`executable`] | the main function beside `firsthand`'s |
 //! | [`completion`] | completions of shells |
+//! | [`consent`] | questions to a person |
 //! | [`failure`] | why a subcommand failed, and its exit code |
 //! | [`table`], [`item`] | text tables; Markdown items |
 //! | [`progress_line`], [`waiting`] | progress, and a robot that is waited for |
@@ -16,6 +17,7 @@
 //! | [`logging`] | logs to standard error, a file, the journal |
 
 pub mod completion;
+pub mod consent;
 pub mod executable;
 pub mod failure;
 pub mod item;

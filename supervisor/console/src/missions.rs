@@ -28,6 +28,8 @@ pub enum LookupError {
     Assigned { name: String, assignments: String, problem: String },
     #[error(transparent)]
     Mission(#[from] MissionError),
+    #[error("{name} with what stands on its map: {problem}")]
+    OnMap { name: String, problem: String },
     #[error("map: {0}")]
     Map(#[from] maps::MapError),
 }
@@ -56,7 +58,17 @@ pub fn load(name: &str, assignments: &[String]) -> Result<Mission, LookupError> 
 
 /// Puts the content of the files that it names in place. Fails if one cannot be read.
 pub fn complete(mission: Mission) -> Result<Mission, LookupError> {
-    Ok(maps::with_prior_map(mission.with_calibration()?)?)
+    let mission = mission.with_calibration()?;
+    let has_map = mission.map.is_some();
+    let mission = maps::with_prior_map(mission)?;
+    if has_map {
+        // Start and targets may lie in what stands on the map.
+        let failed = |problem| LookupError::OnMap { name: mission.name.clone(), problem };
+        let text = toml::to_string(&mission).map_err(|error| failed(error.to_string()))?;
+        Mission::parse(&text, Path::new(&mission.name))
+            .map_err(|error| failed(error.without_place()))?;
+    }
+    Ok(mission)
 }
 
 /// `origin` names `text`. Fails if it or an assignment is invalid.

@@ -9,7 +9,7 @@ use std::{
 
 use common::{domain::RobotName, run};
 use mission_control::recovery::SUMMARY;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::{
     failure::{Failure, Refused},
@@ -36,11 +36,26 @@ pub enum Outcome {
     Running,
     /// The supervisor was killed, or the machine switched off.
     CutOff,
-    Ended {
-        /// A word such as `reached`.
-        outcome: String,
-        mission_time_s: Option<f64>,
-    },
+    Ended(Ended),
+}
+
+/// What the summary of a run says.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+pub struct Ended {
+    /// A word such as `reached`.
+    pub outcome: String,
+    pub mission_time_s: Option<f64>,
+    #[serde(default)]
+    pub targets: Vec<Target>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Target {
+    pub number: u64,
+    pub x_m: f64,
+    pub y_m: f64,
+    pub outcome: String,
+    pub at_s: Option<f64>,
 }
 
 pub fn list(runs: &Path) -> Vec<RunDirectory> {
@@ -80,20 +95,13 @@ impl RunDirectory {
     }
 
     pub fn outcome(&self) -> Outcome {
-        #[derive(Deserialize)]
-        struct Summary {
-            outcome: String,
-            mission_time_s: Option<f64>,
-        }
         let file = self.directory.join(SUMMARY);
         let readable = fs::metadata(&file).is_ok_and(|file| file.len() <= LARGEST_SUMMARY);
         let text = readable.then(|| fs::read_to_string(&file).ok()).flatten();
-        match text.map(|text| serde_json::from_str::<Summary>(&text)) {
-            Some(Ok(summary)) => {
-                Outcome::Ended { outcome: summary.outcome, mission_time_s: summary.mission_time_s }
-            }
+        match text.map(|text| serde_json::from_str(&text)) {
+            Some(Ok(ended)) => Outcome::Ended(ended),
             _ if self.has(SUMMARY) => {
-                Outcome::Ended { outcome: "unreadable".to_owned(), mission_time_s: None }
+                Outcome::Ended(Ended { outcome: "unreadable".to_owned(), ..Ended::default() })
             }
             _ if self.is_running() => Outcome::Running,
             _ => Outcome::CutOff,
@@ -224,9 +232,12 @@ mod tests {
         let mut listed = list(runs.path());
         listed.sort_by_key(|run| run.directory.clone());
         let outcomes: Vec<_> = listed.iter().map(RunDirectory::outcome).collect();
-        let ended = |outcome: &str, mission_time_s| Outcome::Ended {
-            outcome: outcome.to_owned(),
-            mission_time_s,
+        let ended = |outcome: &str, mission_time_s| {
+            Outcome::Ended(Ended {
+                outcome: outcome.to_owned(),
+                mission_time_s,
+                ..Ended::default()
+            })
         };
         let expected = [ended("timeout", Some(2.5)), ended("unreadable", None), Outcome::CutOff];
         assert_eq!(outcomes, expected);

@@ -33,6 +33,7 @@ pub(crate) struct BusEndpoints {
     roster: Writer<RosterHeader, RosterEntry>,
     deaths: Writer<DeathSample>,
     stalls: Writer<StallSample>,
+    orders: Writer<RequestSample>,
     pub requests: Reader<RequestSample>,
     /// The request that was answered last, and the answer, which the roster has; 0 for none.
     pub last_request: (u64, RequestAnswer),
@@ -65,6 +66,7 @@ impl BusEndpoints {
             roster: bus.slice_writer(&topics::ROSTER, 1, stages::TABLE.len())?,
             deaths: bus.writer(&topics::DEATHS, 1)?,
             stalls: bus.writer(&topics::STALLS, 1)?,
+            orders: bus.writer(&topics::ORDERS, 1)?,
             requests: bus.reader(&topics::REQUESTS)?,
             last_request,
             published: None,
@@ -107,6 +109,17 @@ impl BusEndpoints {
     pub(crate) fn publish_death(&mut self, death: DeathSample) {
         let stamp = self.observer.record.pose.unwrap_or_default().stamp;
         warn_if_failed(self.deaths.publish(stamp.tick, stamp.time(), death));
+    }
+
+    pub(crate) fn publish_order(
+        &mut self,
+        time: MissionTime,
+        request: RequestSample,
+        answer: RequestAnswer,
+    ) {
+        let tick = self.observer.record.newest_tick().unwrap_or_default();
+        let order = RequestSample { answer: answer.into(), ..request };
+        warn_if_failed(self.orders.publish(tick, time, order));
     }
 
     pub(crate) fn publish_stall(&mut self, stall: StallSample) {

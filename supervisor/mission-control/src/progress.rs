@@ -29,7 +29,7 @@ impl fmt::Display for Progress<'_> {
         let events = record.newest_guidance().map_or(0, |guidance| guidance.safety_events);
         write!(
             f,
-            "{time:6.1} s  {distance:5.2} m to go  {speed:5.2} m/s  {events:3} safety events  {running}/{all} stages alive"
+            "{time:6.1} s  {distance:5.2} m to go  {speed:5.2} m/s  hazards mapped {events:3} times  {running}/{all} stages alive"
         )?;
         match link.action() {
             Action::Go => Ok(()),

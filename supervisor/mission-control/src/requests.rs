@@ -24,6 +24,7 @@ impl Supervisor<'_> {
                 tracing::warn!(?kind, reason, "an operator's request is refused");
             }
             self.bus.last_request = (request.id, answer);
+            self.bus.publish_order(self.mission_time(), request, answer);
             // Each answer is published, because the roster has one.
             self.publish_state()?;
         }

@@ -8,12 +8,12 @@ use common::{
     mission::Mission,
     process_usage::Usage,
     samples::{
-        CommandSample, GridHeader, GuidanceSample, HoldReason, LinkSample, Order, PoseSample,
-        RangeReading, RangeStatus, RosterEntry, RosterHeader, StageState, WheelSample, name_str,
+        CommandSample, GridHeader, GuidanceSample, LinkSample, Order, PoseSample, RangeReading,
+        RangeStatus, RosterEntry, RosterHeader, StageState, WheelSample, name_str,
     },
 };
 use glam::DVec2;
-use robot_state::{RobotState, Sample, guidance_in_words, words};
+use robot_state::{RobotState, Sample, words};
 use serde_json::{Value, json};
 
 use crate::blob;
@@ -29,12 +29,12 @@ pub(crate) const COLUMNS: [&str; 24] = [
     "yy",
     "v",
     "omega",
-    "v_told",
-    "omega_told",
+    "v_sent",
+    "omega_sent",
     "left",
     "right",
-    "left_told",
-    "right_told",
+    "left_sent",
+    "right_sent",
     "distance",
     "limit",
     "latency_ms",
@@ -61,7 +61,8 @@ struct Tick {
     command: Option<CommandSample>,
     guidance: Option<GuidanceSample>,
     ranges: Option<Vec<Option<f64>>>,
-    latency_ns: Option<u64>,
+    /// The latency of the tick, and the share of the command that the link sends.
+    link: Option<(u64, f64)>,
 }
 
 /// The content of the newest samples.
@@ -117,7 +118,10 @@ impl Collector {
             Sample::Guidance(guidance) => {
                 self.tick(guidance.stamp.tick).guidance = Some(*guidance);
             }
-            Sample::Link(link) => self.tick(link.stamp.tick).latency_ns = Some(link.latency_ns),
+            Sample::Link(link) => {
+                let does = (link.latency_ns, link.action().speed_share());
+                self.tick(link.stamp.tick).link = Some(does);
+            }
             _ => {}
         }
     }
@@ -153,18 +157,18 @@ impl Collector {
     /// The row of `tick`. Values that did not come in it are as before.
     fn row(&mut self, tick: Tick) -> Option<Value> {
         let pose = &tick.pose?;
-        let Tick { wheels, command, guidance, ranges, latency_ns, .. } =
-            std::mem::take(&mut self.newest);
+        let Tick { wheels, command, guidance, ranges, link, .. } = std::mem::take(&mut self.newest);
         self.newest = Tick {
             pose: Some(*pose),
             wheels: tick.wheels.or(wheels),
             command: tick.command.or(command),
             guidance: tick.guidance.or(guidance),
             ranges: tick.ranges.or(ranges),
-            latency_ns: tick.latency_ns.or(latency_ns),
+            link: tick.link.or(link),
         };
         let [left, right] = self.newest.wheels.unwrap_or([f64::NAN; 2]);
         let command = self.newest.command.unwrap_or_default();
+        let (latency_ns, sent) = self.newest.link.unwrap_or_default();
         let guidance = self.newest.guidance.unwrap_or_default();
         let [xx, xy, _, yy, ..] = pose.covariance;
         let of_pose = self.truths.iter().position(|truth| truth.is_of(pose));
@@ -182,15 +186,15 @@ impl Collector {
             yy,
             pose.v_m_s,
             pose.omega_rad_s,
-            command.v_m_s,
-            command.omega_rad_s,
+            sent * command.v_m_s,
+            sent * command.omega_rad_s,
             left,
             right,
-            command.left_rad_s,
-            command.right_rad_s,
+            sent * command.left_rad_s,
+            sent * command.right_rad_s,
             guidance.distance_m,
             guidance.speed_limit_m_s,
-            self.newest.latency_ns.map_or(f64::NAN, |ns| ns as f64 / 1e6),
+            latency_ns as f64 / 1e6,
             volts[0],
             volts[1],
             f64::from(guidance.status),
@@ -287,10 +291,7 @@ impl Collector {
         let mut key: Vec<u64> = self.state.stages.iter().flat_map(flags).collect();
         let LinkSample { action, cause, connected, at_rest, .. } = self.link();
         let RosterHeader { order, reason, .. } = self.roster();
-        let kind = self.state.failsafe();
-        key.extend(
-            [action, cause, at_rest, order, reason, self.status(), kind as u8].map(u64::from),
-        );
+        key.extend([action, cause, at_rest, order, reason, self.status()].map(u64::from));
         let target = self.state.target.map_or(0, |sent| sent.number);
         key.extend([u64::from(connected), target, self.state.targets().count() as u64]);
         let now = self.state.now_s();
@@ -310,7 +311,7 @@ impl Collector {
 
     fn state_json(&self) -> Value {
         let usage = |at: usize| self.usage.get(at).copied().unwrap_or_default();
-        let (link, roster) = (self.link(), self.roster());
+        let (roster, (kind, does)) = (self.roster(), self.state.doing());
         let stages = self.state.stages.iter().enumerate().map(|(at, entry)| {
             json!({
                 "name": name_str(&entry.stage),
@@ -329,17 +330,9 @@ impl Collector {
         json!({
             "t": rounded(self.state.now_s()),
             "order": words(Order::from_byte(roster.order)),
-            "reason": match HoldReason::from_byte(roster.reason) {
-                HoldReason::None => String::new(),
-                reason => words(reason),
-            },
-            "connected": link.connected == 1,
-            "at_rest": link.at_rest == 1,
-            "stopped": link.stopped(),
-            "kind": self.state.failsafe(),
-            "action": link.action().effect(),
-            "cause": link.cause().name(),
-            "guidance": guidance_in_words(self.status()),
+            "kind": kind,
+            "does": does,
+            "to_go": self.state.way_to_go(),
             "targets": targets.collect::<Vec<_>>(),
             "stages": stages.collect::<Vec<_>>(),
             "supervisor": {

@@ -31,12 +31,12 @@ function charts(store) {
   const sensors = (cone) => store.about.sensors.map((sensor, at) => ({ sensor, text: sensor.name, of: () => store.ranges[at] })).filter(({ sensor }) => sensor.cone === cone && !sensor.scan);
   const { steers } = store.about;
   return [
-    { title: "Speed", unit: "m/s", series: [column("v", "driven"), column("v_told", "told"), column("limit", "limit")] },
-    { title: "Turn rate", unit: "rad/s", series: [column("omega", "turned"), column("omega_told", "told")] },
-    { title: steers ? "Driven wheel" : "Left wheel", unit: "rad/s", series: [column("left", "measured"), column("left_told", "told")] },
+    { title: "Speed", unit: "m/s", series: [column("v", "driven"), column("v_sent", "sent"), column("limit", "limit")] },
+    { title: "Turn rate", unit: "rad/s", series: [column("omega", "turned"), column("omega_sent", "sent")] },
+    { title: steers ? "Driven wheel" : "Left wheel", unit: "rad/s", series: [column("left", "measured"), column("left_sent", "sent")] },
     steers
-      ? { title: "Steering", unit: "rad", series: [column("right_told", "told")] }
-      : { title: "Right wheel", unit: "rad/s", series: [column("right", "measured"), column("right_told", "told")] },
+      ? { title: "Steering", unit: "rad", series: [column("right_sent", "sent")] }
+      : { title: "Right wheel", unit: "rad/s", series: [column("right", "measured"), column("right_sent", "sent")] },
     { title: "Sonar", unit: "m", series: sensors(true) },
     { title: "Infrared", unit: "m", series: sensors(false) },
     { title: "Battery", unit: "V", series: [column("board_v", "boards"), column("motor_v", "motors")] },

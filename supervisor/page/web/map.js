@@ -6,6 +6,8 @@ import { Unpacker } from "./store.js";
 const TAU = 2 * Math.PI;
 // A finger is on a target within this distance, CSS pixels.
 const GRAB = 26;
+// The height of the actions, which lie over the lowest part of the map.
+const ACTIONS = 70;
 // The names of the colours of the states of a cell.
 const CELLS = [null, "sensed", "known", "rim", "scanned", "margin"];
 const LEGEND = [["sensed", "believed hazard"], ["margin", "its margin"], ["known", "known before"], ["scanned", "scanned"], ["way", "way"], ["beam", "beams"], ["target", "target"]];
@@ -68,12 +70,12 @@ export class MapView {
 
   pixels(x, y) {
     const { view, scale } = this;
-    return [this.width / 2 + (x - view.x) * scale, this.height / 2 - (y - view.y) * scale];
+    return [this.width / 2 + (x - view.x) * scale, this.middle - (y - view.y) * scale];
   }
 
   metres(px, py) {
     const { view, scale } = this;
-    return [view.x + (px - this.width / 2) / scale, view.y - (py - this.height / 2) / scale];
+    return [view.x + (px - this.width / 2) / scale, view.y - (py - this.middle) / scale];
   }
 
   zoom(factor, px, py) {
@@ -152,7 +154,7 @@ export class MapView {
         this.chosen[Math.max(last, 0)] = [from[0] + 0.1 * step[0], from[1] + 0.1 * step[1]];
         this.onChoose(this.chosen, Math.max(last, 0), true);
       } else if (event.key === "+" || event.key === "-") {
-        this.zoom(event.key === "+" ? 1.25 : 0.8, this.width / 2, this.height / 2);
+        this.zoom(event.key === "+" ? 1.25 : 0.8, this.width / 2, this.middle);
       }
     });
   }
@@ -171,7 +173,9 @@ export class MapView {
     context.fillStyle = colour("map");
     context.fillRect(0, 0, this.width, this.height);
     if (!this.view) return;
-    this.scale = Math.min(this.width, this.height) / this.view.span;
+    const free = this.height - (this.mayChoose ? ACTIONS : 0);
+    this.middle = free / 2;
+    this.scale = Math.min(this.width, free) / this.view.span;
     const at = store.rowAt(t);
     const field = this.fields.of(this.fieldMode === "none" ? null : store.fieldAt(t));
     if (field && this.fieldMode === "colours") this.drawImage("field", field, (it) => new Field(it).image(matchMedia("(prefers-color-scheme: dark)").matches));
@@ -406,7 +410,7 @@ export class MapView {
   /// A bar of a round length.
   drawScale() {
     const metres = [0.1, 0.2, 0.5, 1, 2, 5, 10].findLast((it) => it * this.scale < this.width / 4) ?? 0.1;
-    const [left, bottom] = [12, this.height - 12];
+    const [left, bottom] = [12, 30];
     this.context.beginPath();
     this.context.moveTo(left, bottom);
     this.context.lineTo(left + metres * this.scale, bottom);

@@ -36,6 +36,7 @@ export class Orders {
     document.body.classList.toggle("drive", drives);
     byId("targets").hidden = !drives;
     this.map.mayChoose = drives;
+    this.map.changed();
   }
 
   async ask(name, order) {

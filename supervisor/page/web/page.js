@@ -13,6 +13,9 @@ const byId = (id) => document.getElementById(id);
 const recording = byId("data");
 const store = new Store(!recording);
 let asked = false;
+let isLost = false;
+// A robot that runs says something several times a second.
+const OLD_AFTER_S = 1.5;
 
 function changed() {
   if (asked) return;
@@ -39,21 +42,28 @@ function draw(now) {
   drawStatus();
 }
 
+/// What is known of the robot now, whatever time the map shows; of a recorded robot, at the time that is shown.
+function newest() {
+  const state = store.stateAt(recording ? timeline.t : Infinity);
+  if (recording && store.summary?.kind && timeline.t >= store.end) return [store.summary.kind, store.summary.outcome];
+  if (!store.about) return ["warn", "no robot runs; the page waits for it"];
+  if (store.problem) return ["bad", store.problem];
+  if (!store.running && !recording) return ["warn", `the run has ended at ${store.end.toFixed(1)} s; the page waits for the next`];
+  if (!state) return ["warn", "the robot starts"];
+  return [state.kind, [state.does, state.to_go].filter(Boolean).join("; ")];
+}
+
 function drawStatus() {
-  const state = store.stateAt(timeline.t);
-  const status = byId("status");
-  let text = "no robot runs; the page waits for it";
-  if (store.problem) text = store.problem;
-  else if (store.about && !store.running && !recording) text = `the run has ended at ${store.end.toFixed(1)} s; the page waits for the next`;
-  else if (state) {
-    const why = state.stopped ? `: ${state.cause}` : "";
-    const rest = state.at_rest ? ", at rest" : "";
-    text = state.connected ? `the robot ${state.action}${why}${rest}; guidance: ${state.guidance}` : "the robot does not answer";
-  } else if (store.about) text = "the robot starts";
-  let kind = store.problem ? "bad" : (state?.kind ?? "");
-  if (store.summary?.kind && timeline.t >= store.end) ({ outcome: text, kind } = store.summary);
-  status.textContent = text;
-  status.className = kind;
+  let [kind, text] = newest();
+  if (!recording && store.age > OLD_AFTER_S && (store.running || isLost)) {
+    text += ` (${store.age.toFixed(0)} s ago)`;
+    if (kind === "good") kind = "warn";
+  }
+  if (isLost) [kind, text] = ["bad", `not known now; the last was: ${text}`];
+  byId("status").textContent = text;
+  byId("status").className = document.querySelector("header").className = kind;
+  byId("past").hidden = timeline.follows;
+  byId("past").textContent = `You look at ${timeline.t.toFixed(1)} s, ${(store.end - timeline.t).toFixed(1)} s ago.`;
 }
 
 /// A run is shown from its beginning.
@@ -69,6 +79,8 @@ function begin() {
 }
 
 function lost(why) {
+  isLost = Boolean(why);
+  changed();
   document.body.classList.toggle("lost", Boolean(why));
   byId("notice").hidden = !why;
   byId("notice").textContent = why;
@@ -163,4 +175,6 @@ if (recording) {
   });
   orders = new Orders(net, map);
   orders.choose([]);
+  // What does not come any more grows old.
+  setInterval(changed, 500);
 }

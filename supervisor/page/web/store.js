@@ -41,6 +41,7 @@ export class Store {
     this.ranges = [];
     this.running = false;
     this.problem = "";
+    this.heard = null;
     if (!about) return;
     for (const name of about.columns) this.columns[name] = [];
     this.ranges = about.sensors.map(() => []);
@@ -69,6 +70,7 @@ export class Store {
     for (const event of message.events ?? []) this.events.push(event);
     if (message.metrics) this.summary = message;
     if (message.state) this.states.push(message.state);
+    if (message.state || message.rows) this.heard = performance.now();
     if (!this.isBounded) return;
     if (this.events.length > MOST_EVENTS) this.events.splice(0, this.events.length - MOST_EVENTS);
     if (this.states.length > MOST_STATES) this.states.splice(0, MOST_STATES / 10);
@@ -110,6 +112,11 @@ export class Store {
   /// The index of the row at `t`.
   rowAt(t) {
     return lastBefore(this.times, t);
+  }
+
+  /// The age of the newest row or state, seconds.
+  get age() {
+    return this.heard === null ? 0 : (performance.now() - this.heard) / 1000;
   }
 
   value(name, at) {

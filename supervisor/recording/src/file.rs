@@ -10,9 +10,10 @@ use std::{
 
 use common::{
     bus::Stamp,
+    clock::{MissionClock, MissionTime, monotonic_ns},
     file::FileError,
-    mission::Mission,
-    topics::{AnyTopic, Spec},
+    run::Run,
+    topics::{AnyTopic, EVERY_STAGE, OPERATOR, Spec},
 };
 use mcap::{
     Compression, WriteOptions, Writer,
@@ -39,24 +40,27 @@ pub(crate) struct RecordingFile {
     writer: Writer<BufWriter<File>>,
     path: PathBuf,
     channels: HashMap<String, u16>,
-    /// The start of the recording, nanoseconds since 1970.
+    /// The start of the mission, nanoseconds since 1970.
     began_ns: u64,
+    clock: Option<MissionClock>,
+    /// The newest mission time of a sample.
+    newest: MissionTime,
     chunk_began: Instant,
 }
 
-/// The time, nanoseconds since 1970.
+/// The machine's time, nanoseconds since 1970.
 pub fn now_ns() -> u64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     since.map_or(0, |since| since.as_nanos() as u64)
 }
 
 impl RecordingFile {
-    /// Make a new file `about` a run, with a channel for each of `topics` and for the drawings of `mission` in viewers. The file gets
+    /// Make a new file `about` a `run`, with a channel for each of `topics` and for the drawings of its mission in viewers. The file gets
     /// its name when all of that is written, so a file of this name can always be read.
     pub(crate) fn create(
         path: &Path,
         topics: &[&'static dyn AnyTopic],
-        mission: Option<&Mission>,
+        run: Option<&Run>,
         about: BTreeMap<String, String>,
     ) -> Result<Self, RecordingError> {
         let named = |error: io::Error| FileError::of("make recording", path)(error);
@@ -80,8 +84,11 @@ impl RecordingFile {
             path: path.to_path_buf(),
             channels: HashMap::new(),
             began_ns: now_ns(),
+            clock: run.map(|run| run.clock),
+            newest: MissionTime::default(),
             chunk_began: Instant::now(),
         };
+        recording.began_ns -= recording.mission_time().0.min(recording.began_ns);
         for topic in topics {
             let schema::Schema { name, text } = schema::of(*topic);
             let spec = topic.spec();
@@ -92,7 +99,8 @@ impl RecordingFile {
             recording.add(spec.name, &name, "ros2msg", text.as_bytes(), "cdr", &about)?;
         }
         let none = BTreeMap::new();
-        for Channel { topic, schema, descriptors } in viewers::channels(mission) {
+        for Channel { topic, schema, descriptors } in viewers::channels(run.map(|run| &run.mission))
+        {
             recording.add(&topic, schema, "protobuf", descriptors, "protobuf", &none)?;
         }
         recording.add(LOST, "firsthand.Recorder", "jsonschema", LOST_SCHEMA, "json", &none)?;
@@ -101,10 +109,23 @@ impl RecordingFile {
         Ok(recording)
     }
 
-    /// The same file with the clock of publish times of the file `before`.
+    /// The same file with the times of the file `before`.
     pub(crate) const fn continuing(mut self, before: &Self) -> Self {
-        self.began_ns = before.began_ns;
+        (self.began_ns, self.newest) = (before.began_ns, before.newest);
         self
+    }
+
+    /// Mission time: that of the clock, or of the newest sample in lockstep.
+    fn mission_time(&self) -> MissionTime {
+        match self.clock {
+            Some(clock @ MissionClock::Wall { .. }) => clock.at(0, monotonic_ns()),
+            _ => self.newest,
+        }
+    }
+
+    /// Mission time as nanoseconds since 1970.
+    pub(crate) fn now_ns(&self) -> u64 {
+        self.began_ns.saturating_add(self.mission_time().0)
     }
 
     fn add(
@@ -124,40 +145,54 @@ impl RecordingFile {
         Ok(())
     }
 
-    /// Add `message`, a sample of a topic.
+    /// Add `message`, a sample of a topic. Returns its log time.
     pub(crate) fn sample(
         &mut self,
         spec: &Spec,
         stamp: &Stamp,
         message: &[u8],
-    ) -> Result<(), RecordingError> {
-        let published = self.began_ns.saturating_add(stamp.stamp_ns);
-        self.write(spec.name, stamp.sequence, published, message)
+    ) -> Result<u64, RecordingError> {
+        let mut times = [self.now_ns(); 2];
+        // An operator knows no mission time, and a heartbeat has that of the tick before it.
+        if ![OPERATOR, EVERY_STAGE].contains(&spec.writer) {
+            self.newest = self.newest.max(stamp.time());
+            times[1] = self.began_ns.saturating_add(stamp.stamp_ns);
+            if !matches!(self.clock, Some(MissionClock::Wall { .. })) {
+                times[0] = times[1];
+            }
+        }
+        self.write(spec.name, stamp.sequence, times, message)?;
+        Ok(times[0])
     }
 
     /// Add a message that is no sample.
-    pub(crate) fn message(&mut self, topic: &str, message: &[u8]) -> Result<(), RecordingError> {
-        self.write(topic, 0, now_ns(), message)
+    pub(crate) fn message(
+        &mut self,
+        topic: &str,
+        log_ns: u64,
+        message: &[u8],
+    ) -> Result<(), RecordingError> {
+        self.write(topic, 0, [log_ns; 2], message)
     }
 
     /// Add the numbers of samples that were lost so far.
     pub(crate) fn lost(&mut self, lost: &BTreeMap<&str, u64>) -> Result<(), RecordingError> {
         let json = serde_json::json!({"lost": lost}).to_string();
-        self.message(LOST, json.as_bytes())
+        self.message(LOST, self.now_ns(), json.as_bytes())
     }
 
     fn write(
         &mut self,
         topic: &str,
         sequence: u32,
-        publish_time: u64,
+        [log_time, publish_time]: [u64; 2],
         message: &[u8],
     ) -> Result<(), RecordingError> {
         // This topic is not recorded.
         let Some(&channel_id) = self.channels.get(topic) else {
             return Ok(());
         };
-        let header = MessageHeader { channel_id, sequence, log_time: now_ns(), publish_time };
+        let header = MessageHeader { channel_id, sequence, log_time, publish_time };
         let written = self.writer.write_to_known_channel(&header, message);
         written.map_err(failed(&self.path))
     }

@@ -12,10 +12,11 @@
 //!   (`SceneUpdate`: trajectory, targets, body, uncertainty), `foxglove/scan/SENSOR` (`LaserScan`), `log` (`Log`: the logs of the
 //!   stages and the supervisor).
 //! - A channel `recorder` (JSON): numbers of samples by topic that the recorder lost so far, whenever they grow.
-//! - A metadata record `run`: robot, mission, seed, build, machine, and `run_toml`, the run file of the stages.
+//! - A metadata record `run`: robot, mission, seed, build, machine, date, and `run_toml`, the run file of the stages.
 //!
-//! The log time of a message is the time at which the recorder read it, nanoseconds since 1970. The publish time is the start
-//! of the recording plus the sample's mission time. The sequence of a message is that of its sample.
+//! Times are mission time, counted from the mission's start in nanoseconds since 1970, so that viewers play a run at its speed, in
+//! lockstep too. The publish time of a message is that of its sample. The log time is that at which the recorder read it, in lockstep the
+//! publish time. The sequence of a message is that of its sample.
 //!
 //! A new run of the robot begins a new file: `F.mcap`, `F-2.mcap`.
 //!

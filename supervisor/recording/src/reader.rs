@@ -51,6 +51,8 @@ pub struct Recording {
     pub run: Run,
     pub build: String,
     pub machine: String,
+    /// When the recorder was attached; empty in a recording of an earlier version.
+    pub began: String,
     pub end: End,
     /// Numbers of messages by topic.
     pub counts: BTreeMap<String, u64>,
@@ -61,7 +63,7 @@ pub struct Recording {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Message {
     pub topic: Arc<str>,
-    /// The time when the recorder took the message, nanoseconds since 1970.
+    /// Mission time, as nanoseconds since 1970.
     pub log_ns: u64,
     /// The sample's number, counted by its writer.
     pub sequence: u32,
@@ -72,7 +74,7 @@ pub struct Message {
 /// A sample of a topic of structs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample<P> {
-    /// The time when the recorder took the sample, nanoseconds since 1970.
+    /// Mission time, as nanoseconds since 1970.
     pub log_ns: u64,
     pub sample: P,
 }
@@ -80,7 +82,7 @@ pub struct Sample<P> {
 /// A sample of a topic of slices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SliceSample<H, T> {
-    /// The time when the recorder took the sample, nanoseconds since 1970.
+    /// Mission time, as nanoseconds since 1970.
     pub log_ns: u64,
     pub header: H,
     pub elements: Vec<T>,
@@ -144,6 +146,7 @@ impl Recording {
             run,
             build: about("build"),
             machine: about("machine"),
+            began: about("began"),
             end: problem.map_or(End::Complete, |problem| End::Cut {
                 after: Duration::from_nanos(after),
                 problem,

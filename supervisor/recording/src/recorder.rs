@@ -8,7 +8,7 @@ use std::{
     fs::{self, File},
     io::{self, BufRead, BufReader},
     path::{Path, PathBuf},
-    time::{Duration, Instant},
+    time::{Duration, Instant, SystemTime},
 };
 
 use common::{
@@ -16,15 +16,16 @@ use common::{
     clock::MissionClock,
     domain::Domain,
     follower::{Event, Follower},
-    mission::Mission,
     run::{self, Run},
     topics::{self, AnyTopic},
 };
 
+use httpdate::fmt_http_date;
+
 use crate::{
     budget::Budget,
     error::RecordingError,
-    file::{RecordingFile, now_ns},
+    file::RecordingFile,
     log_files::{self, LogFiles},
     losses::Losses,
     places::{self, numbered},
@@ -57,6 +58,7 @@ impl Options {
     fn topics(&self) -> Vec<&'static dyn AnyTopic> {
         let logged = |topic: &&&'static dyn AnyTopic| match topic.spec().logged {
             Logged::Yes => true,
+            Logged::No => false,
             Logged::WithFields => self.fields,
         };
         match &self.topics {
@@ -90,9 +92,10 @@ pub fn record(
         chosen.iter().map(read).collect()
     };
     let domain = options.domain.clone();
-    // The recorder wakes at the end of a tick, and at the start of a generation, which may be killed soon.
+    // The recorder wakes at the end of a tick, at the start of a generation, which may be killed soon, and for what processes publish that
+    // end with it.
     let mut follower = Follower::new(domain, "recorder", &topics::LINK, open)
-        .also_on([&topics::INPUTS as &'static dyn AnyTopic]);
+        .also_on([&topics::INPUTS as &'static dyn AnyTopic, &topics::FAULTS]);
     let mut current: Option<CurrentRun> = None;
     let mut files = 0;
     let mut supervisor = None;
@@ -184,7 +187,7 @@ fn find_run(options: &Options) -> Option<PathBuf> {
 struct CurrentRun {
     path: PathBuf,
     directory: Option<PathBuf>,
-    mission: Option<Mission>,
+    run: Option<Run>,
     about: BTreeMap<String, String>,
     file: RecordingFile,
     drawn: Drawn,
@@ -208,6 +211,7 @@ impl CurrentRun {
             ("robot", options.domain.robot.to_string()),
             ("build", build()),
             ("machine", machine()),
+            ("began", fmt_http_date(SystemTime::now())),
             ("run_toml", text.unwrap_or_default()),
         ]);
         if let Some(run) = &run {
@@ -217,8 +221,7 @@ impl CurrentRun {
         let about = about.into_iter();
         let about: BTreeMap<_, _> = about.map(|(key, value)| (key.to_owned(), value)).collect();
         give_way(run.as_ref());
-        let mission = run.map(|run| run.mission);
-        let file = RecordingFile::create(path, topics, mission.as_ref(), about.clone())?;
+        let file = RecordingFile::create(path, topics, run.as_ref(), about.clone())?;
         let whole = options.run.is_some();
         let logs = directory.as_ref();
         let logs = logs.map(|directory| LogFiles::follow(directory, whole));
@@ -227,8 +230,8 @@ impl CurrentRun {
             directory,
             about,
             file,
-            drawn: Drawn::new(mission.clone()),
-            mission,
+            drawn: Drawn::new(run.as_ref().map(|run| run.mission.clone())),
+            run,
             losses: Losses::default(),
             logs,
             logs_taken: Instant::now(),
@@ -242,8 +245,7 @@ impl CurrentRun {
         path: &Path,
         topics: &[&'static dyn AnyTopic],
     ) -> Result<PathBuf, RecordingError> {
-        let (mission, about) = (self.mission.as_ref(), self.about.clone());
-        let next = RecordingFile::create(path, topics, mission, about)?;
+        let next = RecordingFile::create(path, topics, self.run.as_ref(), self.about.clone())?;
         let next = next.continuing(&self.file);
         std::mem::replace(&mut self.file, next).finish()?;
         self.file.lost(self.losses.counts())?;
@@ -262,11 +264,11 @@ impl CurrentRun {
                 if !self.losses.came(spec, &stamp, &self.message) {
                     continue;
                 }
-                file.sample(spec, &stamp, &self.message)?;
+                let log_ns = file.sample(spec, &stamp, &self.message)?;
                 let mut written = Ok(());
-                self.drawn.message(spec.name, &self.message, now_ns(), &mut |topic, message| {
+                self.drawn.message(spec.name, &self.message, log_ns, &mut |topic, message| {
                     if written.is_ok() {
-                        written = file.message(topic, message);
+                        written = file.message(topic, log_ns, message);
                     }
                 });
                 written?;
@@ -287,10 +289,11 @@ impl CurrentRun {
             return Ok(());
         };
         let mut written = Ok(());
+        let now_ns = file.now_ns();
         logs.take(&mut |process, line| {
-            viewers::log(process, line, now_ns(), &mut |topic, message| {
+            viewers::log(process, line, now_ns, &mut |topic, message| {
                 if written.is_ok() {
-                    written = file.message(topic, message);
+                    written = file.message(topic, now_ns, message);
                 }
             });
         });

@@ -101,8 +101,8 @@ impl Drawn {
         }
     }
 
-    /// Give `sink` the drawings of a `message` of `topic` that was read at `now_ns` since 1970. Viewers play messages by that time,
-    /// which is not mission time in lockstep. A message that does not match its topic, or of another topic, is not drawn.
+    /// Give `sink` the drawings of a `message` of `topic` that has the time `now_ns` since 1970, by which viewers play it. A
+    /// message that does not match its topic, or of another topic, is not drawn.
     pub fn message(&mut self, topic: &str, message: &[u8], now_ns: u64, sink: Sink<'_>) {
         let is_drawn = DRAWN.iter().any(|drawn| drawn.spec().name == topic);
         let Some(sample) = is_drawn.then(|| Sample::decoded(topic, message)).flatten() else {

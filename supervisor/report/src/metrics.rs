@@ -83,7 +83,7 @@ pub(crate) fn rows(content: &Content) -> Vec<Value> {
             "",
         ),
         row("mean |dv/dt|", "v of pose", measured.speed_change(), 3, "m/s²"),
-        known("safety events", "safety_events", count(measured.safety_events), 0, ""),
+        known("ticks that mapped a hazard", "safety_events", count(measured.safety_events), 0, ""),
         known(
             "share of the sonar unavailable",
             "sonar_unavailable_share",

@@ -34,14 +34,16 @@ fn a_page_has_every_tick_the_maps_a_field_and_the_metrics() {
     assert!(rows.iter().all(|row| row.as_array().unwrap().len() == width[0] + width[1]));
     let columns = about["columns"].as_array().unwrap();
     let left = columns.iter().position(|column| column == "left").unwrap();
-    for (at, name) in ["left", "right", "left_told", "right_told"].into_iter().enumerate() {
+    for (at, name) in ["left", "right", "left_sent", "right_sent"].into_iter().enumerate() {
         assert_eq!(columns[left + at], name);
         assert!(rows.iter().any(|row| row[left + at].as_f64() > Some(1.0)), "{name}");
     }
     let states = messages.iter().filter_map(|message| message["state"].as_object());
-    let states: Vec<_> = states.map(|state| (&state["cause"], &state["kind"])).collect();
-    assert_eq!(states.last(), Some(&(&"mission over".into(), &"good".into())));
-    assert!(states.contains(&(&"no order to drive".into(), &"note".into())), "{states:?}");
+    let states: Vec<_> =
+        states.map(|state| (state["does"].as_str().unwrap(), &state["kind"])).collect();
+    let (does, kind) = states.last().unwrap();
+    assert!(does.contains("mission over") && *kind == "good", "{does} {kind}");
+    assert!(states.contains(&("the robot starts", &"warn".into())), "{states:?}");
     assert!(blobs > 3, "{blobs} maps and fields");
     let metrics = messages.last().unwrap()["metrics"].as_array().unwrap();
     assert!(metrics.iter().any(|metric| metric[2] == "mission_time_s"), "{metrics:?}");

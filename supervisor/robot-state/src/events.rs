@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 use common::samples::{
     Cause, CommandSample, CommandState, DeathSample, DirectiveSample, FaultKind, FaultSample,
-    HoldReason, LinkSample, Order, RequestKind, RequestSample, RosterEntry, StageState,
-    StallSample, TargetSample, name_str,
+    HoldReason, LinkSample, Order, RequestAnswer, RequestKind, RequestSample, RosterEntry,
+    StageState, StallSample, TargetSample, name_str,
 };
 use serde::Serialize;
 
@@ -43,6 +43,8 @@ impl Event {
 pub enum Kind {
     /// The event is a death, a stall or a stop.
     Bad,
+    /// Somebody has to do something before the robot is of use.
+    Warn,
     Good,
     Note,
     /// The event is a line of a process's log.
@@ -93,7 +95,7 @@ impl Events {
             Sample::Death(death) => self.death(death),
             Sample::Directive(directive) => self.directive(directive),
             Sample::Stall(stall) => self.stall(stall),
-            Sample::Request(request) => self.request(request),
+            Sample::Order(request) => self.request(request),
             Sample::Fault(fault) => self.fault(fault),
             Sample::Link(link) => self.link(link),
             _ => {}
@@ -167,8 +169,14 @@ impl Events {
         let targets: String =
             targets.map(|at| format!("({:.2}, {:.2}) ", at.x_m, at.y_m)).collect();
         let kind = words(RequestKind::from_byte(request.kind));
-        let text = format!("{kind} {}{targets}", name_str(&request.stage));
-        self.add("operator", Kind::Note, text.trim_end());
+        let asked = format!("{kind} {}{targets}", name_str(&request.stage));
+        let asked = asked.trim_end();
+        match RequestAnswer::from_byte(request.answer) {
+            RequestAnswer::Taken => self.add("operator", Kind::Note, asked),
+            answer => {
+                self.add("operator", Kind::Bad, format!("{asked}, refused: {}", answer.text()))
+            }
+        }
     }
 
     fn fault(&mut self, fault: &FaultSample) {

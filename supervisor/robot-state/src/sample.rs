@@ -52,7 +52,7 @@ samples! {
     Death(DeathSample): DEATHS by one,
     Directive(DirectiveSample): DIRECTIVE by one,
     Stall(StallSample): STALLS by one,
-    Request(RequestSample): REQUESTS by one,
+    Order(RequestSample): ORDERS by one,
     Fault(FaultSample): FAULTS by one,
     Link(LinkSample): LINK by one,
 }

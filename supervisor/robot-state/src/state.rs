@@ -6,8 +6,9 @@ use common::{
     grid::{Applied, Replica},
     mission::Mission,
     samples::{
-        CommandSample, DeathSample, FieldCell, FieldHeader, GridHeader, GuidanceSample, LinkSample,
-        PoseSample, PowerSample, RosterEntry, RosterHeader, TargetPoint, TargetSample, name_str,
+        CommandSample, DeathSample, FieldCell, FieldHeader, GridHeader, GuidanceSample,
+        GuidanceStatus, HoldReason, LinkSample, PoseSample, PowerSample, RosterEntry, RosterHeader,
+        TargetPoint, TargetSample, name_str,
     },
 };
 use glam::DVec2;
@@ -15,6 +16,7 @@ use glam::DVec2;
 use crate::{
     events::{Event, Events, Kind},
     sample::Sample,
+    words::{failsafe_in_words, guidance_in_words},
 };
 
 /// The longest way, in points.
@@ -90,7 +92,7 @@ impl RobotState {
             | Sample::Scan(..)
             | Sample::Wheels(_)
             | Sample::Directive(_)
-            | Sample::Request(_)
+            | Sample::Order(_)
             | Sample::Fault(_) => {}
         }
         true
@@ -128,12 +130,50 @@ impl RobotState {
 
     /// The current target and those after it.
     pub fn targets(&self) -> impl Iterator<Item = &TargetPoint> {
-        self.target.iter().flat_map(|sent| [&sent.target].into_iter().chain(sent.ahead()))
+        self.target().into_iter().flat_map(|sent| [&sent.target].into_iter().chain(sent.ahead()))
     }
 
-    /// The importance of what the link's failsafe does.
-    pub fn failsafe(&self) -> Kind {
-        self.events.kind(&self.link.unwrap_or_default())
+    /// What the robot does, in a sentence, and how important that is.
+    pub fn doing(&self) -> (Kind, String) {
+        let supervisor = self.supervisor.unwrap_or_default();
+        let status = self.guidance.unwrap_or_default().status;
+        let (kind, text) = match (&self.link, HoldReason::from_byte(supervisor.reason)) {
+            (Some(link), _) if link.connected == 0 && link.losses > 0 => {
+                return (Kind::Bad, "the robot does not answer".to_owned());
+            }
+            (None, _) | (Some(_), HoldReason::Starting) => {
+                return (Kind::Warn, "the robot starts".to_owned());
+            }
+            (_, HoldReason::Waiting) => (Kind::Warn, "the robot waits for a target".to_owned()),
+            (Some(link), _) => (self.events.kind(link), failsafe_in_words(link)),
+        };
+        let link = self.link.unwrap_or_default();
+        if link.stopped() {
+            return (kind, text + if link.at_rest == 1 { ", at rest" } else { "" });
+        }
+        let kind = match GuidanceStatus::from_byte(status) {
+            GuidanceStatus::Unreachable => Kind::Warn,
+            _ => kind,
+        };
+        (kind, format!("{text}; {}", guidance_in_words(status)))
+    }
+
+    /// The target to which the robot is sent; none while it waits for one.
+    pub fn target(&self) -> Option<&TargetSample> {
+        let waits = |it: RosterHeader| HoldReason::from_byte(it.reason) == HoldReason::Waiting;
+        self.target.as_ref().filter(|_| !self.supervisor.is_some_and(waits))
+    }
+
+    /// How far the target is by the robot's own pose, metres.
+    pub fn to_go_m(&self) -> Option<f64> {
+        let at = self.target()?.target.position();
+        Some(self.pose?.pose().position.distance(at))
+    }
+
+    /// The way to go in words, and the number of the target; none while there is none.
+    pub fn way_to_go(&self) -> Option<String> {
+        let TargetSample { number, last, .. } = self.target()?;
+        Some(format!("{:.1} m to target {number} of {last}", self.to_go_m()?))
     }
 }
 
@@ -162,6 +202,46 @@ mod tests {
         let apart = || state.way.windows(2).map(|pair| pair[0].distance(pair[1]));
         let (least, most) = (apart().fold(f64::MAX, f64::min), apart().fold(0.0, f64::max));
         assert!(most < 2.5 * least, "{least} to {most} m");
+    }
+
+    #[test]
+    fn a_robot_that_waits_or_finds_no_way_is_a_warning_and_one_that_stands_or_is_lost_is_bad() {
+        use common::samples::{Action, Cause, HoldReason};
+        let mut state = RobotState::default();
+        assert_eq!(state.doing(), (Kind::Warn, "the robot starts".to_owned()));
+        let header =
+            |reason: HoldReason| RosterHeader { reason: reason.into(), ..RosterHeader::default() };
+        state.supervisor = Some(header(HoldReason::None));
+        let link = |action: Action, cause: Cause| LinkSample {
+            connected: 1,
+            action: action.into(),
+            cause: cause.into(),
+            at_rest: u8::from(action == Action::Stop),
+            ..LinkSample::default()
+        };
+        state.link = Some(link(Action::Go, Cause::None));
+        state.guidance = Some(GuidanceSample {
+            status: GuidanceStatus::Along.into(),
+            ..GuidanceSample::default()
+        });
+        assert_eq!(state.doing(), (Kind::Good, "the robot goes; on its way".to_owned()));
+        state.guidance = Some(GuidanceSample {
+            status: GuidanceStatus::Unreachable.into(),
+            ..GuidanceSample::default()
+        });
+        assert_eq!(state.doing().0, Kind::Warn);
+        state.link = Some(link(Action::Stop, Cause::OperatorStop));
+        let told = "the robot stands: stopped by an operator, at rest".to_owned();
+        assert_eq!(state.doing(), (Kind::Bad, told));
+        state.target = Some(TargetSample { number: 2, last: 3, ..TargetSample::default() });
+        state.pose = Some(PoseSample { x_m: 1.25, ..PoseSample::default() });
+        assert_eq!(state.way_to_go().as_deref(), Some("1.2 m to target 2 of 3"));
+        state.supervisor = Some(header(HoldReason::Waiting));
+        state.link = Some(link(Action::Stop, Cause::NotOrdered));
+        assert_eq!(state.doing().0, Kind::Warn);
+        assert_eq!((state.way_to_go(), state.targets().count()), (None, 0), "it has no target");
+        state.link = Some(LinkSample { connected: 0, losses: 1, ..LinkSample::default() });
+        assert_eq!(state.doing(), (Kind::Bad, "the robot does not answer".to_owned()));
     }
 
     #[test]

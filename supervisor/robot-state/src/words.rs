@@ -19,12 +19,12 @@ pub fn words(variant: impl Debug) -> String {
 /// The status of the planner, a [`GuidanceStatus`].
 pub const fn guidance_in_words(status: u8) -> &'static str {
     match GuidanceStatus::from_byte(status) {
-        GuidanceStatus::Waiting => "waits for a field",
-        GuidanceStatus::Along => "along the field",
+        GuidanceStatus::Waiting => "waits for the way",
+        GuidanceStatus::Along => "on its way",
         GuidanceStatus::AtTarget => "beside the target",
-        GuidanceStatus::WayOut => "out of a hazard",
+        GuidanceStatus::WayOut => "drives out of a hazard",
         GuidanceStatus::Unreachable => "no way to the target",
-        GuidanceStatus::Look => "turn and look",
+        GuidanceStatus::Look => "turns and looks",
     }
 }
 

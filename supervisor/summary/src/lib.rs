@@ -225,7 +225,7 @@ impl fmt::Display for Summary {
             let ratio = self.path_length_m / self.straight_m;
             write!(f, "{ratio:.2} x the straight {:.2} m, ", self.straight_m)?;
         }
-        writeln!(f, "{} safety events", self.safety_events)?;
+        writeln!(f, "hazards mapped {} times", self.safety_events)?;
         for caption in self.captions() {
             writeln!(f, "{caption}")?;
         }

@@ -404,7 +404,9 @@ fn the_words_of_the_table_say_the_numbers_that_hold() {
     says(Cause::RobotDoesNotStop, &does_not_stop);
     says(Cause::WheelsHeld, &seconds(contact::HELD_AFTER));
     says(Cause::WheelsHeld, &format!("stands for {}", seconds(contact::STANDS_FOR)));
-    assert!((SLOW_SHARE - 0.5).abs() < 1e-9 && Action::Slow.effect().contains("half"));
+    assert!(
+        (Action::Slow.speed_share() - 0.5).abs() < 1e-9 && Action::Slow.effect().contains("half")
+    );
 }
 
 #[test]

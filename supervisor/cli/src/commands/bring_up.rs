@@ -2,7 +2,7 @@
 
 mod written;
 
-use std::{fs, io::IsTerminal as _, path::PathBuf};
+use std::{fs, path::PathBuf};
 
 use bring_up::{Finding, Placed, Trace, Verdict, findings};
 use clap::{Args, ValueEnum};
@@ -15,6 +15,7 @@ use common::{
     topics::{COMMAND, COUNTS, IMU_TURN, RANGES, SCAN, WHEELS},
 };
 use console::{
+    consent,
     failure::{Failure, Refused},
     logging, missions,
     output::{print_text, write_stderr},
@@ -103,7 +104,10 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     }
     let is_real = named.robot.address.is_some();
     if is_real && !arguments.yes {
-        consent()?;
+        consent::ask(
+            "the robot will turn on the spot and drive 0.3 m there and back",
+            "Is the floor free for 1 m around it?",
+        )?;
     }
     let mission = arguments.procedure(&named)?;
     let pace = arguments.pace.unwrap_or(if is_real { Pace::Rate(1.0) } else { Pace::Max });
@@ -143,22 +147,6 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
             format!("{wrong} things are not as the mission states; mend them or change the keys, then repeat"),
         )
         .into()),
-    }
-}
-
-/// Asks a person, because the robot will move.
-fn consent() -> Result<(), Failure> {
-    if !std::io::stdin().is_terminal() {
-        return Err("the robot will turn on the spot and drive 0.3 m; give --yes to let it".into());
-    }
-    write_stderr(
-        "The robot will turn on the spot and drive 0.3 m there and back. Is the floor free for 1 m around it? [y/N] ",
-    );
-    let mut answer = String::new();
-    std::io::stdin().read_line(&mut answer)?;
-    match answer.trim().to_lowercase().as_str() {
-        "y" | "yes" => Ok(()),
-        _ => Err("nothing was moved".into()),
     }
 }
 

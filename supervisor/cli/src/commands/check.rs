@@ -1,26 +1,24 @@
-use std::path::PathBuf;
-
 use clap::Args;
-use common::mission::Mission;
 use link::failsafe::stop_distance::{self, Stop};
 
 use console::{
     failure::Failure,
-    missions,
     output::{print_text, write_stderr},
 };
 
-/// Check a mission file. An error is reported with its line, its key and the remedy; of a mission without one, the way from each fault to
-/// rest is printed.
+/// Check a mission as `run` does. An error is reported with its line, its key and the remedy; of a mission without one, the way from each
+/// fault to rest is printed.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// A mission file.
-    file: PathBuf,
+    /// A mission file, or a shipped mission (`firsthand missions`).
+    mission: String,
+    /// Set a key of the mission, as often as needed: `--set start.heading_deg=90`.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
 }
 
 pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
-    let mission = missions::complete(Mission::load(&arguments.file)?)?;
-    super::run::refuse_unspoken(&mission)?;
+    let mission = super::run::ready(&arguments.mission, &arguments.set)?;
     for remark in &mission.remarks {
         write_stderr(&format!("firsthand: {remark}\n"));
     }

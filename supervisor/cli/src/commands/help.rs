@@ -105,30 +105,106 @@ fn terminal_width() -> Option<usize> {
     (size.ws_col > 0).then_some(size.ws_col.into())
 }
 
-/// Rows of tables and code stay as they are.
+/// Paragraphs are wrapped, tables are drawn, and code stays as it is.
 fn wrapped(markdown: &str, width: usize) -> String {
-    let mut text = String::new();
+    let mut all = Vec::new();
     let mut is_code = false;
-    for line in markdown.lines() {
-        is_code ^= line.starts_with("```");
-        let mut column = 0;
-        if is_code || line.starts_with('|') {
-            text.push_str(line);
-        } else {
-            for word in line.split_inclusive(' ') {
-                let letters = word.trim_end().chars().count();
-                if column > 0 && column + letters > width {
-                    text.truncate(text.trim_end().len());
-                    text.push('\n');
-                    column = 0;
-                }
-                text.push_str(word);
-                column += word.chars().count();
+    let mut lines = markdown.lines().peekable();
+    while let Some(line) = lines.next() {
+        let is_fence = line.starts_with("```");
+        is_code ^= is_fence;
+        if is_code || is_fence || line.starts_with('#') || line.is_empty() {
+            all.push(line.to_owned());
+        } else if line.starts_with('|') {
+            let mut rows = vec![line];
+            while let Some(row) = lines.next_if(|next| next.starts_with('|')) {
+                rows.push(row);
             }
+            all.extend(drawn(&rows, width));
+        } else {
+            let mut paragraph = line.to_owned();
+            while let Some(more) = lines.next_if(|next| goes_on(next)) {
+                paragraph = paragraph + " " + more.trim_start();
+            }
+            let hang = if line.trim_start().starts_with("- ") { "  " } else { "" };
+            let rest = split(&paragraph, width.saturating_sub(hang.len()).max(1));
+            all.extend(
+                (0..)
+                    .zip(rest)
+                    .map(|(nth, line)| if nth > 0 { hang.to_owned() + &line } else { line }),
+            );
         }
-        text.push('\n');
     }
-    text
+    all.join("\n") + "\n"
+}
+
+/// Whether a line belongs to the paragraph or the item before it.
+fn goes_on(line: &str) -> bool {
+    let line = line.trim_start();
+    !line.is_empty()
+        && !["#", "|", "- ", "```", "<", "!["].iter().any(|start| line.starts_with(start))
+        && !line.split_once(". ").is_some_and(|(number, _)| number.parse::<u32>().is_ok())
+}
+
+/// The words of `text` in lines of at most `width` letters; a longer word has a line of its own.
+fn split(text: &str, width: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    let mut column = 0;
+    for word in text.split_inclusive(' ') {
+        let letters = word.trim_end().chars().count();
+        if column > 0 && column + letters > width {
+            lines.push(String::new());
+            column = 0;
+        }
+        if let Some(line) = lines.last_mut() {
+            line.push_str(word);
+        }
+        column += word.chars().count();
+    }
+    lines.iter().map(|line| line.trim_end().to_owned()).collect()
+}
+
+/// No column becomes narrower, in letters.
+const NARROWEST: usize = 8;
+
+/// The `rows` of a table in columns, which are as narrow as `width` asks for.
+fn drawn(rows: &[&str], width: usize) -> Vec<String> {
+    let cells = |row: &&str| -> Vec<String> {
+        let row = row.trim().trim_matches('|').replace("\\|", "\u{1}");
+        row.split('|').map(|cell| cell.trim().replace('\u{1}', "|")).collect()
+    };
+    // The second row only divides.
+    let rows = rows.iter().enumerate().filter(|(at, _)| *at != 1);
+    let rows: Vec<Vec<String>> = rows.map(|(_, row)| cells(row)).collect();
+    let columns = rows.iter().map(Vec::len).max().unwrap_or_default();
+    let longest =
+        |column: usize| rows.iter().filter_map(|row| Some(row.get(column)?.chars().count())).max();
+    let mut widths: Vec<usize> = (0..columns).filter_map(longest).collect();
+    let most = width.saturating_sub(2 * columns.saturating_sub(1)).max(columns * NARROWEST);
+    while widths.iter().sum::<usize>() > most
+        && let Some(widest) = widths.iter_mut().max()
+    {
+        *widest -= 1;
+    }
+    let line = |cells: &[String]| {
+        let padded = cells.iter().zip(&widths).map(|(cell, &width)| format!("{cell:<width$}"));
+        padded.collect::<Vec<_>>().join("  ").trim_end().to_owned()
+    };
+    let mut drawn = Vec::new();
+    for (nth, row) in rows.iter().enumerate() {
+        let cells = row.iter().zip(&widths).map(|(cell, &width)| split(cell, width));
+        let cells: Vec<Vec<String>> = cells.collect();
+        let height = cells.iter().map(Vec::len).max().unwrap_or_default();
+        for at in 0..height {
+            let parts = cells.iter().map(|cell| cell.get(at).cloned().unwrap_or_default());
+            drawn.push(line(&parts.collect::<Vec<_>>()));
+        }
+        if nth == 0 {
+            let rules: Vec<_> = widths.iter().map(|&width| "─".repeat(width)).collect();
+            drawn.push(line(&rules));
+        }
+    }
+    drawn
 }
 
 fn subcommand<'a>(whole: &'a mut Command, words: &[String]) -> Option<&'a mut Command> {

@@ -11,11 +11,15 @@ use clap::Args;
 use processes::stages;
 use thiserror::Error;
 
-use console::{failure::Failure, output::print_text};
+use console::{
+    consent,
+    failure::{Failure, Refused},
+    output::print_text,
+};
 
 /// Make this executable a service of systemd: units, user, configuration.
 ///
-/// Nothing is enabled or started.
+/// Each file is named before it is written. Nothing is enabled or started.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// Only print every file, each after its path.
@@ -24,6 +28,9 @@ pub(crate) struct Arguments {
     /// Install below DIR instead of /.
     #[arg(long, value_name = "DIR", default_value = "/", conflicts_with = "print")]
     root: PathBuf,
+    /// Write without asking.
+    #[arg(long, conflicts_with = "print")]
+    yes: bool,
 }
 
 struct Part {
@@ -53,6 +60,9 @@ static PARTS: [Part; 7] = [
     part!("etc/firsthand/mission.toml", "mission.toml", true),
 ];
 
+/// Directories that the units hide from their processes (`ProtectHome`).
+const HIDDEN: [&str; 3] = ["/home", "/root", "/run/user"];
+
 const PACKAGED: &str = "/usr/bin/firsthand";
 
 const THEN: &str = "systemd-sysusers && systemctl daemon-reload
@@ -69,19 +79,48 @@ struct InstallError {
 
 pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     let executable = std::env::current_exe()?;
+    if !arguments.print {
+        refuse_hidden(&executable)?;
+    }
+    let mut changed = Vec::new();
     for part in &PARTS {
         let text = part.text_for(&executable);
         let file = arguments.root.join(part.path);
+        let (name, there) = (file.display(), fs::read_to_string(&file).ok());
         if arguments.print {
-            print_text(&format!("# {}\n{text}\n", file.display()))?;
-        } else if part.configuration && file.exists() {
-            print_text(&format!("{} stays as it is\n", file.display()))?;
-        } else {
-            put(&file, &text)?;
-            print_text(&format!("{}\n", file.display()))?;
+            print_text(&format!("# {name}\n{text}\n"))?;
+            continue;
+        }
+        let becomes = match there {
+            Some(there) if part.configuration || there == text => "stays as it is",
+            Some(_) => "will be replaced",
+            None => "is new",
+        };
+        print_text(&format!("{name} {becomes}\n"))?;
+        if becomes != "stays as it is" {
+            changed.push((file, text));
         }
     }
+    if !(changed.is_empty() || arguments.yes) {
+        consent::ask("these files will be written", "Write them?")?;
+    }
+    for (file, text) in &changed {
+        put(file, text)?;
+    }
     Ok(print_text(&format!("# Then:\n{}\n", remaining()))?)
+}
+
+/// Refuses an executable that a service could not start.
+fn refuse_hidden(executable: &Path) -> Result<(), Refused> {
+    if !HIDDEN.iter().any(|hidden| executable.starts_with(hidden)) {
+        return Ok(());
+    }
+    let executable = executable.display();
+    let message = format!(
+        "{executable} lies in a home directory, which a service cannot read; `sudo install {executable} /usr/local/bin/`, then \
+         `sudo /usr/local/bin/firsthand install`"
+    );
+    Err(Refused::new("home-directory", message))
 }
 
 impl Part {
@@ -143,14 +182,24 @@ mod tests {
     }
 
     #[test]
-    fn configuration_that_is_there_is_not_overwritten() {
+    fn an_executable_that_a_service_cannot_read_is_refused_with_the_remedy() {
+        let refused = refuse_hidden(Path::new("/home/you/firsthand/target/release/firsthand"));
+        assert!(refused.unwrap_err().to_string().contains("/usr/local/bin"));
+        assert!(refuse_hidden(Path::new("/usr/bin/firsthand")).is_ok());
+    }
+
+    #[test]
+    fn files_are_written_after_consent_and_configuration_that_is_there_is_not_overwritten() {
         let root = tempfile::tempdir().unwrap();
         let mission = root.path().join("etc/firsthand/mission.toml");
         put(&mission, "target = [1.0, 0.0]").unwrap();
-        let arguments = Arguments { print: false, root: root.path().to_path_buf() };
+        let mut arguments = Arguments { print: false, root: root.path().to_path_buf(), yes: false };
+        let service = root.path().join("etc/systemd/system/firsthand.service");
+        let asks = main(&arguments).unwrap_err().to_string();
+        assert!(asks.contains("--yes") && !service.exists(), "{asks}");
+        arguments.yes = true;
         main(&arguments).unwrap();
         assert_eq!(fs::read_to_string(&mission).unwrap(), "target = [1.0, 0.0]");
-        let service = root.path().join("etc/systemd/system/firsthand.service");
         let service = fs::read_to_string(service).unwrap();
         let executable = std::env::current_exe().unwrap();
         assert!(service.contains(&format!("ExecStart={} run", executable.display())));

@@ -5,6 +5,7 @@ use std::{fs, path::PathBuf, process::ExitCode};
 
 use clap::Args;
 use common::{
+    address::Address,
     clock::Pace,
     domain::RobotName,
     mission::{Mission, Protocol},
@@ -173,8 +174,7 @@ fn starter(arguments: &Arguments) -> Starter {
 fn mission(arguments: &Arguments) -> Result<Mission, Failure> {
     let stay = arguments.stay.then(|| "stay=true".to_owned());
     let set: Vec<_> = arguments.set.iter().cloned().chain(stay).collect();
-    let mut mission = missions::load(&arguments.mission, &set)?;
-    refuse_unspoken(&mission)?;
+    let mut mission = ready(&arguments.mission, &set)?;
     if let Some(seed) = arguments.seed {
         mission.seed = seed;
     }
@@ -184,12 +184,30 @@ fn mission(arguments: &Arguments) -> Result<Mission, Failure> {
         }
         mission.timeout_s = timeout;
     }
+    Ok(mission)
+}
+
+/// The mission `name` with `set`, which can be carried out here: this executable speaks to its robot, and its devices and planner are
+/// there.
+pub(super) fn ready(name: &str, set: &[String]) -> Result<Mission, Failure> {
+    let mut mission = missions::load(name, set)?;
+    refuse_unspoken(&mission)?;
+    let address = mission.robot.address.as_ref().and_then(|text| text.parse().ok());
+    if let Some(Address::<String>::Serial(device)) = &address
+        && !device.exists()
+    {
+        let device = device.display();
+        let message = format!(
+            "robot.address: {device} is not there; plug its adapter in, or name another (`ls -l /dev/serial/by-id`)"
+        );
+        return Err(Refused::new("no-device", message).into());
+    }
     planner_executable::resolve(&mut mission, OTHER_PLANNERS)?;
     Ok(mission)
 }
 
 /// Refuses a robot of ROS 2 if this executable does not speak it.
-pub(super) fn refuse_unspoken(mission: &Mission) -> Result<(), Refused> {
+fn refuse_unspoken(mission: &Mission) -> Result<(), Refused> {
     if mission.robot.protocol() != Protocol::Ros2 || SPEAKS_ROS2 {
         return Ok(());
     }

@@ -1,6 +1,6 @@
 //! The picture and the report of a run.
 
-use std::{fs, path::PathBuf};
+use std::{fs, path::PathBuf, time::SystemTime};
 
 use common::{
     ground_truth::GroundTruthTick, kinematics::Pose2, mission::Mission, samples::PoseSample,
@@ -44,6 +44,9 @@ fn svg(mission: &Mission, finished: &Finished, heard: &Hearer, summary: &Summary
     let mut captions = summary.captions();
     if summary.outcome != Outcome::Reached {
         captions.insert(0, summary.reason.clone());
+    }
+    if let Some(last) = captions.last_mut() {
+        *last += &format!(" · {}", httpdate::fmt_http_date(SystemTime::now()));
     }
     let tried = |target: &&TargetResult| target.outcome != TargetOutcome::NotTried;
     let targets: Vec<_> = finished

@@ -13,7 +13,7 @@ use super::diff;
 use console::{
     failure::Failure,
     output::{json_lines, print_text},
-    runs::{self, Outcome, RunDirectory},
+    runs::{self, Ended, Outcome, RunDirectory, Target},
     table::Table,
     words,
 };
@@ -58,6 +58,7 @@ struct Listed<'a> {
     mission: Option<&'a str>,
     outcome: String,
     mission_time_s: Option<f64>,
+    targets: Vec<Target>,
     /// Since 1970, UTC.
     began_s: f64,
     size_bytes: u64,
@@ -97,10 +98,11 @@ fn list(arguments: &List) -> Result<ExitCode, Failure> {
 }
 
 fn listed(run: &RunDirectory) -> Listed<'_> {
-    let (outcome, mission_time_s) = match run.outcome() {
-        Outcome::Running => ("running".to_owned(), None),
-        Outcome::CutOff => ("cut off".to_owned(), None),
-        Outcome::Ended { outcome, mission_time_s } => (outcome, mission_time_s),
+    let of = |outcome: &str| Ended { outcome: outcome.to_owned(), ..Ended::default() };
+    let Ended { outcome, mission_time_s, targets } = match run.outcome() {
+        Outcome::Running => of("running"),
+        Outcome::CutOff => of("cut off"),
+        Outcome::Ended(ended) => ended,
     };
     let began = run.began.duration_since(UNIX_EPOCH).unwrap_or_default();
     Listed {
@@ -109,24 +111,32 @@ fn listed(run: &RunDirectory) -> Listed<'_> {
         mission: run.mission.as_deref(),
         outcome,
         mission_time_s,
+        targets,
         began_s: began.as_secs_f64(),
         size_bytes: run.size(),
     }
 }
 
 fn table(listed: &[Listed<'_>]) -> String {
-    let mut table = Table::new(["run", "robot", "mission", ">began", "outcome", ">time", ">size"]);
+    let mut table =
+        Table::new(["run", "robot", "mission", ">began", "outcome", ">targets", ">time", ">size"]);
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let mut all = 0;
     for run in listed {
         let began = (now.as_secs_f64() - run.began_s).max(0.0);
         let time = run.mission_time_s.map_or("-".to_owned(), |time_s| format!("{time_s:.1} s"));
+        let reached = run.targets.iter().filter(|it| it.outcome == "reached").count();
+        let targets = match run.targets.len() {
+            0 => "-".to_owned(),
+            all => format!("{reached} of {all}"),
+        };
         table.row([
             &run.run.file_name().unwrap_or_default().to_string_lossy(),
             run.robot,
             &run.mission.unwrap_or("-"),
             &(words::age(Some(began)) + " ago"),
             &run.outcome,
+            &targets,
             &time,
             &words::size(run.size_bytes),
         ]);

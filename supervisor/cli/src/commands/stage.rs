@@ -88,6 +88,11 @@ impl StageProcess {
     }
 }
 
+fn subcommands() -> Vec<String> {
+    let all = Command::augment_subcommands(clap::Command::new("stage"));
+    all.get_subcommands().map(|it| it.get_name().to_owned()).collect()
+}
+
 fn signal(name: &str) -> Result<Signal, String> {
     Ok(match name.strip_prefix("SIG").unwrap_or(name) {
         "KILL" => Signal::KILL,

@@ -53,7 +53,7 @@ struct Status<'a> {
     order: &'static str,
     tick: u64,
     mission_time_s: f64,
-    /// The target; none if it is not published.
+    /// The target; none if the robot waits for one, or none is published.
     target: Option<TargetStatus>,
     /// The link; none if no link publishes.
     link: Option<LinkStatus>,
@@ -69,6 +69,8 @@ struct TargetStatus {
     last: u64,
     x_m: f64,
     y_m: f64,
+    /// How far the robot is from it; none if no pose is published.
+    to_go_m: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -132,8 +134,8 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// The topics of a status. The supervisor publishes the target before its roster.
-static WANTED: [&dyn AnyTopic; 4] =
-    [&topics::ROSTER, &topics::LINK, &topics::POWER, &topics::TARGET];
+static WANTED: [&dyn AnyTopic; 5] =
+    [&topics::ROSTER, &topics::LINK, &topics::POWER, &topics::TARGET, &topics::POSE];
 
 /// Whether `robot` is complete after `waited`. A robot without a link or without batteries is so after a while.
 fn is_complete(robot: &RobotState, waited: Duration) -> bool {
@@ -216,11 +218,12 @@ fn status<'a>(
         order: order(Order::from_byte(header.order), HoldReason::from_byte(header.reason)),
         tick: header.stamp.tick,
         mission_time_s: header.stamp.time().seconds(),
-        target: robot.target.map(|TargetSample { number, last, target, .. }| TargetStatus {
+        target: robot.target().map(|&TargetSample { number, last, target, .. }| TargetStatus {
             number,
             last,
             x_m: target.x_m,
             y_m: target.y_m,
+            to_go_m: robot.to_go_m(),
         }),
         link: robot.link.as_ref().map(link_status),
         power: robot.power.as_ref().map(power_status),
@@ -279,8 +282,9 @@ impl fmt::Display for Status<'_> {
             "robot {}: supervisor {}, {}, {:.1} s into the mission",
             self.robot, self.supervisor_pid, self.order, self.mission_time_s
         )?;
-        if let Some(TargetStatus { number, last, x_m, y_m }) = &self.target {
-            writeln!(f, "target {number} of {last}: ({x_m:.2}, {y_m:.2})")?;
+        if let Some(TargetStatus { number, last, x_m, y_m, to_go_m }) = &self.target {
+            write!(f, "target {number} of {last}: ({x_m:.2}, {y_m:.2})")?;
+            writeln!(f, "{}", to_go_m.map_or(String::new(), |m| format!(", {m:.2} m to go")))?;
         }
         if let Some(link) = &self.link {
             writeln!(f, "{link}")?;

@@ -75,6 +75,7 @@ fn topic_row(topic: &dyn AnyTopic) -> String {
     };
     let logged = match spec.logged {
         Logged::Yes => "",
+        Logged::No => "; not recorded",
         Logged::WithFields => "; recorded with `--fields`",
     };
     item(&format!(

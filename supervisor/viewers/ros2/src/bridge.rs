@@ -224,7 +224,7 @@ impl Bridge {
                 Sample::Target(target) => goals.target(target),
                 Sample::Command(command) => goals.command(command),
                 Sample::Directive(directive) => goals.directive(directive),
-                Sample::Request(request)
+                Sample::Order(request)
                     if RequestKind::from_byte(request.kind) == RequestKind::Stop =>
                 {
                     *stands_for_cancel = stands_for_cancel.map(|stops| stops + 1);

@@ -235,10 +235,8 @@ fn numbers(state: &RobotState) -> Vec<Line<'static>> {
         let place = format!("{:.2}, {:.2} ±{within_m:.2} m, {heading:.0}°", pose.x_m, pose.y_m);
         line("pose", place, plain);
         line("speed", format!("{:.2} m/s, {:.2} rad/s", pose.v_m_s, pose.omega_rad_s), plain);
-        if let Some(command) = state.command {
-            let (left, driven) = (command.distance_m, pose.travelled_m);
-            line("to go", format!("{left:.2} m; driven {driven:.2} m"), plain);
-        }
+        line("to go", state.way_to_go().unwrap_or_default(), plain);
+        line("driven", format!("{:.2} m", pose.travelled_m), plain);
     }
     if let Some(guidance) = state.guidance {
         let limit = guidance.speed_limit_m_s;
@@ -246,8 +244,7 @@ fn numbers(state: &RobotState) -> Vec<Line<'static>> {
             if limit.is_finite() { format!(", at most {limit:.2} m/s") } else { String::new() };
         line("guidance", format!("{}{limit}", guidance_in_words(guidance.status)), plain);
         let (events, full) = (guidance.safety_events, guidance.full_solves);
-        line("map", format!("{events} safety events"), plain);
-        line("solves", format!("{full} full"), plain);
+        line("map", format!("{events} hazards found; {full} solves"), plain);
     }
     if let Some(link) = &state.link {
         let (text, style) = robot_words(link);

@@ -297,10 +297,20 @@ fn the_guide_has_the_three_presets_of_every_key_of_the_simulation_and_its_source
 }
 
 #[test]
-fn a_page_is_wrapped_to_the_terminal_except_its_tables_and_code() {
-    let page = "# Title\n\none two three\n\n| a | table row |\n\n```sh\nfirsthand run trap\n```\n";
-    let expected =
-        "# Title\n\none two\nthree\n\n| a | table row |\n\n```sh\nfirsthand run trap\n```\n";
+fn a_page_is_wrapped_to_the_terminal_its_tables_are_drawn_and_code_stays() {
+    let page =
+        "# Title\n\none two three\nfour\n\n- an item\n  of two\n\n```sh\nfirsthand run trap\n```\n";
+    let expected = "# Title\n\none two\nthree\nfour\n\n- an\n  item of\n  two\n\n```sh\nfirsthand run trap\n```\n";
     assert_eq!(wrapped(page, 9), expected);
-    assert_eq!(wrapped(page, 80), page);
+    let table =
+        "| key | what it is for |\n|---|---|\n| `a` | one two three four |\n| b \\| c | x |\n";
+    let narrow = wrapped(table, 21);
+    assert!(narrow.lines().all(|line| line.chars().count() <= 21), "{narrow}");
+    assert_eq!(wrapped(table, 80).lines().count(), 4);
+    for page in GUIDE {
+        let text = wrapped(page.text, 80);
+        let lines = text.lines().filter(|line| line.contains("───")).count();
+        assert_eq!(lines, page.text.matches("\n|---").count(), "{}", page.file);
+        assert!(!text.contains("\n|"), "{}", page.file);
+    }
 }

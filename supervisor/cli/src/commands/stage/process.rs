@@ -18,7 +18,13 @@ use processes::{
 
 use crate::companions::{self, LABORATORY};
 
-use console::{failure::Failure, operator};
+use console::{
+    failure::{Failure, Refused},
+    operator,
+};
+
+/// Names that are more alike than this are probably meant for each other.
+const NEAR: f64 = 0.8;
 
 pub(super) fn run(words: &[OsString]) -> Result<(), Failure> {
     let (name, options) = words.split_first().ok_or("name a stage")?;
@@ -39,7 +45,13 @@ pub(super) fn run(words: &[OsString]) -> Result<(), Failure> {
         let words = std::iter::once(SUBCOMMAND.into()).chain(words.iter().cloned());
         return Err(companions::become_executable(LABORATORY, words));
     }
-    let stage = operator::known_stage(&name)?;
+    let stage = operator::known_stage(&name).map_err(|unknown| {
+        let known = super::subcommands();
+        let near = known.iter().find(|known| strsim::jaro_winkler(known, &name) > NEAR);
+        let near = near.map_or(String::new(), |near| format!("; did you mean `stage {near}`?"));
+        let message = format!("{unknown}; `stage` has no such subcommand either{near}");
+        Refused::new("unknown-stage", message)
+    })?;
     let start = stage_command::start_with(stage.name, options.iter().cloned())?;
     if let Start::External { robot, .. } = &start {
         become_executable(stage, &external::mission(robot)?, options)?;

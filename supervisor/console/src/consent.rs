@@ -1,0 +1,19 @@
+//! Questions to a person.
+
+use std::io::{self, IsTerminal as _};
+
+use super::{failure::Failure, output::write_stderr};
+
+/// Says what will be done, and asks whether it shall be. Fails if it shall not, or nobody is there to answer.
+pub fn ask(will: &str, question: &str) -> Result<(), Failure> {
+    if !io::stdin().is_terminal() {
+        return Err(format!("{will}; give --yes to agree").into());
+    }
+    write_stderr(&format!("{will}. {question} [y/N] "));
+    let mut answer = String::new();
+    io::stdin().read_line(&mut answer)?;
+    match answer.trim().to_lowercase().as_str() {
+        "y" | "yes" => Ok(()),
+        _ => Err("nothing was done".into()),
+    }
+}
