@@ -99,7 +99,7 @@ fn every_order_that_was_answered_is_recorded_with_its_answer_though_its_process_
 
 #[test]
 fn the_log_time_of_a_run_in_lockstep_is_mission_time() {
-    let (_, summary, directory) = Run::start("rec-times", "open-room", &[]).finish_in();
+    let (summary, directory) = Run::start("rec-times", "open-room", &[]).arrives_in();
     let recording = open(directory.path());
     let mission_s = summary["mission_time_s"].as_f64().unwrap();
     let pose = recording.samples(&topics::POSE).unwrap().map(Result::unwrap);
