@@ -5,7 +5,7 @@ use std::{path::Path, time::Duration};
 use common::{
     bus::{Bus, decode_sample},
     geometry::wrap_angle,
-    samples::{CommandSample, CommandState, PoseSample},
+    samples::{CommandSample, CommandState, PoseSample, RequestKind, RequestSample, TargetPoint},
     topics,
     waiter::Waiter,
 };
@@ -235,4 +235,154 @@ fn a_run_that_stays_waits_before_between_and_after_its_targets_and_none_ends_it(
     assert_eq!(outcomes(&summary), ["reached", "reached", "unreachable", "reached"], "{summary}");
     assert_eq!(code, Some(0), "{summary}");
     support::assert_nothing_left("goto-stay");
+}
+
+#[test]
+fn a_standing_robot_is_told_where_it_is_goes_on_from_there_and_replays_to_the_bit() {
+    let robot = "goto-place";
+    let directory = tempfile::tempdir().unwrap();
+    let mission = directory.path().join("placed.toml");
+    let text = "start = [-2, 0.5, 90]\nperimeter.width_m = 8.0\nsimulation.realism = 'laboratory'\n\
+                [[world.drum]]\nat = [-2.0, 1.6]\nradius_m = 0.2";
+    std::fs::write(&mission, text).unwrap();
+    let mut run = Run::start(robot, mission.to_str().unwrap(), &["--stay", "--pace", "2"]);
+    let is_at = |status: &Value, x: f64, y: f64| {
+        let at =
+            |key: &str, is: f64| (status["pose"][key].as_f64().unwrap_or(99.0) - is).abs() < 0.2;
+        status["order"] == "waiting for a target" && at("x_m", x) && at("y_m", y)
+    };
+    run.wait_until("it waits at its start", |status| is_at(status, -2.0, 0.5));
+    let place = |numbers: [&'static str; 3]| [&["place", "--robot", robot], &numbers[..]].concat();
+    refused(&place(["9", "0", "0"]), "target-outside", &["perimeter"]);
+    // It stands there, and is believed one metre farther.
+    operate(robot, &["place", "-1", "0.5", "90", "--sigma", "0.1"]);
+    run.wait_until("it believes so", |status| is_at(status, -1.0, 0.5));
+    let stalls = run.records("stalls.jsonl");
+    assert_eq!(stalls.len(), 1, "{stalls:?}");
+    assert_eq!(
+        (&stalls[0]["cause"], &stalls[0]["recovery"]),
+        (&"relocated".into(), &"reset".into())
+    );
+    operate(robot, &["goto", "1.0", "0.5"]);
+    run.wait_until("it drives", |status| status["order"] == "driving");
+    refused(&place(["0", "0", "0"]), "robot-moves", &["stop"]);
+    run.wait_until("it is there", |status| is_at(status, 1.0, 0.5));
+    operate(robot, &["place", "0", "0.5", "0"]);
+    operate(robot, &["return"]);
+    run.wait_until("it is back", |status| is_at(status, -2.0, 0.5));
+    run.signal(Signal::INT);
+    let (_, summary, directory) = run.finish_in();
+    assert_eq!(outcomes(&summary), ["wrong_place", "reached"], "{summary}");
+    let off_m = summary["targets"][0]["truth_m"].as_f64().unwrap();
+    assert!((off_m - 1.0).abs() < 0.3, "{summary}");
+    assert_replays(&directory.path().join("run"));
+    support::assert_nothing_left(robot);
+}
+
+#[test]
+fn zones_that_an_operator_adds_and_removes_hold_for_the_robot_alone_and_replay_to_the_bit() {
+    let robot = "goto-zones";
+    let directory = tempfile::tempdir().unwrap();
+    let mission = directory.path().join("zones.toml");
+    let text = "perimeter.width_m = 8.0\nsimulation.realism = 'laboratory'\n\
+                [[zone]]\npoints = [[1.0, -3.9], [1.4, -3.9], [1.4, 1.5], [1.0, 1.5]]";
+    std::fs::write(&mission, text).unwrap();
+    let mut run = Run::start(robot, mission.to_str().unwrap(), &["--stay", "--pace", "4"]);
+    let waits = |status: &Value| status["order"] == "waiting for a target";
+    let zone = |words: &[&'static str], code: &str| {
+        refused(&[&["zone", "--robot", robot], words].concat(), code, &[]);
+    };
+    run.wait_until("it waits", waits);
+    refused(&["goto", "--robot", robot, "1.2", "0"], "target-in-hazard", &["hazard"]);
+    zone(&["-1", "-1", "1", "-1", "1", "1", "-1", "1"], "zone-here");
+    zone(&["2", "2", "3", "3"], "no-zone");
+    zone(&["3", "3", "--remove"], "not-in-zone");
+    // The way leads around the zone.
+    operate(robot, &["goto", "2.2", "0"]);
+    run.wait_until("it drives", |status| status["order"] == "driving");
+    run.wait_until("it is there", waits);
+    // The zone moves to the other side; where it was the ground is free.
+    operate(robot, &["zone", "1", "-1", "1.4", "-1", "1.4", "3.9", "1", "3.9"]);
+    operate(robot, &["zone", "1.2", "-2", "--remove"]);
+    refused(&["goto", "--robot", robot, "1.2", "2"], "target-in-hazard", &["hazard"]);
+    operate(robot, &["goto", "1.2", "-2", "0", "0"]);
+    run.kill_and_await_successor("mapper", Signal::KILL);
+    run.wait_until("it is back", waits);
+    refused(&["goto", "--robot", robot, "1.2", "2"], "target-in-hazard", &["hazard"]);
+    run.signal(Signal::INT);
+    let (code, summary, directory) = run.finish_in();
+    assert_eq!(code, Some(0), "{summary}");
+    assert_eq!(outcomes(&summary), ["reached"; 3], "{summary}");
+    assert_replays(&directory.path().join("run"));
+    for file in std::fs::read_dir(directory.path().join("run")).unwrap() {
+        let file = file.unwrap().path();
+        if file.extension().is_some_and(|extension| extension == "mcap") {
+            for pose in Recording::open(&file).unwrap().samples(&topics::POSE).unwrap() {
+                let PoseSample { stamp, x_m, y_m, .. } = pose.unwrap().sample;
+                let [first, second] = [y_m < 1.5, y_m > -1.0];
+                let is_in = (1.0..1.4).contains(&x_m) && first && second;
+                assert!(!is_in, "tick {} at ({x_m}, {y_m})", stamp.tick);
+            }
+        }
+    }
+    support::assert_nothing_left(robot);
+}
+
+/// Requests of a hand that pushes the stick `[ahead, left]`, ten a second, until `is_enough` returns true.
+fn push(robot: &str, stick: [f64; 2], mut is_enough: impl FnMut() -> bool) {
+    let bus = Bus::join(&support::domain(robot), "hand").unwrap();
+    let mut requests = bus.writer(&topics::REQUESTS, 1).unwrap();
+    let began = std::time::Instant::now();
+    for id in 1.. {
+        let mut request = RequestSample {
+            id,
+            kind: RequestKind::Hand.into(),
+            target_count: 1,
+            ..RequestSample::default()
+        };
+        request.targets[0] = TargetPoint { x_m: stick[0], y_m: stick[1], ..TargetPoint::default() };
+        requests.publish(0, Default::default(), request).unwrap();
+        if is_enough() {
+            return;
+        }
+        assert!(began.elapsed() < support::PATIENCE, "the hand waits in vain");
+        std::thread::sleep(Duration::from_millis(100));
+    }
+}
+
+#[test]
+fn a_hand_drives_a_robot_that_stays_past_no_hazard_and_it_stands_when_the_hand_goes() {
+    let robot = "goto-hand";
+    let directory = tempfile::tempdir().unwrap();
+    let mission = directory.path().join("hand.toml");
+    let text = "perimeter.width_m = 8.0\nsimulation.realism = 'laboratory'\n\
+                [[world.wall]]\npoints = [[1.5, -3.0], [1.5, 3.0]]";
+    std::fs::write(&mission, text).unwrap();
+    let mut run = Run::start(robot, mission.to_str().unwrap(), &["--stay", "--pace", "1"]);
+    let waits = |status: &Value| status["order"] == "waiting for a target";
+    let at = |status: &Value, key: &str| status["pose"][key].as_f64().unwrap_or(f64::NAN);
+    let status = || support::status_of(robot).unwrap();
+    run.wait_until("it waits", waits);
+    push(robot, [0.0, 1.0], || at(&status(), "heading_deg") > 60.0);
+    run.wait_until("it stands without the hand", |status| {
+        waits(status) && status["link"]["at_rest"] == true
+    });
+    push(robot, [0.0, -1.0], || at(&status(), "heading_deg").abs() < 20.0);
+    // The hand would drive it into the wall, and does not.
+    let began = std::time::Instant::now();
+    push(robot, [1.0, 0.0], || {
+        at(&status(), "x_m") > 0.5 && began.elapsed() > Duration::from_secs(8)
+    });
+    let status = run.wait_until("it waits again", waits);
+    assert!((0.5..1.3).contains(&at(&status, "x_m")), "{status}");
+    operate(robot, &["goto", "0", "0"]);
+    run.wait_until("it drives", |status| status["order"] == "driving");
+    run.wait_until("it is back", waits);
+    run.signal(Signal::INT);
+    let (code, summary, directory) = run.finish_in();
+    assert_eq!(code, Some(0), "{summary}");
+    assert_eq!(outcomes(&summary), ["reached"], "{summary}");
+    assert_eq!(summary["collisions"], 0, "{summary}");
+    assert_replays(&directory.path().join("run"));
+    support::assert_nothing_left(robot);
 }

@@ -248,44 +248,6 @@ fn a_checkpoint_of_another_version_is_refused_by_name_and_not_taken_for_none() {
 }
 
 #[test]
-fn a_run_is_not_resumed_after_the_machine_was_suspended_for_hours() {
-    // The clock went on for two hours while CLOCK_MONOTONIC stood, as over a suspension.
-    let suspended = [
-        "unshare",
-        "--user",
-        "--map-current-user",
-        "--time",
-        "--boottime",
-        "7200",
-        "--kill-child",
-        "--",
-    ];
-    if !support::can_run(&suspended) {
-        let test = "a_run_is_not_resumed_after_the_machine_was_suspended_for_hours";
-        return support::not_run(test, "no namespace of clocks can be had here");
-    }
-    let robot = "mach-susp";
-    let runs = directory_of(robot);
-    let run = |wrapper: &[&str]| {
-        // The timeout ends a run that continues by mistake.
-        let timed = ["--pace", "1", "--timeout", "20", "--resume-last", "--runs"];
-        let mission = ["run", "open-room", "--robot", robot];
-        let mut command = firsthand_under(wrapper, &[&mission[..], &timed].concat());
-        command.arg(runs.path());
-        command
-    };
-    let mut first = start_quietly(&mut run(&[]));
-    support::wait_for_status(robot, |status| status["order"] == "driving");
-    first.kill().unwrap();
-    first.wait().unwrap();
-    let late = run(&suspended).status().unwrap();
-    assert_eq!(late.code(), Some(7));
-    support::wait_until_all_ended(robot);
-    // The next run removes the files of the killed one.
-    Run::start(robot, "open-room", &[]).arrives();
-}
-
-#[test]
 fn another_robots_run_is_not_gone_on_with() {
     let runs = directory_of("mach-mine");
     let run = |robot: &str| {

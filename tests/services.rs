@@ -345,27 +345,32 @@ fn a_stage_without_a_place_is_refused_with_the_remedy() {
     drop(units);
 }
 
-/// A service with `--resume-last`, killed when its robot drives. Returns the command that starts it again, too.
-fn killed_service(robot: &'static str) -> (TempDir, impl Fn() -> Command) {
+/// The command that starts a service with `--resume-last`, each time in the same directory of runs.
+fn service(robot: &'static str, more: &'static [&'static str]) -> (TempDir, impl Fn() -> Command) {
     let directory = support::directory_of(robot);
     let runs = directory.path().to_path_buf();
     let service = move || {
         let mut command = firsthand(&["run", "open-room", "--robot", robot, "--json"]);
-        command.arg("--resume-last").arg("--runs").arg(&runs);
+        command.args(more).arg("--resume-last").arg("--runs").arg(&runs);
         command
     };
-    let mut cut = support::start_quietly(service().args(["--pace", "1"]));
+    (directory, service)
+}
+
+/// Let a service drive, and kill it.
+fn kill_while_it_drives(robot: &str, service: &mut Command) {
+    let mut cut = support::start_quietly(service.args(["--pace", "1"]));
     support::wait_for_status(robot, |status| {
         status["order"] == "driving" && status["mission_time_s"].as_f64().unwrap() > 0.5
     });
     signal_process(cut.id(), Signal::KILL);
     cut.wait().unwrap();
-    (directory, service)
 }
 
 #[test]
-fn a_service_goes_on_with_the_mission_of_a_supervisor_that_was_killed_just_now() {
-    let (_runs, service) = killed_service("goes-on");
+fn a_service_whose_mission_says_so_goes_on_by_itself_after_it_was_killed() {
+    let (_runs, service) = service("goes-on", &["--set", "resume='automatic'"]);
+    kill_while_it_drives("goes-on", &mut service());
     let (exit, summary) = support::json_of(&service().output().unwrap());
     assert_reached(exit.code(), &summary[0]);
     assert_eq!(summary[0]["resumes"], 1, "{summary:?}");
@@ -373,12 +378,46 @@ fn a_service_goes_on_with_the_mission_of_a_supervisor_that_was_killed_just_now()
 }
 
 #[test]
-fn a_service_does_not_begin_a_mission_anew_that_was_cut_off_long_ago_until_told_again() {
-    let (runs, service) = killed_service("cut");
-    // After a start of the machine, nothing indicates that the save was a moment ago.
-    let run = std::fs::read_dir(runs.path()).unwrap().next().unwrap();
-    std::fs::remove_file(run.unwrap().path().join("supervisor.checkpoint")).unwrap();
-    assert_eq!(service().output().unwrap().status.code(), Some(7));
-    assert_eq!(service().output().unwrap().status.code(), Some(0));
+fn a_service_that_was_cut_off_comes_up_stands_says_where_it_is_and_goes_on_when_told() {
+    let (_runs, service) = service("cut", &[]);
+    kill_while_it_drives("cut", &mut service());
+    let again = service().stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let stands = |status: &serde_json::Value| status["order"] == "stopped by an operator";
+    support::wait_for_status("cut", stands);
+    support::operate("cut", &["resume"]);
+    let again = again.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&again.stderr);
+    assert!(
+        said.contains("believes it is where it stood") && said.contains("firsthand resume"),
+        "{said}"
+    );
+    let (exit, summary) = support::json_of(&again);
+    assert_reached(exit.code(), &summary[0]);
+    assert_eq!(summary[0]["resumes"], 1, "{summary:?}");
     assert_nothing_left("cut");
+}
+
+#[test]
+fn a_service_that_stays_begins_where_it_stood_when_it_was_stopped_and_waits() {
+    const STAYS: [&str; 6] = ["--stay", "--pace", "2", "--set", "perimeter.width_m=8.0", "--set"];
+    let (_runs, service) = service(
+        "begins",
+        &[STAYS[0], STAYS[1], STAYS[2], STAYS[3], STAYS[4], STAYS[5], "target=[0.9, 0.3]"],
+    );
+    let mut first = support::start_quietly(&mut service());
+    let waits = |status: &serde_json::Value| status["order"] == "waiting for a target";
+    support::wait_for_status("begins", waits);
+    signal_process(first.id(), Signal::TERM);
+    first.wait().unwrap();
+    // Its mission has a target, so it stands.
+    let mut again = support::start_quietly(&mut service());
+    let status = support::wait_for_status("begins", |status| {
+        status["order"] == "stopped by an operator" && status["pose"]["x_m"].is_f64()
+    });
+    let at = |key: &str| status["pose"][key].as_f64().unwrap();
+    assert!((at("x_m") - 0.9).hypot(at("y_m") - 0.3) < 0.25, "{status}");
+    assert!(at("within_m") > 0.0, "{status}");
+    signal_process(again.id(), Signal::TERM);
+    again.wait().unwrap();
+    assert_nothing_left("begins");
 }

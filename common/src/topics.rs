@@ -7,7 +7,7 @@
 use std::time::Duration;
 
 use crate::{
-    mission::{MOST_BEAMS, MOST_SENSORS},
+    mission::{MOST_BEAMS, MOST_CORNERS, MOST_SENSORS, MOST_ZONES},
     samples::*,
 };
 
@@ -73,6 +73,10 @@ topics! {
     TARGET: Topic<TargetSample> {
         name: "target", writer: SUPERVISOR, rate: on_change(RESTATE),
     }
+    /// The keep-out zones, if operators changed those of the mission.
+    ZONES: Topic<ZonesHeader, ZoneCorner> {
+        name: "zones", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::slices(MOST_ZONES * MOST_CORNERS),
+    }
     /// Readings of the sonars and infrared rangers, one for each row of the mission's sensors.
     RANGES: Topic<RangesHeader, RangeReading> {
         name: "ranges", writer: "link", rate: Rate::EachTick, limits: Limits::slices(MOST_SENSORS),
@@ -104,6 +108,10 @@ topics! {
     /// Where the robot is by the scans of its laser.
     SCAN_FIX: Topic<FixSample> {
         name: "scan_fix", writer: "mapper", rate: Rate::WhenItHappens,
+    }
+    /// Where an operator says that the standing robot is.
+    PLACE: Topic<PlaceSample> {
+        name: "place", writer: SUPERVISOR, rate: on_change(RESTATE),
     }
     /// How far a gyro turned. Any consumer may publish it, one at a time.
     TURN: Topic<TurnSample> {
@@ -173,7 +181,7 @@ topics! {
     STALLS: Topic<StallSample> {
         name: "stalls", writer: SUPERVISOR, rate: Rate::WhenItHappens,
     }
-    /// Requests of an operator: restart, stop, resume, targets.
+    /// Requests of an operator: restart, stop, resume, targets, the place, zones.
     REQUESTS: Topic<RequestSample> {
         name: "requests", writer: OPERATOR, rate: Rate::WhenItHappens, logged: No,
     }

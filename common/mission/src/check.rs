@@ -21,9 +21,13 @@ use toml::de::{DeTable, DeValue};
 
 use self::objection::{Objection, all_within, refuse_if, within};
 use super::{
-    Hurry, MOST_TARGETS, Method, Mission, Perimeter, Sensors, Waypoint, error::MissionError,
+    Hurry, MOST_CORNERS, MOST_TARGETS, MOST_ZONES, Method, Mission, Perimeter, Sensors, Waypoint,
+    error::MissionError,
 };
-use crate::grid::{GridFrame, MAX_CELLS, MIN_CELLS};
+use crate::{
+    geometry::Zone,
+    grid::{MAX_CELLS, MIN_CELLS},
+};
 
 /// A mission is a page or two; a file without end is no mission.
 const MAX_BYTES: u64 = 8 << 20;
@@ -68,7 +72,7 @@ impl Mission {
             mission.target = match mission.targets.first() {
                 Some(first) => first.at,
                 // The robot stands at its target.
-                None if mission.stay => DVec2::ZERO,
+                None if mission.stay => mission.start.at,
                 None => return Err(unreadable(origin, 1, "missing field `target`")),
             };
         }
@@ -199,7 +203,7 @@ impl Checker {
         target(mission)?;
         all_within([
             ("timeout_s", mission.timeout_s, 1.0..=MAX_TIMEOUT_S, "s"),
-            ("start.heading_deg", mission.start.heading_deg, -360.0..=360.0, "degrees"),
+            ("start", mission.start.heading_deg, -360.0..=360.0, "degrees of heading"),
         ])?;
         robot::check(mission)?;
         sensor::check(mission)?;
@@ -208,6 +212,7 @@ impl Checker {
         arduino::check(mission)?;
         stages(mission)?;
         self.shapes("known", &mission.known)?;
+        zones(mission)?;
         self.shapes("world", &mission.world)?;
         self.simulation(&mission.simulation)?;
         start_is_free(mission)
@@ -226,16 +231,14 @@ fn perimeter(mission: &Mission) -> Result<(), Objection> {
         format!("give {MIN_CELLS} to {MAX_CELLS}"),
     )?;
     point("perimeter.centre", perimeter.centre)?;
+    let start = mission.start.at;
+    point("start", start)?;
     refuse_if(
-        !is_inside(frame, DVec2::ZERO),
+        !mission.contains(start),
         "perimeter.centre",
-        "the robot's start (0, 0) is not inside the perimeter",
+        format!("the robot's start {start} is not inside the perimeter"),
         "move the centre or widen perimeter.width_m",
     )
-}
-
-fn is_inside(frame: GridFrame, point: DVec2) -> bool {
-    frame.cell_at(point).is_some_and(|cell| !frame.is_rim(cell))
 }
 
 fn target(mission: &Mission) -> Result<(), Objection> {
@@ -244,7 +247,7 @@ fn target(mission: &Mission) -> Result<(), Objection> {
     for Waypoint { at, heading_deg } in mission.waypoints() {
         point(key, at)?;
         refuse_if(
-            !is_inside(mission.grid_frame(), at),
+            !mission.contains(at),
             key,
             format!("{at} is not inside the perimeter of {width_m} m around {centre}"),
             "move the target in, or widen perimeter.width_m",
@@ -292,7 +295,14 @@ fn stages(mission: &Mission) -> Result<(), Objection> {
         ("mapper.map_within_m", mission.map_within_m(), 0.04..=2.54, "m"),
         ("mapper.margin_m", mapper.margin_m, 0.0..=most_margin_m, "m"),
         ("mapper.clearance_m", mapper.clearance_m, 0.0..=1.0, "m"),
+        ("mapper.forget_after_s", mapper.forget_after_s.unwrap_or(1e3), 10.0..=1e7, "s"),
     ])?;
+    refuse_if(
+        mapper.forget_after_s.is_some() && mission.method == Method::Paper,
+        "mapper.forget_after_s",
+        "the paper's map only grows",
+        "leave the key out, or give method = \"evidential\"",
+    )?;
     refuse_if(
         planner.executable.as_ref().is_some_and(|executable| executable.as_os_str().is_empty()),
         "planner.executable",
@@ -310,19 +320,45 @@ fn stages(mission: &Mission) -> Result<(), Objection> {
     ])
 }
 
+fn zones(mission: &Mission) -> Result<(), Objection> {
+    let zones = &mission.zones;
+    let problem = format!("{} zones are too many", zones.len());
+    refuse_if(zones.len() > MOST_ZONES, "zone", problem, format!("give {MOST_ZONES} at most"))?;
+    for Zone { points } in zones {
+        let count = points.len();
+        refuse_if(
+            !(3..=MOST_CORNERS).contains(&count),
+            "zone",
+            format!("a zone has {count} corners"),
+            format!("give 3 to {MOST_CORNERS}"),
+        )?;
+        points.iter().try_for_each(|corner| point("zone", *corner))?;
+    }
+    Ok(())
+}
+
 /// A robot that starts inside a hazard has already collided.
 fn start_is_free(mission: &Mission) -> Result<(), Objection> {
     let radius = mission.body().radius_m;
+    let start = mission.start.at;
     for (key, shapes) in [("world", &mission.obstacles()), ("known", &mission.known)] {
-        let clearance = shapes.clearance(DVec2::ZERO);
+        let clearance = shapes.clearance(start);
         let problem = format!(
             "something stands {clearance:.2} m from the start, and the robot's radius is {radius} m"
         );
-        refuse_if(clearance <= radius, key, problem, "move it away from (0, 0)")?;
+        refuse_if(clearance <= radius, key, problem, format!("move it away from {start}"))?;
         for Waypoint { at, .. } in mission.waypoints() {
             let which = if mission.targets.is_empty() { String::new() } else { format!(" {at}") };
             let problem = format!("the target{which} lies inside a shape");
             refuse_if(shapes.clearance(at) <= 0.0, key, problem, "move one of them")?;
+        }
+    }
+    for zone in &mission.zones {
+        let problem = "the robot starts in a zone, or reaches into it";
+        refuse_if(zone.clearance(start) <= radius, "zone", problem, "move one of them")?;
+        for Waypoint { at, .. } in mission.waypoints() {
+            let problem = format!("the target {at} lies inside a zone");
+            refuse_if(zone.clearance(at) <= 0.0, "zone", problem, "move one of them")?;
         }
     }
     Ok(())

@@ -1,6 +1,6 @@
 //! The shapes of a world and of what is known of it beforehand.
 //!
-//! Metres, in the mission frame (origin where the robot starts).
+//! Metres, in the mission frame.
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -119,6 +119,29 @@ impl Box2 {
     }
 }
 
+/// A keep-out zone: a polygon.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Zone {
+    pub points: Vec<DVec2>,
+}
+
+impl Zone {
+    /// Distance to its edge, metres; negative inside.
+    pub fn clearance(&self, point: DVec2) -> f64 {
+        let next = self.points.iter().cycle().skip(1);
+        let (mut nearest, mut is_inside) = (f64::INFINITY, false);
+        for (&from, &to) in self.points.iter().zip(next) {
+            nearest = nearest.min(distance_to_segment(point, from, to));
+            let way = to - from;
+            let crosses = (from.y > point.y) != (to.y > point.y)
+                && point.x < from.x + way.x * (point.y - from.y) / way.y;
+            is_inside ^= crosses;
+        }
+        if is_inside { -nearest } else { nearest }
+    }
+}
+
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Shapes {
@@ -169,6 +192,7 @@ pub enum Piece<'a> {
     Drum(&'a Drum),
     Edge(DVec2, DVec2),
     Box(&'a Box2),
+    Zone(&'a Zone),
 }
 
 impl Piece<'_> {
@@ -182,6 +206,7 @@ impl Piece<'_> {
                 let local = axis.rotate(point - block.at).abs() - block.size_m / 2.0;
                 local.max(DVec2::ZERO).length() + local.max_element().min(0.0)
             }
+            Self::Zone(zone) => zone.clearance(point),
         }
     }
 
@@ -193,15 +218,17 @@ impl Piece<'_> {
                 (drum.at - reach, drum.at + reach)
             }
             Self::Edge(from, to) => (from.min(*to), from.max(*to)),
-            Self::Box(block) => {
-                let [first, rest @ ..] = block.corners();
-                let wider = |(least, greatest): (DVec2, DVec2), corner| {
-                    (least.min(corner), greatest.max(corner))
-                };
-                rest.into_iter().fold((first, first), wider)
-            }
+            Self::Box(block) => bounds(&block.corners()),
+            Self::Zone(zone) => bounds(&zone.points),
         }
     }
+}
+
+fn bounds(corners: &[DVec2]) -> (DVec2, DVec2) {
+    let nothing = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    let wider =
+        |(least, most): (DVec2, DVec2), corner: &DVec2| (least.min(*corner), most.max(*corner));
+    corners.iter().fold(nothing, wider)
 }
 
 pub fn distance_to_segment(point: DVec2, from: DVec2, to: DVec2) -> f64 {
@@ -258,6 +285,21 @@ mod tests {
         assert!((above - 0.5).abs() < 1e-12, "the turned box is 2 m tall: {above}");
         let inside = shapes.clearance(DVec2::new(0.0, 4.0));
         assert!((inside + 0.5).abs() < 1e-12, "inside the box: {inside}");
+    }
+
+    #[test]
+    fn the_clearance_of_a_zone_is_negative_inside_of_any_polygon() {
+        let points = [(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (2.0, 1.0), (0.0, 4.0)];
+        let mut zone = Zone { points: points.map(DVec2::from).to_vec() };
+        for _ in 0..2 {
+            assert_eq!(zone.clearance(DVec2::new(1.0, 0.5)), -0.5, "inside");
+            assert_eq!(zone.clearance(DVec2::new(-2.0, 1.0)), 2.0, "beside");
+            assert!(zone.clearance(DVec2::new(2.0, 3.0)) > 0.5, "in the notch");
+            assert!(zone.clearance(DVec2::new(3.8, 3.5)) < 0.0, "in a horn");
+            zone.points.reverse();
+        }
+        let (least, greatest) = Piece::Zone(&zone).bounds();
+        assert_eq!((least, greatest), (DVec2::ZERO, DVec2::splat(4.0)));
     }
 
     #[test]

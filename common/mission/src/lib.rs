@@ -1,8 +1,8 @@
 //! The mission file: everything that a run depends on, validated before anything starts.
 //!
 //! Metres, seconds, radians inside; degrees where a person writes them (`_deg`). All positions are in
-//! the mission frame: its origin is where the robot starts and, unless `start.heading_deg` says
-//! otherwise, its x-axis is the robot's own.
+//! the mission frame: unless `start` says otherwise, its origin is where the robot starts, and its x-axis
+//! is the robot's own.
 //!
 //! | module | holds |
 //! |---|---|
@@ -75,7 +75,7 @@ pub use simulation::{
 pub use touch::{MOST_TOUCHES, TouchKind, TouchRow};
 
 use crate::{
-    geometry::Shapes,
+    geometry::{Shapes, Zone},
     grid::{GridFrame, MIN_CELLS},
     kinematics::Pose2,
 };
@@ -106,6 +106,8 @@ keys! {
         /// The run goes on when a target is reached or given up: the robot stands and waits for the next one. Without a target it waits
         /// from its start on.
         stay: bool,
+        /// Whether a service drives on by itself after it was cut off; see `firsthand run --resume-last`.
+        resume: Resume,
         /// The seed of everything random in the simulation.
         seed: u64 = 1,
         start: Start,
@@ -124,6 +126,9 @@ keys! {
         /// Hazards that the map holds before the robot starts.
         #[serde(skip_serializing_if = "Shapes::is_empty")]
         known: Shapes,
+        /// Where the body may not go: hazards of the field, of which the simulator knows nothing.
+        #[serde(rename = "zone", skip_serializing_if = "Vec::is_empty")]
+        zones: Vec<Zone>,
         /// Shapes that really exist; only the simulator reads them.
         #[serde(skip_serializing_if = "Shapes::is_empty")]
         world: Shapes,
@@ -135,6 +140,9 @@ keys! {
 }
 
 pub const MOST_TARGETS: usize = 16;
+pub const MOST_ZONES: usize = 16;
+/// The most corners of a zone.
+pub const MOST_CORNERS: usize = MOST_TARGETS;
 
 /// `[x, y]`, or `[x, y, heading]`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -152,7 +160,7 @@ impl TryFrom<Vec<f64>> for Waypoint {
         match numbers[..] {
             [x, y] => Ok(Self { at: DVec2::new(x, y), heading_deg: None }),
             [x, y, heading] => Ok(Self { at: DVec2::new(x, y), heading_deg: Some(heading) }),
-            _ => Err("a target of a list is [x, y], or [x, y, heading in degrees]"),
+            _ => Err("a place is [x, y], or [x, y, heading in degrees]"),
         }
     }
 }
@@ -175,11 +183,58 @@ pub enum Method {
     Paper,
 }
 
+/// Written as a [`Waypoint`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(from = "StartKeys", into = "Waypoint")]
+pub struct Start {
+    pub at: DVec2,
+    /// Counter-clockwise from x of the mission frame.
+    pub heading_deg: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(
+    untagged,
+    expecting = "start is [x, y], [x, y, heading in degrees] or { heading_deg = degrees }"
+)]
+enum StartKeys {
+    Place(Waypoint),
+    Heading(StartHeading),
+}
+
 keys! {
-    Start {
-        /// Counter-clockwise from x of the mission frame.
+    StartHeading {
         heading_deg: f64,
     }
+}
+
+impl From<StartKeys> for Start {
+    fn from(keys: StartKeys) -> Self {
+        match keys {
+            StartKeys::Place(Waypoint { at, heading_deg }) => {
+                Self { at, heading_deg: heading_deg.unwrap_or_default() }
+            }
+            StartKeys::Heading(StartHeading { heading_deg }) => {
+                Self { at: DVec2::ZERO, heading_deg }
+            }
+        }
+    }
+}
+
+impl From<Start> for Waypoint {
+    fn from(Start { at, heading_deg }: Start) -> Self {
+        Self { at, heading_deg: Some(heading_deg) }
+    }
+}
+
+/// After a supervisor's death, a power cut or a reboot.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Resume {
+    /// The robot stands until an operator says resume.
+    #[default]
+    Manual,
+    Automatic,
 }
 
 keys! {
@@ -227,6 +282,8 @@ keys! {
         clearance_m: f64 = 0.03,
         /// Hits farther than this are no safety event yet; by default [`Mission::map_within_m`].
         map_within_m: Option<f64>,
+        /// Evidential: evidence falls evenly with time, and the strongest is gone after this; none for never.
+        forget_after_s: Option<f64>,
     }
 }
 
@@ -299,6 +356,12 @@ impl Mission {
             cells.clamp(f64::from(MIN_CELLS), Perimeter::DEFAULT_MOST_CELLS) as u32
         });
         GridFrame { cells, resolution_m: width_m / f64::from(cells), centre }
+    }
+
+    /// Whether a place is inside the perimeter, and not on its rim.
+    pub fn contains(&self, place: DVec2) -> bool {
+        let frame = self.grid_frame();
+        frame.cell_at(place).is_some_and(|cell| !frame.is_rim(cell))
     }
 
     /// Im of (19): the least number of cells around a hit's own that covers the margin.
@@ -500,7 +563,12 @@ impl Mission {
     }
 
     pub fn start_pose(&self) -> Pose2 {
-        Pose2 { position: DVec2::ZERO, heading: self.start.heading_deg.to_radians() }
+        Pose2 { position: self.start.at, heading: self.start.heading_deg.to_radians() }
+    }
+
+    /// From the start to the first target, metres.
+    pub fn straight_m(&self) -> f64 {
+        self.target.distance(self.start.at)
     }
 
     /// Shapes of the world that the body can touch; the others are above or below it.

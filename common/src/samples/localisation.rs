@@ -25,6 +25,21 @@ payloads! {
         shared: [f64; 2],
     }
 
+    /// Where an operator says that the standing robot is: the pose becomes this.
+    #[derive(Serialize, Deserialize)]
+    "firsthand.Place" PlaceSample {
+        /// Counted from 1 in the run.
+        number: u64,
+        /// Metres in the mission frame.
+        x_m: f64,
+        y_m: f64,
+        /// Radians counter-clockwise from x.
+        heading_rad: f64,
+        /// Standard deviations of x as of y, and of the heading.
+        sigma_m: f64,
+        sigma_rad: f64,
+    }
+
     #[derive(Serialize, Deserialize)]
     "firsthand.Turn" TurnSample {
         /// Mission time at which the increment ends, nanoseconds.

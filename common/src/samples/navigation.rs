@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     bus::ZeroCopySend,
-    geometry::principal_axes,
+    geometry::{Zone, principal_axes},
     grid::Part,
     kinematics::{Pose2, Twist},
     mission::{INFRARED_RANGERS, Mission, Waypoint},
@@ -34,7 +34,7 @@ payloads! {
         /// The pose of the odometry frame in the mission frame (map from odom of REP 105): x, y, theta; metres, radians. Odometry is
         /// this pose without the corrections by fixes and gyro, and continuous.
         map_from_odom: [f64; 3],
-        /// Times that fixes which agree contradicted the pose, and it became theirs; each resets the map.
+        /// Times that fixes which agree contradicted the pose, and it became theirs, and that an operator set it; each resets the map.
         relocations: u64,
         fixes: u64,
         fixes_refused: u64,
@@ -192,6 +192,37 @@ impl From<Waypoint> for TargetPoint {
             has_heading: heading_deg.is_some().into(),
             ..Self::at(at)
         }
+    }
+}
+
+payloads! {
+    /// The keep-out zones. The slice is their corners.
+    "firsthand.ZonesHeader" ZonesHeader {
+        /// Counts the changes by operators; 0: the mission's.
+        number: u64,
+    }
+}
+
+structs! {
+    "firsthand.ZoneCorner" ZoneCorner {
+        /// Corners of the same zone follow each other.
+        zone: u32,
+        x_m: f64,
+        y_m: f64,
+    }
+}
+
+impl ZoneCorner {
+    pub fn of(zones: &[Zone]) -> Vec<Self> {
+        let corners =
+            (0..).zip(zones).flat_map(|(zone, it)| it.points.iter().map(move |at| (zone, at)));
+        corners.map(|(zone, at)| Self { zone, x_m: at.x, y_m: at.y }).collect()
+    }
+
+    pub fn zones(corners: &[Self]) -> Vec<Zone> {
+        let zones = corners.chunk_by(|one, next| one.zone == next.zone);
+        let zone = |corners: &[Self]| corners.iter().map(|at| DVec2::new(at.x_m, at.y_m)).collect();
+        zones.map(|corners| Zone { points: zone(corners) }).collect()
     }
 }
 

@@ -1,5 +1,7 @@
 //! The payloads of supervision: health, roster, orders, requests, deaths, stalls, faults.
 
+use std::time::Duration;
+
 use serde::{Deserialize, Serialize, Serializer, ser::SerializeStruct as _};
 
 use super::navigation::{MOST_TARGETS, TargetPoint};
@@ -257,7 +259,7 @@ wire_enum! {
         Held = 4,
         /// It drives far and comes no nearer to its target.
         Wandering = 5,
-        /// Fixes that agree say that it is elsewhere.
+        /// Fixes that agree, or an operator, say that it is elsewhere.
         Relocated = 6,
     }
 }
@@ -307,6 +309,9 @@ impl Serialize for StallSample {
     }
 }
 
+/// A robot that a hand drives stands so long after the hand's last request.
+pub const DEAD_MAN: Duration = Duration::from_millis(300);
+
 wire_enum! {
     RequestKind, unknown = Nothing {
         Nothing = 0,
@@ -318,6 +323,15 @@ wire_enum! {
         Goto = 4,
         /// The targets follow those that the robot has.
         Append = 5,
+        /// The robot, which stands, is at the target, with the deviations.
+        Place = 6,
+        /// The targets are the corners of a zone more.
+        AddZone = 7,
+        /// The zones with the first target inside are no more.
+        RemoveZone = 8,
+        /// Driven by hand: towards the target, which is ahead and to the left of the robot, in shares of full speed. It stands without
+        /// another such request within [`DEAD_MAN`].
+        Hand = 9,
     }
 }
 
@@ -334,6 +348,11 @@ wire_enum! {
         InHazard = 7 "a target is in a believed hazard; name a free place (`firsthand top` shows them)",
         NoHeading = 8 "a car does not turn on the spot, so its targets have no heading; leave it out",
         FixedTarget = 9 "a calibration drives where it must; wait until it ends",
+        Moves = 10 "the robot moves, or is about to; `firsthand stop` it first",
+        NoZone = 11 "a zone has 3 to 16 corners, and there are 16 zones at most",
+        ZoneHere = 12 "the robot stands in that zone, or reaches into it; drive away first",
+        NotInZone = 13 "no zone is there",
+        NotStaying = 14 "a hand drives a robot that stays; start it with `--stay`",
     }
 }
 
@@ -351,6 +370,8 @@ payloads! {
         /// A [`RequestAnswer`], in `orders`.
         answer: u8,
         targets: [TargetPoint; MOST_TARGETS],
+        /// Standard deviations of a place, metres, and its heading, radians.
+        deviations: [f64; 2],
     }
 }
 

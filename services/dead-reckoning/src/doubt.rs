@@ -34,6 +34,11 @@ impl Doubt {
         self.rolled_m = 0.0;
     }
 
+    /// An operator set the pose.
+    pub(crate) const fn place(&mut self) {
+        (self.rolled_m, self.relocated) = (0.0, [0.0; 2]);
+    }
+
     /// Returns a warning once.
     pub(crate) fn roll(
         &mut self,

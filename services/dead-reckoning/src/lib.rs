@@ -32,7 +32,9 @@ use std::path::Path;
 
 use common::{
     checkpoint::{Checkpoint, CheckpointError},
+    mission::Mission,
     run,
+    samples::PlaceSample,
     stage::Answering as _,
 };
 
@@ -40,6 +42,14 @@ use step::{STATE_BYTES, State};
 
 pub use sources::Sources;
 pub use step::DeadReckoning;
+
+/// Where the robot of the run in `directory` last believed it was; none before its first tick.
+pub fn saved_place(
+    directory: &Path,
+    mission: &Mission,
+) -> Result<Option<PlaceSample>, CheckpointError> {
+    Ok(saved_state(directory)?.map(|state| DeadReckoning::place_of(mission, state)))
+}
 
 /// The state that the process of the run in `directory` saved; none before its first tick.
 pub fn saved_state(directory: &Path) -> Result<Option<State>, CheckpointError> {

@@ -4,9 +4,9 @@ use common::{
     bus::{BusError, Reader, Stamped},
     found_response::if_there,
     readers,
-    samples::{CountsSample, FixSample, TurnSample},
+    samples::{CountsSample, FixSample, PlaceSample, TurnSample},
     stage::Further,
-    topics::{COUNTS, FIX, IMU_TURN, SCAN_FIX, TURN},
+    topics::{COUNTS, FIX, IMU_TURN, PLACE, SCAN_FIX, TURN},
 };
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +23,8 @@ pub struct Sources {
     /// Older recordings have none.
     #[serde(deserialize_with = "if_there")]
     pub counts: Vec<CountsSample>,
+    #[serde(deserialize_with = "if_there")]
+    pub place: Option<PlaceSample>,
 }
 
 readers! {
@@ -33,6 +35,7 @@ readers! {
             turns: Reader<TurnSample> = TURN,
             imu_turns: Reader<TurnSample> = IMU_TURN,
             counts: Reader<CountsSample> = COUNTS,
+            places: Reader<PlaceSample> = PLACE,
         }
     }
 }
@@ -46,8 +49,9 @@ impl Further for Sources {
         let outside = some(&mut readers.turns, MOST_TURNS)?;
         let own = some(&mut readers.imu_turns, MOST_TURNS)?;
         let counts = some(&mut readers.counts, MOST_COUNTS)?;
+        let place = readers.places.newest()?;
         // The sequences of two gyros do not continue each other.
-        Ok(Self { fixes, turns: if own.is_empty() { outside } else { own }, counts })
+        Ok(Self { fixes, turns: if own.is_empty() { outside } else { own }, counts, place })
     }
 }
 

@@ -8,7 +8,7 @@ use common::{
     found_response::if_there,
     kinematics::{Drive, Pose2, SteeredWheel, Twist, WheelSpeeds},
     mission::{Body, Mission},
-    samples::{CountsSample, FixRefusal, FixSample, PoseSample, WheelSample},
+    samples::{CountsSample, FixRefusal, FixSample, PlaceSample, PoseSample, WheelSample},
     stage::{Answer, Answering, ForeignState},
     topics::{POSE, WHEELS},
     wire::counts_between,
@@ -69,6 +69,9 @@ pub struct State {
     disagreement: Disagreement,
     #[serde(deserialize_with = "if_there")]
     doubt: Doubt,
+    /// The number of the newest place that an operator set.
+    #[serde(deserialize_with = "if_there")]
+    placed: u64,
 }
 
 impl State {
@@ -92,7 +95,7 @@ struct Last {
     omega: f64,
 }
 
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reckoned {
     pub pose: PoseSample,
     /// The counts jumped farther than wheels turn, or the robot restarted them: the pose stays, and its covariance grows by how far the
@@ -100,6 +103,8 @@ pub struct Reckoned {
     pub rejected: bool,
     /// Fixes that agree contradicted the pose, which became theirs.
     pub relocated: bool,
+    /// An operator set the pose.
+    pub placed: bool,
     /// Unless the fix before was refused for the same reason.
     pub refused: Option<FixRefusal>,
     /// Why laser and wheels disagree, if that is new.
@@ -163,6 +168,7 @@ impl Answering for DeadReckoning {
                 counts: None,
                 disagreement: Disagreement::default(),
                 doubt: Doubt::default(),
+                placed: 0,
             },
         }
     }
@@ -187,18 +193,19 @@ impl Answering for DeadReckoning {
         now: MissionTime,
     ) -> Answer<PoseSample> {
         let first = self.state.newest().is_none();
-        let Reckoned { pose, rejected, relocated, refused, disagree, doubted } =
+        let Reckoned { pose, rejected, relocated, placed, refused, disagree, doubted } =
             self.reckon(wheels, sources, now);
         let warning = match (disagree, refused) {
             (Some(cause), _) => Some(cause.words().into()),
             _ if doubted.is_some() => doubted.map(Into::into),
+            _ if placed => Some("an operator says where the robot is: the pose is set".into()),
             _ if rejected => Some("the encoder counts restarted or jumped; the pose stays".into()),
             _ if relocated => {
                 Some("fixes that agree contradict the pose; the pose is theirs now".into())
             }
             (None, refused) => refused.map(|why| why.words().into()),
         };
-        Answer { sample: pose, saves_first: first || rejected || relocated, warning }
+        Answer { sample: pose, saves_first: first || rejected || relocated || placed, warning }
     }
 }
 
@@ -207,7 +214,7 @@ impl DeadReckoning {
     pub fn reckon(
         &mut self,
         wheels: &WheelSample,
-        Sources { fixes, turns, counts }: &Sources,
+        Sources { fixes, turns, counts, place }: &Sources,
         now: MissionTime,
     ) -> Reckoned {
         let mut motion = Twist::default();
@@ -218,15 +225,7 @@ impl DeadReckoning {
         let counts = WheelCounts::of(wheels, endless);
         if let Some(last) = self.state.last {
             if last.tick == wheels.stamp.tick {
-                let pose = self.sample();
-                return Reckoned {
-                    pose,
-                    rejected,
-                    relocated: false,
-                    refused: None,
-                    disagree: None,
-                    doubted: None,
-                };
+                return Reckoned { pose: self.sample(), ..Reckoned::default() };
             }
             elapsed = now.since(last.time).as_secs_f64();
             let counted = self.moved(last, counts, wheels, elapsed);
@@ -247,6 +246,10 @@ impl DeadReckoning {
         let doubted = state.doubt.roll(wheels, rim_m, self.body.track_m);
         state.history.advance(&self.motions, tick);
         state.history.turn(&self.motions, &mut state.gyro, turns);
+        let place = place.filter(|place| place.number > self.state.placed);
+        if let Some(place) = &place {
+            self.place(place);
+        }
         let (mut relocated, mut refused, mut disagree) = (false, None, None);
         for fix in fixes {
             let taken = self.take_fix(fix);
@@ -264,7 +267,8 @@ impl DeadReckoning {
             refused = if new { Some(why) } else { refused };
             self.state.refusal = why.into();
         }
-        self.follow(relocated);
+        let placed = place.is_some();
+        self.follow(relocated || placed);
         let Twist { v, omega } = self.speeds(motion, elapsed);
         self.state.counts = endless.copied();
         self.state.last = Some(Last {
@@ -277,7 +281,37 @@ impl DeadReckoning {
             v,
             omega,
         });
-        Reckoned { pose: self.sample(), rejected, relocated, refused, disagree, doubted }
+        Reckoned { pose: self.sample(), rejected, relocated, placed, refused, disagree, doubted }
+    }
+
+    /// The estimate becomes what an operator says; wheel and gyro errors stay.
+    fn place(&mut self, place: &PlaceSample) {
+        let state = &mut self.state;
+        let estimate = state.history.newest();
+        let turn = wrapped(place.heading_rad - estimate.pose.heading);
+        let position = DVec2::new(place.x_m, place.y_m);
+        let pose = Pose2 { position, heading: estimate.pose.heading + turn };
+        let [along, turned] = [place.sigma_m, place.sigma_rad].map(|sigma| sigma * sigma);
+        state.history.restart(estimate.moved_to(pose, along, turned));
+        state.contradictions = Contradictions::default();
+        state.doubt.place();
+        state.placed = place.number;
+    }
+
+    /// The first place of another run, which begins where `state` ends.
+    pub(crate) fn place_of(mission: &Mission, state: State) -> PlaceSample {
+        let reckoning = Self { state, ..Answering::new(mission) };
+        let PoseSample { x_m, y_m, heading_rad, covariance: [xx, _, _, yy, _, tt], .. } =
+            reckoning.sample();
+        PlaceSample {
+            number: 1,
+            x_m,
+            y_m,
+            heading_rad,
+            sigma_m: f64::midpoint(xx, yy).sqrt(),
+            sigma_rad: tt.sqrt(),
+            ..PlaceSample::default()
+        }
     }
 
     /// Take a fix, unless it is refused.
@@ -415,7 +449,7 @@ impl DeadReckoning {
             left_counts,
             right_counts,
             map_from_odom: [origin.x, origin.y, turned],
-            relocations: self.state.relocations,
+            relocations: self.state.relocations + self.state.placed,
             fixes: self.state.fixes,
             fixes_refused: self.state.fixes_refused,
             refusal: self.state.refusal,

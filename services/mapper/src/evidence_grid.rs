@@ -36,6 +36,9 @@ const SCANNED: u8 = u8::MAX;
 /// Way of the wheels until scanned ground is one step less certain, metres.
 pub(crate) const STEP_M: f64 = sonar::SCANNED_FOR_M / (SCANNED - POINTED_ENOUGH) as f64;
 
+/// Steps of [`SCANNED`] for one of the weight: both are gone at the same time.
+const LOOKS_FOR_A_STEP: u8 = (SCANNED - POINTED_ENOUGH) / sonar::MOST as u8 + 1;
+
 /// Flag: an obstacle stands in the cell.
 const OCCUPIED: u8 = 1;
 /// Flag: an infrared ranger saw the obstacle, which the sonar may not hear.
@@ -157,6 +160,17 @@ impl EvidenceGrid {
                 *looks = if *looks < POINTED_ENOUGH { *looks } else { less };
             }
         }
+    }
+
+    /// All evidence, for and against an obstacle, and of scanned ground, becomes weaker by `steps` of the weight.
+    pub(crate) fn forget(&mut self, steps: i8) {
+        for cell in self.ground.lattice.whole().cells() {
+            let weight = self.weight_of(self.ground.lattice.index(cell));
+            if weight != 0 {
+                self.set(cell, weight - weight.clamp(-steps, steps));
+            }
+        }
+        self.grow_stale(LOOKS_FOR_A_STEP.saturating_mul(steps.unsigned_abs()));
     }
 
     /// Take one reading, evidence up to `reach` metres, of a robot at `robot`. If a laser has `seen` its cause, only cells occupied there

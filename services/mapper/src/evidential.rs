@@ -162,6 +162,12 @@ impl Evidential {
         self.follow(map).0
     }
 
+    /// Returns the window that may look different now.
+    pub(crate) fn forget(&self, map: &mut EvidenceMap, steps: i8) -> Window {
+        map.grids().for_each(|grid| grid.forget(steps));
+        self.follow(map).0
+    }
+
     /// Inflate the flipped cells. Returns the grid's window that may look different, and whether there is a new obstacle.
     fn follow(&self, map: &mut EvidenceMap) -> (Window, bool) {
         let (mut window, mut is_new) = (Window::default(), false);

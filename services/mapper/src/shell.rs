@@ -10,13 +10,13 @@ use common::{
     readers,
     samples::{
         ContactSample, DirectiveSample, FaultKind, PoseSample, RangeReading, RangesHeader,
-        ScanHeader,
+        ScanHeader, ZoneCorner, ZonesHeader,
     },
     shell::{Context, Process, Progress},
     stage::Runner,
     start::StageError,
     target::TargetReader,
-    topics::{CONTACT, DIRECTIVE, GRID, HEALTH, POSE, RANGES, SCAN, SCAN_FIX, TARGET},
+    topics::{CONTACT, DIRECTIVE, GRID, HEALTH, POSE, RANGES, SCAN, SCAN_FIX, TARGET, ZONES},
     wiring::{Persists, Topics},
 };
 
@@ -37,6 +37,7 @@ readers! {
             pose: Reader<PoseSample> = POSE,
             directive: Reader<DirectiveSample> = DIRECTIVE,
             target: TargetReader = TARGET,
+            zones: Reader<ZonesHeader, ZoneCorner> = ZONES,
         }
     }
 }
@@ -71,6 +72,8 @@ pub struct Shell {
     scans: Vec<(u64, Scan)>,
     contact: OfTick<Option<ContactSample>>,
     last_keyframe: Option<MissionTime>,
+    /// The number of the newest zones.
+    zones: u64,
 }
 
 impl Process for Shell {
@@ -88,10 +91,20 @@ impl Process for Shell {
             tracing::info!(version, "the belief is restored");
         }
         let (ranges, scans, contact) = Default::default();
-        Ok(Self { inputs, runner, ranges, scans, contact, last_keyframe: None })
+        Ok(Self { inputs, runner, ranges, scans, contact, last_keyframe: None, zones: 0 })
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {
+        let mut newest = None;
+        while let Some(slice) = self.inputs.zones.next_slice()? {
+            newest = Some((slice.header().number, ZoneCorner::zones(&slice)));
+        }
+        if let Some((number, zones)) = newest
+            && number != self.zones
+        {
+            self.zones = number;
+            self.step(Input::Zones(zones))?;
+        }
         while let Some(pose) = self.inputs.pose.next_sample()? {
             let tick = pose.stamp.tick;
             self.runner.out.at = Progress::of(&pose.stamp);

@@ -5,7 +5,7 @@
 
 use common::{
     clock::MissionTime,
-    geometry::Shapes,
+    geometry::{Piece, Shapes, Zone},
     grid::{Cell, CellState, GridFrame, Part, Window},
     mission::{Method, Mission},
     samples::{
@@ -22,6 +22,7 @@ use crate::{
     fault,
     reading::{Rows, Touch},
     scan_match::{Reference, ScanMatcher},
+    sonar_model::MOST,
 };
 
 /// The belief follows from its inputs alone, so the journal holds them.
@@ -35,6 +36,8 @@ pub enum Input {
     },
     /// An operator's; it acts from the next tick on.
     Fault(FaultKind),
+    /// In place of those before.
+    Zones(Vec<Zone>),
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -150,6 +153,7 @@ pub struct Mapper {
     target: Option<Cell>,
     /// Shapes known from the mission, and the reach of their hazard, metres.
     known: (Shapes, f64),
+    zones: Vec<Zone>,
     /// Im of (19).
     margin: u32,
     evidential: Evidential,
@@ -163,6 +167,8 @@ pub struct Mapper {
     fix: Option<FixSample>,
     /// Of all lasers.
     beams: usize,
+    /// The time after which evidence is weaker by one, seconds, and the newest tick's; none if it is never.
+    forgets: Option<(f64, Option<MissionTime>)>,
     belief: Belief,
 }
 
@@ -180,6 +186,7 @@ impl Mapper {
             frame,
             target: frame.cell_at(mission.target),
             known: (mission.known.clone(), hazard_reach_m(mission)),
+            zones: mission.zones.clone(),
             margin,
             evidential,
             sensing: mission.sensing,
@@ -191,13 +198,14 @@ impl Mapper {
             poses: Poses::default(),
             fix: None,
             beams: mission.lasers().iter().map(|(_, laser)| laser.beams).sum(),
+            forgets: mission.mapper.forget_after_s.map(|all_s| (all_s / f64::from(MOST), None)),
             belief: Belief {
                 cells: vec![CellState::Free as u8; frame.area()],
                 version: 1,
                 safety_events: 0,
                 epoch: 0,
                 tick: None,
-                robot: DVec2::ZERO,
+                robot: mission.start_pose().position,
                 heading: mission.start_pose().heading,
                 rolled: 0.0,
                 sensed,
@@ -243,6 +251,10 @@ impl Mapper {
             Input::Fault(fault) => {
                 self.belief.fault = fault;
                 Change::None
+            }
+            Input::Zones(zones) => {
+                self.set_zones(zones);
+                Change::Whole
             }
         }
     }
@@ -296,8 +308,8 @@ impl Mapper {
     }
 
     fn mark_known(&mut self) {
-        let Self { frame, target, known: (known, reach), belief, .. } = self;
-        for piece in known.pieces() {
+        let Self { frame, target, known: (known, reach), zones, belief, .. } = self;
+        for piece in known.pieces().chain(zones.iter().map(Piece::Zone)) {
             let (least, greatest) = piece.bounds();
             let near = frame.between(least - *reach, greatest + *reach);
             paint(&mut belief.cells, frame, near, |cell, held| {
@@ -308,6 +320,21 @@ impl Mapper {
         paint(&mut belief.cells, frame, frame.whole(), |cell, held| {
             if frame.is_rim(cell) { CellState::Perimeter } else { held }
         });
+    }
+
+    /// What was sensed shows again where no zone is any more; the paper's hits are forgotten there.
+    fn set_zones(&mut self, zones: Vec<Zone>) {
+        self.zones = zones;
+        let Self { frame, target, evidential, belief: Belief { cells, sensed, .. }, .. } = self;
+        paint(cells, frame, frame.whole(), |cell, held| match (held, &*sensed) {
+            (CellState::Known, Sensed::Hits) => CellState::Free,
+            (CellState::Known, Sensed::Evidence(map)) => {
+                evidential.state(map, cell, Some(cell) == *target)
+            }
+            _ => held,
+        });
+        self.mark_known();
+        self.belief.version += 1;
     }
 
     /// The cell of the new target is no hazard, and that of the old one may be again. Returns the changed window.
@@ -328,7 +355,9 @@ impl Mapper {
     fn state_for_target(&self, cell: Cell) -> CellState {
         let (known, reach) = &self.known;
         let is_target = Some(cell) == self.target;
-        if !is_target && known.clearance(self.frame.centre_of(cell)) <= *reach {
+        let centre = self.frame.centre_of(cell);
+        let zones = self.zones.iter().map(|zone| zone.clearance(centre));
+        if !is_target && zones.fold(known.clearance(centre), f64::min) <= *reach {
             return CellState::Known;
         }
         match &self.belief.sensed {
@@ -363,10 +392,29 @@ impl Mapper {
             let fix = fix.filter(|_| self.matcher.publishes(pose.stamp.tick));
             let source = name("scan");
             self.fix = fix.map(|fix| FixSample { source, ..fix });
-            moved.union(self.map(&pose, (&ranges, &scans), contact.as_ref()))
+            let forgot = self.forget(pose.stamp.time());
+            let mapped = self.map(&pose, (&ranges, &scans), contact.as_ref());
+            moved.union(forgot).union(mapped)
         };
         self.belief.version += u64::from(changed.area() > 0);
         changed
+    }
+
+    /// Returns the changed window.
+    fn forget(&mut self, now: MissionTime) -> Window {
+        let (Some((step_s, newest)), Sensed::Evidence(map)) =
+            (&mut self.forgets, &mut self.belief.sensed)
+        else {
+            return Window::default();
+        };
+        let steps = |at: MissionTime| (at.seconds() / *step_s).floor();
+        let passed = steps(now) - steps(newest.unwrap_or(now));
+        *newest = Some(now);
+        if passed < 1.0 {
+            return Window::default();
+        }
+        let window = self.evidential.forget(map, passed.min(f64::from(MOST)) as i8);
+        self.redraw(window)
     }
 
     fn map(

@@ -12,6 +12,7 @@ mod logs;
 mod man;
 mod map;
 mod missions;
+mod place;
 mod record;
 mod replay;
 mod report;
@@ -25,6 +26,7 @@ mod status;
 mod stop;
 mod table;
 mod topic;
+mod zone;
 
 use std::{
     error::Error,
@@ -74,6 +76,8 @@ commands! {
         Status status,
         Goto goto,
         Return go_back,
+        Place place,
+        Zone zone,
         Stop stop,
         Resume resume,
         @"top" @"page"
@@ -135,7 +139,6 @@ const EXIT_CODES: &str = "Exit codes of run:
   4  timeout
   5  collision (simulated robot)
   6  aborted by a fault
-  7  an earlier run was cut off (--resume-last)
   9  in the wrong place: by the ground truth (simulated robot), or where it came to rest
  10  could not be stopped: told to stand by every method, it moves
  11  reached, unsure: the robot's pose may be farther off than the mission allows

@@ -157,6 +157,7 @@ mod tests {
         let text = guide.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
         let mut shown = Mission::parse(text, Path::new("mission-file.md")).unwrap();
         shown.known = common::geometry::Shapes::default();
+        shown.zones = Vec::new();
         shown.world = common::geometry::Shapes::default();
         let plain = Mission::parse("target = [4.0, 0.0]", Path::new("mission-file.md")).unwrap();
         assert_eq!(shown, plain);

@@ -17,8 +17,6 @@ use super::{
     robots::Robot,
 };
 
-/// It marks a run that was cut off and reported.
-const CUT_OFF: &str = "cut-off";
 /// A summary takes 2 kB; a larger file is not read.
 const LARGEST_SUMMARY: u64 = 1 << 20;
 
@@ -85,13 +83,9 @@ pub fn list(runs: &Path) -> Vec<RunDirectory> {
 }
 
 impl RunDirectory {
-    /// Nobody continues the run: it has a summary, or was reported as cut off.
+    /// The run has a summary, so nobody continues it.
     pub fn has_ended(&self) -> bool {
-        self.has(SUMMARY) || self.has(CUT_OFF)
-    }
-
-    fn has(&self, file: &str) -> bool {
-        self.directory.join(file).exists()
+        self.directory.join(SUMMARY).exists()
     }
 
     pub fn outcome(&self) -> Outcome {
@@ -100,7 +94,7 @@ impl RunDirectory {
         let text = readable.then(|| fs::read_to_string(&file).ok()).flatten();
         match text.map(|text| serde_json::from_str(&text)) {
             Some(Ok(ended)) => Outcome::Ended(ended),
-            _ if self.has(SUMMARY) => {
+            _ if self.has_ended() => {
                 Outcome::Ended(Ended { outcome: "unreadable".to_owned(), ..Ended::default() })
             }
             _ if self.is_running() => Outcome::Running,
@@ -197,17 +191,8 @@ fn runs_of(robot: &RobotName, runs: &Path) -> Vec<RunDirectory> {
     runs
 }
 
-/// The newest run of `robot` that was cut off and not reported yet: it has no summary. Fails if `runs` cannot be
-/// read.
-pub fn cut_off(runs: &Path, robot: &RobotName) -> io::Result<Option<PathBuf>> {
-    let runs = runs_of(robot, runs).into_iter();
-    let newest = runs.filter(|run| !run.has_ended()).max();
-    newest.map(|run| fs::canonicalize(run.directory)).transpose()
-}
-
-/// The next start then begins a new run. Fails if the mark cannot be written.
-pub fn mark_cut_off(directory: &Path) -> io::Result<()> {
-    fs::write(directory.join(CUT_OFF), "")
+pub fn newest(runs: &Path, robot: &RobotName) -> Option<RunDirectory> {
+    runs_of(robot, runs).into_iter().max()
 }
 
 #[cfg(test)]
@@ -261,16 +246,19 @@ mod tests {
     }
 
     #[test]
-    fn a_run_that_was_cut_off_is_reported_once_and_to_its_robot_alone() {
+    fn the_newest_run_is_its_robots_alone_and_has_ended_with_a_summary() {
         let runs = tempfile::tempdir().unwrap();
         let runs = runs.path();
+        assert_eq!(newest(runs, &x80()), None);
+        let cut = begun(runs, "x80", "cut");
+        let file = fs::File::options().append(true).open(cut.join(run::FILE_NAME)).unwrap();
+        file.set_modified(SystemTime::now() + std::time::Duration::from_secs(60)).unwrap();
         fs::write(begun(runs, "x80", "ended").join(SUMMARY), "").unwrap();
         begun(runs, "other", "others");
-        assert_eq!(cut_off(runs, &x80()).unwrap(), None);
-        let cut = fs::canonicalize(begun(runs, "x80", "cut")).unwrap();
-        assert_eq!(cut_off(runs, &x80()).unwrap(), Some(cut.clone()));
-        mark_cut_off(&cut).unwrap();
-        assert_eq!(cut_off(runs, &x80()).unwrap(), None, "reported again");
+        let found = newest(runs, &x80()).unwrap();
+        assert_eq!((&found.directory, found.has_ended()), (&cut, false));
+        fs::write(cut.join(SUMMARY), "").unwrap();
+        assert!(found.has_ended());
     }
 
     #[test]

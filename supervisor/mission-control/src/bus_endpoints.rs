@@ -9,9 +9,10 @@ use std::{
 use common::{
     bus::{Bus, BusError, Reader, Writer},
     clock::MissionTime,
+    mission::{MOST_CORNERS, MOST_ZONES},
     samples::{
-        DeathSample, DirectiveSample, RequestAnswer, RequestSample, RosterEntry, RosterHeader,
-        StallSample, TargetSample, TickLimitSample,
+        DeathSample, DirectiveSample, PlaceSample, RequestAnswer, RequestSample, RosterEntry,
+        RosterHeader, StallSample, TargetSample, TickLimitSample, ZoneCorner, ZonesHeader,
     },
     topics,
     waiter::Waiter,
@@ -28,6 +29,8 @@ pub(crate) struct BusEndpoints {
     /// Wakes for heartbeats, ends of ticks and requests.
     pub waiter: Waiter,
     pub target: Writer<TargetSample>,
+    pub place: Writer<PlaceSample>,
+    pub zones: Writer<ZonesHeader, ZoneCorner>,
     directive: Writer<DirectiveSample>,
     pub tick_limit: Writer<TickLimitSample>,
     roster: Writer<RosterHeader, RosterEntry>,
@@ -61,6 +64,8 @@ impl BusEndpoints {
             observer,
             waiter,
             target: bus.writer(&topics::TARGET, 1)?,
+            place: bus.writer(&topics::PLACE, 1)?,
+            zones: bus.slice_writer(&topics::ZONES, 1, MOST_ZONES * MOST_CORNERS)?,
             directive: bus.writer(&topics::DIRECTIVE, 1)?,
             tick_limit: bus.writer(&topics::TICK_LIMIT, 1)?,
             roster: bus.slice_writer(&topics::ROSTER, 1, stages::TABLE.len())?,

@@ -4,7 +4,7 @@ use std::{collections::VecDeque, time::Instant};
 
 use common::{
     bus::{Bus, BusError, Reader, Writers},
-    grid::{Applied, Part, Replica},
+    grid::{Applied, CellState, Part, Replica},
     mission::Mission,
     roster,
     samples::{
@@ -14,6 +14,7 @@ use common::{
     topics,
     waiter::Waiter,
 };
+use glam::DVec2;
 use processes::stage_processes::StageProcesses;
 
 use crate::long_record;
@@ -186,6 +187,14 @@ fn push<T>(items: &mut VecDeque<T>, item: T, most: usize) {
 }
 
 impl Record {
+    /// Whether a place is in a believed hazard, or outside the map.
+    pub(crate) fn is_hazard(&self, place: DVec2) -> bool {
+        let frame = self.grid.frame();
+        frame
+            .and_then(|frame| Some(frame.index(frame.cell_at(place)?)))
+            .is_none_or(|index| CellState::from_byte(self.grid.cells()[index]).is_hazard())
+    }
+
     /// The arrival at the current target, and whether the pose is sure enough for it.
     pub(crate) fn sure_arrival(&self, mission: &Mission) -> Option<(CommandSample, bool)> {
         let command = self.arrival?;

@@ -26,6 +26,7 @@ use common::{
     topics,
     waiter::Waiter,
 };
+use glam::DVec2;
 use link::stop_guard;
 use processes::{executable, process};
 use thiserror::Error;
@@ -65,6 +66,11 @@ const fn code(answer: RequestAnswer) -> &'static str {
         RequestAnswer::InHazard => "target-in-hazard",
         RequestAnswer::NoHeading => "no-heading",
         RequestAnswer::FixedTarget => "fixed-target",
+        RequestAnswer::Moves => "robot-moves",
+        RequestAnswer::NoZone => "no-zone",
+        RequestAnswer::ZoneHere => "zone-here",
+        RequestAnswer::NotInZone => "not-in-zone",
+        RequestAnswer::NotStaying => "not-staying",
     }
 }
 
@@ -230,13 +236,53 @@ pub fn send_to(
     appends: bool,
 ) -> Result<(), OperatorError> {
     let kind = if appends { RequestKind::Append } else { RequestKind::Goto };
-    let mut request = request(kind);
+    ask_with(robot, kind, points, [0.0; 2])
+}
+
+fn ask_with(
+    robot: &RobotName,
+    kind: RequestKind,
+    points: &[TargetPoint],
+    deviations: [f64; 2],
+) -> Result<(), OperatorError> {
+    let mut request = RequestSample { deviations, ..request(kind) };
     if points.len() > MOST_TARGETS {
         return Err(refused(robot, RequestAnswer::TooMany));
     }
     request.target_count = points.len() as u8;
     request.targets[..points.len()].copy_from_slice(points);
     ask(robot, request)
+}
+
+/// Drive by hand: towards `stick`, ahead and to the left of the robot, in shares of full speed, until [`DEAD_MAN`] after the last call.
+pub fn drive_by_hand(robot: &RobotName, stick: DVec2) -> Result<(), OperatorError> {
+    ask_with(robot, RequestKind::Hand, &[TargetPoint::at(stick)], [0.0; 2])
+}
+
+/// Add the keep-out zone with these corners, or remove those that hold a place.
+pub fn change_zones(
+    robot: &RobotName,
+    points: &[TargetPoint],
+    removes: bool,
+) -> Result<(), OperatorError> {
+    let kind = if removes { RequestKind::RemoveZone } else { RequestKind::AddZone };
+    ask_with(robot, kind, points, [0.0; 2])
+}
+
+/// Send the robot to where its mission starts.
+pub fn send_back(robot: &RobotName) -> Result<(), OperatorError> {
+    let start = Run::load(&Domain::of(robot.clone()).run_directory())
+        .map_or(DVec2::ZERO, |run| run.mission.start.at);
+    send_to(robot, &[TargetPoint::at(start)], false)
+}
+
+/// Tell where the standing robot is: at `point`, with standard deviations in metres and radians.
+pub fn place(
+    robot: &RobotName,
+    point: TargetPoint,
+    deviations: [f64; 2],
+) -> Result<(), OperatorError> {
+    ask_with(robot, RequestKind::Place, &[point], deviations)
 }
 
 /// A request that is made now.

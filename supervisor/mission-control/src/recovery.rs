@@ -7,18 +7,20 @@ use std::{fs, path::Path};
 
 use common::{
     checkpoint::{Checkpoint, CheckpointError},
-    clock::{MissionClock, MissionTime, Pace, boot_ns, monotonic_ns},
+    clock::{MissionClock, MissionTime, Pace, monotonic_ns},
+    geometry::Zone,
+    mission::Mission,
     run::{self, Run, RunError},
+    samples::PlaceSample,
 };
-use dead_reckoning::saved_state;
+use dead_reckoning::{saved_place, saved_state};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::target_list::TargetList;
 
-/// Room for the encoded [`SupervisorState`], bytes: its targets and their results take under 10,000.
-const CAPACITY: usize = 12 << 10;
-const BOOT_ID: &str = "/proc/sys/kernel/random/boot_id";
+/// Room for the encoded [`SupervisorState`], bytes: its targets and their results take under 10,000, its zones 5,000.
+const CAPACITY: usize = 18 << 10;
 /// The summary of a run that ended, in its run directory.
 pub const SUMMARY: &str = "summary.json";
 const SIMULATOR: &str = "x80-sim";
@@ -30,10 +32,10 @@ pub struct SupervisorState {
     pub operator_stopped_s: f64,
     pub resumes: u32,
     pub(crate) targets: Option<TargetList>,
-    /// The boot of the machine in which the supervisor ran.
-    boot: String,
-    /// The time of the last save, [`boot_ns`], which passes while the machine is suspended and the robot may be moved.
-    saved_ns: u64,
+    /// The newest that an operator set; number 0 for none.
+    pub(crate) place: PlaceSample,
+    /// Those that operators left, and how often they changed them; none for the mission's.
+    pub(crate) zones: Option<(u64, Vec<Zone>)>,
 }
 
 #[derive(Debug)]
@@ -46,30 +48,20 @@ impl StateFile {
     pub fn open(directory: &Path) -> Result<Self, CheckpointError> {
         let file = run::checkpoint_file(directory, "supervisor");
         let (checkpoint, state) = Checkpoint::open::<SupervisorState>(&file, CAPACITY)?;
-        let mut state = state.unwrap_or_default();
-        state.boot = boot();
-        Ok(Self { checkpoint, state })
+        Ok(Self { checkpoint, state: state.unwrap_or_default() })
     }
 
     pub fn save(&mut self) -> Result<(), CheckpointError> {
-        self.state.saved_ns = boot_ns();
         self.checkpoint.save(&self.state)
     }
 }
 
-/// The current boot of the machine; empty if the kernel does not say.
-fn boot() -> String {
-    let id = fs::read_to_string(BOOT_ID).unwrap_or_default();
-    id.trim().to_owned()
-}
-
-/// Seconds since the supervisor of `directory` last saved its state; none if the machine was booted since, or there is
-/// no state.
-pub fn age_s(directory: &Path) -> Result<Option<f64>, CheckpointError> {
-    let file = run::checkpoint_file(directory, "supervisor");
-    let (_, state) = Checkpoint::open::<SupervisorState>(&file, CAPACITY)?;
-    let state = state.filter(|state| state.boot == boot());
-    Ok(state.map(|state| boot_ns().saturating_sub(state.saved_ns) as f64 * 1e-9))
+/// Where the robot of the run in `directory` last believed it was, and how long ago, seconds; none if it never knew.
+pub fn last_place(directory: &Path, mission: &Mission) -> Option<(PlaceSample, f64)> {
+    let place = saved_place(directory, mission).ok().flatten()?;
+    let saved =
+        fs::metadata(run::checkpoint_file(directory, "supervisor")).ok()?.modified().ok()?;
+    Some((place, saved.elapsed().unwrap_or_default().as_secs_f64()))
 }
 
 #[derive(Clone, Debug)]
@@ -131,9 +123,10 @@ impl RecoveredRun {
 #[cfg(test)]
 mod tests {
     use common::{
-        mission::Mission,
+        mission::{MOST_CORNERS, MOST_ZONES, Mission},
         samples::{CommandSample, MOST_TARGETS, TargetPoint},
     };
+    use glam::DVec2;
 
     use super::*;
 
@@ -151,6 +144,8 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let mut file = StateFile::open(directory.path()).unwrap();
         file.state.targets = Some(list);
+        let zone = Zone { points: vec![DVec2::splat(1.5); MOST_CORNERS] };
+        file.state.zones = Some((1 << 40, vec![zone; MOST_ZONES]));
         file.save().unwrap();
     }
 }

@@ -1,9 +1,18 @@
 //! The part of the loop that takes operators' requests, and sends the robot to its next target.
 
+use std::time::Instant;
+
 use common::{
     clock::monotonic_ns,
-    samples::{Cause, HoldReason, RequestAnswer, RequestKind, RequestSample, name_str},
+    geometry::Zone,
+    mission::MOST_ZONES,
+    samples::{
+        Cause, DEAD_MAN, HoldReason, PlaceSample, RequestAnswer, RequestKind, RequestSample, Rest,
+        TargetPoint, TargetSample, name_str,
+    },
 };
+
+use glam::DVec2;
 
 use crate::{
     error::SupervisorError,
@@ -11,6 +20,9 @@ use crate::{
     supervisor::Supervisor,
     target_list,
 };
+
+/// A hand's target is so much farther ahead than the robot slows down, metres: it moves on with each request.
+const HAND_AHEAD_M: f64 = 0.3;
 
 impl Supervisor<'_> {
     /// Carry out and answer the requests of operators. Returns whether there was one.
@@ -56,7 +68,66 @@ impl Supervisor<'_> {
             kind @ (RequestKind::Goto | RequestKind::Append) => {
                 return self.send_robot(request, kind == RequestKind::Append, first_tick);
             }
+            RequestKind::Place => return self.place_robot(request),
+            RequestKind::Hand => return self.drive_by_hand(request, first_tick),
+            kind @ (RequestKind::AddZone | RequestKind::RemoveZone) => {
+                return self.change_zones(request, kind == RequestKind::AddZone);
+            }
         }
+        RequestAnswer::Taken
+    }
+
+    /// The stages are told with the state; dead reckoning sets its pose with the next tick, and the map is reset by that.
+    fn place_robot(&mut self, request: &RequestSample) -> RequestAnswer {
+        let stands_by = matches!(self.decision.reason, HoldReason::Operator | HoldReason::Waiting);
+        let link = self.bus.observer.record.link;
+        if !stands_by || link.is_none_or(|link| link.rest() != Rest::AtRest) {
+            return RequestAnswer::Moves;
+        }
+        let Some([point]) = request.targets() else { return RequestAnswer::Malformed };
+        let [sigma_m, sigma_rad] = request.deviations;
+        let is_sane = |sigma: f64| (0.005..=10.0).contains(&sigma);
+        if !(point.heading_rad.is_finite() && is_sane(sigma_m) && is_sane(sigma_rad)) {
+            return RequestAnswer::Malformed;
+        }
+        if !self.options.mission.contains(point.position()) {
+            return RequestAnswer::Outside;
+        }
+        let number = self.state_file.state.place.number + 1;
+        let (x_m, y_m, heading_rad) = (point.x_m, point.y_m, point.heading_rad);
+        tracing::warn!(x_m, y_m, heading_rad, "an operator says where the robot is");
+        let stamp = Default::default();
+        self.state_file.state.place =
+            PlaceSample { stamp, number, x_m, y_m, heading_rad, sigma_m, sigma_rad };
+        RequestAnswer::Taken
+    }
+
+    fn change_zones(&mut self, request: &RequestSample, adds: bool) -> RequestAnswer {
+        let mission = &self.options.mission;
+        let points = request.targets().unwrap_or_default().iter();
+        let points: Vec<_> = points.map(TargetPoint::position).collect();
+        if !points.iter().all(|point| point.is_finite()) {
+            return RequestAnswer::Malformed;
+        }
+        let state = &mut self.state_file.state;
+        let (number, mut zones) = state.zones.clone().unwrap_or((0, mission.zones.clone()));
+        let before = zones.len();
+        match points[..] {
+            [at] if !adds => zones.retain(|zone| zone.clearance(at) > 0.0),
+            [_, _, _, ..] if adds && before < MOST_ZONES => zones.push(Zone { points }),
+            _ => return RequestAnswer::NoZone,
+        }
+        if zones.len() == before {
+            return RequestAnswer::NotInZone;
+        }
+        let here =
+            self.bus.observer.record.pose.map_or(mission.start.at, |pose| pose.pose().position);
+        let new = zones.last().filter(|_| adds);
+        if new.is_some_and(|zone| zone.clearance(here) <= mission.body().radius_m) {
+            return RequestAnswer::ZoneHere;
+        }
+        tracing::warn!(zones = zones.len(), "an operator changes the zones");
+        state.zones = Some((number + 1, zones));
         RequestAnswer::Taken
     }
 
@@ -68,27 +139,74 @@ impl Supervisor<'_> {
     ) -> RequestAnswer {
         let record = &self.bus.observer.record;
         let mission = &self.options.mission;
-        // The link may obey an operator before the supervisor does.
-        let stopped = self.state_file.state.operator_stop
-            || record.link.is_some_and(|link| link.cause() == Cause::OperatorStop);
-        let reason = if stopped { HoldReason::Operator } else { self.decision.reason };
         let points = request.targets();
-        if let Some(answer) = target_list::refusal(points, reason, mission, record) {
+        if let Some(answer) = target_list::refusal(points, self.why_held(), mission, record) {
             return answer;
         }
         let points = points.unwrap_or_default();
-        if appends && !self.targets.waits() {
+        if appends && self.targets.has_target() {
             return match self.targets.append(points) {
                 true => RequestAnswer::Taken,
                 false => RequestAnswer::TooMany,
             };
         }
+        self.replace_targets(points, first_tick);
+        self.log_target();
+        RequestAnswer::Taken
+    }
+
+    fn replace_targets(&mut self, points: &[TargetPoint], first_tick: u64) {
         let limit = self.recovery_steps.limit();
         let since_tick = limit.map_or(first_tick, |limit| limit.last_tick + 1);
-        let (arrival, now_s) = (record.sure_arrival(mission), self.mission_time().seconds());
-        self.targets.replace(points, (since_tick, now_s), arrival);
+        let arrival = self.bus.observer.record.sure_arrival(&self.options.mission);
+        self.targets.replace(points, (since_tick, self.mission_time().seconds()), arrival);
         self.on_new_target();
+    }
+
+    /// The hand's target moves before the robot, no farther than the ground is free. The planner leads there as to any other.
+    fn drive_by_hand(&mut self, request: &RequestSample, first_tick: u64) -> RequestAnswer {
+        let mission = &self.options.mission;
+        if !mission.stay {
+            return RequestAnswer::NotStaying;
+        }
+        let record = &self.bus.observer.record;
+        let (Some([stick]), Some(pose)) = (request.targets(), record.pose) else {
+            return RequestAnswer::Malformed;
+        };
+        // At full speed the robot does not slow down for it.
+        let reach_m = HAND_AHEAD_M + mission.controller.slow_radius_m;
+        let here = pose.pose().position;
+        let way = pose.pose().axis().rotate(stick.position().clamp_length_max(1.0)) * reach_m;
+        let steps = (way.length() / mission.grid_frame().resolution_m).ceil();
+        let points = (1..=steps as u32).map(|step| here + way * (f64::from(step) / steps));
+        let is_free = |at: &DVec2| !record.is_hazard(*at);
+        let free = points.take_while(is_free).last().unwrap_or(here + way);
+        let point = [TargetPoint::at(free)];
+        if let Some(answer) = target_list::refusal(Some(&point), self.why_held(), mission, record) {
+            return answer;
+        }
+        self.replace_targets(&point, first_tick);
+        self.targets.take_in_hand();
+        self.hand_until = Some(Instant::now() + DEAD_MAN);
         RequestAnswer::Taken
+    }
+
+    /// Let the robot stand if the hand that drove it has gone. Returns whether it has.
+    pub(crate) fn miss_hand(&mut self) -> bool {
+        let is_gone = self.hand_until.take_if(|until| *until <= Instant::now()).is_some();
+        let released = is_gone && self.targets.release();
+        if released {
+            self.await_target();
+        }
+        released
+    }
+
+    /// The link may obey an operator before the supervisor does.
+    fn why_held(&self) -> HoldReason {
+        let link = self.bus.observer.record.link;
+        let stopped = self.state_file.state.operator_stop
+            || link.is_some_and(|link| link.cause() == Cause::OperatorStop);
+        if stopped { HoldReason::Operator } else { self.decision.reason }
     }
 
     /// Let the robot wait for its next target if the run stays, and `ending` is that of its target. Returns whether it waits.
@@ -137,19 +255,18 @@ impl Supervisor<'_> {
         };
         self.targets.advance(arrival, since_tick);
         self.on_new_target();
+        self.log_target();
         true
     }
 
+    fn log_target(&self) {
+        let TargetSample { number, last, target: TargetPoint { x_m, y_m, .. }, .. } =
+            self.targets.sample();
+        tracing::info!(number, last, x_m, y_m, "the robot is sent to its next target");
+    }
+
     fn on_new_target(&mut self) {
-        let sample = self.targets.sample();
-        tracing::info!(
-            number = sample.number,
-            last = sample.last,
-            x_m = sample.target.x_m,
-            y_m = sample.target.y_m,
-            "the robot is sent to its next target"
-        );
-        self.bus.observer.record.target_number = sample.number;
+        self.bus.observer.record.target_number = self.targets.number();
         self.bus.observer.record.arrival = None;
         self.arrived = None;
         // The deadline counts anew for each target.

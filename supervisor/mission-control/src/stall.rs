@@ -10,7 +10,7 @@
 //! | inside hazard | it stands in a hazard, and has driven far without leaving it | reset |
 //! | held | something holds its wheels: its motors push and its encoders stand | replan |
 //! | wandering | it has driven several times as far as its target was away; with a laser, on ground where it had been | reset |
-//! | relocated | fixes say that it is elsewhere, so the map is of another place; no limit | reset |
+//! | relocated | fixes or an operator say that it is elsewhere, so the map is of another place; no limit | reset |
 //! | cut off | no way leads from its place to the target, and it has looked around | reset |
 
 use std::{collections::HashSet, f64::consts::TAU, time::Duration};
@@ -83,6 +83,10 @@ pub(crate) fn words(cause: StallCause, body: &Body) -> String {
 pub(crate) fn log(stall: &StallSample) {
     let (cause, recovery) = (stall.cause(), stall.recovery());
     let StallSample { stamp, x_m, y_m, epoch, replans, resets, .. } = stall;
+    let what = match cause {
+        StallCause::Relocated => "the robot is elsewhere, so the map is reset",
+        _ => "the robot stalls",
+    };
     tracing::warn!(
         tick = stamp.tick,
         x_m,
@@ -92,7 +96,7 @@ pub(crate) fn log(stall: &StallSample) {
         epoch,
         replans,
         resets,
-        "the robot stalls"
+        "{what}"
     );
 }
 
@@ -256,6 +260,23 @@ impl StallWatch {
                 .or_else(|| self.without_motion(pose, guidance))
                 .or_else(|| self.without_end(pose, guidance))?
         };
+        Some(self.recover(cause, pose))
+    }
+
+    /// Note that the robot is not ordered to drive at `pose`, so nothing by then is a stall, except that it is elsewhere since the pose
+    /// before. The map is of `epoch`.
+    pub(crate) fn stand(&mut self, pose: &PoseSample, epoch: u64) -> Option<StallSample> {
+        let is_first = self.tick.is_none();
+        self.hold(pose.stamp.tick);
+        self.epoch = self.epoch.max(epoch);
+        let before = std::mem::replace(&mut self.relocations, pose.relocations);
+        let is_elsewhere = !is_first && before != pose.relocations;
+        is_elsewhere.then(|| self.recover(StallCause::Relocated, pose))
+    }
+
+    /// Decide the next recovery step against `cause`.
+    fn recover(&mut self, cause: StallCause, pose: &PoseSample) -> StallSample {
+        let relocated = cause == StallCause::Relocated;
         let recovery = if self.may_replan(cause, pose.pose().position) {
             self.replans += 1;
             RecoveryStep::Replan
@@ -290,7 +311,7 @@ impl StallWatch {
             recovery: recovery.into(),
         };
         self.stalls.push(stall);
-        Some(stall)
+        stall
     }
 
     /// Whether a fresh planner is the next step against `cause`; if so, that is counted.

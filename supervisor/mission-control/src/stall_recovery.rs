@@ -19,10 +19,13 @@ impl Supervisor<'_> {
     pub(crate) fn watch_for_stalls(&mut self) -> Result<Option<Ending>, SupervisorError> {
         if self.decision.order() != Order::Drive {
             // In lockstep mission time stands still meanwhile.
-            if !self.clock.in_ticks()
-                && let Some(pose) = &self.bus.observer.record.pose
-            {
-                self.stall_watch.hold(pose.stamp.tick);
+            let record = &self.bus.observer.record;
+            let pose = record.pose.filter(|_| !self.clock.in_ticks());
+            let epoch = record.published.grid_epoch;
+            if let Some(stall) = pose.and_then(|pose| self.stall_watch.stand(&pose, epoch)) {
+                self.tell(&stall);
+                // The directive carries the new epoch.
+                self.publish_state()?;
             }
             return Ok(None);
         }
@@ -75,10 +78,14 @@ impl Supervisor<'_> {
             }
         }
         let stall = found?;
-        stall::log(&stall);
-        self.bus.publish_stall(stall);
-        records::append(&self.options.directory, records::STALLS, &stall);
+        self.tell(&stall);
         Some(stall)
+    }
+
+    fn tell(&mut self, stall: &StallSample) {
+        stall::log(stall);
+        self.bus.publish_stall(*stall);
+        records::append(&self.options.directory, records::STALLS, stall);
     }
 
     fn carry_out(&mut self, step: RecoveryStep) -> Result<(), SupervisorError> {

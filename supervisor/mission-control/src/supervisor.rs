@@ -1,6 +1,6 @@
 //! The loop of one robot's supervisor: it reads events, asks the pure functions for decisions, and carries them out.
 
-use std::{net::Ipv4Addr, os::fd::AsFd as _, path::PathBuf};
+use std::{net::Ipv4Addr, os::fd::AsFd as _, path::PathBuf, time::Instant};
 
 use common::{
     address::Address,
@@ -9,7 +9,10 @@ use common::{
     ground_truth::GroundTruthTick,
     mission::Mission,
     run::Run,
-    samples::{DirectiveSample, HoldReason, Order, RosterHeader, TickLimitSample},
+    samples::{
+        DirectiveSample, HoldReason, Order, PlaceSample, RosterHeader, TickLimitSample, ZoneCorner,
+        ZonesHeader,
+    },
     signals::Signals,
     topics,
 };
@@ -50,6 +53,10 @@ pub struct Options {
     pub starter: Starter,
     /// The run to resume; without one a new run begins.
     pub recovered: Option<RecoveredRun>,
+    /// The robot stands until an operator says resume.
+    pub stands: bool,
+    /// Where the robot of a new run believes it is; by default at the start of its mission.
+    pub place: Option<PlaceSample>,
 }
 
 pub(crate) struct Robot {
@@ -106,6 +113,8 @@ pub(crate) struct Supervisor<'a> {
     pub drove: bool,
     pub tick_progress: TickProgress,
     pub targets: TargetList,
+    /// Then the hand that drives the robot is missed.
+    pub hand_until: Option<Instant>,
     /// The time when the arrival was first seen.
     pub arrived: Option<Now>,
     stop_clock: StopClock,
@@ -129,6 +138,8 @@ impl<'a> Supervisor<'a> {
         let directory = &options.directory;
         let mission = &options.mission;
         let mut state_file = StateFile::open(directory)?;
+        state_file.state.operator_stop |= options.stands;
+        state_file.state.place = options.place.unwrap_or(state_file.state.place);
         let robot = Robot::start(options, signals)?;
         let clock = match &options.recovered {
             Some(run) => {
@@ -147,7 +158,10 @@ impl<'a> Supervisor<'a> {
         };
         run.save(directory)?;
         let unchecked = clock.in_ticks().then(|| clock.first_tick(None));
-        let targets = state_file.state.targets.take().unwrap_or_else(|| TargetList::of(mission));
+        let targets = state_file.state.targets.take();
+        let mut targets = targets.unwrap_or_else(|| TargetList::of(mission));
+        // A hand that drove the robot before must push again.
+        targets.release();
         let mut supervisor = Self {
             options,
             stages: StageProcesses::new(directory.clone(), options.starter, mission),
@@ -161,6 +175,7 @@ impl<'a> Supervisor<'a> {
             drove: false,
             tick_progress: TickProgress::new(Now::ZERO),
             targets,
+            hand_until: None,
             arrived: None,
             stop_clock: StopClock::default(),
             stall_watch: StallWatch::new(mission),
@@ -231,7 +246,7 @@ impl<'a> Supervisor<'a> {
 
     fn iterate(&mut self) -> Result<Option<Ending>, SupervisorError> {
         let roster_changed = self.bus.observer.read_all(&mut self.stages, &mut self.listener)?;
-        let next = self.take_arrival();
+        let next = self.take_arrival() | self.miss_hand();
         let first_tick = self.first_tick();
         let asked = self.take_requests(first_tick)?;
         let died = self.poll_processes(first_tick)?;
@@ -369,6 +384,14 @@ impl<'a> Supervisor<'a> {
         let (tick, time) = self.published_as_of();
         // A stage that is told to drive already knows the target.
         self.bus.target.publish(tick, time, self.targets.sample())?;
+        let place = self.state_file.state.place;
+        if place.number > 0 {
+            self.bus.place.publish(tick, time, place)?;
+        }
+        if let Some((number, zones)) = &self.state_file.state.zones {
+            let header = ZonesHeader { number: *number, ..ZonesHeader::default() };
+            self.bus.zones.publish_slice(tick, time, header, &ZoneCorner::of(zones))?;
+        }
         // The limit is published again, before the order that starts the first tick.
         self.published_limit = None;
         self.publish_tick_limit()?;
@@ -397,7 +420,7 @@ impl<'a> Supervisor<'a> {
             record: &self.bus.observer.record,
             running: self.stages.running(),
             driving: self.decision.order() == Order::Drive,
-            straight_m: self.targets.current().position().length(),
+            straight_m: self.targets.current().position().distance(self.options.mission.start.at),
         };
         show(&progress);
         self.service.show(|| progress.to_string());
@@ -407,7 +430,8 @@ impl<'a> Supervisor<'a> {
         self.turns.count();
         let mut descriptors = self.stages.descriptors();
         descriptors.extend(self.robot.simulator.as_ref().map(Simulator::descriptor));
-        let deadlines = [self.stages.time_to_deadline(), self.service.time_to_feed()];
+        let hand = self.hand_until.map(|until| until.saturating_duration_since(Instant::now()));
+        let deadlines = [self.stages.time_to_deadline(), self.service.time_to_feed(), hand];
         let soonest = deadlines.into_iter().flatten().min();
         let timeout = soonest.map_or(topics::RESTATE, |soonest| soonest.min(topics::RESTATE));
         self.bus.waiter.wait_also_for(&descriptors, timeout)?;

@@ -5,7 +5,6 @@ use common::{
     mission::Mission,
     samples::{CommandSample, HoldReason, MOST_TARGETS, RequestAnswer, TargetPoint, TargetSample},
 };
-use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -70,6 +69,8 @@ pub struct TargetList {
     results: Vec<Stored>,
     /// The current target has its result, and the robot waits for the next one.
     waits: bool,
+    /// The current target is a hand's, and has no result.
+    by_hand: bool,
 }
 
 impl TargetList {
@@ -83,7 +84,8 @@ impl TargetList {
             began_s: 0.0,
             ahead: points.collect(),
             results: Vec::new(),
-            waits: mission.stay && mission.target == DVec2::ZERO && mission.targets.is_empty(),
+            waits: mission.stay && mission.target == mission.start.at && mission.targets.is_empty(),
+            by_hand: false,
         }
     }
 
@@ -101,6 +103,23 @@ impl TargetList {
 
     pub(crate) const fn waits(&self) -> bool {
         self.waits
+    }
+
+    /// Whether there is a target that has a result when it ends.
+    pub(crate) const fn has_target(&self) -> bool {
+        !self.waits && !self.by_hand
+    }
+
+    pub(crate) const fn take_in_hand(&mut self) {
+        self.by_hand = true;
+    }
+
+    /// The hand has gone, and the robot waits. Returns whether a hand drove it.
+    pub(crate) const fn release(&mut self) -> bool {
+        let was = self.by_hand;
+        self.waits |= was;
+        self.by_hand = false;
+        was
     }
 
     /// The outcome of the newest target, if the robot waits for the next one.
@@ -148,23 +167,15 @@ impl TargetList {
         (since_tick, now_s): (u64, f64),
         arrival: Option<(CommandSample, bool)>,
     ) {
-        let skipped = self.ahead.len() as u64;
-        match arrival {
-            _ if self.waits => {}
-            Some(arrival) => self.store_arrival(arrival),
-            None => {
-                let replaced = self.result_of(0, &self.current, TargetOutcome::Replaced);
-                self.store(TargetResult { at_s: Some(now_s), ..replaced }, None);
-            }
+        if self.has_target() {
+            self.end_current(TargetOutcome::Replaced, now_s, arrival);
         }
-        for (nth, point) in (1..).zip(std::mem::take(&mut self.ahead)) {
-            self.store(self.result_of(nth, &point, TargetOutcome::Replaced), None);
-        }
+        self.drop_ahead(TargetOutcome::Replaced);
         if let Some((first, ahead)) = points.split_first() {
-            self.number += skipped + 1;
+            self.number += 1;
             (self.current, self.ahead) = (*first, ahead.to_vec());
             (self.since_tick, self.began_s) = (since_tick, now_s);
-            self.waits = false;
+            (self.waits, self.by_hand) = (false, false);
         }
     }
 
@@ -176,22 +187,38 @@ impl TargetList {
         now_s: f64,
         arrival: Option<(CommandSample, bool)>,
     ) {
-        match arrival.filter(|_| outcome == Outcome::Reached) {
-            Some(arrival) => self.store_arrival(arrival),
-            None => {
-                let outcome = match outcome {
-                    Outcome::Timeout => TargetOutcome::TimedOut,
-                    _ => TargetOutcome::Unreachable,
-                };
-                let result = self.result_of(0, &self.current, outcome);
-                self.store(TargetResult { at_s: Some(now_s), ..result }, None);
-            }
+        if self.release() {
+            return;
         }
-        for (nth, point) in (1..).zip(std::mem::take(&mut self.ahead)) {
-            self.store(self.result_of(nth, &point, TargetOutcome::NotTried), None);
-            self.number += 1;
-        }
+        let given_up = match outcome {
+            Outcome::Timeout => TargetOutcome::TimedOut,
+            _ => TargetOutcome::Unreachable,
+        };
+        let arrival = arrival.filter(|_| outcome == Outcome::Reached);
+        self.end_current(given_up, now_s, arrival);
+        self.drop_ahead(TargetOutcome::NotTried);
         self.waits = true;
+    }
+
+    /// The current target ended by `arrival`, or with `outcome` at `now_s`.
+    fn end_current(
+        &mut self,
+        outcome: TargetOutcome,
+        now_s: f64,
+        arrival: Option<(CommandSample, bool)>,
+    ) {
+        if let Some(arrival) = arrival {
+            return self.store_arrival(arrival);
+        }
+        let result = self.result_of(0, &self.current, outcome);
+        self.store(TargetResult { at_s: Some(now_s), ..result }, None);
+    }
+
+    fn drop_ahead(&mut self, outcome: TargetOutcome) {
+        for point in std::mem::take(&mut self.ahead) {
+            self.number += 1;
+            self.store(self.result_of(0, &point, outcome), None);
+        }
     }
 
     /// Send the robot, whose `arrival` is a command and whether its pose was sure, to the next target, from `since_tick` on.
@@ -278,7 +305,7 @@ impl TargetList {
             current.distance_m = Some(arrival.distance_m);
             current.truth_m = ended.map(|ended| apart_m(ended, &current));
         }
-        if !self.waits {
+        if self.has_target() {
             results.push(current);
         }
         let ahead = (1..).zip(&self.ahead);
@@ -331,9 +358,9 @@ pub(crate) fn refusal(
     if mission.planner.calibration.is_some() {
         return Some(RequestAnswer::FixedTarget);
     }
-    let Some(frame) = record.grid.frame() else {
+    if record.grid.frame().is_none() {
         return Some(RequestAnswer::NotRunning);
-    };
+    }
     points.iter().find_map(|point| {
         let place = point.position();
         if !(place.is_finite() && point.heading_rad.is_finite()) {
@@ -342,11 +369,10 @@ pub(crate) fn refusal(
         if point.heading().is_some() && mission.body().steering.is_some() {
             return Some(RequestAnswer::NoHeading);
         }
-        let Some(cell) = frame.cell_at(place).filter(|cell| !frame.is_rim(*cell)) else {
+        if !mission.contains(place) {
             return Some(RequestAnswer::Outside);
-        };
-        let state = common::grid::CellState::from_byte(record.grid.cells()[frame.index(cell)]);
-        state.is_hazard().then_some(RequestAnswer::InHazard)
+        }
+        record.is_hazard(place).then_some(RequestAnswer::InHazard)
     })
 }
 

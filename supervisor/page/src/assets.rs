@@ -28,6 +28,7 @@ web! {
     "/charts.js" "charts.js" SCRIPT,
     "/timeline.js" "timeline.js" SCRIPT,
     "/orders.js" "orders.js" SCRIPT,
+    "/hand.js" "hand.js" SCRIPT,
     "/net.js" "net.js" SCRIPT,
     "/page.js" "page.js" SCRIPT,
 }

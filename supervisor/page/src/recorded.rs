@@ -12,7 +12,8 @@ use crate::assets;
 const POLICY: &str = "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'unsafe-inline'; \
 style-src 'unsafe-inline'; img-src data:\">";
 /// The modules, each before those that import it.
-const MODULES: [&str; 8] = ["store", "field", "map", "charts", "timeline", "orders", "net", "page"];
+const MODULES: [&str; 9] =
+    ["store", "field", "map", "charts", "timeline", "orders", "hand", "net", "page"];
 const TITLE: &str = "<title>firsthand</title>";
 
 /// The messages of a recorded run, in the order in which a server would have sent them.

@@ -4,6 +4,7 @@ import { Store } from "./store.js";
 import { MapView } from "./map.js";
 import { Charts } from "./charts.js";
 import { Timeline } from "./timeline.js";
+import { Hand } from "./hand.js";
 import { Orders } from "./orders.js";
 import { Net } from "./net.js";
 
@@ -174,6 +175,7 @@ if (recording) {
     lost,
   });
   orders = new Orders(net, map);
+  new Hand(orders, document.getElementById("targets"));
   orders.choose([]);
   // What does not come any more grows old.
   setInterval(changed, 500);

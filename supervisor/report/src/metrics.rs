@@ -38,7 +38,7 @@ pub(crate) fn rows(content: &Content) -> Vec<Value> {
     let has_poses = measured.ticks > 0;
     let of = |field: &str, measured: Option<f64>| content.summed(field).or(measured);
     let path = of("path_length_m", has_poses.then_some(measured.path_m));
-    let straight = Some(content.mission.target.length()).filter(|straight| *straight > 0.0);
+    let straight = Some(content.mission.straight_m()).filter(|straight| *straight > 0.0);
     let ratio = path.zip(straight).map(|(path, straight)| path / straight);
     let latency = measured.latency();
     let quantile = |field: &str, share: f64| {

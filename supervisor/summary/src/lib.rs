@@ -120,7 +120,7 @@ impl Summary {
                 Some(_) if *resumes == 0 => path_length(truth),
                 _ => pose.map_or(0.0, |pose| pose.travelled_m),
             },
-            straight_m: straight_m(&finished.targets),
+            straight_m: straight_m(mission, &finished.targets),
             min_clearance_m: clearance
                 .filter(|&clearance| clearance < GroundTruthTick::NOTHING_NEAR),
             p_o: near_share(truth),
@@ -234,8 +234,8 @@ impl fmt::Display for Summary {
 }
 
 /// The length of the straight lines from the start to each target in turn, without those that were replaced, metres.
-fn straight_m(targets: &[TargetResult]) -> f64 {
-    let mut here = [0.0, 0.0];
+fn straight_m(mission: &Mission, targets: &[TargetResult]) -> f64 {
+    let mut here = mission.start.at.to_array();
     let counted = targets.iter().filter(|target| target.outcome != TargetOutcome::Replaced);
     let legs = counted.map(|target| {
         let [x, y] = std::mem::replace(&mut here, [target.x_m, target.y_m]);

@@ -38,6 +38,57 @@ fn a_list_of_targets_is_written_in_place_of_one_and_reads_back_the_same() {
 }
 
 #[test]
+fn a_start_is_a_place_with_or_without_a_heading_or_a_heading_at_the_origin() {
+    let start = |keys: &str| {
+        let text = format!("target = [3, 0.5]\n{keys}");
+        let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+        let written = toml::to_string(&mission).unwrap();
+        assert_eq!(Mission::parse(&written, Path::new("m.toml")).unwrap(), mission);
+        (mission.start.at, mission.start.heading_deg)
+    };
+    assert_eq!(start("start = [1, 2, 90]"), (DVec2::new(1.0, 2.0), 90.0));
+    assert_eq!(start("start = [1, -0.5]"), (DVec2::new(1.0, -0.5), 0.0));
+    assert_eq!(start("start.heading_deg = 45"), (DVec2::ZERO, 45.0));
+    assert_eq!(start(""), (DVec2::ZERO, 0.0));
+    let drum = "[[world.drum]]\nat = [3, 0]\nradius_m = 0.3";
+    start(drum);
+    let text = format!("target = [1, 0]\nstart = [3, 0.2]\n{drum}");
+    assert!(refusal(&text).contains("move it away from [3, 0.2]"));
+}
+
+#[test]
+fn a_zone_is_a_polygon_without_the_start_and_the_targets() {
+    let zone = |points: &str| format!("target = [3, 0.5]\n[[zone]]\npoints = {points}");
+    let mission = Mission::parse(&zone("[[1, 1], [2, 1], [2, 2]]"), Path::new("m.toml")).unwrap();
+    assert_eq!(mission.zones.len(), 1);
+    let written = toml::to_string(&mission).unwrap();
+    assert_eq!(Mission::parse(&written, Path::new("m.toml")).unwrap(), mission);
+    assert!(mission.obstacles().is_empty(), "it stands nowhere");
+    for (points, problem) in [
+        ("[[1, 1], [2, 1]]", "a zone has 2 corners"),
+        ("[[-1, -1], [1, -1], [0, 1]]", "the robot starts in a zone"),
+        ("[[2, 0], [4, 0], [4, 1], [2, 1]]", "the target [3, 0.5] lies inside a zone"),
+        ("[[1, 1], [2, nan], [2, 2]]", "is not a place"),
+    ] {
+        let said = refusal(&zone(points));
+        assert!(said.starts_with("m.toml:2: zone: ") && said.contains(problem), "{said}");
+    }
+    let many = format!(
+        "target = [3, 0.5]\n{}",
+        "[[zone]]\npoints = [[1, 1], [2, 1], [2, 2]]\n".repeat(17)
+    );
+    assert!(refusal(&many).contains("17 zones are too many"));
+}
+
+#[test]
+fn the_papers_map_forgets_nothing_with_time() {
+    let set = "target = [3, 0]\nmapper.forget_after_s = 600";
+    let mission = Mission::parse(set, Path::new("m.toml")).unwrap();
+    assert_eq!(mission.mapper.forget_after_s, Some(600.0));
+    assert!(refusal(&format!("{set}\nmethod = 'paper'")).contains("only grows"));
+}
+
+#[test]
 fn every_refusal_names_line_and_key() {
     let cases = [
         ("target = [30, 0]", "m.toml:1: target: "),
@@ -68,7 +119,10 @@ fn every_refusal_names_line_and_key() {
         ("target = [3, 0]\ntargets = [[2, 0]]", "m.toml:2: targets: target and targets"),
         ("targets = [[2, 0], [30, 0]]", "m.toml:1: targets: "),
         ("targets = [[2, 0], [nan, 0]]", "m.toml:1: targets: "),
-        ("targets = [[2, 0], [3]]", "m.toml:1: a target of a list is [x, y]"),
+        ("targets = [[2, 0], [3]]", "m.toml:1: a place is [x, y]"),
+        ("target = [3, 0]\nstart = [9, 0]", "m.toml:1: perimeter.centre: the robot's start [9, 0]"),
+        ("target = [3, 0]\nstart = [9]", "m.toml:2: start is [x, y]"),
+        ("target = [3, 0]\nstart.headin = 3", "m.toml:2: start is [x, y]"),
         ("targets = [[2, 0, 400]]", "m.toml:1: targets: "),
         ("targets = [[2, 0, 90]]\nrobot.model = 'car'", "m.toml:1: targets: a car"),
         ("targets = []", "m.toml:1: missing field `target`"),

@@ -1,7 +1,7 @@
 //! Tests of fixes and a gyro with a robot of known errors.
 
 use super::{tests::reckoning_of, *};
-use common::samples::{Stamp, TurnSample};
+use common::samples::{PlaceSample, Stamp, TurnSample};
 use glam::dvec2;
 
 const TICK_NS: u64 = 100_000_000;
@@ -408,4 +408,42 @@ fn a_state_that_is_restored_between_fixes_goes_on_to_the_bit_and_fits_its_file()
         }
     }
     assert!(longest > 5_000 && longest < STATE_BYTES, "{longest}");
+}
+
+#[test]
+fn an_operator_sets_the_pose_once_with_its_deviations_and_the_way_goes_on_from_there() {
+    let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
+    for _ in 0..100 {
+        reckoning.reckon(&robot.wind(), &Sources::default(), MissionTime(robot.tick * TICK_NS));
+    }
+    let place = PlaceSample {
+        number: 1,
+        x_m: 7.0,
+        y_m: -2.0,
+        heading_rad: 3.0,
+        sigma_m: 0.5,
+        sigma_rad: 0.2,
+        ..PlaceSample::default()
+    };
+    let sources = Sources { place: Some(place), ..Sources::default() };
+    let mut reckoned = || {
+        let wheels = robot.drive(0.0, 0.0);
+        reckoning.reckon(&wheels, &sources, MissionTime(wheels.stamp.stamp_ns))
+    };
+    let first = reckoned();
+    assert!(first.placed);
+    let pose = first.pose;
+    assert_eq!((pose.x_m, pose.y_m, pose.relocations), (7.0, -2.0, 1));
+    assert!((wrapped(pose.heading_rad - 3.0)).abs() < 1e-9, "{pose:?}");
+    assert_eq!([pose.covariance[0], pose.covariance[3]], [0.25; 2]);
+    assert!((pose.covariance[5] - 0.04).abs() < 1e-9, "{pose:?}");
+    // It is said again, and nothing new.
+    assert!(!reckoned().placed);
+    let mut pose = pose;
+    for _ in 0..25 {
+        let wheels = robot.drive(0.04, 0.0);
+        pose = reckoning.reckon(&wheels, &sources, MissionTime(wheels.stamp.stamp_ns)).pose;
+    }
+    let way = pose.pose().position - dvec2(7.0, -2.0);
+    assert!((way - DVec2::from_angle(3.0)).length() < 0.02, "{way}");
 }

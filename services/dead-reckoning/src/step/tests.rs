@@ -34,7 +34,8 @@ impl DeadReckoning {
         fixes: &[FixSample],
         turns: &[TurnSample],
     ) -> Reckoned {
-        let sources = Sources { fixes: fixes.to_vec(), turns: turns.to_vec(), counts: Vec::new() };
+        let (fixes, turns) = (fixes.to_vec(), turns.to_vec());
+        let sources = Sources { fixes, turns, ..Sources::default() };
         self.reckon(wheels, &sources, wheels.stamp.time())
     }
 

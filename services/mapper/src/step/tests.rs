@@ -268,3 +268,43 @@ fn the_cell_of_the_target_is_free_as_long_as_the_robot_is_sent_there() {
         assert_eq!(restored.state_at(margin, 0.0), CellState::Known, "{method}");
     }
 }
+
+#[test]
+fn zones_are_hazard_by_either_method_and_what_was_sensed_shows_again_without_them() {
+    let zone = |x: f64| {
+        let points = [(x, -1.0), (x + 0.5, -1.0), (x + 0.5, -0.5), (x, -0.5)].map(DVec2::from);
+        Zone { points: points.to_vec() }
+    };
+    for method in ["paper", "evidential"] {
+        let mut mapper = mapper_of(&format!(
+            "target = [1.5, 1.0]\nmethod = '{method}'\nperimeter = {{ width_m = 5, cells = 50 }}\n\
+             [[zone]]\npoints = [[-1.0, -1.0], [-0.5, -1.0], [-0.5, -0.5], [-1.0, -0.5]]"
+        ));
+        let fresh = mapper.clone();
+        assert_eq!(mapper.state_at(-0.75, -0.75), CellState::Known);
+        assert_eq!(mapper.state_at(-1.0, -0.4), CellState::Known, "the body has a radius");
+        assert!(!mapper.is_hazard(0.0, 0.0));
+        let set = |mapper: &mut Mapper, zones| mapper.step(Input::Zones(zones), MissionTime(0));
+        assert_eq!(set(&mut mapper, vec![zone(1.0)]), Change::Whole);
+        assert!(!mapper.is_hazard(-0.75, -0.75), "{method}");
+        assert_eq!(mapper.state_at(1.25, -0.75), CellState::Known);
+        // A target moves away from beside the zone, and its cell becomes hazard again.
+        let tick = |target| Tick { target: Some(target), ..Tick::default() };
+        mapper.give(tick(DVec2::new(1.25, -0.45)));
+        assert!(!mapper.is_hazard(1.25, -0.45));
+        mapper.give(tick(DVec2::new(1.5, 1.0)));
+        assert_eq!(mapper.state_at(1.25, -0.45), CellState::Known);
+        assert!(mapper.reset(1));
+        assert_eq!(mapper.state_at(1.25, -0.75), CellState::Known, "a reset forgets no zone");
+        set(&mut mapper, vec![zone(-1.0)]);
+        let hazards = |mapper: &Mapper| {
+            mapper
+                .belief
+                .cells
+                .iter()
+                .map(|cell| CellState::from_byte(*cell).is_hazard())
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(hazards(&mapper), hazards(&fresh), "{method}");
+    }
+}

@@ -26,7 +26,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     let mut text = format!(
         "{}: {} m to the target, {} x {} cells of {:.3} m\nFrom a fault to rest, at most, at {} m/s:\n",
         mission.name,
-        mission.target.length(),
+        mission.straight_m(),
         frame.cells,
         frame.cells,
         frame.resolution_m,

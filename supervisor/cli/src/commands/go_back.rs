@@ -1,5 +1,5 @@
 use clap::Args;
-use common::{domain::RobotName, samples::TargetPoint};
+use common::domain::RobotName;
 use mission_control::operator;
 
 use console::failure::Failure;
@@ -13,6 +13,5 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
-    // The start is the origin of the mission frame.
-    Ok(operator::send_to(&arguments.robot, &[TargetPoint::default()], false)?)
+    Ok(operator::send_back(&arguments.robot)?)
 }

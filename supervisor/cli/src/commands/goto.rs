@@ -8,7 +8,7 @@ use console::failure::{Failure, Refused};
 /// refuses: a place in a believed hazard or outside the perimeter, a robot that an operator stopped.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// X and Y of each target, metres in the mission frame, whose origin is the robot's start.
+    /// X and Y of each target, metres in the mission frame.
     #[arg(required = true, value_names = ["X", "Y"], num_args = 2.., allow_negative_numbers = true)]
     places: Vec<f64>,
     /// Turn to this heading at the last target, degrees counter-clockwise from x.
@@ -23,17 +23,20 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
-    let (places, rest) = arguments.places.as_chunks::<2>();
-    if !rest.is_empty() {
-        let message = format!("{} is an X without a Y; give two numbers for each target", rest[0]);
-        return Err(Refused::new("no-target", message).into());
-    }
-    let mut points: Vec<_> = places
-        .iter()
-        .map(|&[x_m, y_m]| TargetPoint { x_m, y_m, ..TargetPoint::default() })
-        .collect();
+    let mut points = points(&arguments.places)?;
     if let (Some(last), Some(heading)) = (points.last_mut(), arguments.heading) {
         (last.heading_rad, last.has_heading) = (heading.to_radians(), 1);
     }
     Ok(operator::send_to(&arguments.robot, &points, arguments.append)?)
+}
+
+/// Of pairs of numbers.
+pub(super) fn points(places: &[f64]) -> Result<Vec<TargetPoint>, Refused> {
+    let (places, rest) = places.as_chunks::<2>();
+    if !rest.is_empty() {
+        let message = format!("{} is an X without a Y; give two numbers for each place", rest[0]);
+        return Err(Refused::new("no-target", message));
+    }
+    let point = |&[x_m, y_m]: &[f64; 2]| TargetPoint { x_m, y_m, ..TargetPoint::default() };
+    Ok(places.iter().map(point).collect())
 }

@@ -8,10 +8,13 @@ use common::{
     address::Address,
     clock::Pace,
     domain::RobotName,
-    mission::{Mission, Protocol},
+    geometry::wrap_angle,
+    mission::{Mission, Protocol, Resume, Start},
+    samples::PlaceSample,
     signals::Signals,
     start::become_child,
 };
+use glam::DVec2;
 use link::transport::SPEAKS_ROS2;
 use mission_control::{
     Finished, Options, Progress,
@@ -30,6 +33,7 @@ use console::{
     progress_line::{LINE_EVERY, ProgressLine},
     robots::SUPERVISOR_LOG,
     runs,
+    words::age,
 };
 
 /// Carry out a mission: start a robot's stages, let it drive, summarise.
@@ -63,8 +67,8 @@ pub(crate) struct Arguments {
         conflicts_with_all = ["mission", "robot", "pace", "seed", "out", "timeout", "set"]
     )]
     resume: Option<PathBuf>,
-    /// Go on with this robot's newest run below --runs if it was cut off within the last minute. If it was cut off earlier, report
-    /// that once instead of starting, because the robot is not where its mission starts. This is for services of systemd.
+    /// Go on with this robot's newest run below --runs if it was cut off; the robot then stands until `firsthand resume`, unless the
+    /// mission says `resume = "automatic"`. A mission that stays begins where the run before ended. This is for services of systemd.
     #[arg(long, conflicts_with_all = ["resume", "out"])]
     resume_last: bool,
     /// Give up after S seconds of mission time, instead of the mission's timeout.
@@ -107,8 +111,7 @@ impl Default for Arguments {
     }
 }
 
-/// None if an earlier run was cut off too long ago, which is reported.
-fn options(arguments: &Arguments) -> Result<Option<Options>, Failure> {
+fn options(arguments: &Arguments) -> Result<Options, Failure> {
     if let Some(directory) = &arguments.resume {
         let found = fs::canonicalize(directory).map_err(|error| {
             let directory = directory.display();
@@ -117,23 +120,39 @@ fn options(arguments: &Arguments) -> Result<Option<Options>, Failure> {
             );
             Refused::new("no-run", message)
         })?;
-        return resumed(arguments, found).map(Some);
+        return resumed(arguments, found);
     }
-    if arguments.resume_last
-        && let Some(cut) = runs::cut_off(&arguments.runs, &arguments.robot)?
-    {
-        if recovery::age_s(&cut)?.is_some_and(|age| age <= RESUMED_WITHIN_S) {
-            return resumed(arguments, cut).map(Some);
+    let last = arguments.resume_last.then(|| runs::newest(&arguments.runs, &arguments.robot));
+    let last = last.flatten();
+    let mut is_cut_off = false;
+    if let Some(cut) = last.as_ref().filter(|run| !run.has_ended()) {
+        match resumed(arguments, fs::canonicalize(&cut.directory)?) {
+            Ok(options) => {
+                let place = recovery::last_place(&options.directory, &options.mission);
+                let stands = options.mission.resume == Resume::Manual;
+                tell_place(place.as_ref(), stands);
+                return Ok(Options { stands, ..options });
+            }
+            Err(problem) => {
+                write_stderr(&format!("firsthand: the last run ends here: {problem}\n"))
+            }
         }
-        runs::mark_cut_off(&cut)
-            .map_err(|error| format!("cannot mark {} as cut off: {error}", cut.display()))?;
-        let cut = cut.display();
-        write_stderr(&format!(
-            "firsthand: {cut} was cut off, and a mission's origin is where the robot stands at its start: put it there, then start again; or, if it still stands where it came to rest, `firsthand run --resume {cut}`\n"
-        ));
-        return Ok(None);
+        is_cut_off = true;
     }
-    let mission = mission(arguments)?;
+    let mut mission = mission(arguments)?;
+    let same = last.filter(|run| mission.stay && run.mission.as_ref() == Some(&mission.name));
+    let place = same.and_then(|run| recovery::last_place(&run.directory, &mission));
+    let waits = mission.stay && mission.straight_m() == 0.0 && mission.targets.is_empty();
+    if let Some((place, _)) = &place {
+        let heading_deg = wrap_angle(place.heading_rad).to_degrees();
+        mission.start = Start { at: DVec2::new(place.x_m, place.y_m), heading_deg };
+        mission.target = if waits { mission.start.at } else { mission.target };
+    }
+    let goes_on = is_cut_off || place.is_some();
+    let stands = goes_on && !waits && mission.resume == Resume::Manual;
+    if goes_on {
+        tell_place(place.as_ref(), stands);
+    }
     let directory = match &arguments.out {
         Some(directory) => runs::own(directory)?,
         None => {
@@ -143,14 +162,28 @@ fn options(arguments: &Arguments) -> Result<Option<Options>, Failure> {
             runs::numbered(&arguments.runs, &mission.name)?
         }
     };
-    Ok(Some(Options {
+    Ok(Options {
         mission,
         robot: arguments.robot.clone(),
         pace: arguments.pace,
         directory,
         starter: starter(arguments),
         recovered: None,
-    }))
+        stands,
+        place: place.map(|(place, _)| place),
+    })
+}
+
+/// Tell where the robot of an earlier run believes it is, and since when.
+fn tell_place(place: Option<&(PlaceSample, f64)>, stands: bool) {
+    let place = place.map(|(PlaceSample { x_m, y_m, heading_rad, sigma_m, .. }, age_s)| {
+        let heading = wrap_angle(*heading_rad).to_degrees();
+        let (within_m, ago) = (2.0 * sigma_m, age(Some(*age_s)));
+        format!("the robot believes it is where it stood {ago} ago: at ({x_m:.2}, {y_m:.2}) within {within_m:.2} m, heading {heading:.0} degrees")
+    });
+    let place = place.unwrap_or("where the robot stands is not known".to_owned());
+    let until = if stands { "; it stands until `firsthand resume`" } else { "" };
+    write_stderr(&format!("firsthand: {place}; `firsthand place` corrects it{until}\n"));
 }
 
 fn resumed(arguments: &Arguments, directory: PathBuf) -> Result<Options, Failure> {
@@ -164,6 +197,8 @@ fn resumed(arguments: &Arguments, directory: PathBuf) -> Result<Options, Failure
         directory,
         starter: starter(arguments),
         recovered: Some(recovered),
+        stands: false,
+        place: None,
     })
 }
 
@@ -220,9 +255,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if let Some(parent) = arguments.parent {
         become_child("firsthand", parent)?;
     }
-    let Some(options) = options(arguments)? else {
-        return Ok(ExitCode::from(CUT_OFF));
-    };
+    let options = options(arguments)?;
     let directory = &options.directory;
     let made_for_nothing = || {
         // The run did not begin, so its new directory is removed.
@@ -318,12 +351,12 @@ fn complain(reported: Result<(), String>) {
 /// would fill the disk, start by start.
 fn may_be_removed(arguments: &Arguments, options: &Options, finished: &Finished) -> bool {
     let made_here = arguments.out.is_none() && options.recovered.is_none();
-    made_here && !finished.drove && finished.restarts.values().all(|&restarts| restarts == 0)
+    let is_placed = finished.resets > 0;
+    made_here
+        && !finished.drove
+        && !is_placed
+        && finished.restarts.values().all(|&restarts| restarts == 0)
 }
-
-/// Without a supervisor for longer the robot may have been moved.
-const RESUMED_WITHIN_S: f64 = 60.0;
-const CUT_OFF: u8 = 7;
 
 fn exit_code(summary: &Summary, ending: &Ending) -> ExitCode {
     if ending.asked_for && summary.outcome == ending.outcome {
@@ -353,7 +386,7 @@ fn title(options: &Options) -> String {
         "mission {}{}: {:.1} m to the target, robot {}, {pace}; everything of this run is in {}",
         mission.name,
         if options.recovered.is_some() { " goes on" } else { "" },
-        mission.target.length(),
+        mission.straight_m(),
         options.robot,
         options.directory.display()
     )

@@ -9,6 +9,7 @@ use clap::Args;
 use common::{
     domain::{Domain, RobotName},
     follower::{Event, Follower},
+    geometry::wrap_angle,
     roster,
     samples::{
         Action, HoldReason, LinkSample, Order, PowerSample, RosterEntry, StageState, TargetSample,
@@ -55,6 +56,8 @@ struct Status<'a> {
     mission_time_s: f64,
     /// The target; none if the robot waits for one, or none is published.
     target: Option<TargetStatus>,
+    /// Where the robot believes it is; none if it is not published.
+    pose: Option<PoseStatus>,
     /// The link; none if no link publishes.
     link: Option<LinkStatus>,
     /// The power; none if the robot does not report it.
@@ -71,6 +74,15 @@ struct TargetStatus {
     y_m: f64,
     /// How far the robot is from it; none if no pose is published.
     to_go_m: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct PoseStatus {
+    x_m: f64,
+    y_m: f64,
+    heading_deg: f64,
+    /// Two standard deviations of the position along the worst axis.
+    within_m: f64,
 }
 
 #[derive(Serialize)]
@@ -137,10 +149,11 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
 static WANTED: [&dyn AnyTopic; 5] =
     [&topics::ROSTER, &topics::LINK, &topics::POWER, &topics::TARGET, &topics::POSE];
 
-/// Whether `robot` is complete after `waited`. A robot without a link or without batteries is so after a while.
+/// Whether `robot` is complete after `waited`. A robot without a link, batteries or a pose is so after a while.
 fn is_complete(robot: &RobotState, waited: Duration) -> bool {
     let lost = robot.link.is_some_and(|link| link.connected == 0);
-    let all = robot.link.is_some() && (robot.power.is_some() || lost);
+    let heard = robot.power.is_some() && robot.pose.is_some();
+    let all = robot.link.is_some() && (heard || lost);
     robot.supervisor.is_some() && (all || waited >= LINK_PATIENCE)
 }
 
@@ -225,6 +238,12 @@ fn status<'a>(
             y_m: target.y_m,
             to_go_m: robot.to_go_m(),
         }),
+        pose: robot.pose.map(|pose| PoseStatus {
+            x_m: pose.x_m,
+            y_m: pose.y_m,
+            heading_deg: wrap_angle(pose.heading_rad).to_degrees(),
+            within_m: pose.position_within_m(),
+        }),
         link: robot.link.as_ref().map(link_status),
         power: robot.power.as_ref().map(power_status),
         stages: robot.stages.iter().map(stage_status).collect(),
@@ -285,6 +304,12 @@ impl fmt::Display for Status<'_> {
         if let Some(TargetStatus { number, last, x_m, y_m, to_go_m }) = &self.target {
             write!(f, "target {number} of {last}: ({x_m:.2}, {y_m:.2})")?;
             writeln!(f, "{}", to_go_m.map_or(String::new(), |m| format!(", {m:.2} m to go")))?;
+        }
+        if let Some(PoseStatus { x_m, y_m, heading_deg, within_m }) = &self.pose {
+            writeln!(
+                f,
+                "believes it is at ({x_m:.2}, {y_m:.2}) within {within_m:.2} m, heading {heading_deg:.0} degrees"
+            )?;
         }
         if let Some(link) = &self.link {
             writeln!(f, "{link}")?;

@@ -351,3 +351,19 @@ fn a_relocated_robot_forgets_all_of_its_map_each_time_and_gives_up_for_it_never(
     });
     assert_eq!(stalls.map(|stall| stall.recovery()).next(), Some(Reset));
 }
+
+#[test]
+fn a_robot_that_stands_and_is_elsewhere_forgets_its_map_at_once_and_nothing_else_does_so() {
+    let mut watch = watch();
+    let stands = |watch: &mut StallWatch, second: f64, relocations| {
+        watch.stand(&PoseSample { relocations, ..pose(second, 0.0) }, 3)
+    };
+    // What was before the first pose is known.
+    assert_eq!(stands(&mut watch, 0.0, 5), None);
+    assert_eq!(stands(&mut watch, 60.0, 5), None);
+    let stall = stands(&mut watch, 61.0, 6).unwrap();
+    assert_eq!(parts(&stall), (Relocated, Reset, 4));
+    assert_eq!(stands(&mut watch, 62.0, 6), None);
+    let driving = PoseSample { relocations: 6, ..pose(63.0, 0.0) };
+    assert_eq!(step(&mut watch, driving, guidance(Along, 4)), None);
+}

@@ -128,3 +128,28 @@ fn a_robot_that_stays_has_a_result_for_each_target_and_none_for_the_wait() {
     let results = list.results(&Ending::asked_for(Outcome::Reached, ""), None, None, None);
     assert_eq!(outcomes(&results), [(2, TimedOut), (3, NotTried), (4, Reached)]);
 }
+
+#[test]
+fn a_hands_target_has_no_result_and_ends_in_waiting_for_the_next_one() {
+    use TargetOutcome::{Reached, Replaced};
+    let mut list = TargetList::of(&mission("stay = true"));
+    let hand = |list: &mut TargetList, x| {
+        list.replace(&[at(x, 0.0)], (5, 4.0), None);
+        list.take_in_hand();
+    };
+    hand(&mut list, 0.5);
+    hand(&mut list, 0.6);
+    assert_eq!((list.number(), list.waits(), list.has_target()), (3, false, false));
+    // It is reached, or no way leads there.
+    list.settle(Outcome::Reached, 6.0, Some((arrival(6), true)));
+    assert!(list.waits() && !list.release());
+    hand(&mut list, 0.7);
+    assert!(list.release() && list.waits());
+    hand(&mut list, 0.8);
+    list.replace(&[at(2.0, 0.0)], (9, 8.0), None);
+    assert!(list.has_target());
+    list.settle(Outcome::Reached, 9.0, Some((arrival(9), true)));
+    let ending = Ending::asked_for(Outcome::Reached, "");
+    let results = list.results(&ending, None, None, None);
+    assert_eq!(outcomes(&results), [(1, Replaced), (6, Reached)]);
+}

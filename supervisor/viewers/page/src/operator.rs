@@ -48,8 +48,11 @@ impl Operator for RobotOperator {
         told(done, "the supervisor sends the robot there")
     }
 
+    fn hand(&self, stick: [f64; 2]) -> Result<String, String> {
+        told(operator::drive_by_hand(&self.robot, stick.into()), "")
+    }
+
     fn go_back(&self) -> Result<String, String> {
-        // The start is the origin of the mission frame.
-        self.go_to(&[[0.0; 2]])
+        told(operator::send_back(&self.robot), "the supervisor sends the robot there")
     }
 }

@@ -22,6 +22,8 @@ pub(crate) trait Operator: Send + Sync + 'static {
     fn go_to(&self, targets: &[[f64; 2]]) -> Result<String, String>;
     /// Go back to the place where the run began.
     fn go_back(&self) -> Result<String, String>;
+    /// Push the stick, ahead and to the left, in shares of full speed. The robot stands soon unless this is asked again.
+    fn hand(&self, stick: [f64; 2]) -> Result<String, String>;
 }
 
 /// A message of a browser that has shown its token.
@@ -48,6 +50,10 @@ pub(crate) enum Order {
         targets: Vec<[f64; 2]>,
     },
     GoBack,
+    Hand {
+        ahead: f64,
+        left: f64,
+    },
     /// Show the field of a target, without going there.
     Preview {
         x: f64,
@@ -82,6 +88,7 @@ impl Order {
             Self::Kill { stage } => operator.kill(stage),
             Self::GoTo { targets } => operator.go_to(targets),
             Self::GoBack => operator.go_back(),
+            Self::Hand { ahead, left } => operator.hand([*ahead, *left]),
             Self::Preview { .. } => Ok(String::new()),
         }
     }

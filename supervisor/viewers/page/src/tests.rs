@@ -45,6 +45,9 @@ impl Operator for Noted {
     fn go_to(&self, targets: &[[f64; 2]]) -> Result<String, String> {
         self.note(&format!("go to {targets:?}"))
     }
+    fn hand(&self, stick: [f64; 2]) -> Result<String, String> {
+        self.note(&format!("hand {stick:?}"))
+    }
     fn go_back(&self) -> Result<String, String> {
         Err("the robot is supervised by nobody".to_owned())
     }
@@ -304,6 +307,7 @@ fn who_watches_may_stop_the_robot_and_nothing_else() {
         json!({"order": "restart", "stage": "planner"}),
         json!({"order": "go_to", "targets": [[1.0, 2.0]]}),
         json!({"order": "go_back"}),
+        json!({"order": "hand", "ahead": 1.0, "left": 0.0}),
         json!({"order": "preview", "x": 1.0, "y": 0.0}),
     ] {
         let (done, why) = browser.order(&order);
@@ -327,9 +331,13 @@ fn who_drives_is_told_what_was_confirmed_or_why_it_was_not_done() {
     assert!(!browser.order(&json!({"order": "go_to", "targets": vec![[0.0, 0.0]; 17]})).0);
     let (done, why) = browser.order(&json!({"order": "go_back"}));
     assert_eq!((done, &*why), (false, "the robot is supervised by nobody"));
+    assert!(browser.order(&json!({"order": "hand", "ahead": 1.0, "left": -0.5})).0);
     assert!(browser.order(&json!({"order": "preview", "x": 1.5, "y": 0.0})).0);
     assert_eq!(page.shared.lock().wanted, Some([1.5, 0.0]));
-    assert_eq!(*noted.0.lock().unwrap(), ["kill planner", "go to [[1.0, 2.0]]"]);
+    assert_eq!(
+        *noted.0.lock().unwrap(),
+        ["kill planner", "go to [[1.0, 2.0]]", "hand [1.0, -0.5]"]
+    );
 }
 
 #[test]

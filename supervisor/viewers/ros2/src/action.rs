@@ -183,9 +183,10 @@ impl Server {
 
     /// A run that stays gives up a target, and then waits for the next one.
     pub(crate) fn directive(&mut self, directive: &DirectiveSample) {
-        if HoldReason::from_byte(directive.reason) == HoldReason::Waiting
-            && let Some(goal) = self.goals.back_mut().filter(|goal| goal.number.is_some())
-            && std::mem::replace(&mut goal.waits, true)
+        let waits = HoldReason::from_byte(directive.reason) == HoldReason::Waiting;
+        if let Some(goal) = self.goals.back_mut().filter(|goal| goal.number.is_some())
+            && std::mem::replace(&mut goal.waits, waits)
+            && waits
         {
             self.end(Status::Aborted);
         }

@@ -7,13 +7,8 @@ use ros2::cdr::{Malformed, Reader};
 
 use crate::shown::MAP;
 
-/// The robot's place by a node.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Place {
-    pub(crate) pose: Pose2,
-    /// Covariance of x, y and heading: xx, xy, x theta, yy, y theta, theta theta.
-    pub(crate) covariance: [f64; 6],
-}
+/// The least deviations of a place, metres and radians, whatever its covariance says.
+const LEAST_SIGMA: f64 = 0.05;
 
 /// The target of a `geometry_msgs/PoseStamped`.
 pub(crate) fn goal(payload: &[u8]) -> Result<TargetPoint, String> {
@@ -26,12 +21,13 @@ pub(crate) fn goal_of(reader: &mut Reader<'_>) -> Result<TargetPoint, String> {
     Ok(TargetPoint { x_m: position.x, y_m: position.y, heading_rad: heading, has_heading: 1 })
 }
 
-/// The place of a `geometry_msgs/PoseWithCovarianceStamped`.
-pub(crate) fn place(payload: &[u8]) -> Result<Place, String> {
+/// The place of a `geometry_msgs/PoseWithCovarianceStamped`, and its deviations, metres and radians.
+pub(crate) fn place(payload: &[u8]) -> Result<(TargetPoint, [f64; 2]), String> {
     let mut reader = Reader::new(payload).map_err(malformed)?;
-    let pose = pose_in_map(&mut reader)?;
+    let place = goal_of(&mut reader)?;
     let all: [f64; 36] = reader.f64s().map_err(malformed)?;
-    Ok(Place { pose, covariance: [0, 1, 5, 7, 11, 35].map(|at| all[at]) })
+    let variances = [f64::midpoint(all[0], all[7]), all[35]];
+    Ok((place, variances.map(|variance| variance.sqrt().max(LEAST_SIGMA))))
 }
 
 /// The value of a `std_msgs/Bool`.

@@ -7,22 +7,20 @@ use std::{
 };
 
 use common::{
-    bus::{Bus, BusError, Writer},
+    bus::{Bus, BusError},
     domain::{Domain, RobotName},
     follower::{Event, Follower},
-    kinematics::Pose2,
-    samples::{FixSample, RequestKind, TargetPoint, name},
+    samples::{RequestKind, TargetPoint},
     signals::{SIGCONT, Signals},
     topics,
 };
-use glam::DVec2;
 use robot_state::{Feed, Sample, TOPICS, newest_run};
 use ros2::participant::{Message, Request};
 use thiserror::Error;
 
 use crate::{
     action::{Server, Status, Uuid},
-    asked::{self, Place},
+    asked,
     endpoints::{Call, Endpoints},
     orders::{Done, Order, Orders, Why},
     overlap::overlap,
@@ -36,12 +34,6 @@ const LOOK_EVERY: Duration = Duration::from_millis(50);
 const FEEDBACK_EVERY: Duration = Duration::from_millis(100);
 /// The time after which a bus that cannot be used is tried again.
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
-/// The time for which a place that a node names is published, and how often: dead reckoning believes fixes that contradict it when ten of
-/// them agree over three seconds.
-const PLACED_FOR: Duration = Duration::from_secs(4);
-const PLACED_EVERY: Duration = Duration::from_millis(350);
-/// The least deviations of a place, metres and radians, whatever its covariance says.
-const PLACE_SIGMAS: [f64; 2] = [0.05, 0.05];
 /// The most clients that wait for results.
 const MOST_RESULTS: usize = 32;
 /// The least interval between reports of refusals.
@@ -76,32 +68,6 @@ pub(crate) enum BridgeError {
     System(io::Error),
 }
 
-/// The bus of a robot.
-struct RobotBus {
-    feed: Feed,
-    /// The writer of fixes; none if nobody may say where the robot is.
-    fixes: Option<Writer<FixSample>>,
-}
-
-impl RobotBus {
-    fn open(bus: &Bus, accepted: &[Accept]) -> Result<Self, BusError> {
-        let is_placed = accepted.contains(&Accept::Pose);
-        Ok(Self {
-            feed: Feed::open(bus, TOPICS)?,
-            fixes: is_placed.then(|| bus.writer(&topics::FIX, 1)).transpose()?,
-        })
-    }
-}
-
-/// A place that a node named.
-struct Placed {
-    place: Place,
-    /// The pose when the place was named.
-    then: Pose2,
-    since: Instant,
-    newest: Option<Instant>,
-}
-
 /// The state of the bridge.
 struct Bridge {
     robot: RobotName,
@@ -112,7 +78,6 @@ struct Bridge {
     /// Clients that wait for the result of a goal.
     results: Vec<(Request, Uuid)>,
     feedback_at: Instant,
-    placed: Option<Placed>,
     /// The number of stops that were asked for since the robot was ordered to stand for a canceled goal, that order included. None if the
     /// robot does not stand for one.
     stands_for_cancel: Option<u32>,
@@ -135,12 +100,11 @@ pub(crate) fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Resul
         goals: Server::default(),
         results: Vec::new(),
         feedback_at: Instant::now(),
-        placed: None,
         stands_for_cancel: None,
         told_at: None,
     };
     let robot_domain = Domain::of(robot.clone());
-    let open = |bus: &Bus| RobotBus::open(bus, accepted);
+    let open = |bus: &Bus| Feed::open(bus, TOPICS);
     let follow = || Follower::new(robot_domain.clone(), "ros2", &topics::LINK, open);
     let mut follower = follow();
     while !ended() {
@@ -209,17 +173,17 @@ impl Bridge {
     fn end(&mut self) {
         self.goals.end(Status::Aborted);
         self.goals.forget_targets();
-        (self.shown, self.placed, self.stands_for_cancel) = (None, None, None);
+        (self.shown, self.stands_for_cancel) = (None, None);
     }
 
     /// Take all samples that were published on the robot's bus.
-    fn take_samples(&mut self, bus: &mut RobotBus) -> Result<(), BusError> {
+    fn take_samples(&mut self, feed: &mut Feed) -> Result<(), BusError> {
         let Self { endpoints, shown, goals, stands_for_cancel, .. } = self;
         let Some(shown) = shown else {
             return Ok(());
         };
         let now_ns = now_ns();
-        bus.feed.read(&mut |sample| {
+        feed.read(&mut |sample| {
             match &sample {
                 Sample::Target(target) => goals.target(target),
                 Sample::Command(command) => goals.command(command),
@@ -232,41 +196,7 @@ impl Bridge {
                 _ => {}
             }
             shown.sample(&sample, now_ns, &mut |id, payload| endpoints.publish(id, payload));
-        })?;
-        bus.fixes.as_mut().map_or(Ok(()), |fixes| self.place(fixes))
-    }
-
-    /// Publish the place that a node named, moved by the robot's way since then.
-    fn place(&mut self, fixes: &mut Writer<FixSample>) -> Result<(), BusError> {
-        let (Some(placed), Some(shown)) = (&mut self.placed, &self.shown) else {
-            return Ok(());
-        };
-        if placed.newest.is_some_and(|newest| newest.elapsed() < PLACED_EVERY) {
-            return Ok(());
-        }
-        placed.newest = Some(Instant::now());
-        let now = shown.newest_pose();
-        let Place { pose, covariance } = placed.place;
-        let turned = pose.heading - placed.then.heading;
-        let way = DVec2::from_angle(turned).rotate(now.pose().position - placed.then.position);
-        let mut covariance = covariance;
-        for (variance, sigma) in [(0, PLACE_SIGMAS[0]), (3, PLACE_SIGMAS[0]), (5, PLACE_SIGMAS[1])]
-        {
-            covariance[variance] = covariance[variance].max(sigma * sigma);
-        }
-        let fix = FixSample {
-            capture_ns: now.stamp.stamp_ns,
-            source: name("initialpose"),
-            x_m: pose.position.x + way.x,
-            y_m: pose.position.y + way.y,
-            heading_rad: now.heading_rad + turned,
-            covariance,
-            ..FixSample::default()
-        };
-        if placed.since.elapsed() > PLACED_FOR {
-            self.placed = None;
-        }
-        fixes.publish(now.stamp.tick, now.stamp.time(), fix)
+        })
     }
 
     /// Take the messages that nodes have sent.
@@ -287,10 +217,8 @@ impl Bridge {
         match id {
             Id::GoalPose => self.go(asked::goal(&message.payload)?, Why::Topic),
             Id::InitialPose => {
-                let place = asked::place(&message.payload)?;
-                let shown = self.shown.as_ref().ok_or("a place, and no robot runs")?;
-                let then = shown.newest_pose().pose();
-                self.placed = Some(Placed { place, then, since: Instant::now(), newest: None });
+                let (place, deviations) = asked::place(&message.payload)?;
+                self.orders.give(Order::Place(place, deviations));
             }
             Id::Stop if asked::flag(&message.payload)? => {
                 self.orders.give(Order::Stand { is_cancel: false });
@@ -358,7 +286,7 @@ impl Bridge {
             Order::Stand { is_cancel: true } if result.is_ok() => self.goals.end(Status::Canceled),
             // A robot that did not obey is not reported to stand.
             Order::Stand { is_cancel: true } => self.goals.end(Status::Aborted),
-            Order::Stand { is_cancel: false } | Order::Resume => {}
+            Order::Stand { is_cancel: false } | Order::Resume | Order::Place(..) => {}
         }
     }
 

@@ -30,6 +30,8 @@ pub(crate) enum Order {
         is_cancel: bool,
     },
     Resume,
+    /// The robot is there, with deviations in metres and radians.
+    Place(TargetPoint, [f64; 2]),
 }
 
 /// The sender of a target.
@@ -78,7 +80,7 @@ impl Orders {
     /// Have `order` carried out.
     pub(crate) fn give(&self, order: Order) {
         let worker = match order {
-            Order::Go { .. } => &self.targets,
+            Order::Go { .. } | Order::Place(..) => &self.targets,
             Order::Stand { .. } | Order::Resume => &self.stops,
         };
         if let Err(TrySendError::Full(order) | TrySendError::Disconnected(order)) =
@@ -110,5 +112,6 @@ fn perform(robot: &RobotName, order: &Order) -> Result<(), OperatorError> {
         }
         Order::Stand { .. } => operator::stand(robot).map(|_| ()),
         Order::Resume => operator::resume(robot),
+        Order::Place(place, deviations) => operator::place(robot, *place, *deviations),
     }
 }

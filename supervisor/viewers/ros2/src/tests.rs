@@ -122,6 +122,18 @@ fn arrival(target_number: u64) -> CommandSample {
 }
 
 #[test]
+fn a_place_is_taken_with_the_deviations_of_its_covariance() {
+    let mut covariance = [0.0; 36];
+    (covariance[0], covariance[7], covariance[35]) = (0.25, 0.25, 0.0685);
+    let message = Writer::default().header(0, "map").pose([1.0, 2.0, 0.5]).f64s(&covariance).take();
+    let (place, [sigma_m, sigma_rad]) = asked::place(&message).unwrap();
+    assert_eq!((place.x_m, place.y_m, sigma_m), (1.0, 2.0, 0.5));
+    assert!((place.heading_rad - 0.5).abs() < 1e-9 && (sigma_rad - 0.262).abs() < 1e-3);
+    let sure = Writer::default().header(0, "map").pose([1.0, 2.0, 0.5]).f64s(&[0.0; 36]).take();
+    assert_eq!(asked::place(&sure).unwrap().1, [0.05; 2]);
+}
+
+#[test]
 fn a_goal_of_the_action_is_reached_with_its_own_target_only() {
     let mut goals = with_a_goal();
     goals.command(&arrival(4));
@@ -156,6 +168,29 @@ fn a_goal_of_the_action_whose_target_is_given_up_ends_though_the_run_stays() {
     goals.command(&arrival(5));
     goals.directive(&waits);
     assert_eq!(state(&goals, 1), Some(Status::Succeeded as u8));
+}
+
+#[test]
+fn goals_of_the_action_are_reached_one_after_the_other_in_a_run_that_stays() {
+    let directive = |reason: HoldReason| DirectiveSample {
+        reason: reason.into(),
+        ..DirectiveSample::default()
+    };
+    let (waits, drives) = (directive(HoldReason::Waiting), directive(HoldReason::None));
+    let mut goals = Server::default();
+    for nth in 1..=20 {
+        let sent = Server::read_goal(&call(nth, &goal("map")[4..])).unwrap();
+        goals.accept(sent, goals.newest_target(), 7);
+        goals.target(&target(nth.into()));
+        // The supervisor tells of the target before it orders the robot to drive.
+        for said in [waits, drives, drives, waits] {
+            assert_eq!(state(&goals, nth), None);
+            goals.directive(&said);
+        }
+        goals.command(&arrival(nth.into()));
+        goals.directive(&waits);
+        assert_eq!(state(&goals, nth), Some(Status::Succeeded as u8), "goal {nth}");
+    }
 }
 
 #[test]

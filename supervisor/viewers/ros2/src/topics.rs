@@ -100,7 +100,7 @@ table! {
     Id::GoalPose => "goal_pose", geometry_msgs / PoseStamped, false, Some(Accept::Goals),
         "where to go, as RViz's button sends it; the action `navigate_to_pose` (`nav2_msgs/NavigateToPose`) is taken too";
     Id::InitialPose => "initialpose", geometry_msgs / PoseWithCovarianceStamped, false, Some(Accept::Pose),
-        "where the robot is, as RViz's button sends it: for 4 s it is a source of fixes";
+        "where the robot, which stands, is, as RViz's button sends it: its pose is set, and its map reset";
     Id::Stop => "stop", std_msgs / Bool, false, Some(Accept::Stop),
         "true: the robot stands; false: it goes on";
 }

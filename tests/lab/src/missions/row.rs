@@ -83,7 +83,7 @@ impl Row {
     /// The row of `trial`, run with noise `seed` under `setting`, that ended with `summary`.
     pub fn new(trial: &Trial, seed: u64, setting: &Setting, summary: &Summary) -> Self {
         let Trial { rules, shortest_m, .. } = *trial;
-        let straight_m = trial.mission.target.length();
+        let straight_m = trial.mission.straight_m();
         let started_s = summary.departed_s.filter(|_| rules.clock_after_departure);
         let time_s = (summary.mission_time_s - started_s.unwrap_or_default()).max(0.0);
         let late = rules.most_s.is_some_and(|most_s| time_s > most_s);

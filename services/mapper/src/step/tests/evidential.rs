@@ -309,3 +309,33 @@ fn a_reading_that_no_sensor_can_give_is_ignored() {
     mapper.sense(PoseSample::default(), &readings);
     assert_eq!(mapper.state().safety_events(), 0);
 }
+
+#[test]
+fn evidence_that_nothing_renews_is_weaker_with_time_and_gone_when_it_should_be() {
+    let seconds = |tick: u64| tick * 1_000_000_000;
+    let hear = |mapper: &mut Mapper, tick, heard: Option<f64>| {
+        let pose = at(tick, 0.0, 0.0, 0.0);
+        let stamp = Stamp { stamp_ns: seconds(tick), ..pose.stamp };
+        let readings = heard.map(echo);
+        mapper.sense(PoseSample { stamp, ..pose }, readings.as_slice());
+    };
+    let gone_after = |set: &str, echoes: u64| {
+        let mut mapper = mapper_of(&format!(
+            "target = [2, 0]\nperimeter = {{ width_m = 5, cells = 50 }}\nsonar.forward_m = 0.2\n[mapper]\nmap_within_m = 1.0\n{set}"
+        ));
+        for tick in 0..echoes {
+            hear(&mut mapper, tick, Some(0.7));
+        }
+        assert!(mapper.is_hazard(0.9, 0.0) && mapper.state_at(0.5, 0.0) == CellState::Scanned);
+        let gone = (echoes..400).find(|tick| {
+            hear(&mut mapper, *tick, None);
+            !mapper.is_hazard(0.9, 0.0)
+        });
+        (gone, mapper.state_at(0.5, 0.0))
+    };
+    let forgets = "forget_after_s = 120";
+    // Three echoes have the greatest weight, and one a third of it.
+    assert_eq!(gone_after(forgets, 3), (Some(120), CellState::Free));
+    assert_eq!(gone_after(forgets, 1), (Some(40), CellState::Scanned));
+    assert_eq!(gone_after("", 3), (None, CellState::Scanned));
+}

@@ -42,6 +42,8 @@ pub(in crate::commands) fn carry_out(
         directory,
         starter: Starter::Supervisor,
         recovered: None,
+        stands: false,
+        place: None,
     };
     let place = options.directory.display();
     let title = format!("{title}: everything of this run is in {place}");

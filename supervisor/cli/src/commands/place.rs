@@ -1,0 +1,36 @@
+use clap::Args;
+use common::{domain::RobotName, samples::TargetPoint};
+use mission_control::operator;
+
+use console::failure::Failure;
+
+/// Tell a robot that stands where it is: its pose becomes that, and what it sensed before is forgotten. Fails if the supervisor
+/// refuses: a robot that drives, a place outside the perimeter.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// Metres in the mission frame.
+    #[arg(allow_negative_numbers = true)]
+    x: f64,
+    /// Metres in the mission frame.
+    #[arg(allow_negative_numbers = true)]
+    y: f64,
+    /// Degrees counter-clockwise from x.
+    #[arg(allow_negative_numbers = true)]
+    heading: f64,
+    /// Standard deviation of X and of Y, metres.
+    #[arg(long, value_name = "M", default_value = "0.05")]
+    sigma: f64,
+    /// Standard deviation of HEADING, degrees.
+    #[arg(long, value_name = "DEG", default_value = "3")]
+    sigma_heading: f64,
+    /// Name of the robot.
+    #[arg(long, default_value = "x80")]
+    robot: RobotName,
+}
+
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+    let Arguments { x, y, heading, sigma, sigma_heading, robot } = arguments;
+    let heading_rad = heading.to_radians();
+    let point = TargetPoint { x_m: *x, y_m: *y, heading_rad, has_heading: 1 };
+    Ok(operator::place(robot, point, [*sigma, sigma_heading.to_radians()])?)
+}
