@@ -195,17 +195,12 @@ pub struct Start {
 #[derive(Deserialize)]
 #[serde(
     untagged,
+    deny_unknown_fields,
     expecting = "start is [x, y], [x, y, heading in degrees] or { heading_deg = degrees }"
 )]
 enum StartKeys {
     Place(Waypoint),
-    Heading(StartHeading),
-}
-
-keys! {
-    StartHeading {
-        heading_deg: f64,
-    }
+    Heading { heading_deg: f64 },
 }
 
 impl From<StartKeys> for Start {
@@ -214,9 +209,7 @@ impl From<StartKeys> for Start {
             StartKeys::Place(Waypoint { at, heading_deg }) => {
                 Self { at, heading_deg: heading_deg.unwrap_or_default() }
             }
-            StartKeys::Heading(StartHeading { heading_deg }) => {
-                Self { at: DVec2::ZERO, heading_deg }
-            }
+            StartKeys::Heading { heading_deg } => Self { at: DVec2::ZERO, heading_deg },
         }
     }
 }
