@@ -89,16 +89,7 @@ impl MissionClock {
 
 /// CLOCK_MONOTONIC, nanoseconds. All processes of the machine read the same time.
 pub fn monotonic_ns() -> u64 {
-    nanoseconds(ClockId::Monotonic)
-}
-
-/// CLOCK_BOOTTIME, nanoseconds. Unlike [`monotonic_ns`] it includes the time that the machine was suspended.
-pub fn boot_ns() -> u64 {
-    nanoseconds(ClockId::Boottime)
-}
-
-fn nanoseconds(clock: ClockId) -> u64 {
-    let now = clock_gettime(clock);
+    let now = clock_gettime(ClockId::Monotonic);
     now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64
 }
 

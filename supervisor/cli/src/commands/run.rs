@@ -134,7 +134,7 @@ fn options(arguments: &Arguments) -> Result<Options, Failure> {
                 return Ok(Options { stands, ..options });
             }
             Err(problem) => {
-                write_stderr(&format!("firsthand: the last run ends here: {problem}\n"))
+                write_stderr(&format!("firsthand: the last run ends here: {problem}\n"));
             }
         }
         is_cut_off = true;
