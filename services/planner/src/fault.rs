@@ -5,15 +5,10 @@ use harmonic::{Cell, Field, Scaled};
 /// Overwrites u wherever the target can be reached, so that every way leads to `summit`, in cell units: u halves with each cell away
 /// from it, through walls too. The field's verification stays.
 pub(crate) fn lead_astray(field: &mut Field, summit: [f64; 2]) {
-    for row in 0..field.height() {
-        for col in 0..field.width() {
-            let cell = Cell { col, row };
-            if field.is_reachable(cell) && cell != field.target() {
-                let away = (col as f64 - summit[0]).hypot(row as f64 - summit[1]);
-                field.overwrite(cell, Scaled::new((-away.fract()).exp2(), -(away as i32)));
-            }
-        }
-    }
+    field.overwrite(|Cell { col, row }| {
+        let away = (col as f64 - summit[0]).hypot(row as f64 - summit[1]);
+        Scaled::new((-away.fract()).exp2(), -(away as i32))
+    });
 }
 
 #[cfg(test)]

@@ -1,9 +1,11 @@
 //! A flag by which one thread tells another that its solve is no longer wanted.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{
+    Arc,
+    atomic::{AtomicBool, Ordering},
+};
 
-use crate::error::SolveError;
+use crate::SolveError;
 
 /// Cancels the solves it is handed to. Clones share one flag.
 #[derive(Clone, Debug, Default)]

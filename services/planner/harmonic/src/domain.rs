@@ -1,8 +1,6 @@
 //! The map a field is solved on: free and blocked cells, the target, the screening.
 
-use crate::cell::{Cell, Change, MAX_SIDE};
-use crate::error::SolveError;
-use crate::screening::{Coefficients, MIN_SCREENING_CELLS, Screening};
+use crate::{Cell, Change, MAX_SIDE, MIN_SCREENING_CELLS, Screening, SolveError};
 
 /// A map of `width` x `height` cells with its target and screening, row-major: index = row * width + col.
 ///
@@ -12,7 +10,8 @@ pub struct Domain {
     width: usize,
     height: usize,
     blocked: Vec<bool>,
-    screening: Coefficients,
+    /// The screening coefficient k of all cells.
+    screening: f64,
     target: Cell,
 }
 
@@ -36,13 +35,9 @@ impl Domain {
         }
         let expected = width * height;
         if blocked.len() != expected {
-            return Err(SolveError::WrongLength {
-                what: "the blocked mask",
-                found: blocked.len(),
-                expected,
-            });
+            return Err(SolveError::WrongLength { found: blocked.len(), expected });
         }
-        let domain = Self { width, height, blocked, screening: Coefficients::NONE, target };
+        let domain = Self { width, height, blocked, screening: 0.0, target };
         if domain.blocked[domain.checked_index(target, "the target")?] {
             return Err(SolveError::TargetBlocked { target });
         }
@@ -52,33 +47,15 @@ impl Domain {
     /// Replaces the screening.
     ///
     /// # Errors
-    /// [`SolveError::WrongLength`] and [`SolveError::ScreeningLength`].
+    /// [`SolveError::ScreeningLength`].
     pub fn with_screening(mut self, screening: &Screening) -> Result<Self, SolveError> {
-        let check = |index: usize, cells: f64| {
-            if cells >= MIN_SCREENING_CELLS {
-                Ok(())
-            } else {
-                Err(SolveError::ScreeningLength { index, cells })
-            }
-        };
-        match screening {
-            Screening::None => {}
-            Screening::Uniform { length, cell } => check(0, length / cell)?,
-            Screening::PerCell(lengths) => {
-                let expected = self.blocked.len();
-                if lengths.len() != expected {
-                    return Err(SolveError::WrongLength {
-                        what: "the screening",
-                        found: lengths.len(),
-                        expected,
-                    });
-                }
-                for (index, &length) in lengths.iter().enumerate() {
-                    check(index, f64::from(length))?;
-                }
+        if let Screening::Uniform { length, cell } = screening {
+            let cells = length / cell;
+            if cells.is_nan() || cells < MIN_SCREENING_CELLS {
+                return Err(SolveError::ScreeningLength { cells });
             }
         }
-        self.screening = Coefficients::of(screening);
+        self.screening = screening.coefficient();
         Ok(self)
     }
 
@@ -124,30 +101,14 @@ impl Domain {
         cell.col >= self.width || cell.row >= self.height || self.blocked[self.index(cell)]
     }
 
-    /// The screening coefficient k of the cell with row-major `index`, 0 beyond the map.
-    pub fn screening_coefficient(&self, index: usize) -> f64 {
-        self.screening.at(index)
-    }
-
-    pub(crate) fn screening(&self) -> &Coefficients {
-        &self.screening
+    /// The screening coefficient k.
+    pub fn screening_coefficient(&self) -> f64 {
+        self.screening
     }
 
     /// Row-major index of a cell of the map.
     pub(crate) fn index(&self, cell: Cell) -> usize {
         cell.row * self.width + cell.col
-    }
-
-    /// Row-major indices of the neighbours inside the map of the cell with index `index`: west, east, north, south.
-    pub fn neighbours(&self, index: usize) -> [Option<usize>; 4] {
-        let (width, height) = (self.width, self.height);
-        let (col, row) = (index % width, index / width);
-        [
-            (col > 0).then(|| index - 1),
-            (col + 1 < width).then(|| index + 1),
-            (row > 0).then(|| index - width),
-            (row + 1 < height).then(|| index + width),
-        ]
     }
 
     fn checked_index(&self, cell: Cell, what: &'static str) -> Result<usize, SolveError> {

@@ -2,8 +2,7 @@
 
 use thiserror::Error;
 
-use crate::cell::{Cell, MAX_SIDE};
-use crate::screening::MIN_SCREENING_CELLS;
+use crate::{Cell, MAX_SIDE, MIN_SCREENING_CELLS};
 
 /// A map is invalid, or a solve has no field.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -17,11 +16,11 @@ pub enum SolveError {
         "the map is too large ({width} x {height} cells): at most {MAX_SIDE} a side; use larger cells"
     )]
     MapTooLarge { width: usize, height: usize },
-    /// A per-cell input does not have one value for each cell.
+    /// The mask does not have one value for each cell.
     #[error(
-        "{what} has {found} values, the map {expected} cells: give one value a cell, row by row"
+        "the blocked mask has {found} values, the map {expected} cells: give one value a cell, row by row"
     )]
-    WrongLength { what: &'static str, found: usize, expected: usize },
+    WrongLength { found: usize, expected: usize },
     /// A cell was named that the map does not have.
     #[error("{what} (column {}, row {}) lies outside the map of {width} x {height} cells", cell.col, cell.row)]
     Outside { what: &'static str, cell: Cell, width: usize, height: usize },
@@ -30,12 +29,9 @@ pub enum SolveError {
     TargetBlocked { target: Cell },
     /// A screening length is not a number or shorter than [`MIN_SCREENING_CELLS`].
     #[error(
-        "a screening length of {cells} cells at cell index {index}: it must be at least {MIN_SCREENING_CELLS}; an \
-         infinite length is no screening"
+        "a screening length of {cells} cells: it must be at least {MIN_SCREENING_CELLS}; an infinite length is no screening"
     )]
     ScreeningLength {
-        /// Row-major index of the first cell with such a length; 0 for a uniform screening.
-        index: usize,
         /// The length found, in cells.
         cells: f64,
     },

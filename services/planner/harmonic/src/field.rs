@@ -1,11 +1,10 @@
 //! The harmonic field: u of every cell, and the result of its verification.
 
-use crate::cell::Cell;
-use crate::domain::Domain;
-use crate::method::Method;
-use crate::scaled::Scaled;
-use crate::store::Store;
-use crate::verification::{Check, Verification};
+use crate::{
+    Cell, Domain, Method, Scaled,
+    store::{BLOCKED, Store},
+    verification::{Check, Verification},
+};
 
 /// The field of one domain: u = 1 at the target, 0 where blocked or cut off, positive wherever the target can be reached.
 ///
@@ -15,7 +14,7 @@ pub struct Field {
     width: usize,
     height: usize,
     target: Cell,
-    store: Store,
+    pub(crate) store: Store,
     verification: Verification,
 }
 
@@ -61,13 +60,17 @@ impl Field {
         self.store.u(cell.row * self.width + cell.col)
     }
 
-    /// Replaces u of a reachable cell by `u`, which must not be zero: a fault injected on purpose, to see the effects of
-    /// a wrong field. Other cells are left as they are. The [`verification`](Self::verification) no longer holds.
-    pub fn overwrite(&mut self, cell: Cell, u: Scaled) {
-        if self.is_reachable(cell) && !u.is_zero() {
-            let index = cell.row * self.width + cell.col;
-            self.store.set(index, u.mantissa, u.exponent);
-        }
+    /// Replaces u of every reachable cell but the target, which must not become zero: a fault injected on purpose, to see the effects
+    /// of a wrong field. The [`verification`](Self::verification) no longer holds.
+    pub fn overwrite(&mut self, u: impl Fn(Cell) -> Scaled) {
+        let raw = |index: usize| {
+            let cell = Cell::new(index % self.width, index / self.width);
+            let is_replaced = self.is_reachable(cell) && cell != self.target;
+            let u = if is_replaced { u(cell) } else { self.store.u(index) };
+            (if self.is_blocked(cell) { BLOCKED } else { u.mantissa }, u.exponent)
+        };
+        let (mantissas, exponents) = (0..self.width * self.height).map(raw).unzip();
+        self.store = Store::Extended { mantissas, exponents };
     }
 
     /// Whether the target can be reached from `cell`.
@@ -94,18 +97,6 @@ impl Field {
         least.log10()
     }
 
-    /// The neighbour with the largest u as seen from `cell`, `None` where u is zero and at the target.
-    ///
-    /// This is steepest ascent cell by cell; it ends at the target from every reachable cell.
-    pub fn ascent(&self, cell: Cell) -> Option<Cell> {
-        if cell == self.target || !self.is_reachable(cell) {
-            return None;
-        }
-        let (col, row) = (cell.col as i64, cell.row as i64);
-        let [dc, dr] = self.steepest_ascent(col, row);
-        Some(Cell::new((col + dc) as usize, (row + dr) as usize))
-    }
-
     /// The step, along columns or rows, to the neighbour with the largest u.
     pub(crate) fn steepest_ascent(&self, col: i64, row: i64) -> [i64; 2] {
         let mut best = (Scaled::ZERO, [0; 2]);
@@ -121,10 +112,6 @@ impl Field {
     /// Whether this is a field of a map of the same size and the same target.
     pub(crate) fn fits(&self, domain: &Domain) -> bool {
         (self.width, self.height, self.target) == (domain.width(), domain.height(), domain.target())
-    }
-
-    pub(crate) fn store(&self) -> &Store {
-        &self.store
     }
 
     /// u at a signed column and row: zero outside the map.

@@ -5,8 +5,7 @@
 //! a blocked corner are left out. Near a wall the component into the wall decreases with the distance and is 0 at the wall, so
 //! the gradient never leads into a blocked cell. Only ratios of neighbouring u matter, so the common exponent is removed first.
 
-use crate::cell::Cell;
-use crate::field::Field;
+use crate::{Cell, Field};
 
 /// The field's answer at a position. Directions are unit vectors (along columns, along rows).
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -112,17 +112,19 @@ mod store;
 mod testing;
 mod verification;
 
-pub use cancellation::Cancellation;
-pub use cell::{Cell, Change, MAX_SIDE};
-pub use domain::Domain;
-pub use error::SolveError;
-pub use field::Field;
-pub use guidance::Guidance;
-pub use method::Method;
-pub use policy::Policy;
-pub use scaled::Scaled;
-pub use screening::{MIN_SCREENING_CELLS, Screening};
-pub use solver::{Phase, Settings, Solver};
+pub use crate::{
+    cancellation::Cancellation,
+    cell::{Cell, Change, MAX_SIDE},
+    domain::Domain,
+    error::SolveError,
+    field::Field,
+    guidance::Guidance,
+    method::Method,
+    policy::Policy,
+    scaled::Scaled,
+    screening::{MIN_SCREENING_CELLS, Screening},
+    solver::{Phase, Settings, Solver},
+    verification::Verification,
+};
 #[cfg(feature = "testing")]
 pub use testing::solve_exactly;
-pub use verification::Verification;

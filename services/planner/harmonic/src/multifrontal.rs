@@ -23,12 +23,10 @@ mod gauss_seidel;
 mod tree;
 mod workspace;
 
-use crate::cancellation::Cancellation;
-use crate::domain::Domain;
-use crate::error::SolveError;
-use crate::screening::Coefficients;
-use crate::store::Store;
+use crate::{Cancellation, Domain, SolveError, store::Store};
+
 use back_substitution::substitute;
+
 pub(crate) use breadth_first::BreadthFirst;
 pub(crate) use budget::Budget;
 pub(crate) use gauss_seidel::relax;
@@ -92,11 +90,7 @@ fn factor(
             spent.push(update);
         }
         for (at, &place) in cells[..own].iter().enumerate() {
-            let k = match domain.screening() {
-                Coefficients::Uniform(k) => *k,
-                per_cell @ Coefficients::PerCell(_) => per_cell.at(pass.cell(place)),
-            };
-            matrix.add(at, at, 4.0 * (1.0 + k));
+            matrix.add(at, at, 4.0 * (1.0 + domain.screening_coefficient()));
             for neighbour in pass.neighbours(place) {
                 // Cells that a child eliminated before have no slot here; pairs within the front are met twice.
                 let other = slot.get(neighbour as usize).copied().unwrap_or(NOWHERE);

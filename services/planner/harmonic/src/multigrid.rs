@@ -21,24 +21,21 @@ mod sources;
 #[cfg(test)]
 mod tests;
 
-use coarse::Coarse;
-use coarsest::Coarsest;
-use couplings::Level;
-pub(crate) use finest::Progress;
-use finest::{Finest, Source, Work};
-use galerkin::Products;
-use grid::Grid;
-
 use std::ops::Range;
 
-use crate::cancellation::Cancellation;
-use crate::cell::Cell;
-use crate::domain::Domain;
-use crate::error::SolveError;
-use crate::real::Real;
-use crate::scaled::pow2;
-use crate::screening::Coefficients;
-use crate::simd::Simd;
+use crate::{Cancellation, Cell, Domain, SolveError, real::Real, scaled::pow2, simd::Simd};
+
+use coarse::Coarse;
+
+use coarsest::Coarsest;
+
+use couplings::Level;
+
+use finest::{Finest, Source, Work};
+
+use galerkin::Products;
+
+use grid::Grid;
 
 /// A cell whose direction a coarse correction turns by more than this, radians, has not settled. The correction is applied, and
 /// the next would be smaller by a factor of three or more, which leaves directions well within a degree.
@@ -134,24 +131,13 @@ impl<R: Real> Multigrid<R> {
         self.is_steep = false;
         let finest = &mut self.finest;
         let width = domain.width();
+        let inverse = R::of(0.25 / (1.0 + domain.screening_coefficient()));
         self.simd.run(
             #[inline(always)]
             || {
                 for row in rows.clone() {
-                    let cells = row * width..(row + 1) * width;
-                    let blocked = &domain.blocked()[cells.clone()];
-                    match domain.screening() {
-                        Coefficients::Uniform(k) => {
-                            let inverse = R::of(0.25 / (1.0 + k));
-                            finest.set_row(row, blocked, |_| inverse);
-                        }
-                        Coefficients::PerCell(all) => {
-                            let all = &all[cells];
-                            finest.set_row(row, blocked, |col| {
-                                R::of(0.25 / (1.0 + f64::from(all[col])))
-                            });
-                        }
-                    }
+                    let blocked = &domain.blocked()[row * width..(row + 1) * width];
+                    finest.set_row(row, blocked, inverse);
                 }
             },
         );
@@ -286,7 +272,7 @@ impl<R: Real> Multigrid<R> {
         for cycle in 1..=most {
             cancellation.check()?;
             let judged = (cycle >= next_check).then_some(TOLERANCE);
-            let settled = self.cycle(judged).unsettled == 0 && judged.is_some();
+            let settled = self.cycle(judged) == 0 && judged.is_some();
             let checked = settled || cycle == most;
             match after(self, checked) {
                 Some(excess) if checked => {
@@ -300,14 +286,13 @@ impl<R: Real> Multigrid<R> {
         Ok(())
     }
 
-    /// Run a cycle. A cell counts as unsettled if the correction turns its direction by more than `tolerance`, radians. Without a
-    /// tolerance no cells are counted.
-    pub(crate) fn cycle(&mut self, tolerance: Option<f64>) -> Progress {
+    /// Runs a cycle and counts the cells whose direction the correction turns by more than `tolerance`, radians; without a tolerance none.
+    pub(crate) fn cycle(&mut self, tolerance: Option<f64>) -> usize {
         let sweeps = if self.corrects && self.is_large() { SWEEPS } else { 1 };
-        let progress = self.pass(sweeps, true, tolerance);
+        let unsettled = self.pass(sweeps, true, tolerance);
         self.solve_level(0);
         self.corrects = true;
-        progress
+        unsettled
     }
 
     /// Solves on a coarse level, from zero, by one cycle through it and those below; on some it is followed by another.
@@ -359,7 +344,7 @@ impl<R: Real> Multigrid<R> {
         }
     }
 
-    fn pass(&mut self, sweeps: usize, descend: bool, tolerance: Option<f64>) -> Progress {
+    fn pass(&mut self, sweeps: usize, descend: bool, tolerance: Option<f64>) -> usize {
         let (finest, next) = (&mut self.finest, &mut self.coarse[0]);
         let share = if self.corrects { OVERCORRECTION } else { 1.0 };
         let work = Work { share: R::of(share), sweeps, descend, tolerance: tolerance.map(R::of) };

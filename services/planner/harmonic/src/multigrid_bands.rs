@@ -6,15 +6,13 @@
 //! there and back. For the same reason a band needs no cells in which u is below its range, so its equations are those of the
 //! rectangle around the cells within a number of steps from the inflow, which the band before told.
 
-use crate::cancellation::Cancellation;
-use crate::cell::Cell;
-use crate::domain::Domain;
-use crate::error::SolveError;
-use crate::multigrid::{FIRST_CHECK, Multigrid, SINGLE_CYCLES};
-use crate::real::Real;
-use crate::scaled::Scaled;
-use crate::store::{BLOCKED, Store};
-use crate::verification;
+use crate::{
+    Cancellation, Cell, Domain, Scaled, SolveError,
+    multigrid::{FIRST_CHECK, Multigrid, SINGLE_CYCLES},
+    real::Real,
+    store::{BLOCKED, Store},
+    verification,
+};
 
 /// Binary orders of magnitude below the largest inflow at which inflow has no effect on a band.
 const NO_INFLOW: i32 = 2 * f32::TOP;
@@ -232,8 +230,8 @@ impl<'a> Bands<'a> {
         inverse.resize(here.width * here.height, 0.0);
         values.clear();
         values.resize(here.width * here.height, BLOCKED as f32);
+        let k = self.domain.screening_coefficient();
         for &at in &unknowns.places {
-            let k = self.domain.screening_coefficient(self.index(at));
             inverse[here.index(at)] = (0.25 / (1.0 + k)) as f32;
         }
         let inflow = |from| self.u(from).relative_to(top - f32::TOP) as f32;

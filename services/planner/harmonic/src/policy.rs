@@ -1,11 +1,7 @@
 //! The direction and the logarithm of u of every cell of a row. For whole maps, [`Field::direction`] cell by cell would
 //! take several times as long.
 
-use crate::cell::Cell;
-use crate::field::Field;
-use crate::guidance::SADDLE;
-use crate::scaled::Scaled;
-use crate::store::Store;
+use crate::{Cell, Field, Scaled, guidance::SADDLE, store::Store};
 
 /// The field's answer at a cell's centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,7 +18,7 @@ impl Field {
     pub fn policy_of_row(&self, row: usize, mut each: impl FnMut(Policy)) {
         let width = self.width();
         let inside = (1..self.height().saturating_sub(1)).contains(&row);
-        match self.store() {
+        match &self.store {
             Store::Single { values, exponent } if inside => {
                 self.of_row(values, *exponent, row, each);
             }

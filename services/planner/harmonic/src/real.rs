@@ -51,46 +51,33 @@ pub(crate) trait Real:
     }
 }
 
-impl Real for f32 {
-    const ONE: Self = 1.0;
-    const TOP: i32 = 100;
-    const TINY: Self = 1e-34;
-    const KNOWN: f64 = 1e-28;
+macro_rules! real {
+    ($($name:ident: $top:literal $tiny:literal $known:literal)*) => {$(
+        impl Real for $name {
+            const ONE: Self = 1.0;
+            const TOP: i32 = $top;
+            const TINY: Self = $tiny;
+            const KNOWN: f64 = $known;
 
-    #[inline(always)]
-    fn of(value: f64) -> Self {
-        value as f32
-    }
+            #[inline(always)]
+            fn of(value: f64) -> Self {
+                value as $name
+            }
 
-    #[inline(always)]
-    fn wide(self) -> f64 {
-        f64::from(self)
-    }
+            #[inline(always)]
+            fn wide(self) -> f64 {
+                self.into()
+            }
 
-    #[inline(always)]
-    fn size(self) -> Self {
-        self.abs()
-    }
+            #[inline(always)]
+            fn size(self) -> Self {
+                self.abs()
+            }
+        }
+    )*};
 }
 
-impl Real for f64 {
-    const ONE: Self = 1.0;
-    const TOP: i32 = 900;
-    const TINY: Self = 1e-300;
-    const KNOWN: f64 = 1e-294;
-
-    #[inline(always)]
-    fn of(value: f64) -> Self {
-        value
-    }
-
-    #[inline(always)]
-    fn wide(self) -> f64 {
-        self
-    }
-
-    #[inline(always)]
-    fn size(self) -> Self {
-        self.abs()
-    }
+real! {
+    f32: 100 1e-34 1e-28
+    f64: 900 1e-300 1e-294
 }

@@ -20,8 +20,6 @@ pub enum Screening {
         /// The side of a cell; 1 where lengths are in cells.
         cell: f64,
     },
-    /// Each cell has its screening length, in cells, row-major; infinite for no screening.
-    PerCell(Vec<f32>),
 }
 
 impl Screening {
@@ -29,53 +27,14 @@ impl Screening {
     pub const fn cells(length: f64) -> Self {
         Self::Uniform { length, cell: 1.0 }
     }
-}
 
-/// The screening coefficients k of a map.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Coefficients {
-    /// The k of all cells.
-    Uniform(f64),
-    /// The k of each cell, row-major.
-    PerCell(Vec<f32>),
-}
-
-impl Coefficients {
-    /// No screening.
-    pub(crate) const NONE: Self = Self::Uniform(0.0);
-
-    /// The coefficients of valid lengths.
-    pub(crate) fn of(screening: &Screening) -> Self {
-        match screening {
-            Screening::None => Self::NONE,
-            Screening::Uniform { length, cell } => Self::Uniform(coefficient(*length, *cell)),
-            Screening::PerCell(lengths) => {
-                let k = lengths.iter().map(|&length| coefficient(f64::from(length), 1.0) as f32);
-                Self::PerCell(k.collect())
-            }
-        }
-    }
-
-    /// k of the cell with row-major `index`, 0 beyond the map.
-    pub(crate) fn at(&self, index: usize) -> f64 {
+    /// The coefficient k.
+    pub(crate) fn coefficient(&self) -> f64 {
         match self {
-            Self::Uniform(k) => *k,
-            Self::PerCell(cells) => cells.get(index).copied().map_or(0.0, f64::from),
+            Self::None => 0.0,
+            Self::Uniform { length, cell } => (cell / (2.0 * length)).powi(2),
         }
     }
-
-    /// The smallest k of any cell.
-    pub(crate) fn least(&self) -> f64 {
-        match self {
-            Self::Uniform(k) => *k,
-            Self::PerCell(cells) => f64::from(cells.iter().copied().fold(f32::INFINITY, f32::min)),
-        }
-    }
-}
-
-/// k of a screening length; `cell` is the side of a cell in the same unit.
-fn coefficient(length: f64, cell: f64) -> f64 {
-    (cell / (2.0 * length)).powi(2)
 }
 
 #[cfg(test)]
@@ -88,11 +47,11 @@ mod tests {
         for cells in [200, 1000] {
             let cell = 10.0 / f64::from(cells);
             let length = 0.5;
-            let k = Coefficients::of(&Screening::Uniform { length, cell }).at(0);
+            let k = Screening::Uniform { length, cell }.coefficient();
             let decay = (1.0 + 2.0 * k).acosh() / cell;
             assert!((decay * length - 1.0).abs() < 1e-3, "{decay} a metre");
         }
-        assert_eq!(Coefficients::of(&Screening::None).at(0), 0.0);
-        assert_eq!(Coefficients::of(&Screening::cells(f64::INFINITY)).at(0), 0.0);
+        assert_eq!(Screening::None.coefficient(), 0.0);
+        assert_eq!(Screening::cells(f64::INFINITY).coefficient(), 0.0);
     }
 }

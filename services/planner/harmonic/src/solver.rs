@@ -3,21 +3,18 @@
 
 mod plan;
 
-use std::num::NonZeroUsize;
-use std::ops::Range;
+use std::{num::NonZeroUsize, ops::Range};
 
-use crate::cancellation::Cancellation;
-use crate::domain::Domain;
-use crate::error::SolveError;
-use crate::field::Field;
-use crate::method::Method;
-use crate::multifrontal::{self, BreadthFirst, Budget, Tree, Workspace};
-use crate::multigrid::{DOUBLE_CYCLES, FIRST_CHECK, Multigrid, SINGLE_CYCLES};
-use crate::multigrid_bands;
-use crate::real::Real;
-use crate::screening::Coefficients;
-use crate::store::{BLOCKED, Store};
-use crate::verification::{self, Check};
+use crate::{
+    Cancellation, Domain, Field, Method, SolveError,
+    multifrontal::{self, BreadthFirst, Budget, Tree, Workspace},
+    multigrid::{DOUBLE_CYCLES, FIRST_CHECK, Multigrid, SINGLE_CYCLES},
+    multigrid_bands,
+    real::Real,
+    store::{BLOCKED, Store},
+    verification::{self, Check},
+};
+
 use plan::{beyond_single, plan};
 
 /// Cycles before the first check of a solve that starts from the field of a similar map: the first cycle has no correction to judge by.
@@ -123,18 +120,12 @@ struct Task<'a> {
 }
 
 /// The levels of one precision, and the map they were set up for.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Prepared<R> {
     levels: Option<Multigrid<R>>,
     width: usize,
     blocked: Vec<bool>,
-    screening: Coefficients,
-}
-
-impl<R> Default for Prepared<R> {
-    fn default() -> Self {
-        Self { levels: None, width: 0, blocked: Vec::new(), screening: Coefficients::NONE }
-    }
+    screening: f64,
 }
 
 impl Solver {
@@ -192,7 +183,7 @@ impl Solver {
                     let mut check = verification::check(domain, &store, threads);
                     observe(Phase::Verified);
                     if !check.holds() {
-                        multifrontal::relax(domain, &pass, &mut store);
+                        store = multifrontal::relax(domain, &pass, &store);
                         observe(Phase::Solved);
                         check = verification::check(domain, &store, threads);
                         observe(Phase::Verified);
@@ -277,7 +268,7 @@ where
                 let width = domain.width();
                 levels.start_near(domain.target(), |row, guess| {
                     let cells = row * width..(row + 1) * width;
-                    near.store().read_row_as(cells, -R::TOP, guess);
+                    near.store.read_row_as(cells, -R::TOP, guess);
                 });
                 first_check = FIRST_CHECK_NEAR;
             }
@@ -311,7 +302,9 @@ where
     fn prepare(&mut self, domain: &Domain) -> &mut Multigrid<R> {
         let same_size =
             self.width == domain.width() && self.blocked.len() == domain.blocked().len();
-        let changed = if same_size && self.levels.is_some() && self.screening == *domain.screening()
+        let changed = if same_size
+            && self.levels.is_some()
+            && self.screening == domain.screening_coefficient()
         {
             changed_rows(&self.blocked, domain)
         } else {
@@ -327,7 +320,7 @@ where
             self.width = width;
             self.blocked.clear();
             self.blocked.extend_from_slice(domain.blocked());
-            self.screening.clone_from(domain.screening());
+            self.screening = domain.screening_coefficient();
         }
         levels
     }

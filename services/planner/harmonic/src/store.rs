@@ -2,8 +2,7 @@
 
 use std::ops::Range;
 
-use crate::real::Real;
-use crate::scaled::{Scaled, pow2};
+use crate::{Scaled, real::Real, scaled::pow2};
 
 /// u of a blocked cell in the stores: any negative number would do, the accessors hide it.
 pub(crate) const BLOCKED: f64 = -1.0;
@@ -51,35 +50,6 @@ impl Store {
         }
     }
 
-    /// Sets a cell to u, [`BLOCKED`] or 0; the whole store becomes extended if u is out of its range.
-    pub(crate) fn set(&mut self, index: usize, value: f64, exponent: i32) {
-        let u = Scaled::new(value, exponent);
-        // 0 and BLOCKED have no exponent to fit.
-        let plain = |common: i32| {
-            if value > 0.0 { u.relative_to(common) } else { value }
-        };
-        match self {
-            Self::Single { values, exponent: common }
-                if fits(plain(*common), f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX)) =>
-            {
-                values[index] = plain(*common) as f32;
-            }
-            Self::Double { values, exponent: common }
-                if fits(plain(*common), f64::MIN_POSITIVE, f64::MAX) =>
-            {
-                values[index] = plain(*common);
-            }
-            Self::Extended { mantissas, exponents } => {
-                mantissas[index] = if value > 0.0 { u.mantissa } else { value };
-                exponents[index] = u.exponent;
-            }
-            Self::Single { .. } | Self::Double { .. } => {
-                self.extend();
-                self.set(index, value, exponent);
-            }
-        }
-    }
-
     /// u of a cell; zero where blocked or cut off.
     pub(crate) fn u(&self, index: usize) -> Scaled {
         let (value, exponent) = self.raw(index);
@@ -116,19 +86,4 @@ impl Store {
         }
         Self::Double { values: mantissas, exponent: -TOP }
     }
-
-    fn extend(&mut self) {
-        let len = match self {
-            Self::Single { values, .. } => values.len(),
-            Self::Double { values, .. } => values.len(),
-            Self::Extended { .. } => return,
-        };
-        let (mantissas, exponents) = (0..len).map(|index| self.raw(index)).unzip();
-        *self = Self::Extended { mantissas, exponents };
-    }
-}
-
-/// Whether a plain value is 0 or [`BLOCKED`], or lies in a range of normal numbers.
-fn fits(value: f64, least: f64, largest: f64) -> bool {
-    value <= 0.0 || (least..=largest).contains(&value)
 }

@@ -2,13 +2,11 @@
 
 use std::num::NonZeroUsize;
 
-use crate::cancellation::Cancellation;
-use crate::domain::Domain;
-use crate::error::SolveError;
-use crate::field::Field;
-use crate::method::Method;
-use crate::multifrontal::{self, BreadthFirst, Budget, Tree, Workspace};
-use crate::verification;
+use crate::{
+    Cancellation, Domain, Field, Method, SolveError,
+    multifrontal::{self, BreadthFirst, Budget, Tree, Workspace},
+    verification,
+};
 
 /// The field of `domain` by multifrontal factorisation: exact but for the rounding of `f64`, on maps of any shape.
 ///
@@ -20,9 +18,9 @@ pub fn solve_exactly(domain: &Domain) -> Result<Field, SolveError> {
     let pass = BreadthFirst::from_target(domain, &budget, &cancellation)?;
     let tree = Tree::of(&pass, &budget, &cancellation)?;
     let mut workspace = Workspace::default();
-    let mut store =
+    let store =
         multifrontal::solve(domain, (&pass, &tree), None, &budget, &mut workspace, &cancellation)?;
-    multifrontal::relax(domain, &pass, &mut store);
+    let store = multifrontal::relax(domain, &pass, &store);
     let check = verification::check(domain, &store, NonZeroUsize::MIN);
     Ok(Field::new(domain, store, &check, Method::Multifrontal))
 }

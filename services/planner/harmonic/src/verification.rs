@@ -15,19 +15,17 @@ mod cells;
 mod rows;
 mod tiles;
 
-use std::num::NonZeroUsize;
-use std::ops::Range;
+use std::{num::NonZeroUsize, ops::Range};
 
-use crate::domain::Domain;
-use crate::method::Method;
-use crate::real::Real;
-use crate::simd::Simd;
-use crate::store::Store;
-use cells::Around;
+use crate::{Domain, Method, real::Real, simd::Simd, store::Store};
+
 use cells::Cells;
-pub(crate) use cells::Check;
+
 use rows::{Rows, ScaledRows, Window};
+
 use tiles::{TILE, Tiles};
+
+pub(crate) use cells::Check;
 
 /// The result of a field's verification, cell by cell.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,7 +56,7 @@ pub(crate) fn check_above(
     threads: NonZeroUsize,
     floor: f64,
 ) -> Check {
-    let mut found = match store {
+    match store {
         Store::Single { values, .. } => {
             in_strips(domain, threads, |rows| check_plain(domain, values, rows, floor))
         }
@@ -68,10 +66,7 @@ pub(crate) fn check_above(
         Store::Extended { mantissas, exponents } => {
             in_strips(domain, threads, |rows| check_extended(domain, mantissas, exponents, rows))
         }
-    };
-    // The target is positive by construction and was left out.
-    found.reachable += 1;
-    found
+    }
 }
 
 /// Runs `check` on strips of rows, on several threads if that is faster.
@@ -103,7 +98,8 @@ fn in_strips(
 fn check_plain<R: Real>(domain: &Domain, values: &[R], strip: Range<usize>, floor: f64) -> Check {
     let width = domain.width();
     let row_of = |row: usize| values.get(row * width..(row + 1) * width);
-    check_strip(domain, values, Cells::above(width, floor), Rows::new(width), row_of, strip)
+    let cells = Cells::above(width, floor);
+    check_rows(values, cells, Rows::new(width), row_of, strip, weights_of(domain))
 }
 
 /// Checks rows of a field with an exponent a cell.
@@ -118,7 +114,19 @@ fn check_extended(
         let cells = row * width..(row + 1) * width;
         mantissas.get(cells.clone()).zip(exponents.get(cells))
     };
-    check_strip(domain, mantissas, Cells::above(width, 0.0), ScaledRows::new(width), row_of, strip)
+    let cells = Cells::above(width, 0.0);
+    check_rows(mantissas, cells, ScaledRows::new(width), row_of, strip, weights_of(domain))
+}
+
+/// Sets the weights of a row of `domain`; no equation holds at the target.
+fn weights_of<R: Real>(domain: &Domain) -> impl Fn(usize, &mut [R]) {
+    let (target, weight) = (domain.target(), R::of(0.25 / (1.0 + domain.screening_coefficient())));
+    move |row, weights| {
+        weights.fill(weight);
+        if row == target.row {
+            weights[target.col] = R::default();
+        }
+    }
 }
 
 /// Checks the cells of a part of a map that have a `weight`, 0.25 / (1 + k), and in which u is above `floor`.
@@ -128,54 +136,22 @@ pub(crate) fn check_above_with<R: Real>(
     weights: &[R],
     floor: f64,
 ) -> Check {
-    let cells = Cells::above(width, floor);
     let row_of = |row: usize| values.get(row * width..(row + 1) * width);
+    let set =
+        |row: usize, of_row: &mut [R]| of_row.copy_from_slice(&weights[row * width..][..width]);
     let strip = 0..values.len() / width;
-    check_rows(
-        values,
-        cells,
-        Rows::new(width),
-        row_of,
-        strip,
-        #[inline(always)]
-        |cells, row, raw, u, found| {
-            cells.weights.copy_from_slice(&weights[row * width..(row + 1) * width]);
-            cells.check(raw, u, 0..width, found);
-        },
-    )
-}
-
-/// Checks a strip of rows of `domain`.
-fn check_strip<'f, R: Real, W: Window<R>>(
-    domain: &Domain,
-    raw: &[R],
-    cells: Cells<R>,
-    rows: W,
-    row_of: impl Fn(usize) -> Option<W::Row<'f>>,
-    strip: Range<usize>,
-) -> Check {
-    check_rows(
-        raw,
-        cells,
-        rows,
-        row_of,
-        strip,
-        #[inline(always)]
-        |cells, row, raw, u, found| {
-            cells.check_row(domain, row, raw, u, found);
-        },
-    )
+    check_rows(values, Cells::above(width, floor), Rows::new(width), row_of, strip, set)
 }
 
 /// Checks a strip of rows with wide vectors: `raw` are the stored values, `row_of` gives rows by number, none beyond the
-/// map.
+/// map, and `set_weights` the weights of the cells of a row.
 fn check_rows<'f, R: Real, W: Window<R>>(
     raw: &[R],
     mut cells: Cells<R>,
     mut rows: W,
     row_of: impl Fn(usize) -> Option<W::Row<'f>>,
     strip: Range<usize>,
-    check_row: impl Fn(&mut Cells<R>, usize, &[R], Around<'_, R>, &mut Check),
+    set_weights: impl Fn(usize, &mut [R]),
 ) -> Check {
     Simd::default().run(
         #[inline(always)]
@@ -187,8 +163,8 @@ fn check_rows<'f, R: Real, W: Window<R>>(
             rows.take(row_of(strip.start));
             for row in strip.clone() {
                 rows.take(row_of(row + 1));
-                let raw = &raw[row * width..(row + 1) * width];
-                check_row(&mut cells, row, raw, rows.around(), &mut found);
+                set_weights(row, &mut cells.weights);
+                cells.check(&raw[row * width..][..width], rows.around(), &mut found);
                 tiles.add_row(row, &cells.residuals, &cells.slopes);
             }
             found.worst_tile = tiles.finish();
@@ -225,11 +201,11 @@ mod tests {
             let mut solver = Solver::default();
             let wrong = solver.solve(&screened.unwrap(), &Cancellation::new()).unwrap();
             let threads = NonZeroUsize::MIN;
-            let found = check(&domain, wrong.store(), threads);
+            let found = check(&domain, &wrong.store, threads);
             assert!(found.worst_residual < RESIDUAL_LIMIT || k > 1.8e-4, "{found:?}");
             assert!(found.worst_tile > TILE_LIMIT, "{found:?}");
             let right = solver.solve(&domain, &Cancellation::new()).unwrap();
-            let found = check(&domain, right.store(), threads);
+            let found = check(&domain, &right.store, threads);
             assert!(found.worst_tile < TILE_LIMIT / 10.0, "{found:?}");
         }
     }
@@ -240,7 +216,7 @@ mod tests {
         let field = Solver::default().solve(&domain, &Cancellation::new()).unwrap();
         let place = domain.index(Cell::new(90, 70));
         for factor in [1.0, 1.001, 3.0, 0.0, f64::NAN, f64::INFINITY] {
-            let u = |index: usize| field.store().u(index);
+            let u = |index: usize| field.store.u(index);
             let blocked = |index: usize| domain.blocked()[index];
             let factor = |index: usize| if index == place { factor } else { 1.0 };
             let of = |value: &dyn Fn(usize) -> f64| -> Vec<f64> {

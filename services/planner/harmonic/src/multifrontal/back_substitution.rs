@@ -1,13 +1,10 @@
 //! Back substitution: from the factors to u, outwards from the cells whose u is known, in extended range.
 
-use super::breadth_first::BreadthFirst;
-use super::tree::Tree;
-use super::workspace::Workspace;
-use crate::cancellation::Cancellation;
-use crate::domain::Domain;
-use crate::error::SolveError;
-use crate::scaled::Scaled;
-use crate::store::{BLOCKED, Store};
+use super::{breadth_first::BreadthFirst, tree::Tree, workspace::Workspace};
+use crate::{
+    Cancellation, Domain, Scaled, SolveError,
+    store::{BLOCKED, Store},
+};
 
 /// Binary orders of magnitude a front may span to be computed in plain `f64` with one common exponent.
 const PLAIN_SPAN: i32 = 300;

@@ -1,9 +1,7 @@
 //! A breadth-first pass over the free cells, from the target or from all cells whose u is known.
 
 use super::budget::Budget;
-use crate::cancellation::Cancellation;
-use crate::domain::Domain;
-use crate::error::SolveError;
+use crate::{Cancellation, Domain, SolveError};
 
 /// The cell has no place in the order: blocked, or cut off from the target.
 pub(crate) const ABSENT: u32 = u32::MAX;

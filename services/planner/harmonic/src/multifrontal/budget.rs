@@ -1,7 +1,6 @@
 //! The memory and the operations that a factorisation may take, asked about before they are spent.
 
-use crate::domain::Domain;
-use crate::error::SolveError;
+use crate::{Domain, SolveError};
 
 /// Bytes and multiplications allowed for the factorisation of one map.
 #[derive(Clone, Copy, Debug)]

@@ -6,9 +6,10 @@
 //! range propagate them, because in such passages u changes by orders of magnitude a cell.
 
 use super::breadth_first::{ABSENT, BreadthFirst};
-use crate::domain::Domain;
-use crate::scaled::Scaled;
-use crate::store::Store;
+use crate::{
+    Domain, Scaled,
+    store::{BLOCKED, Store},
+};
 
 /// Most sweeps, each in both directions.
 const SWEEPS: usize = 200;
@@ -16,23 +17,26 @@ const SWEEPS: usize = 200;
 /// Largest relative change of a sweep that ends them.
 const CONVERGED: f64 = 1e-7;
 
-/// Relaxes `store` from the farthest cell to the nearest and back, until it converges.
-pub(crate) fn relax(domain: &Domain, pass: &BreadthFirst, store: &mut Store) {
+/// u of `store`, relaxed from the farthest cell to the nearest and back until it converges.
+pub(crate) fn relax(domain: &Domain, pass: &BreadthFirst, store: &Store) -> Store {
+    let cells = 0..domain.blocked().len();
+    let mut u: Vec<Scaled> = cells.map(|index| store.u(index)).collect();
     for _ in 0..SWEEPS {
         let mut change = 0.0_f64;
         let places = pass.unknown();
         for place in places.clone().rev().chain(places) {
             let around = pass.neighbours(place).into_iter().filter(|&it| it != ABSENT);
-            let sum = Scaled::sum(around.map(|place| store.u(pass.cell(place))));
-            let index = pass.cell(place);
-            let mean = 0.25 * sum.mantissa / (1.0 + domain.screening_coefficient(index));
-            let u = Scaled::new(mean, sum.exponent);
-            let before = store.u(index);
-            change = change.max((before.relative_to(u.exponent) / u.mantissa - 1.0).abs());
-            store.set(index, u.mantissa, u.exponent);
+            let sum = Scaled::sum(around.map(|place| u[pass.cell(place)]));
+            let mean = 0.25 * sum.mantissa / (1.0 + domain.screening_coefficient());
+            let (new, own) = (Scaled::new(mean, sum.exponent), &mut u[pass.cell(place)]);
+            change = change.max((own.relative_to(new.exponent) / new.mantissa - 1.0).abs());
+            *own = new;
         }
         if change <= CONVERGED {
             break;
         }
     }
+    let mantissa = |(u, &blocked): (&Scaled, &bool)| if blocked { BLOCKED } else { u.mantissa };
+    let mantissas = u.iter().zip(domain.blocked()).map(mantissa).collect();
+    Store::narrowest(mantissas, u.iter().map(|u| u.exponent).collect())
 }

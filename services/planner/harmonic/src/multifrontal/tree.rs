@@ -13,13 +13,10 @@
 //! Each separator is eliminated once both slabs beside it are, so what it then touches is the next separator inwards, a
 //! bounded number of cells nearer to the target: weights stay far above the smallest `f64` as they do without slabs.
 
-use std::cmp::Reverse;
-use std::ops::Range;
+use std::{cmp::Reverse, ops::Range};
 
-use super::breadth_first::BreadthFirst;
-use super::budget::Budget;
-use crate::cancellation::Cancellation;
-use crate::error::SolveError;
+use super::{breadth_first::BreadthFirst, budget::Budget};
+use crate::{Cancellation, SolveError};
 
 /// Cells that are eliminated together, followed by the cells on which they leave an update.
 #[derive(Clone, Copy)]

@@ -1,6 +1,6 @@
 //! The factors, and the memory a factorisation works in.
 
-use crate::scaled::Scaled;
+use crate::Scaled;
 
 /// Memory reused between solves: fresh pages from the system cost as much as filling them.
 #[derive(Debug, Default)]

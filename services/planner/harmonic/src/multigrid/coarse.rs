@@ -5,9 +5,11 @@
 //! last on the way down, so their residual is zero, and first on the way up, so they need no correction. So no interpolation to them is
 //! stored.
 
-use super::couplings::{EAST, SOUTH, SOUTH_EAST, SOUTH_WEST};
-use super::grid::{EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Weights, around, correct};
-use super::kernels::{add_active, gather, relax, subtract, sum_weighted};
+use super::{
+    couplings::{EAST, SOUTH, SOUTH_EAST, SOUTH_WEST},
+    grid::{EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Weights, around, correct},
+    kernels::{add_active, gather, relax, subtract, sum_weighted},
+};
 use crate::real::Real;
 
 const W: (isize, isize) = (-1, 0);
@@ -66,31 +68,19 @@ impl<R: Real> Coarse<R> {
 
             let Scratch { residual_eo, residual_oe, residual_ee, restricted, .. } = &mut scratch;
             let [above, here] = grid.buffered(number);
-            self.gather(EE, o, ALL, &mut residual_ee[m..][..n]);
-            self.gather(OE, o, [N, S, NW, NE, SW, SE], &mut residual_oe[m..][..n]);
-            self.gather(EO, o, [W, E], &mut residual_eo[here..][..n]);
-            let residual_eo = (&residual_eo[above..], &residual_eo[here..]);
-            let restricted = &mut restricted[..n];
-            self.restrict(o, &residual_ee[m..], &residual_oe[m - 1..], residual_eo, restricted);
+            gather(&mut residual_ee[m..][..n], &self.terms(EE, o, n, ALL));
+            let steps = [N, S, NW, NE, SW, SE];
+            gather(&mut residual_oe[m..][..n], &self.terms(OE, o, n, steps));
+            gather(&mut residual_eo[here..][..n], &self.terms(EO, o, n, [W, E]));
+            let (west, above, here) =
+                (&residual_oe[m - 1..], &residual_eo[above..], &residual_eo[here..]);
+            let (active, own) = (&self.inverse[EE][o..], &residual_ee[m..]);
+            let weights = around(&self.weights, o, grid.stride);
+            let values = [&west[1..], west, here, above];
+            sum_weighted(&mut restricted[..n], active, own, weights, values);
             scratch.split_restricted(&grid, &next.grid, &mut next.f, number);
         }
         self.scratch = scratch;
-    }
-
-    /// Restricts residuals to as many cells of the next level from `o` on as `out` has. `odd_even` starts one cell to the west; the two
-    /// rows of even-odd cells are that above and this one.
-    #[inline(always)]
-    fn restrict(
-        &self,
-        o: usize,
-        even_even: &[R],
-        odd_even: &[R],
-        (above, here): (&[R], &[R]),
-        out: &mut [R],
-    ) {
-        let weights = around(&self.weights, o, self.grid.stride);
-        let around = [&odd_even[1..], odd_even, here, above];
-        sum_weighted(out, &self.inverse[EE][o..], even_even, weights, around);
     }
 
     /// Adds `share` of the correction from `next` and relaxes.
@@ -157,19 +147,7 @@ impl<R: Real> Coarse<R> {
         self.u[plane] = row;
     }
 
-    /// The sum of couplings times u over the neighbours at `steps`, for as many places of a plane from `o` on as `into` has.
-    #[inline(always)]
-    fn gather<const COUNT: usize>(
-        &self,
-        plane: usize,
-        o: usize,
-        steps: [(isize, isize); COUNT],
-        into: &mut [R],
-    ) {
-        let terms = self.terms(plane, o, into.len(), steps);
-        gather(into, &terms);
-    }
-
+    /// The couplings and u of the neighbours at `steps` of the `n` places of a plane from `o` on.
     #[inline(always)]
     fn terms<const COUNT: usize>(
         &self,

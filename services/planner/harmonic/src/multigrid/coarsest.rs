@@ -1,7 +1,9 @@
 //! The coarsest level, a few dozen cells at most: solved by its inverse.
 
-use super::coarse::Coarse;
-use super::couplings::{EAST, SOUTH, SOUTH_EAST, SOUTH_WEST};
+use super::{
+    coarse::Coarse,
+    couplings::{EAST, SOUTH, SOUTH_EAST, SOUTH_WEST},
+};
 use crate::real::Real;
 
 #[derive(Debug, Default)]

@@ -4,9 +4,11 @@
 //! kind has a type of its own, so that one text compiles to loops in which those that are 1 or none take no work: a loop that
 //! loads all couplings takes 30 % longer for the whole set-up.
 
-use super::coarse::Coarse;
-use super::finest::Finest;
-use super::grid::{Grid, Planes, Weights};
+use super::{
+    coarse::Coarse,
+    finest::Finest,
+    grid::{Grid, Planes, Weights},
+};
 use crate::real::Real;
 
 /// The directions in which a cell stores its couplings. Those in the others are its neighbours' own.
@@ -84,22 +86,28 @@ pub(super) trait Level<R: Real> {
     fn diagonal(&self, direction: usize, owner: Place, n: usize) -> impl Couplings<R>;
 }
 
+macro_rules! fields {
+    () => {
+        fn grid(&self) -> Grid {
+            self.grid
+        }
+
+        fn inverse(&self) -> &Planes<R> {
+            &self.inverse
+        }
+
+        fn weights(&self) -> &Weights<R> {
+            &self.weights
+        }
+
+        fn weights_mut(&mut self) -> &mut Weights<R> {
+            &mut self.weights
+        }
+    };
+}
+
 impl<R: Real> Level<R> for Finest<R> {
-    fn grid(&self) -> Grid {
-        self.grid
-    }
-
-    fn inverse(&self) -> &Planes<R> {
-        &self.inverse
-    }
-
-    fn weights(&self) -> &Weights<R> {
-        &self.weights
-    }
-
-    fn weights_mut(&mut self) -> &mut Weights<R> {
-        &mut self.weights
-    }
+    fields!();
 
     #[inline(always)]
     fn along(&self, _: usize, _: Place, (plane, at): Place, n: usize) -> impl Couplings<R> {
@@ -118,21 +126,7 @@ impl<R: Real> Level<R> for Finest<R> {
 }
 
 impl<R: Real> Level<R> for Coarse<R> {
-    fn grid(&self) -> Grid {
-        self.grid
-    }
-
-    fn inverse(&self) -> &Planes<R> {
-        &self.inverse
-    }
-
-    fn weights(&self) -> &Weights<R> {
-        &self.weights
-    }
-
-    fn weights_mut(&mut self) -> &mut Weights<R> {
-        &mut self.weights
-    }
+    fields!();
 
     #[inline(always)]
     fn along(&self, direction: usize, owner: Place, _: Place, n: usize) -> impl Couplings<R> {

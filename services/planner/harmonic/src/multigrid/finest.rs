@@ -6,8 +6,10 @@
 //! own), black from red, then red again. The changes of that last half sweep, summed over the red neighbours of a black cell,
 //! are exactly its residual, which is restricted at once.
 
-use super::coarse::Coarse;
-use super::grid::{EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Weights, around, correct};
+use super::{
+    coarse::Coarse,
+    grid::{EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Weights, around, correct, first},
+};
 use crate::real::Real;
 
 /// An inflow at one cell: the right-hand side of its equation.
@@ -51,13 +53,6 @@ pub(super) struct Work<R> {
     pub tolerance: Option<R>,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Progress {
-    /// Even-even cells whose direction the coarse correction turned by more than the tolerance, or whose u it changed
-    /// by more than [`LARGEST_CHANGE`].
-    pub unsettled: usize,
-}
-
 impl<R: Real> Finest<R> {
     /// Makes this a level of `grid` without cells.
     pub(super) fn reshape(&mut self, grid: Grid) {
@@ -67,16 +62,16 @@ impl<R: Real> Finest<R> {
         self.scratch.reset(&grid);
     }
 
-    /// Sets one row of cells; `inverse` gives 1 / diagonal of a free cell by its column.
+    /// Sets one row of cells; `inverse` is 1 / diagonal of a free one.
     #[inline(always)]
-    pub(super) fn set_row(&mut self, row: usize, blocked: &[bool], inverse: impl Fn(usize) -> R) {
+    pub(super) fn set_row(&mut self, row: usize, blocked: &[bool], inverse: R) {
         let Grid { width, columns, .. } = self.grid;
         let (plane, start) = self.grid.locate(0, row);
         let (first, second) = self.inverse.split_at_mut(plane + 1);
         let even = &mut first[plane][start..][..columns];
         let odd = &mut second[0][start..][..columns];
         let value = |col: usize| {
-            if blocked[col] { R::default() } else { inverse(col) }
+            if blocked[col] { R::default() } else { inverse }
         };
         for x in 0..width / 2 {
             even[x] = value(2 * x);
@@ -87,12 +82,13 @@ impl<R: Real> Finest<R> {
         }
     }
 
-    /// A pass over the level: correction from `next`, sweeps, and residual.
+    /// A pass over the level: correction from `next`, sweeps, and residual. Returns the number of even-even cells whose direction the
+    /// correction turned by more than the tolerance, or whose u it changed by more than [`LARGEST_CHANGE`].
     #[inline(always)]
-    pub(super) fn pass(&mut self, next: &mut Coarse<R>, work: Work<R>) -> Progress {
+    pub(super) fn pass(&mut self, next: &mut Coarse<R>, work: Work<R>) -> usize {
         let Work { share, sweeps, descend, tolerance } = work;
         let (grid, strips, m) = (self.grid, self.grid.strips, MARGIN);
-        let mut progress = Progress::default();
+        let mut unsettled = 0;
         let mut scratch = std::mem::take(&mut self.scratch);
         scratch.change_oo[..m + grid.stride].fill(R::default());
         scratch.residual_eo[..m + grid.stride].fill(R::default());
@@ -103,7 +99,7 @@ impl<R: Real> Finest<R> {
                 let (upper, lower) =
                     scratch.correction_below(&grid, (&next.grid, &next.u), y, share);
                 if let Some(tolerance) = tolerance {
-                    progress.unsettled += self.unsettled(o, upper, lower, tolerance, n);
+                    unsettled += self.unsettled(o, upper, lower, tolerance, n);
                 }
                 correct(&mut self.u, &self.weights, (upper, lower), o, n);
             }
@@ -137,18 +133,21 @@ impl<R: Real> Finest<R> {
                 change_ee[beyond..][..grid.stride].fill(R::default());
             }
             self.relax(OO, y, Some(&mut change_oo[second..]));
-            residual_on_black(
-                [&change_ee[first..], &change_ee[second..]],
-                [&change_oo[first - 1..], &change_oo[second - 1..]],
-                &mut residual_oe[m..][..n],
-                &mut residual_eo[second..][..n],
-            );
-            let residual_eo = (&residual_eo[first..], &residual_eo[second..]);
-            self.restrict(o, &residual_oe[m - 1..], residual_eo, &mut restricted[..n]);
+            // The residual of black cells is the sum of the changes of their red neighbours. Blocked cells get one too; their
+            // interpolation weights are zero.
+            let (even, even_below) = (&change_ee[first..], &change_ee[second..]);
+            let (odd_above, odd) = (&change_oo[first - 1..], &change_oo[second - 1..]);
+            let odd_even = [even, &even[1..], &odd_above[1..], &odd[1..]];
+            sum_of_four(&mut residual_oe[m..][..n], odd_even);
+            sum_of_four(&mut residual_eo[second..][..n], [even, even_below, odd, &odd[1..]]);
+            let (west, above, here) =
+                (&residual_oe[m - 1..], &residual_eo[first..], &residual_eo[second..]);
+            let weights = around(&self.weights, o, grid.stride);
+            sum_weighted(&mut restricted[..n], weights, [&west[1..], west, here, above]);
             scratch.split_restricted(&grid, &next.grid, &mut next.f, y);
         }
         self.scratch = scratch;
-        progress
+        unsettled
     }
 
     /// Counts the even-even cells that the coarse correction unsettles, of `n` places from `o` on.
@@ -178,14 +177,6 @@ impl<R: Real> Finest<R> {
                 u32::from((turned | reversed | (own.size() > largest)) & (u[x] > R::default()));
         }
         unsettled as usize
-    }
-
-    /// Restricts the residuals of black cells to as many coarse cells from `o` on as `out` has. `odd_even` starts one cell to
-    /// the west; the two rows of even-odd cells are that above and this one.
-    #[inline(always)]
-    fn restrict(&self, o: usize, odd_even: &[R], (above, here): (&[R], &[R]), out: &mut [R]) {
-        let weights = around(&self.weights, o, self.grid.stride);
-        sum_weighted(out, weights, [&odd_even[1..], odd_even, here, above]);
     }
 
     /// Relaxes a strip of a plane from its four neighbours; `change`, if given, takes the change of each cell.
@@ -228,7 +219,7 @@ impl<R: Real> Finest<R> {
 #[inline(always)]
 fn relax<R: Real>(u: &mut [R], inverse: &[R], [a, b, c, d]: [&[R]; 4]) {
     let n = u.len();
-    let (inverse, a, b, c, d) = (&inverse[..n], &a[..n], &b[..n], &c[..n], &d[..n]);
+    first!(n, inverse, a, b, c, d);
     for x in 0..n {
         u[x] = (inverse[x] * ((a[x] + b[x]) + (c[x] + d[x]))).flushed();
     }
@@ -237,7 +228,7 @@ fn relax<R: Real>(u: &mut [R], inverse: &[R], [a, b, c, d]: [&[R]; 4]) {
 #[inline(always)]
 fn relax_noting<R: Real>(u: &mut [R], inverse: &[R], [a, b, c, d]: [&[R]; 4], change: &mut [R]) {
     let n = u.len();
-    let (inverse, a, b, c, d) = (&inverse[..n], &a[..n], &b[..n], &c[..n], &d[..n]);
+    first!(n, inverse, a, b, c, d);
     let change = &mut change[..n];
     for x in 0..n {
         let new = (inverse[x] * ((a[x] + b[x]) + (c[x] + d[x]))).flushed();
@@ -246,24 +237,10 @@ fn relax_noting<R: Real>(u: &mut [R], inverse: &[R], [a, b, c, d]: [&[R]; 4], ch
     }
 }
 
-/// The residual of black cells, as many as the outputs have: the sum of the changes of their red neighbours. Blocked cells get
-/// one too; their interpolation weights are zero. The changes of even-even cells are those here and a row below, those of
-/// odd-odd cells a row above and here, from one cell to the west on.
-#[inline(always)]
-fn residual_on_black<R: Real>(
-    [even, even_below]: [&[R]; 2],
-    [odd_above, odd]: [&[R]; 2],
-    odd_even: &mut [R],
-    even_odd: &mut [R],
-) {
-    sum_of_four(odd_even, [even, &even[1..], &odd_above[1..], &odd[1..]]);
-    sum_of_four(even_odd, [even, even_below, odd, &odd[1..]]);
-}
-
 #[inline(always)]
 fn sum_of_four<R: Real>(out: &mut [R], [a, b, c, d]: [&[R]; 4]) {
     let n = out.len();
-    let (a, b, c, d) = (&a[..n], &b[..n], &c[..n], &d[..n]);
+    first!(n, a, b, c, d);
     for x in 0..n {
         out[x] = (a[x] + b[x]) + (c[x] + d[x]);
     }
@@ -272,8 +249,8 @@ fn sum_of_four<R: Real>(out: &mut [R], [a, b, c, d]: [&[R]; 4]) {
 #[inline(always)]
 fn sum_weighted<R: Real>(out: &mut [R], weights: [&[R]; 4], values: [&[R]; 4]) {
     let n = out.len();
-    let [s, t, v, w] = weights.map(|it| &it[..n]);
-    let [a, b, c, d] = values.map(|it| &it[..n]);
+    let ([s, t, v, w], [a, b, c, d]) = (weights, values);
+    first!(n, s, t, v, w, a, b, c, d);
     for x in 0..n {
         out[x] = ((s[x] * a[x] + t[x] * b[x]) + (v[x] * c[x] + w[x] * d[x])).flushed();
     }

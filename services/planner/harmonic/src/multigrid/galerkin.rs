@@ -7,9 +7,11 @@
 
 use std::ops::Range;
 
-use super::coarse::Coarse;
-use super::couplings::{Couplings as _, EAST, Level, SOUTH, SOUTH_EAST, SOUTH_WEST};
-use super::grid::{EE, EO, Grid, MARGIN, OE, OO, cut, split_row};
+use super::{
+    coarse::Coarse,
+    couplings::{Couplings as _, EAST, Level, SOUTH, SOUTH_EAST, SOUTH_WEST},
+    grid::{EE, EO, Grid, MARGIN, OE, OO, cut, first, split_row},
+};
 use crate::real::Real;
 
 /// Columns of a product row by the coarse cell they belong to. Around an odd-even cell these are west, east and the
@@ -135,8 +137,7 @@ pub(super) fn corner_weights<R: Real>(
     let (w, e, w_below, e_below) = (&west[o..], &east[o..], &west[below..], &east[below..]);
     let (no, so, no_east, so_east) = (&north[o..], &south[o..], &north[o + 1..], &south[o + 1..]);
     cut!(0, n, nw, ne, sw, se);
-    let (w, e, w_below, e_below) = (&w[..n], &e[..n], &w_below[..n], &e_below[..n]);
-    let (no, so, no_east, so_east) = (&no[..n], &so[..n], &no_east[..n], &so_east[..n]);
+    first!(n, w, e, w_below, e_below, no, so, no_east, so_east);
     let inverse = &fine.inverse()[OO][o..][..n];
     let (up, down) = (fine.across(SOUTH, (OE, o), n), fine.across(SOUTH, (OO, o), n));
     let (left, right) = (fine.across(EAST, (EO, o), n), fine.across(EAST, (OO, o), n));

@@ -28,6 +28,12 @@ macro_rules! cut {
 }
 pub(super) use cut;
 
+/// Likewise, makes each of these rows the first `n` of its values, to be read.
+macro_rules! first {
+    ($n:expr, $($row:ident),+) => { $(let $row = &$row[..$n];)+ };
+}
+pub(super) use first;
+
 /// A value for each cell, by plane.
 pub(super) type Planes<R> = [Vec<R>; 4];
 
@@ -195,7 +201,7 @@ pub(super) fn correct<R: Real>(
 #[inline(always)]
 fn add_products<R: Real>(out: &mut [R], (w, a): (&[R], &[R]), (v, b): (&[R], &[R])) {
     let n = out.len();
-    let (w, a, v, b) = (&w[..n], &a[..n], &v[..n], &b[..n]);
+    first!(n, w, a, v, b);
     for x in 0..n {
         out[x] += w[x] * a[x] + v[x] * b[x];
     }

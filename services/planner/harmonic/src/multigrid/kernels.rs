@@ -1,6 +1,7 @@
 //! The work of a coarser level on rows of values. These are functions of their own because only an argument tells the
 //! compiler that the output overlaps no input.
 
+use super::grid::first;
 use crate::real::Real;
 
 /// `f` and the sum of `terms`, divided by the diagonal.
@@ -19,7 +20,7 @@ pub(super) fn relax<R: Real, const COUNT: usize>(
 #[inline(always)]
 pub(super) fn add_active<R: Real>(u: &mut [R], inverse: &[R], values: &[R]) {
     let n = u.len();
-    let (inverse, values) = (&inverse[..n], &values[..n]);
+    first!(n, inverse, values);
     for x in 0..n {
         u[x] += inverse[x].is_active() * values[x];
     }
@@ -35,9 +36,8 @@ pub(super) fn sum_weighted<R: Real>(
     values: [&[R]; 4],
 ) {
     let n = out.len();
-    let (inverse, own) = (&inverse[..n], &own[..n]);
-    let [s, t, v, w] = weights.map(|it| &it[..n]);
-    let [a, b, c, d] = values.map(|it| &it[..n]);
+    let ([s, t, v, w], [a, b, c, d]) = (weights, values);
+    first!(n, inverse, own, s, t, v, w, a, b, c, d);
     for x in 0..n {
         let around = (s[x] * a[x] + t[x] * b[x]) + (v[x] * c[x] + w[x] * d[x]);
         out[x] = (inverse[x].is_active() * own[x] + around).flushed();

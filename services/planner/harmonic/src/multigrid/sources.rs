@@ -1,10 +1,12 @@
 //! The inflow at single cells, restricted to the coarse levels: interpolation transposed, for a handful of cells a level.
 
-use super::coarse::Coarse;
-use super::couplings::Level;
-use super::finest::Finest;
-use super::galerkin::corner_weights;
-use super::grid::{EE, EO, MARGIN, OE};
+use super::{
+    coarse::Coarse,
+    couplings::Level,
+    finest::Finest,
+    galerkin::corner_weights,
+    grid::{EE, EO, MARGIN, OE},
+};
 use crate::real::Real;
 
 /// Inflow at a cell, by column and row.

@@ -1,10 +1,7 @@
 //! Tests of the algebra of the levels against dense matrices.
 
-use super::couplings::Level;
-use super::grid::EE;
-use super::sources::interpolation_weights;
-use super::*;
-use crate::screening::Screening;
+use super::{couplings::Level, grid::EE, sources::interpolation_weights, *};
+use crate::Screening;
 
 type Dense = Vec<Vec<f64>>;
 

@@ -5,13 +5,12 @@
 //! counted first. Where it is large, multigrid is chosen at once; elsewhere one breadth-first pass from the target gives
 //! the length of the ways, with that the range of u, and the exact cost of the factorisation.
 
-use crate::cancellation::Cancellation;
-use crate::domain::Domain;
-use crate::error::SolveError;
-use crate::method::Method;
-use crate::multifrontal::{BreadthFirst, Budget, Tree};
-use crate::real::Real as _;
-use crate::store::Store;
+use crate::{
+    Cancellation, Domain, Method, SolveError,
+    multifrontal::{BreadthFirst, Budget, Tree},
+    real::Real as _,
+    store::Store,
+};
 
 /// The mean width of free space, cells, from which multigrid is chosen without a further look.
 const WIDE: f64 = 32.0;
@@ -137,15 +136,12 @@ pub(super) fn beyond_single(
     Ok(cheaper_tree(&pass, bands, budget, cancellation)?.map(|tree| (pass, tree)))
 }
 
-/// The orders of magnitude by which u falls a cell along a passage of this width: like exp(-pi x / width), and by screening.
+/// The orders of magnitude by which u falls a cell along a passage of this width: like exp(-pi x / width), and by screening, by which
+/// cosh(1 / L) = 1 + 2 k.
 fn decades_per_cell(domain: &Domain, width: f64) -> f64 {
     let confined = std::f64::consts::PI / (width + 1.0) / std::f64::consts::LN_10;
-    confined.hypot(screened(domain))
-}
-
-/// The orders of magnitude by which screening makes u fall a cell on its own: cosh(1 / L) = 1 + 2 k.
-fn screened(domain: &Domain) -> f64 {
-    (1.0 + 2.0 * domain.screening().least()).acosh() / std::f64::consts::LN_10
+    let screened = (1.0 + 2.0 * domain.screening_coefficient()).acosh() / std::f64::consts::LN_10;
+    confined.hypot(screened)
 }
 
 /// The mean length of the runs of free cells along rows or along columns, whichever is the shorter.

@@ -1,10 +1,6 @@
 //! The checks of the cells of one row.
 
-use std::ops::Range;
-
-use crate::domain::Domain;
 use crate::real::Real;
-use crate::screening::Coefficients;
 
 /// Largest componentwise relative residual of a published field.
 pub(super) const RESIDUAL_LIMIT: f64 = 2e-4;
@@ -71,7 +67,6 @@ pub(super) struct Around<'a, R> {
 pub(super) struct Cells<R> {
     /// 0.25 / (1 + k) of each cell, 0 where no equation holds.
     pub weights: Vec<R>,
-    weights_set: bool,
     /// Relative residuals, with their signs, of the cells an equation holds for.
     pub residuals: Vec<R>,
     /// (|grad u| / u)^2 of the cells in `residuals`.
@@ -84,74 +79,17 @@ impl<R: Real> Cells<R> {
     /// Rows of `width` cells, of which those with a larger u than `floor` are checked.
     pub(super) fn above(width: usize, floor: f64) -> Self {
         let row = vec![R::default(); width];
-        Self {
-            weights: row.clone(),
-            weights_set: false,
-            residuals: row.clone(),
-            slopes: row,
-            floor: R::of(floor),
-        }
+        Self { weights: row.clone(), residuals: row.clone(), slopes: row, floor: R::of(floor) }
     }
 
-    /// Checks row `row` of the map but the target.
+    /// Checks the cells of a row; `raw` are their stored values.
     #[inline(always)]
-    pub(super) fn check_row(
-        &mut self,
-        domain: &Domain,
-        row: usize,
-        raw: &[R],
-        u: Around<'_, R>,
-        found: &mut Check,
-    ) {
-        self.set_weights(domain, row);
-        let (width, target) = (domain.width(), domain.target());
-        if row == target.row {
-            self.check(raw, u, 0..target.col, found);
-            self.check(raw, u, target.col + 1..width, found);
-            self.residuals[target.col] = R::default();
-            self.slopes[target.col] = R::default();
-        } else {
-            self.check(raw, u, 0..width, found);
-        }
-    }
-
-    #[inline(always)]
-    fn set_weights(&mut self, domain: &Domain, row: usize) {
-        let width = domain.width();
-        match domain.screening() {
-            Coefficients::Uniform(k) if !self.weights_set => {
-                self.weights.fill(R::of(0.25 / (1.0 + k)));
-                self.weights_set = true;
-            }
-            Coefficients::Uniform(_) => {}
-            Coefficients::PerCell(cells) => {
-                for (weight, &k) in
-                    self.weights.iter_mut().zip(&cells[row * width..(row + 1) * width])
-                {
-                    *weight = R::of(0.25 / (1.0 + f64::from(k)));
-                }
-            }
-        }
-    }
-
-    /// Checks the cells of `columns`; `raw` are their stored values.
-    #[inline(always)]
-    pub(super) fn check(
-        &mut self,
-        raw: &[R],
-        u: Around<'_, R>,
-        columns: Range<usize>,
-        found: &mut Check,
-    ) {
-        let (start, n) = (columns.start, columns.len());
-        let (zero, floor) = (R::default(), self.floor);
-        let raw = &raw[start..][..n];
-        let (here, west, east) =
-            (&u.here[start..][..n], &u.west[start..][..n], &u.east[start..][..n]);
-        let (north, south) = (&u.north[start..][..n], &u.south[start..][..n]);
-        let weights = &self.weights[start..][..n];
-        let residuals = &mut self.residuals[start..][..n];
-        let slopes = &mut self.slopes[start..][..n];
+    pub(super) fn check(&mut self, raw: &[R], u: Around<'_, R>, found: &mut Check) {
+        let (n, zero, floor) = (raw.len(), R::default(), self.floor);
+        let Around { here, west, east, north, south } = u;
+        let (here, west, east) = (&here[..n], &west[..n], &east[..n]);
+        let (north, south, weights) = (&north[..n], &south[..n], &self.weights[..n]);
+        let (residuals, slopes) = (&mut self.residuals[..n], &mut self.slopes[..n]);
         let quarter = R::of(0.25);
         let larger = |a: R, b: R| if a > b { a } else { b };
         let (mut local_maxima, mut unreached, mut reachable) = (0_u32, 0_u32, 0_u32);

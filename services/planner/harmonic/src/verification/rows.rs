@@ -1,9 +1,7 @@
 //! Rows of u under way over the map, three at a time.
 
-use crate::real::Real;
-use crate::scaled::pow2;
-
 use super::cells::Around;
+use crate::{real::Real, scaled::pow2};
 
 /// Three neighbouring rows of u.
 pub(super) trait Window<R> {

@@ -23,12 +23,12 @@ impl Reference {
         let mut diagonal = vec![1.0; cells];
         let mut right = vec![Scaled::ZERO; cells];
         for i in (0..cells).filter(|&i| free(i) && i != target) {
-            diagonal[i] = 4.0 * (1.0 + domain.screening_coefficient(i));
-            let [_, east, _, south] = domain.neighbours(i);
+            diagonal[i] = 4.0 * (1.0 + domain.screening_coefficient());
+            let [_, east, _, south] = neighbours(domain, i);
             for next in [east, south].into_iter().flatten().filter(|&n| free(n) && n != target) {
                 coupling[i * width + (next - i - 1)] += 1.0;
             }
-            if domain.neighbours(i).contains(&Some(target)) {
+            if neighbours(domain, i).contains(&Some(target)) {
                 right[i] = Scaled::ONE;
             }
         }
@@ -102,7 +102,7 @@ impl Reference {
 
     /// u of the neighbours of a cell: west, east, north, south.
     fn around(&self, index: usize) -> [Scaled; 4] {
-        let around = self.domain.neighbours(index);
+        let around = neighbours(&self.domain, index);
         around.map(|there| there.map_or(Scaled::ZERO, |there| self.u[there]))
     }
 
@@ -118,7 +118,7 @@ impl Reference {
                 if self.u[i].is_zero() || i == target {
                     continue;
                 }
-                let weight = 0.25 / (1.0 + self.domain.screening_coefficient(i));
+                let weight = 0.25 / (1.0 + self.domain.screening_coefficient());
                 let mean = scale(sum(&self.around(i)), weight);
                 if pass == 1 {
                     let ratio = mean.relative_to(self.u[i].exponent) / self.u[i].mantissa;
@@ -129,6 +129,18 @@ impl Reference {
         }
         worst
     }
+}
+
+/// Row-major indices of the neighbours inside the map: west, east, north, south.
+fn neighbours(domain: &Domain, index: usize) -> [Option<usize>; 4] {
+    let (width, height) = (domain.width(), domain.height());
+    let (col, row) = (index % width, index / width);
+    [
+        (col > 0).then(|| index - 1),
+        (col + 1 < width).then(|| index + 1),
+        (row > 0).then(|| index - width),
+        (row + 1 < height).then(|| index + width),
+    ]
 }
 
 /// The angle between two vectors, degrees.
@@ -154,10 +166,18 @@ pub(crate) fn follow(field: &Field) -> f64 {
             // The cell counts as not arriving until proven, because a walk that meets itself does not arrive.
             arrives[here] = Some(false);
             path.push(here);
-            match field.ascent(cell(here)) {
-                Some(next) => here = next.row * width + next.col,
-                None => break false,
-            }
+            let Cell { col, row } = cell(here);
+            let around = [
+                Cell::new(col + 1, row),
+                Cell::new(col.wrapping_sub(1), row),
+                Cell::new(col, row + 1),
+                Cell::new(col, row.wrapping_sub(1)),
+            ];
+            let next = around
+                .into_iter()
+                .reduce(|best, next| if field.u(next) > field.u(best) { next } else { best })
+                .expect("four neighbours");
+            here = next.row * width + next.col;
         };
         for index in path {
             arrives[index] = Some(result);
