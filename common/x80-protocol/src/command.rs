@@ -46,7 +46,6 @@ pub enum Targets {
 }
 
 impl Targets {
-    #[must_use]
     pub fn of(&self, channel: u8) -> Option<i16> {
         match self {
             Self::One { channel: set, value } => (*set == channel).then_some(*value),
@@ -139,7 +138,6 @@ pub enum Command {
 
 impl Command {
     /// Channels 0 and 1, counts per second; the others are left alone.
-    #[must_use]
     pub fn velocity(wheels: [Option<i16>; 2], limit_ms: impl Into<Option<u16>>) -> Self {
         Self::Motion(Motion {
             quantity: Quantity::Velocity,

@@ -19,7 +19,6 @@ const fn table() -> [u8; 256] {
 }
 
 /// In a frame, `bytes` are RID to the last data byte.
-#[must_use]
 pub fn crc8(bytes: &[u8]) -> u8 {
     bytes.iter().fold(0, |crc, byte| TABLE[usize::from(crc ^ byte)])
 }

@@ -150,7 +150,6 @@ impl Decoder {
         self.skip(self.buffer.len() - self.start);
     }
 
-    #[must_use]
     pub fn tally(&self) -> DecoderTally {
         self.tally
     }

@@ -32,13 +32,14 @@ impl Report {
 
     /// # Errors
     /// The DID is unknown, the frame too short, or a byte has no meaning.
-    pub fn parse(frame: &Frame<'_>) -> Result<Self, MessageError> {
-        match frame.did {
-            did::MOTOR => MotorSensors::from_bytes(frame.data).map(Self::Motor),
-            did::CUSTOM => CustomSensors::from_bytes(frame.data).map(Self::Custom),
-            did::STANDARD => StandardSensors::from_bytes(frame.data).map(Self::Standard),
-            did::SYSTEM => SystemSignal::parse(frame.data).map(Self::System),
-            did => Err(MessageError::UnknownDid { did }),
-        }
+    pub fn parse(&Frame { did, data, .. }: &Frame<'_>) -> Result<Self, MessageError> {
+        let report = match did {
+            did::MOTOR => MotorSensors::from_bytes(data).map(Self::Motor),
+            did::CUSTOM => CustomSensors::from_bytes(data).map(Self::Custom),
+            did::STANDARD => StandardSensors::from_bytes(data).map(Self::Standard),
+            did::SYSTEM => SystemSignal::parse(data).map(Self::System),
+            _ => None,
+        };
+        report.ok_or(MessageError { did })
     }
 }

@@ -1,10 +1,5 @@
 //! The contents of the three sensor frames.
 
-use super::{
-    did,
-    frame::{MessageError, length},
-};
-
 /// Counts run 0..32767 and begin again.
 pub const COUNT_CYCLE: u16 = 32_768;
 
@@ -18,21 +13,18 @@ pub struct Encoder {
 
 impl Encoder {
     /// Positive in the channel's positive direction.
-    #[must_use]
     pub fn velocity(&self) -> i32 {
         let speed = i32::from(self.speed);
         if self.positive { speed } else { -speed }
     }
 
     /// The shorter way round the cycle, in the channel's positive direction.
-    #[must_use]
     pub fn counts_since(&self, earlier: &Self) -> i32 {
         counts_between(earlier.position, self.position)
     }
 }
 
 /// The shorter way round the cycle, both below [`COUNT_CYCLE`].
-#[must_use]
 pub fn counts_between(old: u16, new: u16) -> i32 {
     let cycle = i32::from(COUNT_CYCLE);
     let ahead = (i32::from(new) - i32::from(old)).rem_euclid(cycle);
@@ -86,21 +78,16 @@ pub struct CustomSensors {
 
 /// A frame's data in their order, described once for reading and for writing.
 pub(super) trait Layout: Default {
-    const DID: u8;
     const BYTES: usize;
-    const EXPECTED: &str;
 
     /// Passes each byte to `byte`, which reads or replaces it.
     fn each_byte(&mut self, byte: &mut impl FnMut(&mut u8));
 
     /// Further bytes are ignored.
-    fn from_bytes(data: &[u8]) -> Result<Self, MessageError> {
-        if data.len() < Self::BYTES {
-            return Err(length(Self::DID, data, Self::EXPECTED));
-        }
-        let (mut new, mut bytes) = (Self::default(), data.iter());
+    fn from_bytes(data: &[u8]) -> Option<Self> {
+        let (mut new, mut bytes) = (Self::default(), data.get(..Self::BYTES)?.iter());
         new.each_byte(&mut |byte| *byte = bytes.next().copied().unwrap_or_default());
-        Ok(new)
+        Some(new)
     }
 
     fn to_bytes(mut self) -> Vec<u8> {
@@ -121,9 +108,7 @@ fn each_word<'a>(words: impl IntoIterator<Item = &'a mut u16>, byte: &mut impl F
 }
 
 impl Layout for MotorSensors {
-    const DID: u8 = did::MOTOR;
     const BYTES: usize = 33;
-    const EXPECTED: &str = "33";
 
     fn each_byte(&mut self, byte: &mut impl FnMut(&mut u8)) {
         each_word(self.pots.iter_mut().chain(&mut self.currents), byte);
@@ -141,9 +126,7 @@ impl Layout for MotorSensors {
 }
 
 impl Layout for StandardSensors {
-    const DID: u8 = did::STANDARD;
     const BYTES: usize = 40;
-    const EXPECTED: &str = "40 or 41";
 
     fn each_byte(&mut self, byte: &mut impl FnMut(&mut u8)) {
         self.ultrasonic.iter_mut().for_each(&mut *byte);
@@ -157,9 +140,7 @@ impl Layout for StandardSensors {
 }
 
 impl Layout for CustomSensors {
-    const DID: u8 = did::CUSTOM;
     const BYTES: usize = 17;
-    const EXPECTED: &str = "17";
 
     fn each_byte(&mut self, byte: &mut impl FnMut(&mut u8)) {
         each_word(&mut self.ad, byte);

@@ -12,7 +12,6 @@ pub enum Echo {
 
 impl Echo {
     /// None for 0, which is no reading.
-    #[must_use]
     pub const fn from_byte(byte: u8) -> Option<Self> {
         match byte {
             0 => None,
@@ -23,13 +22,11 @@ impl Echo {
     }
 
     /// Whole centimetres, 4 to 255.
-    #[must_use]
     pub fn byte_at(range: f64) -> u8 {
         (range * 100.0).round().clamp(4.0, 255.0) as u8
     }
 
     /// 0.04 when touching; none for nothing.
-    #[must_use]
     pub fn metres(self) -> Option<f64> {
         match self {
             Self::Touching => Some(0.04),
@@ -46,7 +43,6 @@ const INFRARED_M: (f64, f64) = (0.09, 0.81);
 pub const INFRARED_LIVE_AD: RangeInclusive<u16> = 268..=4_060;
 
 /// Metres, clamped to 0.09..0.81; 0.81 is also nothing.
-#[must_use]
 pub fn infrared_m(ad: u16) -> f64 {
     let volts_over = f64::from(ad) * 3.0 / 4028.0 - 0.17;
     if volts_over <= 0.0 {
@@ -56,7 +52,6 @@ pub fn infrared_m(ad: u16) -> f64 {
 }
 
 /// The inverse of [`infrared_m`].
-#[must_use]
 pub fn infrared_ad(range: f64) -> u16 {
     let range = range.clamp(INFRARED_M.0, INFRARED_M.1);
     ((0.216 / range + 0.17) * 4028.0 / 3.0).round() as u16
@@ -68,19 +63,16 @@ pub const LOGIC_SCALE_V: f64 = 9.0;
 pub const MOTOR_SCALE_V: f64 = 24.0;
 
 /// `ad` counts reach 4095 at `full_scale` volts.
-#[must_use]
 pub fn volts(ad: u16, full_scale: f64) -> f64 {
     f64::from(ad) / 4095.0 * full_scale
 }
 
 /// The vendor's manual gives the formula.
-#[must_use]
 pub fn board_celsius(ad: u16) -> f64 {
     (f64::from(ad) - 1256.0) / 34.8
 }
 
 /// The vendor's manual gives the formula for its overheat sensors; at least one project doubts it.
-#[must_use]
 pub fn driver_celsius(ad: u16) -> f64 {
     100.0 - (f64::from(ad) - 980.0) / 11.6
 }
