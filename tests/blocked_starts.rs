@@ -129,7 +129,7 @@ fn places_in_a_topic_that_are_never_given_back_block_starts_until_the_bus_is_rec
     in_own_process(|| {
         let mut run = Run::start("block-places", "open-room", &PACE);
         let status = run.wait_until_under_way(1.0);
-        let joined = Bus::join(bus_instance("block-places").domain(), "greedy").unwrap();
+        let joined = Bus::join(&bus_instance("block-places").domain, "greedy").unwrap();
         let mut places = Vec::new();
         let mut take_all = || {
             loop {

@@ -122,7 +122,6 @@ impl WireTally {
     }
 
     /// Adds bytes that were dropped before they could be a message.
-    #[must_use]
     pub const fn with_dropped(self, bytes: u64) -> Self {
         Self { bytes_dropped: self.bytes_dropped + bytes, ..self }
     }
@@ -200,7 +199,6 @@ fn most_m(sensor: &Sensor) -> f64 {
 
 /// The reading of the sensor in `row` of the mission's table at a range, metres: none or one beyond reach is nothing; one that is negative,
 /// no number, or beyond twice the reach is no reading.
-#[must_use]
 pub fn range_reading(row: usize, sensor: &Sensor, range: Option<f64>) -> RangeReading {
     let (status, range_m) = match range {
         Some(range) if !(0.0..=most_m(sensor)).contains(&range) => (RangeStatus::Invalid, 0.0),
@@ -213,7 +211,6 @@ pub fn range_reading(row: usize, sensor: &Sensor, range: Option<f64>) -> RangeRe
 
 /// A beam as the topic `scan` has it: infinite for none or one beyond reach, no number for one too short to be a range or beyond twice
 /// the reach.
-#[must_use]
 pub fn beam(sensor: &Sensor, range: Option<f32>) -> f32 {
     let (least_m, reach_m) = (sensor.model.least_m() as f32, sensor.reach_m as f32);
     match range {

@@ -1,7 +1,8 @@
-//! The error of a file that cannot be used, and the replacement of a file.
+//! The error of a file that cannot be used, the replacement of a file, and its text.
 
 use std::{
-    fs, io,
+    fs,
+    io::{self, Read as _},
     path::{Path, PathBuf},
 };
 
@@ -31,4 +32,11 @@ pub fn replace(file: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
     new.push(".new");
     fs::write(&new, content)?;
     fs::rename(&new, file)
+}
+
+/// The beginning of a text file, at most `most` bytes; none if it cannot be read.
+pub fn text(file: &Path, most: u64) -> Option<String> {
+    let mut text = String::new();
+    fs::File::open(file).ok()?.take(most).read_to_string(&mut text).ok()?;
+    Some(text)
 }

@@ -50,17 +50,8 @@ impl Outputs {
         Self::of_process(context, None, 0)
     }
 
-    /// The outputs of the process of `context`, which starts from `start`. A slice has at most `longest` elements.
-    pub(crate) fn with_inputs(
-        context: &mut Context,
-        start: &impl Serialize,
-        longest: usize,
-    ) -> Result<Self, StageError> {
-        let inputs = InputLog::begin(context, start)?;
-        Self::of_process(context, Some(inputs), longest)
-    }
-
-    fn of_process(
+    /// The outputs of the process of `context`. A slice has at most `longest` elements.
+    pub(crate) fn of_process(
         context: &mut Context,
         inputs: Option<InputLog>,
         longest: usize,

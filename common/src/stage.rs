@@ -38,7 +38,7 @@ use thiserror::Error;
 use crate::{
     bus::{Bus, BusError, Layout, Reader, Stamped, Topic},
     clock::MissionTime,
-    inputs,
+    inputs::{self, InputLog},
     mission::Mission,
     outputs::Outputs,
     replay::{Beginning, Output, Replay, ReplayError, entry},
@@ -109,7 +109,8 @@ impl<S: Stage> Runner<S> {
     ) -> Result<Self, StageError> {
         let mut stage = S::new(&context.run.mission);
         let start = stage.start(context)?;
-        let out = Outputs::with_inputs(context, &start, longest(&stage))?;
+        let inputs = InputLog::begin(context, &start)?;
+        let out = Outputs::of_process(context, Some(inputs), longest(&stage))?;
         if let Err(foreign) = stage.begin(start) {
             tracing::warn!("{foreign}");
         }

@@ -8,8 +8,8 @@ use super::{
     layout::{Kind, Value, type_name},
     make::{Bus, Services},
     payload::{Payload, Stamp, Stamped, decode_slice, encode_slice, has_slice},
-    ports::{self, Carried, OpenedBy},
-    read::{Reader, Slice, Wakeup},
+    ports::{self, Carried, OpenedBy, Slice},
+    read::{Reader, Wakeup},
     spec::Spec,
     topic::Topic,
     write::Writer,
@@ -23,6 +23,8 @@ pub trait AnyTopic: Sync {
     fn payload(&self) -> String;
     /// The kind of a sample's header, and that of its elements where it has a slice.
     fn layout(&self) -> (Kind, Option<Kind>);
+    /// The values in a message of the topic, as those of an [`AnySample`]; none if it is no such message.
+    fn decoded(&self, message: &[u8]) -> Option<(Value, Option<Vec<Value>>)>;
     /// The types of its samples for the middleware. The result has no name outside this crate.
     #[doc(hidden)]
     fn carried(&self) -> Carried;
@@ -75,6 +77,12 @@ impl<H: Stamped, E: Payload> AnyTopic for Topic<H, E> {
 
     fn layout(&self) -> (Kind, Option<Kind>) {
         (H::kind(), has_slice::<E>().then(E::kind))
+    }
+
+    fn decoded(&self, message: &[u8]) -> Option<(Value, Option<Vec<Value>>)> {
+        let (header, slice) = decode_slice::<H, E>(message)?;
+        let elements = has_slice::<E>().then(|| slice.iter().map(E::value).collect());
+        Some((header.value(), elements))
     }
 
     fn carried(&self) -> Carried {

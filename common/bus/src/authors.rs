@@ -147,26 +147,26 @@ impl Writers {
 }
 
 #[derive(Debug)]
-pub(crate) enum Admitted {
-    /// All authors: several processes write the topic at a time, or nobody names them.
-    All,
-    /// The newest generation, and the generation that was newest so far: nobody names authors.
-    Newest(u32),
-    /// The supervisor's process. It knows no [`Writers`]: a reader of the roster is their source, and a circle of owners would keep its
-    /// place on the bus for ever.
-    Supervisor(Newest),
-    Named(OneStage),
-}
-
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Newest {
-    process: u32,
-    newest: u32,
+pub(crate) struct Admitted {
+    authors: Authors,
+    /// Samples of older generations are returned, too, and of processes that the supervisor named earlier.
     all_generations: bool,
 }
 
 #[derive(Debug)]
-pub(crate) struct OneStage {
+enum Authors {
+    /// All authors: several processes write the topic at a time.
+    All,
+    /// The newest generation, and the generation that was newest so far: nobody names authors.
+    Newest(u32),
+    /// The supervisor's process, and its newest generation. It knows no [`Writers`]: a reader of the roster is their source, and a
+    /// circle of owners would keep its place on the bus for ever.
+    Supervisor(u32, u32),
+    Named(OneStage),
+}
+
+#[derive(Debug)]
+struct OneStage {
     writers: Writers,
     stage: &'static str,
     process: Option<Author>,
@@ -175,55 +175,49 @@ pub(crate) struct OneStage {
     /// The newest generation that the supervisor's process published on the topic, because it may play a recording, or that anybody
     /// published before anybody was named.
     newest: u32,
-    /// Processes that the supervisor named earlier are admitted, too.
-    all_generations: bool,
 }
 
 impl Admitted {
     /// The authors of a topic for a process that knows the `writers`, or for one that does not.
     pub(crate) fn of(spec: &Spec, writers: Option<&Writers>) -> Self {
-        match writers {
-            _ if !spec.has_one_writer() => Self::All,
-            None => Self::Newest(0),
-            Some(writers) if spec.writer == SUPERVISOR => Self::Supervisor(Newest {
-                process: writers.supervisor(),
-                newest: 0,
-                all_generations: false,
-            }),
-            Some(writers) => Self::Named(OneStage {
+        let authors = match writers {
+            _ if !spec.has_one_writer() => Authors::All,
+            None => Authors::Newest(0),
+            Some(writers) if spec.writer == SUPERVISOR => {
+                Authors::Supervisor(writers.supervisor(), 0)
+            }
+            Some(writers) => Authors::Named(OneStage {
                 writers: writers.clone(),
                 stage: spec.writer,
                 process: None,
                 before: None,
                 newest: 0,
-                all_generations: false,
             }),
-        }
+        };
+        Self { authors, all_generations: false }
     }
 
     pub(crate) fn of_all_generations(self) -> Self {
-        match self {
-            Self::All | Self::Newest(_) => Self::All,
-            Self::Supervisor(one) => Self::Supervisor(Newest { all_generations: true, ..one }),
-            Self::Named(one) => Self::Named(OneStage { all_generations: true, ..one }),
-        }
+        Self { all_generations: true, ..self }
     }
 
     pub(crate) fn hold_samples(&self) -> Result<bool, BusError> {
-        match self {
-            Self::Named(one) => one.writers.hold_samples(),
+        match &self.authors {
+            Authors::Named(one) => one.writers.hold_samples(),
             _ => Ok(false),
         }
     }
 
     /// Whether a sample of `author` is returned. Samples of older generations are dropped, because their process has ended.
     pub(crate) fn admits(&mut self, author: Author) -> Result<bool, BusError> {
-        match self {
-            Self::All => Ok(true),
-            Self::Newest(newest) => Ok(is_newest(author, newest)),
-            Self::Supervisor(one) => Ok(author.process == one.process
-                && (is_newest(author, &mut one.newest) || one.all_generations)),
-            Self::Named(one) => one.admits(author),
+        let all = self.all_generations;
+        match &mut self.authors {
+            Authors::All => Ok(true),
+            Authors::Newest(newest) => Ok(is_newest(author, newest) || all),
+            Authors::Supervisor(process, newest) => {
+                Ok(author.process == *process && (is_newest(author, newest) || all))
+            }
+            Authors::Named(one) => one.admits(author, all),
         }
     }
 }
@@ -235,12 +229,12 @@ fn is_newest(author: Author, newest: &mut u32) -> bool {
 }
 
 impl OneStage {
-    fn admits(&mut self, author: Author) -> Result<bool, BusError> {
+    fn admits(&mut self, author: Author, all_generations: bool) -> Result<bool, BusError> {
         let by_supervisor = author.process == self.writers.supervisor();
         if by_supervisor || self.writers.names_are_awaited() {
-            return Ok(is_newest(author, &mut self.newest) || self.all_generations);
+            return Ok(is_newest(author, &mut self.newest) || all_generations);
         }
-        if self.all_generations {
+        if all_generations {
             let named = self.writers.has_named(self.stage, author)?;
             if !named {
                 self.writers.ignore(author.process);

@@ -21,7 +21,7 @@ const LETTERS: &[u8; 32] = b"abcdefghijkmnpqrstuvwxyz23456789";
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BusInstance {
-    domain: Domain,
+    pub domain: Domain,
     name: String,
 }
 
@@ -59,10 +59,6 @@ impl BusInstance {
         let unfinished = link.with_extension("unfinished");
         symlink(self.config_name(), &unfinished)?;
         fs::rename(unfinished, link)
-    }
-
-    pub const fn domain(&self) -> &Domain {
-        &self.domain
     }
 
     fn config_name(&self) -> String {

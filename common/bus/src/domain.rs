@@ -23,7 +23,7 @@ use crate::{claim, lock_holders::holders};
 ///
 /// It is short because Linux limits the length of socket paths. It has no `_` because `_` ends the name in a shared memory prefix.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(try_from = "String", into = "String")]
+#[serde(try_from = "String")]
 pub struct RobotName(String);
 
 #[derive(Debug, Error)]
@@ -48,12 +48,6 @@ impl TryFrom<String> for RobotName {
 
     fn try_from(text: String) -> Result<Self, RobotNameError> {
         text.parse()
-    }
-}
-
-impl From<RobotName> for String {
-    fn from(name: RobotName) -> Self {
-        name.0
     }
 }
 

@@ -93,7 +93,7 @@ pub fn kind_of<P, F: Layout>(_: fn(&P) -> &F) -> Kind {
 }
 
 macro_rules! numbers {
-    ($($number:ident: $value:ident)*) => {$(
+    ($($number:ident: $value:ident $({ $($of_many:tt)* })?)*) => {$(
         impl Layout for $number {
             fn zero() -> Self {
                 0 as Self
@@ -114,46 +114,29 @@ macro_rules! numbers {
             fn decode(from: &mut Decoder<'_>) -> Option<Self> {
                 from.number().map(Self::from_le_bytes)
             }
+
+            $($($of_many)*)?
         }
     )*};
 }
 
-numbers!(u16: Unsigned u32: Unsigned u64: Unsigned i32: Signed i64: Signed f32: Single f64: Double);
+numbers! {
+    u8: Unsigned {
+        fn array(array: &[Self]) -> Value {
+            let text = array.split(|&byte| byte == 0).next().unwrap_or_default();
+            Value::Text(String::from_utf8_lossy(text).into_owned())
+        }
 
-impl Layout for u8 {
-    fn zero() -> Self {
-        0
-    }
+        fn encode_all(items: &[Self], to: &mut Encoder<'_>) {
+            to.bytes(items);
+        }
 
-    fn kind() -> Kind {
-        Kind::Number("u8")
+        fn decode_all(items: &mut [Self], from: &mut Decoder<'_>) -> Option<()> {
+            items.copy_from_slice(from.bytes(items.len())?);
+            Some(())
+        }
     }
-
-    fn value(&self) -> Value {
-        Value::Unsigned((*self).into())
-    }
-
-    fn array(array: &[Self]) -> Value {
-        let text = array.split(|&byte| byte == 0).next().unwrap_or_default();
-        Value::Text(String::from_utf8_lossy(text).into_owned())
-    }
-
-    fn encode(&self, to: &mut Encoder<'_>) {
-        to.bytes(&[*self]);
-    }
-
-    fn decode(from: &mut Decoder<'_>) -> Option<Self> {
-        from.bytes(1)?.first().copied()
-    }
-
-    fn encode_all(items: &[Self], to: &mut Encoder<'_>) {
-        to.bytes(items);
-    }
-
-    fn decode_all(items: &mut [Self], from: &mut Decoder<'_>) -> Option<()> {
-        items.copy_from_slice(from.bytes(items.len())?);
-        Some(())
-    }
+    u16: Unsigned u32: Unsigned u64: Unsigned i32: Signed i64: Signed f32: Single f64: Double
 }
 
 /// The element of a sample without a slice.

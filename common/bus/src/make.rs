@@ -3,6 +3,7 @@
 use std::{
     any::Any,
     ffi::OsStr,
+    fmt::Debug,
     fs::{DirBuilder, File},
     io,
     os::unix::{ffi::OsStrExt as _, fs::DirBuilderExt as _},
@@ -81,12 +82,12 @@ impl Bus {
     /// Write the configuration again that processes join by.
     pub fn restore_config(&self) -> Result<(), BusError> {
         Self::write_config(&self.instance)?;
-        let failed = |error: io::Error| no_join(self.instance.domain())(error.to_string());
+        let failed = |error: io::Error| no_join(&self.instance.domain)(error.to_string());
         self.instance.make_current().map_err(failed)
     }
 
     fn write_config(instance: &BusInstance) -> Result<(), BusError> {
-        let failed = no_join(instance.domain());
+        let failed = no_join(&instance.domain);
         let mut config = Config::default();
         let root = instance.root();
         let prefix = instance.shared_memory_prefix();
@@ -130,23 +131,23 @@ impl Bus {
     fn join_instance(instance: BusInstance, name: &str) -> Result<Self, BusError> {
         // Errors of the middleware are in our own errors; IOX2_LOG_LEVEL turns its messages on again.
         set_log_level_from_env_or(LogLevel::Fatal);
-        let join = no_join(instance.domain());
-        let failed = |error: io::Error| join(error.to_string());
-        ownership::check(&instance).map_err(failed)?;
+        let join = no_join(&instance.domain);
+        let refused = |error: &dyn Debug| join(format!("{error:?}"));
+        ownership::check(&instance).map_err(|error| join(error.to_string()))?;
         let file = instance.config();
         let path = SemanticString::new(file.as_os_str().as_encoded_bytes())
             .map_err(|error| join(format!("{error:?} in {file:?}")))?;
         // The middleware uses the global configuration where a node has none of its own. It can be set only once, so it stays that of
         // the first bus that the process joins.
-        Config::setup_global_config_from_file(&path).map_err(|error| join(format!("{error:?}")))?;
-        let config = Config::from_file(&path).map_err(|error| join(format!("{error:?}")))?;
-        let name = NodeName::new(name).map_err(|error| join(format!("{error:?}")))?;
+        Config::setup_global_config_from_file(&path).map_err(|error| refused(&error))?;
+        let config = Config::from_file(&path).map_err(|error| refused(&error))?;
+        let name = NodeName::new(name).map_err(|error| refused(&error))?;
         let node = NodeBuilder::new()
             .config(&config)
             .name(&name)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
-            .map_err(|error| join(format!("{error:?}")))?;
+            .map_err(|error| refused(&error))?;
         Ok(Self { node: node.into(), writers: None, is_stage: false, instance })
     }
 
@@ -158,7 +159,7 @@ impl Bus {
     /// Whether this bus is no longer used: another bus replaced it, in this run or the next one, or the run has ended. A consumer then
     /// drops everything that it opened on this bus, and joins again.
     pub fn is_replaced(&self) -> bool {
-        BusInstance::current(self.instance.domain()).map_or(true, |now| now != self.instance)
+        BusInstance::current(&self.instance.domain).map_or(true, |now| now != self.instance)
     }
 
     /// Prevent the removal of the bus while a consumer opens a topic, which would make the bus's directory again and leave it there.
@@ -167,7 +168,7 @@ impl Bus {
         if self.is_stage {
             return Ok(None);
         }
-        let domain = self.instance.domain();
+        let domain = &self.instance.domain;
         let held = domain.joining().map_err(not_running(domain))?;
         match self.is_replaced() {
             false => Ok(Some(held)),

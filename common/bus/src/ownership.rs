@@ -22,7 +22,7 @@ const OTHERS: u32 = 0o077;
 /// Check that the files which a process opens first to join belong to this user, are closed to others and are complete. The
 /// middleware would wait for files that are not. The error names the file.
 pub(super) fn check(instance: &BusInstance) -> io::Result<()> {
-    let directory = instance.domain().directory();
+    let directory = instance.domain.directory();
     let directories = [directory, &instance.root()];
     for path in directory.parent().into_iter().chain(directories) {
         check_one(path, true)?;

@@ -12,14 +12,15 @@
 
 mod raw;
 
-use std::{collections::HashSet, marker::PhantomData, mem::MaybeUninit, ptr};
+use std::{collections::HashSet, marker::PhantomData, mem::MaybeUninit, ops::Deref, ptr};
 
 pub use self::raw::OpenedBy;
 pub(super) use self::raw::{BusNode, Carried, Listener, Notifier, create, opened_by};
 use self::raw::{RawPublisher, RawSample, RawService, RawSubscriber};
 use super::{
+    authors::Author,
     error::BusError,
-    payload::{Payload, has_slice},
+    payload::{Payload, Stamped, has_slice},
     spec::Spec,
 };
 
@@ -56,10 +57,6 @@ impl<H: Payload, E: Payload> Service<H, E> {
 
     pub(super) fn readers(&self) -> HashSet<u128> {
         self.raw.readers()
-    }
-
-    pub(super) fn number_of_readers(&self) -> usize {
-        self.raw.number_of_readers()
     }
 }
 
@@ -104,20 +101,21 @@ pub(super) struct Subscriber<H, E> {
 
 impl<H: Payload, E: Payload> Subscriber<H, E> {
     /// The next sample; none when all were taken.
-    pub(super) fn receive(&self) -> Result<Option<Sample<H, E>>, BusError> {
+    pub(super) fn receive(&self) -> Result<Option<Slice<H, E>>, BusError> {
         let raw = self.raw.receive_sample(self.spec)?;
-        Ok(raw.map(|raw| Sample { raw, carries: PhantomData }))
+        Ok(raw.map(|raw| Slice { raw, carries: PhantomData }))
     }
 }
 
+/// A header with its slice in shared memory, which the writer cannot reuse while this is held.
 #[derive(Debug)]
-pub(super) struct Sample<H, E> {
+pub struct Slice<H, E = ()> {
     raw: RawSample,
     carries: PhantomData<fn() -> (H, E)>,
 }
 
-impl<H: Payload, E: Payload> Sample<H, E> {
-    pub(super) fn header(&self) -> &H {
+impl<H: Stamped, E: Payload> Slice<H, E> {
+    pub fn header(&self) -> &H {
         let place = match has_slice::<E>() {
             true => self.raw.header().addr(),
             false => self.raw.elements().as_ptr().expose_provenance(),
@@ -126,14 +124,19 @@ impl<H: Payload, E: Payload> Sample<H, E> {
         unsafe { &*ptr::with_exposed_provenance::<H>(place) }
     }
 
-    pub(super) fn elements(&self) -> &[E] {
+    /// The process and the generation that wrote the sample. The process is part of the id of the port that published it.
+    pub fn author(&self) -> Author {
+        Author { process: self.raw.process(), generation: self.header().stamp().generation }
+    }
+}
+
+impl<H: Payload, E: Payload> Deref for Slice<H, E> {
+    type Target = [E];
+
+    fn deref(&self) -> &[E] {
         // SAFETY: any bytes that are aligned for an `E` are a value of it.
         let (_, elements, _) = unsafe { self.raw.elements().align_to::<E>() };
         elements
-    }
-
-    pub(super) fn process(&self) -> u32 {
-        self.raw.process()
     }
 }
 

@@ -2,16 +2,15 @@
 
 use std::{
     cell::Cell,
-    ops::Deref,
     os::fd::{AsFd, BorrowedFd},
 };
 
 use super::{
-    authors::{Admitted, Author},
+    authors::Admitted,
     error::BusError,
     make::Bus,
     payload::{Payload, Stamped},
-    ports::{Listener, Sample, Service, Subscriber},
+    ports::{Listener, Service, Slice, Subscriber},
     spec::{Limits, Spec},
     topic::Topic,
 };
@@ -33,7 +32,7 @@ impl Bus {
     ) -> Result<Reader<H, E>, BusError> {
         let _held = self.hold()?;
         let service = Service::open(&self.node, topic.spec)?;
-        self.leave_places(topic.spec, topic.spec.limits.readers, service.number_of_readers())?;
+        self.leave_places(topic.spec, topic.spec.limits.readers, service.readers().len())?;
         Ok(Reader {
             subscriber: service.subscriber(buffer)?,
             admitted: Admitted::of(topic.spec, self.writers.as_ref()),
@@ -63,9 +62,8 @@ impl<H: Stamped, E: Payload> Reader<H, E> {
             return Ok(None);
         }
         while let Some(sample) = self.subscriber.receive()? {
-            let slice = Slice { sample };
-            if self.admitted.admits(slice.author())? {
-                return Ok(Some(slice));
+            if self.admitted.admits(sample.author())? {
+                return Ok(Some(sample));
             }
         }
         Ok(None)
@@ -91,31 +89,6 @@ impl<H: Stamped> Reader<H> {
             newest = Some(sample);
         }
         Ok(newest)
-    }
-}
-
-/// A header with its slice in shared memory, which the writer cannot reuse while this is held.
-#[derive(Debug)]
-pub struct Slice<H, E = ()> {
-    sample: Sample<H, E>,
-}
-
-impl<H: Stamped, E: Payload> Slice<H, E> {
-    pub fn header(&self) -> &H {
-        self.sample.header()
-    }
-
-    /// The process and the generation that wrote the sample. The process is part of the id of the port that published it.
-    pub fn author(&self) -> Author {
-        Author { process: self.sample.process(), generation: self.header().stamp().generation }
-    }
-}
-
-impl<H: Payload, E: Payload> Deref for Slice<H, E> {
-    type Target = [E];
-
-    fn deref(&self) -> &[E] {
-        self.sample.elements()
     }
 }
 

@@ -50,17 +50,18 @@ pub const SUPERVISOR: &str = "supervisor";
 impl Spec {
     /// The time after which its writer publishes the topic again if nothing changes; zero if it does not.
     pub const fn restated_every(&self) -> Duration {
-        match self.rate {
-            Rate::EachTick | Rate::EachFrame | Rate::WhenItHappens => Duration::ZERO,
-            Rate::OnChange { again_after, .. } => again_after,
+        if let Rate::OnChange { again_after, .. } = self.rate {
+            again_after
+        } else {
+            Duration::ZERO
         }
     }
 
     /// The least time between two changes that its writer publishes; zero if there is none.
     pub const fn changes_at_most_every(&self) -> Duration {
         match self.rate {
-            Rate::EachTick | Rate::EachFrame | Rate::WhenItHappens => Duration::ZERO,
             Rate::OnChange { at_most_every, .. } => at_most_every,
+            _ => Duration::ZERO,
         }
     }
 

@@ -84,7 +84,6 @@ pub enum Order {
     Ping {},
 }
 
-#[must_use]
 pub fn line(message: &impl Serialize) -> Vec<u8> {
     // A struct of numbers and names always serialises.
     let mut line = serde_json::to_vec(message).unwrap_or_default();
@@ -135,7 +134,6 @@ impl Lines {
         self.drops = false;
     }
 
-    #[must_use]
     pub const fn dropped(&self) -> u64 {
         self.dropped
     }

@@ -165,7 +165,6 @@ impl GridFrame {
     }
 
     /// The window of an upright rectangle between two corners, metres; those outside the map stand for its rim.
-    #[must_use]
     pub fn between(&self, least: DVec2, greatest: DVec2) -> Window {
         let last = DVec2::splat(f64::from(self.cells) - 1.0);
         let cell = |at: DVec2| {

@@ -18,6 +18,13 @@ pub enum Malformed {
     Long(u32, usize),
 }
 
+/// For those who only say why a message is refused.
+impl From<Malformed> for String {
+    fn from(error: Malformed) -> Self {
+        error.to_string()
+    }
+}
+
 #[derive(Clone, Debug)]
 pub struct Reader<'a> {
     /// Alignment counts from its start.

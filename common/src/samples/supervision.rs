@@ -5,7 +5,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize, Serializer, ser::SerializeStruct as _};
 
 use super::navigation::{MOST_TARGETS, TargetPoint};
-use crate::bus::{ZeroCopySend, layouts};
+use crate::bus::ZeroCopySend;
 
 wire_enum! {
     HealthState, unknown = Starting {
@@ -173,23 +173,11 @@ wire_enum! {
     }
 }
 
-/// Text in shared memory: UTF-8, padded with zeros.
-#[derive(Clone, Copy, PartialEq, Eq, ZeroCopySend)]
-#[type_name("firsthand.Words")]
-#[repr(C)]
-pub struct Words {
-    bytes: [u8; 400],
-}
-
-impl Default for Words {
-    fn default() -> Self {
-        Self { bytes: [0; 400] }
-    }
-}
-
-impl std::fmt::Debug for Words {
-    fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(to, "{:?}", self.text())
+structs! {
+    /// Text in shared memory.
+    "firsthand.Words" Words {
+        /// UTF-8, padded with zeros.
+        bytes: [u8; 400],
     }
 }
 
@@ -429,8 +417,4 @@ payloads! {
     "firsthand.InputsHeader" InputsHeader {
         stage: Name,
     }
-}
-
-layouts! {
-    Words { bytes }
 }

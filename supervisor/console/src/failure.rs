@@ -3,7 +3,7 @@
 //! `firsthand` prints the code in brackets at the end of the message, `[not-running]`. A script matches the code; the
 //! sentence before it may change.
 
-use std::{error::Error, fs, path::Path, process::ExitCode};
+use std::{error::Error, path::Path, process::ExitCode};
 
 use common::{
     address::AddressError, bus::BusError, checkpoint::CheckpointError, domain::SHARED_MEMORY,
@@ -152,8 +152,7 @@ fn not_running(error: &(dyn Error + 'static)) -> Option<String> {
 
 /// Users with files of that robot in `shared` memory: file names begin with the user's number.
 fn users<'a>(shared: &Path, robot: &'a str) -> impl Iterator<Item = u32> + use<'a> {
-    let entries = fs::read_dir(shared).into_iter().flatten().flatten();
-    entries.filter_map(move |entry| {
+    robots::entries(shared).filter_map(move |entry| {
         let name = entry.file_name();
         let (user, rest) = name.to_str()?.strip_prefix("fh")?.split_once('_')?;
         let named = rest.strip_prefix(robot)?.starts_with('_');
@@ -163,6 +162,8 @@ fn users<'a>(shared: &Path, robot: &'a str) -> impl Iterator<Item = u32> + use<'
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]

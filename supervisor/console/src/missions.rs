@@ -20,12 +20,8 @@ pub enum LookupError {
     Unknown { name: String },
     #[error("{name:?} is neither a shipped mission ({}) nor a file", names())]
     Neither { name: String },
-    #[error(
-        "--set {assignment:?} is not KEY=VALUE with a TOML value: {problem}; for example --set start.heading_deg=90"
-    )]
-    Assignment { assignment: String, problem: String },
-    #[error("{name} with --set {assignments}: {problem}")]
-    Assigned { name: String, assignments: String, problem: String },
+    #[error("{0}")]
+    Assigned(String),
     #[error(transparent)]
     Mission(#[from] MissionError),
     #[error("{name} with what stands on its map: {problem}")]
@@ -84,16 +80,12 @@ pub fn parsed(text: &str, origin: &str, assignments: &[String]) -> Result<Missio
         // The error of the file is better, because it names the line.
         Err(of_file) if of_file.is_same_fault(&error) => of_file.into(),
         // The fault is in no line of the file.
-        _ => assigned(origin, assignments, error.without_place()),
+        _ => assigned(origin, assignments, &error.without_place()),
     })?)
 }
 
-fn assigned(name: &str, assignments: &[String], problem: String) -> LookupError {
-    LookupError::Assigned {
-        name: name.to_owned(),
-        assignments: assignments.join(" --set "),
-        problem,
-    }
+fn assigned(name: &str, assignments: &[String], problem: &str) -> LookupError {
+    LookupError::Assigned(format!("{name} with --set {}: {problem}", assignments.join(" --set ")))
 }
 
 /// None if there are no assignments. Fails if one is invalid.
@@ -101,7 +93,7 @@ pub fn with(mission: &Mission, assignments: &[String]) -> Result<Option<Mission>
     if assignments.is_empty() {
         return Ok(None);
     }
-    let failed = |problem| assigned(&mission.name, assignments, problem);
+    let failed = |problem: String| assigned(&mission.name, assignments, &problem);
     let table = toml::Table::try_from(mission).map_err(|error| failed(error.to_string()))?;
     let mission = Mission::parse(&assign(table, assignments)?, Path::new(&mission.name));
     complete(mission.map_err(|error| failed(error.without_place()))?).map(Some)
@@ -109,10 +101,7 @@ pub fn with(mission: &Mission, assignments: &[String]) -> Result<Option<Mission>
 
 fn assign(mut table: toml::Table, assignments: &[String]) -> Result<String, LookupError> {
     for assignment in assignments {
-        let failed = |problem: &str| LookupError::Assignment {
-            assignment: assignment.clone(),
-            problem: problem.trim().replace('\n', " "),
-        };
+        let failed = |problem: &str| not_assigned(assignment, problem);
         let (path, _) = assignment.split_once('=').ok_or_else(|| failed("no '='"))?;
         let layer: toml::Table =
             toml::from_str(assignment).map_err(|error| failed(error.message()))?;
@@ -121,10 +110,15 @@ fn assign(mut table: toml::Table, assignments: &[String]) -> Result<String, Look
         }
         merge(&mut table, layer);
     }
-    toml::to_string(&table).map_err(|error| LookupError::Assignment {
-        assignment: assignments.join(" "),
-        problem: error.to_string(),
-    })
+    toml::to_string(&table)
+        .map_err(|error| not_assigned(&assignments.join(" "), &error.to_string()))
+}
+
+fn not_assigned(assignment: &str, problem: &str) -> LookupError {
+    let problem = problem.trim().replace('\n', " ");
+    LookupError::Assigned(format!(
+        "--set {assignment:?} is not KEY=VALUE with a TOML value: {problem}; for example --set start.heading_deg=90"
+    ))
 }
 
 fn merge(base: &mut toml::Table, layer: toml::Table) {

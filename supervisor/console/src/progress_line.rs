@@ -22,30 +22,18 @@ impl ProgressLine {
         Self { rewrites: io::stderr().is_terminal(), every, shown: None }
     }
 
-    /// Show a line if one is due, and before the first one a `title`.
+    /// Show a line if one is due, and before the first one a `title`. A line that cannot be rewritten is shown only if it `may_stay`.
     pub fn update(&mut self, title: &str, line: impl FnOnce() -> String, may_stay: bool) {
-        if self.is_due() {
-            if self.begin() {
-                write_stderr(&format!("{title}\n"));
-            }
-            self.show(&line(), may_stay);
+        let waits = |shown: Instant| !self.rewrites && shown.elapsed() < self.every;
+        if self.shown.is_some_and(waits) {
+            return;
         }
-    }
-
-    pub fn is_due(&self) -> bool {
-        self.shown.is_none_or(|shown| self.rewrites || shown.elapsed() >= self.every)
-    }
-
-    /// A line is due now. Returns whether it is the first.
-    pub fn begin(&mut self) -> bool {
-        self.shown.replace(Instant::now()).is_none()
-    }
-
-    /// A line that cannot be rewritten is shown only if it `may_stay`.
-    pub fn show(&self, line: &str, may_stay: bool) {
+        if self.shown.replace(Instant::now()).is_none() {
+            write_stderr(&format!("{title}\n"));
+        }
+        let line = line();
         if self.rewrites {
-            let line = cut(line, columns());
-            write_stderr(&format!("\r\x1b[K{line}"));
+            write_stderr(&format!("\r\x1b[K{}", cut(&line, columns())));
         } else if may_stay {
             write_stderr(&format!("{line}\n"));
         }

@@ -4,7 +4,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use common::{domain::Domain, domain::RobotName};
+use common::domain::{Domain, RobotName};
 
 /// The supervisor's, in the directory of its run.
 pub const SUPERVISOR_LOG: &str = "supervisor.log";
@@ -35,12 +35,16 @@ pub fn own() -> Vec<Robot> {
     };
     let domain = Domain::of(any);
     let mut robots: Vec<_> = domain.directory().parent().map_or(Vec::new(), |directory| {
-        let entries = fs::read_dir(directory).into_iter().flatten().flatten();
-        let names = entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
+        let names = entries(directory).filter_map(|entry| entry.file_name().to_str()?.parse().ok());
         names.map(Robot::find).collect()
     });
     robots.sort_by(|one, other| one.name.cmp(&other.name));
     robots
+}
+
+/// The entries of `directory` that can be read; none where it is missing.
+pub(crate) fn entries(directory: &Path) -> impl Iterator<Item = fs::DirEntry> + use<> {
+    fs::read_dir(directory).into_iter().flatten().flatten()
 }
 
 /// Users who have, or had, robots on this machine. Only they can list them.
@@ -50,7 +54,6 @@ pub fn other_users() -> Vec<u32> {
 }
 
 fn users_in(directory: &Path, own: u32) -> Vec<u32> {
-    let entries = fs::read_dir(directory).into_iter().flatten().flatten();
     let user = |entry: fs::DirEntry| {
         let name = entry.file_name();
         let user = name.to_str()?.strip_prefix(USER_DIRECTORY)?.parse().ok()?;
@@ -58,7 +61,7 @@ fn users_in(directory: &Path, own: u32) -> Vec<u32> {
         let its = entry.metadata().ok()?.uid() == user;
         (user != own && its).then_some(user)
     };
-    let mut users: Vec<_> = entries.filter_map(user).collect();
+    let mut users: Vec<_> = entries(directory).filter_map(user).collect();
     users.sort_unstable();
     users
 }

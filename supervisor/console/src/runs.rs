@@ -7,14 +7,14 @@ use std::{
     time::SystemTime,
 };
 
-use common::{domain::RobotName, run};
+use common::{domain::RobotName, file, run};
 use mission_control::recovery::SUMMARY;
 use serde::{Deserialize, Serialize};
 
 use super::{
     failure::{Failure, Refused},
     output::write_stderr,
-    robots::Robot,
+    robots::{Robot, entries},
 };
 
 /// A summary takes 2 kB; a larger file is not read.
@@ -78,8 +78,7 @@ pub fn list(runs: &Path) -> Vec<RunDirectory> {
             mission: named.mission.map(|mission| mission.name),
         })
     };
-    let entries = fs::read_dir(runs).into_iter().flatten().flatten();
-    entries.filter_map(read).collect()
+    entries(runs).filter_map(read).collect()
 }
 
 impl RunDirectory {
@@ -90,8 +89,7 @@ impl RunDirectory {
 
     pub fn outcome(&self) -> Outcome {
         let file = self.directory.join(SUMMARY);
-        let readable = fs::metadata(&file).is_ok_and(|file| file.len() <= LARGEST_SUMMARY);
-        let text = readable.then(|| fs::read_to_string(&file).ok()).flatten();
+        let text = file::text(&file, LARGEST_SUMMARY);
         match text.map(|text| serde_json::from_str(&text)) {
             Some(Ok(ended)) => Outcome::Ended(ended),
             _ if self.has_ended() => {
@@ -116,8 +114,7 @@ impl RunDirectory {
 const MOST_LEVELS: u32 = 8;
 
 fn size(directory: &Path, levels: u32) -> u64 {
-    let entries = fs::read_dir(directory).into_iter().flatten().flatten();
-    let sizes = entries.filter_map(|entry| {
+    let sizes = entries(directory).filter_map(|entry| {
         // A link counts by itself, without the file to which it leads.
         let file = entry.metadata().ok()?;
         let below = if file.is_dir() && levels > 0 { size(&entry.path(), levels - 1) } else { 0 };
@@ -166,8 +163,7 @@ fn highest_number(runs: &Path, name: &str) -> u64 {
         let rest = file_name.to_str()?.strip_prefix(name)?;
         rest.strip_prefix('-')?.parse().ok()
     };
-    let entries = fs::read_dir(runs).into_iter().flatten().flatten();
-    entries.filter_map(number).max().unwrap_or_default()
+    entries(runs).filter_map(number).max().unwrap_or_default()
 }
 
 /// All but the newest `keep` runs of `robot` that have ended are removed. If one cannot be removed, it stays and the

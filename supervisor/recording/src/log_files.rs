@@ -3,7 +3,6 @@
 use std::{
     collections::HashMap,
     fs::{self, File},
-    io::Read as _,
     os::unix::fs::FileExt as _,
     path::{Path, PathBuf},
 };
@@ -77,13 +76,6 @@ impl LogFiles {
             }
         }
     }
-}
-
-/// The text of `file`, at most `most` bytes.
-pub(crate) fn text(file: &Path, most: u64) -> Option<String> {
-    let mut text = String::new();
-    File::open(file).ok()?.take(most).read_to_string(&mut text).ok()?;
-    Some(text)
 }
 
 #[cfg(test)]

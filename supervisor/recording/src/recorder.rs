@@ -15,6 +15,7 @@ use common::{
     bus::{AnyReader, Bus, BusError, Logged},
     clock::MissionClock,
     domain::Domain,
+    file,
     follower::{Event, Follower},
     run::{self, Run},
     topics::{self, AnyTopic},
@@ -26,7 +27,7 @@ use crate::{
     budget::Budget,
     error::RecordingError,
     file::RecordingFile,
-    log_files::{self, LogFiles},
+    log_files::LogFiles,
     losses::Losses,
     places::{self, numbered},
     viewers::{self, Drawn},
@@ -205,7 +206,7 @@ impl CurrentRun {
         directory: Option<PathBuf>,
     ) -> Result<Self, RecordingError> {
         let run_file = directory.as_ref().map(|run| run.join(run::FILE_NAME));
-        let text = run_file.and_then(|file| log_files::text(&file, LONGEST_RUN_FILE));
+        let text = run_file.and_then(|file| file::text(&file, LONGEST_RUN_FILE));
         let run: Option<Run> = text.as_ref().and_then(|text| toml::from_str(text).ok());
         let mut about = BTreeMap::from([
             ("robot", options.domain.robot.to_string()),

@@ -13,7 +13,7 @@ pub(crate) struct Measured {
     pub(crate) time_s: f64,
     /// Length of the estimated path, metres.
     pub(crate) path_m: f64,
-    last_pose: Option<PoseSample>,
+    pub(crate) last_pose: Option<PoseSample>,
     /// v of the newest pose whose speeds are valid.
     last_speed: Option<f64>,
     speed_change: f64,
@@ -100,10 +100,6 @@ impl Measured {
     pub(crate) fn solves(&self) -> u64 {
         let last = self.planner.map_or(0, |last| last.full_solves);
         self.solves.saturating_add(last)
-    }
-
-    pub(crate) const fn last_pose(&self) -> Option<&PoseSample> {
-        self.last_pose.as_ref()
     }
 
     /// Mean of |dv/dt|, m/s^2.

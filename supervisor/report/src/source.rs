@@ -1,11 +1,8 @@
 //! The recordings of a run, and its summary.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
-use common::run::Run;
+use common::{file, run::Run};
 use recording::{Recording, RecordingError};
 use serde_json::{Map, Value};
 
@@ -48,9 +45,7 @@ impl Source {
 /// The summary of the run of `recording`, if its file is beside the recording.
 pub(crate) fn summary(recording: &Recording) -> Option<Map<String, Value>> {
     let file = run_directory(recording)?.join("summary.json");
-    let is_small = fs::metadata(&file).ok()?.len() <= LARGEST_SUMMARY;
-    let text = is_small.then(|| fs::read_to_string(&file).ok()).flatten()?;
-    serde_json::from_str(&text).ok()
+    serde_json::from_str(&file::text(&file, LARGEST_SUMMARY)?).ok()
 }
 
 /// The directory of the run of `recording`; none if the recording lies elsewhere.

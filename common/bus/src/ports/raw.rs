@@ -182,7 +182,7 @@ pub(crate) fn create(
     Ok(Box::new((samples, event)))
 }
 
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OpenedBy {
     pub readers: BTreeSet<u32>,
     pub writers: BTreeSet<u32>,
@@ -196,23 +196,20 @@ pub(crate) fn opened_by(
 ) -> Result<OpenedBy, BusError> {
     let service = RawService::open(node, spec, carried)?;
     let event = event(node, spec)?;
-    let mut opened = OpenedBy::default();
-    service.dynamic_config().list_subscribers(|reader| {
-        let process = process_of(reader.subscriber_id.value());
-        opened.readers.insert(process);
-        CallbackProgression::Continue
-    });
+    let (mut writers, mut woken) = (BTreeSet::new(), BTreeSet::new());
     service.dynamic_config().list_publishers(|writer| {
-        let process = process_of(writer.publisher_id.value());
-        opened.writers.insert(process);
+        writers.insert(process_of(writer.publisher_id.value()));
         CallbackProgression::Continue
     });
     event.dynamic_config().list_listeners(|listener| {
-        let process = process_of(listener.listener_id.value());
-        opened.woken.insert(process);
+        woken.insert(process_of(listener.listener_id.value()));
         CallbackProgression::Continue
     });
-    Ok(opened)
+    Ok(OpenedBy {
+        readers: service.readers().into_iter().map(process_of).collect(),
+        writers,
+        woken,
+    })
 }
 
 impl RawService {
@@ -251,10 +248,6 @@ impl RawService {
             CallbackProgression::Continue
         });
         readers
-    }
-
-    pub(super) fn number_of_readers(&self) -> usize {
-        self.dynamic_config().number_of_subscribers()
     }
 }
 

@@ -1,9 +1,6 @@
 //! The fields of a message as text, to describe a difference.
 
-use common::{
-    bus::{Kind, Layout as _, cdr::Decoder},
-    topics::AnyTopic,
-};
+use common::{bus::Value, topics::AnyTopic};
 
 /// The first field in which two messages of `topic` differ, and both values. Fields with an end among `left_out` do not count.
 pub(crate) fn first_difference(
@@ -25,68 +22,39 @@ pub(crate) fn first_difference(
     }
 }
 
-/// The fields of a message of `topic`: names and values, in order. They end where the message ends.
+/// The fields of a message of `topic`: names and values, in order.
 fn of(topic: &dyn AnyTopic, message: &[u8]) -> Vec<(String, String)> {
-    let Some(from) = Decoder::new(message) else {
-        return Vec::new();
+    let mut fields = Vec::new();
+    if let Some((header, elements)) = topic.decoded(message) {
+        flatten("", &header, &mut fields);
+        flatten("elements", &Value::Array(elements.unwrap_or_default()), &mut fields);
+    }
+    fields
+}
+
+fn flatten(path: &str, value: &Value, fields: &mut Vec<(String, String)>) {
+    let text = match value {
+        Value::Unsigned(number) => number.to_string(),
+        Value::Signed(number) => number.to_string(),
+        // The format has the digits that distinguish any two values.
+        Value::Single(number) => format!("{number:?}"),
+        Value::Double(number) => format!("{number:?}"),
+        Value::Text(text) => text.clone(),
+        Value::Array(items) => {
+            for (index, item) in items.iter().enumerate() {
+                flatten(&format!("{path}[{index}]"), item, fields);
+            }
+            return;
+        }
+        Value::Struct(members) => {
+            for (name, member) in members {
+                let within = if path.is_empty() { "" } else { "." };
+                flatten(&format!("{path}{within}{name}"), member, fields);
+            }
+            return;
+        }
     };
-    let mut walk = Walk { from, values: Vec::new() };
-    let (sample, element) = topic.layout();
-    if walk.kind("", &sample).is_some()
-        && let Some(element) = element
-        && let Some(length) = u32::decode(&mut walk.from)
-    {
-        for index in 0..length {
-            if walk.kind(&format!("elements[{index}]"), &element).is_none() {
-                break;
-            }
-        }
-    }
-    walk.values
-}
-
-struct Walk<'a> {
-    from: Decoder<'a>,
-    values: Vec<(String, String)>,
-}
-
-impl Walk<'_> {
-    fn kind(&mut self, path: &str, kind: &Kind) -> Option<()> {
-        match kind {
-            Kind::Number(name) => {
-                let value = self.value(name)?;
-                self.values.push((path.to_owned(), value));
-            }
-            Kind::Array(item, length) => {
-                for index in 0..*length {
-                    self.kind(&format!("{path}[{index}]"), item)?;
-                }
-            }
-            Kind::Struct(structure) => {
-                let before = if path.is_empty() { String::new() } else { format!("{path}.") };
-                for field in &structure.fields {
-                    self.kind(&format!("{before}{}", field.name), &field.kind)?;
-                }
-            }
-        }
-        Some(())
-    }
-
-    fn value(&mut self, name: &str) -> Option<String> {
-        let from = &mut self.from;
-        Some(match name {
-            "u8" => u8::decode(from)?.to_string(),
-            "u16" => u16::decode(from)?.to_string(),
-            "u32" => u32::decode(from)?.to_string(),
-            "u64" => u64::decode(from)?.to_string(),
-            "i32" => i32::decode(from)?.to_string(),
-            "i64" => i64::decode(from)?.to_string(),
-            // The format has the digits that distinguish any two values.
-            "f32" => format!("{:?}", f32::decode(from)?),
-            "f64" => format!("{:?}", f64::decode(from)?),
-            _ => return None,
-        })
-    }
+    fields.push((path.to_owned(), text));
 }
 
 #[cfg(test)]

@@ -11,39 +11,13 @@ use common::samples::{
 use ros2::cdr::{Reader, Writer};
 
 use crate::{
-    asked::{goal_of, malformed},
+    asked::goal_of,
     messages::{Header, pose_stamped},
     shown::MAP,
 };
 
 /// The id that a client gave its goal.
 pub(crate) type Uuid = [u8; 16];
-
-/// The services and topics of the action, and their types in DDS.
-pub(crate) const SEND_GOAL: (&str, [&str; 2]) = (
-    "navigate_to_pose/_action/send_goal",
-    [
-        "nav2_msgs::action::dds_::NavigateToPose_SendGoal_Request_",
-        "nav2_msgs::action::dds_::NavigateToPose_SendGoal_Response_",
-    ],
-);
-pub(crate) const CANCEL_GOAL: (&str, [&str; 2]) = (
-    "navigate_to_pose/_action/cancel_goal",
-    ["action_msgs::srv::dds_::CancelGoal_Request_", "action_msgs::srv::dds_::CancelGoal_Response_"],
-);
-pub(crate) const GET_RESULT: (&str, [&str; 2]) = (
-    "navigate_to_pose/_action/get_result",
-    [
-        "nav2_msgs::action::dds_::NavigateToPose_GetResult_Request_",
-        "nav2_msgs::action::dds_::NavigateToPose_GetResult_Response_",
-    ],
-);
-pub(crate) const FEEDBACK: (&str, &str) = (
-    "navigate_to_pose/_action/feedback",
-    "nav2_msgs::action::dds_::NavigateToPose_FeedbackMessage_",
-);
-pub(crate) const STATUS: (&str, &str) =
-    ("navigate_to_pose/_action/status", "action_msgs::msg::dds_::GoalStatusArray_");
 
 /// The most goals that are remembered; older ones are forgotten.
 const MOST_GOALS: usize = 16;
@@ -93,8 +67,8 @@ struct Goal {
 #[derive(Debug, Default)]
 pub(crate) struct Server {
     goals: VecDeque<Goal>,
-    /// The number of the newest target.
-    newest_target: u64,
+    /// The number of the newest target, which the target of a goal that is sent now follows; another run counts from 1.
+    pub(crate) newest_target: u64,
     /// Whether the states have changed since they were last published.
     is_changed: bool,
 }
@@ -109,7 +83,7 @@ pub(crate) struct Sent {
 impl Server {
     /// The goal that a client sends. The error says why the payload is none.
     pub(crate) fn read_goal(payload: &[u8]) -> Result<Sent, String> {
-        let mut reader = Reader::new(payload).map_err(malformed)?;
+        let mut reader = Reader::new(payload)?;
         let id = uuid(&mut reader)?;
         Ok(Sent { id, point: goal_of(&mut reader)? })
     }
@@ -117,11 +91,6 @@ impl Server {
     /// The reply to a goal, at `now_ns` since 1970.
     pub(crate) fn goal_reply(is_accepted: bool, now_ns: u64) -> Vec<u8> {
         Writer::default().u8(is_accepted.into()).time(now_ns).take()
-    }
-
-    /// The number of the newest target, which the target of a goal that is sent now follows.
-    pub(crate) const fn newest_target(&self) -> u64 {
-        self.newest_target
     }
 
     /// Take a goal that the supervisor accepted; its target comes after the one with the number `after`.
@@ -150,11 +119,6 @@ impl Server {
             goal.status = status;
             self.is_changed = true;
         }
-    }
-
-    /// Forget the numbers of targets, because another run counts them from 1.
-    pub(crate) fn forget_targets(&mut self) {
-        self.newest_target = 0;
     }
 
     pub(crate) fn target(&mut self, target: &TargetSample) {
@@ -194,8 +158,8 @@ impl Server {
 
     /// Take a request to cancel. Returns the reply, and whether the robot is to stand because of it.
     pub(crate) fn cancel(&mut self, payload: &[u8]) -> Result<(Vec<u8>, bool), String> {
-        let mut reader = Reader::new(payload).map_err(malformed)?;
-        let (id, until_ns) = (uuid(&mut reader)?, reader.time().map_err(malformed)?);
+        let mut reader = Reader::new(payload)?;
+        let (id, until_ns) = (uuid(&mut reader)?, reader.time()?);
         let is_any = id == Uuid::default();
         let until_ns = u64::try_from(until_ns).unwrap_or_default();
         let is_asked = |goal: &Goal| {
@@ -225,7 +189,7 @@ impl Server {
 
     /// The goal of which a client asks for the result.
     pub(crate) fn read_result(payload: &[u8]) -> Result<Uuid, String> {
-        uuid(&mut Reader::new(payload).map_err(malformed)?)
+        uuid(&mut Reader::new(payload)?)
     }
 
     /// The result of a goal; none while it is not over. An unknown goal has the state 0.
@@ -269,6 +233,6 @@ impl Server {
 }
 
 fn uuid(reader: &mut Reader<'_>) -> Result<Uuid, String> {
-    let bytes = reader.raw(16).map_err(malformed)?;
+    let bytes = reader.raw(16)?;
     bytes.try_into().map_err(|_| "an id of other than 16 bytes".to_owned())
 }

@@ -172,7 +172,7 @@ impl Bridge {
     /// Note that the run has ended: no goal is reached any more.
     fn end(&mut self) {
         self.goals.end(Status::Aborted);
-        self.goals.forget_targets();
+        self.goals.newest_target = 0;
         (self.shown, self.stands_for_cancel) = (None, None);
     }
 
@@ -243,7 +243,7 @@ impl Bridge {
                 let sent = Server::read_goal(&payload).inspect_err(|_| {
                     self.endpoints.reply(call, request, &Server::goal_reply(false, now_ns()));
                 })?;
-                let after = self.goals.newest_target();
+                let after = self.goals.newest_target;
                 self.go(sent.point, Why::Action { request: request.clone(), sent, after });
             }
             Call::CancelGoal => {

@@ -8,10 +8,7 @@ use ros2::{
     topic::Topic,
 };
 
-use crate::{
-    action::{CANCEL_GOAL, FEEDBACK, GET_RESULT, SEND_GOAL, STATUS},
-    topics::{Accept, Id, Spec, TABLE, spec},
-};
+use crate::topics::{Accept, Id, Spec, TABLE, spec};
 
 /// The name of the node.
 const NODE: &str = "firsthand";
@@ -124,21 +121,44 @@ impl Endpoints {
     }
 
     fn open_action(&mut self) -> io::Result<()> {
-        let name = |name| format!("{}/{name}", self.namespace);
-        for (call, (of, types)) in [
-            (Call::SendGoal, SEND_GOAL),
-            (Call::CancelGoal, CANCEL_GOAL),
-            (Call::GetResult, GET_RESULT),
+        let name = |part| format!("{}/navigate_to_pose/_action/{part}", self.namespace);
+        for (call, part, types) in [
+            (
+                Call::SendGoal,
+                "send_goal",
+                [
+                    "nav2_msgs::action::dds_::NavigateToPose_SendGoal_Request_",
+                    "nav2_msgs::action::dds_::NavigateToPose_SendGoal_Response_",
+                ],
+            ),
+            (
+                Call::CancelGoal,
+                "cancel_goal",
+                [
+                    "action_msgs::srv::dds_::CancelGoal_Request_",
+                    "action_msgs::srv::dds_::CancelGoal_Response_",
+                ],
+            ),
+            (
+                Call::GetResult,
+                "get_result",
+                [
+                    "nav2_msgs::action::dds_::NavigateToPose_GetResult_Request_",
+                    "nav2_msgs::action::dds_::NavigateToPose_GetResult_Response_",
+                ],
+            ),
         ] {
-            let [requests, replies] = Topic::service(&name(of), types);
+            let [requests, replies] = Topic::service(&name(part), types);
             let requests = self.participant.reader(&requests, SURE)?;
             let replies = self.participant.writer(&replies, SURE)?;
             self.services.push((call, Service { requests, replies }));
         }
-        for (id, (of, type_name), quality) in
-            [(Id::Feedback, FEEDBACK, SURE), (Id::Status, STATUS, LATCHED)]
+        let feedback = "nav2_msgs::action::dds_::NavigateToPose_FeedbackMessage_";
+        let status = "action_msgs::msg::dds_::GoalStatusArray_";
+        for (id, part, type_name, quality) in
+            [(Id::Feedback, "feedback", feedback, SURE), (Id::Status, "status", status, LATCHED)]
         {
-            let topic = Topic::new(&name(of), type_name);
+            let topic = Topic::new(&name(part), type_name);
             self.writers.insert(id, self.participant.writer(&topic, quality)?);
         }
         Ok(())

@@ -82,15 +82,16 @@ pub(crate) fn pose_stamped(writer: &mut Writer, Header(ns, frame): Header<'_>, p
 }
 
 /// The shapes of markers that are used.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) enum Shape {
+    #[default]
     Cylinder = 3,
     /// Lines, each between two points.
     Lines = 5,
 }
 
 /// A `visualization_msgs/Marker`.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Marker {
     pub(crate) namespace: &'static str,
     pub(crate) id: i32,
@@ -108,18 +109,9 @@ const DELETE_ALL: i32 = 3;
 
 /// A `visualization_msgs/MarkerArray` that replaces the one before.
 pub(crate) fn markers(header: Header<'_>, markers: &[Marker]) -> Vec<u8> {
-    let nothing = Marker {
-        namespace: "",
-        id: 0,
-        shape: Shape::Cylinder,
-        pose: [0.0; 3],
-        scale: [0.0; 3],
-        color: [0.0; 4],
-        points: Vec::new(),
-    };
     let mut writer = Writer::default();
     writer.length(markers.len() + 1);
-    marker(&mut writer, header, &nothing, DELETE_ALL);
+    marker(&mut writer, header, &Marker::default(), DELETE_ALL);
     for each in markers {
         marker(&mut writer, header, each, 0);
     }

@@ -194,11 +194,10 @@ impl Shown {
         let target = |(id, target): (i32, &TargetPoint)| Marker {
             namespace: "targets",
             id,
-            shape: Shape::Cylinder,
             pose: [target.x_m, target.y_m, target.heading_rad],
             scale: [across, across, 0.01],
             color: [0.1, 0.7, 0.2, 0.6],
-            points: Vec::new(),
+            ..Marker::default()
         };
         (0..).zip(self.state.targets()).map(target).collect()
     }
@@ -344,11 +343,10 @@ fn directions(frame: GridFrame, cells: &[FieldCell]) -> Marker {
     }
     Marker {
         namespace: "field",
-        id: 0,
         shape: Shape::Lines,
-        pose: [0.0; 3],
         scale: [0.02, 0.0, 0.0],
         color: [0.2, 0.4, 0.9, 0.8],
         points,
+        ..Marker::default()
     }
 }

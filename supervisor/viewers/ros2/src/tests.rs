@@ -107,7 +107,7 @@ fn with_a_goal() -> Server {
     let mut goals = Server::default();
     goals.target(&TargetSample { number: 4, ..TargetSample::default() });
     let sent = Server::read_goal(&call(1, &goal("map")[4..])).unwrap();
-    goals.accept(sent, goals.newest_target(), 7);
+    goals.accept(sent, goals.newest_target, 7);
     goals.target(&target(5));
     goals
 }
@@ -150,7 +150,7 @@ fn a_goal_of_the_action_ends_when_the_robot_is_sent_elsewhere() {
     assert_eq!(state(&goals, 1), Some(Status::Aborted as u8));
     let mut goals = with_a_goal();
     let sent = Server::read_goal(&call(2, &goal("map")[4..])).unwrap();
-    goals.accept(sent, goals.newest_target(), 8);
+    goals.accept(sent, goals.newest_target, 8);
     assert_eq!((state(&goals, 1), state(&goals, 2)), (Some(Status::Aborted as u8), None));
 }
 
@@ -180,7 +180,7 @@ fn goals_of_the_action_are_reached_one_after_the_other_in_a_run_that_stays() {
     let mut goals = Server::default();
     for nth in 1..=20 {
         let sent = Server::read_goal(&call(nth, &goal("map")[4..])).unwrap();
-        goals.accept(sent, goals.newest_target(), 7);
+        goals.accept(sent, goals.newest_target, 7);
         goals.target(&target(nth.into()));
         // The supervisor tells of the target before it orders the robot to drive.
         for said in [waits, drives, drives, waits] {
