@@ -12,24 +12,24 @@ use crate::error::MapError;
 
 /// Files that are not regular may never end.
 pub(crate) fn open(file: &Path, most: u64) -> Result<File, MapError> {
-    let unreadable = |cause| MapError::Unreadable { file: file.to_owned(), cause };
     // The check comes before opening, because opening a pipe waits for its other end.
-    let metadata = fs::metadata(file).map_err(unreadable)?;
+    let metadata = fs::metadata(file).map_err(MapError::unreadable(file))?;
     if !metadata.is_file() {
-        return Err(MapError::NotAFile { file: file.to_owned() });
+        // A directory, a pipe or a device.
+        return Err(MapError::of(file, "not a regular file; give a map file"));
     }
-    if metadata.len() > most {
-        return Err(MapError::TooLong { file: file.to_owned(), bytes: metadata.len(), most });
+    let bytes = metadata.len();
+    if bytes > most {
+        let problem =
+            format!("{bytes} bytes, a file of this kind has at most {most}; check that it is one");
+        return Err(MapError::of(file, problem));
     }
-    File::open(file).map_err(unreadable)
+    File::open(file).map_err(MapError::unreadable(file))
 }
 
 pub(crate) fn read(file: &Path, most: u64) -> Result<Vec<u8>, MapError> {
     let mut bytes = Vec::new();
-    open(file, most)?
-        .take(most)
-        .read_to_end(&mut bytes)
-        .map_err(|cause| MapError::Unreadable { file: file.to_owned(), cause })?;
+    open(file, most)?.take(most).read_to_end(&mut bytes).map_err(MapError::unreadable(file))?;
     Ok(bytes)
 }
 
@@ -39,5 +39,8 @@ pub(crate) fn check_size(file: &Path, cols: u64, rows: u64) -> Result<(), MapErr
     if sides.contains(&cols) && sides.contains(&rows) {
         return Ok(());
     }
-    Err(MapError::Size { file: file.to_owned(), cols, rows })
+    let problem = format!(
+        "{cols} x {rows} cells; a map has 1 to {MAX_SIDE} on each side, so crop or scale it"
+    );
+    Err(MapError::of(file, problem))
 }

@@ -59,8 +59,7 @@ pub(super) fn load(file: &Path, lightness: Lightness) -> Result<Map, MapError> {
 
 pub(super) fn pixels(file: &Path, lightness: Lightness) -> Result<Free, MapError> {
     let mut reader = BufReader::new(open(file, LONGEST)?);
-    let start =
-        reader.fill_buf().map_err(|cause| MapError::Unreadable { file: file.to_owned(), cause })?;
+    let start = reader.fill_buf().map_err(MapError::unreadable(file))?;
     // The first bytes decide: a PNG that is called .pgm is still a PNG.
     let decoded = match start {
         [0x89, b'P', b'N', b'G', ..] => png(reader, lightness, file),
@@ -70,7 +69,7 @@ pub(super) fn pixels(file: &Path, lightness: Lightness) -> Result<Free, MapError
             netpbm(reader, kind, lightness, file)
         }
         _ => {
-            return Err(MapError::malformed(
+            return Err(MapError::of(
                 file,
                 "neither a PGM nor a PNG image by its first bytes; save it as one of them",
             ));
@@ -78,7 +77,7 @@ pub(super) fn pixels(file: &Path, lightness: Lightness) -> Result<Free, MapError
     };
     decoded.map_err(|cause| match cause.downcast() {
         Ok(size) => *size,
-        Err(cause) => MapError::malformed(
+        Err(cause) => MapError::of(
             file,
             format!("a damaged or unusual image ({cause}); save it anew as an 8-bit PGM or PNG"),
         ),
@@ -229,11 +228,11 @@ mod tests {
         ];
         for bytes in damaged {
             let error = map_of(bytes, usual).unwrap_err();
-            assert!(matches!(error, MapError::Malformed { .. }), "{error}");
+            assert!(error.to_string().contains("save it"), "{error}");
         }
         for header in ["P5 99999 3 255\n", "P5 0 3 255\n", "P5 4000000000 4000000000 255\n"] {
             let error = map_of(header.as_bytes(), usual).unwrap_err();
-            assert!(matches!(error, MapError::Size { .. }), "{header}: {error}");
+            assert!(error.to_string().contains("on each side"), "{header}: {error}");
         }
     }
 

@@ -38,7 +38,10 @@ pub fn load(file: &Path) -> Result<Map, MapError> {
             image::load(file, image::Lightness::default())
         }
         Some("map") => moving_ai::load(file),
-        _ => Err(MapError::UnknownFormat { file: file.to_owned() }),
+        _ => Err(MapError::of(
+            file,
+            "not the name of a map; give a .yaml of the ROS map_server, a .pgm or .png image, or a MovingAI .map",
+        )),
     }
 }
 
@@ -53,10 +56,11 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let folder = directory.path().join("folder.map");
         fs::create_dir(&folder).unwrap();
-        assert!(matches!(load(&folder), Err(MapError::NotAFile { .. })));
+        let refused = |file: &Path| load(file).unwrap_err().to_string();
+        assert!(refused(&folder).contains("not a regular file"));
         let missing = directory.path().join("missing.png");
-        assert!(matches!(load(&missing), Err(MapError::Unreadable { .. })));
+        assert!(refused(&missing).contains("can be read"));
         let nameless = directory.path().join("map");
-        assert!(matches!(load(&nameless), Err(MapError::UnknownFormat { .. })));
+        assert!(refused(&nameless).contains("not the name of a map"));
     }
 }

@@ -29,7 +29,7 @@ fn parse(file: &Path, bytes: &[u8]) -> Result<Map, MapError> {
     for row in 0..rows {
         let line = lines.next().unwrap_or_default();
         if line.len() != cols {
-            return Err(MapError::malformed(
+            return Err(MapError::of(
                 file,
                 format!(
                     "row {row} has {} cells, the header says {cols} and {rows} rows; the file is cut short or its \
@@ -40,7 +40,7 @@ fn parse(file: &Path, bytes: &[u8]) -> Result<Map, MapError> {
         }
         for (col, &cell) in line.iter().enumerate() {
             free.push(is_free(cell).ok_or_else(|| {
-                MapError::malformed(
+                MapError::of(
                     file,
                     format!(
                         "'{}' in row {row}, column {col} is no cell; use . G S (free) and @ O T W (blocked)",
@@ -51,7 +51,7 @@ fn parse(file: &Path, bytes: &[u8]) -> Result<Map, MapError> {
         }
     }
     if lines.any(|line| !line.trim_ascii().is_empty()) {
-        return Err(MapError::malformed(
+        return Err(MapError::of(
             file,
             format!("more than the {rows} rows of its header; correct `height`"),
         ));
@@ -83,7 +83,7 @@ fn header<'a>(
     }
     match (cols, rows) {
         (Some(cols), Some(rows)) if begun => Ok((cols, rows)),
-        _ => Err(MapError::malformed(
+        _ => Err(MapError::of(
             file,
             "not a MovingAI map: it begins with the lines `type octile`, `height H`, `width W`, `map`",
         )),

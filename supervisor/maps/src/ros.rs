@@ -65,7 +65,7 @@ fn placed(
             CELL_M.start(),
             CELL_M.end()
         );
-        return Err(MapError::malformed(file, problem));
+        return Err(MapError::of(file, problem));
     }
     let origin = keys.values.get("origin").ok_or_else(|| keys.missing("origin: [x, y, 0]"))?;
     let numbers: Vec<f64> = origin.iter().map_while(|number| number.parse().ok()).collect();
@@ -73,7 +73,7 @@ fn placed(
         [x, y, 0.0] if x.abs() <= FARTHEST_M && y.abs() <= FARTHEST_M && origin.len() == 3 => {
             Ok(PlacedMap { map: map_of(file, &text)?, cell_m, corner_m: [x, y] })
         }
-        _ => Err(MapError::malformed(
+        _ => Err(MapError::of(
             file,
             format!(
                 "origin: {:?} is not read here; set it to [x, y, 0] in metres, the image not turned",
@@ -85,7 +85,7 @@ fn placed(
 
 fn text(file: &Path) -> Result<String, MapError> {
     String::from_utf8(read(file, LONGEST)?)
-        .map_err(|_| MapError::malformed(file, "not UTF-8 text; give the YAML of a map_server map"))
+        .map_err(|_| MapError::of(file, "not UTF-8 text; give the YAML of a map_server map"))
 }
 
 fn image_of(file: &Path, text: &str) -> Result<Map, MapError> {
@@ -114,7 +114,8 @@ pub(super) struct Saved {
 
 /// Writes the YAML `file` and an image of the same name beside it.
 pub(super) fn save(file: &Path, map: &Saved) -> Result<(), MapError> {
-    let unwritable = |cause| MapError::Unwritable { file: file.to_owned(), cause };
+    let unwritable =
+        |cause| MapError::of(file, format!("{cause}; give the name of a map to write"));
     let image = file.with_extension("pgm");
     let mut bytes = format!("P5\n{} {}\n255\n", map.cols, map.pixels.len() / map.cols).into_bytes();
     bytes.extend_from_slice(&map.pixels);
@@ -133,7 +134,7 @@ impl<'a> Keys<'a> {
     /// The YAML is read event by event, and aliases are refused, so that no text needs more memory than it has bytes.
     fn parse(file: &'a Path, text: &str) -> Result<Self, MapError> {
         let refused =
-            |problem: &str| MapError::malformed(file, format!("not a map_server map: {problem}"));
+            |problem: &str| MapError::of(file, format!("not a map_server map: {problem}"));
         let mut values: HashMap<String, Vec<String>> = HashMap::new();
         let mut parser = Parser::new_from_str(text);
         let (mut depth, mut key) = (0_u32, None);
@@ -168,7 +169,7 @@ impl<'a> Keys<'a> {
 
     fn missing(&self, needed: &str) -> MapError {
         let problem = format!("not a map_server map: it needs at least `{needed}`");
-        MapError::malformed(self.file, problem)
+        MapError::of(self.file, problem)
     }
 
     /// None where the file has no such key.
@@ -176,20 +177,20 @@ impl<'a> Keys<'a> {
         match self.values.get(key).map(Vec::as_slice) {
             None => Ok(None),
             Some([scalar]) => Ok(Some(scalar)),
-            Some(_) => Err(MapError::malformed(self.file, format!("{key}: is no single value"))),
+            Some(_) => Err(MapError::of(self.file, format!("{key}: is no single value"))),
         }
     }
 
     fn number(&self, key: &str) -> Result<Option<f64>, MapError> {
         let number = |text: &str| {
             let problem = || format!("{key}: {text:?} is not a number");
-            text.parse().map_err(|_| MapError::malformed(self.file, problem()))
+            text.parse().map_err(|_| MapError::of(self.file, problem()))
         };
         self.scalar(key)?.map(number).transpose()
     }
 
     fn lightness(&self) -> Result<Lightness, MapError> {
-        let malformed = |problem| MapError::malformed(self.file, problem);
+        let malformed = |problem| MapError::of(self.file, problem);
         if let Some(mode) = self.scalar("mode")?.filter(|mode| *mode != "trinary") {
             let problem = format!("mode: {mode:?} is not read here; set it to trinary");
             return Err(malformed(problem));
@@ -290,7 +291,8 @@ mod tests {
         }
         bomb += "image: *a11\n";
         assert!(map_of(&bomb, 255).is_err());
-        assert!(matches!(map_of(&"#".repeat(1 << 17), 255), Err(MapError::TooLong { .. })));
+        let long = map_of(&"#".repeat(1 << 17), 255).unwrap_err();
+        assert!(long.to_string().contains("has at most"), "{long}");
     }
 
     #[test]

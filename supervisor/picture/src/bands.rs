@@ -70,7 +70,7 @@ pub(super) struct Bands<'a> {
     lattice: Lattice,
     cells: &'a [FieldCell],
     style: &'static Style,
-    levels: Levels,
+    pub(super) levels: Levels,
 }
 
 impl<'a> Bands<'a> {
@@ -102,10 +102,6 @@ impl<'a> Bands<'a> {
                 ramp: style.ramp,
             },
         })
-    }
-
-    pub(super) const fn levels(&self) -> Levels {
-        self.levels
     }
 
     pub(super) fn layer(&self) -> String {

@@ -14,7 +14,7 @@ use super::{
 const BUDGET: usize = 90_000;
 
 /// Areas with their colours and what the legend calls them, the lowest first.
-pub(super) struct BelievedHazard([(&'static str, &'static str, Path); 3]);
+pub(super) struct BelievedHazard(pub(super) [(&'static str, &'static str, Path); 3]);
 
 impl BelievedHazard {
     /// `cells` has one byte a cell, row-major.
@@ -37,10 +37,6 @@ impl BelievedHazard {
 
     fn len(&self) -> usize {
         self.0.iter().map(|(.., area)| area.len()).sum()
-    }
-
-    pub(super) const fn areas(&self) -> &[(&'static str, &'static str, Path); 3] {
-        &self.0
     }
 
     pub(super) fn layer(&self) -> String {
@@ -139,7 +135,7 @@ mod tests {
         let hazard = BelievedHazard::of(&lattice, &cells);
         let two = "M162 492h200v200h-200z";
         let one = "M162 392h100v100h-100z";
-        let [perimeter, known, sensed] = hazard.areas().each_ref().map(|(.., area)| area);
+        let [perimeter, known, sensed] = hazard.0.each_ref().map(|(.., area)| area);
         assert!(sensed.element("").contains(&format!("{two}{one}")));
         assert!(known.is_empty() && perimeter.is_empty());
     }

@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::{
     margin::FONT,
-    page::{Path, Px, ink, round_up, text},
+    page::{Path, Px, ink, round_up, text, ticks},
 };
 
 /// Text is readable on a telephone, and as large as the text in a column of print.
@@ -74,15 +74,10 @@ impl Range {
     }
 
     /// The parts at which round numbers stand, and these numbers.
-    fn ticks(&self) -> impl Iterator<Item = (f64, String)> {
-        let digits = (-self.step.log10().floor()).clamp(0.0, 9.0) as usize;
-        let first = (self.low / self.step - 1e-6).ceil();
-        (0..40)
-            .map(move |nth| (first + f64::from(nth)) * self.step + 0.0)
-            .take_while(|value| *value <= self.high + self.step * 1e-6)
-            .map(move |value| {
-                ((value - self.low) / (self.high - self.low), format!("{value:.digits$}"))
-            })
+    fn ticks(&self) -> impl Iterator<Item = (f64, String)> + use<'_> {
+        let part = |value: f64| (value - self.low) / (self.high - self.low);
+        let ticks = ticks(self.low, self.high, self.step);
+        ticks.map(move |(value, number)| (part(value), number))
     }
 }
 

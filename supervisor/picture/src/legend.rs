@@ -91,7 +91,7 @@ impl Legend<'_> {
         let cell = |colour: &'static str| move |at: DVec2| patch(at, &format!("fill=\"{colour}\""));
         if let Some(hazard) = self.hazard {
             column.heading("Believed hazardous");
-            for (colour, words, area) in hazard.areas().iter().rev() {
+            for (colour, words, area) in hazard.0.iter().rev() {
                 if !area.is_empty() {
                     column.row(words, cell(colour));
                 }
@@ -107,7 +107,7 @@ impl Legend<'_> {
 
     /// A round length, a sixth to a third of the plot, in the lower corner.
     fn scale_bar(&self) -> String {
-        let length = round_up(self.view.side_m() / 8.0);
+        let length = round_up(self.view.side_m / 8.0);
         let (y, right) = (PLOT_TOP + PLOT_SIDE - 4.0, COLUMN + self.view.px(length));
         let mut bar = Path::default();
         bar.move_to(DVec2::new(COLUMN, y - 8.0));

@@ -81,7 +81,7 @@ pub fn svg(scene: &Scene<'_>) -> String {
     let motion = Motion::of(scene);
     let legend = Legend {
         view: &view,
-        levels: bands.as_ref().map(Bands::levels),
+        levels: bands.as_ref().map(|bands| bands.levels),
         guidance: lines.is_some(),
         isolated: has_isolated_cells(grid, field),
         hazard: hazard.as_ref(),

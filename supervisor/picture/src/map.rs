@@ -73,7 +73,7 @@ pub fn map_svg(map: &FieldOnMap<'_>) -> String {
     let lattice = Lattice::of_image(map.size, DVec2::splat(FRAME), cell_size(map.size));
     let bands = Bands::of(&lattice, map.cells, &BANDS);
     let bands = bands
-        .map_or(String::new(), |bands| bands.layer() + &flat_cells(map, &lattice, bands.levels()));
+        .map_or(String::new(), |bands| bands.layer() + &flat_cells(map, &lattice, bands.levels));
     let lines = streamlines::layer(&lattice, map.cells, &LINES);
     let kinds = Blocks { lattice: &lattice, side: 1, kinds: kinds(map) };
     // Neighbouring rectangles would show a seam if they were anti-aliased.

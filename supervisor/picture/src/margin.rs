@@ -3,7 +3,9 @@
 use glam::DVec2;
 
 use super::{
-    page::{PLOT_LEFT, PLOT_SIDE, PLOT_TOP, Path, Px, View, WIDTH, escape, ink, round_up, text},
+    page::{
+        PLOT_LEFT, PLOT_SIDE, PLOT_TOP, Path, Px, View, WIDTH, escape, ink, round_up, text, ticks,
+    },
     scene::Scene,
     world,
 };
@@ -77,29 +79,24 @@ fn facts(scene: &Scene<'_>) -> String {
 
 /// The frame of the plot with ticks in metres.
 pub(super) fn axes(view: &View) -> String {
-    let step = round_up(view.side_m() / 12.0);
-    let digits = (-step.log10().floor()).max(0.0) as usize;
-    let low = view.low();
+    let step = round_up(view.side_m / 12.0);
+    let low = view.low;
     let bottom = PLOT_TOP + PLOT_SIDE;
-    let mut ticks = Path::default();
+    let mut marks = Path::default();
     let mut labels = String::new();
     for axis in 0..2 {
-        let first = (low[axis] / step).ceil();
-        let last = ((low[axis] + view.side_m()) / step).floor();
-        // There are twelve steps by construction; the bound holds for a perimeter at any distance from 0.
-        for nth in (0..=20).map(|nth| first + f64::from(nth)).take_while(|nth| *nth <= last) {
+        for (value, number) in ticks(low[axis], low[axis] + view.side_m, step) {
             let mut at = low;
-            at[axis] = nth * step;
+            at[axis] = value;
             let mark = view.place(at);
             let away = if axis == 0 { DVec2::Y } else { DVec2::NEG_X } * 6.0;
-            ticks.segment(mark, mark + away);
+            marks.segment(mark, mark + away);
             let (at, anchor) = if axis == 0 {
                 (DVec2::new(mark.x, bottom + 20.0), " text-anchor=\"middle\"")
             } else {
                 (DVec2::new(PLOT_LEFT - 10.0, mark.y + 4.5), " text-anchor=\"end\"")
             };
-            // Adding 0 turns -0 into 0.
-            labels += &text(at, anchor, &format!("{:.digits$}", nth * step + 0.0));
+            labels += &text(at, anchor, &number);
         }
     }
     let middle = PLOT_TOP + PLOT_SIDE / 2.0;
@@ -110,7 +107,7 @@ pub(super) fn axes(view: &View) -> String {
          <text x=\"{}\" y=\"{}\" text-anchor=\"middle\">x, metres</text>\n\
          <text transform=\"translate({} {middle}) rotate(-90)\" text-anchor=\"middle\">y, metres</text>\n\
          </g>\n",
-        ticks.element(&style),
+        marks.element(&style),
         Px(12.5),
         PLOT_LEFT + PLOT_SIDE / 2.0,
         Px(bottom + 40.0),

@@ -1,6 +1,6 @@
 //! Trajectories, the robot's body at regular times, start, target, end.
 
-use common::{geometry::principal_axes, kinematics::Pose2, mission::Mission};
+use common::{geometry::principal_axes, kinematics::Pose2};
 use glam::DVec2;
 
 use super::{
@@ -18,25 +18,14 @@ const WITHIN_95: f64 = 2.4477;
 const MOST_BODIES: usize = 200;
 
 pub(super) struct Motion<'a> {
-    mission: &'a Mission,
-    believed: &'a [Pose2],
-    covariance: Option<[f64; 3]>,
-    truth: &'a [Pose2],
-    targets: &'a [DVec2],
+    scene: &'a Scene<'a>,
     /// Mission time between two bodies, and poses from one to the next.
     every: Option<(f64, f64)>,
 }
 
 impl<'a> Motion<'a> {
-    pub(super) fn of(scene: &Scene<'a>) -> Self {
-        let mut motion = Self {
-            mission: scene.mission,
-            believed: scene.believed,
-            covariance: scene.covariance,
-            truth: scene.truth,
-            targets: scene.targets,
-            every: None,
-        };
+    pub(super) fn of(scene: &'a Scene<'a>) -> Self {
+        let mut motion = Self { scene, every: None };
         let duration = scene.facts.mission_time_s;
         let steps = motion.way().len().saturating_sub(1);
         if steps > 0 && duration.is_finite() && duration > 0.0 {
@@ -48,19 +37,19 @@ impl<'a> Motion<'a> {
 
     /// The estimated one if the true one is unknown.
     fn way(&self) -> &'a [Pose2] {
-        if self.truth.is_empty() { self.believed } else { self.truth }
+        if self.scene.truth.is_empty() { self.scene.believed } else { self.scene.truth }
     }
 
     pub(super) const fn has_truth(&self) -> bool {
-        !self.truth.is_empty()
+        !self.scene.truth.is_empty()
     }
 
     pub(super) const fn has_belief(&self) -> bool {
-        !self.believed.is_empty()
+        !self.scene.believed.is_empty()
     }
 
     pub(super) const fn has_covariance(&self) -> bool {
-        self.covariance.is_some() && self.has_belief()
+        self.scene.covariance.is_some() && self.has_belief()
     }
 
     pub(super) fn period_s(&self) -> Option<f64> {
@@ -68,20 +57,20 @@ impl<'a> Motion<'a> {
     }
 
     pub(super) fn layer(&self, view: &View) -> String {
-        let radius = view.px(self.mission.body().radius_m);
-        let start = self.mission.start_pose();
-        let ring = view.px(self.mission.arrival_tolerance_m);
-        let mut targets = self.targets.to_vec();
+        let radius = view.px(self.scene.mission.body().radius_m);
+        let start = self.scene.mission.start_pose();
+        let ring = view.px(self.scene.mission.arrival_tolerance_m);
+        let mut targets = self.scene.targets.to_vec();
         if targets.is_empty() {
-            targets.extend(self.mission.waypoints().iter().map(|waypoint| waypoint.at));
+            targets.extend(self.scene.mission.waypoints().iter().map(|waypoint| waypoint.at));
         }
         [
             targets.into_iter().map(|at| target(view.place(at), ring)).collect(),
-            halo(&trajectory(view, self.truth)),
-            halo(&trajectory(view, self.believed)),
+            halo(&trajectory(view, self.scene.truth)),
+            halo(&trajectory(view, self.scene.believed)),
             self.bodies(view, radius),
-            trajectory(view, self.truth).element(&truth_line()),
-            trajectory(view, self.believed).element(&believed_line()),
+            trajectory(view, self.scene.truth).element(&truth_line()),
+            trajectory(view, self.scene.believed).element(&believed_line()),
             start_mark(view.place(start.position)),
             self.end(view, radius),
             self.region(view),
@@ -109,7 +98,7 @@ impl<'a> Motion<'a> {
 
     /// The outline of a body that is no disc, inside the disc that covers it.
     fn add_footprint(&self, path: &mut Path, view: &View, pose: &Pose2) {
-        let footprint = self.mission.body().footprint;
+        let footprint = self.scene.mission.body().footprint;
         let corners = footprint.iter().flat_map(|it| it.corners_at(*pose));
         let mut corners = corners.map(|corner| view.place(corner)).collect::<Vec<_>>();
         corners.extend(corners.first().copied());
@@ -120,7 +109,8 @@ impl<'a> Motion<'a> {
 
     /// The robot's centre is in this ellipse with 95 %.
     fn region(&self, view: &View) -> String {
-        let (Some(covariance), Some(end)) = (self.covariance, self.believed.last()) else {
+        let (Some(covariance), Some(end)) = (self.scene.covariance, self.scene.believed.last())
+        else {
             return String::new();
         };
         let ([long, short], angle) = principal_axes(covariance);
@@ -153,7 +143,7 @@ impl<'a> Motion<'a> {
             path.element(style)
         };
         let believed = if self.has_truth() {
-            body(self.believed.last(), &believed_end())
+            body(self.scene.believed.last(), &believed_end())
         } else {
             String::new()
         };

@@ -37,8 +37,8 @@ pub(super) mod ink {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct View {
     /// Least x and y, metres.
-    low: DVec2,
-    side_m: f64,
+    pub(super) low: DVec2,
+    pub(super) side_m: f64,
 }
 
 impl View {
@@ -51,14 +51,6 @@ impl View {
         }
         // No valid mission leads here, but a picture is made all the same.
         Self { low: DVec2::splat(-0.5), side_m: 1.0 }
-    }
-
-    pub(super) const fn low(&self) -> DVec2 {
-        self.low
-    }
-
-    pub(super) const fn side_m(&self) -> f64 {
-        self.side_m
     }
 
     pub(super) fn place(&self, point: DVec2) -> DVec2 {
@@ -249,6 +241,17 @@ pub fn escape(text: &str, limit: usize) -> String {
         }
     }
     escaped
+}
+
+/// The multiples of `step` from `low` to `high`, and these numbers as text.
+pub(super) fn ticks(low: f64, high: f64, step: f64) -> impl Iterator<Item = (f64, String)> {
+    let digits = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
+    let first = (low / step - 1e-6).ceil();
+    // There are a dozen steps by construction; the bound holds for numbers at any distance from 0. Adding 0 turns -0 into 0.
+    (0..40)
+        .map(move |nth| (first + f64::from(nth)) * step + 0.0)
+        .take_while(move |value| *value <= high + step * 1e-6)
+        .map(move |value| (value, format!("{value:.digits$}")))
 }
 
 /// 1, 2, 5, 10, 20, ... and their fractions; not below `least`.

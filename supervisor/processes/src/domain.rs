@@ -321,14 +321,15 @@ fn remove_root(root: &Path) -> Result<(), DomainError> {
 
 /// Remove a file, if it exists: a consumer that leaves the old bus at the same time removes its own.
 fn remove_file(path: &Path) -> Result<(), DomainError> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(failed("remove", path)(error)),
-        _ => Ok(()),
-    }
+    removed(fs::remove_file(path), path)
 }
 
 fn remove_directory(path: &Path) -> Result<(), DomainError> {
-    match fs::remove_dir_all(path) {
+    removed(fs::remove_dir_all(path), path)
+}
+
+fn removed(result: io::Result<()>, path: &Path) -> Result<(), DomainError> {
+    match result {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(failed("remove", path)(error)),
         _ => Ok(()),
     }

@@ -6,26 +6,16 @@ use std::{
 };
 
 use rustix::fs::{Access, access};
-use thiserror::Error;
-
-#[derive(Debug, Error)]
-pub enum ExecutableError {
-    #[error("it is neither beside firsthand nor on PATH")]
-    Nowhere,
-    #[error("its path is not UTF-8")]
-    NotUtf8,
-    #[error(transparent)]
-    Refused(#[from] io::Error),
-}
-
 /// The absolute path of the executable `named`: a path from the current directory, or a plain name beside this executable
 /// or on `PATH`.
-pub fn find(named: &Path) -> Result<PathBuf, ExecutableError> {
+pub fn find(named: &Path) -> io::Result<PathBuf> {
     let is_name = named.components().count() == 1 && !named.is_absolute();
     let is_name = is_name && !named.as_os_str().as_encoded_bytes().contains(&b'/');
     let found = if is_name {
         let mut found = folders().map(|folder| folder.join(named));
-        found.find(|candidate| check(candidate).is_ok()).ok_or(ExecutableError::Nowhere)?
+        found
+            .find(|candidate| check(candidate).is_ok())
+            .ok_or_else(|| io::Error::other("it is neither beside firsthand nor on PATH"))?
     } else {
         let absolute = std::path::absolute(named)?;
         check(&absolute)?;
@@ -33,7 +23,7 @@ pub fn find(named: &Path) -> Result<PathBuf, ExecutableError> {
     };
     match found.to_str() {
         Some(_) => Ok(found),
-        None => Err(ExecutableError::NotUtf8),
+        None => Err(io::Error::other("its path is not UTF-8")),
     }
 }
 

@@ -1,12 +1,15 @@
 //! Finds the planner that a mission names, before anything starts: an executable, which is checked and made absolute, or another
 //! planner that `firsthand stage NAME` starts.
 
-use std::path::{Path, PathBuf};
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
 
 use common::mission::Mission;
 use thiserror::Error;
 
-use crate::executable::{self, ExecutableError};
+use crate::executable;
 
 /// The executable that a mission names for its planner cannot be started.
 #[derive(Debug, Error)]
@@ -16,7 +19,7 @@ use crate::executable::{self, ExecutableError};
 )]
 pub struct PlannerExecutableError {
     named: PathBuf,
-    problem: ExecutableError,
+    problem: io::Error,
     others: &'static [&'static str],
 }
 

@@ -13,13 +13,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use common::{
-    bus::close_all_on_exec,
-    poll,
-    samples::{DeathCause, DeathSample},
-    stage_command,
-    start::Generation,
-};
+use common::{bus::close_all_on_exec, poll, stage_command, start::Generation};
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 use serde::Serialize;
 
@@ -96,18 +90,6 @@ impl From<ExitStatus> for ExitCause {
             (None, signal) => {
                 Self::Signalled { signal: signal.unwrap_or_default(), core: status.core_dumped() }
             }
-        }
-    }
-}
-
-impl From<&DeathSample> for ExitCause {
-    fn from(death: &DeathSample) -> Self {
-        let signal = death.code;
-        match DeathCause::from_byte(death.cause) {
-            DeathCause::Exited => Self::Exited(death.code),
-            DeathCause::Signalled => Self::Signalled { signal, core: false },
-            DeathCause::SignalledWithCore => Self::Signalled { signal, core: true },
-            DeathCause::Unknown => Self::Unknown,
         }
     }
 }
