@@ -71,7 +71,7 @@ impl fmt::Debug for Writers {
 
 impl Writers {
     /// Only the process `supervisor` may write, until stages are named.
-    pub(crate) fn of(supervisor: u32) -> Self {
+    pub fn of(supervisor: u32) -> Self {
         Self(Rc::new(RefCell::new(Named { supervisor, ..Named::default() })))
     }
 
@@ -146,8 +146,9 @@ impl Writers {
     }
 }
 
+/// Whose samples a reader returns.
 #[derive(Debug)]
-pub(crate) struct Admitted {
+pub struct Admitted {
     authors: Authors,
     /// Samples of older generations are returned, too, and of processes that the supervisor named earlier.
     all_generations: bool,
@@ -179,7 +180,7 @@ struct OneStage {
 
 impl Admitted {
     /// The authors of a topic for a process that knows the `writers`, or for one that does not.
-    pub(crate) fn of(spec: &Spec, writers: Option<&Writers>) -> Self {
+    pub fn of(spec: &Spec, writers: Option<&Writers>) -> Self {
         let authors = match writers {
             _ if !spec.has_one_writer() => Authors::All,
             None => Authors::Newest(0),
@@ -209,7 +210,7 @@ impl Admitted {
     }
 
     /// Whether a sample of `author` is returned. Samples of older generations are dropped, because their process has ended.
-    pub(crate) fn admits(&mut self, author: Author) -> Result<bool, BusError> {
+    pub fn admits(&mut self, author: Author) -> Result<bool, BusError> {
         let all = self.all_generations;
         match &mut self.authors {
             Authors::All => Ok(true),

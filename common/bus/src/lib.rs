@@ -60,7 +60,7 @@ mod write;
 
 pub use self::{
     any::{AnyReader, AnySample, AnyTopic, AnyWriter},
-    authors::{Author, Ignored, Names, Writers},
+    authors::{Admitted, Author, Ignored, Names, Writers},
     close_on_exec::close_all_on_exec,
     error::BusError,
     layout::{Field, Kind, Layout, Structure, Value, kind_of},

@@ -99,6 +99,9 @@ pub struct Link {
     newest_command: Option<CommandSample>,
     repeat: Option<Repeat>,
     decision: Decision,
+    /// When this link began, or an operator's stop last applied: an earlier tick moves nothing. None in lockstep, where a tick waits for
+    /// its answer.
+    stood: Option<MissionTime>,
     stop_sent_ns: Option<u64>,
     /// Motor frames still to come in lockstep: one for each command and ping since the order.
     due: u32,
@@ -133,6 +136,7 @@ impl Link {
             newest_command: None,
             repeat: None,
             decision: Decision { action: Action::Stop, cause: Cause::NotOrdered },
+            stood: None,
             stop_sent_ns: None,
             due: 0,
             tally: Tally::default(),
@@ -155,6 +159,9 @@ impl Link {
     pub fn step(&mut self, entry: Entry<'_>) -> Vec<Effect> {
         let Entry { event, machine_ns: now_ns, now } = entry;
         self.now = now;
+        if !self.in_ticks() {
+            self.stood.get_or_insert(now);
+        }
         let mut effects = Vec::new();
         match event {
             Event::Datagram(bytes) => {
@@ -166,8 +173,11 @@ impl Link {
             Event::SensorWire(number, open) => self.take_sensor_wire(number, open, &mut effects),
             Event::Command(command) => self.take_command(&command, now_ns, &mut effects),
             Event::Order(order, reason) => self.take_order(order, reason, now_ns, &mut effects),
-            Event::Operator(Request::Stop) => self.observe(Observation::Stopped, now_ns),
-            Event::Operator(Request::Resume) => self.observe(Observation::Resumed, now_ns),
+            Event::Operator(Request::Stop) => self.failsafe.monitors.orders.stop_here(true),
+            Event::Operator(Request::Resume) => {
+                self.failsafe.monitors.orders.stop_here(false);
+                self.observe(Observation::Resumed, now_ns);
+            }
             Event::TickLimit { last_tick, target_number } => {
                 (self.last_tick, self.target_number) = (Some(last_tick), target_number);
             }
@@ -367,7 +377,7 @@ impl Link {
         self.newest_command = Some(*command);
         self.observe(Observation::Command(command), now_ns);
         let decision = self.decide(now_ns);
-        if decision.stops() {
+        if decision.stops() || Some(command.stamp.time()) <= self.stood {
             return;
         }
         let share = decision.action.speed_share();

@@ -22,7 +22,7 @@ use common::{
         RosterEntry, RosterHeader, TargetPoint, name,
     },
     start::StageError,
-    stop_socket::{self, Answer, Request},
+    stop_socket::{self, Answer, Request, StopMark},
     topics,
     waiter::Waiter,
 };
@@ -213,10 +213,13 @@ fn rests(link: &LinkSample) -> bool {
 }
 
 pub fn resume(robot: &RobotName) -> Result<(), OperatorError> {
-    // A stop that the supervisor was not told of holds at the link alone.
-    if let Ok(Some(link)) = stop_socket::Operator::connect(&Domain::of(robot.clone())) {
-        let _ = link.send(Request::Resume);
-    }
+    let domain = Domain::of(robot.clone());
+    domain.made_again(domain.stop_socket());
+    // The link's own stop ends with this alone. Where no link runs, the next one need not know of it.
+    let _ = match stop_socket::Operator::connect(&domain) {
+        Ok(Some(link)) => link.send(Request::Resume),
+        _ => StopMark::of(&domain.run_directory()).set(false),
+    };
     ask(robot, request(RequestKind::Resume))
 }
 

@@ -113,8 +113,13 @@ impl OtherCommander {
         if has_passed(began_ns, now_ns, WINDOW) {
             let stated = self.stated.min(self.most as f64);
             let away = stated - frames as f64;
-            let is_shared = frames > 0 && away > AWAY_SHARE * stated && (2 * late) as f64 <= away;
-            self.shared = if is_shared { self.shared + 1 } else { 0 };
+            let is_shared = away > AWAY_SHARE * stated && (2 * late) as f64 <= away;
+            if !is_shared {
+                self.shared = 0;
+            } else if frames > 0 {
+                // Streams may have stopped; but a host that commands often takes all frames of some windows.
+                self.shared += 1;
+            }
             self.most = self.most.max(frames);
             let is_sure = self.shared >= WINDOWS;
             self.shows = self.window.shows().or_else(|| {

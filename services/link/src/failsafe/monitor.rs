@@ -26,8 +26,6 @@ pub enum Observation<'a> {
     Time,
     /// The supervisor published a directive.
     Directive(Order, HoldReason),
-    /// An operator stops the robot at its link.
-    Stopped,
     /// An operator resumed the robot, so faults count as repaired.
     Resumed,
     /// The controller published a newer command.

@@ -46,6 +46,11 @@ impl Orders {
         self.stopped_here
     }
 
+    /// An operator's stop or resume came to the link itself. A supervisor that has not heard of this stop does not end it.
+    pub const fn stop_here(&mut self, stop: bool) {
+        self.stopped_here = stop;
+    }
+
     fn is(&self, order: Order) -> bool {
         self.newest.is_some_and(|directive| directive.order == order)
     }
@@ -62,13 +67,8 @@ impl Monitor for Orders {
     }
 
     fn observe(&mut self, what: &Observation<'_>, now: Moment) {
-        match *what {
-            Observation::Directive(order, reason) => {
-                self.newest = Some(Directive { order, reason, heard_ns: now.machine_ns });
-            }
-            Observation::Stopped => self.stopped_here = true,
-            Observation::Resumed => self.stopped_here = false,
-            _ => {}
+        if let Observation::Directive(order, reason) = *what {
+            self.newest = Some(Directive { order, reason, heard_ns: now.machine_ns });
         }
     }
 

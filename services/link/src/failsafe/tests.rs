@@ -509,6 +509,7 @@ fn frames_that_go_elsewhere_while_acknowledgements_come_at_once_show_another_com
         monitor.condition(Cause::AnotherCommander, now())
     };
     assert_eq!(cause(3, 5, 1), Condition::Holds);
+    assert_eq!(cause(40, 5, 1), Condition::Holds, "it commands so often that it takes nearly all");
     let none = Condition::OverFor(Duration::MAX);
     assert_eq!(cause(1, 5, 1), none, "all is well");
     assert_eq!(cause(3, 5, 3), none, "the radio loses both");

@@ -29,6 +29,9 @@ impl Link {
         if now.stops() {
             self.repeat = None;
             if !self.in_ticks() {
+                if self.failsafe.applied(Cause::OperatorStop) {
+                    self.stood = Some(self.now);
+                }
                 // The robot may still drive by a command of an earlier link.
                 let new = !before.stops()
                     || self.stop_sent_ns.is_none() && self.monitors().presence.is_wire_open();

@@ -455,6 +455,7 @@ fn an_abandoned_tick_does_not_keep_the_next_from_starting() {
 mod arduino;
 mod held;
 mod lockstep;
+mod model;
 mod robot_health;
 mod ros2;
 mod sensor_wire;

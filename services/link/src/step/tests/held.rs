@@ -111,8 +111,8 @@ fn a_fresh_command_from_an_old_pose_or_guidance_moves_nothing() {
 #[test]
 fn on_a_low_battery_the_robot_goes_the_same_way_at_half_speed() {
     let mut link = driving(on_the_wall());
-    let curve = command(0, 0, TURN, 0.5 * TURN);
-    let effects = tick_by(&mut link, 0, &powered(6.5), &curve);
+    let curve = command(0, MS, TURN, 0.5 * TURN);
+    let effects = tick_by(&mut link, MS, &powered(6.5), &curve);
     assert_eq!(velocities(&effects), [[Some(-600), Some(300)]]);
     assert!(decided(&effects).contains(&(Action::Slow, Cause::BatteryLow)));
     let curve = command(1, 143 * MS, TURN, 0.5 * TURN);

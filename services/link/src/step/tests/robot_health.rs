@@ -194,7 +194,7 @@ fn wheels_that_reach_four_fifths_of_their_command_are_told_more_until_they_turn_
     let half = TURN / 2.0;
     let (mut turned, mut told) = (0.0, 0.0);
     for number in 0..60 {
-        let now = number * PERIOD_NS;
+        let now = (number + 1) * PERIOD_NS;
         turned += 0.8 * told / 7.0;
         let counts = |turned: f64| turned.rem_euclid(COUNT_CYCLE.into()) as u16;
         link.at(Event::Order(Order::Drive, HoldReason::None), now);

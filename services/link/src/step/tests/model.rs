@@ -1,0 +1,448 @@
+//! Every history of twelve events around an operator's stop: the real step of the link, and beside it a plain model of what talks to it.
+//!
+//! Histories are explored breadth first, and those that lead to the same state are continued once. Two states are the same if all that
+//! stops and starts the robot is, with times as ages. The evidence of monitors that judge motion (odometry, ranges, response, other
+//! commanders) is not compared: the modelled robot moves as it is told, too slowly to be judged.
+
+use std::collections::HashSet;
+
+use common::{
+    bus::{Admitted, Author, Writers},
+    topics::DIRECTIVE,
+};
+use x80_driver::X80;
+
+use super::*;
+use crate::failsafe::{
+    TABLE,
+    monitor::{Condition, Monitor as _},
+};
+
+/// Readings of the clock are above this, and no other number is.
+const BEGAN_NS: u64 = 1_000_000_000_000_000;
+const DEPTH: usize = 12;
+const TICK_MS: u64 = 100;
+/// No deadline of the link is longer than this: greater ages are equal.
+const OLD_NS: u64 = 2_400_000_000;
+/// Commands last for 250 ms: the ages of older ones are equal.
+const OLD_COMMAND_NS: u64 = 300_000_000;
+
+#[derive(Clone, Copy, Debug)]
+enum Happens {
+    Tick,
+    /// Long enough for the cause to apply.
+    Pause,
+    CauseBegins,
+    CauseEnds,
+    /// The operator's word reaches the link, and the supervisor later, in whatever order.
+    Stop,
+    Resume,
+    SupervisorHearsStop,
+    SupervisorHearsResume,
+    /// The command of the newest tick before the last stop comes late, or again.
+    OldCommand,
+    LinkRestarts,
+    SupervisorRestarts,
+    /// Another supervisor orders the robot to drive.
+    SecondSupervisor,
+}
+
+use Happens::*;
+
+const ALL: [Happens; 12] = [
+    Tick,
+    Pause,
+    CauseBegins,
+    CauseEnds,
+    Stop,
+    Resume,
+    SupervisorHearsStop,
+    SupervisorHearsResume,
+    OldCommand,
+    LinkRestarts,
+    SupervisorRestarts,
+    SecondSupervisor,
+];
+
+/// The causes that are tried, and after how many milliseconds each must hold the robot.
+const CAUSES: [(Cause, u64); 6] = [
+    (Cause::RobotLost, 750),
+    (Cause::FramesSilent, 750),
+    (Cause::CommandStale, 250),
+    (Cause::StageHeld, 2 * TICK_MS),
+    (Cause::SupervisorSilent, 2000),
+    (Cause::BatteryEmpty, 2000 + 2 * TICK_MS),
+];
+
+#[derive(Clone, Debug)]
+struct Supervisor {
+    process: u32,
+    is_starting: bool,
+    operator_stop: bool,
+    resumed_ns: u64,
+    /// When an operator asked for what the supervisor has not heard.
+    asked_stop: Option<u64>,
+    asked_resume: Option<u64>,
+    said: Option<(Order, HoldReason)>,
+}
+
+struct World {
+    link: Link,
+    admitted: Admitted,
+    now_ns: u64,
+    is_marked: bool,
+    supervisor: Supervisor,
+    counts: [f64; 2],
+    told: [i16; 2],
+    cause: (Cause, u64),
+    cause_since: Option<u64>,
+    stopped_ns: u64,
+    is_stopped: bool,
+    newest: Option<CommandSample>,
+    old: Option<CommandSample>,
+    moved: u64,
+    history: Vec<Happens>,
+}
+
+fn started(now_ns: u64, next_tick: u64) -> Link {
+    let mut link = Link::new(&mission());
+    link.now = MissionTime(now_ns);
+    link.restore(State { pace: Pace::Rate(1.0), next_tick });
+    link
+}
+
+fn admitted(process: u32) -> Admitted {
+    Admitted::of(DIRECTIVE.spec(), Some(&Writers::of(process)))
+}
+
+/// A driver keeps nothing of whole datagrams that a stop depends on.
+fn copy(link: &Link) -> Link {
+    Link {
+        state: link.state,
+        base: Box::new(X80::new(&mission())),
+        drivers: Vec::new(),
+        sensors: link.sensors.clone(),
+        speeds: link.speeds.clone(),
+        failsafe: link.failsafe.clone(),
+        restart: link.restart.clone(),
+        trim: link.trim.clone(),
+        open: link.open.clone(),
+        polls: link.polls,
+        clock_rate: link.clock_rate,
+        ..*link
+    }
+}
+
+impl Clone for World {
+    fn clone(&self) -> Self {
+        Self {
+            link: copy(&self.link),
+            admitted: admitted(self.supervisor.process),
+            supervisor: self.supervisor.clone(),
+            history: self.history.clone(),
+            ..*self
+        }
+    }
+}
+
+impl World {
+    fn new(cause: (Cause, u64)) -> Self {
+        let supervisor = Supervisor {
+            process: 1,
+            is_starting: true,
+            operator_stop: false,
+            resumed_ns: 0,
+            asked_stop: None,
+            asked_resume: None,
+            said: None,
+        };
+        let mut world = Self {
+            link: started(BEGAN_NS, 0),
+            admitted: admitted(1),
+            now_ns: BEGAN_NS,
+            is_marked: false,
+            supervisor,
+            counts: [0.0; 2],
+            told: [0; 2],
+            cause,
+            cause_since: None,
+            stopped_ns: 0,
+            is_stopped: false,
+            newest: None,
+            old: None,
+            moved: 0,
+            history: Vec::new(),
+        };
+        (0..5).for_each(|_| world.tick());
+        assert!(world.moved > 0, "it drives at first");
+        world
+    }
+
+    /// The link takes `event`, and what it sends is judged, obeyed and acknowledged. Returns its effects.
+    fn give(&mut self, event: Event<'_>) -> Vec<Effect> {
+        let entry = Entry { event, machine_ns: self.now_ns, now: MissionTime(self.now_ns) };
+        let effects = self.link.step(entry);
+        // The process writes the mark after each turn.
+        self.is_marked = self.link.is_stopped_by_operator();
+        for velocity in velocities(&effects) {
+            let counts = velocity.map(Option::unwrap_or_default);
+            self.told = [counts[0].saturating_neg(), counts[1]];
+            if counts != [0, 0] {
+                self.moved += 1;
+                self.judge_motion();
+            }
+        }
+        if let Some(since) = self.cause_since
+            && self.now_ns - since > self.cause.1 * MS
+        {
+            let decision = self.link.decision();
+            assert!(decision.stops(), "{:?} holds: {decision:?}, {:?}", self.cause, self.history);
+        }
+        if !self.has(Cause::RobotLost) {
+            let mut acknowledged = Vec::new();
+            for _ in sent(&effects) {
+                Report::System(SystemSignal::Ack).encode(Addressing::default(), &mut acknowledged);
+            }
+            if !acknowledged.is_empty() {
+                self.give(Event::Datagram(&acknowledged));
+            }
+        }
+        effects
+    }
+
+    fn judge_motion(&self) {
+        let history = &self.history;
+        assert!(!self.is_stopped, "it moves although an operator stopped it: {history:?}");
+        let obeyed = self.link.newest_command.unwrap().stamp.stamp_ns;
+        assert!(obeyed > self.stopped_ns, "it obeys a command from before the stop: {history:?}");
+        let said = self.supervisor.said.map(|(order, _)| order);
+        assert_eq!(said, Some(Order::Drive), "it obeys another supervisor: {history:?}");
+        if let Some(since) = self.cause_since {
+            let held_ns = self.now_ns - since;
+            assert!(held_ns <= self.cause.1 * MS, "it moves under {:?}: {history:?}", self.cause);
+        }
+    }
+
+    fn has(&self, cause: Cause) -> bool {
+        self.cause_since.is_some() && self.cause.0 == cause
+    }
+
+    fn pass(&mut self, ms: u64) {
+        self.now_ns += ms * MS;
+        for (counts, told) in self.counts.iter_mut().zip(self.told) {
+            *counts += f64::from(told) * ms as f64 * 1e-3;
+        }
+    }
+
+    fn order(&mut self, process: u32, order: Order, reason: HoldReason) {
+        if self.admitted.admits(Author { process, generation: u32::MAX }).unwrap() {
+            self.give(Event::Order(order, reason));
+        }
+    }
+
+    fn tick(&mut self) {
+        self.pass(TICK_MS / 2);
+        self.give(Event::Quiet);
+        self.pass(TICK_MS / 2 - 1);
+        if !self.has(Cause::SupervisorSilent) {
+            let supervisor = &mut self.supervisor;
+            let (order, reason) = if std::mem::take(&mut supervisor.is_starting) {
+                (Order::Hold, HoldReason::Starting)
+            } else if supervisor.operator_stop {
+                (Order::Hold, HoldReason::Operator)
+            } else if self.cause.0 == Cause::StageHeld && self.cause_since.is_some() {
+                (Order::Hold, HoldReason::StageHeld)
+            } else {
+                (Order::Drive, HoldReason::None)
+            };
+            supervisor.said = Some((order, reason));
+            let process = supervisor.process;
+            self.order(process, order, reason);
+        }
+        self.pass(1);
+        if !self.has(Cause::RobotLost) {
+            let mut standard = StandardSensors::default();
+            standard.ultrasonic[1] = 255;
+            standard.board_battery = if self.has(Cause::BatteryEmpty) { 2000 } else { 3900 };
+            let mut bytes = Vec::new();
+            Report::Standard(standard).encode(Addressing::default(), &mut bytes);
+            if !self.has(Cause::FramesSilent) {
+                let mut motor = MotorSensors::default();
+                let cycle = f64::from(common::wire::COUNT_CYCLE);
+                let [left, right] = self.counts.map(|counts| counts.rem_euclid(cycle) as u16);
+                motor.encoders[0].position =
+                    (common::wire::COUNT_CYCLE - left) % common::wire::COUNT_CYCLE;
+                motor.encoders[1].position = right;
+                Report::Motor(motor).encode(Addressing::default(), &mut bytes);
+            }
+            let effects = self.give(Event::Datagram(&bytes));
+            for (tick, ..) in ticks(&effects) {
+                if !self.has(Cause::CommandStale) {
+                    // Under 0.03 m/s at the rim, so that no monitor of motion judges it.
+                    let command = command(tick, self.now_ns, 0.3, 0.3);
+                    self.newest = Some(command);
+                    self.give(Event::Command(command));
+                }
+            }
+        }
+    }
+
+    /// Returns whether it can happen.
+    fn happen(&mut self, what: Happens) -> bool {
+        self.history.push(what);
+        match what {
+            Tick => self.tick(),
+            Pause => (0..self.cause.1 / TICK_MS + 2).for_each(|_| self.tick()),
+            CauseBegins if self.cause_since.is_none() => self.cause_since = Some(self.now_ns),
+            CauseEnds if self.cause_since.is_some() => self.cause_since = None,
+            Stop => {
+                (self.is_stopped, self.stopped_ns) = (true, self.now_ns);
+                self.old = self.newest;
+                self.supervisor.asked_stop = Some(self.asked_ns());
+                self.give(Event::Operator(Request::Stop));
+            }
+            Resume if self.is_stopped => {
+                self.is_stopped = false;
+                self.supervisor.asked_resume = Some(self.asked_ns());
+                self.give(Event::Operator(Request::Resume));
+            }
+            SupervisorHearsStop => match self.supervisor.asked_stop.take() {
+                Some(asked_ns) => {
+                    self.supervisor.operator_stop |= asked_ns >= self.supervisor.resumed_ns;
+                }
+                None => return false,
+            },
+            SupervisorHearsResume => match self.supervisor.asked_resume.take() {
+                Some(asked_ns) => {
+                    self.supervisor.operator_stop = false;
+                    self.supervisor.resumed_ns = asked_ns;
+                }
+                None => return false,
+            },
+            OldCommand => match self.old {
+                Some(old) => drop(self.give(Event::Command(old))),
+                None => return false,
+            },
+            LinkRestarts => self.restart_link(),
+            SupervisorRestarts => {
+                let supervisor = &mut self.supervisor;
+                supervisor.process += 1;
+                supervisor.is_starting = true;
+                supervisor.resumed_ns = 0;
+                // Its bus is made again, and its link started again.
+                (supervisor.asked_stop, supervisor.asked_resume) = (None, None);
+                self.admitted = admitted(supervisor.process);
+                self.restart_link();
+            }
+            SecondSupervisor => {
+                let own = self.supervisor.process;
+                for other in [own - 1, own + 1] {
+                    self.order(other, Order::Drive, HoldReason::None);
+                }
+            }
+            CauseBegins | CauseEnds | Resume => return false,
+        }
+        true
+    }
+
+    /// Requests that are made at one time differ by their number.
+    fn asked_ns(&self) -> u64 {
+        self.now_ns + self.history.len() as u64
+    }
+
+    fn restart_link(&mut self) {
+        self.link = started(self.now_ns, self.link.state().next_tick);
+        self.supervisor.said = None;
+        if self.has(Cause::BatteryEmpty) {
+            // The next link has to see it again; the supervisor has ended the mission.
+            self.cause_since = Some(self.now_ns);
+        }
+        if self.is_marked {
+            self.give(Event::Operator(Request::Stop));
+        }
+    }
+
+    /// What tells this state from others.
+    fn key(&self) -> String {
+        let moment = Moment { time: MissionTime(self.now_ns), machine_ns: self.now_ns };
+        let (link, supervisor) = (&self.link, &self.supervisor);
+        let all = &link.failsafe.monitors;
+        let applied: Vec<_> = TABLE.iter().map(|row| link.failsafe.applied(row.cause)).collect();
+        let does_not_stop = all.stop.condition(Cause::RobotDoesNotStop, moment);
+        let presence = (all.presence.connected(), all.presence.is_silent(self.now_ns));
+        // When it last sent something matters to a robot that acknowledges late only.
+        let latency = format!("{:?}", all.latency);
+        let latency = latency.split("came_late").last();
+        let command = |command: Option<CommandSample>| {
+            let age = |then_ns: u64| (self.now_ns - then_ns).min(OLD_COMMAND_NS);
+            let stamp = command.map(|command| command.stamp.stamp_ns);
+            let stood = link.stood.map(|stood| stood.0);
+            (stamp.map(age), stamp.map(|at| [at > self.stopped_ns, Some(at) > stood]))
+        };
+        let resumed_ns = supervisor.resumed_ns;
+        let newer = |asked: Option<u64>| asked.map(|asked_ns| asked_ns >= resumed_ns);
+        let asked = (newer(supervisor.asked_stop), newer(supervisor.asked_resume));
+        let in_order = supervisor.asked_stop < supervisor.asked_resume;
+        let held_ns = self.cause_since.map(|since| self.now_ns - since);
+        let state = (
+            (&all.orders, presence, latency, &all.battery, all.streams.motor_frames(self.now_ns)),
+            (does_not_stop == Condition::Holds, all.stop.method(), applied, link.decision),
+            (link.repeat.map(|repeat| repeat.due <= link.now), link.open.is_some()),
+            (command(link.newest_command), command(self.old), command(self.newest)),
+            (self.is_marked, supervisor.is_starting, supervisor.operator_stop, asked, in_order),
+            (self.is_stopped, supervisor.said, held_ns.map(|ns| ns.min(self.cause.1 * MS + 1))),
+        );
+        let text = format!("{state:?}");
+        let mut key = String::with_capacity(text.len());
+        let mut digits = String::new();
+        for letter in text.chars().chain([' ']) {
+            if letter.is_ascii_digit() {
+                digits.push(letter);
+                continue;
+            }
+            match digits.parse::<u64>() {
+                Ok(number) if number >= BEGAN_NS => {
+                    let age_ns = self.now_ns.saturating_sub(number).min(OLD_NS);
+                    key.push_str(&age_ns.to_string());
+                }
+                _ => key.push_str(&digits),
+            }
+            digits.clear();
+            key.push(letter);
+        }
+        key
+    }
+}
+
+/// Returns how many states there are, and how often the robot was told to move.
+fn explore(cause: (Cause, u64)) -> (usize, u64) {
+    let first = World::new(cause);
+    let mut seen = HashSet::from([first.key()]);
+    let (mut newest, mut moved) = (vec![first], 0);
+    for depth in 0..DEPTH {
+        let mut next = Vec::new();
+        for world in newest {
+            for what in ALL {
+                let mut world = world.clone();
+                let before = world.moved;
+                if world.happen(what) {
+                    moved += world.moved - before;
+                    if seen.insert(world.key()) {
+                        next.push(world);
+                    }
+                }
+            }
+        }
+        println!("{cause:?} {depth}: {} new, {} states", next.len(), seen.len());
+        newest = next;
+    }
+    (seen.len(), moved)
+}
+
+#[test]
+fn no_history_moves_a_robot_against_a_cause_an_operators_stop_or_its_own_supervisor() {
+    for cause in CAUSES {
+        let (states, moved) = explore(cause);
+        assert!(states > 100 && moved > 100, "{cause:?}: {states} states, {moved} moves");
+    }
+}
