@@ -2,6 +2,8 @@
 //! robots at once. `rows.csv` has a row for each robot of each run and is added to, so that a large number may take many nights;
 //! `certificate.md` is written again from all rows.
 
+mod fuzz;
+
 use std::{collections::BTreeMap, fs, path::PathBuf, thread, time::Instant};
 
 use clap::{Args, Parser as _, builder::PossibleValuesParser};
@@ -26,6 +28,9 @@ pub struct Arguments {
     /// The parts, with commas; by default all.
     #[arg(long, value_delimiter = ',', value_parser = PossibleValuesParser::new(PARTS.iter().map(|part| part.name)))]
     parts: Vec<String>,
+    /// Inputs of the part fuzz, in place of its share.
+    #[arg(long, value_name = "N")]
+    inputs: Option<u32>,
 }
 
 struct Part {
@@ -33,40 +38,48 @@ struct Part {
     what: &'static str,
     /// Of the whole certificate, over both robots.
     whole: u32,
-    /// Options of `firsthand bench chaos`, without numbers.
-    options: &'static str,
+    /// Options of `firsthand bench chaos`, without numbers; none of what it does not try.
+    options: Option<&'static str>,
 }
+
+const FUZZ: &str = "fuzz";
 
 const PARTS: &[Part] = &[
     Part {
         name: "signals",
         what: "kills and freezes of stages, successors as they start, and the supervisor",
         whole: 10_000,
-        options: "--include-startup --include-supervisor",
+        options: Some("--include-startup --include-supervisor"),
     },
     Part {
         name: "consumers",
         what: "the same of stages and consumers; every generation is replayed",
         whole: 2000,
-        options: "--include-consumers --replay",
+        options: Some("--include-consumers --replay"),
     },
     Part {
         name: "machine",
         what: "freezes of all processes, while the target changes",
         whole: 1000,
-        options: "--freeze-all --targets",
+        options: Some("--freeze-all --targets"),
     },
     Part {
         name: "faults-x80",
         what: "missions with a fault of the robot, an X80",
         whole: 500,
-        options: "--robot-faults",
+        options: Some("--robot-faults"),
     },
     Part {
         name: "faults-json",
         what: "missions with a fault of the robot, which speaks lines of JSON and has a laser",
         whole: 500,
-        options: "--robot-faults --set robot={model='kobuki',protocol='json',rate_hz=10}",
+        options: Some("--robot-faults --set robot={model='kobuki',protocol='json',rate_hz=10}"),
+    },
+    Part {
+        name: FUZZ,
+        what: "inputs, random and changed, to what decodes wires, missions, states, maps and recordings",
+        whole: 100_000_000,
+        options: None,
     },
 ];
 
@@ -84,13 +97,15 @@ struct Row {
 }
 
 pub fn main(arguments: &Arguments) -> Result {
-    let Arguments { out, share, parts } = arguments;
+    let Arguments { out, share, parts, .. } = arguments;
     fs::create_dir_all(out).or_cannot_file("make", out)?;
     let mut rows = Table::open(out.join("rows.csv"))?;
     let before = rows.rows.len();
     let is_asked = |part: &&Part| parts.is_empty() || parts.iter().any(|name| name == part.name);
     for part in PARTS.iter().filter(is_asked) {
         write_stderr(&format!("{}: {}\n", part.name, part.what));
+        let inputs = arguments.inputs.filter(|_| part.name == FUZZ);
+        let share = inputs.map_or(*share, |inputs| f64::from(inputs) / f64::from(part.whole));
         // A row's number is its seed's, so that no seed is tried twice.
         let number = rows.rows.len() as u64;
         let tried =
@@ -116,13 +131,21 @@ fn one(part: &Part, share: f64, number: u64) -> Result<Row> {
     let began = Instant::now();
     let many = (f64::from(part.whole) * share).ceil().max(1.0);
     let seed = 1 + number * 10_000;
-    let count = match part.options.contains("--robot-faults") {
-        true => format!("--missions {}", (many / chaos::FAULTS as f64).ceil()),
-        false => format!("--kills {many}"),
+    let (Judged { tried, lost, worst, .. }, command) = match part.options {
+        None => (
+            fuzz::judge(many as u64, seed)?,
+            format!("firsthand-lab certify --parts {FUZZ}, {many} of seed {seed}"),
+        ),
+        Some(options) => {
+            let count = match options.contains("--robot-faults") {
+                true => format!("--missions {}", (many / chaos::FAULTS as f64).ceil()),
+                false => format!("--kills {many}"),
+            };
+            let words = format!("chaos {options} {count} --seed {seed} --robot certify-{number}");
+            let asked = Chaos::try_parse_from(words.split(' ')).or_cannot("try")?.asked;
+            (chaos::judge(&asked)?, format!("firsthand bench {words}"))
+        }
     };
-    let words = format!("chaos {} {count} --seed {seed} --robot certify-{number}", part.options);
-    let asked = Chaos::try_parse_from(words.split(' ')).or_cannot("try")?.asked;
-    let Judged { tried, lost, worst, .. } = chaos::judge(&asked)?;
     Ok(Row {
         part: part.name.to_owned(),
         seed,
@@ -132,7 +155,7 @@ fn one(part: &Part, share: f64, number: u64) -> Result<Row> {
         took_s: began.elapsed().as_secs_f64(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         processors: thread::available_parallelism().map_or(0, usize::from),
-        command: format!("firsthand bench {words}"),
+        command,
     })
 }
 
@@ -182,9 +205,9 @@ mod tests {
 
     #[test]
     fn every_part_is_a_chaos_that_its_options_allow() {
-        for part in PARTS {
-            let words = format!("chaos --seed 1 {}", part.options);
-            assert!(Chaos::try_parse_from(words.split(' ')).is_ok(), "{}", part.name);
+        for options in PARTS.iter().filter_map(|part| part.options) {
+            let words = format!("chaos --seed 1 {options}");
+            assert!(Chaos::try_parse_from(words.split(' ')).is_ok(), "{options}");
         }
     }
 }
