@@ -58,7 +58,7 @@ pub struct Judged {
     pub tried: u64,
     pub lost: u64,
     pub worst: String,
-    text: String,
+    pub text: String,
 }
 
 /// A result for people, or as a line of JSON.

@@ -157,7 +157,8 @@ pub(super) fn judge(inputs: u64, seed: u64) -> Result<Judged> {
     let directory = tempfile::tempdir().or_cannot("make a temporary directory")?;
     let mut targets = targets(directory.path())?;
     let count = targets.len();
-    let mut judged = Judged { tried: inputs, lost: 0, worst: "no panic".to_owned() };
+    let mut judged =
+        Judged { tried: inputs, lost: 0, worst: "no panic".to_owned(), text: String::new() };
     let mut random = Random::new(seed, 0xf022);
     for number in 0..inputs {
         let target = &mut targets[number as usize % count];
