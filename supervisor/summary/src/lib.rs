@@ -57,6 +57,9 @@ pub struct Summary {
     /// Mean |dv/dt|: f_vs of MRPB, (6).
     pub f_vs_m_s2: Option<f64>,
     pub collisions: Option<u64>,
+    /// The speed of the faster wheel's rim in the tick before the first contact, m/s: a robot at rest was run into.
+    #[serde(default)]
+    pub contact_speed_m_s: Option<f64>,
     pub pose_error_m: Option<f64>,
     /// The root mean square of the pose error by the covariance of the last pose.
     pub pose_error_expected_m: Option<f64>,
@@ -127,6 +130,7 @@ impl Summary {
             f_ps_m2: path_smoothness(truth),
             f_vs_m_s2: velocity_smoothness(truth),
             collisions,
+            contact_speed_m_s: contact_speed_m_s(truth, mission.body().track_m),
             pose_error_m: pose.and_then(|pose| {
                 let its = truth.iter().rev().find(|tick| tick.is_of(pose));
                 Some(its.or(truth.last())?.pose_error_m(pose))
@@ -248,6 +252,12 @@ fn path_length(truth: &[GroundTruthTick]) -> f64 {
     truth.windows(2).map(|pair| (pair[1].x - pair[0].x).hypot(pair[1].y - pair[0].y)).sum()
 }
 
+fn contact_speed_m_s(truth: &[GroundTruthTick], track_m: f64) -> Option<f64> {
+    let first = truth.iter().position(|tick| tick.contacts > 0)?;
+    let before = truth.get(first.checked_sub(1)?)?;
+    Some(before.v.abs() + before.omega.abs() * track_m / 2.0)
+}
+
 fn near_share(truth: &[GroundTruthTick]) -> Option<f64> {
     let [first, .., last] = truth else { return None };
     let near = truth.windows(2).filter(|pair| pair[1].clearance_m <= SAFE_M);
@@ -287,6 +297,15 @@ mod tests {
         assert_eq!(sonar_unavailable_share(&[]), None);
         let truth = [255, 0, 255, 254, 4].map(tick);
         assert_eq!(sonar_unavailable_share(&truth), Some(0.6));
+    }
+
+    #[test]
+    fn the_speed_at_a_contact_is_the_faster_wheels_in_the_tick_before() {
+        let tick =
+            |contacts, v, omega| GroundTruthTick { contacts, v, omega, ..Default::default() };
+        let truth = [tick(0, 0.0, 0.0), tick(0, -0.3, 1.0), tick(1, 0.0, 0.0)];
+        assert_eq!(contact_speed_m_s(&truth, 0.4), Some(0.5));
+        assert_eq!(contact_speed_m_s(&truth[..2], 0.4), None);
     }
 
     #[test]

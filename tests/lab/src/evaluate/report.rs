@@ -17,6 +17,9 @@ use crate::{
     },
 };
 
+/// The share of collisions in which the robot was in motion; in the others it was run into at rest.
+const AT_FAULT: &str = "at_fault_collision";
+
 /// Metrics beside the shares. With `median_` the key is of the median of a column over the successes, otherwise of the mean over all
 /// missions.
 const METRICS: [&str; 9] = [
@@ -47,12 +50,13 @@ pub fn report(settings: &[Setting], rows: &[Row]) -> Value {
 fn totals(setting: &str, rows: &[Row]) -> Value {
     let rows: Vec<&Row> = rows.iter().filter(|row| row.setting == setting).collect();
     let mut totals = json!({ "setting": setting, "count": rows.len() });
-    for name in OUTCOMES {
-        let hits = rows.iter().filter(|row| row.outcome_name() == name).count();
-        let share = share(hits, rows.len());
+    let mut add = |name: &str, counts: &dyn Fn(&Row) -> bool| {
+        let share = share(rows.iter().filter(|row| counts(row)).count(), rows.len());
         totals[name] = share.value.into();
         totals["intervals"][name] = interval(share).into();
-    }
+    };
+    OUTCOMES.into_iter().for_each(|name| add(name, &|row| row.outcome_name() == name));
+    add(AT_FAULT, &Row::is_at_fault);
     for key in METRICS {
         let value = match key.strip_prefix("median_") {
             Some(column) => {
@@ -81,8 +85,7 @@ fn versus(from: &str, to: &str, rows: &[Row]) -> Value {
     let (first, second) = (of(from), of(to));
     let pairs: Vec<(&Row, &Row)> =
         first.iter().filter_map(|(key, row)| Some((*row, *second.get(key)?))).collect();
-    let change = |outcome| {
-        let has = |row: &Row| row.outcome == outcome;
+    let change = |has: &dyn Fn(&Row) -> bool| {
         let gained = pairs.iter().filter(|(a, b)| has(b) && !has(a)).count();
         let lost = pairs.iter().filter(|(a, b)| has(a) && !has(b)).count();
         let change = paired_difference(gained, lost, pairs.len());
@@ -92,8 +95,9 @@ fn versus(from: &str, to: &str, rows: &[Row]) -> Value {
     let mut versus = json!({
         "totals": totals(to, rows),
         "pairs": pairs.len(),
-        "success_change": change(Outcome::Success),
-        "collision_change": change(Outcome::Collision),
+        "success_change": change(&Row::is_success),
+        "collision_change": change(&|row| row.outcome == Outcome::Collision),
+        "at_fault_change": change(&Row::is_at_fault),
     });
     // The median ratio of the times, over missions in which both succeeded.
     if let Some(ratio) = median(both.map(|(a, b)| b.time_s / a.time_s.max(1e-9))) {

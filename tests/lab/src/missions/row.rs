@@ -72,7 +72,12 @@ pub struct Row {
     pub replans: u64,
     pub resets: u64,
     pub full_solves: u64,
+    /// The speed of the faster wheel in the tick before the contact, m/s.
+    pub contact_speed_m_s: Option<f64>,
 }
+
+/// A robot that is faster at a contact, by its faster wheel, is at fault, m/s; a slower one was run into.
+const AT_FAULT_M_S: f64 = 0.05;
 
 /// The multiples of the optimal time up to which a robot gets the best score, and from which on the worst.
 const BARN_CLIP: [f64; 2] = [2.0, 8.0];
@@ -130,7 +135,14 @@ impl Row {
             replans: summary.replans.into(),
             resets: summary.resets,
             full_solves: summary.full_solves,
+            contact_speed_m_s: summary.contact_speed_m_s,
         }
+    }
+
+    /// Whether the robot was in motion when it touched something. A contact of unknown speed counts.
+    pub fn is_at_fault(&self) -> bool {
+        let moved = self.contact_speed_m_s.is_none_or(|speed| speed > AT_FAULT_M_S);
+        self.outcome == Outcome::Collision && moved
     }
 
     pub fn is_success(&self) -> bool {
@@ -245,6 +257,18 @@ mod tests {
         assert_eq!(outcome(Reported::ReachedUnsure, 0.6), Outcome::WrongPlace);
         assert_eq!(outcome(Reported::Collision, 0.1), Outcome::Collision);
         assert_eq!(outcome(Reported::Timeout, 0.1), Outcome::Timeout);
+    }
+
+    #[test]
+    fn a_robot_at_rest_is_run_into_and_one_in_motion_is_at_fault() {
+        let is_at_fault = |contact_speed_m_s| {
+            let summary = Summary { contact_speed_m_s, ..summary(Reported::Collision, 3.0) };
+            Row::new(&trial(None), 1, &setting(), &summary).is_at_fault()
+        };
+        assert_eq!([Some(0.0), Some(0.5), None].map(is_at_fault), [false, true, true]);
+        assert!(
+            !Row::new(&trial(None), 1, &setting(), &summary(Reported::Reached, 0.1)).is_at_fault()
+        );
     }
 
     #[test]
