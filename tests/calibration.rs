@@ -37,8 +37,7 @@ fn unknown_wheels_are_found_within_three_deviations_and_written() {
     let provenance = found.calibrated.unwrap();
     assert_eq!((&*provenance.method, &*provenance.robot), ("wall", "calibrated"));
     assert!(provenance.metres > 20.0 && provenance.chi2_per_dof < 4.0, "{provenance:?}");
-    let picture = std::fs::read_to_string(said["picture"].as_str().unwrap()).unwrap();
-    assert!(picture.starts_with("<svg"), "{picture:.20}");
+    assert!(said["residuals"].as_array().unwrap().len() >= 6, "{said}");
 }
 
 #[test]

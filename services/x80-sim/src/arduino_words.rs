@@ -2,7 +2,7 @@
 //! answers. A sonar says its reading of the newest tick.
 
 use common::{
-    mission::{ArduinoBoard, Mission},
+    mission::{ArduinoBoard, Mission, RobotConfig},
     wire::{Command, Echo, StandardSensors},
 };
 
@@ -89,7 +89,8 @@ impl ArduinoWords {
         let sonars = table.filter_map(|row| Some((pin(&row.name)?, usize::from(row.channel))));
         Self {
             board: mission.robot.arduino.clone(),
-            wheels: OnChannel::left_and_right(&mission.robot),
+            // Its program knows the usual wiring; that of the mission is how it was assembled.
+            wheels: OnChannel::left_and_right(&RobotConfig::default()),
             sonars: sonars.collect(),
             zero: [0.0; 2],
             boots_until: None,

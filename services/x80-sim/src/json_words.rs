@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, f64::consts::TAU};
 
 use common::{
     json_wire::{Order, Report, Scan, line},
-    mission::{Mission, Sensor, SensorKind},
+    mission::{Mission, RobotConfig, Sensor, SensorKind},
     wire::{
         Command, CustomSensors, Echo, Feedback, INFRARED_LIVE_AD, MOTOR_SCALE_V, Mode,
         MotorSensors, Parameter, StandardSensors, infrared_m, volts,
@@ -31,7 +31,8 @@ pub(crate) struct JsonWords {
 impl JsonWords {
     pub(crate) fn new(mission: &Mission) -> Self {
         Self {
-            wheels: OnChannel::left_and_right(&mission.robot),
+            // Its program knows the usual wiring; that of the mission is how it was assembled.
+            wheels: OnChannel::left_and_right(&RobotConfig::default()),
             held_current_ad: mission.robot.held_current_ad.into(),
             counts_per_radian: mission.body().counts_per_turn / TAU,
             table: mission.sensor_table(),

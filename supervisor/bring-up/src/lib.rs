@@ -13,7 +13,9 @@
 //! | `wheels` | which wheel counts what it is told, and how fast the base answers |
 //! | `scans` | the body's motion and the laser's mounting that place all scans on each other |
 //! | `rangers` | liveliness and noise of sensors, bearings of sonars, way and turn where there is no laser |
+//! | `body` | motors and sizes, by what laser or sonars saw of the body's motion |
 
+mod body;
 mod rangers;
 mod scans;
 pub mod trace;
@@ -86,6 +88,11 @@ impl Finding {
 #[must_use]
 pub fn findings(mission: &Mission, trace: &Trace, lifted: bool) -> (Vec<Finding>, Option<Placed>) {
     let mut found = vec![wheels::rate(mission, trace)];
+    if !trace.begins_at_rest() {
+        let text = "what it did was recorded from too late on: repeat this, on a machine that has less to do";
+        found.push(Finding::unknown("recording", text));
+        return (found, None);
+    }
     found.extend(rangers::liveliness(mission, trace));
     let wheels = wheels::Wheels::of(trace);
     found.push(wheels.finding(mission));
@@ -97,7 +104,8 @@ pub fn findings(mission: &Mission, trace: &Trace, lifted: bool) -> (Vec<Finding>
     let placed = scans::place(mission, trace, &motion);
     let gyro = rangers::Gyro::of(trace, &motion);
     found.extend(scans::findings(mission, trace, placed.as_ref(), gyro.as_ref()));
-    found.extend(rangers::findings(mission, trace, &motion, placed.as_ref(), gyro.as_ref()));
+    let sure = placed.as_ref().filter(|placed| placed.is_sure());
+    found.extend(rangers::findings(mission, trace, &motion, sure, gyro.as_ref()));
     (found, placed)
 }
 

@@ -4,12 +4,13 @@ use std::f64::consts::TAU;
 
 use common::{
     geometry::wrap_angle,
-    mission::{Mission, Protocol, Sensor, SensorKind},
+    mission::{Mission, Sensor, SensorKind},
     samples::{RangeReading, RangeStatus},
 };
 
 use crate::{
     Finding, Placed, Trace,
+    body::{Moves, SizesTold},
     trace::{Leg, Told, between},
     wheels::Motion,
 };
@@ -29,8 +30,13 @@ const LEAST_DIFFERENCE_M: f64 = 0.12;
 const LEAST_SAMPLES: usize = 30;
 /// A bearing less beside the stated one is not told, bins.
 const BESIDE_BINS: usize = 3;
-/// A sonar is wider than a beam; so much is the share of way that the front one tells.
-const WAY_TOLD: f64 = 0.15;
+/// A sonar is wider than a beam; so much are the shares of way and turn that sonars tell.
+const SIZES_TOLD: SizesTold = SizesTold { sizes: 0.15, ratio: f64::INFINITY };
+/// The scales of the turn that are tried: half to double, by equal factors.
+const SCALE_RATIO: f64 = 1.02;
+const SCALES: i32 = 35;
+/// Shares of way that wheels of another size may have; an echo that changes by another is not of what is ahead.
+const SHARES: std::ops::Range<f64> = 0.3..3.0;
 const GYRO_TOLD: f64 = 0.05;
 /// A turn that tells something of a gyro, radians.
 const LEAST_TURN: f64 = 2.0;
@@ -202,7 +208,7 @@ fn turning_legs(trace: &Trace) -> Vec<Leg> {
     legs.filter(|leg| leg.told != Told::Stand).collect()
 }
 
-/// What rangers and gyro say beside the laser.
+/// What rangers and gyro say, and without a laser that saw the way, what the body did.
 pub(crate) fn findings(
     mission: &Mission,
     trace: &Trace,
@@ -210,33 +216,50 @@ pub(crate) fn findings(
     placed: Option<&Placed>,
     gyro: Option<&Gyro>,
 ) -> Vec<Finding> {
-    let placed = placed.filter(|placed| placed.is_sure());
     let mut found = Vec::new();
     if let Some(gyro) = gyro {
         found.extend(scale_of_gyro(gyro, placed));
     }
     let table = mission.sensor_table();
-    let by_wheels = |at: f64| between(motion, at).map_or(0.0, |[angle, _]| angle);
-    let heading: Box<dyn Fn(f64) -> f64> = match placed {
-        Some(placed) => Box::new(|at| placed.pose(at).heading),
-        None => Box::new(by_wheels),
-    };
     let cones = || table.iter().enumerate().filter(|(_, it)| it.kind == SensorKind::Cone);
+    let by_wheels = |at: f64| between(motion, at).map_or(0.0, |[angle, _]| angle);
     let seen = |heading: &dyn Fn(f64) -> f64| -> Vec<_> {
         cones().map(|(row, it)| (it, seen_turning(trace, row, it, heading))).collect()
     };
-    let all = seen(&heading);
-    if placed.is_none() {
-        let mirrored = seen(&|at| -by_wheels(at));
-        let motors = motors(mission, trace, motion, disagreement(&all), disagreement(&mirrored));
-        if let Some(motors) = motors {
-            let is_wrong = motors.verdict == crate::Verdict::Wrong;
-            found.push(motors);
-            if is_wrong {
+    let heading: Box<dyn Fn(f64) -> f64> = match placed {
+        Some(placed) => Box::new(|at| placed.pose(at).heading),
+        None if cones().count() == 0 => return found,
+        None => {
+            let turn = Turn::best(|scale| disagreement(&seen(&|at| scale * by_wheels(at))));
+            let moves = moves(mission, trace, motion, turn);
+            if let Some(motors) = moves.motors(mission) {
+                found.push(motors);
                 return found;
             }
+            found.extend(match moves.way {
+                Some(way) if (way - 1.0).abs() <= SIZES_TOLD.sizes => {
+                    let text = "the front sonar sees";
+                    let text =
+                        format!("{text} {:.0} % of the way that the wheels count", 100.0 * way);
+                    Some(Finding::right("way", text))
+                }
+                Some(_) => None,
+                None => {
+                    let text =
+                        "its way was not seen: let it stand 0.8 to 2 m before a wall, facing it";
+                    Some(Finding::unknown("way", text))
+                }
+            });
+            let sizes = moves.sizes(mission, SIZES_TOLD);
+            // By wheels of another size no bearing is known well.
+            if !sizes.is_empty() {
+                found.extend(sizes);
+                return found;
+            }
+            Box::new(by_wheels)
         }
-    }
+    };
+    let all = seen(&heading);
     for (place, (sensor, seen)) in all.iter().enumerate() {
         // Each is compared with what all others saw, or with the laser.
         let reference = match placed {
@@ -269,91 +292,64 @@ fn disagreement(all: &[Seen<'_>]) -> Option<f64> {
     (all.len() > 2 && each.len() > 1).then(|| each.iter().sum::<f64>() / each.len() as f64)
 }
 
-/// The motors by the sonars alone: whether they agree better when the robot turns the other way, and where the front one sees it drive.
-fn motors(
-    mission: &Mission,
-    trace: &Trace,
-    motion: &Motion,
-    plain: Option<f64>,
-    mirrored: Option<f64>,
-) -> Option<Finding> {
-    let track_m = mission.body().track_m;
-    let turns_back = plain.zip(mirrored).is_some_and(|(plain, mirrored)| {
-        plain > LEAST_DIFFERENCE_M && mirrored < LEAST_DIFFERENCE_M.min(EXPLAINS * plain)
+/// The turns over those by the wheels at which the sonars agree best.
+#[derive(Clone, Copy, Debug)]
+struct Turn {
+    turns_back: bool,
+    /// None if the sonars agree at the turns that the wheels say, or at none.
+    scale: Option<f64>,
+    agrees: bool,
+}
+
+impl Turn {
+    /// `differs` gives the disagreement of the sonars at a scale of the wheels' turns.
+    fn best(differs: impl Fn(f64) -> Option<f64>) -> Option<Self> {
+        let scales =
+            |sign: f64| (-SCALES..=SCALES).map(move |power| sign * SCALE_RATIO.powi(power));
+        let least = |sign| {
+            let each = scales(sign).filter_map(|scale| Some((differs(scale)?, scale)));
+            each.min_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        let (ahead, back) = (least(1.0)?, least(-1.0)?);
+        let is_better = |new: f64, old: f64| {
+            old > LEAST_DIFFERENCE_M && new < LEAST_DIFFERENCE_M.min(EXPLAINS * old)
+        };
+        let turns_back = is_better(back.0, ahead.0);
+        let (best, stated) = if turns_back { (back, -1.0) } else { (ahead, 1.0) };
+        let scale = is_better(best.0, differs(stated)?).then_some(best.1.abs());
+        Some(Self { turns_back, scale, agrees: best.0 < LEAST_DIFFERENCE_M })
+    }
+}
+
+/// What the sonars say of the body's motion.
+fn moves(mission: &Mission, trace: &Trace, motion: &Motion, turn: Option<Turn>) -> Moves {
+    let rims_m = mission.body().track_m / 2.0;
+    let turned_m = |[angle, _]: [f64; 2]| angle * rims_m;
+    // A wheel that turns backwards drives the body where it is told to turn. Sonars that agree on a turn saw one.
+    let turning = [(Told::TurnLeft, 1.0), (Told::TurnRight, -1.0)].into_iter();
+    let mut driven = turning.filter_map(|(told, sign)| {
+        let share = sign * share_of_way(mission, trace, motion, told, turned_m)?;
+        (0.5..2.0).contains(&share.abs()).then_some(share)
     });
-    let is_x80 = mission.robot.protocol() == Protocol::X80;
-    let (left, right) = (mission.robot.left, mission.robot.right);
-    let reversed = |finding: Finding, sides: &[(&str, bool)]| {
-        sides.iter().filter(|_| is_x80).fold(finding, |finding, (side, now)| {
-            finding.with_key(format!("robot.{side}.reversed"), (!now).to_string())
-        })
-    };
-    let swapped = |finding: Finding| match is_x80 {
-        true => finding
-            .with_key("robot.left.channel", right.channel.to_string())
-            .with_key("robot.right.channel", left.channel.to_string()),
-        false => finding,
-    };
-    // A wheel that turns backwards drives the body where it is told to turn.
-    for (told, sign) in [(Told::TurnLeft, 1.0), (Told::TurnRight, -1.0)] {
-        let rims = |[angle, _]: [f64; 2]| angle * track_m / 2.0;
-        if let Some(share) = share_of_way(mission, trace, motion, told, rims)
-            && (0.5..2.0).contains(&share.abs())
-        {
-            let (side, now) = if share * sign > 0.0 {
-                ("left", left.reversed)
-            } else {
-                ("right", right.reversed)
-            };
-            let text = format!("told to turn, the body drives: the {side} wheel turns backwards");
-            return Some(reversed(Finding::wrong("motors", text), &[(side, now)]));
-        }
-    }
+    let driven = driven.find(|_| turn.is_none_or(|turn| !turn.agrees));
     let share = share_of_way(mission, trace, motion, Told::Drive, |[_, way]| way);
-    let both = [("left", left.reversed), ("right", right.reversed)];
-    match (turns_back, share.map(|share| share < 0.0)) {
-        (_, Some(false)) if share.is_some_and(|share| (share - 1.0).abs() > WAY_TOLD) => {}
-        (true, Some(true)) => {
-            let text = "it turns and drives the other way: both motors turn backwards";
-            return Some(reversed(Finding::wrong("motors", text), &both));
-        }
-        (false, Some(true)) => {
-            let text = "it drives backwards when it is told to drive ahead: the motors are swapped and turn backwards, or front and rear sonar are swapped";
-            let finding = Finding::wrong("motors", text);
-            return Some(swapped(reversed(
-                finding,
-                &[("left", right.reversed), ("right", left.reversed)],
-            )));
-        }
-        (true, _) => {
-            let text = "it turns the other way: the motors are swapped, left and right";
-            let finding = swapped(Finding::wrong("motors", text));
-            // A channel's direction goes with it.
-            let flags = [("left", !right.reversed), ("right", !left.reversed)];
-            return Some(reversed(finding, &flags));
-        }
-        _ => {}
+    let share = share.filter(|share| SHARES.contains(&share.abs()));
+    Moves {
+        turns_back: driven.map_or(turn.is_some_and(|turn| turn.turns_back), |share| share < 0.0),
+        drives_back: share.is_some_and(|share| share < 0.0),
+        exchanged: driven.is_some(),
+        turn: turn.and_then(|turn| turn.scale),
+        way: share.map(f64::abs),
+        curl: 0.0,
     }
-    let Some(share) = share else {
-        let text = "its way was not seen: let it stand 0.8 to 2 m before a wall, facing it";
-        return Some(Finding::unknown("way", text));
-    };
-    let text =
-        format!("the front sonar sees {:.0} % of the way that the wheels count", 100.0 * share);
-    Some(match (share - 1.0).abs() > WAY_TOLD {
-        true => Finding::wrong("wheel size", text).with_key(
-            "robot.counts_per_turn",
-            format!("{:.0}", mission.body().counts_per_turn / share),
-        ),
-        false => Finding::right("way", text),
-    })
 }
 
 fn scale_of_gyro(gyro: &Gyro, placed: Option<&Placed>) -> Option<Finding> {
-    let truth = placed.map_or(1.0, |it| it.turn_scale().abs());
+    let moves = placed.map(Placed::moves);
+    let truth = moves.and_then(|it| it.turn).unwrap_or(1.0);
     let scale = gyro.scale.abs() / truth;
     if (scale - 1.0).abs() <= GYRO_TOLD {
-        let is_told = gyro.agrees() && placed.is_none_or(Placed::is_plain);
+        let is_told = gyro.agrees() && moves.is_none_or(|it| !it.turns_back && !it.exchanged);
         return is_told.then(|| {
             Finding::right("gyro", format!("it says {:.1} % of the turn", 100.0 * scale))
         });

@@ -8,16 +8,17 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use common::{
-    geometry::wrap_angle,
-    kinematics::Pose2,
-    mission::{Mission, Protocol},
-    samples::ScanHeader,
-};
+use common::{geometry::wrap_angle, kinematics::Pose2, mission::Mission, samples::ScanHeader};
 use glam::DVec2;
 use nalgebra::{SMatrix, SVector};
 
-use crate::{Finding, Trace, rangers::Gyro, trace::between, wheels::Motion};
+use crate::{
+    Finding, Trace,
+    body::{Moves, SizesTold},
+    rangers::Gyro,
+    trace::between,
+    wheels::Motion,
+};
 
 /// The unknowns, and how far from 0 they may well be: the laser's yaw, radians, and place, metres; the age of its scans beyond what they
 /// say, seconds; the logarithms of true turn and way over the wheels'; turn per metre, radians.
@@ -49,8 +50,7 @@ const CERTAIN: f64 = 0.93;
 const YAW_TOLD: f64 = 4.0 * PI / 180.0;
 const PLACE_TOLD_M: f64 = 0.05;
 const AGE_TOLD_S: f64 = 0.06;
-const SCALE_TOLD: f64 = 0.04;
-const RATIO_TOLD: f64 = 0.03;
+const SIZES_TOLD: SizesTold = SizesTold { sizes: 0.04, ratio: 0.03 };
 
 type Unknowns = SVector<f64, UNKNOWNS>;
 
@@ -82,15 +82,17 @@ impl Placed {
         self.share >= LEAST_PLACED
     }
 
-    /// True turns over the wheels'; negative if they go the other way round.
-    pub(crate) fn turn_scale(&self) -> f64 {
-        let sign = if self.hypothesis.turns_back { -1.0 } else { 1.0 };
-        sign * self.unknowns[TURN].exp()
-    }
-
-    /// The body drives and turns as told, up to scales.
-    pub(crate) const fn is_plain(&self) -> bool {
-        !self.hypothesis.turns_back && !self.hypothesis.exchanged
+    pub(crate) fn moves(&self) -> Moves {
+        let Hypothesis { turns_back, exchanged } = self.hypothesis;
+        let scale = |it: usize| Some(self.unknowns[it].exp());
+        Moves {
+            turns_back,
+            drives_back: false,
+            exchanged,
+            turn: scale(TURN),
+            way: scale(WAY),
+            curl: self.unknowns[CURL],
+        }
     }
 
     pub(crate) fn pose(&self, at_s: f64) -> Pose2 {
@@ -336,57 +338,61 @@ pub(crate) fn findings(
     let mut found = Vec::new();
     let it = placed.unknowns;
     let key = |key: &str| format!("robot.sensor.{name}.{key}");
-    let own = |channel: &common::mission::Channel| !channel.reversed;
-    let is_x80 = mission.robot.protocol() == Protocol::X80;
-    if placed.hypothesis.exchanged {
-        let side = if placed.hypothesis.turns_back { "right" } else { "left" };
-        let channel = if side == "left" { &mission.robot.left } else { &mission.robot.right };
-        let text = format!("told to drive, the body turns: the {side} wheel turns backwards");
-        let finding = Finding::wrong("motors", text);
-        found.push(match is_x80 {
-            true => finding.with_key(format!("robot.{side}.reversed"), own(channel).to_string()),
-            false => finding,
-        });
-        return found;
+    let moves = placed.moves();
+    if moves.exchanged {
+        return moves.motors(mission).into_iter().collect();
     }
     let turns_with_gyro = gyro.map(Gyro::agrees);
-    if placed.hypothesis.turns_back {
-        let (upside_down, roll) =
-            (key("roll_deg"), if sensor.is_upside_down { "0" } else { "180" });
+    if moves.turns_back {
         let mirrored = format!("{name} sees it turn the other way");
-        found.push(match turns_with_gyro {
-            Some(true) => Finding::wrong(name, format!("{mirrored}, and the gyro does not: it is upside down"))
-                .with_key(upside_down, roll),
-            Some(false) => Finding::wrong("motors", format!("{mirrored}, and so does the gyro: the wheels are swapped, left and right")),
-            None => Finding::wrong(name, format!("{mirrored}: it is upside down, or the wheels are swapped, left and right; look which way it turns"))
-                .with_key(upside_down, roll),
+        let upside_down = |text: &str| {
+            let roll = if sensor.is_upside_down { "0" } else { "180" };
+            Finding::wrong(name, format!("{mirrored}{text}")).with_key(key("roll_deg"), roll)
+        };
+        found.extend(match turns_with_gyro {
+            Some(true) => Some(upside_down(", and the gyro does not: it is upside down")),
+            Some(false) => moves.motors(mission),
+            None => Some(upside_down(": it is upside down, or the wheels are swapped, left and right; look which way it turns")),
         });
     } else if turns_with_gyro == Some(false) {
         let text = "it says turns to the left as turns to the right: its z axis points down, or its sign is wrong";
         found.push(Finding::wrong("gyro", text));
     }
-    let yaw_deg = it[YAW].to_degrees();
-    if it[YAW].abs() > FRAC_PI_2 * 1.7 {
-        let text = format!(
-            "sees it drive backwards: it looks {yaw_deg:.0} degrees beside what is stated, or both motors turn backwards; look which way it drives"
-        );
-        found.push(Finding::wrong(name, text));
-    } else if it[YAW].abs() > YAW_TOLD {
-        let sign = if placed.hypothesis.turns_back { -1.0 } else { 1.0 };
-        let turned = wrap_angle(sensor.mount.turned_rad + sign * it[YAW]).to_degrees();
-        let text = format!("looks {yaw_deg:.1} degrees beside what is stated, counter-clockwise");
-        found.push(Finding::wrong(name, text).with_key(key("turned_deg"), format!("{turned:.1}")));
-    }
+    let mount = sensor.mount;
     let off = DVec2::new(it[X], it[Y]);
-    if off.length() > PLACE_TOLD_M {
-        let at = DVec2::from_angle(sensor.mount.bearing_rad) * sensor.mount.forward_m + off;
+    let (turns, stands) = (it[YAW].abs() > YAW_TOLD, off.length() > PLACE_TOLD_M);
+    let mut bearing_rad = mount.bearing_rad;
+    if stands {
+        let at = DVec2::from_angle(bearing_rad) * mount.forward_m + off;
+        let aside = wrap_angle(at.to_angle() - bearing_rad);
+        // A place behind the centre is ahead of it by less than nothing, so that the bearing hardly changes.
+        let behind = aside.abs() > FRAC_PI_2;
+        bearing_rad = wrap_angle(at.to_angle() + if behind { PI } else { 0.0 });
+        let forward_m = if behind { -at.length() } else { at.length() };
         let text = format!("stands {:.2} m beside its stated place", off.length());
-        let bearing = at.to_angle().to_degrees();
         found.push(
             Finding::wrong(name, text)
-                .with_key(key("forward_m"), format!("{:.3}", at.length()))
-                .with_key(key("bearing_deg"), format!("{bearing:.1}")),
+                .with_key(key("forward_m"), format!("{forward_m:.3}"))
+                .with_key(key("bearing_deg"), format!("{:.1}", bearing_rad.to_degrees())),
         );
+    }
+    if turns || stands {
+        // The beams are turned from the bearing.
+        let sign = if moves.turns_back { -1.0 } else { 1.0 };
+        let yaw = if turns { sign * it[YAW] } else { 0.0 };
+        let turned = wrap_angle(mount.turned_rad + yaw + mount.bearing_rad - bearing_rad);
+        let turned = (key("turned_deg"), format!("{:.1}", turned.to_degrees()));
+        let yaw_deg = it[YAW].to_degrees();
+        let text = match it[YAW].abs() > FRAC_PI_2 * 1.7 {
+            true => format!(
+                "sees it drive backwards: it looks {yaw_deg:.0} degrees beside what is stated, or both motors turn backwards; look which way it drives"
+            ),
+            false => format!("looks {yaw_deg:.1} degrees beside what is stated, counter-clockwise"),
+        };
+        if turns {
+            found.push(Finding::wrong(name, text));
+        }
+        found.last_mut().into_iter().for_each(|it| it.keys.push(turned.clone()));
     }
     if it[AGE].abs() > AGE_TOLD_S {
         let text = format!(
@@ -396,7 +402,7 @@ pub(crate) fn findings(
         );
         found.push(Finding::wrong(name, text));
     }
-    found.extend(sizes(mission, it));
+    found.extend(moves.sizes(mission, SIZES_TOLD));
     if found.is_empty() {
         let count = trace.scans.len();
         let text = format!(
@@ -404,43 +410,6 @@ pub(crate) fn findings(
             100.0 * placed.share
         );
         found.push(Finding::right(name, text));
-    }
-    found
-}
-
-/// Wheels and track by what the body did.
-fn sizes(mission: &Mission, it: Unknowns) -> Vec<Finding> {
-    let mut found = Vec::new();
-    let body = mission.body();
-    let (turn, way) = (it[TURN].exp(), it[WAY].exp());
-    let is_stated = (way - 1.0).abs() <= SCALE_TOLD;
-    if !is_stated {
-        let text = format!("the body drives {:.0} % of what the wheels count", 100.0 * way);
-        let finding = Finding::wrong("wheel size", text);
-        found.push(match mission.robot.protocol() {
-            Protocol::X80 | Protocol::Arduino => finding
-                .with_key("robot.counts_per_turn", format!("{:.0}", body.counts_per_turn / way)),
-            Protocol::Json | Protocol::Ros2 => finding
-                .with_key("robot.wheel_radius_m", format!("{:.4}", body.wheel_radius_m * way)),
-        });
-    }
-    // The stated wheels stay where their error is not told.
-    let track = if is_stated { 1.0 / turn } else { way / turn };
-    if (track - 1.0).abs() > SCALE_TOLD {
-        let text = format!("the body turns {:.0} % of what the wheels count", 100.0 / track);
-        let track_m = format!("{:.3}", body.track_m * track);
-        found.push(Finding::wrong("track", text).with_key("robot.track_m", track_m));
-    }
-    let ratio = 1.0 + it[CURL] * body.track_m;
-    if (ratio - 1.0).abs() > RATIO_TOLD {
-        let text = format!(
-            "it turns to one side when both wheels count the same: their diameters differ by {:.1} %",
-            100.0 * (ratio - 1.0).abs()
-        );
-        found.push(
-            Finding::wrong("wheel ratio", text)
-                .with_key("robot.odometry.diameter_ratio", format!("{ratio:.3}")),
-        );
     }
     found
 }

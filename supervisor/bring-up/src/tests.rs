@@ -1,6 +1,11 @@
 use std::{f64::consts::TAU, path::Path};
 
-use common::{kinematics::Pose2, mission::Mission, samples::ScanHeader};
+use common::{
+    driver::range_reading,
+    kinematics::Pose2,
+    mission::{Mission, SensorKind},
+    samples::ScanHeader,
+};
 use glam::DVec2;
 
 use super::*;
@@ -19,6 +24,8 @@ struct Robot {
     /// Which wheel each encoder follows, and in which direction it counts.
     encoders: [(usize, f64); 2],
     left_motor: f64,
+    motors_swapped: bool,
+    laser_m: f64,
 }
 
 const RIGHT: Robot = Robot {
@@ -29,11 +36,24 @@ const RIGHT: Robot = Robot {
     wheel: 1.0,
     encoders: [(0, 1.0), (1, 1.0)],
     left_motor: 1.0,
+    motors_swapped: false,
+    laser_m: 0.05,
 };
 
 fn mission() -> Mission {
     let text = "target = [1, 0]\n[robot]\nmodel = 'kobuki'\nrate_hz = 10.0\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nmodel = 'rplidar-a1'\nforward_m = 0.05\nbearing_deg = 0.0\nbeams = 180";
     Mission::parse(text, Path::new("m.toml")).unwrap()
+}
+
+/// Three sonars, and counts that only a driver knows.
+fn with_sonars() -> Mission {
+    let mut text = "target = [1, 0]\n[robot]\nmodel = 'x80'\nrate_hz = 10.0\n".to_owned();
+    for (channel, bearing) in [(0, 0), (1, 40), (2, -40)] {
+        text += &format!(
+            "[[robot.sensor]]\nname = 'sonar{channel}'\nkind = 'cone'\nchannel = {channel}\nforward_m = 0.1\nbearing_deg = {bearing}\n"
+        );
+    }
+    Mission::parse(&text, Path::new("m.toml")).unwrap()
 }
 
 /// Range from `at` along `along` in a room whose walls stand 1.4 m ahead, 1.9 m behind, 1.6 m to the left and 1.2 m to the right.
@@ -50,8 +70,7 @@ fn range(at: DVec2, along: DVec2) -> f64 {
 }
 
 /// The trace of `robot` in the room; without lag or noise.
-fn trace(robot: Robot) -> Trace {
-    let mission = mission();
+fn trace(mission: &Mission, robot: Robot) -> Trace {
     let track_m = mission.body().track_m;
     let turn = |side: f64| [-side * 0.12, side * 0.12];
     // Seconds, and the speeds of the rims.
@@ -65,8 +84,9 @@ fn trace(robot: Robot) -> Trace {
         (1.0, [0.0; 2]),
     ];
     legs.extend((0..8).map(|leg| (1.6, turn(if leg % 2 == 0 { 1.0 } else { -1.0 }))));
-    let (first, step) = mission.sensor_table()[0].fan();
-    let header = ScanHeader::of(0, &mission.sensor_table()[0]);
+    let table = mission.sensor_table();
+    let (first, step) = (-TAU / 2.0, TAU / BEAMS as f64);
+    let header = ScanHeader::of(0, &table[0]);
     let (mut trace, mut pose, mut rolled, mut poses) =
         (Trace::default(), Pose2::default(), [0.0; 2], Vec::new());
     let mut at = 0.0;
@@ -75,7 +95,8 @@ fn trace(robot: Robot) -> Trace {
         for _ in 0..(seconds * RATE_HZ) as usize {
             at += 1.0 / RATE_HZ;
             let rims = [0, 1].map(|wheel| told[wheel] * [robot.left_motor, 1.0][wheel] / RATE_HZ);
-            let went = rims.map(|rim| rim * robot.wheel);
+            let [left, right] = rims.map(|rim| rim * robot.wheel);
+            let went = if robot.motors_swapped { [right, left] } else { [left, right] };
             pose = pose.along_arc(
                 (went[0] + went[1]) / 2.0,
                 (went[1] - went[0]) / (track_m * robot.track),
@@ -88,7 +109,16 @@ fn trace(robot: Robot) -> Trace {
             trace.told.push((at, told));
             poses.push(pose);
             let seen = poses[poses.len().saturating_sub(1 + (robot.late_s * RATE_HZ) as usize)];
-            let laser = seen.position + seen.axis() * 0.05;
+            if table[0].kind == SensorKind::Cone {
+                let reading = |row: usize| {
+                    let along = DVec2::from_angle(pose.heading + table[row].mount.bearing_rad);
+                    let range = range(pose.position, along) - 0.1;
+                    range_reading(row, &table[row], Some(range))
+                };
+                trace.ranges.push((at, (0..table.len()).map(reading).collect()));
+                continue;
+            }
+            let laser = seen.position + seen.axis() * robot.laser_m;
             let beam = |beam: usize| {
                 let beam = if robot.mirrored { (BEAMS - beam) % BEAMS } else { beam };
                 let along = seen.heading + robot.yaw_rad + first + step * beam as f64;
@@ -97,17 +127,20 @@ fn trace(robot: Robot) -> Trace {
             trace.scans.push((at, header, (0..BEAMS).map(beam).collect()));
         }
     }
-    assert!((step * BEAMS as f64 - TAU).abs() < 1e-9);
     trace
 }
 
-fn wrong(robot: Robot) -> Vec<String> {
-    let (found, _) = findings(&mission(), &trace(robot), false);
+fn wrong_of(mission: &Mission, trace: &Trace) -> Vec<String> {
+    let (found, _) = findings(mission, trace, false);
     found.into_iter().filter(|it| it.verdict == Verdict::Wrong).map(|it| it.part).collect()
 }
 
+fn wrong(robot: Robot) -> Vec<String> {
+    wrong_of(&mission(), &trace(&mission(), robot))
+}
+
 fn key(robot: Robot, name: &str) -> f64 {
-    let (found, _) = findings(&mission(), &trace(robot), false);
+    let (found, _) = findings(&mission(), &trace(&mission(), robot), false);
     let keys = found.iter().flat_map(|it| &it.keys);
     keys.filter(|it| it.0 == name).map(|it| it.1.parse().unwrap()).next().unwrap()
 }
@@ -143,4 +176,36 @@ fn encoders_that_are_swapped_reversed_or_dead_and_a_reversed_motor_are_told_apar
     }
     // The encoder sits on the motor: what it counts is as told.
     assert_eq!(wrong(Robot { left_motor: -1.0, ..RIGHT }), ["motors"]);
+}
+
+#[test]
+fn sonars_alone_tell_counts_per_turn_from_motors_that_are_swapped() {
+    let mission = with_sonars();
+    let wrong = |robot| wrong_of(&mission, &trace(&mission, robot));
+    assert_eq!(wrong(RIGHT), Vec::<String>::new());
+    assert_eq!(wrong(Robot { motors_swapped: true, ..RIGHT }), ["motors"]);
+    for wheel in [1.0 / 1.5, 1.5] {
+        assert_eq!(wrong(Robot { wheel, ..RIGHT }), ["wheel size"], "{wheel}");
+    }
+}
+
+#[test]
+fn the_keys_of_a_laser_behind_the_centre_do_not_turn_it() {
+    let behind = Robot { laser_m: -0.1, ..RIGHT };
+    assert_eq!(wrong(behind), ["laser"]);
+    assert!((key(behind, "robot.sensor.laser.forward_m") + 0.1).abs() < 0.02);
+    let looks =
+        ["bearing_deg", "turned_deg"].map(|it| key(behind, &format!("robot.sensor.laser.{it}")));
+    assert!((looks[0] + looks[1]).abs() < 1.5, "{looks:?}");
+}
+
+#[test]
+fn a_recording_that_begins_in_a_turn_is_no_finding() {
+    let mut late = trace(&mission(), RIGHT);
+    late.rolled.retain(|it| it.0 > 4.0);
+    late.told.retain(|it| it.0 > 5.0);
+    late.scans.retain(|it| it.0 > 4.0);
+    let (found, placed) = findings(&mission(), &late, false);
+    assert!(placed.is_none() && found.iter().all(|it| it.verdict != Verdict::Wrong), "{found:?}");
+    assert!(found.iter().any(|it| it.part == "recording"), "{found:?}");
 }

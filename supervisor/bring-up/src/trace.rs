@@ -1,6 +1,14 @@
 //! What was told, counted and seen while the robot went through the procedure.
 
-use common::samples::{RangeReading, ScanHeader};
+use std::collections::BTreeMap;
+
+use common::{
+    driver::counts::WheelCounts,
+    mission::Mission,
+    samples::{CountsSample, RangeReading, ScanHeader, WheelSample},
+    topics::{COMMAND, COUNTS, IMU_TURN, RANGES, SCAN, WHEELS},
+};
+use recording::{Recording, RecordingError};
 
 /// The parts of the procedure differ by what the robot is told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,6 +53,8 @@ impl Leg {
     }
 }
 
+/// A wheel that rolls no farther rests, metres.
+const RESTS_M: f64 = 0.02;
 /// Slower rims are told to stand, m/s.
 const STANDS_M_S: f64 = 0.005;
 
@@ -60,6 +70,55 @@ impl Told {
 }
 
 impl Trace {
+    /// What `recording` holds, by the sizes that `mission` states.
+    ///
+    /// # Errors
+    /// The recording cannot be read.
+    pub fn read(mission: &Mission, recording: &Recording) -> Result<Self, RecordingError> {
+        let body = mission.body();
+        let scales = mission.robot.odometry.wheel_scales();
+        let mut endless = BTreeMap::<u64, CountsSample>::new();
+        for counts in recording.samples(&COUNTS)? {
+            let counts = counts?.sample;
+            endless.insert(counts.stamp.tick, counts);
+        }
+        let mut trace = Self::default();
+        let (mut before, mut rolled): (Option<(WheelSample, WheelCounts)>, _) = (None, [0.0; 2]);
+        for wheels in recording.samples(&WHEELS)? {
+            let wheels = wheels?.sample;
+            let counts = WheelCounts::of(&wheels, endless.get(&wheels.stamp.tick));
+            if let Some((old, earlier)) = before
+                && old.restarts == wheels.restarts
+            {
+                let went = counts.since(earlier);
+                rolled =
+                    [0, 1].map(|it| rolled[it] + went[it] * body.metres_per_count() * scales[it]);
+            }
+            before = Some((wheels, counts));
+            trace.rolled.push((wheels.stamp.time().seconds(), rolled));
+        }
+        for command in recording.samples(&COMMAND)? {
+            let command = command?.sample;
+            let rims = [command.left_rad_s, command.right_rad_s].map(|it| it * body.wheel_radius_m);
+            trace.told.push((command.stamp.time().seconds(), rims));
+        }
+        let mut angle = 0.0;
+        for turn in recording.samples(&IMU_TURN)? {
+            let turn = turn?.sample;
+            angle += turn.turn_rad;
+            trace.gyro.push((turn.stamp.time().seconds(), angle));
+        }
+        for ranges in recording.slices(&RANGES)? {
+            let ranges = ranges?;
+            trace.ranges.push((ranges.header.stamp.time().seconds(), ranges.elements));
+        }
+        for scan in recording.slices(&SCAN)? {
+            let scan = scan?;
+            trace.scans.push((scan.header.stamp.time().seconds(), scan.header, scan.elements));
+        }
+        Ok(trace)
+    }
+
     /// The legs in their order. The first begins with the trace, because no command comes before the robot moves.
     #[must_use]
     pub fn legs(&self) -> Vec<Leg> {
@@ -76,6 +135,15 @@ impl Trace {
             }
         }
         legs
+    }
+
+    /// A recording that lacks the beginning begins in a turn.
+    #[must_use]
+    pub fn begins_at_rest(&self) -> bool {
+        let until = self.rest_until_s();
+        let (first, last) = (self.rolled.first(), self.rolled.iter().rfind(|it| it.0 < until));
+        let went = first.zip(last).map(|(first, last)| [0, 1].map(|it| last.1[it] - first.1[it]));
+        went.is_none_or(|went| went.iter().all(|it| it.abs() < RESTS_M))
     }
 
     /// The time until which the robot has not been told to move.

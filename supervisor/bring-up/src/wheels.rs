@@ -2,6 +2,7 @@
 
 use calibration::response;
 use common::mission::{Mission, Protocol};
+use nalgebra::{Matrix2, Vector2};
 
 use crate::{
     Finding,
@@ -46,7 +47,7 @@ pub(crate) type Motion = Vec<(f64, [f64; 2])>;
 impl Wheels {
     /// Least squares over all moments at which the base had time to answer.
     pub(crate) fn of(trace: &Trace) -> Self {
-        let (mut squares, mut products) = ([[0.0; 2]; 2], [[0.0; 2]; 2]);
+        let (mut squares, mut products) = (Matrix2::zeros(), Matrix2::zeros());
         let legs = trace.legs();
         for leg in legs.iter().filter(|leg| leg.told != Told::Stand) {
             let settled = leg.from_s + SETTLED_S.min(leg.seconds() / 2.0);
@@ -56,26 +57,20 @@ impl Wheels {
                 if let Some(before) = before
                     && let Some(told) = between(&trace.told, before.0)
                 {
-                    let seconds = now.0 - before.0;
-                    for wheel in 0..2 {
-                        let speed = (now.1[wheel] - before.1[wheel]) / seconds.max(1e-3);
-                        for other in 0..2 {
-                            squares[wheel][other] += told[wheel] * told[other];
-                            products[wheel][other] += speed * told[other];
-                        }
-                    }
+                    let seconds = (now.0 - before.0).max(1e-3);
+                    let speed = (Vector2::from(now.1) - Vector2::from(before.1)) / seconds;
+                    let told = Vector2::from(told);
+                    squares += told * told.transpose();
+                    products += speed * told.transpose();
                 }
                 before = Some(now);
             }
         }
-        let [[ll, lr], [_, rr]] = squares;
-        let determinant = ll * rr - lr * lr;
         // Turns and ways alone tell the two wheels apart.
-        let is_told = determinant > 1e-6 * ll * rr && determinant > 0.0;
-        let solve = |[left, right]: [f64; 2]| {
-            [(left * rr - right * lr) / determinant, (right * ll - left * lr) / determinant]
-        };
-        Self { counted: if is_told { products.map(solve) } else { [[0.0; 2]; 2] }, is_told }
+        let is_told = squares.determinant() > 1e-6 * squares[(0, 0)] * squares[(1, 1)];
+        let inverse = squares.try_inverse().filter(|_| is_told);
+        let counted: Matrix2<f64> = products * inverse.unwrap_or_default();
+        Self { counted: counted.transpose().into(), is_told: inverse.is_some() }
     }
 
     /// The wheel that each encoder follows, and whether it counts backwards; none for one that counts nothing.
@@ -99,7 +94,6 @@ impl Wheels {
             100.0 * right
         );
         let is_x80 = mission.robot.protocol() == Protocol::X80;
-        let (own_left, own_right) = (mission.robot.left, mission.robot.right);
         let remedy = |text: &str, x80: &str| {
             let by = if is_x80 { x80 } else { "mend the wiring, or the robot's own program" };
             Finding::wrong("wheels", format!("{text}: {by}"))
@@ -135,15 +129,7 @@ impl Wheels {
                     "swap the two wires of its encoder or of its motor",
                 )
             }
-            _ => {
-                let finding = remedy("each encoder counts the other wheel", "swap their plugs");
-                match is_x80 {
-                    true => finding
-                        .with_key("robot.left.channel", own_right.channel.to_string())
-                        .with_key("robot.right.channel", own_left.channel.to_string()),
-                    false => finding,
-                }
-            }
+            _ => remedy("each encoder counts the other wheel", "swap their plugs"),
         }
     }
 
@@ -185,7 +171,8 @@ pub(crate) fn response(mission: &Mission, trace: &Trace, motion: &Motion) -> Opt
         limit.map_or_else(|| "any".to_owned(), |it| format!("{:.2}", it.value)),
     );
     // A lag of the stated length hides in the delay.
-    let late = delay.value - stated.delay_s > DELAY_S.max(4.0 * delay.sd);
+    let least_s = DELAY_FRAMES / mission.robot.rate_hz;
+    let late = delay.value - stated.delay_s > least_s.max(4.0 * delay.sd);
     let turning = stated.turn_acceleration_rad_s2 * body.track_m / 2.0;
     let heavy = limit.is_some_and(|it| {
         let stated = stated.acceleration_m_s2.min(turning);
@@ -203,8 +190,8 @@ pub(crate) fn response(mission: &Mission, trace: &Trace, motion: &Motion) -> Opt
     Some(finding)
 }
 
-/// A delay that is this much longer than stated is told, seconds.
-const DELAY_S: f64 = 0.05;
+/// A delay that is so many periods of the motor frames longer than stated is told: a busy machine adds half of one.
+const DELAY_FRAMES: f64 = 0.75;
 /// An acceleration below this share of the stated one is told, if it is less than [`STRONG_M_S2`].
 const WEAKER: f64 = 0.8;
 /// Turns on the spot at their speed do not tell greater accelerations from none.

@@ -10,15 +10,15 @@
 //! | `ways` | nominal ways from counts |
 //! | `normal` | the wall's normal from a sweep |
 //! | [`loops`] | ratio, track and slip from loops, and refusals |
-//! | [`squares`] | ratio and track from squares measured by tape |
-//! | [`bring_up`] | the procedure of a bring-up |
+//! | [`squares`] | ratio and track from the ends of squares, measured by tape |
+//! | [`script`] | the procedures of a bring-up, of turns and of squares |
 //! | [`response`] | delay and acceleration from turns to and fro |
 //! | [`shell`] | the process in the planner's place |
 
-pub mod bring_up;
 pub mod loops;
 mod normal;
 pub mod response;
+pub mod script;
 pub mod shell;
 pub mod squares;
 pub mod wall;

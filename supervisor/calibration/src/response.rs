@@ -8,17 +8,10 @@ use std::ops::Range;
 use common::{
     geometry::wrap_angle,
     mission::{Body, Response},
-    samples::GuidanceStatus,
 };
-use serde::{Deserialize, Serialize};
 
-use crate::wall::{Order, State};
+use crate::script::LEG_S;
 
-/// A turn to one side lasts so long, seconds: a base that answers after 0.5 s and gains 1 rad/s in a second turns by then.
-pub(crate) const LEG_S: f64 = 1.6;
-pub(crate) const LEGS: u32 = 8;
-/// The direction is so far aside that the robot turns as fast as it may.
-pub(crate) const ASIDE_RAD: f64 = 1.2;
 const LONGEST_DELAY_S: f64 = 1.0;
 const COARSE_S: f64 = 0.04;
 const DELAY_STEP_S: f64 = 0.01;
@@ -36,36 +29,6 @@ const FEWEST: usize = 3;
 const STEP_S: f64 = 0.01;
 /// A pause between two headings is cut into no more.
 const MOST_STEPS: f64 = 100.0;
-
-/// The procedure in the planner's place.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Turns {
-    tick: u32,
-    ticks_a_leg: u32,
-}
-
-impl Turns {
-    #[must_use]
-    pub fn new(rate_hz: f64) -> Self {
-        Self { tick: 0, ticks_a_leg: (LEG_S * rate_hz).ceil() as u32 }
-    }
-
-    #[must_use]
-    pub const fn state(&self) -> State {
-        if self.tick >= LEGS * self.ticks_a_leg { State::Finished } else { State::Running }
-    }
-
-    pub fn step(&mut self) -> Order {
-        let leg = self.tick / self.ticks_a_leg;
-        let status = match self.state() {
-            State::Finished => GuidanceStatus::AtTarget,
-            _ => GuidanceStatus::Look,
-        };
-        self.tick = self.tick.saturating_add(1);
-        let aside_rad = if leg.is_multiple_of(2) { ASIDE_RAD } else { -ASIDE_RAD };
-        Order { status, aside_rad, speed_limit_m_s: 0.0, x_m: 0.0, heading_rad: 0.0 }
-    }
-}
 
 /// A value and its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! `pose` and `ranges` in, `guidance` out, in the planner's place. The state is saved before the guidance is
 //! published.
 
-use std::{collections::VecDeque, path::Path};
+use std::path::Path;
 
 use common::{
     bus::Reader,
@@ -22,23 +22,17 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    bring_up::BringUp,
-    response::Turns,
-    squares::Square,
+    script::Script,
     wall::{Order, Wall, echo_m},
 };
 
 /// Encoded: two legs of 200 readings, and 64 loops.
 pub(crate) const STATE_BYTES: usize = 16 << 10;
-/// They wait for the readings of their tick.
-const MOST_POSES: usize = 64;
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Drive {
     Wall(Box<Wall>),
-    Square(Square),
-    Turns(Turns),
-    BringUp(BringUp),
+    Script(Script),
 }
 
 impl Drive {
@@ -55,19 +49,14 @@ impl Drive {
     fn new(plan: CalibrationPlan, rate_hz: f64) -> Self {
         match plan.procedure {
             Procedure::Wall => Self::Wall(Box::new(Wall::new(plan))),
-            Procedure::LeftSquare => Self::Square(Square::new(plan.drive_m, true)),
-            Procedure::Turns => Self::Turns(Turns::new(rate_hz)),
-            Procedure::BringUp => Self::BringUp(BringUp::new(rate_hz)),
-            Procedure::RightSquare => Self::Square(Square::new(plan.drive_m, false)),
+            procedure => Self::Script(Script::new(procedure, plan.drive_m, rate_hz)),
         }
     }
 
     fn step(&mut self, counts: [u16; 2], echo_m: Option<f64>, body: &Body) -> Order {
         match self {
             Self::Wall(wall) => wall.step(counts, echo_m, body),
-            Self::Square(square) => square.step(counts, body),
-            Self::Turns(turns) => turns.step(),
-            Self::BringUp(procedure) => procedure.step(counts, echo_m, body),
+            Self::Script(script) => script.step(counts, echo_m, body),
         }
     }
 }
@@ -89,7 +78,6 @@ pub struct Shell {
     /// The robot faces the wall there.
     target: TargetSample,
     drive: Drive,
-    poses: VecDeque<PoseSample>,
     /// The newest tick with readings, and the front sonar's echo, metres.
     newest: Option<(u64, Option<f64>)>,
     answered: Option<GuidanceSample>,
@@ -98,7 +86,7 @@ pub struct Shell {
 
 impl Process for Shell {
     const NAME: &'static str = "planner";
-    const WAKES: Topics = &[&POSE, &RANGES];
+    const WAKES: Topics = &[&POSE];
     const OUTPUTS: Topics = &[&GUIDANCE];
     const PERSISTS: Persists = Persists::State(STATE_BYTES);
     type Readers = Inputs;
@@ -120,7 +108,6 @@ impl Process for Shell {
             body,
             target,
             drive,
-            poses: VecDeque::new(),
             newest: None,
             answered: None,
             progress: Progress::default(),
@@ -130,28 +117,19 @@ impl Process for Shell {
     fn turn(&mut self) -> Result<Progress, StageError> {
         while let Some(pose) = self.inputs.pose.next_sample()? {
             self.progress = Progress::of(&pose.stamp);
-            self.poses.push_back(pose);
-            if self.poses.len() > MOST_POSES {
-                self.poses.pop_front();
-                // A tick that is given again gets its answer again.
-                if let Some(answered) = self.answered.filter(|it| it.pose_ns == pose.stamp.stamp_ns)
-                {
-                    self.out.at = self.progress;
-                    self.out.publish(&GUIDANCE, answered)?;
-                    continue;
-                }
+            // A tick that is given again gets its answer again.
+            if let Some(answered) = self.answered.filter(|it| it.pose_ns == pose.stamp.stamp_ns) {
+                self.out.at = self.progress;
+                self.out.publish(&GUIDANCE, answered)?;
+                continue;
             }
-        }
-        while let Some(pose) = self.poses.front().copied() {
-            // Pose and readings of a tick come in any order.
-            while self.newest.is_none_or(|(tick, _)| tick < pose.stamp.tick) {
-                let Some(ranges) = self.inputs.ranges.next_slice()? else {
-                    return Ok(self.progress);
-                };
+            // The link publishes the readings of a tick before its wheels.
+            while self.newest.is_none_or(|(tick, _)| tick < pose.stamp.tick)
+                && let Some(ranges) = self.inputs.ranges.next_slice()?
+            {
                 let front = ranges.iter().find(|it| usize::from(it.sensor) == self.front);
                 self.newest = Some((ranges.header().stamp.tick, front.and_then(echo_m)));
             }
-            self.poses.pop_front();
             let readings = self.newest.filter(|(tick, _)| *tick == pose.stamp.tick);
             self.answer(&pose, readings.and_then(|(_, echo_m)| echo_m))?;
         }

@@ -5,21 +5,15 @@
 //! from the same mark. In place of their formulae the ways of the wheels are integrated again with other values,
 //! until the ends are those of the tape.
 
-use std::f64::consts::FRAC_PI_2;
-
-use common::{kinematics::Pose2, mission::Body, samples::GuidanceStatus};
+use common::{kinematics::Pose2, mission::Body};
 use glam::DVec2;
 use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
 
 use crate::{
     loops::{Estimate, Refusal, Rows, Wheels},
-    wall::{FAST_RAD, Order, SPEED_M_S, State, direction_aside},
     ways::Ways,
 };
 
-/// A corner with so little rest counts as turned.
-const TURNED_RAD: f64 = 0.03;
 /// Standard deviation of a coordinate by tape.
 const TAPE_M: f64 = 0.005;
 /// The fit's problem is nearly linear.
@@ -28,62 +22,6 @@ const STEPS: u32 = 5;
 const NUDGE: f64 = 1e-4;
 /// Half of them are to the left.
 pub const FEWEST_SQUARES: usize = 6;
-
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Square {
-    side_m: f64,
-    /// 1 to the left, -1 to the right.
-    turns: f64,
-    ways: Ways,
-    /// The count is 4 at the end.
-    corners: u32,
-    turning: bool,
-    from_m: f64,
-}
-
-impl Square {
-    #[must_use]
-    pub fn new(side_m: f64, to_the_left: bool) -> Self {
-        let turns = if to_the_left { 1.0 } else { -1.0 };
-        let ways = Ways::default();
-        Self { side_m, turns, ways, corners: 0, turning: false, from_m: 0.0 }
-    }
-
-    #[must_use]
-    pub const fn state(&self) -> State {
-        if self.corners >= 4 { State::Finished } else { State::Running }
-    }
-
-    pub fn step(&mut self, counts: [u16; 2], body: &Body) -> Order {
-        self.ways.step(counts, body);
-        let heading =
-            Wheels::NOMINAL.turned(self.ways.left_m, self.ways.right_m, body.track_m) * self.turns;
-        let corner = FRAC_PI_2 * f64::from(self.corners + 1);
-        let driven = (self.ways.arc_m() - self.from_m).abs();
-        if self.turning && corner - heading <= TURNED_RAD {
-            self.corners += 1;
-            (self.turning, self.from_m) = (false, self.ways.arc_m());
-        } else if !self.turning && driven >= self.side_m {
-            self.turning = true;
-        }
-        let target = FRAC_PI_2 * f64::from(self.corners + u32::from(self.turning));
-        let left = target - heading;
-        let (status, aside, speed_limit_m_s) = if self.state() == State::Finished {
-            (GuidanceStatus::AtTarget, 0.0, 0.0)
-        } else if self.turning {
-            (GuidanceStatus::Look, direction_aside(left, FAST_RAD), 0.0)
-        } else {
-            (GuidanceStatus::Along, left.clamp(-FAST_RAD, FAST_RAD), SPEED_M_S)
-        };
-        Order {
-            status,
-            aside_rad: aside * self.turns,
-            speed_limit_m_s,
-            x_m: 0.0,
-            heading_rad: heading * self.turns,
-        }
-    }
-}
 
 #[must_use]
 pub fn nominal_ways(counts: &[[u16; 2]], body: &Body) -> Vec<[f64; 2]> {

@@ -188,8 +188,9 @@ fn listed() -> String {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "{heading}:");
         for name in *names {
-            let name = name.replace("gU", "g-u").to_lowercase();
-            let about = all.find_subcommand(&name).and_then(clap::Command::get_about);
+            let is_it = |it: &&clap::Command| it.get_name().replace('-', "") == name.to_lowercase();
+            let Some(command) = all.get_subcommands().find(is_it) else { continue };
+            let (name, about) = (command.get_name(), command.get_about());
             let about = about.map(ToString::to_string).unwrap_or_default();
             let about = about.split([';', ':']).next().unwrap_or_default();
             let about = about.split(". ").next().unwrap_or_default();

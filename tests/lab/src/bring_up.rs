@@ -65,8 +65,24 @@ impl Fault {
 }
 
 const ROOM: &str = "target = [0.8, 0]\nsensors = 'all'\nsimulation.realism = 'measured'\n[perimeter]\nwidth_m = 8.0\ncentre = [0.0, 0.0]\n";
-const X80: &str = "[robot]\nmodel = 'x80'\n";
-const KOBUKI: &str = "[robot]\nmodel = 'kobuki'\nrate_hz = 10.0\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nmodel = 'rplidar-a1'\nforward_m = 0.05\nbearing_deg = 0.0\n";
+/// The robots by the names of the table of faults. Their addresses are those of the simulator, where this word stands.
+const ROBOTS: [(&str, &str); 4] = [
+    ("x80", "[robot]\n#ADDRESS\nmodel = 'x80'\n"),
+    (
+        "kobuki",
+        "[robot]\n#ADDRESS\nmodel = 'kobuki'\nrate_hz = 10.0\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nmodel = 'rplidar-a1'\nforward_m = 0.05\nbearing_deg = 0.0\n",
+    ),
+    (
+        "arduino",
+        "[robot]\n#ADDRESS\nprotocol = 'arduino'\nrate_hz = 10.0\nwheel_radius_m = 0.0325\ntrack_m = 0.20\nradius_m = 0.15\ntop_speed_m_s = 0.5\ncounts_per_turn = 1320.0\n[[robot.sensor]]\nname = 'laser'\n#ADDRESS\nkind = 'scan'\nmodel = 'rplidar-a1'\nforward_m = 0.05\nbearing_deg = 0.0\n",
+    ),
+    (
+        "sonars",
+        "[robot]\n#ADDRESS\nprotocol = 'arduino'\nrate_hz = 10.0\nwheel_radius_m = 0.0325\ntrack_m = 0.20\nradius_m = 0.15\ntop_speed_m_s = 0.5\ncounts_per_turn = 1320.0\narduino.sonars = { front = 4, left = 5, right = 6 }\n[[robot.sensor]]\nname = 'front'\nkind = 'cone'\nforward_m = 0.12\nbearing_deg = 0.0\n[[robot.sensor]]\nname = 'left'\nkind = 'cone'\nforward_m = 0.12\nbearing_deg = 40.0\n[[robot.sensor]]\nname = 'right'\nkind = 'cone'\nforward_m = 0.12\nbearing_deg = -40.0\n",
+    ),
+];
+/// Draws of a second fault, one of which is another than the first.
+const DRAWS: u32 = 20;
 /// Longer than a bring-up on a loaded machine.
 const PATIENCE: Duration = Duration::from_secs(400);
 const LOOK: Duration = Duration::from_millis(100);
@@ -104,19 +120,22 @@ pub fn main(arguments: &Arguments) -> Result {
 /// Whether the bring-up of a robot named its faults and no other, and what it said.
 fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, String)> {
     let mut random = Random::of_world(arguments.seed, 0, number);
-    let (robot, body) = [("x80", X80), ("kobuki", KOBUKI)][(number % 2) as usize];
+    let (robot, body) = ROBOTS[number as usize % ROBOTS.len()];
     let text = format!("seed = {}\n{ROOM}{body}{}", number + 1, walls(&mut random));
-    // Two faults of wheels that hide each other are not drawn; lasers have two now and then.
-    let count = match (number < arguments.faulty, robot) {
+    let most = match (number < arguments.faulty, robot) {
         (false, _) => 0,
-        (true, "kobuki") => 1 + random.below(2),
+        (true, "kobuki" | "arduino") => 1 + random.below(2),
+        // Sonars alone do not tell two faults of wheels apart.
         (true, _) => 1,
     };
     let table: Vec<&Fault> = table.iter().filter(|fault| fault.robot == robot).collect();
     let mut faults: Vec<&Fault> = Vec::new();
-    while faults.len() < count {
+    for _ in 0..DRAWS {
         let fault = table[random.below(table.len())];
-        if !faults.iter().any(|it| it.parts == fault.parts) {
+        // While a motor turns backwards nothing else can be told.
+        let hides = |it: &&Fault| [&it.parts, &fault.parts].iter().any(|it| it.contains("motors"));
+        let is_other = !faults.iter().any(|it| it.parts == fault.parts || hides(it));
+        if faults.len() < most && is_other {
             faults.push(fault);
         }
     }
@@ -127,10 +146,10 @@ fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, Str
     let mut simulator =
         Simulator::start(robot::firsthand(&[]), &directory, &mission, Pace::Rate(1.0), None)?;
     let stated = directory.join("stated.toml");
-    fs::write(&stated, &text).or_cannot_file("write", &stated)?;
-    let address = format!("robot.address='udp://{}'", simulator.address());
-    let mut command = robot::mission("bring-up", &stated, format!("bring-up-{number}"), &[address]);
-    command.arg("--yes").arg("--runs").arg(directory.join("runs"));
+    let address = format!("address = 'udp://{}'", simulator.address());
+    fs::write(&stated, text.replace("#ADDRESS", &address)).or_cannot_file("write", &stated)?;
+    let mut command = robot::mission("bring-up", &stated, format!("bring-up-{number}"), &[]);
+    command.args(["--yes", "--runs"]).arg(directory.join("runs"));
     let mut child = command
         .stdout(Stdio::piped())
         .stderr(Stdio::null())

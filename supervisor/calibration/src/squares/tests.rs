@@ -1,16 +1,25 @@
 //! Tests of the squares.
 
+use common::{mission::Procedure, samples::GuidanceStatus};
+
 use super::*;
-use crate::wall::tests::{body, counts_of, obeyed};
+use crate::{
+    script::Script,
+    wall::{
+        State,
+        tests::{body, counts_of, obeyed},
+    },
+};
 
 /// Drive a square with wheels of this ratio and track, which do not slip.
 fn drive(ratio: f64, track: f64, to_the_left: bool) -> Driven {
     let wheels = Wheels { e: (ratio - 1.0) / (ratio + 1.0), track };
-    let mut square = Square::new(2.0, to_the_left);
+    let side = if to_the_left { Procedure::LeftSquare } else { Procedure::RightSquare };
+    let mut square = Script::new(side, 2.0, 7.0);
     let mut pose = Pose2::default();
     let (mut nominal, mut ways) = ([0.0; 2], Vec::new());
     for _ in 0..2000 {
-        let order = square.step(counts_of(nominal), &body());
+        let order = square.step(counts_of(nominal), None, &body());
         if order.status == GuidanceStatus::AtTarget {
             break;
         }

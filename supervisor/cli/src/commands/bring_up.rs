@@ -2,30 +2,32 @@
 
 mod written;
 
-use std::{fs, path::PathBuf};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use bring_up::{Finding, Placed, Trace, Verdict, findings};
-use clap::{Args, ValueEnum};
+use clap::Args;
 use common::{
-    clock::Pace,
-    domain::RobotName,
     file::{FileError, replace},
     mission::{CalibrationPlan, Mission, Procedure, Protocol},
-    samples::{CountsSample, WheelSample},
-    topics::{COMMAND, COUNTS, IMU_TURN, RANGES, SCAN, WHEELS},
 };
 use console::{
     consent,
     failure::{Failure, Refused},
-    logging, missions,
+    missions,
     output::{print_text, write_stderr},
 };
 use picture::{Chart, Mark, Series};
-use recording::{Recording, RecordingError};
+use recording::Recording;
+use serde::{
+    Deserialize as _,
+    de::{IntoDeserializer as _, value::Error as ValueError},
+};
 use serde_json::json;
 
-use super::calibrate::drive::{Carried, Setting, carry_out};
-use common::driver::counts::WheelCounts;
+use super::calibrate::drive::{Carried, Setting};
 
 /// Compare a new robot with its mission file: wheels, gyro, laser, rangers, response. Says what to mend, and the keys to change.
 ///
@@ -33,11 +35,11 @@ use common::driver::counts::WheelCounts;
 /// side, drives 0.3 m there and back, and turns to and fro: about a minute.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// A mission file with the robot. By default the simulated X80, or one that is written for --protocol.
+    /// A mission file with the robot. By default the simulated X80.
     mission: Option<String>,
-    /// Write a mission for a new robot that speaks this protocol to --out, and bring that up.
-    #[arg(long, value_enum, conflicts_with = "mission", requires = "address")]
-    protocol: Option<Spoken>,
+    /// Write a mission for a new robot that speaks this protocol to --out: x80, json, arduino or ros2.
+    #[arg(long, value_parser = protocol, conflicts_with = "mission", requires = "address")]
+    protocol: Option<Protocol>,
     /// The address of the robot, as robot.address has it.
     #[arg(long, requires = "protocol")]
     address: Option<String>,
@@ -53,71 +55,43 @@ pub(crate) struct Arguments {
     /// Let the robot move without asking.
     #[arg(long, short)]
     yes: bool,
-    /// Name of the robot, which also names its shared memory.
-    #[arg(long, default_value = "x80")]
-    robot: RobotName,
-    /// Mission time of a simulated robot: `max`, or R times wall-clock.
-    #[arg(long)]
-    pace: Option<Pace>,
-    /// Seed of everything random in the simulation, instead of the mission's.
-    #[arg(long)]
-    seed: Option<u64>,
-    /// Set a key of the mission, as often as needed.
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<String>,
-    /// The directory in which the directories of runs are.
-    #[arg(long, value_name = "DIR", default_value = "runs")]
-    runs: PathBuf,
-    /// Print one line of JSON, and nothing else on standard output.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    setting: Setting,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Spoken {
-    X80,
-    Json,
-    Arduino,
-    Ros2,
-}
-
-impl From<Spoken> for Protocol {
-    fn from(spoken: Spoken) -> Self {
-        match spoken {
-            Spoken::X80 => Self::X80,
-            Spoken::Json => Self::Json,
-            Spoken::Arduino => Self::Arduino,
-            Spoken::Ros2 => Self::Ros2,
-        }
-    }
+fn protocol(word: &str) -> Result<Protocol, ValueError> {
+    Protocol::deserialize(word.into_deserializer())
 }
 
 const SIMULATED: &str = "target = [1.5, 0]\nsimulation.realism = 'measured'\nsensors = 'all'\n[perimeter]\nwidth_m = 6.0\ncentre = [0.0, 0.0]\n[[world.wall]]\npoints = [[1.3, -1.6], [1.3, 1.2], [-0.4, 1.6], [-1.5, 0.4], [-1.2, -1.6], [1.3, -1.6]]\n";
 
 pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
-    fs::create_dir_all(&arguments.runs)
-        .map_err(|error| format!("cannot make {}: {error}", arguments.runs.display()))?;
-    logging::to_file(&arguments.runs.join("bring-up.log"), "info")?;
-    let named = arguments.named()?;
-    if named.body().steering.is_some() {
-        return Err("a car does not turn on the spot, which a bring-up is made of".into());
+    arguments.setting.log("bring-up.log")?;
+    if let (Some(protocol), Some(address)) = (arguments.protocol, &arguments.address) {
+        return write_new(protocol, address, &arguments.out);
     }
-    let is_real = named.robot.address.is_some();
-    if is_real && !arguments.yes {
+    let set = &arguments.setting.set;
+    let named = match &arguments.mission {
+        Some(name) => missions::load(name, set)?,
+        None => missions::parsed(SIMULATED, "bring-up", set)?,
+    };
+    let plan = CalibrationPlan { procedure: Procedure::BringUp, ..CalibrationPlan::default() };
+    let mut mission = arguments.setting.procedure(&named, plan, 0.2)?;
+    (mission.start, mission.perimeter) = (named.start.clone(), named.perimeter.clone());
+    (mission.sensors, mission.world) = (named.sensors, named.world.clone());
+    mission.timeout_s = 150.0;
+    if named.robot.address.is_some() && !arguments.yes {
         consent::ask(
             "the robot will turn on the spot and drive 0.3 m there and back",
             "Is the floor free for 1 m around it?",
         )?;
     }
-    let mission = arguments.procedure(&named)?;
-    let pace = arguments.pace.unwrap_or(if is_real { Pace::Rate(1.0) } else { Pace::Max });
-    let setting = Setting { robot: &arguments.robot, pace, runs: &arguments.runs };
-    let Carried { directory, .. } = carry_out(setting, mission, "bring-up")?;
-    let trace = read(&named, &Recording::open(&directory.join("recording.mcap"))?)?;
+    let Carried { directory, .. } = arguments.setting.carry_out(&mission, "bring-up")?;
+    let trace = Trace::read(&named, &Recording::open(&directory.join("recording.mcap"))?)?;
     let (found, placed) = findings(&named, &trace, arguments.lifted);
     let picture = directory.join("bring-up.svg");
     fs::write(&picture, drawn(placed.as_ref())).map_err(FileError::of("write", &picture))?;
-    if arguments.json {
+    if arguments.setting.json {
         let object = json!({
             "findings": found.iter().map(as_json).collect::<Vec<_>>(),
             "picture": picture,
@@ -150,96 +124,18 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-impl Arguments {
-    fn named(&self) -> Result<Mission, Failure> {
-        let mut named = match (&self.mission, self.protocol, &self.address) {
-            (Some(name), ..) => missions::load(name, &self.set)?,
-            (None, Some(protocol), Some(address)) => {
-                let text = written::new_robot(protocol.into(), address);
-                let mission = missions::parsed(&text, "bring-up", &self.set)?;
-                if self.out.exists() {
-                    let out = self.out.display();
-                    return Err(
-                        format!("{out} exists; bring it up: firsthand bring-up {out}").into()
-                    );
-                }
-                replace(&self.out, text).map_err(FileError::of("write", &self.out))?;
-                write_stderr(&format!(
-                    "firsthand: wrote {}; correct its sizes and sensors\n",
-                    self.out.display()
-                ));
-                mission
-            }
-            _ => missions::parsed(SIMULATED, "bring-up", &self.set)?,
-        };
-        named.seed = self.seed.unwrap_or(named.seed);
-        Ok(named)
+/// Writes a mission for a robot that nobody described yet.
+fn write_new(protocol: Protocol, address: &str, out: &Path) -> Result<(), Failure> {
+    let text = written::new_robot(protocol, address);
+    missions::parsed(&text, "bring-up", &[])?;
+    let place = out.display();
+    if out.exists() {
+        return Err(format!("{place} exists; bring it up: firsthand bring-up {place}").into());
     }
-
-    /// The robot of `named` in the procedure.
-    fn procedure(&self, named: &Mission) -> Result<Mission, Failure> {
-        let mut mission = named.clone();
-        mission.name = "bring-up".into();
-        // Only the procedure ends the run; the target is where it never comes.
-        mission.target = missions::parsed("target = [0.3, 0]", "bring-up", &[])?.target;
-        mission.targets.clear();
-        mission.sensing = false;
-        mission.arrival_tolerance_m = 0.05;
-        mission.timeout_s = 240.0;
-        mission.planner.executable = Some(calibration::PLANNER.into());
-        mission.planner.calibration =
-            Some(CalibrationPlan { procedure: Procedure::BringUp, ..CalibrationPlan::default() });
-        mission.controller.speed_m_s = Some(named.body().top_speed_m_s.min(0.2));
-        mission.controller.turn_rad_s = Some(0.1);
-        mission.controller.look_rad_s = Some(1.5);
-        mission.controller.slow_radius_m = 0.01;
-        Ok(missions::parsed(&toml::to_string(&mission)?, "bring-up", &[])?)
-    }
-}
-
-/// The trace in `recording`, by the sizes that `mission` states.
-fn read(mission: &Mission, recording: &Recording) -> Result<Trace, RecordingError> {
-    let body = mission.body();
-    let scales = mission.robot.odometry.wheel_scales();
-    let mut endless = std::collections::BTreeMap::<u64, CountsSample>::new();
-    for counts in recording.samples(&COUNTS)? {
-        let counts = counts?.sample;
-        endless.insert(counts.stamp.tick, counts);
-    }
-    let mut trace = Trace::default();
-    let (mut before, mut rolled): (Option<(WheelSample, WheelCounts)>, _) = (None, [0.0; 2]);
-    for wheels in recording.samples(&WHEELS)? {
-        let wheels = wheels?.sample;
-        let counts = WheelCounts::of(&wheels, endless.get(&wheels.stamp.tick));
-        if let Some((old, earlier)) = before
-            && old.restarts == wheels.restarts
-        {
-            let went = counts.since(earlier);
-            rolled = [0, 1].map(|it| rolled[it] + went[it] * body.metres_per_count() * scales[it]);
-        }
-        before = Some((wheels, counts));
-        trace.rolled.push((wheels.stamp.time().seconds(), rolled));
-    }
-    for command in recording.samples(&COMMAND)? {
-        let command = command?.sample;
-        let rims = [command.left_rad_s, command.right_rad_s].map(|it| it * body.wheel_radius_m);
-        trace.told.push((command.stamp.time().seconds(), rims));
-    }
-    let mut angle = 0.0;
-    for turn in recording.samples(&IMU_TURN)? {
-        let turn = turn?.sample;
-        angle += turn.turn_rad;
-        trace.gyro.push((turn.stamp.time().seconds(), angle));
-    }
-    for ranges in recording.slices(&RANGES)? {
-        let ranges = ranges?;
-        trace.ranges.push((ranges.header.stamp.time().seconds(), ranges.elements));
-    }
-    for scan in recording.slices(&SCAN)? {
-        let scan = scan?;
-        trace.scans.push((scan.header.stamp.time().seconds(), scan.header, scan.elements));
-    }
-    Ok(trace)
+    replace(out, text).map_err(FileError::of("write", out))?;
+    Ok(print_text(&format!(
+        "wrote {place}; correct its sizes and the rows of its sensors, then: firsthand bring-up {place} --write\n"
+    ))?)
 }
 
 fn line(finding: &Finding) -> String {

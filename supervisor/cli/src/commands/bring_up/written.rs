@@ -20,7 +20,7 @@ pub(super) fn new_robot(protocol: Protocol, address: &str) -> String {
             "\n[[robot.sensor]]\nname = \"scan\"\nkind = \"scan\"\nforward_m = 0.0\nbearing_deg = 0.0\nfield_of_view_deg = 360\nbeams = 360\nreach_m = 8.0\n"
         }
         Protocol::Json | Protocol::Arduino => {
-            "\n[[robot.sensor]]              # one for each sensor, by the name that the robot gives it\nname = \"front\"\nkind = \"cone\"\nforward_m = 0.1\nbearing_deg = 0.0\n"
+            "\n[[robot.sensor]]              # one for each sensor, by the name that the robot gives it\nname = \"front\"\nkind = \"cone\"                 # a sonar; \"scan\" of a laser, with field_of_view_deg, beams and reach_m\nforward_m = 0.1\nbearing_deg = 0.0\n"
         }
     };
     let pins = if matches!(protocol, Protocol::Arduino) {

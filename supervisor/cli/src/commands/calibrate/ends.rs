@@ -1,9 +1,7 @@
-//! The ends of squares, typed by a person or read from a file.
+//! The ends of squares, typed by a person or from a file as standard input.
 
 use std::{
-    fs::File,
-    io::{self, BufRead, BufReader, Read as _},
-    path::Path,
+    io::{self, BufRead as _, IsTerminal as _, Read as _},
     time::Duration,
 };
 
@@ -17,75 +15,37 @@ const FARTHEST_M: f64 = 10.0;
 /// The time between looks for a signal while somebody measures.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 
-pub(super) enum Ends {
-    Typed,
-    File(BufReader<File>),
+/// A person puts the robot on its mark. Who gives a file has nobody to wait for.
+pub(super) fn await_robot(title: &str, signals: &mut Signals) -> Result<(), Failure> {
+    if io::stdin().is_terminal() {
+        write_stderr(&format!("{title}: put the robot on its mark, then press Enter\n"));
+        line(signals)?;
+    }
+    Ok(())
 }
 
-impl Ends {
-    pub(super) fn open(file: Option<&Path>) -> Result<Self, Failure> {
-        let Some(file) = file else {
-            return Ok(Self::Typed);
-        };
-        let opened = File::open(file)
-            .map_err(|error| format!("cannot read the ends in {}: {error}", file.display()))?;
-        Ok(Self::File(BufReader::new(opened)))
-    }
-
-    pub(super) fn await_robot(
-        &mut self,
-        title: &str,
-        signals: &mut Signals,
-    ) -> Result<(), Failure> {
-        if matches!(self, Self::Typed) {
-            write_stderr(&format!("{title}: put the robot on its mark, then press Enter\n"));
-            self.line(signals)?;
+/// A line that is no end is asked for again.
+pub(super) fn next(title: &str, signals: &mut Signals) -> Result<DVec2, Failure> {
+    loop {
+        write_stderr(&format!("{title}: where is it? metres ahead and to the left of the mark: "));
+        if let Some(end) = end(&line(signals)?) {
+            return Ok(end);
         }
-        Ok(())
+        write_stderr("give two numbers, such as 0.03 -0.12\n");
     }
+}
 
-    /// A line that is no end is asked for again.
-    pub(super) fn next(&mut self, title: &str, signals: &mut Signals) -> Result<DVec2, Failure> {
-        loop {
-            if matches!(self, Self::Typed) {
-                write_stderr(&format!(
-                    "{title}: where is it? metres ahead and to the left of the mark: "
-                ));
-            }
-            let line = self.line(signals)?;
-            match end(&line) {
-                Some(end) => return Ok(end),
-                None if matches!(self, Self::Typed) => {
-                    write_stderr("type two numbers, such as 0.03 -0.12\n");
-                }
-                None => {
-                    return Err(format!(
-                        "{title}: {line:?} is no end; give two numbers, such as 0.03 -0.12"
-                    )
-                    .into());
-                }
-            }
+fn line(signals: &mut Signals) -> Result<String, Failure> {
+    let mut line = String::new();
+    while !poll::is_readable(io::stdin(), LOOK_EVERY)? {
+        if signals.came() {
+            return Err("stopped; nothing was written".into());
         }
     }
-
-    fn line(&mut self, signals: &mut Signals) -> Result<String, Failure> {
-        let mut line = String::new();
-        let read = match self {
-            Self::File(file) => file.take(LONGEST_LINE).read_line(&mut line)?,
-            Self::Typed => {
-                while !poll::is_readable(io::stdin(), LOOK_EVERY)? {
-                    if signals.came() {
-                        return Err("stopped; nothing was written".into());
-                    }
-                }
-                io::stdin().lock().take(LONGEST_LINE).read_line(&mut line)?
-            }
-        };
-        if read == 0 {
-            return Err("the ends of the squares are missing; nothing was written".into());
-        }
-        Ok(line.trim().to_owned())
+    if io::stdin().lock().take(LONGEST_LINE).read_line(&mut line)? == 0 {
+        return Err("the ends of the squares are missing; nothing was written".into());
     }
+    Ok(line.trim().to_owned())
 }
 
 /// Two numbers, metres.

@@ -1,37 +1,25 @@
 //! The response of a base, from the recording of its turns.
 
+use bring_up::Trace;
 use calibration::response::{Estimate, Measured, estimate, keys};
-use common::{
-    mission::CalibrationPlan,
-    topics::{COMMAND, POSE},
-};
+use common::mission::CalibrationPlan;
 use recording::Recording;
 use serde_json::json;
 
-use super::{
-    Arguments,
-    drive::{Carried, carry_out},
-    refused,
-};
+use super::{Arguments, drive::Carried, refused};
 use console::{failure::Failure, output::print_text};
 
 pub(super) fn measure(arguments: &Arguments, plan: CalibrationPlan) -> Result<(), Failure> {
     let mission = arguments.mission(plan)?;
     let body = mission.body();
-    let Carried { directory, .. } = carry_out(arguments.setting(), mission, "turns")?;
+    let Carried { directory, .. } = arguments.setting.carry_out(&mission, "turns")?;
     let recording = Recording::open(&directory.join("recording.mcap"))?;
-    let mut commands = Vec::new();
-    for command in recording.samples(&COMMAND)? {
-        let command = command?.sample;
-        commands.push((command.stamp.time().seconds(), command.omega_rad_s));
-    }
-    let mut headings = Vec::new();
-    for pose in recording.samples(&POSE)? {
-        let pose = pose?.sample;
-        headings.push((pose.stamp.time().seconds(), pose.heading_rad));
-    }
-    let found = estimate(&commands, &headings, &body).map_err(|why| refused(&why))?;
-    let text = match arguments.json {
+    let trace = Trace::read(&mission, &recording)?;
+    let turn = |(at, [left, right]): &(f64, [f64; 2])| (*at, (right - left) / body.track_m);
+    let [told, turned] =
+        [&trace.told, &trace.rolled].map(|it| it.iter().map(turn).collect::<Vec<_>>());
+    let found = estimate(&told, &turned, &body).map_err(|why| refused(&why))?;
+    let text = match arguments.setting.json {
         true => format!("{}\n", as_json(&found)),
         false => keys(&found, body.response),
     };

@@ -10,11 +10,11 @@ use crate::commands::record::DiskBudget;
 
 /// Waiting for the recorder takes milliseconds, and seconds beside 30 busy processes a core. These are the most seconds until it
 /// is attached, because one that attaches later misses the beginning, and until it has ended. A robot and the service manager
-/// wait for a run on a wall clock, nobody for one in lockstep.
-const fn patience(pace: Pace) -> [Duration; 2] {
-    let [attached, ended] = match pace {
-        Pace::Max => [20, 60],
-        Pace::Rate(_) => [2, 5],
+/// wait for a run on a wall clock, nobody for one in lockstep. A calibration is nothing without its recording.
+const fn patience(options: &Options) -> [Duration; 2] {
+    let [attached, ended] = match (options.pace, &options.mission.planner.calibration) {
+        (Pace::Rate(_), None) => [2, 5],
+        _ => [20, 60],
     };
     [Duration::from_secs(attached), Duration::from_secs(ended)]
 }
@@ -49,7 +49,7 @@ impl RunRecorder {
         command.args(["--supervisor", &std::process::id().to_string()]);
         command.stdout(Stdio::piped()).stderr(log);
         let mut process = Process::spawn(command)?;
-        let [attached_within, ends_within] = patience(options.pace);
+        let [attached_within, ends_within] = patience(options);
         let said = process.take_stdout().ok_or(io::ErrorKind::BrokenPipe)?;
         let awaited = [said.as_fd(), signals.as_fd()];
         let attached = poll::readable(&awaited, Some(attached_within))?.first() == Some(&true);

@@ -1,20 +1,29 @@
-//! The procedure of a bring-up: the robot stands, turns on the spot to both sides, drives a short way and back, and turns to and fro.
+//! Procedures that are a list of legs: a bring-up, turns to and fro, squares.
 //!
-//! A leg ends when the wheels have counted its way in either direction, because a wheel of a new robot may count backwards, or after a
-//! time.
+//! In a bring-up the robot stands, turns on the spot to both sides, drives a short way and back, and turns to and fro. A leg ends when the
+//! wheels have counted its way in either direction, because a wheel of a new robot may count backwards, or after a time.
 
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_2, PI};
 
-use common::{mission::Body, samples::GuidanceStatus, wire::counts_between};
+use common::{
+    mission::{Body, Procedure},
+    samples::GuidanceStatus,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    response::{ASIDE_RAD, LEG_S, LEGS},
-    wall::{Order, State},
+    loops::Wheels,
+    wall::{FAST_RAD, Order, SPEED_M_S, State, direction_aside},
+    ways::Ways,
 };
 
+/// A turn to one side lasts so long, seconds: a base that answers after 0.5 s and gains 1 rad/s in a second turns by then.
+pub(crate) const LEG_S: f64 = 1.6;
+const LEGS: u32 = 8;
+/// The direction is so far aside that the robot turns as fast as it may.
+const ASIDE_RAD: f64 = 1.2;
 /// The speed of the way there and back, m/s.
-const SPEED_M_S: f64 = 0.15;
+const SLOWLY_M_S: f64 = 0.15;
 const WAY_M: f64 = 0.3;
 /// Nearer things ahead end a leg, metres.
 const NEAR_M: f64 = 0.2;
@@ -22,6 +31,8 @@ const NEAR_M: f64 = 0.2;
 const TURN_RAD: f64 = 3.0 * PI;
 /// Longer than a slow base needs for [`TURN_RAD`] at its speed.
 const LONGEST_TURN_S: f64 = 20.0;
+/// A corner of a square with so little rest counts as turned.
+const TURNED_RAD: f64 = 0.03;
 
 /// What the robot is told, and after how much it is told the next: seconds, radians or metres by the counts, to the left if positive.
 #[derive(Clone, Copy, Debug)]
@@ -30,6 +41,8 @@ enum Leg {
     Turn(f64),
     Drive,
     ToAndFro(f64),
+    Side,
+    Corner,
 }
 
 const STILL: Leg = Leg::Stand(1.0);
@@ -50,26 +63,39 @@ const PARTS: [Leg; 12] = [
 
 /// The procedure in the planner's place.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct BringUp {
-    leg: u32,
-    ticks: u32,
+pub struct Script {
+    procedure: Procedure,
+    side_m: f64,
     rate_hz: f64,
-    counts: Option<[u16; 2]>,
-    /// Counts of both wheels in this leg, on average, in any direction.
-    counted: f64,
+    leg: u32,
+    /// Ticks of this leg, and the ways at its beginning.
+    ticks: u32,
+    from: Ways,
+    ways: Ways,
 }
 
-impl BringUp {
+impl Script {
+    /// Every procedure but that before a wall; squares have this side.
     #[must_use]
-    pub const fn new(rate_hz: f64) -> Self {
-        Self { leg: 0, ticks: 0, rate_hz, counts: None, counted: 0.0 }
+    pub fn new(procedure: Procedure, side_m: f64, rate_hz: f64) -> Self {
+        let (from, ways) = (Ways::default(), Ways::default());
+        Self { procedure, side_m, rate_hz, leg: 0, ticks: 0, from, ways }
     }
 
     fn leg(&self) -> Option<Leg> {
-        let leg = self.leg as usize;
-        let to_and_fro = leg.checked_sub(PARTS.len()).filter(|it| *it < LEGS as usize);
-        let side = |number: usize| if number.is_multiple_of(2) { 1.0 } else { -1.0 };
-        PARTS.get(leg).copied().or_else(|| to_and_fro.map(|it| Leg::ToAndFro(side(it))))
+        let is_even = self.leg.is_multiple_of(2);
+        let to_and_fro = |before: u32| {
+            let side = if is_even { 1.0 } else { -1.0 };
+            (self.leg < before + LEGS).then_some(Leg::ToAndFro(side))
+        };
+        match self.procedure {
+            Procedure::Turns => to_and_fro(0),
+            Procedure::BringUp => {
+                let part = PARTS.get(self.leg as usize).copied();
+                part.or_else(|| to_and_fro(PARTS.len() as u32))
+            }
+            _ => (self.leg < 8).then_some(if is_even { Leg::Side } else { Leg::Corner }),
+        }
     }
 
     #[must_use]
@@ -79,33 +105,43 @@ impl BringUp {
 
     /// `echo_m` is the front sonar's: a robot that drives where it is told to turn ends its leg before what is there.
     pub fn step(&mut self, counts: [u16; 2], echo_m: Option<f64>, body: &Body) -> Order {
-        let before = self.counts.replace(counts).unwrap_or(counts);
-        let went =
-            [0, 1].map(|wheel| f64::from(counts_between(before[wheel], counts[wheel])).abs());
-        self.counted += (went[0] + went[1]) / 2.0;
-        self.ticks = self.ticks.saturating_add(1);
+        self.ways.step(counts, body);
+        let (from, ways) = (self.from, self.ways);
+        let rolled_m = (ways.rolled_m - from.rolled_m) / 2.0;
+        let side = if self.procedure == Procedure::RightSquare { -1.0 } else { 1.0 };
+        let heading = side * Wheels::NOMINAL.turned(ways.left_m, ways.right_m, body.track_m);
+        let left = |leg: u32| FRAC_PI_2 * f64::from(leg.div_ceil(2)) - heading;
         let seconds = f64::from(self.ticks) / self.rate_hz;
-        let way_m = self.counted * body.metres_per_count();
         let is_over = match self.leg() {
             Some(Leg::Stand(least_s)) => seconds >= least_s,
             Some(Leg::Turn(angle)) => {
-                way_m >= angle.abs() * body.track_m / 2.0 || seconds >= LONGEST_TURN_S
+                rolled_m >= angle.abs() * body.track_m / 2.0 || seconds >= LONGEST_TURN_S
             }
-            Some(Leg::Drive) => way_m >= WAY_M || seconds >= 3.0 * WAY_M / SPEED_M_S,
+            Some(Leg::Drive) => rolled_m >= WAY_M || seconds >= 3.0 * WAY_M / SLOWLY_M_S,
             Some(Leg::ToAndFro(_)) => seconds >= LEG_S,
+            Some(Leg::Side) => (ways.arc_m() - from.arc_m()).abs() >= self.side_m,
+            Some(Leg::Corner) => left(self.leg) <= TURNED_RAD,
             None => false,
         };
         let is_near = echo_m.is_some_and(|it| it < NEAR_M);
+        self.ticks = self.ticks.saturating_add(1);
         if is_over || is_near && matches!(self.leg(), Some(Leg::Turn(_) | Leg::Drive)) {
-            (self.leg, self.ticks, self.counted) = (self.leg + 1, 0, 0.0);
+            (self.leg, self.ticks, self.from) = (self.leg + 1, 1, ways);
         }
+        let left = left(self.leg);
         let (status, aside_rad, speed_limit_m_s) = match self.leg() {
             // A robot that faces its way and may go at no speed stands.
             Some(Leg::Stand(_)) => (GuidanceStatus::Along, 0.0, 0.0),
             Some(Leg::Turn(side) | Leg::ToAndFro(side)) => {
                 (GuidanceStatus::Look, ASIDE_RAD.copysign(side), 0.0)
             }
-            Some(Leg::Drive) => (GuidanceStatus::Along, 0.0, SPEED_M_S),
+            Some(Leg::Drive) => (GuidanceStatus::Along, 0.0, SLOWLY_M_S),
+            Some(Leg::Side) => {
+                (GuidanceStatus::Along, side * left.clamp(-FAST_RAD, FAST_RAD), SPEED_M_S)
+            }
+            Some(Leg::Corner) => {
+                (GuidanceStatus::Look, side * direction_aside(left, FAST_RAD), 0.0)
+            }
             None => (GuidanceStatus::AtTarget, 0.0, 0.0),
         };
         Order { status, aside_rad, speed_limit_m_s, x_m: 0.0, heading_rad: 0.0 }
@@ -125,7 +161,7 @@ mod tests {
         let mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
         let body = mission.body();
         for counts_a_tick in [0, 40] {
-            let mut procedure = BringUp::new(10.0);
+            let mut procedure = Script::new(Procedure::BringUp, 0.0, 10.0);
             let (mut ticks, mut counts) = (0, [0_u16; 2]);
             while procedure.state() == State::Running {
                 let order = procedure.step(counts, None, &body);
