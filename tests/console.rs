@@ -98,6 +98,8 @@ fn echo_prints_every_topic_with_the_fields_of_its_layout() {
             "requests",
             "orders",
             "faults",
+            "place",
+            "zones",
         ]
         .contains(&name)
         {

@@ -249,7 +249,10 @@ fn a_standing_robot_is_told_where_it_is_goes_on_from_there_and_replays_to_the_bi
     let is_at = |status: &Value, x: f64, y: f64| {
         let at =
             |key: &str, is: f64| (status["pose"][key].as_f64().unwrap_or(99.0) - is).abs() < 0.2;
-        status["order"] == "waiting for a target" && at("x_m", x) && at("y_m", y)
+        status["order"] == "waiting for a target"
+            && status["link"]["at_rest"] == true
+            && at("x_m", x)
+            && at("y_m", y)
     };
     run.wait_until("it waits at its start", |status| is_at(status, -2.0, 0.5));
     let place = |numbers: [&'static str; 3]| [&["place", "--robot", robot], &numbers[..]].concat();

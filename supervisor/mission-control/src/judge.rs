@@ -153,6 +153,9 @@ impl Snapshot<'_> {
                     "no robot answers at {address}, but its host does from port {port}; name that one in robot.address"
                 ),
             }
+        } else if !self.was_ready {
+            "the robot answers and no tick begins: it may not send all that a tick needs, wheels and every sensor of its mission; see link.log"
+                .to_owned()
         } else {
             "the pipeline makes no progress; see the stages' logs".to_owned()
         };

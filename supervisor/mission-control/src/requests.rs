@@ -79,11 +79,6 @@ impl Supervisor<'_> {
 
     /// The stages are told with the state; dead reckoning sets its pose with the next tick, and the map is reset by that.
     fn place_robot(&mut self, request: &RequestSample) -> RequestAnswer {
-        let stands_by = matches!(self.decision.reason, HoldReason::Operator | HoldReason::Waiting);
-        let link = self.bus.observer.record.link;
-        if !stands_by || link.is_none_or(|link| link.rest() != Rest::AtRest) {
-            return RequestAnswer::Moves;
-        }
         let Some([point]) = request.targets() else { return RequestAnswer::Malformed };
         let [sigma_m, sigma_rad] = request.deviations;
         let is_sane = |sigma: f64| (0.005..=10.0).contains(&sigma);
@@ -92,6 +87,11 @@ impl Supervisor<'_> {
         }
         if !self.options.mission.contains(point.position()) {
             return RequestAnswer::Outside;
+        }
+        let stands_by = matches!(self.decision.reason, HoldReason::Operator | HoldReason::Waiting);
+        let link = self.bus.observer.record.link;
+        if !stands_by || link.is_none_or(|link| link.rest() != Rest::AtRest) {
+            return RequestAnswer::Moves;
         }
         let number = self.state_file.state.place.number + 1;
         let (x_m, y_m, heading_rad) = (point.x_m, point.y_m, point.heading_rad);

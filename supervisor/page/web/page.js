@@ -175,7 +175,7 @@ if (recording) {
     lost,
   });
   orders = new Orders(net, map);
-  new Hand(orders, document.getElementById("targets"));
+  new Hand(orders, byId("by-hand"));
   orders.choose([]);
   // What does not come any more grows old.
   setInterval(changed, 500);

@@ -174,7 +174,7 @@ impl Events {
         match RequestAnswer::from_byte(request.answer) {
             RequestAnswer::Taken => self.add("operator", Kind::Note, asked),
             answer => {
-                self.add("operator", Kind::Bad, format!("{asked}, refused: {}", answer.text()))
+                self.add("operator", Kind::Bad, format!("{asked}, refused: {}", answer.text()));
             }
         }
     }

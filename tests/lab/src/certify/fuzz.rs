@@ -69,7 +69,7 @@ impl Target {
             let file = directory.join(self.name);
             // A full disk is no finding.
             return if fs::write(&file, bytes).is_ok() {
-                open(&file)
+                open(&file);
             };
         };
         let drive = Event::Order(Order::Drive, HoldReason::None);
