@@ -77,7 +77,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     };
     let plan = CalibrationPlan { procedure: Procedure::BringUp, ..CalibrationPlan::default() };
     let mut mission = arguments.setting.procedure(&named, plan, 0.2)?;
-    (mission.start, mission.perimeter) = (named.start.clone(), named.perimeter.clone());
+    (mission.start, mission.perimeter) = (named.start, named.perimeter.clone());
     (mission.sensors, mission.world) = (named.sensors, named.world.clone());
     mission.timeout_s = 150.0;
     if named.robot.address.is_some() && !arguments.yes {

@@ -143,7 +143,7 @@ fn goes_on(line: &str) -> bool {
     let line = line.trim_start();
     !line.is_empty()
         && !["#", "|", "- ", "```", "<", "!["].iter().any(|start| line.starts_with(start))
-        && !line.split_once(". ").is_some_and(|(number, _)| number.parse::<u32>().is_ok())
+        && line.split_once(". ").is_none_or(|(number, _)| number.parse::<u32>().is_err())
 }
 
 /// The words of `text` in lines of at most `width` letters; a longer word has a line of its own.
