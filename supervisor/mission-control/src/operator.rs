@@ -257,7 +257,7 @@ fn ask_with(
     ask(robot, request)
 }
 
-/// Drive by hand: towards `stick`, ahead and to the left of the robot, in shares of full speed, until [`DEAD_MAN`] after the last call.
+/// Drive by hand: towards `stick`, ahead and to the left of the robot, in shares of full speed, for 0.3 s after the last call.
 pub fn drive_by_hand(robot: &RobotName, stick: DVec2) -> Result<(), OperatorError> {
     ask_with(robot, RequestKind::Hand, &[TargetPoint::at(stick)], [0.0; 2])
 }
