@@ -127,13 +127,16 @@ fn the_keys_of_top_do_what_they_say_and_the_mission_arrives() {
     let robot = "con-top";
     let mut screen = Screen::start(robot);
     screen.wait_for("is not running here");
-    // The robot is slow enough that all keys are pressed before it arrives.
+    // The robot stands while the other keys are pressed, so it does not arrive before.
     let slow = ["--pace", "2", "--timeout", "600", "--set", "controller.speed_m_s=0.2"];
     let mut run = Run::start(robot, "obstacle-course", &slow);
     screen.wait_for("driving");
     screen.wait_for("dead-reckoning");
     screen.wait_for("perimeter");
     run.wait_until_under_way(1.0);
+    screen.press("s");
+    screen.wait_for("stop: done");
+    run.wait_until("it stands", |status| status["order"] == "stopped by an operator");
     // The planner is the fourth stage.
     screen.press("\x1b[B\x1b[B\x1b[Bk");
     screen.wait_for("kill planner: done");
@@ -148,15 +151,12 @@ fn the_keys_of_top_do_what_they_say_and_the_mission_arrives() {
     });
     assert!(killed, "{deaths:?}");
     screen.wait_for("signal 9");
-    screen.press("s");
-    screen.wait_for("stop: done");
-    run.wait_until("it stands", |status| status["order"] == "stopped by an operator");
-    screen.press("c");
-    screen.wait_for("resume: done");
     screen.press("r");
     screen.wait_for("restart planner: done");
     screen.press("f");
     screen.wait_for("freeze planner: done");
+    screen.press("c");
+    screen.wait_for("resume: done");
     screen.press("q");
     let (code, written) = screen.end();
     assert_eq!(code, Some(0), "{written:?}");
