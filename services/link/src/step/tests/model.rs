@@ -4,7 +4,7 @@
 //! stops and starts the robot is, with times as ages. The evidence of monitors that judge motion (odometry, ranges, response, other
 //! commanders) is not compared: the modelled robot moves as it is told, too slowly to be judged.
 
-use std::collections::HashSet;
+use std::{collections::HashSet, thread};
 
 use common::{
     bus::{Admitted, Author, Writers},
@@ -441,8 +441,12 @@ fn explore(cause: (Cause, u64)) -> (usize, u64) {
 
 #[test]
 fn no_history_moves_a_robot_against_a_cause_an_operators_stop_or_its_own_supervisor() {
-    for cause in CAUSES {
-        let (states, moved) = explore(cause);
-        assert!(states > 100 && moved > 100, "{cause:?}: {states} states, {moved} moves");
-    }
+    thread::scope(|threads| {
+        for cause in CAUSES {
+            threads.spawn(move || {
+                let (states, moved) = explore(cause);
+                assert!(states > 100 && moved > 100, "{cause:?}: {states} states, {moved} moves");
+            });
+        }
+    });
 }
