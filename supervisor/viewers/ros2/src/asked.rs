@@ -1,8 +1,7 @@
 //! The requests of nodes by topics: messages in, their meaning out. Each message is taken, or refused as a whole with a
 //! reason.
 
-use common::{kinematics::Pose2, samples::TargetPoint};
-use glam::DVec2;
+use common::samples::TargetPoint;
 use ros2::cdr::Reader;
 
 use crate::shown::MAP;
@@ -15,10 +14,18 @@ pub(crate) fn goal(payload: &[u8]) -> Result<TargetPoint, String> {
     goal_of(&mut Reader::new(payload)?)
 }
 
-/// The target of a `geometry_msgs/PoseStamped` that is a part of a message.
+/// The target of a `geometry_msgs/PoseStamped` that is a part of a message, in the mission's frame.
 pub(crate) fn goal_of(reader: &mut Reader<'_>) -> Result<TargetPoint, String> {
-    let Pose2 { position, heading } = pose_in_map(reader)?;
-    Ok(TargetPoint { x_m: position.x, y_m: position.y, heading_rad: heading, has_heading: 1 })
+    let (_stamp_ns, frame) = reader.header()?;
+    if !(frame.is_empty() || frame.trim_start_matches('/') == MAP) {
+        return Err(format!("a pose in the frame {frame:?}; give it in {MAP:?}"));
+    }
+    let ([x_m, y_m], heading) = reader.pose()?;
+    let heading_rad = heading.ok_or("an orientation that is no rotation; fill orientation.w")?;
+    if !(x_m.is_finite() && y_m.is_finite()) {
+        return Err("a position that is no number; give metres".to_owned());
+    }
+    Ok(TargetPoint { x_m, y_m, heading_rad, has_heading: 1 })
 }
 
 /// The place of a `geometry_msgs/PoseWithCovarianceStamped`, and its deviations, metres and radians.
@@ -33,18 +40,4 @@ pub(crate) fn place(payload: &[u8]) -> Result<(TargetPoint, [f64; 2]), String> {
 /// The value of a `std_msgs/Bool`.
 pub(crate) fn flag(payload: &[u8]) -> Result<bool, String> {
     Ok(Reader::new(payload)?.u8()? != 0)
-}
-
-/// A header and a pose in the mission's frame.
-fn pose_in_map(reader: &mut Reader<'_>) -> Result<Pose2, String> {
-    let (_stamp_ns, frame) = reader.header()?;
-    if !(frame.is_empty() || frame.trim_start_matches('/') == MAP) {
-        return Err(format!("a pose in the frame {frame:?}; give it in {MAP:?}"));
-    }
-    let ([x, y], heading) = reader.pose()?;
-    let heading = heading.ok_or("an orientation that is no rotation; fill orientation.w")?;
-    if !(x.is_finite() && y.is_finite()) {
-        return Err("a position that is no number; give metres".to_owned());
-    }
-    Ok(Pose2 { position: DVec2::new(x, y), heading })
 }
