@@ -4,7 +4,7 @@
 //! stops and starts the robot is, with times as ages. The evidence of monitors that judge motion (odometry, ranges, response, other
 //! commanders) is not compared: the modelled robot moves as it is told, too slowly to be judged.
 
-use std::{collections::HashSet, thread};
+use std::{collections::HashSet, sync::LazyLock, thread};
 
 use common::{
     bus::{Admitted, Author, Writers},
@@ -104,8 +104,11 @@ struct World {
     history: Vec<Happens>,
 }
 
+/// It is read once, for reading it takes longer than a step.
+static MISSION: LazyLock<Mission> = LazyLock::new(mission);
+
 fn started(now_ns: u64, next_tick: u64) -> Link {
-    let mut link = Link::new(&mission());
+    let mut link = Link::new(&MISSION);
     link.now = MissionTime(now_ns);
     link.restore(State { pace: Pace::Rate(1.0), next_tick });
     link
@@ -119,7 +122,7 @@ fn admitted(process: u32) -> Admitted {
 fn copy(link: &Link) -> Link {
     Link {
         state: link.state,
-        base: Box::new(X80::new(&mission())),
+        base: Box::new(X80::new(&MISSION)),
         drivers: Vec::new(),
         sensors: link.sensors.clone(),
         speeds: link.speeds.clone(),
