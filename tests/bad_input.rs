@@ -31,7 +31,7 @@ fn an_invalid_mission_is_refused_with_line_key_and_remedy_by_check_and_run_alike
 
 #[test]
 fn what_is_not_there_or_cannot_be_is_named_with_what_there_is() {
-    let cases: [(&[&str], _, &[&str]); 19] = [
+    let cases: [(&[&str], _, &[&str]); 20] = [
         (&["run", "moon"], "unknown-mission", &["moon", "obstacle-course"]),
         (&["check", "/no/such/file.toml"], "mission", &["/no/such/file.toml"]),
         (
@@ -70,6 +70,7 @@ fn what_is_not_there_or_cannot_be_is_named_with_what_there_is() {
         (&["run", "--pace", "warp"], "usage", &["warp"]),
         (&["run", "--robot", "../x"], "usage", &["../x"]),
         (&["bench", "chaos", "--robot-faults=honest"], "usage", &["honest", "encoder-dead"]),
+        (&["evaluate", "--set", "robot={model"], "mission", &["robot={model", "inline table"]),
         (&["experiments", "--only", "6"], "unknown-experiment", &["5-modulated"]),
     ];
     for (arguments, code, names) in cases {

@@ -64,14 +64,10 @@ fn facts(scene: &Scene<'_>) -> String {
     } else {
         String::new()
     };
-    let events = match facts.safety_events {
-        1 => "1 safety event".to_owned(),
-        count => format!("{count} safety events"),
-    };
     let mut parts = vec![
         format!("{} s", number(facts.mission_time_s, 1)),
         format!("path {} m{times}", number(facts.path_length_m, 2)),
-        events,
+        format!("hazards mapped {} times", facts.safety_events),
     ];
     parts.extend(facts.seed.map(|seed| format!("seed {seed}")));
     parts.join("  ·  ")

@@ -1,9 +1,11 @@
-//! The disk budget of a recorder: its files have at most a share of it, and the oldest are removed.
+//! The disk budget of a recorder: its files have at most a share of it and last an hour at most, and the oldest are removed.
 
-use std::{collections::VecDeque, fs, path::PathBuf};
+use std::{collections::VecDeque, fs, path::PathBuf, time::Duration};
 
 /// The number of files for which a budget has room, so that at least three quarters of it are the newest samples.
 const FILES: u64 = 4;
+/// A robot that waits for days leaves files that one opens for the hour in question.
+const LONGEST: Duration = Duration::from_secs(3600);
 
 pub(crate) struct Budget {
     bytes: u64,
@@ -22,9 +24,9 @@ impl Budget {
         Self { bytes, complete }
     }
 
-    /// Whether `file` has its share.
-    pub(crate) fn is_spent_by(&self, file: &PathBuf) -> bool {
-        size(file) >= self.bytes / FILES
+    /// Whether `file` has its share, or is an hour old.
+    pub(crate) fn ends(&self, file: &PathBuf, age: Duration) -> bool {
+        age >= LONGEST || size(file) >= self.bytes / FILES
     }
 
     /// Count a complete `file`, and remove the oldest until there is room for the next.
@@ -55,12 +57,19 @@ mod tests {
         let mut budget = Budget::new(100, [file(0)]);
         for number in 1..5 {
             write(number, 24);
-            assert!(!budget.is_spent_by(&file(number)));
+            assert!(!budget.ends(&file(number), Duration::ZERO));
             write(number, 25);
-            assert!(budget.is_spent_by(&file(number)));
+            assert!(budget.ends(&file(number), Duration::ZERO));
             budget.complete(file(number));
         }
         let there = [0, 1, 2, 3, 4].map(|number| file(number).exists());
         assert_eq!(there, [false, false, true, true, true]);
+    }
+    #[test]
+    fn a_file_ends_after_an_hour_however_small_it_is() {
+        let budget = Budget::new(100, []);
+        let none = PathBuf::from("/nonexistent");
+        assert!(!budget.ends(&none, LONGEST - Duration::from_secs(1)));
+        assert!(budget.ends(&none, LONGEST));
     }
 }

@@ -145,7 +145,8 @@ pub fn record(
             }
             run.take_logs(stopped)?;
             run.file.flush_if_due()?;
-            if let Some(budget) = budget.as_mut().filter(|budget| budget.is_spent_by(&run.path)) {
+            let age = run.began.elapsed();
+            if let Some(budget) = budget.as_mut().filter(|budget| budget.ends(&run.path, age)) {
                 // Readers that are new get whole maps, with which the next file begins.
                 if let Ok(Some(mut before)) = follower.reopen() {
                     run.take(&mut before)?;
@@ -187,6 +188,7 @@ fn find_run(options: &Options) -> Option<PathBuf> {
 
 struct CurrentRun {
     path: PathBuf,
+    began: Instant,
     directory: Option<PathBuf>,
     run: Option<Run>,
     about: BTreeMap<String, String>,
@@ -228,6 +230,7 @@ impl CurrentRun {
         let logs = logs.map(|directory| LogFiles::follow(directory, whole));
         Ok(Self {
             path: path.to_path_buf(),
+            began: Instant::now(),
             directory,
             about,
             file,
@@ -250,6 +253,7 @@ impl CurrentRun {
         let next = next.continuing(&self.file);
         std::mem::replace(&mut self.file, next).finish()?;
         self.file.lost(self.losses.counts())?;
+        self.began = Instant::now();
         Ok(std::mem::replace(&mut self.path, path.to_path_buf()))
     }
 

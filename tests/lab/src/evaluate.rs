@@ -9,7 +9,7 @@ use std::{
 
 use clap::Args;
 use common::mission::Mission;
-use console::output::write_stderr;
+use console::{missions, output::write_stderr};
 use glam::DVec2;
 use processes::planner_executable;
 
@@ -101,7 +101,12 @@ pub fn main(arguments: &Arguments) -> Result {
         heading: heading_deg.to_radians(),
         target: target.into(),
     });
-    let swept_m = narrowest_m(&arguments.robot, &arguments.set)?;
+    // What no mission takes is refused before the first of them.
+    let robots: Vec<Mission> = settings
+        .iter()
+        .map(|setting| missions::parsed("target = [1, 0]", "its missions", &setting.set))
+        .collect::<Result<_, _>>()?;
+    let swept_m = swept_m(&robots[0]);
     let asked = Asked { count: arguments.count, seed, ends, swept_m };
     // A world that is damaged is no error of the mission on the command line.
     let found = worlds::find(&arguments.worlds, asked).map_err(|error| error.to_string())?;
@@ -183,12 +188,4 @@ fn settings(arguments: &Arguments) -> Result<Vec<Setting>> {
         settings.push(setting);
     }
     Ok(settings)
-}
-
-/// Half the width of the narrowest way for the robot's model with the changes in `set`, metres.
-fn narrowest_m(robot: &str, set: &[String]) -> Result<f64> {
-    let radius = set.iter().rfind(|assignment| assignment.starts_with("robot.radius_m"));
-    let radius = radius.map_or("", String::as_str);
-    let text = format!("target = [1, 0]\nrobot.model = '{robot}'\n{radius}");
-    Ok(swept_m(&Mission::parse(&text, Path::new("--robot"))?))
 }

@@ -29,7 +29,7 @@ pub(crate) struct Arguments {
     /// Fields, too: they are larger than all else together.
     #[arg(long)]
     fields: bool,
-    /// Most bytes of all files: `500MB`, `2GB`. A file ends at a quarter of it, and the oldest files are removed.
+    /// Most bytes of all files: `500MB`, `2GB`. A file ends at a quarter of it or after an hour, and the oldest files are removed.
     #[arg(long, value_name = "SIZE")]
     disk_budget: Option<DiskBudget>,
     /// The directory of the one run to record.

@@ -87,7 +87,7 @@ pub(crate) struct Arguments {
     /// Record nothing; by default everything but fields goes into recording.mcap in the run's directory.
     #[arg(long)]
     no_record: bool,
-    /// Most bytes of the run's recordings: `500MB`, `2GB`. A file ends at a quarter of it, and the oldest files are removed.
+    /// Most bytes of the run's recordings: `500MB`, `2GB`. A file ends at a quarter of it or after an hour, and the oldest files are removed.
     #[arg(long, value_name = "SIZE", default_value = "2GB")]
     disk_budget: Option<DiskBudget>,
     /// Print one line of JSON at the end, and nothing else on standard output.

@@ -42,7 +42,7 @@ fn declare(kind: &Kind, known: &mut BTreeSet<&'static str>, module: &mut String)
         declare(&field.kind, known, module);
     }
     let class = class(structure);
-    let _ = writeln!(module, "class {class}(ctypes.Structure):\n    _fields_ = [");
+    let _ = writeln!(module, "class {class}(Struct):\n    _fields_ = [");
     for field in &structure.fields {
         let _ = writeln!(module, "        (\"{}\", {}),", field.name, python(&field.kind));
     }
@@ -130,6 +130,15 @@ mod tests {
         if let Ok(output) = ran {
             let error = String::from_utf8_lossy(&output.stderr);
             assert!(output.status.success(), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_struct_in_python_prints_its_fields_and_those_of_its_structs() {
+        let module = module() + "\nprint(repr(TOPICS['pose'][0](x_m=1.5)))";
+        if let Ok(output) = std::process::Command::new("python3").args(["-c", &module]).output() {
+            let said = String::from_utf8_lossy(&output.stdout);
+            assert!(said.contains("x_m=1.5") && said.contains("stamp=Stamp(tick=0"), "{output:?}");
         }
     }
 }

@@ -7,6 +7,15 @@ import os
 import time
 
 
+class Struct(ctypes.Structure):
+    """A struct of a topic, which prints its fields. Their names end with their units."""
+
+    def __repr__(self):
+        values = ((name, getattr(self, name)) for name, _ in self._fields_)
+        listed = ((name, list(it) if isinstance(it, ctypes.Array) else it) for name, it in values)
+        return f"{type(self).__name__}({', '.join(f'{name}={it!r}' for name, it in listed)})"
+
+
 class Follower:
     """Follows a robot from run to run.
 
