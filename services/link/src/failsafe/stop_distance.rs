@@ -49,10 +49,25 @@ mod tests {
 
     use super::*;
 
-    fn stale(text: &str) -> Stop {
+    fn mission(text: &str) -> Mission {
         let text = format!("target = [3, 0]\ncontroller.turn_rad_s = 0.8\n{text}");
-        let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
-        Stop::by(Cause::CommandStale, &mission).unwrap()
+        Mission::parse(&text, Path::new("m.toml")).unwrap()
+    }
+
+    fn stale(text: &str) -> Stop {
+        Stop::by(Cause::CommandStale, &mission(text)).unwrap()
+    }
+
+    #[test]
+    fn each_fault_that_a_time_bounds_ends_at_rest_after_it_is_known_and_later_on_a_heavier_base() {
+        let light = from_faults(&mission("controller.speed_m_s = 0.4"));
+        let heavy = "controller.speed_m_s = 0.4\nrobot.response.acceleration_m_s2 = 0.6";
+        let heavy = from_faults(&mission(heavy));
+        assert!(light.len() > 10 && light.len() == heavy.len(), "{light:?}");
+        for ((cause, light), (_, heavy)) in light.into_iter().zip(heavy) {
+            assert!(light.known_s > 0.0 && light.rest_s > light.known_s, "{cause:?}: {light:?}");
+            assert!(heavy.rest_s > light.rest_s && heavy.way_m > light.way_m, "{cause:?}");
+        }
     }
 
     #[test]

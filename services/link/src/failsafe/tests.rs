@@ -516,3 +516,26 @@ fn frames_that_go_elsewhere_while_acknowledgements_come_at_once_show_another_com
     assert_eq!(cause(3, 90, 1), none, "the machine is busy");
     assert_eq!(cause(1000, 5, 1), none, "its motor frames have stopped");
 }
+
+#[test]
+fn a_cause_that_the_log_explains_is_explained_by_what_was_seen_in_a_clause_without_an_end() {
+    for &(by, _, cause) in CASES {
+        let mut failsafe = broken(by);
+        failsafe.decide(false, now());
+        let explained = failsafe.explain(cause, now());
+        // How slow a base is, is told when that is found.
+        let is_promised =
+            rule(cause).unwrap().when.contains("link.log") && cause != Cause::BaseSlow;
+        assert!(!is_promised || explained.is_some(), "{cause:?}");
+        let is_clause = |text: String| text.len() > 20 && !text.ends_with('.');
+        assert!(explained.clone().is_none_or(is_clause), "{cause:?}: {explained:?}");
+    }
+}
+
+#[test]
+fn each_row_says_how_its_cause_ends() {
+    let ends = |cause: Cause| rule(cause).unwrap().clears.to_string();
+    assert_eq!(ends(Cause::CommandStale), "that is over");
+    assert_eq!(ends(Cause::OdometryGivenUp), "the next mission");
+    assert!(ends(Cause::RangeImplausible).contains("`resume`, or that has been over for"));
+}

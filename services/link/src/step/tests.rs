@@ -454,6 +454,7 @@ fn an_abandoned_tick_does_not_keep_the_next_from_starting() {
 
 mod arduino;
 mod held;
+mod json;
 mod lockstep;
 mod model;
 mod robot_health;

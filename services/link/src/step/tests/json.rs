@@ -1,0 +1,37 @@
+//! A robot that speaks JSON.
+
+use super::*;
+
+fn link() -> Link {
+    let text = "target = [3, 0]\nrobot.model = 'kobuki'";
+    let mut link = Link::new(&Mission::parse(text, Path::new("test.toml")).unwrap());
+    link.restore(State { pace: Pace::Rate(1.0), next_tick: 0 });
+    link.at(Event::Order(Order::Drive, HoldReason::None), 0);
+    link
+}
+
+/// The counts of the tick that a robot begins which is at `x` metres by its own odometry.
+fn counts_at(link: &mut Link, x: f64, machine_ns: u64) -> WheelSample {
+    let line = format!("{{\"odometry\":[{x},0,0],\"speeds\":[0,0]}}\n");
+    ticks(&link.at(Event::Datagram(line.as_bytes()), machine_ns))[0].2
+}
+
+#[test]
+fn a_link_goes_on_with_the_odometry_that_the_link_before_it_remembered() {
+    let mut first = link();
+    counts_at(&mut first, 1.0, 0);
+    let memory = first.driver_memory().unwrap();
+    let (mut next, mut forgetful) = (link(), link());
+    next.at(Event::Remember(memory), 0);
+    let [before, after, without] =
+        [&mut first, &mut next, &mut forgetful].map(|link| counts_at(link, 1.1, 100 * MS));
+    assert_eq!(after.left_counts, before.left_counts);
+    assert_ne!(without.left_counts, before.left_counts);
+}
+
+#[test]
+fn a_link_that_ends_tells_its_robot_to_stand() {
+    let mut link = driving(on_the_wall());
+    let last = velocities(&link.at(Event::End, MS));
+    assert_eq!(last, [[Some(0); 2]; STOPS as usize]);
+}
