@@ -114,3 +114,34 @@ fn a_laser_that_is_late_and_turns_slowly_and_says_so_places_the_robot_like_a_pro
         assert!(summary["pose_error_m"].as_f64().unwrap() < 0.1, "{late:?}: {summary}");
     }
 }
+
+/// The run of a robot of 0.9 by 0.4 m with a laser in a room of 8 m, with these targets and walls.
+fn long_robot(robot: &str, targets: &str, walls: &str) -> (Option<i32>, serde_json::Value) {
+    let text = format!(
+        "targets = {targets}\nperimeter = {{ width_m = 8, centre = [1.5, 0] }}\nworld.wall = {walls}\n\
+         [robot]\nmodel = 'jackal'\n\
+         footprint = [[-0.45, -0.2], [0.45, -0.2], [0.45, 0.2], [-0.45, 0.2]]"
+    );
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("long.toml");
+    std::fs::write(&file, text).unwrap();
+    run(robot, file.to_str().unwrap(), &["--seed", "3"])
+}
+
+#[test]
+fn a_long_robot_passes_a_gap_narrower_than_its_length_and_turns_behind_it() {
+    let wall = "[{ points = [[1, -4], [1, -0.35]] }, { points = [[1, 0.35], [1, 4]] }]";
+    let (code, summary) = long_robot("long-gap", "[[2.5, 0.5, 90]]", wall);
+    assert_eq!((code, &summary["collisions"]), (Some(0), &0.into()), "{summary}");
+}
+
+#[test]
+fn a_long_robot_refuses_to_turn_to_its_heading_in_a_corridor_and_touches_nothing() {
+    let walls = "[{ points = [[0.8, 0.4], [3.2, 0.4], [3.2, -0.4], [0.8, -0.4]] }]";
+    let (_, summary) = long_robot("long-corridor", "[[2.2, 0, 90]]", walls);
+    assert_eq!(summary["outcome"], "unreachable", "{summary}");
+    assert_eq!(summary["collisions"], 0, "{summary}");
+    // It drives in, backs out and turns outside.
+    let (code, summary) = long_robot("long-return", "[[2.2, 0], [-0.5, 0, 180]]", walls);
+    assert_eq!((code, &summary["collisions"]), (Some(0), &0.into()), "{summary}");
+}

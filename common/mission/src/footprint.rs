@@ -76,6 +76,20 @@ impl Footprint {
         -self.sides().map(|(from, out)| -out.dot(from)).fold(f64::NEG_INFINITY, f64::max)
     }
 
+    /// A corridor of twice this width lets the body through along x.
+    pub fn half_width_m(&self) -> f64 {
+        let aside = |side: f64| self.corners().iter().map(move |at| side * at.y);
+        aside(1.0).fold(0.0, f64::max).min(aside(-1.0).fold(0.0, f64::max))
+    }
+
+    /// Points of the outline, no farther apart than `step_m`.
+    pub fn outline(&self, step_m: f64) -> impl Iterator<Item = DVec2> + '_ {
+        self.edges().flat_map(move |(from, to)| {
+            let steps = (from.distance(to) / step_m).ceil().max(1.0) as u32;
+            (0..steps).map(move |step| from.lerp(to, f64::from(step) / f64::from(steps)))
+        })
+    }
+
     fn edges(&self) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
         let corners = self.corners();
         corners.iter().zip(corners.iter().cycle().skip(1)).map(|(from, to)| (*from, *to))

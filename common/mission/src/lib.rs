@@ -373,6 +373,13 @@ impl Mission {
             && self.body().ackermann().is_none()
     }
 
+    /// The outline that the planner keeps clear where the circle that covers it does not fit: that of a robot with a laser that looks
+    /// first. Others keep the circle clear.
+    pub fn outline(&self) -> Option<Footprint> {
+        let checks = self.looks_first() && self.used(SensorKind::Scan) > 0;
+        self.body().footprint.filter(|_| checks)
+    }
+
     /// vd: `controller.speed_m_s`, or by default 0.5 for a robot that looks first, 0.7 with infrared rangers, the
     /// body's top speed with a laser; else the paper's 0.25.
     pub fn speed_m_s(&self) -> f64 {

@@ -26,6 +26,9 @@ const TURN_GAIN: f64 = 3.0;
 /// Farther away a robot has not arrived beside its target, whatever the planner says, metres.
 const MOST_OFF_TARGET_M: f64 = 0.5;
 
+/// Whatever the planner says.
+const MOST_BACK_M_S: f64 = 0.2;
+
 const FACES_WITHIN_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
 
 /// (14), with the heading in place of the measured velocity, which has no direction at rest, where every mission starts.
@@ -169,7 +172,7 @@ impl Controller {
                 (Arrival::Arrived, _) => {
                     return CommandSample { state: CommandState::Arrived.into(), ..command };
                 }
-                (Arrival::Turning, Some(heading)) => {
+                (Arrival::Turning, Some(heading)) if self.may_turn(guidance, distance) => {
                     (GuidanceStatus::Look, DVec2::from_angle(heading))
                 }
                 _ => {
@@ -216,8 +219,7 @@ impl Controller {
         if self.arrival.0 != number {
             self.arrival = (number, Arrival::OnTheWay);
         }
-        let beside = GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::AtTarget;
-        let is_there = distance <= self.tolerance || beside && distance <= MOST_OFF_TARGET_M;
+        let is_there = self.is_there(guidance, distance);
         let arrival = &mut self.arrival.1;
         if *arrival == Arrival::OnTheWay && is_there && number != 0 {
             *arrival = Arrival::Turning;
@@ -229,6 +231,18 @@ impl Controller {
             *arrival = Arrival::Arrived;
         }
         *arrival
+    }
+
+    fn is_there(&self, guidance: &GuidanceSample, distance: f64) -> bool {
+        let beside = GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::AtTarget;
+        distance <= self.tolerance || beside && distance <= MOST_OFF_TARGET_M
+    }
+
+    /// A body that is no disc turns to the wanted heading only where the planner sees that it can: there the limit is a number.
+    fn may_turn(&self, guidance: &GuidanceSample, distance: f64) -> bool {
+        let waits = GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::Waiting;
+        let allows = !waits && !guidance.speed_limit_m_s.is_nan();
+        self.mission.outline().is_none() || allows && self.is_there(guidance, distance)
     }
 
     /// None to stand.
@@ -251,6 +265,12 @@ impl Controller {
                 let omega = self.angular(alignment);
                 let v = self.tangential(alignment, omega, distance);
                 Some(Twist { v, omega })
+            }
+            // Back, straight: a body that is no disc may not be able to turn here.
+            (GuidanceStatus::Along | GuidanceStatus::WayOut, SpeedLaw::Evidential)
+                if limit < 0.0 && self.mission.outline().is_some() =>
+            {
+                Some(Twist { v: limit.max(-MOST_BACK_M_S), omega: 0.0 })
             }
             (GuidanceStatus::Along | GuidanceStatus::WayOut, SpeedLaw::Evidential) => {
                 let v = self.cautious(alignment, distance, limit);

@@ -51,9 +51,12 @@ pub(crate) struct Evidential {
 impl Evidential {
     pub(crate) fn new(mission: &Mission) -> Self {
         let grid = mission.grid_frame();
-        let radius = mission.body().radius_m;
+        let disc = mission.body().radius_m;
+        let [body, radius] = mission
+            .outline()
+            .map_or([disc; 2], |outline| [outline.half_width_m(), outline.inscribed_m()]);
         // A position is up to half a cell off the centre that stands for it.
-        let reach = radius + mission.mapper.clearance_m + grid.resolution_m / 2.0;
+        let reach = body + mission.mapper.clearance_m + grid.resolution_m / 2.0;
         let rows = Rows::new(mission);
         let lattice = lattice(mission, reach);
         let under = |along| lattice.cell_at(grid.centre_of(Cell { col: along, row: along }));

@@ -16,6 +16,7 @@ use glam::DVec2;
 
 use crate::{
     near_echoes::{STANDS_BEFORE_M, clear_ahead_m},
+    outline::Outline,
     undetected_surfaces::UndetectedSurfaces,
     view::{STEP_M, View},
 };
@@ -33,9 +34,13 @@ pub(crate) enum Advice {
     Look(DVec2),
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct ActiveSensing {
     radius: f64,
+    /// It must be scanned so far around the way's middle, metres.
+    ground_m: f64,
+    /// None for a disc.
+    pub(crate) outline: Option<Outline>,
     speed: f64,
     turn: f64,
     response: Response,
@@ -57,8 +62,11 @@ impl ActiveSensing {
         let (response, speed) = (mission.body().response, mission.speed_m_s());
         let stops_within_s = mission.hurry().stops_within_s;
         let stops_m = response.way_to_stop_m(speed, stops_within_s);
+        let (radius, outline) = (mission.body().radius_m, mission.outline());
         Self {
-            radius: mission.body().radius_m,
+            radius,
+            ground_m: outline.map_or(radius, |it| it.half_width_m()),
+            outline: outline.map(|it| Outline::new(mission, &it)),
             speed,
             turn: mission.turn_rad_s(),
             response,
@@ -86,7 +94,7 @@ impl ActiveSensing {
         let ahead = &way[..steps.min(way.len())];
         let ground = ahead
             .iter()
-            .flat_map(|&at| view.unscanned(at, self.radius))
+            .flat_map(|&at| view.unscanned(at, self.ground_m))
             .filter_map(|at| (at - pose.position).try_normalize());
         let before = std::iter::once(&pose.position).chain(ahead);
         let surfaces = before.zip(ahead).flat_map(|(&from, &to)| {
@@ -127,7 +135,8 @@ impl ActiveSensing {
             let ahead = pose.along_arc(way, way * curvature);
             let at = ahead.position;
             !view.is_hazard(at)
-                && view.unscanned(at, self.radius).next().is_none()
+                && !self.outline.as_ref().is_some_and(|it| it.touches(view, &ahead))
+                && view.unscanned(at, self.ground_m).next().is_none()
                 && (self.has_laser || undetected.normals(at, ahead.axis()).next().is_none())
         };
         let free = (1..=steps).find(|step| !open(step)).unwrap_or(steps + 1) - 1;

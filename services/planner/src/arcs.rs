@@ -103,7 +103,7 @@ impl Arcs {
 
 impl View<'_> {
     /// Unit vector; zero where the field gives none.
-    fn along(&self, at: DVec2) -> DVec2 {
+    pub(crate) fn along(&self, at: DVec2) -> DVec2 {
         match self.guidance(at) {
             Guidance::Along(direction) | Guidance::WayOut(direction) => direction.into(),
             _ => DVec2::ZERO,

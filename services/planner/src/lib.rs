@@ -9,6 +9,7 @@ mod background_solver;
 mod fault;
 mod field_publisher;
 mod near_echoes;
+mod outline;
 pub mod shell;
 pub mod stage;
 pub mod step;

@@ -7,8 +7,9 @@ use std::sync::Arc;
 
 use common::{
     found_response::FoundResponse,
+    geometry::wrap_angle,
     grid::{Applied, GridFrame, Replica, Window},
-    kinematics::Pose2,
+    kinematics::{LEAST_SPEED_M_S, Pose2},
     mission::{Method, Mission},
     samples::{
         FaultKind, FieldHeader, GridHeader, GuidanceSample, GuidanceStatus, PoseSample,
@@ -22,6 +23,7 @@ use crate::active_sensing::{ActiveSensing, Advice};
 use crate::aim;
 use crate::arcs::Arcs;
 use crate::fault::lead_astray;
+use crate::outline::Passage;
 use crate::view::field_cell;
 use live::{Live, Robot, is_hazard};
 
@@ -30,7 +32,7 @@ pub use output::{Job, Snapshot, Solved, Work};
 /// Speed out of a hazard that the robot stands in, m/s: something is near.
 const WAY_OUT_M_S: f64 = 0.08;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 enum Advisor {
     /// The paper's method, and any without sensing.
     Follow,
@@ -101,6 +103,9 @@ impl Planner {
     /// Here and below, when there is no field: the target is outside the map, or the map is no map.
     pub fn take_grid(&mut self, header: &GridHeader, cells: &[u8]) -> Result<Work, SolveError> {
         let before = self.grid.version();
+        if header.epoch != self.belief.epoch && self.forget_ways() {
+            self.live = None;
+        }
         let work = match self.grid.apply(&header.part, cells) {
             Applied::Missed => return Ok(Work::Missed),
             Applied::Whole => self.solve_first()?,
@@ -134,6 +139,7 @@ impl Planner {
         if before == Some(place) {
             return Ok(Work::None);
         }
+        self.forget_ways();
         let Some(mut live) = self.live.take() else {
             return self.solve_first();
         };
@@ -141,6 +147,15 @@ impl Planner {
         live.target_changed(self.grid.version());
         self.live = Some(live);
         Ok(Work::Stale)
+    }
+
+    /// The way that a body plans through narrow places, and the places that it refused. Returns whether there were any.
+    fn forget_ways(&mut self) -> bool {
+        if let Advisor::LookFirst(ActiveSensing { outline: Some(outline), .. }) = &mut self.advisor
+        {
+            outline.forget_plan();
+        }
+        self.live.as_mut().is_some_and(Live::forget_refused)
     }
 
     fn solve_first(&mut self) -> Result<Work, SolveError> {
@@ -171,6 +186,7 @@ impl Planner {
             changed = !changes.is_empty();
         } else {
             live.map = self.map(&live.frame, aim)?;
+            live.refuse_again()?;
         }
         if changed {
             live.map_changed(before);
@@ -325,7 +341,7 @@ impl Planner {
             }
             (Advisor::Follow | Advisor::Steer(_), _) => return (status, direction, f64::INFINITY),
         };
-        match status {
+        let advice = match status {
             GuidanceStatus::Along => match sensing.advise(&view, &self.belief, pose, direction) {
                 Advice::Look(there) => (GuidanceStatus::Look, there, 0.0),
                 Advice::Go(limit) => (status, direction, limit),
@@ -337,6 +353,45 @@ impl Planner {
             // A false echo may block the way: look around once before the map is reset.
             GuidanceStatus::Unreachable => (status, pose.axis().perp(), 0.0),
             _ => (status, direction, 0.0),
+        };
+        let Some(outline) = &mut sensing.outline else {
+            return advice;
+        };
+        let beside = status == GuidanceStatus::AtTarget;
+        let is_there = beside || pose.position.distance(target) <= self.tolerance_m;
+        let heading = self.target.and_then(|it| it.target.heading()).filter(|_| is_there);
+        if heading
+            .is_some_and(|heading| !outline.turns(&view, pose, wrap_angle(heading - pose.heading)))
+        {
+            return (GuidanceStatus::Unreachable, DVec2::ZERO, f64::NAN);
+        }
+        let (axis, (status, there, limit)) = (pose.axis(), advice);
+        let may_turn = outline.turns(&view, pose, axis.angle_to(there));
+        let slow = match status {
+            GuidanceStatus::Along => limit,
+            GuidanceStatus::Look if !may_turn => LEAST_SPEED_M_S,
+            GuidanceStatus::WayOut if !may_turn => {
+                let ahead = axis.dot(there).signum();
+                return (status, axis, limit.min(WAY_OUT_M_S) * ahead);
+            }
+            GuidanceStatus::Unreachable if !may_turn => return (status, DVec2::ZERO, 0.0),
+            _ => return advice,
+        };
+        match outline.pass(&view, pose, direction) {
+            Passage::Follow(most) => (GuidanceStatus::Along, direction, slow.min(most)),
+            Passage::Turn(there) => (GuidanceStatus::Look, there, 0.0),
+            Passage::Drive(there, most) => {
+                let limit = sensing.limit_before_echoes(&self.belief, pose);
+                (GuidanceStatus::Along, there, most.min(limit))
+            }
+            Passage::Refused(cells) => {
+                let version = self.grid.version();
+                if let Some(live) = self.live.as_mut().filter(|_| !cells.is_empty()) {
+                    // The cells are of the map.
+                    let _ = live.refuse(&cells, version);
+                }
+                (GuidanceStatus::Along, axis, 0.0)
+            }
         }
     }
 

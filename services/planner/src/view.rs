@@ -15,6 +15,8 @@ pub(crate) struct View<'a> {
     /// One [`CellState`] byte a cell, row-major.
     pub(crate) cells: &'a [u8],
     pub(crate) field: &'a Field,
+    /// Cells that the field avoids because the body does not get through there, row-major; empty without any.
+    pub(crate) refused: &'a [bool],
 }
 
 impl View<'_> {
@@ -43,10 +45,23 @@ impl View<'_> {
         self.frame.cell_at(at).is_none_or(|cell| self.state(cell).is_hazard())
     }
 
+    pub(crate) fn has_hazard(&self, at: DVec2, radius: f64) -> bool {
+        self.cells_within(at, radius, 1).any(|cell| self.state(cell).is_hazard())
+    }
+
+    /// Whether `at` lies so deep in hazard: what hazards are inflated by is then nearer than the inflation less `depth_m`.
+    pub(crate) fn is_deep(&self, at: DVec2, depth_m: f64) -> bool {
+        let is_hazard = |cell| self.state(cell).is_hazard();
+        self.frame.cell_at(at).is_some_and(is_hazard)
+            && self.cells_within(at, depth_m, 1).all(is_hazard)
+    }
+
     /// Whether a cell within `radius` changed after the field's map was taken.
     pub(crate) fn has_changed(&self, at: DVec2, radius: f64) -> bool {
-        self.cells_within(at, radius, 1)
-            .any(|cell| self.state(cell).is_hazard() != self.field.is_blocked(field_cell(cell)))
+        self.cells_within(at, radius, 1).any(|cell| {
+            let refused = self.refused.get(self.frame.index(cell)).is_some_and(|it| *it);
+            (refused || self.state(cell).is_hazard()) != self.field.is_blocked(field_cell(cell))
+        })
     }
 
     /// Centres of free and sensed cells within `radius` that the sonar has not scanned.
@@ -58,7 +73,12 @@ impl View<'_> {
     }
 
     /// Cells in every `step`th column and row, with centres within `radius`.
-    fn cells_within(&self, at: DVec2, radius: f64, step: usize) -> impl Iterator<Item = Cell> {
+    pub(crate) fn cells_within(
+        &self,
+        at: DVec2,
+        radius: f64,
+        step: usize,
+    ) -> impl Iterator<Item = Cell> {
         let frame = self.frame;
         let last = f64::from(frame.cells) - 1.0;
         let inside = |corner: DVec2| corner.clamp(DVec2::ZERO, DVec2::splat(last));

@@ -317,3 +317,32 @@ fn a_controller_goes_by_the_response_that_the_link_found_as_if_it_were_stated() 
     told.answer(&guidance, &hostile.into(), MissionTime::default());
     assert_eq!(told.response, before);
 }
+
+/// A body that is no disc.
+fn jackal() -> Controller {
+    let text = "target = [3, 0]\nrobot.model = 'jackal'";
+    Controller::new(&Mission::parse(text, Path::new("test.toml")).unwrap())
+}
+
+#[test]
+fn a_body_that_is_no_disc_backs_along_its_axis_at_a_limit_below_0_and_no_faster_than_0_2() {
+    for (limit, v) in [(-0.1, -0.1), (f64::NEG_INFINITY, -MOST_BACK_M_S)] {
+        let command = jackal().at(facing(0.3), &limited(limit));
+        assert_eq!((command.v_m_s, command.omega_rad_s), (v, 0.0));
+    }
+}
+
+#[test]
+fn a_body_that_is_no_disc_turns_to_a_heading_only_where_the_planner_gives_a_limit() {
+    let target = TargetPoint {
+        heading_rad: FRAC_PI_2,
+        has_heading: 1,
+        ..TargetPoint::at(DVec2::new(3.0, 0.0))
+    };
+    for (limit, short_m, turns) in [(0.0, 0.1, true), (f64::NAN, 0.1, false), (0.5, 0.3, false)] {
+        let mut jackal = jackal();
+        jackal.at(short(0.1), &GuidanceSample { target, ..ahead() });
+        let command = jackal.at(short(short_m), &GuidanceSample { target, ..limited(limit) });
+        assert_eq!(command.omega_rad_s != 0.0, turns, "{limit}: {command:?}");
+    }
+}

@@ -22,7 +22,7 @@ fn advice(heading: f64, hazard: impl Fn(DVec2) -> bool) -> (f64, f64) {
     let target = frame.cell_at(mission.target).unwrap();
     let domain = Domain::new(80, 80, blocked.collect(), field_cell(target)).unwrap();
     let field = Solver::default().solve(&domain, &Cancellation::default()).unwrap();
-    let view = View { frame, cells: &cells, field: &field };
+    let view = View { frame, cells: &cells, field: &field, refused: &[] };
     let pose = Pose2 { heading, ..Pose2::default() };
     let (direction, limit) = Arcs::new(&mission).unwrap().advise(&view, &pose, 1.5);
     (limit, pose.axis().perp_dot(direction))

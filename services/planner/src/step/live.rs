@@ -20,7 +20,7 @@ use common::{
     samples::GuidanceStatus,
 };
 use glam::DVec2;
-use harmonic::{Cell, Change, Domain, Field, Guidance};
+use harmonic::{Cell, Change, Domain, Field, Guidance, SolveError};
 
 use super::output::Job;
 use crate::view::{View, field_cell};
@@ -57,13 +57,23 @@ pub(super) struct Live {
     field_version: u64,
     /// It leads to the target before, so it is not followed.
     leads_elsewhere: bool,
+    /// Row-major; empty without any.
+    refused: Vec<bool>,
     state: State,
 }
 
 impl Live {
     pub(super) fn new(frame: GridFrame, map: Domain, field: Field) -> Self {
         let field = Arc::new(field);
-        Self { frame, map, field, field_version: 0, leads_elsewhere: false, state: State::Current }
+        Self {
+            frame,
+            map,
+            field,
+            field_version: 0,
+            leads_elsewhere: false,
+            refused: Vec::new(),
+            state: State::Current,
+        }
     }
 
     pub(super) fn is_small(&self) -> bool {
@@ -169,7 +179,35 @@ impl Live {
     }
 
     pub(super) fn view<'a>(&'a self, cells: &'a [u8]) -> View<'a> {
-        View { frame: self.frame, cells, field: &self.field }
+        View { frame: self.frame, cells, field: &self.field, refused: &self.refused }
+    }
+
+    pub(super) fn is_refused(&self, cell: grid::Cell) -> bool {
+        self.refused.get(self.frame.index(cell)).is_some_and(|it| *it)
+    }
+
+    /// The field is not to lead through `cells` of a map of `version` any more.
+    pub(super) fn refuse(&mut self, cells: &[grid::Cell], version: u64) -> Result<(), SolveError> {
+        self.refused.resize(self.frame.area(), false);
+        cells.iter().for_each(|cell| self.refused[self.frame.index(*cell)] = true);
+        self.map_changed(version);
+        self.refuse_again()
+    }
+
+    /// `map` is new.
+    pub(super) fn refuse_again(&mut self) -> Result<(), SolveError> {
+        let refused = self.refused.iter().enumerate().filter(|(_, refused)| **refused);
+        let side = self.frame.cells as usize;
+        let cells = refused.map(|(index, _)| Cell::new(index % side, index / side));
+        let cells = cells.filter(|cell| *cell != self.map.target());
+        let changes: Vec<_> = cells.map(|cell| Change { cell, blocked: true }).collect();
+        self.map.apply(&changes)
+    }
+
+    /// Returns whether there were any. They are in `map` until it is new.
+    pub(super) fn forget_refused(&mut self) -> bool {
+        let refused = std::mem::take(&mut self.refused);
+        refused.contains(&true)
     }
 
     /// The field leads to a cell beside the target, and the robot is there.
@@ -183,7 +221,7 @@ impl Live {
     /// Cells whose hazard differs between `cells` and the map.
     pub(super) fn changes_in(&self, window: Window, cells: &[u8]) -> Vec<Change> {
         let changed = window.cells().filter_map(|cell| {
-            let blocked = is_hazard(cells[self.frame.index(cell)]);
+            let blocked = is_hazard(cells[self.frame.index(cell)]) || self.is_refused(cell);
             let cell = field_cell(cell);
             // The target's cell counts as free.
             let changed = cell != self.map.target() && blocked != self.map.is_blocked(cell);

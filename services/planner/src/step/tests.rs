@@ -473,3 +473,58 @@ fn on_a_large_map_the_robot_waits_until_the_field_leads_to_its_new_target() {
     assert_eq!(status(&guidance), GuidanceStatus::Along);
     assert!(guidance.ex < -0.9, "{guidance:?}");
 }
+
+/// A planner of a robot of 0.9 by 0.4 m with a laser, in a scanned room with hazard where `hazard` says so, and what it was told.
+fn long_in_room(target: &str, hazard: impl Fn(DVec2) -> bool) -> (Planner, GridHeader, Vec<u8>) {
+    let text = format!(
+        "{target}\nrobot.model = 'jackal'\nperimeter = {{ width_m = 4, cells = 80 }}\n\
+         robot.footprint = [[-0.45, -0.2], [0.45, -0.2], [0.45, 0.2], [-0.45, 0.2]]"
+    );
+    let mission = Mission::parse(&text, Path::new("test.toml")).unwrap();
+    let mut planner = sent(&mission);
+    let (header, mut cells) = keyframe_of(mission.grid_frame(), 1, hazard);
+    for cell in cells.iter_mut().filter(|cell| **cell == CellState::Free as u8) {
+        *cell = CellState::Scanned as u8;
+    }
+    assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::Solved);
+    (planner, header, cells)
+}
+
+#[test]
+fn the_field_leads_past_a_bend_that_the_body_refused_until_the_map_is_reset() {
+    // Two walls 0.55 m apart, each with a gap, grown by half the body's width; there is a way around both at y = -1.5.
+    let wall = |at: DVec2, x: f64, gap: f64| {
+        (at.x - x).abs() < 0.255 && at.y > -1.0 && (at.y - gap).abs() > 0.05
+    };
+    let hazard = |at: DVec2| wall(at, 0.3, 0.0) || wall(at, 0.85, 1.0);
+    let (mut planner, header, cells) = long_in_room("target = [1.5, 1.0]", hazard);
+    let start = at(-0.3, 0.0);
+    let first = planner.ask(&start);
+    assert!(first.speed_limit_m_s == 0.0, "it does not go in: {first:?}");
+    let mut led = first;
+    for _ in 0..30 {
+        planner.end_tick().unwrap();
+        led = planner.ask(&start);
+    }
+    assert!(led.ey < -0.5 && status(&led) != GuidanceStatus::Unreachable, "{led:?}");
+    let reset = GridHeader { epoch: 1, part: Part { version: 2, ..header.part }, ..header };
+    planner.take_grid(&reset, &cells).unwrap();
+    assert_eq!(planner.ask(&start).speed_limit_m_s, 0.0, "the refusal is forgotten");
+}
+
+#[test]
+fn a_long_body_is_not_turned_to_a_targets_heading_where_it_would_touch() {
+    let between = |at: DVec2| at.y.abs() > 0.06;
+    for (hazard, refuses) in [(&between as &dyn Fn(DVec2) -> bool, true), (&|_| false, false)] {
+        let (mut planner, ..) = long_in_room("target = [1.0, 0]", hazard);
+        let turned = TargetPoint {
+            heading_rad: std::f64::consts::FRAC_PI_2,
+            has_heading: 1,
+            ..TargetPoint::at(DVec2::new(1.0, 0.0))
+        };
+        let target = TargetSample { number: 1, last: 1, target: turned, ..Default::default() };
+        planner.take_target(&target).unwrap();
+        let guidance = planner.ask(&at(1.0, 0.0));
+        assert_eq!(guidance.speed_limit_m_s.is_nan(), refuses, "{guidance:?}");
+    }
+}

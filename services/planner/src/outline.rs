@@ -1,0 +1,355 @@
+//! A body that is no disc gets through where the circle that covers it does not fit.
+//!
+//! Hazards are inflated by half the body's width, so the field leads wherever the body may fit. From each pose the way that the controller
+//! would take along the field is followed with its heading. Where the outline would touch, a search over poses (hybrid A*: forward along
+//! arcs, on the spot, back) finds how to get to the field's next place in the open. Where that fails, the body does not get through:
+//! cells at the narrow place are refused, no more than the covering circle would make hazard, and the field leads elsewhere.
+
+use std::{cmp::Reverse, collections::BinaryHeap, collections::HashSet, f64::consts::PI};
+
+use common::{
+    geometry::wrap_angle,
+    grid::Cell,
+    kinematics::{LEAST_SPEED_M_S, Pose2},
+    mission::{Footprint, Mission, Response},
+};
+use glam::DVec2;
+
+use crate::view::{STEP_M, View};
+
+/// The most speed where the covering circle does not fit, m/s, and back.
+const NARROW_M_S: f64 = 0.5;
+const BACK_M_S: f64 = 0.2;
+/// The controller's way is followed so many radii of the covering circle far.
+const AHEAD: f64 = 2.0;
+/// A pose that touches by the margin may be left if the outline stays so much deeper outside of things, metres.
+const SQUEEZED_M: f64 = 0.03;
+/// The turn of a step, radians, and the length of one, metres.
+const TURN_RAD: f64 = PI / 16.0;
+const WAY_M: f64 = 0.1;
+/// Way and turn of the steps of the search.
+const STEPS: [[f64; 2]; 6] = [
+    [WAY_M, 0.0],
+    [WAY_M, TURN_RAD],
+    [WAY_M, -TURN_RAD],
+    [0.0, TURN_RAD],
+    [0.0, -TURN_RAD],
+    [-WAY_M, 0.0],
+];
+/// A radian costs as much as so many metres, and a metre back as two ahead.
+const TURN_COSTS_M: f64 = 0.25;
+/// A step is over so near to its end, and a plan if the robot is so far off.
+const TURNED_RAD: f64 = 0.05;
+const ARRIVED_M: f64 = 0.02;
+const MOST_OFF_M: f64 = 0.1;
+/// The search ends so near to its goal, metres.
+const NEAR_M: f64 = 0.15;
+/// The goal of a search is on the field's way within this length, metres.
+const GOAL_WITHIN_M: f64 = 2.0;
+/// Most poses that a search follows.
+const MOST_POSES: usize = 5_000;
+
+/// What the body does about the field's direction.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Passage {
+    /// It follows it, no faster than this, m/s.
+    Follow(f64),
+    /// On the spot to this unit vector.
+    Turn(DVec2),
+    /// Along this unit vector, no faster than this, m/s; back along its axis if that is negative.
+    Drive(DVec2, f64),
+    /// It does not get through these cells; none if it cannot move at all.
+    Refused(Vec<Cell>),
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Outline {
+    /// Of the body's frame, no farther apart than a cell of the map.
+    points: Vec<DVec2>,
+    half_width: f64,
+    covers: f64,
+    speed: f64,
+    turn: f64,
+    /// Cosine of the angle beyond which the controller turns on the spot.
+    turns: f64,
+    response: Response,
+    stops_within_s: f64,
+    /// The rest of the way that was found, its next step last.
+    plan: Vec<Planned>,
+}
+
+/// The end of a step.
+#[derive(Clone, Copy, Debug)]
+struct Planned {
+    pose: Pose2,
+    step: [f64; 2],
+}
+
+impl Planned {
+    /// A robot at `pose` has made the step.
+    fn is_over(&self, pose: &Pose2) -> bool {
+        let [way, turn] = self.step;
+        let left_m = (self.pose.position - pose.position).dot(self.pose.axis());
+        let left_rad = wrap_angle(self.pose.heading - pose.heading);
+        match way == 0.0 {
+            true => left_rad * turn.signum() <= TURNED_RAD,
+            false => left_m * way.signum() <= ARRIVED_M,
+        }
+    }
+
+    /// A robot at `pose` is not where the step begins or goes on.
+    fn is_elsewhere(&self, pose: &Pose2) -> bool {
+        let off = self.pose.position - pose.position;
+        let turned = wrap_angle(self.pose.heading - pose.heading).abs();
+        match self.step[0] == 0.0 {
+            true => off.length() > MOST_OFF_M,
+            false => self.pose.axis().perp_dot(off).abs() > MOST_OFF_M || turned > 2.0 * TURN_RAD,
+        }
+    }
+}
+
+/// A pose of a search.
+#[derive(Clone, Copy, Debug)]
+struct Reached {
+    pose: Pose2,
+    /// The pose before, and the step from there.
+    from: usize,
+    step: [f64; 2],
+    cost_m: f64,
+}
+
+impl Outline {
+    pub(crate) fn new(mission: &Mission, footprint: &Footprint) -> Self {
+        let (body, hurry) = (mission.body(), mission.hurry());
+        Self {
+            points: footprint.outline(mission.grid_frame().resolution_m).collect(),
+            half_width: footprint.half_width_m(),
+            covers: body.radius_m,
+            speed: mission.speed_m_s().min(NARROW_M_S),
+            turn: mission.turn_rad_s(),
+            turns: hurry.turns_beyond_deg.to_radians().cos(),
+            response: body.response,
+            stops_within_s: hurry.stops_within_s,
+            plan: Vec::new(),
+        }
+    }
+
+    /// Points of the outline at `pose` that are nearer to a thing than the inflation's margin, or that less `squeezed` metres.
+    fn touching(
+        &self,
+        view: &View<'_>,
+        pose: &Pose2,
+        squeezed: f64,
+    ) -> impl Iterator<Item = DVec2> {
+        let (axis, position, depth) = (pose.axis(), pose.position, self.half_width + squeezed);
+        let points = self.points.iter().map(move |point| position + axis.rotate(*point));
+        points.filter(move |at| view.is_deep(*at, depth))
+    }
+
+    pub(crate) fn touches(&self, view: &View<'_>, pose: &Pose2) -> bool {
+        self.touching(view, pose, 0.0).next().is_some()
+    }
+
+    /// The covering circle does not fit.
+    pub(crate) fn is_narrow(&self, view: &View<'_>, at: DVec2) -> bool {
+        view.has_hazard(at, self.covers - self.half_width)
+    }
+
+    /// Whether the body turns by `angle` on the spot without a touch.
+    pub(crate) fn turns(&self, view: &View<'_>, pose: &Pose2, angle: f64) -> bool {
+        let steps = (angle.abs() / TURN_RAD * 2.0).ceil();
+        !self.is_narrow(view, pose.position)
+            || (1..=steps as u32).all(|step| {
+                let turn = angle * f64::from(step) / steps;
+                !self.touches(view, &pose.along_arc(0.0, turn))
+            })
+    }
+
+    /// How a body at `pose` gets on in the field's `direction`, a unit vector.
+    pub(crate) fn pass(&mut self, view: &View<'_>, pose: &Pose2, direction: DVec2) -> Passage {
+        if let Some(passage) = self.go_on(view, pose) {
+            return passage;
+        }
+        match self.follow(view, pose, direction) {
+            Some(false) => Passage::Follow(f64::INFINITY),
+            // On the spot, the controller may turn to either side.
+            Some(true) if pose.axis().dot(direction) < 0.0 => {
+                let left = pose.axis().perp_dot(direction) > 0.0;
+                Passage::Turn(if left { pose.axis().perp() } else { -pose.axis().perp() })
+            }
+            Some(true) => Passage::Follow(self.speed),
+            None => match self.search(view, pose, direction) {
+                Ok(plan) => {
+                    self.plan = plan;
+                    self.go_on(view, pose).unwrap_or(Passage::Refused(Vec::new()))
+                }
+                Err(cells) => Passage::Refused(cells),
+            },
+        }
+    }
+
+    /// Whether a body that is at `pose` fits elsewhere. One that touches by the margin leaves, and comes no nearer.
+    fn fits(&self, view: &View<'_>, pose: &Pose2) -> impl Fn(&Pose2) -> bool {
+        let (squeezed, allowed) = match self.touches(view, pose) {
+            true => (SQUEEZED_M, self.touching(view, pose, SQUEEZED_M).count()),
+            false => (0.0, 0),
+        };
+        move |at| self.touching(view, at, squeezed).nth(allowed).is_none()
+    }
+
+    /// The next step of the plan; none without a plan. One that touches by now, or is not where the robot is, is over.
+    fn go_on(&mut self, view: &View<'_>, pose: &Pose2) -> Option<Passage> {
+        while self.plan.pop_if(|next| next.is_over(pose)).is_some() {}
+        let Planned { step: [way, turn], .. } = *self.plan.last()?;
+        let run = self.plan.iter().rev().take_while(|it| it.step[0] == way);
+        let room_m = run.clone().count() as f64 * WAY_M;
+        let speed = self.response.speed_to_stop_within(room_m, self.stops_within_s);
+        let speed = speed.max(LEAST_SPEED_M_S);
+        let fits = self.fits(view, pose);
+        let moves = |way, turn| {
+            [0.5, 1.0].iter().all(|share| fits(&pose.along_arc(share * way, share * turn)))
+        };
+        let passage = if way == 0.0 {
+            let left = |to: &Planned| wrap_angle(to.pose.heading - pose.heading) * turn.signum();
+            let ahead = run.map(left).take_while(|left| *left < PI / 2.0).fold(0.0, f64::max);
+            let there = pose.along_arc(0.0, ahead * turn.signum());
+            let next = ahead.min(TURN_RAD) * turn.signum();
+            moves(0.0, next).then_some(Passage::Turn(there.axis()))
+        } else if way < 0.0 {
+            let speed = speed.min(BACK_M_S);
+            moves(way, 0.0).then_some(Passage::Drive(pose.axis(), -speed))
+        } else {
+            // Pure pursuit of a place after the next two steps, or the step itself.
+            let to = run.take(2).last()?.pose;
+            let to = to.position + WAY_M * to.axis() - pose.position;
+            let pursuit = 2.0 * pose.axis().perp_dot(to) / to.length_squared();
+            let speed = speed.min(self.speed);
+            // (15): the controller's turn rate is that of the sine.
+            let sines = [pursuit, turn / way].map(|curvature| curvature * speed / self.turn);
+            let mut sines = sines.into_iter().map(|sine| sine.clamp(-0.9, 0.9));
+            let sine = sines.find(|sine| moves(way, way * sine * self.turn / speed));
+            sine.map(|sine| Passage::Drive(pose.along_arc(0.0, sine.asin()).axis(), speed))
+        };
+        let is_valid =
+            self.plan.iter().all(|it| fits(&it.pose)) && !self.plan.last()?.is_elsewhere(pose);
+        drop(fits);
+        let passage = passage.filter(|_| is_valid);
+        if passage.is_none() {
+            self.plan.clear();
+        }
+        passage
+    }
+
+    pub(crate) fn forget_plan(&mut self) {
+        self.plan.clear();
+    }
+
+    /// Whether the controller's way is narrow anywhere; none if the body touches on it.
+    fn follow(&self, view: &View<'_>, pose: &Pose2, direction: DVec2) -> Option<bool> {
+        let (mut at, mut along, mut way, mut narrow) = (*pose, direction, 0.0, false);
+        while way < AHEAD * self.covers && along != DVec2::ZERO {
+            let (cosine, sine) = (at.axis().dot(along), at.axis().perp_dot(along));
+            if cosine < self.turns {
+                let angle = sine.atan2(cosine);
+                at = at.along_arc(0.0, angle.clamp(-TURN_RAD / 2.0, TURN_RAD / 2.0));
+            } else {
+                at = at.along_arc(STEP_M, STEP_M * self.turn * sine / self.speed);
+                way += STEP_M;
+                along = view.along(at.position);
+            }
+            if self.is_narrow(view, at.position) {
+                narrow = true;
+                if self.touches(view, &at) {
+                    return None;
+                }
+            }
+        }
+        Some(narrow)
+    }
+
+    /// The field's way into the open, or as far as it is looked at.
+    fn way_out(&self, view: &View<'_>, pose: &Pose2, direction: DVec2) -> Vec<DVec2> {
+        let mut way = view.way(pose.position, direction, GOAL_WITHIN_M);
+        let is_narrow = |at: &DVec2| self.is_narrow(view, *at);
+        let least = ((AHEAD * self.covers / STEP_M) as usize).min(way.len());
+        if let Some(open) = way[least..].iter().position(|at| !is_narrow(at)) {
+            way.truncate(least + open + 1);
+        }
+        way
+    }
+
+    /// The plan, or the narrow cells that the body does not get through.
+    fn search(
+        &self,
+        view: &View<'_>,
+        pose: &Pose2,
+        direction: DVec2,
+    ) -> Result<Vec<Planned>, Vec<Cell>> {
+        let way = self.way_out(view, pose, direction);
+        let goal = way.last().copied().unwrap_or(pose.position);
+        let along = view.along(goal);
+        let is_open = !self.is_narrow(view, goal);
+        let ends = |at: &Pose2| {
+            let is_along = along == DVec2::ZERO || at.axis().dot(along).abs() > 0.9;
+            at.position.distance(goal) <= NEAR_M && (is_open || is_along)
+        };
+        let fits = self.fits(view, pose);
+        let key = |at: &Pose2| {
+            let turn = (wrap_angle(at.heading) / TURN_RAD).round() as i32;
+            view.frame.cell_at(at.position).map(|cell| (cell, turn.rem_euclid(32)))
+        };
+        let mut reached = vec![Reached { pose: *pose, from: 0, step: [0.0; 2], cost_m: 0.0 }];
+        let mut open = BinaryHeap::from([(Reverse(0), 0)]);
+        let mut closed = HashSet::new();
+        while let Some((_, index)) = open.pop()
+            && closed.len() < MOST_POSES
+        {
+            let Reached { pose: at, cost_m, .. } = reached[index];
+            if !key(&at).is_some_and(|key| closed.insert(key)) {
+                continue;
+            }
+            if index > 0 && ends(&at) {
+                let mut plan = Vec::new();
+                let mut index = index;
+                while index > 0 {
+                    let Reached { pose, step, from, .. } = reached[index];
+                    plan.push(Planned { pose, step });
+                    index = from;
+                }
+                return Ok(plan);
+            }
+            for step in STEPS {
+                let [way, turn] = step;
+                let [middle, end] = [0.5, 1.0].map(|share| at.along_arc(share * way, share * turn));
+                let is_known = key(&end).is_none_or(|key| closed.contains(&key));
+                if is_known || view.is_hazard(end.position) || !fits(&middle) || !fits(&end) {
+                    continue;
+                }
+                let back = if way < 0.0 { 2.0 } else { 1.0 };
+                let cost_m = cost_m + back * way.abs() + TURN_COSTS_M * turn.abs();
+                let estimate_mm = 1e3 * (cost_m + end.position.distance(goal));
+                open.push((Reverse(estimate_mm as u32), reached.len()));
+                reached.push(Reached { pose: end, from: index, step, cost_m });
+            }
+        }
+        Err(self.refused(view, &way, &reached))
+    }
+
+    /// The narrow cells where the field's `way` goes on from what was `reached`.
+    fn refused(&self, view: &View<'_>, way: &[DVec2], reached: &[Reached]) -> Vec<Cell> {
+        let is_reached =
+            |at: &DVec2| reached.iter().any(|it| it.pose.position.distance(*at) <= NEAR_M);
+        let on = way.iter().rposition(is_reached).map_or(0, |last| last + 1);
+        let start = reached[0].pose.position;
+        let narrow = way[on.min(way.len())..].iter().find(|at| self.is_narrow(view, **at));
+        let cells = narrow.map(|&at| view.cells_within(at, self.covers, 1));
+        let cells = cells.into_iter().flatten().filter(|cell| {
+            let at = view.frame.centre_of(*cell);
+            at.distance(start) > NEAR_M && !view.is_hazard(at) && self.is_narrow(view, at)
+        });
+        cells.collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;

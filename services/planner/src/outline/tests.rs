@@ -1,0 +1,159 @@
+use std::path::Path;
+
+use common::grid::CellState;
+use harmonic::{Cancellation, Domain, Field, Solver};
+
+use super::*;
+use crate::view::field_cell;
+
+/// What hazards are inflated by: half the width and the mapper's margin.
+const INFLATED_M: f64 = 0.2 + 0.055;
+
+/// A robot of 0.9 by 0.4 m with a laser, in a square of 4 m whose target is 1.5 m ahead along x.
+fn long() -> (Mission, Outline) {
+    let text = "target = [1.5, 0]\nrobot.model = 'jackal'\n\
+         robot.footprint = [[-0.45, -0.2], [0.45, -0.2], [0.45, 0.2], [-0.45, 0.2]]\n\
+         perimeter = { width_m = 4, cells = 80 }";
+    let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
+    let outline = Outline::new(&mission, &mission.outline().unwrap());
+    (mission, outline)
+}
+
+/// The map among things whose distance from a place is `clearance`, and its field.
+fn room(mission: &Mission, clearance: impl Fn(DVec2) -> f64) -> (Vec<u8>, Field) {
+    let frame = mission.grid_frame();
+    let state = |cell: Cell| match frame.is_rim(cell) {
+        true => CellState::Perimeter,
+        false if clearance(frame.centre_of(cell)) <= INFLATED_M => CellState::Margin,
+        false => CellState::Scanned,
+    };
+    let cells: Vec<u8> = frame.whole().cells().map(|cell| state(cell) as u8).collect();
+    let blocked = cells.iter().map(|&cell| CellState::from_byte(cell).is_hazard());
+    let target = field_cell(frame.cell_at(mission.target).unwrap());
+    let domain = Domain::new(80, 80, blocked.collect(), target).unwrap();
+    let field = Solver::default().solve(&domain, &Cancellation::default()).unwrap();
+    (cells, field)
+}
+
+fn view<'a>(mission: &Mission, (cells, field): &'a (Vec<u8>, Field)) -> View<'a> {
+    View { frame: mission.grid_frame(), cells, field, refused: &[] }
+}
+
+fn pose(x: f64, y: f64, heading_deg: f64) -> Pose2 {
+    Pose2 { position: DVec2::new(x, y), heading: heading_deg.to_radians() }
+}
+
+/// The distance from a wall across the room at x = 0.3 with a gap of 0.6 m.
+fn gap(at: DVec2) -> f64 {
+    DVec2::new((at.x - 0.3).abs(), (0.3 - at.y.abs()).max(0.0)).length()
+}
+
+#[test]
+fn an_outline_touches_what_is_nearer_than_the_margin_and_nothing_else() {
+    let (mission, outline) = long();
+    let footprint = mission.outline().unwrap();
+    let mut touched = 0;
+    for n in 0..400 {
+        let n = f64::from(n);
+        let at = pose(0.5 * (n * 0.7).sin(), 0.5 * (n * 1.3).cos(), n * 37.0);
+        let post = DVec2::new(0.4 * (n * 0.31).sin(), 0.4 * (n * 0.17).cos());
+        let map = room(&mission, |place| place.distance(post));
+        let local = DVec2::from_angle(-at.heading).rotate(post - at.position);
+        let (gap_m, _) = footprint.gap_to_point(local);
+        let touches = outline.touches(&view(&mission, &map), &at);
+        // A post within the body is on its outline before.
+        if gap_m.abs() < 0.04 {
+            assert!(touches, "{gap_m} m");
+            touched += 1;
+        }
+        assert!(!touches || gap_m < 0.11, "{gap_m} m");
+    }
+    assert!(touched > 20, "{touched}");
+}
+
+#[test]
+fn a_long_body_turns_in_the_open_and_not_between_walls() {
+    let (mission, outline) = long();
+    let map = room(&mission, |at| (at.y.abs() - 0.35).abs());
+    let between = view(&mission, &map);
+    let along = pose(-1.0, 0.0, 0.0);
+    assert!(!outline.touches(&between, &along));
+    assert!(outline.touches(&between, &pose(-1.0, 0.0, 90.0)));
+    assert!(outline.turns(&between, &along, 0.1) && !outline.turns(&between, &along, PI));
+    let empty = room(&mission, |_| f64::INFINITY);
+    assert!(outline.turns(&view(&mission, &empty), &along, PI));
+}
+
+/// The place where a body that starts at `pose` ends: it does what it is told for so many steps.
+fn drive(mission: &Mission, map: &(Vec<u8>, Field), outline: &Outline, start: Pose2) -> Pose2 {
+    let mut outline = outline.clone();
+    let (view, mut at) = (view(mission, map), start);
+    for _ in 0..300 {
+        let direction = view.along(at.position);
+        if at.position.distance(mission.target) < 0.1 || direction == DVec2::ZERO {
+            break;
+        }
+        let (there, way) = match outline.pass(&view, &at, direction) {
+            Passage::Follow(_) if at.axis().dot(direction) < outline.turns => (direction, 0.0),
+            Passage::Follow(_) => (direction, 0.03),
+            Passage::Turn(there) => (there, 0.0),
+            Passage::Drive(there, limit) => (there, 0.03 * limit.signum()),
+            Passage::Refused(_) => break,
+        };
+        let angle = at.axis().angle_to(there);
+        let turn = if way == 0.0 { angle.clamp(-0.1, 0.1) } else { 4.8 * angle.sin() * way };
+        at = at.along_arc(way, if way < 0.0 { 0.0 } else { turn });
+        assert!(!outline.touches(&view, &at), "at {at:?}");
+    }
+    at
+}
+
+#[test]
+fn a_long_body_passes_a_gap_narrower_than_its_length_from_any_side_and_touches_nothing() {
+    let (mission, outline) = long();
+    let map = room(&mission, gap);
+    assert!(outline.is_narrow(&view(&mission, &map), DVec2::new(0.3, 0.0)));
+    for (start, y) in [(0.0, 0.0), (90.0, 0.0), (-135.0, 0.9), (180.0, 0.0), (60.0, -1.2)] {
+        let end = drive(&mission, &map, &outline, pose(-1.0, y, start));
+        assert!(end.position.distance(mission.target) < 0.2, "{start}: {end:?}");
+    }
+}
+
+#[test]
+fn a_long_body_that_faces_a_dead_end_backs_out() {
+    let (mission, outline) = long();
+    // A corridor 0.7 m wide around the body, closed ahead, whose way out is behind.
+    let pocket = |at: DVec2| {
+        let aside = DVec2::new((-0.3 - at.x).max(0.0).max(at.x - 1.0), at.y.abs() - 0.35);
+        let end = DVec2::new(at.x - 1.0, (at.y.abs() - 0.35).max(0.0)).length();
+        aside.length().min(end)
+    };
+    let map = room(&mission, pocket);
+    let start = pose(0.3, 0.0, 0.0);
+    let passage = outline.clone().pass(&view(&mission, &map), &start, DVec2::NEG_X);
+    assert!(matches!(passage, Passage::Drive(_, limit) if limit < 0.0), "{passage:?}");
+    let end = drive(&mission, &map, &outline, start);
+    assert!(end.position.distance(mission.target) < 0.2, "{end:?}");
+}
+
+#[test]
+fn narrow_cells_where_a_long_body_cannot_turn_are_refused() {
+    let (mission, outline) = long();
+    // Behind the gap, 0.6 m farther, a wall with a gap 1.2 m aside: between them the body would have to turn.
+    let bend = |at: DVec2| {
+        let beside = DVec2::new((at.x - 0.9).abs(), (0.3 - (at.y - 1.2).abs()).max(0.0));
+        gap(at).min(beside.length())
+    };
+    let map = room(&mission, bend);
+    let view = view(&mission, &map);
+    let start = pose(-0.3, 0.0, 0.0);
+    let passage = outline.clone().pass(&view, &start, view.along(start.position));
+    let Passage::Refused(cells) = passage else {
+        panic!("the body does not get through: {passage:?}");
+    };
+    assert!(!cells.is_empty());
+    for cell in cells {
+        let at = view.frame.centre_of(cell);
+        assert!(outline.is_narrow(&view, at) && at.distance(start.position) > NEAR_M, "{at}");
+    }
+}
