@@ -7,6 +7,7 @@ pub mod base_response;
 pub mod battery;
 pub mod commander;
 mod contact;
+mod deafness;
 pub mod latency_monitor;
 pub mod monitor;
 pub mod odometry;
@@ -235,7 +236,7 @@ pub const TABLE: &[Rule] = &[
     },
     Rule {
         cause: Cause::RangeImplausible,
-        when: "the front sonar says the same within 1 cm to either side while the robot drives 0.4 m or turns by 90 degrees, another sensor while it turns by 90 degrees on the spot, or within 7 cm for 1.8 times as much; two of three readings do not follow from those before; scans change as if they were 0.3 s late or more, or the robot stood; or the front sonar hears nothing more than 4 times in a row of a surface nearer than 0.45 m that the two infrared rangers beside it see within 12 degrees of square; `link.log` names the sensor",
+        when: "the front sonar says the same within 1 cm to either side while the robot drives 0.4 m or turns by 90 degrees, another sensor while it turns by 90 degrees on the spot, or within 7 cm for 1.8 times as much; two of three readings do not follow from those before; scans change as if they were 0.3 s late or more, or the robot stood; or the front sonar hears nothing more than 4 times in a row of a surface nearer than 0.45 m that the two infrared rangers beside it see within 12 degrees of square; or no sensor reads anything while readings at the end of the infrared rangers' scale are due, or none ever has for twice as far as the sensors reach; `link.log` names the sensor",
         action: Action::Stop,
         clears: Clears::OnResume { or_after: Some(range::CHANGES) },
         known_within_s: Some(range::known_within_s),
@@ -267,7 +268,7 @@ pub const TABLE: &[Rule] = &[
     },
     Rule {
         cause: Cause::RangeDoubtful,
-        when: "half of what makes a ranging sensor implausible; a robot that goes slowly shows whether it is; `link.log` names the sensor",
+        when: "half of what makes a ranging sensor implausible, or no reading of any for as far as they reach; a robot that goes slowly shows whether it is; `link.log` names the sensor",
         action: Action::Slow,
         clears: Clears::After(range::CHANGES),
         known_within_s: None,

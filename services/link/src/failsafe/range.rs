@@ -22,6 +22,7 @@ use common::{
 };
 
 use super::{
+    deafness::Deafness,
     monitor::{Condition, Counts, Moment, Monitor, Observation},
     scan_motion::ScanMotion,
     undetected_surface::UndetectedSurface,
@@ -208,6 +209,7 @@ pub struct Range {
     rows: Vec<Row>,
     scans: Vec<ScanMotion>,
     undetected: Option<UndetectedSurface>,
+    deafness: Deafness,
 }
 
 impl Range {
@@ -224,6 +226,7 @@ impl Range {
             };
             self.pose = self.pose.along_arc(twist.v, twist.omega);
             self.way_m += twist.v;
+            self.deafness.went(twist.v);
             if twist.v.abs() < ON_THE_SPOT * twist.omega.abs() * self.body.track_m / 2.0 {
                 self.spot_rad += twist.omega;
             }
@@ -239,6 +242,7 @@ impl Range {
             (row.past, row.implausible) = (Past::default(), [None; 2]);
         }
         self.scans.iter_mut().for_each(ScanMotion::reset);
+        self.deafness.reset();
         if let Some(undetected) = &mut self.undetected {
             undetected.reset();
         }
@@ -262,6 +266,7 @@ impl Monitor for Range {
             rows: others.into_iter().map(|(row, sensor)| Row::of(row, sensor, front)).collect(),
             scans: lasers.into_iter().map(|(row, sensor)| ScanMotion::new(row, sensor)).collect(),
             undetected: UndetectedSurface::of(mission),
+            deafness: Deafness::of(mission),
         }
     }
 
@@ -278,6 +283,7 @@ impl Monitor for Range {
                 if let Some(undetected) = &mut self.undetected {
                     undetected.take(readings);
                 }
+                self.deafness.take(readings);
             }
             Observation::Scan(scan, at_s) => {
                 if let Some(scans) = self.scans.iter_mut().find(|scans| scans.row == scan.row) {
@@ -299,6 +305,7 @@ impl Monitor for Range {
         let surface = self.undetected.as_ref().filter(|_| sure);
         if surface.is_some_and(UndetectedSurface::is_implausible)
             || self.scans.iter().any(|scans| scans.is_implausible(sure))
+            || self.deafness.is_implausible(sure)
         {
             return Condition::Holds;
         }
@@ -320,6 +327,9 @@ impl Monitor for Range {
         }
         if let Some(scans) = self.scans.iter().find(|scans| scans.is_implausible(false)) {
             return scans.explain();
+        }
+        if self.deafness.is_implausible(false) {
+            return Some(self.deafness.explain());
         }
         let newest = |row: &&Row| row.implausible[0].map(|at| now.time.since(at.time));
         let implausible = self.rows.iter().filter(|row| row.implausible[0].is_some());
