@@ -24,6 +24,7 @@ use common::{
 use super::{
     deafness::Deafness,
     monitor::{Condition, Counts, Moment, Monitor, Observation},
+    range_motion::RangeMotion,
     scan_motion::ScanMotion,
     undetected_surface::UndetectedSurface,
 };
@@ -210,6 +211,7 @@ pub struct Range {
     scans: Vec<ScanMotion>,
     undetected: Option<UndetectedSurface>,
     deafness: Deafness,
+    motion: RangeMotion,
 }
 
 impl Range {
@@ -232,8 +234,9 @@ impl Range {
             }
         }
         for scans in &mut self.scans {
-            scans.robot_is(self.pose, now);
+            scans.poses.robot_is(self.pose, now);
         }
+        self.motion.poses.robot_is(self.pose, now);
     }
 
     fn forget(&mut self) {
@@ -243,6 +246,7 @@ impl Range {
         }
         self.scans.iter_mut().for_each(ScanMotion::reset);
         self.deafness.reset();
+        self.motion.reset();
         if let Some(undetected) = &mut self.undetected {
             undetected.reset();
         }
@@ -267,6 +271,7 @@ impl Monitor for Range {
             scans: lasers.into_iter().map(|(row, sensor)| ScanMotion::new(row, sensor)).collect(),
             undetected: UndetectedSurface::of(mission),
             deafness: Deafness::of(mission),
+            motion: RangeMotion::of(mission),
         }
     }
 
@@ -284,6 +289,7 @@ impl Monitor for Range {
                     undetected.take(readings);
                 }
                 self.deafness.take(readings);
+                self.motion.take(readings, now.time.seconds());
             }
             Observation::Scan(scan, at_s) => {
                 if let Some(scans) = self.scans.iter_mut().find(|scans| scans.row == scan.row) {
@@ -306,6 +312,7 @@ impl Monitor for Range {
         if surface.is_some_and(UndetectedSurface::is_implausible)
             || self.scans.iter().any(|scans| scans.is_implausible(sure))
             || self.deafness.is_implausible(sure)
+            || self.motion.is_implausible(sure)
         {
             return Condition::Holds;
         }
@@ -330,6 +337,9 @@ impl Monitor for Range {
         }
         if self.deafness.is_implausible(false) {
             return Some(self.deafness.explain());
+        }
+        if self.motion.is_implausible(false) {
+            return Some(self.motion.explain());
         }
         let newest = |row: &&Row| row.implausible[0].map(|at| now.time.since(at.time));
         let implausible = self.rows.iter().filter(|row| row.implausible[0].is_some());

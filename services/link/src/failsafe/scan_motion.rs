@@ -31,11 +31,38 @@ const TELLS_M: f64 = 0.005;
 const FACTOR: f64 = 1.2;
 const BETTER: [f64; 2] = [0.016, 0.03];
 
+/// Where the robot was by its wheels in the last seconds.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Poses(VecDeque<(f64, Pose2)>);
+
+impl Poses {
+    pub(super) fn robot_is(&mut self, pose: Pose2, now: MissionTime) {
+        self.0.push_back((now.seconds(), pose));
+        let old = |(at, _): &(f64, Pose2)| *at < now.seconds() - POSES_S;
+        while self.0.len() > MOST_KEPT || self.0.front().is_some_and(old) {
+            self.0.pop_front();
+        }
+    }
+
+    pub(super) fn at(&self, at_s: f64) -> Pose2 {
+        let after = self.0.partition_point(|(then, _)| *then < at_s);
+        let before = after.saturating_sub(1);
+        let kept = |it: usize| self.0.get(it).or(self.0.back()).copied().unwrap_or_default();
+        let ((from_s, from), (to_s, to)) = (kept(before), kept(after));
+        let share = if to_s > from_s { (at_s - from_s) / (to_s - from_s) } else { 0.0 };
+        let share = share.clamp(0.0, 1.0);
+        Pose2 {
+            position: from.position.lerp(to.position, share),
+            heading: from.heading + share * (to.heading - from.heading),
+        }
+    }
+}
+
 #[derive(Clone, Debug)]
 pub(super) struct ScanMotion {
     pub(super) row: usize,
     sensor: Sensor,
-    poses: VecDeque<(f64, Pose2)>,
+    pub(super) poses: Poses,
     /// The newest is judged when poses after it are known.
     scans: VecDeque<(f64, Vec<f32>)>,
     /// By how much each delay is better than none.
@@ -44,7 +71,7 @@ pub(super) struct ScanMotion {
 
 impl ScanMotion {
     pub(super) fn new(row: usize, sensor: Sensor) -> Self {
-        let (poses, scans) = (VecDeque::new(), VecDeque::new());
+        let (poses, scans) = (Poses::default(), VecDeque::new());
         Self { row, sensor, poses, scans, better: [0.0; DELAYS_S.len()] }
     }
 
@@ -52,17 +79,9 @@ impl ScanMotion {
         *self = Self::new(self.row, self.sensor.clone());
     }
 
-    pub(super) fn robot_is(&mut self, pose: Pose2, now: MissionTime) {
-        self.poses.push_back((now.seconds(), pose));
-        let old = |(at, _): &(f64, Pose2)| *at < now.seconds() - POSES_S;
-        while self.poses.len() > MOST_KEPT || self.poses.front().is_some_and(old) {
-            self.poses.pop_front();
-        }
-    }
-
     /// The scan says that it was measured at `at_s`.
     pub(super) fn take(&mut self, scan: &LaserScan, at_s: f64) {
-        if self.poses.is_empty() || scan.beams.len() != self.sensor.beams {
+        if self.poses.0.is_empty() || scan.beams.len() != self.sensor.beams {
             return;
         }
         if let Some((newest_s, newest)) = self.scans.back()
@@ -73,7 +92,7 @@ impl ScanMotion {
                 let [from, to] = if delay_s.is_infinite() {
                     [Pose2::default(); 2]
                 } else {
-                    [self.pose_at(first_s - delay_s), self.pose_at(newest_s - delay_s)]
+                    [self.poses.at(first_s - delay_s), self.poses.at(newest_s - delay_s)]
                 };
                 self.unlike((first, from), (newest, to))
             };
@@ -95,20 +114,6 @@ impl ScanMotion {
         let old = |next_s: f64| next_s <= at_s - APART_S || next_s > at_s;
         while self.scans.len() > MOST_KEPT || self.scans.get(1).is_some_and(|next| old(next.0)) {
             self.scans.pop_front();
-        }
-    }
-
-    fn pose_at(&self, at_s: f64) -> Pose2 {
-        let after = self.poses.partition_point(|(then, _)| *then < at_s);
-        let before = after.saturating_sub(1);
-        let kept =
-            |it: usize| self.poses.get(it).or(self.poses.back()).copied().unwrap_or_default();
-        let ((from_s, from), (to_s, to)) = (kept(before), kept(after));
-        let share = if to_s > from_s { (at_s - from_s) / (to_s - from_s) } else { 0.0 };
-        let share = share.clamp(0.0, 1.0);
-        Pose2 {
-            position: from.position.lerp(to.position, share),
-            heading: from.heading + share * (to.heading - from.heading),
         }
     }
 
@@ -191,7 +196,7 @@ mod tests {
             };
             scans.push((0..sensor.beams).map(beam).collect::<Vec<_>>());
             let at_s = tick as f64 * 0.1;
-            motion.robot_is(pose, MissionTime::from_seconds(at_s));
+            motion.poses.robot_is(pose, MissionTime::from_seconds(at_s));
             let beams = scans[seen(tick)].clone();
             motion.take(&LaserScan { row, beams, ..LaserScan::default() }, at_s);
         }
