@@ -10,6 +10,7 @@
 //! |---|---|
 //! | [`grid`] | cells and metres; parts and versions of a map |
 //! | [`latency`] | a histogram that fits in a sample |
+//! | [`least_squares`] | a fit of one factor to the newest pairs |
 //! | [`ground_truth`] | what a simulated robot writes about itself |
 //! | [`signals`] | signals as something to wait for |
 //! | [`checkpoint`], [`journal`] | state that outlives a SIGKILL: small, and large with few changes |
@@ -43,6 +44,7 @@ pub mod ground_truth;
 pub mod inputs;
 pub mod journal;
 pub mod latency;
+pub mod least_squares;
 pub mod outputs;
 pub mod process_status;
 pub mod process_usage;

@@ -7,7 +7,10 @@
 
 use std::collections::VecDeque;
 
-use common::kinematics::{Pose2, Twist};
+use common::{
+    kinematics::{Pose2, Twist},
+    least_squares::Line,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -43,33 +46,6 @@ const BETTER: f64 = 1.5;
 
 /// The pose's variances where there is a cause, m^2 and rad^2.
 pub(crate) const DOUBT: [f64; 2] = [0.25, 0.01];
-
-/// Sums of a least-squares fit of y = factor x.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-struct Line {
-    xx: f64,
-    xy: f64,
-    yy: f64,
-}
-
-impl Line {
-    fn add(&mut self, x: f64, y: f64) {
-        for (sum, term) in [(&mut self.xx, x * x), (&mut self.xy, x * y), (&mut self.yy, y * y)] {
-            *sum = *sum * REMEMBERED + term;
-        }
-    }
-
-    /// The factor if at least `least` squared x tell it, and its deviation.
-    fn factor(&self, least: f64, pairs: f64) -> Option<(f64, f64)> {
-        let factor = self.xy / self.xx;
-        let rest = (self.yy - factor * self.xy).max(0.0);
-        (self.xx >= least).then(|| (factor, (rest / pairs / self.xx).sqrt()))
-    }
-
-    fn explained(&self) -> f64 {
-        self.xy * self.xy / (self.xx * self.yy)
-    }
-}
 
 /// Turn for turn, and radians for a metre, each with its deviation; and the share of the turns that both explain.
 #[derive(Clone, Copy)]
@@ -177,11 +153,16 @@ impl Disagreement {
             *sum = *sum * REMEMBERED + square;
         }
         self.pairs = self.pairs * REMEMBERED + 1.0;
-        self.turn.add(by_wheels.heading, turn);
-        self.way.add(by_wheels.position.x, way.x);
-        self.aside.add(by_wheels.position.x, way.y - by_wheels.position.y);
-        self.bend.add(by_wheels.position.x, turn);
-        self.turn_way = self.turn_way * REMEMBERED + by_wheels.heading * by_wheels.position.x;
+        let went = by_wheels.position;
+        for (line, x, y) in [
+            (&mut self.turn, by_wheels.heading, turn),
+            (&mut self.way, went.x, way.x),
+            (&mut self.aside, went.x, way.y - went.y),
+            (&mut self.bend, went.x, turn),
+        ] {
+            line.add(REMEMBERED, x, y);
+        }
+        self.turn_way = self.turn_way * REMEMBERED + by_wheels.heading * went.x;
         if self.is_named() || self.pairs < LEAST_PAIRS {
             return None;
         }
@@ -193,9 +174,10 @@ impl Disagreement {
         let is_off = |factor: f64, deviation: f64, explained: f64| {
             (factor - 1.0).abs() > FACTOR.max(DEVIATIONS * deviation) && explained > EXPLAINED
         };
-        let factor = |line: &Line, least| {
-            let (factor, deviation) = line.factor(least, self.pairs)?;
-            is_off(factor, deviation, line.explained()).then_some(factor)
+        let factor = |line: &Line, least: f64| {
+            let (factor, deviation) = line.factor(self.pairs);
+            let explained = factor * line.xy / line.yy;
+            (line.xx >= least && is_off(factor, deviation, explained)).then_some(factor)
         };
         if factor(&self.turn, LEAST_TURN).is_some_and(|turn| turn < 0.0) {
             return Some(Cause::Mirrored);
@@ -209,9 +191,8 @@ impl Disagreement {
         {
             return Some(Cause::Uneven(1.0 + bend * track_m));
         }
-        if let Some((aside, deviation)) = self.aside.factor(LEAST_WAY, self.pairs)
-            && aside.abs() > ASIDE_RAD.max(DEVIATIONS * deviation)
-        {
+        let (aside, deviation) = self.aside.factor(self.pairs);
+        if self.aside.xx >= LEAST_WAY && aside.abs() > ASIDE_RAD.max(DEVIATIONS * deviation) {
             return Some(Cause::Turned(-aside.clamp(-1.0, 1.0).asin()));
         }
         let turn = turns.filter(|Turns { factor: [factor, deviation], explained, .. }| {

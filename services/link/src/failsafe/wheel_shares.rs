@@ -8,6 +8,7 @@
 
 use common::{
     driver::counts::WheelCounts,
+    least_squares::Line,
     mission::{Body, Mission, ModelledSpeed, Response},
 };
 
@@ -30,9 +31,7 @@ const LEAST_SPEED: f64 = 0.15;
 struct Sums {
     way_m: f64,
     ticks: f64,
-    xx: f64,
-    xy: f64,
-    yy: f64,
+    line: Line,
 }
 
 impl Sums {
@@ -47,17 +46,15 @@ impl Sums {
         }
         let (x, y) = (counted[0] * right / way_m, counted[1] * left / way_m);
         let left = LEFT_AFTER_A_METRE.powf(way_m);
-        let sums = [&mut self.way_m, &mut self.ticks, &mut self.xx, &mut self.xy, &mut self.yy];
-        for (sum, term) in sums.into_iter().zip([way_m, 1.0, x * x, x * y, y * y]) {
-            *sum = *sum * left + term;
-        }
+        self.way_m = self.way_m * left + way_m;
+        self.ticks = self.ticks * left + 1.0;
+        self.line.add(left, x, y);
     }
 
     fn ratio(&self) -> WheelRatio {
-        let ratio = self.xy / self.xx;
-        let rest = (self.yy - ratio * self.xy).max(0.0) / self.ticks;
+        let (ratio, deviation) = self.line.factor(self.ticks);
         match self.way_m >= LEAST_M {
-            true => WheelRatio { ratio, deviation: (rest / self.xx).sqrt() },
+            true => WheelRatio { ratio, deviation },
             false => WheelRatio::UNKNOWN,
         }
     }
