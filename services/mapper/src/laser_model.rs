@@ -263,7 +263,14 @@ mod tests {
         let mut grid = EvidenceGrid::new(Ground { lattice: LATTICE, radius: 0.2 });
         for beams in scans {
             let (first_rad, step_rad) = (0.0, 1_f64.to_radians());
-            let fan = Fan { origin: DVec2::ZERO, first_rad, step_rad, reach_m: 8.0, beams };
+            let fan = Fan {
+                origin: DVec2::ZERO,
+                first_rad,
+                step_rad,
+                reach_m: 8.0,
+                noise: (0.0, 0.0),
+                beams,
+            };
             grid.take_scan(&fan, DVec2::ZERO);
         }
         grid
@@ -318,7 +325,8 @@ mod tests {
         let beams: Vec<f32> = (0..1440).map(beam).collect();
         let origin = DVec2::new(0.013, -0.021);
         let (first_rad, step_rad) = (0.0, 0.25_f64.to_radians());
-        let fan = Fan { origin, first_rad, step_rad, reach_m: 8.0, beams: &beams };
+        let fan =
+            Fan { origin, first_rad, step_rad, reach_m: 8.0, noise: (0.0, 0.0), beams: &beams };
         let mut scan = Scan::new(&LATTICE, &fan).unwrap();
         scan.pass(5.0, PASSED);
         let mut passed = vec![false; LATTICE.area()];

@@ -32,6 +32,7 @@ struct Row {
     kind: SensorKind,
     /// The bearing of the first beam from the laser's own, and the angle from beam to beam.
     fan: (f64, f64),
+    noise: (f64, f64),
     /// None for other kinds.
     cone: Option<SonarModel>,
 }
@@ -44,6 +45,7 @@ impl Rows {
                 reach_m: sensor.reach_m,
                 kind: sensor.kind,
                 fan: sensor.fan(),
+                noise: sensor.model.beam_noise(),
                 cone: (sensor.kind == SensorKind::Cone).then(|| SonarModel::of(&sensor)),
             })
         };
@@ -83,11 +85,11 @@ impl Rows {
 
     /// None without beams.
     pub(crate) fn scan<'a>(&self, row: usize, robot: Pose2, beams: &'a [f32]) -> Option<Fan<'a>> {
-        let Row { mount, reach_m, fan: (first, step_rad), .. } =
+        let Row { mount, reach_m, fan: (first, step_rad), noise, .. } =
             self.laser(row).filter(|_| !beams.is_empty())?;
         let mount = mount.on(robot);
         let first_rad = mount.heading + first;
-        Some(Fan { origin: mount.position, first_rad, step_rad, reach_m, beams })
+        Some(Fan { origin: mount.position, first_rad, step_rad, reach_m, noise, beams })
     }
 
     pub(crate) fn uses(&self, reading: &RangeReading) -> bool {
@@ -174,6 +176,8 @@ pub(crate) struct Fan<'a> {
     pub(crate) first_rad: f64,
     pub(crate) step_rad: f64,
     pub(crate) reach_m: f64,
+    /// Deviation of a range: metres, and a share of it.
+    pub(crate) noise: (f64, f64),
     /// Metres: infinite for nothing in reach, not a number for no reading.
     pub(crate) beams: &'a [f32],
 }

@@ -22,23 +22,25 @@ use crate::{
     reading::{Fan, Rows},
 };
 
-/// Deviation of a point from its line, metres: the noise of a laser, and of the line.
+/// The least deviation of a point from its line, metres: walls are rough, though a laser's noise may be less.
 const POINT_M: f64 = 0.02;
 /// Deviation of the first pose: metres and radians.
 const PRIOR: [f64; 2] = [0.10, 0.05];
-/// A point's greatest distance from its line, metres: in the first round, and in the last ones.
+/// A point's greatest distance from its line: metres in the first round and in the last ones, and deviations of a noisy point.
 const GATES_M: [f64; 2] = [0.30, 0.08];
+const GATE: f64 = 2.5;
 const ROUNDS: usize = 6;
 /// A smaller change of the pose ends the rounds, metres and radians.
 const SETTLED: f64 = 1e-4;
 /// Matched points of each scan, about.
 const POINTS: usize = 240;
-/// Half the length of a line through points, metres.
+/// Half the length of a line through points: the least, metres, and in deviations of a noisy point.
 const LINE_M: f64 = 0.06;
+const LINE: f64 = 2.5;
 /// A point farther from its neighbours is an edge, metres.
 const EDGE_M: f64 = 0.20;
-/// The greatest distance of points from their line, root mean square, metres.
-const STRAIGHT_M: f64 = 0.03;
+/// The greatest distance of points from their line, root mean square, over half its length.
+const STRAIGHT: f64 = 0.5;
 /// Lines of a point are sought within this angle of its bearing, radians.
 const BESIDE_RAD: f64 = 0.08;
 /// Points on lines that a match needs.
@@ -116,7 +118,8 @@ impl ScanMatcher {
         let robot = reckoned.pose();
         let fan = rows.scan(row, robot, beams)?;
         let Some(held) = reference else {
-            *reference = Some(Reference::new(&fan, robot, covariance_of(reckoned)));
+            let covariance = covariance_of(reckoned) + variances(OF_REFERENCE);
+            *reference = Some(Reference::new(&fan, robot, covariance));
             return None;
         };
         if held.lines.is_empty() {
@@ -126,10 +129,7 @@ impl ScanMatcher {
         }
         let seen_from = rows.scan(row, held.pose, beams)?;
         let found = held.matched(&fan, &seen_from, robot);
-        let (pose, matched, share) = match found {
-            Some(found) => found,
-            None => (robot, DMat3::IDENTITY, 1.0),
-        };
+        let (pose, matched, share) = found.unwrap_or((robot, DMat3::IDENTITY, 1.0));
         let of_reference = held.carried_to(pose.position);
         let fix = found.map(|_| {
             let all = (matched + variances(LEAST)) * self.shared + of_reference;
@@ -157,10 +157,11 @@ impl ScanMatcher {
         let turned = (pose.heading - held.pose.heading).abs();
         if went > REPLACED_AFTER.0 || turned > REPLACED_AFTER.1 || share < LEAST_SHARE {
             let covariance = match found {
-                Some(_) => of_reference + matched + variances(OF_REFERENCE),
+                Some(_) => of_reference + matched,
                 None => covariance_of(reckoned),
             };
             let fan = rows.scan(row, pose, beams)?;
+            let covariance = covariance + variances(OF_REFERENCE);
             *reference = Some(Reference::new(&fan, pose, covariance));
         }
         fix
@@ -192,25 +193,28 @@ impl Reference {
         let seen: Vec<_> = points_of(fan).into_iter().flatten().collect();
         let every = seen.len().div_ceil(POINTS).max(1);
         let back = DVec2::from_angle(-start.heading);
-        let points = seen.iter().step_by(every).map(|point| back.rotate(point - start.position));
-        let points: Vec<_> = points.collect();
-        let prior = DVec3::new(PRIOR[0], PRIOR[0], PRIOR[1]).map(|deviation| deviation.powi(-2));
+        let with_deviation =
+            |point: &DVec2| (back.rotate(point - start.position), deviation_m(fan, *point));
+        let points: Vec<_> = seen.iter().step_by(every).map(with_deviation).collect();
+        // The points of lines have errors, too, but all of them share in lines.
+        let of_lines = 1.0 + 1.0 / every as f64;
+        let prior = variances(PRIOR).inverse();
         let (mut pose, mut information, mut found) = (start, DMat3::ZERO, 0);
         for round in 0..ROUNDS {
             let gate = if round < 2 { GATES_M[0] } else { GATES_M[1] };
             let turned = DVec2::from_angle(pose.heading);
             (information, found) = (DMat3::ZERO, 0);
             let gone = pose.position - start.position;
-            let mut pull = -prior * DVec3::new(gone.x, gone.y, pose.heading - start.heading);
-            for point in &points {
+            let mut pull = -(prior * gone.extend(pose.heading - start.heading));
+            for (point, deviation) in &points {
                 let arm = turned.rotate(*point);
                 let at = pose.position + arm;
-                let Some(line) = self.line_near(seen_from, at, gate) else {
+                let Some(line) = self.line_near(seen_from, at, gate.max(GATE * deviation)) else {
                     continue;
                 };
                 let off = line.normal.dot(at - line.point);
-                let by = DVec3::new(line.normal.x, line.normal.y, line.normal.dot(arm.perp()));
-                let weight = (POINT_M * POINT_M).recip();
+                let by = line.normal.extend(line.normal.dot(arm.perp()));
+                let weight = (of_lines * deviation * deviation).max(POINT_M * POINT_M).recip();
                 information += weight * DMat3::from_cols(by * by.x, by * by.y, by * by.z);
                 pull -= weight * off * by;
                 found += 1;
@@ -218,16 +222,15 @@ impl Reference {
             if found < LEAST_POINTS {
                 return None;
             }
-            let change = (information + DMat3::from_diagonal(prior)).inverse() * pull;
+            let change = (information + prior).inverse() * pull;
             pose.position += change.truncate();
             pose.heading += change.z;
             if round > 1 && change.abs().max_element() < SETTLED {
                 break;
             }
         }
-        // The covariance of a guess, in directions of which the scan says nothing.
-        let guess = DVec3::new(1.0, 1.0, 1.0);
-        let covariance = (information + DMat3::from_diagonal(guess)).inverse();
+        // The identity is a guess in directions of which the scan says nothing.
+        let covariance = (information + DMat3::IDENTITY).inverse();
         let usable =
             pose.position.is_finite() && pose.heading.is_finite() && covariance.is_finite();
         usable.then(|| (pose, covariance, found as f64 / points.len().max(1) as f64))
@@ -238,16 +241,14 @@ impl Reference {
         let way = at - seen_from.origin;
         let bearing = (way.to_angle() - seen_from.first_rad).rem_euclid(std::f64::consts::TAU);
         let beam = (bearing / seen_from.step_rad).round() as i32;
-        let beside = (BESIDE_RAD.max(gate / way.length().max(gate)) / seen_from.step_rad).ceil();
-        let beside = beside as i32;
+        let beside_rad = BESIDE_RAD.max(gate / way.length().max(gate));
+        let beside = (beside_rad / seen_from.step_rad).ceil() as i32;
         // A scan of 1,081 beams has more than are needed.
         let stride = (beside / 6).max(1);
         let whole_turn = (std::f64::consts::TAU / seen_from.step_rad).round().max(1.0) as i32;
         let near = |line: &Line| line.point.distance_squared(at);
-        let first = (beam - beside).rem_euclid(whole_turn);
         (0..=2 * beside / stride)
-            .map(|step| first + step * stride)
-            .map(|beam| if beam < whole_turn { beam } else { beam - whole_turn } as usize)
+            .map(|step| (beam - beside + step * stride).rem_euclid(whole_turn) as usize)
             .filter_map(|beam| *self.lines.get(beam)?)
             .min_by(|a, b| near(a).total_cmp(&near(b)))
             .filter(|line| near(line) <= gate * gate)
@@ -259,10 +260,12 @@ impl Line {
     fn through(points: &[Option<DVec2>], fan: &Fan<'_>, beam: usize) -> Option<Self> {
         let point = points[beam]?;
         let spacing = point.distance(fan.origin) * fan.step_rad;
-        let beside = ((LINE_M / spacing.max(1e-6)).ceil() as usize).clamp(1, 40);
+        let half_m = LINE_M.max(LINE * deviation_m(fan, point));
+        let beside = ((half_m / spacing.max(1e-6)).ceil() as usize).clamp(1, 40);
         let around = points.get(beam.checked_sub(beside)?..=beam + beside)?;
-        let near = |other: &&Option<DVec2>| other.is_some_and(|at| at.distance(point) <= EDGE_M);
-        if around.iter().filter(near).count() < around.len() {
+        let edge_m = EDGE_M.max(2.0 * half_m);
+        let near = |other: &Option<DVec2>| other.is_some_and(|at| at.distance(point) <= edge_m);
+        if !around.iter().all(near) {
             return None;
         }
         let share = 1.0 / around.len() as f64;
@@ -276,13 +279,19 @@ impl Line {
         }
         let ([_, aside], along) = principal_axes([xx, xy, yy]);
         let normal = DVec2::from_angle(along).perp();
-        (aside <= STRAIGHT_M).then_some(Self { point: mean, normal })
+        (aside <= STRAIGHT * half_m).then_some(Self { point: mean, normal })
     }
 }
 
 fn covariance_of(pose: &PoseSample) -> DMat3 {
     let [xx, xy, xt, yy, yt, tt] = pose.covariance;
     DMat3::from_cols(DVec3::new(xx, xy, xt), DVec3::new(xy, yy, yt), DVec3::new(xt, yt, tt))
+}
+
+/// Of the range to `end`, metres.
+fn deviation_m(fan: &Fan<'_>, end: DVec2) -> f64 {
+    let (least_m, share) = fan.noise;
+    least_m + share * end.distance(fan.origin)
 }
 
 /// Deviations of the place, metres, and of the heading, radians.
@@ -372,6 +381,40 @@ mod tests {
         let fix = matcher.step(&mut reference, wheels, &scan(&mission, start, true)).unwrap();
         assert!((fix.x_m - 0.3).abs() < 0.01 && fix.y_m.abs() < 0.01, "{fix:?}");
         assert!(fix.covariance[0] > 100.0 * fix.covariance[3], "{fix:?}");
+    }
+
+    #[test]
+    fn a_laser_of_great_noise_is_matched_with_its_reference_and_says_how_well() {
+        let (mission, matcher) = matcher();
+        let mut random = 1_u32;
+        let mut noisy = |pose| {
+            let mut beams = scan(&mission, pose, false);
+            for range in &mut beams {
+                // A sum of twelve even numbers is nearly normal.
+                let noise: f64 = (0..12)
+                    .map(|_| {
+                        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                        f64::from(random) / f64::from(u32::MAX) - 0.5
+                    })
+                    .sum();
+                let (least_m, share) = mission.sensor_table()[0].model.beam_noise();
+                let exact = f64::from(*range);
+                *range = (exact + noise * (least_m + share * exact)) as f32;
+            }
+            beams
+        };
+        let (mut reference, start) = (None, Pose2::default());
+        matcher.step(&mut reference, start, &noisy(start));
+        let (mut squares, mut stated) = (0.0, 0.0);
+        for step in 0..40 {
+            let position = DVec2::new(0.01 * f64::from(step), 0.0);
+            let truth = Pose2 { position, heading: 0.0 };
+            let fix = matcher.step(&mut reference, truth, &noisy(truth)).unwrap();
+            squares += DVec2::new(fix.x_m, fix.y_m).distance_squared(position);
+            stated += (fix.covariance[0] + fix.covariance[3]) / matcher.0.shared;
+        }
+        assert_eq!(reference.unwrap().pose, start, "the scans were not matched with the first one");
+        assert!((0.3..2.0).contains(&(squares / stated)), "{squares} where {stated} is stated");
     }
 
     #[test]
