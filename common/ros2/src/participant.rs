@@ -29,8 +29,8 @@ use rustix::{
 
 use crate::{cdr::ENCAPSULATION, topic::Topic};
 
-/// A longer message is cut, and its decoder refuses what it needs beyond: the ranges of a scan of 16,384 beams have 66 kB.
-const LONGEST: usize = 98_304;
+/// A longer message is cut, and its decoder refuses what it needs beyond: a map of 8192 x 8192 cells has 67 MB.
+const LONGEST: usize = 1 << 27;
 /// Messages skipped at a time because they cannot be decoded.
 const MOST_BROKEN: usize = 16;
 
@@ -170,7 +170,7 @@ impl Participant {
     }
 
     fn topic(&self, topic: &Topic, policies: &QosPolicies) -> io::Result<rustdds::Topic> {
-        let (name, type_name) = (topic.dds_name(), topic.type_name.to_owned());
+        let (name, type_name) = (topic.dds_name(), topic.type_name.clone());
         let topic = self.inner.create_topic(name, type_name, policies, TopicKind::NoKey);
         topic.map_err(io::Error::other)
     }
@@ -179,6 +179,11 @@ impl Participant {
     /// had none.
     pub fn unring(&self) {
         let _ = read(&self.rung, &mut [0_u8; 8]);
+    }
+
+    /// Other threads ring the descriptor with it.
+    pub fn bell(&self) -> Waker {
+        self.bell.clone()
     }
 
     pub fn gid(&self) -> Gid {

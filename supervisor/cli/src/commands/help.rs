@@ -38,6 +38,7 @@ static GUIDE: &[Page] = guide! {
     "your-robot",
     "operate",
     "attach",
+    "nav2-planner",
     "recordings",
     "break-it",
     "evaluation",

@@ -15,13 +15,14 @@ use common::{
     topics,
 };
 use robot_state::{Feed, Sample, TOPICS, newest_run};
-use ros2::participant::{Message, Request};
+use ros2::participant::Message;
 use thiserror::Error;
 
 use crate::{
-    action::{Server, Status, Uuid},
-    asked,
-    endpoints::{Call, Endpoints},
+    action::{Aim, Server},
+    asked, endpoints,
+    goals::{Goals, Status},
+    node::{Call, Node},
     orders::{Done, Order, Orders, Why},
     overlap::overlap,
     shown::Shown,
@@ -34,8 +35,6 @@ const LOOK_EVERY: Duration = Duration::from_millis(50);
 const FEEDBACK_EVERY: Duration = Duration::from_millis(100);
 /// The time after which a bus that cannot be used is tried again.
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
-/// The most clients that wait for results.
-const MOST_RESULTS: usize = 32;
 /// The least interval between reports of refusals.
 const TELL_EVERY: Duration = Duration::from_secs(1);
 
@@ -71,12 +70,10 @@ pub(crate) enum BridgeError {
 /// The state of the bridge.
 struct Bridge {
     robot: RobotName,
-    endpoints: Endpoints,
+    node: Node<Id>,
     orders: Orders,
     shown: Option<Shown>,
-    goals: Server,
-    /// Clients that wait for the result of a goal.
-    results: Vec<(Request, Uuid)>,
+    server: Server,
     feedback_at: Instant,
     /// The number of stops that were asked for since the robot was ordered to stand for a canceled goal, that order included. None if the
     /// robot does not stand for one.
@@ -88,17 +85,16 @@ struct Bridge {
 pub(crate) fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), BridgeError> {
     let Options { robot, domain, interface, namespace, accepted } = options;
     let join = || {
-        Endpoints::open(*domain, *interface, namespace, accepted)
+        endpoints::open(*domain, *interface, namespace, accepted)
             .map_err(|source| BridgeError::Join { domain: *domain, source })
     };
     let mut continued = Signals::catch(&[SIGCONT]).map_err(BridgeError::System)?;
     let mut bridge = Bridge {
         robot: robot.clone(),
-        endpoints: join()?,
+        node: join()?,
         orders: Orders::new(robot).map_err(BridgeError::System)?,
         shown: None,
-        goals: Server::default(),
-        results: Vec::new(),
+        server: Server::default(),
         feedback_at: Instant::now(),
         stands_for_cancel: None,
         told_at: None,
@@ -111,7 +107,7 @@ pub(crate) fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Resul
         if continued.came() {
             // The library's threads end when a call of theirs is interrupted, as happens when the process is stopped and continued. New
             // readers of the bus get whole maps for the new writers.
-            (bridge.endpoints, bridge.shown) = (join()?, None);
+            (bridge.node, bridge.shown) = (join()?, None);
             follower = follow();
         }
         let taken = match follower.wait(LOOK_EVERY) {
@@ -140,7 +136,7 @@ pub(crate) fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Resul
 }
 
 /// The time, nanoseconds since 1970.
-fn now_ns() -> u64 {
+pub(crate) fn now_ns() -> u64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
 }
@@ -161,33 +157,33 @@ impl Bridge {
         if let Some(topic) = overlap((ros, namespace), &run, shown.sensor_topics()) {
             return Err(BridgeError::Overlap { topic, domain: ros });
         }
-        if let Err(error) = self.endpoints.open_sensors(shown.sensor_topics()) {
+        if let Err(error) = endpoints::open_sensors(&mut self.node, shown.sensor_topics()) {
             self.tell(&format!("the topics of the sensors cannot be opened: {error}"));
         }
-        shown.mounting(now_ns(), &mut |id, payload| self.endpoints.publish(id, payload));
+        shown.mounting(now_ns(), &mut |id, payload| self.node.publish(id, payload));
         self.shown = Some(shown);
         Ok(())
     }
 
     /// Note that the run has ended: no goal is reached any more.
     fn end(&mut self) {
-        self.goals.end(Status::Aborted);
-        self.goals.newest_target = 0;
+        self.server.goals.end(Status::Aborted);
+        self.server.newest_target = 0;
         (self.shown, self.stands_for_cancel) = (None, None);
     }
 
     /// Take all samples that were published on the robot's bus.
     fn take_samples(&mut self, feed: &mut Feed) -> Result<(), BusError> {
-        let Self { endpoints, shown, goals, stands_for_cancel, .. } = self;
+        let Self { node, shown, server, stands_for_cancel, .. } = self;
         let Some(shown) = shown else {
             return Ok(());
         };
         let now_ns = now_ns();
         feed.read(&mut |sample| {
             match &sample {
-                Sample::Target(target) => goals.target(target),
-                Sample::Command(command) => goals.command(command),
-                Sample::Directive(directive) => goals.directive(directive),
+                Sample::Target(target) => server.target(target),
+                Sample::Command(command) => server.command(command),
+                Sample::Directive(directive) => server.directive(directive),
                 Sample::Order(request)
                     if RequestKind::from_byte(request.kind) == RequestKind::Stop =>
                 {
@@ -195,18 +191,18 @@ impl Bridge {
                 }
                 _ => {}
             }
-            shown.sample(&sample, now_ns, &mut |id, payload| endpoints.publish(id, payload));
+            shown.sample(&sample, now_ns, &mut |id, payload| node.publish(id, payload));
         })
     }
 
     /// Take the messages that nodes have sent.
     fn hear(&mut self) {
-        for (id, message) in self.endpoints.heard() {
+        for (id, message) in self.node.heard() {
             if let Err(why) = self.hear_topic(id, &message) {
                 self.tell(&format!("a message is refused: {why}"));
             }
         }
-        for (call, message) in self.endpoints.called() {
+        for (_, call, message) in self.node.called() {
             if let Err(why) = self.hear_call(call, &message) {
                 self.tell(&format!("a call of the action is refused: {why}"));
             }
@@ -241,26 +237,20 @@ impl Bridge {
         match call {
             Call::SendGoal => {
                 let sent = Server::read_goal(&payload).inspect_err(|_| {
-                    self.endpoints.reply(call, request, &Server::goal_reply(false, now_ns()));
+                    self.node.reply(0, call, request, &Goals::<Aim>::reply(false, now_ns()));
                 })?;
-                let after = self.goals.newest_target;
+                let after = self.server.newest_target;
                 self.go(sent.point, Why::Action { request: request.clone(), sent, after });
             }
             Call::CancelGoal => {
-                let (reply, stands) = self.goals.cancel(&payload)?;
-                self.endpoints.reply(call, request, &reply);
+                let (reply, stands) = self.server.goals.cancel(&payload)?;
+                self.node.reply(0, call, request, &reply);
                 if stands {
                     self.stands_for_cancel = Some(0);
                     self.orders.give(Order::Stand { is_cancel: true });
                 }
             }
-            Call::GetResult => {
-                let id = Server::read_result(&payload)?;
-                if self.results.len() == MOST_RESULTS {
-                    self.results.remove(0);
-                }
-                self.results.push((request.clone(), id));
-            }
+            Call::GetResult => self.server.goals.wait(request, &payload)?,
         }
         Ok(())
     }
@@ -276,16 +266,18 @@ impl Bridge {
                     self.stands_for_cancel = None;
                 }
                 if let Why::Action { request, sent, after } = why {
-                    let reply = Server::goal_reply(result.is_ok(), now_ns());
-                    self.endpoints.reply(Call::SendGoal, &request, &reply);
+                    let reply = Goals::<Aim>::reply(result.is_ok(), now_ns());
+                    self.node.reply(0, Call::SendGoal, &request, &reply);
                     if result.is_ok() {
-                        self.goals.accept(sent, after, now_ns());
+                        self.server.accept(sent, after, now_ns());
                     }
                 }
             }
-            Order::Stand { is_cancel: true } if result.is_ok() => self.goals.end(Status::Canceled),
+            Order::Stand { is_cancel: true } if result.is_ok() => {
+                self.server.goals.end(Status::Canceled);
+            }
             // A robot that did not obey is not reported to stand.
-            Order::Stand { is_cancel: true } => self.goals.end(Status::Aborted),
+            Order::Stand { is_cancel: true } => self.server.goals.end(Status::Aborted),
             Order::Stand { is_cancel: false } | Order::Resume | Order::Place(..) => {}
         }
     }
@@ -293,26 +285,23 @@ impl Bridge {
     /// Publish the samples that are due.
     fn publish(&mut self) {
         let now_ns = now_ns();
-        if let Some(status) = self.goals.take_status() {
-            self.endpoints.publish(Id::Status, status);
+        let (node, server) = (&self.node, &mut self.server);
+        if let Some(status) = server.goals.take_status() {
+            node.publish_status(0, status);
         }
-        let (goals, endpoints) = (&self.goals, &self.endpoints);
-        self.results.retain(|(request, id)| match goals.result(*id) {
-            Some(result) => {
-                endpoints.reply(Call::GetResult, request, &result);
-                false
-            }
-            None => true,
-        });
+        for (request, id) in server.goals.answerable() {
+            let result = server.result(id).unwrap_or_default();
+            node.reply(0, Call::GetResult, &request, &result);
+        }
         let Some(shown) = &mut self.shown else {
             return;
         };
-        shown.tick(now_ns, &mut |id, payload| endpoints.publish(id, payload));
+        shown.tick(now_ns, &mut |id, payload| node.publish(id, payload));
         if self.feedback_at.elapsed() >= FEEDBACK_EVERY {
             self.feedback_at = Instant::now();
-            let feedback = self.goals.feedback(&shown.newest_pose(), shown.state.stalls, now_ns);
+            let feedback = server.feedback(&shown.newest_pose(), shown.state.stalls, now_ns);
             if let Some(feedback) = feedback {
-                self.endpoints.publish(Id::Feedback, feedback);
+                node.publish_feedback(0, feedback);
             }
         }
     }

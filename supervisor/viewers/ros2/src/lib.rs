@@ -6,10 +6,13 @@
 //! | `topics` | THE table of topics |
 //! | `shown` | samples of the robot's bus to messages, pure |
 //! | `asked` | messages that ask for something to what they ask, pure |
+//! | `goals` | the goals of any action, pure |
 //! | `action` | the server of the action `navigate_to_pose`, pure |
 //! | `messages` | the messages that are written |
 //! | `bridge` | the bridge itself |
-//! | `endpoints` | its readers and writers, and the node that `ros2 node list` shows |
+//! | `endpoints` | its readers and writers |
+//! | `node` | readers, writers and servers of actions as a node that `ros2 node list` shows |
+//! | `planner` | Nav2's planner server, which is no bridge |
 //! | `overlap` | whether it would publish what the robot's own link reads |
 //! | `orders` | what was asked is done, without holding up the bridge |
 
@@ -17,9 +20,12 @@ mod action;
 mod asked;
 mod bridge;
 mod endpoints;
+mod goals;
 mod messages;
+mod node;
 mod orders;
 mod overlap;
+mod planner;
 mod shown;
 #[cfg(test)]
 mod tests;
@@ -27,7 +33,7 @@ mod topics;
 
 use std::{net::Ipv4Addr, process::ExitCode};
 
-use clap::Parser;
+use clap::{Parser, Subcommand};
 use common::{
     address::domain_of_environment,
     domain::RobotName,
@@ -54,13 +60,13 @@ pub struct Arguments {
     #[arg(long, default_value = "x80")]
     robot: RobotName,
     /// The domain of ROS, 0 to 232, instead of that which `ROS_DOMAIN_ID` names.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(0..=232))]
+    #[arg(long, global = true, value_parser = clap::value_parser!(u16).range(0..=232))]
     domain: Option<u16>,
     /// The address of the only network interface to use. Without it, this machine's own with `ROS_LOCALHOST_ONLY=1`, else all.
-    #[arg(long, value_name = "ADDRESS")]
+    #[arg(long, global = true, value_name = "ADDRESS")]
     interface: Option<Ipv4Addr>,
     /// The namespace of all topics, `tf` too. A robot that speaks ROS 2 itself publishes `/tf` and `/odom`, so give it one.
-    #[arg(long, default_value = "", value_parser = namespace)]
+    #[arg(long, global = true, default_value = "", value_parser = namespace)]
     namespace: String,
     /// Print the table of its topics, and nothing else.
     #[arg(long)]
@@ -68,6 +74,13 @@ pub struct Arguments {
     /// What others may do.
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     accept: Vec<Accept>,
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Planner(planner::Arguments),
 }
 
 /// A namespace of ROS: names of letters, digits and `_` between slashes.
@@ -106,11 +119,17 @@ fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
         print_text(&topics())?;
         return Ok(ExitCode::SUCCESS);
     }
-    let_stages_go_first();
     let mut signals = Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?;
+    let domain = arguments.domain.map_or_else(domain_of_environment, Ok)?;
+    if let Some(Command::Planner(options)) = &arguments.command {
+        let network = (domain, arguments.interface, arguments.namespace.as_str());
+        planner::serve(network, options, &mut || signals.came())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let_stages_go_first();
     let options = Options {
         robot: arguments.robot.clone(),
-        domain: arguments.domain.map_or_else(domain_of_environment, Ok)?,
+        domain,
         interface: arguments.interface,
         namespace: arguments.namespace.clone(),
         accepted: arguments.accept.clone(),

@@ -72,8 +72,15 @@ pub(crate) fn map_update(
 
 /// A `nav_msgs/Path`.
 pub(crate) fn path(header: Header<'_>, poses: &[Pose]) -> Vec<u8> {
-    let stamped = |writer: &mut Writer, pose: &Pose| pose_stamped(writer, header, *pose);
-    begin(header).list(poses, stamped).take()
+    let mut writer = Writer::default();
+    write_path(&mut writer, header, poses);
+    writer.take()
+}
+
+/// A `nav_msgs/Path` as a part of a message.
+pub(crate) fn write_path(writer: &mut Writer, Header(ns, frame): Header<'_>, poses: &[Pose]) {
+    let stamped = |writer: &mut Writer, pose: &Pose| pose_stamped(writer, Header(ns, frame), *pose);
+    writer.header(ns, frame).list(poses, stamped);
 }
 
 /// A `geometry_msgs/PoseStamped` as a part of a message.

@@ -322,21 +322,28 @@ fn way(frame: GridFrame, cells: &[FieldCell], from: DVec2, to: DVec2) -> Vec<Pos
     way
 }
 
-/// A line along the direction of each cell, or of one among several.
+/// The direction of each cell that has one.
 fn directions(frame: GridFrame, cells: &[FieldCell]) -> Marker {
-    let side = frame.cells as usize;
-    let each = side.div_ceil(ARROWS);
-    let length = 0.7 * each as f64 * frame.resolution_m;
+    arrows([frame.cells as usize; 2], frame.resolution_m, |col, row| {
+        let cell = Cell { col: col as u32, row: row as u32 };
+        let direction = cells.get(frame.index(cell))?;
+        let ahead = DVec2::new(direction.ex.into(), direction.ey.into());
+        (ahead != DVec2::ZERO).then(|| [frame.centre_of(cell), ahead])
+    })
+}
+
+/// A line at each cell, or at one among several, from the first of what `of` says of its column and row along the second.
+pub(crate) fn arrows(
+    [columns, rows]: [usize; 2],
+    cell_m: f64,
+    of: impl Fn(usize, usize) -> Option<[DVec2; 2]>,
+) -> Marker {
+    let each = columns.max(rows).div_ceil(ARROWS).max(1);
+    let length = 0.7 * each as f64 * cell_m;
     let mut points = Vec::new();
-    for row in (each / 2..side).step_by(each) {
-        for col in (each / 2..side).step_by(each) {
-            let cell = Cell { col: col as u32, row: row as u32 };
-            let Some(direction) = cells.get(frame.index(cell)) else {
-                continue;
-            };
-            let ahead = DVec2::new(direction.ex.into(), direction.ey.into());
-            if ahead != DVec2::ZERO {
-                let at = frame.centre_of(cell);
+    for row in (each / 2..rows).step_by(each) {
+        for col in (each / 2..columns).step_by(each) {
+            if let Some([at, ahead]) = of(col, row) {
                 points.extend([at.to_array(), (at + length * ahead).to_array()]);
             }
         }

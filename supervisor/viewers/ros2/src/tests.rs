@@ -18,8 +18,9 @@ use robot_state::Sample;
 use ros2::cdr::{Reader, Writer};
 
 use crate::{
-    action::{Server, Status},
+    action::Server,
     asked,
+    goals::Status,
     messages::{self, Header, Level, Marker, Shape},
     shown::Shown,
     topics::Id,
@@ -198,16 +199,16 @@ fn a_goal_that_is_canceled_stays_canceled_although_the_robot_arrives() {
     let any_time = [0; 8];
     for id in [0, 1] {
         let mut goals = with_a_goal();
-        let (reply, stands) = goals.cancel(&call(id, &any_time)).unwrap();
+        let (reply, stands) = goals.goals.cancel(&call(id, &any_time)).unwrap();
         assert!(stands);
         assert_eq!(reply[4], 0, "it is taken");
         goals.command(&arrival(5));
         assert_eq!(state(&goals, 1), None, "the robot does not stand yet");
-        goals.end(Status::Canceled);
+        goals.goals.end(Status::Canceled);
         assert_eq!(state(&goals, 1), Some(Status::Canceled as u8));
     }
     let mut goals = with_a_goal();
-    let (reply, stands) = goals.cancel(&call(2, &any_time)).unwrap();
+    let (reply, stands) = goals.goals.cancel(&call(2, &any_time)).unwrap();
     assert_eq!((reply[4], stands), (2, false), "it is unknown");
 }
 

@@ -20,10 +20,6 @@ pub(crate) enum Id {
     Range(usize),
     Battery,
     Diagnostics,
-    /// The progress with a goal of the action, which is not in the table.
-    Feedback,
-    /// The states of the goals of the action, which is not in the table.
-    Status,
     GoalPose,
     InitialPose,
     Stop,

@@ -1,0 +1,166 @@
+//! The goals of a server of an action: their states, and the messages that all actions have. Pure.
+//!
+//! The server has one goal at a time: a newer one takes its place, as in Nav2.
+
+use std::collections::VecDeque;
+
+use ros2::{
+    cdr::{Reader, Writer},
+    participant::Request,
+};
+
+/// The id that a client gave its goal.
+pub(crate) type Uuid = [u8; 16];
+
+/// The most goals that are remembered; older ones are forgotten.
+const MOST_GOALS: usize = 16;
+/// The most clients that wait for results.
+const MOST_RESULTS: usize = 32;
+
+/// A `action_msgs/GoalStatus`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Status {
+    Executing = 2,
+    Canceling = 3,
+    Succeeded = 4,
+    Canceled = 5,
+    Aborted = 6,
+}
+
+impl Status {
+    /// Whether the status is final.
+    pub(crate) const fn is_final(self) -> bool {
+        matches!(self, Self::Succeeded | Self::Canceled | Self::Aborted)
+    }
+}
+
+/// The answer to a request to cancel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Cancel {
+    Taken = 0,
+    Unknown = 2,
+    Over = 3,
+}
+
+/// A goal that was accepted, with what its action knows of it.
+#[derive(Clone, Debug)]
+pub(crate) struct Goal<T> {
+    pub(crate) id: Uuid,
+    /// The time when the goal was accepted, nanoseconds since 1970.
+    pub(crate) at_ns: u64,
+    pub(crate) status: Status,
+    pub(crate) known: T,
+}
+
+/// A server's goals.
+#[derive(Debug, Default)]
+pub(crate) struct Goals<T> {
+    goals: VecDeque<Goal<T>>,
+    /// Whether the states have changed since they were last published.
+    is_changed: bool,
+    /// Clients that wait for the result of a goal.
+    waiting: Vec<(Request, Uuid)>,
+}
+
+impl<T> Goals<T> {
+    /// The reply to a goal, at `now_ns` since 1970.
+    pub(crate) fn reply(is_accepted: bool, now_ns: u64) -> Vec<u8> {
+        Writer::default().u8(is_accepted.into()).time(now_ns).take()
+    }
+
+    /// Take a goal; it ends the one before.
+    pub(crate) fn accept(&mut self, id: Uuid, known: T, now_ns: u64) {
+        self.end(Status::Aborted);
+        if self.goals.len() == MOST_GOALS {
+            self.goals.pop_front();
+        }
+        self.goals.push_back(Goal { id, at_ns: now_ns, status: Status::Executing, known });
+        self.is_changed = true;
+    }
+
+    /// Let the goal that is not over end with `status`.
+    pub(crate) fn end(&mut self, status: Status) {
+        for goal in self.goals.iter_mut().filter(|goal| !goal.status.is_final()) {
+            goal.status = status;
+            self.is_changed = true;
+        }
+    }
+
+    /// The newest goal, if it is not over.
+    pub(crate) fn current(&mut self) -> Option<&mut Goal<T>> {
+        self.goals.back_mut().filter(|goal| !goal.status.is_final())
+    }
+
+    /// Take a request to cancel. Returns the reply, and whether a goal is canceled.
+    pub(crate) fn cancel(&mut self, payload: &[u8]) -> Result<(Vec<u8>, bool), String> {
+        let mut reader = Reader::new(payload)?;
+        let (id, until_ns) = (uuid(&mut reader)?, reader.time()?);
+        let is_any = id == Uuid::default();
+        let until_ns = u64::try_from(until_ns).unwrap_or_default();
+        let is_asked = |goal: &Goal<T>| {
+            goal.id == id || (is_any && until_ns == 0) || (until_ns > 0 && goal.at_ns <= until_ns)
+        };
+        let mut canceled = Vec::new();
+        for goal in self.goals.iter_mut().filter(|goal| is_asked(goal)) {
+            if goal.status == Status::Executing {
+                goal.status = Status::Canceling;
+                self.is_changed = true;
+                canceled.push((goal.id, goal.at_ns));
+            }
+        }
+        let answer = match self.goals.iter().any(|goal| goal.id == id) {
+            _ if is_any || !canceled.is_empty() => Cancel::Taken,
+            true => Cancel::Over,
+            false => Cancel::Unknown,
+        };
+        let reply = Writer::default()
+            .u8(answer as u8)
+            .list(&canceled, |writer, (id, at_ns)| {
+                writer.raw(id).time(*at_ns);
+            })
+            .take();
+        Ok((reply, !canceled.is_empty()))
+    }
+
+    /// Take a request for the result of a goal.
+    pub(crate) fn wait(&mut self, request: &Request, payload: &[u8]) -> Result<(), String> {
+        let id = uuid(&mut Reader::new(payload)?)?;
+        if self.waiting.len() == MOST_RESULTS {
+            self.waiting.remove(0);
+        }
+        self.waiting.push((request.clone(), id));
+        Ok(())
+    }
+
+    /// The state of a goal with what is known of it; none while it is not over. An unknown goal has the state 0.
+    pub(crate) fn over(&self, id: Uuid) -> Option<(u8, Option<&T>)> {
+        match self.goals.iter().find(|goal| goal.id == id) {
+            Some(goal) if !goal.status.is_final() => None,
+            Some(goal) => Some((goal.status as u8, Some(&goal.known))),
+            None => Some((0, None)),
+        }
+    }
+
+    /// The requests whose goals are over; the others still wait.
+    pub(crate) fn answerable(&mut self) -> Vec<(Request, Uuid)> {
+        let waiting = std::mem::take(&mut self.waiting);
+        let (over, waiting) = waiting.into_iter().partition(|(_, id)| self.over(*id).is_some());
+        self.waiting = waiting;
+        over
+    }
+
+    /// The states of all goals, if they have changed.
+    pub(crate) fn take_status(&mut self) -> Option<Vec<u8>> {
+        let status = |writer: &mut Writer, goal: &Goal<T>| {
+            writer.raw(&goal.id).time(goal.at_ns).u8(goal.status as u8);
+        };
+        let is_changed = std::mem::take(&mut self.is_changed);
+        is_changed.then(|| Writer::default().list(&self.goals, status).take())
+    }
+}
+
+/// The id of a goal.
+pub(crate) fn uuid(reader: &mut Reader<'_>) -> Result<Uuid, String> {
+    let bytes = reader.raw(16)?;
+    bytes.try_into().map_err(|_| "an id of other than 16 bytes".to_owned())
+}

@@ -1,0 +1,182 @@
+//! A node in DDS: readers and writers of topics, servers of actions, and what `ros2 node list` shows of them.
+
+use std::{collections::BTreeMap, io, net::Ipv4Addr};
+
+use ros2::{
+    cdr,
+    participant::{Gid, Message, Participant, Quality, Reader, Request, Writer},
+    topic::Topic,
+};
+
+/// The most messages of a topic that wait for a slow reader, or for the node.
+const DEPTH: u16 = 10;
+/// The most messages of a topic that are taken at a time.
+const AT_A_TIME: usize = 16;
+
+/// The quality that sends lost messages again, for messages that all count.
+pub(crate) const SURE: Quality = Quality { is_reliable: true, is_latched: false, depth: DEPTH };
+/// The quality that stores the newest message for readers that join later.
+pub(crate) const LATCHED: Quality = Quality { is_reliable: true, is_latched: true, depth: 1 };
+
+/// The services of an action.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Call {
+    SendGoal,
+    CancelGoal,
+    GetResult,
+}
+
+/// The server of an action.
+#[derive(Debug)]
+struct Action {
+    services: Vec<(Call, Reader, Writer)>,
+    feedback: Writer,
+    status: Writer,
+}
+
+/// Topics are told apart by `Id`, actions by the order in which they were opened.
+#[derive(Debug)]
+pub(crate) struct Node<Id> {
+    name: &'static str,
+    /// Empty, or with a slash before it.
+    pub(crate) namespace: String,
+    writers: BTreeMap<Id, Writer>,
+    readers: Vec<(Id, Reader)>,
+    actions: Vec<Action>,
+    /// The list of the participant's readers and writers, for other nodes.
+    entities: Writer,
+    pub(crate) participant: Participant,
+}
+
+impl<Id: Copy + Ord> Node<Id> {
+    /// Join `domain` by the interface `only`, with topics below `namespace`.
+    pub(crate) fn join(
+        domain: u16,
+        only: Option<Ipv4Addr>,
+        namespace: &str,
+        name: &'static str,
+    ) -> io::Result<Self> {
+        let participant = Participant::join(domain, only)?;
+        let namespace = namespace.trim_matches('/');
+        let entities = Topic::plain(
+            "ros_discovery_info",
+            "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_",
+        );
+        Ok(Self {
+            name,
+            namespace: if namespace.is_empty() { String::new() } else { format!("/{namespace}") },
+            writers: BTreeMap::new(),
+            readers: Vec::new(),
+            actions: Vec::new(),
+            entities: participant.writer(&entities, LATCHED)?,
+            participant,
+        })
+    }
+
+    /// The name from the root of one that is below the namespace unless it begins with a slash.
+    pub(crate) fn full_name(&self, name: &str) -> String {
+        if name.starts_with('/') { name.to_owned() } else { format!("{}/{name}", self.namespace) }
+    }
+
+    pub(crate) fn write_to(&mut self, id: Id, topic: &Topic, quality: Quality) -> io::Result<()> {
+        self.writers.insert(id, self.participant.writer(topic, quality)?);
+        Ok(())
+    }
+
+    /// Close the writers of other ids.
+    pub(crate) fn retain_writers(&mut self, keep: impl Fn(Id) -> bool) {
+        self.writers.retain(|id, _| keep(*id));
+    }
+
+    pub(crate) fn read_from(&mut self, id: Id, topic: &Topic, quality: Quality) -> io::Result<()> {
+        self.readers.push((id, self.participant.reader(topic, quality)?));
+        Ok(())
+    }
+
+    /// Serve an action of Nav2, `kind`, as `name`.
+    pub(crate) fn serve(&mut self, name: &str, kind: &str) -> io::Result<()> {
+        let name = |part| format!("{}/_action/{part}", self.full_name(name));
+        let kind = |part| format!("nav2_msgs::action::dds_::{kind}_{part}");
+        let mut services = Vec::new();
+        for (call, part, kind) in [
+            (Call::SendGoal, "send_goal", kind("SendGoal")),
+            (Call::CancelGoal, "cancel_goal", "action_msgs::srv::dds_::CancelGoal".to_owned()),
+            (Call::GetResult, "get_result", kind("GetResult")),
+        ] {
+            let [requests, replies] = Topic::service(&name(part), &kind);
+            let requests = self.participant.reader(&requests, SURE)?;
+            services.push((call, requests, self.participant.writer(&replies, SURE)?));
+        }
+        let writer = |part, kind: &str, quality| {
+            self.participant.writer(&Topic::new(&name(part), kind), quality)
+        };
+        let feedback = writer("feedback", &kind("FeedbackMessage_"), SURE)?;
+        let status = writer("status", "action_msgs::msg::dds_::GoalStatusArray_", LATCHED)?;
+        self.actions.push(Action { services, feedback, status });
+        Ok(())
+    }
+
+    /// Tell other nodes which readers and writers are the node's.
+    pub(crate) fn announce(&self) {
+        let services = || self.actions.iter().flat_map(|action| &action.services);
+        let readers = self.readers.iter().map(|(_, reader)| reader);
+        let readers = readers.chain(services().map(|(_, requests, _)| requests)).map(Reader::gid);
+        let writers = self.writers.values().chain(services().map(|(.., replies)| replies));
+        let topics = self.actions.iter().flat_map(|action| [&action.feedback, &action.status]);
+        let writers = writers.chain(topics).map(Writer::gid);
+        let gid = |writer: &mut cdr::Writer, gid: Gid| {
+            writer.raw(&gid);
+        };
+        let namespace = if self.namespace.is_empty() { "/" } else { &self.namespace };
+        let mut entities = cdr::Writer::default();
+        entities.raw(&self.participant.gid()).length(1).text(namespace).text(self.name);
+        entities.list(readers.collect::<Vec<_>>(), gid).list(writers.collect::<Vec<_>>(), gid);
+        self.entities.write(entities.take());
+    }
+
+    /// Send a message. If the library does not accept it now, it is lost, and a newer one follows.
+    pub(crate) fn publish(&self, id: Id, payload: Vec<u8>) {
+        if let Some(writer) = self.writers.get(&id) {
+            writer.write(payload);
+        }
+    }
+
+    pub(crate) fn publish_feedback(&self, action: usize, payload: Vec<u8>) {
+        if let Some(action) = self.actions.get(action) {
+            action.feedback.write(payload);
+        }
+    }
+
+    pub(crate) fn publish_status(&self, action: usize, payload: Vec<u8>) {
+        if let Some(action) = self.actions.get(action) {
+            action.status.write(payload);
+        }
+    }
+
+    /// The messages that have come on the topics.
+    pub(crate) fn heard(&self) -> Vec<(Id, Message)> {
+        let heard = self.readers.iter().flat_map(|(id, reader)| {
+            reader.messages().take(AT_A_TIME).map(|message| (*id, message))
+        });
+        heard.collect()
+    }
+
+    /// The calls of clients of actions.
+    pub(crate) fn called(&self) -> Vec<(usize, Call, Message)> {
+        let actions = self.actions.iter().enumerate();
+        let called = actions.flat_map(|(action, it)| {
+            it.services.iter().flat_map(move |(call, requests, _)| {
+                requests.messages().take(AT_A_TIME).map(move |message| (action, *call, message))
+            })
+        });
+        called.collect()
+    }
+
+    /// Answer a call.
+    pub(crate) fn reply(&self, action: usize, call: Call, to: &Request, payload: &[u8]) {
+        let services = self.actions.get(action).map(|action| &action.services);
+        if let Some((.., replies)) = services.into_iter().flatten().find(|(of, ..)| *of == call) {
+            replies.reply(to, payload);
+        }
+    }
+}

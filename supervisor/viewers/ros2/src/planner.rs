@@ -1,0 +1,427 @@
+//! `firsthand ros2 planner`: Nav2's planner server over the harmonic field. It needs no robot of ours.
+//!
+//! | module | holds |
+//! |---|---|
+//! | `costmap` | a map, and what of it is blocked, pure |
+//! | `frames` | the frames of `/tf`, pure |
+//! | `planning` | map, start and goals to a path, pure |
+//! | `calls` | the messages of the actions, pure |
+//!
+//! A goal is accepted at once; a thread plans.
+
+mod calls;
+mod costmap;
+mod frames;
+mod planning;
+#[cfg(test)]
+mod tests;
+
+use std::{
+    io,
+    net::Ipv4Addr,
+    sync::{
+        Arc,
+        mpsc::{Receiver, SyncSender, channel, sync_channel},
+    },
+    task::Waker,
+    thread,
+    time::{Duration, Instant},
+};
+
+use clap::{Args, value_parser};
+use common::{
+    poll::is_readable,
+    signals::{SIGCONT, Signals},
+};
+use glam::{DAffine2, DVec2};
+use harmonic::{Cancellation, Cell};
+use ros2::{
+    participant::{Message, Quality},
+    topic::Topic,
+};
+
+use self::{
+    calls::{Asked, Outcome, Placed},
+    costmap::{Body, Costmap},
+    frames::Frames,
+    planning::{Failure, Planner, Reason},
+};
+use crate::{
+    bridge::{BridgeError, now_ns},
+    goals::{Goals, Status, Uuid},
+    messages::{self, Header},
+    node::{Call, LATCHED, Node, SURE},
+    shown::arrows,
+};
+
+/// The interval at which the end of this process, or that of the time for a path, is noticed.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+/// The most goals that wait.
+const MOST_WAITING: usize = 16;
+/// `/tf_static` keeps the messages of all its publishers; messages of `/tf` are many.
+const DEPTH: u16 = 256;
+
+/// The actions, their types, and where Nav2's error codes of them begin.
+const ACTIONS: [(&str, &str, u16); 2] = [
+    ("firsthand/compute_path_to_pose", "ComputePathToPose", 200),
+    ("firsthand/compute_path_through_poses", "ComputePathThroughPoses", 300),
+];
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Id {
+    Map,
+    Updates,
+    Tf,
+    TfStatic,
+    Plan,
+    Field,
+}
+
+/// Plan paths for Nav2 along the harmonic field; `firsthand help nav2-planner` says how Nav2 asks for them.
+///
+/// Names without a slash at their beginning are below the namespace.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct Arguments {
+    /// The topic of the map, which is a costmap of Nav2 or the map itself; its updates are on that with `_updates`.
+    #[arg(long, value_name = "TOPIC", default_value = "global_costmap/costmap")]
+    map: String,
+    /// The topic of transforms; those that stay are on that with `_static`.
+    #[arg(long, value_name = "TOPIC", default_value = "tf")]
+    tf: String,
+    /// The frame of the robot.
+    #[arg(long, value_name = "FRAME", default_value = "base_link")]
+    base: String,
+    /// The robot's radius, metres; 0 on a costmap that Nav2 inflates.
+    #[arg(long, value_name = "METRES", default_value = "0", value_parser = amount)]
+    robot_radius: f64,
+    /// The robot's outline instead of its radius, metres, as `[[x, y], ...]` in its frame.
+    #[arg(long, value_name = "POINTS", conflicts_with = "robot_radius", value_parser = inscribed)]
+    footprint: Option<f64>,
+    /// The distance that is kept from obstacles, beyond the radius, where that leaves a way or not, metres.
+    #[arg(long, value_name = "METRES", default_value = "0", value_parser = amount)]
+    inflation: f64,
+    /// Cells with this value or more are occupied.
+    #[arg(long, value_name = "VALUE", default_value_t = 99, value_parser = value_parser!(u8).range(1..=100))]
+    occupied: u8,
+    /// Do not lead through cells of which nothing is known.
+    #[arg(long)]
+    avoid_unknown: bool,
+    /// The field's screening length, metres: a longer one prefers wide ways, a shorter one short ways.
+    #[arg(long, value_name = "METRES", default_value = "0.5", value_parser = amount)]
+    screening: f64,
+    /// The most time for a path, seconds.
+    #[arg(long, value_name = "SECONDS", default_value = "5", value_parser = amount)]
+    max_planning_time: f64,
+    /// Transforms may be so old, seconds.
+    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = amount)]
+    transform_tolerance: f64,
+}
+
+/// A number that is not negative, of less than a day's seconds.
+fn amount(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|number| (0.0..86_400.0).contains(number));
+    number.ok_or_else(|| "no amount; give a number from 0 on".to_owned())
+}
+
+/// The radius of the circle about the robot's centre in an outline.
+fn inscribed(text: &str) -> Result<f64, String> {
+    let words = text.split(['[', ']', ',', ' ']).filter(|word| !word.is_empty());
+    let numbers: Vec<f64> = words.map_while(|word| word.parse().ok()).collect();
+    let corners: Vec<_> = numbers.chunks_exact(2).map(DVec2::from_slice).collect();
+    if corners.len() < 3 || text.matches(',').count() + 1 != numbers.len() {
+        return Err("no outline; give three corners or more, as [[x, y], ...]".to_owned());
+    }
+    let sides = corners.iter().zip(corners.iter().cycle().skip(1));
+    let distance = |(from, to): (&DVec2, &DVec2)| {
+        let along = (to - from).length_squared().max(f64::MIN_POSITIVE);
+        from.lerp(*to, (-from.dot(to - from) / along).clamp(0.0, 1.0)).length()
+    };
+    Ok(sides.map(distance).fold(f64::INFINITY, f64::min))
+}
+
+/// A path to be planned.
+struct Job {
+    action: usize,
+    id: Uuid,
+    map: Arc<Costmap>,
+    start: DAffine2,
+    goals: Vec<DAffine2>,
+    cancellation: Cancellation,
+}
+
+/// A job's action, its goal and outcome, and the field as a message.
+type Done = (usize, Uuid, Outcome, Option<Vec<u8>>);
+
+/// A goal that was accepted.
+#[derive(Debug, Default)]
+struct Plan {
+    began: Option<Instant>,
+    cancellation: Cancellation,
+    outcome: Outcome,
+}
+
+/// Serve until `ended` returns true.
+pub(crate) fn serve(
+    (domain, interface, namespace): (u16, Option<Ipv4Addr>, &str),
+    options: &Arguments,
+    ended: &mut dyn FnMut() -> bool,
+) -> Result<(), BridgeError> {
+    let open = || {
+        let node = open(domain, interface, namespace, options);
+        let node = node.map_err(|source| BridgeError::Join { domain, source })?;
+        Server::new(options, node).map_err(BridgeError::System)
+    };
+    let mut continued = Signals::catch(&[SIGCONT]).map_err(BridgeError::System)?;
+    let mut server = open()?;
+    while !ended() {
+        if continued.came() {
+            // The library's threads end when a call of theirs is interrupted, as happens when the process is stopped and continued.
+            server = open()?;
+        }
+        is_readable(&server.node.participant, LOOK_EVERY).map_err(BridgeError::System)?;
+        server.turn();
+    }
+    Ok(())
+}
+
+fn open(
+    domain: u16,
+    interface: Option<Ipv4Addr>,
+    namespace: &str,
+    options: &Arguments,
+) -> io::Result<Node<Id>> {
+    let mut node = Node::join(domain, interface, namespace, "firsthand_planner")?;
+    let map = node.full_name(&options.map);
+    let tf = node.full_name(&options.tf);
+    let grid = Topic::new(&map, "nav_msgs::msg::dds_::OccupancyGrid_");
+    let updates =
+        Topic::new(&format!("{map}_updates"), "map_msgs::msg::dds_::OccupancyGridUpdate_");
+    let frames = "tf2_msgs::msg::dds_::TFMessage_";
+    let stay = Topic::new(&format!("{tf}_static"), frames);
+    node.read_from(Id::Map, &grid, LATCHED)?;
+    node.read_from(Id::Updates, &updates, Quality { depth: DEPTH, ..SURE })?;
+    node.read_from(
+        Id::Tf,
+        &Topic::new(&tf, frames),
+        Quality { is_reliable: false, depth: DEPTH, ..SURE },
+    )?;
+    node.read_from(Id::TfStatic, &stay, Quality { depth: DEPTH, ..LATCHED })?;
+    let plan = Topic::new(&node.full_name("plan"), "nav_msgs::msg::dds_::Path_");
+    node.write_to(Id::Plan, &plan, LATCHED)?;
+    let field = "visualization_msgs::msg::dds_::MarkerArray_";
+    node.write_to(Id::Field, &Topic::new(&node.full_name("plan_field"), field), LATCHED)?;
+    for (name, kind, _) in ACTIONS {
+        node.serve(name, kind)?;
+    }
+    node.announce();
+    Ok(node)
+}
+
+struct Server<'a> {
+    options: &'a Arguments,
+    node: Node<Id>,
+    frames: Frames,
+    map: Option<Arc<Costmap>>,
+    /// The goals of each action.
+    goals: [Goals<Plan>; 2],
+    jobs: SyncSender<Job>,
+    done: Receiver<Done>,
+}
+
+impl<'a> Server<'a> {
+    fn new(options: &'a Arguments, node: Node<Id>) -> io::Result<Self> {
+        let body = Body {
+            radius_m: options.footprint.unwrap_or(options.robot_radius) + options.inflation,
+            occupied: options.occupied,
+            enters_unknown: !options.avoid_unknown,
+        };
+        let planner = Planner::new(body, options.screening);
+        let (jobs, done) = start_planning(planner, node.participant.bell())?;
+        let goals = <[Goals<Plan>; 2]>::default();
+        Ok(Self { options, node, frames: Frames::default(), map: None, goals, jobs, done })
+    }
+
+    /// Do all that is to be done now.
+    fn turn(&mut self) {
+        self.node.participant.unring();
+        for (id, message) in self.node.heard() {
+            if let Err(why) = self.hear(id, &message.payload) {
+                tracing::warn!("a message of {id:?} is refused: {why}");
+            }
+        }
+        for (action, call, message) in self.node.called() {
+            if let Err(why) = self.hear_call(action, call, &message) {
+                tracing::warn!("a call of {} is refused: {why}", ACTIONS[action].0);
+            }
+        }
+        while let Ok((action, id, outcome, field)) = self.done.try_recv() {
+            let header = Header(outcome.at_ns, &outcome.frame);
+            if outcome.failure.is_none() {
+                self.node.publish(Id::Plan, messages::path(header, &outcome.path));
+            }
+            field.into_iter().for_each(|field| self.node.publish(Id::Field, field));
+            self.end(action, id, outcome);
+        }
+        let most = Duration::from_secs_f64(self.options.max_planning_time);
+        for (action, goals) in self.goals.iter_mut().enumerate() {
+            if let Some(goal) = goals.current()
+                && goal.known.began.is_some_and(|began| began.elapsed() > most)
+            {
+                goal.known.cancellation.cancel();
+            }
+            if let Some(status) = goals.take_status() {
+                self.node.publish_status(action, status);
+            }
+            for (request, id) in goals.answerable() {
+                if let Some((state, plan)) = goals.over(id) {
+                    let unknown = Outcome::default();
+                    let outcome = plan.map_or(&unknown, |plan| &plan.outcome);
+                    let result = calls::result(state, outcome, ACTIONS[action].2);
+                    self.node.reply(action, Call::GetResult, &request, &result);
+                }
+            }
+        }
+    }
+
+    fn hear(&mut self, id: Id, payload: &[u8]) -> Result<(), String> {
+        match id {
+            Id::Map => self.map = Some(Arc::new(Costmap::read(payload)?)),
+            Id::Updates => {
+                if let Some(map) = &mut self.map {
+                    Arc::make_mut(map).update(payload)?;
+                }
+            }
+            Id::Tf => self.frames.take(payload, Some(Instant::now()))?,
+            Id::TfStatic => self.frames.take(payload, None)?,
+            Id::Plan | Id::Field => {}
+        }
+        Ok(())
+    }
+
+    fn hear_call(&mut self, action: usize, call: Call, message: &Message) -> Result<(), String> {
+        let request = &message.request;
+        let payload = request.without_header(&message.payload);
+        match call {
+            Call::SendGoal => {
+                let asked = calls::read(&payload, action == 0);
+                let reply = Goals::<Plan>::reply(asked.is_ok(), now_ns());
+                self.node.reply(action, call, request, &reply);
+                self.begin(action, &asked?);
+            }
+            Call::CancelGoal => {
+                let (reply, is_canceled) = self.goals[action].cancel(&payload)?;
+                self.node.reply(action, call, request, &reply);
+                if is_canceled {
+                    self.interrupt(action);
+                }
+            }
+            Call::GetResult => self.goals[action].wait(request, &payload)?,
+        }
+        Ok(())
+    }
+
+    /// Let nobody wait for the current goal of `action` any longer.
+    fn interrupt(&mut self, action: usize) {
+        if let Some(goal) = self.goals[action].current() {
+            goal.known.cancellation.cancel();
+        }
+    }
+
+    fn begin(&mut self, action: usize, asked: &Asked) {
+        self.interrupt(action);
+        let (id, cancellation) = (asked.id, Cancellation::default());
+        let plan = Plan {
+            began: Some(Instant::now()),
+            cancellation: cancellation.clone(),
+            outcome: Outcome::default(),
+        };
+        self.goals[action].accept(id, plan, now_ns());
+        let begun = self.job(action, asked, cancellation).and_then(|job| {
+            let sent = self.jobs.try_send(job);
+            sent.map_err(|_| (Reason::Timeout, "too many goals wait already".to_owned()))
+        });
+        if let Err(failure) = begun {
+            let outcome = Outcome { at_ns: now_ns(), failure: Some(failure), ..Outcome::default() };
+            self.end(action, id, outcome);
+        }
+    }
+
+    /// The job for a goal, with all poses in the frame of the map.
+    fn job(
+        &self,
+        action: usize,
+        asked: &Asked,
+        cancellation: Cancellation,
+    ) -> Result<Job, Failure> {
+        let Some(map) = &self.map else {
+            let topic = self.node.full_name(&self.options.map);
+            return Err((Reason::Timeout, format!("no map has come on {topic}")));
+        };
+        let tolerance = Duration::from_secs_f64(self.options.transform_tolerance);
+        let since = Instant::now().checked_sub(tolerance);
+        let find = |frame: &str| {
+            self.frames.find(frame, &map.frame, since).map_err(|why| (Reason::Tf, why))
+        };
+        let place = |(frame, pose): &Placed| match frame.as_str() {
+            "" => Ok(*pose),
+            frame => Ok(find(frame)? * *pose),
+        };
+        let start = asked.start.as_ref().map_or_else(|| find(&self.options.base), place)?;
+        let goals = asked.goals.iter().map(place).collect::<Result<_, _>>()?;
+        Ok(Job { action, id: asked.id, map: Arc::clone(map), start, goals, cancellation })
+    }
+
+    /// Let a goal end with its outcome, unless it has ended already.
+    fn end(&mut self, action: usize, id: Uuid, outcome: Outcome) {
+        let goals = &mut self.goals[action];
+        if let Some(goal) = goals.current().filter(|goal| goal.id == id) {
+            let status = match (&outcome.failure, goal.status) {
+                (_, Status::Canceling) => Status::Canceled,
+                (None, _) => Status::Succeeded,
+                (Some(_), _) => Status::Aborted,
+            };
+            goal.known.outcome = outcome;
+            goals.end(status);
+        }
+    }
+}
+
+/// Start a thread that plans one path after the other and rings `bell`. It ends with the sender.
+fn start_planning(
+    mut planner: Planner,
+    bell: Waker,
+) -> io::Result<(SyncSender<Job>, Receiver<Done>)> {
+    let (jobs, waiting) = sync_channel::<Job>(MOST_WAITING);
+    let (ended, done) = channel();
+    thread::Builder::new().name("planner".to_owned()).spawn(move || {
+        for job in waiting {
+            if ended.send(plan(&mut planner, &job)).is_err() {
+                break;
+            }
+            bell.wake_by_ref();
+        }
+    })?;
+    Ok((jobs, done))
+}
+
+fn plan(planner: &mut Planner, job: &Job) -> Done {
+    let Job { action, id, map, start, goals, cancellation } = job;
+    let began = Instant::now();
+    let planned = planner.plan(map, *start, goals, cancellation);
+    let took_ns = u64::try_from(began.elapsed().as_nanos()).unwrap_or(u64::MAX);
+    let (path, failure) = match planned {
+        Ok(path) => (path, None),
+        Err(failure) => (Vec::new(), Some(failure)),
+    };
+    let at_ns = now_ns();
+    let outcome = Outcome { frame: map.frame.clone(), at_ns, took_ns, path, failure };
+    let field = planner.newest_field().map(|field| {
+        let drawn = arrows([map.width, map.height], map.resolution_m, |col, row| {
+            let ahead = field.direction(Cell::new(col, row))?;
+            let at = map.place.transform_point2(DVec2::new(col as f64, row as f64));
+            Some([at, map.place.transform_vector2(ahead.into()).normalize_or_zero()])
+        });
+        messages::markers(Header(at_ns, &map.frame), &[drawn])
+    });
+    (*action, *id, outcome, field)
+}

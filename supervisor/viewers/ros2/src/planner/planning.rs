@@ -1,0 +1,163 @@
+//! From a map, a start and goals to a path along the harmonic field. Pure.
+
+use std::{collections::VecDeque, sync::Arc};
+
+use glam::{DAffine2, DVec2};
+use harmonic::{Cancellation, Cell, Domain, Field, Guidance, Screening, SolveError, Solver};
+use ros2::parts::Pose;
+
+use super::costmap::{Body, Costmap};
+
+/// The most cells of the fields that are kept, those of the newest goals.
+const MOST_CELLS: usize = 1 << 24;
+/// A path follows the field in such steps, in cells: at a wall the field leads away from it or along it.
+const STEP: f64 = 0.25;
+
+/// Why there is no path: Nav2's error codes, less 200 for one goal and 300 for several.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Reason {
+    Unknown = 0,
+    Tf = 2,
+    StartOutside,
+    GoalOutside,
+    StartOccupied,
+    GoalOccupied,
+    Timeout,
+    NoPath,
+    NoGoal,
+}
+
+/// There is no path, for a reason with its words.
+pub(super) type Failure = (Reason, String);
+
+/// Plans on one map after the other.
+#[derive(Debug)]
+pub(super) struct Planner {
+    body: Body,
+    screening_m: f64,
+    solver: Solver,
+    map: Option<Arc<Costmap>>,
+    blocked: Vec<bool>,
+    /// Fields with what they are of, that of the newest path last.
+    fields: VecDeque<(Domain, Field)>,
+}
+
+impl Planner {
+    pub(super) fn new(body: Body, screening_m: f64) -> Self {
+        let (solver, fields) = (Solver::default(), VecDeque::new());
+        Self { body, screening_m, solver, map: None, blocked: Vec::new(), fields }
+    }
+
+    /// Poses about a cell apart in the frame of `map`, from `start` by way of all `goals`, each of which has its own heading.
+    pub(super) fn plan(
+        &mut self,
+        map: &Arc<Costmap>,
+        start: DAffine2,
+        goals: &[DAffine2],
+        cancellation: &Cancellation,
+    ) -> Result<Vec<Pose>, Failure> {
+        if goals.is_empty() {
+            return Err((Reason::NoGoal, "no goal was given".to_owned()));
+        }
+        let before = self.map.replace(Arc::clone(map));
+        if before.is_none_or(|before| !Arc::ptr_eq(&before, map)) {
+            self.blocked = map.blocked(&self.body);
+        }
+        let mut path = Vec::new();
+        let mut from = start.translation;
+        for goal in goals {
+            let to = goal.translation;
+            let leg = self.leg(map, [from, to], cancellation)?;
+            // The last position is somewhere in the goal's cell.
+            let next = leg.iter().skip(1).take(leg.len().saturating_sub(2)).chain([&to]);
+            let ahead = leg.iter().zip(next).map(|(at, to)| [at.x, at.y, (to - at).to_angle()]);
+            path.extend(ahead);
+            path.push([to.x, to.y, goal.matrix2.x_axis.to_angle()]);
+            from = to;
+        }
+        Ok(path)
+    }
+
+    /// The field of the last path.
+    pub(super) fn newest_field(&self) -> Option<&Field> {
+        self.fields.back().map(|(_, field)| field)
+    }
+
+    /// Positions in the frame of `map`, from the first of `ends` to the cell of the other.
+    fn leg(
+        &mut self,
+        map: &Costmap,
+        ends: [DVec2; 2],
+        cancellation: &Cancellation,
+    ) -> Result<Vec<DVec2>, Failure> {
+        let [start, goal] = ends.map(|end| format!("({:.2}, {:.2})", end.x, end.y));
+        let [from, to] = ends.map(|end| map.place.inverse().transform_point2(end));
+        let fails = |reason, text: String| move || (reason, text);
+        let of_start = format!("the start {start} is outside of the map");
+        let of_goal = format!("the goal {goal} is outside of the map");
+        let first = map.cell_at(from).ok_or_else(fails(Reason::StartOutside, of_start))?;
+        let last = map.cell_at(to).ok_or_else(fails(Reason::GoalOutside, of_goal))?;
+        if map.is_occupied(first, &self.body) {
+            return Err((Reason::StartOccupied, format!("the start {start} is occupied")));
+        }
+        if self.blocked[last.row * map.width + last.col] {
+            let text = format!("the goal {goal} is occupied, or the robot does not fit there");
+            return Err((Reason::GoalOccupied, text));
+        }
+        let body = self.body;
+        let field = self.field(map, last, cancellation).map_err(|error| match error {
+            SolveError::Cancelled => {
+                (Reason::Timeout, "the field was not solved in time".to_owned())
+            }
+            error => (Reason::Unknown, error.to_string()),
+        })?;
+        let enters = |at: DVec2| map.cell_at(at).is_some_and(|cell| !map.is_occupied(cell, &body));
+        let way = way(field, from, enters)
+            .ok_or_else(|| (Reason::NoPath, format!("no way leads from {start} to {goal}")))?;
+        Ok(way.into_iter().map(|at| map.place.transform_point2(at)).collect())
+    }
+
+    /// The field of a goal. One of an earlier map is what the solve starts from.
+    fn field(
+        &mut self,
+        map: &Costmap,
+        goal: Cell,
+        cancellation: &Cancellation,
+    ) -> Result<&Field, SolveError> {
+        let domain = Domain::new(map.width, map.height, self.blocked.clone(), goal)?
+            .with_screening(&Screening::cells(self.screening_m / map.resolution_m))?;
+        let known = self.fields.iter().position(|(_, field)| field.target() == goal);
+        let field = match known.and_then(|at| self.fields.remove(at)) {
+            Some((of, field)) if of == domain => field,
+            Some((_, near)) => self.solver.solve_near(&domain, &near, cancellation)?,
+            None => self.solver.solve(&domain, cancellation)?,
+        };
+        let most = MOST_CELLS / self.blocked.len();
+        self.fields.drain(..self.fields.len().saturating_sub(most));
+        Ok(&self.fields.push_back_mut((domain, field)).1)
+    }
+}
+
+/// Positions about a cell apart along `field`; none if it does not lead from `from` to its target, or only through what cannot be
+/// entered.
+fn way(field: &Field, from: DVec2, enters: impl Fn(DVec2) -> bool) -> Option<Vec<DVec2>> {
+    let mut at = from;
+    let mut way = vec![from];
+    // No way that leads from cell to cell is longer.
+    for _ in 0..field.width() * field.height() * (2.0 / STEP) as usize {
+        let ahead = match field.guidance(at.x, at.y) {
+            Guidance::AtTarget => {
+                way.push(at);
+                return Some(way);
+            }
+            Guidance::Along(ahead) => ahead,
+            Guidance::WayOut(ahead) if enters(at) => ahead,
+            Guidance::WayOut(_) | Guidance::Unreachable => return None,
+        };
+        at += STEP * DVec2::from(ahead);
+        if way.last().is_none_or(|last| at.distance(*last) >= 1.0) {
+            way.push(at);
+        }
+    }
+    None
+}

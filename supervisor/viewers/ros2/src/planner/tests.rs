@@ -1,0 +1,302 @@
+mod figures;
+
+use std::{
+    f64::consts::{FRAC_PI_2, PI},
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use glam::{DAffine2, DVec2};
+use harmonic::Cancellation;
+use ros2::{
+    cdr::{Reader, Writer},
+    parts::Pose,
+};
+
+use self::figures::{Grid, RESOLUTION_M};
+use super::{
+    calls::{self, Outcome},
+    costmap::{Body, Costmap},
+    frames::Frames,
+    inscribed,
+    planning::{Failure, Planner, Reason},
+};
+
+const BODY: Body = Body { radius_m: 0.22, occupied: 99, enters_unknown: true };
+
+fn planner() -> Planner {
+    Planner::new(BODY, 0.5)
+}
+
+fn at(x: f64, y: f64) -> DAffine2 {
+    DAffine2::from_angle_translation(0.5, DVec2::new(x, y))
+}
+
+fn map(grid: &Grid) -> Arc<Costmap> {
+    Arc::new(Costmap::read(&grid.message()).unwrap())
+}
+
+/// Two rooms of 5 m x 5 m with a door of 1.5 m at the top, and a closed box in the left one.
+fn rooms() -> Grid {
+    let mut grid = Grid::new(200, 100);
+    grid.fill([100, 0], [2, 100], true);
+    grid.fill([100, 65], [2, 30], false);
+    grid.fill([10, 10], [40, 40], true);
+    grid.fill([14, 14], [32, 32], false);
+    grid
+}
+
+fn plan(
+    planner: &mut Planner,
+    map: &Arc<Costmap>,
+    from: DAffine2,
+    to: &[DAffine2],
+) -> Result<Vec<Pose>, Failure> {
+    planner.plan(map, from, to, &Cancellation::default())
+}
+
+/// An update of a map: the value of a window.
+fn update([col, row]: [u32; 2], [width, height]: [u32; 2], value: u8) -> Vec<u8> {
+    let cells = vec![value; (width * height) as usize];
+    let mut writer = Writer::default();
+    writer
+        .header(0, "map")
+        .u32(col)
+        .u32(row)
+        .u32(width)
+        .u32(height)
+        .length(cells.len())
+        .raw(&cells)
+        .take()
+}
+
+#[test]
+fn a_path_begins_at_the_start_ends_in_the_goals_pose_and_looks_ahead_a_cell_at_a_time() {
+    let path = plan(&mut planner(), &map(&rooms()), at(1.0, 4.0), &[at(9.0, 1.0)]).unwrap();
+    assert_eq!((path[0][..2].to_vec(), path.last()), (vec![1.0, 4.0], Some(&[9.0, 1.0, 0.5])));
+    for pair in path.windows(2) {
+        let [from, to] = [pair[0], pair[1]].map(|[x, y, _]| DVec2::new(x, y));
+        assert!(from.distance(to) < 2.3 * RESOLUTION_M, "{from} {to}");
+        assert!(((to - from).to_angle() - pair[0][2]).abs() < 1e-9);
+    }
+    let by_way =
+        plan(&mut planner(), &map(&rooms()), at(1.0, 4.0), &[at(4.0, 4.5), at(9.0, 1.0)]).unwrap();
+    assert!(by_way.contains(&[4.0, 4.5, 0.5]) && by_way.last() == path.last());
+}
+
+#[test]
+fn a_map_that_is_turned_gives_the_path_that_is_turned() {
+    let straight = plan(&mut planner(), &map(&rooms()), at(1.0, 4.0), &[at(9.0, 1.0)]).unwrap();
+    let mut payload = rooms().message();
+    let end = payload.len() - 200 * 100 - 4;
+    payload.truncate(end - 32);
+    let turn = DAffine2::from_angle_translation(FRAC_PI_2, DVec2::ZERO);
+    payload.extend(
+        [0.0, 0.0, (PI / 4.0).sin(), (PI / 4.0).cos()]
+            .iter()
+            .flat_map(|part: &f64| part.to_le_bytes()),
+    );
+    payload.extend(&rooms().message()[end..]);
+    let turned = Arc::new(Costmap::read(&payload).unwrap());
+    let path = plan(&mut planner(), &turned, turn * at(1.0, 4.0), &[turn * at(9.0, 1.0)]).unwrap();
+    assert_eq!(path.len(), straight.len());
+    for (a, b) in path.iter().zip(&straight) {
+        assert!(
+            turn.transform_point2(DVec2::new(b[0], b[1])).distance(DVec2::new(a[0], a[1])) < 1e-6
+        );
+    }
+}
+
+#[test]
+fn each_reason_against_a_path_has_nav2s_error_code_and_says_where() {
+    let map = map(&rooms());
+    let (free, outside, occupied, closed) =
+        (at(4.0, 4.0), at(20.0, 1.0), at(0.6, 1.5), at(1.5, 1.5));
+    for (from, to, code, says) in [
+        (outside, free, 203, "the start (20.00, 1.00)"),
+        (free, outside, 204, "the goal (20.00, 1.00)"),
+        (free, at(f64::NAN, 0.0), 204, "the goal"),
+        (occupied, free, 205, "the start (0.60, 1.50) is occupied"),
+        (free, occupied, 206, "the goal (0.60, 1.50) is occupied"),
+        (free, at(4.9, 1.0), 206, "does not fit"),
+        (free, closed, 208, "no way leads from (4.00, 4.00) to (1.50, 1.50)"),
+        (closed, free, 208, "no way"),
+    ] {
+        let (reason, words) = plan(&mut planner(), &map, from, &[to]).unwrap_err();
+        assert_eq!((reason as u16 + 200, words.contains(says)), (code, true), "{words}");
+    }
+    assert_eq!(plan(&mut planner(), &map, free, &[]).unwrap_err().0 as u16, 9);
+    let canceled = Cancellation::default();
+    canceled.cancel();
+    let late = planner().plan(&map, free, &[at(9.0, 1.0)], &canceled).unwrap_err();
+    assert_eq!(late.0, Reason::Timeout);
+}
+
+#[test]
+fn a_robot_that_touches_what_is_inflated_is_led_out_and_not_through_a_wall() {
+    let mut grid = Grid::new(200, 100);
+    grid.fill([100, 0], [1, 100], true);
+    // 0.1 m before the wall the robot's centre is in the inflated part.
+    let path = plan(&mut planner(), &map(&grid), at(4.9, 2.5), &[at(1.0, 2.5)]).unwrap();
+    assert!(path.iter().all(|pose| pose[0] < 4.95));
+    let through = plan(&mut planner(), &map(&grid), at(4.9, 2.5), &[at(9.0, 2.5)]).unwrap_err();
+    assert_eq!(through.0, Reason::NoPath);
+}
+
+#[test]
+fn a_change_of_the_map_changes_the_field_of_a_goal_as_a_new_solve_would() {
+    let mut changing = planner();
+    let mut grid = rooms();
+    let mut newest = map(&grid);
+    let ends = (at(1.0, 4.0), [at(9.0, 1.0)]);
+    plan(&mut changing, &newest, ends.0, &ends.1).unwrap();
+    grid.fill([100, 80], [2, 15], true);
+    grid.fill([150, 40], [20, 4], true);
+    for window in [([100, 80], [2, 15]), ([150, 40], [20, 4])] {
+        Arc::make_mut(&mut newest).update(&update(window.0, window.1, 100)).unwrap();
+    }
+    let changed = plan(&mut changing, &newest, ends.0, &ends.1).unwrap();
+    let anew = plan(&mut planner(), &map(&grid), ends.0, &ends.1).unwrap();
+    for (a, b) in changed.iter().zip(&anew) {
+        assert!(DVec2::new(a[0], a[1]).distance(DVec2::new(b[0], b[1])) < 0.05, "{a:?} {b:?}");
+    }
+    Arc::make_mut(&mut newest).update(&update([100, 60], [2, 25], 100)).unwrap();
+    assert_eq!(plan(&mut changing, &newest, ends.0, &ends.1).unwrap_err().0 as u16, 8);
+    Arc::make_mut(&mut newest).update(&update([178, 18], [4, 4], 100)).unwrap();
+    assert_eq!(plan(&mut changing, &newest, ends.0, &ends.1).unwrap_err().0 as u16, 6);
+}
+
+#[test]
+fn cells_are_blocked_whose_centres_are_within_the_radius_of_an_occupied_one_and_unknown_ones_if_asked()
+ {
+    let mut grid = Grid::new(30, 20);
+    grid.fill([12, 9], [1, 1], true);
+    let mut map = Costmap::read(&grid.message()).unwrap();
+    map.update(&update([0, 0], [1, 1], 255)).unwrap();
+    map.update(&update([29, 19], [1, 1], 98)).unwrap();
+    for (radius_m, enters_unknown) in [(0.0, true), (0.21, true), (0.11, false), (9.0, true)] {
+        let blocked = map.blocked(&Body { radius_m, enters_unknown, ..BODY });
+        for (index, &is_blocked) in blocked.iter().enumerate() {
+            let (col, row) = ((index % 30) as f64, (index / 30) as f64);
+            let near = |c: f64, r: f64| (col - c).hypot(row - r) * RESOLUTION_M <= radius_m + 1e-9;
+            assert_eq!(
+                is_blocked,
+                near(12.0, 9.0) || !enters_unknown && near(0.0, 0.0),
+                "{col} {row}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_footprint_has_the_radius_of_the_circle_in_it() {
+    let box_ = inscribed("[[0.3, 0.2], [0.3, -0.2], [-0.25, -0.2], [-0.25, 0.2]]").unwrap();
+    assert!((box_ - 0.2).abs() < 1e-9);
+    for wrong in
+        ["", "[[0.3, 0.2], [0.3, -0.2]]", "[[0.3, 0.2], [0.3, -0.2], [x, -0.2], [-0.25, 0.2]]"]
+    {
+        assert!(inscribed(wrong).unwrap_err().contains("[[x, y], ...]"), "{wrong}");
+    }
+}
+
+#[test]
+fn a_map_or_update_that_is_cut_or_false_is_refused_whole() {
+    let message = Grid::new(3, 2).message();
+    for end in 0..message.len() {
+        assert!(Costmap::read(&message[..end]).is_err(), "{end} bytes");
+    }
+    let mut map = Costmap::read(&message).unwrap();
+    for ([col, row], size) in [([2, 0], [2, 1]), ([0, 1], [1, 2]), ([u32::MAX, 0], [1, 1])] {
+        assert!(map.update(&update([col, row], size, 100)).is_err());
+    }
+    assert!(map.blocked(&BODY).iter().all(|blocked| !blocked));
+}
+
+/// A message of transforms: parent, frame, pose.
+fn transforms(of: &[(&str, &str, Pose)]) -> Vec<u8> {
+    crate::messages::transforms(0, of)
+}
+
+#[test]
+fn the_pose_of_the_robot_is_that_of_its_frame_by_way_of_odometry_unless_one_is_old_or_missing() {
+    let mut frames = Frames::default();
+    let now = Instant::now();
+    let find = |frames: &Frames, frame, since| frames.find(frame, "map", since);
+    frames.take(&transforms(&[("/odom", "base_link", [2.0, 0.0, 0.5])]), Some(now)).unwrap();
+    assert!(find(&frames, "base_link", None).unwrap_err().contains("\"odom\""));
+    frames.take(&transforms(&[("map", "odom", [1.0, 2.0, FRAC_PI_2])]), None).unwrap();
+    let pose = find(&frames, "base_link", Some(now)).unwrap();
+    assert!(pose.translation.distance(DVec2::new(1.0, 4.0)) < 1e-12);
+    assert!((pose.matrix2.x_axis.to_angle() - 0.5 - FRAC_PI_2).abs() < 1e-12);
+    assert_eq!(find(&frames, "map", None), Ok(DAffine2::IDENTITY));
+    let later = now + Duration::from_secs(1);
+    assert!(find(&frames, "base_link", Some(later)).unwrap_err().contains("old"));
+    assert!(find(&frames, "odom", Some(later)).is_ok(), "it stays");
+    frames.take(&transforms(&[("a", "b", [0.0; 3]), ("b", "a", [0.0; 3])]), None).unwrap();
+    assert!(find(&frames, "a", None).unwrap_err().contains("circle"));
+}
+
+fn stamped(writer: &mut Writer, pose: Pose) {
+    writer.header(1_700_000_000_123_456_789, "map").pose(pose);
+}
+
+#[test]
+fn goals_are_read_as_kilted_and_as_jazzy_write_them() {
+    let end = |mut writer: Writer, uses_start: u8| {
+        stamped(&mut writer, [7.0, 8.0, 0.0]);
+        writer.text("GridBased").u8(uses_start).take()
+    };
+    let mut one = Writer::default();
+    one.raw(&[3; 16]);
+    stamped(&mut one, [1.0, 2.0, 0.5]);
+    let asked = calls::read(&end(one.clone(), 0), true).unwrap();
+    assert_eq!((asked.id, asked.goals.len(), asked.start.is_none()), ([3; 16], 1, true));
+    assert!(asked.goals[0].1.translation.distance(DVec2::new(1.0, 2.0)) < 1e-12);
+    let asked = calls::read(&end(one, 1), true).unwrap();
+    assert_eq!(asked.start.unwrap().1.translation, DVec2::new(7.0, 8.0));
+    for has_header in [true, false] {
+        let mut several = Writer::default();
+        several.raw(&[3; 16]);
+        if has_header {
+            several.header(0, "map");
+        }
+        several.length(3);
+        (1..=3).for_each(|n| stamped(&mut several, [n.into(), 0.0, 0.0]));
+        let payload = end(several, 0);
+        let asked = calls::read(&payload, false).unwrap();
+        let xs: Vec<_> = asked.goals.iter().map(|(_, pose)| pose.translation.x).collect();
+        assert_eq!(xs, [1.0, 2.0, 3.0], "{has_header}");
+        for cut in 0..payload.len() {
+            assert!(calls::read(&payload[..cut], false).is_err(), "{cut} bytes");
+        }
+    }
+}
+
+#[test]
+fn a_result_has_the_path_or_the_error_code_of_its_action_with_words() {
+    let outcome = Outcome {
+        frame: "map".to_owned(),
+        path: vec![[1.0, 2.0, 0.0]; 2],
+        took_ns: 5,
+        ..Outcome::default()
+    };
+    let payload = calls::result(4, &outcome, 200);
+    let mut reader = Reader::new(&payload).unwrap();
+    assert_eq!(reader.u8().unwrap(), 4);
+    assert_eq!((reader.header().unwrap().1, reader.u32().unwrap()), ("map", 2));
+    for _ in 0..2 {
+        reader.header().unwrap();
+        assert_eq!(reader.pose().unwrap(), ([1.0, 2.0], Some(0.0)));
+    }
+    assert_eq!((reader.time().unwrap(), reader.u16().unwrap(), reader.text().unwrap()), (5, 0, ""));
+    let failed = Outcome {
+        failure: Some((Reason::NoGoal, "no goal was given".to_owned())),
+        ..Outcome::default()
+    };
+    let payload = calls::result(6, &failed, 300);
+    let mut reader = Reader::new(&payload).unwrap();
+    reader.u8().unwrap();
+    reader.header().unwrap();
+    assert_eq!((reader.u32().unwrap(), reader.time().unwrap()), (0, 0));
+    assert_eq!((reader.u16().unwrap(), reader.text().unwrap()), (309, "no goal was given"));
+}
