@@ -333,10 +333,12 @@ def main(firsthand):
         heard.until("the end of the mission", lambda: run.poll() is not None, 120)
         assert json.loads(run.stdout.read())["outcome"] == "reached"
 
-        # A robot that is said to be elsewhere believes that.
+        # A robot that stands and is said to be elsewhere believes that.
         run = mission("placed")
         heard.messages.clear()
         heard.until("movement", lambda: heard.messages.get("odom") and heard.newest("odom").twist.twist.linear.x > 0.1)
+        stops.publish(Bool(data=True))
+        heard.until("rest", lambda: status(firsthand)["link"]["cause"] == "stopped by an operator" and status(firsthand)["link"]["at_rest"])
         places = node.create_publisher(PoseWithCovarianceStamped, "initialpose", 10)
         heard.until("a reader of places", lambda: places.get_subscription_count() > 0)
         place = PoseWithCovarianceStamped()

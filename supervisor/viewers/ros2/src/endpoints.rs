@@ -2,8 +2,6 @@
 
 use std::{io, net::Ipv4Addr};
 
-use ros2::topic::Topic;
-
 use crate::{
     node::{LATCHED, Node, SURE},
     topics::{Accept, Id, Spec, TABLE, spec},
@@ -23,7 +21,8 @@ pub(crate) fn open(
             None if matches!(row.id, Id::Range(_) | Id::Scan(_)) => {}
             None => write_to(&mut node, row.id, row, "")?,
             Some(by) if accepted.contains(&by) => {
-                node.read_from(row.id, &topic(&node, row, ""), SURE)?;
+                let name = topic_name(namespace, row, "");
+                node.read_from(row.id, [&name, row.type_name], SURE)?;
             }
             Some(_) => {}
         }
@@ -50,13 +49,9 @@ pub(crate) fn open_sensors<'a>(
     Ok(())
 }
 
-fn topic(node: &Node<Id>, row: &Spec, sensor: &str) -> Topic {
-    Topic::new(&topic_name(&node.namespace, row, sensor), row.type_name)
-}
-
 fn write_to(node: &mut Node<Id>, id: Id, row: &Spec, sensor: &str) -> io::Result<()> {
-    let topic = topic(node, row, sensor);
-    node.write_to(id, &topic, if row.is_latched { LATCHED } else { SURE })
+    let name = topic_name(&node.namespace, row, sensor);
+    node.write_to(id, [&name, row.type_name], if row.is_latched { LATCHED } else { SURE })
 }
 
 /// The name of the topic of `row` below `namespace`, from the root.

@@ -78,8 +78,15 @@ impl<Id: Copy + Ord> Node<Id> {
         if name.starts_with('/') { name.to_owned() } else { format!("{}/{name}", self.namespace) }
     }
 
-    pub(crate) fn write_to(&mut self, id: Id, topic: &Topic, quality: Quality) -> io::Result<()> {
-        self.writers.insert(id, self.participant.writer(topic, quality)?);
+    /// Write to a topic of a type.
+    pub(crate) fn write_to(
+        &mut self,
+        id: Id,
+        [name, kind]: [&str; 2],
+        quality: Quality,
+    ) -> io::Result<()> {
+        let topic = Topic::new(&self.full_name(name), kind);
+        self.writers.insert(id, self.participant.writer(&topic, quality)?);
         Ok(())
     }
 
@@ -88,8 +95,15 @@ impl<Id: Copy + Ord> Node<Id> {
         self.writers.retain(|id, _| keep(*id));
     }
 
-    pub(crate) fn read_from(&mut self, id: Id, topic: &Topic, quality: Quality) -> io::Result<()> {
-        self.readers.push((id, self.participant.reader(topic, quality)?));
+    /// Read from a topic of a type.
+    pub(crate) fn read_from(
+        &mut self,
+        id: Id,
+        [name, kind]: [&str; 2],
+        quality: Quality,
+    ) -> io::Result<()> {
+        let topic = Topic::new(&self.full_name(name), kind);
+        self.readers.push((id, self.participant.reader(&topic, quality)?));
         Ok(())
     }
 

@@ -35,10 +35,7 @@ use common::{
 };
 use glam::{DAffine2, DVec2};
 use harmonic::{Cancellation, Cell};
-use ros2::{
-    participant::{Message, Quality},
-    topic::Topic,
-};
+use ros2::participant::{Message, Quality};
 
 use self::{
     calls::{Asked, Outcome, Placed},
@@ -191,25 +188,21 @@ fn open(
     options: &Arguments,
 ) -> io::Result<Node<Id>> {
     let mut node = Node::join(domain, interface, namespace, "firsthand_planner")?;
-    let map = node.full_name(&options.map);
-    let tf = node.full_name(&options.tf);
-    let grid = Topic::new(&map, "nav_msgs::msg::dds_::OccupancyGrid_");
-    let updates =
-        Topic::new(&format!("{map}_updates"), "map_msgs::msg::dds_::OccupancyGridUpdate_");
+    let Arguments { map, tf, .. } = options;
+    let [updates, stay] = [format!("{map}_updates"), format!("{tf}_static")];
     let frames = "tf2_msgs::msg::dds_::TFMessage_";
-    let stay = Topic::new(&format!("{tf}_static"), frames);
-    node.read_from(Id::Map, &grid, LATCHED)?;
-    node.read_from(Id::Updates, &updates, Quality { depth: DEPTH, ..SURE })?;
-    node.read_from(
-        Id::Tf,
-        &Topic::new(&tf, frames),
-        Quality { is_reliable: false, depth: DEPTH, ..SURE },
-    )?;
-    node.read_from(Id::TfStatic, &stay, Quality { depth: DEPTH, ..LATCHED })?;
-    let plan = Topic::new(&node.full_name("plan"), "nav_msgs::msg::dds_::Path_");
-    node.write_to(Id::Plan, &plan, LATCHED)?;
-    let field = "visualization_msgs::msg::dds_::MarkerArray_";
-    node.write_to(Id::Field, &Topic::new(&node.full_name("plan_field"), field), LATCHED)?;
+    let many = Quality { depth: DEPTH, ..SURE };
+    for (id, name, kind, quality) in [
+        (Id::Map, map, "nav_msgs::msg::dds_::OccupancyGrid_", LATCHED),
+        (Id::Updates, &updates, "map_msgs::msg::dds_::OccupancyGridUpdate_", many),
+        (Id::Tf, tf, frames, Quality { is_reliable: false, ..many }),
+        (Id::TfStatic, &stay, frames, Quality { is_latched: true, ..many }),
+    ] {
+        node.read_from(id, [name, kind], quality)?;
+    }
+    node.write_to(Id::Plan, ["plan", "nav_msgs::msg::dds_::Path_"], LATCHED)?;
+    let field = ["plan_field", "visualization_msgs::msg::dds_::MarkerArray_"];
+    node.write_to(Id::Field, field, LATCHED)?;
     for (name, kind, _) in ACTIONS {
         node.serve(name, kind)?;
     }

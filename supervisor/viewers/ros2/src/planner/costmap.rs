@@ -46,13 +46,12 @@ impl Costmap {
         let [width, height] = [reader.u32()? as usize, reader.u32()? as usize];
         let (origin, heading) = reader.pose()?;
         let heading = heading.ok_or("an origin whose orientation is no rotation")?;
-        let is_number =
-            resolution_m > 0.0 && origin.iter().chain([&resolution_m]).all(|x| x.is_finite());
-        if !is_number || !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
-            return Err(format!("{width} x {height} cells of {resolution_m} m at {origin:?}"));
-        }
         let scale = DVec2::splat(resolution_m);
         let corner = DAffine2::from_scale_angle_translation(scale, heading, origin.into());
+        let fits = |side| (1..=MAX_SIDE).contains(&side);
+        if !(resolution_m > 0.0 && corner.is_finite() && fits(width) && fits(height)) {
+            return Err(format!("{width} x {height} cells of {resolution_m} m at {origin:?}"));
+        }
         let count = reader.length(MOST_CELLS)?;
         if count != width * height {
             return Err(format!("{count} cells instead of {width} x {height}"));
