@@ -1,15 +1,16 @@
 //! What the body does against what its wheels count, as the laser or else the sonars see it: motors, and the sizes of wheels and track.
 
-use common::mission::{Channel, Mission, Protocol};
+use common::mission::{Mission, Protocol};
+use nalgebra::{Matrix2, Vector2};
 
 use crate::Finding;
 
 /// The body's motion over that of its wheels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Moves {
-    /// It turns against the wheels.
-    pub(crate) turns_back: bool,
-    pub(crate) drives_back: bool,
+    /// It turns, or drives, the other way; none if nothing shows it.
+    pub(crate) turns_back: Option<bool>,
+    pub(crate) drives_back: Option<bool>,
     /// It drives where the wheels say that it turns, and turns where they say that it drives.
     pub(crate) exchanged: bool,
     /// True turn and way over the wheels'; none if nothing shows it.
@@ -26,43 +27,73 @@ pub(crate) struct SizesTold {
     pub(crate) ratio: f64,
 }
 
+/// Motors that let the body move so: in each row, a wheel's, 1 or -1 at the wheel that it goes as, when that is told.
+pub(crate) fn motors(turns_back: bool, drives_back: bool, exchanged: bool) -> Matrix2<f64> {
+    // Turn and way are the difference and the sum of the rims' ways, and those of turn and way are twice the rims'.
+    let sums = Matrix2::new(-1.0, 1.0, 1.0, 1.0);
+    let sign = |back| if back { -1.0 } else { 1.0 };
+    let signs = Matrix2::from_diagonal(&Vector2::new(sign(turns_back), sign(drives_back)));
+    let goes = if exchanged { signs * Matrix2::new(0.0, 1.0, 1.0, 0.0) } else { signs };
+    sums * goes * sums / 2.0
+}
+
+/// What is wrong with `motors`.
+pub(crate) fn words(motors: Matrix2<f64>) -> String {
+    let is_swapped = motors[(0, 0)] == 0.0;
+    let reversed = match [0, 1].map(|row| motors.row(row).sum() < 0.0) {
+        [true, true] => "both motors turn backwards",
+        [true, false] => "the left wheel turns backwards",
+        [false, true] => "the right wheel turns backwards",
+        _ => "",
+    };
+    let swapped = if is_swapped { "the motors are swapped, left and right" } else { "" };
+    let and = if is_swapped && !reversed.is_empty() { ", and " } else { "" };
+    format!("{swapped}{and}{reversed}")
+}
+
 impl Moves {
-    /// Motors that are swapped or turn backwards; none if they are right.
-    pub(crate) fn motors(&self, mission: &Mission) -> Option<Finding> {
-        let [left, right] = [mission.robot.left, mission.robot.right];
-        let not = |it: Channel| Channel { reversed: !it.reversed, ..it };
-        let (text, mended) = match (self.exchanged, self.turns_back, self.drives_back) {
-            (true, false, _) => (
-                "told to drive, the body turns: the left wheel turns backwards",
-                [not(left), right],
-            ),
-            (true, true, _) => (
-                "told to drive, the body turns: the right wheel turns backwards",
-                [left, not(right)],
-            ),
-            (_, true, true) => (
-                "it turns and drives the other way: both motors turn backwards",
-                [not(left), not(right)],
-            ),
-            (_, true, false) => {
-                ("it turns the other way: the motors are swapped, left and right", [right, left])
-            }
-            (_, false, true) => (
-                "it drives backwards when it is told to drive ahead: the motors are swapped and turn backwards, or front and rear sonar are swapped",
-                [not(right), not(left)],
-            ),
-            _ => return None,
-        };
+    /// All motors that what was seen allows.
+    fn possible(&self) -> Vec<Matrix2<f64>> {
+        let either = |known: Option<bool>| known.map_or(vec![false, true], |it| vec![it]);
+        let turns = either(self.turns_back).into_iter();
+        turns
+            .flat_map(|turns| either(self.drives_back).into_iter().map(move |it| (turns, it)))
+            .map(|(turns, drives)| motors(turns, drives, self.exchanged))
+            .collect()
+    }
+
+    /// The motors, if what was seen tells them.
+    pub(crate) fn motors(&self) -> Option<Matrix2<f64>> {
+        let possible = self.possible();
+        possible.first().copied().filter(|_| possible.len() == 1)
+    }
+
+    /// Motors that are swapped or turn backwards; none if they may be right. Keys mend them if the encoders are connected `alike`.
+    pub(crate) fn finding(&self, mission: &Mission, alike: bool) -> Option<Finding> {
+        let possible = self.possible();
+        if possible.contains(&Matrix2::identity()) {
+            return None;
+        }
+        let all: Vec<_> = possible.iter().map(|it| words(*it)).collect();
+        let which = if all.len() > 1 { ": look which way it turns and drives" } else { "" };
+        let told = if self.exchanged { "told to drive, the body turns: " } else { "" };
+        let text = format!("{told}{}{which}", all.join("; or "));
         let mut finding = Finding::wrong("motors", text);
-        if mission.robot.protocol() == Protocol::X80 {
-            for (side, stated, mended) in [("left", left, mended[0]), ("right", right, mended[1])] {
-                if mended.channel != stated.channel {
+        if let [motors] = possible[..]
+            && alike
+            && mission.robot.protocol() == Protocol::X80
+        {
+            let stated = [mission.robot.left, mission.robot.right];
+            for (row, side) in ["left", "right"].into_iter().enumerate() {
+                let goes_as = stated[usize::from(motors[(row, 0)] == 0.0)];
+                let reversed = goes_as.reversed != (motors.row(row).sum() < 0.0);
+                if goes_as.channel != stated[row].channel {
                     let key = format!("robot.{side}.channel");
-                    finding = finding.with_key(key, mended.channel.to_string());
+                    finding = finding.with_key(key, goes_as.channel.to_string());
                 }
-                if mended.reversed != stated.reversed {
+                if reversed != stated[row].reversed {
                     let key = format!("robot.{side}.reversed");
-                    finding = finding.with_key(key, mended.reversed.to_string());
+                    finding = finding.with_key(key, reversed.to_string());
                 }
             }
         }

@@ -93,19 +93,31 @@ pub fn findings(mission: &Mission, trace: &Trace, lifted: bool) -> (Vec<Finding>
         found.push(Finding::unknown("recording", text));
         return (found, None);
     }
-    found.extend(rangers::liveliness(mission, trace));
     let wheels = wheels::Wheels::of(trace);
-    found.push(wheels.finding(mission));
     let motion = wheels.motion(trace, mission.body().track_m);
-    found.extend(wheels::response(mission, trace, &motion));
+    let response = wheels::response(mission, trace, &motion);
     if lifted {
+        found.extend(rangers::liveliness(mission, trace, false));
+        found.extend([wheels.finding(mission, None), response]);
         return (found, None);
     }
     let placed = scans::place(mission, trace, &motion);
     let gyro = rangers::Gyro::of(trace, &motion);
-    found.extend(scans::findings(mission, trace, placed.as_ref(), gyro.as_ref()));
     let sure = placed.as_ref().filter(|placed| placed.is_sure());
-    found.extend(rangers::findings(mission, trace, &motion, sure, gyro.as_ref()));
+    let moves = match sure {
+        Some(placed) => placed.moves(gyro.as_ref()),
+        None => rangers::moves(mission, trace, &motion),
+    };
+    found.extend(rangers::liveliness(mission, trace, !moves.exchanged));
+    found.extend([wheels.finding(mission, moves.motors()), response]);
+    let motors = moves.finding(mission, wheels.is_as_told());
+    let are_right = motors.is_none();
+    found.extend(motors);
+    found.extend(scans::findings(mission, trace, placed.as_ref(), &moves, gyro.as_ref()));
+    found.extend(rangers::gyro_finding(mission, gyro.as_ref(), sure, &moves));
+    if are_right || sure.is_some() {
+        found.extend(rangers::findings(mission, trace, &motion, sure, &moves));
+    }
     (found, placed)
 }
 

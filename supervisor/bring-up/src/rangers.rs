@@ -35,6 +35,8 @@ const SIZES_TOLD: SizesTold = SizesTold { sizes: 0.15, ratio: f64::INFINITY };
 /// The scales of the turn that are tried: half to double, by equal factors.
 const SCALE_RATIO: f64 = 1.02;
 const SCALES: i32 = 35;
+/// Scales at which the sonars disagree by no more than so many times the least are as good.
+const ALIKE: f64 = 1.5;
 /// Shares of way that wheels of another size may have; an echo that changes by another is not of what is ahead.
 const SHARES: std::ops::Range<f64> = 0.3..3.0;
 const GYRO_TOLD: f64 = 0.05;
@@ -51,12 +53,14 @@ fn readings(trace: &Trace, row: usize) -> impl Iterator<Item = (f64, &RangeReadi
     trace.ranges.iter().filter_map(move |(at, all)| Some((*at, all.iter().find(of)?)))
 }
 
-/// Whether each sensor of the table says something, and how noisy it is at rest.
-pub(crate) fn liveliness(mission: &Mission, trace: &Trace) -> Vec<Finding> {
+/// Whether each sensor of the table says something, and how noisy it is at rest; `turned` if the robot turned around.
+pub(crate) fn liveliness(mission: &Mission, trace: &Trace, turned: bool) -> Vec<Finding> {
     let until = trace.rest_until_s();
     let ticks = trace.rolled.len().max(1) as f64;
     let mut found = Vec::new();
-    for (row, sensor) in mission.sensor_table().iter().enumerate() {
+    let table = mission.sensor_table();
+    let sees = |row: usize| readings(trace, row).filter(|it| range_m(it.1).is_some()).count();
+    for (row, sensor) in table.iter().enumerate() {
         let name = &sensor.name;
         if sensor.kind == SensorKind::Scan {
             found.push(laser_lives(trace, row, sensor));
@@ -65,13 +69,24 @@ pub(crate) fn liveliness(mission: &Mission, trace: &Trace) -> Vec<Finding> {
         let valid =
             |it: &RangeReading| !matches!(it.status(), RangeStatus::Absent | RangeStatus::Invalid);
         let said = readings(trace, row).filter(|(_, it)| valid(it)).count() as f64;
-        let echoes = readings(trace, row).filter(|(_, it)| range_m(it).is_some()).count();
         if said * (sensor.every_ticks as f64) < LIVES * ticks {
             let text = "it says nothing in most ticks: check its plug, its name and its row";
             found.push(Finding::wrong(name, text));
             continue;
         }
-        if echoes == 0 {
+        let seen_by_others = || {
+            let mut others = table.iter().enumerate();
+            others.any(|(other, it)| {
+                let alike = it.kind == SensorKind::Cone && it.reach_m <= sensor.reach_m;
+                alike && 2 * sees(other) > readings(trace, other).count()
+            })
+        };
+        if sees(row) == 0 && turned && sensor.kind == SensorKind::Cone && seen_by_others() {
+            let text = "it sees nothing all around, where others do: check its plug, its pin and its transmitter";
+            found.push(Finding::wrong(name, text));
+            continue;
+        }
+        if sees(row) == 0 {
             let text = "it sees nothing all around: is something within its reach? A ranger whose transmitter is dead does so too";
             found.push(Finding::unknown(name, text));
             continue;
@@ -129,17 +144,16 @@ pub(crate) struct Gyro {
 impl Gyro {
     /// None without a gyro, or if the wheels hardly turned the body.
     pub(crate) fn of(trace: &Trace, motion: &Motion) -> Option<Self> {
-        let gyro: Vec<_> = trace.gyro.iter().map(|(at, angle)| (*at, [*angle])).collect();
         let (mut squares, mut products, mut wheels) = (0.0, 0.0, 0.0);
-        for leg in trace.legs() {
-            if matches!(leg.told, Told::Stand | Told::Drive) {
+        for (at, turn) in &trace.gyro {
+            let tick = motion.partition_point(|it| it.0 < *at);
+            let (Some(now), Some(before)) = (motion.get(tick), motion.get(tick.wrapping_sub(1)))
+            else {
                 continue;
-            }
-            let turned = |at| Some((between(&gyro, at)?[0], between(motion, at)?[0]));
-            let (from, until) = (turned(leg.from_s)?, turned(leg.until_s)?);
-            let (own, by_wheels) = (until.0 - from.0, until.1 - from.1);
+            };
+            let by_wheels = now.1[0] - before.1[0];
             squares += by_wheels * by_wheels;
-            products += own * by_wheels;
+            products += turn * by_wheels;
             wheels += by_wheels.abs();
         }
         (wheels > LEAST_TURN).then(|| Self { scale: products / squares })
@@ -208,58 +222,48 @@ fn turning_legs(trace: &Trace) -> Vec<Leg> {
     legs.filter(|leg| leg.told != Told::Stand).collect()
 }
 
-/// What rangers and gyro say, and without a laser that saw the way, what the body did.
+/// What rangers say, and without a laser that saw the way, what the body did.
 pub(crate) fn findings(
     mission: &Mission,
     trace: &Trace,
     motion: &Motion,
     placed: Option<&Placed>,
-    gyro: Option<&Gyro>,
+    moves: &Moves,
 ) -> Vec<Finding> {
     let mut found = Vec::new();
-    if let Some(gyro) = gyro {
-        found.extend(scale_of_gyro(gyro, placed));
-    }
     let table = mission.sensor_table();
-    let cones = || table.iter().enumerate().filter(|(_, it)| it.kind == SensorKind::Cone);
-    let by_wheels = |at: f64| between(motion, at).map_or(0.0, |[angle, _]| angle);
-    let seen = |heading: &dyn Fn(f64) -> f64| -> Vec<_> {
-        cones().map(|(row, it)| (it, seen_turning(trace, row, it, heading))).collect()
-    };
-    let heading: Box<dyn Fn(f64) -> f64> = match placed {
-        Some(placed) => Box::new(|at| placed.pose(at).heading),
-        None if cones().count() == 0 => return found,
-        None => {
-            let turn = Turn::best(|scale| disagreement(&seen(&|at| scale * by_wheels(at))));
-            let moves = moves(mission, trace, motion, turn);
-            if let Some(motors) = moves.motors(mission) {
-                found.push(motors);
-                return found;
+    if !table.iter().any(|it| it.kind == SensorKind::Cone) {
+        return found;
+    }
+    if placed.is_none() {
+        found.extend(match moves.way {
+            Some(way) if (way - 1.0).abs() <= SIZES_TOLD.sizes => {
+                let text = format!(
+                    "the front sonar sees {:.0} % of the way that the wheels count",
+                    100.0 * way
+                );
+                Some(Finding::right("way", text))
             }
-            found.extend(match moves.way {
-                Some(way) if (way - 1.0).abs() <= SIZES_TOLD.sizes => {
-                    let text = "the front sonar sees";
-                    let text =
-                        format!("{text} {:.0} % of the way that the wheels count", 100.0 * way);
-                    Some(Finding::right("way", text))
-                }
-                Some(_) => None,
-                None => {
-                    let text =
-                        "its way was not seen: let it stand 0.8 to 2 m before a wall, facing it";
-                    Some(Finding::unknown("way", text))
-                }
-            });
-            let sizes = moves.sizes(mission, SIZES_TOLD);
-            // By wheels of another size no bearing is known well.
-            if !sizes.is_empty() {
-                found.extend(sizes);
-                return found;
+            Some(_) => None,
+            None => {
+                let text = "its way was not seen: let it stand 0.8 to 2 m before a wall, facing it";
+                Some(Finding::unknown("way", text))
             }
-            Box::new(by_wheels)
+        });
+        if moves.turns_back.is_none() {
+            let text = "the sonars do not tell which way it turned: look, when it turns first it should turn to the left";
+            found.push(Finding::unknown("turn", text));
         }
-    };
-    let all = seen(&heading);
+        let sizes = moves.sizes(mission, SIZES_TOLD);
+        // By wheels of another size no bearing is known well.
+        if !sizes.is_empty() {
+            found.extend(sizes);
+            return found;
+        }
+    }
+    let all = seen_by_cones(&table, trace, &|at| {
+        placed.map_or_else(|| turned(motion, at), |placed| placed.pose(at).heading)
+    });
     for (place, (sensor, seen)) in all.iter().enumerate() {
         // Each is compared with what all others saw, or with the laser.
         let reference = match placed {
@@ -274,6 +278,21 @@ pub(crate) fn findings(
         }
     }
     found
+}
+
+/// The turn by the wheels.
+fn turned(motion: &Motion, at_s: f64) -> f64 {
+    between(motion, at_s).map_or(0.0, |[angle, _]| angle)
+}
+
+/// What each sonar saw while the robot turned.
+fn seen_by_cones<'a>(
+    table: &'a [Sensor],
+    trace: &Trace,
+    heading: &dyn Fn(f64) -> f64,
+) -> Vec<Seen<'a>> {
+    let cones = table.iter().enumerate().filter(|(_, it)| it.kind == SensorKind::Cone);
+    cones.map(|(row, it)| (it, seen_turning(trace, row, it, heading))).collect()
 }
 
 type Seen<'a> = (&'a Sensor, Vec<(f64, f64)>);
@@ -295,7 +314,8 @@ fn disagreement(all: &[Seen<'_>]) -> Option<f64> {
 /// The turns over those by the wheels at which the sonars agree best.
 #[derive(Clone, Copy, Debug)]
 struct Turn {
-    turns_back: bool,
+    /// None if they agree as well the other way round.
+    turns_back: Option<bool>,
     /// None if the sonars agree at the turns that the wheels say, or at none.
     scale: Option<f64>,
     agrees: bool,
@@ -304,39 +324,48 @@ struct Turn {
 impl Turn {
     /// `differs` gives the disagreement of the sonars at a scale of the wheels' turns.
     fn best(differs: impl Fn(f64) -> Option<f64>) -> Option<Self> {
-        let scales =
-            |sign: f64| (-SCALES..=SCALES).map(move |power| sign * SCALE_RATIO.powi(power));
-        let least = |sign| {
-            let each = scales(sign).filter_map(|scale| Some((differs(scale)?, scale)));
-            each.min_by(|a, b| a.0.total_cmp(&b.0))
-        };
-        let (ahead, back) = (least(1.0)?, least(-1.0)?);
-        let is_better = |new: f64, old: f64| {
-            old > LEAST_DIFFERENCE_M && new < LEAST_DIFFERENCE_M.min(EXPLAINS * old)
-        };
-        let turns_back = is_better(back.0, ahead.0);
-        let (best, stated) = if turns_back { (back, -1.0) } else { (ahead, 1.0) };
-        let scale = is_better(best.0, differs(stated)?).then_some(best.1.abs());
-        Some(Self { turns_back, scale, agrees: best.0 < LEAST_DIFFERENCE_M })
+        let scales = (-SCALES..=SCALES).map(|power| SCALE_RATIO.powi(power));
+        let each = scales.flat_map(|scale| [scale, -scale]);
+        let each: Vec<_> = each.filter_map(|scale| Some((differs(scale)?, scale))).collect();
+        let (least, best) = each.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let agrees = least < LEAST_DIFFERENCE_M;
+        // By chance they may agree somewhat at another scale.
+        let others = each.iter().filter(|it| it.1 * best < 0.0);
+        let is_told = agrees && others.fold(f64::INFINITY, |m, it| m.min(it.0)) * EXPLAINS > least;
+        let alike = each.iter().filter(|it| it.1 * best > 0.0 && it.0 <= ALIKE * least);
+        let logarithms: Vec<f64> = alike.map(|it| it.1.abs().ln()).collect();
+        let scale = (logarithms.iter().sum::<f64>() / logarithms.len() as f64).exp();
+        let is_other = differs(best.signum())
+            .is_some_and(|it| it > LEAST_DIFFERENCE_M / 2.0 && least < EXPLAINS * it);
+        Some(Self {
+            turns_back: is_told.then_some(best < 0.0),
+            scale: (is_told && is_other).then_some(scale),
+            agrees,
+        })
     }
 }
 
 /// What the sonars say of the body's motion.
-fn moves(mission: &Mission, trace: &Trace, motion: &Motion, turn: Option<Turn>) -> Moves {
+pub(crate) fn moves(mission: &Mission, trace: &Trace, motion: &Motion) -> Moves {
+    let table = mission.sensor_table();
+    let turn = Turn::best(|scale| {
+        disagreement(&seen_by_cones(&table, trace, &|at| scale * turned(motion, at)))
+    });
     let rims_m = mission.body().track_m / 2.0;
     let turned_m = |[angle, _]: [f64; 2]| angle * rims_m;
     // A wheel that turns backwards drives the body where it is told to turn. Sonars that agree on a turn saw one.
-    let turning = [(Told::TurnLeft, 1.0), (Told::TurnRight, -1.0)].into_iter();
-    let mut driven = turning.filter_map(|(told, sign)| {
-        let share = sign * share_of_way(mission, trace, motion, told, turned_m)?;
+    let mut driven = [Told::TurnLeft, Told::TurnRight].into_iter().filter_map(|told| {
+        let share = share_of_way(mission, trace, motion, told, turned_m)?;
         (0.5..2.0).contains(&share.abs()).then_some(share)
     });
     let driven = driven.find(|_| turn.is_none_or(|turn| !turn.agrees));
     let share = share_of_way(mission, trace, motion, Told::Drive, |[_, way]| way);
-    let share = share.filter(|share| SHARES.contains(&share.abs()));
+    // A front sonar that looks elsewhere disagrees with the others.
+    let is_ahead = driven.is_some() || turn.is_none_or(|turn| turn.agrees);
+    let share = share.filter(|share| is_ahead && SHARES.contains(&share.abs()));
     Moves {
-        turns_back: driven.map_or(turn.is_some_and(|turn| turn.turns_back), |share| share < 0.0),
-        drives_back: share.is_some_and(|share| share < 0.0),
+        turns_back: turn.and_then(|turn| turn.turns_back).filter(|_| driven.is_none()),
+        drives_back: driven.or(share).map(|share| share < 0.0),
         exchanged: driven.is_some(),
         turn: turn.and_then(|turn| turn.scale),
         way: share.map(f64::abs),
@@ -344,22 +373,39 @@ fn moves(mission: &Mission, trace: &Trace, motion: &Motion, turn: Option<Turn>) 
     }
 }
 
-fn scale_of_gyro(gyro: &Gyro, placed: Option<&Placed>) -> Option<Finding> {
-    let moves = placed.map(Placed::moves);
-    let truth = moves.and_then(|it| it.turn).unwrap_or(1.0);
-    let scale = gyro.scale.abs() / truth;
-    if (scale - 1.0).abs() <= GYRO_TOLD {
-        let is_told = gyro.agrees() && moves.is_none_or(|it| !it.turns_back && !it.exchanged);
-        return is_told.then(|| {
-            Finding::right("gyro", format!("it says {:.1} % of the turn", 100.0 * scale))
-        });
+/// The gyro by what the laser saw, or else by the wheels.
+pub(crate) fn gyro_finding(
+    mission: &Mission,
+    gyro: Option<&Gyro>,
+    placed: Option<&Placed>,
+    moves: &Moves,
+) -> Option<Finding> {
+    let Some(gyro) = gyro else {
+        let text = "no turn of it was used: link.log says whether it is silent, or turns otherwise than odometry, as one does whose z axis points down";
+        return mission.robot.ros2.imu.is_some().then(|| Finding::wrong("gyro", text));
+    };
+    let truth = moves.turn.filter(|_| placed.is_some());
+    let scale = gyro.scale / truth.unwrap_or(1.0);
+    let text = format!("it says {:.1} % of the turn that the", 100.0 * scale.abs());
+    if (scale.abs() - 1.0).abs() <= GYRO_TOLD {
+        return match (gyro.agrees(), moves.turns_back) {
+            _ if moves.exchanged => None,
+            (true, _) | (_, Some(true)) => {
+                Some(Finding::right("gyro", format!("{text} wheels say")))
+            }
+            (false, Some(false)) => Some(Finding::wrong(
+                "gyro",
+                "it says turns to the left as turns to the right: its z axis points down, or its sign is wrong",
+            )),
+            _ => None,
+        };
     }
-    Some(match placed {
-        Some(_) => Finding::wrong("gyro", format!("it says {:.0} % of the turn that the laser sees: mend its scale", 100.0 * scale)),
-        None if gyro.agrees() => Finding::wrong("gyro", format!("it says {:.0} % of the turn that the wheels say: its scale or robot.track_m is wrong", 100.0 * scale)),
-        None => return None,
-    })
-    .filter(|_| scale.is_finite())
+    let text = match truth {
+        Some(_) => format!("{text} laser sees: mend its scale"),
+        None => format!("{text} wheels say: its scale or robot.track_m is wrong"),
+    };
+    let is_told = scale.is_finite() && !moves.exchanged && (truth.is_some() || gyro.agrees());
+    is_told.then(|| Finding::wrong("gyro", text))
 }
 
 fn bearing(reference: &Profile, sensor: &Sensor, seen: &[(f64, f64)]) -> Option<Finding> {

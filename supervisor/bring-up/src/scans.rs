@@ -14,7 +14,7 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::{
     Finding, Trace,
-    body::{Moves, SizesTold},
+    body::{Moves, SizesTold, motors, words},
     rangers::Gyro,
     trace::between,
     wheels::Motion,
@@ -44,10 +44,14 @@ const BEAMS: usize = 90;
 const PLACED_M: f64 = 0.08;
 /// The least share of placed points.
 const LEAST_PLACED: f64 = 0.6;
-/// The share at which no other solution is looked for.
+/// The share at which no other solution is looked for, and how much of it a logarithm of turn or way over the wheels' takes: a turn the
+/// other way round that is longer ends at the same heading.
 const CERTAIN: f64 = 0.93;
+const UNLIKELY: f64 = 0.25;
 /// What is told: an angle, radians, a distance, metres, a time, seconds, and shares.
 const YAW_TOLD: f64 = 4.0 * PI / 180.0;
+/// A laser that looks back within this may as well be on a robot that drives back.
+const BACK_RAD: f64 = 10.0 * PI / 180.0;
 const PLACE_TOLD_M: f64 = 0.05;
 const AGE_TOLD_S: f64 = 0.06;
 const SIZES_TOLD: SizesTold = SizesTold { sizes: 0.04, ratio: 0.03 };
@@ -82,12 +86,23 @@ impl Placed {
         self.share >= LEAST_PLACED
     }
 
-    pub(crate) fn moves(&self) -> Moves {
+    /// It seems to the laser that the body drives back.
+    fn seems_back(&self) -> bool {
+        PI - self.unknowns[YAW].abs() < BACK_RAD
+    }
+
+    /// A laser upside down or looking back sees what motors that are swapped or reversed show, but for turns that drive. A gyro, if it turns
+    /// with the wheels, tells which.
+    pub(crate) fn moves(&self, gyro: Option<&Gyro>) -> Moves {
         let Hypothesis { turns_back, exchanged } = self.hypothesis;
         let scale = |it: usize| Some(self.unknowns[it].exp());
+        let agrees = gyro.map(Gyro::agrees);
+        let drives_back = self.seems_back();
+        let are_motors = exchanged || turns_back && agrees == Some(false);
+        let is_laser = !exchanged && turns_back && agrees == Some(true);
         Moves {
-            turns_back,
-            drives_back: false,
+            turns_back: (are_motors || is_laser || !turns_back).then_some(turns_back && !is_laser),
+            drives_back: (are_motors || !drives_back).then_some(drives_back),
             exchanged,
             turn: scale(TURN),
             way: scale(WAY),
@@ -278,14 +293,14 @@ impl<'a> Problem<'a> {
 /// Place the scans of the first laser; none without scans from before the robot moved and after.
 pub(crate) fn place(mission: &Mission, trace: &Trace, motion: &Motion) -> Option<Placed> {
     let problem = Problem::new(trace, motion, mission.body().track_m)?;
-    let mut best: Option<(f64, Hypothesis, Unknowns)> = None;
+    let mut best: Option<(f64, f64, Hypothesis, Unknowns)> = None;
     let both = [false, true];
     let hypotheses = both
         .into_iter()
         .flat_map(|exchanged| both.map(|turns_back| Hypothesis { turns_back, exchanged }));
     let mut starts = hypotheses.flat_map(|it| (0..STARTS).map(move |start| (it, start)));
     // What places nearly all points needs no other start.
-    while best.as_ref().is_none_or(|(share, ..)| *share < CERTAIN)
+    while best.as_ref().is_none_or(|(likely, ..)| *likely < CERTAIN)
         && let Some((hypothesis, start)) = starts.next()
     {
         let mut unknowns = Unknowns::zeros();
@@ -296,12 +311,13 @@ pub(crate) fn place(mission: &Mission, trace: &Trace, motion: &Motion) -> Option
             }
         }
         let share = problem.placed(hypothesis, &unknowns);
+        let likely = share - UNLIKELY * (unknowns[TURN].abs() + unknowns[WAY].abs());
         // As good is not better: the robot is as stated unless the scans say otherwise.
-        if best.as_ref().is_none_or(|(most, ..)| share > most + 0.03) {
-            best = Some((share, hypothesis, unknowns));
+        if best.as_ref().is_none_or(|(most, ..)| likely > most + 0.03) {
+            best = Some((likely, share, hypothesis, unknowns));
         }
     }
-    let (share, hypothesis, mut unknowns) = best?;
+    let (_, share, hypothesis, mut unknowns) = best?;
     unknowns[YAW] = wrap_angle(unknowns[YAW]);
     Some(Placed {
         share,
@@ -318,6 +334,7 @@ pub(crate) fn findings(
     mission: &Mission,
     trace: &Trace,
     placed: Option<&Placed>,
+    moves: &Moves,
     gyro: Option<&Gyro>,
 ) -> Vec<Finding> {
     let table = mission.sensor_table();
@@ -338,29 +355,35 @@ pub(crate) fn findings(
     let mut found = Vec::new();
     let it = placed.unknowns;
     let key = |key: &str| format!("robot.sensor.{name}.{key}");
-    let moves = placed.moves();
     if moves.exchanged {
-        return moves.motors(mission).into_iter().collect();
+        return found;
     }
-    let turns_with_gyro = gyro.map(Gyro::agrees);
-    if moves.turns_back {
-        let mirrored = format!("{name} sees it turn the other way");
-        let upside_down = |text: &str| {
-            let roll = if sensor.is_upside_down { "0" } else { "180" };
-            Finding::wrong(name, format!("{mirrored}{text}")).with_key(key("roll_deg"), roll)
-        };
-        found.extend(match turns_with_gyro {
-            Some(true) => Some(upside_down(", and the gyro does not: it is upside down")),
-            Some(false) => moves.motors(mission),
-            None => Some(upside_down(": it is upside down, or the wheels are swapped, left and right; look which way it turns")),
+    // What the motors explain is not the laser's.
+    let seen_back = placed.hypothesis.turns_back && moves.turns_back != Some(true);
+    let looks_back = placed.seems_back() && moves.drives_back != Some(true);
+    if seen_back {
+        let roll = if sensor.is_upside_down { "0" } else { "180" };
+        let text = format!("{name} sees it turn the other way");
+        found.push(match gyro {
+            Some(_) => Finding::wrong(name, format!("{text}, and the gyro does not: it is upside down"))
+                .with_key(key("roll_deg"), roll),
+            None => Finding::wrong(name, format!("{text}: it is upside down, so that {} = {roll}, or {}; look which way it turns", key("roll_deg"), words(motors(true, looks_back, false)))),
         });
-    } else if turns_with_gyro == Some(false) {
-        let text = "it says turns to the left as turns to the right: its z axis points down, or its sign is wrong";
-        found.push(Finding::wrong("gyro", text));
+    } else if looks_back {
+        let text = format!(
+            "sees it drive backwards: it looks back, so that {} = 180, or {}; look which way it drives",
+            key("turned_deg"),
+            words(motors(false, true, false))
+        );
+        found.push(Finding::wrong(name, text));
     }
     let mount = sensor.mount;
     let off = DVec2::new(it[X], it[Y]);
-    let (turns, stands) = (it[YAW].abs() > YAW_TOLD, off.length() > PLACE_TOLD_M);
+    let yaw = it[YAW];
+    // Nobody knows where a laser stands and looks that may be upside down or look back.
+    let is_known = (!seen_back || gyro.is_some()) && !placed.seems_back();
+    let (turns, stands) =
+        (is_known && yaw.abs() > YAW_TOLD, is_known && off.length() > PLACE_TOLD_M);
     let mut bearing_rad = mount.bearing_rad;
     if stands {
         let at = DVec2::from_angle(bearing_rad) * mount.forward_m + off;
@@ -378,18 +401,14 @@ pub(crate) fn findings(
     }
     if turns || stands {
         // The beams are turned from the bearing.
-        let sign = if moves.turns_back { -1.0 } else { 1.0 };
-        let yaw = if turns { sign * it[YAW] } else { 0.0 };
-        let turned = wrap_angle(mount.turned_rad + yaw + mount.bearing_rad - bearing_rad);
+        let yaw = if seen_back { -yaw } else { yaw };
+        let turned = mount.turned_rad + if turns { yaw } else { 0.0 };
+        let turned = wrap_angle(turned + mount.bearing_rad - bearing_rad);
         let turned = (key("turned_deg"), format!("{:.1}", turned.to_degrees()));
-        let yaw_deg = it[YAW].to_degrees();
-        let text = match it[YAW].abs() > FRAC_PI_2 * 1.7 {
-            true => format!(
-                "sees it drive backwards: it looks {yaw_deg:.0} degrees beside what is stated, or both motors turn backwards; look which way it drives"
-            ),
-            false => format!("looks {yaw_deg:.1} degrees beside what is stated, counter-clockwise"),
-        };
         if turns {
+            let yaw_deg = it[YAW].to_degrees();
+            let text =
+                format!("looks {yaw_deg:.1} degrees beside what is stated, counter-clockwise");
             found.push(Finding::wrong(name, text));
         }
         found.last_mut().into_iter().for_each(|it| it.keys.push(turned.clone()));

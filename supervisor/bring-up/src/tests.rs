@@ -3,7 +3,7 @@ use std::{f64::consts::TAU, path::Path};
 use common::{
     driver::range_reading,
     kinematics::Pose2,
-    mission::{Mission, SensorKind},
+    mission::{Channel, Mission, SensorKind},
     samples::ScanHeader,
 };
 use glam::DVec2;
@@ -22,10 +22,20 @@ struct Robot {
     track: f64,
     wheel: f64,
     /// Which wheel each encoder follows, and in which direction it counts.
-    encoders: [(usize, f64); 2],
-    left_motor: f64,
-    motors_swapped: bool,
+    encoders: Wires,
+    /// As which wheel is told each goes, and in which direction.
+    motors: Wires,
     laser_m: f64,
+}
+
+type Wires = [(usize, f64); 2];
+
+const AS_STATED: Wires = [(0, 1.0), (1, 1.0)];
+const SWAPPED: Wires = [(1, 1.0), (0, 1.0)];
+
+/// What comes through `wires`.
+fn through(wires: Wires, values: [f64; 2]) -> [f64; 2] {
+    wires.map(|(from, sign)| sign * values[from])
 }
 
 const RIGHT: Robot = Robot {
@@ -34,9 +44,8 @@ const RIGHT: Robot = Robot {
     late_s: 0.0,
     track: 1.0,
     wheel: 1.0,
-    encoders: [(0, 1.0), (1, 1.0)],
-    left_motor: 1.0,
-    motors_swapped: false,
+    encoders: AS_STATED,
+    motors: AS_STATED,
     laser_m: 0.05,
 };
 
@@ -94,19 +103,15 @@ fn trace(mission: &Mission, robot: Robot) -> Trace {
         trace.told.push((at, told));
         for _ in 0..(seconds * RATE_HZ) as usize {
             at += 1.0 / RATE_HZ;
-            let rims = [0, 1].map(|wheel| told[wheel] * [robot.left_motor, 1.0][wheel] / RATE_HZ);
+            let rims = through(robot.motors, told.map(|told| told / RATE_HZ));
             let [left, right] = rims.map(|rim| rim * robot.wheel);
-            let went = if robot.motors_swapped { [right, left] } else { [left, right] };
-            pose = pose.along_arc(
-                (went[0] + went[1]) / 2.0,
-                (went[1] - went[0]) / (track_m * robot.track),
-            );
-            let counted = robot
-                .encoders
-                .map(|(wheel, sign)| sign * rims[wheel] * [robot.left_motor, 1.0][wheel]);
+            let turn = (right - left) / (track_m * robot.track);
+            pose = pose.along_arc((left + right) / 2.0, turn);
+            let counted = through(robot.encoders, rims);
             rolled = [0, 1].map(|wheel| rolled[wheel] + counted[wheel]);
             trace.rolled.push((at, rolled));
             trace.told.push((at, told));
+            trace.gyro.push((at, turn));
             poses.push(pose);
             let seen = poses[poses.len().saturating_sub(1 + (robot.late_s * RATE_HZ) as usize)];
             if table[0].kind == SensorKind::Cone {
@@ -127,6 +132,22 @@ fn trace(mission: &Mission, robot: Robot) -> Trace {
             trace.scans.push((at, header, (0..BEAMS).map(beam).collect()));
         }
     }
+    trace.sent = trace.told.clone();
+    // The driver drops a gyro that turns otherwise than the wheels by their counts.
+    let by_counts = |it: usize| {
+        let [now, before] = [trace.rolled[it].1, trace.rolled[it - 1].1];
+        (now[1] - before[1] - now[0] + before[0]) / track_m
+    };
+    let product: f64 = (1..trace.rolled.len()).map(|it| by_counts(it) * trace.gyro[it].1).sum();
+    let square: f64 = (1..trace.rolled.len()).map(|it| by_counts(it).powi(2)).sum();
+    if !(0.5..2.0).contains(&(product / square)) {
+        trace.gyro.clear();
+    }
+    trace
+}
+
+fn without_gyro(mut trace: Trace) -> Trace {
+    trace.gyro.clear();
     trace
 }
 
@@ -155,7 +176,12 @@ fn a_laser_that_is_turned_mirrored_or_late_is_named_with_the_keys_that_mend_it()
     let turned = Robot { yaw_rad: 0.3, ..RIGHT };
     assert_eq!(wrong(turned), ["laser"]);
     assert!((key(turned, "robot.sensor.laser.turned_deg") - 0.3_f64.to_degrees()).abs() < 1.5);
-    assert_eq!(key(Robot { mirrored: true, ..RIGHT }, "robot.sensor.laser.roll_deg"), 180.0);
+    let mirrored = Robot { mirrored: true, ..RIGHT };
+    assert_eq!(key(mirrored, "robot.sensor.laser.roll_deg"), 180.0);
+    // The motors may be swapped instead.
+    let (found, _) = findings(&mission(), &without_gyro(trace(&mission(), mirrored)), false);
+    assert!(found.iter().any(|it| it.part == "laser" && it.verdict == Verdict::Wrong));
+    assert!(found.iter().all(|it| it.keys.is_empty()), "{found:?}");
     assert_eq!(wrong(Robot { late_s: 0.2, ..RIGHT }), ["laser"]);
 }
 
@@ -169,21 +195,107 @@ fn the_sizes_of_track_and_wheels_are_found() {
 }
 
 #[test]
-fn encoders_that_are_swapped_reversed_or_dead_and_a_reversed_motor_are_told_apart() {
-    let encoders = |encoders| wrong(Robot { encoders, ..RIGHT });
-    for wrong in [[(1, 1.0), (0, 1.0)], [(0, -1.0), (1, 1.0)], [(0, 0.0), (1, 1.0)]] {
-        assert!(encoders(wrong).contains(&"wheels".to_owned()), "{wrong:?}");
+fn an_encoder_that_counts_nothing_is_named() {
+    assert_eq!(wrong(Robot { encoders: [(0, 0.0), (1, 1.0)], ..RIGHT })[0], "wheels");
+}
+
+/// Both wires as they are or swapped, each in one of two directions.
+fn all_wires() -> impl Iterator<Item = Wires> {
+    (0..8).map(|bits: usize| {
+        let sign = |bit: usize| if bits & bit == 0 { 1.0 } else { -1.0 };
+        let first = usize::from(bits & 4 != 0);
+        [(first, sign(1)), (1 - first, sign(2))]
+    })
+}
+
+/// Names of what must be wrong with `robot`, in which the motors are told if `is_told`, and the keys that mend an X80.
+fn expected(robot: Robot, mission: &Mission, is_told: bool) -> (Vec<&'static str>, Vec<Channel>) {
+    let probe = [1.0, 2.0];
+    let as_told = through(robot.encoders, through(robot.motors, probe)) == probe;
+    let encoders_wrong = !as_told && (!is_told || robot.encoders != AS_STATED);
+    let motors_wrong = robot.motors != AS_STATED;
+    let mut parts = Vec::new();
+    parts.extend(encoders_wrong.then_some("wheels"));
+    parts.extend(motors_wrong.then_some("motors"));
+    let stated = [mission.robot.left, mission.robot.right];
+    let mended = robot.motors.map(|(from, sign)| {
+        let Channel { channel, reversed } = stated[from];
+        Channel { channel, reversed: reversed != (sign < 0.0) }
+    });
+    (parts, if as_told && is_told { mended.to_vec() } else { stated.to_vec() })
+}
+
+/// The channels of `mission` with the keys of `found`.
+fn with_keys(mission: &Mission, found: &[Finding]) -> Vec<Channel> {
+    let keys: Vec<_> = found.iter().flat_map(|it| &it.keys).collect();
+    let of = |side: &str, stated: Channel| {
+        let value = |key: &str| {
+            let key = format!("robot.{side}.{key}");
+            keys.iter().find(|it| it.0 == key).map(|it| it.1.as_str())
+        };
+        Channel {
+            channel: value("channel").map_or(stated.channel, |it| it.parse().unwrap()),
+            reversed: value("reversed").map_or(stated.reversed, |it| it.parse().unwrap()),
+        }
+    };
+    vec![of("left", mission.robot.left), of("right", mission.robot.right)]
+}
+
+fn wrong_parts(found: &[Finding]) -> Vec<&str> {
+    found.iter().filter(|it| it.verdict == Verdict::Wrong).map(|it| it.part.as_str()).collect()
+}
+
+/// One wheel alone turns backwards: the body drives where it is told to turn.
+fn exchanges(motors: Wires) -> bool {
+    motors[0].1 != motors[1].1
+}
+
+#[test]
+fn sonars_tell_all_swapped_and_reversed_motors_and_encoders_right_or_as_undecided() {
+    let mission = with_sonars();
+    for (motors, encoders) in all_wires().flat_map(|it| all_wires().map(move |other| (it, other))) {
+        let robot = Robot { motors, encoders, ..RIGHT };
+        let (found, _) = findings(&mission, &without_gyro(trace(&mission, robot)), false);
+        let (parts, channels) = expected(robot, &mission, !exchanges(motors));
+        assert_eq!(wrong_parts(&found), parts, "{motors:?} {encoders:?}: {found:?}");
+        assert_eq!(with_keys(&mission, &found), channels, "{motors:?} {encoders:?}: {found:?}");
     }
-    // The encoder sits on the motor: what it counts is as told.
-    assert_eq!(wrong(Robot { left_motor: -1.0, ..RIGHT }), ["motors"]);
+}
+
+#[test]
+fn a_laser_tells_all_swapped_and_reversed_motors_and_encoders_right_or_as_undecided() {
+    let mission = mission();
+    for motors in all_wires() {
+        // The encoders are wired as the motors, or right, or otherwise.
+        for encoders in [motors.map(|(_, sign)| sign), [1.0, 1.0], [-1.0, 1.0]] {
+            let encoders = [0, 1].map(|it| (motors[it].0, encoders[it]));
+            let robot = Robot { motors, encoders, ..RIGHT };
+            let trace = trace(&mission, robot);
+            let (found, _) = findings(&mission, &trace, false);
+            let [(left, sign), _] = motors;
+            let drives_back_only = left == 1 && sign < 0.0;
+            let is_told = exchanges(motors)
+                || motors == AS_STATED
+                || !trace.gyro.is_empty() && !drives_back_only;
+            let (mut parts, _) = expected(robot, &mission, is_told);
+            if !is_told {
+                *parts.last_mut().unwrap() = "laser";
+            }
+            assert_eq!(wrong_parts(&found), parts, "{motors:?} {encoders:?}: {found:?}");
+            assert!(
+                found.iter().all(|it| it.keys.is_empty()),
+                "{motors:?} {encoders:?}: {found:?}"
+            );
+        }
+    }
 }
 
 #[test]
 fn sonars_alone_tell_counts_per_turn_from_motors_that_are_swapped() {
     let mission = with_sonars();
-    let wrong = |robot| wrong_of(&mission, &trace(&mission, robot));
+    let wrong = |robot| wrong_of(&mission, &without_gyro(trace(&mission, robot)));
     assert_eq!(wrong(RIGHT), Vec::<String>::new());
-    assert_eq!(wrong(Robot { motors_swapped: true, ..RIGHT }), ["motors"]);
+    assert_eq!(wrong(Robot { motors: SWAPPED, encoders: SWAPPED, ..RIGHT }), ["motors"]);
     for wheel in [1.0 / 1.5, 1.5] {
         assert_eq!(wrong(Robot { wheel, ..RIGHT }), ["wheel size"], "{wheel}");
     }

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use common::{
     driver::counts::WheelCounts,
-    mission::Mission,
+    mission::{Body, Mission},
     samples::{CountsSample, RangeReading, ScanHeader, WheelSample},
-    topics::{COMMAND, COUNTS, IMU_TURN, RANGES, SCAN, WHEELS},
+    topics::{COMMAND, COUNTS, IMU_TURN, LINK, RANGES, SCAN, WHEELS},
 };
 use recording::{Recording, RecordingError};
 
@@ -26,7 +26,9 @@ pub struct Trace {
     pub rolled: Vec<(f64, [f64; 2])>,
     /// Speeds of the rims as told, m/s.
     pub told: Vec<(f64, [f64; 2])>,
-    /// Angle turned by the gyro since the beginning, radians counter-clockwise.
+    /// What the link made of it, when it sent that.
+    pub sent: Vec<(f64, [f64; 2])>,
+    /// Turn by the gyro since the tick before, radians counter-clockwise, where it is known.
     pub gyro: Vec<(f64, f64)>,
     /// The readings of a tick, a row of the mission's table each.
     pub ranges: Vec<(f64, Vec<RangeReading>)>,
@@ -102,11 +104,27 @@ impl Trace {
             let rims = [command.left_rad_s, command.right_rad_s].map(|it| it * body.wheel_radius_m);
             trace.told.push((command.stamp.time().seconds(), rims));
         }
-        let mut angle = 0.0;
+        let mut newest = None;
+        for link in recording.samples(&LINK)? {
+            let link = link?.sample;
+            let at = link.stamp.time().seconds();
+            let told = trace.told.partition_point(|it| it.0 <= at).checked_sub(1);
+            let Some((_, rims)) = told.and_then(|it| trace.told.get(it)) else { continue };
+            if newest.replace((told, link.action)) == Some((told, link.action)) {
+                continue;
+            }
+            let wanted = rims.map(|it| link.action().speed_share() * it);
+            let before = trace.sent.last().map_or([0.0; 2], |it| it.1);
+            let sent_s = at + 1e-9 * link.latency_ns as f64;
+            trace.sent.push((sent_s, reached(mission, before, wanted)));
+        }
+        let mut before = None;
         for turn in recording.samples(&IMU_TURN)? {
             let turn = turn?.sample;
-            angle += turn.turn_rad;
-            trace.gyro.push((turn.stamp.time().seconds(), angle));
+            // A number that is left out is that of a turn that is not known.
+            if before.replace(turn.sequence) == turn.sequence.checked_sub(1) {
+                trace.gyro.push((turn.stamp.time().seconds(), turn.turn_rad));
+            }
         }
         for ranges in recording.slices(&RANGES)? {
             let ranges = ranges?;
@@ -151,6 +169,21 @@ impl Trace {
     pub fn rest_until_s(&self) -> f64 {
         self.legs().first().map_or(0.0, |rest| rest.until_s)
     }
+}
+
+/// The speeds of the rims that the link sends on the way to `wanted` after it sent `before`: they grow as stated, and fall at once.
+fn reached(mission: &Mission, before: [f64; 2], wanted: [f64; 2]) -> [f64; 2] {
+    let Body { track_m, response, .. } = mission.body();
+    // Half the difference of the rims' speeds, and their mean.
+    let parts = |[left, right]: [f64; 2]| [(right - left) / 2.0, (left + right) / 2.0];
+    let limits = [response.turn_acceleration_rad_s2 * track_m / 2.0, response.acceleration_m_s2];
+    let [before, wanted] = [parts(before), parts(wanted)];
+    let [turn, way] = [0, 1].map(|of| {
+        let slower = (before[of] * wanted[of].signum()).max(0.0);
+        let most = slower + limits[of] / mission.robot.rate_hz;
+        wanted[of].clamp(-most, most)
+    });
+    [way - turn, way + turn]
 }
 
 /// A value between the two that `at_s` lies between, or the nearest; none without values.

@@ -36,7 +36,7 @@ pub(crate) fn rate(mission: &Mission, trace: &Trace) -> Finding {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Wheels {
     /// Rows are the wheels that count, columns the wheels that were told; left and right.
-    counted: [[f64; 2]; 2],
+    counted: Matrix2<f64>,
     /// It was told to turn and to drive for long enough.
     is_told: bool,
 }
@@ -55,13 +55,12 @@ impl Wheels {
             let mut before: Option<&(f64, [f64; 2])> = None;
             for now in in_leg {
                 if let Some(before) = before
-                    && let Some(told) = between(&trace.told, before.0)
+                    && let Some(told) = between(&trace.sent, before.0)
                 {
-                    let seconds = (now.0 - before.0).max(1e-3);
-                    let speed = (Vector2::from(now.1) - Vector2::from(before.1)) / seconds;
+                    // Frames that a busy machine takes late and close together weigh less.
                     let told = Vector2::from(told);
-                    squares += told * told.transpose();
-                    products += speed * told.transpose();
+                    squares += told * told.transpose() * (now.0 - before.0);
+                    products += (Vector2::from(now.1) - Vector2::from(before.1)) * told.transpose();
                 }
                 before = Some(now);
             }
@@ -69,83 +68,84 @@ impl Wheels {
         // Turns and ways alone tell the two wheels apart.
         let is_told = squares.determinant() > 1e-6 * squares[(0, 0)] * squares[(1, 1)];
         let inverse = squares.try_inverse().filter(|_| is_told);
-        let counted: Matrix2<f64> = products * inverse.unwrap_or_default();
-        Self { counted: counted.transpose().into(), is_told: inverse.is_some() }
+        let counted = inverse.map_or_else(Matrix2::identity, |inverse| products * inverse);
+        Self { counted, is_told: inverse.is_some() }
     }
 
-    /// The wheel that each encoder follows, and whether it counts backwards; none for one that counts nothing.
-    fn follows(&self) -> [Option<(usize, bool)>; 2] {
-        self.counted.map(|shares| {
-            let wheel = usize::from(shares[1].abs() > shares[0].abs());
-            let share = shares[wheel];
-            (share.abs() >= LEAST_SHARE).then_some((wheel, share < 0.0))
+    /// In each row, an encoder's, 1 at the wheel that it follows as told, or -1 if it counts backwards; 0 for one that counts nothing.
+    fn follows(&self) -> Matrix2<f64> {
+        Matrix2::from_fn(|row, column| {
+            let (share, other) = (self.counted[(row, column)], self.counted[(row, 1 - column)]);
+            let is_least = share.abs() < other.abs() || share.abs() == other.abs() && column == 1;
+            if is_least || share.abs() < LEAST_SHARE { 0.0 } else { share.signum() }
         })
     }
 
-    fn shares(&self) -> [f64; 2] {
-        self.counted.map(|shares| shares[0].abs().max(shares[1].abs()))
-    }
-
-    pub(crate) fn finding(&self, mission: &Mission) -> Finding {
-        let [left, right] = self.shares();
+    /// `motors` are the wheels that go as each is told, if that was seen.
+    pub(crate) fn finding(&self, mission: &Mission, motors: Option<Matrix2<f64>>) -> Finding {
+        let [left, right] = [0, 1].map(|row| self.counted.row(row).amax());
         let told = format!(
             "they count {:.0} and {:.0} % of what they are told",
             100.0 * left,
             100.0 * right
         );
-        let is_x80 = mission.robot.protocol() == Protocol::X80;
         let remedy = |text: &str, x80: &str| {
+            let is_x80 = mission.robot.protocol() == Protocol::X80;
             let by = if is_x80 { x80 } else { "mend the wiring, or the robot's own program" };
             Finding::wrong("wheels", format!("{text}: {by}"))
         };
-        match self.follows() {
+        let follows = self.follows();
+        // Encoders that count as told are as right or wrong as the motors.
+        let encoders = match motors {
+            Some(motors) if !self.is_as_told() => follows * motors.transpose(),
+            _ => follows,
+        };
+        let or_motor = if motors.is_none() { ", or its motor turns backwards" } else { "" };
+        let which = [0, 1].map(|row| (encoders[(row, row)], encoders[(row, 1 - row)]));
+        match which {
             _ if !self.is_told => Finding::unknown(
                 "wheels",
                 "it moved for too short a time: what stopped it? Look at the logs of the run, and give it more room",
             ),
-            [None, None] => Finding::wrong(
+            [(0.0, 0.0), (0.0, 0.0)] => Finding::wrong(
                 "wheels",
                 "neither wheel counts: does it move? Check the motors' power and the encoders",
             ),
-            [None, _] => remedy("the left wheel's encoder counts nothing", "check its plug"),
-            [_, None] => remedy("the right wheel's encoder counts nothing", "check its plug"),
-            [Some((0, false)), Some((1, false))] if (left / right - 1.0).abs() > ALIKE => {
-                Finding::wrong(
-                    "wheels",
-                    format!(
-                        "{told}: one encoder loses counts or one motor is weak, or the wheels' diameters differ (calibrate them)"
-                    ),
-                )
-            }
-            [Some((0, false)), Some((1, false))] => Finding::right("wheels", told),
-            [Some((0, left)), Some((1, right))] => {
-                let which = match (left, right) {
+            [(0.0, 0.0), _] => remedy("the left wheel's encoder counts nothing", "check its plug"),
+            [_, (0.0, 0.0)] => remedy("the right wheel's encoder counts nothing", "check its plug"),
+            [(1.0, _), (1.0, _)] if (left / right - 1.0).abs() > ALIKE => Finding::wrong(
+                "wheels",
+                format!(
+                    "{told}: one encoder loses counts or one motor is weak, or the wheels' diameters differ (calibrate them)"
+                ),
+            ),
+            [(1.0, _), (1.0, _)] => Finding::right("wheels", told),
+            [(left, 0.0), (right, 0.0)] => {
+                let which = match (left < 0.0, right < 0.0) {
                     (true, true) => "both wheels' encoders count",
                     (true, false) => "the left wheel's encoder counts",
                     _ => "the right wheel's encoder counts",
                 };
-                remedy(
-                    &format!("{which} backwards, or the motor turns backwards"),
-                    "swap the two wires of its encoder or of its motor",
-                )
+                remedy(&format!("{which} backwards{or_motor}"), "swap two wires of what is wrong")
             }
-            _ => remedy("each encoder counts the other wheel", "swap their plugs"),
+            [(_, left), (_, right)] => {
+                let too = if left + right < 2.0 { ", and not only forwards" } else { "" };
+                let or = if motors.is_none() { ", or the motors are swapped" } else { "" };
+                remedy(&format!("each encoder counts the other wheel{too}{or}"), "swap their plugs")
+            }
         }
+    }
+
+    /// The encoders count what each wheel is told.
+    pub(crate) fn is_as_told(&self) -> bool {
+        self.follows() == Matrix2::identity()
     }
 
     /// The body's motion by what the wheels counted, put right.
     pub(crate) fn motion(&self, trace: &Trace, track_m: f64) -> Motion {
-        let follows = self.follows();
-        let of = |wheel: usize, counted: [f64; 2]| {
-            let encoder = (0..2).find(|it| follows[*it].is_some_and(|(which, _)| which == wheel));
-            let encoder = encoder.unwrap_or(wheel);
-            match follows[encoder] {
-                Some((_, true)) => -counted[encoder],
-                _ => counted[encoder],
-            }
-        };
+        let wheels = self.follows().transpose();
         let motion = |(at, counted): &(f64, [f64; 2])| {
-            let [left, right] = [of(0, *counted), of(1, *counted)];
+            let [left, right]: [f64; 2] = (wheels * Vector2::from(*counted)).into();
             (*at, [(right - left) / track_m, (left + right) / 2.0])
         };
         trace.rolled.iter().map(motion).collect()
@@ -153,14 +153,14 @@ impl Wheels {
 }
 
 /// Delay and acceleration of the base against the stated ones.
-pub(crate) fn response(mission: &Mission, trace: &Trace, motion: &Motion) -> Option<Finding> {
+pub(crate) fn response(mission: &Mission, trace: &Trace, motion: &Motion) -> Finding {
     let body = mission.body();
     let turn = |(at, told): &(f64, [f64; 2])| (*at, (told[1] - told[0]) / body.track_m);
-    let told: Vec<_> = trace.told.iter().map(turn).collect();
+    let told: Vec<_> = trace.sent.iter().map(turn).collect();
     let turned: Vec<_> = motion.iter().map(|(at, [angle, _])| (*at, *angle)).collect();
     let found = match response::estimate(&told, &turned, &body) {
         Ok(found) => found,
-        Err(why) => return Some(Finding::unknown("response", why)),
+        Err(why) => return Finding::unknown("response", why),
     };
     let stated = body.response;
     let (delay, limit) = (found.delay_s, found.acceleration_m_s2);
@@ -179,7 +179,7 @@ pub(crate) fn response(mission: &Mission, trace: &Trace, motion: &Motion) -> Opt
         it.value < STRONG_M_S2 && it.value + 4.0 * it.sd < WEAKER * stated
     });
     if !late && !heavy {
-        return Some(Finding::right("response", text));
+        return Finding::right("response", text);
     }
     let mut finding = Finding::wrong("response", text)
         .with_key("robot.response.delay_s", format!("{:.3}", delay.value));
@@ -187,7 +187,7 @@ pub(crate) fn response(mission: &Mission, trace: &Trace, motion: &Motion) -> Opt
         finding =
             finding.with_key("robot.response.acceleration_m_s2", format!("{:.2}", limit.value));
     }
-    Some(finding)
+    finding
 }
 
 /// A delay that is so many periods of the motor frames longer than stated is told: a busy machine adds half of one.

@@ -17,7 +17,7 @@ pub(super) fn measure(arguments: &Arguments, plan: CalibrationPlan) -> Result<()
     let trace = Trace::read(&mission, &recording)?;
     let turn = |(at, [left, right]): &(f64, [f64; 2])| (*at, (right - left) / body.track_m);
     let [told, turned] =
-        [&trace.told, &trace.rolled].map(|it| it.iter().map(turn).collect::<Vec<_>>());
+        [&trace.sent, &trace.rolled].map(|it| it.iter().map(turn).collect::<Vec<_>>());
     let found = estimate(&told, &turned, &body).map_err(|why| refused(&why))?;
     let text = match arguments.setting.json {
         true => format!("{}\n", as_json(&found)),
