@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use crate::{
     arduino::ArduinoBoard,
     footprint::Footprint,
-    kinematics::{Ackermann, DifferentialDrive, Drive},
+    kinematics::{Ackermann, DifferentialDrive, Drive, Twist, WheelSpeeds},
     odometry::Odometry,
     response::{Response, ResponseKeys},
     ros2::Ros2Topics,
@@ -184,6 +184,29 @@ impl Body {
                 Drive::Differential(DifferentialDrive::new(self.wheel_radius_m, self.track_m, top))
             }
         }
+    }
+
+    /// The speeds of the left and right wheel, rad/s, that a tick reaches on the way from the `told` to the `wanted` ones: they grow no
+    /// faster than the body's accelerations allow, and fall at once.
+    pub fn reached(&self, told: [f64; 2], wanted: [f64; 2], rate_hz: f64) -> [f64; 2] {
+        let Self { wheel_radius_m, track_m, response, .. } = *self;
+        let acceleration = [response.acceleration_m_s2, response.turn_acceleration_rad_s2];
+        if acceleration == [f64::INFINITY; 2] {
+            return wanted;
+        }
+        let drive = DifferentialDrive::new(wheel_radius_m, track_m, f64::INFINITY);
+        let twist = |[left, right]: [f64; 2]| drive.twist(WheelSpeeds { right, left });
+        let (now, then) = (twist(wanted), twist(told));
+        let grown = |now: f64, then: f64, acceleration: f64| {
+            let most = (then * now.signum()).max(0.0) + acceleration / rate_hz;
+            now.clamp(-most, most)
+        };
+        let omega = grown(now.omega, then.omega, acceleration[1]);
+        // Slowing down so that the curve stays, which is free.
+        let turned = if omega == now.omega { 1.0 } else { (omega / now.omega).abs() };
+        let v = grown(now.v * turned, then.v, acceleration[0]);
+        let WheelSpeeds { right, left } = drive.wheels(Twist { v, omega });
+        [left, right]
     }
 
     /// None for a robot with two driven wheels.

@@ -2,7 +2,6 @@
 //! it can.
 
 use common::{
-    kinematics::{DifferentialDrive, Twist, WheelSpeeds as Wheels},
     mission::{Body, Mission},
     samples::{CommandSample, WheelSample},
     wire::counts_between,
@@ -33,7 +32,9 @@ impl WheelSpeeds {
     pub(crate) fn of(&self, command: &CommandSample, share: f64, wheels: &WheelSample) -> [i16; 2] {
         let Some(steering) = self.body.steering else {
             let wanted = [command.left_rad_s, command.right_rad_s].map(|speed| share * speed);
-            return self.reachable(wanted).map(|speed| self.counts_per_second(speed));
+            let told = self.told.map(|it| f64::from(it) / self.counts_per_radian());
+            let reached = self.body.reached(told, wanted, self.rate_hz);
+            return reached.map(|speed| self.counts_per_second(speed));
         };
         let driven = self.counts_per_second(share * command.left_rad_s);
         let angle = command.right_rad_s.clamp(-steering.limit_rad, steering.limit_rad);
@@ -41,29 +42,6 @@ impl WheelSpeeds {
         let top = steering.counts(steering.rate_rad_s);
         let rate = (left * STEERING_GAIN * self.rate_hz).clamp(-top, top);
         [driven, whole(rate)]
-    }
-
-    /// The wheel speeds, rad/s, that a tick reaches on the way to the `wanted` ones.
-    fn reachable(&self, wanted: [f64; 2]) -> [f64; 2] {
-        let Body { wheel_radius_m, track_m, response, .. } = self.body;
-        let acceleration = [response.acceleration_m_s2, response.turn_acceleration_rad_s2];
-        if acceleration == [f64::INFINITY; 2] {
-            return wanted;
-        }
-        let drive = DifferentialDrive::new(wheel_radius_m, track_m, f64::INFINITY);
-        let twist = |[left, right]: [f64; 2]| drive.twist(Wheels { right, left });
-        let per_radian = self.counts_per_radian();
-        let (now, then) = (twist(wanted), twist(self.told.map(|it| f64::from(it) / per_radian)));
-        let grown = |now: f64, then: f64, acceleration: f64| {
-            let most = (then * now.signum()).max(0.0) + acceleration / self.rate_hz;
-            now.clamp(-most, most)
-        };
-        let omega = grown(now.omega, then.omega, acceleration[1]);
-        // Slowing down so that the curve stays, which is free.
-        let turned = if omega == now.omega { 1.0 } else { (omega / now.omega).abs() };
-        let v = grown(now.v * turned, then.v, acceleration[0]);
-        let Wheels { right, left } = drive.wheels(Twist { v, omega });
-        [left, right]
     }
 
     fn counts_per_radian(&self) -> f64 {
@@ -86,7 +64,7 @@ fn whole(counts: f64) -> i16 {
 mod tests {
     use std::path::Path;
 
-    use common::wire::COUNT_CYCLE;
+    use common::{kinematics::Twist, wire::COUNT_CYCLE};
 
     use super::*;
 

@@ -27,6 +27,8 @@ pub(crate) struct SizesTold {
     pub(crate) ratio: f64,
 }
 
+pub(crate) const MOTOR: &str = "motor turns";
+
 /// Motors that let the body move so: in each row, a wheel's, 1 or -1 at the wheel that it goes as, when that is told.
 pub(crate) fn motors(turns_back: bool, drives_back: bool, exchanged: bool) -> Matrix2<f64> {
     // Turn and way are the difference and the sum of the rims' ways, and those of turn and way are twice the rims'.
@@ -37,29 +39,29 @@ pub(crate) fn motors(turns_back: bool, drives_back: bool, exchanged: bool) -> Ma
     sums * goes * sums / 2.0
 }
 
-/// What is wrong with `motors`.
-pub(crate) fn words(motors: Matrix2<f64>) -> String {
-    let is_swapped = motors[(0, 0)] == 0.0;
-    let reversed = match [0, 1].map(|row| motors.row(row).sum() < 0.0) {
-        [true, true] => "both motors turn backwards",
-        [true, false] => "the left wheel turns backwards",
-        [false, true] => "the right wheel turns backwards",
-        _ => "",
-    };
-    let swapped = if is_swapped { "the motors are swapped, left and right" } else { "" };
-    let and = if is_swapped && !reversed.is_empty() { ", and " } else { "" };
-    format!("{swapped}{and}{reversed}")
+/// What is wrong with a motor of each wheel, or an encoder: a `part` for each row that is not as it should be, in the column of its wheel.
+pub(crate) fn words(parts: Matrix2<f64>, part: &str) -> String {
+    let sides = ["left", "right"].into_iter().enumerate();
+    let wrong = sides.filter_map(|(row, side)| {
+        let what = match (parts[(row, row)], parts[(row, 1 - row)]) {
+            (1.0, _) => return None,
+            (0.0, 0.0) => "nothing",
+            (_, 0.0) => "backwards",
+            (_, 1.0) => "the other wheel",
+            _ => "the other wheel backwards",
+        };
+        Some(format!("the {side} {part} {what}"))
+    });
+    wrong.collect::<Vec<_>>().join(" and ")
 }
 
 impl Moves {
     /// All motors that what was seen allows.
     fn possible(&self) -> Vec<Matrix2<f64>> {
         let either = |known: Option<bool>| known.map_or(vec![false, true], |it| vec![it]);
-        let turns = either(self.turns_back).into_iter();
-        turns
-            .flat_map(|turns| either(self.drives_back).into_iter().map(move |it| (turns, it)))
-            .map(|(turns, drives)| motors(turns, drives, self.exchanged))
-            .collect()
+        let drives = either(self.drives_back);
+        let with = |turns| drives.iter().map(move |it| motors(turns, *it, self.exchanged));
+        either(self.turns_back).into_iter().flat_map(with).collect()
     }
 
     /// The motors, if what was seen tells them.
@@ -74,7 +76,7 @@ impl Moves {
         if possible.contains(&Matrix2::identity()) {
             return None;
         }
-        let all: Vec<_> = possible.iter().map(|it| words(*it)).collect();
+        let all: Vec<_> = possible.iter().map(|it| words(it.transpose(), MOTOR)).collect();
         let which = if all.len() > 1 { ": look which way it turns and drives" } else { "" };
         let told = if self.exchanged { "told to drive, the body turns: " } else { "" };
         let text = format!("{told}{}{which}", all.join("; or "));

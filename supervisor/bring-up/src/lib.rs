@@ -98,7 +98,7 @@ pub fn findings(mission: &Mission, trace: &Trace, lifted: bool) -> (Vec<Finding>
     let response = wheels::response(mission, trace, &motion);
     if lifted {
         found.extend(rangers::liveliness(mission, trace, false));
-        found.extend([wheels.finding(mission, None), response]);
+        found.extend([wheels.finding(None), response]);
         return (found, None);
     }
     let placed = scans::place(mission, trace, &motion);
@@ -109,7 +109,7 @@ pub fn findings(mission: &Mission, trace: &Trace, lifted: bool) -> (Vec<Finding>
         None => rangers::moves(mission, trace, &motion),
     };
     found.extend(rangers::liveliness(mission, trace, !moves.exchanged));
-    found.extend([wheels.finding(mission, moves.motors()), response]);
+    found.extend([wheels.finding(moves.motors()), response]);
     let motors = moves.finding(mission, wheels.is_as_told());
     let are_right = motors.is_none();
     found.extend(motors);

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use calibration::response::spread;
 use common::{
     geometry::wrap_angle,
     mission::{Mission, Sensor, SensorKind},
@@ -45,6 +46,11 @@ const LEAST_TURN: f64 = 2.0;
 
 fn range_m(reading: &RangeReading) -> Option<f64> {
     (reading.status() == RangeStatus::Measured).then_some(reading.range_m)
+}
+
+/// None of fewer than `least` values.
+fn mean(values: &[f64], least: usize) -> Option<f64> {
+    (values.len() >= least).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
 /// The readings of a row with their times.
@@ -194,8 +200,7 @@ impl Profile {
         let each = seen.iter().filter_map(|(bearing, range)| {
             Some((self.range(Self::bin(*bearing) + turned)? - range).abs().min(DIFFERENT_M))
         });
-        let each: Vec<f64> = each.collect();
-        (each.len() >= LEAST_SAMPLES).then(|| each.iter().sum::<f64>() / each.len() as f64)
+        mean(&each.collect::<Vec<f64>>(), LEAST_SAMPLES)
     }
 }
 
@@ -307,8 +312,7 @@ fn others(all: &[Seen<'_>], place: usize) -> Profile {
 fn disagreement(all: &[Seen<'_>]) -> Option<f64> {
     let each =
         all.iter().enumerate().map(|(place, (_, seen))| others(all, place).difference(seen, 0));
-    let each: Vec<f64> = each.flatten().collect();
-    (all.len() > 2 && each.len() > 1).then(|| each.iter().sum::<f64>() / each.len() as f64)
+    mean(&each.flatten().collect::<Vec<f64>>(), 2).filter(|_| all.len() > 2)
 }
 
 /// The turns over those by the wheels at which the sonars agree best.
@@ -334,7 +338,7 @@ impl Turn {
         let is_told = agrees && others.fold(f64::INFINITY, |m, it| m.min(it.0)) * EXPLAINS > least;
         let alike = each.iter().filter(|it| it.1 * best > 0.0 && it.0 <= ALIKE * least);
         let logarithms: Vec<f64> = alike.map(|it| it.1.abs().ln()).collect();
-        let scale = (logarithms.iter().sum::<f64>() / logarithms.len() as f64).exp();
+        let scale = mean(&logarithms, 1)?.exp();
         let is_other = differs(best.signum())
             .is_some_and(|it| it > LEAST_DIFFERENCE_M / 2.0 && least < EXPLAINS * it);
         Some(Self {
@@ -384,28 +388,22 @@ pub(crate) fn gyro_finding(
         let text = "no turn of it was used: link.log says whether it is silent, or turns otherwise than odometry, as one does whose z axis points down";
         return mission.robot.ros2.imu.is_some().then(|| Finding::wrong("gyro", text));
     };
-    let truth = moves.turn.filter(|_| placed.is_some());
-    let scale = gyro.scale / truth.unwrap_or(1.0);
-    let text = format!("it says {:.1} % of the turn that the", 100.0 * scale.abs());
-    if (scale.abs() - 1.0).abs() <= GYRO_TOLD {
-        return match (gyro.agrees(), moves.turns_back) {
-            _ if moves.exchanged => None,
-            (true, _) | (_, Some(true)) => {
-                Some(Finding::right("gyro", format!("{text} wheels say")))
-            }
-            (false, Some(false)) => Some(Finding::wrong(
-                "gyro",
-                "it says turns to the left as turns to the right: its z axis points down, or its sign is wrong",
-            )),
-            _ => None,
-        };
-    }
-    let text = match truth {
-        Some(_) => format!("{text} laser sees: mend its scale"),
-        None => format!("{text} wheels say: its scale or robot.track_m is wrong"),
+    let (truth, by) = match moves.turn.filter(|_| placed.is_some()) {
+        Some(turn) => (turn, "laser sees: mend its scale"),
+        None => (1.0, "wheels say: its scale or robot.track_m is wrong"),
     };
-    let is_told = scale.is_finite() && !moves.exchanged && (truth.is_some() || gyro.agrees());
-    is_told.then(|| Finding::wrong("gyro", text))
+    let scale = gyro.scale.abs() / truth;
+    let text = format!("it says {:.1} % of the turn", 100.0 * scale);
+    Some(match (gyro.agrees(), moves.turns_back) {
+        _ if moves.exchanged => return None,
+        (false, None) => return None,
+        (false, Some(false)) => Finding::wrong(
+            "gyro",
+            "it says turns to the left as turns to the right: its z axis points down, or its sign is wrong",
+        ),
+        _ if (scale - 1.0).abs() <= GYRO_TOLD => Finding::right("gyro", text),
+        _ => Finding::wrong("gyro", format!("{text} that the {by}")),
+    })
 }
 
 fn bearing(reference: &Profile, sensor: &Sensor, seen: &[(f64, f64)]) -> Option<Finding> {
@@ -442,22 +440,16 @@ fn share_of_way(
     let row = mission.front_row();
     let mut shares = Vec::new();
     for leg in trace.legs().iter().filter(|leg| leg.told == told && leg.seconds() > 1.0) {
-        let in_leg = readings(trace, row).filter(|(at, _)| leg.contains(*at));
-        let points: Vec<(f64, f64)> =
-            in_leg.filter_map(|(at, it)| Some((way(between(motion, at)?), range_m(it)?))).collect();
-        let count = points.len() as f64;
-        let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count;
-        let (x, y) = (mean(|it| it.0), mean(|it| it.1));
-        let sum = |of: &dyn Fn(f64, f64) -> f64| {
-            points.iter().map(|it| of(it.0 - x, it.1 - y)).sum::<f64>()
-        };
-        let (xx, xy, yy) = (sum(&|x, _| x * x), sum(&|x, y| x * y), sum(&|_, y| y * y));
+        let in_leg: Vec<_> = readings(trace, row).filter(|(at, _)| leg.contains(*at)).collect();
+        let point =
+            |(at, it): &(f64, &RangeReading)| Some([way(between(motion, *at)?), range_m(it)?]);
+        let points: Vec<_> = in_leg.iter().filter_map(point).collect();
+        let [xx, xy, yy] = spread(&points);
         // Another wall behind the first, or a slanted one, gives no straight line.
-        let mostly =
-            2 * points.len() > readings(trace, row).filter(|(at, _)| leg.contains(*at)).count();
+        let mostly = 2 * points.len() > in_leg.len();
         if points.len() >= 6 && mostly && xx > 1e-3 && xy * xy > 0.95 * xx * yy {
             shares.push(-xy / xx);
         }
     }
-    (!shares.is_empty()).then(|| shares.iter().sum::<f64>() / shares.len() as f64)
+    mean(&shares, 1)
 }

@@ -14,7 +14,7 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::{
     Finding, Trace,
-    body::{Moves, SizesTold, motors, words},
+    body::{MOTOR, Moves, SizesTold, motors, words},
     rangers::Gyro,
     trace::between,
     wheels::Motion,
@@ -361,21 +361,24 @@ pub(crate) fn findings(
     // What the motors explain is not the laser's.
     let seen_back = placed.hypothesis.turns_back && moves.turns_back != Some(true);
     let looks_back = placed.seems_back() && moves.drives_back != Some(true);
+    let or_motors = format!(
+        "or {}; look which way it turns and drives",
+        words(motors(seen_back, looks_back, false).transpose(), MOTOR)
+    );
     if seen_back {
         let roll = if sensor.is_upside_down { "0" } else { "180" };
-        let text = format!("{name} sees it turn the other way");
+        let upside_down = format!("{name} sees it turn the other way: it is upside down");
         found.push(match gyro {
-            Some(_) => Finding::wrong(name, format!("{text}, and the gyro does not: it is upside down"))
-                .with_key(key("roll_deg"), roll),
-            None => Finding::wrong(name, format!("{text}: it is upside down, so that {} = {roll}, or {}; look which way it turns", key("roll_deg"), words(motors(true, looks_back, false)))),
+            Some(_) => Finding::wrong(name, upside_down).with_key(key("roll_deg"), roll),
+            None => {
+                let key = key("roll_deg");
+                Finding::wrong(name, format!("{upside_down}, so that {key} = {roll}, {or_motors}"))
+            }
         });
     } else if looks_back {
-        let text = format!(
-            "sees it drive backwards: it looks back, so that {} = 180, or {}; look which way it drives",
-            key("turned_deg"),
-            words(motors(false, true, false))
-        );
-        found.push(Finding::wrong(name, text));
+        let key = key("turned_deg");
+        let text = "sees it drive backwards: it looks back, so that";
+        found.push(Finding::wrong(name, format!("{text} {key} = 180, {or_motors}")));
     }
     let mount = sensor.mount;
     let off = DVec2::new(it[X], it[Y]);

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use common::{
     driver::counts::WheelCounts,
-    mission::{Body, Mission},
+    mission::Mission,
     samples::{CountsSample, RangeReading, ScanHeader, WheelSample},
     topics::{COMMAND, COUNTS, IMU_TURN, LINK, RANGES, SCAN, WHEELS},
 };
@@ -115,8 +115,10 @@ impl Trace {
             }
             let wanted = rims.map(|it| link.action().speed_share() * it);
             let before = trace.sent.last().map_or([0.0; 2], |it| it.1);
+            let wheels = |rims: [f64; 2]| rims.map(|it| it / body.wheel_radius_m);
+            let sent = body.reached(wheels(before), wheels(wanted), mission.robot.rate_hz);
             let sent_s = at + 1e-9 * link.latency_ns as f64;
-            trace.sent.push((sent_s, reached(mission, before, wanted)));
+            trace.sent.push((sent_s, sent.map(|it| it * body.wheel_radius_m)));
         }
         let mut before = None;
         for turn in recording.samples(&IMU_TURN)? {
@@ -169,21 +171,6 @@ impl Trace {
     pub fn rest_until_s(&self) -> f64 {
         self.legs().first().map_or(0.0, |rest| rest.until_s)
     }
-}
-
-/// The speeds of the rims that the link sends on the way to `wanted` after it sent `before`: they grow as stated, and fall at once.
-fn reached(mission: &Mission, before: [f64; 2], wanted: [f64; 2]) -> [f64; 2] {
-    let Body { track_m, response, .. } = mission.body();
-    // Half the difference of the rims' speeds, and their mean.
-    let parts = |[left, right]: [f64; 2]| [(right - left) / 2.0, (left + right) / 2.0];
-    let limits = [response.turn_acceleration_rad_s2 * track_m / 2.0, response.acceleration_m_s2];
-    let [before, wanted] = [parts(before), parts(wanted)];
-    let [turn, way] = [0, 1].map(|of| {
-        let slower = (before[of] * wanted[of].signum()).max(0.0);
-        let most = slower + limits[of] / mission.robot.rate_hz;
-        wanted[of].clamp(-most, most)
-    });
-    [way - turn, way + turn]
 }
 
 /// A value between the two that `at_s` lies between, or the nearest; none without values.

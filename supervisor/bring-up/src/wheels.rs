@@ -1,11 +1,12 @@
 //! Which wheel counts what it is told, and how fast the base answers.
 
 use calibration::response;
-use common::mission::{Mission, Protocol};
+use common::mission::Mission;
 use nalgebra::{Matrix2, Vector2};
 
 use crate::{
     Finding,
+    body::words,
     trace::{Told, Trace, between},
 };
 
@@ -82,58 +83,34 @@ impl Wheels {
     }
 
     /// `motors` are the wheels that go as each is told, if that was seen.
-    pub(crate) fn finding(&self, mission: &Mission, motors: Option<Matrix2<f64>>) -> Finding {
+    pub(crate) fn finding(&self, motors: Option<Matrix2<f64>>) -> Finding {
+        if !self.is_told {
+            let text = "it moved for too short a time: what stopped it? Look at the logs of the run, and give it more room";
+            return Finding::unknown("wheels", text);
+        }
         let [left, right] = [0, 1].map(|row| self.counted.row(row).amax());
-        let told = format!(
+        let follows = self.follows();
+        // Encoders that count as told are as right or wrong as the motors.
+        let (encoders, or_motors) = match motors {
+            _ if self.is_as_told() => (follows, ""),
+            Some(motors) => (follows * motors.transpose(), ""),
+            None => (follows, ", or the motors do so"),
+        };
+        let wrong = words(encoders, "encoder counts");
+        if !wrong.is_empty() {
+            let by = "check motors, plugs and wires, or the robot's own program";
+            return Finding::wrong("wheels", format!("{wrong}{or_motors}: {by}"));
+        }
+        let text = format!(
             "they count {:.0} and {:.0} % of what they are told",
             100.0 * left,
             100.0 * right
         );
-        let remedy = |text: &str, x80: &str| {
-            let is_x80 = mission.robot.protocol() == Protocol::X80;
-            let by = if is_x80 { x80 } else { "mend the wiring, or the robot's own program" };
-            Finding::wrong("wheels", format!("{text}: {by}"))
-        };
-        let follows = self.follows();
-        // Encoders that count as told are as right or wrong as the motors.
-        let encoders = match motors {
-            Some(motors) if !self.is_as_told() => follows * motors.transpose(),
-            _ => follows,
-        };
-        let or_motor = if motors.is_none() { ", or its motor turns backwards" } else { "" };
-        let which = [0, 1].map(|row| (encoders[(row, row)], encoders[(row, 1 - row)]));
-        match which {
-            _ if !self.is_told => Finding::unknown(
-                "wheels",
-                "it moved for too short a time: what stopped it? Look at the logs of the run, and give it more room",
-            ),
-            [(0.0, 0.0), (0.0, 0.0)] => Finding::wrong(
-                "wheels",
-                "neither wheel counts: does it move? Check the motors' power and the encoders",
-            ),
-            [(0.0, 0.0), _] => remedy("the left wheel's encoder counts nothing", "check its plug"),
-            [_, (0.0, 0.0)] => remedy("the right wheel's encoder counts nothing", "check its plug"),
-            [(1.0, _), (1.0, _)] if (left / right - 1.0).abs() > ALIKE => Finding::wrong(
-                "wheels",
-                format!(
-                    "{told}: one encoder loses counts or one motor is weak, or the wheels' diameters differ (calibrate them)"
-                ),
-            ),
-            [(1.0, _), (1.0, _)] => Finding::right("wheels", told),
-            [(left, 0.0), (right, 0.0)] => {
-                let which = match (left < 0.0, right < 0.0) {
-                    (true, true) => "both wheels' encoders count",
-                    (true, false) => "the left wheel's encoder counts",
-                    _ => "the right wheel's encoder counts",
-                };
-                remedy(&format!("{which} backwards{or_motor}"), "swap two wires of what is wrong")
-            }
-            [(_, left), (_, right)] => {
-                let too = if left + right < 2.0 { ", and not only forwards" } else { "" };
-                let or = if motors.is_none() { ", or the motors are swapped" } else { "" };
-                remedy(&format!("each encoder counts the other wheel{too}{or}"), "swap their plugs")
-            }
+        if (left / right - 1.0).abs() <= ALIKE {
+            return Finding::right("wheels", text);
         }
+        let why = "one encoder loses counts or one motor is weak, or the wheels' diameters differ (calibrate them)";
+        Finding::wrong("wheels", format!("{text}: {why}"))
     }
 
     /// The encoders count what each wheel is told.

@@ -180,14 +180,19 @@ impl Model {
                 seen.push(turned);
             }
         }
-        let mean = [0, 1].map(|of| seen.iter().map(|it| it[of]).sum::<f64>() / seen.len() as f64);
-        let sum = |one: usize, other: usize| {
-            seen.iter().map(|it| (it[one] - mean[one]) * (it[other] - mean[other])).sum::<f64>()
-        };
-        let (model, both, turned) = (sum(0, 0), sum(0, 1), sum(1, 1));
+        let [model, both, turned] = spread(&seen);
         (model > 0.0 && turned > 0.0 && both > 0.0)
             .then(|| (both * both / (model * turned), both / model))
     }
+}
+
+/// Sums of the squares of the first values from their mean, of the products of both, and of the squares of the second.
+#[must_use]
+pub fn spread(points: &[[f64; 2]]) -> [f64; 3] {
+    let mean = [0, 1].map(|of| points.iter().map(|it| it[of]).sum::<f64>() / points.len() as f64);
+    [(0, 0), (0, 1), (1, 1)].map(|(one, other)| {
+        points.iter().map(|it| (it[one] - mean[one]) * (it[other] - mean[other])).sum()
+    })
 }
 
 /// The keys of a mission for `estimate`, with the lag of `stated`.
