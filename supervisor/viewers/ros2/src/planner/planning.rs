@@ -12,6 +12,9 @@ use super::costmap::{Body, Costmap};
 const MOST_CELLS: usize = 1 << 24;
 /// A path follows the field in such steps, in cells: at a wall the field leads away from it or along it.
 const STEP: f64 = 0.25;
+/// A path has no more poses but for its goals: DDS does not divide an answer of over 64 kB here.
+const MOST_POSES: usize = 500;
+const MOST_GOALS: usize = 100;
 
 /// Why there is no path: Nav2's error codes, less 200 for one goal and 300 for several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,7 +51,7 @@ impl Planner {
         Self { body, screening_m, solver, map: None, blocked: Vec::new(), fields }
     }
 
-    /// Poses about a cell apart in the frame of `map`, from `start` by way of all `goals`, each of which has its own heading.
+    /// Poses about a cell apart, farther on a long way, in the frame of `map`, from `start` by way of all `goals`, each of which has its own heading.
     pub(super) fn plan(
         &mut self,
         map: &Arc<Costmap>,
@@ -59,11 +62,14 @@ impl Planner {
         if goals.is_empty() {
             return Err((Reason::NoGoal, "no goal was given".to_owned()));
         }
+        if goals.len() > MOST_GOALS {
+            return Err((Reason::Unknown, format!("a path has at most {MOST_GOALS} goals")));
+        }
         let before = self.map.replace(Arc::clone(map));
         if before.is_none_or(|before| !Arc::ptr_eq(&before, map)) {
             self.blocked = map.blocked(&self.body);
         }
-        let mut path = Vec::new();
+        let (mut path, mut ends) = (Vec::new(), Vec::new());
         let mut from = start.translation;
         for goal in goals {
             let to = goal.translation;
@@ -72,10 +78,14 @@ impl Planner {
             let next = leg.iter().skip(1).take(leg.len().saturating_sub(2)).chain([&to]);
             let ahead = leg.iter().zip(next).map(|(at, to)| [at.x, at.y, (to - at).to_angle()]);
             path.extend(ahead);
+            ends.push(path.len());
             path.push([to.x, to.y, goal.matrix2.x_axis.to_angle()]);
             from = to;
         }
-        Ok(path)
+        let every = path.len().div_ceil(MOST_POSES);
+        let kept = path.into_iter().enumerate();
+        let kept = kept.filter(|(at, _)| at % every == 0 || ends.binary_search(at).is_ok());
+        Ok(kept.map(|(_, pose)| pose).collect())
     }
 
     /// The field of the last path.

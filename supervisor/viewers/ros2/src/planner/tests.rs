@@ -71,6 +71,18 @@ fn update([col, row]: [u32; 2], [width, height]: [u32; 2], value: u8) -> Vec<u8>
 }
 
 #[test]
+fn a_long_path_has_as_many_poses_as_an_answer_carries_and_all_of_its_goals() {
+    let map = map(&Grid::new(1000, 20));
+    let goals = [at(25.0, 0.5), at(49.0, 0.5)];
+    let path = plan(&mut planner(), &map, at(1.0, 0.5), &goals).unwrap();
+    assert!((450..=502).contains(&path.len()), "{}", path.len());
+    assert!(path.contains(&[25.0, 0.5, 0.5]) && path.ends_with(&[[49.0, 0.5, 0.5]]), "{path:?}");
+    let many = vec![at(2.0, 0.5); 101];
+    let refused = plan(&mut planner(), &map, at(1.0, 0.5), &many).unwrap_err();
+    assert!(refused.1.contains("at most 100 goals"), "{refused:?}");
+}
+
+#[test]
 fn a_path_begins_at_the_start_ends_in_the_goals_pose_and_looks_ahead_a_cell_at_a_time() {
     let path = plan(&mut planner(), &map(&rooms()), at(1.0, 4.0), &[at(9.0, 1.0)]).unwrap();
     assert_eq!((path[0][..2].to_vec(), path.last()), (vec![1.0, 4.0], Some(&[9.0, 1.0, 0.5])));
