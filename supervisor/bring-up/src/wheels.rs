@@ -135,7 +135,7 @@ pub(crate) fn response(mission: &Mission, trace: &Trace, motion: &Motion) -> Fin
     let turn = |(at, told): &(f64, [f64; 2])| (*at, (told[1] - told[0]) / body.track_m);
     let told: Vec<_> = trace.sent.iter().map(turn).collect();
     let turned: Vec<_> = motion.iter().map(|(at, [angle, _])| (*at, *angle)).collect();
-    let found = match response::estimate(&told, &turned, &body) {
+    let found = match response::estimate(&told, &turned, &body, response::By::Headings) {
         Ok(found) => found,
         Err(why) => return Finding::unknown("response", why),
     };

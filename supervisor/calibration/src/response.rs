@@ -1,8 +1,7 @@
 //! Delay and acceleration of a base, from turns on the spot to and fro.
 //!
-//! The turn rates that were commanded pass through the model of a response, and what is left between its heading and that of the base is
-//! least for the base's own. Headings are hardly changed by frames that come late on a busy machine, as rates are. Each turn and its return
-//! give an estimate; their spread is the deviation.
+//! The turn rates that were commanded pass through the model of a response, and what is left between its turns and those of the base is
+//! least for the base's own. Each turn and its return give an estimate; their spread is the deviation.
 
 use std::ops::Range;
 
@@ -22,14 +21,31 @@ const RATIO: f64 = 1.1;
 const ACCELERATIONS: i32 = 64;
 /// The least share of the turned angles that the response explains.
 const EXPLAINED: f64 = 0.95;
-/// A share that is less by no more than this is the same.
-const AS_MUCH: f64 = 1e-4;
 /// The estimates that make a deviation.
 const FEWEST: usize = 3;
 /// The model goes on in steps of so many seconds.
 const STEP_S: f64 = 0.01;
 /// A pause between two headings is cut into no more.
 const MOST_STEPS: f64 = 100.0;
+
+/// What of the model and the base is compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum By {
+    /// The turns between frames tell delay and acceleration apart best, but frames that come late on a busy machine change them.
+    Turns,
+    /// Headings are hardly changed by such frames.
+    Headings,
+}
+
+impl By {
+    /// An explained share that is less by no more than this is the same.
+    const fn as_much(self) -> f64 {
+        match self {
+            Self::Turns => 1e-3,
+            Self::Headings => 1e-4,
+        }
+    }
+}
 
 /// A value and its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,12 +72,13 @@ pub fn estimate(
     commands: &[(f64, f64)],
     headings: &[(f64, f64)],
     body: &Body,
+    by: By,
 ) -> Result<Estimate, String> {
     let changes = commands.windows(2).filter(|pair| pair[0].1 * pair[1].1 < 0.0);
     let turns: Vec<f64> = changes.map(|pair| pair[1].0).collect();
     // The first turn starts from rest; each window is a turn and its return.
     let windows = turns.windows(3).map(|ends| (ends[0], ends[2]));
-    let fits = windows.filter_map(|window| Fit::best(commands, headings, body, window));
+    let fits = windows.filter_map(|window| Fit::best(commands, headings, (body, by), window));
     let mut fits: Vec<Fit> = fits.filter(|fit| fit.explained >= EXPLAINED).collect();
     // A busy machine lets the robot stand for a moment in some of the windows.
     fits.sort_by(|one, other| other.explained.total_cmp(&one.explained));
@@ -110,14 +127,14 @@ impl Fit {
     fn best(
         commands: &[(f64, f64)],
         headings: &[(f64, f64)],
-        body: &Body,
+        (body, by): (&Body, By),
         window: (f64, f64),
     ) -> Option<Self> {
         let Response { lag_s, acceleration_m_s2, turn_acceleration_rad_s2, .. } = body.response;
         let stated = turn_acceleration_rad_s2.min(acceleration_m_s2 / (body.track_m / 2.0));
         let fit = |delay_s: f64, acceleration| {
             let model = Model { delay_s: delay_s.max(0.0), lag_s, acceleration };
-            let (explained, factor) = model.explains(commands, headings, window)?;
+            let (explained, factor) = model.explains(commands, headings, window, by)?;
             // A base that turns at half the rate reaches it in half the time.
             Some(Self { delay_s: model.delay_s, acceleration: factor * acceleration, explained })
         };
@@ -128,11 +145,13 @@ impl Fit {
             };
             let better = |one: &Self, other: &Self| one.explained.total_cmp(&other.explained);
             let limited = delays.clone().flat_map(limited).max_by(better)?;
-            // It is as stated, or without a limit, if that explains as much.
-            let mut simple = [stated, f64::INFINITY].into_iter().filter_map(|acceleration| {
+            // It is without a limit, or, of headings, as stated, if that explains as much.
+            let stated = (by == By::Headings).then_some(stated);
+            let simple = stated.into_iter().chain([f64::INFINITY]);
+            let mut simple = simple.filter_map(|acceleration| {
                 delays.clone().filter_map(|step| fit(at(step), acceleration)).max_by(better)
             });
-            let as_much = |it: &Self| it.explained >= limited.explained - AS_MUCH;
+            let as_much = |it: &Self| it.explained >= limited.explained - by.as_much();
             Some(simple.find(as_much).unwrap_or(limited))
         };
         let coarse = best(0..(LONGEST_DELAY_S / COARSE_S) as i32, 0.0, COARSE_S)?;
@@ -149,13 +168,14 @@ struct Model {
 }
 
 impl Model {
-    /// The square of the correlation of the headings with those of the model, within `window`, and their ratio: the link or the base may
+    /// The square of the correlation of the base's turns with those of the model, within `window`, and their ratio: the link or the base may
     /// turn slower than commanded.
     fn explains(
         self,
         commands: &[(f64, f64)],
         headings: &[(f64, f64)],
         window: (f64, f64),
+        by: By,
     ) -> Option<(f64, f64)> {
         // Before it, the model needs time to forget that it began at rest.
         let begins = window.0 - self.delay_s - 2.0 * LEG_S;
@@ -166,6 +186,9 @@ impl Model {
         let mut seen = Vec::new();
         for pair in headings.windows(2).filter(|pair| (begins..window.1).contains(&pair[1].0)) {
             let [(from, heading), (until, then)] = [pair[0], pair[1]];
+            if by == By::Turns {
+                turned = [0.0; 2];
+            }
             let steps = ((until - from) / STEP_S).round().clamp(1.0, MOST_STEPS);
             for step in 1..=steps as u32 {
                 let now = from + (until - from) * f64::from(step) / steps;
@@ -242,13 +265,15 @@ mod tests {
     fn delay_and_acceleration_of_a_base_are_measured_from_its_turns() {
         for (dead_s, acceleration) in [(0.15, 2.0), (0.48, 4.0), (0.1, 20.0), (0.28, 1.0)] {
             let [commands, headings] = turned(ModelledSpeed::new(dead_s, acceleration), 0.8);
-            let found = estimate(&commands, &headings, &body()).unwrap();
-            let off = found.delay_s.value - dead_s;
-            assert!(off.abs() < 0.05, "{dead_s} {acceleration}: {found:?}");
-            if acceleration < 10.0 {
-                let rims = found.acceleration_m_s2.unwrap().value;
-                let share = rims / (acceleration * body().track_m / 2.0);
-                assert!((0.85..1.15).contains(&share), "{dead_s} {acceleration}: {found:?}");
+            for by in [By::Turns, By::Headings] {
+                let found = estimate(&commands, &headings, &body(), by).unwrap();
+                let off = found.delay_s.value - dead_s;
+                assert!(off.abs() < 0.05, "{dead_s} {acceleration}: {found:?}");
+                if acceleration < 10.0 {
+                    let rims = found.acceleration_m_s2.unwrap().value;
+                    let share = rims / (acceleration * body().track_m / 2.0);
+                    assert!((0.85..1.15).contains(&share), "{dead_s} {acceleration}: {found:?}");
+                }
             }
         }
     }
@@ -257,8 +282,8 @@ mod tests {
     fn a_robot_that_turns_the_wrong_way_or_not_at_all_has_no_response() {
         for factor in [-1.0, 0.0] {
             let [commands, headings] = turned(ModelledSpeed::new(0.1, 2.0), factor);
-            assert!(estimate(&commands, &headings, &body()).is_err(), "{factor}");
+            assert!(estimate(&commands, &headings, &body(), By::Turns).is_err(), "{factor}");
         }
-        assert!(estimate(&[], &[], &body()).is_err());
+        assert!(estimate(&[], &[], &body(), By::Turns).is_err());
     }
 }

@@ -1,7 +1,7 @@
 //! The response of a base, from the recording of its turns.
 
 use bring_up::Trace;
-use calibration::response::{Estimate, Measured, estimate, keys};
+use calibration::response::{By, Estimate, Measured, estimate, keys};
 use common::mission::CalibrationPlan;
 use recording::Recording;
 use serde_json::json;
@@ -17,8 +17,8 @@ pub(super) fn measure(arguments: &Arguments, plan: CalibrationPlan) -> Result<()
     let trace = Trace::read(&mission, &recording)?;
     let turn = |(at, [left, right]): &(f64, [f64; 2])| (*at, (right - left) / body.track_m);
     let [told, turned] =
-        [&trace.sent, &trace.rolled].map(|it| it.iter().map(turn).collect::<Vec<_>>());
-    let found = estimate(&told, &turned, &body).map_err(|why| refused(&why))?;
+        [&trace.told, &trace.rolled].map(|it| it.iter().map(turn).collect::<Vec<_>>());
+    let found = estimate(&told, &turned, &body, By::Turns).map_err(|why| refused(&why))?;
     let text = match arguments.setting.json {
         true => format!("{}\n", as_json(&found)),
         false => keys(&found, body.response),
