@@ -65,6 +65,7 @@ mod tests {
         let there = [0, 1, 2, 3, 4].map(|number| file(number).exists());
         assert_eq!(there, [false, false, true, true, true]);
     }
+
     #[test]
     fn a_file_ends_after_an_hour_however_small_it_is() {
         let budget = Budget::new(100, []);

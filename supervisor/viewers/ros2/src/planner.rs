@@ -30,6 +30,7 @@ use std::{
 
 use clap::{Args, value_parser};
 use common::{
+    geometry::distance_to_segment,
     poll::is_readable,
     signals::{SIGCONT, Signals},
 };
@@ -129,10 +130,7 @@ fn inscribed(text: &str) -> Result<f64, String> {
         return Err("no outline; give three corners or more, as [[x, y], ...]".to_owned());
     }
     let sides = corners.iter().zip(corners.iter().cycle().skip(1));
-    let distance = |(from, to): (&DVec2, &DVec2)| {
-        let along = (to - from).length_squared().max(f64::MIN_POSITIVE);
-        from.lerp(*to, (-from.dot(to - from) / along).clamp(0.0, 1.0)).length()
-    };
+    let distance = |(from, to): (&DVec2, &DVec2)| distance_to_segment(DVec2::ZERO, *from, *to);
     Ok(sides.map(distance).fold(f64::INFINITY, f64::min))
 }
 

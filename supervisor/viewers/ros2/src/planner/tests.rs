@@ -75,7 +75,8 @@ fn a_long_path_has_as_many_poses_as_an_answer_carries_and_all_of_its_goals() {
     let map = map(&Grid::new(1000, 20));
     let goals = [at(25.0, 0.5), at(49.0, 0.5)];
     let path = plan(&mut planner(), &map, at(1.0, 0.5), &goals).unwrap();
-    assert!((450..=502).contains(&path.len()), "{}", path.len());
+    // Every second one of some 880 cells.
+    assert!((400..=502).contains(&path.len()), "{}", path.len());
     assert!(path.contains(&[25.0, 0.5, 0.5]) && path.ends_with(&[[49.0, 0.5, 0.5]]), "{path:?}");
     let many = vec![at(2.0, 0.5); 101];
     let refused = plan(&mut planner(), &map, at(1.0, 0.5), &many).unwrap_err();
