@@ -20,8 +20,9 @@ use recording::{
 use rustix::process::Signal;
 
 use crate::support::{
-    PATIENCE, Run, STAGES, assert_nothing_left, assert_refused, firsthand, golden, golden_of,
-    json_of, operate, output, refused, replayed, replayed_in, wait_until,
+    self, PATIENCE, Run, STAGES, assert_nothing_left, assert_refused, firsthand, golden, golden_of,
+    json_of, operate, output, processes, refused, replayed, replayed_in, signal_process,
+    wait_until,
 };
 
 fn open(directory: &Path) -> Recording {
@@ -134,6 +135,23 @@ fn on_a_wall_clock_a_tick_is_answered_again_when_its_map_is_solved() {
     replayed(&recording);
 }
 
+#[test]
+fn a_run_in_lockstep_waits_for_its_recorder_and_is_recorded_from_its_first_sample() {
+    let run = Run::start("rec-late", "open-room", &["--timeout", "8"]);
+    let file = run.directory().join("recording.mcap");
+    wait_until("the recorder has begun its file", || file.exists());
+    let line = run.directory().to_str().unwrap().to_owned();
+    let recorder = processes(&line).into_iter().find(|(_, line)| line.contains(" record "));
+    let (recorder, _) = recorder.unwrap();
+    signal_process(recorder, Signal::STOP);
+    support::wait_for_status("rec-late", |status| status["order"] == "driving");
+    signal_process(recorder, Signal::CONT);
+    let (_, _, directory) = run.finish_in();
+    let recording = open(directory.path());
+    assert!(recording.lost.is_empty(), "{:?}", recording.lost);
+    assert_eq!(replayed(&recording).equal(), 5);
+}
+
 /// Kill a recorder of `robot` whose file has grown `growths` times. Returns its file.
 fn killed_recorder(run: &Run, file: PathBuf, growths: usize) -> PathBuf {
     let mut recorder = firsthand(&["record", "--robot", &run.robot, "--out"])
@@ -179,7 +197,7 @@ fn recorders_killed_leave_readable_files_that_say_so_and_the_mission_as_it_was()
     operate("rec-shot", &["resume"]);
     let (code, summary, directory) = run.finish_in();
     assert_eq!((code, &summary["outcome"]), (Some(0), &"reached".into()), "{summary}");
-    crate::support::assert_no_restart(&summary);
+    support::assert_no_restart(&summary);
     // The run's own recorder was not affected.
     assert_eq!(replayed_in(&directory).equal(), 5);
     assert_nothing_left("rec-shot");

@@ -65,5 +65,5 @@ pub mod target_list;
 pub use error::SupervisorError;
 pub use observer::{Heard, Listener, Record};
 pub use progress::Progress;
-pub use run::{EndSignals, Finished, StillMoving, end_signals, run};
+pub use run::{Consumer, EndSignals, Finished, StillMoving, end_signals, run};
 pub use supervisor::Options;

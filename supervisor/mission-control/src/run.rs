@@ -80,14 +80,33 @@ pub fn end_signals() -> Result<EndSignals, SupervisorError> {
     Ok([catch()?, catch()?])
 }
 
-/// Carry out a run. `attach` is called once, when the bus exists and no stage has started: consumers that start there miss no sample.
-/// It returns early when one of its signals comes. `listener` hears the samples that the run reads. `show` is called a few times a
+/// A process that should miss no sample of a run. The run waits for it, and neither call waits longer than is good for the run or until one
+/// of `signals` comes.
+pub trait Consumer {
+    /// Start it. The bus exists, and no stage has started.
+    fn attach(&mut self, signals: &Signals);
+    /// Wait until it has taken what there is. In lockstep this is called every [`CAUGHT_UP_EVERY`] ticks, fewer than the bus keeps for it;
+    /// and always before the stages end, because what a writer published that ended before it was first read is gone.
+    fn catch_up(&mut self, signals: &Signals);
+}
+
+/// Nobody reads along.
+impl Consumer for () {
+    fn attach(&mut self, _: &Signals) {}
+
+    fn catch_up(&mut self, _: &Signals) {}
+}
+
+/// Ticks in lockstep after which the run waits for its consumer.
+pub(crate) const CAUGHT_UP_EVERY: u64 = 32;
+
+/// Carry out a run, with a `consumer` that misses nothing of it. `listener` hears the samples that the run reads. `show` is called a few times a
 /// second. The files of the robot stay until `lock` is dropped, which is after the consumers have ended.
 pub fn run<'a>(
     options: &'a Options,
     [mut signals, for_last_resort]: EndSignals,
     lock: &mut Option<DomainLock>,
-    attach: &mut dyn FnMut(&Signals),
+    consumer: &mut dyn Consumer,
     listener: Listener,
     show: &mut dyn FnMut(&Progress<'_>),
 ) -> Result<(Finished, Option<StillMoving<'a>>), SupervisorError> {
@@ -96,10 +115,10 @@ pub fn run<'a>(
     last_resort::watch(for_last_resort, turns.clone(), domain.clone());
     let lock = lock.insert(DomainLock::acquire(domain, options.mission.grid_frame().area())?);
     let mut supervisor =
-        Supervisor::start(options, lock, (turns.clone(), &signals), attach, listener)
+        Supervisor::start(options, lock, (turns.clone(), &signals), consumer, listener)
             .inspect_err(|_| turns.end())?;
     let ending = loop {
-        match supervisor.drive(&mut signals, lock, show) {
+        match supervisor.drive(&mut signals, lock, consumer, show) {
             Ok(Some(ending)) => break Ok(ending),
             Ok(None) => supervisor = supervisor.recreate_bus(lock)?,
             Err(error) => break Err(error),
@@ -108,7 +127,7 @@ pub fn run<'a>(
     // The robot is stopped first after an error, too, and then the stages in order.
     let given_up = Some(Cause::OdometryGivenUp.name());
     let trusts_encoders = ending.as_ref().map_or(true, |ending| ending.cause != given_up);
-    let stopped = supervisor.end_mission(trusts_encoders);
+    let stopped = supervisor.end_mission(trusts_encoders, &mut || consumer.catch_up(&signals));
     turns.end();
     let ending = ending?;
     let wheels = stopped?;

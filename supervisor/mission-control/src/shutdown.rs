@@ -25,8 +25,12 @@ const NEW: Duration = Duration::from_secs(1);
 
 impl Supervisor<'_> {
     /// Bring the robot to rest and stop the stages. The link comes last, and not while wheels turn. Without `trusts_encoders` nobody
-    /// knows whether they turn.
-    pub(crate) fn end_mission(&mut self, trusts_encoders: bool) -> Result<Wheels, SupervisorError> {
+    /// knows whether they turn. `catch_up` waits for who reads along.
+    pub(crate) fn end_mission(
+        &mut self,
+        trusts_encoders: bool,
+        catch_up: &mut dyn FnMut(),
+    ) -> Result<Wheels, SupervisorError> {
         self.service.stopping();
         self.decision = Decision::ENDING;
         let wheels = match self.come_to_rest()? {
@@ -35,6 +39,7 @@ impl Supervisor<'_> {
             }
             wheels => wheels,
         };
+        catch_up();
         if wheels == Wheels::Turning {
             self.stop_stages(1)?;
         } else {

@@ -37,6 +37,7 @@ use crate::{
     progress::Progress,
     recovery::{RecoveredRun, StateFile},
     recovery_step::RecoverySteps,
+    run::{CAUGHT_UP_EVERY, Consumer},
     run_clock::RunClock,
     simulator::{Simulator, SimulatorError},
     stall::StallWatch,
@@ -132,7 +133,7 @@ impl<'a> Supervisor<'a> {
         options: &'a Options,
         lock: &mut DomainLock,
         (turns, signals): (Turns, &Signals),
-        attach: &mut dyn FnMut(&Signals),
+        consumer: &mut dyn Consumer,
         listener: Listener,
     ) -> Result<Self, SupervisorError> {
         let directory = &options.directory;
@@ -192,7 +193,7 @@ impl<'a> Supervisor<'a> {
         let domain = Domain::of(options.robot.clone());
         lock.link_to_run(directory, domain.run_directory())?;
         if !signals.pending() {
-            attach(signals);
+            consumer.attach(signals);
         }
         if signals.pending() {
             return Ok(supervisor);
@@ -218,9 +219,12 @@ impl<'a> Supervisor<'a> {
         &mut self,
         signals: &mut Signals,
         lock: &mut DomainLock,
+        consumer: &mut dyn Consumer,
         show: &mut dyn FnMut(&Progress<'_>),
     ) -> Result<Option<Ending>, SupervisorError> {
         self.bus.waiter.on_readable(&*signals)?;
+        // In wall-clock time nothing waits for a consumer that is slow.
+        let mut catch_up_at = self.clock.in_ticks().then_some(0);
         loop {
             if signals.came() {
                 let outcome = self.targets.outcome_while_waiting().unwrap_or(Outcome::Aborted);
@@ -231,6 +235,11 @@ impl<'a> Supervisor<'a> {
             }
             if self.stages.is_start_blocked() {
                 return Ok(None);
+            }
+            let tick = self.bus.observer.record.published.tick;
+            if let Some(tick) = tick.filter(|tick| catch_up_at.is_some_and(|at| *tick >= at)) {
+                consumer.catch_up(signals);
+                catch_up_at = Some(tick + CAUGHT_UP_EVERY);
             }
             if self.bus.is_due(topics::RESTATE) {
                 self.publish_state()?;

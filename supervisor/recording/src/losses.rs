@@ -21,6 +21,8 @@ struct Last {
 
 #[derive(Debug, Default)]
 pub(crate) struct Losses {
+    /// The recorder was there before all writers, so their first samples are missing if they do not come.
+    whole: bool,
     /// The last sample by topic, by stage if every stage writes the topic, and by generation.
     last: HashMap<(&'static str, Name, u32), Last>,
     bus: u32,
@@ -29,6 +31,10 @@ pub(crate) struct Losses {
 }
 
 impl Losses {
+    pub(crate) fn new(whole: bool) -> Self {
+        Self { whole, ..Self::default() }
+    }
+
     /// Take a sample. Returns whether it is new: a consumer that joins a bus again receives the last sample of each writer again.
     pub(crate) fn came(&mut self, spec: &Spec, stamp: &Stamp, message: &[u8]) -> bool {
         // Each request has a writer of its own.
@@ -39,18 +45,17 @@ impl Losses {
         let stage = stage.filter(|_| spec.writer == EVERY_STAGE);
         let key = (spec.name, stage.copied().unwrap_or_default(), stamp.generation);
         let now = Last { sequence: stamp.sequence, crc32: crc32fast::hash(message), bus: self.bus };
-        // Samples before the first one read are not lost.
-        let Some(last) = self.last.insert(key, now) else {
-            return true;
+        let last = self.last.insert(key, now);
+        let next = match last {
+            Some(last) => (last.bus == now.bus).then(|| last.sequence.wrapping_add(1)),
+            None => self.whole.then_some(0),
         };
-        let next = last.sequence.wrapping_add(1);
-        let missing = stamp.sequence.checked_sub(next);
-        let same_bus = last.bus == now.bus;
-        if let Some(missing) = missing.filter(|missing| *missing > 0 && same_bus) {
+        let missing = next.and_then(|next| stamp.sequence.checked_sub(next)).unwrap_or(0);
+        if missing > 0 {
             *self.counts.entry(spec.name).or_default() += u64::from(missing);
             self.changed = true;
         }
-        (now.sequence, now.crc32) != (last.sequence, last.crc32)
+        last.is_none_or(|last| (now.sequence, now.crc32) != (last.sequence, last.crc32))
     }
 
     /// Note that a bus was joined, another one or the same again. Writers may have restarted, and samples published meanwhile
@@ -115,5 +120,15 @@ mod tests {
             losses.came(POSE.spec(), &stamp(sequence), b"pose");
         }
         assert_eq!(losses.total(), 2);
+    }
+
+    #[test]
+    fn first_samples_that_did_not_come_are_lost_to_a_recorder_that_was_there_before_the_writer() {
+        let lost = |whole: bool| {
+            let mut losses = Losses::new(whole);
+            assert!(losses.came(POSE.spec(), &stamp(5), b"five"));
+            losses.total()
+        };
+        assert_eq!([lost(true), lost(false)], [5, 0]);
     }
 }

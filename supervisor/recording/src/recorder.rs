@@ -1,7 +1,8 @@
 //! The recorder is a consumer: it attaches to a robot at any time, records all topics, and follows the robot from run to run.
 //!
 //! It holds only the chunk that is written next. When the disk is slow or the machine busy, samples that no longer fit in
-//! the bus's buffers are lost to it and counted. No stage waits.
+//! the bus's buffers are lost to it and counted. No stage waits; a run waits at its end, and in lockstep from time to time, until the
+//! recorder of that run has taken what there is.
 
 use std::{
     collections::BTreeMap,
@@ -74,17 +75,28 @@ impl Options {
 pub enum Happened<'a> {
     /// The recorder is attached, and records into this file from now on.
     Attached(&'a Path),
+    /// All samples were taken that had been published when the caller asked.
+    CaughtUp,
     /// A file is complete, and this number of samples was lost.
     Complete(&'a Path, u64),
+}
+
+/// What the caller wants of the recorder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wish {
+    Record,
+    /// Take all samples there are, and say so.
+    CatchUp,
+    Stop,
 }
 
 /// The readers of one bus.
 type Readers = Vec<(&'static dyn AnyTopic, Box<dyn AnyReader>)>;
 
-/// Record until `stop` returns true, or a single run until its end.
+/// Record until the caller wishes it to stop, or a single run until its end.
 pub fn record(
     options: &Options,
-    stop: &mut dyn FnMut() -> bool,
+    wish: &mut dyn FnMut() -> Wish,
     tell: &mut dyn FnMut(Happened<'_>),
 ) -> Result<(), RecordingError> {
     let chosen = options.topics();
@@ -103,8 +115,9 @@ pub fn record(
     let earlier = options.run.as_deref().map(places::parts).unwrap_or_default();
     let mut budget = options.budget.map(|bytes| Budget::new(bytes, earlier));
     loop {
-        let stopped = stop();
-        let news = match follower.wait(if stopped { Duration::ZERO } else { POLL })? {
+        let wish = wish();
+        let stopped = wish == Wish::Stop;
+        let news = match follower.wait(if wish == Wish::Record { POLL } else { Duration::ZERO })? {
             Event::Connected => Some(true),
             Event::Disconnected => Some(false),
             Event::Samples(_) | Event::Nothing => None,
@@ -158,6 +171,9 @@ pub fn record(
                 };
                 budget.complete(run.go_on_in(&next, &chosen)?);
             }
+        }
+        if wish == Wish::CatchUp {
+            tell(Happened::CaughtUp);
         }
         let run_over = news == Some(false) && !options.domain.is_supervised();
         if (stopped || run_over)
@@ -236,7 +252,7 @@ impl CurrentRun {
             file,
             drawn: Drawn::new(run.as_ref().map(|run| run.mission.clone())),
             run,
-            losses: Losses::default(),
+            losses: Losses::new(whole),
             logs,
             logs_taken: Instant::now(),
             message: Vec::new(),

@@ -1,13 +1,24 @@
-use std::{path::PathBuf, str::FromStr};
+use std::{
+    fs::File,
+    io::{self, Read as _},
+    os::fd::AsFd as _,
+    path::PathBuf,
+    str::FromStr,
+    time::Duration,
+};
 
 use clap::Args;
 use common::{
     domain::{Domain, RobotName},
+    poll,
     signals::{SIGHUP, SIGINT, SIGTERM, Signals},
     start::become_child,
     topics::{self, AnyTopic},
 };
-use recording::{Options, recorder::Happened};
+use recording::{
+    Options,
+    recorder::{Happened, Wish},
+};
 
 use console::{
     failure::Failure,
@@ -93,6 +104,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
             Happened::Attached(file) => {
                 print_text(&format!("recording {} into {}\n", arguments.robot, file.display()))
             }
+            Happened::CaughtUp => print_text("caught up\n"),
             Happened::Complete(file, lost) => {
                 print_text(&format!("{}: complete, {lost} samples lost\n", file.display()))
             }
@@ -101,5 +113,24 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
             write_stderr(&format!("firsthand: cannot say so: {error}\n"));
         }
     };
-    Ok(recording::record(&options, &mut || signals.came(), &mut tell)?)
+    // The supervisor writes a byte for each wish, and may end before its recorder.
+    let mut asks = match arguments.supervisor {
+        Some(_) => Some(File::from(io::stdin().as_fd().try_clone_to_owned()?)),
+        None => None,
+    };
+    let mut wish = || {
+        if signals.came() {
+            return Wish::Stop;
+        }
+        let asked = asks
+            .as_mut()
+            .filter(|asks| matches!(poll::is_readable(asks, Duration::ZERO), Ok(true)));
+        match asked.map(|asks| asks.read(&mut [0])) {
+            Some(Ok(1)) => return Wish::CatchUp,
+            Some(_) => asks = None,
+            None => {}
+        }
+        Wish::Record
+    };
+    Ok(recording::record(&options, &mut wish, &mut tell)?)
 }

@@ -11,13 +11,12 @@ use common::{
     geometry::wrap_angle,
     mission::{Mission, Protocol, Resume, Start},
     samples::PlaceSample,
-    signals::Signals,
     start::become_child,
 };
 use glam::DVec2;
 use link::transport::SPEAKS_ROS2;
 use mission_control::{
-    Finished, Options, Progress,
+    Consumer, Finished, Options, Progress,
     outcome::{Ending, Outcome},
     recovery::{self, RecoveredRun},
 };
@@ -268,17 +267,13 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     // The journal gets no progress, because the status of the service has it.
     let may_stay = !logging::to_journal();
     let mut lock = None;
-    let mut recorder = None;
-    let mut attach = |signals: &Signals| {
-        if !arguments.no_record {
-            recorder = RunRecorder::start(&options, arguments.disk_budget, signals);
-        }
-    };
+    let mut recorder = RunRecorder::new(&options, arguments.disk_budget);
+    let consumer: &mut dyn Consumer = if arguments.no_record { &mut () } else { &mut recorder };
     let (heard, listener) = Hearer::with_listener();
     let mut show = |progress: &Progress<'_>| {
         line.update(&title, || progress.to_string(), may_stay);
     };
-    let ran = mission_control::run(&options, signals, &mut lock, &mut attach, listener, &mut show);
+    let ran = mission_control::run(&options, signals, &mut lock, consumer, listener, &mut show);
     let (finished, still_moving) = match ran {
         Ok(ran) => ran,
         Err(error) => {

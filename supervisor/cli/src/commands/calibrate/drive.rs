@@ -113,12 +113,12 @@ impl Setting {
         let mut line = ProgressLine::new(LINE_EVERY);
         let mut complained = None;
         let mut lock = None;
-        let mut recorder = None;
+        let mut recorder = RunRecorder::new(&options, None);
         let ran = mission_control::run(
             &options,
             mission_control::end_signals()?,
             &mut lock,
-            &mut |signals| recorder = RunRecorder::start(&options, None, signals),
+            &mut recorder,
             Box::new(|_| {}),
             &mut |progress| {
                 line.update(&title, || shown(progress), true);

@@ -1,72 +1,123 @@
 //! The recorder of a run: a consumer in a process of its own, without which the mission goes on.
 
-use std::{fs::File, io, os::fd::AsFd as _, process::Stdio, time::Duration};
+use std::{
+    fs::File,
+    io::{self, Read as _, Write as _},
+    os::fd::AsFd as _,
+    process::{ChildStdin, ChildStdout, Stdio},
+    time::Duration,
+};
 
 use common::{clock::Pace, poll, signals::Signals};
-use mission_control::Options;
+use mission_control::{Consumer, Options};
 use processes::process::{Process, firsthand};
 
 use crate::commands::record::DiskBudget;
 
-/// Waiting for the recorder takes milliseconds, and seconds beside 30 busy processes a core. These are the most seconds until it
-/// is attached, because one that attaches later misses the beginning, and until it has ended. A robot and the service manager
-/// wait for a run on a wall clock, nobody for one in lockstep. A calibration is nothing without its recording.
-const fn patience(options: &Options) -> [Duration; 2] {
-    let [attached, ended] = match (options.pace, &options.mission.planner.calibration) {
-        (Pace::Rate(_), None) => [2, 5],
-        _ => [20, 60],
+/// Longest times that a run waits for its recorder.
+#[derive(Clone, Copy)]
+struct Patience {
+    /// One that attaches later misses the beginning.
+    attached: Duration,
+    caught_up: Duration,
+    ended: Duration,
+}
+
+/// Waiting for the recorder takes milliseconds, and seconds beside 30 busy processes a core. A robot and the service manager wait for a run
+/// on a wall clock, nobody for one in lockstep. A calibration is nothing without its recording.
+const fn patience(options: &Options) -> Patience {
+    let [attached, caught_up, ended] = match (options.pace, &options.mission.planner.calibration) {
+        (Pace::Rate(_), None) => [2_000, 500, 5_000],
+        _ => [20_000, 20_000, 60_000],
     };
-    [Duration::from_secs(attached), Duration::from_secs(ended)]
+    Patience {
+        attached: Duration::from_millis(attached),
+        caught_up: Duration::from_millis(caught_up),
+        ended: Duration::from_millis(ended),
+    }
 }
 
-pub(crate) struct RunRecorder {
-    process: Process,
-    ends_within: Duration,
+pub(crate) struct RunRecorder<'a> {
+    options: &'a Options,
+    budget: Option<DiskBudget>,
+    patience: Patience,
+    process: Option<Process>,
+    /// The pipes for asking it to catch up; none once it has not answered.
+    pipes: Option<(ChildStdin, ChildStdout)>,
 }
 
-impl RunRecorder {
-    /// Waits until the recorder is attached, or one of `signals` comes. None if it cannot be started, which is logged.
-    pub(crate) fn start(
-        options: &Options,
-        budget: Option<DiskBudget>,
-        signals: &Signals,
-    ) -> Option<Self> {
-        Self::spawn(options, budget, signals)
-            .inspect_err(|error| tracing::error!(%error, "nothing is recorded"))
-            .ok()
+impl<'a> RunRecorder<'a> {
+    pub(crate) const fn new(options: &'a Options, budget: Option<DiskBudget>) -> Self {
+        Self { options, budget, patience: patience(options), process: None, pipes: None }
     }
 
-    fn spawn(options: &Options, budget: Option<DiskBudget>, signals: &Signals) -> io::Result<Self> {
-        let directory = &options.directory;
+    fn spawn(&self) -> io::Result<Process> {
+        let Options { directory, robot, .. } = self.options;
         let log = File::options().create(true).append(true).open(directory.join("recorder.log"))?;
-        let mut command = firsthand(&["record", "--robot", &options.robot.to_string()]);
+        let mut command = firsthand(&["record", "--robot", &robot.to_string()]);
         // A resumed run may have a recording already.
         command.arg("--out").arg(recording::next_place(directory));
-        if let Some(DiskBudget(bytes)) = budget {
+        if let Some(DiskBudget(bytes)) = self.budget {
             command.args(["--disk-budget", &bytes.to_string()]);
         }
         command.arg("--run-directory").arg(directory);
         command.args(["--supervisor", &std::process::id().to_string()]);
-        command.stdout(Stdio::piped()).stderr(log);
-        let mut process = Process::spawn(command)?;
-        let [attached_within, ends_within] = patience(options);
-        let said = process.take_stdout().ok_or(io::ErrorKind::BrokenPipe)?;
-        let awaited = [said.as_fd(), signals.as_fd()];
-        let attached = poll::readable(&awaited, Some(attached_within))?.first() == Some(&true);
-        if !attached {
-            tracing::warn!(
-                "the recorder is not attached yet; what is published now is not recorded"
-            );
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(log);
+        Process::spawn(command)
+    }
+
+    /// Wait until the recorder says something. Returns whether it did.
+    fn hear(&mut self, within: Duration, signals: &Signals) -> io::Result<bool> {
+        let Some((_, said)) = &mut self.pipes else {
+            return Ok(false);
+        };
+        let heard = poll::readable(&[said.as_fd(), signals.as_fd()], Some(within))?;
+        // A recorder that has ended leaves nothing to read.
+        Ok(heard.first() == Some(&true) && said.read(&mut [0; 4096])? > 0)
+    }
+}
+
+impl Consumer for RunRecorder<'_> {
+    /// If it cannot be started, that is logged.
+    fn attach(&mut self, signals: &Signals) {
+        let attached = self.spawn().and_then(|mut process| {
+            self.pipes = process.take_stdin().zip(process.take_stdout());
+            self.process = Some(process);
+            self.hear(self.patience.attached, signals)
+        });
+        match attached {
+            Ok(true) => {}
+            Ok(false) => {
+                tracing::warn!(
+                    "the recorder is not attached yet; what is published now is not recorded"
+                );
+                // One that is stopped before it is attached has recorded nothing.
+                if signals.pending() {
+                    self.patience.ended = Duration::ZERO;
+                }
+            }
+            Err(error) => tracing::error!(%error, "nothing is recorded"),
         }
-        // One that is stopped before it is attached has recorded nothing.
-        let ends_within = if attached || !signals.pending() { ends_within } else { Duration::ZERO };
-        Ok(Self { process, ends_within })
+    }
+
+    fn catch_up(&mut self, signals: &Signals) {
+        let asked = match &mut self.pipes {
+            Some((ask, _)) => ask.write_all(b"?"),
+            None => return,
+        };
+        let answered = asked.and_then(|()| self.hear(self.patience.caught_up, signals));
+        if !matches!(answered, Ok(true)) && !signals.pending() {
+            tracing::warn!("the recorder does not answer; what it misses is counted in its file");
+            self.pipes = None;
+        }
     }
 }
 
 /// It writes the rest at the end of the run.
-impl Drop for RunRecorder {
+impl Drop for RunRecorder<'_> {
     fn drop(&mut self) {
-        self.process.end(self.ends_within);
+        if let Some(process) = &mut self.process {
+            process.end(self.patience.ended);
+        }
     }
 }
