@@ -37,8 +37,9 @@ const STEPS: [f64; UNKNOWNS] = [1e-3, 1e-3, 1e-3, 2e-3, 1e-3, 5e-3, 5e-3];
 const STAGES: [(f64, f64, usize); 4] =
     [(0.7, 0.4, 6), (2.5, 0.2, 6), (f64::INFINITY, 0.1, 8), (f64::INFINITY, 0.04, 8)];
 const STARTS: usize = 8;
-/// Placed scans and beams of each, about.
+/// Placed scans, and beams of each while a solution is looked for and while it is made exact, about.
 const SCANS: usize = 60;
+const FEW_BEAMS: usize = 30;
 const BEAMS: usize = 90;
 /// A point so near the reference is placed, metres.
 const PLACED_M: f64 = 0.08;
@@ -129,6 +130,7 @@ struct Problem<'a> {
     reference: Vec<f64>,
     /// The scans to place, each with the wheels' turn until then.
     scans: Vec<(usize, f64)>,
+    beams_of_each: usize,
 }
 
 impl<'a> Problem<'a> {
@@ -160,6 +162,7 @@ impl<'a> Problem<'a> {
             header,
             reference: (0..beams).map(median).collect(),
             scans,
+            beams_of_each: FEW_BEAMS,
         })
     }
 
@@ -197,16 +200,21 @@ impl<'a> Problem<'a> {
         let poses = self.poses(hypothesis, unknowns);
         let laser = self.laser(unknowns);
         let mut ends = Vec::new();
+        // The beams of a scan that says nothing of its sweep have one pose.
+        let mut held = (f64::NAN, DVec2::ZERO, DVec2::X);
         for (scan, _) in self.scans.iter().filter(|(_, turned)| *turned <= most_turn) {
             let (at, header, beams) = &self.trace.scans[*scan];
-            for beam in (0..beams.len()).step_by(1 + beams.len() / BEAMS) {
+            for beam in (0..beams.len()).step_by(1 + beams.len() / self.beams_of_each) {
                 let range = f64::from(beams[beam]);
                 let seconds = 1e-9 * header.sweep().beam_time_ns(beam, beams.len()) as f64;
+                let taken = at + seconds - unknowns[AGE];
                 ends.push(range.is_finite().then(|| {
-                    let robot = pose(&poses, at + seconds - unknowns[AGE]);
+                    if held.0 != taken {
+                        let robot = pose(&poses, taken);
+                        held = (taken, robot.position, DVec2::from_angle(robot.heading));
+                    }
                     let along = header.first_rad + header.step_rad * beam as f64 + unknowns[YAW];
-                    let end = laser + range * DVec2::from_angle(along);
-                    robot.position + DVec2::from_angle(robot.heading).rotate(end)
+                    held.1 + held.2.rotate(laser + range * DVec2::from_angle(along))
                 }));
             }
         }
@@ -292,8 +300,8 @@ impl<'a> Problem<'a> {
 
 /// Place the scans of the first laser; none without scans from before the robot moved and after.
 pub(crate) fn place(mission: &Mission, trace: &Trace, motion: &Motion) -> Option<Placed> {
-    let problem = Problem::new(trace, motion, mission.body().track_m)?;
-    let mut best: Option<(f64, f64, Hypothesis, Unknowns)> = None;
+    let mut problem = Problem::new(trace, motion, mission.body().track_m)?;
+    let mut best: Option<(f64, Hypothesis, Unknowns)> = None;
     let both = [false, true];
     let hypotheses = both
         .into_iter()
@@ -314,10 +322,16 @@ pub(crate) fn place(mission: &Mission, trace: &Trace, motion: &Motion) -> Option
         let likely = share - UNLIKELY * (unknowns[TURN].abs() + unknowns[WAY].abs());
         // As good is not better: the robot is as stated unless the scans say otherwise.
         if best.as_ref().is_none_or(|(most, ..)| likely > most + 0.03) {
-            best = Some((likely, share, hypothesis, unknowns));
+            best = Some((likely, hypothesis, unknowns));
         }
     }
-    let (_, share, hypothesis, mut unknowns) = best?;
+    let (_, hypothesis, mut unknowns) = best?;
+    problem.beams_of_each = BEAMS;
+    let [.., (most_turn, half_m, rounds)] = STAGES;
+    for _ in 0..rounds {
+        problem.improve(hypothesis, &mut unknowns, (most_turn, half_m));
+    }
+    let share = problem.placed(hypothesis, &unknowns);
     unknowns[YAW] = wrap_angle(unknowns[YAW]);
     Some(Placed {
         share,
