@@ -25,11 +25,13 @@ use crate::{
 const SCANNED_AHEAD_M: f64 = 0.25;
 /// The planned way is followed so far, metres; the arc at least so far.
 const AHEAD_M: f64 = 0.6;
+/// The robot heads for a point of the planned way so many radii of its body ahead.
+const AIM_RADII: f64 = 2.4;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Advice {
-    /// No faster than this, m/s.
-    Go(f64),
+    /// No faster than this, m/s, and in this direction, a unit vector.
+    Go(f64, DVec2),
     /// Turn on the spot until this unit vector is faced.
     Look(DVec2),
 }
@@ -53,6 +55,9 @@ pub(crate) struct ActiveSensing {
     sonars: usize,
     /// Its beams end at a surface of any angle, so ground that scans leave free is free.
     has_laser: bool,
+    /// Whether it heads for a point of the way ahead. A body that is no disc fits on the way itself, and a front sonar alone
+    /// sees nothing of what it passes: such a robot touched twice as often.
+    aims: bool,
     /// Left is 0, right is 1; none without a scan.
     scan_side: Option<usize>,
 }
@@ -75,6 +80,8 @@ impl ActiveSensing {
             ahead_m: AHEAD_M.max(stops_m + STEP_M),
             sonars: mission.used(SensorKind::Cone),
             has_laser: mission.used(SensorKind::Scan) > 0,
+            aims: outline.is_none()
+                && mission.used(SensorKind::Scan) + mission.used(SensorKind::Ray) > 0,
             scan_side: None,
         }
     }
@@ -105,7 +112,10 @@ impl ActiveSensing {
         let unseen = ground.chain(surfaces);
         match scan(self.bearing.rotate(pose.axis()), unseen, &mut self.scan_side) {
             Some(there) => Advice::Look(DVec2::new(self.bearing.x, -self.bearing.y).rotate(there)),
-            None => Advice::Go(self.limit(view, &undetected, belief, pose, direction)),
+            None => {
+                let direction = self.aim(view, &undetected, place, &way).unwrap_or(direction);
+                Advice::Go(self.limit(view, &undetected, belief, pose, direction), direction)
+            }
         }
     }
 
@@ -116,6 +126,39 @@ impl ActiveSensing {
             return 0.0;
         }
         self.response.speed_to_stop_within(clear_m, self.stops_within_s)
+    }
+
+    /// Whether the body may go to `at` along `axis`: no hazard is there, and no ground that is not scanned.
+    fn is_open(
+        &self,
+        view: &View<'_>,
+        undetected: &UndetectedSurfaces,
+        at: DVec2,
+        axis: DVec2,
+    ) -> bool {
+        !view.is_hazard(at)
+            && view.unscanned(at, self.ground_m).next().is_none()
+            && (self.has_laser || undetected.normals(at, axis).next().is_none())
+    }
+
+    /// The direction to a point of the `way` ahead, with an open line to it. The field bends right before a hazard, so a robot that follows
+    /// its local direction towards the middle of a drum is at the drum before it turns.
+    fn aim(
+        &self,
+        view: &View<'_>,
+        undetected: &UndetectedSurfaces,
+        place: DVec2,
+        way: &[DVec2],
+    ) -> Option<DVec2> {
+        let within = (AIM_RADII * self.radius / STEP_M) as usize;
+        let is_open = |to: &DVec2| {
+            let (steps, axis) = ((to.length() / STEP_M).ceil(), to.normalize_or_zero());
+            (1..=steps as u32).all(|step| {
+                self.is_open(view, undetected, place + *to * (f64::from(step) / steps), axis)
+            })
+        };
+        let points = way.iter().take(within).rev().map(|at| *at - place);
+        points.filter(|_| self.aims).find(is_open)?.try_normalize()
     }
 
     /// The speed by the readings and by the arc on which the controller turns the robot into `direction`, m/s. Where the arc allows
@@ -133,11 +176,8 @@ impl ActiveSensing {
         let open = |step: &usize| {
             let way = *step as f64 * STEP_M;
             let ahead = pose.along_arc(way, way * curvature);
-            let at = ahead.position;
-            !view.is_hazard(at)
+            self.is_open(view, undetected, ahead.position, ahead.axis())
                 && !self.outline.as_ref().is_some_and(|it| it.touches(view, &ahead))
-                && view.unscanned(at, self.ground_m).next().is_none()
-                && (self.has_laser || undetected.normals(at, ahead.axis()).next().is_none())
         };
         let free = (1..=steps).find(|step| !open(step)).unwrap_or(steps + 1) - 1;
         let room_m = free as f64 * STEP_M;

@@ -344,7 +344,7 @@ impl Planner {
         let advice = match status {
             GuidanceStatus::Along => match sensing.advise(&view, &self.belief, pose, direction) {
                 Advice::Look(there) => (GuidanceStatus::Look, there, 0.0),
-                Advice::Go(limit) => (status, direction, limit),
+                Advice::Go(limit, direction) => (status, direction, limit),
             },
             GuidanceStatus::WayOut => {
                 let limit = sensing.limit_before_echoes(&self.belief, pose);

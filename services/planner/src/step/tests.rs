@@ -155,8 +155,15 @@ fn in_the_targets_cell_the_rest_is_straight() {
 
 /// An evidential planner in a room where only the cells for which `scanned` says so were scanned.
 fn evidential(scanned: impl Fn(DVec2) -> bool) -> Planner {
-    let mission = Mission { method: Method::Evidential, ..mission() };
-    let (mut header, mut cells) = keyframe(1, |_| false);
+    evidential_in(Mission { method: Method::Evidential, ..mission() }, |_| false, scanned)
+}
+
+fn evidential_in(
+    mission: Mission,
+    hazard: impl Fn(DVec2) -> bool,
+    scanned: impl Fn(DVec2) -> bool,
+) -> Planner {
+    let (mut header, mut cells) = keyframe(1, hazard);
     // A scan to both sides had no echo.
     header.clear_beam_count = 11;
     for (index, beam) in header.clear_beams.iter_mut().take(11).enumerate() {
@@ -212,6 +219,20 @@ fn over_scanned_ground_an_evidential_robot_goes_at_full_speed() {
     let guidance = evidential(|_| true).ask(&at(0.0, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Along);
     assert!(guidance.speed_limit_m_s > 0.25, "{guidance:?}");
+}
+
+#[test]
+fn a_robot_that_senses_beside_it_turns_from_a_drum_before_the_field_does() {
+    let drum = |at: DVec2| at.distance(DVec2::new(0.8, 0.05)) < 0.3;
+    let text = "target = [1.5, 0]\nperimeter = { width_m = 4, cells = 40 }\nrobot.model = 'kobuki'";
+    let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
+    let mut planner = evidential_in(mission, drum, |_| true);
+    let asked = at(0.1, 0.0);
+    let (_, field) = planner.follow_field(&asked.pose()).unwrap();
+    let guidance = planner.ask(&asked);
+    assert_eq!(status(&guidance), GuidanceStatus::Along);
+    let [field, aimed] = [field.to_angle(), guidance.ey.atan2(guidance.ex)].map(f64::to_degrees);
+    assert!(field < 0.0 && (-90.0..field - 5.0).contains(&aimed), "{field} {aimed}");
 }
 
 #[test]
