@@ -149,6 +149,16 @@ fn an_empty_room_is_crossed_without_a_safety_event() {
 }
 
 #[test]
+fn a_robot_with_a_sonar_alone_crosses_an_empty_hall() {
+    let text = "target = [7, 0]\nsensors = 'front'\nperimeter = { width_m = 20, centre = [3.5, 0] }\n\
+                simulation.realism = 'laboratory'";
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("hall.toml");
+    std::fs::write(&file, text).unwrap();
+    arrives_untouched("hall", file.to_str().unwrap(), &[]);
+}
+
+#[test]
 fn a_turn_of_a_quarter_at_the_start_costs_little() {
     let turned = ["--set", "start.heading_deg=90"];
     let summary = arrives_untouched("quarter", "open-room", &turned);
