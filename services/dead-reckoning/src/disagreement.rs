@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 
 use common::{
     kinematics::{Pose2, Twist},
-    least_squares::Line,
+    least_squares::{Line, Two},
 };
 use serde::{Deserialize, Serialize};
 
@@ -46,14 +46,6 @@ const BETTER: f64 = 1.5;
 
 /// The pose's variances where there is a cause, m^2 and rad^2.
 pub(crate) const DOUBT: [f64; 2] = [0.25, 0.01];
-
-/// Turn for turn, and radians for a metre, each with its deviation; and the share of the turns that both explain.
-#[derive(Clone, Copy)]
-struct Turns {
-    factor: [f64; 2],
-    bend: [f64; 2],
-    explained: f64,
-}
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) enum Cause {
@@ -185,8 +177,11 @@ impl Disagreement {
         if let Some(by_s) = self.late() {
             return Some(Cause::Late(by_s));
         }
-        let turns = self.turns();
-        if let Some([bend, deviation]) = turns.map(|turns| turns.bend)
+        // A robot that drives curves has turns by its turning and by its way, radians for a metre.
+        let turns = (self.turn.xx >= LEAST_TURN)
+            .then(|| Two::of(&self.turn, &self.bend, self.turn_way, self.pairs, LEAST_ALONE))
+            .flatten();
+        if let Some(Two { b: [bend, deviation], .. }) = turns
             && bend.abs() > (UNEVEN / track_m).max(DEVIATIONS * deviation)
         {
             return Some(Cause::Uneven(1.0 + bend * track_m));
@@ -195,29 +190,11 @@ impl Disagreement {
         if self.aside.xx >= LEAST_WAY && aside.abs() > ASIDE_RAD.max(DEVIATIONS * deviation) {
             return Some(Cause::Turned(-aside.clamp(-1.0, 1.0).asin()));
         }
-        let turn = turns.filter(|Turns { factor: [factor, deviation], explained, .. }| {
-            is_off(*factor, *deviation, *explained)
+        let turn = turns.filter(|Two { a: [factor, deviation], rest, .. }| {
+            is_off(*factor, *deviation, 1.0 - rest / self.turn.yy)
         });
         let way = factor(&self.way, LEAST_WAY).map(Cause::Way);
-        way.or(turn.map(|turns| Cause::Turn(turns.factor[0])))
-    }
-
-    /// The turns of the fixes by the turns and ways of the wheels, together: a robot that drives curves has both.
-    fn turns(&self) -> Option<Turns> {
-        let (turn, way) = (&self.turn, &self.bend);
-        let determinant = turn.xx * way.xx - self.turn_way * self.turn_way;
-        if turn.xx < LEAST_TURN || determinant < LEAST_ALONE * turn.xx * way.xx {
-            return None;
-        }
-        let factor = (turn.xy * way.xx - way.xy * self.turn_way) / determinant;
-        let bend = (way.xy * turn.xx - turn.xy * self.turn_way) / determinant;
-        let rest = (turn.yy - factor * turn.xy - bend * way.xy).max(0.0);
-        let deviation = |of: f64| (rest / self.pairs * of / determinant).sqrt();
-        Some(Turns {
-            factor: [factor, deviation(way.xx)],
-            bend: [bend, deviation(turn.xx)],
-            explained: 1.0 - rest / turn.yy,
-        })
+        way.or(turn.map(|turns| Cause::Turn(turns.a[0])))
     }
 
     /// The delay, seconds, if the turns agree far better with it than without.

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// The wheels' ratio is off if it is so many of its deviations, and so much, from 1.
 const DEVIATIONS: f64 = 3.0;
-const LEAST_OFF: f64 = 0.02;
+const LEAST_OFF: f64 = 0.01;
 /// A doubt of the place is told from here on, metres.
 const TOLD_M: f64 = 0.1;
 const WIDEST_M: f64 = 10.0;

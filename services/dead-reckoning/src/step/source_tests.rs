@@ -314,16 +314,17 @@ fn wheels_that_count_unequal_shares_of_what_they_are_told_make_the_pose_unsure_u
         let mut told = 0;
         for _ in 0..80 {
             let told_ratio = ratio;
-            let wheels = WheelSample { told_ratio, told_ratio_sd: 0.001, ..robot.wind() };
+            let wheels = WheelSample { told_ratio, told_ratio_sd: 0.006, ..robot.wind() };
             let fixes = if by_others { vec![robot.fix()] } else { Vec::new() };
             told += u32::from(reckoning.given(&wheels, &fixes, &[]).doubted.is_some());
         }
         (reckoning.sample().covariance[3].sqrt(), told)
     };
     let (even, _) = deviation(1.01, false);
-    let (uneven, told) = deviation(0.95, false);
+    // Of 20 missions with an encoder 5 % low it is no nearer to 1 in any.
+    let (uneven, told) = deviation(0.965, false);
     assert!(even < 0.15 && uneven > 0.5 && told == 1, "{even} and {uneven}, told {told} times");
-    assert!(deviation(0.95, true).0 < 0.1);
+    assert!(deviation(0.965, true).0 < 0.1);
 }
 
 /// The error of the heading after 20 s at rest and 60 s of driving, with a gyro of this bias that says how often it is off.

@@ -4,11 +4,12 @@
 //! than the other, its encoder, its loop or the ground is not as stated, and nothing here tells which: dead reckoning gets the ratio as a
 //! doubt of the curve that the robot drove. With ways x that are modelled and y that are counted, the ratio is (y/x) of the right wheel
 //! over that of the left one. Least squares of `y_right x_left` over `y_left x_right` give it, so that what both wheels share, as a
-//! frame that comes late, is no error.
+//! frame that comes late, is no error. Wheels that answer sooner or later than modelled count another ratio while the commanded curve
+//! changes, so the change of the curve is fitted along.
 
 use common::{
     driver::counts::WheelCounts,
-    least_squares::Line,
+    least_squares::{Line, Two},
     mission::{Body, Mission, ModelledSpeed, Response},
 };
 
@@ -26,17 +27,24 @@ const AGREE: f64 = 0.75;
 /// A slower wheel, by its share of the top speed, says little: what the model leaves out is a large part of its way.
 const LEAST_SPEED: f64 = 0.15;
 
+/// Of a tick's change of the curve, the logarithm of the ways' ratio: the least square, as wheels answer within some ticks of when they
+/// should, and the most, as what the model leaves out is more then.
+const LEAST_CHANGE: f64 = 1e-8;
+const MOST_CHANGE: f64 = 0.05;
+
 /// Sums over ticks.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
     way_m: f64,
     ticks: f64,
     line: Line,
+    change: Line,
+    both: f64,
 }
 
 impl Sums {
-    /// The modelled and the counted ways of a tick, left and right, metres.
-    fn add(&mut self, told: [f64; 2], counted: [f64; 2]) {
+    /// The modelled and the counted ways of a tick, left and right, metres, and how much the ratio of the modelled ones grows in a tick.
+    fn add(&mut self, told: [f64; 2], counted: [f64; 2], change: f64) {
         let [left, right] = told;
         let way_m = f64::midpoint(left.abs(), right.abs());
         let turns =
@@ -49,13 +57,18 @@ impl Sums {
         self.way_m = self.way_m * left + way_m;
         self.ticks = self.ticks * left + 1.0;
         self.line.add(left, x, y);
+        self.change.add(left, change * x, y);
+        self.both = self.both * left + change * x * x;
     }
 
     fn ratio(&self) -> WheelRatio {
-        let (ratio, deviation) = self.line.factor(self.ticks);
-        match self.way_m >= LEAST_M {
-            true => WheelRatio { ratio, deviation },
-            false => WheelRatio::UNKNOWN,
+        let Self { line, change, .. } = self;
+        let change = Line { xx: change.xx + LEAST_CHANGE * line.xx, ..*change };
+        match Two::of(line, &change, self.both, self.ticks, 0.0) {
+            Some(Two { a: [ratio, deviation], .. }) if self.way_m >= LEAST_M => {
+                WheelRatio { ratio, deviation }
+            }
+            _ => WheelRatio::UNKNOWN,
         }
     }
 }
@@ -129,8 +142,12 @@ impl WheelShares {
             let now = [metres(told), metres(rolled)];
             self.newest.rotate_left(1);
             self.newest[STEADY - 1] = now;
-            if self.is_steady(LEAST_SPEED * self.top_speed_m_s * (now_s - then_s)) {
-                self.sums.add(now[0], now[1]);
+            let curve = |[[left, right], _]: [[f64; 2]; 2]| (right / left).abs().ln();
+            let change = (curve(now) - curve(self.newest[0])) / (STEADY - 1) as f64;
+            if self.is_steady(LEAST_SPEED * self.top_speed_m_s * (now_s - then_s))
+                && change.abs() <= MOST_CHANGE
+            {
+                self.sums.add(now[0], now[1], change);
             }
         }
     }
@@ -194,6 +211,24 @@ mod tests {
             let low = ratio(reached, [0.95, 1.0], winding);
             assert!((low.ratio - 1.0 / 0.95).abs() < 0.01 && low.deviation < 0.01, "{low:?}");
         }
+    }
+
+    #[test]
+    fn wheels_that_answer_sooner_than_stated_are_even_though_their_curve_narrows_all_the_time() {
+        let mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
+        let mut shares = WheelShares::new(&mission);
+        let mut rolled = [0.0; 2];
+        for tick in 0..112 {
+            let now_s = f64::from(tick) * PERIOD_S;
+            shares.rolled(WheelCounts::Endless(rolled), now_s);
+            let told = [600, 600 - 3 * tick];
+            shares.told(told, now_s);
+            for (rolled, told) in rolled.iter_mut().zip(told) {
+                *rolled += f64::from(told) * PERIOD_S;
+            }
+        }
+        let WheelRatio { ratio, deviation } = shares.ratio();
+        assert!((ratio - 1.0).abs() < 0.003, "{ratio} with a deviation of {deviation}");
     }
 
     #[test]
