@@ -9,6 +9,7 @@
 //! no number of fixes averages it out.
 
 use common::{
+    found_response::if_there,
     geometry::principal_axes,
     kinematics::Pose2,
     mission::Mission,
@@ -49,9 +50,17 @@ const LEAST_POINTS: usize = 10;
 const REPLACED_AFTER: (f64, f64) = (2.0, std::f64::consts::FRAC_PI_3);
 const LEAST_SHARE: f64 = 0.6;
 /// The deviation that a new reference adds to all after it, besides its match's: metres and radians. An error of its heading turns all
-/// later poses. With these values, a Kobuki's poses are 0.03 to 0.38 m off after 31 to 49 m in an office, and expected to be 0.16 to
-/// 0.33 m off.
-const OF_REFERENCE: [f64; 2] = [0.005, 0.001];
+/// later poses.
+const OF_REFERENCE: [f64; 2] = [0.0005, 0.0002];
+/// The variance of a match over that of its scatter, because its reference has a scan's noise too.
+const OF_SCATTER: f64 = 1.75;
+/// The share of a match's variance that is alike in all of a place: lines of what is round lie behind its points. By .06 m after 140
+/// references of a Kobuki, and by .2 m of a TurtleBot, both among glass.
+const ALIKE: f64 = 0.01;
+/// The least and the greatest variance of a match, over that by its points.
+const SCALES: [f64; 2] = [0.25, 9.0];
+/// So much of the scatter is left after each further match.
+const REMEMBERED: f64 = 0.99;
 /// More would leave no room for the fixes of others.
 const MOST_FIXES_HZ: f64 = 20.0;
 /// Errors of matches are alike for so long, seconds.
@@ -68,6 +77,46 @@ pub(crate) struct Reference {
     /// Lines by beams; not saved, because they can be computed again.
     #[serde(skip)]
     lines: Vec<Option<Line>>,
+    #[serde(deserialize_with = "if_there")]
+    scatter: Scatter,
+}
+
+/// How much matches scatter from scan to scan about the places by dead reckoning, whose drift is slow.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Scatter {
+    /// The newest match's way from its place by dead reckoning.
+    off: DVec2,
+    /// Variances of matches, m^2: as they scatter, and by their points.
+    seen: f64,
+    stated: f64,
+    /// References that were matched with ones before.
+    references: f64,
+}
+
+impl Default for Scatter {
+    fn default() -> Self {
+        Self { off: DVec2::ZERO, seen: 1e-4, stated: 1e-4, references: 0.0 }
+    }
+}
+
+impl Scatter {
+    fn add(&mut self, off: DVec2, stated: f64) {
+        self.seen = self.seen * REMEMBERED + 0.5 * (off - self.off).length_squared();
+        self.stated = self.stated * REMEMBERED + stated;
+        self.off = off;
+    }
+
+    /// The variance of matches over that by their points.
+    fn scale(&self) -> f64 {
+        let [least, most] = SCALES;
+        (OF_SCATTER * self.seen / self.stated).clamp(least, most)
+    }
+
+    /// The variance that a new reference adds, likewise. What is alike in all adds up in the deviation.
+    fn scale_of_reference(&mut self) -> f64 {
+        self.references += 1.0;
+        self.scale() * (1.0 + ALIKE * (2.0 * self.references - 1.0))
+    }
 }
 
 /// Its frame is the mission's.
@@ -119,17 +168,22 @@ impl ScanMatcher {
         let fan = rows.scan(row, robot, beams)?;
         let Some(held) = reference else {
             let covariance = covariance_of(reckoned) + variances(OF_REFERENCE);
-            *reference = Some(Reference::new(&fan, robot, covariance));
+            *reference = Some(Reference::new(&fan, robot, covariance, Scatter::default()));
             return None;
         };
         if held.lines.is_empty() {
             let saved = std::mem::take(&mut held.beams);
             let fan = rows.scan(row, held.pose, &saved)?;
-            *held = Reference::new(&fan, held.pose, held.covariance);
+            *held = Reference::new(&fan, held.pose, held.covariance, held.scatter);
         }
         let seen_from = rows.scan(row, held.pose, beams)?;
         let found = held.matched(&fan, &seen_from, robot);
         let (pose, matched, share) = found.unwrap_or((robot, DMat3::IDENTITY, 1.0));
+        if found.is_some() {
+            let variance = matched.x_axis.x + matched.y_axis.y;
+            held.scatter.add(pose.position - robot.position, variance);
+        }
+        let mut scatter = held.scatter;
         let of_reference = held.carried_to(pose.position);
         let fix = found.map(|_| {
             let all = (matched + variances(LEAST)) * self.shared + of_reference;
@@ -157,22 +211,22 @@ impl ScanMatcher {
         let turned = (pose.heading - held.pose.heading).abs();
         if went > REPLACED_AFTER.0 || turned > REPLACED_AFTER.1 || share < LEAST_SHARE {
             let covariance = match found {
-                Some(_) => of_reference + matched,
+                Some(_) => of_reference + matched * scatter.scale_of_reference(),
                 None => covariance_of(reckoned),
             };
             let fan = rows.scan(row, pose, beams)?;
             let covariance = covariance + variances(OF_REFERENCE);
-            *reference = Some(Reference::new(&fan, pose, covariance));
+            *reference = Some(Reference::new(&fan, pose, covariance, scatter));
         }
         fix
     }
 }
 
 impl Reference {
-    fn new(fan: &Fan<'_>, pose: Pose2, covariance: DMat3) -> Self {
+    fn new(fan: &Fan<'_>, pose: Pose2, covariance: DMat3, scatter: Scatter) -> Self {
         let points = points_of(fan);
         let lines = (0..points.len()).map(|beam| Line::through(&points, fan, beam)).collect();
-        Self { pose, beams: fan.beams.to_vec(), covariance, lines }
+        Self { pose, beams: fan.beams.to_vec(), covariance, lines, scatter }
     }
 
     /// The covariance at `there`, known exactly from this pose.
@@ -190,12 +244,17 @@ impl Reference {
         seen_from: &Fan<'_>,
         start: Pose2,
     ) -> Option<(Pose2, DMat3, f64)> {
-        let seen: Vec<_> = points_of(fan).into_iter().flatten().collect();
+        let ends = points_of(fan);
+        let seen: Vec<_> = (0..ends.len()).filter(|beam| ends[*beam].is_some()).collect();
         let every = seen.len().div_ceil(POINTS).max(1);
         let back = DVec2::from_angle(-start.heading);
-        let with_deviation =
-            |point: &DVec2| (back.rotate(point - start.position), deviation_m(fan, *point));
-        let points: Vec<_> = seen.iter().step_by(every).map(with_deviation).collect();
+        // A line lies behind the points of what is round. Lines on lines lie right; points on lines move each reference towards it.
+        let point = |beam: &usize| {
+            let line = Line::through(&ends, fan, *beam).map(|line| line.point);
+            let point = line.or(ends[*beam])?;
+            Some((back.rotate(point - start.position), deviation_m(fan, point)))
+        };
+        let points: Vec<_> = seen.iter().step_by(every).filter_map(point).collect();
         // The points of lines have errors, too, but all of them share in lines.
         let of_lines = 1.0 + 1.0 / every as f64;
         let prior = variances(PRIOR).inverse();
@@ -369,6 +428,20 @@ mod tests {
         let off = DVec2::new(fix.x_m, fix.y_m).distance(truth.position);
         assert!(off < 0.01 && (fix.heading_rad - 0.2).abs() < 0.005, "{fix:?}");
         assert!(fix.covariance[0] < 10.0 * 1e-3, "{fix:?}");
+    }
+
+    #[test]
+    fn the_variance_of_matches_follows_how_they_scatter_within_bounds() {
+        let scale = |off: f64| {
+            let mut scatter = Scatter::default();
+            for step in 0..400 {
+                let off = if step % 2 == 0 { off } else { -off };
+                scatter.add(DVec2::new(off, 0.0), 1e-4);
+            }
+            scatter.scale()
+        };
+        assert!((scale(0.005) - 0.5 * OF_SCATTER).abs() < 0.02, "{}", scale(0.005));
+        assert_eq!([scale(0.0), scale(0.05)], SCALES);
     }
 
     #[test]
