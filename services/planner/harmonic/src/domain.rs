@@ -78,10 +78,12 @@ impl Domain {
         Ok(())
     }
 
+    /// Cells along a row.
     pub fn width(&self) -> usize {
         self.width
     }
 
+    /// Cells along a column.
     pub fn height(&self) -> usize {
         self.height
     }

@@ -10,23 +10,50 @@ use crate::{Cell, MAX_SIDE, MIN_SCREENING_CELLS};
 pub enum SolveError {
     /// The map has no cells.
     #[error("the map is empty ({width} x {height} cells): give it at least one cell")]
-    MapEmpty { width: usize, height: usize },
+    MapEmpty {
+        /// Cells along a row.
+        width: usize,
+        /// Cells along a column.
+        height: usize,
+    },
     /// The map is wider or higher than [`MAX_SIDE`].
     #[error(
         "the map is too large ({width} x {height} cells): at most {MAX_SIDE} a side; use larger cells"
     )]
-    MapTooLarge { width: usize, height: usize },
+    MapTooLarge {
+        /// Cells along a row.
+        width: usize,
+        /// Cells along a column.
+        height: usize,
+    },
     /// The mask does not have one value for each cell.
     #[error(
         "the blocked mask has {found} values, the map {expected} cells: give one value a cell, row by row"
     )]
-    WrongLength { found: usize, expected: usize },
+    WrongLength {
+        /// Values of the mask.
+        found: usize,
+        /// Cells of the map.
+        expected: usize,
+    },
     /// A cell was named that the map does not have.
     #[error("{what} (column {}, row {}) lies outside the map of {width} x {height} cells", cell.col, cell.row)]
-    Outside { what: &'static str, cell: Cell, width: usize, height: usize },
+    Outside {
+        /// The cell's part: the target, or a change.
+        what: &'static str,
+        /// The cell that was named.
+        cell: Cell,
+        /// Cells along a row.
+        width: usize,
+        /// Cells along a column.
+        height: usize,
+    },
     /// The target is on a blocked cell.
     #[error("the target (column {}, row {}) is blocked: choose a free cell or free that one", target.col, target.row)]
-    TargetBlocked { target: Cell },
+    TargetBlocked {
+        /// The target that was given.
+        target: Cell,
+    },
     /// A screening length is not a number or shorter than [`MIN_SCREENING_CELLS`].
     #[error(
         "a screening length of {cells} cells: it must be at least {MIN_SCREENING_CELLS}; an infinite length is no screening"
@@ -48,7 +75,9 @@ pub enum SolveError {
         needed: u64,
         /// Bytes the settings allow.
         allowed: u64,
+        /// Cells along a row.
         width: usize,
+        /// Cells along a column.
         height: usize,
     },
     /// No method produced a field that passes verification; the field is not handed out.

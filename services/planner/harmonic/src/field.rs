@@ -35,10 +35,12 @@ impl Field {
         }
     }
 
+    /// Cells along a row.
     pub fn width(&self) -> usize {
         self.width
     }
 
+    /// Cells along a column.
     pub fn height(&self) -> usize {
         self.height
     }
@@ -48,6 +50,7 @@ impl Field {
         self.target
     }
 
+    /// What the check of every cell found.
     pub fn verification(&self) -> &Verification {
         &self.verification
     }

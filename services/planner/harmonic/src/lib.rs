@@ -90,6 +90,7 @@
 //!
 //! The feature `testing` adds a solver that is exact but slow. The library has no clock, files or unsafe code, and
 //! starts no thread unless [`Settings::threads`] asks for threads; the same input gives the same field to the bit.
+#![deny(missing_docs)]
 
 mod cancellation;
 mod cell;
@@ -128,3 +129,8 @@ pub use crate::{
 };
 #[cfg(feature = "testing")]
 pub use testing::solve_exactly;
+
+/// The example of the README runs as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -3,12 +3,16 @@
 /// A non-negative number, `mantissa` * 2^`exponent`, the mantissa in 1.0 .. 2.0; zero is (0.0, 0).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Scaled {
+    /// 1.0 .. 2.0, or 0.
     pub mantissa: f64,
+    /// Of base 2.
     pub exponent: i32,
 }
 
 impl Scaled {
+    /// The number 0.
     pub const ZERO: Self = Self { mantissa: 0.0, exponent: 0 };
+    /// The number 1.
     pub const ONE: Self = Self { mantissa: 1.0, exponent: 0 };
 
     /// `value` * 2^`exponent`. A value that is no positive finite number becomes zero.
@@ -28,6 +32,7 @@ impl Scaled {
         Self { mantissa, exponent: exponent.saturating_add(own) }
     }
 
+    /// Whether the number is 0.
     pub fn is_zero(self) -> bool {
         self.mantissa == 0.0
     }
