@@ -5,7 +5,8 @@
 //! doubt of the curve that the robot drove. With ways x that are modelled and y that are counted, the ratio is (y/x) of the right wheel
 //! over that of the left one. Least squares of `y_right x_left` over `y_left x_right` give it, so that what both wheels share, as a
 //! frame that comes late, is no error. Wheels that answer sooner or later than modelled count another ratio while the commanded curve
-//! changes, so the change of the curve is fitted along.
+//! changes, so the change of the curve is fitted along. In a curve that narrows steadily that fit takes one for the other, and so the ratio
+//! nearer to 1 counts, of the fit with the change and of the one without.
 
 use common::{
     driver::counts::WheelCounts,
@@ -64,8 +65,13 @@ impl Sums {
     fn ratio(&self) -> WheelRatio {
         let Self { line, change, .. } = self;
         let change = Line { xx: change.xx + LEAST_CHANGE * line.xx, ..*change };
+        let alone = line.factor(self.ticks);
         match Two::of(line, &change, self.both, self.ticks, 0.0) {
             Some(Two { a: [ratio, deviation], .. }) if self.way_m >= LEAST_M => {
+                let (ratio, deviation) = match (alone.0 - 1.0).abs() < (ratio - 1.0).abs() {
+                    true => alone,
+                    false => (ratio, deviation),
+                };
                 WheelRatio { ratio, deviation }
             }
             _ => WheelRatio::UNKNOWN,
