@@ -8,8 +8,9 @@ use crate::{death::Death, stages};
 
 /// Longest time between cleanups. The end of a consumer is not notified.
 const PERIOD: Duration = Duration::from_secs(1);
-/// Delay after a stage's death: another death often follows within it.
-const DELAY: Duration = Duration::from_millis(50);
+/// Delay after a stage's death: another death often follows within it, and a recorder that gets little of a busy machine reads meanwhile
+/// what the stage published.
+const DELAY: Duration = Duration::from_millis(250);
 
 pub struct Cleanup {
     done: Instant,
@@ -44,9 +45,10 @@ impl Cleanup {
     /// that places on the bus may run out.
     pub fn run_if_due(&mut self, bus: &Bus, any_starting: bool) {
         let (deaths, last) = self.deaths;
-        let quiet = deaths > 0 && last.elapsed() >= DELAY && !any_starting;
+        let is_late = last.elapsed() >= DELAY;
+        let quiet = deaths > 0 && !any_starting || self.done.elapsed() >= PERIOD;
         let many = deaths >= stages::TABLE.len();
-        if quiet || many || self.done.elapsed() >= PERIOD {
+        if quiet && is_late || many {
             self.run(bus);
         }
     }
