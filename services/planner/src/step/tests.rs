@@ -155,11 +155,11 @@ fn in_the_targets_cell_the_rest_is_straight() {
 
 /// An evidential planner in a room where only the cells for which `scanned` says so were scanned.
 fn evidential(scanned: impl Fn(DVec2) -> bool) -> Planner {
-    evidential_in(Mission { method: Method::Evidential, ..mission() }, |_| false, scanned)
+    evidential_in(&Mission { method: Method::Evidential, ..mission() }, |_| false, scanned)
 }
 
 fn evidential_in(
-    mission: Mission,
+    mission: &Mission,
     hazard: impl Fn(DVec2) -> bool,
     scanned: impl Fn(DVec2) -> bool,
 ) -> Planner {
@@ -179,7 +179,7 @@ fn evidential_in(
             *state = CellState::Scanned as u8;
         }
     }
-    let mut planner = sent(&mission);
+    let mut planner = sent(mission);
     planner.take_grid(&header, &cells).unwrap();
     planner
 }
@@ -226,7 +226,7 @@ fn a_robot_that_senses_beside_it_turns_from_a_drum_before_the_field_does() {
     let drum = |at: DVec2| at.distance(DVec2::new(0.8, 0.05)) < 0.3;
     let text = "target = [1.5, 0]\nperimeter = { width_m = 4, cells = 40 }\nrobot.model = 'kobuki'";
     let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
-    let mut planner = evidential_in(mission, drum, |_| true);
+    let mut planner = evidential_in(&mission, drum, |_| true);
     let asked = at(0.1, 0.0);
     let (_, field) = planner.follow_field(&asked.pose()).unwrap();
     let guidance = planner.ask(&asked);
