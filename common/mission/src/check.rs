@@ -73,7 +73,13 @@ impl Mission {
                 Some(first) => first.at,
                 // The robot stands at its target.
                 None if mission.stay => mission.start.at,
-                None => return Err(unreadable(origin, 1, "missing field `target`")),
+                None => {
+                    return Err(unreadable(
+                        origin,
+                        1,
+                        "missing field `target`, or `stay = true` to wait for one",
+                    ));
+                }
             };
         }
         if mission.name.is_empty() {

@@ -21,7 +21,8 @@ impl fmt::Display for Progress<'_> {
         let record = self.record;
         let link = record.link.unwrap_or_default();
         if !self.driving && link.cause() == Cause::NotOrdered {
-            return write!(f, "starting: {running}/{all} stages alive");
+            let what = if running == all { "waiting" } else { "starting" };
+            return write!(f, "{what}: {running}/{all} stages alive");
         }
         let time = record.pose.map_or(0.0, |pose| pose.stamp.time().seconds());
         let speed = record.pose.map_or(0.0, |pose| pose.v_m_s);

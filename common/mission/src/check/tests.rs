@@ -125,12 +125,15 @@ fn every_refusal_names_line_and_key() {
         ("target = [3, 0]\nstart.headin = 3", "m.toml:2: start is [x, y]"),
         ("targets = [[2, 0, 400]]", "m.toml:1: targets: "),
         ("targets = [[2, 0, 90]]\nrobot.model = 'car'", "m.toml:1: targets: a car"),
-        ("targets = []", "m.toml:1: missing field `target`"),
+        ("targets = []", "m.toml:1: missing field `target`, or `stay = true` to wait for one"),
         (
             "targets = [[2, 0], [3, 0]]\n[[known.drum]]\nat = [3, 0]\nradius_m = 0.2",
             "m.toml:2: known: the target [3, 0] lies inside",
         ),
-        ("description = 'no target'", "m.toml:1: missing field `target`"),
+        (
+            "description = 'no target'",
+            "m.toml:1: missing field `target`, or `stay = true` to wait for one",
+        ),
     ];
     for (text, start) in cases {
         let refusal = refusal(text);

@@ -118,7 +118,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
         0 => Ok(()),
         _ => Err(Refused::new(
             "not-as-stated",
-            format!("{wrong} things are not as the mission states; mend them or change the keys, then repeat"),
+            format!("of what was looked at, {wrong} is not as the mission states; mend it or change the keys, then repeat"),
         )
         .into()),
     }
