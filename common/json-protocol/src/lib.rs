@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, de::IgnoredAny};
 
 /// The greatest length of a line, bytes: a scan of 16,384 beams has 100 kB in millimetres, and 360 kB with all digits that a number may
 /// have.
@@ -106,7 +106,8 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// Returns the lines that `bytes` complete, without their line feeds.
+    /// Returns the lines that `bytes` complete, without their line feeds. An object that ends with `bytes` needs none: a robot may leave it
+    /// out of its datagrams.
     pub fn push(&mut self, bytes: &[u8]) -> Vec<Vec<u8>> {
         let mut complete = Vec::new();
         let mut pieces = bytes.split(|byte| *byte == b'\n').peekable();
@@ -123,6 +124,9 @@ impl Lines {
                 let line = std::mem::take(&mut self.held);
                 complete.extend(Some(line).filter(|line| !line.trim_ascii().is_empty()));
             }
+        }
+        if self.held.trim_ascii_end().ends_with(b"}") && parse::<IgnoredAny>(&self.held).is_ok() {
+            complete.push(std::mem::take(&mut self.held));
         }
         complete
     }
@@ -161,6 +165,22 @@ mod tests {
         for foreign in ["{\"wheel\":[1,2]}", "{\"wheels\":[1]}", "{\"wheels\":[1e999,0]}", "7"] {
             parse::<Report>(foreign.as_bytes()).unwrap_err();
         }
+    }
+
+    #[test]
+    fn a_whole_object_is_a_line_without_its_newline_and_a_part_of_one_is_not() {
+        let mut lines = Lines::default();
+        let whole = br#"{"ranges":{"front":1.2},"heard":1}"#;
+        assert_eq!(lines.push(whole), [whole]);
+        assert_eq!(lines.push(b"\n"), Vec::<Vec<u8>>::new(), "its newline comes late");
+        let (first, rest) = whole.split_at(23);
+        assert!(first.ends_with(b"}"));
+        assert_eq!(
+            lines.push(first),
+            Vec::<Vec<u8>>::new(),
+            "a long line is divided over datagrams"
+        );
+        assert_eq!(lines.push(rest), [whole]);
     }
 
     #[test]

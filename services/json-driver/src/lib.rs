@@ -22,8 +22,6 @@ pub struct Json {
     body: Body,
     rate_hz: f64,
     lines: Lines,
-    /// A datagram ends a line, whether it ends with a newline or not.
-    in_datagrams: bool,
     table: Vec<Sensor>,
     lasers: Vec<(usize, Sensor)>,
     touches: Vec<TouchRow>,
@@ -40,7 +38,6 @@ impl Json {
             body: mission.body(),
             rate_hz: mission.robot.rate_hz,
             lines: Lines::default(),
-            in_datagrams: mission.robot.address.as_deref().is_some_and(|it| it.starts_with("udp:")),
             table: mission.sensor_table(),
             answered: None,
             odometry: Odometry::default(),
@@ -154,11 +151,7 @@ fn scan_of(
 impl Driver for Json {
     fn hear(&mut self, bytes: &[u8]) -> Heard {
         let mut heard = Heard::default();
-        let mut lines = self.lines.push(bytes);
-        if self.in_datagrams && !bytes.ends_with(b"\n") {
-            lines.extend(self.lines.push(b"\n"));
-        }
-        for line in lines {
+        for line in self.lines.push(bytes) {
             let taken = parse(&line).and_then(|report| self.take(&report, &mut heard));
             heard.anything |= self.tally.count(&line, taken, &mut heard);
         }
@@ -225,18 +218,6 @@ mod tests {
 
     fn heard(driver: &mut Json, line: &str) -> Heard {
         driver.hear(format!("{line}\n").as_bytes())
-    }
-
-    #[test]
-    fn a_datagram_ends_a_line_and_a_piece_of_a_stream_does_not() {
-        let heard = |address: &str| {
-            let text = format!(
-                "target = [3, 0]\nrobot = {{ protocol = 'json', counts_per_turn = 3600, address = '{address}' }}"
-            );
-            let mut driver = Json::new(&Mission::parse(&text, Path::new("m.toml")).unwrap());
-            driver.hear(br#"{"wheels":[1,1],"speeds":[0,0]}"#).anything
-        };
-        assert_eq!(["udp://127.0.0.1:5600", "tcp://127.0.0.1:5600"].map(heard), [true, false]);
     }
 
     #[test]

@@ -100,8 +100,8 @@ impl Consumer for () {
 /// Ticks in lockstep after which the run waits for its consumer.
 pub(crate) const CAUGHT_UP_EVERY: u64 = 32;
 
-/// Carry out a run, with a `consumer` that misses nothing of it. `listener` hears the samples that the run reads. `show` is called a few times a
-/// second. The files of the robot stay until `lock` is dropped, which is after the consumers have ended.
+/// Carry out a run, with a `consumer` that misses nothing of it. `listener` hears the samples that the run reads. `show` is called a few
+/// times a second. The files of the robot stay until `lock` is dropped, which is after the consumers have ended.
 pub fn run<'a>(
     options: &'a Options,
     [mut signals, for_last_resort]: EndSignals,

@@ -45,10 +45,10 @@ impl Cleanup {
     /// that places on the bus may run out.
     pub fn run_if_due(&mut self, bus: &Bus, any_starting: bool) {
         let (deaths, last) = self.deaths;
-        let is_late = last.elapsed() >= DELAY;
-        let quiet = deaths > 0 && !any_starting || self.done.elapsed() >= PERIOD;
+        let due = deaths > 0 && !any_starting || self.done.elapsed() >= PERIOD;
+        let quiet = last.elapsed() >= DELAY;
         let many = deaths >= stages::TABLE.len();
-        if quiet && is_late || many {
+        if due && quiet || many {
             self.run(bus);
         }
     }
