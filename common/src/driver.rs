@@ -145,6 +145,8 @@ pub struct Heard {
     pub infrared: Option<InfraredSample>,
     /// Whether its odometry jumped farther than the robot can move. The wheels' counts leave the jump out.
     pub jumped: bool,
+    /// Whether it counts orders from 0 again: it has restarted, and knows no settings.
+    pub restarted: bool,
     /// Its newest odometry by its own clock, if it says that.
     pub stamp_ns: Option<i64>,
     pub commander: Option<Commander>,

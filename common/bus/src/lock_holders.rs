@@ -7,7 +7,10 @@ use std::{
     os::unix::fs::MetadataExt as _,
 };
 
-use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
+use rustix::{
+    io::Errno,
+    process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal},
+};
 
 /// The number of times that the list of locks is read. A list longer than a page is read in parts and may change between them:
 /// with 180 locks that came and went, one reading in 200 missed a lock that was held all the time.
@@ -45,7 +48,8 @@ pub fn signal(pid: u32, file: &File, signal: Signal) -> io::Result<()> {
     let gone = || io::Error::from(io::ErrorKind::NotFound);
     let number = i32::try_from(pid).ok().and_then(Pid::from_raw);
     // The descriptor refers to this process even if the process ends and its number is used again.
-    let process = pidfd_open(number.ok_or_else(gone)?, PidfdFlags::empty())?;
+    let process = pidfd_open(number.ok_or_else(gone)?, PidfdFlags::empty())
+        .map_err(|error| if error == Errno::SRCH { gone() } else { error.into() })?;
     let file = file.metadata()?;
     let opened = fs::read_dir(format!("/proc/{pid}/fd"))?.flatten();
     let ours = opened
@@ -54,7 +58,8 @@ pub fn signal(pid: u32, file: &File, signal: Signal) -> io::Result<()> {
     if !ours {
         return Err(gone());
     }
-    Ok(pidfd_send_signal(&process, signal)?)
+    pidfd_send_signal(&process, signal)
+        .map_err(|error| if error == Errno::SRCH { gone() } else { error.into() })
 }
 
 #[cfg(test)]

@@ -26,6 +26,8 @@ pub struct Json {
     lasers: Vec<(usize, Sensor)>,
     touches: Vec<TouchRow>,
     answered: Option<u64>,
+    /// The count before the newest line, if that line counts less: an old one, or of a robot that has restarted, as the next one tells.
+    fell_from: Option<u64>,
     odometry: Odometry,
     tally: WireTally,
 }
@@ -40,6 +42,7 @@ impl Json {
             lines: Lines::default(),
             table: mission.sensor_table(),
             answered: None,
+            fell_from: None,
             odometry: Odometry::default(),
             tally: WireTally::default(),
         }
@@ -74,9 +77,13 @@ impl Json {
         heard.scans.extend(scans);
         heard.touched.extend(touched);
         if let Some(count) = report.heard {
-            // A robot that has restarted counts from 0.
-            let before = self.answered.replace(count).filter(|before| *before <= count);
-            let answered = before.map_or(0, |before| count - before);
+            let before = self.answered.replace(count).unwrap_or(count);
+            if count < before {
+                self.fell_from.get_or_insert(before);
+            } else {
+                heard.restarted |= self.fell_from.take().is_some_and(|highest| count < highest);
+            }
+            let answered = count.saturating_sub(before);
             let answered = heard.acknowledged.saturating_add(answered as usize);
             heard.acknowledged = answered.min(MOST_ANSWERED);
         }
@@ -312,13 +319,24 @@ mod tests {
         let counts = [(5, 0), (8, 3), (8, 0), (2, 0), (1_000_000, 64), (u64::MAX, 64)];
         for (count, answered) in counts {
             let heard = heard(&mut driver, &format!("{{\"heard\":{count}}}"));
-            assert_eq!(heard.acknowledged, answered, "{count}");
+            assert_eq!((heard.acknowledged, heard.restarted), (answered, false), "{count}");
         }
         let sent = [driver.greeting(), driver.velocity([1, 1], Duration::ZERO)].concat();
         assert_eq!(driver.owed(&sent), 2);
         let most = format!("{{\"heard\":0}}\n{{\"heard\":1}}\n{{\"heard\":{}}}", u64::MAX);
         let many = format!("{most}\n{most}");
         assert_eq!(heard(&mut driver, &many).acknowledged, 64);
+    }
+
+    #[test]
+    fn a_robot_whose_count_of_orders_begins_anew_has_restarted_and_one_old_line_is_no_restart() {
+        let mut driver = driver();
+        for (count, restarted) in
+            [(90, false), (60, false), (91, false), (0, false), (2, true), (3, false)]
+        {
+            let heard = heard(&mut driver, &format!("{{\"heard\":{count}}}"));
+            assert_eq!(heard.restarted, restarted, "{count}");
+        }
     }
 
     #[test]

@@ -383,7 +383,7 @@ impl Shell {
                 }
                 Effect::Restarted => {
                     let restarts = self.runner.stage.link.restarts();
-                    tracing::warn!(restarts, "the robot restarted its encoder counts");
+                    tracing::warn!(restarts, "the robot has restarted");
                 }
                 Effect::CountsElsewhere => tracing::warn!(
                     "the encoder counts or the odometry jumped farther than wheels turn and continue from there; the pose stays"

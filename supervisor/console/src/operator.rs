@@ -1,12 +1,12 @@
 //! Requests to a robot's supervisor, and signals to its processes.
 
-use std::fs::File;
+use std::{fs::File, io, path::Path};
 
 use common::{
     domain::{Domain, RobotName},
     lock_holders,
     roster::{self, Roster},
-    samples::name_str,
+    samples::{RosterEntry, name_str},
 };
 use mission_control::operator;
 use processes::stages::{self, Stage};
@@ -34,34 +34,51 @@ pub fn known_stage(stage: &str) -> Result<&'static Stage, Refused> {
     stages::find(stage).ok_or_else(|| Refused::new("unknown-stage", stages::unknown(stage)))
 }
 
-/// Only if that process holds the lock of its robot; else fails.
+/// Sends a signal to the process of this name that holds the lock of its robot, and to no other. The roster comes five times a
+/// second: a process that it still names after its end is not meant, but its successor,
+/// which is waited for.
 pub fn send(robot: &RobotName, stage: &str, signal: Signal) -> Result<(), Failure> {
     let domain = Domain::of(robot.clone());
     // A frozen supervisor publishes nothing.
-    let (pid, lock) = if stage == "supervisor" {
+    if stage == "supervisor" {
         let holder = domain.supervisor();
         let holder = holder
             .map_err(|error| format!("cannot find the supervisor of robot {robot}: {error}"))?;
-        (holder, domain.lock_file())
-    } else {
-        (pid_of(&domain, known(stage)?)?, domain.stages_lock_file())
+        let pid = holder.ok_or_else(|| no_process(robot, stage))?;
+        return Ok(signal_holder(pid, &domain.lock_file(), signal)
+            .map_err(|error| cannot_signal(stage, pid, &error))?);
+    }
+    let stage = known(stage)?;
+    let bus = roster::join(&domain, "operator")?;
+    let mut roster = Roster::open(&bus)?;
+    let named = |entries: &[RosterEntry]| {
+        let entry = entries.iter().find(|entry| name_str(&entry.stage) == stage);
+        entry.map(|entry| entry.pid)
     };
-    let pid = pid.ok_or_else(|| {
-        let message =
-            format!("{stage} of robot {robot} has no process now; see `firsthand status`");
-        Refused::new("no-process", message)
-    })?;
-    File::open(&lock)
-        .and_then(|lock| lock_holders::signal(pid, &lock, signal))
-        .map_err(|error| format!("cannot signal {stage} ({pid}): {error}"))?;
-    Ok(())
+    let mut pid = operator::find(&mut roster, robot, |_, entries| named(entries))?;
+    loop {
+        if pid != 0 {
+            match signal_holder(pid, &domain.stages_lock_file(), signal) {
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                done => return Ok(done.map_err(|error| cannot_signal(stage, pid, &error))?),
+            }
+        }
+        let successor =
+            |entries: &[RosterEntry]| named(entries).filter(|it| ![0, pid].contains(it));
+        let next = roster.find(operator::PATIENCE, |_, entries| successor(entries))?;
+        pid = next.ok_or_else(|| no_process(robot, stage))?;
+    }
 }
 
-fn pid_of(domain: &Domain, stage: &str) -> Result<Option<u32>, Failure> {
-    let bus = roster::join(domain, "operator")?;
-    Ok(operator::find(&mut Roster::open(&bus)?, &domain.robot, |_, entries| {
-        let mut entries = entries.iter();
-        let entry = entries.find(|entry| name_str(&entry.stage) == stage)?;
-        Some((entry.pid != 0).then_some(entry.pid))
-    })?)
+fn signal_holder(pid: u32, lock: &Path, signal: Signal) -> io::Result<()> {
+    File::open(lock).and_then(|lock| lock_holders::signal(pid, &lock, signal))
+}
+
+fn cannot_signal(stage: &str, pid: u32, error: &io::Error) -> String {
+    format!("cannot signal {stage} ({pid}): {error}")
+}
+
+fn no_process(robot: &RobotName, stage: &str) -> Refused {
+    let message = format!("{stage} of robot {robot} has no process now; see `firsthand status`");
+    Refused::new("no-process", message)
 }

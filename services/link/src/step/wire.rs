@@ -96,12 +96,14 @@ impl Link {
         if counts == Some(Counts::Elsewhere) {
             effects.push(Effect::CountsElsewhere);
         }
-        if matches!(counts, Some(Counts::Restarted { .. })) {
+        let restarted = heard.restarted || matches!(counts, Some(Counts::Restarted { .. }));
+        if restarted {
             effects.push(Effect::Restarted);
-            if self.connected() {
-                // A restarted robot has its default settings.
-                effects.push(Effect::Send(self.base.greeting()));
-            }
+        }
+        if (restarted || counts == Some(Counts::Elsewhere)) && self.connected() && !self.in_ticks()
+        {
+            // A restarted robot has its default settings.
+            effects.push(Effect::Send(self.base.greeting()));
         }
         self.take_power(&heard, now_ns, effects);
         self.take_readings(&mut heard, None, now_ns);

@@ -30,6 +30,22 @@ fn a_link_goes_on_with_the_odometry_that_the_link_before_it_remembered() {
 }
 
 #[test]
+fn a_robot_whose_program_restarts_while_it_drives_is_greeted_again_before_it_is_silent() {
+    let mut link = link();
+    let mut greetings = |heard: u64, at_ms: u64| {
+        let line = format!("{{\"heard\":{heard},\"odometry\":[0,0,0],\"speeds\":[0,0]}}\n");
+        let effects = link.at(Event::Datagram(line.as_bytes()), at_ms * MS);
+        let is_greeting = |effect: &&Effect| matches!(effect, Effect::Send(bytes) if bytes.starts_with(b"{\"hello\""));
+        effects.iter().filter(is_greeting).count()
+    };
+    assert_eq!(greetings(3, 0), 1, "a robot is found");
+    assert_eq!(
+        [(4, 100), (1, 300), (2, 400), (3, 500)].map(|(n, at)| greetings(n, at)),
+        [0, 0, 1, 0]
+    );
+}
+
+#[test]
 fn a_link_that_ends_tells_its_robot_to_stand() {
     let mut link = driving(on_the_wall());
     let last = velocities(&link.at(Event::End, MS));
