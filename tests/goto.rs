@@ -238,6 +238,24 @@ fn a_run_that_stays_waits_before_between_and_after_its_targets_and_none_ends_it(
 }
 
 #[test]
+fn a_run_that_is_ended_while_it_waits_for_its_first_target_has_waited() {
+    let mission = ["--stay", "--pace", "4"];
+    let mut run = Run::start("goto-waits", "open-room", &mission);
+    run.wait_until("it drives", |status| status["order"] == "driving");
+    run.signal(Signal::INT);
+    assert_eq!(run.finish().1["outcome"], "aborted");
+    let directory = tempfile::tempdir().unwrap();
+    let mission_file = directory.path().join("waits.toml");
+    std::fs::write(&mission_file, "perimeter.width_m = 8.0").unwrap();
+    let mut run = Run::start("goto-waits", mission_file.to_str().unwrap(), &mission);
+    run.wait_until("it waits", |status| status["order"] == "waiting for a target");
+    run.signal(Signal::INT);
+    let (code, summary) = run.finish();
+    assert_eq!((code, &summary["outcome"]), (Some(0), &"waited".into()), "{summary}");
+    assert_eq!(outcomes(&summary), [""; 0]);
+}
+
+#[test]
 fn a_standing_robot_is_told_where_it_is_goes_on_from_there_and_replays_to_the_bit() {
     let robot = "goto-place";
     let directory = tempfile::tempdir().unwrap();

@@ -328,7 +328,7 @@ wire_enum! {
     RequestAnswer, unknown = Unknown, text = text {
         Taken = 0 "it is not refused",
         Unknown = 1 "it knows no such request; are both of the same version?",
-        NotRunning = 2 "the mission has not begun, or ends; wait until `firsthand status` says driving",
+        NotRunning = 2 "the mission has not begun, or ends; wait until `firsthand status` says driving or waiting",
         Stopped = 3 "an operator stopped the robot; `firsthand resume` first",
         Malformed = 4 "a target is no place; give 1 to 16 places of finite numbers, metres",
         TooMany = 5 "a list has at most 16 targets; wait until some are reached",

@@ -23,7 +23,8 @@ pub(crate) const RESTS_WITHIN: Duration = Duration::from_secs(5);
 pub(crate) struct Snapshot<'a> {
     pub arrival: Option<Arrival>,
     pub link: Option<&'a LinkSample>,
-    pub simulated: bool,
+    /// Whether the robot may be out of reach for any time: a real one, for which no procedure waits.
+    pub may_be_away: bool,
     pub simulator_ended: bool,
     /// Place at which a simulated robot touched something, metres.
     pub collision_m: Option<[f64; 2]>,
@@ -32,8 +33,8 @@ pub(crate) struct Snapshot<'a> {
     pub in_ticks: bool,
     /// The time when the newest tick was first seen or the order last changed, whichever is later.
     pub progress: Now,
-    /// Whether the robot was once ready to drive.
-    pub was_ready: bool,
+    /// Whether a tick has begun.
+    pub has_ticked: bool,
     pub reason: HoldReason,
     pub held: Vec<&'static str>,
     /// Stages that do not run although another should have started them.
@@ -128,8 +129,7 @@ impl Snapshot<'_> {
 
     fn stuck(&self, now: Now) -> Option<Ending> {
         let may_wait = match self.reason {
-            // A real robot may be out of reach for any time.
-            HoldReason::None => !self.simulated,
+            HoldReason::None => self.may_be_away,
             HoldReason::Operator | HoldReason::Waiting => true,
             // In wall-clock time the mission's timeout ends such a mission.
             HoldReason::StageHeld => !self.in_ticks,
@@ -145,7 +145,7 @@ impl Snapshot<'_> {
         } else if !self.held.is_empty() {
             let (held, file) = (self.held.join(", "), records::DEATHS);
             format!("{held} died again and again and is held; see {file} in the run directory")
-        } else if !self.was_ready && !robot_answers {
+        } else if !self.has_ticked && !robot_answers {
             let address = self.address;
             match self.link.map_or(0, |link| link.other_port) {
                 0 => format!("no robot answers at {address}; is it on, is robot.address right?"),
@@ -153,7 +153,7 @@ impl Snapshot<'_> {
                     "no robot answers at {address}, but its host does from port {port}; name that one in robot.address"
                 ),
             }
-        } else if !self.was_ready {
+        } else if !self.has_ticked {
             "the robot answers and no tick begins: it may not send all that a tick needs, wheels and every sensor of its mission; see link.log"
                 .to_owned()
         } else {

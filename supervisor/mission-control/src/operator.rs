@@ -18,8 +18,8 @@ use common::{
     roster::{self, Roster},
     run::Run,
     samples::{
-        Action, Cause, LinkSample, MOST_TARGETS, RequestAnswer, RequestKind, RequestSample, Rest,
-        RosterEntry, RosterHeader, TargetPoint, name,
+        Action, Cause, HoldReason, LinkSample, MOST_TARGETS, RequestAnswer, RequestKind,
+        RequestSample, Rest, RosterEntry, RosterHeader, TargetPoint, name,
     },
     start::StageError,
     stop_socket::{self, Answer, Request, StopMark},
@@ -304,6 +304,13 @@ fn ask(robot: &RobotName, request: RequestSample) -> Result<(), OperatorError> {
     // The roster is opened first, so that the answer is not missed.
     let mut roster = Roster::open(&bus)?;
     let mut requests = bus.writer(&topics::REQUESTS, 1)?;
+    // A supervisor that starts is waited for, and for targets until its robot may be sent to them.
+    let goes = [RequestKind::Goto, RequestKind::Append].map(u8::from).contains(&request.kind);
+    let is_up = |header: &RosterHeader, _: &[RosterEntry]| {
+        let starts = HoldReason::from_byte(header.reason) == HoldReason::Starting;
+        (!goes || !starts).then_some(())
+    };
+    roster.find(PATIENCE, is_up)?;
     let id = new_id();
     requests.publish(0, MissionTime::default(), RequestSample { id, ..request })?;
     let answer = find(&mut roster, robot, |header, _| {

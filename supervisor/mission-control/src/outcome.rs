@@ -26,6 +26,8 @@ pub enum Outcome {
     Unreachable,
     Timeout,
     Collision,
+    /// The robot stood and waited for its first target when the run was ended.
+    Waited,
     /// The run was stopped by hand, or something failed.
     #[default]
     Aborted,
@@ -42,6 +44,7 @@ impl Outcome {
             Self::Unreachable => "unreachable",
             Self::Timeout => "timeout",
             Self::Collision => "collision",
+            Self::Waited => "waited",
             Self::Aborted => "aborted",
             Self::CouldNotBeStopped => "could_not_be_stopped",
         }
@@ -91,18 +94,18 @@ impl Ending {
         let said = &self.reason;
         let (outcome, contradicted) = if let Some(distance_m) = by_truth_m.filter(too_far) {
             let by_truth = format!(
-                "{said} by its own pose, {distance_m:.2} m by the ground truth: more than {allowed_m} m"
+                "{said} by its own pose; it is {distance_m:.2} m from the target by the ground truth: more than {allowed_m} m"
             );
             (Outcome::WrongPlace, by_truth)
         } else if let Some(distance_m) = at_rest_m.filter(too_far) {
             let rest = format!(
-                "{said}, and came to rest {distance_m:.2} m from it: more than {allowed_m} m"
+                "{said}; it came to rest {distance_m:.2} m from the target: more than {allowed_m} m"
             );
             (Outcome::WrongPlace, rest)
         } else if let Some(pose) = at_rest.filter(|pose| !pose.is_sure(mission)) {
             let (within_m, sure_m) = (pose.position_within_m(), mission.sure_within_m);
             let unsure = format!(
-                "{said} by its own pose, which is known to within {within_m:.2} m (2 standard deviations): more than {sure_m} m"
+                "{said}; its pose is known to within {within_m:.2} m (2 standard deviations): more than {sure_m} m"
             );
             (Outcome::ReachedUnsure, unsure)
         } else {

@@ -227,8 +227,11 @@ impl<'a> Supervisor<'a> {
         let mut catch_up_at = self.clock.in_ticks().then_some(0);
         loop {
             if signals.came() {
-                let outcome = self.targets.outcome_while_waiting().unwrap_or(Outcome::Aborted);
-                return Ok(Some(Ending::asked_for(outcome, "stopped by a signal")));
+                let (outcome, reason) = match self.targets.outcome_while_waiting() {
+                    Some(outcome) => (outcome, "stopped by a signal while it waited for a target"),
+                    None => (Outcome::Aborted, "stopped by a signal"),
+                };
+                return Ok(Some(Ending::asked_for(outcome, reason)));
             }
             if let Some(ending) = self.iterate()? {
                 return Ok(Some(ending));
@@ -335,14 +338,15 @@ impl<'a> Supervisor<'a> {
         judge::Snapshot {
             arrival,
             link: record.link.as_ref(),
-            simulated: self.robot.simulator.is_some(),
+            may_be_away: self.robot.simulator.is_none()
+                && self.options.mission.planner.calibration.is_none(),
             simulator_ended,
             collision_m: collision.map(|truth| [truth.x, truth.y]),
             time,
             deadline: self.deadline(),
             in_ticks: self.clock.in_ticks(),
             progress: self.tick_progress.update(record.newest_tick(), now),
-            was_ready: self.decision.ready,
+            has_ticked: record.newest_tick().is_some(),
             reason: self.decision.reason,
             held: self.stages.held(),
             not_started: self.stages.not_started(),

@@ -77,14 +77,17 @@ impl TargetList {
     /// The targets that `mission` begins with.
     pub(crate) fn of(mission: &Mission) -> Self {
         let mut points = mission.waypoints().into_iter().map(TargetPoint::from);
+        let waits =
+            mission.stay && mission.target == mission.start.at && mission.targets.is_empty();
         Self {
-            number: 1,
+            // The start is no target.
+            number: u64::from(!waits),
             current: points.next().unwrap_or_default(),
             since_tick: 0,
             began_s: 0.0,
             ahead: points.collect(),
             results: Vec::new(),
-            waits: mission.stay && mission.target == mission.start.at && mission.targets.is_empty(),
+            waits,
             by_hand: false,
         }
     }
@@ -122,13 +125,14 @@ impl TargetList {
         was
     }
 
-    /// The outcome of the newest target, if the robot waits for the next one.
+    /// The ending of a run whose robot waits for its next target: the outcome of the newest one.
     pub(crate) fn outcome_while_waiting(&self) -> Option<Outcome> {
         let tried = |it: &&Stored| it.result.outcome != TargetOutcome::NotTried;
         let newest = self.results.iter().rfind(tried).map(|it| it.result.outcome);
         self.waits.then_some(match newest {
             Some(TargetOutcome::Unreachable) => Outcome::Unreachable,
             Some(TargetOutcome::TimedOut) => Outcome::Timeout,
+            None => Outcome::Waited,
             _ => Outcome::Reached,
         })
     }

@@ -304,6 +304,9 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     drop(lock);
     if may_be_removed {
         let _ = fs::remove_dir_all(directory);
+        if !arguments.json {
+            complain(print_removed(directory));
+        }
     } else {
         // Picture and report come last and have no effect on the result.
         let show = |written: run_report::Written| {
@@ -358,7 +361,7 @@ fn exit_code(summary: &Summary, ending: &Ending) -> ExitCode {
         return ExitCode::SUCCESS;
     }
     ExitCode::from(match summary.outcome {
-        Outcome::Reached => 0,
+        Outcome::Reached | Outcome::Waited => 0,
         Outcome::Unreachable => 3,
         Outcome::Timeout => 4,
         Outcome::Collision => 5,
@@ -369,6 +372,14 @@ fn exit_code(summary: &Summary, ending: &Ending) -> ExitCode {
     })
 }
 
+fn print_removed(directory: &std::path::Path) -> Result<(), String> {
+    let text = format!(
+        "the robot did not drive, so {} is removed; --out DIR keeps it\n",
+        directory.display()
+    );
+    print_text(&text).map_err(|error| format!("cannot print what is removed: {error}"))
+}
+
 /// The first line of the progress.
 fn title(options: &Options) -> String {
     let mission = &options.mission;
@@ -377,11 +388,14 @@ fn title(options: &Options) -> String {
         Some(address) => format!("at {address}"),
         None => format!("pace {}", options.pace),
     };
+    let way = match mission.straight_m() {
+        0.0 => "no target yet".to_owned(),
+        straight_m => format!("{straight_m:.1} m to the target"),
+    };
     format!(
-        "mission {}{}: {:.1} m to the target, robot {}, {pace}; everything of this run is in {}",
+        "mission {}{}: {way}, robot {}, {pace}; everything of this run is in {}",
         mission.name,
         if options.recovered.is_some() { " goes on" } else { "" },
-        mission.straight_m(),
         options.robot,
         options.directory.display()
     )

@@ -153,7 +153,7 @@ static WANTED: [&dyn AnyTopic; 5] =
 fn is_complete(robot: &RobotState, waited: Duration) -> bool {
     let lost = robot.link.is_some_and(|link| link.connected == 0);
     let heard = robot.power.is_some() && robot.pose.is_some();
-    let all = robot.link.is_some() && (heard || lost);
+    let all = robot.link.is_some() && robot.target.is_some() && (heard || lost);
     robot.supervisor.is_some() && (all || waited >= LINK_PATIENCE)
 }
 

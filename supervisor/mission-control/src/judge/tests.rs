@@ -38,21 +38,21 @@ fn every_rule_of_the_judgement_decides_its_row() {
     let driving = || Snapshot {
         arrival: None,
         link: Some(&go),
-        simulated: true,
+        may_be_away: false,
         simulator_ended: false,
         collision_m: None,
         time: MissionTime::from_seconds(10.0),
         deadline: deadline(60.0, 0.0),
         in_ticks: true,
         progress: start,
-        was_ready: true,
+        has_ticked: true,
         reason: HoldReason::None,
         held: Vec::new(),
         not_started: Vec::new(),
         robot: &robot,
         address: &address,
     };
-    let starting = || Snapshot { was_ready: false, reason: HoldReason::Starting, ..driving() };
+    let starting = || Snapshot { has_ticked: false, reason: HoldReason::Starting, ..driving() };
     let held = || Snapshot { reason: HoldReason::StageHeld, held: vec!["mapper"], ..driving() };
     // These are times after the last tick.
     const MS: Duration = Duration::from_millis(1);
@@ -84,11 +84,13 @@ fn every_rule_of_the_judgement_decides_its_row() {
         ("a timeout after an operator's stop", Snapshot { deadline: deadline(8.0, 2.0), ..driving() }, late,
          Some((Outcome::Timeout, "not there after 8 s, 2 s of an operator's stop not counted"))),
         ("no tick while driving", driving(), late, Some((Outcome::Aborted, "stages' logs"))),
-        ("a real robot may be away", Snapshot { simulated: false, ..driving() }, late, None),
+        ("a real robot may be away", Snapshot { may_be_away: true, ..driving() }, late, None),
+        ("a robot in a procedure may not be away", Snapshot { has_ticked: false, ..driving() }, late,
+         Some((Outcome::Aborted, "no tick begins"))),
         ("a robot that answers from another port",
-         Snapshot { simulated: false, link: Some(&elsewhere), ..starting() }, late,
+         Snapshot { may_be_away: true, link: Some(&elsewhere), ..starting() }, late,
          Some((Outcome::Aborted, "its host does from port 4711"))),
-        ("a real robot that is to start may not be away", Snapshot { simulated: false, link: None, ..starting() }, late,
+        ("a real robot that is to start may not be away", Snapshot { may_be_away: true, link: None, ..starting() }, late,
          Some((Outcome::Aborted, "no robot answers at udp://10.0.0.1:10001"))),
         ("a robot that answers and does not start", starting(), late, Some((Outcome::Aborted, "every sensor of its mission"))),
         ("a robot that once was ready is not looked for", Snapshot { link: None, ..driving() }, late,

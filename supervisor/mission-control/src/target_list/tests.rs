@@ -117,7 +117,7 @@ fn a_robot_that_stays_has_a_result_for_each_target_and_none_for_the_wait() {
     use TargetOutcome::{NotTried, Reached, TimedOut};
     let stays = Mission::parse("stay = true\nperimeter.width_m = 8", Path::new("m.toml")).unwrap();
     let mut list = TargetList::of(&stays);
-    assert!(list.waits());
+    assert_eq!((list.waits(), list.outcome_while_waiting()), (true, Some(Outcome::Waited)));
     list.replace(&[at(1.0, 0.0), at(2.0, 0.0)], (5, 5.0), None);
     assert!(!list.waits());
     list.settle(Outcome::Timeout, 9.0, None);
@@ -126,7 +126,7 @@ fn a_robot_that_stays_has_a_result_for_each_target_and_none_for_the_wait() {
     list.settle(Outcome::Reached, 30.0, Some((arrival(30), true)));
     assert_eq!(list.outcome_while_waiting(), Some(Outcome::Reached));
     let results = list.results(&Ending::asked_for(Outcome::Reached, ""), None, None, None);
-    assert_eq!(outcomes(&results), [(2, TimedOut), (3, NotTried), (4, Reached)]);
+    assert_eq!(outcomes(&results), [(1, TimedOut), (2, NotTried), (3, Reached)]);
 }
 
 #[test]

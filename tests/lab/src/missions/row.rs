@@ -97,7 +97,7 @@ impl Row {
             Reported::Collision => Outcome::Collision,
             Reported::Timeout => Outcome::Timeout,
             Reported::Unreachable => Outcome::Unreachable,
-            Reported::Aborted | Reported::CouldNotBeStopped => Outcome::Aborted,
+            Reported::Waited | Reported::Aborted | Reported::CouldNotBeStopped => Outcome::Aborted,
             _ if !arrived => Outcome::WrongPlace,
             _ if late => Outcome::Timeout,
             _ => Outcome::Success,

@@ -111,7 +111,7 @@ impl Setting {
         let place = options.directory.display();
         let title = format!("{title}: everything of this run is in {place}");
         let mut line = ProgressLine::new(LINE_EVERY);
-        let mut complained = None;
+        let mut complained = Vec::new();
         let mut lock = None;
         let mut recorder = RunRecorder::new(&options, None);
         let ran = mission_control::run(
@@ -126,12 +126,13 @@ impl Setting {
                     Some(_) => None,
                     None => complaint(&options.directory),
                 };
-                if said.is_some() && said != complained {
-                    write_stderr(&format!(
-                        "\nfirsthand: {}\n",
-                        said.as_deref().unwrap_or_default()
-                    ));
-                    complained = said;
+                if let Some(said) = said {
+                    // Numbers in it may differ each time.
+                    let words: String = said.chars().filter(|it| !it.is_numeric()).collect();
+                    if !complained.contains(&words) {
+                        write_stderr(&format!("\nfirsthand: {said}\n"));
+                        complained.push(words);
+                    }
                 }
             },
         );
