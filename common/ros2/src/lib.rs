@@ -5,9 +5,11 @@
 //! | [`topic`] | topics as DDS knows them |
 //! | [`cdr`] | the encoding of messages |
 //! | [`parts`] | what many messages are made of |
+//! | [`messages`] | messages that a robot publishes |
 //! | `participant` | a DDS domain's readers and writers, with the feature `dds` |
 
 pub mod cdr;
+pub mod messages;
 #[cfg(feature = "dds")]
 pub mod participant;
 pub mod parts;

@@ -105,29 +105,40 @@ impl Moves {
     /// Wheels and track that are not as stated.
     pub(crate) fn sizes(&self, mission: &Mission, told: SizesTold) -> Vec<Finding> {
         let mut found = Vec::new();
-        let body = mission.body();
+        let (body, odometry) = (mission.body(), &mission.robot.odometry);
+        // Sizes change nothing of what a robot's own odometry says.
+        let is_own = mission.robot.protocol() == Protocol::Ros2;
+        let said = if is_own { "its odometry says" } else { "the wheels count" };
         let is_told = |share: &f64| (share - 1.0).abs() > told.sizes;
         // A turn alone does not tell the wheels' size from the track; large errors are those of the wheels.
         let way = self.way.or(self.turn);
         let other = way.filter(is_told);
         if let Some(way) = other {
-            let text = format!("the body drives {:.0} % of what the wheels count", 100.0 * way);
+            let text = format!("the body drives {:.0} % of what {said}", 100.0 * way);
             let (key, value) = match mission.robot.protocol() {
                 Protocol::X80 | Protocol::Arduino => {
                     ("robot.counts_per_turn", format!("{:.0}", body.counts_per_turn / way))
                 }
-                Protocol::Json | Protocol::Ros2 => {
+                Protocol::Json => {
                     ("robot.wheel_radius_m", format!("{:.4}", body.wheel_radius_m * way))
                 }
+                Protocol::Ros2 => (
+                    "robot.odometry.distance_scale",
+                    format!("{:.3}", odometry.distance_scale * way),
+                ),
             };
             found.push(Finding::wrong("wheel size", text).with_key(key, value));
         }
         // The stated wheels stay where their error is not told.
         let track = self.turn.map(|turn| other.unwrap_or(1.0) / turn);
         if let Some(track) = track.filter(is_told) {
-            let text = format!("the body turns {:.0} % of what the wheels count", 100.0 / track);
-            let track_m = format!("{:.3}", body.track_m * track);
-            found.push(Finding::wrong("track", text).with_key("robot.track_m", track_m));
+            let text = format!("the body turns {:.0} % of what {said}", 100.0 / track);
+            let (key, stated) = match is_own {
+                true => ("robot.odometry.track_scale", odometry.track_scale),
+                false => ("robot.track_m", body.track_m),
+            };
+            let finding = Finding::wrong("track", text);
+            found.push(finding.with_key(key, format!("{:.3}", stated * track)));
         }
         let ratio = 1.0 + self.curl * body.track_m;
         if (ratio - 1.0).abs() > told.ratio {
@@ -136,7 +147,12 @@ impl Moves {
                 100.0 * (ratio - 1.0).abs()
             );
             let key = "robot.odometry.diameter_ratio";
-            found.push(Finding::wrong("wheel ratio", text).with_key(key, format!("{ratio:.3}")));
+            let finding = Finding::wrong("wheel ratio", text);
+            // Nobody knows to which side, if a laser upside down may have seen it.
+            found.push(match self.turns_back {
+                None => finding,
+                Some(_) => finding.with_key(key, format!("{:.3}", odometry.diameter_ratio * ratio)),
+            });
         }
         found
     }

@@ -94,7 +94,8 @@ pub fn findings(mission: &Mission, trace: &Trace, lifted: bool) -> (Vec<Finding>
         return (found, None);
     }
     let wheels = wheels::Wheels::of(trace);
-    let motion = wheels.motion(trace, mission.body().track_m);
+    let track_m = mission.body().track_m * mission.robot.odometry.track_scale;
+    let motion = wheels.motion(trace, track_m);
     let response = wheels::response(mission, trace, &motion);
     if lifted {
         found.extend(rangers::liveliness(mission, trace, false));

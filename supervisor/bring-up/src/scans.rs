@@ -37,7 +37,9 @@ const STEPS: [f64; UNKNOWNS] = [1e-3, 1e-3, 1e-3, 2e-3, 1e-3, 5e-3, 5e-3];
 const STAGES: [(f64, f64, usize); 4] =
     [(0.7, 0.4, 6), (2.5, 0.2, 6), (f64::INFINITY, 0.1, 8), (f64::INFINITY, 0.04, 8)];
 const STARTS: usize = 8;
-/// Placed scans, and beams of each while a solution is looked for and while it is made exact, about.
+/// While a solution is looked for, all scans up to such a turn, radians, and about so many others are placed, and so many beams of each;
+/// while it is made exact, so many beams of all scans.
+const EARLY: f64 = 2.5;
 const SCANS: usize = 60;
 const FEW_BEAMS: usize = 30;
 const BEAMS: usize = 90;
@@ -107,7 +109,8 @@ impl Placed {
             exchanged,
             turn: scale(TURN),
             way: scale(WAY),
-            curl: self.unknowns[CURL],
+            // A laser upside down sees the turn to the other side.
+            curl: if is_laser { -self.unknowns[CURL] } else { self.unknowns[CURL] },
         }
     }
 
@@ -128,8 +131,10 @@ struct Problem<'a> {
     header: ScanHeader,
     /// Ranges of the robot at rest; not finite for nothing.
     reference: Vec<f64>,
-    /// The scans to place, each with the wheels' turn until then.
+    /// All scans since it moved, each with the wheels' turn until then.
     scans: Vec<(usize, f64)>,
+    /// Of later scans one in so many is placed.
+    every: usize,
     beams_of_each: usize,
 }
 
@@ -154,14 +159,14 @@ impl<'a> Problem<'a> {
             let [angle, way] = between(motion, trace.scans[scan].0).unwrap_or_default();
             (scan, angle.abs() + 2.0 * way.abs() / track_m)
         };
-        let scans = moving.iter().step_by(1 + moving.len() / SCANS).map(|it| turned(*it)).collect();
         Some(Self {
             trace,
             motion,
             track_m,
             header,
             reference: (0..beams).map(median).collect(),
-            scans,
+            every: 1 + moving.len() / SCANS,
+            scans: moving.into_iter().map(turned).collect(),
             beams_of_each: FEW_BEAMS,
         })
     }
@@ -202,7 +207,10 @@ impl<'a> Problem<'a> {
         let mut ends = Vec::new();
         // The beams of a scan that says nothing of its sweep have one pose.
         let mut held = (f64::NAN, DVec2::ZERO, DVec2::X);
-        for (scan, _) in self.scans.iter().filter(|(_, turned)| *turned <= most_turn) {
+        let is_placed = |(number, (_, turned)): &(usize, &(usize, f64))| {
+            *turned <= most_turn && (*turned <= EARLY || number.is_multiple_of(self.every))
+        };
+        for (_, (scan, _)) in self.scans.iter().enumerate().filter(is_placed) {
             let (at, header, beams) = &self.trace.scans[*scan];
             for beam in (0..beams.len()).step_by(1 + beams.len() / self.beams_of_each) {
                 let range = f64::from(beams[beam]);
@@ -326,7 +334,7 @@ pub(crate) fn place(mission: &Mission, trace: &Trace, motion: &Motion) -> Option
         }
     }
     let (_, hypothesis, mut unknowns) = best?;
-    problem.beams_of_each = BEAMS;
+    (problem.every, problem.beams_of_each) = (1, BEAMS);
     let [.., (most_turn, half_m, rounds)] = STAGES;
     for _ in 0..rounds {
         problem.improve(hypothesis, &mut unknowns, (most_turn, half_m));

@@ -3,7 +3,7 @@ use std::{f64::consts::TAU, path::Path};
 use common::{
     driver::range_reading,
     kinematics::Pose2,
-    mission::{Channel, Mission, SensorKind},
+    mission::{Channel, Mission, Protocol, SensorKind},
     samples::ScanHeader,
 };
 use glam::DVec2;
@@ -192,6 +192,25 @@ fn the_sizes_of_track_and_wheels_are_found() {
     assert!((track - 1.15).abs() < 0.03, "{track}");
     let wheel = key(Robot { wheel: 0.9, ..RIGHT }, "robot.wheel_radius_m") / body.wheel_radius_m;
     assert!((wheel - 0.9).abs() < 0.03, "{wheel}");
+}
+
+#[test]
+fn the_keys_of_a_robot_of_ros_2_mend_what_its_odometry_says() {
+    let robot = Robot { wheel: 0.9, track: 1.15, ..RIGHT };
+    let mut mission = mission();
+    mission.robot.protocol = Some(Protocol::Ros2);
+    let mut trace = trace(&mission, robot);
+    let (found, _) = findings(&mission, &trace, false);
+    let key = |name: &str| {
+        let keys = found.iter().flat_map(|it| &it.keys);
+        keys.filter(|it| it.0 == name).map(|it| it.1.parse().unwrap()).next().unwrap()
+    };
+    mission.robot.odometry.distance_scale = key("robot.odometry.distance_scale");
+    mission.robot.odometry.track_scale = key("robot.odometry.track_scale");
+    for (_, rolled) in &mut trace.rolled {
+        *rolled = rolled.map(|it| it * mission.robot.odometry.distance_scale);
+    }
+    assert_eq!(wrong_of(&mission, &trace), Vec::<String>::new());
 }
 
 #[test]

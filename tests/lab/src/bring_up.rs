@@ -14,6 +14,7 @@ use crate::{
     missions::runner::in_parallel,
     random::Random,
     robot,
+    ros2_robot::{self, Ros2Robot},
 };
 
 /// Bring up simulated robots with faults of assembly, and count what is found and what is invented.
@@ -27,6 +28,10 @@ pub struct Arguments {
     right: u64,
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// The robots in turn: x80, kobuki (JSON), arduino and sonars by default; ros2 and burger speak ROS 2, which a firsthand that was built
+    /// with --features ros2 alone speaks.
+    #[arg(long, value_delimiter = ',', default_value = "x80,kobuki,arduino,sonars", value_parser = robot_named)]
+    robots: Vec<&'static (&'static str, &'static str)>,
     /// Robots at once; each takes about a minute of wall-clock time.
     #[arg(long, default_value_t = 6)]
     jobs: usize,
@@ -66,7 +71,7 @@ impl Fault {
 
 const ROOM: &str = "target = [0.8, 0]\nsensors = 'all'\nsimulation.realism = 'measured'\n[perimeter]\nwidth_m = 8.0\ncentre = [0.0, 0.0]\n";
 /// The robots by the names of the table of faults. Their addresses are those of the simulator, where this word stands.
-const ROBOTS: [(&str, &str); 4] = [
+static ROBOTS: [(&str, &str); 6] = [
     ("x80", "[robot]\n#ADDRESS\nmodel = 'x80'\n"),
     (
         "kobuki",
@@ -80,12 +85,31 @@ const ROBOTS: [(&str, &str); 4] = [
         "sonars",
         "[robot]\n#ADDRESS\nprotocol = 'arduino'\nrate_hz = 10.0\nwheel_radius_m = 0.0325\ntrack_m = 0.20\nradius_m = 0.15\ntop_speed_m_s = 0.5\ncounts_per_turn = 1320.0\narduino.sonars = { front = 4, left = 5, right = 6 }\n[[robot.sensor]]\nname = 'front'\nkind = 'cone'\nforward_m = 0.12\nbearing_deg = 0.0\n[[robot.sensor]]\nname = 'left'\nkind = 'cone'\nforward_m = 0.12\nbearing_deg = 40.0\n[[robot.sensor]]\nname = 'right'\nkind = 'cone'\nforward_m = 0.12\nbearing_deg = -40.0\n",
     ),
+    (
+        "ros2",
+        "[robot]\nmodel = 'kobuki'\nrate_hz = 10.0\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nmodel = 'rplidar-a1'\nforward_m = 0.05\nbearing_deg = 0.0\n[simulation.laser]\nsweep_s = 0.1\n",
+    ),
+    (
+        "burger",
+        "[robot]\nmodel = 'turtlebot3-burger'\nrate_hz = 10.0\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nmodel = 'lds-02'\nforward_m = -0.032\nbearing_deg = 0.0\n[simulation.laser]\nsweep_s = 0.1\n",
+    ),
 ];
+/// Those that speak ROS 2; the simulated ones speak JSON.
+const OF_ROS2: [&str; 2] = ["ros2", "burger"];
+/// Instead of a key of a mission: how far such a robot turns by its odometry, over how far its wheels do.
+const ODOMETRY_TURNS: &str = "odometry.turns=";
 /// Draws of a second fault, one of which is another than the first.
 const DRAWS: u32 = 20;
 /// Longer than a bring-up on a loaded machine.
 const PATIENCE: Duration = Duration::from_secs(400);
 const LOOK: Duration = Duration::from_millis(100);
+
+fn robot_named(name: &str) -> Result<&'static (&'static str, &'static str), String> {
+    ROBOTS.iter().find(|it| it.0 == name).ok_or_else(|| {
+        let names: Vec<_> = ROBOTS.iter().map(|it| it.0).collect();
+        format!("no robot is called so; {} are", names.join(", "))
+    })
+}
 
 /// Walls around the robot, a little otherwise for each.
 fn walls(random: &mut Random) -> String {
@@ -120,13 +144,13 @@ pub fn main(arguments: &Arguments) -> Result {
 /// Whether the bring-up of a robot named its faults and no other, and what it said.
 fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, String)> {
     let mut random = Random::of_world(arguments.seed, 0, number);
-    let (robot, body) = ROBOTS[number as usize % ROBOTS.len()];
+    let &(robot, body) = arguments.robots[number as usize % arguments.robots.len()];
     let text = format!("seed = {}\n{ROOM}{body}{}", number + 1, walls(&mut random));
     let most = match (number < arguments.faulty, robot) {
         (false, _) => 0,
-        (true, "kobuki" | "arduino") => 1 + random.below(2),
         // Sonars alone do not tell two faults of wheels apart.
-        (true, _) => 1,
+        (true, "x80" | "sonars") => 1,
+        (true, _) => 1 + random.below(2),
     };
     let table: Vec<&Fault> = table.iter().filter(|fault| fault.robot == robot).collect();
     let mut faults: Vec<&Fault> = Vec::new();
@@ -140,7 +164,9 @@ fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, Str
         }
     }
     let keys: Vec<_> = faults.iter().flat_map(|fault| fault.keys(&mut random)).collect();
-    let mission = missions::parsed(&text, "bring-up", &keys)?;
+    let (turns, of_mission): (Vec<_>, Vec<_>) =
+        keys.iter().cloned().partition(|key| key.starts_with(ODOMETRY_TURNS));
+    let mission = missions::parsed(&text, "bring-up", &of_mission)?;
     let directory = arguments.out.join(number.to_string());
     fs::create_dir_all(&directory).or_cannot_file("make", &directory)?;
     let mut simulator =
@@ -148,7 +174,25 @@ fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, Str
     let stated = directory.join("stated.toml");
     let address = format!("address = 'udp://{}'", simulator.address());
     fs::write(&stated, text.replace("#ADDRESS", &address)).or_cannot_file("write", &stated)?;
-    let mut command = robot::mission("bring-up", &stated, format!("bring-up-{number}"), &[]);
+    let (mut set, mut node) = (Vec::new(), None);
+    if OF_ROS2.contains(&robot) {
+        let domain = ros2_robot::domain(number);
+        set.extend(ros2_robot::keys(domain));
+        let program = missions::parsed(&text, "bring-up", &set)?;
+        let turns = turns.first().map_or(Ok(1.0), |key| key[ODOMETRY_TURNS.len()..].parse::<f64>());
+        node = Some(Ros2Robot::start(
+            simulator.address(),
+            &program,
+            domain,
+            turns.or_cannot("read a fault")?,
+        )?);
+    }
+    let mut command = robot::mission(
+        "bring-up",
+        &stated,
+        format!("bring-up{}-{number}", std::process::id()),
+        &set,
+    );
     command.args(["--yes", "--runs"]).arg(directory.join("runs"));
     let mut child = command
         .stdout(Stdio::piped())
@@ -162,9 +206,13 @@ fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, Str
         std::thread::sleep(LOOK);
     }
     let _ = child.kill();
+    drop(node);
     let output = child.wait_with_output()?;
-    let said: Value = serde_json::from_slice(&output.stdout)
-        .map_err(|_| format!("robot {number} gave no findings; see {}", directory.display()))?;
+    let found = directory.join("findings.json");
+    fs::write(&found, &output.stdout).or_cannot_file("write", &found)?;
+    let said: Value = serde_json::from_slice(&output.stdout).map_err(|_| {
+        format!("robot {number}, of {robot}, gave no findings; see {}", directory.display())
+    })?;
     let findings = said["findings"].as_array().into_iter().flatten();
     let wrong = findings.filter(|it| it["verdict"] == "WRONG");
     let wrong: BTreeSet<&str> = wrong.filter_map(|it| it["part"].as_str()).collect();

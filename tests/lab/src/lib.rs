@@ -16,6 +16,7 @@
 //! | `field` | the field of a map |
 //! | `random` | random numbers |
 //! | `robot` | the executable `firsthand` |
+//! | `ros2_robot` | a simulated robot as one of ROS 2 |
 //! | `error` | why a bench ended early |
 
 // No other crate uses these modules: `pub` says that another module does, and what none uses is reported all the same.
@@ -32,6 +33,7 @@ mod field;
 mod missions;
 mod random;
 mod robot;
+mod ros2_robot;
 mod sources;
 mod tick;
 mod worlds;
@@ -83,7 +85,7 @@ fn print(report: &impl Serialize, json: bool) -> error::Result {
 
 /// The main function of the executable.
 pub fn main() -> ExitCode {
-    console::executable::run("error", execute, |_| None)
+    console::executable::run("error,rustdds=off", execute, |_| None)
 }
 
 fn execute(arguments: &Arguments) -> error::Result<ExitCode> {

@@ -25,7 +25,8 @@ pub fn path() -> Result<PathBuf, Refused> {
 /// A subcommand of `firsthand` in a process of its own. It does not start if there is no `firsthand`, see [`path`].
 pub fn firsthand(arguments: &[&str]) -> Command {
     let mut command = process::child(path().unwrap_or_default());
-    command.args(arguments);
+    // The robots of ROS 2 stay on this machine.
+    command.args(arguments).env("ROS_LOCALHOST_ONLY", "1");
     command
 }
 

@@ -3,21 +3,12 @@
 
 use std::f64::consts::TAU;
 
-use ros2::{cdr::Writer, parts::Pose};
-
-/// The count of numbers in the covariance of a pose or a twist.
-const COVARIANCE: usize = 36;
-
-/// The time of a message, nanoseconds since 1970, and its frame.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Header<'a>(pub u64, pub &'a str);
-
-/// The beginning of a message with this header.
-fn begin(Header(ns, frame): Header<'_>) -> Writer {
-    let mut writer = Writer::default();
-    writer.header(ns, frame);
-    writer
-}
+pub(crate) use ros2::messages::{Header, battery, odometry, scan};
+use ros2::{
+    cdr::Writer,
+    messages::{COVARIANCE, begin},
+    parts::Pose,
+};
 
 /// A `tf2_msgs/TFMessage` of frames and the frames in them.
 pub(crate) fn transforms(ns: u64, transforms: &[(&str, &str, Pose)]) -> Vec<u8> {
@@ -31,18 +22,6 @@ pub(crate) fn transforms(ns: u64, transforms: &[(&str, &str, Pose)]) -> Vec<u8> 
 /// A `geometry_msgs/PoseWithCovarianceStamped`.
 pub(crate) fn pose(header: Header<'_>, pose: Pose, covariance: &[f64; COVARIANCE]) -> Vec<u8> {
     begin(header).pose(pose).f64s(covariance).take()
-}
-
-/// A `nav_msgs/Odometry` that states no covariance.
-pub(crate) fn odometry(
-    header: Header<'_>,
-    child: &str,
-    pose: Pose,
-    [v, omega]: [f64; 2],
-) -> Vec<u8> {
-    let unknown = [0.0; COVARIANCE];
-    let twist = [v, 0.0, 0.0, 0.0, 0.0, omega];
-    begin(header).text(child).pose(pose).f64s(&unknown).f64s(&twist).f64s(&unknown).take()
 }
 
 /// A `nav_msgs/OccupancyGrid` of square cells; `corner` is the corner of the first cell, and its rows go along x.
@@ -142,26 +121,6 @@ fn marker(writer: &mut Writer, Header(ns, frame): Header<'_>, marker: &Marker, a
     writer.text("").text("").text("").length(0).u8(0);
 }
 
-/// A `sensor_msgs/LaserScan`.
-pub(crate) fn scan(
-    header: Header<'_>,
-    [first, step]: [f64; 2],
-    [least, most]: [f64; 2],
-    period_s: f64,
-    ranges: &[f32],
-) -> Vec<u8> {
-    let last = first + step * ranges.len().saturating_sub(1) as f64;
-    let mut writer = begin(header);
-    for number in [first, last, step, 0.0, period_s, least, most] {
-        writer.f32(number as f32);
-    }
-    let range = |writer: &mut Writer, range: &f32| {
-        writer.f32(*range);
-    };
-    // There are no intensities.
-    writer.list(ranges, range).length(0).take()
-}
-
 /// A `sensor_msgs/Range` of a sonar, or of an infrared ranger.
 pub(crate) fn range(
     header: Header<'_>,
@@ -177,17 +136,6 @@ pub(crate) fn range(
         writer.f32(number as f32);
     }
     writer.take()
-}
-
-/// A `sensor_msgs/BatteryState` that states the voltage only.
-pub(crate) fn battery(header: Header<'_>, volts: f64) -> Vec<u8> {
-    let mut writer = begin(header);
-    writer.f32(volts as f32);
-    for _temperature_current_charge_capacity_design_percentage in 0..6 {
-        writer.f32(f32::NAN);
-    }
-    // Status, health and technology are unknown; the battery is present; there are no cells, place or number.
-    writer.u8(0).u8(0).u8(0).u8(1).length(0).length(0).text("").text("").take()
 }
 
 /// The severity of a `diagnostic_msgs/DiagnosticStatus`.

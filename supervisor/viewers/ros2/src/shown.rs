@@ -142,7 +142,7 @@ impl Shown {
             let fan = [header.first_rad - sensor.mount.looks_rad(), header.step_rad];
             let limits = [sensor.model.least_m(), header.reach_m];
             let header = Header(now_ns, &sensor.name);
-            sink(Id::Scan(row), messages::scan(header, fan, limits, period_s, beams));
+            sink(Id::Scan(row), messages::scan(header, fan, limits, [0.0, period_s], beams));
         }
     }
 

@@ -47,7 +47,7 @@ fn what_is_written_is_what_rclpy_writes() {
     assert_eq!(hex(&messages::path(AT, &[[1.0, 2.0, 0.0]])), PATH);
     assert_eq!(hex(&messages::battery(Header(ns, "base_link"), 12.5)), BATTERY);
     let ranges = [1.0, f32::INFINITY, 2.0];
-    let scan = messages::scan(Header(ns, "laser"), [-1.0, 1.0], [0.25, 8.0], 0.125, &ranges);
+    let scan = messages::scan(Header(ns, "laser"), [-1.0, 1.0], [0.25, 8.0], [0.0, 0.125], &ranges);
     assert_eq!(hex(&scan), SCAN);
     assert_eq!(hex(&messages::range(Header(ns, "front"), false, 0.5, [0.25, 2.0], 1.5)), RANGE);
     let map = messages::map(AT, 0.5, [2, 2], [-1.0, -2.0], &[255, 0, 99, 100]);
