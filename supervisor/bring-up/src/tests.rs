@@ -21,6 +21,8 @@ struct Robot {
     late_s: f64,
     track: f64,
     wheel: f64,
+    /// The right wheel's diameter over the left one's.
+    ratio: f64,
     /// Which wheel each encoder follows, and in which direction it counts.
     encoders: Wires,
     /// As which wheel is told each goes, and in which direction.
@@ -44,6 +46,7 @@ const RIGHT: Robot = Robot {
     late_s: 0.0,
     track: 1.0,
     wheel: 1.0,
+    ratio: 1.0,
     encoders: AS_STATED,
     motors: AS_STATED,
     laser_m: 0.05,
@@ -104,7 +107,8 @@ fn trace(mission: &Mission, robot: Robot) -> Trace {
         for _ in 0..(seconds * RATE_HZ) as usize {
             at += 1.0 / RATE_HZ;
             let rims = through(robot.motors, told.map(|told| told / RATE_HZ));
-            let [left, right] = rims.map(|rim| rim * robot.wheel);
+            let [left, right] = rims.map(|rim| rim * robot.wheel * 2.0 / (1.0 + robot.ratio));
+            let right = right * robot.ratio;
             let turn = (right - left) / (track_m * robot.track);
             pose = pose.along_arc((left + right) / 2.0, turn);
             let counted = through(robot.encoders, rims);
@@ -211,6 +215,17 @@ fn the_keys_of_a_robot_of_ros_2_mend_what_its_odometry_says() {
         *rolled = rolled.map(|it| it * mission.robot.odometry.distance_scale);
     }
     assert_eq!(wrong_of(&mission, &trace), Vec::<String>::new());
+}
+
+#[test]
+fn a_laser_upside_down_sees_a_larger_wheel_on_the_other_side() {
+    let robot = Robot { ratio: 1.06, mirrored: true, ..RIGHT };
+    let ratio = key(robot, "robot.odometry.diameter_ratio");
+    assert!((ratio - 1.06).abs() < 0.02, "{ratio}");
+    // Motors that are swapped see it on this side.
+    let (found, _) = findings(&mission(), &without_gyro(trace(&mission(), robot)), false);
+    let ratio = found.iter().find(|it| it.part == "wheel ratio").unwrap();
+    assert!(ratio.verdict == Verdict::Wrong && ratio.keys.is_empty(), "{found:?}");
 }
 
 #[test]

@@ -176,16 +176,11 @@ fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, Str
     fs::write(&stated, text.replace("#ADDRESS", &address)).or_cannot_file("write", &stated)?;
     let (mut set, mut node) = (Vec::new(), None);
     if OF_ROS2.contains(&robot) {
-        let domain = ros2_robot::domain(number);
-        set.extend(ros2_robot::keys(domain));
+        set.extend(ros2_robot::keys(number));
         let program = missions::parsed(&text, "bring-up", &set)?;
-        let turns = turns.first().map_or(Ok(1.0), |key| key[ODOMETRY_TURNS.len()..].parse::<f64>());
-        node = Some(Ros2Robot::start(
-            simulator.address(),
-            &program,
-            domain,
-            turns.or_cannot("read a fault")?,
-        )?);
+        let turns = turns.first().map_or(Ok(1.0), |key| key[ODOMETRY_TURNS.len()..].parse());
+        let turns = turns.or_cannot("read a fault")?;
+        node = Some(Ros2Robot::start(simulator.address(), &program, turns)?);
     }
     let mut command = robot::mission(
         "bring-up",

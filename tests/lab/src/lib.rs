@@ -70,6 +70,7 @@ enum Bench {
     Chaos(Box<chaos::Arguments>),
     BringUp(bring_up::Arguments),
     Consumer(chaos::consumers::Arguments),
+    Ros2Robot(ros2_robot::Arguments),
     Sources(sources::Arguments),
 }
 
@@ -99,6 +100,7 @@ fn execute(arguments: &Arguments) -> error::Result<ExitCode> {
         Command::Bench(Bench::Chaos(arguments)) => return chaos::main(arguments),
         Command::Bench(Bench::BringUp(arguments)) => bring_up::main(arguments),
         Command::Bench(Bench::Consumer(arguments)) => chaos::consumers::main(arguments),
+        Command::Bench(Bench::Ros2Robot(arguments)) => ros2_robot::main(arguments),
         Command::Bench(Bench::Sources(arguments)) => sources::main(arguments),
     };
     Ok(done?.report())

@@ -5,9 +5,11 @@
 //! the simulated robot are. A robot that is told nothing stands after [`WATCHDOG_S`], which the simulated robot sees to.
 
 use std::{
-    io,
+    collections::BTreeMap,
+    fs, io,
     net::{Ipv4Addr, SocketAddr, UdpSocket},
     os::fd::AsFd as _,
+    path::PathBuf,
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering::Relaxed},
@@ -16,14 +18,18 @@ use std::{
     time::{Duration, Instant},
 };
 
+use clap::Args;
 use common::{
-    clock::monotonic_ns,
+    address::Address,
+    clock::{Pace, monotonic_ns},
     driver::odometry::drive,
     json_wire::{Lines, Order, Report, Scan, line, parse},
     kinematics::{DifferentialDrive, Pose2, Twist, WheelSpeeds},
     mission::Mission,
     poll,
 };
+use console::{missions, output::print_text};
+use mission_control::simulator::Simulator;
 use ros2::{
     cdr,
     messages::{Header, battery, odometry, scan},
@@ -31,7 +37,10 @@ use ros2::{
 };
 use ros2_driver::topics::{Content, Topics};
 
-use crate::error::{OrCannot as _, Result};
+use crate::{
+    error::{OrCannot as _, Result},
+    robot::firsthand,
+};
 
 const WATCHDOG_S: f64 = 0.25;
 /// Longest wait until the thread sees that it ends.
@@ -43,15 +52,43 @@ const RELIABLE: Quality = Quality { is_reliable: true, is_latched: false, depth:
 /// The type of a bumper's and a cliff sensor's hazard.
 const HAZARDS: [u8; 2] = [1, 2];
 
-/// What a mission of the robot states beside its other keys.
-pub fn keys(domain: u16) -> [String; 3] {
-    let address = format!("robot.address='ros2:{domain}'");
-    ["robot.protocol='ros2'".to_owned(), address, "robot.ros2.hazards='/hazards'".to_owned()]
+/// What a mission of robot `number` of this process states beside its other keys. The topics of two robots differ, because others on this
+/// machine may have its domain; the ports of greater domains are those of other sockets, too.
+pub fn keys(number: u64) -> Vec<String> {
+    let process = std::process::id();
+    let topics = ["odom", "scan", "cmd_vel", "battery", "hazards"];
+    let topic = |name| format!("robot.ros2.{name}='/lab{process}_{number}/{name}'");
+    let domain = 1 + (u64::from(process) + number) % 99;
+    let keys = ["robot.protocol='ros2'".to_owned(), format!("robot.address='ros2:{domain}'")];
+    keys.into_iter().chain(topics.map(topic)).collect()
 }
 
-/// The domain of robot `number` of this process: ports of greater ones are those of other sockets, too.
-pub fn domain(number: u64) -> u16 {
-    1 + ((u64::from(std::process::id()) + number) % 99) as u16
+/// Simulate a robot that speaks ROS 2 in the world of a mission, until this ends. Prints the keys of its mission, as options of `firsthand
+/// run`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// A mission of a robot that speaks lines of JSON when it is simulated.
+    mission: String,
+    /// Set a key of the simulated robot, of which its program and its mission know nothing.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// The directory of the ground truth.
+    #[arg(long, value_name = "DIR", default_value = "ros2-robot")]
+    out: PathBuf,
+}
+
+pub fn main(arguments: &Arguments) -> Result {
+    let Arguments { mission, set, out } = arguments;
+    fs::create_dir_all(out).or_cannot_file("make", out)?;
+    let simulated = missions::load(mission, set)?;
+    let mut simulator = Simulator::start(firsthand(&[]), out, &simulated, Pace::Rate(1.0), None)?;
+    let keys = keys(0);
+    let _node = Ros2Robot::start(simulator.address(), &missions::load(mission, &keys)?, 1.0)?;
+    print_text(&keys.iter().map(|key| format!("--set={key}\n")).collect::<String>())?;
+    while simulator.poll()? {
+        std::thread::sleep(LOOK);
+    }
+    Ok(())
 }
 
 #[derive(Debug)]
@@ -61,9 +98,16 @@ pub struct Ros2Robot {
 }
 
 impl Ros2Robot {
-    /// Speak for the simulated robot at `robot` in `domain`, by the topics and the sizes of `stated`. Its odometry turns `turns` times as
+    /// Speak for the simulated robot at `robot`, by the domain, the topics and the sizes of `stated`. Its odometry turns `turns` times as
     /// far as the wheels do.
-    pub fn start(robot: SocketAddr, stated: &Mission, domain: u16, turns: f64) -> Result<Self> {
+    ///
+    /// # Errors
+    /// `stated` names no domain, or DDS does not start.
+    pub fn start(robot: SocketAddr, stated: &Mission, turns: f64) -> Result<Self> {
+        let address = stated.robot.address.as_deref().map(str::parse::<Address<String>>);
+        let Some(Ok(Address::Ros2(Some(domain)))) = address else {
+            return Err("robot.address: a robot of ROS 2 needs a domain, as ros2:7".into());
+        };
         let mut node =
             Node::new(robot, stated, domain, turns).or_cannot("start a node of ROS 2")?;
         let ends = Arc::new(AtomicBool::new(false));
@@ -87,18 +131,14 @@ impl Drop for Ros2Robot {
     }
 }
 
+/// What moves messages between the simulated robot and the domain.
 struct Node {
     wire: UdpSocket,
     lines: Lines,
     heard: Option<Instant>,
     commands: Reader,
     writers: Vec<(Content, Writer)>,
-    stated: Mission,
-    drive: DifferentialDrive,
-    turns: f64,
-    pose: Pose2,
-    /// The newest angles of the wheels.
-    wheels: Option<WheelSpeeds>,
+    program: Program,
     participant: Participant,
 }
 
@@ -118,11 +158,7 @@ impl Node {
             heard: None,
             commands: participant.reader(&topics.command, RELIABLE)?,
             writers: writers.collect::<io::Result<_>>()?,
-            stated: stated.clone(),
-            drive: drive(&stated.body()),
-            turns,
-            pose: Pose2::default(),
-            wheels: None,
+            program: Program::new(stated, turns),
             participant,
         })
     }
@@ -130,59 +166,82 @@ impl Node {
     fn turn(&mut self) -> io::Result<()> {
         if self.heard.is_none_or(|heard| heard.elapsed() > SILENT) {
             self.heard = Some(Instant::now());
-            self.wire.send(&line(&Order::Hello { rate_hz: self.stated.robot.rate_hz }))?;
+            self.wire.send(&line(&Order::Hello { rate_hz: self.program.stated.robot.rate_hz }))?;
         }
         poll::readable(&[self.wire.as_fd(), self.participant.as_fd()], Some(LOOK))?;
         self.participant.unring();
         for message in self.commands.messages().take(MOST_COMMANDS) {
-            let twist = cdr::Reader::new(&message.payload).and_then(|mut it| it.f64s::<6>());
-            if let Ok([v, .., omega]) = twist {
-                let WheelSpeeds { right, left } = self.drive.wheels(Twist { v, omega });
-                let (wheels, twist) = ([left, right], [v, omega]);
-                self.wire.send(&line(&Order::Drive { wheels, twist, for_s: WATCHDOG_S }))?;
+            if let Ok(order) = self.program.order(&message.payload) {
+                self.wire.send(&line(&order))?;
             }
         }
         let mut buffer = [0; 65_536];
         while let Ok(length) = self.wire.recv(&mut buffer) {
             self.heard = Some(Instant::now());
             for report in self.lines.push(&buffer[..length]) {
-                parse(&report).into_iter().for_each(|report| self.publish(&report));
+                let Ok(report) = parse(&report) else { continue };
+                self.program.take_wheels(&report);
+                for (content, writer) in &self.writers {
+                    let message = self.program.message(*content, &report, monotonic_ns());
+                    message.into_iter().for_each(|message| _ = writer.write(message));
+                }
             }
         }
         Ok(())
     }
+}
 
-    /// Publish what the robot said just now.
-    fn publish(&mut self, report: &Report) {
-        let now_ns = monotonic_ns();
-        let speeds = self.moved(report);
-        let Pose2 { position, heading } = self.pose;
-        let pose = [position.x, position.y, heading];
-        for (content, writer) in &self.writers {
-            let message = match content {
-                Content::Odometry => speeds
-                    .map(|speeds| odometry(Header(now_ns, "odom"), "base_footprint", pose, speeds)),
-                Content::Scan(row) => self.scan(*row, report, now_ns),
-                Content::Battery => {
-                    report.battery_v.map(|volts| battery(Header(now_ns, ""), volts))
-                }
-                Content::Hazards => self.hazards(report, now_ns),
-                _ => None,
-            };
-            message.into_iter().for_each(|message| _ = writer.write(message));
+/// The robot's own program. Pure: times and lines in, messages out.
+struct Program {
+    stated: Mission,
+    drive: DifferentialDrive,
+    turns: f64,
+    pose: Pose2,
+    /// The newest angles of the wheels.
+    wheels: Option<WheelSpeeds>,
+}
+
+impl Program {
+    fn new(stated: &Mission, turns: f64) -> Self {
+        let drive = drive(&stated.body());
+        Self { stated: stated.clone(), drive, turns, pose: Pose2::default(), wheels: None }
+    }
+
+    /// What a `geometry_msgs/Twist` tells the wheels. Fails if `payload` is none.
+    fn order(&self, payload: &[u8]) -> Result<Order, cdr::Malformed> {
+        let [v, .., omega] = cdr::Reader::new(payload)?.f64s::<6>()?;
+        let WheelSpeeds { right, left } = self.drive.wheels(Twist { v, omega });
+        Ok(Order::Drive { wheels: [left, right], twist: [v, omega], for_s: WATCHDOG_S })
+    }
+
+    /// Go on to where the wheels turned.
+    fn take_wheels(&mut self, report: &Report) {
+        if let Some(now) = report.wheels.map(both) {
+            let before = self.wheels.replace(now).unwrap_or(now);
+            let turned = both([now.left - before.left, now.right - before.right]);
+            let Twist { v: arc, omega: turn } = self.drive.twist(turned);
+            self.pose = self.pose.along_arc(arc, self.turns * turn);
         }
     }
 
-    /// Take the wheels' angles into the pose. Returns the speeds, m/s and rad/s; none without wheels.
-    fn moved(&mut self, report: &Report) -> Option<[f64; 2]> {
-        let both = |[left, right]: [f64; 2]| WheelSpeeds { right, left };
-        let (now, speeds) = (both(report.wheels?), both(report.speeds?));
-        let before = self.wheels.replace(now).unwrap_or(now);
-        let turned = both([now.left - before.left, now.right - before.right]);
-        let Twist { v: arc, omega: turn } = self.drive.twist(turned);
-        self.pose = self.pose.along_arc(arc, self.turns * turn);
-        let Twist { v, omega } = self.drive.twist(speeds);
-        Some([v, self.turns * omega])
+    /// What a topic says when `report` came at `now_ns`; none if `report` says nothing of it.
+    fn message(&self, content: Content, report: &Report, now_ns: u64) -> Option<Vec<u8>> {
+        match content {
+            Content::Odometry => {
+                let Twist { v, omega } = self.drive.twist(both(report.speeds?));
+                let Pose2 { position, heading } = self.pose;
+                let pose = [position.x, position.y, heading];
+                let header = Header(now_ns, "odom");
+                report.wheels?;
+                Some(odometry(header, "base_footprint", pose, [v, self.turns * omega]))
+            }
+            Content::Scan(row) => self.scan(row, report, now_ns),
+            Content::Battery => report.battery_v.map(|volts| battery(Header(now_ns, ""), volts)),
+            Content::Hazards => {
+                (!report.touched.is_empty()).then(|| hazards(&report.touched, now_ns))
+            }
+            _ => None,
+        }
     }
 
     fn scan(&self, row: usize, report: &Report, now_ns: u64) -> Option<Vec<u8>> {
@@ -204,23 +263,79 @@ impl Node {
         let period_s = sensor.every_ticks as f64 / self.stated.robot.rate_hz;
         let limits = [sensor.model.least_m(), sensor.reach_m];
         let ranges: Vec<_> = ranges.iter().map(range).collect();
-        Some(scan(
-            Header(taken_ns, &sensor.name),
-            sensor.fan().into(),
-            limits,
-            [beam_s, period_s],
-            &ranges,
-        ))
+        let header = Header(taken_ns, &sensor.name);
+        Some(scan(header, sensor.fan().into(), limits, [beam_s, period_s], &ranges))
     }
+}
 
-    /// An `irobot_create_msgs/HazardDetectionVector` of what bumpers and cliff sensors feel.
-    fn hazards(&self, report: &Report, now_ns: u64) -> Option<Vec<u8>> {
-        let feels = report.touched.iter().filter(|(_, feels)| **feels);
-        let feels: Vec<_> = feels.map(|(name, _)| name.replace('-', "_")).collect();
-        let mut message = cdr::Writer::default();
-        message.header(now_ns, "").list(feels, |message, frame| {
-            message.header(now_ns, &frame).u8(HAZARDS[usize::from(frame.starts_with("cliff"))]);
-        });
-        (!report.touched.is_empty()).then(|| message.take())
+const fn both([left, right]: [f64; 2]) -> WheelSpeeds {
+    WheelSpeeds { right, left }
+}
+
+/// An `irobot_create_msgs/HazardDetectionVector` of what bumpers and cliff sensors feel, by the names of their rows.
+fn hazards(touched: &BTreeMap<String, bool>, now_ns: u64) -> Vec<u8> {
+    let feels = touched.iter().filter(|(_, feels)| **feels);
+    let feels: Vec<_> = feels.map(|(name, _)| name.replace('-', "_")).collect();
+    let mut message = cdr::Writer::default();
+    message.header(now_ns, "").list(feels, |message, frame| {
+        message.header(now_ns, &frame).u8(HAZARDS[usize::from(frame.starts_with("cliff"))]);
+    });
+    message.take()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use common::driver::{Base as _, Driver as _};
+    use ros2_driver::Ros2;
+
+    use super::*;
+
+    #[test]
+    fn what_a_simulated_robot_says_in_json_is_heard_over_ros_2_and_a_command_turns_its_wheels() {
+        let text = "target = [3, 0]\nrobot.model = 'kobuki'\nrobot.protocol = 'ros2'\nrobot.address = 'ros2:7'\nrobot.ros2.hazards = '/hazards'\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nfield_of_view_deg = 180\nbeams = 3\nreach_m = 4.0";
+        let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
+        let (mut program, mut driver) = (Program::new(&mission, 1.0), Ros2::new(&mission));
+        let topics = Topics::of(&mission).heard;
+        let mut say = |report: &Report, now_ns| {
+            program.take_wheels(report);
+            let said = topics.iter().enumerate().filter_map(|(row, (content, _))| {
+                let message = program.message(*content, report, now_ns)?;
+                Some(driver.hear(&[&[row as u8][..], &message].concat()))
+            });
+            said.collect::<Vec<_>>()
+        };
+        let turned =
+            |wheels| Report { wheels: Some(wheels), speeds: Some([1.0, 2.0]), ..Report::default() };
+        say(&turned([5.0, 5.0]), 10_000_000_000);
+        let report = Report {
+            scan: Some(vec![Some(1.5), None, Some(-1.0)]),
+            scan_age_s: Some(0.2),
+            scan_time_s: Some(0.060_000_1),
+            touched: [("bumper-left", true), ("cliff-left", false)]
+                .map(|(name, feels)| (name.to_owned(), feels))
+                .into(),
+            battery_v: Some(14.5),
+            ..turned([6.0, 4.5])
+        };
+        let heard = say(&report, 10_100_000_000);
+        let motion = heard.iter().find_map(|it| it.motion.clone()).unwrap().wheels;
+        let counts = |angle: f64| (angle * 3600.0 / std::f64::consts::TAU).round() as i32;
+        assert_eq!(i32::from(motion.left_counts), counts(1.0));
+        assert_eq!(i32::from(motion.right_counts) - 32_768, counts(-0.5));
+        assert_eq!([motion.left_counts_per_s, motion.right_counts_per_s], [1.0, 2.0].map(counts));
+        let scan = heard.iter().find_map(|it| it.scans.first()).unwrap();
+        assert_eq!((scan.stamp_ns, scan.sweep.beam_ns / 1000), (Some(9_900_000_000), 20_000));
+        assert!(scan.beams[..2] == [1.5, f32::INFINITY] && scan.beams[2].is_nan(), "{scan:?}");
+        assert!(
+            heard
+                .iter()
+                .any(|it| it.touched.contains(&(0, true)) && it.touched.contains(&(3, false)))
+        );
+        assert!(heard.iter().any(|it| it.power.is_some_and(|power| power.motor_v == 14.5)));
+        let order = program.order(&driver.velocity([-573, 1146], Duration::ZERO)).unwrap();
+        let Order::Drive { wheels, for_s, .. } = order else { panic!("{order:?}") };
+        assert!((wheels[0] + 1.0).abs() < 1e-3 && (wheels[1] - 2.0).abs() < 1e-3 && for_s == 0.25);
     }
 }

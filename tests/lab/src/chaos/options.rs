@@ -3,7 +3,11 @@
 use std::{env, fs, path::PathBuf, process};
 
 use clap::Args;
-use common::{clock::Pace, domain::RobotName, mission::Mission};
+use common::{
+    clock::Pace,
+    domain::RobotName,
+    mission::{Mission, Protocol},
+};
 use console::missions;
 
 use super::{consumers::Consumer, robot_fault::RobotFault};
@@ -65,6 +69,9 @@ pub struct Arguments {
     /// Missions for each fault.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..), requires = "robot_faults")]
     pub missions: u32,
+    /// The robot of the mission, which speaks lines of JSON, speaks ROS 2 to its link; the faults are in what its program hears of it.
+    #[arg(long, requires = "robot_faults")]
+    pub ros2: bool,
     /// One line of JSON.
     #[arg(long)]
     pub json: bool,
@@ -101,6 +108,9 @@ impl Options {
                 "robot faults are of a robot with two driven wheels; leave robot.model = 'car' out"
                     .into(),
             );
+        }
+        if asked.ros2 && loaded.robot.protocol() != Protocol::Json {
+            return Err("--ros2 needs a robot that is simulated with lines of JSON; give --set robot.model='kobuki'".into());
         }
         if asked.pace == Pace::Max {
             return Err("chaos needs a wall clock; give --pace R, 4 for four times as fast".into());

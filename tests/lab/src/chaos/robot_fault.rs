@@ -134,8 +134,10 @@ impl RobotFault {
         let row = self.row();
         let does = match protocol {
             Protocol::X80 => row.x80,
-            Protocol::Json => row.json,
-            Protocol::Arduino | Protocol::Ros2 => NOTHING,
+            // ROS 2 has no other word than speed 0 that stops a robot.
+            Protocol::Ros2 if matches!(self, Self::DoesNotStop | Self::IgnoresZero) => NOTHING,
+            Protocol::Json | Protocol::Ros2 => row.json,
+            Protocol::Arduino => NOTHING,
         };
         does != NOTHING
     }

@@ -12,10 +12,11 @@ use common::{
     domain::Domain,
     follower::{Event, Follower},
     ground_truth::GroundTruthTick,
+    mission::Protocol,
     samples::LinkSample,
     topics,
 };
-use console::output::write_stderr;
+use console::{missions, output::write_stderr};
 use mission_control::{outcome::RIGHT_PLACE_M, simulator::Simulator};
 use processes::process::Process;
 use rustix::process::Signal;
@@ -33,6 +34,7 @@ use crate::{
     error::{OrCannot as _, Result},
     random::Random,
     robot::{command_lines, firsthand},
+    ros2_robot::{self, Ros2Robot},
 };
 
 /// Time from the robot's departure to its fault, seconds: the least, and the width of the random range.
@@ -49,7 +51,7 @@ const LOOK: Duration = Duration::from_millis(10);
 /// Run missions of each fault that is asked for and that a robot of this protocol can have.
 pub fn run(options: &Options) -> Result<StopTimeTable> {
     let asked = &options.asked;
-    let protocol = options.loaded.robot.protocol();
+    let protocol = if asked.ros2 { Protocol::Ros2 } else { options.loaded.robot.protocol() };
     let named = asked.robot_faults.as_deref().filter(|named| !named.is_empty());
     let faults = named.unwrap_or(RobotFault::value_variants()).iter().copied();
     let (faults, left_out): (Vec<_>, Vec<_>) =
@@ -85,12 +87,21 @@ fn one(options: &Options, fault: RobotFault, seed: u64, files: &Path) -> Result<
     let protocol = options.loaded.robot.protocol();
     let proxy = Proxy::start(robot.address(), fault, protocol, seed)?;
     let mut start = mission::command(options, seed, "1", &files.join("run"), false)?;
-    start.args(["--set", &format!("robot.address='udp://{}'", proxy.address)]);
+    let mut keys = vec![format!("robot.address='udp://{}'", proxy.address)];
+    let mut node = None;
+    if options.asked.ros2 {
+        keys = ros2_robot::keys(fault as u64);
+        let stated = [&options.asked.set[..], &keys].concat();
+        let stated = missions::load(&options.asked.mission, &stated)?;
+        node = Some(Ros2Robot::start(proxy.address, &stated, 1.0)?);
+    }
+    start.args(keys.iter().flat_map(|key| ["--set", key]));
     let mut child = Process::spawn(start).or_cannot("start a mission")?;
     let observed = observe(options, fault, seed, &mut child, &mut robot, &proxy);
     // A frozen supervisor does not end in order.
     child.signal(Signal::CONT);
     child.end(END_GRACE);
+    drop(node);
     robot.stop()?;
     let summary = mission::summary(&files.join("run"));
     Ok(entry(options, fault, seed, &observed?, robot.truth(), summary))

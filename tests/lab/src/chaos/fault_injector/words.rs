@@ -39,7 +39,7 @@ impl Words {
     pub fn of(protocol: Protocol) -> Self {
         match protocol {
             Protocol::X80 => Self::X80 { robot: Decoder::default(), host: Decoder::default() },
-            // The other protocols have no fault that is injected on a wire.
+            // Robots of ROS 2 are simulated with JSON, and those with an Arduino have no fault on a wire.
             Protocol::Json | Protocol::Arduino | Protocol::Ros2 => {
                 Self::Json { robot: Lines::default(), host: Lines::default() }
             }
