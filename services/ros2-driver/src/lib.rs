@@ -61,7 +61,7 @@ pub struct Ros2 {
     gyro: Gyro,
     /// The odometry of the newest tick gives it, radians.
     heading: Option<f64>,
-    /// Stamps of the newest odometry, and of that with which the newest tick began.
+    /// The stamp of the newest odometry, and when the newest tick was due: at most half a period before its own.
     stamps_ns: Option<[i64; 2]>,
     tally: WireTally,
 }
@@ -183,8 +183,10 @@ impl Ros2 {
         // If odometry comes faster than ticks, the message nearest to a tick's time begins the tick.
         let slack_ns = (stamp_ns - newest_ns) / 2;
         let is_tick = stamp_ns - tick_ns >= self.period_ns - slack_ns;
+        // A message that was stamped late is no reason to leave out the next.
+        let due_ns = (tick_ns + self.period_ns).clamp(stamp_ns - self.period_ns / 2, stamp_ns);
         heard.stamp_ns = Some(stamp_ns);
-        self.stamps_ns = Some([stamp_ns, if is_tick { stamp_ns } else { tick_ns }]);
+        self.stamps_ns = Some([stamp_ns, if is_tick { due_ns } else { tick_ns }]);
         if is_tick {
             let [_, _, heading] = odometry.pose;
             let before = self.heading.replace(heading).unwrap_or(heading);

@@ -173,6 +173,16 @@ fn odometry_is_the_way_of_wheels_and_begins_a_tick_at_the_missions_rate() {
 }
 
 #[test]
+fn odometry_that_was_stamped_late_does_not_hide_the_next() {
+    let mut driver = driver("robot.rate_hz = 10");
+    for stamp_ms in [1000, 1100, 1250, 1300, 1400, 1540, 1590, 1690, 2000, 2010] {
+        let is_tick = said(&mut driver, ODOM, &odometry_at(stamp_ms, 1.0)).motion.is_some();
+        // What comes at once after a silence of three periods is of the tick that the silence ended with.
+        assert_eq!(is_tick, stamp_ms != 2010, "{stamp_ms}");
+    }
+}
+
+#[test]
 fn odometry_that_is_repeated_or_old_is_refused_until_it_goes_on() {
     let mut driver = driver("robot.rate_hz = 10");
     let mut refused = |stamp_ms| said(&mut driver, ODOM, &odometry_at(stamp_ms, 1.0)).refused;

@@ -320,7 +320,7 @@ mod tests {
             ..turned([6.0, 4.5])
         };
         let heard = say(&report, 10_100_000_000);
-        let motion = heard.iter().find_map(|it| it.motion.clone()).unwrap().wheels;
+        let motion = heard.iter().find_map(|it| it.motion).unwrap().wheels;
         let counts = |angle: f64| (angle * 3600.0 / std::f64::consts::TAU).round() as i32;
         assert_eq!(i32::from(motion.left_counts), counts(1.0));
         assert_eq!(i32::from(motion.right_counts) - 32_768, counts(-0.5));
