@@ -79,21 +79,22 @@ impl Deafness {
         (self.answers, self.hears, self.ends) = (false, false, 0.0);
     }
 
-    pub(super) fn is_implausible(&self, sure: bool) -> bool {
+    /// The explanation if the sensors are doubted, or surely deaf.
+    pub(super) fn judged(&self, sure: bool) -> Option<String> {
         let reach_m = self.sensors.iter().fold(0.0, |most: f64, (_, reach_m)| most.max(*reach_m));
         let is_open = !sure && self.way_m > reach_m;
-        self.missing >= MISSING[usize::from(sure)] || self.spells >= SPELLS || is_open
-    }
-
-    pub(super) fn explain(&self) -> String {
+        let is_in_motion = self.spells >= SPELLS;
+        if self.missing < MISSING[usize::from(sure)] && !is_in_motion && !is_open {
+            return None;
+        }
         let Self { frames, way_m, .. } = self;
-        let when = match self.spells >= SPELLS {
+        let when = match is_in_motion {
             true => format!("has heard anything while the robot moved, {SPELLS} times"),
             false => format!("has heard anything in {frames} frames and {way_m:.1} m"),
         };
-        format!(
+        Some(format!(
             "no ranging sensor {when}: this is open ground, or they are deaf; check their supply and cable, then `firsthand stop` and `resume`"
-        )
+        ))
     }
 }
 
@@ -115,7 +116,7 @@ mod tests {
             deafness.take(&[of(3), of(4)]);
             deafness.went(0.05);
         }
-        [false, true].map(|sure| deafness.is_implausible(sure))
+        [false, true].map(|sure| deafness.judged(sure).is_some())
     }
 
     fn frames(range: Option<f64>, count: usize) -> impl Iterator<Item = Option<f64>> {

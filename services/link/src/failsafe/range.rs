@@ -239,6 +239,17 @@ impl Range {
         self.motion.poses.robot_is(self.pose, now);
     }
 
+    /// The explanation by the first judge of more than one reading that finds them doubtful, or surely implausible.
+    fn judged(&self, sure: bool) -> Option<String> {
+        let front = self.rows.iter().find(|row| row.looks_ahead);
+        let surface = self.undetected.as_ref().filter(|it| sure && it.is_implausible());
+        let surface = surface.zip(front).map(|(surface, front)| surface.explain(&front.name));
+        surface
+            .or_else(|| self.scans.iter().find_map(|scans| scans.judged(sure)))
+            .or_else(|| self.deafness.judged(sure))
+            .or_else(|| self.motion.judged(sure))
+    }
+
     fn forget(&mut self) {
         self.counts = None;
         for row in &mut self.rows {
@@ -308,12 +319,7 @@ impl Monitor for Range {
             return false.into();
         }
         let sure = cause == Cause::RangeImplausible;
-        let surface = self.undetected.as_ref().filter(|_| sure);
-        if surface.is_some_and(UndetectedSurface::is_implausible)
-            || self.scans.iter().any(|scans| scans.is_implausible(sure))
-            || self.deafness.is_implausible(sure)
-            || self.motion.is_implausible(sure)
-        {
+        if self.judged(sure).is_some() {
             return Condition::Holds;
         }
         let over_for = |row: &Row| match row.condition(sure, now) {
@@ -325,25 +331,11 @@ impl Monitor for Range {
         least.map_or(Condition::Holds, Condition::OverFor)
     }
 
-    fn explain(&self, _: Cause, now: Moment) -> Option<String> {
-        if let Some(undetected) =
-            self.undetected.as_ref().filter(|undetected| undetected.is_implausible())
-        {
-            let front = self.rows.iter().find(|row| row.looks_ahead)?;
-            return Some(undetected.explain(&front.name));
-        }
-        if let Some(scans) = self.scans.iter().find(|scans| scans.is_implausible(false)) {
-            return scans.explain();
-        }
-        if self.deafness.is_implausible(false) {
-            return Some(self.deafness.explain());
-        }
-        if self.motion.is_implausible(false) {
-            return Some(self.motion.explain());
-        }
-        let newest = |row: &&Row| row.implausible[0].map(|at| now.time.since(at.time));
-        let implausible = self.rows.iter().filter(|row| row.implausible[0].is_some());
-        Some(implausible.min_by_key(newest)?.words.clone())
+    fn explain(&self, cause: Cause, now: Moment) -> Option<String> {
+        let sure = cause == Cause::RangeImplausible;
+        let doubted =
+            |row: &Row| Some((row.implausible[usize::from(sure)]?.time, row.words.clone()));
+        self.judged(sure).or_else(|| Some(self.rows.iter().filter_map(doubted).max()?.1))
     }
 }
 
@@ -435,6 +427,25 @@ mod tests {
         let random = |tick: u32| 10 + (tick * tick * 37 % 240) as u16;
         assert!(implausible_at([0.03; 2], random).is_some_and(|tick| tick < 60));
         assert_eq!(implausible_at([0.0; 2], |tick| if tick % 3 == 0 { 200 } else { 90 }), None);
+    }
+
+    #[test]
+    fn the_explanation_is_that_of_the_judge_that_holds_and_not_of_one_that_only_doubts() {
+        let mission = Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap();
+        let mut monitor = Range::new(&mission);
+        let now = Moment::default();
+        let nothing = RangeReading { status: RangeStatus::Nothing.into(), ..Default::default() };
+        for _ in 0..100 {
+            monitor.deafness.take(&[nothing]);
+            monitor.deafness.went(0.05);
+        }
+        for (row, implausible) in [[Some(now); 2], [Some(now), None]].into_iter().enumerate() {
+            monitor.rows[row].implausible = implausible;
+            monitor.rows[row].words = format!("sensor {row}");
+        }
+        let explain = |cause| monitor.explain(cause, now).unwrap();
+        assert_eq!(explain(Cause::RangeImplausible), "sensor 0");
+        assert!(explain(Cause::RangeDoubtful).contains("they are deaf"));
     }
 
     #[test]

@@ -98,21 +98,13 @@ impl RangeMotion {
         }
     }
 
-    /// The delay that is best, and by how much.
-    fn likely(&self) -> (f64, f64) {
+    /// The explanation by the delay that is best, if readings are doubted, or surely late.
+    pub(super) fn judged(&self, sure: bool) -> Option<String> {
         let better = DELAYS_S.into_iter().zip(self.better);
-        better.max_by(|(_, one), (_, other)| one.total_cmp(other)).unwrap_or_default()
-    }
-
-    pub(super) fn is_implausible(&self, sure: bool) -> bool {
-        self.likely().1 > BETTER[usize::from(sure)]
-    }
-
-    pub(super) fn explain(&self) -> String {
-        format!(
-            "what the infrared rangers see fits together if they are {} s later than they say: look for what holds their readings back, then `firsthand stop` and `resume`",
-            self.likely().0
-        )
+        let (likely_s, better) = better.max_by(|(_, one), (_, other)| one.total_cmp(other))?;
+        (better > BETTER[usize::from(sure)]).then(|| format!(
+            "what the infrared rangers see fits together if they are {likely_s} s later than they say: look for what holds their readings back, then `firsthand stop` and `resume`"
+        ))
     }
 }
 
@@ -158,8 +150,8 @@ mod tests {
                 })
                 .collect();
             motion.take(&readings, at_s);
-            if motion.is_implausible(true) {
-                return Some(motion.explain());
+            if let Some(said) = motion.judged(true) {
+                return Some(said);
             }
         }
         None

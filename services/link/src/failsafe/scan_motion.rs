@@ -136,19 +136,12 @@ impl ScanMotion {
         if beams < LEAST_BEAMS { f64::NAN } else { sum / beams }
     }
 
-    /// The delay that is best, and by how much.
-    fn likely(&self) -> (f64, f64) {
+    /// The explanation by the delay that is best, if scans are doubted, or surely late.
+    pub(super) fn judged(&self, sure: bool) -> Option<String> {
         let better = DELAYS_S.into_iter().zip(self.better);
-        better.max_by(|(_, one), (_, other)| one.total_cmp(other)).unwrap_or_default()
-    }
-
-    pub(super) fn is_implausible(&self, sure: bool) -> bool {
-        self.likely().1 > BETTER[usize::from(sure)]
-    }
-
-    pub(super) fn explain(&self) -> Option<String> {
+        let (likely_s, better) = better.max_by(|(_, one), (_, other)| one.total_cmp(other))?;
         let name = &self.sensor.name;
-        Some(match self.likely().0 {
+        (better > BETTER[usize::from(sure)]).then(|| match likely_s {
             f64::INFINITY => format!(
                 "the scans of {name} do not change although the wheels turn: check the laser, and whether the wheels slip, then `firsthand stop` and `resume`"
             ),
@@ -200,7 +193,7 @@ mod tests {
             let beams = scans[seen(tick)].clone();
             motion.take(&LaserScan { row, beams, ..LaserScan::default() }, at_s);
         }
-        motion.explain().filter(|_| motion.is_implausible(true))
+        motion.judged(true)
     }
 
     #[test]
