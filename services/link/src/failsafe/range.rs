@@ -331,7 +331,7 @@ impl Monitor for Range {
         least.map_or(Condition::Holds, Condition::OverFor)
     }
 
-    fn explain(&self, cause: Cause, now: Moment) -> Option<String> {
+    fn explain(&self, cause: Cause, _: Moment) -> Option<String> {
         let sure = cause == Cause::RangeImplausible;
         let doubted =
             |row: &Row| Some((row.implausible[usize::from(sure)]?.time, row.words.clone()));
