@@ -42,6 +42,7 @@ mod tests {
     fn a_target_is_taken_once_and_in_its_tick_but_by_a_stage_that_has_none_at_once() {
         let sample =
             |number, since_tick| TargetSample { number, since_tick, ..TargetSample::default() };
+        assert!(takes(&mut None, &sample(0, 0), 3), "the start, where a robot waits");
         let mut taken = None;
         let mut takes = |sample, tick| takes(&mut taken, &sample, tick);
         assert!(takes(sample(2, 9), 3), "none before");

@@ -46,10 +46,10 @@ fn lockers(locks: &str, inode: u64) -> Vec<u32> {
 /// is [`io::ErrorKind::NotFound`].
 pub fn signal(pid: u32, file: &File, signal: Signal) -> io::Result<()> {
     let gone = || io::Error::from(io::ErrorKind::NotFound);
+    let gone_or = |error: Errno| if error == Errno::SRCH { gone() } else { error.into() };
     let number = i32::try_from(pid).ok().and_then(Pid::from_raw);
     // The descriptor refers to this process even if the process ends and its number is used again.
-    let process = pidfd_open(number.ok_or_else(gone)?, PidfdFlags::empty())
-        .map_err(|error| if error == Errno::SRCH { gone() } else { error.into() })?;
+    let process = pidfd_open(number.ok_or_else(gone)?, PidfdFlags::empty()).map_err(gone_or)?;
     let file = file.metadata()?;
     let opened = fs::read_dir(format!("/proc/{pid}/fd"))?.flatten();
     let ours = opened
@@ -58,8 +58,7 @@ pub fn signal(pid: u32, file: &File, signal: Signal) -> io::Result<()> {
     if !ours {
         return Err(gone());
     }
-    pidfd_send_signal(&process, signal)
-        .map_err(|error| if error == Errno::SRCH { gone() } else { error.into() })
+    pidfd_send_signal(&process, signal).map_err(gone_or)
 }
 
 #[cfg(test)]

@@ -34,9 +34,8 @@ pub fn known_stage(stage: &str) -> Result<&'static Stage, Refused> {
     stages::find(stage).ok_or_else(|| Refused::new("unknown-stage", stages::unknown(stage)))
 }
 
-/// Sends a signal to the process of this name that holds the lock of its robot, and to no other. The roster comes five times a
-/// second: a process that it still names after its end is not meant, but its successor,
-/// which is waited for.
+/// Sends a signal to the process of this name that holds the lock of its robot, and to no other. The roster comes five times a second:
+/// where it still names a process that has ended, the successor is waited for.
 pub fn send(robot: &RobotName, stage: &str, signal: Signal) -> Result<(), Failure> {
     let domain = Domain::of(robot.clone());
     // A frozen supervisor publishes nothing.

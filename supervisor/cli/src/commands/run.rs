@@ -1,7 +1,11 @@
 pub(crate) mod recorder;
 mod summary_file;
 
-use std::{fs, path::PathBuf, process::ExitCode};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
 
 use clap::Args;
 use common::{
@@ -372,7 +376,7 @@ fn exit_code(summary: &Summary, ending: &Ending) -> ExitCode {
     })
 }
 
-fn print_removed(directory: &std::path::Path) -> Result<(), String> {
+fn print_removed(directory: &Path) -> Result<(), String> {
     let text = format!(
         "the robot did not drive, so {} is removed; --out DIR keeps it\n",
         directory.display()

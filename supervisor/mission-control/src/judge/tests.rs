@@ -93,7 +93,7 @@ fn every_rule_of_the_judgement_decides_its_row() {
         ("a real robot that is to start may not be away", Snapshot { may_be_away: true, link: None, ..starting() }, late,
          Some((Outcome::Aborted, "no robot answers at udp://10.0.0.1:10001"))),
         ("a robot that answers and does not start", starting(), late, Some((Outcome::Aborted, "every sensor of its mission"))),
-        ("a robot that once was ready is not looked for", Snapshot { link: None, ..driving() }, late,
+        ("a robot that has begun a tick is not looked for", Snapshot { link: None, ..driving() }, late,
          Some((Outcome::Aborted, "stages' logs"))),
         ("an operator may wait", Snapshot { reason: HoldReason::Operator, ..driving() }, late, None),
         ("a held stage in ticks", held(), late, Some((Outcome::Aborted, "mapper died again and again"))),
