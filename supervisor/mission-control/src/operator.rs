@@ -18,8 +18,8 @@ use common::{
     roster::{self, Roster},
     run::Run,
     samples::{
-        Action, Cause, HoldReason, LinkSample, MOST_TARGETS, RequestAnswer, RequestKind,
-        RequestSample, Rest, RosterEntry, RosterHeader, TargetPoint, name,
+        Action, Cause, LinkSample, MOST_TARGETS, RequestAnswer, RequestKind, RequestSample, Rest,
+        RosterEntry, RosterHeader, TargetPoint, name,
     },
     start::StageError,
     stop_socket::{self, Answer, Request, StopMark},
@@ -304,21 +304,27 @@ fn ask(robot: &RobotName, request: RequestSample) -> Result<(), OperatorError> {
     // The roster is opened first, so that the answer is not missed.
     let mut roster = Roster::open(&bus)?;
     let mut requests = bus.writer(&topics::REQUESTS, 1)?;
-    // A supervisor that starts is waited for, and for targets until its robot may be sent to them.
-    let goes = [RequestKind::Goto, RequestKind::Append].map(u8::from).contains(&request.kind);
-    let is_up = |header: &RosterHeader, _: &[RosterEntry]| {
-        let starts = HoldReason::from_byte(header.reason) == HoldReason::Starting;
-        (!goes || !starts).then_some(())
-    };
-    roster.find(PATIENCE, is_up)?;
-    let id = new_id();
-    requests.publish(0, MissionTime::default(), RequestSample { id, ..request })?;
-    let answer = find(&mut roster, robot, |header, _| {
-        (header.last_request == id).then(|| RequestAnswer::from_byte(header.answer))
-    })?;
-    match answer {
-        RequestAnswer::Taken => Ok(()),
-        answer => Err(refused(robot, answer)),
+    let goes =
+        matches!(RequestKind::from_byte(request.kind), RequestKind::Goto | RequestKind::Append);
+    if goes {
+        // A supervisor that starts does not read yet. A hand's requests come too often to wait for a roster each time.
+        roster.find(PATIENCE, |_, _| Some(()))?;
+    }
+    let began = Instant::now();
+    loop {
+        let id = new_id();
+        requests.publish(0, MissionTime::default(), RequestSample { id, ..request })?;
+        let answer = find(&mut roster, robot, |header, _| {
+            (header.last_request == id).then(|| RequestAnswer::from_byte(header.answer))
+        })?;
+        match answer {
+            RequestAnswer::Taken => return Ok(()),
+            // So answers a run that starts, or one whose supervisor missed a part of the map and waits for the next whole one.
+            RequestAnswer::NotRunning if goes && began.elapsed() < PATIENCE => {
+                roster.find(PATIENCE, |_, _| Some(()))?;
+            }
+            answer => return Err(refused(robot, answer)),
+        }
     }
 }
 
