@@ -237,7 +237,7 @@ pub const TABLE: &[Rule] = &[
     },
     Rule {
         cause: Cause::RangeImplausible,
-        when: "the front sonar says the same within 1 cm to either side while the robot drives 0.4 m or turns by 90 degrees, another sensor while it turns by 90 degrees on the spot, or within 7 cm for 1.8 times as much; two of three readings do not follow from those before; scans, or readings of infrared rangers, change as if they were 0.3 s late or more, scans also as if the robot stood; or the front sonar hears nothing more than 4 times in a row of a surface nearer than 0.45 m that the two infrared rangers beside it see within 12 degrees of square; or no sensor reads anything while readings at the end of the infrared rangers' scale are due; `link.log` names the sensor",
+        when: "the front sonar says the same within 1 cm to either side while the robot drives 0.4 m or turns by 90 degrees, another sensor while it turns by 90 degrees on the spot, or within 7 cm for 1.8 times as much; two of three readings do not follow from those before; scans, or readings of sonars and infrared rangers, change as if they were 0.3 s late or more, scans also as if the robot stood; or the front sonar hears nothing more than 4 times in a row of a surface nearer than 0.45 m that the two infrared rangers beside it see within 12 degrees of square; or no sensor reads anything while readings at the end of the infrared rangers' scale are due; `link.log` names the sensor",
         action: Action::Stop,
         clears: Clears::OnResume { or_after: Some(range::CHANGES) },
         known_within_s: Some(range::known_within_s),
