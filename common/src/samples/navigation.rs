@@ -48,6 +48,13 @@ impl PoseSample {
         Pose2 { position: DVec2::new(self.x_m, self.y_m), heading: self.heading_rad }
     }
 
+    /// The pose in the odometry frame, which no correction moves.
+    pub fn odometry(&self) -> Pose2 {
+        let ([x, y, turn], Pose2 { position, heading }) = (self.map_from_odom, self.pose());
+        let position = DVec2::from_angle(-turn).rotate(position - DVec2::new(x, y));
+        Pose2 { position, heading: heading - turn }
+    }
+
     /// The 6x6 covariance of ROS messages, by rows: x, y, z and the rotations about them; only x, y and the last are estimated.
     pub fn covariance_6x6(&self) -> [f64; 36] {
         let [xx, xy, xt, yy, yt, tt] = self.covariance;
@@ -105,6 +112,24 @@ structs! {
 /// The most infrared rays in a `grid` sample: 32 ticks.
 pub const CLEAR_RAYS: usize = 32 * INFRARED_RANGERS;
 
+/// The most movers in a `grid` sample.
+pub const MOVERS: usize = 32;
+
+structs! {
+    /// A thing that moves, as a disc, at the time of the tick; in the mission's frame.
+    #[derive(Serialize, Deserialize)]
+    "firsthand.Mover" Mover {
+        x_m: f32,
+        y_m: f32,
+        vx_m_s: f32,
+        vy_m_s: f32,
+        radius_m: f32,
+        /// Deviations of the place, and of the velocity, along any axis.
+        doubt_m: f32,
+        doubt_m_s: f32,
+    }
+}
+
 payloads! {
     /// The slice is one [`crate::grid::CellState`] byte a cell of the window.
     "firsthand.GridHeader" GridHeader {
@@ -121,6 +146,10 @@ payloads! {
         clear_ray_count: u64,
         /// The newest infrared readings, oldest first: nothing stands on the ray nearer than `clear_m`, at any angle.
         clear_rays: [ClearBeam; CLEAR_RAYS],
+        /// 0 without a laser.
+        mover_count: u64,
+        /// Things that move, also out of sight for a while.
+        movers: [Mover; MOVERS],
     }
 }
 
@@ -132,17 +161,21 @@ impl GridHeader {
     pub fn clear_rays(&self) -> &[ClearBeam] {
         counted(&self.clear_rays, self.clear_ray_count)
     }
+
+    pub fn movers(&self) -> &[Mover] {
+        counted(&self.movers, self.mover_count)
+    }
 }
 
-/// The first `count` of `beams`; the count comes from shared memory and may be any number.
-fn counted(beams: &[ClearBeam], count: u64) -> &[ClearBeam] {
-    let count = usize::try_from(count).unwrap_or(beams.len());
-    &beams[..count.min(beams.len())]
+/// The first `count` of `all`; the count comes from shared memory and may be any number.
+fn counted<T>(all: &[T], count: u64) -> &[T] {
+    let count = usize::try_from(count).unwrap_or(all.len());
+    &all[..count.min(all.len())]
 }
 
 wire_enum! {
     GuidanceStatus, unknown = Waiting {
-        /// No field yet.
+        /// No field yet, or something that moves must pass first: the robot stands.
         Waiting = 0,
         Along = 1,
         /// Arrived beside the target, which is not free itself: no free place is nearer.

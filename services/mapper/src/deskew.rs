@@ -7,7 +7,7 @@
 //! own time. A scan from the pose in the middle of the sweep is interpolated from these ends, so that matcher and evidence grid, which
 //! look beams up by their bearing, need not know of it.
 
-use std::{collections::VecDeque, f64::consts::TAU, time::Duration};
+use std::{collections::VecDeque, time::Duration};
 
 use common::{geometry::wrap_angle, kinematics::Pose2, samples::PoseSample};
 use glam::DVec2;
@@ -41,10 +41,7 @@ impl Poses {
         if self.held.back().is_some_and(|(newest_ns, _)| *newest_ns >= ns) {
             return;
         }
-        let [x, y, turn] = pose.map_from_odom;
-        let Pose2 { position, heading } = pose.pose();
-        let position = DVec2::from_angle(-turn).rotate(position - DVec2::new(x, y));
-        let robot = Pose2 { position, heading: heading - turn };
+        let robot = pose.odometry();
         if self.held.is_empty() && (pose.v_m_s, pose.omega_rad_s) == (0.0, 0.0) {
             self.stood_at = Some((ns, robot));
         }
@@ -138,7 +135,7 @@ fn at_once<'a>(fan: &Fan<'_>, seen_from: impl Fn(usize) -> Option<Fan<'a>>) -> O
     };
     let ends: Option<Vec<_>> = fan.beams.iter().enumerate().map(end).collect();
     let mut ends = ends?;
-    let is_circle = (count as f64 * fan.step_rad - TAU).abs() < 0.5 * fan.step_rad;
+    let is_circle = fan.is_circle();
     if is_circle {
         ends.extend(ends.first().map(|(place, range)| (place + count as f64, *range)));
     }

@@ -13,6 +13,7 @@ mod fault;
 mod inflation;
 mod infrared_model;
 mod laser_model;
+mod movers;
 mod reading;
 mod scan_match;
 pub mod shell;

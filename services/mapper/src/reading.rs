@@ -1,6 +1,6 @@
 //! Readings in the mission's frame, by the mission's rows of sensors.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 use common::{
     kinematics::Pose2,
@@ -189,6 +189,24 @@ impl Fan<'_> {
         let first = DVec2::from_angle(self.first_rad);
         let along = std::iter::successors(Some(first), move |along| Some(step.rotate(*along)));
         along.zip(self.beams.iter().map(|range| f64::from(*range)))
+    }
+
+    /// None for a beam without an end.
+    pub(crate) fn ends(&self) -> impl Iterator<Item = Option<DVec2>> + '_ {
+        self.iter().map(|(along, range)| {
+            (range >= 0.0 && range <= self.reach_m).then(|| self.origin + range * along)
+        })
+    }
+
+    /// Of the range to `end`, metres.
+    pub(crate) fn deviation_m(&self, end: DVec2) -> f64 {
+        let (least_m, share) = self.noise;
+        least_m + share * end.distance(self.origin)
+    }
+
+    /// The first beam follows the last one.
+    pub(crate) fn is_circle(&self) -> bool {
+        (self.beams.len() as f64 * self.step_rad - TAU).abs() < 0.5 * self.step_rad
     }
 }
 

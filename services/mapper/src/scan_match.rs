@@ -20,6 +20,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     deskew::Placed,
+    movers::Movers,
     reading::{Fan, Rows},
 };
 
@@ -154,19 +155,23 @@ impl ScanMatcher {
     }
 
     /// Match the laser's scan, if it is among `scans`, with the reference, replaced if necessary. None if too little of the reference is
-    /// seen.
+    /// seen. While something moves, only what stands counts.
     pub(crate) fn step(
         &self,
         rows: &Rows,
         reference: &mut Option<Reference>,
         scans: &[Placed],
+        movers: &mut Movers,
     ) -> Option<FixSample> {
         let row = self.row;
-        let Placed { robot: reckoned, capture_ns, beams, .. } =
-            scans.iter().find(|scan| scan.row == row)?;
+        let scan = scans.iter().find(|scan| scan.row == row)?;
+        let (beams, moves_first) = movers.take(rows, scan);
+        let (Placed { robot: reckoned, capture_ns, .. }, beams) = (scan, &beams[..]);
         let robot = reckoned.pose();
         let fan = rows.scan(row, robot, beams)?;
-        let Some(held) = reference else {
+        // What is known to move now may be a part of the reference, too.
+        let held = reference.as_mut().filter(|_| !moves_first);
+        let Some(held) = held else {
             let covariance = covariance_of(reckoned) + variances(OF_REFERENCE);
             *reference = Some(Reference::new(&fan, robot, covariance, Scatter::default()));
             return None;
@@ -207,9 +212,11 @@ impl ScanMatcher {
                 ..FixSample::default()
             }
         });
+        let is_empty = held.lines.iter().flatten().count() < LEAST_POINTS;
         let went = pose.position.distance(held.pose.position);
         let turned = (pose.heading - held.pose.heading).abs();
-        if went > REPLACED_AFTER.0 || turned > REPLACED_AFTER.1 || share < LEAST_SHARE {
+        let is_left = went > REPLACED_AFTER.0 || turned > REPLACED_AFTER.1;
+        if is_left || share < LEAST_SHARE || is_empty {
             let covariance = match found {
                 Some(_) => of_reference + matched * scatter.scale_of_reference(),
                 None => covariance_of(reckoned),
@@ -224,7 +231,7 @@ impl ScanMatcher {
 
 impl Reference {
     fn new(fan: &Fan<'_>, pose: Pose2, covariance: DMat3, scatter: Scatter) -> Self {
-        let points = points_of(fan);
+        let points = fan.ends().collect::<Vec<_>>();
         let lines = (0..points.len()).map(|beam| Line::through(&points, fan, beam)).collect();
         Self { pose, beams: fan.beams.to_vec(), covariance, lines, scatter }
     }
@@ -244,7 +251,7 @@ impl Reference {
         seen_from: &Fan<'_>,
         start: Pose2,
     ) -> Option<(Pose2, DMat3, f64)> {
-        let ends = points_of(fan);
+        let ends = fan.ends().collect::<Vec<_>>();
         let seen: Vec<_> = (0..ends.len()).filter(|beam| ends[*beam].is_some()).collect();
         let every = seen.len().div_ceil(POINTS).max(1);
         let back = DVec2::from_angle(-start.heading);
@@ -252,7 +259,7 @@ impl Reference {
         let point = |beam: &usize| {
             let line = Line::through(&ends, fan, *beam).map(|line| line.point);
             let point = line.or(ends[*beam])?;
-            Some((back.rotate(point - start.position), deviation_m(fan, point)))
+            Some((back.rotate(point - start.position), fan.deviation_m(point)))
         };
         let points: Vec<_> = seen.iter().step_by(every).filter_map(point).collect();
         // The points of lines have errors, too, but all of them share in lines.
@@ -319,7 +326,7 @@ impl Line {
     fn through(points: &[Option<DVec2>], fan: &Fan<'_>, beam: usize) -> Option<Self> {
         let point = points[beam]?;
         let spacing = point.distance(fan.origin) * fan.step_rad;
-        let half_m = LINE_M.max(LINE * deviation_m(fan, point));
+        let half_m = LINE_M.max(LINE * fan.deviation_m(point));
         let beside = ((half_m / spacing.max(1e-6)).ceil() as usize).clamp(1, 40);
         let around = points.get(beam.checked_sub(beside)?..=beam + beside)?;
         let edge_m = EDGE_M.max(2.0 * half_m);
@@ -347,23 +354,9 @@ fn covariance_of(pose: &PoseSample) -> DMat3 {
     DMat3::from_cols(DVec3::new(xx, xy, xt), DVec3::new(xy, yy, yt), DVec3::new(xt, yt, tt))
 }
 
-/// Of the range to `end`, metres.
-fn deviation_m(fan: &Fan<'_>, end: DVec2) -> f64 {
-    let (least_m, share) = fan.noise;
-    least_m + share * end.distance(fan.origin)
-}
-
 /// Deviations of the place, metres, and of the heading, radians.
 fn variances([place, heading]: [f64; 2]) -> DMat3 {
     DMat3::from_diagonal(DVec3::new(place, place, heading).map(|deviation| deviation * deviation))
-}
-
-/// None for a beam without an end.
-fn points_of(fan: &Fan<'_>) -> Vec<Option<DVec2>> {
-    let ends = |(along, range): (DVec2, f64)| {
-        (range >= 0.0 && range <= fan.reach_m).then(|| fan.origin + range * along)
-    };
-    fan.iter().map(ends).collect()
 }
 
 #[cfg(test)]
@@ -387,7 +380,7 @@ mod tests {
             let reckoned = PoseSample { x_m, y_m, heading_rad: heading, ..PoseSample::default() };
             let beams = beams.to_vec();
             let scan = Placed { row: 0, robot: reckoned, capture_ns: 0, beams };
-            self.0.step(&self.1, reference, &[scan])
+            self.0.step(&self.1, reference, &[scan], &mut Movers::default())
         }
     }
 

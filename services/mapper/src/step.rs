@@ -20,6 +20,7 @@ use crate::{
     deskew::{Placed, Poses},
     evidential::{EvidenceMap, Evidential},
     fault,
+    movers::Movers,
     reading::{Rows, Touch},
     scan_match::{Reference, ScanMatcher},
     sonar_model::MOST,
@@ -163,6 +164,7 @@ pub struct Mapper {
     footprint: f64,
     half_track: f64,
     matcher: ScanMatcher,
+    movers: Movers,
     poses: Poses,
     fix: Option<FixSample>,
     /// Of all lasers.
@@ -195,6 +197,7 @@ impl Mapper {
             footprint: mission.body().radius_m,
             half_track: mission.body().track_m / 2.0,
             matcher: ScanMatcher::new(mission),
+            movers: Movers::default(),
             poses: Poses::default(),
             fix: None,
             beams: mission.lasers().iter().map(|(_, laser)| laser.beams).sum(),
@@ -301,6 +304,7 @@ impl Mapper {
             epoch: self.belief.epoch,
             ..GridHeader::default()
         };
+        self.movers.fill(&mut header);
         if let Sensed::Evidence(map) = &self.belief.sensed {
             map.beams.fill(&mut header);
         }
@@ -388,7 +392,9 @@ impl Mapper {
                 scan => self.poses.scan_at_once(&self.rows, &pose, scan),
             };
             let scans: Vec<_> = scans.into_iter().filter_map(placed).collect();
-            let fix = self.matcher.step(&self.rows, &mut self.belief.reference, &scans);
+            let (reference, movers) = (&mut self.belief.reference, &mut self.movers);
+            let fix = self.matcher.step(&self.rows, reference, &scans, movers);
+            self.movers.place(&pose);
             let fix = fix.filter(|_| self.matcher.publishes(pose.stamp.tick));
             let source = name("scan");
             self.fix = fix.map(|fix| FixSample { source, ..fix });

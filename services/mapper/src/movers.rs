@@ -1,0 +1,433 @@
+//! What moves, by a laser, and what stands.
+//!
+//! Runs of beams without a gap are things, and their middles are followed from scan to scan, in the frame of odometry, which no fix moves.
+//! A thing is a mover once its way is beyond the doubt of its middles, and it was seen whole where an earlier scan saw through, or not as
+//! far. The middle of a thing that is partly hidden slides along it, so its doubt is half the width. Only what is nearest to each other
+//! belongs together; otherwise tracks would change from post to post.
+//!
+//! While something moves, a beam stands if an earlier scan, by the time that movers need to go away, saw something at its end, too.
+
+use std::{collections::VecDeque, f64::consts::FRAC_PI_4};
+
+use common::{
+    geometry::wrap_angle,
+    kinematics::Pose2,
+    samples::{GridHeader, Mover, PoseSample},
+};
+use glam::DVec2;
+
+use crate::{
+    deskew::Placed,
+    reading::{Fan, Rows},
+};
+
+/// Scans nearer in time than the first of these are not followed, seconds. One is compared with those that are older by the next ones, to
+/// see what moves and what stands, and held for the last.
+const APART_S: f64 = 0.09;
+const CAME_S: f64 = 0.4;
+const STANDS_S: f64 = 1.5;
+const KEPT_S: f64 = 2.0;
+/// Things may move for so long after the last mover was seen, seconds.
+const MOVES_FOR_S: f64 = 10.0;
+/// The surface is another one if its range differs by so much: metres, and deviations of a reading.
+const OTHER_M: f64 = 0.12;
+const OTHER: f64 = 3.0;
+/// A thing of fewer beams may be any of several posts.
+const LEAST_BEAMS: usize = 4;
+/// One in so many of a thing's beams ends where it came.
+const OF_BEAMS: usize = 6;
+/// Neighbouring ends on a thing are nearer than this: metres, and distances of neighbouring beams.
+const GAP_M: f64 = 0.3;
+const GAP: f64 = 3.0;
+/// Wider things are not followed, metres.
+const WIDEST_M: f64 = 1.6;
+/// Nothing is expected to be faster, m/s; and the way between two middles of a thing that stands, metres.
+const FASTEST_M_S: f64 = 2.5;
+const NEAR_M: f64 = 0.15;
+/// A thing is known by its newest places, and forgotten after so many seconds out of sight.
+const PLACES: usize = 8;
+const LEAST_PLACES: usize = 4;
+const FORGOTTEN_S: f64 = 1.0;
+/// A mover is at least so fast: m/s, and deviations of its velocity. It came in this share of its places.
+const LEAST_M_S: f64 = 0.25;
+const SURE: f64 = 3.0;
+const CAME_SHARE: f64 = 0.3;
+/// The deviation of a middle that is seen whole, metres: its surface is not known.
+const MIDDLE_M: f64 = 0.03;
+/// So much of a radius that was seen is left in the next scan, which may see a part of it.
+const RADIUS_LEFT: f64 = 0.9;
+
+#[derive(Clone, Copy, Debug)]
+struct Thing {
+    at_s: f64,
+    /// The laser's place.
+    origin: DVec2,
+    /// Of the ends on it.
+    middle: DVec2,
+    half_width_m: f64,
+    doubt_m: f64,
+    came: bool,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Track {
+    /// Oldest first.
+    places: VecDeque<Thing>,
+    radius_m: f64,
+    /// From the laser, a unit vector.
+    along: DVec2,
+    /// None for a thing that may stand.
+    motion: Option<Motion>,
+}
+
+/// At the time of the newest place.
+#[derive(Clone, Copy, Debug)]
+struct Motion {
+    middle: DVec2,
+    velocity: DVec2,
+    doubt_m: f64,
+    doubt_m_s: f64,
+}
+
+/// It is not saved: the next process knows what moves within a second.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Movers {
+    /// Oldest first: times, the robot by odometry, beams.
+    scans: VecDeque<(f64, Pose2, Vec<f32>)>,
+    tracks: Vec<Track>,
+    /// The time at which a mover was seen last.
+    seen_s: Option<f64>,
+    placed: Vec<Mover>,
+}
+
+impl Movers {
+    /// Follow what the scan shows. Returns its beams, of which those that may not stand have no reading, and whether the first mover is
+    /// seen.
+    pub(crate) fn take(&mut self, rows: &Rows, scan: &Placed) -> (Vec<f32>, bool) {
+        let (at_s, robot) = (scan.capture_ns as f64 * 1e-9, scan.robot.odometry());
+        let Some(fan) = rows.scan(scan.row, robot, &scan.beams) else {
+            return (scan.beams.clone(), false);
+        };
+        let scans = std::mem::take(&mut self.scans);
+        let older = |by_s: f64| {
+            let older = scans.iter().rev().find(|(then, ..)| at_s - then >= by_s);
+            older.and_then(|(_, robot, beams)| rows.scan(scan.row, *robot, beams))
+        };
+        let moved = self.moves(at_s);
+        let is_next = scans.back().is_none_or(|(newest, ..)| at_s - newest >= APART_S);
+        if is_next {
+            self.follow(things(&fan, older(CAME_S).as_ref(), at_s));
+        }
+        let moves = self.moves(at_s);
+        let mut beams = scan.beams.clone();
+        if moves {
+            let before = older(STANDS_S);
+            let stands =
+                |end: DVec2| before.is_some_and(|before| Difference::of(&before, end).has_same());
+            for (beam, end) in beams.iter_mut().zip(fan.ends()) {
+                *beam = if end.is_some_and(stands) { *beam } else { f32::NAN };
+            }
+        }
+        self.scans = scans;
+        if is_next {
+            self.scans.retain(|(then, ..)| at_s - then <= KEPT_S);
+            self.scans.push_back((at_s, robot, scan.beams.clone()));
+        }
+        (beams, moves && !moved)
+    }
+
+    fn moves(&self, at_s: f64) -> bool {
+        self.seen_s.is_some_and(|seen_s| at_s - seen_s <= MOVES_FOR_S)
+    }
+
+    fn follow(&mut self, things: Vec<Thing>) {
+        let Some(at_s) = things.first().map(|thing| thing.at_s) else { return };
+        self.tracks.retain(|track| track.age_s(at_s) <= FORGOTTEN_S);
+        let off_m = |track: &Track, thing: &Thing| track.at(at_s).distance(thing.middle);
+        let track_of = |thing: &Thing| {
+            let off = |it: &usize| off_m(&self.tracks[*it], thing);
+            let nearest = |one: &usize, other: &usize| off(one).total_cmp(&off(other));
+            let track = (0..self.tracks.len()).min_by(nearest)?;
+            let least_m = off(&track);
+            let has_nearer = |other: &Thing| off_m(&self.tracks[track], other) < least_m;
+            let is_its = least_m <= self.tracks[track].most_off_m(at_s);
+            (is_its && !things.iter().any(has_nearer)).then_some(track)
+        };
+        let tracks: Vec<_> = things.iter().map(track_of).collect();
+        for (thing, track) in things.into_iter().zip(tracks) {
+            let track = track.unwrap_or_else(|| {
+                self.tracks.push(Track::default());
+                self.tracks.len() - 1
+            });
+            self.tracks[track].see(thing);
+        }
+        if self.tracks.iter().any(|track| track.motion.is_some()) {
+            self.seen_s = Some(at_s);
+        }
+    }
+
+    /// Foresee where the movers are at the time of `pose`.
+    pub(crate) fn place(&mut self, pose: &PoseSample) {
+        let [x, y, turn] = pose.map_from_odom;
+        let (at_s, turned) = (pose.stamp.time().seconds(), DVec2::from_angle(turn));
+        let mover = |track: &Track| {
+            let motion = track.motion.filter(|_| track.age_s(at_s) <= FORGOTTEN_S);
+            let Motion { velocity, doubt_m, doubt_m_s, .. } = motion?;
+            // The ends on a disc lie before its middle, by so much on average.
+            let middle = track.at(at_s) + FRAC_PI_4 * track.radius_m * track.along;
+            let (at, velocity) = (turned.rotate(middle), turned.rotate(velocity));
+            Some(Mover {
+                x_m: (at.x + x) as f32,
+                y_m: (at.y + y) as f32,
+                vx_m_s: velocity.x as f32,
+                vy_m_s: velocity.y as f32,
+                radius_m: track.radius_m as f32,
+                doubt_m: doubt_m as f32,
+                doubt_m_s: doubt_m_s as f32,
+            })
+        };
+        self.placed = self.tracks.iter().filter_map(mover).collect();
+    }
+
+    pub(crate) fn fill(&self, header: &mut GridHeader) {
+        for (mover, placed) in header.movers.iter_mut().zip(&self.placed) {
+            *mover = *placed;
+            header.mover_count += 1;
+        }
+    }
+}
+
+impl Track {
+    fn age_s(&self, at_s: f64) -> f64 {
+        self.places.back().map_or(0.0, |newest| at_s - newest.at_s)
+    }
+
+    /// The middle, foreseen.
+    fn at(&self, at_s: f64) -> DVec2 {
+        match (self.motion, self.places.back()) {
+            (Some(motion), _) => motion.middle + self.age_s(at_s) * motion.velocity,
+            (None, newest) => newest.map_or(DVec2::ZERO, |newest| newest.middle),
+        }
+    }
+
+    fn most_off_m(&self, at_s: f64) -> f64 {
+        let most_m_s = self.motion.map_or(FASTEST_M_S, |motion| SURE * motion.doubt_m_s);
+        NEAR_M + most_m_s * self.age_s(at_s)
+    }
+
+    fn see(&mut self, thing: Thing) {
+        if self.places.len() == PLACES {
+            self.places.pop_front();
+        }
+        self.places.push_back(thing);
+        self.radius_m = thing.half_width_m.max(RADIUS_LEFT * self.radius_m);
+        self.along = (thing.middle - thing.origin).normalize_or_zero();
+        self.motion = self.fit(&thing);
+    }
+
+    /// The straight way through the places, by least squares; none if a thing that stands may look like it.
+    fn fit(&self, newest: &Thing) -> Option<Motion> {
+        let (count, first) = (self.places.len() as f64, self.places.front()?);
+        let mean = |of: &dyn Fn(&Thing) -> f64| self.places.iter().map(of).sum::<f64>() / count;
+        let mean_s = mean(&|it| it.at_s);
+        let spread = count * mean(&|it| (it.at_s - mean_s).powi(2));
+        let line = |of: fn(&Thing) -> DVec2| {
+            let slope: DVec2 = self.places.iter().map(|it| (it.at_s - mean_s) * of(it)).sum();
+            (self.places.iter().map(of).sum::<DVec2>() / count, slope / spread)
+        };
+        let (middle, velocity) = line(|it| it.middle);
+        let off = |it: &Thing| it.middle - middle - velocity * (it.at_s - mean_s);
+        let rest = mean(&|it| off(it).length_squared());
+        // The fit takes two of the places along each axis.
+        let variance = (0.5 * rest * count / (count - 2.0)).max(mean(&|it| it.doubt_m.powi(2)));
+        let (doubt_m_s, since_s) = ((variance / spread).sqrt(), newest.at_s - mean_s);
+        // What glass throws back comes from where the laser is square to it, and goes along it as the robot does.
+        let aside = self.along.perp();
+        let glint = aside * aside.dot(line(|it| it.origin).1);
+        let way_m = velocity.length() * (newest.at_s - first.at_s);
+        let moves = self.places.len() >= LEAST_PLACES
+            && mean(&|it| f64::from(u8::from(it.came))) >= CAME_SHARE
+            && velocity.length() > LEAST_M_S.max(SURE * doubt_m_s)
+            && way_m > first.doubt_m + newest.doubt_m
+            && velocity.distance(glint) > SURE * doubt_m_s;
+        moves.then(|| Motion {
+            middle: middle + velocity * since_s,
+            velocity,
+            doubt_m: (variance / count + (doubt_m_s * since_s).powi(2)).sqrt(),
+            doubt_m_s,
+        })
+    }
+}
+
+/// The things in a scan that are not too wide, compared with an earlier scan.
+fn things(fan: &Fan<'_>, before: Option<&Fan<'_>>, at_s: f64) -> Vec<Thing> {
+    let ends: Vec<_> = fan.ends().collect();
+    let (count, is_circle) = (ends.len(), fan.is_circle());
+    let range = |beam: usize| {
+        ends[beam % count].map_or(f64::INFINITY, |end: DVec2| end.distance(fan.origin))
+    };
+    let joins = |beam: usize| {
+        let spacing_m = fan.step_rad * range(beam).min(range(beam + 1));
+        let pair = ends[beam % count].zip(ends[(beam + 1) % count]);
+        pair.is_some_and(|(one, next)| one.distance(next) <= GAP_M.max(GAP * spacing_m))
+    };
+    // A circle is cut at a gap.
+    let cut = (0..count).find(|beam| is_circle && !joins(*beam)).map_or(0, |beam| beam + 1);
+    let end = cut + count;
+    let (mut things, mut first) = (Vec::new(), cut);
+    while first < end {
+        let last = (first..end - 1).find(|beam| !joins(*beam)).unwrap_or(end - 1);
+        let points: Vec<_> = (first..=last).filter_map(|beam| ends[beam % count]).collect();
+        // An end is the thing's own if the next beam goes on behind it.
+        let is_own = |beam: usize, next: Option<usize>| {
+            next.is_some_and(|it| !fan.beams[it % count].is_nan() && range(it) > range(beam))
+        };
+        let next = (is_circle || last + 1 < count).then_some(last + 1);
+        let former = if is_circle { Some(first + count - 1) } else { first.checked_sub(1) };
+        let hidden = [(first, former), (last, next)].into_iter().filter(|it| !is_own(it.0, it.1));
+        let hidden = hidden.count() as f64;
+        first = last + 1;
+        let [Some(from), Some(to)] = [points.first(), points.last()] else { continue };
+        let (width_m, number) = (from.distance(*to), points.len() as f64);
+        if width_m > WIDEST_M {
+            continue;
+        }
+        let middle = points.iter().sum::<DVec2>() / number;
+        let spacing_m = fan.step_rad * middle.distance(fan.origin);
+        let half_width_m = 0.5 * (width_m + spacing_m);
+        let noise_m = fan.deviation_m(middle) / number.sqrt();
+        let came = before.is_some_and(|before| {
+            let came = points.iter().filter(|it| Difference::of(before, **it).is_other());
+            hidden == 0.0 && points.len() >= LEAST_BEAMS && came.count() * OF_BEAMS >= points.len()
+        });
+        let doubt_m = MIDDLE_M + 0.5 * spacing_m + noise_m + hidden * half_width_m;
+        things.push(Thing { at_s, origin: fan.origin, middle, half_width_m, doubt_m, came });
+    }
+    things
+}
+
+/// How much farther than an end an earlier scan saw there, metres, by three beams; no number for a beam without an end.
+struct Difference {
+    by_beams: [f64; 3],
+    most_m: f64,
+}
+
+impl Difference {
+    fn of(before: &Fan<'_>, end: DVec2) -> Self {
+        let way = end - before.origin;
+        let bearing = wrap_angle(way.to_angle() - before.first_rad);
+        let beam = (bearing.rem_euclid(std::f64::consts::TAU) / before.step_rad).round() as usize;
+        let count = before.beams.len();
+        let by = |beside: usize| {
+            let beam = beam + count + beside - 1;
+            let beam = if before.is_circle() { beam % count } else { beam.wrapping_sub(count) };
+            let range = before.beams.get(beam).map_or(f64::NAN, |range| f64::from(*range));
+            if range <= before.reach_m { range - way.length() } else { f64::NAN }
+        };
+        Self { by_beams: [by(0), by(1), by(2)], most_m: OTHER_M + OTHER * before.deviation_m(end) }
+    }
+
+    fn has_same(&self) -> bool {
+        self.by_beams.iter().any(|by| by.abs() <= self.most_m)
+    }
+
+    /// All saw through the end, or something before it.
+    fn is_other(&self) -> bool {
+        let all = |side: f64| self.by_beams.iter().all(|by| side * by > self.most_m);
+        all(1.0) || all(-1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use common::{bus::Stamp, clock::MissionTime, mission::Mission};
+
+    use super::*;
+
+    const PERIOD_S: f64 = 1.0 / 7.0;
+
+    /// A robot with a laser that drives along x at 0.5 m/s in a room of 10 by 8 metres, among discs: at 0 s, their velocities, radii.
+    struct Room {
+        rows: Rows,
+        movers: Movers,
+        discs: Vec<(DVec2, DVec2, f64)>,
+    }
+
+    impl Room {
+        fn new(discs: &[(DVec2, DVec2, f64)]) -> Self {
+            let text = "target = [3, 0]\nrobot.model = 'kobuki'";
+            let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
+            Self { rows: Rows::new(&mission), movers: Movers::default(), discs: discs.to_vec() }
+        }
+
+        /// The scan of a tick with the discs that it sees, and what is taken of it.
+        fn tick(&mut self, tick: u64) -> (Placed, (Vec<f32>, bool)) {
+            let at_s = PERIOD_S * tick as f64;
+            let time = MissionTime::from_seconds(at_s);
+            let stamp = Stamp { tick, stamp_ns: time.0, ..Stamp::default() };
+            let robot = PoseSample { stamp, x_m: 0.5 * at_s, ..PoseSample::default() };
+            let blank = vec![0.0; 360];
+            let fan = self.rows.scan(0, robot.pose(), &blank).unwrap();
+            let wall = |from: f64, along: f64, half: f64| (half * along.signum() - from) / along;
+            let beams = fan.iter().map(|(along, _)| {
+                let discs = self.discs.iter().filter_map(|(start, velocity, radius)| {
+                    let way = *start + *velocity * at_s - fan.origin;
+                    let (near, aside) = (way.dot(along), way.perp_dot(along));
+                    let ends = near > 0.0 && aside.abs() < *radius;
+                    ends.then(|| near - (radius * radius - aside * aside).sqrt())
+                });
+                let walls = wall(fan.origin.x, along.x, 5.0).min(wall(fan.origin.y, along.y, 4.0));
+                discs.fold(walls, f64::min) as f32
+            });
+            let scan = Placed { row: 0, robot, capture_ns: time.0, beams: beams.collect() };
+            let taken = self.movers.take(&self.rows, &scan);
+            self.movers.place(&robot);
+            (scan, taken)
+        }
+    }
+
+    #[test]
+    fn what_moves_is_known_within_a_second_with_its_velocity_and_posts_that_the_robot_passes_stand()
+    {
+        let posts = [1.0, 1.5, 2.0].map(|x| (DVec2::new(x, 1.0), DVec2::ZERO, 0.05));
+        let velocity = DVec2::new(-0.8, -0.3);
+        let walker = (DVec2::new(3.5, -1.0), velocity, 0.25);
+        let mut room = Room::new(&posts);
+        for tick in 0..30 {
+            room.tick(tick);
+            assert!(room.movers.placed.is_empty(), "{tick}: {:?}", room.movers.placed);
+        }
+        let mut room = Room::new(&[&posts[..], &[walker]].concat());
+        (0..=7).for_each(|tick| drop(room.tick(tick)));
+        let [mover] = room.movers.placed[..] else { panic!("{:?}", room.movers.placed) };
+        let there = walker.0 + velocity * 7.0 * PERIOD_S;
+        let off_m = there.distance(DVec2::new(mover.x_m.into(), mover.y_m.into()));
+        let off_m_s = velocity.distance(DVec2::new(mover.vx_m_s.into(), mover.vy_m_s.into()));
+        assert!(off_m < 0.1 && off_m_s < 0.15, "{mover:?} {off_m} {off_m_s}");
+    }
+
+    #[test]
+    fn only_beams_that_end_on_what_stands_are_matched_while_something_moves() {
+        let walker = (DVec2::new(3.5, -1.0), DVec2::new(-0.8, -0.3), 0.25);
+        let mut room = Room::new(&[walker]);
+        let first = (0..16).find(|tick| {
+            let (scan, (beams, moves_first)) = room.tick(*tick);
+            assert_eq!(!moves_first, beams == scan.beams, "{tick}: all is matched before");
+            moves_first
+        });
+        let (scan, (beams, moves_first)) = room.tick(first.unwrap() + 8);
+        assert!(!moves_first, "the reference is dropped once");
+        let fan = room.rows.scan(0, scan.robot.pose(), &scan.beams).unwrap();
+        let at_s = scan.capture_ns as f64 * 1e-9;
+        let (mut on_walker, mut on_walls) = ([0, 0], [0, 0]);
+        for (end, beam) in fan.ends().zip(&beams) {
+            let off_m = end.unwrap().distance(walker.0 + walker.1 * at_s);
+            let counts = if off_m < 0.3 { &mut on_walker } else { &mut on_walls };
+            counts[usize::from(beam.is_nan())] += 1;
+        }
+        assert!(on_walker[0] == 0 && on_walker[1] > 3, "{on_walker:?}");
+        assert!(on_walls[0] > 10 * on_walls[1], "{on_walls:?}");
+    }
+}
