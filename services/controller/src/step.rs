@@ -26,9 +26,6 @@ const TURN_GAIN: f64 = 3.0;
 /// Farther away a robot has not arrived beside its target, whatever the planner says, metres.
 const MOST_OFF_TARGET_M: f64 = 0.5;
 
-/// Whatever the planner says.
-const MOST_BACK_M_S: f64 = 0.2;
-
 const FACES_WITHIN_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
 
 /// (14), with the heading in place of the measured velocity, which has no direction at rest, where every mission starts.
@@ -266,11 +263,11 @@ impl Controller {
                 let v = self.tangential(alignment, omega, distance);
                 Some(Twist { v, omega })
             }
-            // Back, straight: a body that is no disc may not be able to turn here.
+            // Back, straight: a body that is no disc may not be able to turn here, and something that comes leaves no time for it.
             (GuidanceStatus::Along | GuidanceStatus::WayOut, SpeedLaw::Evidential)
-                if limit < 0.0 && self.mission.outline().is_some() =>
+                if limit < 0.0 =>
             {
-                Some(Twist { v: limit.max(-MOST_BACK_M_S), omega: 0.0 })
+                Some(Twist { v: limit.max(-self.speed), omega: 0.0 })
             }
             (GuidanceStatus::Along | GuidanceStatus::WayOut, SpeedLaw::Evidential) => {
                 let v = self.cautious(alignment, distance, limit);

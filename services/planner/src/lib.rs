@@ -6,6 +6,7 @@ mod aim;
 mod arcs;
 mod background;
 mod background_solver;
+mod evasion;
 mod fault;
 mod field_publisher;
 mod near_echoes;

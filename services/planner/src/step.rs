@@ -22,6 +22,7 @@ use harmonic::{Cancellation, Cell, Domain, Screening, Settings, SolveError, Solv
 use crate::active_sensing::{ActiveSensing, Advice};
 use crate::aim;
 use crate::arcs::Arcs;
+use crate::evasion::Evasion;
 use crate::fault::lead_astray;
 use crate::outline::Passage;
 use crate::view::field_cell;
@@ -65,6 +66,8 @@ pub struct Planner {
     screening: Screening,
     robot: Robot,
     advisor: Advisor,
+    /// None for a robot that does not see what moves.
+    evasion: Option<Evasion>,
     solver: Solver,
     grid: Replica<u8>,
     belief: GridHeader,
@@ -87,6 +90,7 @@ impl Planner {
             screening: screening(mission),
             robot: Robot::new(mission),
             advisor: Advisor::new(mission),
+            evasion: Evasion::new(mission),
             solver: Solver::new(Settings::default()),
             grid: Replica::default(),
             belief: GridHeader::default(),
@@ -120,6 +124,7 @@ impl Planner {
     pub fn take_response(&mut self, found: &FoundResponse) -> Work {
         if let Some(mission) = self.found.changed(found, &self.mission) {
             self.advisor = Advisor::new(&mission);
+            self.evasion = Evasion::new(&mission);
         }
         Work::None
     }
@@ -308,7 +313,14 @@ impl Planner {
         let (status, direction, limit) = if self.on_a_saddle {
             (GuidanceStatus::Along, DVec2::ZERO, 0.0)
         } else {
-            self.advise(&pose, status, direction)
+            let advice = self.advise(&pose, status, direction);
+            match (&self.live, &self.evasion) {
+                (Some(live), Some(evasion)) if advice.0 != GuidanceStatus::AtTarget => {
+                    let view = live.view(self.grid.cells());
+                    evasion.advise(&view, self.belief.movers(), sample, advice)
+                }
+                _ => advice,
+            }
         };
         GuidanceSample {
             ex: direction.x,

@@ -171,7 +171,7 @@ fn an_evidential_robot_goes_no_faster_than_its_guidance_allows() {
 
 #[test]
 fn a_limit_of_0_is_0_however_well_the_robot_faces_its_way() {
-    for limit in [0.0, f64::NAN, -1.0, 0.01, 0.039] {
+    for limit in [0.0, f64::NAN, 0.01, 0.039] {
         let command = evidential().at(facing(0.0), &limited(limit));
         assert_eq!(state(&command), CommandState::Halt);
         assert_eq!((command.left_rad_s, command.right_rad_s), (0.0, 0.0), "{limit}");
@@ -325,8 +325,8 @@ fn jackal() -> Controller {
 }
 
 #[test]
-fn a_body_that_is_no_disc_backs_along_its_axis_at_a_limit_below_0_and_no_faster_than_0_2() {
-    for (limit, v) in [(-0.1, -0.1), (f64::NEG_INFINITY, -MOST_BACK_M_S)] {
+fn a_robot_backs_along_its_axis_at_a_limit_below_0_and_no_faster_than_the_mission_allows() {
+    for (limit, v) in [(-0.1, -0.1), (f64::NEG_INFINITY, -2.0)] {
         let command = jackal().at(facing(0.3), &limited(limit));
         assert_eq!((command.v_m_s, command.omega_rad_s), (v, 0.0));
     }

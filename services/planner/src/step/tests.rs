@@ -1,7 +1,7 @@
 use super::*;
 use common::{
     grid::{CellState, Part},
-    samples::{BaseResponseSample, ClearBeam, TargetPoint},
+    samples::{BaseResponseSample, ClearBeam, Mover, TargetPoint},
 };
 use std::path::Path;
 
@@ -548,4 +548,49 @@ fn a_long_body_is_not_turned_to_a_targets_heading_where_it_would_touch() {
         let guidance = planner.ask(&at(1.0, 0.0));
         assert_eq!(guidance.speed_limit_m_s.is_nan(), refuses, "{guidance:?}");
     }
+}
+
+/// The guidance of a Kobuki at the origin that drives at 0.4 m/s along x, which is its way, in the middle of a hall whose ground was
+/// scanned, beside a mover at `at` with `velocity`.
+fn guidance_beside(at: DVec2, velocity: DVec2) -> (GuidanceSample, f64) {
+    let text = "target = [4, 0]\nrobot.model = 'kobuki'\nperimeter = { width_m = 12, cells = 120 }";
+    let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
+    let mut planner = sent(&mission);
+    let (mut header, mut cells) = keyframe_of(mission.grid_frame(), 1, |_| false);
+    let free = cells.iter_mut().filter(|cell| **cell == CellState::Free as u8);
+    free.for_each(|cell| *cell = CellState::Scanned as u8);
+    header.movers[0] = Mover {
+        x_m: at.x as f32,
+        y_m: at.y as f32,
+        vx_m_s: velocity.x as f32,
+        vy_m_s: velocity.y as f32,
+        radius_m: 0.3,
+        ..Mover::default()
+    };
+    header.mover_count = 1;
+    planner.take_grid(&header, &cells).unwrap();
+    let guidance = planner.ask(&PoseSample { v_m_s: 0.4, ..PoseSample::default() });
+    (guidance, mission.speed_m_s())
+}
+
+#[test]
+fn what_goes_away_or_passes_far_off_changes_no_guidance() {
+    for (at, velocity) in [([1.5, 0.0], [1.5, 0.0]), ([0.0, 3.0], [1.0, 0.0])] {
+        let (guidance, speed) = guidance_beside(at.into(), velocity.into());
+        assert_eq!(status(&guidance), GuidanceStatus::Along);
+        assert!(guidance.ex > 0.99 && guidance.speed_limit_m_s >= speed, "{guidance:?}");
+    }
+}
+
+#[test]
+fn a_robot_gets_out_of_the_way_of_what_comes() {
+    let (guidance, speed) = guidance_beside(DVec2::new(2.5, 0.1), DVec2::new(-0.8, 0.0));
+    let aside = guidance.ey.abs() > 0.3 || guidance.speed_limit_m_s < 0.0;
+    assert!(aside && status(&guidance) == GuidanceStatus::Along, "{speed}: {guidance:?}");
+}
+
+#[test]
+fn a_robot_that_cannot_get_out_of_the_way_of_what_comes_stands() {
+    let (guidance, _) = guidance_beside(DVec2::new(1.2, 0.0), DVec2::new(-1.5, 0.0));
+    assert_eq!(status(&guidance), GuidanceStatus::Waiting, "{guidance:?}");
 }
