@@ -138,22 +138,15 @@ impl Link {
         }
     }
 
-    /// All counts are plausible in lockstep, because a simulated robot does not restart; only contacts are noticed.
+    /// All counts are plausible in lockstep, because a simulated robot does not restart. `judge_tick` judges of those that begin a
+    /// tick: how many more frames come depends on the machine.
     fn judge_counts(&mut self, motion: &Motion, now_ns: u64, effects: &mut Vec<Effect>) -> Counts {
-        let wheels = motion.wheels;
-        let counts = match WheelCounts::of(&wheels, motion.endless.as_ref()) {
-            WheelCounts::Cyclic(counts) => counts.map(|count| count % COUNT_CYCLE).into(),
-            endless @ WheelCounts::Endless(_) => endless,
-        };
-        let currents = Observation::Currents(motion.currents);
         if self.in_ticks() {
-            let now = self.moment(now_ns);
-            let odometry = &mut self.failsafe.monitors.odometry;
-            odometry.observe(&currents, now);
-            odometry.observe(&Observation::Motor(counts, Counts::Follow), now);
             return Counts::Follow;
         }
-        self.observe(currents, now_ns);
+        let wheels = motion.wheels;
+        let counts = cyclic(motion);
+        self.observe(Observation::Currents(motion.currents), now_ns);
         let speeds = [wheels.left_counts_per_s, wheels.right_counts_per_s];
         let was_away = !self.connected();
         let are = self.restart.step(counts, speeds, was_away, self.now);
@@ -164,6 +157,14 @@ impl Link {
             effects.extend(base.words().map(Effect::FoundResponse));
         }
         are
+    }
+
+    /// Contacts and the wheels' shares are judged in lockstep too, by the motion that begins a tick.
+    pub(super) fn judge_tick(&mut self, motion: &Motion, now_ns: u64) {
+        let now = self.moment(now_ns);
+        let odometry = &mut self.failsafe.monitors.odometry;
+        odometry.observe(&Observation::Currents(motion.currents), now);
+        odometry.observe(&Observation::Motor(cyclic(motion), Counts::Follow), now);
     }
 
     /// `own_wire` is the time at which readings came that did not come with the robot's motion.
@@ -244,5 +245,13 @@ impl Link {
         self.restart.lost();
         self.observe(Observation::Lost, now_ns);
         effects.push(Effect::Connected(false));
+    }
+}
+
+/// Counts of a robot that has some wrap as on the wire.
+fn cyclic(motion: &Motion) -> WheelCounts {
+    match WheelCounts::of(&motion.wheels, motion.endless.as_ref()) {
+        WheelCounts::Cyclic(counts) => counts.map(|count| count % COUNT_CYCLE).into(),
+        endless @ WheelCounts::Endless(_) => endless,
     }
 }

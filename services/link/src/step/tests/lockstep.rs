@@ -1,5 +1,7 @@
 //! The link in lockstep, where the robot waits for each command.
 
+use common::wire::COUNT_CYCLE;
+
 use super::*;
 
 #[test]
@@ -63,6 +65,30 @@ fn in_lockstep_an_unanswered_tick_is_given_again_and_answered_once() {
     let effects = link.at(Event::Command(command(0, 0, 1.0, 1.0)), 102 * MS);
     let second = velocities(&effects);
     assert!(second.is_empty(), "a tick given twice is answered once");
+}
+
+#[test]
+fn in_lockstep_frames_that_begin_no_tick_change_nothing_of_what_the_wheels_count() {
+    let wheels = |more_frames: usize| {
+        let mut link = driving(in_ticks());
+        let tick = |tick: u64| {
+            let tick = tick as u16;
+            datagram(255, COUNT_CYCLE - 1 - 130 * tick, 120 * tick)
+        };
+        let effects = (0..60).flat_map(|number| {
+            let effects = link.at(Event::Datagram(&tick(number)), number);
+            for _ in 0..more_frames {
+                link.at(Event::Datagram(&tick(number)), number);
+            }
+            let stamp_ns = number * PERIOD_NS;
+            link.at(Event::Command(command(number, stamp_ns, 5.0, 5.0)), number);
+            effects
+        });
+        ticks(&effects.collect::<Vec<_>>()).pop().unwrap().2
+    };
+    let once = wheels(0);
+    assert!((once.told_ratio - 12.0 / 13.0).abs() < 0.01, "{once:?}");
+    assert_eq!(wheels(1), once);
 }
 
 #[test]
