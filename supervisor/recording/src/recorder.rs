@@ -150,6 +150,7 @@ pub fn record(
             }
             if let Some(current) = &current {
                 tell(Happened::Attached(&current.path));
+                give_way(current.run.as_ref());
             }
         }
         if let Some(run) = &mut current {
@@ -187,8 +188,8 @@ pub fn record(
     }
 }
 
-/// Let the stages go first that answer a robot, once the recorder is attached. In lockstep no robot waits for them, and a recorder that
-/// falls behind them loses what they publish.
+/// Let the stages go first that answer a robot, once the recorder is attached, which misses what they publish until then. In lockstep no
+/// robot waits for them, and a recorder that falls behind them loses what they publish.
 fn give_way(run: Option<&Run>) {
     let in_lockstep = run.is_some_and(|run| matches!(run.clock, MissionClock::Ticks { .. }));
     if !in_lockstep && rustix::process::getpriority_process(None).is_ok_and(|nice| nice < NICE) {
@@ -239,7 +240,6 @@ impl CurrentRun {
         }
         let about = about.into_iter();
         let about: BTreeMap<_, _> = about.map(|(key, value)| (key.to_owned(), value)).collect();
-        give_way(run.as_ref());
         let file = RecordingFile::create(path, topics, run.as_ref(), about.clone())?;
         let whole = options.run.is_some();
         let logs = directory.as_ref();

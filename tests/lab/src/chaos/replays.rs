@@ -33,7 +33,7 @@ struct Counts {
 pub struct Replays {
     #[serde(flatten)]
     whole: Counts,
-    /// Results of recordings whose recorders were hit, attached during a mission, or competed with those that are started again.
+    /// Results of recordings whose recorders were hit, attached late or during a mission, or competed with those that are started again.
     partial: Counts,
 }
 
@@ -78,7 +78,8 @@ impl Replays {
         consumers: &Consumers,
         wrong: &mut Vec<String>,
     ) {
-        let own: Vec<_> = recordings(directory).map(|file| (hits_recorders, file)).collect();
+        let partial = hits_recorders || began_late(directory);
+        let own: Vec<_> = recordings(directory).map(|file| (partial, file)).collect();
         if own.is_empty() {
             wrong.push("nothing was recorded".to_owned());
         }
@@ -90,6 +91,12 @@ impl Replays {
             }
         }
     }
+}
+
+/// Whether the run says that it went on before its recorder was attached: on a wall clock a robot does not wait long for one.
+fn began_late(directory: &Path) -> bool {
+    let log = fs::read_to_string(directory.join("supervisor.log")).unwrap_or_default();
+    log.contains("the recorder is not attached yet")
 }
 
 fn recordings(directory: &Path) -> impl Iterator<Item = PathBuf> {
