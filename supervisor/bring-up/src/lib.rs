@@ -22,8 +22,9 @@ pub mod trace;
 mod wheels;
 
 use common::mission::Mission;
+use glam::DVec2;
 
-pub use scans::Placed;
+use scans::Placed;
 pub use trace::Trace;
 
 /// A verdict about one part of the robot.
@@ -83,15 +84,15 @@ impl Finding {
     }
 }
 
-/// What the trace says of the robot of `mission`, and the scans as they were placed, for a picture. With `lifted` wheels nothing is said
-/// of what the body does.
+/// What the trace says of the robot of `mission`, and where the beams of a laser, or without one the echoes of rangers, ended: metres from
+/// the robot's first place, x ahead. With `lifted` wheels nothing is said of what the body does.
 #[must_use]
-pub fn findings(mission: &Mission, trace: &Trace, lifted: bool) -> (Vec<Finding>, Option<Placed>) {
+pub fn findings(mission: &Mission, trace: &Trace, lifted: bool) -> (Vec<Finding>, Vec<DVec2>) {
     let mut found = vec![wheels::rate(mission, trace)];
     if !trace.begins_at_rest() {
         let text = "what it did was recorded from too late on: repeat this, on a machine that has less to do";
         found.push(Finding::unknown("recording", text));
-        return (found, None);
+        return (found, Vec::new());
     }
     let wheels = wheels::Wheels::of(trace);
     let track_m = mission.body().track_m * mission.robot.odometry.track_scale;
@@ -100,7 +101,7 @@ pub fn findings(mission: &Mission, trace: &Trace, lifted: bool) -> (Vec<Finding>
     if lifted {
         found.extend(rangers::liveliness(mission, trace, false));
         found.extend([wheels.finding(None), response]);
-        return (found, None);
+        return (found, Vec::new());
     }
     let placed = scans::place(mission, trace, &motion);
     let gyro = rangers::Gyro::of(trace, &motion);
@@ -119,7 +120,8 @@ pub fn findings(mission: &Mission, trace: &Trace, lifted: bool) -> (Vec<Finding>
     if are_right || sure.is_some() {
         found.extend(rangers::findings(mission, trace, &motion, sure, &moves));
     }
-    (found, placed)
+    let echoes = || rangers::echoes(mission, trace, &motion);
+    (found, placed.map_or_else(echoes, |placed| placed.points))
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use common::{
     mission::{Mission, Sensor, SensorKind},
     samples::{RangeReading, RangeStatus},
 };
+use glam::DVec2;
 
 use crate::{
     Finding, Placed, Trace,
@@ -426,6 +427,24 @@ fn bearing(reference: &Profile, sensor: &Sensor, seen: &[(f64, f64)]) -> Option<
         Finding::wrong(&sensor.name, text)
             .with_key(format!("robot.sensor.{}.bearing_deg", sensor.name), format!("{deg:.0}")),
     )
+}
+
+/// Where the echoes ended by the motion that the wheels count, metres from the first place.
+pub(crate) fn echoes(mission: &Mission, trace: &Trace, motion: &Motion) -> Vec<DVec2> {
+    let table = mission.sensor_table();
+    let (mut at, mut before_m) = (DVec2::ZERO, 0.0);
+    let mut points = Vec::new();
+    for (at_s, readings) in &trace.ranges {
+        let [heading, way_m] = between(motion, *at_s).unwrap_or_default();
+        at += (way_m - before_m) * DVec2::from_angle(heading);
+        before_m = way_m;
+        points.extend(readings.iter().filter_map(|reading| {
+            let mount = table.get(usize::from(reading.sensor))?.mount;
+            let direction = DVec2::from_angle(heading + mount.bearing_rad);
+            Some(at + (mount.forward_m + range_m(reading)?) * direction)
+        }));
+    }
+    points
 }
 
 /// The way by the front sonar's echo over `way` by the wheels, in the legs in which the robot is told so; less than 0 for a way back. None

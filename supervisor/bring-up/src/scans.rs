@@ -72,14 +72,14 @@ struct Hypothesis {
 
 /// The scans in one frame, in which the robot stood at the origin first.
 #[derive(Clone, Debug)]
-pub struct Placed {
+pub(crate) struct Placed {
     hypothesis: Hypothesis,
     unknowns: Unknowns,
     share: f64,
     /// The row of the laser.
     row: usize,
     /// Where the beams ended, metres.
-    pub points: Vec<DVec2>,
+    pub(crate) points: Vec<DVec2>,
     poses: Vec<(f64, [f64; 3])>,
 }
 

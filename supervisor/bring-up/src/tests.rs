@@ -1,4 +1,7 @@
-use std::{f64::consts::TAU, path::Path};
+use std::{
+    f64::consts::{FRAC_PI_2, TAU},
+    path::Path,
+};
 
 use common::{
     driver::range_reading,
@@ -351,7 +354,25 @@ fn a_recording_that_begins_in_a_turn_is_no_finding() {
     late.rolled.retain(|it| it.0 > 4.0);
     late.told.retain(|it| it.0 > 5.0);
     late.scans.retain(|it| it.0 > 4.0);
-    let (found, placed) = findings(&mission(), &late, false);
-    assert!(placed.is_none() && found.iter().all(|it| it.verdict != Verdict::Wrong), "{found:?}");
+    let (found, seen) = findings(&mission(), &late, false);
+    assert!(seen.is_empty() && found.iter().all(|it| it.verdict != Verdict::Wrong), "{found:?}");
     assert!(found.iter().any(|it| it.part == "recording"), "{found:?}");
+}
+
+#[test]
+fn echoes_are_drawn_where_they_ended_when_the_robot_has_turned_and_driven() {
+    let mission =
+        Mission::parse("target = [3, 0]\nsensors = 'front'", Path::new("m.toml")).unwrap();
+    let motion = vec![(0.0, [0.0, 0.0]), (1.0, [FRAC_PI_2, 0.0]), (2.0, [FRAC_PI_2, 0.5])];
+    let row = mission.front_row();
+    let sensor = &mission.sensor_table()[row];
+    let echo = range_reading(row, sensor, Some(1.0));
+    let ranges = vec![(0.0, vec![echo]), (1.5, Vec::new()), (2.0, vec![echo])];
+    let seen = rangers::echoes(&mission, &Trace { ranges, ..Trace::default() }, &motion);
+    let ahead_m = 1.0 + sensor.mount.forward_m;
+    for (seen, ended) in seen.iter().zip([DVec2::new(ahead_m, 0.0), DVec2::new(0.0, 0.5 + ahead_m)])
+    {
+        assert!(seen.distance(ended) < 1e-9, "{seen}");
+    }
+    assert_eq!(seen.len(), 2);
 }

@@ -85,7 +85,7 @@ impl Wheels {
     /// `motors` are the wheels that go as each is told, if that was seen.
     pub(crate) fn finding(&self, motors: Option<Matrix2<f64>>) -> Finding {
         if !self.is_told {
-            let text = "it moved for too short a time: what stopped it? Look at the logs of the run, and give it more room";
+            let text = "it moved for too short a time: was something within 0.2 m of its front, or what stopped it? Look at the logs of the run, and give it more room";
             return Finding::unknown("wheels", text);
         }
         let [left, right] = [0, 1].map(|row| self.counted.row(row).amax());

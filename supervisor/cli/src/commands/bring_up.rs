@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use bring_up::{Finding, Placed, Trace, Verdict, findings};
+use bring_up::{Finding, Trace, Verdict, findings};
 use clap::Args;
 use common::{
     file::{FileError, replace},
@@ -19,6 +19,7 @@ use console::{
     missions,
     output::{print_text, write_stderr},
 };
+use glam::DVec2;
 use picture::{Chart, Mark, Series};
 use recording::Recording;
 use serde::{
@@ -88,9 +89,9 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     }
     let Carried { directory, .. } = arguments.setting.carry_out(&mission, "bring-up")?;
     let trace = Trace::read(&named, &Recording::open(&directory.join("recording.mcap"))?)?;
-    let (found, placed) = findings(&named, &trace, arguments.lifted);
+    let (found, seen) = findings(&named, &trace, arguments.lifted);
     let picture = directory.join("bring-up.svg");
-    fs::write(&picture, drawn(placed.as_ref())).map_err(FileError::of("write", &picture))?;
+    fs::write(&picture, drawn(&seen)).map_err(FileError::of("write", &picture))?;
     if arguments.setting.json {
         let object = json!({
             "findings": found.iter().map(as_json).collect::<Vec<_>>(),
@@ -154,17 +155,16 @@ fn as_json(finding: &Finding) -> serde_json::Value {
     json!({ "part": part, "verdict": verdict.word(), "text": text, "keys": keys })
 }
 
-/// Where the beams of all scans ended, by what was found.
-fn drawn(placed: Option<&Placed>) -> String {
-    let points = placed.map_or(&[][..], |placed| &placed.points);
+/// What was seen, by the motion that was found.
+fn drawn(seen: &[DVec2]) -> String {
     Chart {
-        title: "What the laser saw, placed by the motion that was found",
-        description: "Where the beams of all scans ended: one sharp outline if everything is as found.",
+        title: "What the robot saw, placed by the motion that was found",
+        description: "Where beams and echoes ended: one sharp outline if everything is as found.",
         axes: ["ahead of the robot's first place, m", "to its left, m"],
         series: vec![Series {
-            name: "ends of beams",
+            name: "ends of beams, or of echoes",
             mark: Mark::Crosses,
-            points: points.iter().map(|it| [it.x, it.y]).collect(),
+            points: seen.iter().map(|it| [it.x, it.y]).collect(),
         }],
     }
     .svg()
