@@ -4,9 +4,12 @@
 //! earlier one at its matched pose, replaced when the robot has gone so far that it sees other things. The search begins at dead
 //! reckoning's pose, which also holds the robot in directions without lines, as along a corridor.
 //!
+//! A new reference is laid by the scan after it: where that one is by the reference before, it is by the new one, too. Without this the
+//! errors of all references add up, and they lean to one side, because a scan that matches badly is the one that is replaced.
+//!
 //! The result is a fix for dead reckoning, which takes the errors of fixes for independent. Those of matches are alike for a while, so the
 //! fixes of [`SHARED_S`] weigh like one. All share the error of their reference, and so of all references before; a fix states it, because
-//! no number of fixes averages it out.
+//! no number of fixes averages it out. How much a reference adds is measured by the second scan after it, with both references again.
 
 use common::{
     found_response::if_there,
@@ -55,9 +58,6 @@ const LEAST_SHARE: f64 = 0.6;
 const OF_REFERENCE: [f64; 2] = [0.0005, 0.0002];
 /// The variance of a match over that of its scatter, because its reference has a scan's noise too.
 const OF_SCATTER: f64 = 1.75;
-/// The share of a match's variance that is alike in all of a place: lines of what is round lie behind its points. By .06 m after 140
-/// references of a Kobuki, and by .2 m of a TurtleBot, both among glass.
-const ALIKE: f64 = 0.01;
 /// The least and the greatest variance of a match, over that by its points.
 const SCALES: [f64; 2] = [0.25, 9.0];
 /// So much of the scatter is left after each further match.
@@ -65,7 +65,7 @@ const REMEMBERED: f64 = 0.99;
 /// More would leave no room for the fixes of others.
 const MOST_FIXES_HZ: f64 = 20.0;
 /// Errors of matches are alike for so long, seconds.
-const SHARED_S: f64 = 5.0;
+const SHARED_S: f64 = 2.0;
 /// The least deviation of a match: metres and radians.
 const LEAST: [f64; 2] = [0.005, 0.002];
 
@@ -80,6 +80,9 @@ pub(crate) struct Reference {
     lines: Vec<Option<Line>>,
     #[serde(deserialize_with = "if_there")]
     scatter: Scatter,
+    /// The reference before, and whether this one is laid by it; none after two scans. It is not saved, because the next one comes soon.
+    #[serde(skip)]
+    before: Option<(Box<Self>, bool)>,
 }
 
 /// How much matches scatter from scan to scan about the places by dead reckoning, whose drift is slow.
@@ -90,13 +93,14 @@ struct Scatter {
     /// Variances of matches, m^2: as they scatter, and by their points.
     seen: f64,
     stated: f64,
-    /// References that were matched with ones before.
-    references: f64,
+    /// Variances that references added, m^2: by the ways between a scan's places by a laid one and by that before, and by the points.
+    added: f64,
+    added_stated: f64,
 }
 
 impl Default for Scatter {
     fn default() -> Self {
-        Self { off: DVec2::ZERO, seen: 1e-4, stated: 1e-4, references: 0.0 }
+        Self { off: DVec2::ZERO, seen: 1e-4, stated: 1e-4, added: 0.0, added_stated: 0.0 }
     }
 }
 
@@ -113,10 +117,14 @@ impl Scatter {
         (OF_SCATTER * self.seen / self.stated).clamp(least, most)
     }
 
-    /// The variance that a new reference adds, likewise. What is alike in all adds up in the deviation.
-    fn scale_of_reference(&mut self) -> f64 {
-        self.references += 1.0;
-        self.scale() * (1.0 + ALIKE * (2.0 * self.references - 1.0))
+    /// The variance that a new reference adds, likewise. Until it was measured, that of a match; then the scatter counts like one
+    /// measurement of `variance`.
+    fn scale_of_reference(&self, variance: f64) -> f64 {
+        if self.added_stated == 0.0 {
+            return self.scale();
+        }
+        let by_scatter = variance * self.scale() / OF_SCATTER;
+        (by_scatter + self.added) / (variance + self.added_stated)
     }
 }
 
@@ -183,12 +191,26 @@ impl ScanMatcher {
         }
         let seen_from = rows.scan(row, held.pose, beams)?;
         let found = held.matched(&fan, &seen_from, robot);
-        let (pose, matched, share) = found.unwrap_or((robot, DMat3::IDENTITY, 1.0));
+        let (mut pose, matched, share) = found.unwrap_or((robot, DMat3::IDENTITY, 1.0));
+        let variance = matched.x_axis.x + matched.y_axis.y;
         if found.is_some() {
-            let variance = matched.x_axis.x + matched.y_axis.y;
+            if let Some((before, is_laid)) = held.before.take()
+                && let Some(seen_from) = rows.scan(row, before.pose, beams)
+                && let Some((by_before, ..)) = before.matched(&fan, &seen_from, robot)
+            {
+                if is_laid {
+                    // Laying and measuring have the same error, so each has half of the square.
+                    held.scatter.added += 0.5 * pose.position.distance_squared(by_before.position);
+                    held.scatter.added_stated += variance;
+                } else {
+                    held.lay(pose, by_before);
+                    pose = by_before;
+                    held.before = Some((before, true));
+                }
+            }
             held.scatter.add(pose.position - robot.position, variance);
         }
-        let mut scatter = held.scatter;
+        let scatter = held.scatter;
         let of_reference = held.carried_to(pose.position);
         let fix = found.map(|_| {
             let all = (matched + variances(LEAST)) * self.shared + of_reference;
@@ -218,12 +240,15 @@ impl ScanMatcher {
         let is_left = went > REPLACED_AFTER.0 || turned > REPLACED_AFTER.1;
         if is_left || share < LEAST_SHARE || is_empty {
             let covariance = match found {
-                Some(_) => of_reference + matched * scatter.scale_of_reference(),
+                Some(_) => of_reference + matched * scatter.scale_of_reference(variance),
                 None => covariance_of(reckoned),
             };
             let fan = rows.scan(row, pose, beams)?;
             let covariance = covariance + variances(OF_REFERENCE);
-            *reference = Some(Reference::new(&fan, pose, covariance, scatter));
+            held.before = None;
+            let before = found.and_then(|_| reference.take()).map(|it| (Box::new(it), false));
+            *reference =
+                Some(Reference { before, ..Reference::new(&fan, pose, covariance, scatter) });
         }
         fix
     }
@@ -233,7 +258,18 @@ impl Reference {
     fn new(fan: &Fan<'_>, pose: Pose2, covariance: DMat3, scatter: Scatter) -> Self {
         let points = fan.ends().collect::<Vec<_>>();
         let lines = (0..points.len()).map(|beam| Line::through(&points, fan, beam)).collect();
-        Self { pose, beams: fan.beams.to_vec(), covariance, lines, scatter }
+        Self { pose, beams: fan.beams.to_vec(), covariance, lines, scatter, before: None }
+    }
+
+    /// Move it as a scan moves from one pose to the other.
+    fn lay(&mut self, from: Pose2, to: Pose2) {
+        let turn = to.heading - from.heading;
+        let turned = DVec2::from_angle(turn);
+        let laid = |at: DVec2| to.position + turned.rotate(at - from.position);
+        self.pose = Pose2 { position: laid(self.pose.position), heading: self.pose.heading + turn };
+        for line in self.lines.iter_mut().flatten() {
+            *line = Line { point: laid(line.point), normal: turned.rotate(line.normal) };
+        }
     }
 
     /// The covariance at `there`, known exactly from this pose.
@@ -449,12 +485,11 @@ mod tests {
         assert!(fix.covariance[0] > 100.0 * fix.covariance[3], "{fix:?}");
     }
 
-    #[test]
-    fn a_laser_of_great_noise_is_matched_with_its_reference_and_says_how_well() {
-        let (mission, matcher) = matcher();
+    /// Scans in the room as [`scan`] gives them, with the noise of the laser's model.
+    fn noisy(mission: &Mission) -> impl FnMut(Pose2) -> Vec<f32> + use<'_> {
         let mut random = 1_u32;
-        let mut noisy = |pose| {
-            let mut beams = scan(&mission, pose, false);
+        move |pose| {
+            let mut beams = scan(mission, pose, false);
             for range in &mut beams {
                 // A sum of twelve even numbers is nearly normal.
                 let noise: f64 = (0..12)
@@ -468,7 +503,36 @@ mod tests {
                 *range = (exact + noise * (least_m + share * exact)) as f32;
             }
             beams
-        };
+        }
+    }
+
+    #[test]
+    fn a_new_reference_is_laid_where_the_next_scan_is_by_the_one_before() {
+        let (mission, matcher) = matcher();
+        let mut noisy = noisy(&mission);
+        let at = |x| Pose2 { position: DVec2::new(x, 0.0), heading: 0.0 };
+        let mut reference = None;
+        matcher.step(&mut reference, at(-1.0), &noisy(at(-1.0)));
+        let mut before = reference.clone();
+        matcher.step(&mut reference, at(1.1), &noisy(at(1.1)));
+        let replaced = reference.as_ref().unwrap().pose;
+        assert_ne!(replaced, before.as_ref().unwrap().pose, "the reference was not replaced");
+        let there = at(1.0);
+        let beams = noisy(there);
+        let [by_before, by_both, by_new] = [&mut before, &mut reference.clone(), &mut reference]
+            .map(|held| matcher.step(held, there, &beams).unwrap());
+        assert_eq!([by_both.x_m, by_both.y_m], [by_before.x_m, by_before.y_m]);
+        assert_eq!(by_new, by_both);
+        let again = matcher.step(&mut reference, there, &beams).unwrap();
+        let off = |fix: &FixSample| (fix.x_m - by_before.x_m).hypot(fix.y_m - by_before.y_m);
+        let laid = reference.as_ref().unwrap().pose.position.distance(replaced.position);
+        assert!(laid > 0.003 && off(&again) < 0.001, "{laid} {}", off(&again));
+    }
+
+    #[test]
+    fn a_laser_of_great_noise_is_matched_with_its_reference_and_says_how_well() {
+        let (mission, matcher) = matcher();
+        let mut noisy = noisy(&mission);
         let (mut reference, start) = (None, Pose2::default());
         matcher.step(&mut reference, start, &noisy(start));
         let (mut squares, mut stated) = (0.0, 0.0);

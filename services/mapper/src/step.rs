@@ -289,7 +289,7 @@ impl Mapper {
             Sensed::Hits => 0,
             Sensed::Evidence(_) => self.evidential.saved_bytes(),
         };
-        self.frame.area() + evidence + 5 * self.beams + 240
+        self.frame.area() + evidence + 5 * self.beams + 256
     }
 
     /// Room for an entry of the journal: it takes 250 bytes, and the beams of a scan four each.
