@@ -17,3 +17,6 @@ pub const LEAST_SPEED_M_S: f64 = 0.04;
 
 /// Within 11 degrees a robot faces its way: it does not turn on the spot, and where it may not go on it stands.
 pub const FACES_COSINE: f64 = 0.98;
+
+/// The controller's turn rate on the spot per remaining angle, 1/s.
+pub const TURN_GAIN: f64 = 3.0;

@@ -43,6 +43,7 @@ mod footprint;
 pub mod geometry;
 pub mod grid;
 pub mod kinematics;
+mod lead;
 mod odometry;
 mod response;
 mod robot;
@@ -60,6 +61,7 @@ use serde::{Deserialize, Serialize};
 pub use arduino::{ArduinoBoard, LEAST_BAUD};
 pub use error::MissionError;
 pub use footprint::Footprint;
+pub use lead::Lead;
 pub use odometry::{Calibration, CalibrationPlan, Odometry, Procedure, Provenance};
 pub use response::{ModelledSpeed, Response, ResponseKeys};
 pub use robot::{BatteryLimits, Body, Channel, Model, Protocol, RobotConfig, Steering};
@@ -525,9 +527,16 @@ impl Mission {
             turns_beyond_deg: turns_beyond_deg.unwrap_or(turns),
             look_rad_s: look_rad_s.unwrap_or(look),
             stops_within_s: self.planner.stops_within_s.unwrap_or_else(|| {
-                stops + (self.body().response.dead_time_s() - Response::X80.dead_time_s())
+                stops + (self.trusted_response().dead_time_s() - Response::X80.dead_time_s())
             }),
         }
+    }
+
+    /// The time until the robot brakes, seconds, from the pose for which the planner answers: the one at which the command acts, if the
+    /// base answers late.
+    pub fn brakes_within_s(&self) -> f64 {
+        let within_s = self.hurry().stops_within_s;
+        Lead::new(self).map_or(within_s, |lead| (within_s - lead.dead_time_s()).max(0.0))
     }
 
     /// wd: `controller.turn_rad_s`, or by default 2.4 for a robot that looks first, else the paper's 0.8.
@@ -591,6 +600,23 @@ impl Mission {
 
     pub fn body(&self) -> Body {
         self.robot.body()
+    }
+
+    /// Whether somebody measured or stated all of the base's response. Of all models only X80s were measured.
+    pub fn states_response(&self) -> bool {
+        let ResponseKeys { delay_s, acceleration_m_s2, .. } = self.robot.response;
+        let is_stated = delay_s.is_some() && acceleration_m_s2.is_some();
+        is_stated || !self.robot.protocol().has_scans()
+    }
+
+    /// What the base is trusted to do: what is stated, and for the rest no more than a late and heavy base does. The link finds out
+    /// what it really does.
+    pub fn trusted_response(&self) -> Response {
+        let Body { response, track_m, .. } = self.body();
+        match self.states_response() {
+            true => response,
+            false => self.robot.response.over(Response::careful(track_m), track_m),
+        }
     }
 
     /// The mission of a robot whose base was found to go on as before for `dead_time_s` and to accelerate at `acceleration_m_s2`, which

@@ -55,6 +55,13 @@ impl Response {
         turn_acceleration_rad_s2: f64::INFINITY,
     };
 
+    /// What a base is trusted to do as long as nobody knows it: hardly any is later and heavier.
+    pub(crate) fn careful(track_m: f64) -> Self {
+        let acceleration_m_s2 = 0.3;
+        let turn_acceleration_rad_s2 = 2.0 * acceleration_m_s2 / track_m;
+        Self { delay_s: 0.5, lag_s: 0.0, acceleration_m_s2, turn_acceleration_rad_s2 }
+    }
+
     pub(crate) const fn limited(acceleration_m_s2: f64, turn_acceleration_rad_s2: f64) -> Self {
         Self { acceleration_m_s2, turn_acceleration_rad_s2, ..Self::X80 }
     }
@@ -124,6 +131,11 @@ impl ModelledSpeed {
         self.speed
     }
 
+    /// What the speed is still to gain.
+    pub fn left(&self) -> f64 {
+        self.target - self.speed
+    }
+
     /// Go on to the time `until_s`. Returns the way since the last call.
     pub fn go_on(&mut self, until_s: f64) -> f64 {
         let mut way = 0.0;
@@ -182,6 +194,23 @@ mod tests {
         assert_eq!((response.delay_s, response.turn_acceleration_rad_s2), (0.07, 4.0));
         let none = ResponseKeys::default().over(Response::limited(1.0, 2.0), 0.3);
         assert_eq!(none, Response::limited(1.0, 2.0));
+    }
+
+    #[test]
+    fn a_base_of_which_nobody_stated_how_it_answers_is_trusted_little_and_an_x80_with_what_it_does()
+    {
+        let trusted = |text: &str| {
+            let text = format!("target = [3, 0]\n{text}");
+            let mission = crate::Mission::parse(&text, std::path::Path::new("m.toml")).unwrap();
+            let Response { delay_s, acceleration_m_s2, .. } = mission.trusted_response();
+            (mission.states_response(), delay_s, acceleration_m_s2)
+        };
+        assert_eq!(trusted(""), (true, 0.07, f64::INFINITY));
+        assert_eq!(trusted("robot.protocol = 'json'"), (false, 0.5, 0.3));
+        let json = |stated| format!("robot = {{ protocol = 'json', response = {{ {stated} }} }}");
+        assert_eq!(trusted(&json("delay_s = 0.2")), (false, 0.2, 0.3));
+        let both = "delay_s = 0.1, acceleration_m_s2 = 2.0";
+        assert_eq!(trusted(&json(both)), (true, 0.1, 2.0));
     }
 
     #[test]

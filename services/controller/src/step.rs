@@ -1,27 +1,22 @@
 //! Align the robot with the guidance, and let alignment set the speed.
 
 mod car;
-mod lead;
 
 use common::{
     bus::Topic,
     clock::MissionTime,
     found_response::FoundResponse,
     geometry::wrap_angle,
-    kinematics::{Drive, FACES_COSINE, LEAST_SPEED_M_S, Twist},
-    mission::{Method, Mission, Response},
+    kinematics::{Drive, FACES_COSINE, LEAST_SPEED_M_S, TURN_GAIN, Twist},
+    mission::{Lead, Method, Mission, Response},
     samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus},
     stage::{Answer, Answering, ForeignState},
     topics::{COMMAND, GUIDANCE},
 };
 use glam::DVec2;
 
-use lead::Lead;
-
 /// The wheels stick below it.
 const LEAST_TURN_RAD_S: f64 = 0.25;
-/// Turn rate on the spot per remaining angle, 1/s.
-const TURN_GAIN: f64 = 3.0;
 
 /// Farther away a robot has not arrived beside its target, whatever the planner says, metres.
 const MOST_OFF_TARGET_M: f64 = 0.5;
@@ -102,7 +97,6 @@ impl Answering for Controller {
     fn new(mission: &Mission) -> Self {
         let body = mission.body();
         let (settings, hurry) = (&mission.controller, mission.hurry());
-        let lead = if body.steering.is_some() { None } else { Lead::new(mission) };
         Self {
             drive: body.drive(),
             tolerance: mission.arrival_tolerance_m,
@@ -119,8 +113,8 @@ impl Answering for Controller {
                 Method::Paper => SpeedLaw::Paper,
                 Method::Evidential => SpeedLaw::Evidential,
             },
-            response: body.response,
-            lead,
+            response: mission.trusted_response(),
+            lead: Lead::new(mission),
             side: 1.0,
             arrival: Default::default(),
             mission: mission.clone(),

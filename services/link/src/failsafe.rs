@@ -203,7 +203,7 @@ pub const TABLE: &[Rule] = &[
         action: Action::Stop,
         clears: Clears::OnResume { or_after: Some(odometry::CALM) },
         known_within_s: Some(|mission| {
-            mission.body().response.dead_time_s() + odometry::STILL_AFTER.as_secs_f64()
+            mission.trusted_response().dead_time_s() + odometry::STILL_AFTER.as_secs_f64()
         }),
         monitor: |all| &all.odometry,
     },
@@ -213,7 +213,7 @@ pub const TABLE: &[Rule] = &[
         action: Action::Stop,
         clears: Clears::WithCondition,
         known_within_s: Some(|mission| {
-            mission.body().response.dead_time_s() + contact::HELD_AFTER.as_secs_f64()
+            mission.trusted_response().dead_time_s() + contact::HELD_AFTER.as_secs_f64()
         }),
         monitor: |all| &all.odometry,
     },

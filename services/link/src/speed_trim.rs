@@ -6,7 +6,7 @@
 
 use common::{
     driver::counts::WheelCounts,
-    mission::{Mission, ModelledSpeed, Response},
+    mission::{Mission, ModelledSpeed},
 };
 
 /// Agreeing commands until a wheel's speed is steady: its delay and lag take 0.15 s, a period at 7 Hz.
@@ -36,9 +36,9 @@ pub(crate) struct SpeedTrim {
 impl SpeedTrim {
     pub(crate) fn new(mission: &Mission) -> Self {
         let body = mission.body();
-        let Response { acceleration_m_s2, .. } = body.response;
-        let change = acceleration_m_s2 / body.metres_per_count();
-        let wheel = ModelledSpeed::new(body.response.dead_time_s(), change);
+        let response = mission.trusted_response();
+        let change = response.acceleration_m_s2 / body.metres_per_count();
+        let wheel = ModelledSpeed::new(response.dead_time_s(), change);
         Self {
             wheels: vec![wheel; if body.steering.is_some() { 1 } else { 2 }],
             told: [[0.0; 2]; STEADY],

@@ -318,7 +318,7 @@ impl Link {
             if self.open.is_some() || self.due > 0 {
                 return;
             }
-            self.judge_tick(&motion, now_ns);
+            self.judge_tick(&motion, now_ns, effects);
         }
         if !self.in_ticks() {
             // The tick uses up its number even if it is never answered.

@@ -2,7 +2,7 @@
 //! it can.
 
 use common::{
-    mission::{Body, Mission},
+    mission::{Body, Mission, Protocol},
     samples::{CommandSample, WheelSample},
     wire::counts_between,
 };
@@ -14,13 +14,20 @@ const STEERING_GAIN: f64 = 0.6;
 pub(crate) struct WheelSpeeds {
     body: Body,
     rate_hz: f64,
+    keeps_curve: bool,
     /// The robot's newest command, counts/s.
     told: [i16; 2],
 }
 
 impl WheelSpeeds {
     pub(crate) fn new(mission: &Mission) -> Self {
-        Self { body: mission.body(), rate_hz: mission.robot.rate_hz, told: [0; 2] }
+        Self {
+            body: mission.body(),
+            rate_hz: mission.robot.rate_hz,
+            // An X80 answers so soon that it makes good what it did not turn; its results are those of wheels that are limited one by one.
+            keeps_curve: mission.robot.protocol() != Protocol::X80,
+            told: [0; 2],
+        }
     }
 
     pub(crate) const fn told(&mut self, counts: [i16; 2]) {
@@ -28,10 +35,13 @@ impl WheelSpeeds {
     }
 
     /// Speeds of the two wheels, or of a car's wheel and steering, for `command` at `share` of its speed, counts/s; `wheels` are the
-    /// newest counts. Steering is driven towards its angle by a speed loop like a wheel's, so a timed command ends its motion too.
+    /// newest counts. Wheels that would be too fast are slower together, so that the curve stays. Steering is driven towards its angle by a speed loop like a wheel's, so a timed command ends its motion too.
     pub(crate) fn of(&self, command: &CommandSample, share: f64, wheels: &WheelSample) -> [i16; 2] {
         let Some(steering) = self.body.steering else {
             let wanted = [command.left_rad_s, command.right_rad_s].map(|speed| share * speed);
+            let fastest = wanted.map(f64::abs).into_iter().fold(self.top_rad_s(), f64::max);
+            let slower = if self.keeps_curve { self.top_rad_s() / fastest } else { 1.0 };
+            let wanted = wanted.map(|speed| slower * speed);
             let told = self.told.map(|it| f64::from(it) / self.counts_per_radian());
             let reached = self.body.reached(told, wanted, self.rate_hz);
             return reached.map(|speed| self.counts_per_second(speed));
@@ -42,6 +52,10 @@ impl WheelSpeeds {
         let top = steering.counts(steering.rate_rad_s);
         let rate = (left * STEERING_GAIN * self.rate_hz).clamp(-top, top);
         [driven, whole(rate)]
+    }
+
+    fn top_rad_s(&self) -> f64 {
+        self.body.top_speed_m_s / self.body.wheel_radius_m
     }
 
     fn counts_per_radian(&self) -> f64 {
@@ -100,6 +114,22 @@ mod tests {
         let tau = std::f64::consts::TAU;
         assert_eq!(counts(tau, five, 1.0, 0), [600, 210]);
         assert_eq!(counts(tau, five, 0.5, 0), [300, 210]);
+    }
+
+    #[test]
+    fn wheels_that_would_be_too_fast_keep_the_curve_of_a_robot_of_another_protocol() {
+        for (protocol, ratio) in [("json", 0.8), ("x80", 1.0)] {
+            let text = format!("target = [3, 0]\nrobot.protocol = '{protocol}'");
+            let speeds = WheelSpeeds::new(&Mission::parse(&text, Path::new("m.toml")).unwrap());
+            let top = speeds.top_rad_s();
+            let command = CommandSample {
+                left_rad_s: 0.8 * top,
+                right_rad_s: top,
+                ..CommandSample::default()
+            };
+            let [left, right] = speeds.of(&command, 1.25, &WheelSample::default()).map(f64::from);
+            assert!((left / right - ratio).abs() < 0.01, "{protocol}: {left} {right}");
+        }
     }
 
     #[test]

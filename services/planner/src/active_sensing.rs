@@ -47,7 +47,7 @@ pub(crate) struct ActiveSensing {
     turn: f64,
     response: Response,
     /// The time until the robot brakes, seconds.
-    stops_within_s: f64,
+    brakes_within_s: f64,
     /// Turns the robot's axis to the front sonar's, which is turned for a look.
     bearing: DVec2,
     /// The arc is followed so far: at top speed the robot can stop there, metres.
@@ -64,9 +64,9 @@ pub(crate) struct ActiveSensing {
 
 impl ActiveSensing {
     pub(crate) fn new(mission: &Mission) -> Self {
-        let (response, speed) = (mission.body().response, mission.speed_m_s());
-        let stops_within_s = mission.hurry().stops_within_s;
-        let stops_m = response.way_to_stop_m(speed, stops_within_s);
+        let (response, speed) = (mission.trusted_response(), mission.speed_m_s());
+        let brakes_within_s = mission.brakes_within_s();
+        let stops_m = response.way_to_stop_m(speed, brakes_within_s);
         let (radius, outline) = (mission.body().radius_m, mission.outline());
         Self {
             radius,
@@ -75,7 +75,7 @@ impl ActiveSensing {
             speed,
             turn: mission.turn_rad_s(),
             response,
-            stops_within_s,
+            brakes_within_s,
             bearing: DVec2::from_angle(mission.front_sonar().faces_rad()),
             ahead_m: AHEAD_M.max(stops_m + STEP_M),
             sonars: mission.used(SensorKind::Cone),
@@ -125,7 +125,7 @@ impl ActiveSensing {
         if clear_m < STANDS_BEFORE_M {
             return 0.0;
         }
-        self.response.speed_to_stop_within(clear_m, self.stops_within_s)
+        self.response.speed_to_stop_within(clear_m, self.brakes_within_s)
     }
 
     /// Whether the body may go to `at` along `axis`: no hazard is there, and no ground that is not scanned.
@@ -181,7 +181,7 @@ impl ActiveSensing {
         };
         let free = (1..=steps).find(|step| !open(step)).unwrap_or(steps + 1) - 1;
         let room_m = free as f64 * STEP_M;
-        let on_arc = self.response.speed_to_stop_within(room_m, self.stops_within_s);
+        let on_arc = self.response.speed_to_stop_within(room_m, self.brakes_within_s);
         let faces = pose.axis().dot(direction) > FACES_COSINE;
         let least = if faces { LEAST_SPEED_M_S } else { 0.0 };
         on_arc.max(least).min(self.limit_before_echoes(belief, pose))

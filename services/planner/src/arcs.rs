@@ -52,7 +52,7 @@ impl Arcs {
             speed: mission.speed_m_s(),
             turn: mission.turn_rad_s(),
             slow_radius: mission.controller.slow_radius_m,
-            response: mission.body().response,
+            response: mission.trusted_response(),
         })
     }
 

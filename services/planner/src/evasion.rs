@@ -8,7 +8,7 @@
 use std::f64::consts::TAU;
 
 use common::{
-    kinematics::{FACES_COSINE, LEAST_SPEED_M_S},
+    kinematics::{FACES_COSINE, LEAST_SPEED_M_S, TURN_GAIN},
     mission::{Mission, Response, SensorKind},
     samples::{GuidanceStatus, Mover, PoseSample},
 };
@@ -21,8 +21,6 @@ const STEP_S: f64 = 0.1;
 const DIRECTIONS: u32 = 16;
 /// Shares of the top speed.
 const SPEEDS: [f64; 2] = [1.0, 0.5];
-/// The controller's turn rate on the spot per remaining angle, 1/s.
-const TURN_GAIN: f64 = 3.0;
 /// The least distance from a mover, metres, and its growth for a robot in motion and at rest, m/s: movers turn and change their speed.
 const APART_M: f64 = 0.1;
 const GROWS_M_S: f64 = 0.15;

@@ -73,7 +73,7 @@ pub(crate) struct Outline {
     /// Cosine of the angle beyond which the controller turns on the spot.
     turns: f64,
     response: Response,
-    stops_within_s: f64,
+    brakes_within_s: f64,
     /// The rest of the way that was found, its next step last.
     plan: Vec<Planned>,
 }
@@ -128,8 +128,8 @@ impl Outline {
             speed: mission.speed_m_s().min(NARROW_M_S),
             turn: mission.turn_rad_s(),
             turns: hurry.turns_beyond_deg.to_radians().cos(),
-            response: body.response,
-            stops_within_s: hurry.stops_within_s,
+            response: mission.trusted_response(),
+            brakes_within_s: mission.brakes_within_s(),
             plan: Vec::new(),
         }
     }
@@ -203,7 +203,7 @@ impl Outline {
         let Planned { step: [way, turn], .. } = *self.plan.last()?;
         let run = self.plan.iter().rev().take_while(|it| it.step[0] == way);
         let room_m = run.clone().count() as f64 * WAY_M;
-        let speed = self.response.speed_to_stop_within(room_m, self.stops_within_s);
+        let speed = self.response.speed_to_stop_within(room_m, self.brakes_within_s);
         let speed = speed.max(LEAST_SPEED_M_S);
         let fits = self.fits(view, pose);
         let moves = |way, turn| {

@@ -6,12 +6,12 @@ use common::{
     bus::Reader,
     clock::MissionClock,
     readers,
-    samples::{BaseResponseSample, FaultKind, GridHeader, PoseSample},
+    samples::{BaseResponseSample, CommandSample, FaultKind, GridHeader, PoseSample},
     shell::{Context, Process, Progress},
     stage::Runner,
     start::StageError,
     target::TargetReader,
-    topics::{BASE_RESPONSE, FIELD, GRID, GUIDANCE, POSE, TARGET},
+    topics::{BASE_RESPONSE, COMMAND, FIELD, GRID, GUIDANCE, POSE, TARGET},
     wiring::Topics,
 };
 
@@ -32,6 +32,7 @@ readers! {
         }
         feedback {
             response: Reader<BaseResponseSample> = BASE_RESPONSE,
+            commands: Reader<CommandSample> = COMMAND,
         }
     }
 }
@@ -207,6 +208,11 @@ impl Shell {
         if let Some(pose) = self.latest_pose.filter(|pose| pose.stamp.tick == tick) {
             if let Some(response) = self.inputs.response.newest()? {
                 self.take(Taken::Response(response.into()))?;
+            }
+            while let Some(command) = self.inputs.commands.next_sample()? {
+                if self.runner.stage.planner.foresees() {
+                    self.take(Taken::Command(command))?;
+                }
             }
             let full_solve_ns = self.runner.stage.full_solve_ns;
             self.take(Taken::Pose { pose, full_solve_ns })?;

@@ -8,7 +8,9 @@ use common::{
     inputs,
     mission::Mission,
     outputs::Outputs,
-    samples::{FaultKind, FieldHeader, GridHeader, GuidanceSample, PoseSample, TargetSample},
+    samples::{
+        CommandSample, FaultKind, FieldHeader, GridHeader, GuidanceSample, PoseSample, TargetSample,
+    },
     shell::{Context, Progress},
     stage::{ForeignState, Stage},
     start::StageError,
@@ -55,6 +57,8 @@ pub(crate) enum Taken<'a> {
     Policy,
     Target(#[serde(with = "inputs::sample")] TargetSample),
     Response(FoundResponse),
+    /// Only of a robot whose base answers late.
+    Command(#[serde(with = "inputs::sample")] CommandSample),
 }
 
 /// The step, and the computations outside of it: threads take the jobs and give the results, or this thread does in a replay.
@@ -117,6 +121,7 @@ impl Stage for PlannerStage {
                 self.jobs.extend(job);
                 work
             }),
+            Taken::Command(command) => Ok(planner.take_command(&command)),
             Taken::Response(found) => Ok(planner.take_response(&found)),
             Taken::Target(target) => planner.take_target(&target),
             Taken::Solved(number) => {

@@ -6,14 +6,15 @@ mod output;
 use std::sync::Arc;
 
 use common::{
+    clock::MissionTime,
     found_response::FoundResponse,
     geometry::wrap_angle,
     grid::{Applied, GridFrame, Replica, Window},
-    kinematics::{LEAST_SPEED_M_S, Pose2},
-    mission::{Method, Mission},
+    kinematics::{LEAST_SPEED_M_S, Pose2, Twist},
+    mission::{Lead, Method, Mission},
     samples::{
-        FaultKind, FieldHeader, GridHeader, GuidanceSample, GuidanceStatus, PoseSample,
-        TargetSample,
+        CommandSample, CommandState, FaultKind, FieldHeader, GridHeader, GuidanceSample,
+        GuidanceStatus, PoseSample, TargetSample,
     },
 };
 use glam::DVec2;
@@ -68,6 +69,8 @@ pub struct Planner {
     advisor: Advisor,
     /// None for a robot that does not see what moves.
     evasion: Option<Evasion>,
+    /// None for a base that answers soon enough.
+    lead: Option<Lead>,
     solver: Solver,
     grid: Replica<u8>,
     belief: GridHeader,
@@ -91,6 +94,7 @@ impl Planner {
             robot: Robot::new(mission),
             advisor: Advisor::new(mission),
             evasion: Evasion::new(mission),
+            lead: Lead::new(mission),
             solver: Solver::new(Settings::default()),
             grid: Replica::default(),
             belief: GridHeader::default(),
@@ -125,8 +129,33 @@ impl Planner {
         if let Some(mission) = self.found.changed(found, &self.mission) {
             self.advisor = Advisor::new(&mission);
             self.evasion = Evasion::new(&mission);
+            self.lead = Lead::new(&mission);
         }
         Work::None
+    }
+
+    /// Whether its answers depend on the commands before.
+    pub const fn foresees(&self) -> bool {
+        self.lead.is_some()
+    }
+
+    /// The base was commanded, and acts later.
+    pub fn take_command(&mut self, command: &CommandSample) -> Work {
+        let CommandSample { v_m_s: v, omega_rad_s: omega, pose_ns, state, .. } = *command;
+        let drives = CommandState::from_byte(state) == CommandState::Driving;
+        let twist = Twist { v, omega };
+        // Samples may hold anything.
+        let twist = if drives && self.can(twist) { twist } else { Twist::default() };
+        if let Some(lead) = &mut self.lead {
+            lead.command(twist, MissionTime(pose_ns).seconds());
+        }
+        Work::None
+    }
+
+    fn can(&self, Twist { v, omega }: Twist) -> bool {
+        let body = self.mission.body();
+        let most_rad_s = self.mission.turn_rad_s().max(self.mission.hurry().look_rad_s);
+        v.abs() <= body.top_speed_m_s && omega.abs() <= most_rad_s
     }
 
     /// The robot is sent elsewhere. A target that is not inside the perimeter is ignored.
@@ -287,14 +316,15 @@ impl Planner {
 
     /// The guidance for a robot at that pose. A small map is solved first if its field must not be followed there.
     pub fn answer(&mut self, sample: &PoseSample) -> Result<(Work, GuidanceSample), SolveError> {
-        let pose = sample.pose();
+        let (pose, time_s) = (sample.pose(), sample.stamp.time().seconds());
+        let acts_at = self.lead.as_mut().map_or(pose, |lead| lead.pose(pose, time_s));
         let mut work = Work::None;
-        let mut followed = self.follow_field(&pose);
+        let mut followed = self.follow_field(&acts_at);
         if followed.is_none() && self.is_solved_here() {
             work = self.solve_newest()?;
-            followed = self.follow_field(&pose);
+            followed = self.follow_field(&acts_at);
         }
-        Ok((work, self.guide(sample, followed)))
+        Ok((work, self.guide(sample, acts_at, followed)))
     }
 
     /// None where the field must not be followed.
@@ -306,9 +336,9 @@ impl Planner {
     fn guide(
         &mut self,
         sample: &PoseSample,
+        pose: Pose2,
         followed: Option<(GuidanceStatus, DVec2)>,
     ) -> GuidanceSample {
-        let pose = sample.pose();
         let (status, direction) = followed.unwrap_or((GuidanceStatus::Waiting, DVec2::ZERO));
         let (status, direction, limit) = if self.on_a_saddle {
             (GuidanceStatus::Along, DVec2::ZERO, 0.0)

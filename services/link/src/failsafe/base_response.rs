@@ -1,4 +1,4 @@
-//! A base that answers later, or brakes more slowly, than stated. What was found is given with each tick, so that planner and controller
+//! A base that answers later, or brakes more slowly, than stated, or one of which nobody stated how it answers. What was found is given with each tick, so that planner and controller
 //! go by it; until a command follows from such a tick, the robot drives at half speed, because whatever allows it a speed counts on the
 //! stated response. It stays slow where nothing lets the response limit the speed: by the paper's method and with another planner.
 
@@ -19,10 +19,12 @@ const LONGER_M: f64 = 0.02;
 
 #[derive(Clone, Debug)]
 pub struct BaseResponse {
+    /// Or what the base is trusted to do, if nothing is stated.
     stated: Response,
+    is_stated: bool,
     top_speed_m_s: f64,
     brakes_by_response: bool,
-    /// The newest that stops later than stated.
+    /// The newest that stops later than stated, or the newest if nothing is stated.
     found: Option<Response>,
     /// Ticks since then have told it.
     told_from: MissionTime,
@@ -46,15 +48,24 @@ impl BaseResponse {
 
     /// What was found, and what to do about it.
     pub(crate) fn words(&self) -> Option<String> {
-        let Response { delay_s, acceleration_m_s2, .. } = self.found?;
+        let found = self.found?;
+        let Response { delay_s, acceleration_m_s2, .. } = found;
+        let answers = format!(
+            "the base answers after {:.2} s and accelerates at {acceleration_m_s2:.2} m/s^2",
+            found.dead_time_s()
+        );
+        if !self.is_stated {
+            return Some(format!(
+                "{answers}, or stops sooner, and nobody stated it: run `firsthand calibrate --response`, and write what it finds in [robot.response]; until then each run finds it out anew"
+            ));
+        }
         let stated = self.stated;
         let until_then = match self.brakes_by_response {
             true => "until then each run finds it out anew",
             false => "until then it drives at half speed, because it stops later than stated",
         };
         Some(format!(
-            "the base answers after {:.2} s and accelerates at {acceleration_m_s2} m/s^2, and {:.2} s and {} m/s^2 are stated: look for what delays commands or frames, or give delay_s = {delay_s:.2} and acceleration_m_s2 = {acceleration_m_s2} in [robot.response]; {until_then}",
-            self.found?.dead_time_s(),
+            "{answers}, and {:.2} s and {} m/s^2 are stated: look for what delays commands or frames, or give delay_s = {delay_s:.2} and acceleration_m_s2 = {acceleration_m_s2:.2} in [robot.response]; {until_then}",
             stated.dead_time_s(),
             stated.acceleration_m_s2,
         ))
@@ -63,11 +74,13 @@ impl BaseResponse {
 
 impl Monitor for BaseResponse {
     fn new(mission: &Mission) -> Self {
-        let Body { response: stated, top_speed_m_s, .. } = mission.body();
+        let Body { response, top_speed_m_s, .. } = mission.body();
+        let brakes_by_response = mission.brakes_by_response();
         Self {
-            stated,
+            stated: if brakes_by_response { mission.trusted_response() } else { response },
+            is_stated: mission.states_response(),
             top_speed_m_s,
-            brakes_by_response: mission.brakes_by_response(),
+            brakes_by_response,
             found: None,
             told_from: MissionTime::default(),
             is_followed: false,
@@ -78,9 +91,10 @@ impl Monitor for BaseResponse {
         match *what {
             Observation::Responds(response) => {
                 let most_m = LONGER_SHARE * self.stops_within_m(self.stated) + LONGER_M;
-                if self.stops_within_m(response) > most_m {
+                let is_slower = self.stops_within_m(response) > most_m;
+                if is_slower || !self.is_stated {
                     self.found = Some(response);
-                    (self.told_from, self.is_followed) = (now.time, false);
+                    (self.told_from, self.is_followed) = (now.time, !is_slower);
                 }
             }
             Observation::Command(command) => {

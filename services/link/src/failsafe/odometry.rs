@@ -62,6 +62,9 @@ pub(crate) const JUMPS_WITHIN: Duration = Duration::from_secs(2);
 pub(crate) const CALM: Duration = Duration::from_secs(2);
 /// So often it ends by itself: a faulty robot's counts may jump only while it moves.
 const MOST_RECOVERIES: u32 = 2;
+/// A response that was searched for is new if the way to stop is longer by the second factor or shorter by the first: what is new makes
+/// planner and controller forget the commands that the base has not answered yet.
+const UNCHANGED: std::ops::Range<f64> = 0.67..1.2;
 /// Time between looks for a delay.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
 pub(crate) const GIVEN_UP_AFTER: Duration = Duration::from_secs(10);
@@ -174,6 +177,10 @@ pub struct Odometry {
     counts_per_m: f64,
     steers: bool,
     response: Response,
+    /// Nobody stated the response.
+    searches: bool,
+    is_known: bool,
+    top_speed_m_s: f64,
     /// The commands, as far as the base's acceleration has reached them, counts/s.
     reached: [ModelledSpeed; 2],
     fit: ResponseFit,
@@ -245,8 +252,17 @@ impl Odometry {
         self.shares.adopt(response);
     }
 
+    fn stops_within_m(&self, response: Response) -> f64 {
+        response.way_to_stop_m(self.top_speed_m_s, response.dead_time_s())
+    }
+
     pub(crate) fn wheel_ratio(&self) -> WheelRatio {
         self.shares.ratio()
+    }
+
+    /// Nobody stated how the base answers.
+    pub(crate) const fn searches(&self) -> bool {
+        self.searches
     }
 
     /// The response that explained a motion that the one before did not; the next call gives none.
@@ -331,7 +347,16 @@ impl Odometry {
             return;
         }
         self.looked = now;
-        if let Some(found) = self.fit.later(self.response, self.steers) {
+        let is_new = |found: &Response| {
+            let change = self.stops_within_m(*found) / self.stops_within_m(self.response);
+            !self.is_known || !UNCHANGED.contains(&change)
+        };
+        let found = self.fit.later(self.response, self.steers).or_else(|| {
+            let searched = self.searches.then(|| self.fit.slowest(self.top_speed_m_s, self.steers));
+            searched.flatten().filter(is_new)
+        });
+        if let Some(found) = found {
+            self.is_known = true;
             self.adopt(found);
             self.found = Some(found);
             self.clear_evidence();
@@ -355,7 +380,10 @@ impl Odometry {
         }
         let suspected = Suspected { channel, from_s: since.seconds() - JUDGED.as_secs_f64() };
         if let Some(found) = self.fit.explain(self.response, self.steers, suspected) {
-            if found != self.response {
+            // A moment explains less than all that was seen, from which the search takes what is slow enough.
+            let is_news =
+                !self.searches || self.stops_within_m(found) > self.stops_within_m(self.response);
+            if found != self.response && is_news {
                 self.adopt(found);
                 self.found = Some(found);
             }
@@ -423,10 +451,14 @@ impl Monitor for Odometry {
     fn new(mission: &Mission) -> Self {
         let body = mission.body();
         let counts_per_m = 1.0 / body.metres_per_count();
-        let change = body.response.acceleration_m_s2 * counts_per_m;
+        let response = mission.trusted_response();
+        let change = response.acceleration_m_s2 * counts_per_m;
         Self {
             counts_per_m,
-            response: body.response,
+            response,
+            searches: !mission.states_response(),
+            is_known: mission.states_response(),
+            top_speed_m_s: body.top_speed_m_s,
             reached: [(); 2].map(|()| ModelledSpeed::new(0.0, change)),
             fit: ResponseFit::new(counts_per_m),
             shares: WheelShares::new(mission),

@@ -47,6 +47,14 @@ const BETTER: f64 = 1.5;
 const LATER_UNEXPLAINED: f64 = 0.1;
 const TURN_EXPLAINED: f64 = 0.5;
 
+/// The least motion of both wheels that tells a response, and what two responses leave unexplained that are alike: squares of m/s, times
+/// seconds.
+const LEAST_MOTION: f64 = 0.05;
+const ALIKE: f64 = 0.003;
+/// The ways to stop of responses that are told apart differ by this factor and by those of so many seconds.
+const TOLD_APART: f64 = 1.3;
+const TOLD_APART_S: f64 = 0.15;
+
 /// The square of the share by which two wheels that are told the same differ.
 const DIFFERENT: f64 = 0.05 * 0.05;
 
@@ -63,6 +71,17 @@ pub(super) struct Suspected {
     pub(super) channel: usize,
     /// What raised the suspicion happened from then on.
     pub(super) from_s: f64,
+}
+
+/// Dead times, seconds, and accelerations, m/s^2.
+fn candidates() -> impl Iterator<Item = (f64, f64)> {
+    (0..DEAD_TIMES).flat_map(|step| {
+        let dead_time_s = f64::from(step) * DEAD_TIME_STEP_S;
+        let accelerations = (0..ACCELERATIONS)
+            .map(|power| LEAST_ACCELERATION_M_S2 * ACCELERATION_RATIO.powi(power))
+            .chain([f64::INFINITY]);
+        accelerations.map(move |acceleration| (dead_time_s, acceleration))
+    })
 }
 
 fn channels([left, right]: [f64; 2]) -> [f64; CHANNELS] {
@@ -88,6 +107,14 @@ impl ResponseFit {
     }
 
     pub(super) fn turned(&mut self, counts: Option<[f64; 2]>, now: MissionTime) {
+        // In lockstep further frames may come at the time of a tick.
+        if let Some((at, Some(before))) = self.turned.back_mut()
+            && *at == now.seconds()
+        {
+            let [left, right] = counts.unwrap_or_default();
+            *before = [before[0] + left, before[1] + right];
+            return;
+        }
         keep(&mut self.turned, (now.seconds(), counts), KEPT_S);
     }
 
@@ -125,14 +152,7 @@ impl ResponseFit {
         steers: bool,
         suspected: Suspected,
     ) -> Option<Response> {
-        let candidates = (0..DEAD_TIMES).flat_map(|step| {
-            let dead_time_s = f64::from(step) * DEAD_TIME_STEP_S;
-            let accelerations = (0..ACCELERATIONS)
-                .map(|power| LEAST_ACCELERATION_M_S2 * ACCELERATION_RATIO.powi(power))
-                .chain([f64::INFINITY]);
-            accelerations.map(move |acceleration| (dead_time_s, acceleration))
-        });
-        let explained = candidates.filter_map(|(dead_time_s, acceleration_m_s2)| {
+        let explained = candidates().filter_map(|(dead_time_s, acceleration_m_s2)| {
             let explained = self.explained(dead_time_s, acceleration_m_s2, steers, suspected)?;
             let lag_s = stated.lag_s.min(dead_time_s);
             let delay_s = dead_time_s - lag_s;
@@ -173,6 +193,38 @@ impl ResponseFit {
             && later_s >= LEAST_LATER_S
             && prompt > (unlike + LEAST_BETTER).max(BETTER * (unlike + NOISE));
         is_later.then_some(Response { delay_s: stated.delay_s + later_s, ..stated })
+    }
+
+    /// Of the responses that explain the wheels' motion about as well as the best one does, the one that stops last from `top_speed_m_s`.
+    /// None as long as they differ much: delay and acceleration, which both make a start late, are told apart by more of them.
+    pub(super) fn slowest(&self, top_speed_m_s: f64, steers: bool) -> Option<Response> {
+        let ((first_s, _), (last_s, _)) = (self.turned.front()?, self.turned.back()?);
+        let intervals = self.turned.iter().filter(|(_, turned)| turned.is_some()).count();
+        // Squares of counts in an interval to squares of m/s, times seconds.
+        let scale = intervals as f64 / (last_s - first_s) / self.counts_per_m.powi(2);
+        let fits = candidates().filter_map(|(dead_time_s, acceleration)| {
+            let [[left, right, _], _] = self.motions(dead_time_s, acceleration, *first_s)?;
+            let wheels = if steers { left } else { left.with(&right) };
+            let factor = (wheels.both / wheels.model).clamp(*FACTORS.start(), *FACTORS.end());
+            let (unlike, all) = (scale * wheels.unlike(factor), scale * wheels.turned);
+            // Wheels that reach less of a speed reach it sooner.
+            let acceleration_m_s2 = acceleration * factor;
+            let response = Response {
+                delay_s: dead_time_s,
+                lag_s: 0.0,
+                acceleration_m_s2,
+                turn_acceleration_rad_s2: f64::INFINITY,
+            };
+            let stops_m = response.way_to_stop_m(top_speed_m_s, dead_time_s);
+            let tells = all >= LEAST_MOTION && unlike <= LATER_UNEXPLAINED * all;
+            tells.then_some((unlike, stops_m, response))
+        });
+        let fits: Vec<_> = fits.collect();
+        let (least, best_m, _) = *fits.iter().min_by(|one, other| one.0.total_cmp(&other.0))?;
+        let near = fits.iter().filter(|(unlike, ..)| *unlike <= BETTER * least + ALIKE);
+        let (_, slowest_m, slowest) = near.max_by(|one, other| one.1.total_cmp(&other.1))?;
+        let most_m = TOLD_APART * best_m + TOLD_APART_S * top_speed_m_s;
+        (*slowest_m <= most_m).then_some(*slowest)
     }
 
     /// The least share of a channel's motion that the response explains; none if a channel moved by no factor of it, or
@@ -299,13 +351,21 @@ mod tests {
 
     /// Drives a base with a track of 0.3 m as a controller does: on, to the left, on, to the right; its wheels turn by `model`, seen
     /// through `encoders`.
-    fn explained(
+    fn explained(response: [f64; 2], encoders: impl Fn([f64; 2]) -> [f64; 2]) -> Option<Response> {
+        let suspected = Suspected { channel: 0, from_s: 3.0 };
+        driven(response, 1.0, 45, encoders).explain(Response::X80, false, suspected)
+    }
+
+    /// What is known after so many ticks of a base whose wheels reach `gain` of what they are told.
+    fn driven(
         [delay_s, acceleration]: [f64; 2],
+        gain: f64,
+        ticks: u32,
         encoders: impl Fn([f64; 2]) -> [f64; 2],
-    ) -> Option<Response> {
+    ) -> ResponseFit {
         let mut fit = ResponseFit::new(1000.0);
         let mut wheels = [(); 2].map(|()| ModelledSpeed::new(delay_s, acceleration * 1000.0));
-        for tick in 0..45 {
+        for tick in 0..ticks {
             let now = f64::from(tick) * PERIOD_S;
             let turned = wheels.each_mut().map(|wheel| wheel.go_on(now));
             fit.turned((tick > 0).then(|| encoders(turned)), MissionTime::from_seconds(now));
@@ -316,11 +376,29 @@ mod tests {
             };
             fit.commanded(command, MissionTime::from_seconds(now));
             for (wheel, speed) in wheels.iter_mut().zip(command) {
-                wheel.command(now, speed);
+                wheel.command(now, gain * speed);
             }
         }
-        let suspected = Suspected { channel: 0, from_s: 3.0 };
-        fit.explain(Response::X80, false, suspected)
+        fit
+    }
+
+    #[test]
+    fn delay_and_acceleration_of_a_base_of_which_nobody_stated_them_are_found_together_and_on_the_slow_side()
+     {
+        let stops_m = |[delay_s, acceleration]: [f64; 2]| 0.5 * delay_s + 0.125 / acceleration;
+        for response in [[0.4, 0.3], [0.25, 0.6], [0.1, 0.3], [0.4, 3.0], [0.1, f64::INFINITY]] {
+            let found = driven(response, 0.78, 45, |turned| turned).slowest(0.5, false).unwrap();
+            let found_m = stops_m([found.dead_time_s(), found.acceleration_m_s2]);
+            let share = found_m / (stops_m(response) + 0.02);
+            assert!((0.9..1.7).contains(&share), "{response:?} {found:?}: {share}");
+        }
+        let ramp = driven([0.4, 0.3], 0.78, 8, |turned| turned);
+        assert!(ramp.slowest(0.5, false).is_none_or(|found| found.acceleration_m_s2 <= 0.3));
+        assert_eq!(driven([0.1, 0.6], 1.0, 45, |_| [0.0; 2]).slowest(0.5, false), None);
+        assert_eq!(
+            driven([0.1, 0.6], 1.0, 45, |[_, right]| [0.0, right]).slowest(0.5, false),
+            None
+        );
     }
 
     #[test]

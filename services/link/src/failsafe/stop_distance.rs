@@ -18,7 +18,7 @@ pub struct Stop {
 impl Stop {
     /// The stop of a robot whose fault is known after `known_s`.
     pub fn known_after(known_s: f64, mission: &Mission) -> Self {
-        let (response, speed) = (mission.body().response, mission.speed_m_s());
+        let (response, speed) = (mission.trusted_response(), mission.speed_m_s());
         let turns_s = mission.turn_rad_s() / response.turn_acceleration_rad_s2;
         let brakes_s = turns_s.max(speed / response.acceleration_m_s2);
         // A lag leaves of the speed what is called rest after so many time constants.

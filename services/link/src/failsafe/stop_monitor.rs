@@ -28,7 +28,7 @@ const NEXT_METHOD_AFTER: Duration = Duration::from_millis(300);
 
 /// Until a robot that does not stop at full speed is told by its next method, seconds. It moves in whole intervals between frames.
 pub(crate) fn known_within_s(mission: &Mission) -> f64 {
-    let comes_to_rest = comes_to_rest_s(mission.body().response, mission.speed_m_s());
+    let comes_to_rest = comes_to_rest_s(mission.trusted_response(), mission.speed_m_s());
     comes_to_rest + DOES_NOT_STOP_AFTER.as_secs_f64() + 2.0 / mission.robot.rate_hz
 }
 
@@ -148,7 +148,7 @@ impl Monitor for StopMonitor {
         Self {
             counts_per_m: 1.0 / mission.body().metres_per_count(),
             longest_gap: Duration::from_secs_f64(2.0 / mission.robot.rate_hz),
-            response: mission.body().response,
+            response: mission.trusted_response(),
             driven: 0.0,
             told_to_stand: None,
             frame: None,

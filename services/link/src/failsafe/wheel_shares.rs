@@ -27,6 +27,8 @@ const STEADY: usize = 3;
 const AGREE: f64 = 0.75;
 /// A slower wheel, by its share of the top speed, says little: what the model leaves out is a large part of its way.
 const LEAST_SPEED: f64 = 0.15;
+/// A modelled wheel has its commanded speed within this share.
+const SETTLED: f64 = 0.05;
 
 /// Of a tick's change of the curve, the logarithm of the ways' ratio: the least square, as wheels answer within some ticks of when they
 /// should, and the most, as what the model leaves out is more then.
@@ -105,8 +107,9 @@ pub(crate) struct WheelShares {
 
 impl WheelShares {
     pub(crate) fn new(mission: &Mission) -> Self {
-        let Body { response, steering, top_speed_m_s, .. } = mission.body();
-        let metres_per_count = mission.body().metres_per_count();
+        let (body, response) = (mission.body(), mission.trusted_response());
+        let Body { steering, top_speed_m_s, .. } = body;
+        let metres_per_count = body.metres_per_count();
         let wheel = ModelledSpeed::new(
             response.dead_time_s(),
             response.acceleration_m_s2 / metres_per_count,
@@ -145,6 +148,10 @@ impl WheelShares {
         {
             let rolled = counts.since(before);
             let metres = |counts: [f64; 2]| counts.map(|count| count * self.metres_per_count);
+            // Ways of wheels that gain or lose speed differ by when they do, which the model knows less well.
+            let settles =
+                |wheel: &ModelledSpeed| wheel.left().abs() <= SETTLED * wheel.speed().abs();
+            let told = if wheels.iter().all(settles) { told } else { [0.0; 2] };
             let now = [metres(told), metres(rolled)];
             self.newest.rotate_left(1);
             self.newest[STEADY - 1] = now;
@@ -235,6 +242,33 @@ mod tests {
         }
         let WheelRatio { ratio, deviation } = shares.ratio();
         assert!((ratio - 1.0).abs() < 0.003, "{ratio} with a deviation of {deviation}");
+    }
+
+    #[test]
+    fn equal_wheels_that_gain_speed_slowly_and_fall_short_alike_are_even() {
+        let text = "target = [3, 0]\nrobot.response.acceleration_m_s2 = 0.3";
+        let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
+        let mut shares = WheelShares::new(&mission);
+        let mut wheels = shares.wheels.clone().unwrap();
+        let mut rolled = [0.0; 2];
+        for tick in 0..200 {
+            let now_s = f64::from(tick) * PERIOD_S;
+            shares.rolled(WheelCounts::Endless(rolled.map(f64::round)), now_s);
+            let told = match tick / 9 % 4 {
+                0 => [600, 600],
+                1 => [300, 700],
+                2 => [700, 600],
+                _ => [700, 250],
+            };
+            shares.told(told, now_s);
+            for (wheel, rolls) in wheels.iter_mut().enumerate() {
+                // They gain speed as stated, and less of it.
+                rolls.command(now_s, 0.78 * f64::from(told[wheel]));
+                rolled[wheel] += rolls.go_on(now_s + PERIOD_S);
+            }
+        }
+        let WheelRatio { ratio, deviation } = shares.ratio();
+        assert!((ratio - 1.0).abs() < 0.01 + 3.0 * deviation, "{ratio} +- {deviation}");
     }
 
     #[test]

@@ -151,20 +151,28 @@ impl Link {
         let was_away = !self.connected();
         let are = self.restart.step(counts, speeds, was_away, self.now);
         self.observe(Observation::Motor(counts, are), now_ns);
+        self.tell_response(now_ns, effects);
+        are
+    }
+
+    fn tell_response(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         if let Some(response) = self.failsafe.monitors.odometry.take_found() {
             self.observe(Observation::Responds(response), now_ns);
             let base = &self.failsafe.monitors.base;
             effects.extend(base.words().map(Effect::FoundResponse));
         }
-        are
     }
 
-    /// Contacts and the wheels' shares are judged in lockstep too, by the motion that begins a tick.
-    pub(super) fn judge_tick(&mut self, motion: &Motion, now_ns: u64) {
+    /// Contacts, the wheels' shares and an unstated response are judged in lockstep too, by the motion that begins a tick.
+    pub(super) fn judge_tick(&mut self, motion: &Motion, now_ns: u64, effects: &mut Vec<Effect>) {
         let now = self.moment(now_ns);
         let odometry = &mut self.failsafe.monitors.odometry;
         odometry.observe(&Observation::Currents(motion.currents), now);
         odometry.observe(&Observation::Motor(cyclic(motion), Counts::Follow), now);
+        // A simulated robot answers as stated, if that is stated.
+        if odometry.searches() {
+            self.tell_response(now_ns, effects);
+        }
     }
 
     /// `own_wire` is the time at which readings came that did not come with the robot's motion.

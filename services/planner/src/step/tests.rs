@@ -251,6 +251,45 @@ fn a_robot_whose_base_was_found_to_stop_late_goes_no_faster_than_it_can_stop() {
 }
 
 #[test]
+fn a_robot_goes_slower_before_what_it_has_not_seen_as_long_as_nobody_knows_how_it_answers() {
+    let limit = |robot: &str| {
+        let text = format!("target = [1.5, 0]\nperimeter = {{ width_m = 4, cells = 40 }}\n{robot}");
+        let mission = Mission::parse(&text, Path::new("test.toml")).unwrap();
+        evidential_in(&mission, |_| false, |at| at.x < 0.7).ask(&at(0.0, 0.0)).speed_limit_m_s
+    };
+    let unknown = limit("robot.protocol = 'json'");
+    let stated =
+        "robot = { protocol = 'json', response = { delay_s = 0.07, acceleration_m_s2 = 1000.0 } }";
+    assert!(unknown > 0.0 && unknown < 0.7 * limit(stated), "{unknown} {}", limit(stated));
+    assert!((limit(stated) - limit("")).abs() < 0.01, "{} {}", limit(stated), limit(""));
+}
+
+#[test]
+fn a_late_base_is_guided_for_the_place_where_it_will_act() {
+    let text =
+        "target = [1.5, 0]\nperimeter = { width_m = 4, cells = 40 }\nrobot.response.delay_s = 0.4";
+    let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
+    let advice = |commanded: &[CommandSample], from: f64| {
+        let mut planner = evidential_in(&mission, |_| false, |at| at.x < 0.9);
+        commanded.iter().for_each(|command| _ = planner.take_command(command));
+        let mut asked = at(from, 0.0);
+        asked.stamp.stamp_ns = 480_000_000;
+        planner.ask(&asked)
+    };
+    let driving = CommandSample {
+        v_m_s: 0.5,
+        state: CommandState::Driving.into(),
+        ..CommandSample::default()
+    };
+    let [late, there] = [advice(&[driving], 0.0), advice(&[], 0.24)];
+    assert!((late.speed_limit_m_s - there.speed_limit_m_s).abs() < 1e-6, "{late:?} {there:?}");
+    assert!((late.ex - there.ex).abs() < 1e-6 && late.x_m == 0.0, "{late:?} {there:?}");
+    assert!(there.speed_limit_m_s < advice(&[], 0.0).speed_limit_m_s);
+    let hostile = CommandSample { v_m_s: f64::NAN, ..driving };
+    assert_eq!(advice(&[hostile], 0.0), advice(&[], 0.0));
+}
+
+#[test]
 fn an_evidential_robot_does_not_creep_towards_what_it_hears_right_before_it() {
     for (clear_m, may_go) in [(-0.01, false), (0.07, false), (0.5, true)] {
         let mut planner = evidential(|_| true);
