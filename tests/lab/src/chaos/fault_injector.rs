@@ -9,7 +9,7 @@ use crate::{chaos::robot_fault::RobotFault, random::Random};
 
 mod words;
 
-const LATE: Duration = Duration::from_secs(2);
+pub(super) const LATE: Duration = Duration::from_secs(2);
 const LATE_FROM_BOOT: Duration = Duration::from_millis(500);
 const RANGE_LATE: Duration = Duration::from_secs(1);
 const OLD: Duration = Duration::from_secs(3);

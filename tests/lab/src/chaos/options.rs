@@ -124,6 +124,11 @@ impl Options {
         Ok(Self { asked, loaded, directory })
     }
 
+    /// Of the robot's link.
+    pub fn protocol(&self) -> Protocol {
+        if self.asked.ros2 { Protocol::Ros2 } else { self.loaded.robot.protocol() }
+    }
+
     pub fn records(&self) -> bool {
         self.asked.replay || self.asked.include_consumers
     }

@@ -10,6 +10,8 @@ use common::{
 use link::failsafe::stop_distance::Stop;
 use serde::{Serialize, Serializer};
 
+use super::fault_injector::LATE;
+
 /// The time until some faults show, seconds: counts of 0 first look like a restart of the robot, swapped encoders show in turns, a robot
 /// that believes in stuck ranges goes slowly, and slow frames leave pauses.
 const SHOWS_AFTER_S: f64 = 2.0;
@@ -142,6 +144,18 @@ impl RobotFault {
         does != NOTHING
     }
 
+    /// The greatest time from the fault to rest for good of a robot that speaks `protocol`, seconds; none if the robot may go on.
+    pub fn rest_within_s(self, mission: &Mission, protocol: Protocol) -> Option<f64> {
+        let promised_s = self.row().promise.rest_within_s(mission)?;
+        if (self, protocol) != (Self::FramesLate, Protocol::Ros2) {
+            return Some(promised_s);
+        }
+        // What comes late has fresh stamps there: the robot rests while nothing comes and goes on when frames come. They show that it
+        // came to rest, and then that its wheels do not follow its commands.
+        let follows_not_s = Promise::Rests(Cause::OdometryImplausible).rest_within_s(mission)?;
+        Some(promised_s + LATE.as_secs_f64() + follows_not_s)
+    }
+
     /// Whether the robot has the fault from its start on.
     pub const fn begins_at_boot(self) -> bool {
         matches!(self, Self::LateFromBoot)
@@ -175,6 +189,19 @@ mod tests {
                 _ => assert!(times[0].unwrap() + 0.3 < times[1].unwrap(), "{name}: {times:?}"),
             }
         }
+    }
+
+    #[test]
+    fn a_robot_whose_late_frames_have_fresh_stamps_is_given_the_time_in_which_they_come_and_are_found_out()
+     {
+        let mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
+        let within_s = |fault: RobotFault, protocol| fault.rest_within_s(&mission, protocol);
+        let [json, ros2] = [Protocol::Json, Protocol::Ros2]
+            .map(|protocol| within_s(RobotFault::FramesLate, protocol).unwrap());
+        assert!((json + 3.0..json + 4.0).contains(&ros2), "{json} {ros2}");
+        let silence = within_s(RobotFault::Silence, Protocol::Ros2);
+        assert_eq!(silence, within_s(RobotFault::Silence, Protocol::Json));
+        assert_eq!(within_s(RobotFault::RangeLate, Protocol::Ros2), None);
     }
 
     #[test]

@@ -12,7 +12,6 @@ use common::{
     domain::Domain,
     follower::{Event, Follower},
     ground_truth::GroundTruthTick,
-    mission::Protocol,
     samples::LinkSample,
     topics,
 };
@@ -51,7 +50,7 @@ const LOOK: Duration = Duration::from_millis(10);
 /// Run missions of each fault that is asked for and that a robot of this protocol can have.
 pub fn run(options: &Options) -> Result<StopTimeTable> {
     let asked = &options.asked;
-    let protocol = if asked.ros2 { Protocol::Ros2 } else { options.loaded.robot.protocol() };
+    let protocol = options.protocol();
     let named = asked.robot_faults.as_deref().filter(|named| !named.is_empty());
     let faults = named.unwrap_or(RobotFault::value_variants()).iter().copied();
     let (faults, left_out): (Vec<_>, Vec<_>) =
@@ -207,7 +206,7 @@ fn entry(
     let mut entry = Entry {
         fault,
         seed,
-        promised_s: fault.row().promise.rest_within_s(&options.loaded),
+        promised_s: fault.rest_within_s(&options.loaded, options.protocol()),
         fault_began: false,
         last_moving_s: None,
         rest_s: None,
