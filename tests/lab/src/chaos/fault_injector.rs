@@ -2,9 +2,9 @@
 
 use std::{collections::VecDeque, time::Duration};
 
-use common::{mission::Protocol, wire::COUNT_CYCLE};
+use common::{json_wire::Report, mission::Protocol, wire::COUNT_CYCLE};
 
-use self::words::{Effect, Readings, Said, Wheels, Words};
+use self::words::{COUNT_RAD, Effect, Said, Words};
 use crate::{chaos::robot_fault::RobotFault, random::Random};
 
 mod words;
@@ -17,6 +17,14 @@ const AGAIN_EVERY: Duration = Duration::from_secs(2);
 /// Period of slow messages: three a second.
 const SLOW: Duration = Duration::from_millis(333);
 const RUNS_COUNTS_S: f64 = 150.0;
+/// The greatest of random speeds, counts/s.
+const RANDOM_COUNTS_S: f64 = 1000.0;
+/// The greatest of random readings, metres.
+const RANDOM_M: f64 = 2.5;
+/// The value for no reading.
+const NO_READING: f64 = -1.0;
+/// The frozen range of a sensor that has measured nothing yet, metres.
+const FROZEN_M: f64 = 1.5;
 /// Messages that are stored: as many as come in [`OLD`] at ten times the usual rate.
 const MOST_KEPT: usize = 1024;
 
@@ -33,30 +41,29 @@ pub struct Late {
 pub struct FaultInjector {
     fault: RobotFault,
     faulty: bool,
-    /// Of the first message that the fault changed.
+    /// Of the first message with wheels that the fault changed.
     began: Option<Duration>,
     chance: Random,
     channel: usize,
     words: Words,
+    /// The last message with wheels before the fault.
     base: Option<Said>,
-    readings: Readings,
-    /// Whether the newest message with wheels says that one turns.
-    turns: bool,
+    /// The newest readings before the fault that are distances.
+    newest: Report,
     /// Messages with wheels or readings of the last seconds, oldest first.
     kept: VecDeque<(Duration, Said)>,
     next_again: Duration,
-    next_slow: [Duration; 256],
+    next_slow: [Duration; 4],
+    /// The newest command that moves the wheels; none once the link stopped the robot by other means than speed 0.
     moving: Option<Vec<u8>>,
     /// Whether the newest command of a speed moves the wheels.
     pushes: bool,
-    /// Whether the link stopped the robot by other means than speed 0.
-    disabled: bool,
 }
 
 impl FaultInjector {
     pub fn new(fault: RobotFault, protocol: Protocol, seed: u64) -> Self {
         let mut chance = Random::new(seed, 13);
-        let channel = (chance.bits() % 2) as usize;
+        let channel = chance.below(2);
         Self {
             fault,
             faulty: false,
@@ -65,14 +72,12 @@ impl FaultInjector {
             channel,
             words: Words::of(protocol),
             base: None,
-            readings: Readings::default(),
-            turns: false,
+            newest: Report::default(),
             kept: VecDeque::new(),
             next_again: Duration::ZERO,
-            next_slow: [Duration::ZERO; 256],
+            next_slow: [Duration::ZERO; 4],
             moving: None,
             pushes: false,
-            disabled: false,
         }
     }
 
@@ -82,65 +87,62 @@ impl FaultInjector {
 
     /// Convert bytes that the robot sent at `now` into those for the host.
     pub fn report(&mut self, bytes: &[u8], now: Duration) -> Vec<Late> {
-        let (mut out, mut more) = (Vec::new(), Vec::new());
+        let mut out = Vec::new();
         for said in self.words.said(bytes) {
-            self.keep(&said, now);
-            if let Some(wheels) = said.wheels(&said) {
-                self.turns = wheels.speeds != [0.0; 2];
-                if !self.faulty {
-                    self.base = Some(said.clone());
-                }
+            if said.stream().is_some() {
+                self.kept.push_back((now, said.clone()));
+                self.kept.drain(..self.kept.len().saturating_sub(MOST_KEPT));
             }
             if self.faulty {
                 out.extend(self.changed(said, now));
             } else {
-                self.readings.take(&said);
+                self.note(said);
             }
         }
         if !self.faulty {
-            out = bytes.to_vec();
+            return vec![Late { at: now, bytes: bytes.to_vec() }];
         }
-        if self.faulty && self.fault == RobotFault::OldFrames && now >= self.next_again {
-            self.next_again = now + AGAIN_EVERY;
-            let is_old =
-                |(at, said): &&(Duration, Said)| *at + OLD <= now && said.wheels(said).is_some();
-            let old = self.kept.iter().rfind(is_old);
-            more.extend(old.map(|(_, old)| Late { at: now, bytes: old.bytes() }));
-        }
-        let at = match self.fault {
-            RobotFault::FramesLate if self.faulty => now + LATE,
-            RobotFault::LateFromBoot | RobotFault::LateMidway if self.faulty => {
-                now + LATE_FROM_BOOT
-            }
-            _ => now,
+        let late = match self.fault {
+            RobotFault::FramesLate => LATE,
+            RobotFault::LateFromBoot | RobotFault::LateMidway => LATE_FROM_BOOT,
+            _ => Duration::ZERO,
         };
-        let first = (!out.is_empty()).then_some(Late { at, bytes: out });
-        first.into_iter().chain(more).collect()
+        let mut passed = vec![Late { at: now + late, bytes: out }];
+        if self.fault == RobotFault::OldFrames && now >= self.next_again {
+            self.next_again = now + AGAIN_EVERY;
+            let old = self.old(now, OLD, |said| said.report.wheels.is_some());
+            passed.extend(old.map(|old| Late { at: now, bytes: old.bytes() }));
+        }
+        passed.retain(|late| !late.bytes.is_empty());
+        passed
+    }
+
+    /// The newest of the messages `of_kind` that are `age` old.
+    fn old(&self, now: Duration, age: Duration, of_kind: impl Fn(&Said) -> bool) -> Option<&Said> {
+        let old = self.kept.iter().rfind(|(at, said)| *at + age <= now && of_kind(said));
+        old.map(|(_, said)| said)
     }
 
     /// Convert bytes of the host into those for the robot. `moves` is called for each command that moves the wheels.
     pub fn order(&mut self, bytes: &[u8], moves: &mut dyn FnMut()) -> Vec<u8> {
+        let is_faulty = |fault| self.faulty && self.fault == fault;
+        let holds_wheels = is_faulty(RobotFault::HeldWheels);
+        let keeps_speed = is_faulty(RobotFault::DoesNotStop) || is_faulty(RobotFault::IgnoresZero);
         let mut out = Vec::new();
-        for ordered in self.words.ordered(bytes) {
-            let mut bytes = ordered.bytes;
-            match ordered.effect {
+        for (mut bytes, effect) in self.words.ordered(bytes) {
+            match effect {
                 Effect::Moves { stand } => {
-                    (self.disabled, self.pushes) = (false, true);
-                    self.moving = Some(bytes.clone());
                     moves();
-                    if self.holds_wheels() {
+                    (self.moving, self.pushes) = (Some(bytes.clone()), true);
+                    if holds_wheels {
                         bytes = stand;
                     }
                 }
                 Effect::Stands => {
                     self.pushes = false;
-                    if let (true, false, Some(moving)) =
-                        (self.keeps_speed(), self.disabled, &self.moving)
-                    {
-                        bytes.clone_from(moving);
-                    }
+                    bytes = self.moving.clone().filter(|_| keeps_speed).unwrap_or(bytes);
                 }
-                Effect::Disables => self.disabled = true,
+                Effect::Disables => self.moving = None,
                 Effect::Other => {}
             }
             out.extend(bytes);
@@ -148,130 +150,144 @@ impl FaultInjector {
         out
     }
 
-    fn holds_wheels(&self) -> bool {
-        self.faulty && self.fault == RobotFault::HeldWheels
-    }
-
-    fn keeps_speed(&self) -> bool {
-        self.faulty && matches!(self.fault, RobotFault::DoesNotStop | RobotFault::IgnoresZero)
-    }
-
-    fn keep(&mut self, said: &Said, now: Duration) {
-        if said.stream().is_none() {
-            return;
-        }
-        self.kept.push_back((now, said.clone()));
-        if self.kept.len() > MOST_KEPT {
-            self.kept.pop_front();
+    /// Note a message that came before the fault.
+    fn note(&mut self, said: Said) {
+        let Report { ranges, scan, scans, .. } = &said.report;
+        let distances = ranges.iter().filter(|(_, range)| range.is_some_and(|range| range >= 0.0));
+        self.newest.ranges.extend(distances.map(|(name, range)| (name.clone(), *range)));
+        self.newest.scans.extend(scans.clone());
+        self.newest.scan = scan.clone().or(self.newest.scan.take());
+        if said.report.wheels.is_some() {
+            self.base = Some(said);
         }
     }
 
     /// The bytes into which the fault changes the message `said`.
-    fn changed(&mut self, said: Said, now: Duration) -> Vec<u8> {
+    fn changed(&mut self, mut said: Said, now: Duration) -> Vec<u8> {
         use RobotFault as F;
         match self.fault {
-            F::Silence => Vec::new(),
-            F::StreamsStop if said.stream().is_some() => Vec::new(),
+            F::Silence => return Vec::new(),
+            F::StreamsStop if said.stream().is_some() => return Vec::new(),
             F::FramesSlow => {
                 if let Some(stream) = said.stream() {
-                    let next = &mut self.next_slow[usize::from(stream)];
+                    let next = &mut self.next_slow[stream];
                     if now < *next {
                         return Vec::new();
                     }
                     *next = now + SLOW;
                 }
-                said.bytes()
             }
             F::Garbage => {
-                let mut bytes = said.bytes();
-                bytes.truncate(bytes.len() / 2);
-                bytes.push(b'\n');
-                bytes
+                let bytes = said.bytes();
+                return [&bytes[..bytes.len() / 2], b"\n"].concat();
             }
-            F::MotorOnes => said.with_data(0xff),
-            F::MotorZeros => said.with_data(0),
+            F::MotorOnes => return said.with_data(0xff),
+            F::MotorZeros => return said.with_data(0),
+            F::RangeMissing if said.is_frame() && !said.report.ranges.is_empty() => {
+                return Vec::new();
+            }
+            F::RangeMissing => {
+                let Report { ranges, scan, scans, .. } = &mut said.report;
+                (*ranges, *scan, *scans) = Default::default();
+            }
             F::RangeLate => {
-                let is_old = |(at, old): &&(Duration, Said)| {
-                    *at + RANGE_LATE <= now && old.readings() == said.readings()
-                };
-                let old = self.kept.iter().rfind(is_old).filter(|_| said.readings().is_some());
-                match old {
-                    Some((_, old)) => said.with_readings_of(old),
-                    None => said.bytes(),
+                let kind = said.readings();
+                let old = self.old(now, RANGE_LATE, |old| old.readings() == kind);
+                if let Some(old) = old.filter(|_| kind.contains(&true)) {
+                    said = said.with_readings_of(old.clone());
                 }
             }
-            F::RangeDeaf if !self.turns => said.bytes(),
+            F::RangeDeaf if !self.turns() => {}
             F::RangeInvalid
-            | F::RangeMissing
             | F::RangeStuck
             | F::RangeSilent
             | F::RangeFrozen
             | F::RangeNear
             | F::RangeRandom
-            | F::RangeDeaf => said.with_readings(self.fault, &self.readings, &mut self.chance),
-            fault => {
-                let base = self.base.get_or_insert_with(|| said.clone());
-                self.began.get_or_insert(now);
-                let (Some(wheels), Some(before)) = (said.wheels(base), base.wheels(base)) else {
-                    return said.bytes();
-                };
-                if fault == F::MotorRepeated {
-                    return base.bytes();
-                }
-                let told = self.counted(fault, wheels, before, now);
-                said.with_wheels(&told, self.holds_wheels() && self.pushes)
+            | F::RangeDeaf => self.misread(&mut said),
+            _ => self.miscount(&mut said, now),
+        }
+        said.bytes()
+    }
+
+    /// Whether the newest message with speeds says that a wheel turns.
+    fn turns(&self) -> bool {
+        let speeds = self.kept.iter().rev().find_map(|(_, said)| said.report.speeds);
+        speeds.is_some_and(|speeds| speeds != [0.0; 2])
+    }
+
+    /// Change the readings of `said`.
+    fn misread(&mut self, said: &mut Said) {
+        use RobotFault as F;
+        let (fault, chance) = (self.fault, &mut self.chance);
+        let [stuck_m, least_m] = said.stuck_and_least_m();
+        let Report { ranges, scan, scans, .. } = &mut said.report;
+        if matches!(fault, F::RangeFrozen | F::RangeNear) {
+            for (name, range) in &mut *ranges {
+                *range = self.newest.ranges.get(name).copied().unwrap_or(Some(FROZEN_M));
             }
+            *scan = scan.take().and(self.newest.scan.clone());
+            if !scans.is_empty() {
+                scans.clone_from(&self.newest.scans);
+            }
+        }
+        let mut told = |read: Option<f64>, is_beam: bool| match fault {
+            F::RangeFrozen => read,
+            F::RangeNear if is_beam => read.map(|beam| beam * chance.within(0.995, 1.005)),
+            F::RangeNear => read.map(|range| range + chance.within(-0.03, 0.03)),
+            F::RangeRandom => Some(chance.within(least_m, RANDOM_M)),
+            F::RangeStuck => Some(stuck_m),
+            F::RangeInvalid => Some(NO_READING),
+            _ => None,
+        };
+        ranges.values_mut().for_each(|range| *range = told(*range, false));
+        let named = scans.values_mut().flat_map(|scan| &mut scan.ranges);
+        for beam in scan.iter_mut().flatten().chain(named) {
+            *beam = told(beam.map(f64::from), true).map(|beam| beam as f32);
         }
     }
 
-    /// The wheels into which the fault changes `true_ones`, which were at `base` when it began.
-    fn counted(
-        &mut self,
-        fault: RobotFault,
-        true_ones: Wheels,
-        base: Wheels,
-        now: Duration,
-    ) -> Wheels {
-        let mut told = true_ones;
-        let channel = self.channel;
-        let turned = [0, 1].map(|wheel| true_ones.counts[wheel] - base.counts[wheel]);
-        match fault {
-            RobotFault::EncoderDead => {
-                told.counts[channel] = base.counts[channel];
-                told.speeds[channel] = 0.0;
+    /// Change the wheels of `said`, if it has any, from those before the fault on.
+    fn miscount(&mut self, said: &mut Said, now: Duration) {
+        use RobotFault as F;
+        let Some(mut angles) = said.report.wheels else { return };
+        let mut speeds = said.report.speeds.unwrap_or_default();
+        let base = self.base.get_or_insert_with(|| said.clone());
+        if self.fault == F::MotorRepeated {
+            *said = base.clone();
+            return;
+        }
+        let before = base.report.wheels.unwrap_or(angles);
+        let since_s = now.saturating_sub(*self.began.get_or_insert(now)).as_secs_f64();
+        let (channel, chance) = (self.channel, &mut self.chance);
+        let turned = [0, 1].map(|wheel| angles[wheel] - before[wheel]);
+        let mut counts_share = |share: f64| {
+            angles[channel] = before[channel] + share * turned[channel];
+            speeds[channel] *= share;
+        };
+        match self.fault {
+            F::EncoderDead => counts_share(0.0),
+            F::EncoderReversed => counts_share(-1.0),
+            F::EncoderLow => counts_share(0.95),
+            F::EncoderLower => counts_share(0.8),
+            F::EncodersSwapped => {
+                angles = [0, 1].map(|wheel| before[wheel] + turned[1 - wheel]);
+                speeds.reverse();
             }
-            RobotFault::EncodersSwapped => {
-                for channel in [0, 1] {
-                    told.counts[channel] = base.counts[channel] + turned[1 - channel];
-                    told.speeds[channel] = true_ones.speeds[1 - channel];
-                }
+            F::EncoderRuns => {
+                angles[channel] += RUNS_COUNTS_S * COUNT_RAD * since_s;
+                speeds[channel] += RUNS_COUNTS_S * COUNT_RAD;
             }
-            RobotFault::EncoderReversed => {
-                told.counts[channel] = base.counts[channel] - turned[channel];
-                told.speeds[channel] = -true_ones.speeds[channel];
+            F::CountsRandom => {
+                let mut random = |least, most| chance.within(least, most) * COUNT_RAD;
+                angles = [(); 2].map(|()| random(0.0, COUNT_CYCLE.into()));
+                speeds = [(); 2].map(|()| random(-RANDOM_COUNTS_S, RANDOM_COUNTS_S));
             }
-            RobotFault::EncoderLow | RobotFault::EncoderLower => {
-                let share = if fault == RobotFault::EncoderLow { 0.95 } else { 0.8 };
-                told.counts[channel] = base.counts[channel] + share * turned[channel];
-                told.speeds[channel] *= share;
-            }
-            RobotFault::EncoderRuns => {
-                let since_s = now.saturating_sub(self.began.unwrap_or(now)).as_secs_f64();
-                told.counts[channel] += RUNS_COUNTS_S * since_s;
-                told.speeds[channel] += RUNS_COUNTS_S;
-            }
-            RobotFault::CountsRandom => {
-                for wheel in [0, 1] {
-                    let chance = self.chance.bits();
-                    let speed = f64::from((chance >> 16) as u16 % 1000);
-                    told.counts[wheel] = f64::from(chance as u16 % COUNT_CYCLE);
-                    told.speeds[wheel] = if chance >> 32 & 1 == 1 { speed } else { -speed };
-                }
-            }
-            RobotFault::CountsReset => told.counts = turned,
+            F::CountsReset => angles = turned,
+            F::HeldWheels if self.pushes => said.report.held = Some([true; 2]),
             _ => {}
         }
-        told
+        (said.report.wheels, said.report.speeds) = (Some(angles), Some(speeds));
     }
 }
 

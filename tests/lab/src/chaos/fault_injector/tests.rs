@@ -6,7 +6,7 @@ use common::wire::{
 
 use clap::ValueEnum as _;
 
-use super::{words::STUCK_CM, *};
+use super::*;
 
 const fn encoder(position: u16) -> Encoder {
     Encoder { position, speed: 300, positive: true }
@@ -115,7 +115,7 @@ fn the_sonar_is_wrong_as_the_table_says() {
     let told = |fault| sonar(&faulted(fault, [150, 190]).1);
     assert_eq!(told(RobotFault::RangeInvalid), Some(0));
     assert_eq!(told(RobotFault::RangeMissing), None);
-    assert_eq!(told(RobotFault::RangeStuck), Some(STUCK_CM));
+    assert_eq!(told(RobotFault::RangeStuck), Some(8));
     assert_eq!(told(RobotFault::EncoderDead), Some(90));
     assert_eq!(told(RobotFault::RangeSilent), Some(255));
     // Messages that the robot hears after the fault began change nothing.

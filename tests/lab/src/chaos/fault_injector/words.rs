@@ -1,44 +1,49 @@
 //! The messages of robot and host in either protocol, as far as faults change them.
 
-use std::{collections::BTreeMap, f64::consts::TAU};
+use std::f64::consts::TAU;
 
 use common::{
     json_wire::{self, Lines, line, parse},
     mission::Protocol,
     wire::{
-        Addressing, COUNT_CYCLE, Command, Decoder, Frame, Motion, MotorSensors, Quantity, Report,
-        did,
+        Addressing, COUNT_CYCLE, Command, Decoder, Echo, Encoder, Frame, Motion, MotorSensors,
+        Quantity, Report, did,
     },
 };
 
-use crate::{chaos::robot_fault::RobotFault, random::Random};
-
-/// The stuck echo of a sonar, centimetres, and the stuck range of a robot that speaks lines of JSON, metres.
-pub const STUCK_CM: u8 = 8;
-pub const STUCK_M: f64 = 0.3;
-/// The frozen echo of a sonar that has heard nothing yet, centimetres.
-const FROZEN_CM: u8 = 150;
-const NOTHING: u8 = 255;
-/// The value for no reading of a robot that speaks lines of JSON.
-const NO_READING: f64 = -1.0;
 /// The current of a held motor, as that of the simulated robot, AD counts.
 const HELD_AD: u16 = 1520;
-/// Ultrasonic bytes at the front of a standard frame's data.
-const ULTRASONIC: usize = 6;
-/// The angle of a count, radians, in messages with angles: that of an X80.
-const COUNT_RAD: f64 = TAU / 1200.0;
+/// The longest echo of a sonar that heard something, metres.
+const LONGEST_ECHO_M: f64 = 2.54;
+/// Bytes of a motor frame's data.
+const MOTOR_BYTES: usize = 33;
+/// The angle of a count of an X80, radians.
+pub const COUNT_RAD: f64 = TAU / 1200.0;
 
 /// Converts bytes to the messages of one protocol.
 #[derive(Debug)]
 pub enum Words {
-    X80 { robot: Decoder, host: Decoder },
-    Json { robot: Lines, host: Lines },
+    X80 {
+        robot: Decoder,
+        host: Decoder,
+        /// The newest encoders, and the counts without a cycle.
+        encoders: [Encoder; 2],
+        counts: [f64; 2],
+    },
+    Json {
+        robot: Lines,
+        host: Lines,
+    },
 }
 
 impl Words {
     pub fn of(protocol: Protocol) -> Self {
         match protocol {
-            Protocol::X80 => Self::X80 { robot: Decoder::default(), host: Decoder::default() },
+            Protocol::X80 => {
+                let (encoders, counts) = Default::default();
+                let (robot, host) = Default::default();
+                Self::X80 { robot, host, encoders, counts }
+            }
             // Robots of ROS 2 are simulated with JSON, and those with an Arduino have no fault on a wire.
             Protocol::Json | Protocol::Arduino | Protocol::Ros2 => {
                 Self::Json { robot: Lines::default(), host: Lines::default() }
@@ -48,26 +53,34 @@ impl Words {
 
     pub fn said(&mut self, bytes: &[u8]) -> Vec<Said> {
         match self {
-            Self::X80 { robot, .. } => frames(robot, bytes, |frame| {
-                let Frame { rid, did, data, .. } = *frame;
-                Said::Frame { rid, did, data: data.to_vec() }
-            }),
+            Self::X80 { robot, encoders, counts, .. } => {
+                let said = frames(robot, bytes, |frame| Said::of_frame(frame, encoders, counts));
+                said.into_iter().flatten().collect()
+            }
             Self::Json { robot, .. } => {
-                let lines = robot.push(bytes).into_iter();
-                lines.filter_map(|line| parse(&line).ok()).map(Said::Line).collect()
+                let lines = robot.push(bytes).into_iter().filter_map(|line| parse(&line).ok());
+                lines.map(|report| Said { report, frame: None }).collect()
             }
         }
     }
 
-    pub fn ordered(&mut self, bytes: &[u8]) -> Vec<Ordered> {
+    /// The orders in the bytes of the host, each with what it does.
+    pub fn ordered(&mut self, bytes: &[u8]) -> Vec<(Vec<u8>, Effect)> {
         match self {
-            Self::X80 { host, .. } => frames(host, bytes, Ordered::of_frame),
-            Self::Json { host, .. } => host.push(bytes).into_iter().map(Ordered::of_line).collect(),
+            Self::X80 { host, .. } => frames(host, bytes, |frame| {
+                let mut bytes = Vec::new();
+                frame.encode(&mut bytes);
+                (bytes, Effect::of_frame(frame))
+            }),
+            Self::Json { host, .. } => {
+                let lines = host.push(bytes).into_iter();
+                lines.map(|order| ([&*order, b"\n"].concat(), Effect::of_line(&order))).collect()
+            }
         }
     }
 }
 
-fn frames<T>(decoder: &mut Decoder, bytes: &[u8], of: impl Fn(&Frame<'_>) -> T) -> Vec<T> {
+fn frames<T>(decoder: &mut Decoder, bytes: &[u8], mut of: impl FnMut(&Frame<'_>) -> T) -> Vec<T> {
     decoder.push(bytes);
     let mut all = Vec::new();
     while let Some(frame) = decoder.next_frame() {
@@ -76,247 +89,125 @@ fn frames<T>(decoder: &mut Decoder, bytes: &[u8], of: impl Fn(&Frame<'_>) -> T) 
     all
 }
 
-#[allow(clippy::large_enum_variant, reason = "one is held at a time")]
+/// A message of the robot, in the words of JSON whatever it speaks.
 #[derive(Clone, Debug)]
-pub enum Said {
-    Frame { rid: u8, did: u8, data: Vec<u8> },
-    Line(json_wire::Report),
-}
-
-/// The left and the right wheel, or the two channels of an X80: counts and counts/s.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Wheels {
-    pub counts: [f64; 2],
-    pub speeds: [f64; 2],
-}
-
-/// The newest readings of a robot that are distances.
-#[derive(Debug)]
-pub struct Readings {
-    ultrasonic: [u8; ULTRASONIC],
-    ranges: BTreeMap<String, Option<f64>>,
-    scan: Option<Vec<Option<f32>>>,
-    scans: BTreeMap<String, json_wire::Scan>,
-}
-
-impl Default for Readings {
-    fn default() -> Self {
-        let (ranges, scans) = Default::default();
-        Self { ultrasonic: [FROZEN_CM; ULTRASONIC], ranges, scan: None, scans }
-    }
-}
-
-impl Readings {
-    pub fn take(&mut self, said: &Said) {
-        match said {
-            Said::Frame { did: did::STANDARD, data, .. } => {
-                for (newest, &byte) in self.ultrasonic.iter_mut().zip(data) {
-                    if !matches!(byte, 0 | NOTHING) {
-                        *newest = byte;
-                    }
-                }
-            }
-            Said::Frame { .. } => {}
-            Said::Line(report) => {
-                let distances = report.ranges.iter().filter(|(_, range)| range.is_some());
-                self.ranges.extend(distances.map(|(name, range)| (name.clone(), *range)));
-                self.scans.extend(report.scans.clone());
-                self.scan = report.scan.clone().or(self.scan.take());
-            }
-        }
-    }
+pub struct Said {
+    /// Of an X80 the wheels are its channels, and the ranges those of its sonars, by their numbers.
+    pub report: json_wire::Report,
+    /// The frame of an X80.
+    frame: Option<(Addressing, Report)>,
 }
 
 impl Said {
+    /// Counts go on from `counts` at the `encoders` before. None if nobody knows such a frame.
+    fn of_frame(
+        frame: &Frame<'_>,
+        encoders: &mut [Encoder; 2],
+        counts: &mut [f64; 2],
+    ) -> Option<Self> {
+        let mut report = json_wire::Report::default();
+        let parsed = Report::parse(frame).ok()?;
+        match &parsed {
+            Report::Motor(sensors) => {
+                for (channel, now) in sensors.encoders.iter().enumerate() {
+                    counts[channel] += f64::from(now.counts_since(&encoders[channel]));
+                }
+                *encoders = sensors.encoders;
+                report.wheels = Some(counts.map(|count| count * COUNT_RAD));
+                let speed = |encoder: Encoder| f64::from(encoder.velocity()) * COUNT_RAD;
+                report.speeds = Some(encoders.map(speed));
+            }
+            Report::Standard(sensors) => {
+                let metres = |byte: &u8| Echo::from_byte(*byte).map_or(Some(-1.0), Echo::metres);
+                let ranges = sensors.ultrasonic.iter().map(metres).enumerate();
+                report.ranges = ranges.map(|(sonar, range)| (sonar.to_string(), range)).collect();
+            }
+            Report::Custom(_) | Report::System(_) => {}
+        }
+        Some(Self { report, frame: Some((Addressing::of_host(frame.rid)?, parsed)) })
+    }
+
     pub fn bytes(&self) -> Vec<u8> {
-        match self {
-            Self::Frame { rid, did, data } => {
-                let mut bytes = Vec::new();
-                Frame { rid: *rid, sn: 0, did: *did, data }.encode(&mut bytes);
-                bytes
+        let Some((addressing, mut frame)) = self.frame else { return line(&self.report) };
+        let json_wire::Report { wheels, speeds, held, ranges, .. } = &self.report;
+        match &mut frame {
+            Report::Motor(MotorSensors { encoders, currents, .. }) => {
+                let counts = |angles: &Option<[f64; 2]>, channel: usize| {
+                    (angles.unwrap_or_default()[channel] / COUNT_RAD).round()
+                };
+                *encoders = [0, 1].map(|channel| {
+                    let speed = counts(speeds, channel);
+                    Encoder {
+                        position: counts(wheels, channel).rem_euclid(COUNT_CYCLE.into()) as u16,
+                        speed: speed.abs() as u16,
+                        positive: speed > 0.0,
+                    }
+                });
+                if held.is_some() {
+                    currents[..2].fill(HELD_AD);
+                }
             }
-            Self::Line(report) => line(report),
+            Report::Standard(sensors) => {
+                for (byte, range) in sensors.ultrasonic.iter_mut().zip(ranges.values()) {
+                    *byte = match *range {
+                        None => u8::MAX,
+                        Some(no_reading) if no_reading < 0.0 => 0,
+                        Some(range) => Echo::byte_at(range.min(LONGEST_ECHO_M)),
+                    };
+                }
+            }
+            Report::Custom(_) | Report::System(_) => {}
         }
+        let mut bytes = Vec::new();
+        frame.encode(addressing, &mut bytes);
+        bytes
     }
 
-    /// The kind of message by its readings; none without any.
-    pub fn readings(&self) -> Option<u8> {
-        match self {
-            Self::Frame { did, .. } => {
-                Some(*did).filter(|did| matches!(*did, did::CUSTOM | did::STANDARD))
-            }
-            Self::Line(report) => {
-                let kind =
-                    u8::from(report.scan.is_some()) + 2 * u8::from(!report.ranges.is_empty());
-                Some(kind).filter(|kind| *kind > 0)
-            }
-        }
+    pub const fn is_frame(&self) -> bool {
+        self.frame.is_some()
     }
 
-    /// The message with the readings of `old`, of the same kind.
-    pub fn with_readings_of(self, old: &Self) -> Vec<u8> {
-        match (self, old) {
-            (Self::Line(report), Self::Line(old)) => {
-                let (ranges, scan) = (old.ranges.clone(), old.scan.clone());
-                line(&json_wire::Report { ranges, scan, ..report })
-            }
-            (_, old) => old.bytes(),
-        }
+    /// The stuck range of the robot's sensors, and the least of their random ones, metres.
+    pub const fn stuck_and_least_m(&self) -> [f64; 2] {
+        if self.is_frame() { [0.08, 0.04] } else { [0.3, 0.2] }
     }
 
-    /// The sensor stream to which the message belongs; none for an answer.
-    pub fn stream(&self) -> Option<u8> {
-        match self {
-            Self::Frame { did, .. } => {
-                Some(*did).filter(|did| matches!(*did, did::MOTOR | did::CUSTOM | did::STANDARD))
-            }
-            Self::Line(report) if report.wheels.is_some() => Some(0),
-            Self::Line(report) => {
-                let scans = report.scan.is_some() || !report.scans.is_empty();
-                (scans || !report.ranges.is_empty()).then_some(1)
-            }
-        }
+    /// Whether the message has ranges, a scan, or the further readings of an X80.
+    pub fn readings(&self) -> [bool; 3] {
+        let json_wire::Report { ranges, scan, scans, .. } = &self.report;
+        let has_further = matches!(self.frame, Some((_, Report::Custom(_))));
+        [!ranges.is_empty(), scan.is_some() || !scans.is_empty(), has_further]
     }
 
-    fn motor(&self) -> Option<MotorSensors> {
-        let Self::Frame { rid, did: did::MOTOR, data } = self else {
-            return None;
-        };
-        match Report::parse(&Frame { rid: *rid, sn: 0, did: did::MOTOR, data }) {
-            Ok(Report::Motor(sensors)) => Some(sensors),
-            _ => None,
-        }
+    /// The number of the sensor stream to which the message belongs; none for an answer.
+    pub fn stream(&self) -> Option<usize> {
+        let has_wheels = self.report.wheels.is_some();
+        std::iter::once(has_wheels).chain(self.readings()).position(|has| has)
     }
 
-    /// The wheels of the message, counted on from those of `base`.
-    pub fn wheels(&self, base: &Self) -> Option<Wheels> {
-        if let Self::Line(report) = self {
-            let counts = |angles: [f64; 2]| angles.map(|angle| angle / COUNT_RAD);
-            let speeds = counts(report.speeds.unwrap_or_default());
-            return Some(Wheels { counts: counts(report.wheels?), speeds });
-        }
-        let (now, base) = (self.motor()?.encoders, base.motor()?.encoders);
-        let counts = |channel: usize| {
-            let turned = now[channel].counts_since(&base[channel]);
-            f64::from(i32::from(base[channel].position) + turned)
-        };
-        Some(Wheels {
-            counts: [0, 1].map(counts),
-            speeds: now.map(|encoder| encoder.velocity().into()),
-        })
-    }
-
-    /// The message with other `wheels`; `held` if something holds both.
-    pub fn with_wheels(mut self, wheels: &Wheels, held: bool) -> Vec<u8> {
-        if let Some(mut sensors) = self.motor() {
-            for (channel, encoder) in sensors.encoders.iter_mut().enumerate() {
-                let speed = wheels.speeds[channel];
-                encoder.position = wheels.counts[channel].rem_euclid(COUNT_CYCLE.into()) as u16;
-                encoder.speed = speed.abs() as u16;
-                encoder.positive = speed > 0.0;
-            }
-            if held {
-                sensors.currents[..2].fill(HELD_AD);
-            }
-            return report(&self, sensors);
-        }
-        if let Self::Line(report) = &mut self {
-            let angles = |counts: [f64; 2]| Some(counts.map(|count| count * COUNT_RAD));
-            (report.wheels, report.speeds) = (angles(wheels.counts), angles(wheels.speeds));
-            report.held = if held { Some([true; 2]) } else { report.held };
-        }
-        self.bytes()
+    /// The message with the readings of `other`, of the same kind.
+    pub fn with_readings_of(self, other: Self) -> Self {
+        let json_wire::Report { ranges, scan, scans, .. } = other.report;
+        let report = json_wire::Report { ranges, scan, scans, ..self.report };
+        Self { report, frame: other.frame }
     }
 
     /// The message with data that are all `byte`, if it has wheels; in lines of JSON the wheels are 0.
     pub fn with_data(mut self, byte: u8) -> Vec<u8> {
-        match &mut self {
-            Self::Frame { did: did::MOTOR, data, .. } => data.fill(byte),
-            Self::Frame { .. } => {}
-            Self::Line(json_wire::Report { wheels: Some(_), .. }) => {
-                return self.with_wheels(&Wheels::default(), false);
+        if self.report.wheels.is_some() {
+            if let Some((addressing, _)) = self.frame {
+                let (rid, mut bytes) = (addressing.host(), Vec::new());
+                let data = &[byte; MOTOR_BYTES];
+                Frame { rid, sn: 0, did: did::MOTOR, data }.encode(&mut bytes);
+                return bytes;
             }
-            Self::Line(_) => {}
-        }
-        self.bytes()
-    }
-
-    /// The message with the readings of `fault`, whose robot read `newest` before; none if no readings come.
-    pub fn with_readings(
-        mut self,
-        fault: RobotFault,
-        newest: &Readings,
-        chance: &mut Random,
-    ) -> Vec<u8> {
-        let (echo, range) = match fault {
-            RobotFault::RangeStuck => (STUCK_CM, Some(STUCK_M)),
-            RobotFault::RangeSilent | RobotFault::RangeDeaf => (NOTHING, None),
-            _ => (0, Some(NO_READING)),
-        };
-        match (&mut self, fault) {
-            (Self::Frame { did: did::STANDARD, .. }, RobotFault::RangeMissing) => {
-                return Vec::new();
-            }
-            (Self::Frame { did: did::STANDARD, data, .. }, _) => {
-                let told = newest.ultrasonic.map(|newest| match fault {
-                    RobotFault::RangeFrozen => newest,
-                    RobotFault::RangeNear => (newest + chance.below(7) as u8).clamp(6, 253) - 3,
-                    RobotFault::RangeRandom => 3 + chance.below(252) as u8,
-                    _ => echo,
-                });
-                data.iter_mut().zip(told).for_each(|(byte, told)| *byte = told);
-            }
-            (Self::Frame { .. }, _) => {}
-            (Self::Line(report), RobotFault::RangeMissing) => {
-                (report.ranges, report.scan) = (BTreeMap::new(), None);
-                report.scans.clear();
-            }
-            (Self::Line(report), _) => {
-                if matches!(fault, RobotFault::RangeFrozen | RobotFault::RangeNear) {
-                    for (name, range) in &mut report.ranges {
-                        *range = newest.ranges.get(name).copied().unwrap_or(*range);
-                    }
-                    report.scan = report.scan.take().and(newest.scan.clone());
-                    if !report.scans.is_empty() {
-                        report.scans.clone_from(&newest.scans);
-                    }
-                }
-                let mut told = |read: Option<f64>, is_beam: bool| match fault {
-                    RobotFault::RangeFrozen => read,
-                    RobotFault::RangeNear if is_beam => {
-                        read.map(|beam| beam * chance.within(0.995, 1.005))
-                    }
-                    RobotFault::RangeNear => read.map(|range| range + chance.within(-0.03, 0.03)),
-                    RobotFault::RangeRandom => Some(chance.within(0.2, 2.5)),
-                    _ => range,
-                };
-                report.ranges.values_mut().for_each(|range| *range = told(*range, false));
-                let named = report.scans.values_mut().flat_map(|scan| &mut scan.ranges);
-                for beam in report.scan.iter_mut().flatten().chain(named) {
-                    *beam = told(beam.map(f64::from), true).map(|beam| beam as f32);
-                }
-            }
+            (self.report.wheels, self.report.speeds) = (Some([0.0; 2]), Some([0.0; 2]));
         }
         self.bytes()
     }
 }
 
-/// A motor frame with `sensors`, from the device of `said`.
-fn report(said: &Said, sensors: MotorSensors) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    if let Said::Frame { rid, .. } = said {
-        let addressing = Addressing::of_host(*rid).unwrap_or_default();
-        Report::Motor(sensors).encode(addressing, &mut bytes);
-    }
-    bytes
-}
-
-#[derive(Clone, Debug)]
-pub struct Ordered {
-    pub bytes: Vec<u8>,
-    pub effect: Effect,
-}
-
+/// What an order does.
 #[derive(Clone, Debug)]
 pub enum Effect {
     /// The wheels turn; these bytes in place of the order make them stand.
@@ -330,37 +221,32 @@ pub enum Effect {
     Other,
 }
 
-impl Ordered {
+impl Effect {
     fn of_frame(frame: &Frame<'_>) -> Self {
-        let mut bytes = Vec::new();
-        frame.encode(&mut bytes);
-        let effect = match Command::parse(frame) {
+        match Command::parse(frame) {
             Ok(Command::Motion(motion)) if is_moving(&motion) => {
                 let addressing = Addressing::of_robot(frame.rid).unwrap_or_default();
                 let mut stand = Vec::new();
                 Command::velocity([Some(0); 2], motion.limit_ms).encode(addressing, &mut stand);
-                Effect::Moves { stand }
+                Self::Moves { stand }
             }
-            Ok(Command::Motion(motion)) if motion.quantity == Quantity::Velocity => Effect::Stands,
-            Ok(Command::Motion(_) | Command::Enable { on: false, .. }) => Effect::Disables,
-            _ => Effect::Other,
-        };
-        Self { bytes, effect }
+            Ok(Command::Motion(motion)) if motion.quantity == Quantity::Velocity => Self::Stands,
+            Ok(Command::Motion(_) | Command::Enable { on: false, .. }) => Self::Disables,
+            _ => Self::Other,
+        }
     }
 
-    fn of_line(mut bytes: Vec<u8>) -> Self {
+    fn of_line(order: &[u8]) -> Self {
         use json_wire::Order;
-        let effect = match parse(&bytes) {
+        match parse(order) {
             Ok(Order::Drive { wheels, for_s, .. }) if wheels != [0.0; 2] => {
                 let stand = line(&Order::Drive { wheels: [0.0; 2], twist: [0.0; 2], for_s });
-                Effect::Moves { stand }
+                Self::Moves { stand }
             }
-            Ok(Order::Drive { .. }) => Effect::Stands,
-            Ok(Order::Brake {}) => Effect::Disables,
-            _ => Effect::Other,
-        };
-        bytes.push(b'\n');
-        Self { bytes, effect }
+            Ok(Order::Drive { .. }) => Self::Stands,
+            Ok(Order::Brake {}) => Self::Disables,
+            _ => Self::Other,
+        }
     }
 }
 
