@@ -1,11 +1,17 @@
 //! `firsthand bring-up` of simulated robots that were assembled with faults: what it names, and what it names of right ones.
 
-use std::{collections::BTreeSet, fs, path::PathBuf, process::Stdio, time::Duration};
+use std::{
+    collections::BTreeSet,
+    fs::{self, File},
+    path::PathBuf,
+    process::Stdio,
+    time::{Duration, Instant},
+};
 
-use clap::Args;
+use clap::{Args, builder::PossibleValuesParser};
 use common::clock::Pace;
 use console::{missions, output::print_text};
-use mission_control::simulator::Simulator;
+use processes::process::Process;
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -14,7 +20,7 @@ use crate::{
     missions::runner::in_parallel,
     random::Random,
     robot,
-    ros2_robot::{self, Ros2Robot},
+    ros2_robot::Ros2Robot,
 };
 
 /// Bring up simulated robots with faults of assembly, and count what is found and what is invented.
@@ -30,8 +36,8 @@ pub struct Arguments {
     seed: u64,
     /// The robots in turn: x80, kobuki (JSON), arduino and sonars by default; ros2 and burger speak ROS 2, which a firsthand that was built
     /// with --features ros2 alone speaks.
-    #[arg(long, value_delimiter = ',', default_value = "x80,kobuki,arduino,sonars", value_parser = robot_named)]
-    robots: Vec<&'static (&'static str, &'static str)>,
+    #[arg(long, value_delimiter = ',', default_value = "x80,kobuki,arduino,sonars", value_parser = PossibleValuesParser::new(ROBOTS.map(|it| it.0)))]
+    robots: Vec<String>,
     /// Robots at once; each takes about a minute of wall-clock time.
     #[arg(long, default_value_t = 6)]
     jobs: usize,
@@ -70,7 +76,9 @@ impl Fault {
 }
 
 const ROOM: &str = "target = [0.8, 0]\nsensors = 'all'\nsimulation.realism = 'measured'\n[perimeter]\nwidth_m = 8.0\ncentre = [0.0, 0.0]\n";
-/// The robots by the names of the table of faults. Their addresses are those of the simulator, where this word stands.
+/// In its place the address of the simulator is stated, unless the robot speaks ROS 2; the simulated ones of these speak JSON.
+const ADDRESS: &str = "#ADDRESS";
+/// The robots by the names of the table of faults.
 static ROBOTS: [(&str, &str); 6] = [
     ("x80", "[robot]\n#ADDRESS\nmodel = 'x80'\n"),
     (
@@ -94,8 +102,6 @@ static ROBOTS: [(&str, &str); 6] = [
         "[robot]\nmodel = 'turtlebot3-burger'\nrate_hz = 10.0\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nmodel = 'lds-02'\nforward_m = -0.032\nbearing_deg = 0.0\n[simulation.laser]\nsweep_s = 0.1\n",
     ),
 ];
-/// Those that speak ROS 2; the simulated ones speak JSON.
-const OF_ROS2: [&str; 2] = ["ros2", "burger"];
 /// Instead of a key of a mission: how far such a robot turns by its odometry, over how far its wheels do.
 const ODOMETRY_TURNS: &str = "odometry.turns=";
 /// Draws of a second fault, one of which is another than the first.
@@ -103,13 +109,6 @@ const DRAWS: u32 = 20;
 /// Longer than a bring-up on a loaded machine.
 const PATIENCE: Duration = Duration::from_secs(400);
 const LOOK: Duration = Duration::from_millis(100);
-
-fn robot_named(name: &str) -> Result<&'static (&'static str, &'static str), String> {
-    ROBOTS.iter().find(|it| it.0 == name).ok_or_else(|| {
-        let names: Vec<_> = ROBOTS.iter().map(|it| it.0).collect();
-        format!("no robot is called so; {} are", names.join(", "))
-    })
-}
 
 /// Walls around the robot, a little otherwise for each.
 fn walls(random: &mut Random) -> String {
@@ -144,7 +143,8 @@ pub fn main(arguments: &Arguments) -> Result {
 /// Whether the bring-up of a robot named its faults and no other, and what it said.
 fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, String)> {
     let mut random = Random::of_world(arguments.seed, 0, number);
-    let &(robot, body) = arguments.robots[number as usize % arguments.robots.len()];
+    let robot = &*arguments.robots[number as usize % arguments.robots.len()];
+    let body = ROBOTS.iter().find(|it| it.0 == robot).map_or("", |it| it.1);
     let text = format!("seed = {}\n{ROOM}{body}{}", number + 1, walls(&mut random));
     let most = match (number < arguments.faulty, robot) {
         (false, _) => 0,
@@ -168,44 +168,37 @@ fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, Str
         keys.iter().cloned().partition(|key| key.starts_with(ODOMETRY_TURNS));
     let mission = missions::parsed(&text, "bring-up", &of_mission)?;
     let directory = arguments.out.join(number.to_string());
-    fs::create_dir_all(&directory).or_cannot_file("make", &directory)?;
-    let mut simulator =
-        Simulator::start(robot::firsthand(&[]), &directory, &mission, Pace::Rate(1.0), None)?;
+    let mut simulator = robot::simulated(&directory, &mission, Pace::Rate(1.0))?;
     let stated = directory.join("stated.toml");
     let address = format!("address = 'udp://{}'", simulator.address());
-    fs::write(&stated, text.replace("#ADDRESS", &address)).or_cannot_file("write", &stated)?;
-    let (mut set, mut node) = (Vec::new(), None);
-    if OF_ROS2.contains(&robot) {
-        set.extend(ros2_robot::keys(number));
-        let program = missions::parsed(&text, "bring-up", &set)?;
+    fs::write(&stated, text.replace(ADDRESS, &address)).or_cannot_file("write", &stated)?;
+    let node = if body.contains(ADDRESS) {
+        None
+    } else {
         let turns = turns.first().map_or(Ok(1.0), |key| key[ODOMETRY_TURNS.len()..].parse());
         let turns = turns.or_cannot("read a fault")?;
-        node = Some(Ros2Robot::start(simulator.address(), &program, turns)?);
-    }
-    let mut command = robot::mission(
-        "bring-up",
-        &stated,
-        format!("bring-up{}-{number}", std::process::id()),
-        &set,
-    );
-    command.args(["--yes", "--runs"]).arg(directory.join("runs"));
-    let mut child = command
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()
-        .or_cannot("start firsthand bring-up")?;
-    let began = std::time::Instant::now();
-    while child.try_wait()?.is_none() && began.elapsed() < PATIENCE {
+        let stated = |keys: &[String]| missions::parsed(&text, "bring-up", keys);
+        Some(Ros2Robot::start(simulator.address(), number, turns, stated)?)
+    };
+    let set = node.as_ref().map_or(&[][..], |node| &node.keys);
+    let name = format!("bring-up{}-{number}", std::process::id());
+    let mut command = robot::mission("bring-up", &stated, name, set);
+    let found = directory.join("findings.json");
+    let file = File::create(&found).or_cannot_file("write", &found)?;
+    command
+        .args(["--yes", "--runs"])
+        .arg(directory.join("runs"))
+        .stdout(file)
+        .stderr(Stdio::null());
+    let mut child = Process::spawn(command).or_cannot("start firsthand bring-up")?;
+    let began = Instant::now();
+    while child.try_reap()?.is_none() && began.elapsed() < PATIENCE {
         // A simulator whose ground truth nobody reads stops.
         simulator.poll()?;
         std::thread::sleep(LOOK);
     }
-    let _ = child.kill();
-    drop(node);
-    let output = child.wait_with_output()?;
-    let found = directory.join("findings.json");
-    fs::write(&found, &output.stdout).or_cannot_file("write", &found)?;
-    let said: Value = serde_json::from_slice(&output.stdout).map_err(|_| {
+    drop(child);
+    let said: Value = serde_json::from_slice(&fs::read(&found)?).map_err(|_| {
         format!("robot {number}, of {robot}, gave no findings; see {}", directory.display())
     })?;
     let findings = said["findings"].as_array().into_iter().flatten();

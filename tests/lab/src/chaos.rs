@@ -107,7 +107,7 @@ fn run(options: &Options) -> Result<report::Report> {
         mission::attack(&mut series, seed, &undisturbed)?;
         let left = leftovers::find(&options.asked.robot, &options.directory);
         let report = &mut series.report;
-        let (kills, missions) = (report.signals(), report.missions);
+        let (kills, missions) = (report.signals, report.missions);
         report.leftovers.extend(left.iter().map(|what| format!("by mission {missions}: {what}")));
         write_stderr(&format!("{kills} of {} signals, {missions} missions\n", options.asked.kills));
     }

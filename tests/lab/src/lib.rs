@@ -14,14 +14,16 @@
 //! | `bring_up` | bring-ups of robots with faults of assembly |
 //! | [`sources`] | simulated sources of fixes and turns |
 //! | `field` | the field of a map |
+//! | `background` | threads that stand between a simulated robot and its host |
 //! | `random` | random numbers |
-//! | `robot` | the executable `firsthand` |
+//! | `robot` | the executable `firsthand`, its runs, and simulated robots |
 //! | `ros2_robot` | a simulated robot as one of ROS 2 |
 //! | `error` | why a bench ended early |
 
 // No other crate uses these modules: `pub` says that another module does, and what none uses is reported all the same.
 #![allow(unreachable_pub)]
 
+mod background;
 mod baselines;
 mod bring_up;
 mod certify;

@@ -1,15 +1,24 @@
-//! The executable `firsthand`, which the laboratory starts, and the processes of this machine.
+//! The executable `firsthand`, which the laboratory starts, its runs and simulated robots, and the processes of this machine.
 
 use std::{
     ffi::OsStr,
     fmt::Display,
-    fs,
+    fs::{self, File},
     path::{Path, PathBuf},
-    process::Command,
+    process::{Command, Stdio},
+    time::Duration,
 };
 
-use console::failure::Refused;
-use processes::{executable, process};
+use common::{clock::Pace, mission::Mission, poll};
+use mission_control::{recovery::SUMMARY, simulator::Simulator};
+use processes::{
+    death::log_tail,
+    executable,
+    process::{self, Process},
+};
+use summary::Summary;
+
+use crate::error::{OrCannot as _, Refused, Result};
 
 /// The path of `firsthand`, beside this executable or on `PATH`.
 ///
@@ -40,6 +49,57 @@ pub fn mission(
     let mut command = firsthand(&[subcommand, "--json", "--robot", &robot.to_string()]);
     command.arg(mission).args(set.iter().flat_map(|assignment| ["--set", assignment]));
     command
+}
+
+/// A simulated robot in the world of `mission`, which does not end with its supervisor. Its files are in `directory`.
+pub fn simulated(directory: &Path, mission: &Mission, pace: Pace) -> Result<Simulator> {
+    fs::create_dir_all(directory).or_cannot_file("make", directory)?;
+    Ok(Simulator::start(firsthand(&[]), directory, mission, pace, None)?)
+}
+
+/// A run in a process that ends with this one.
+pub struct Run {
+    pub process: Process,
+    directory: PathBuf,
+}
+
+impl Run {
+    /// Start `command`, a run with its files in `directory`. What it says goes to a file beside that.
+    pub fn start(mut command: Command, directory: &Path, records: bool) -> Result<Self> {
+        let said = File::options().create(true).append(true).open(said(directory));
+        command.args((!records).then_some("--no-record"));
+        command.args(["--parent", &std::process::id().to_string()]);
+        command.stdout(Stdio::null()).stderr(said.or_cannot("write what a mission says")?);
+        let process = Process::spawn(command).or_cannot("start a mission")?;
+        Ok(Self { process, directory: directory.to_owned() })
+    }
+
+    /// Wait until the run ends, and `look` every so often meanwhile.
+    pub fn wait(mut self, every: Duration, mut look: impl FnMut()) -> Result<Self> {
+        while self.process.try_reap().or_cannot("reap")?.is_none() {
+            look();
+            poll::is_readable(&self.process, every)?;
+        }
+        Ok(self)
+    }
+
+    /// The summary of the run, which it has at its end.
+    ///
+    /// # Errors
+    /// There is none; the last line that the run said is the error.
+    pub fn summary(&self) -> Result<Summary> {
+        let summary = fs::read(self.directory.join(SUMMARY)).ok();
+        summary.and_then(|summary| serde_json::from_slice(&summary).ok()).ok_or_else(|| {
+            let file = said(&self.directory);
+            let said = log_tail(&file, 0);
+            let said = said.lines().last().unwrap_or("a mission gave no summary");
+            format!("{said}; see {}", file.display()).into()
+        })
+    }
+}
+
+fn said(directory: &Path) -> PathBuf {
+    directory.with_extension("stderr")
 }
 
 pub fn processes() -> impl Iterator<Item = u32> {

@@ -6,21 +6,15 @@
 
 use std::{
     collections::BTreeMap,
-    fs, io,
+    io,
     net::{Ipv4Addr, SocketAddr, UdpSocket},
     os::fd::AsFd as _,
     path::PathBuf,
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering::Relaxed},
-    },
-    thread::JoinHandle,
     time::{Duration, Instant},
 };
 
 use clap::Args;
 use common::{
-    address::Address,
     clock::{Pace, monotonic_ns},
     driver::odometry::drive,
     json_wire::{Lines, Order, Report, Scan, line, parse},
@@ -28,8 +22,10 @@ use common::{
     mission::Mission,
     poll,
 };
-use console::{missions, output::print_text};
-use mission_control::simulator::Simulator;
+use console::{
+    missions::{self, LookupError},
+    output::print_text,
+};
 use ros2::{
     cdr,
     messages::{Header, battery, odometry, scan},
@@ -38,8 +34,9 @@ use ros2::{
 use ros2_driver::topics::{Content, Topics};
 
 use crate::{
+    background::{Turns, to_robot},
     error::{OrCannot as _, Result},
-    robot::firsthand,
+    robot::simulated,
 };
 
 const WATCHDOG_S: f64 = 0.25;
@@ -51,17 +48,6 @@ const MOST_COMMANDS: usize = 16;
 const RELIABLE: Quality = Quality { is_reliable: true, is_latched: false, depth: 10 };
 /// The type of a bumper's and a cliff sensor's hazard.
 const HAZARDS: [u8; 2] = [1, 2];
-
-/// What a mission of robot `number` of this process states beside its other keys. The topics of two robots differ, because others on this
-/// machine may have its domain; the ports of greater domains are those of other sockets, too.
-pub fn keys(number: u64) -> Vec<String> {
-    let process = std::process::id();
-    let topics = ["odom", "scan", "cmd_vel", "battery", "hazards"];
-    let topic = |name| format!("robot.ros2.{name}='/lab{process}_{number}/{name}'");
-    let domain = 1 + (u64::from(process) + number) % 99;
-    let keys = ["robot.protocol='ros2'".to_owned(), format!("robot.address='ros2:{domain}'")];
-    keys.into_iter().chain(topics.map(topic)).collect()
-}
 
 /// Simulate a robot that speaks ROS 2 in the world of a mission, until this ends. Prints the keys of its mission, as options of `firsthand
 /// run`.
@@ -79,12 +65,10 @@ pub struct Arguments {
 
 pub fn main(arguments: &Arguments) -> Result {
     let Arguments { mission, set, out } = arguments;
-    fs::create_dir_all(out).or_cannot_file("make", out)?;
-    let simulated = missions::load(mission, set)?;
-    let mut simulator = Simulator::start(firsthand(&[]), out, &simulated, Pace::Rate(1.0), None)?;
-    let keys = keys(0);
-    let _node = Ros2Robot::start(simulator.address(), &missions::load(mission, &keys)?, 1.0)?;
-    print_text(&keys.iter().map(|key| format!("--set={key}\n")).collect::<String>())?;
+    let mut simulator = simulated(out, &missions::load(mission, set)?, Pace::Rate(1.0))?;
+    let stated = |keys: &[String]| missions::load(mission, keys);
+    let robot = Ros2Robot::start(simulator.address(), 0, 1.0, stated)?;
+    print_text(&robot.keys.iter().map(|key| format!("--set={key}\n")).collect::<String>())?;
     while simulator.poll()? {
         std::thread::sleep(LOOK);
     }
@@ -93,41 +77,35 @@ pub fn main(arguments: &Arguments) -> Result {
 
 #[derive(Debug)]
 pub struct Ros2Robot {
-    ends: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    /// What a mission of the robot states beside its other keys.
+    pub keys: Vec<String>,
+    _thread: Turns,
 }
 
 impl Ros2Robot {
-    /// Speak for the simulated robot at `robot`, by the domain, the topics and the sizes of `stated`. Its odometry turns `turns` times as
-    /// far as the wheels do.
+    /// Speak for the simulated robot at `robot`, the `number`th of this process, by the sizes of the mission that is `stated` with the
+    /// robot's keys. Its odometry turns `turns` times as far as the wheels do.
     ///
     /// # Errors
-    /// `stated` names no domain, or DDS does not start.
-    pub fn start(robot: SocketAddr, stated: &Mission, turns: f64) -> Result<Self> {
-        let address = stated.robot.address.as_deref().map(str::parse::<Address<String>>);
-        let Some(Ok(Address::Ros2(Some(domain)))) = address else {
-            return Err("robot.address: a robot of ROS 2 needs a domain, as ros2:7".into());
-        };
-        let mut node =
-            Node::new(robot, stated, domain, turns).or_cannot("start a node of ROS 2")?;
-        let ends = Arc::new(AtomicBool::new(false));
-        let is_over = ends.clone();
-        let thread = std::thread::spawn(move || {
-            while !is_over.load(Relaxed) {
-                // A datagram that cannot be sent is lost, as on a serial line.
-                let _ = node.turn();
-            }
-        });
-        Ok(Self { ends, thread: Some(thread) })
-    }
-}
-
-impl Drop for Ros2Robot {
-    fn drop(&mut self) {
-        self.ends.store(true, Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
+    /// There is no such mission, or DDS does not start.
+    pub fn start(
+        robot: SocketAddr,
+        number: u64,
+        turns: f64,
+        stated: impl Fn(&[String]) -> Result<Mission, LookupError>,
+    ) -> Result<Self> {
+        // The topics of two robots differ, because others on this machine may have its domain; the ports of greater domains are those of
+        // other sockets, too.
+        let process = std::process::id();
+        let domain = 1 + (u64::from(process) + number) % 99;
+        let topics = ["odom", "scan", "cmd_vel", "battery", "hazards"];
+        let topic = |name| format!("robot.ros2.{name}='/lab{process}_{number}/{name}'");
+        let address = format!("robot.address='ros2:{domain}'");
+        let mut keys = vec!["robot.protocol='ros2'".to_owned(), address];
+        keys.extend(topics.map(topic));
+        let node = Node::new(robot, &stated(&keys)?, domain as u16, turns);
+        let mut node = node.or_cannot("start a node of ROS 2")?;
+        Ok(Self { keys, _thread: Turns::start(move || node.turn()) })
     }
 }
 
@@ -144,9 +122,7 @@ struct Node {
 
 impl Node {
     fn new(robot: SocketAddr, stated: &Mission, domain: u16, turns: f64) -> io::Result<Self> {
-        let wire = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
-        wire.connect(robot)?;
-        wire.set_nonblocking(true)?;
+        let wire = to_robot(robot)?;
         let participant = Participant::join(domain, Some(Ipv4Addr::LOCALHOST))?;
         let topics = Topics::of(stated);
         let said = topics.heard.iter().filter(|(content, _)| *content != Content::Command);

@@ -24,7 +24,7 @@ use serde::Serialize;
 use summary::Quantiles;
 
 use crate::{
-    error::{NOTHING, OrCannot as _, Result},
+    error::{OrCannot as _, Result},
     missions::statistics::{median, rounded},
 };
 
@@ -178,7 +178,7 @@ impl Times {
                 let [p50_us, p99_us, max_us] = [p50, p99, max].map(rounded);
                 Ok(Self { of, count, p50_us, p99_us, max_us })
             }
-            _ => Err(NOTHING.into()),
+            _ => Err("nothing was measured; does the mission drive at all?".into()),
         }
     }
 }

@@ -10,7 +10,7 @@ use common::{
     roster::Roster,
     samples::{
         DeathSample, HealthSample, HealthState, Order, PoseSample, RosterEntry, RosterHeader,
-        StageState, WheelSample, name_str,
+        StageState, name_str,
     },
     topics::{self, SUPERVISOR},
 };
@@ -18,7 +18,6 @@ use mission_control::simulator::Simulator;
 use processes::{
     policy::{HOLD_AFTER, HOLD_WINDOW},
     process::Process,
-    stages,
 };
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
@@ -26,7 +25,7 @@ use serde_json::Value;
 use super::{
     consumers::Consumers,
     options::Options,
-    report::{EVERYTHING, Report, Series},
+    report::{EVERYTHING, Series},
     schedule::Kind,
     signals::{Row, ms_since},
 };
@@ -50,13 +49,20 @@ pub struct Attack {
     /// Whether the supervisor was hit. Later samples of it and its stages are no sign of its successor.
     supervisor_hit: bool,
     driving: bool,
-    pending: Vec<PendingRecovery>,
-    /// Signals whose measurement is complete.
-    measured: Vec<Row>,
-    /// Generations that were frozen alone. The supervisor may abort these as hung.
-    frozen: Vec<(&'static str, u32)>,
-    hits: Vec<(&'static str, Instant)>,
+    sent: Vec<Sent>,
+    /// The number of signals at the front of `sent` whose rows are kept.
+    kept: usize,
     pose: Option<PoseSample>,
+}
+
+/// A signal that was sent.
+struct Sent {
+    row: Row,
+    at: Instant,
+    /// Whether its stage, or the supervisor, has no working successor yet.
+    pending: bool,
+    /// The time after its start at which the successor is to be hit too.
+    startup_hit: Option<Duration>,
 }
 
 impl Attack {
@@ -73,26 +79,24 @@ impl Attack {
         patience: Duration,
     ) -> Result {
         let began = Instant::now();
-        self.supervisor_hit = false;
-        self.driving = false;
+        (self.supervisor_hit, self.driving) = (false, false);
         self.entries.clear();
         // The stages of a supervisor that was hit end with it.
-        let is_stage = |recovery: &mut PendingRecovery| recovery.row.stage != SUPERVISOR;
-        let ended = self.pending.extract_if(.., is_stage);
-        self.measured.extend(ended.map(|recovery| recovery.row));
-        let mut subscriptions = loop {
-            self.consumers.maintain(&mut series.report)?;
-            if child.try_reap().or_cannot("reap")?.is_some() || began.elapsed() >= patience {
-                return Ok(());
-            }
-            match Subscriptions::join(series.options, child.id()) {
-                Ok(Some(subscriptions)) => break subscriptions,
-                // The bus does not exist yet.
-                Ok(None) | Err(_) => std::thread::park_timeout(POLL),
-            }
-        };
-        let mut next = Instant::now() + series.schedule.pause();
+        for sent in &mut self.sent {
+            sent.pending &= sent.row.stage == SUPERVISOR;
+        }
+        let (mut joined, mut next) = (None, None);
         while child.try_reap().or_cannot("reap")?.is_none() && began.elapsed() < patience {
+            self.consumers.maintain(&mut series.report)?;
+            let Some(subscriptions) = &mut joined else {
+                // The bus may not exist yet.
+                joined = Subscriptions::join(series.options, child.id()).unwrap_or_default();
+                if joined.is_none() {
+                    std::thread::park_timeout(POLL);
+                }
+                continue;
+            };
+            let next = next.get_or_insert_with(|| Instant::now() + series.schedule.pause());
             // An overdue hit waits for the robot to drive.
             let due = next.checked_duration_since(Instant::now());
             let startup_hit = self.next_startup_hit();
@@ -103,35 +107,45 @@ impl Attack {
             if let Some(robot) = &mut robot {
                 robot.poll()?;
             }
-            self.read(&mut subscriptions)?;
-            self.hit_starting(&mut series.report);
-            if Instant::now() >= next && self.driving && !series.is_over() {
+            self.read(subscriptions)?;
+            self.hit_starting(series);
+            if Instant::now() >= *next && self.driving && !series.is_over() {
                 let pause = series.schedule.pause();
                 self.hit(series)?;
-                next = Instant::now() + pause;
+                *next = Instant::now() + pause;
             }
-            self.consumers.maintain(&mut series.report)?;
-            self.keep_measured(series)?;
+            self.keep_rows(series)?;
         }
         Ok(())
     }
 
-    /// Write the rows of the signals whose measurement is complete.
-    fn keep_measured(&mut self, series: &mut Series<'_>) -> Result {
-        self.measured.drain(..).try_for_each(|row| series.keep(row))
+    /// Keep the rows of the signals up to the first whose measurement is not complete.
+    fn keep_rows(&mut self, series: &mut Series<'_>) -> Result {
+        let left = self.sent.iter().skip(self.kept);
+        for sent in left.take_while(|sent| !sent.pending) {
+            series.keep(sent.row.clone())?;
+            self.kept += 1;
+        }
+        Ok(())
     }
 
     /// Note that the mission is over, and end all measurements.
     pub fn end(&mut self, series: &mut Series<'_>) -> Result {
         self.consumers.end();
-        let pending = self.pending.drain(..);
-        self.measured.extend(pending.map(|recovery| recovery.row));
-        self.keep_measured(series)
+        self.sent.iter_mut().for_each(|sent| sent.pending = false);
+        self.keep_rows(series)
     }
 
-    /// The row of a signal of `kind` that is sent to a generation of `stage` now.
-    fn row(&self, stage: &str, kind: Kind, generation: Option<u32>) -> Row {
-        Row {
+    /// Note a signal of `kind` to a generation of `stage` that was sent now; `pending` if a successor is to come.
+    fn note(
+        &mut self,
+        series: &mut Series<'_>,
+        (stage, generation): (&str, Option<u32>),
+        kind: Kind,
+        pending: bool,
+    ) {
+        series.report.signals += 1;
+        let row = Row {
             mission: self.seed,
             time_s: self.time.map(MissionTime::seconds),
             stage: stage.to_owned(),
@@ -139,7 +153,8 @@ impl Attack {
             generation,
             start_up: kind == Kind::KillAtStart,
             ..Row::default()
-        }
+        };
+        self.sent.push(Sent { row, at: Instant::now(), pending, startup_hit: None });
     }
 
     /// Whether the supervisor was hit and has no working successor yet.
@@ -148,21 +163,25 @@ impl Attack {
     }
 
     fn is_recovering(&self, stage: &str) -> bool {
-        self.pending.iter().any(|recovery| recovery.row.stage == stage)
+        self.sent.iter().any(|sent| sent.pending && sent.row.stage == stage)
+    }
+
+    /// Whether a generation of `stage` was frozen alone, which the supervisor may abort as hung.
+    fn was_frozen(&self, stage: &str, generation: u32) -> bool {
+        let frozen = self.sent.iter().filter(|sent| sent.row.kind == Kind::Freeze);
+        frozen
+            .map(|sent| &sent.row)
+            .any(|it| it.stage == stage && it.generation == Some(generation))
     }
 
     /// Stages that the supervisor aborted as hung, by the `deaths` of the run, although they were not frozen alone.
     pub fn healthy_aborted(&self, deaths: &[Value]) -> Vec<String> {
-        let frozen = |death: &Value| {
-            self.frozen.iter().any(|(stage, generation)| {
-                death["stage"] == *stage && death["generation"] == *generation
-            })
-        };
         let hung = deaths.iter().filter(|death| death["hung"] == true);
-        let healthy = hung.filter(|death| !frozen(death));
-        healthy
-            .map(|death| format!("{} generation {}", death["stage"], death["generation"]))
-            .collect()
+        let named = hung.filter_map(|death| {
+            Some((death["stage"].as_str()?, u32::try_from(death["generation"].as_u64()?).ok()?))
+        });
+        let healthy = named.filter(|(stage, generation)| !self.was_frozen(stage, *generation));
+        healthy.map(|(stage, generation)| format!("{stage} generation {generation}")).collect()
     }
 
     /// Distance from the last published pose to the ground truth of its tick, metres; none without both.
@@ -175,7 +194,7 @@ impl Attack {
     /// Read new samples, which show the stages that run, beat and publish.
     fn read(&mut self, subscriptions: &mut Subscriptions) -> Result {
         while let Some(death) = subscriptions.deaths.next_sample()? {
-            for PendingRecovery { row, at, .. } in &mut self.pending {
+            for Sent { row, at, .. } in self.sent.iter_mut().filter(|sent| sent.pending) {
                 if row.stage == name_str(&death.stage) && row.generation == Some(death.generation) {
                     row.noticed_ms.get_or_insert_with(|| ms_since(*at));
                 }
@@ -195,19 +214,15 @@ impl Attack {
                 self.on_sign(name_str(&health.stage), health.stamp.generation, true);
             }
         }
-        while let Some(sample) = subscriptions.wheels.next_sample()? {
-            self.time = Some(sample.stamp.time());
-            let writer = topics::WHEELS.spec().writer;
-            self.on_sign(writer, sample.stamp.generation, false);
-        }
         while let Some(sample) = subscriptions.pose.next_sample()? {
-            let writer = topics::POSE.spec().writer;
-            self.on_sign(writer, sample.stamp.generation, false);
+            self.on_sign(topics::POSE.spec().writer, sample.stamp.generation, false);
             self.pose = Some(sample);
         }
         for (writer, reader) in &mut subscriptions.outputs {
             while let Some(sample) = reader.next_sample()? {
-                self.on_sign(writer, sample.stamp().generation, false);
+                let stamp = sample.stamp();
+                self.time = self.time.max(Some(stamp.time()));
+                self.on_sign(writer, stamp.generation, false);
                 if *writer == topics::COMMAND.spec().writer {
                     self.on_supervisor_sign(false);
                 }
@@ -225,23 +240,21 @@ impl Attack {
 
     /// Note a sign of work of a generation of `stage`: a ready beat, or a sample of a tick.
     fn on_sign(&mut self, stage: &str, generation: u32, beat: bool) {
-        let complete = self.pending.extract_if(.., |PendingRecovery { row, at, .. }| {
-            if row.stage != stage || Some(generation) <= row.generation {
-                return false;
+        let pending = self.sent.iter_mut().filter(|sent| sent.pending);
+        for Sent { row, at, pending, .. } in pending {
+            if row.stage == stage && Some(generation) > row.generation {
+                row.ready_ms.get_or_insert_with(|| ms_since(*at));
+                row.first_output_ms = (!beat).then(|| ms_since(*at));
+                *pending = beat;
             }
-            row.ready_ms.get_or_insert_with(|| ms_since(*at));
-            row.first_output_ms = (!beat).then(|| ms_since(*at));
-            !beat
-        });
-        self.measured.extend(complete.map(|recovery| recovery.row));
+        }
     }
 
     /// Freeze supervisor and stages together, and thaw them after `pause`.
-    fn freeze_all(&mut self, pause: Duration, report: &mut Report) {
+    fn freeze_all(&mut self, pause: Duration, series: &mut Series<'_>) {
         // A stage that is frozen alone stays frozen.
-        let hangs = |entry: &&RosterEntry| {
-            self.frozen.contains(&(name_str(&entry.stage), entry.generation))
-        };
+        let hangs =
+            |entry: &&RosterEntry| self.was_frozen(name_str(&entry.stage), entry.generation);
         let stages = self.entries.iter().filter(|entry| !hangs(entry));
         // The supervisor is frozen first: it must not see frozen stages.
         let all = std::iter::once(self.supervisor).chain(stages.map(|entry| entry.pid));
@@ -254,93 +267,83 @@ impl Attack {
         for process in all.into_iter().rev() {
             send(process, Signal::CONT);
         }
-        report.hit(EVERYTHING, Kind::FreezeAll);
-        self.measured.push(self.row(EVERYTHING, Kind::FreezeAll, None));
         // The pause does not count as time of recovery.
-        for recovery in &mut self.pending {
-            recovery.at += began.elapsed();
+        for sent in self.sent.iter_mut().filter(|sent| sent.pending) {
+            sent.at += began.elapsed();
         }
+        self.note(series, (EVERYTHING, None), Kind::FreezeAll, false);
     }
 
     /// Hit a consumer, the supervisor, or a running stage without a pending recovery.
     fn hit(&mut self, series: &mut Series<'_>) -> Result {
         let Series { options, schedule, report, .. } = series;
+        let asked = &options.asked;
         if let Some((index, kind, pause)) = schedule.consumer(self.consumers.len()) {
-            let hit = self.consumers.hit(index, kind, pause, report)?;
-            self.measured.extend(hit.map(|(name, starts)| self.row(&name, kind, Some(starts))));
-            return Ok(());
-        }
-        if options.asked.include_supervisor && schedule.supervisor() {
-            let kind = schedule.supervisor_kind();
-            if !self.supervisor_is_down() && send(self.supervisor, kind.signal()) {
-                report.hit(SUPERVISOR, kind);
-                self.pending.push(PendingRecovery::new(self.row(SUPERVISOR, kind, None)));
-                self.supervisor_hit = true;
-                self.driving = false;
+            if let Some((name, starts)) = self.consumers.hit(index, kind, pause, report)? {
+                self.note(series, (&name, Some(starts)), kind, false);
             }
             return Ok(());
         }
-        if options.asked.freeze_all
-            && let Some(pause) = schedule.freeze_all()
-        {
-            self.freeze_all(pause, report);
+        if asked.include_supervisor && schedule.supervisor() {
+            let kind = schedule.supervisor_kind();
+            if !self.supervisor_is_down() && send(self.supervisor, kind.signal()) {
+                self.note(series, (SUPERVISOR, None), kind, true);
+                (self.supervisor_hit, self.driving) = (true, false);
+            }
             return Ok(());
         }
-        let (stage, kind) = (schedule.stage(), schedule.kind());
-        let startup_hit = schedule.startup_hit();
+        if asked.freeze_all
+            && let Some(pause) = schedule.freeze_all()
+        {
+            self.freeze_all(pause, series);
+            return Ok(());
+        }
+        let (stage, kind, startup_hit) =
+            (schedule.stage(), schedule.kind(), schedule.startup_hit());
         let running = |entry: &&RosterEntry| {
             name_str(&entry.stage) == stage
                 && StageState::from_byte(entry.state) == StageState::Running
         };
-        let Some(entry) = self.entries.iter().find(running) else {
+        let Some(&RosterEntry { pid, generation, .. }) = self.entries.iter().find(running) else {
             return Ok(());
         };
-        self.hits.retain(|(_, at)| at.elapsed() < HOLD_WINDOW);
-        let lately = self.hits.iter().filter(|(hit, _)| *hit == stage).count();
-        if self.is_recovering(stage) || lately >= MOST_HITS || !send(entry.pid, kind.signal()) {
-            return Ok(());
+        let lately = |sent: &&Sent| sent.row.stage == stage && sent.at.elapsed() < HOLD_WINDOW;
+        let is_spared = self.is_recovering(stage)
+            || self.sent.iter().filter(lately).count() >= MOST_HITS
+            || !send(pid, kind.signal());
+        if !is_spared {
+            self.note(series, (stage, Some(generation)), kind, true);
+            let startup_hit = startup_hit.filter(|_| asked.include_startup && kind != Kind::Freeze);
+            self.sent.last_mut().into_iter().for_each(|sent| sent.startup_hit = startup_hit);
         }
-        if kind == Kind::Freeze {
-            self.frozen.push((stage, entry.generation));
-        }
-        self.hits.push((stage, Instant::now()));
-        report.hit(stage, kind);
-        let mut recovery = PendingRecovery::new(self.row(stage, kind, Some(entry.generation)));
-        recovery.startup_hit =
-            startup_hit.filter(|_| options.asked.include_startup && kind != Kind::Freeze);
-        self.pending.push(recovery);
         Ok(())
     }
 
-    /// The next hit of a successor in its start-up: its time, its place among the pending recoveries, and the process.
+    /// The next hit of a successor in its start-up: its time, its place among the signals, and the process.
     fn next_startup_hit(&self) -> Option<(Instant, usize, RosterEntry)> {
         let read = self.entries_read?;
-        let hits = self.pending.iter().enumerate().filter_map(|(place, recovery)| {
-            let after = recovery.startup_hit?;
+        let pending = self.sent.iter().enumerate().filter(|(_, sent)| sent.pending);
+        let hits = pending.filter_map(|(place, Sent { row, startup_hit, .. })| {
             let entry = self.entries.iter().find(|entry| {
-                name_str(&entry.stage) == recovery.row.stage
-                    && Some(entry.generation) > recovery.row.generation
+                name_str(&entry.stage) == row.stage
+                    && Some(entry.generation) > row.generation
                     && entry.pid != 0
             })?;
             let age = Duration::from_nanos(entry.uptime_ns);
-            Some((read + after.saturating_sub(age), place, *entry))
+            Some((read + (*startup_hit)?.saturating_sub(age), place, *entry))
         });
         hits.min_by_key(|hit| hit.0)
     }
 
-    fn hit_starting(&mut self, report: &mut Report) {
+    fn hit_starting(&mut self, series: &mut Series<'_>) {
         while let Some((at, place, entry)) = self.next_startup_hit()
             && at <= Instant::now()
         {
-            self.pending[place].startup_hit = None;
-            if let Some(stage) = stages::find(name_str(&entry.stage)).map(|stage| stage.name)
-                && send(entry.pid, Signal::KILL)
-            {
-                self.hits.push((stage, Instant::now()));
-                report.hit(stage, Kind::KillAtStart);
-                let row = self.row(stage, Kind::KillAtStart, Some(entry.generation));
-                let next = PendingRecovery::new(row);
-                self.measured.push(std::mem::replace(&mut self.pending[place], next).row);
+            self.sent[place].startup_hit = None;
+            if send(entry.pid, Signal::KILL) {
+                self.sent[place].pending = false;
+                let hit = (name_str(&entry.stage), Some(entry.generation));
+                self.note(series, hit, Kind::KillAtStart, true);
             }
         }
     }
@@ -351,26 +354,11 @@ pub fn send(pid: u32, signal: Signal) -> bool {
     Pid::from_raw(pid.cast_signed()).is_some_and(|pid| kill_process(pid, signal).is_ok())
 }
 
-/// The recovery of a stage or the supervisor that was hit, until its successor works.
-struct PendingRecovery {
-    row: Row,
-    at: Instant,
-    /// The time after its start at which the successor is to be hit too.
-    startup_hit: Option<Duration>,
-}
-
-impl PendingRecovery {
-    fn new(row: Row) -> Self {
-        Self { row, at: Instant::now(), startup_hit: None }
-    }
-}
-
 /// The attacker's readers on the bus of one generation of the supervisor.
 struct Subscriptions {
     roster: Roster,
     deaths: Reader<DeathSample>,
     health: Reader<HealthSample>,
-    wheels: Reader<WheelSample>,
     pose: Reader<PoseSample>,
     /// The other outputs of a tick, each with its writer.
     outputs: Vec<(&'static str, Box<dyn AnyReader>)>,
@@ -384,13 +372,13 @@ impl Subscriptions {
         roster.waiter.on(bus.wakeup(&topics::DEATHS)?);
         roster.waiter.on(bus.wakeup(&topics::HEALTH)?);
         roster.waiter.on(bus.wakeup(&topics::COMMAND)?);
-        let outputs: [&dyn AnyTopic; 3] = [&topics::GRID, &topics::GUIDANCE, &topics::COMMAND];
+        let outputs: [&dyn AnyTopic; 4] =
+            [&topics::WHEELS, &topics::GRID, &topics::GUIDANCE, &topics::COMMAND];
         let outputs = outputs.iter().map(|it| Ok((it.spec().writer, it.any_reader(&bus)?)));
         let mut subscriptions = Self {
             roster,
             deaths: bus.reader(&topics::DEATHS)?,
             health: bus.reader(&topics::HEALTH)?,
-            wheels: bus.reader(&topics::WHEELS)?,
             pose: bus.reader(&topics::POSE)?,
             outputs: outputs.collect::<Result<_, BusError>>()?,
         };

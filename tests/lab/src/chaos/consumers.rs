@@ -105,12 +105,10 @@ impl Consumers {
         running.signal(kind.signal());
         if freezes {
             running.frozen_until = Some(Instant::now() + pause);
-            report.consumer(&hit.0).frozen += 1;
         } else {
             // Dropping the process reaps it.
             running.process = None;
             running.frozen_until = None;
-            report.consumer(&hit.0).killed += 1;
             running.start(&self.directory, report)?;
         }
         Ok(Some(hit))

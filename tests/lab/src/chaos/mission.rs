@@ -1,9 +1,9 @@
 //! One mission, undisturbed and under attack.
 
 use std::{
-    fs::{self, File},
+    fs,
     path::Path,
-    process::{Command, Stdio},
+    process::Command,
     time::{Duration, Instant},
 };
 
@@ -19,52 +19,29 @@ use crate::chaos::{
 };
 use crate::{
     error::{OrCannot as _, Result},
-    robot::{self, firsthand},
+    robot::{self, Run, firsthand},
 };
-use mission_control::{outcome::Outcome, recovery::SUMMARY, simulator::Simulator};
-use processes::{DEATHS, process::Process};
+use mission_control::{outcome::Outcome, simulator::Simulator};
+use processes::DEATHS;
 use summary::Summary;
 
 /// The time after which a mission is stopped. In wall-clock time a mission takes half a minute.
 const PATIENCE: Duration = Duration::from_secs(600);
 
-pub fn command(
-    options: &Options,
-    seed: u64,
-    pace: &str,
-    out: &Path,
-    records: bool,
-) -> Result<Command> {
+pub fn command(options: &Options, seed: u64, pace: &str, out: &Path) -> Command {
     let Arguments { mission, robot, set, .. } = &options.asked;
     let mut command = robot::mission("run", mission, robot, set);
     command.args(["--pace", pace, "--seed", &seed.to_string(), "--out"]).arg(out);
-    child(command, out, records)
-}
-
-/// Make `command` a child that ends with this process. Its standard output is piped; its standard error goes to a file
-/// beside the run's directory.
-fn child(mut command: Command, directory: &Path, records: bool) -> Result<Command> {
-    let stderr = directory.with_extension("stderr");
-    let stderr = File::options().create(true).append(true).open(stderr);
-    let stderr = stderr.or_cannot("write a mission's standard error")?;
-    command.args((!records).then_some("--no-record"));
-    command.args(["--parent", &std::process::id().to_string()]);
-    command.stdout(Stdio::null()).stderr(stderr);
-    Ok(command)
+    command
 }
 
 /// The summary of the mission without an attack, to compare with.
 pub fn undisturbed(options: &Options, seed: u64) -> Result<Summary> {
     let directory = options.directory.join("undisturbed");
-    let mut command = command(options, seed, &Pace::Max.to_string(), &directory, false)?;
-    command.status().or_cannot("start a mission")?;
-    let summary = summary(&directory).ok_or_else(|| no_summary(&directory))?;
+    let command = command(options, seed, &Pace::Max.to_string(), &directory);
+    let summary = Run::start(command, &directory, false)?.wait(PATIENCE, || ())?.summary()?;
     fs::remove_dir_all(directory).or_cannot("remove its directory")?;
     Ok(summary)
-}
-
-fn no_summary(directory: &Path) -> String {
-    format!("a mission gave no summary; see {}", directory.with_extension("stderr").display())
 }
 
 /// Attack the mission, and report. Its files stay if something was wrong.
@@ -75,11 +52,9 @@ pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Resu
     let files = options.directory.join(format!("seed-{seed}"));
     fs::create_dir(&files).or_cannot("make a directory")?;
     let directory = files.join("run");
-    let mut robot = asked
-        .include_supervisor
-        .then(|| robot(options, seed, &files.join("robot"), false))
-        .transpose()?;
-    let mut start = command(options, seed, &asked.pace.to_string(), &directory, options.records())?;
+    let mut robot =
+        asked.include_supervisor.then(|| robot(options, seed, &files, false)).transpose()?;
+    let mut start = command(options, seed, &asked.pace.to_string(), &directory);
     if let Some(robot) = &robot {
         let address = robot.address();
         start.args(["--set", &format!("robot.address='udp://{address}'")]);
@@ -91,18 +66,17 @@ pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Resu
     let mut attack = Attack::new(seed, consumers);
     let began = Instant::now();
     let summary = loop {
-        let mut supervisor = Process::spawn(start).or_cannot("start a mission")?;
-        let attacked = attack.run(series, &mut supervisor, robot.as_mut(), PATIENCE);
-        supervisor.end(Duration::from_secs(2));
+        let mut run = Run::start(start, &directory, options.records())?;
+        let attacked = attack.run(series, &mut run.process, robot.as_mut(), PATIENCE);
+        run.process.end(Duration::from_secs(2));
         attacked?;
-        let summary = summary(&directory);
+        let summary = run.summary();
         // A supervisor that was hit leaves no summary, unless the run had just ended.
-        if !attack.supervisor_is_down() || summary.is_some() || began.elapsed() >= PATIENCE {
-            break summary.ok_or_else(|| no_summary(&directory))?;
+        if !attack.supervisor_is_down() || summary.is_ok() || began.elapsed() >= PATIENCE {
+            break summary?;
         }
         start = firsthand(&["run", "--json", "--resume"]);
         start.arg(&directory);
-        start = child(start, &directory, options.records())?;
     };
     attack.end(series)?;
     let report = &mut series.report;
@@ -171,20 +145,9 @@ fn pose_allowance_m(mission: &Mission, kills: u32, summary: &Summary) -> f64 {
     body.metres_per_count() * (f64::from(kills) + target / body.track_m) + slip_m
 }
 
-/// Start a robot that does not end with its supervisor.
-pub fn robot(
-    options: &Options,
-    seed: u64,
-    directory: &Path,
-    ignores_time: bool,
-) -> Result<Simulator> {
-    fs::create_dir(directory).or_cannot("make a directory")?;
+/// Start the robot of a mission with its files in `files`.
+pub fn robot(options: &Options, seed: u64, files: &Path, ignores_time: bool) -> Result<Simulator> {
     let mut mission = Mission { seed, ..options.loaded.clone() };
     mission.simulation.ignores_time |= ignores_time;
-    Ok(Simulator::start(firsthand(&[]), directory, &mission, options.asked.pace, None)?)
-}
-
-/// The summary of the run in `directory`; none before its end.
-pub fn summary(directory: &Path) -> Option<Summary> {
-    serde_json::from_slice(&fs::read(directory.join(SUMMARY)).ok()?).ok()
+    robot::simulated(&files.join("robot"), &mission, options.asked.pace)
 }

@@ -2,13 +2,12 @@
 
 use std::{
     io,
-    net::{Ipv4Addr, SocketAddr, UdpSocket},
+    net::{SocketAddr, UdpSocket},
     os::fd::AsFd as _,
     sync::{
         Arc,
         atomic::{AtomicBool, AtomicU64, Ordering::Relaxed},
     },
-    thread::JoinHandle,
     time::{Duration, Instant},
 };
 
@@ -18,7 +17,7 @@ use super::{
     fault_injector::{FaultInjector, Late},
     robot_fault::RobotFault,
 };
-use crate::error::{OrCannot as _, Result};
+use crate::background::{Turns, socket, to_robot};
 
 /// Longest wait until the thread sees that the fault begins or the proxy ends.
 const LOOK: Duration = Duration::from_millis(10);
@@ -28,7 +27,6 @@ const MOST_HELD: usize = 16_384;
 #[derive(Debug, Default)]
 struct Shared {
     faulty: AtomicBool,
-    ends: AtomicBool,
     /// The time from the proxy's start to the host's newest order that turns a wheel.
     last_moving_ns: AtomicU64,
 }
@@ -38,7 +36,7 @@ pub struct Proxy {
     pub address: SocketAddr,
     began: Instant,
     shared: Arc<Shared>,
-    thread: Option<JoinHandle<()>>,
+    _thread: Turns,
 }
 
 impl Proxy {
@@ -48,20 +46,14 @@ impl Proxy {
         fault: RobotFault,
         protocol: Protocol,
         seed: u64,
-    ) -> Result<Self> {
-        let (front, back) = sockets(robot).or_cannot("open the proxy's sockets")?;
-        let address = front.local_addr().or_cannot("name the proxy")?;
+    ) -> io::Result<Self> {
+        let (front, back) = (socket()?, to_robot(robot)?);
+        let address = front.local_addr()?;
         let (began, shared) = (Instant::now(), Arc::new(Shared::default()));
         let injector = FaultInjector::new(fault, protocol, seed);
         let (host, held) = (None, Vec::new());
         let mut wire = Wire { front, back, host, injector, held, began, shared: shared.clone() };
-        let thread = std::thread::spawn(move || {
-            while !wire.shared.ends.load(Relaxed) {
-                // A datagram that cannot be sent, for example before the other end listens, is lost, as on a radio.
-                let _ = wire.turn();
-            }
-        });
-        Ok(Self { address, began, shared, thread: Some(thread) })
+        Ok(Self { address, began, shared, _thread: Turns::start(move || wire.turn()) })
     }
 
     pub fn begin_fault(&self) {
@@ -72,25 +64,6 @@ impl Proxy {
     pub fn last_moving(&self) -> Instant {
         self.began + Duration::from_nanos(self.shared.last_moving_ns.load(Relaxed))
     }
-}
-
-impl Drop for Proxy {
-    fn drop(&mut self) {
-        self.shared.ends.store(true, Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
-    }
-}
-
-/// A socket for the host and one for the robot.
-fn sockets(robot: SocketAddr) -> io::Result<(UdpSocket, UdpSocket)> {
-    let front = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
-    let back = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
-    back.connect(robot)?;
-    front.set_nonblocking(true)?;
-    back.set_nonblocking(true)?;
-    Ok((front, back))
 }
 
 struct Wire {

@@ -30,8 +30,11 @@ pub struct Report {
     /// Missions that did not reach the target, touched something, lost the pose, did not tell of a target or were not replayed to the
     /// bit: seeds and reasons.
     pub wrong: Vec<String>,
+    /// Signals that were sent, to consumers too.
+    #[serde(skip)]
+    pub signals: u32,
     /// Signals of each kind to each stage and the supervisor.
-    kills: BTreeMap<&'static str, BTreeMap<Kind, u32>>,
+    kills: BTreeMap<String, BTreeMap<Kind, u32>>,
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     consumers: BTreeMap<String, ConsumerCounts>,
     recovery_ms: BTreeMap<String, Recovery>,
@@ -77,72 +80,64 @@ pub struct Series<'a> {
     pub options: &'a Options,
     pub schedule: Schedule,
     pub report: Report,
-    /// The table of signals; none if no results are written.
-    signals: Option<Table<Row>>,
+    signals: Table<Row>,
 }
 
 impl<'a> Series<'a> {
     pub fn new(options: &'a Options) -> Result<Self> {
-        let out = options.asked.out.as_deref();
         Ok(Self {
             options,
             schedule: Schedule::new(options.asked.seed),
             report: Report::default(),
-            signals: out.map(signals::create).transpose()?,
+            signals: signals::create(options.asked.out.as_ref().unwrap_or(&options.directory))?,
         })
     }
 
     /// Keep a signal whose measurement is complete.
     pub fn keep(&mut self, row: Row) -> Result {
-        self.report.add_recovery(&row);
-        self.signals.as_mut().map_or(Ok(()), |table| table.add(row))
+        self.report.add(&row);
+        self.signals.add(row)
     }
 
     pub fn is_over(&self) -> bool {
-        self.report.signals() >= self.options.asked.kills
+        self.report.signals >= self.options.asked.kills
     }
 }
 
 impl Report {
-    pub fn signals(&self) -> u32 {
-        let consumers = self.consumers.values();
-        let to_consumers: u32 = consumers.map(|counts| counts.killed + counts.frozen).sum();
-        self.kills() + to_consumers
-    }
-
     pub fn consumer(&mut self, name: &str) -> &mut ConsumerCounts {
         self.consumers.entry(name.to_owned()).or_default()
     }
 
+    /// Signals to stages and the supervisor whose measurement is complete.
     pub fn kills(&self) -> u32 {
         self.kills.values().flat_map(BTreeMap::values).sum()
     }
 
-    pub fn hit(&mut self, stage: &'static str, kind: Kind) {
-        *self.kills.entry(stage).or_default().entry(kind).or_default() += 1;
-    }
-
-    /// Count the times of a signal whose measurement is complete.
-    pub fn add_recovery(&mut self, row: &Row) {
-        let record = |histogram: &mut Histogram, ms: Option<f64>| {
-            ms.into_iter().for_each(|ms| histogram.record((ms * 1e6) as u64));
-        };
-        if row.ready_ms.is_none() {
-            return;
-        }
-        let recovery = self.recovery_ms.entry(row.stage.clone()).or_default();
-        if row.kind == Kind::Freeze {
-            record(&mut recovery.after_freeze, row.ready_ms);
-        } else {
-            record(&mut recovery.ready, row.ready_ms);
-            record(&mut recovery.output, row.first_output_ms);
+    /// Count a signal whose measurement is complete.
+    fn add(&mut self, row: &Row) {
+        let Row { stage, kind, ready_ms, first_output_ms, .. } = row;
+        *match self.consumers.get_mut(stage) {
+            Some(counts) if *kind == Kind::Freeze => &mut counts.frozen,
+            Some(counts) => &mut counts.killed,
+            None => self.kills.entry(stage.clone()).or_default().entry(*kind).or_default(),
+        } += 1;
+        if let Some(ready_ms) = ready_ms {
+            let recovery = self.recovery_ms.entry(stage.clone()).or_default();
+            let record = |histogram: &mut Histogram, ms: &f64| histogram.record((ms * 1e6) as u64);
+            if *kind == Kind::Freeze {
+                record(&mut recovery.after_freeze, ready_ms);
+            } else {
+                record(&mut recovery.ready, ready_ms);
+                first_output_ms.iter().for_each(|ms| record(&mut recovery.output, ms));
+            }
         }
     }
 
     pub fn judged(&self, json: bool) -> Result<Judged> {
         let moved = || format!("a pose {:.3} m worse than undisturbed", self.worst_pose_excess_m);
         Ok(Judged {
-            tried: self.signals().into(),
+            tried: self.signals.into(),
             lost: (self.wrong.len() + self.leftovers.len()) as u64,
             worst: self.wrong.iter().chain(&self.leftovers).next().cloned().unwrap_or_else(moved),
             text: super::text(self, json)?,

@@ -19,21 +19,20 @@ use console::{missions, output::write_stderr};
 use mission_control::{outcome::RIGHT_PLACE_M, simulator::Simulator};
 use processes::process::Process;
 use rustix::process::Signal;
-use summary::Summary;
 
 use crate::chaos::{
     attack::send,
     mission,
     options::Options,
     proxy::Proxy,
-    robot_fault::{Promise, RobotFault},
+    robot_fault::{Promise, RobotFault, Row},
     stop_time_table::{Entry, StopTimeTable},
 };
 use crate::{
     error::{OrCannot as _, Result},
     random::Random,
-    robot::{command_lines, firsthand},
-    ros2_robot::{self, Ros2Robot},
+    robot::{Run, command_lines, firsthand},
+    ros2_robot::Ros2Robot,
 };
 
 /// Time from the robot's departure to its fault, seconds: the least, and the width of the random range.
@@ -82,79 +81,67 @@ pub fn run(options: &Options) -> Result<StopTimeTable> {
 }
 
 fn one(options: &Options, fault: RobotFault, seed: u64, files: &Path) -> Result<Entry> {
-    let mut robot = mission::robot(options, seed, &files.join("robot"), fault.is_kill())?;
-    let protocol = options.loaded.robot.protocol();
-    let proxy = Proxy::start(robot.address(), fault, protocol, seed)?;
-    let mut start = mission::command(options, seed, "1", &files.join("run"), false)?;
-    let mut keys = vec![format!("robot.address='udp://{}'", proxy.address)];
-    let mut node = None;
-    if options.asked.ros2 {
-        keys = ros2_robot::keys(fault as u64);
-        let stated = [&options.asked.set[..], &keys].concat();
-        let stated = missions::load(&options.asked.mission, &stated)?;
-        node = Some(Ros2Robot::start(proxy.address, &stated, 1.0)?);
-    }
+    let Options { asked, loaded, .. } = options;
+    let directory = files.join("run");
+    let mut robot = mission::robot(options, seed, files, fault.is_kill())?;
+    let proxy = Proxy::start(robot.address(), fault, loaded.robot.protocol(), seed);
+    let proxy = proxy.or_cannot("start a proxy")?;
+    let mut start = mission::command(options, seed, "1", &directory);
+    let node = if asked.ros2 {
+        let stated =
+            |keys: &[String]| missions::load(&asked.mission, &[&asked.set[..], keys].concat());
+        Some(Ros2Robot::start(proxy.address, fault as u64, 1.0, stated)?)
+    } else {
+        None
+    };
+    let address = [format!("robot.address='udp://{}'", proxy.address)];
+    let keys = node.as_ref().map_or(&address[..], |node| &node.keys);
     start.args(keys.iter().flat_map(|key| ["--set", key]));
-    let mut child = Process::spawn(start).or_cannot("start a mission")?;
-    let observed = observe(options, fault, seed, &mut child, &mut robot, &proxy);
+    let mut run = Run::start(start, &directory, false)?;
+    let entry = watch(options, fault, seed, &mut run, &mut robot, &proxy);
     // A frozen supervisor does not end in order.
-    child.signal(Signal::CONT);
-    child.end(END_GRACE);
-    drop(node);
-    robot.stop()?;
-    let summary = mission::summary(&files.join("run"));
-    Ok(entry(options, fault, seed, &observed?, robot.truth(), summary))
+    run.process.signal(Signal::CONT);
+    run.process.end(END_GRACE);
+    entry
 }
 
-#[derive(Debug, Default)]
-struct Observed {
-    /// The time when the fault began, and the ticks of the ground truth by then.
-    fault_began: Option<(Instant, usize)>,
-    /// The end of the watch, and the newest order before it that turns a wheel.
-    ended: Option<(Instant, Instant)>,
-    /// The ticks of the ground truth by then: the end of the run stops the robot.
-    ticks: usize,
-    /// Whether the mission ended by itself.
-    ended_by_itself: bool,
-    link: Option<LinkSample>,
-}
-
-/// Observe the robot until the mission ends, or for as long as the fault needs.
-fn observe(
+/// Watch the robot until the mission ends, or for as long as the fault needs.
+fn watch(
     options: &Options,
     fault: RobotFault,
     seed: u64,
-    child: &mut Process,
+    run: &mut Run,
     robot: &mut Simulator,
     proxy: &Proxy,
-) -> Result<Observed> {
-    let began = Instant::now();
+) -> Result<Entry> {
+    let Row { name, promise, .. } = *fault.row();
+    let Options { asked, loaded, .. } = options;
     let (least, more) = FAULT_AFTER_S;
     let fault_after_s = least + more * Random::new(seed, 17 + fault as u128).share();
-    let watched = match fault.row().promise {
+    let watched = match promise {
         Promise::Unharmed | Promise::EndsAtRest => WATCHED_ON_ITS_WAY,
         _ => WATCHED,
     };
-    let mut observed = Observed::default();
-    let (mut departed_s, mut stop) = (None, None);
+    let began = Instant::now();
+    // The beginning of the fault, and the ticks of the ground truth by then.
+    let mut fault_began = None;
+    let (mut departed_s, mut stop, mut link) = (None, None, None);
     // The process leaves the bus of the mission before, which that mission may have left behind.
-    let robot_domain = Domain::of(options.asked.robot.clone());
-    let mut link =
-        Follower::new(robot_domain, "chaos", &topics::LINK, |bus| bus.reader(&topics::LINK));
-    loop {
-        observed.ended = Some((Instant::now(), proxy.last_moving()));
+    let domain = Domain::of(asked.robot.clone());
+    let mut links = Follower::new(domain, "chaos", &topics::LINK, |bus| bus.reader(&topics::LINK));
+    // The ground truth counts to the end of the watch: the end of the run stops the robot.
+    let (ended, moving, is_over) = loop {
+        let (now, moving) = (Instant::now(), proxy.last_moving());
         robot.poll()?;
-        observed.ticks = robot.truth().len();
-        if let Ok(Event::Samples(reader)) = link.wait(Duration::ZERO) {
+        if let Ok(Event::Samples(reader)) = links.wait(Duration::ZERO) {
             while let Some(sample) = reader.next_sample()? {
-                observed.link = Some(sample);
+                link = Some(sample);
             }
         }
-        observed.ended_by_itself =
-            child.try_reap().or_cannot("reap")?.is_some() && !fault.is_kill();
-        let patience = observed.fault_began.map_or(began + DEPARTS_WITHIN, |(at, _)| at + watched);
-        if observed.ended_by_itself || Instant::now() >= patience {
-            break;
+        let is_over = run.process.try_reap().or_cannot("reap")?.is_some() && !fault.is_kill();
+        let patience = fault_began.map_or(began + DEPARTS_WITHIN, |(at, _)| at + watched);
+        if is_over || Instant::now() >= patience {
+            break (now, moving, is_over);
         }
         let newest = robot.truth().last();
         let gone = newest.filter(|tick| tick.x.hypot(tick.y) >= DEPARTED_M);
@@ -163,79 +150,58 @@ fn observe(
         let due = newest
             .zip(departed_s)
             .is_some_and(|(tick, departed_s): (_, f64)| tick.time_s >= departed_s + fault_after_s);
-        if observed.fault_began.is_none() && (fault.begins_at_boot() || due) {
+        if fault_began.is_none() && (fault.begins_at_boot() || due) {
             proxy.begin_fault();
-            observed.fault_began = Some((Instant::now(), observed.ticks));
+            fault_began = Some((Instant::now(), robot.truth().len()));
             if fault.is_kill() {
-                kill(fault, child, &directory(options, fault, seed));
+                kill(fault, &run.process, &directory(options, fault, seed));
             }
             if matches!(fault, RobotFault::DoesNotStop | RobotFault::AllKilled) {
                 stop = Some(operator_stop(options)?);
             }
         }
         std::thread::park_timeout(LOOK);
-    }
+    };
     if let Some(mut stop) = stop {
         stop.end(END_GRACE);
     }
-    Ok(observed)
-}
-
-fn entry(
-    options: &Options,
-    fault: RobotFault,
-    seed: u64,
-    observed: &Observed,
-    truth: &[GroundTruthTick],
-    summary: Option<Summary>,
-) -> Entry {
-    let stopped = observed.link.filter(LinkSample::stopped);
+    let truth = robot.truth();
     let (mut outcome, reason) = if fault.is_kill() {
-        ("killed".to_owned(), fault.row().name.to_owned())
-    } else if observed.ended_by_itself {
-        summary.map(|it| (it.outcome.as_str().to_owned(), it.reason)).unwrap_or_default()
+        ("killed".to_owned(), name.to_owned())
+    } else if is_over {
+        run.summary().map(|it| (it.outcome.as_str().to_owned(), it.reason)).unwrap_or_default()
     } else {
+        let stopped = link.filter(LinkSample::stopped);
         ("goes on".to_owned(), stopped.map_or("", |link| link.cause().name()).to_owned())
     };
-    let target = options.loaded.target;
+    let target = loaded.target;
     let is_wrong =
         |tick: &GroundTruthTick| (tick.x - target.x).hypot(tick.y - target.y) > RIGHT_PLACE_M;
     if outcome == "reached" && truth.last().is_some_and(is_wrong) {
         outcome = "wrong_place".to_owned();
     }
-    let mut entry = Entry {
+    let (began, first) = fault_began.unwrap_or((ended, truth.len()));
+    let since_fault = |time: Instant| time.saturating_duration_since(began).as_secs_f64();
+    // The tick before is the newest when the fault began.
+    let watched = &truth[first.saturating_sub(1).min(truth.len())..];
+    let ways = watched.windows(2).map(|two| (two[1].x - two[0].x).hypot(two[1].y - two[0].y));
+    let began_s = watched.first().map_or(0.0, |tick| tick.time_s);
+    let track_m = loaded.body().track_m;
+    let turning = watched.iter().skip(1).rfind(|tick| !is_at_rest(tick, track_m));
+    let contacts = |tick: Option<&GroundTruthTick>| tick.map_or(0, |tick| tick.contacts);
+    Ok(Entry {
         fault,
         seed,
-        promised_s: fault.rest_within_s(&options.loaded, options.protocol()),
-        fault_began: false,
-        last_moving_s: None,
-        rest_s: None,
-        way_m: 0.0,
-        watched_s: 0.0,
-        collisions: 0,
+        promised_s: fault.rest_within_s(loaded, options.protocol()),
+        fault_began: fault_began.is_some(),
+        last_moving_s: fault_began.map(|_| since_fault(moving)),
+        rest_s: fault_began.map(|_| turning.map_or(0.0, |tick| tick.time_s - began_s)),
+        way_m: ways.sum(),
+        watched_s: since_fault(ended),
+        collisions: contacts(watched.last()).saturating_sub(contacts(watched.first())),
         outcome,
         reason,
-    };
-    let (Some((began, first)), Some((ended, moving))) = (observed.fault_began, observed.ended)
-    else {
-        return entry;
-    };
-    let since_fault = |time: Instant| time.saturating_duration_since(began).as_secs_f64();
-    entry.fault_began = true;
-    entry.watched_s = since_fault(ended);
-    entry.last_moving_s = Some(since_fault(moving));
-    let track_m = options.loaded.body().track_m;
-    // The tick before is the newest when the fault began.
-    let before = first.saturating_sub(1);
-    let watched = truth.get(before..observed.ticks).unwrap_or_default();
-    let ways = watched.windows(2).map(|two| (two[1].x - two[0].x).hypot(two[1].y - two[0].y));
-    entry.way_m = ways.sum();
-    let began_s = watched.first().map_or(0.0, |tick| tick.time_s);
-    let moving = watched.iter().skip(1).rfind(|tick| !is_at_rest(tick, track_m));
-    entry.rest_s = Some(moving.map_or(0.0, |tick| tick.time_s - began_s));
-    let contacts = |tick: Option<&GroundTruthTick>| tick.map_or(0, |tick| tick.contacts);
-    entry.collisions = contacts(watched.last()).saturating_sub(contacts(watched.first()));
-    entry
+    })
 }
 
 fn is_at_rest(tick: &GroundTruthTick, track_m: f64) -> bool {

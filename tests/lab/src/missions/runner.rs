@@ -22,7 +22,7 @@ use super::{
 };
 use crate::{
     error::{OrCannot as _, Result},
-    robot,
+    robot::{self, Run},
 };
 
 /// A run's picture and its page, in its directory.
@@ -187,31 +187,32 @@ impl Job<'_> {
     /// Run the mission, in processes of its own. Without a summary it has no latencies.
     fn run(&self, worker: usize) -> Result<(Row, Option<Latency>)> {
         let Self { plan, trial, setting, seed, directory: all, .. } = *self;
-        let directory = all.join(format!("run-{worker}"));
-        let calibration = all.join(format!("calibration-{worker}"));
+        let files = all.join(format!("run-{worker}"));
+        // A worker that was killed left its files.
+        let _ = fs::remove_dir_all(&files);
+        fs::create_dir(&files).or_cannot_file("make", &files)?;
+        let directory = files.join("run");
         let mut calibrated = None;
         if plan.calibrates {
-            let file = calibration.join("calibration.toml");
+            let (runs, file) = (files.join("calibration"), files.join("calibration.toml"));
             let mut calibrate = self.firsthand("calibrate", worker);
-            calibrate.arg("--runs").arg(&calibration).arg("--out").arg(&file);
+            calibrate.arg("--runs").arg(runs).arg("--out").arg(&file);
             let ended = calibrate.stdout(Stdio::null()).stderr(Stdio::null()).status();
             if ended.or_cannot("start a calibration")?.success() {
                 let file = toml::Value::from(file.to_string_lossy().into_owned());
                 calibrated = Some(format!("robot.calibration={file}"));
             }
         }
-        let run = |options: &[&str]| {
+        let run = |records| {
             let mut command = self.firsthand("run", worker);
-            command.args(options).args(["--parent", &std::process::id().to_string()]);
             command.args(calibrated.iter().flat_map(|key| ["--set", key]));
-            command.arg("--out").arg(&directory).output().or_cannot("start a mission")
+            command.arg("--out").arg(&directory);
+            Run::start(command, &directory, records)?.wait(LINE_EVERY, || ())
         };
-        let output = run(&["--no-record"])?;
-        let summary = serde_json::from_slice::<Summary>(&output.stdout);
+        let summary = run(false)?.summary();
         let has_summary = summary.is_ok();
-        let summary = summary.unwrap_or_else(|_| {
-            let said = String::from_utf8_lossy(&output.stderr);
-            let reason = said.trim().lines().last().unwrap_or("no summary").to_owned();
+        let summary = summary.unwrap_or_else(|reason| {
+            let reason = reason.to_string();
             Summary { reason, ..Summary::default() }
         });
         let row = Row::new(trial, seed, setting, &summary);
@@ -224,11 +225,10 @@ impl Job<'_> {
         if !matches!(row.outcome, Outcome::Success | Outcome::Aborted) {
             // The mission can be run again, to the bit, and recordings of all missions would take too much room.
             let _ = fs::remove_dir_all(&directory);
-            run(&[])?;
+            run(true)?;
             let _ = fs::rename(directory.join(PAGE), kept.with_extension("html"));
         }
-        let _ = fs::remove_dir_all(&directory);
-        let _ = fs::remove_dir_all(&calibration);
+        let _ = fs::remove_dir_all(&files);
         Ok((row, latency))
     }
 }

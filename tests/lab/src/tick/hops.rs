@@ -18,7 +18,11 @@ use common::{
 };
 use processes::domain::DomainLock;
 
-use crate::error::{LOST, LOST_SAMPLE, OrCannot as _, Result};
+use crate::error::{OrCannot as _, Result};
+
+/// The time after which a sample is lost: a trip takes microseconds, the forwarders' start some milliseconds.
+const LOST: Duration = Duration::from_secs(5);
+const LOST_SAMPLE: &str = "no sample came back within 5 s; is the machine overloaded?";
 
 /// Cells of the smallest map. No forwarder reads it.
 const CELLS: usize = 64;

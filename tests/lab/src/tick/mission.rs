@@ -1,11 +1,6 @@
 //! A mission whose ticks are measured, and its consumers: each a process that reads every sample of grid and field.
 
-use std::{
-    process::Stdio,
-    sync::mpsc::{RecvTimeoutError, channel},
-    thread,
-    time::Duration,
-};
+use std::time::Duration;
 
 use common::{
     clock::Pace,
@@ -21,8 +16,8 @@ use super::{
     process_set::{ProcessSet, Used},
 };
 use crate::{
-    error::{self, OrCannot as _, Result},
-    robot,
+    error::{OrCannot as _, Result},
+    robot::{self, Run},
 };
 
 pub const CONSUMER: &str = "consumer";
@@ -39,31 +34,14 @@ pub fn measure(
     let directory = tempfile::Builder::new().prefix("firsthand-latency-").tempdir();
     let directory = directory.or_cannot("make a directory for the mission")?;
     let mut command = robot::mission("run", &arguments.mission, robot, &arguments.set);
-    command.args(["--pace", &pace.to_string(), "--out"]).arg(directory.path());
-    if arguments.no_record {
-        command.arg("--no-record");
-    }
+    let files = directory.path().join("run");
+    command.args(["--pace", &pace.to_string(), "--out"]).arg(&files);
     // The consumers wait for the bus, and follow it. They do not belong to the mission's processes.
     let consumers = (0..arguments.consumers).map(|_| super::start(CONSUMER, robot));
     let _consumers = consumers.collect::<Result<Vec<_>>>()?;
-    let run = command
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .or_cannot("start the mission")?;
-    let mut processes = ProcessSet::of(run.id());
-    let (ended, end) = channel();
-    let waiting = thread::spawn(move || ended.send(run.wait_with_output()));
-    let output = loop {
-        match end.recv_timeout(LOOK_EVERY) {
-            Ok(output) => break output.or_cannot("wait for the mission")?,
-            Err(RecvTimeoutError::Timeout) => processes.look(),
-            Err(RecvTimeoutError::Disconnected) => return Err(error::NOTHING.into()),
-        }
-    };
-    // The thread has ended, because it has sent its result.
-    let _ = waiting.join();
-    let summary = error::summary(&output.stdout, &output.stderr)?;
+    let run = Run::start(command, &files, !arguments.no_record)?;
+    let mut processes = ProcessSet::of(run.process.id());
+    let summary = run.wait(LOOK_EVERY, || processes.look())?.summary()?;
     let times = Times::new("a mission's ticks", summary.ticks, summary.tick_latency_us)?;
     Ok((times, processes.used()))
 }
