@@ -1,4 +1,4 @@
-//! Threads that stand between a simulated robot and its host.
+//! Threads beside a measurement: between a simulated robot and its host, and consumers.
 
 use std::{
     io,
@@ -18,12 +18,15 @@ pub struct Turns {
 }
 
 impl Turns {
-    /// Each turn waits for a short time at most. A datagram that it cannot send, for example before the other end listens, is lost, as on a
-    /// radio.
-    pub fn start(mut turn: impl FnMut() -> io::Result<()> + Send + 'static) -> Self {
+    /// The thread gets its work from `begin`. Each turn waits for a short time at most, and may fail: a datagram that it cannot send, for
+    /// example before the other end listens, is lost, as on a radio.
+    pub fn start<E, Turn: FnMut() -> Result<(), E>>(
+        begin: impl FnOnce() -> Turn + Send + 'static,
+    ) -> Self {
         let ends = Arc::new(AtomicBool::new(false));
         let is_over = ends.clone();
         let thread = thread::spawn(move || {
+            let mut turn = begin();
             while !is_over.load(Relaxed) {
                 let _ = turn();
             }

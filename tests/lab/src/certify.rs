@@ -6,7 +6,7 @@ mod fuzz;
 
 use std::{collections::BTreeMap, fs, path::PathBuf, thread, time::Instant};
 
-use clap::{Args, Parser as _, builder::PossibleValuesParser};
+use clap::{Args, Parser as _, ValueEnum as _, builder::PossibleValuesParser};
 use console::output::{print_text, write_stderr};
 use serde::{Deserialize, Serialize};
 
@@ -137,8 +137,9 @@ fn one(part: &Part, share: f64, number: u64) -> Result<Row> {
             format!("firsthand-lab certify --parts {FUZZ}, {many} of seed {seed}"),
         ),
         Some(options) => {
+            let faults = chaos::RobotFault::value_variants().len() as f64;
             let count = match options.contains("--robot-faults") {
-                true => format!("--missions {}", (many / chaos::FAULTS as f64).ceil()),
+                true => format!("--missions {}", (many / faults).ceil()),
                 false => format!("--kills {many}"),
             };
             let words = format!("chaos {options} {count} --seed {seed} --robot certify-{number}");

@@ -13,8 +13,7 @@
 //! | `changes` | targets that change meanwhile |
 //! | `replays` | replays of the missions' recordings |
 //! | `leftovers` | files and processes that outlived a mission |
-//! | `report` | the result of all missions |
-//! | `signals` | the table of signals, THE file format |
+//! | `report` | the result of all missions, and the table of signals |
 //! | `robot_fault` | THE table of robot faults |
 //! | `robot_faults`, `proxy`, `fault_injector` | missions of faulty robots; the proxy before the robot; the changes of its bytes |
 //! | `stop_time_table` | how long each moved after its fault |
@@ -32,10 +31,10 @@ mod report;
 mod robot_fault;
 mod robot_faults;
 mod schedule;
-mod signals;
 mod stop_time_table;
 
 pub use options::{Arguments, Options};
+pub use robot_fault::RobotFault;
 
 use std::{fmt::Display, fs, process::ExitCode, time::Instant};
 
@@ -48,9 +47,6 @@ use report::Series;
 /// The exit code if a mission did not arrive, touched something, lost its pose, aborted a healthy stage, or left something
 /// behind; or if a robot with a fault did not come to rest in time.
 const NOT_CLEAN: u8 = 8;
-
-/// The number of kinds of robot faults.
-pub const FAULTS: usize = robot_fault::TABLE.len();
 
 /// What a chaos tried, what went wrong, the worst case in words, and the whole result as text.
 #[derive(Debug)]

@@ -14,7 +14,7 @@
 //! | `bring_up` | bring-ups of robots with faults of assembly |
 //! | [`sources`] | simulated sources of fixes and turns |
 //! | `field` | the field of a map |
-//! | `background` | threads that stand between a simulated robot and its host |
+//! | `background` | threads beside a measurement |
 //! | `random` | random numbers |
 //! | `robot` | the executable `firsthand`, its runs, and simulated robots |
 //! | `ros2_robot` | a simulated robot as one of ROS 2 |

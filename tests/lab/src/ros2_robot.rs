@@ -105,7 +105,7 @@ impl Ros2Robot {
         keys.extend(topics.map(topic));
         let node = Node::new(robot, &stated(&keys)?, domain as u16, turns);
         let mut node = node.or_cannot("start a node of ROS 2")?;
-        Ok(Self { keys, _thread: Turns::start(move || node.turn()) })
+        Ok(Self { keys, _thread: Turns::start(|| move || node.turn()) })
     }
 }
 

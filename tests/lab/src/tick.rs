@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`Arguments`] | missions and bare hops, in turn |
 //! | `hops` | five bare hops between processes |
-//! | `busy` | processes that compute meanwhile |
+//! | `busy` | threads that compute meanwhile |
 //! | `mission` | a mission whose ticks are measured, and its consumers |
 //! | `process_set` | resources of a process and its descendants |
 
@@ -13,18 +13,17 @@ mod hops;
 mod mission;
 mod process_set;
 
-use std::{fmt, time::Duration};
+use std::{fmt, thread, time::Duration};
 
 use clap::Args;
 use common::{clock::Pace, domain::RobotName, latency::Histogram};
 use console::missions;
 use process_set::Used;
-use processes::process::{Process, firsthand};
 use serde::Serialize;
 use summary::Quantiles;
 
 use crate::{
-    error::{OrCannot as _, Result},
+    error::Result,
     missions::statistics::{median, rounded},
 };
 
@@ -46,10 +45,10 @@ pub struct Arguments {
     /// Do not record the missions meanwhile; `run` does.
     #[arg(long)]
     no_record: bool,
-    /// Number of processes that read grid and field of the missions meanwhile.
+    /// Number of consumers that read grid and field of the missions meanwhile.
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(0..=16))]
     consumers: u32,
-    /// Number of processes of ordinary priority that compute meanwhile, without end.
+    /// Number of threads of ordinary priority that compute meanwhile, without end.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=1000))]
     busy: u32,
     /// One line of JSON.
@@ -58,9 +57,9 @@ pub struct Arguments {
     /// Name of the robot, which also names its shared memory.
     #[arg(long)]
     robot: Option<RobotName>,
-    /// Be one of the processes beside a measurement: busy, a consumer, or the forwarder that stands for this stage.
+    /// Be the forwarder that stands for this stage.
     #[arg(long, hide = true, requires = "supervisor", requires = "robot")]
-    role: Option<String>,
+    forwarder: Option<String>,
     /// The parent process: this one stops when it ends.
     #[arg(long, hide = true)]
     supervisor: Option<u32>,
@@ -72,16 +71,12 @@ pub fn main(arguments: &Arguments) -> Result {
         Some(robot) => robot.clone(),
         None => format!("latency{}", std::process::id()).parse()?,
     };
-    if let (Some(role), Some(supervisor)) = (&arguments.role, arguments.supervisor) {
-        return match &**role {
-            busy::ROLE => busy::run(supervisor),
-            mission::CONSUMER => mission::consume(&robot, supervisor),
-            place => hops::run_forwarder(&robot, place, supervisor),
-        };
+    if let (Some(place), Some(supervisor)) = (&arguments.forwarder, arguments.supervisor) {
+        return hops::run_forwarder(&robot, place, supervisor);
     }
     let rate_hz = missions::load(&arguments.mission, &arguments.set)?.robot.rate_hz;
-    let busy = (0..arguments.busy).map(|_| start(busy::ROLE, &robot));
-    let _busy = busy.collect::<Result<Vec<_>>>()?;
+    // They end with this process.
+    (0..arguments.busy).for_each(|_| drop(thread::spawn(busy::run)));
     let both = || vec![Regime(None), Regime(Some(rate_hz))];
     let regimes = arguments.rate.map_or_else(both, |regime| vec![regime]);
     let reports = regimes.into_iter().map(|regime| measure(regime, arguments, &robot, rate_hz));
@@ -107,13 +102,6 @@ fn measure(
         used = its;
     }
     Report::new(regime, &hops, &rounds, used)
-}
-
-/// Start this program as the process `role` beside a measurement of `robot`. It ends when it is dropped.
-fn start(role: &str, robot: &RobotName) -> Result<Process> {
-    let (own, robot) = (std::process::id().to_string(), robot.to_string());
-    let beside = ["bench", "tick", "--role", role, "--supervisor", &own, "--robot", &robot];
-    Process::spawn(firsthand(&beside)).or_cannot("start a process beside the measurement")
 }
 
 /// Ticks a second; none if they follow each other at once. Their cost depends on it: caches are warm or cold, cores awake or asleep.

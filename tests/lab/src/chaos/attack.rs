@@ -25,9 +25,8 @@ use serde_json::Value;
 use super::{
     consumers::Consumers,
     options::Options,
-    report::{EVERYTHING, Series},
+    report::{EVERYTHING, Row, Series, ms_since},
     schedule::Kind,
-    signals::{Row, ms_since},
 };
 use crate::error::{OrCannot as _, Result};
 

@@ -53,7 +53,7 @@ impl Proxy {
         let injector = FaultInjector::new(fault, protocol, seed);
         let (host, held) = (None, Vec::new());
         let mut wire = Wire { front, back, host, injector, held, began, shared: shared.clone() };
-        Ok(Self { address, began, shared, _thread: Turns::start(move || wire.turn()) })
+        Ok(Self { address, began, shared, _thread: Turns::start(|| move || wire.turn()) })
     }
 
     pub fn begin_fault(&self) {

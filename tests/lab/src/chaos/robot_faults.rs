@@ -25,7 +25,7 @@ use crate::chaos::{
     mission,
     options::Options,
     proxy::Proxy,
-    robot_fault::{Promise, RobotFault, Row},
+    robot_fault::{Promise, RobotFault},
     stop_time_table::{Entry, StopTimeTable},
 };
 use crate::{
@@ -55,7 +55,7 @@ pub fn run(options: &Options) -> Result<StopTimeTable> {
     let (faults, left_out): (Vec<_>, Vec<_>) =
         faults.partition(|fault| fault.has_meaning(protocol));
     if !left_out.is_empty() {
-        let names: Vec<_> = left_out.iter().map(|fault| fault.row().name).collect();
+        let names: Vec<_> = left_out.iter().map(|fault| &*fault.row().name).collect();
         let left_out = format!("no faults of this robot's protocol: {}", names.join(", "));
         if faults.is_empty() {
             return Err(left_out.into());
@@ -114,11 +114,11 @@ fn watch(
     robot: &mut Simulator,
     proxy: &Proxy,
 ) -> Result<Entry> {
-    let Row { name, promise, .. } = *fault.row();
+    let row = fault.row();
     let Options { asked, loaded, .. } = options;
     let (least, more) = FAULT_AFTER_S;
     let fault_after_s = least + more * Random::new(seed, 17 + fault as u128).share();
-    let watched = match promise {
+    let watched = match row.promise {
         Promise::Unharmed | Promise::EndsAtRest => WATCHED_ON_ITS_WAY,
         _ => WATCHED,
     };
@@ -150,7 +150,7 @@ fn watch(
         let due = newest
             .zip(departed_s)
             .is_some_and(|(tick, departed_s): (_, f64)| tick.time_s >= departed_s + fault_after_s);
-        if fault_began.is_none() && (fault.begins_at_boot() || due) {
+        if fault_began.is_none() && (fault == RobotFault::LateFromBoot || due) {
             proxy.begin_fault();
             fault_began = Some((Instant::now(), robot.truth().len()));
             if fault.is_kill() {
@@ -167,7 +167,7 @@ fn watch(
     }
     let truth = robot.truth();
     let (mut outcome, reason) = if fault.is_kill() {
-        ("killed".to_owned(), name.to_owned())
+        ("killed".to_owned(), row.name.clone())
     } else if is_over {
         run.summary().map(|it| (it.outcome.as_str().to_owned(), it.reason)).unwrap_or_default()
     } else {

@@ -125,7 +125,7 @@ mod tests {
         Entry {
             fault,
             seed: 1,
-            promised_s: matches!(fault.row().promise, Promise::Rests(_)).then_some(2.0),
+            promised_s: (fault.row().promise == Promise::Rests).then_some(2.0),
             fault_began: true,
             last_moving_s: Some(0.7),
             rest_s: Some(0.9),

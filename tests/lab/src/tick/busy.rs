@@ -1,25 +1,19 @@
-//! Processes that take the processor from a mission whose ticks are measured.
+//! Threads that take the processor from a mission whose ticks are measured.
 
-use common::start::become_child;
 use thread_priority::{
     NormalThreadSchedulePolicy as Normal, ThreadPriority, ThreadPriorityValue,
     ThreadSchedulePolicy, set_thread_priority_and_policy, thread_native_id,
 };
 
-use crate::error::Result;
-
-pub const ROLE: &str = "busy";
-
 /// Niceness 0 on the scale of [`ThreadPriority::Crossplatform`], which 99 gives the most.
 const NICENESS_0: u8 = 48;
 
-/// Compute without end, with the ordinary priority, whatever the parent has.
-pub fn run(supervisor: u32) -> Result {
-    become_child(ROLE, supervisor)?;
+/// Compute without end, with the ordinary priority, whatever this process has.
+pub fn run() {
     if let Ok(value) = ThreadPriorityValue::try_from(NICENESS_0) {
         let policy = ThreadSchedulePolicy::Normal(Normal::Other);
         let priority = ThreadPriority::Crossplatform(value);
-        // A process that may not take a priority has the ordinary one.
+        // A thread that may not take a priority has the ordinary one.
         let _ = set_thread_priority_and_policy(thread_native_id(), priority, policy);
     }
     loop {

@@ -16,7 +16,10 @@ use common::{
     topics,
     waiter::Waiter,
 };
-use processes::domain::DomainLock;
+use processes::{
+    domain::DomainLock,
+    process::{Process, firsthand},
+};
 
 use crate::error::{OrCannot as _, Result};
 
@@ -42,9 +45,12 @@ pub fn measure(robot: &RobotName, trips: u64, period: Option<Duration>) -> Resul
     let mut end = bus.reader(&topics::COMMAND)?;
     let mut waiter = Waiter::default();
     waiter.on(bus.wakeup(&topics::COMMAND)?);
+    let (own, name) = (std::process::id().to_string(), robot.to_string());
     let mut forwarders = Vec::new();
     for place in PLACES {
-        let forwarder = super::start(place, robot)?;
+        let beside =
+            ["bench", "tick", "--forwarder", place, "--supervisor", &own, "--robot", &name];
+        let forwarder = Process::spawn(firsthand(&beside)).or_cannot("start a forwarder")?;
         if let Some(writers) = bus.writers() {
             let author = Author { process: forwarder.id(), generation: 1 };
             writers.name([(place.to_owned(), author)]);

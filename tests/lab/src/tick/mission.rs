@@ -1,13 +1,12 @@
-//! A mission whose ticks are measured, and its consumers: each a process that reads every sample of grid and field.
+//! A mission whose ticks are measured, and its consumers: each a thread that reads every sample of grid and field.
 
 use std::time::Duration;
 
 use common::{
+    bus::BusError,
     clock::Pace,
     domain::{Domain, RobotName},
     follower::{Event, Follower},
-    signals::{SIGTERM, Signals},
-    start::become_child,
     topics,
 };
 
@@ -16,11 +15,11 @@ use super::{
     process_set::{ProcessSet, Used},
 };
 use crate::{
+    background::Turns,
     error::{OrCannot as _, Result},
     robot::{self, Run},
 };
 
-pub const CONSUMER: &str = "consumer";
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 /// How often a consumer looks whether it is asked to stop.
 const STOPS_WITHIN: Duration = Duration::from_millis(100);
@@ -37,8 +36,7 @@ pub fn measure(
     let files = directory.path().join("run");
     command.args(["--pace", &pace.to_string(), "--out"]).arg(&files);
     // The consumers wait for the bus, and follow it. They do not belong to the mission's processes.
-    let consumers = (0..arguments.consumers).map(|_| super::start(CONSUMER, robot));
-    let _consumers = consumers.collect::<Result<Vec<_>>>()?;
+    let _consumers: Vec<_> = (0..arguments.consumers).map(|_| consumer(robot)).collect();
     let run = Run::start(command, &files, !arguments.no_record)?;
     let mut processes = ProcessSet::of(run.process.id());
     let summary = run.wait(LOOK_EVERY, || processes.look())?.summary()?;
@@ -46,19 +44,19 @@ pub fn measure(
     Ok((times, processes.used()))
 }
 
-/// Be a consumer of `robot` until `supervisor` ends it.
-pub fn consume(robot: &RobotName, supervisor: u32) -> Result {
-    let mut terminated = Signals::catch(&[SIGTERM]).or_cannot("catch SIGTERM")?;
-    become_child(CONSUMER, supervisor)?;
+/// A consumer of `robot` until it is dropped.
+fn consumer(robot: &RobotName) -> Turns {
     let domain = Domain::of(robot.clone());
-    let mut follower = Follower::new(domain, CONSUMER, &topics::GRID, |bus| {
-        Ok((bus.reader(&topics::GRID)?, bus.reader(&topics::FIELD)?))
-    });
-    while !terminated.came() {
-        if let Event::Samples((grids, fields)) = follower.wait(STOPS_WITHIN)? {
-            while grids.next_slice()?.is_some() {}
-            while fields.next_slice()?.is_some() {}
+    Turns::start(move || {
+        let mut follower = Follower::new(domain, "consumer", &topics::GRID, |bus| {
+            Ok((bus.reader(&topics::GRID)?, bus.reader(&topics::FIELD)?))
+        });
+        move || -> Result<(), BusError> {
+            if let Event::Samples((grids, fields)) = follower.wait(STOPS_WITHIN)? {
+                while grids.next_slice()?.is_some() {}
+                while fields.next_slice()?.is_some() {}
+            }
+            Ok(())
         }
-    }
-    Ok(())
+    })
 }
