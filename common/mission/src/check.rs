@@ -19,7 +19,7 @@ use std::{
 use glam::DVec2;
 use toml::de::{DeTable, DeValue};
 
-use self::objection::{Objection, all_within, refuse_if, within};
+use self::objection::{Objection, Result, all_within, refuse_if, within};
 use super::{
     Hurry, MOST_CORNERS, MOST_TARGETS, MOST_ZONES, Method, Mission, Perimeter, Sensors, Waypoint,
     error::MissionError,
@@ -191,7 +191,7 @@ struct Checker {
 }
 
 impl Checker {
-    fn run(&mut self, mission: &Mission) -> Result<(), Objection> {
+    fn run(&mut self, mission: &Mission) -> Result {
         let plain = |c: char| c.is_alphanumeric() || "-_. ".contains(c);
         refuse_if(
             mission.name.starts_with('.') || !mission.name.chars().all(plain),
@@ -225,7 +225,7 @@ impl Checker {
     }
 }
 
-fn perimeter(mission: &Mission) -> Result<(), Objection> {
+fn perimeter(mission: &Mission) -> Result {
     let perimeter = &mission.perimeter;
     within("perimeter.width_m", perimeter.width_m, 0.5..=1000.0, "m")?;
     let frame = mission.grid_frame();
@@ -247,7 +247,7 @@ fn perimeter(mission: &Mission) -> Result<(), Objection> {
     )
 }
 
-fn target(mission: &Mission) -> Result<(), Objection> {
+fn target(mission: &Mission) -> Result {
     let key = if mission.targets.is_empty() { "target" } else { "targets" };
     let Perimeter { width_m, centre, .. } = mission.perimeter;
     for Waypoint { at, heading_deg } in mission.waypoints() {
@@ -278,12 +278,12 @@ fn target(mission: &Mission) -> Result<(), Objection> {
     ])
 }
 
-fn point(key: &'static str, point: DVec2) -> Result<(), Objection> {
+fn point(key: &'static str, point: DVec2) -> Result {
     let problem = format!("{point} is not a place");
     refuse_if(!point.is_finite(), key, problem, "give two finite numbers, metres")
 }
 
-fn stages(mission: &Mission) -> Result<(), Objection> {
+fn stages(mission: &Mission) -> Result {
     let Mission { controller, mapper, planner, perimeter, .. } = mission;
     let top = mission.body().top_speed_m_s;
     let Hurry { full_speed_within_deg: full, turns_beyond_deg: turns, .. } = mission.hurry();
@@ -326,7 +326,7 @@ fn stages(mission: &Mission) -> Result<(), Objection> {
     ])
 }
 
-fn zones(mission: &Mission) -> Result<(), Objection> {
+fn zones(mission: &Mission) -> Result {
     let zones = &mission.zones;
     let problem = format!("{} zones are too many", zones.len());
     refuse_if(zones.len() > MOST_ZONES, "zone", problem, format!("give {MOST_ZONES} at most"))?;
@@ -344,7 +344,7 @@ fn zones(mission: &Mission) -> Result<(), Objection> {
 }
 
 /// A robot that starts inside a hazard has already collided.
-fn start_is_free(mission: &Mission) -> Result<(), Objection> {
+fn start_is_free(mission: &Mission) -> Result {
     let radius = mission.body().radius_m;
     let start = mission.start.at;
     for (key, shapes) in [("world", &mission.obstacles()), ("known", &mission.known)] {

@@ -14,15 +14,6 @@ pub struct Footprint {
 }
 
 impl Footprint {
-    pub(crate) const fn rectangle(back_m: f64, front_m: f64, half_width_m: f64) -> Self {
-        let mut corners = [DVec2::ZERO; MOST_CORNERS];
-        corners[0] = DVec2::new(back_m, -half_width_m);
-        corners[1] = DVec2::new(front_m, -half_width_m);
-        corners[2] = DVec2::new(front_m, half_width_m);
-        corners[3] = DVec2::new(back_m, half_width_m);
-        Self { corners, count: 4 }
-    }
-
     /// # Errors
     /// When the corners are not those of a convex polygon around the origin in the order of its outline, with what is wrong.
     pub fn new(corners: &[DVec2]) -> Result<Self, &'static str> {
@@ -152,9 +143,14 @@ fn least(pairs: impl Iterator<Item = (DVec2, DVec2)>) -> (f64, DVec2) {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::LazyLock;
+
     use super::*;
 
-    const LONG: Footprint = Footprint::rectangle(-0.2, 0.3, 0.1);
+    static LONG: LazyLock<Footprint> = LazyLock::new(|| {
+        let corners = [[-0.2, -0.1], [0.3, -0.1], [0.3, 0.1], [-0.2, 0.1]];
+        Footprint::new(&corners.map(DVec2::from)).unwrap()
+    });
 
     fn close((gap, out): (f64, DVec2), want: f64, along: DVec2) {
         assert!((gap - want).abs() < 1e-12 && out.distance(along) < 1e-9, "{gap} {out}");
@@ -176,7 +172,7 @@ mod tests {
     #[test]
     fn a_footprint_is_a_convex_polygon_around_the_origin_in_either_order() {
         let mut corners = LONG.corners().to_vec();
-        assert_eq!(Footprint::new(&corners), Ok(LONG));
+        assert_eq!(Footprint::new(&corners), Ok(*LONG));
         assert!((LONG.inscribed_m() - 0.1).abs() < 1e-12);
         assert!((LONG.circumscribed_m() - 0.1_f64.hypot(0.3)).abs() < 1e-12);
         corners.reverse();

@@ -72,7 +72,7 @@ pub use sensor::{
 };
 pub use simulation::{
     BatteryPhysics, Block, BlockedWheels, Heights, Hole, InfraredPhysics, LaserTiming, Move,
-    Physics, Radio, Ranger, Realism, Simulation, SonarPhysics, Thing, WheelPhysics,
+    Physics, Radio, Ranged, Ranger, Realism, Simulation, SonarPhysics, Thing, WheelPhysics,
 };
 pub use touch::{MOST_TOUCHES, TouchKind, TouchRow};
 
@@ -409,62 +409,27 @@ impl Mission {
     /// A reading names its sensor by the row of this table.
     pub fn sensor_table(&self) -> Vec<Sensor> {
         let RobotConfig { sensors, rate_hz, .. } = &self.robot;
-        let rows = match self.robot.model {
+        let rows = match &self.robot.preset().sensors {
             _ if !sensors.is_empty() => sensors.clone(),
-            Model::X80 | Model::X80sv | Model::Car => {
-                sensor::x80(self.body().radius_m, &self.sonar)
-            }
-            Model::Jackal => sensor::laser(SensorModel::Ust10lx, 0.12, 0.0),
-            Model::TurtleBot3Burger => sensor::laser(SensorModel::Lds02, -0.032, 0.0),
-            Model::TurtleBot3Waffle => sensor::laser(SensorModel::Lds02, -0.064, 0.0),
-            Model::TurtleBot4 => sensor::laser(SensorModel::RplidarA1, -0.04, 90.0),
-            Model::Kobuki | Model::Create3 => sensor::laser(SensorModel::RplidarA1, 0.0, 0.0),
+            preset if !preset.is_empty() => preset.clone(),
+            _ => sensor::x80(self.body().radius_m, &self.sonar),
         };
         sensor::table(&rows, *rate_hz, &self.sonar, self.sensor_set())
     }
 
     /// Bumpers and cliff sensors: those that are written, or else the model's. A robot says what they feel by their names.
     pub fn touches(&self) -> Vec<TouchRow> {
-        use TouchKind::{Bumper, Cliff};
-        match self.robot.model {
-            _ if !self.robot.touches.is_empty() => self.robot.touches.clone(),
-            _ if !self.robot.protocol().has_scans() => Vec::new(),
-            // Source of the bearings: the user guide's drawing, nominal.
-            Model::Kobuki => touch::rows(
-                60.0,
-                &[
-                    ("bumper-left", Bumper, 60.0),
-                    ("bumper-center", Bumper, 0.0),
-                    ("bumper-right", Bumper, -60.0),
-                    ("cliff-left", Cliff, 60.0),
-                    ("cliff-center", Cliff, 0.0),
-                    ("cliff-right", Cliff, -60.0),
-                ],
-            ),
-            // The frames of a Create 3's hazards; the bearings are nominal.
-            Model::Create3 | Model::TurtleBot4 => touch::rows(
-                36.0,
-                &[
-                    ("bump-left", Bumper, 72.0),
-                    ("bump-front-left", Bumper, 36.0),
-                    ("bump-front-center", Bumper, 0.0),
-                    ("bump-front-right", Bumper, -36.0),
-                    ("bump-right", Bumper, -72.0),
-                    ("cliff-side-left", Cliff, 60.0),
-                    ("cliff-front-left", Cliff, 15.0),
-                    ("cliff-front-right", Cliff, -15.0),
-                    ("cliff-side-right", Cliff, -60.0),
-                ],
-            ),
+        match &self.robot.touches {
+            written if !written.is_empty() => written.clone(),
+            _ if self.robot.protocol().has_scans() => self.robot.preset().touches.clone(),
             _ => Vec::new(),
         }
     }
 
     /// The ROS topic of [`ros2::Ros2Topics::hazards`].
     pub fn hazards_topic(&self) -> Option<String> {
-        let is_create = matches!(self.robot.model, Model::Create3 | Model::TurtleBot4);
-        let default = is_create.then(|| "/hazard_detection".to_owned());
-        self.robot.ros2.hazards.clone().or(default)
+        let preset = &self.robot.preset().ros2;
+        self.robot.ros2.hazards.as_ref().or(preset.hazards.as_ref()).cloned()
     }
 
     /// The lasers and their rows.

@@ -62,10 +62,6 @@ impl Response {
         Self { delay_s: 0.5, lag_s: 0.0, acceleration_m_s2, turn_acceleration_rad_s2 }
     }
 
-    pub(crate) const fn limited(acceleration_m_s2: f64, turn_acceleration_rad_s2: f64) -> Self {
-        Self { acceleration_m_s2, turn_acceleration_rad_s2, ..Self::X80 }
-    }
-
     /// The time in which the base goes on as before, seconds: a lag delays the way by its time constant.
     pub fn dead_time_s(&self) -> f64 {
         self.delay_s + self.lag_s
@@ -192,8 +188,8 @@ mod tests {
         let keys = ResponseKeys { acceleration_m_s2: Some(0.6), ..ResponseKeys::default() };
         let response = keys.over(Response::X80, 0.3);
         assert_eq!((response.delay_s, response.turn_acceleration_rad_s2), (0.07, 4.0));
-        let none = ResponseKeys::default().over(Response::limited(1.0, 2.0), 0.3);
-        assert_eq!(none, Response::limited(1.0, 2.0));
+        let limited = Response { acceleration_m_s2: 1.0, ..Response::X80 };
+        assert_eq!(ResponseKeys::default().over(limited, 0.3), limited);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-use std::path::PathBuf;
+use std::{collections::BTreeMap, path::PathBuf, sync::LazyLock};
 
 use crate::{
     arduino::ArduinoBoard,
@@ -13,7 +13,8 @@ use crate::{
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Its numbers are those of `models.toml`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Model {
     /// 1200 counts a wheel turn.
@@ -226,118 +227,67 @@ impl Body {
     }
 }
 
-/// A robot that reports the angles of its wheels; one count is 0.1 degrees.
-const fn differential(
-    wheel_radius_m: f64,
-    track_m: f64,
-    radius_m: f64,
-    top_speed_m_s: f64,
-    response: Response,
-) -> Body {
-    Body {
-        wheel_radius_m,
-        track_m,
-        counts_per_turn: 3600.0,
-        radius_m,
-        footprint: None,
-        top_speed_m_s,
-        response,
-        steering: None,
-    }
-}
+/// What `robot.model` presets, in the words of `[robot]`.
+static MODELS: LazyLock<BTreeMap<Model, RobotConfig>> =
+    LazyLock::new(|| toml::from_str(include_str!("models.toml")).unwrap_or_default());
 
-impl Model {
-    pub const fn is_x80(self) -> bool {
-        matches!(self, Self::X80 | Self::X80sv | Self::Car)
+impl RobotConfig {
+    /// The presets of the model.
+    pub(crate) fn preset(&self) -> &Self {
+        MODELS.get(&self.model).unwrap_or(self)
     }
 
-    pub const fn body(self) -> Body {
-        match self {
-            Self::X80 => Body {
-                wheel_radius_m: 0.085,
-                track_m: 0.26,
-                counts_per_turn: 1200.0,
-                radius_m: 0.19,
-                footprint: None,
-                top_speed_m_s: 1.0,
-                response: Response::X80,
-                steering: None,
-            },
-            Self::X80sv => Body {
-                wheel_radius_m: 0.085,
-                track_m: 0.283,
-                counts_per_turn: 756.0,
-                radius_m: 0.19,
-                footprint: None,
-                top_speed_m_s: 0.76,
-                response: Response::X80,
-                steering: None,
-            },
-            Self::Jackal => Body {
-                footprint: Some(Footprint::rectangle(-0.254, 0.254, 0.215)),
-                ..differential(0.098, 0.375_59, 0.333, 2.0, Response::limited(20.0, 25.0))
-            },
-            Self::TurtleBot3Burger => {
-                differential(0.033, 0.16, 0.105, 0.22, Response::limited(2.5, 3.2))
-            }
-            // Its body reaches farther back than ahead of its wheels.
-            Self::TurtleBot3Waffle => Body {
-                footprint: Some(Footprint::rectangle(-0.2045, 0.0765, 0.153)),
-                ..differential(0.033, 0.287, 0.2555, 0.26, Response::limited(2.5, 3.2))
-            },
-            Self::TurtleBot4 | Self::Create3 => {
-                differential(0.035_75, 0.233, 0.175, 0.306, Response::limited(0.9, 7.725))
-            }
-            Self::Kobuki => differential(0.0352, 0.23, 0.1758, 0.7, Response::limited(1.0, 2.0)),
-            // Nominal. The pose is the middle of the rear axle; the disc covers a body that reaches 0.22 m ahead of
-            // it and 0.09 m to either side. It turns in 0.31 m.
-            Self::Car => Body {
-                wheel_radius_m: 0.04,
-                track_m: 0.16,
-                counts_per_turn: 600.0,
-                radius_m: 0.24,
-                footprint: None,
-                top_speed_m_s: 1.0,
-                response: Response::X80,
-                steering: Some(Steering {
-                    wheelbase_m: 0.18,
-                    limit_rad: std::f64::consts::FRAC_PI_6,
-                    rate_rad_s: std::f64::consts::TAU / 3.0,
-                    counts_per_turn: 3600.0,
-                }),
-            },
+    pub fn protocol(&self) -> Protocol {
+        self.protocol.or(self.preset().protocol).unwrap_or_default()
+    }
+
+    pub fn body(&self) -> Body {
+        let preset = self.preset();
+        let value = |of: fn(&Self) -> Option<f64>| of(self).or(of(preset)).unwrap_or_default();
+        let track_m = value(|it| it.track_m);
+        let written = Footprint::new(&self.footprint).ok();
+        let outline = Footprint::new(&preset.footprint).ok();
+        let covers_m = written.map(|written| written.circumscribed_m());
+        let response = preset.response.over(Response::X80, track_m);
+        Body {
+            // A radius alone means a disc.
+            footprint: written.or(outline.filter(|_| self.radius_m.is_none())),
+            wheel_radius_m: value(|it| it.wheel_radius_m),
+            track_m,
+            counts_per_turn: value(|it| it.counts_per_turn),
+            radius_m: self.radius_m.or(covers_m).or(preset.radius_m).unwrap_or_default(),
+            top_speed_m_s: value(|it| it.top_speed_m_s),
+            response: self.response.over(response, track_m),
+            steering: preset.wheelbase_m.map(|_| Steering {
+                wheelbase_m: value(|it| it.wheelbase_m),
+                limit_rad: value(|it| it.steering_limit_deg).to_radians(),
+                rate_rad_s: value(|it| it.steering_rate_deg_s).to_radians(),
+                counts_per_turn: value(|it| it.steering_counts_per_turn),
+            }),
         }
     }
 }
 
-impl RobotConfig {
-    pub fn protocol(&self) -> Protocol {
-        self.protocol.unwrap_or(match self.model.is_x80() {
-            true => Protocol::X80,
-            false => Protocol::Json,
-        })
-    }
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-    pub fn body(&self) -> Body {
-        let preset = self.model.body();
-        let track_m = self.track_m.unwrap_or(preset.track_m);
-        let written = Footprint::new(&self.footprint).ok();
-        let covers_m = written.map_or(preset.radius_m, |written| written.circumscribed_m());
-        Body {
-            // A radius alone means a disc.
-            footprint: written.or(preset.footprint.filter(|_| self.radius_m.is_none())),
-            wheel_radius_m: self.wheel_radius_m.unwrap_or(preset.wheel_radius_m),
-            track_m,
-            counts_per_turn: self.counts_per_turn.unwrap_or(preset.counts_per_turn),
-            radius_m: self.radius_m.unwrap_or(covers_m),
-            top_speed_m_s: self.top_speed_m_s.unwrap_or(preset.top_speed_m_s),
-            response: self.response.over(preset.response, track_m),
-            steering: preset.steering.map(|steering| Steering {
-                wheelbase_m: self.wheelbase_m.unwrap_or(steering.wheelbase_m),
-                limit_rad: self.steering_limit_deg.map_or(steering.limit_rad, f64::to_radians),
-                rate_rad_s: self.steering_rate_deg_s.map_or(steering.rate_rad_s, f64::to_radians),
-                counts_per_turn: self.steering_counts_per_turn.unwrap_or(steering.counts_per_turn),
-            }),
+    #[test]
+    fn every_model_has_a_body_and_no_other_is_preset() {
+        use Model as M;
+        let models = [
+            [M::X80, M::X80sv, M::Jackal],
+            [M::TurtleBot3Burger, M::TurtleBot3Waffle, M::TurtleBot4],
+            [M::Create3, M::Kobuki, M::Car],
+        ];
+        assert_eq!(MODELS.keys().copied().collect::<Vec<_>>(), models.concat());
+        for model in models.concat() {
+            let body = RobotConfig { model, ..RobotConfig::default() }.body();
+            let sizes = [body.wheel_radius_m, body.track_m, body.radius_m, body.top_speed_m_s];
+            assert!(sizes.iter().all(|size| *size > 0.0), "{model:?}: {body:?}");
+            let has_outline = matches!(model, M::Jackal | M::TurtleBot3Waffle);
+            assert_eq!(body.footprint.is_some(), has_outline, "{model:?}");
+            assert_eq!(body.steering.is_some(), model == M::Car, "{model:?}");
         }
     }
 }

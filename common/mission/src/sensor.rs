@@ -35,10 +35,11 @@ const RING: [(f64, f64); INFRARED_RANGERS] = [
     (90.0, 0.121 / 0.19),
 ];
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SensorKind {
     /// A sonar: something stands on the arc of an echo, and nothing that is square to the beam stands nearer.
+    #[default]
     Cone,
     /// An infrared ranger: the ray is free up to where it ends.
     Ray,
@@ -162,7 +163,7 @@ impl SensorModel {
     }
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorRow {
     pub name: String,
@@ -361,35 +362,14 @@ pub(crate) fn front(table: &[Sensor], sonar: &SonarConfig) -> Option<usize> {
     candidates.min_by(|(_, a), (_, b)| ahead(a).total_cmp(&ahead(b))).map(|(index, _)| index)
 }
 
-fn row(name: impl Into<String>, kind: SensorKind, forward_m: f64, bearing_deg: f64) -> SensorRow {
-    SensorRow {
-        name: name.into(),
-        kind,
-        channel: None,
-        forward_m,
-        bearing_deg,
-        turned_deg: 0.0,
-        roll_deg: 0.0,
-        height_m: None,
-        field_of_view_deg: None,
-        reach_m: None,
-        beams: None,
-        rate_hz: None,
-        model: None,
-        address: None,
-    }
-}
-
-pub(crate) fn laser(model: SensorModel, forward_m: f64, turned_deg: f64) -> Vec<SensorRow> {
-    let laser = row("laser", SensorKind::Scan, forward_m, 0.0);
-    vec![SensorRow { turned_deg, model: Some(model), ..laser }]
-}
-
 /// The car has the same boards and sensors.
 pub(crate) fn x80(radius_m: f64, sonar: &SonarConfig) -> Vec<SensorRow> {
     let cone = |name, beside: u8, forward_m, bearing_deg| SensorRow {
+        name: String::from(name),
         channel: Some((sonar.index % SONARS as u8 + beside) % SONARS as u8),
-        ..row(name, SensorKind::Cone, forward_m, bearing_deg)
+        forward_m,
+        bearing_deg,
+        ..SensorRow::default()
     };
     let ahead = sonar.bearing_deg;
     let cones = [
@@ -398,8 +378,12 @@ pub(crate) fn x80(radius_m: f64, sonar: &SonarConfig) -> Vec<SensorRow> {
         cone("front-right", 1, SIDE_FORWARD_M, ahead - SIDE_BEARING_DEG),
     ];
     let rays = (0..).zip(RING).map(|(channel, (bearing_deg, share))| SensorRow {
+        name: format!("infrared-{channel}"),
+        kind: SensorKind::Ray,
         channel: Some(channel),
-        ..row(format!("infrared-{channel}"), SensorKind::Ray, share * radius_m, bearing_deg)
+        forward_m: share * radius_m,
+        bearing_deg,
+        ..SensorRow::default()
     });
     cones.into_iter().chain(rays).collect()
 }

@@ -30,15 +30,3 @@ pub struct TouchRow {
 const fn wide_deg() -> f64 {
     60.0
 }
-
-/// The rows of a body with bumpers of `wide_deg` each at these bearings, and cliff sensors.
-pub(crate) fn rows(wide_deg: f64, all: &[(&str, TouchKind, f64)]) -> Vec<TouchRow> {
-    let row = |&(name, kind, bearing_deg): &(&str, TouchKind, f64)| TouchRow {
-        name: name.to_owned(),
-        kind,
-        bearing_deg,
-        wide_deg,
-        forward_m: None,
-    };
-    all.iter().map(row).collect()
-}

@@ -1,3 +1,5 @@
+pub(super) type Result<T = (), E = Objection> = std::result::Result<T, E>;
+
 pub(super) struct Objection {
     pub(super) key: &'static str,
     pub(super) problem: String,
@@ -17,13 +19,13 @@ pub(super) fn refuse_if(
     key: &'static str,
     problem: impl Into<String>,
     remedy: impl Into<String>,
-) -> Result<(), Objection> {
+) -> Result {
     if wrong { Err(objection(key, problem, remedy)) } else { Ok(()) }
 }
 
 pub(super) fn all_within<const N: usize>(
     limits: [(&'static str, f64, std::ops::RangeInclusive<f64>, &str); N],
-) -> Result<(), Objection> {
+) -> Result {
     limits.into_iter().try_for_each(|(key, value, range, unit)| within(key, value, range, unit))
 }
 
@@ -33,7 +35,7 @@ pub(super) fn within(
     value: f64,
     range: std::ops::RangeInclusive<f64>,
     unit: &str,
-) -> Result<(), Objection> {
+) -> Result {
     let problem = format!("{value} {unit} is out of range");
     let remedy = format!("give {} to {} {unit}", range.start(), range.end());
     refuse_if(!range.contains(&value), key, problem, remedy)

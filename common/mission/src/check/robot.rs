@@ -1,12 +1,12 @@
 use x80_protocol::MOTOR_SCALE_V;
 
-use super::objection::{Objection, all_within, objection, refuse_if, within};
+use super::objection::{Result, all_within, objection, refuse_if, within};
 use crate::{
     Footprint, Mission, Protocol, ResponseKeys,
     address::{Address, AddressError, FORMS},
 };
 
-pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
+pub(super) fn check(mission: &Mission) -> Result {
     let body = mission.body();
     let robot = &mission.robot;
     if let Some(Err(error)) = robot.address.as_deref().map(str::parse::<Address<String>>) {
@@ -87,7 +87,7 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     )
 }
 
-fn steering(mission: &Mission) -> Result<(), Objection> {
+fn steering(mission: &Mission) -> Result {
     let robot = &mission.robot;
     let Some(steering) = mission.body().steering else {
         let written = [
@@ -119,7 +119,7 @@ fn steering(mission: &Mission) -> Result<(), Objection> {
     ])
 }
 
-fn response(keys: ResponseKeys) -> Result<(), Objection> {
+fn response(keys: ResponseKeys) -> Result {
     let ResponseKeys { delay_s, lag_s, acceleration_m_s2, turn_acceleration_rad_s2 } = keys;
     let turn = turn_acceleration_rad_s2.unwrap_or(1.0);
     all_within([

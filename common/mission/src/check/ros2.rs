@@ -1,9 +1,9 @@
-use super::objection::{Objection, objection, refuse_if};
+use super::objection::{Result, objection, refuse_if};
 use crate::{Mission, Protocol, Sensor, SensorKind, address::Address};
 
 const LONGEST_TOPIC: usize = 200;
 
-pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
+pub(super) fn check(mission: &Mission) -> Result {
     let robot = &mission.robot;
     let speaks = robot.protocol() == Protocol::Ros2;
     let address = robot.address.as_deref().map(str::parse);

@@ -1,4 +1,4 @@
-use super::objection::{Objection, all_within, objection, refuse_if};
+use super::objection::{Result, all_within, objection, refuse_if};
 use crate::{
     INFRARED_RANGERS, MOST_BEAMS, MOST_LASERS, MOST_SENSORS, Method, Mission, Protocol, SONARS,
     SensorKind, SensorRow, Sensors, SonarConfig, address::Address,
@@ -7,7 +7,7 @@ use crate::{
 const KEY: &str = "robot.sensor";
 const LONGEST_NAME: usize = 23;
 
-pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
+pub(super) fn check(mission: &Mission) -> Result {
     let sonar = &mission.sonar;
     channel("sonar.index", SensorKind::Cone, sonar.index)?;
     all_within([
@@ -65,7 +65,7 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     Err(objection("sensors", format!("robot.sensor lacks {lacks}"), "add a row, or give \"all\""))
 }
 
-pub(super) fn name(key: &'static str, name: &str) -> Result<(), Objection> {
+pub(super) fn name(key: &'static str, name: &str) -> Result {
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '-';
     refuse_if(
         name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(plain),
@@ -75,7 +75,7 @@ pub(super) fn name(key: &'static str, name: &str) -> Result<(), Objection> {
     )
 }
 
-fn row(row: &SensorRow, rate_hz: f64) -> Result<(), Objection> {
+fn row(row: &SensorRow, rate_hz: f64) -> Result {
     let SensorRow { name, kind, roll_deg, .. } = row;
     let is_scan = *kind == SensorKind::Scan;
     self::name(KEY, name)?;
@@ -125,7 +125,7 @@ fn row(row: &SensorRow, rate_hz: f64) -> Result<(), Objection> {
 }
 
 /// RPLIDARs beside the robot's wire.
-fn wire(mission: &Mission) -> Result<(), Objection> {
+fn wire(mission: &Mission) -> Result {
     let is_real = mission.robot.address.is_some();
     let rplidars = mission.rplidars();
     refuse_if(
@@ -165,7 +165,7 @@ fn wire(mission: &Mission) -> Result<(), Objection> {
     Ok(())
 }
 
-fn its_channel(row: &SensorRow) -> Result<(), Objection> {
+fn its_channel(row: &SensorRow) -> Result {
     let number = row.channel.ok_or_else(|| {
         let problem = format!("{:?} has no channel, by which an X80 sends its readings", row.name);
         let remedy = "give channel: 0 to 5 for a sonar, 0 to 6 for an infrared ranger";
@@ -174,7 +174,7 @@ fn its_channel(row: &SensorRow) -> Result<(), Objection> {
     channel(KEY, row.kind, number)
 }
 
-fn channel(key: &'static str, kind: SensorKind, channel: u8) -> Result<(), Objection> {
+fn channel(key: &'static str, kind: SensorKind, channel: u8) -> Result {
     let (channels, remedy) = match kind {
         SensorKind::Cone => (SONARS, "give 0 to 5 for a sonar; 1 is the front one of an X80"),
         SensorKind::Ray => (INFRARED_RANGERS, "give 0 to 6 for an infrared ranger"),

@@ -1,4 +1,4 @@
-use super::{Checker, Objection, all_within, point, refuse_if, within};
+use super::{Checker, Result, all_within, point, refuse_if, within};
 use crate::geometry::{Profile, Shapes};
 
 /// More shapes than this in a file are a mistake.
@@ -6,7 +6,7 @@ const MAX_POINTS: usize = 100_000;
 const HIGHEST_M: f64 = 1000.0;
 
 impl Checker {
-    pub(super) fn shapes(&mut self, key: &'static str, shapes: &Shapes) -> Result<(), Objection> {
+    pub(super) fn shapes(&mut self, key: &'static str, shapes: &Shapes) -> Result {
         for drum in &shapes.drums {
             point(key, drum.at)?;
             within(key, drum.radius_m, 0.001..=1000.0, "m of drum radius")?;
@@ -34,7 +34,7 @@ impl Checker {
     }
 }
 
-fn profile(key: &'static str, profile: Profile) -> Result<(), Objection> {
+fn profile(key: &'static str, profile: Profile) -> Result {
     let Profile { bottom_m, top_m, echo, light: _ } = profile;
     within(key, bottom_m, 0.0..=HIGHEST_M, "m of bottom_m")?;
     refuse_if(

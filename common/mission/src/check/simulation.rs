@@ -1,4 +1,4 @@
-use super::{Checker, MAX_TIMEOUT_S, Objection, all_within, point, refuse_if, within};
+use super::{Checker, MAX_TIMEOUT_S, Result, all_within, point, refuse_if, within};
 use crate::simulation::{Block, Ranger, Simulation, Thing};
 
 /// More than these are a mistake.
@@ -7,7 +7,7 @@ const MAX_BLOCKS: usize = 100;
 const MAX_MOVES: usize = 1000;
 
 impl Checker {
-    pub(super) fn simulation(&mut self, simulation: &Simulation) -> Result<(), Objection> {
+    pub(super) fn simulation(&mut self, simulation: &Simulation) -> Result {
         for (key, value, range) in simulation.ranges() {
             let problem = format!("{value} is out of range");
             let remedy = format!("give {} to {}", range.start(), range.end());
@@ -39,7 +39,7 @@ impl Checker {
         simulation.blocks.iter().try_for_each(block)
     }
 
-    fn thing(&mut self, thing: &Thing) -> Result<(), Objection> {
+    fn thing(&mut self, thing: &Thing) -> Result {
         const KEY: &str = "simulation.thing";
         self.shapes(KEY, &thing.shape)?;
         span(KEY, thing.from_s, thing.until_s)?;
@@ -55,18 +55,18 @@ impl Checker {
     }
 }
 
-fn span(key: &'static str, from_s: f64, until_s: Option<f64>) -> Result<(), Objection> {
+fn span(key: &'static str, from_s: f64, until_s: Option<f64>) -> Result {
     all_within([
         (key, from_s, 0.0..=MAX_TIMEOUT_S, "s"),
         (key, until_s.unwrap_or(from_s), from_s..=MAX_TIMEOUT_S, "s of until_s"),
     ])
 }
 
-fn block(block: &Block) -> Result<(), Objection> {
+fn block(block: &Block) -> Result {
     span("simulation.block", block.from_s, block.until_s)
 }
 
-fn ranger(ranger: &Ranger) -> Result<(), Objection> {
+fn ranger(ranger: &Ranger) -> Result {
     const KEY: &str = "simulation.ring";
     all_within([
         (KEY, f64::from(ranger.index), 0.0..=5.0, "as the index"),

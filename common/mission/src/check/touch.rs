@@ -1,9 +1,9 @@
-use super::objection::{Objection, all_within, refuse_if};
+use super::objection::{Result, all_within, refuse_if};
 use crate::{MOST_TOUCHES, Mission, Protocol};
 
 const KEY: &str = "robot.touch";
 
-pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
+pub(super) fn check(mission: &Mission) -> Result {
     let robot = &mission.robot;
     let rows = &robot.touches;
     let problem = format!("{} rows, and {MOST_TOUCHES} are the most", rows.len());

@@ -8,7 +8,7 @@ const DT: f64 = 1.0 / 7.0;
 const WALL_M: f64 = 1.0;
 
 pub(crate) fn body() -> Body {
-    common::mission::Model::X80.body()
+    common::mission::RobotConfig::default().body()
 }
 
 pub(crate) fn counts_of(ways: [f64; 2]) -> [u16; 2] {

@@ -8,7 +8,7 @@ use std::{
 
 mod printed;
 
-use common::mission::Simulation;
+use common::mission::{Realism, Simulation};
 
 use super::*;
 use console::missions;
@@ -285,7 +285,9 @@ fn the_guide_has_the_three_presets_of_every_key_of_the_simulation_and_its_source
         .lines()
         .map(|line| line.trim_matches('|').split('|').map(str::trim).collect())
         .collect();
-    for (key, presets) in Simulation::presets() {
+    let presets = Realism::ALL.map(|realism| Simulation { realism, ..Default::default() }.ranges());
+    for (index, (key, ..)) in presets[0].iter().enumerate() {
+        let presets = [0, 1, 2].map(|realism| presets[realism][index].1);
         let key = format!("`{}`", key.trim_start_matches("simulation."));
         let row = rows.iter().find(|row| row[0] == key).unwrap_or_else(|| panic!("no row {key}"));
         let values: Vec<f64> = row[1..4].iter().map(|value| value.parse().unwrap()).collect();
