@@ -45,13 +45,13 @@ const fn on_change(again_after: Duration) -> Rate {
     Rate::OnChange { at_most_every: Duration::ZERO, again_after }
 }
 
-/// A topic without `limits` has small samples, and all recordings contain one without `logged`.
+/// A row has its name, the header and the elements of its samples, its writer and its rate. A topic without `limits` has small samples, and
+/// all recordings contain one without `logged`.
 macro_rules! topics {
     (@ $written:expr, $default:expr) => { $written };
     (@ $default:expr) => { $default };
-    ($($(#[doc = $meaning:literal])+ $id:ident: Topic<$($payload:ty),+> {
-        name: $name:literal, writer: $writer:expr, rate: $rate:expr $(, limits: $limits:expr)? $(, logged: $logged:ident)? $(,)?
-    })*) => {
+    ($($(#[doc = $meaning:literal])+ $id:ident $name:literal: $($payload:ident)+, $writer:expr, $rate:expr
+        $(, limits: $limits:expr)? $(, logged: $logged:ident)?;)*) => {
         $(
             $(#[doc = $meaning])+
             pub static $id: Topic<$($payload),+> = Topic::new(&Spec {
@@ -70,138 +70,72 @@ macro_rules! topics {
 
 topics! {
     /// Where the robot is sent: the current target, and those after it.
-    TARGET: Topic<TargetSample> {
-        name: "target", writer: SUPERVISOR, rate: on_change(RESTATE),
-    }
+    TARGET "target": TargetSample, SUPERVISOR, on_change(RESTATE);
     /// The keep-out zones, if operators changed those of the mission.
-    ZONES: Topic<ZonesHeader, ZoneCorner> {
-        name: "zones", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::slices(MOST_ZONES * MOST_CORNERS),
-    }
+    ZONES "zones": ZonesHeader ZoneCorner, SUPERVISOR, on_change(RESTATE), limits: Limits::slices(MOST_ZONES * MOST_CORNERS);
     /// Readings of the sonars and infrared rangers, one for each row of the mission's sensors.
-    RANGES: Topic<RangesHeader, RangeReading> {
-        name: "ranges", writer: "link", rate: Rate::EachTick, limits: Limits::slices(MOST_SENSORS),
-    }
+    RANGES "ranges": RangesHeader RangeReading, "link", Rate::EachTick, limits: Limits::slices(MOST_SENSORS);
     /// The beams of a laser, a sample for each laser that measured.
-    SCAN: Topic<ScanHeader, f32> {
-        name: "scan", writer: "link", rate: Rate::WhenItHappens, limits: SCANS,
-    }
+    SCAN "scan": ScanHeader f32, "link", Rate::WhenItHappens, limits: SCANS;
     /// Encoder counts and wheel speeds.
-    WHEELS: Topic<WheelSample> {
-        name: "wheels", writer: "link", rate: Rate::EachTick,
-    }
+    WHEELS "wheels": WheelSample, "link", Rate::EachTick;
     /// The counts of `wheels` without their cycle, in each tick of a robot that says angles of its wheels or its odometry.
-    COUNTS: Topic<CountsSample> {
-        name: "counts", writer: "link", rate: Rate::WhenItHappens,
-    }
+    COUNTS "counts": CountsSample, "link", Rate::WhenItHappens;
     /// How the base was found to answer, in each tick, if it stops later than the mission states.
-    BASE_RESPONSE: Topic<BaseResponseSample> {
-        name: "base_response", writer: "link", rate: Rate::WhenItHappens,
-    }
+    BASE_RESPONSE "base_response": BaseResponseSample, "link", Rate::WhenItHappens;
     /// Wheels are held although they were told to turn, or a bumper or a cliff sensor feels something: where.
-    CONTACT: Topic<ContactSample> {
-        name: "contact", writer: "link", rate: Rate::WhenItHappens,
-    }
+    CONTACT "contact": ContactSample, "link", Rate::WhenItHappens;
     /// Where a source outside saw the robot: a camera, a satellite receiver. Any consumer may publish it.
-    FIX: Topic<FixSample> {
-        name: "fix", writer: OPERATOR, rate: Rate::WhenItHappens,
-    }
+    FIX "fix": FixSample, OPERATOR, Rate::WhenItHappens;
     /// Where the robot is by the scans of its laser.
-    SCAN_FIX: Topic<FixSample> {
-        name: "scan_fix", writer: "mapper", rate: Rate::WhenItHappens,
-    }
+    SCAN_FIX "scan_fix": FixSample, "mapper", Rate::WhenItHappens;
     /// Where an operator says that the standing robot is.
-    PLACE: Topic<PlaceSample> {
-        name: "place", writer: SUPERVISOR, rate: on_change(RESTATE),
-    }
+    PLACE "place": PlaceSample, SUPERVISOR, on_change(RESTATE);
     /// How far a gyro turned. Any consumer may publish it, one at a time.
-    TURN: Topic<TurnSample> {
-        name: "turn", writer: OPERATOR, rate: Rate::WhenItHappens,
-    }
+    TURN "turn": TurnSample, OPERATOR, Rate::WhenItHappens;
     /// How far the robot turned by its own gyro, in each tick.
-    IMU_TURN: Topic<TurnSample> {
-        name: "imu_turn", writer: "link", rate: Rate::WhenItHappens,
-    }
+    IMU_TURN "imu_turn": TurnSample, "link", Rate::WhenItHappens;
     /// Where the robot believes it is.
-    POSE: Topic<PoseSample> {
-        name: "pose", writer: "dead-reckoning", rate: Rate::EachTick,
-    }
+    POSE "pose": PoseSample, "dead-reckoning", Rate::EachTick;
     /// The safety map: keyframes and changed windows.
-    GRID: Topic<GridHeader, u8> {
-        name: "grid", writer: "mapper", rate: Rate::EachTick, limits: Limits::MAP,
-    }
+    GRID "grid": GridHeader u8, "mapper", Rate::EachTick, limits: Limits::MAP;
     /// The reference direction at the robot's pose.
-    GUIDANCE: Topic<GuidanceSample> {
-        name: "guidance", writer: "planner", rate: Rate::EachTick,
-    }
+    GUIDANCE "guidance": GuidanceSample, "planner", Rate::EachTick;
     /// The whole-domain policy, for consumers.
-    FIELD: Topic<FieldHeader, FieldCell> {
-        name: "field", writer: "planner", rate: FIELD_RATE, limits: Limits::WHOLE_MAP, logged: WithFields,
-    }
+    FIELD "field": FieldHeader FieldCell, "planner", FIELD_RATE, limits: Limits::WHOLE_MAP, logged: WithFields;
     /// Wheel speeds for the robot.
-    COMMAND: Topic<CommandSample> {
-        name: "command", writer: "controller", rate: Rate::EachTick,
-    }
+    COMMAND "command": CommandSample, "controller", Rate::EachTick;
     /// Heartbeats, from inside the work loop.
-    HEALTH: Topic<HealthSample> {
-        name: "health", writer: EVERY_STAGE, rate: on_change(BEAT),
-    }
+    HEALTH "health": HealthSample, EVERY_STAGE, on_change(BEAT);
     /// The connection to the robot: its state, counts, tick latency.
-    LINK: Topic<LinkSample> {
-        name: "link", writer: "link", rate: on_change(LINK_AGAIN),
-    }
+    LINK "link": LinkSample, "link", on_change(LINK_AGAIN);
     /// The seven infrared rangers, metres.
-    INFRARED: Topic<InfraredSample> {
-        name: "infrared", writer: "link", rate: Rate::EachFrame,
-    }
+    INFRARED "infrared": InfraredSample, "link", Rate::EachFrame;
     /// Battery volts and whether they are low, motor currents, temperatures of the drivers.
-    POWER: Topic<PowerSample> {
-        name: "power", writer: "link", rate: Rate::EachFrame,
-    }
+    POWER "power": PowerSample, "link", Rate::EachFrame;
     /// Human sensors, tilt, temperature.
-    SURROUNDINGS: Topic<SurroundingsSample> {
-        name: "surroundings", writer: "link", rate: Rate::EachFrame,
-    }
+    SURROUNDINGS "surroundings": SurroundingsSample, "link", Rate::EachFrame;
     /// The supervisor's order to all stages.
-    DIRECTIVE: Topic<DirectiveSample> {
-        name: "directive", writer: SUPERVISOR, rate: on_change(RESTATE),
-    }
+    DIRECTIVE "directive": DirectiveSample, SUPERVISOR, on_change(RESTATE);
     /// How far the robot may go in lockstep, and since which tick the newest recovery step holds.
-    TICK_LIMIT: Topic<TickLimitSample> {
-        name: "tick_limit", writer: SUPERVISOR, rate: on_change(RESTATE),
-    }
+    TICK_LIMIT "tick_limit": TickLimitSample, SUPERVISOR, on_change(RESTATE);
     /// The stages' processes, as the supervisor sees them.
-    ROSTER: Topic<RosterHeader, RosterEntry> {
-        name: "roster", writer: SUPERVISOR, rate: on_change(RESTATE), limits: ROSTERS,
-    }
+    ROSTER "roster": RosterHeader RosterEntry, SUPERVISOR, on_change(RESTATE), limits: ROSTERS;
     /// A stage's process ended: cause, ages, the end of its log, what follows.
-    DEATHS: Topic<DeathSample> {
-        name: "deaths", writer: SUPERVISOR, rate: Rate::WhenItHappens,
-    }
+    DEATHS "deaths": DeathSample, SUPERVISOR, Rate::WhenItHappens;
     /// The robot should make progress and does not: how, and what is tried.
-    STALLS: Topic<StallSample> {
-        name: "stalls", writer: SUPERVISOR, rate: Rate::WhenItHappens,
-    }
+    STALLS "stalls": StallSample, SUPERVISOR, Rate::WhenItHappens;
     /// Requests of an operator: restart, stop, resume, targets, the place, zones.
-    REQUESTS: Topic<RequestSample> {
-        name: "requests", writer: OPERATOR, rate: Rate::WhenItHappens, logged: No,
-    }
+    REQUESTS "requests": RequestSample, OPERATOR, Rate::WhenItHappens, logged: No;
     /// Each request with its answer. The process of an operator may end before others have read its request.
-    ORDERS: Topic<RequestSample> {
-        name: "orders", writer: SUPERVISOR, rate: Rate::WhenItHappens,
-    }
+    ORDERS "orders": RequestSample, SUPERVISOR, Rate::WhenItHappens;
     /// Requests of an operator to inject a fault into a stage; every stage reads it.
-    FAULTS: Topic<FaultSample> {
-        name: "faults", writer: OPERATOR, rate: Rate::WhenItHappens,
-    }
+    FAULTS "faults": FaultSample, OPERATOR, Rate::WhenItHappens;
     /// The bytes that the link received from the robot and sent to it. Wakes nobody: a reader waits for `link`.
-    WIRE: Topic<WireHeader, u8> {
-        name: "wire", writer: "link", rate: Rate::WhenItHappens, limits: WIRE_PIECES,
-    }
+    WIRE "wire": WireHeader u8, "link", Rate::WhenItHappens, limits: WIRE_PIECES;
     /// The inputs of every stage's step, and the checkpoint each generation started from, for a replay.
     /// Wakes nobody: a reader waits for `link`.
-    INPUTS: Topic<InputsHeader, u8> {
-        name: "inputs", writer: EVERY_STAGE, rate: Rate::WhenItHappens, limits: Limits::DEEP,
-    }
+    INPUTS "inputs": InputsHeader u8, EVERY_STAGE, Rate::WhenItHappens, limits: Limits::DEEP;
 }
 
 #[cfg(test)]

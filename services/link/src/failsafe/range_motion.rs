@@ -21,7 +21,7 @@ use common::{
 };
 use glam::DVec2;
 
-use super::scan_motion::Poses;
+use super::scan_motion::{Poses, best};
 
 const DELAYS_S: [f64; 7] = [0.0, 0.3, 0.5, 0.75, 1.0, 1.25, 1.5];
 /// The share of a sensor's reach up to which a hit is well known.
@@ -133,9 +133,8 @@ impl RangeMotion {
 
     /// The explanation by the delay that is best, if readings are doubted, or surely late.
     pub(super) fn judged(&self, sure: bool) -> Option<String> {
-        let better = DELAYS_S.into_iter().zip(self.better);
-        let (likely_s, better) = better.max_by(|(_, one), (_, other)| one.total_cmp(other))?;
-        (better > BETTER[usize::from(sure)]).then(|| format!(
+        let likely_s = best(&DELAYS_S, &self.better, BETTER[usize::from(sure)])?;
+        Some(format!(
             "what sonars and infrared rangers see fits together if they are {likely_s} s later than they say: look for what holds their readings back, then `firsthand stop` and `resume`"
         ))
     }

@@ -58,6 +58,13 @@ impl Poses {
     }
 }
 
+/// The delay with the greatest sum, if that is more than `least`.
+pub(super) fn best(delays_s: &[f64], better: &[f64], least: f64) -> Option<f64> {
+    let better = delays_s.iter().zip(better);
+    let (likely_s, better) = better.max_by(|(_, one), (_, other)| one.total_cmp(other))?;
+    (*better > least).then_some(*likely_s)
+}
+
 #[derive(Clone, Debug)]
 pub(super) struct ScanMotion {
     pub(super) row: usize,
@@ -138,10 +145,9 @@ impl ScanMotion {
 
     /// The explanation by the delay that is best, if scans are doubted, or surely late.
     pub(super) fn judged(&self, sure: bool) -> Option<String> {
-        let better = DELAYS_S.into_iter().zip(self.better);
-        let (likely_s, better) = better.max_by(|(_, one), (_, other)| one.total_cmp(other))?;
+        let likely_s = best(&DELAYS_S, &self.better, BETTER[usize::from(sure)])?;
         let name = &self.sensor.name;
-        (better > BETTER[usize::from(sure)]).then(|| match likely_s {
+        Some(match likely_s {
             f64::INFINITY => format!(
                 "the scans of {name} do not change although the wheels turn: check the laser, and whether the wheels slip, then `firsthand stop` and `resume`"
             ),
