@@ -4,10 +4,7 @@
 use common::samples::PoseSample;
 use serde_json::{Value, json};
 
-use crate::{
-    content::Content,
-    shortest_path::{ShortestPath, shortest_path},
-};
+use crate::{content::Content, shortest_path::shortest_path};
 
 fn shown(value: Option<f64>, digits: usize, unit: &str) -> String {
     match value.filter(|value| value.is_finite()) {
@@ -25,10 +22,8 @@ fn spl(content: &Content, path: Option<f64>) -> Option<f64> {
     let mission = &content.mission;
     let start = mission.start_pose().position;
     let body = mission.body().radius_m;
-    match shortest_path(&mission.obstacles(), start, mission.target, body) {
-        ShortestPath::Found(shortest) => Some(shortest / path?.max(shortest)),
-        ShortestPath::None | ShortestPath::TooLarge => None,
-    }
+    let shortest = shortest_path(&mission.obstacles(), start, mission.target, body)?;
+    Some(shortest / path?.max(shortest))
 }
 
 /// The rows of the table as the page takes them: the name in the literature, the value with its unit or a dash, and the field in

@@ -9,7 +9,7 @@ use mission_control::outcome::RIGHT_PLACE_M;
 use std::path::Path;
 
 use crate::error::Result;
-use report::shortest_path::{ShortestPath, shortest_path};
+use report::shortest_path::shortest_path;
 
 /// The perimeter's width is a multiple of this, metres: a whole number of cells by both methods.
 const WIDTH_STEP_M: f64 = 0.1;
@@ -76,7 +76,7 @@ impl Trial {
     /// The trial `world` in `scene`, if the body can get from start to target with `swept_m` around its centre.
     pub fn new(world: String, scene: &Scene, rules: Rules, swept_m: f64) -> Result<Option<Self>> {
         let touched = Heights::preset(Realism::default()).touched(&scene.shapes);
-        let Some(shortest_m) = shortest_m(&touched, scene.start, scene.target, swept_m) else {
+        let Some(shortest_m) = shortest_path(&touched, scene.start, scene.target, swept_m) else {
             return Ok(None);
         };
         let mut mission = mission(&world, scene)?;
@@ -89,16 +89,8 @@ impl Trial {
     /// The trial `world` of an unchanged `mission`, if a body can get from start to target in its world.
     pub fn of_mission(world: String, mission: Mission, swept_m: f64) -> Option<Self> {
         let start = mission.start_pose().position;
-        let shortest_m = shortest_m(&mission.obstacles(), start, mission.target, swept_m)?;
+        let shortest_m = shortest_path(&mission.obstacles(), start, mission.target, swept_m)?;
         Some(Self { world, mission, shortest_m, rules: Rules::PLAIN })
-    }
-}
-
-/// The length of the shortest path between `shapes` that stays `swept_m` away from them, metres; none if there is none.
-fn shortest_m(shapes: &Shapes, start: DVec2, target: DVec2, swept_m: f64) -> Option<f64> {
-    match shortest_path(shapes, start, target, swept_m) {
-        ShortestPath::Found(shortest_m) => Some(shortest_m),
-        ShortestPath::None | ShortestPath::TooLarge => None,
     }
 }
 
