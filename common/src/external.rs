@@ -20,19 +20,19 @@ use crate::{
     roster::Roster,
     run::{self, Run},
     samples::{Order, name_str},
-    start::{Generation, Joined, StageError, enter, name_process, system},
+    start::{Generation, Joined, Result, StageError, enter, name_process, system},
 };
 
 /// The roster is published five times a second, and the place of a process that has ended is free in the next.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-pub fn mission(robot: &RobotName) -> Result<Mission, StageError> {
+pub fn mission(robot: &RobotName) -> Result<Mission> {
     let (directory, _stage_lock) = enter_run(&Domain::of(robot.clone()))?;
     Ok(Run::load(&directory)?.mission)
 }
 
 /// Count as a process of `domain` until the returned file is dropped. Returns the directory of the run, too.
-fn enter_run(domain: &Domain) -> Result<(PathBuf, File), StageError> {
+fn enter_run(domain: &Domain) -> Result<(PathBuf, File)> {
     let robot = &domain.robot;
     if !domain.directory().exists() {
         return Err(StageError::Other(format!(
@@ -51,7 +51,7 @@ fn enter_run(domain: &Domain) -> Result<(PathBuf, File), StageError> {
     Ok((directory, stage_lock))
 }
 
-pub(crate) fn join(stage: &'static str, robot: &RobotName) -> Result<Joined, StageError> {
+pub(crate) fn join(stage: &'static str, robot: &RobotName) -> Result<Joined> {
     name_process(stage)?;
     let domain = Domain::of(robot.clone());
     let (directory, stage_lock) = enter_run(&domain)?;
@@ -70,7 +70,7 @@ struct Place {
     supervisor: OwnedFd,
 }
 
-fn wait_for_place(bus: &Bus, stage: &str) -> Result<Place, StageError> {
+fn wait_for_place(bus: &Bus, stage: &str) -> Result<Place> {
     let mut holder = None;
     let place = Roster::open(bus)?.find(PATIENCE, |header, entries| {
         if Order::from_byte(header.order) == Order::Stop {
@@ -100,7 +100,7 @@ fn gone() -> StageError {
 
 /// A descriptor that becomes readable when the supervisor ends. It published a moment ago, so no other process has its
 /// number yet.
-fn watch(pid: u32) -> Result<OwnedFd, StageError> {
+fn watch(pid: u32) -> Result<OwnedFd> {
     let pid = i32::try_from(pid).ok().and_then(Pid::from_raw);
     pidfd_open(pid.ok_or_else(gone)?, PidfdFlags::empty()).map_err(|_| gone())
 }

@@ -1,4 +1,4 @@
-//! The error of a file that cannot be used, the replacement of a file, and its text.
+//! The error of a file that cannot be used, the replacement of a file, what is written behind its end, and its text.
 
 use std::{
     fs,
@@ -32,6 +32,11 @@ pub fn replace(file: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
     new.push(".new");
     fs::write(&new, content)?;
     fs::rename(&new, file)
+}
+
+/// The file, which is made if there is none, to write behind its end.
+pub fn append(file: impl AsRef<Path>) -> io::Result<fs::File> {
+    fs::File::options().create(true).append(true).open(file)
 }
 
 /// The beginning of a text file, at most `most` bytes; none if it cannot be read.

@@ -15,7 +15,7 @@ use crate::{
     bus::{BusError, Writer},
     samples::{InputsHeader, name},
     shell::{Context, Progress},
-    start::StageError,
+    start::{Result, StageError},
     topics,
 };
 
@@ -36,7 +36,7 @@ pub(crate) struct InputLog {
 
 impl InputLog {
     /// Begin with the `start` of the process of `context`, which is published at once.
-    pub(crate) fn begin(context: &Context, start: &impl Serialize) -> Result<Self, StageError> {
+    pub(crate) fn begin(context: &Context, start: &impl Serialize) -> Result<Self> {
         let generation = &context.generation;
         let cells = context.run.mission.grid_frame().area();
         let piece = PIECE.max(cells / CELLS_FOR_A_BYTE);
@@ -53,7 +53,7 @@ impl InputLog {
         Ok(log)
     }
 
-    pub(crate) fn note(&mut self, input: &impl Serialize, at: Progress) -> Result<(), StageError> {
+    pub(crate) fn note(&mut self, input: &impl Serialize, at: Progress) -> Result {
         self.append(input)?;
         if self.unpublished.len() >= self.piece {
             self.publish(at)?;
@@ -61,7 +61,7 @@ impl InputLog {
         Ok(())
     }
 
-    fn append(&mut self, entry: &impl Serialize) -> Result<(), StageError> {
+    fn append(&mut self, entry: &impl Serialize) -> Result {
         let start = self.unpublished.len();
         let mut bytes = std::mem::take(&mut self.unpublished);
         bytes.extend_from_slice(&[0; 4]);

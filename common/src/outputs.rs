@@ -11,7 +11,7 @@ use crate::{
     journal::Journal,
     replay::Output,
     shell::{Context, Progress},
-    start::StageError,
+    start::{Result, StageError},
     topics::Rate,
 };
 
@@ -46,7 +46,7 @@ impl Outputs {
     ///
     /// # Errors
     /// When an output cannot be opened.
-    pub fn without_inputs(context: &mut Context) -> Result<Self, StageError> {
+    pub fn without_inputs(context: &mut Context) -> Result<Self> {
         Self::of_process(context, None, 0)
     }
 
@@ -55,7 +55,7 @@ impl Outputs {
         context: &mut Context,
         inputs: Option<InputLog>,
         longest: usize,
-    ) -> Result<Self, StageError> {
+    ) -> Result<Self> {
         let saved = std::mem::take(&mut context.saved);
         let mut out = Self { inputs, saved, ..Self::default() };
         out.open(context, longest, false)?;
@@ -74,16 +74,11 @@ impl Outputs {
     }
 
     /// Open the topics that follow each frame of the robot.
-    pub(crate) fn open_late(&mut self, context: &mut Context) -> Result<(), StageError> {
+    pub(crate) fn open_late(&mut self, context: &mut Context) -> Result {
         self.open(context, 0, true)
     }
 
-    fn open(
-        &mut self,
-        context: &mut Context,
-        longest: usize,
-        late: bool,
-    ) -> Result<(), StageError> {
+    fn open(&mut self, context: &mut Context, longest: usize, late: bool) -> Result {
         for topic in context.wiring.outputs {
             if (topic.spec().rate == Rate::EachFrame) == late {
                 let number = context.generation.number;
@@ -94,10 +89,7 @@ impl Outputs {
         Ok(())
     }
 
-    fn writer<H: Stamped, E: Payload>(
-        &mut self,
-        topic: &Topic<H, E>,
-    ) -> Result<&mut Writer<H, E>, StageError> {
+    fn writer<H: Stamped, E: Payload>(&mut self, topic: &Topic<H, E>) -> Result<&mut Writer<H, E>> {
         let name = topic.spec().name;
         let mut writers = self.writers.iter_mut();
         let writer = writers.find(|(topic, _)| *topic == name);
@@ -109,7 +101,7 @@ impl Outputs {
         self.replayed.as_mut().map(|it| std::mem::take(&mut it.published)).unwrap_or_default()
     }
 
-    pub(crate) fn note(&mut self, input: &impl Serialize) -> Result<(), StageError> {
+    pub(crate) fn note(&mut self, input: &impl Serialize) -> Result {
         self.inputs.as_mut().map_or(Ok(()), |inputs| inputs.note(input, self.at))
     }
 
@@ -118,11 +110,7 @@ impl Outputs {
         self.inputs.as_mut().map_or(Ok(()), |inputs| inputs.publish(self.at))
     }
 
-    pub fn publish<H: Stamped>(
-        &mut self,
-        topic: &'static Topic<H>,
-        sample: H,
-    ) -> Result<(), StageError> {
+    pub fn publish<H: Stamped>(&mut self, topic: &'static Topic<H>, sample: H) -> Result {
         self.publish_slice(topic, sample, &[])
     }
 
@@ -131,7 +119,7 @@ impl Outputs {
         topic: &'static Topic<H, E>,
         header: H,
         slice: &[E],
-    ) -> Result<(), StageError> {
+    ) -> Result {
         self.publish_quietly(topic, header, slice)?;
         match self.replayed {
             Some(_) => Ok(()),
@@ -145,7 +133,7 @@ impl Outputs {
         topic: &'static Topic<H, E>,
         header: H,
         slice: &[E],
-    ) -> Result<(), StageError> {
+    ) -> Result {
         let Progress { tick, time } = self.at;
         if let Some(Replayed { published, .. }) = &mut self.replayed {
             published.push(Output::of(topic, tick, time, header, slice));
@@ -159,18 +147,18 @@ impl Outputs {
     pub fn has_new_reader<H: Stamped, E: Payload>(
         &mut self,
         topic: &'static Topic<H, E>,
-    ) -> Result<bool, StageError> {
+    ) -> Result<bool> {
         Ok(self.replayed.is_none() && self.writer(topic)?.has_new_reader())
     }
 
-    pub fn save(&mut self, state: &impl Serialize) -> Result<(), StageError> {
+    pub fn save(&mut self, state: &impl Serialize) -> Result {
         match &mut self.saved {
             Saved::State(checkpoint) => Ok(checkpoint.save(state)?),
             Saved::Nothing | Saved::Journal(_) => Ok(()),
         }
     }
 
-    pub fn append(&mut self, entry: &impl Serialize) -> Result<(), StageError> {
+    pub fn append(&mut self, entry: &impl Serialize) -> Result {
         match &mut self.saved {
             Saved::Journal(journal) => Ok(journal.append(entry)?),
             Saved::Nothing | Saved::State(_) => Ok(()),
@@ -183,7 +171,7 @@ impl Outputs {
     }
 
     /// Save a snapshot of `state` if one is due.
-    pub fn shorten_journal(&mut self, state: &impl Serialize) -> Result<(), StageError> {
+    pub fn shorten_journal(&mut self, state: &impl Serialize) -> Result {
         match &mut self.saved {
             Saved::Journal(journal) if journal.is_long() => Ok(journal.snapshot(state)?),
             _ => Ok(()),

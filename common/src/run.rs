@@ -1,7 +1,7 @@
 //! The run file, TOML in the run directory, tells the stages of a run what to do. Beside it is the count of each stage's generations.
 
 use std::{
-    fs::{self, File},
+    fs,
     io::{self, Write as _},
     path::{Path, PathBuf},
 };
@@ -10,7 +10,11 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::{
-    address::Address, clock::MissionClock, domain::RobotName, file::replace, mission::Mission,
+    address::Address,
+    clock::MissionClock,
+    domain::RobotName,
+    file::{append, replace},
+    mission::Mission,
 };
 
 pub const FILE_NAME: &str = "run.toml";
@@ -60,7 +64,7 @@ impl Run {
 pub fn next_generation(directory: &Path, stage: &str) -> Result<u32, RunError> {
     let file = directory.join(format!("{stage}.generations"));
     let count = || {
-        let mut lines = File::options().create(true).append(true).open(&file)?;
+        let mut lines = append(&file)?;
         lines.write_all(b"\n")?;
         let count = lines.metadata()?.len();
         u32::try_from(count).map_err(|_| io::Error::other(format!("{count} generations")))

@@ -34,7 +34,7 @@ use crate::{
     wiring::{Persists, Readers, Topics, Wiring},
 };
 
-pub use crate::start::StageError;
+pub use crate::start::{Result, StageError};
 
 /// On a wall clock, a pause of this length without input means that the tick is over: a tick takes a tenth of that.
 const TICK_OVER: Duration = Duration::from_millis(5);
@@ -56,7 +56,7 @@ impl Context {
     }
 
     /// Open the checkpoint, and give the state that the stage's last process saved.
-    pub fn saved_state<T: DeserializeOwned>(&mut self) -> Result<Option<T>, StageError> {
+    pub fn saved_state<T: DeserializeOwned>(&mut self) -> Result<Option<T>> {
         let Persists::State(bytes) = self.wiring.persists else {
             return Ok(None);
         };
@@ -70,7 +70,7 @@ impl Context {
         &mut self,
         bytes: usize,
         entry_bytes: usize,
-    ) -> Result<Restored<S, E>, StageError> {
+    ) -> Result<Restored<S, E>> {
         let (journal, restored) = Journal::open(&self.checkpoint_file(), bytes, entry_bytes)?;
         self.saved = Saved::Journal(journal);
         Ok(restored)
@@ -116,13 +116,13 @@ pub trait Process: Sized {
     ///
     /// # Errors
     /// When one of them cannot be opened.
-    fn open(context: &mut Context, readers: Self::Readers) -> Result<Self, StageError>;
+    fn open(context: &mut Context, readers: Self::Readers) -> Result<Self>;
 
     /// Take what came, step, publish. Called whenever something may have come, and for each heartbeat.
-    fn turn(&mut self) -> Result<Progress, StageError>;
+    fn turn(&mut self) -> Result<Progress>;
 
     /// Open what nobody waits for. Called once, after the first heartbeat that says ready.
-    fn after_ready(&mut self, context: &mut Context) -> Result<(), StageError> {
+    fn after_ready(&mut self, context: &mut Context) -> Result {
         let _ = context;
         Ok(())
     }
@@ -140,17 +140,17 @@ pub trait Process: Sized {
     /// keep the processor from the one it has just woken, so on a wall clock this is called in the pause after a
     /// tick, where [`Process::has_idle_work`] says so; in lockstep, where ticks follow each other at once,
     /// after each turn.
-    fn idle(&mut self) -> Result<(), StageError> {
+    fn idle(&mut self) -> Result {
         Ok(())
     }
 
     /// Inject a fault. Returns false if the stage has no such fault, or nothing yet to inject it into.
-    fn inject(&mut self, fault: FaultKind) -> Result<bool, StageError> {
+    fn inject(&mut self, fault: FaultKind) -> Result<bool> {
         let _ = fault;
         Ok(false)
     }
 
-    fn stop(&mut self) -> Result<(), StageError> {
+    fn stop(&mut self) -> Result {
         Ok(())
     }
 }
@@ -183,7 +183,7 @@ fn complain(error: &dyn fmt::Display) {
 /// The exit code for a wrong command line; `firsthand` has the same.
 const WRONG_USAGE: u8 = 2;
 
-pub fn run_stage<P: Process>(start: &Start) -> Result<(), StageError> {
+pub fn run_stage<P: Process>(start: &Start) -> Result {
     let terminated = Signals::catch(&[SIGTERM]).map_err(system("catch SIGTERM"))?;
     let Joined { generation, run, bus, supervisor, stage_lock: _stage_lock } = match start {
         Start::Child { generation, supervisor } => start::join_as_child(generation, *supervisor)?,
@@ -233,7 +233,7 @@ fn work(
     heartbeat: &mut Heartbeat,
     context: &mut Context,
     stop: &mut StopRequest,
-) -> Result<(), StageError> {
+) -> Result {
     let ticks_follow_at_once = matches!(context.run.clock, MissionClock::Ticks { .. });
     let mut progress = process.turn()?;
     if ticks_follow_at_once {
@@ -288,7 +288,7 @@ fn work(
 fn inject(
     process: &mut impl Process,
     request: Result<FaultKind, FaultAnswer>,
-) -> Result<FaultAnswer, StageError> {
+) -> Result<FaultAnswer> {
     Ok(match request {
         Err(answer) => answer,
         // The work loop injects the faults that every stage has.
@@ -309,7 +309,7 @@ struct Heartbeat {
 }
 
 impl Heartbeat {
-    fn new(bus: &Bus, generation: &Generation) -> Result<Self, StageError> {
+    fn new(bus: &Bus, generation: &Generation) -> Result<Self> {
         Ok(Self {
             writer: bus.writer(&topics::HEALTH, generation.number)?,
             sample: HealthSample {
@@ -323,13 +323,13 @@ impl Heartbeat {
         })
     }
 
-    fn beat(&mut self, state: HealthState, progress: Progress) -> Result<(), StageError> {
+    fn beat(&mut self, state: HealthState, progress: Progress) -> Result {
         self.beat_quietly(state, progress)?;
         self.writer.wake()?;
         Ok(())
     }
 
-    fn beat_quietly(&mut self, state: HealthState, progress: Progress) -> Result<(), StageError> {
+    fn beat_quietly(&mut self, state: HealthState, progress: Progress) -> Result {
         self.sample.state = state.into();
         (self.last, self.tick) = (Instant::now(), progress.tick);
         self.writer.publish_quietly(progress.tick, progress.time, self.sample, &[])?;
@@ -344,7 +344,7 @@ impl Heartbeat {
     ///
     /// A stage that has answered a tick is awake anyway: it beats early, so that it need not wake for that alone, and
     /// wakes nobody, for the supervisor is woken when the tick ends.
-    fn beat_if_due(&mut self, progress: Progress) -> Result<bool, StageError> {
+    fn beat_if_due(&mut self, progress: Progress) -> Result<bool> {
         self.sample.turns += 1;
         let age = self.last.elapsed();
         let with_a_tick = progress.tick != self.tick && age >= self.period / 2;
@@ -358,12 +358,7 @@ impl Heartbeat {
         Ok(true)
     }
 
-    fn answer(
-        &mut self,
-        id: u64,
-        answer: FaultAnswer,
-        progress: Progress,
-    ) -> Result<(), StageError> {
+    fn answer(&mut self, id: u64, answer: FaultAnswer, progress: Progress) -> Result {
         self.sample.last_fault = id;
         self.sample.fault_answer = answer.into();
         self.beat(HealthState::Ready, progress)

@@ -33,6 +33,11 @@ impl Signals {
         Ok(Self { pipe })
     }
 
+    /// Catch from now on what asks a process to end. Fails as [`Self::catch`].
+    pub fn that_end() -> io::Result<Self> {
+        Self::catch(&[SIGINT, SIGTERM, SIGHUP])
+    }
+
     /// Whether a signal came that [`Self::came`] has not taken.
     pub fn pending(&self) -> bool {
         poll::is_readable(self, Duration::ZERO).unwrap_or(true)

@@ -43,7 +43,7 @@ use crate::{
     outputs::Outputs,
     replay::{Beginning, Output, Replay, ReplayError, entry},
     shell::{Context, Process, Progress},
-    start::StageError,
+    start::Result,
     wiring::{Persists, Readers, Topics},
 };
 
@@ -59,7 +59,7 @@ pub trait Stage: Sized + 'static {
     fn new(mission: &Mission) -> Self;
 
     /// Open the file that the stage persists its state in, and give the state that its process starts from.
-    fn start(&self, context: &mut Context) -> Result<Self::Start, StageError>;
+    fn start(&self, context: &mut Context) -> Result<Self::Start>;
 
     /// Go on from `start`. Called at most once, before the first entry.
     ///
@@ -72,14 +72,10 @@ pub trait Stage: Sized + 'static {
     ///
     /// # Errors
     /// When an output cannot be published or the state cannot be saved.
-    fn take_entry(
-        &mut self,
-        entry: Self::Entry<'_>,
-        out: &mut Outputs,
-    ) -> Result<Self::Outcome, StageError>;
+    fn take_entry(&mut self, entry: Self::Entry<'_>, out: &mut Outputs) -> Result<Self::Outcome>;
 
     /// Publish outputs that no stage waits for. A process calls this in a pause, a replay after each entry.
-    fn publish_rest(&mut self, out: &mut Outputs) -> Result<(), StageError> {
+    fn publish_rest(&mut self, out: &mut Outputs) -> Result {
         let _ = out;
         Ok(())
     }
@@ -103,10 +99,7 @@ pub struct Runner<S> {
 impl<S: Stage> Runner<S> {
     /// Open the topics that the stage writes, restore its state, and go on from there. A slice that it publishes has at most
     /// `longest` elements.
-    pub fn open(
-        context: &mut Context,
-        longest: impl FnOnce(&S) -> usize,
-    ) -> Result<Self, StageError> {
+    pub fn open(context: &mut Context, longest: impl FnOnce(&S) -> usize) -> Result<Self> {
         let mut stage = S::new(&context.run.mission);
         let start = stage.start(context)?;
         let inputs = InputLog::begin(context, &start)?;
@@ -118,17 +111,17 @@ impl<S: Stage> Runner<S> {
     }
 
     /// Open the topics that follow each frame of the robot: to be called after the first heartbeat that says ready.
-    pub fn open_late(&mut self, context: &mut Context) -> Result<(), StageError> {
+    pub fn open_late(&mut self, context: &mut Context) -> Result {
         self.out.open_late(context)
     }
 
     /// Note `entry` for a replay, and let the stage take it.
-    pub fn take_entry(&mut self, entry: S::Entry<'_>) -> Result<S::Outcome, StageError> {
+    pub fn take_entry(&mut self, entry: S::Entry<'_>) -> Result<S::Outcome> {
         self.out.note(&entry)?;
         self.stage.take_entry(entry, &mut self.out)
     }
 
-    pub fn publish_rest(&mut self) -> Result<(), StageError> {
+    pub fn publish_rest(&mut self) -> Result {
         self.stage.publish_rest(&mut self.out)
     }
 }
@@ -236,7 +229,7 @@ impl<A: Answering> Stage for A {
         Answering::new(mission)
     }
 
-    fn start(&self, context: &mut Context) -> Result<Self::Start, StageError> {
+    fn start(&self, context: &mut Context) -> Result<Self::Start> {
         let saved: Self::Start = context.saved_state()?;
         if let Some(state) = &saved {
             tracing::info!(?state, "the state is restored");
@@ -252,7 +245,7 @@ impl<A: Answering> Stage for A {
         &mut self,
         Sample(input, further): Sample<A::In, A::Further>,
         out: &mut Outputs,
-    ) -> Result<Self::Outcome, StageError> {
+    ) -> Result<Self::Outcome> {
         out.at = Progress::of(input.stamp());
         let answer = self.answer(&input, &further, out.at.time);
         if answer.saves_first {
@@ -298,11 +291,11 @@ impl<A: Answering> Process for Answers<A> {
     const PERSISTS: Persists = A::PERSISTS;
     type Readers = Questions<A>;
 
-    fn open(context: &mut Context, readers: Questions<A>) -> Result<Self, StageError> {
+    fn open(context: &mut Context, readers: Questions<A>) -> Result<Self> {
         Ok(Self { runner: Runner::open(context, |_| 0)?, readers })
     }
 
-    fn turn(&mut self) -> Result<Progress, StageError> {
+    fn turn(&mut self) -> Result<Progress> {
         let Questions(input, further) = &mut self.readers;
         loop {
             let next = match A::NEWEST_ONLY {

@@ -42,6 +42,8 @@ pub(crate) struct Joined {
     pub(crate) stage_lock: File,
 }
 
+pub type Result<T = (), E = StageError> = std::result::Result<T, E>;
+
 #[derive(Debug, Error)]
 pub enum StageError {
     #[error(transparent)]
@@ -72,10 +74,7 @@ impl StageError {
     }
 }
 
-pub(crate) fn join_as_child(
-    generation: &Generation,
-    supervisor: u32,
-) -> Result<Joined, StageError> {
+pub(crate) fn join_as_child(generation: &Generation, supervisor: u32) -> Result<Joined> {
     become_child(generation.stage, supervisor)?;
     let run = Run::load(&generation.directory)?;
     let domain = Domain::of(run.robot.clone());
@@ -85,7 +84,7 @@ pub(crate) fn join_as_child(
 }
 
 /// Count as a process of `domain`, until the result is dropped.
-pub(crate) fn enter(domain: &Domain) -> Result<File, StageError> {
+pub(crate) fn enter(domain: &Domain) -> Result<File> {
     domain.enter().map_err(system("enter the robot's directory"))
 }
 
@@ -97,7 +96,7 @@ pub(crate) fn system(action: &'static str) -> impl FnOnce(std::io::Error) -> Sta
 ///
 /// # Errors
 /// When the supervisor has ended already, or the system is not Linux.
-pub fn become_child(process_name: &str, supervisor: u32) -> Result<(), StageError> {
+pub fn become_child(process_name: &str, supervisor: u32) -> Result {
     name_process(process_name)?;
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::TERM))
         .map_err(|errno| system("tie the process to its supervisor")(errno.into()))?;
@@ -113,7 +112,7 @@ pub fn become_child(process_name: &str, supervisor: u32) -> Result<(), StageErro
 }
 
 /// Take a name that `ps` and `pkill` show.
-pub(crate) fn name_process(name: &str) -> Result<(), StageError> {
+pub(crate) fn name_process(name: &str) -> Result {
     // A name with a zero byte cannot come from the table.
     if let Ok(name) = std::ffi::CString::new(name) {
         rustix::thread::set_name(&name)

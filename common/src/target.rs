@@ -1,6 +1,6 @@
 //! The target, as a stage follows it on topic `target`.
 
-use crate::{bus::Reader, samples::TargetSample, start::StageError};
+use crate::{bus::Reader, samples::TargetSample, start::Result};
 
 #[derive(Debug)]
 pub struct TargetReader {
@@ -17,7 +17,7 @@ impl From<Reader<TargetSample>> for TargetReader {
 
 impl TargetReader {
     /// The target that holds in `tick`, if it is not the one that was returned last.
-    pub fn next(&mut self, tick: u64) -> Result<Option<TargetSample>, StageError> {
+    pub fn next(&mut self, tick: u64) -> Result<Option<TargetSample>> {
         self.newest = self.samples.newest()?.or(self.newest);
         Ok(self.newest.filter(|newest| takes(&mut self.taken, newest, tick)))
     }

@@ -4,7 +4,7 @@ use std::any::Any;
 
 use super::{
     authors::Author,
-    error::BusError,
+    error::Result,
     layout::{Kind, Value, type_name},
     make::{Bus, Services},
     payload::{Payload, Stamp, Stamped, decode_slice, encode_slice, has_slice},
@@ -28,26 +28,21 @@ pub trait AnyTopic: Sync {
     /// The types of its samples for the middleware. The result has no name outside this crate.
     #[doc(hidden)]
     fn carried(&self) -> Carried;
-    fn any_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>, BusError>;
+    fn any_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>>;
     /// Opens a reader of the samples of all generations, with the buffer of a recorder.
-    fn recorder_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>, BusError>;
-    fn any_writer(
-        &self,
-        bus: &Bus,
-        generation: u32,
-        longest: usize,
-    ) -> Result<Box<dyn AnyWriter>, BusError>;
+    fn recorder_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>>;
+    fn any_writer(&self, bus: &Bus, generation: u32, longest: usize) -> Result<Box<dyn AnyWriter>>;
     /// The processes that have the topic open. It fails if the topic is missing or carries another payload.
-    fn opened_by(&self, bus: &Bus) -> Result<OpenedBy, BusError> {
+    fn opened_by(&self, bus: &Bus) -> Result<OpenedBy> {
         ports::opened_by(&bus.node, self.spec(), &self.carried())
     }
 }
 
 pub trait AnyReader {
-    fn next_sample(&mut self) -> Result<Option<Box<dyn AnySample>>, BusError>;
+    fn next_sample(&mut self) -> Result<Option<Box<dyn AnySample>>>;
     /// Puts the next sample as a message (see [`super::cdr`]) in place of what is in `message`. Returns its stamp; none when all samples
     /// were taken.
-    fn next_message(&mut self, message: &mut Vec<u8>) -> Result<Option<Stamp>, BusError>;
+    fn next_message(&mut self, message: &mut Vec<u8>) -> Result<Option<Stamp>>;
 }
 
 /// A sample of a topic. It stays in shared memory, and its writer cannot reuse that memory while the sample is held.
@@ -60,7 +55,7 @@ pub trait AnySample {
 
 pub trait AnyWriter: Any {
     /// Publish the sample in `message` with the stamp that it has, and wake the readers. Returns whether `message` is of this topic.
-    fn publish_message(&mut self, message: &[u8]) -> Result<bool, BusError>;
+    fn publish_message(&mut self, message: &[u8]) -> Result<bool>;
 }
 
 impl<H: Stamped, E: Payload> AnyTopic for Topic<H, E> {
@@ -89,31 +84,26 @@ impl<H: Stamped, E: Payload> AnyTopic for Topic<H, E> {
         Carried::of::<H, E>()
     }
 
-    fn any_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>, BusError> {
+    fn any_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>> {
         Ok(Box::new(bus.reader(self)?))
     }
 
-    fn recorder_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>, BusError> {
+    fn recorder_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>> {
         let reader = bus.reader_that_keeps(self, self.spec.limits.recorder_buffer)?;
         Ok(Box::new(reader.of_all_generations()))
     }
 
-    fn any_writer(
-        &self,
-        bus: &Bus,
-        generation: u32,
-        longest: usize,
-    ) -> Result<Box<dyn AnyWriter>, BusError> {
+    fn any_writer(&self, bus: &Bus, generation: u32, longest: usize) -> Result<Box<dyn AnyWriter>> {
         Ok(Box::new(bus.slice_writer(self, generation, longest)?))
     }
 }
 
 impl<H: Stamped, E: Payload> AnyReader for Reader<H, E> {
-    fn next_sample(&mut self) -> Result<Option<Box<dyn AnySample>>, BusError> {
+    fn next_sample(&mut self) -> Result<Option<Box<dyn AnySample>>> {
         Ok(self.next_slice()?.map(|sample| Box::new(sample) as Box<dyn AnySample>))
     }
 
-    fn next_message(&mut self, message: &mut Vec<u8>) -> Result<Option<Stamp>, BusError> {
+    fn next_message(&mut self, message: &mut Vec<u8>) -> Result<Option<Stamp>> {
         message.clear();
         Ok(self.next_slice()?.map(|sample| {
             encode_slice(sample.header(), &sample, message);
@@ -141,7 +131,7 @@ impl<H: Stamped, E: Payload> AnySample for Slice<H, E> {
 }
 
 impl<H: Stamped, E: Payload> AnyWriter for Writer<H, E> {
-    fn publish_message(&mut self, message: &[u8]) -> Result<bool, BusError> {
+    fn publish_message(&mut self, message: &[u8]) -> Result<bool> {
         let sample = decode_slice(message);
         let sent = sample.map(|(header, slice)| self.publish_as_stamped(header, &slice));
         Ok(sent.transpose()?.is_some())
@@ -151,16 +141,12 @@ impl<H: Stamped, E: Payload> AnyWriter for Writer<H, E> {
 impl Bus {
     /// Create the bus of a robot: its configuration, which consumers in other languages load too, and the services of all topics of
     /// `table`. The new bus replaces an earlier one, and nobody can join it before all services exist. Only the supervisor calls this.
-    pub fn make(
-        domain: &Domain,
-        name: &str,
-        table: &[&dyn AnyTopic],
-    ) -> Result<(Self, Services), BusError> {
+    pub fn make(domain: &Domain, name: &str, table: &[&dyn AnyTopic]) -> Result<(Self, Services)> {
         Self::make_services(domain, name, table.iter().map(|topic| (topic.spec(), topic.carried())))
     }
 
     /// A wakeup that is readable once a sample was published on `topic`. It fails if the topic is missing or has no place left.
-    pub fn wakeup(&self, topic: &dyn AnyTopic) -> Result<Wakeup, BusError> {
+    pub fn wakeup(&self, topic: &dyn AnyTopic) -> Result<Wakeup> {
         Wakeup::open(self, topic.spec())
     }
 }

@@ -9,7 +9,7 @@ use std::{
 };
 
 use crate::{
-    error::BusError,
+    error::Result,
     spec::{SUPERVISOR, Spec},
 };
 
@@ -28,7 +28,7 @@ pub struct Ignored {
 }
 
 /// Reads which processes the stages have; none if there is no newer list since the last call.
-pub type Names = Box<dyn FnMut() -> Result<Option<Vec<(String, Author)>>, BusError>>;
+pub type Names = Box<dyn FnMut() -> Result<Option<Vec<(String, Author)>>>>;
 
 /// The number of processes of a stage that are remembered. A recorder still takes samples of those that ended.
 const REMEMBERED: usize = 64;
@@ -99,7 +99,7 @@ impl Writers {
         self.0.borrow().supervisor
     }
 
-    fn read_names(&self) -> Result<(), BusError> {
+    fn read_names(&self) -> Result {
         // The source is a reader of this bus, which asks for the supervisor's process.
         let Some(mut source) = self.0.borrow_mut().source.take() else {
             return Ok(());
@@ -114,12 +114,12 @@ impl Writers {
         Ok(())
     }
 
-    fn process_of(&self, stage: &str) -> Result<Option<Author>, BusError> {
+    fn process_of(&self, stage: &str) -> Result<Option<Author>> {
         self.read_names()?;
         Ok(self.0.borrow().stages.get(stage).and_then(|known| known.back().copied()))
     }
 
-    fn has_named(&self, stage: &str, author: Author) -> Result<bool, BusError> {
+    fn has_named(&self, stage: &str, author: Author) -> Result<bool> {
         let named =
             || self.0.borrow().stages.get(stage).is_some_and(|known| known.contains(&author));
         if !named() {
@@ -132,7 +132,7 @@ impl Writers {
         self.0.borrow().names_come_by.is_some()
     }
 
-    fn hold_samples(&self) -> Result<bool, BusError> {
+    fn hold_samples(&self) -> Result<bool> {
         if self.names_are_awaited() {
             self.read_names()?;
         }
@@ -202,7 +202,7 @@ impl Admitted {
         Self { all_generations: true, ..self }
     }
 
-    pub(crate) fn hold_samples(&self) -> Result<bool, BusError> {
+    pub(crate) fn hold_samples(&self) -> Result<bool> {
         match &self.authors {
             Authors::Named(one) => one.writers.hold_samples(),
             _ => Ok(false),
@@ -210,7 +210,7 @@ impl Admitted {
     }
 
     /// Whether a sample of `author` is returned. Samples of older generations are dropped, because their process has ended.
-    pub fn admits(&mut self, author: Author) -> Result<bool, BusError> {
+    pub fn admits(&mut self, author: Author) -> Result<bool> {
         let all = self.all_generations;
         match &mut self.authors {
             Authors::All => Ok(true),
@@ -230,7 +230,7 @@ fn is_newest(author: Author, newest: &mut u32) -> bool {
 }
 
 impl OneStage {
-    fn admits(&mut self, author: Author, all_generations: bool) -> Result<bool, BusError> {
+    fn admits(&mut self, author: Author, all_generations: bool) -> Result<bool> {
         let by_supervisor = author.process == self.writers.supervisor();
         if by_supervisor || self.writers.names_are_awaited() {
             return Ok(is_newest(author, &mut self.newest) || all_generations);

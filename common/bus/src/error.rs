@@ -11,6 +11,8 @@ use thiserror::Error;
 use super::spec::Spec;
 use crate::domain::SHARED_MEMORY;
 
+pub(crate) type Result<T = (), E = BusError> = std::result::Result<T, E>;
+
 #[derive(Debug, Error)]
 pub enum BusError {
     #[error(

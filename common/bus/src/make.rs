@@ -21,7 +21,7 @@ use iceoryx2::{
 
 use super::{
     authors::Writers,
-    error::BusError,
+    error::{BusError, Result},
     leftovers, ownership,
     ports::{self, BusNode, Carried},
     spec::{Limits, Spec},
@@ -61,7 +61,7 @@ impl Bus {
         domain: &Domain,
         name: &str,
         topics: impl Iterator<Item = (&'static Spec, Carried)>,
-    ) -> Result<(Self, Services), BusError> {
+    ) -> Result<(Self, Services)> {
         let failed = |error: io::Error| no_join(domain)(error.to_string());
         let instance = BusInstance::new(domain);
         // A directory that exists is an error, because another user may have created it.
@@ -80,13 +80,13 @@ impl Bus {
     }
 
     /// Write the configuration again that processes join by.
-    pub fn restore_config(&self) -> Result<(), BusError> {
+    pub fn restore_config(&self) -> Result {
         Self::write_config(&self.instance)?;
         let failed = |error: io::Error| no_join(&self.instance.domain)(error.to_string());
         self.instance.make_current().map_err(failed)
     }
 
-    fn write_config(instance: &BusInstance) -> Result<(), BusError> {
+    fn write_config(instance: &BusInstance) -> Result {
         let failed = no_join(&instance.domain);
         let mut config = Config::default();
         let root = instance.root();
@@ -109,26 +109,26 @@ impl Bus {
 
     /// Join the bus of a robot under a name that `iox2 node list` shows, and read the newest generation, whoever wrote it. It fails if
     /// the robot does not run here, if it belongs to another user, or if shared memory is full.
-    pub fn join(domain: &Domain, name: &str) -> Result<Self, BusError> {
+    pub fn join(domain: &Domain, name: &str) -> Result<Self> {
         let _joining = domain.joining().map_err(not_running(domain))?;
         let instance = BusInstance::current(domain).map_err(not_running(domain))?;
         Self::join_instance(instance, name)
     }
 
     /// Join with [`Bus::join`] as a consumer. If there is a supervisor, only samples of it and of the processes that it names are read.
-    pub fn join_as_consumer(domain: &Domain, name: &str) -> Result<Self, BusError> {
+    pub fn join_as_consumer(domain: &Domain, name: &str) -> Result<Self> {
         let supervisor = domain.supervisor().ok().flatten();
         Ok(Self { writers: supervisor.map(Writers::of), ..Self::join(domain, name)? })
     }
 
     /// Join with [`Bus::join`] as a stage of the supervisor with the process number `supervisor`. Samples of processes that the
     /// supervisor does not name are ignored, and the stage may take the places that consumers leave free.
-    pub fn join_as_stage(domain: &Domain, name: &str, supervisor: u32) -> Result<Self, BusError> {
+    pub fn join_as_stage(domain: &Domain, name: &str, supervisor: u32) -> Result<Self> {
         let writers = Some(Writers::of(supervisor));
         Ok(Self { writers, is_stage: true, ..Self::join(domain, name)? })
     }
 
-    fn join_instance(instance: BusInstance, name: &str) -> Result<Self, BusError> {
+    fn join_instance(instance: BusInstance, name: &str) -> Result<Self> {
         // Errors of the middleware are in our own errors; IOX2_LOG_LEVEL turns its messages on again.
         set_log_level_from_env_or(LogLevel::Fatal);
         let join = no_join(&instance.domain);
@@ -164,7 +164,7 @@ impl Bus {
 
     /// Prevent the removal of the bus while a consumer opens a topic, which would make the bus's directory again and leave it there.
     /// The stages share another lock as long as they run.
-    pub(super) fn hold(&self) -> Result<Option<File>, BusError> {
+    pub(super) fn hold(&self) -> Result<Option<File>> {
         if self.is_stage {
             return Ok(None);
         }

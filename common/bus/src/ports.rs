@@ -19,7 +19,7 @@ pub(super) use self::raw::{BusNode, Carried, Listener, Notifier, create, opened_
 use self::raw::{RawPublisher, RawSample, RawService, RawSubscriber};
 use super::{
     authors::Author,
-    error::BusError,
+    error::Result,
     payload::{Payload, Stamped, has_slice},
     spec::Spec,
 };
@@ -32,12 +32,12 @@ pub(super) struct Service<H, E> {
 }
 
 impl<H: Payload, E: Payload> Service<H, E> {
-    pub(super) fn open(node: &BusNode, spec: &'static Spec) -> Result<Self, BusError> {
+    pub(super) fn open(node: &BusNode, spec: &'static Spec) -> Result<Self> {
         let raw = RawService::open(node, spec, &Carried::of::<H, E>())?;
         Ok(Self { raw, spec, carries: PhantomData })
     }
 
-    pub(super) fn publisher(&self, longest: usize) -> Result<Publisher<H, E>, BusError> {
+    pub(super) fn publisher(&self, longest: usize) -> Result<Publisher<H, E>> {
         let longest = if has_slice::<E>() { longest } else { 1 };
         Ok(Publisher {
             raw: self.raw.publisher(self.spec, longest)?,
@@ -47,7 +47,7 @@ impl<H: Payload, E: Payload> Service<H, E> {
     }
 
     /// A subscriber with a buffer for the newest `buffer` samples that were not taken yet.
-    pub(super) fn subscriber(&self, buffer: usize) -> Result<Subscriber<H, E>, BusError> {
+    pub(super) fn subscriber(&self, buffer: usize) -> Result<Subscriber<H, E>> {
         Ok(Subscriber {
             raw: self.raw.subscriber(self.spec, buffer)?,
             spec: self.spec,
@@ -72,7 +72,7 @@ impl<H: Payload, E: Payload> Publisher<H, E> {
         self.topic
     }
 
-    pub(super) fn send(&self, header: H, slice: &[E]) -> Result<(), BusError> {
+    pub(super) fn send(&self, header: H, slice: &[E]) -> Result {
         let count = if has_slice::<E>() { slice.len() } else { 1 };
         self.raw.send(self.topic, count, &mut |loan| {
             let place = match has_slice::<E>() {
@@ -101,7 +101,7 @@ pub(super) struct Subscriber<H, E> {
 
 impl<H: Payload, E: Payload> Subscriber<H, E> {
     /// The next sample; none when all were taken.
-    pub(super) fn receive(&self) -> Result<Option<Slice<H, E>>, BusError> {
+    pub(super) fn receive(&self) -> Result<Option<Slice<H, E>>> {
         let raw = self.raw.receive_sample(self.spec)?;
         Ok(raw.map(|raw| Slice { raw, carries: PhantomData }))
     }

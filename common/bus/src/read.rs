@@ -7,7 +7,7 @@ use std::{
 
 use super::{
     authors::Admitted,
-    error::BusError,
+    error::{BusError, Result},
     make::Bus,
     payload::{Payload, Stamped},
     ports::{Listener, Service, Slice, Subscriber},
@@ -17,10 +17,7 @@ use super::{
 
 impl Bus {
     /// Read `topic`. It fails if the topic is missing, carries another payload, or has no place left.
-    pub fn reader<H: Stamped, E: Payload>(
-        &self,
-        topic: &Topic<H, E>,
-    ) -> Result<Reader<H, E>, BusError> {
+    pub fn reader<H: Stamped, E: Payload>(&self, topic: &Topic<H, E>) -> Result<Reader<H, E>> {
         self.reader_that_keeps(topic, topic.spec.limits.buffer)
     }
 
@@ -29,7 +26,7 @@ impl Bus {
         &self,
         topic: &Topic<H, E>,
         buffer: usize,
-    ) -> Result<Reader<H, E>, BusError> {
+    ) -> Result<Reader<H, E>> {
         let _held = self.hold()?;
         let service = Service::open(&self.node, topic.spec)?;
         self.leave_places(topic.spec, topic.spec.limits.readers, service.readers().len())?;
@@ -40,7 +37,7 @@ impl Bus {
     }
 
     /// Refuse a consumer the last places, which the stages may need.
-    fn leave_places(&self, spec: &Spec, places: usize, taken: usize) -> Result<(), BusError> {
+    fn leave_places(&self, spec: &Spec, places: usize, taken: usize) -> Result {
         if !self.is_stage && taken + Limits::KEPT_FREE >= places {
             let topic = spec.name;
             return Err(BusError::NoPlace { topic, places });
@@ -57,7 +54,7 @@ pub struct Reader<H, E = ()> {
 
 impl<H: Stamped, E: Payload> Reader<H, E> {
     /// The next sample in order of publication; none when all were taken. An error means that the connection to the writer broke.
-    pub fn next_slice(&mut self) -> Result<Option<Slice<H, E>>, BusError> {
+    pub fn next_slice(&mut self) -> Result<Option<Slice<H, E>>> {
         if self.admitted.hold_samples()? {
             return Ok(None);
         }
@@ -78,12 +75,12 @@ impl<H: Stamped, E: Payload> Reader<H, E> {
 
 impl<H: Stamped> Reader<H> {
     /// A copy of the [next](Self::next_slice) sample, which has no slice.
-    pub fn next_sample(&mut self) -> Result<Option<H>, BusError> {
+    pub fn next_sample(&mut self) -> Result<Option<H>> {
         Ok(self.next_slice()?.map(|sample| *sample.header()))
     }
 
     /// Take all samples, and return the newest. It fails as [`Self::next_slice`] does.
-    pub fn newest(&mut self) -> Result<Option<H>, BusError> {
+    pub fn newest(&mut self) -> Result<Option<H>> {
         let mut newest = None;
         while let Some(sample) = self.next_sample()? {
             newest = Some(sample);
@@ -100,7 +97,7 @@ pub struct Wakeup {
 }
 
 impl Wakeup {
-    pub(super) fn open(bus: &Bus, spec: &'static Spec) -> Result<Self, BusError> {
+    pub(super) fn open(bus: &Bus, spec: &'static Spec) -> Result<Self> {
         let _held = bus.hold()?;
         let admit = |taken| bus.leave_places(spec, Limits::LISTENERS, taken);
         let listener = Listener::open(&bus.node, spec, admit)?;
@@ -108,7 +105,7 @@ impl Wakeup {
     }
 
     /// Clear the wakeup, which stays readable until then, and return whether it had an event. Drain it before taking the samples.
-    pub(crate) fn drain(&self) -> Result<bool, BusError> {
+    pub(crate) fn drain(&self) -> Result<bool> {
         let had_events = self.listener.drain()?;
         self.had_events.set(had_events);
         Ok(had_events)
@@ -117,7 +114,7 @@ impl Wakeup {
     /// Drain the wakeup once more if the last drain found an event. The middleware marks a listener as not notified, and then empties
     /// its socket. If the socket loses the datagram of a notification in between, the listener stays marked as notified: nobody
     /// writes to its socket again. That happens only to a drain that finds an event.
-    pub(crate) fn drain_what_came_meanwhile(&self) -> Result<bool, BusError> {
+    pub(crate) fn drain_what_came_meanwhile(&self) -> Result<bool> {
         Ok(self.had_events.get() && self.drain()?)
     }
 }

@@ -5,7 +5,11 @@ use std::{
     time::Duration,
 };
 
-use crate::{error::BusError, poll, read::Wakeup};
+use crate::{
+    error::{BusError, Result},
+    poll,
+    read::Wakeup,
+};
 
 /// Waits for wakeups and other descriptors (sockets, signals, processes) at once.
 #[derive(Debug, Default)]
@@ -20,7 +24,7 @@ impl Waiter {
     }
 
     /// Wait for `descriptor` too, until it is readable; the caller reads from it. An error means that the process has no descriptor left.
-    pub fn on_readable(&mut self, descriptor: impl AsFd) -> Result<(), BusError> {
+    pub fn on_readable(&mut self, descriptor: impl AsFd) -> Result {
         let own = descriptor.as_fd().try_clone_to_owned().map_err(BusError::Wait)?;
         self.descriptors.push(own);
         Ok(())
@@ -28,15 +32,11 @@ impl Waiter {
 
     /// Wait until a wakeup or a descriptor is readable or `timeout` has passed, and drain the wakeups. Returns whether anything was
     /// readable.
-    pub fn wait(&self, timeout: Duration) -> Result<bool, BusError> {
+    pub fn wait(&self, timeout: Duration) -> Result<bool> {
         self.wait_also_for(&[], timeout)
     }
 
-    pub fn wait_also_for(
-        &self,
-        others: &[BorrowedFd<'_>],
-        timeout: Duration,
-    ) -> Result<bool, BusError> {
+    pub fn wait_also_for(&self, others: &[BorrowedFd<'_>], timeout: Duration) -> Result<bool> {
         let wakeups = self.wakeups.iter().map(AsFd::as_fd);
         let own = self.descriptors.iter().map(AsFd::as_fd);
         let all: Vec<BorrowedFd<'_>> = wakeups.chain(own).chain(others.iter().copied()).collect();

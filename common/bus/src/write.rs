@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use super::{
     clock::MissionTime,
-    error::BusError,
+    error::Result,
     make::Bus,
     payload::{Payload, Stamp, Stamped},
     ports::{Notifier, Publisher, Service},
@@ -14,11 +14,7 @@ use super::{
 impl Bus {
     /// Write `topic` as the `generation`-th process of its stage. It fails if the topic is missing, carries another payload, or has no
     /// place left.
-    pub fn writer<H: Stamped>(
-        &self,
-        topic: &Topic<H>,
-        generation: u32,
-    ) -> Result<Writer<H>, BusError> {
+    pub fn writer<H: Stamped>(&self, topic: &Topic<H>, generation: u32) -> Result<Writer<H>> {
         self.slice_writer(topic, generation, 0)
     }
 
@@ -28,7 +24,7 @@ impl Bus {
         topic: &Topic<H, E>,
         generation: u32,
         longest: usize,
-    ) -> Result<Writer<H, E>, BusError> {
+    ) -> Result<Writer<H, E>> {
         let _held = self.hold()?;
         let service = Service::open(&self.node, topic.spec)?;
         Ok(Writer {
@@ -55,7 +51,7 @@ pub struct Writer<H, E = ()> {
 impl<H: Stamped> Writer<H> {
     /// Stamp `sample` with `tick` and the mission time `time`, publish it, and wake the readers. It fails if no memory is left for the
     /// sample; the limits prevent that unless a reader holds more than it may.
-    pub fn publish(&mut self, tick: u64, time: MissionTime, sample: H) -> Result<(), BusError> {
+    pub fn publish(&mut self, tick: u64, time: MissionTime, sample: H) -> Result {
         self.publish_slice(tick, time, sample, &[])
     }
 }
@@ -68,7 +64,7 @@ impl<H: Stamped, E: Payload> Writer<H, E> {
         time: MissionTime,
         header: H,
         slice: &[E],
-    ) -> Result<(), BusError> {
+    ) -> Result {
         self.publish_quietly(tick, time, header, slice)?;
         self.wake()
     }
@@ -80,7 +76,7 @@ impl<H: Stamped, E: Payload> Writer<H, E> {
         time: MissionTime,
         mut header: H,
         slice: &[E],
-    ) -> Result<(), BusError> {
+    ) -> Result {
         let Self { generation, sequence, .. } = *self;
         *header.stamp_mut() = Stamp { tick, stamp_ns: time.0, generation, sequence };
         self.sequence = sequence.wrapping_add(1);
@@ -88,12 +84,12 @@ impl<H: Stamped, E: Payload> Writer<H, E> {
     }
 
     /// Publish `header`, with the stamp that it has, and `slice`, and wake the readers.
-    pub(super) fn publish_as_stamped(&self, header: H, slice: &[E]) -> Result<(), BusError> {
+    pub(super) fn publish_as_stamped(&self, header: H, slice: &[E]) -> Result {
         self.publisher.send(header, slice)?;
         self.wake()
     }
 
-    pub fn wake(&self) -> Result<(), BusError> {
+    pub fn wake(&self) -> Result {
         self.notifier.wake(self.publisher.topic())
     }
 

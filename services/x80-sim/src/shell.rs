@@ -14,13 +14,14 @@ use std::{
 use common::{
     checkpoint::Checkpoint,
     clock::{Pace, monotonic_ns},
+    file::append,
     mission::Mission,
     poll,
 };
 
 use self::session::Session;
 use crate::{
-    error::SimError,
+    error::{Result, SimError},
     robot::Robot,
     saved_state::{self, SavedState},
     transport::{Transport, Way},
@@ -53,7 +54,7 @@ pub struct SimOptions {
 
 /// Run until `stop` becomes readable (or its other end is closed). Fails when it cannot listen, the transport fails,
 /// or its state cannot be saved.
-pub fn run(options: SimOptions, stop: impl AsFd) -> Result<(), SimError> {
+pub fn run(options: SimOptions, stop: impl AsFd) -> Result {
     let SimOptions { mission, pace, listen, transport, own_user_only, keep, ground_truth } =
         options;
     let way = Way::open(transport, listen, own_user_only)?;
@@ -104,17 +105,13 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result<(), SimError> {
 
 /// Waits until nobody else has `file`, which it makes.
 fn lock(file: &Path) -> io::Result<File> {
-    let file = File::options().create(true).append(true).open(file)?;
+    let file = append(file)?;
     file.lock()?;
     Ok(file)
 }
 
 /// Returns whether bytes and whether the stop came.
-fn wait(
-    session: &Session,
-    stop: &impl AsFd,
-    timeout: Option<Duration>,
-) -> Result<[bool; 2], SimError> {
+fn wait(session: &Session, stop: &impl AsFd, timeout: Option<Duration>) -> Result<[bool; 2]> {
     let mut descriptors = session.readable();
     descriptors.push(stop.as_fd());
     let mut came = poll::readable(&descriptors, timeout).map_err(SimError::Wait)?;

@@ -9,7 +9,7 @@ mod udp;
 use std::{io, net::SocketAddr, os::fd::BorrowedFd};
 
 pub(crate) use self::source::Source;
-use crate::error::SimError;
+use crate::error::{Result, SimError};
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Transport {
@@ -52,7 +52,7 @@ impl Way {
         transport: Transport,
         address: SocketAddr,
         own_user_only: bool,
-    ) -> Result<Self, SimError> {
+    ) -> Result<Self> {
         let bound = |source| SimError::Bind { address, source };
         Ok(Self(match transport {
             Transport::Udp => Box::new(udp::Udp::bind(address, own_user_only).map_err(bound)?),
@@ -61,7 +61,7 @@ impl Way {
         }))
     }
 
-    pub(crate) fn connected(&mut self) -> Result<Option<Source>, SimError> {
+    pub(crate) fn connected(&mut self) -> Result<Option<Source>> {
         self.0.connected().map_err(|source| self.lost(source))
     }
 
@@ -81,7 +81,7 @@ impl Way {
     pub(crate) fn receive<'b>(
         &mut self,
         buffer: &'b mut [u8],
-    ) -> Result<Option<(Source, &'b [u8])>, SimError> {
+    ) -> Result<Option<(Source, &'b [u8])>> {
         let received = self.0.receive(buffer).map_err(|source| self.lost(source))?;
         Ok(received.and_then(|(source, length)| Some((source, buffer.get(..length)?))))
     }

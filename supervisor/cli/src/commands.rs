@@ -6,7 +6,7 @@ mod check;
 mod diff;
 mod go_back;
 mod goto;
-pub(crate) mod help;
+pub mod help;
 mod install;
 mod logs;
 mod man;
@@ -39,7 +39,7 @@ use ::report::ReportError;
 use clap::{CommandFactory as _, Parser, Subcommand};
 use console::{
     completion,
-    failure::{self, Failure},
+    failure::{self, Result},
 };
 
 use crate::companions;
@@ -52,7 +52,7 @@ macro_rules! commands {
         $(@ $companion:literal)*
     })*) => {
         #[derive(Debug, Subcommand)]
-        pub(crate) enum Command {
+        pub enum Command {
             $($($name($module::Arguments),)*)*
         }
 
@@ -61,7 +61,7 @@ macro_rules! commands {
             &[$(($heading, &[$(stringify!($name),)* $($companion,)*])),*];
 
         impl Command {
-            pub(crate) fn execute(&self) -> Result<ExitCode, Failure> {
+            pub fn execute(&self) -> Result<ExitCode> {
                 Ok(match self {
                     $($(Self::$name(arguments) => $module::main(arguments $(, $whole())?)?.report(),)*)*
                 })
@@ -147,19 +147,19 @@ const EXIT_CODES: &str = "Exit codes of run:
 An error message ends with a code in brackets, which scripts can match.";
 
 /// Help, completions and the manual page come from it.
-pub(crate) fn command_line() -> clap::Command {
+pub fn command_line() -> clap::Command {
     Arguments::command().subcommands(companions::TABLE.iter().map(companions::Companion::command))
 }
 
 /// Only errors that no other executable has get a code here.
-pub(crate) fn error_code(error: &(dyn Error + 'static)) -> Option<&'static str> {
+pub fn error_code(error: &(dyn Error + 'static)) -> Option<&'static str> {
     match error.downcast_ref()? {
         ReportError::Recording(error) => failure::code(error),
         _ => None,
     }
 }
 
-pub(crate) fn parse<T: AsRef<OsStr>>(words: &[T]) -> Result<Command, clap::Error> {
+pub fn parse<T: AsRef<OsStr>>(words: &[T]) -> Result<Command, clap::Error> {
     let executable = OsString::from("firsthand");
     let words =
         std::iter::once(executable).chain(words.iter().map(|word| word.as_ref().to_owned()));
@@ -169,7 +169,7 @@ pub(crate) fn parse<T: AsRef<OsStr>>(words: &[T]) -> Result<Command, clap::Error
 
 impl Command {
     /// None if the command sees to its log itself.
-    pub(crate) fn log_level(&self) -> Option<&'static str> {
+    pub fn log_level(&self) -> Option<&'static str> {
         match self {
             Self::Run(_) | Self::BringUp(_) | Self::Calibrate(_) => None,
             Self::Stage(arguments) if arguments.is_process() => Some("info"),

@@ -12,11 +12,11 @@ use std::{
 use clap::Arg;
 use console::{
     completion::{INDEX, VARIABLE},
-    failure::{Failure, Refused},
+    failure::{Failure, Refused, Result},
 };
 use processes::executable;
 
-pub(crate) struct Companion {
+pub struct Companion {
     pub name: &'static str,
     executable: &'static str,
     /// The executable has further subcommands and is told this one's name.
@@ -33,10 +33,10 @@ const fn laboratory(name: &'static str, about: &'static str) -> Companion {
 }
 
 /// It measures robots and contains the planners to compare with.
-pub(crate) const LABORATORY: &str = "firsthand-lab";
+pub const LABORATORY: &str = "firsthand-lab";
 
 /// THE table: the package, completions, help and the manual page know them from here.
-pub(crate) static TABLE: [Companion; 8] = [
+pub static TABLE: [Companion; 8] = [
     viewer(
         "top",
         "firsthand-top",
@@ -58,13 +58,13 @@ pub(crate) static TABLE: [Companion; 8] = [
     laboratory("bench", "Measure ticks; send random signals to a robot's processes"),
 ];
 
-pub(crate) fn find(named: &OsStr) -> Option<&'static Companion> {
+pub fn find(named: &OsStr) -> Option<&'static Companion> {
     TABLE.iter().find(|companion| named == companion.name)
 }
 
 /// `words` after `firsthand` name a companion or ask for its help. None if they name none, else the error of an
 /// executable that does not start.
-pub(crate) fn execute(words: &[OsString]) -> Option<Result<ExitCode, Failure>> {
+pub fn execute(words: &[OsString]) -> Option<Result<ExitCode>> {
     let (first, rest) = words.split_first()?;
     let (companion, options) = match find(first) {
         Some(companion) => (companion, rest.to_vec()),
@@ -78,7 +78,7 @@ pub(crate) fn execute(words: &[OsString]) -> Option<Result<ExitCode, Failure>> {
 }
 
 /// A companion answers a shell itself. `words` are the executable, `--`, and the line that is completed.
-pub(crate) fn answer_shell(words: &[OsString]) {
+pub fn answer_shell(words: &[OsString]) {
     let Some(companion) = words.get(3).and_then(|word| find(word)) else { return };
     if env::var_os(VARIABLE).is_none() || words.len() < 5 {
         return;
@@ -102,7 +102,7 @@ impl Companion {
     }
 
     /// Help, completions and the manual page show it.
-    pub(crate) fn command(&self) -> clap::Command {
+    pub fn command(&self) -> clap::Command {
         let words = Arg::new("words")
             .num_args(0..)
             .allow_hyphen_values(true)
@@ -112,7 +112,7 @@ impl Companion {
 }
 
 /// The executable is beside this one or on PATH. Returns why that is impossible.
-pub(crate) fn become_executable(named: &str, words: impl Iterator<Item = OsString>) -> Failure {
+pub fn become_executable(named: &str, words: impl Iterator<Item = OsString>) -> Failure {
     match executable::find(Path::new(named)) {
         Ok(found) => {
             let error = Command::new(&found).args(words).exec();

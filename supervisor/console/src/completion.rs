@@ -15,7 +15,7 @@ use clap_complete::{
 use common::{domain::RobotName, topics};
 use processes::stages;
 
-use crate::{failure::Failure, missions, output::print_text, robots};
+use crate::{failure::Result, missions, output::print_text, robots};
 
 /// Print completions for a shell: `firsthand completions bash > ~/.local/share/bash-completion/completions/firsthand`.
 #[derive(Debug, Args)]
@@ -32,7 +32,7 @@ pub const INDEX: &str = "_CLAP_COMPLETE_INDEX";
 /// The shell finds it on PATH.
 const EXECUTABLE: &str = "firsthand";
 
-pub fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     let shells = Shells::builtins();
     let shell = shells.completer(&arguments.shell).ok_or("name a shell")?;
     let mut script = Vec::new();

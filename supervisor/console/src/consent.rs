@@ -2,10 +2,10 @@
 
 use std::io::{self, IsTerminal as _};
 
-use super::{failure::Failure, output::write_stderr};
+use super::{failure::Result, output::write_stderr};
 
 /// Says what will be done, and asks whether it shall be. Fails if it shall not, or nobody is there to answer.
-pub fn ask(will: &str, question: &str) -> Result<(), Failure> {
+pub fn ask(will: &str, question: &str) -> Result {
     if !io::stdin().is_terminal() {
         return Err(format!("{will}; give --yes to agree").into());
     }

@@ -6,7 +6,7 @@ use clap::Parser;
 
 use crate::{
     completion,
-    failure::{self, Failure},
+    failure::{self, Result},
     logging,
 };
 
@@ -14,7 +14,7 @@ use crate::{
 /// knows the codes of errors that only this executable has.
 pub fn run<A: Parser>(
     log_level: &str,
-    execute: fn(&A) -> Result<ExitCode, Failure>,
+    execute: fn(&A) -> Result<ExitCode>,
     own_code: fn(&(dyn Error + 'static)) -> Option<&'static str>,
 ) -> ExitCode {
     completion::answer_shell(A::command, Vec::new);

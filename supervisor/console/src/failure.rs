@@ -19,6 +19,8 @@ use super::{missions::LookupError, output::write_stderr, robots};
 /// A sentence that names the input and the remedy.
 pub type Failure = Box<dyn Error>;
 
+pub type Result<T = (), E = Failure> = std::result::Result<T, E>;
+
 #[derive(Debug, Error)]
 #[error("{message}")]
 pub struct Refused {
@@ -36,7 +38,7 @@ impl Refused {
 /// Reports an error and its code on standard error: `own_code` knows codes of errors that only this executable has,
 /// [`code`] the others.
 pub fn report(
-    result: Result<ExitCode, Failure>,
+    result: Result<ExitCode>,
     own_code: fn(&(dyn Error + 'static)) -> Option<&'static str>,
 ) -> ExitCode {
     result.unwrap_or_else(|error| {

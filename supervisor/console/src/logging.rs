@@ -14,6 +14,8 @@ use std::{
     sync::Mutex,
 };
 
+use common::file::append;
+
 use tracing::{Level, Metadata};
 use tracing_subscriber::{
     Layer, Registry,
@@ -49,7 +51,7 @@ pub fn to_stderr(default: &str) {
 
 /// Appends to `file`, and to the journal if there is one. Fails if the file cannot be opened.
 pub fn to_file(file: &Path, default: &str) -> io::Result<()> {
-    let log = Mutex::new(File::options().create(true).append(true).open(file)?);
+    let log = Mutex::new(append(file)?);
     let mut layers: Vec<AnyLayer> =
         vec![fmt::layer().with_writer(log).log_internal_errors(false).with_ansi(false).boxed()];
     if to_journal() {

@@ -13,12 +13,12 @@ use processes::stages::{self, Stage};
 use rustix::process::Signal;
 
 use super::{
-    failure::{Failure, Refused},
+    failure::{Refused, Result},
     output::write_stderr,
 };
 
 /// Waits until the robot rests. Fails if it does not.
-pub fn stand(robot: &RobotName) -> Result<(), Failure> {
+pub fn stand(robot: &RobotName) -> Result {
     if let Some(why) = operator::stand(robot)? {
         write_stderr(&format!("firsthand: the robot rests; its supervisor was not told: {why}\n"));
     }
@@ -26,7 +26,7 @@ pub fn stand(robot: &RobotName) -> Result<(), Failure> {
 }
 
 /// Fails if the table has no such stage.
-pub fn known(stage: &str) -> Result<&'static str, Failure> {
+pub fn known(stage: &str) -> Result<&'static str> {
     Ok(known_stage(stage)?.name)
 }
 
@@ -36,7 +36,7 @@ pub fn known_stage(stage: &str) -> Result<&'static Stage, Refused> {
 
 /// Sends a signal to the process of this name that holds the lock of its robot, and to no other. The roster comes five times a second:
 /// where it still names a process that has ended, the successor is waited for.
-pub fn send(robot: &RobotName, stage: &str, signal: Signal) -> Result<(), Failure> {
+pub fn send(robot: &RobotName, stage: &str, signal: Signal) -> Result {
     let domain = Domain::of(robot.clone());
     // A frozen supervisor publishes nothing.
     if stage == "supervisor" {

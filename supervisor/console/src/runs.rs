@@ -12,7 +12,7 @@ use mission_control::recovery::SUMMARY;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    failure::{Failure, Refused},
+    failure::{Refused, Result},
     output::write_stderr,
     robots::{Robot, entries},
 };
@@ -125,7 +125,7 @@ fn size(directory: &Path, levels: u32) -> u64 {
 }
 
 /// Fails if the directory holds an earlier run.
-pub fn own(directory: &Path) -> Result<PathBuf, Failure> {
+pub fn own(directory: &Path) -> Result<PathBuf> {
     fs::create_dir_all(directory).map_err(|error| {
         format!("cannot make {}: {error}; give another --out", directory.display())
     })?;
@@ -140,7 +140,7 @@ pub fn own(directory: &Path) -> Result<PathBuf, Failure> {
 }
 
 /// `NAME-NNN`, after the highest number there. Fails if it cannot be made.
-pub fn numbered(runs: &Path, name: &str) -> Result<PathBuf, Failure> {
+pub fn numbered(runs: &Path, name: &str) -> Result<PathBuf> {
     fs::create_dir_all(runs).map_err(|error| {
         format!("cannot make {}: {error}; say where with --out", runs.display())
     })?;

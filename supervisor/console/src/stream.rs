@@ -5,10 +5,7 @@ use std::{
     time::Duration,
 };
 
-use common::{
-    poll,
-    signals::{SIGHUP, SIGINT, SIGTERM, Signals},
-};
+use common::{poll, signals::Signals};
 
 use super::output::unless_closed;
 
@@ -39,7 +36,7 @@ impl Stream {
 
     /// [`Self::open`] without the lower priority.
     pub fn with_usual_priority() -> io::Result<Self> {
-        Ok(Self { signals: Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?, ended: false })
+        Ok(Self { signals: Signals::that_end()?, ended: false })
     }
 
     pub fn has_ended(&mut self) -> bool {

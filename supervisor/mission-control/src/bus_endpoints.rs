@@ -20,7 +20,7 @@ use common::{
 use processes::{domain::DomainLock, stages};
 
 use crate::{
-    error::{SupervisorError, system},
+    error::{Result, system},
     observer::{Observer, Record},
 };
 
@@ -46,7 +46,7 @@ pub(crate) struct BusEndpoints {
 }
 
 impl BusEndpoints {
-    pub(crate) fn open(lock: &DomainLock) -> Result<Self, SupervisorError> {
+    pub(crate) fn open(lock: &DomainLock) -> Result<Self> {
         Self::continued(lock, Record::default(), (0, RequestAnswer::Taken))
     }
 
@@ -54,7 +54,7 @@ impl BusEndpoints {
         lock: &DomainLock,
         record: Record,
         last_request: (u64, RequestAnswer),
-    ) -> Result<Self, SupervisorError> {
+    ) -> Result<Self> {
         let bus = lock.bus();
         let bus = bus.ok_or_else(|| system("open the bus")(io::ErrorKind::NotConnected.into()))?;
         let mut waiter = Waiter::default();
@@ -79,7 +79,7 @@ impl BusEndpoints {
         })
     }
 
-    pub(crate) fn recreate(mut self, lock: &mut DomainLock) -> Result<Self, SupervisorError> {
+    pub(crate) fn recreate(mut self, lock: &mut DomainLock) -> Result<Self> {
         let mut record = std::mem::take(&mut self.observer.record);
         // The next link opens the connection to the robot again.
         record.link = None;

@@ -6,6 +6,8 @@ use thiserror::Error;
 
 use crate::simulator::SimulatorError;
 
+pub(crate) type Result<T = (), E = SupervisorError> = std::result::Result<T, E>;
+
 #[derive(Debug, Error)]
 pub enum SupervisorError {
     #[error(transparent)]

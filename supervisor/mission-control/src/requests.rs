@@ -15,7 +15,7 @@ use common::{
 use glam::DVec2;
 
 use crate::{
-    error::SupervisorError,
+    error::Result,
     outcome::{Ending, Outcome, allowed_m},
     supervisor::Supervisor,
     target_list,
@@ -26,7 +26,7 @@ const HAND_AHEAD_M: f64 = 0.3;
 
 impl Supervisor<'_> {
     /// Carry out and answer the requests of operators. Returns whether there was one.
-    pub(crate) fn take_requests(&mut self, first_tick: u64) -> Result<bool, SupervisorError> {
+    pub(crate) fn take_requests(&mut self, first_tick: u64) -> Result<bool> {
         let mut asked = false;
         while let Some(request) = self.bus.requests.next_sample()? {
             asked = true;

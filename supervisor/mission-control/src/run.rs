@@ -2,12 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use common::{
-    domain::Domain,
-    ground_truth::GroundTruthTick,
-    samples::Cause,
-    signals::{SIGHUP, SIGINT, SIGTERM, Signals},
-};
+use common::{domain::Domain, ground_truth::GroundTruthTick, samples::Cause, signals::Signals};
 use processes::{
     domain::DomainLock,
     last_resort::{self, Turns},
@@ -15,7 +10,7 @@ use processes::{
 
 use crate::{
     decisive::{self, Timeout},
-    error::{SupervisorError, system},
+    error::{Result, system},
     observer::{Listener, Record},
     outcome::{Ending, Wheels, allowed_m},
     progress::Progress,
@@ -50,7 +45,7 @@ pub struct StillMoving<'a> {
 
 impl StillMoving<'_> {
     /// Wait until the robot rests or a signal tells this process to leave it. Returns what the robot did then.
-    pub fn watch(mut self) -> Result<&'static str, SupervisorError> {
+    pub fn watch(mut self) -> Result<&'static str> {
         let supervisor = &mut self.supervisor;
         let did = loop {
             supervisor.wait_turn()?;
@@ -75,8 +70,8 @@ impl StillMoving<'_> {
 pub type EndSignals = [Signals; 2];
 
 /// Catch them from now on. Call this before the first file of a run is made, so that a signal leaves none.
-pub fn end_signals() -> Result<EndSignals, SupervisorError> {
-    let catch = || Signals::catch(&[SIGINT, SIGTERM, SIGHUP]).map_err(system("catch signals"));
+pub fn end_signals() -> Result<EndSignals> {
+    let catch = || Signals::that_end().map_err(system("catch signals"));
     Ok([catch()?, catch()?])
 }
 
@@ -109,7 +104,7 @@ pub fn run<'a>(
     consumer: &mut dyn Consumer,
     listener: Listener,
     show: &mut dyn FnMut(&Progress<'_>),
-) -> Result<(Finished, Option<StillMoving<'a>>), SupervisorError> {
+) -> Result<(Finished, Option<StillMoving<'a>>)> {
     let turns = Turns::default();
     let domain = Domain::of(options.robot.clone());
     last_resort::watch(for_last_resort, turns.clone(), domain.clone());

@@ -9,7 +9,7 @@ use common::{
 use processes::{domain::DomainLock, policy::Now};
 
 use crate::{
-    error::SupervisorError,
+    error::Result,
     judge::{RESTS_WITHIN, TickProgress},
     order::Decision,
     outcome::Wheels,
@@ -30,7 +30,7 @@ impl Supervisor<'_> {
         &mut self,
         trusts_encoders: bool,
         catch_up: &mut dyn FnMut(),
-    ) -> Result<Wheels, SupervisorError> {
+    ) -> Result<Wheels> {
         self.service.stopping();
         self.decision = Decision::ENDING;
         let wheels = match self.come_to_rest()? {
@@ -48,7 +48,7 @@ impl Supervisor<'_> {
         Ok(wheels)
     }
 
-    pub(crate) fn stop_processes(&mut self) -> Result<(), SupervisorError> {
+    pub(crate) fn stop_processes(&mut self) -> Result {
         self.stages.start_no_more();
         self.stop_all()?;
         if let Some(simulator) = &mut self.robot.simulator {
@@ -59,7 +59,7 @@ impl Supervisor<'_> {
 
     /// Recreate the bus, files of which block the start of a stage, and restart all stages from their checkpoints. A consumer of the old
     /// bus asks [`Bus::is_replaced`](common::bus::Bus::is_replaced).
-    pub(crate) fn recreate_bus(mut self, lock: &mut DomainLock) -> Result<Self, SupervisorError> {
+    pub(crate) fn recreate_bus(mut self, lock: &mut DomainLock) -> Result<Self> {
         tracing::error!("the bus is recreated; consumers must join it again");
         self.decision = Decision::STARTING;
         self.stand()?;
@@ -74,7 +74,7 @@ impl Supervisor<'_> {
     }
 
     /// Order the robot to stand, and wait a moment for the link to confirm it.
-    fn stand(&mut self) -> Result<(), SupervisorError> {
+    fn stand(&mut self) -> Result {
         self.publish_state()?;
         let began = self.stages.now();
         loop {
@@ -88,7 +88,7 @@ impl Supervisor<'_> {
     }
 
     /// Order the end of the mission, and wait until the encoders say that the robot rests, or have said nothing for too long.
-    fn come_to_rest(&mut self) -> Result<Wheels, SupervisorError> {
+    fn come_to_rest(&mut self) -> Result<Wheels> {
         self.publish_state()?;
         let began = self.stages.now();
         let mut heard = began;
@@ -142,7 +142,7 @@ impl Supervisor<'_> {
         self.stages.now().saturating_sub(since)
     }
 
-    pub(crate) fn wait_turn(&mut self) -> Result<(), SupervisorError> {
+    pub(crate) fn wait_turn(&mut self) -> Result {
         self.service.feed();
         self.bus.observer.read_all(&mut self.stages, &mut self.listener)?;
         self.poll_processes(self.first_tick())?;
@@ -154,13 +154,13 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    fn stop_all(&mut self) -> Result<(), SupervisorError> {
+    fn stop_all(&mut self) -> Result {
         self.stop_stages(1)?;
         self.stop_stages(0)
     }
 
     /// Stop the stages from the `first` of the start order on, all at once.
-    fn stop_stages(&mut self, first: usize) -> Result<(), SupervisorError> {
+    fn stop_stages(&mut self, first: usize) -> Result {
         while self.stages.stop_from(first) {
             self.wait()?;
             self.wait_turn()?;

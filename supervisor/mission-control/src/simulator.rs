@@ -12,6 +12,7 @@ use std::{
 
 use common::{
     clock::Pace,
+    file::append,
     ground_truth::{GROUND_TRUTH, GroundTruthHeader, GroundTruthTick},
     mission::Mission,
     poll, run,
@@ -73,7 +74,7 @@ impl Simulator {
         let file = directory.join("mission.toml");
         fs::write(&file, text).map_err(system(format!("write {} for", file.display())))?;
         let log_path = directory.join("x80-sim.log");
-        let log = File::options().create(true).append(true).open(&log_path);
+        let log = append(&log_path);
         let log = log.map_err(system(format!("write {} for", log_path.display())))?;
         let checkpoint = run::checkpoint_file(directory, "x80-sim");
         let mission = file.to_str().ok_or_else(|| {
@@ -97,7 +98,7 @@ impl Simulator {
         let flags = fcntl_getfl(&pipe).map_err(|errno| system("listen to")(errno.into()))?;
         fcntl_setfl(&pipe, flags | OFlags::NONBLOCK)
             .map_err(|errno| system("listen to")(errno.into()))?;
-        let file = File::options().create(true).append(true).open(directory.join(GROUND_TRUTH));
+        let file = append(directory.join(GROUND_TRUTH));
         let mut truth = GroundTruth {
             pipe,
             file: file.ok(),

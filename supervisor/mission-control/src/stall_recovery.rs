@@ -7,7 +7,7 @@ use common::samples::{Cause, Order, RecoveryStep, StallSample, TickLimitSample};
 use processes::{records, stages};
 
 use crate::{
-    error::SupervisorError,
+    error::Result,
     outcome::{Ending, Outcome},
     recovery_step::Next,
     stall,
@@ -16,7 +16,7 @@ use crate::{
 
 impl Supervisor<'_> {
     /// Look for stalls, and take the next recovery step. The last one ends the mission.
-    pub(crate) fn watch_for_stalls(&mut self) -> Result<Option<Ending>, SupervisorError> {
+    pub(crate) fn watch_for_stalls(&mut self) -> Result<Option<Ending>> {
         if self.decision.order() != Order::Drive {
             // In lockstep mission time stands still meanwhile.
             let record = &self.bus.observer.record;
@@ -88,7 +88,7 @@ impl Supervisor<'_> {
         records::append(&self.options.directory, records::STALLS, stall);
     }
 
-    fn carry_out(&mut self, step: RecoveryStep) -> Result<(), SupervisorError> {
+    fn carry_out(&mut self, step: RecoveryStep) -> Result {
         match step {
             RecoveryStep::Replan => self.stages.replace(stages::PLANNER, self.first_tick()),
             // The directive carries the new epoch.
@@ -117,7 +117,7 @@ impl Supervisor<'_> {
     }
 
     /// Publish the limit of the link, if there is one and it changed.
-    pub(crate) fn publish_tick_limit(&mut self) -> Result<(), SupervisorError> {
+    pub(crate) fn publish_tick_limit(&mut self) -> Result {
         let target_number = self.targets.number();
         let limit = self.recovery_steps.limit();
         let limit = limit.map(|limit| TickLimitSample { target_number, ..limit });

@@ -29,7 +29,7 @@ use processes::{
 use crate::{
     bus_endpoints::BusEndpoints,
     decisive,
-    error::SupervisorError,
+    error::Result,
     judge::{self, Arrival, Deadline, StopClock, TickProgress},
     observer::Listener,
     order::{self, Decision},
@@ -66,7 +66,7 @@ pub(crate) struct Robot {
 }
 
 impl Robot {
-    fn start(options: &Options, signals: &Signals) -> Result<Self, SupervisorError> {
+    fn start(options: &Options, signals: &Signals) -> Result<Self> {
         if let Some(address) = &options.mission.robot.address {
             let address = address.parse::<Address<String>>()?.resolve()?;
             return Ok(Self { simulator: None, address });
@@ -94,7 +94,7 @@ impl Robot {
     }
 
     /// Read the ground truth. Returns whether a simulated robot's process still runs.
-    pub(crate) fn poll(&mut self) -> Result<bool, SupervisorError> {
+    pub(crate) fn poll(&mut self) -> Result<bool> {
         Ok(self.simulator.as_mut().map(Simulator::poll).transpose()?.unwrap_or(true))
     }
 }
@@ -135,7 +135,7 @@ impl<'a> Supervisor<'a> {
         (turns, signals): (Turns, &Signals),
         consumer: &mut dyn Consumer,
         listener: Listener,
-    ) -> Result<Self, SupervisorError> {
+    ) -> Result<Self> {
         let directory = &options.directory;
         let mission = &options.mission;
         let mut state_file = StateFile::open(directory)?;
@@ -209,7 +209,7 @@ impl<'a> Supervisor<'a> {
     }
 
     /// Recreate the bus. No stage may use the old one.
-    pub(crate) fn with_new_bus(self, lock: &mut DomainLock) -> Result<Self, SupervisorError> {
+    pub(crate) fn with_new_bus(self, lock: &mut DomainLock) -> Result<Self> {
         let bus = self.bus.recreate(lock)?;
         Ok(Self { bus, ..self })
     }
@@ -221,7 +221,7 @@ impl<'a> Supervisor<'a> {
         lock: &mut DomainLock,
         consumer: &mut dyn Consumer,
         show: &mut dyn FnMut(&Progress<'_>),
-    ) -> Result<Option<Ending>, SupervisorError> {
+    ) -> Result<Option<Ending>> {
         self.bus.waiter.on_readable(&*signals)?;
         // In wall-clock time nothing waits for a consumer that is slow.
         let mut catch_up_at = self.clock.in_ticks().then_some(0);
@@ -256,7 +256,7 @@ impl<'a> Supervisor<'a> {
         }
     }
 
-    fn iterate(&mut self) -> Result<Option<Ending>, SupervisorError> {
+    fn iterate(&mut self) -> Result<Option<Ending>> {
         let roster_changed = self.bus.observer.read_all(&mut self.stages, &mut self.listener)?;
         let next = self.take_arrival() | self.miss_hand();
         let first_tick = self.first_tick();
@@ -283,7 +283,7 @@ impl<'a> Supervisor<'a> {
     }
 
     /// Reap and restart stages; log, publish and record each death once. Returns whether there was one.
-    pub(crate) fn poll_processes(&mut self, first_tick: u64) -> Result<bool, SupervisorError> {
+    pub(crate) fn poll_processes(&mut self, first_tick: u64) -> Result<bool> {
         let deaths = self.stages.poll(&self.bus.bus, first_tick)?;
         for death in &deaths {
             death.log();
@@ -388,7 +388,7 @@ impl<'a> Supervisor<'a> {
 
     /// Save the state, then publish the order and the roster. The roster confirms an operator's request, so the state is
     /// saved before.
-    pub(crate) fn publish_state(&mut self) -> Result<(), SupervisorError> {
+    pub(crate) fn publish_state(&mut self) -> Result {
         self.state_file.state.targets = Some(self.targets.clone());
         if let Err(error) = self.state_file.save() {
             // Only a supervisor that resumes this run needs the state, so the mission goes on.
@@ -439,7 +439,7 @@ impl<'a> Supervisor<'a> {
         self.service.show(|| progress.to_string());
     }
 
-    pub(crate) fn wait(&mut self) -> Result<(), SupervisorError> {
+    pub(crate) fn wait(&mut self) -> Result {
         self.turns.count();
         let mut descriptors = self.stages.descriptors();
         descriptors.extend(self.robot.simulator.as_ref().map(Simulator::descriptor));

@@ -66,7 +66,7 @@ struct Tick {
 }
 
 /// The content of the newest samples.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Collector {
     mission: Mission,
     /// Ticks whose samples come in, by their numbers.
@@ -90,18 +90,12 @@ impl Collector {
     pub fn new(mission: &Mission) -> Self {
         Self {
             mission: mission.clone(),
-            ticks: BTreeMap::new(),
-            pose_tick: 0,
             newest: Tick {
                 ranges: Some(vec![None; mission.sensor_table().len()]),
                 ..Tick::default()
             },
             state: RobotState::of_mission(mission),
-            usage: Vec::new(),
-            truths: VecDeque::new(),
-            state_of: None,
-            map_of: None,
-            field_of: None,
+            ..Self::default()
         }
     }
 

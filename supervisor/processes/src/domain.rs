@@ -14,6 +14,7 @@ use common::{
     bus::{Bus, Services},
     claim::Claim,
     domain::{Domain, SHARED_MEMORY},
+    file::append,
     topics,
 };
 
@@ -156,7 +157,7 @@ impl DomainLock {
         }
         // A consumer that waits for the last of them finds all others.
         for file in [domain.stages_lock_file(), domain.joining_lock_file()] {
-            let made = File::options().create(true).append(true).open(&file);
+            let made = append(&file);
             made.map_err(failed("make", &file))?;
         }
         Ok(())

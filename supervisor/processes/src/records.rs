@@ -2,10 +2,11 @@
 //! log, and the mission goes on.
 
 use std::{
-    fs::File,
     io::{self, Write as _},
     path::Path,
 };
+
+use common::file;
 
 use serde::Serialize;
 
@@ -18,9 +19,9 @@ pub fn append(directory: &Path, name: &str, record: &impl Serialize) {
     }
 }
 
-fn append_line(file: &Path, record: &impl Serialize) -> io::Result<()> {
+fn append_line(path: &Path, record: &impl Serialize) -> io::Result<()> {
     let mut line = serde_json::to_vec(record)?;
     line.push(b'\n');
-    let mut file = File::options().create(true).append(true).open(file)?;
+    let mut file = file::append(path)?;
     file.write_all(&line)
 }

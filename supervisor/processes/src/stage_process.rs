@@ -1,13 +1,13 @@
 //! A stage of a run: its policy and the process of its current generation.
 
 use std::{
-    fs::File,
     io,
     path::{Path, PathBuf},
     process::Stdio,
 };
 
 use common::{
+    file::append,
     mission::Mission,
     run,
     samples::{HealthSample, HealthState, RosterEntry, StageState, name},
@@ -142,7 +142,7 @@ impl StageProcess {
         let log = self.log(directory);
         let named =
             |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", log.display()));
-        let log = File::options().create(true).append(true).open(&log).map_err(named)?;
+        let log = append(&log).map_err(named)?;
         let generation = Generation {
             stage: self.stage.name,
             directory: directory.to_path_buf(),

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use common::{bus::BusError, file::FileError};
 use thiserror::Error;
 
+pub(crate) type Result<T = (), E = RecordingError> = std::result::Result<T, E>;
+
 #[derive(Debug, Error)]
 pub enum RecordingError {
     #[error(transparent)]

@@ -21,7 +21,7 @@ use mcap::{
 };
 
 use crate::{
-    error::RecordingError,
+    error::{RecordingError, Result},
     schema,
     viewers::{self, Channel},
 };
@@ -62,7 +62,7 @@ impl RecordingFile {
         topics: &[&'static dyn AnyTopic],
         run: Option<&Run>,
         about: BTreeMap<String, String>,
-    ) -> Result<Self, RecordingError> {
+    ) -> Result<Self> {
         let named = |error: io::Error| FileError::of("make recording", path)(error);
         if path.exists() {
             return Err(named(io::ErrorKind::AlreadyExists.into()).into());
@@ -136,7 +136,7 @@ impl RecordingFile {
         text: &[u8],
         encoding: &str,
         about: &BTreeMap<String, String>,
-    ) -> Result<(), RecordingError> {
+    ) -> Result {
         let failed = failed(&self.path);
         let schema = self.writer.add_schema(schema, language, text);
         let added =
@@ -146,12 +146,7 @@ impl RecordingFile {
     }
 
     /// Add `message`, a sample of a topic. Returns its log time.
-    pub(crate) fn sample(
-        &mut self,
-        spec: &Spec,
-        stamp: &Stamp,
-        message: &[u8],
-    ) -> Result<u64, RecordingError> {
+    pub(crate) fn sample(&mut self, spec: &Spec, stamp: &Stamp, message: &[u8]) -> Result<u64> {
         let mut times = [self.now_ns(); 2];
         // An operator knows no mission time, and a heartbeat has that of the tick before it.
         if ![OPERATOR, EVERY_STAGE].contains(&spec.writer) {
@@ -166,17 +161,12 @@ impl RecordingFile {
     }
 
     /// Add a message that is no sample.
-    pub(crate) fn message(
-        &mut self,
-        topic: &str,
-        log_ns: u64,
-        message: &[u8],
-    ) -> Result<(), RecordingError> {
+    pub(crate) fn message(&mut self, topic: &str, log_ns: u64, message: &[u8]) -> Result {
         self.write(topic, 0, [log_ns; 2], message)
     }
 
     /// Add the numbers of samples that were lost so far.
-    pub(crate) fn lost(&mut self, lost: &BTreeMap<&str, u64>) -> Result<(), RecordingError> {
+    pub(crate) fn lost(&mut self, lost: &BTreeMap<&str, u64>) -> Result {
         let json = serde_json::json!({"lost": lost}).to_string();
         self.message(LOST, self.now_ns(), json.as_bytes())
     }
@@ -187,7 +177,7 @@ impl RecordingFile {
         sequence: u32,
         [log_time, publish_time]: [u64; 2],
         message: &[u8],
-    ) -> Result<(), RecordingError> {
+    ) -> Result {
         // This topic is not recorded.
         let Some(&channel_id) = self.channels.get(topic) else {
             return Ok(());
@@ -197,7 +187,7 @@ impl RecordingFile {
         written.map_err(failed(&self.path))
     }
 
-    fn metadata(&mut self, metadata: BTreeMap<String, String>) -> Result<(), RecordingError> {
+    fn metadata(&mut self, metadata: BTreeMap<String, String>) -> Result {
         let name = RUN.to_owned();
         let record = Metadata { name, metadata };
         let written = self.writer.write_metadata(&record);
@@ -206,20 +196,20 @@ impl RecordingFile {
     }
 
     /// Write the current chunk, if the last one was written [`CHUNK_EVERY`] ago.
-    pub(crate) fn flush_if_due(&mut self) -> Result<(), RecordingError> {
+    pub(crate) fn flush_if_due(&mut self) -> Result {
         if self.chunk_began.elapsed() >= CHUNK_EVERY {
             self.flush()?;
         }
         Ok(())
     }
 
-    fn flush(&mut self) -> Result<(), RecordingError> {
+    fn flush(&mut self) -> Result {
         self.chunk_began = Instant::now();
         self.writer.flush().map_err(failed(&self.path))
     }
 
     /// Write the rest, and the summary that readers use as an index.
-    pub(crate) fn finish(mut self) -> Result<(), RecordingError> {
+    pub(crate) fn finish(mut self) -> Result {
         self.writer.finish().map(drop).map_err(failed(&self.path))
     }
 }

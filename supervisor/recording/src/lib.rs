@@ -68,6 +68,7 @@ pub mod replay;
 pub mod schema;
 pub mod viewers;
 
+pub(crate) use self::error::Result;
 pub use self::{
     error::RecordingError,
     file::now_ns,

@@ -21,7 +21,7 @@ use mcap::{
 };
 
 use crate::{
-    error::RecordingError,
+    error::{RecordingError, Result},
     file::{LOST, RUN},
     places::parts,
 };
@@ -91,7 +91,7 @@ pub struct SliceSample<H, T> {
 impl Recording {
     /// Read the run, the counts and the end of the recording at `path`, a file or a run's directory. The file is read once and
     /// not held in memory.
-    pub fn open(path: &Path) -> Result<Self, RecordingError> {
+    pub fn open(path: &Path) -> Result<Self> {
         if path.is_dir() {
             return match &parts(path)[..] {
                 [only] => Self::open(only),
@@ -158,7 +158,7 @@ impl Recording {
 
     /// The messages of the topics that `wanted` names, or of all without names, in the order of the file. They end where the
     /// file is cut.
-    pub fn messages(&self, wanted: &[&str]) -> Result<Messages, RecordingError> {
+    pub fn messages(&self, wanted: &[&str]) -> Result<Messages> {
         Ok(Messages {
             records: Some(Records::open(&self.path)?),
             wanted: wanted.iter().map(|&topic| topic.to_owned()).collect(),
@@ -169,8 +169,7 @@ impl Recording {
     pub fn samples<P: Payload + Stamped + Layout>(
         &self,
         topic: &'static Topic<P>,
-    ) -> Result<impl Iterator<Item = Result<Sample<P>, RecordingError>> + use<P>, RecordingError>
-    {
+    ) -> Result<impl Iterator<Item = Result<Sample<P>>> + use<P>> {
         self.decoded(topic.spec().name, |log_ns, data| {
             let sample = decode_sample(data)?;
             Some(Sample { log_ns, sample })
@@ -181,10 +180,7 @@ impl Recording {
     pub fn slices<H: Payload + Stamped + Layout, T: Payload + Layout>(
         &self,
         topic: &'static Topic<H, T>,
-    ) -> Result<
-        impl Iterator<Item = Result<SliceSample<H, T>, RecordingError>> + use<H, T>,
-        RecordingError,
-    > {
+    ) -> Result<impl Iterator<Item = Result<SliceSample<H, T>>> + use<H, T>> {
         self.decoded(topic.spec().name, |log_ns, data| {
             let (header, elements) = decode_slice(data)?;
             Some(SliceSample { log_ns, header, elements })
@@ -196,7 +192,7 @@ impl Recording {
         &self,
         topic: &str,
         decode: D,
-    ) -> Result<impl Iterator<Item = Result<S, RecordingError>> + use<S, D>, RecordingError> {
+    ) -> Result<impl Iterator<Item = Result<S>> + use<S, D>> {
         let file = self.path.clone();
         let messages = self.messages(&[topic])?;
         Ok(messages.map(move |message| {
@@ -229,7 +225,7 @@ pub struct Messages {
 
 impl Messages {
     /// The next message; none at the end of the file, or where it is cut.
-    fn read(&mut self) -> Result<Option<Message>, RecordingError> {
+    fn read(&mut self) -> Result<Option<Message>> {
         let Some(records) = &mut self.records else {
             return Ok(None);
         };
@@ -250,7 +246,7 @@ impl Messages {
 }
 
 impl Iterator for Messages {
-    type Item = Result<Message, RecordingError>;
+    type Item = Result<Message>;
 
     fn next(&mut self) -> Option<Self::Item> {
         let read = self.read();
@@ -287,7 +283,7 @@ impl std::fmt::Debug for Records {
 }
 
 impl Records {
-    fn open(path: &Path) -> Result<Self, RecordingError> {
+    fn open(path: &Path) -> Result<Self> {
         let file = File::open(path).map_err(FileError::of("read recording", path))?;
         // A chunk is checked as a whole before its content is used.
         let options = LinearReaderOptions::default()
@@ -301,7 +297,7 @@ impl Records {
         })
     }
 
-    fn topic(&self, header: &MessageHeader) -> Result<Arc<str>, RecordingError> {
+    fn topic(&self, header: &MessageHeader) -> Result<Arc<str>> {
         let known = self.channels.get(&header.channel_id).cloned();
         known.ok_or_else(|| RecordingError::Foreign {
             file: self.path.clone(),

@@ -26,7 +26,7 @@ use httpdate::fmt_http_date;
 
 use crate::{
     budget::Budget,
-    error::RecordingError,
+    error::Result,
     file::RecordingFile,
     log_files::LogFiles,
     losses::Losses,
@@ -98,7 +98,7 @@ pub fn record(
     options: &Options,
     wish: &mut dyn FnMut() -> Wish,
     tell: &mut dyn FnMut(Happened<'_>),
-) -> Result<(), RecordingError> {
+) -> Result {
     let chosen = options.topics();
     let open = |bus: &Bus| -> Result<Readers, BusError> {
         let read = |topic: &&'static dyn AnyTopic| Ok((*topic, topic.recorder_reader(bus)?));
@@ -223,7 +223,7 @@ impl CurrentRun {
         topics: &[&'static dyn AnyTopic],
         path: &Path,
         directory: Option<PathBuf>,
-    ) -> Result<Self, RecordingError> {
+    ) -> Result<Self> {
         let run_file = directory.as_ref().map(|run| run.join(run::FILE_NAME));
         let text = run_file.and_then(|file| file::text(&file, LONGEST_RUN_FILE));
         let run: Option<Run> = text.as_ref().and_then(|text| toml::from_str(text).ok());
@@ -260,11 +260,7 @@ impl CurrentRun {
     }
 
     /// Go on in another file, which can be read alone. Returns the file that is now complete.
-    fn go_on_in(
-        &mut self,
-        path: &Path,
-        topics: &[&'static dyn AnyTopic],
-    ) -> Result<PathBuf, RecordingError> {
+    fn go_on_in(&mut self, path: &Path, topics: &[&'static dyn AnyTopic]) -> Result<PathBuf> {
         let next = RecordingFile::create(path, topics, self.run.as_ref(), self.about.clone())?;
         let next = next.continuing(&self.file);
         std::mem::replace(&mut self.file, next).finish()?;
@@ -277,7 +273,7 @@ impl CurrentRun {
         self.directory.as_deref() == run
     }
 
-    fn take(&mut self, readers: &mut Readers) -> Result<(), RecordingError> {
+    fn take(&mut self, readers: &mut Readers) -> Result {
         let file = &mut self.file;
         for (topic, reader) in readers {
             let spec = topic.spec();
@@ -301,7 +297,7 @@ impl CurrentRun {
         Ok(())
     }
 
-    fn take_logs(&mut self, now: bool) -> Result<(), RecordingError> {
+    fn take_logs(&mut self, now: bool) -> Result {
         if !now && self.logs_taken.elapsed() < LOGS_EVERY {
             return Ok(());
         }
@@ -321,7 +317,7 @@ impl CurrentRun {
         written
     }
 
-    fn finish(mut self, tell: &mut dyn FnMut(Happened<'_>)) -> Result<PathBuf, RecordingError> {
+    fn finish(mut self, tell: &mut dyn FnMut(Happened<'_>)) -> Result<PathBuf> {
         self.take_logs(true)?;
         self.file.finish()?;
         tell(Happened::Complete(&self.path, self.losses.total()));

@@ -34,6 +34,7 @@ const MOST: usize = 60_000;
 /// Most maps of a page.
 const MOST_MAPS: usize = 2400;
 
+#[derive(Default)]
 pub(crate) struct Content {
     pub(crate) mission: Mission,
     /// Names and values: robot, build, machine and others.
@@ -79,19 +80,14 @@ impl Content {
         Self {
             mission: run.mission.clone(),
             about,
-            remarks: Vec::new(),
             summary: source::summary(recording).unwrap_or_default(),
             front: Some(run.mission.front_row())
                 .filter(|_| run.mission.front_sonar().kind == SensorKind::Cone),
-            measured: Measured::default(),
             collector: Collector::new(&run.mission),
-            beliefs: Beliefs::default(),
             page,
             truth: source::run_directory(recording).and_then(truth),
-            added: 0,
-            maps: 0,
             map_at_s: f64::NEG_INFINITY,
-            has_fields: false,
+            ..Self::default()
         }
     }
 

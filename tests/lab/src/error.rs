@@ -2,9 +2,7 @@
 
 use std::{fmt::Display, path::Path};
 
-pub use console::failure::{Failure, Refused};
-
-pub type Result<T = (), E = Failure> = std::result::Result<T, E>;
+pub use console::failure::{Failure, Refused, Result};
 
 /// Says which action failed, and with which file.
 pub trait OrCannot<T>: Sized {

@@ -3,13 +3,13 @@
 use std::{
     ffi::OsStr,
     fmt::Display,
-    fs::{self, File},
+    fs,
     path::{Path, PathBuf},
     process::{Command, Stdio},
     time::Duration,
 };
 
-use common::{clock::Pace, mission::Mission, poll};
+use common::{clock::Pace, file::append, mission::Mission, poll};
 use mission_control::{recovery::SUMMARY, simulator::Simulator};
 use processes::{
     death::log_tail,
@@ -66,7 +66,7 @@ pub struct Run {
 impl Run {
     /// Start `command`, a run with its files in `directory`. What it says goes to a file beside that.
     pub fn start(mut command: Command, directory: &Path, records: bool) -> Result<Self> {
-        let said = File::options().create(true).append(true).open(said(directory));
+        let said = append(said(directory));
         command.args((!records).then_some("--no-record"));
         command.args(["--parent", &std::process::id().to_string()]);
         command.stdout(Stdio::null()).stderr(said.or_cannot("write what a mission says")?);

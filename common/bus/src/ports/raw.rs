@@ -33,7 +33,7 @@ use iceoryx2::{
 };
 
 use crate::{
-    error::{BusError, opening, reading, refused, taking},
+    error::{BusError, Result, opening, reading, refused, taking},
     layout::type_name,
     leftovers::process_of,
     payload::{Payload, has_slice},
@@ -104,7 +104,7 @@ impl Type {
         Self { name: type_name::<P>(), size: size_of::<P>(), alignment: align_of::<P>() }
     }
 
-    fn detail(self, variant: TypeVariant, spec: &Spec) -> Result<TypeDetail, BusError> {
+    fn detail(self, variant: TypeVariant, spec: &Spec) -> Result<TypeDetail> {
         TypeDetail::__internal_new_from_parts(variant, self.name, self.size, self.alignment)
             .map_err(refused("name the payload of", spec.name))
     }
@@ -137,7 +137,7 @@ fn samples(
     node: &BusNode,
     spec: &Spec,
     carried: &Carried,
-) -> Result<Builder<Bytes, CustomHeaderMarker, ipc::Service>, BusError> {
+) -> Result<Builder<Bytes, CustomHeaderMarker, ipc::Service>> {
     let header = carried.header.detail(TypeVariant::FixedSize, spec)?;
     let element = carried.element.detail(carried.elements, spec)?;
     let builder = node
@@ -160,16 +160,12 @@ fn samples(
         .enable_safe_overflow(true))
 }
 
-fn service_name(spec: &Spec) -> Result<ServiceName, BusError> {
+fn service_name(spec: &Spec) -> Result<ServiceName> {
     spec.name.try_into().map_err(refused("name", spec.name))
 }
 
 /// Create the services of a topic. They exist as long as the result is held.
-pub(crate) fn create(
-    node: &BusNode,
-    spec: &Spec,
-    carried: &Carried,
-) -> Result<Box<dyn Any>, BusError> {
+pub(crate) fn create(node: &BusNode, spec: &Spec, carried: &Carried) -> Result<Box<dyn Any>> {
     let samples = samples(node, spec, carried)?.create().map_err(refused("create", spec.name))?;
     let event = node
         .service_builder(&service_name(spec)?)
@@ -189,11 +185,7 @@ pub struct OpenedBy {
     pub woken: BTreeSet<u32>,
 }
 
-pub(crate) fn opened_by(
-    node: &BusNode,
-    spec: &Spec,
-    carried: &Carried,
-) -> Result<OpenedBy, BusError> {
+pub(crate) fn opened_by(node: &BusNode, spec: &Spec, carried: &Carried) -> Result<OpenedBy> {
     let service = RawService::open(node, spec, carried)?;
     let event = event(node, spec)?;
     let (mut writers, mut woken) = (BTreeSet::new(), BTreeSet::new());
@@ -213,7 +205,7 @@ pub(crate) fn opened_by(
 }
 
 impl RawService {
-    pub(super) fn open(node: &BusNode, spec: &Spec, carried: &Carried) -> Result<Self, BusError> {
+    pub(super) fn open(node: &BusNode, spec: &Spec, carried: &Carried) -> Result<Self> {
         let service = samples(node, spec, carried)?.open().map_err(opening(spec.name))?;
         let there = service.static_config().message_type_details();
         let fits = carried.header.is_that_of(&there.user_header)
@@ -225,7 +217,7 @@ impl RawService {
         Ok(service.into())
     }
 
-    pub(super) fn publisher(&self, spec: &Spec, longest: usize) -> Result<RawPublisher, BusError> {
+    pub(super) fn publisher(&self, spec: &Spec, longest: usize) -> Result<RawPublisher> {
         let publisher = self
             .publisher_builder()
             .initial_max_slice_len(longest)
@@ -235,7 +227,7 @@ impl RawService {
         Ok(publisher.into())
     }
 
-    pub(super) fn subscriber(&self, spec: &Spec, buffer: usize) -> Result<RawSubscriber, BusError> {
+    pub(super) fn subscriber(&self, spec: &Spec, buffer: usize) -> Result<RawSubscriber> {
         let subscriber =
             self.subscriber_builder().buffer_size(buffer).create().map_err(reading(spec))?;
         Ok(subscriber.into())
@@ -263,7 +255,7 @@ impl RawPublisher {
         topic: &'static str,
         elements: usize,
         fill: &mut dyn FnMut(Loan<'_>) -> bool,
-    ) -> Result<(), BusError> {
+    ) -> Result {
         // SAFETY: `elements` is 1 where samples have no slice.
         let mut sample =
             unsafe { self.loan_custom_payload(elements) }.map_err(refused("publish on", topic))?;
@@ -279,7 +271,7 @@ impl RawPublisher {
 
 impl RawSubscriber {
     #[inline(never)]
-    pub(super) fn receive_sample(&self, spec: &Spec) -> Result<Option<RawSample>, BusError> {
+    pub(super) fn receive_sample(&self, spec: &Spec) -> Result<Option<RawSample>> {
         let sample = self.receive().map_err(taking(spec))?;
         Ok(sample.map(RawSample::from))
     }
@@ -301,18 +293,18 @@ impl RawSample {
         process_of(self.origin().value())
     }
 }
-fn event(node: &BusNode, spec: &Spec) -> Result<event::PortFactory<ipc::Service>, BusError> {
+fn event(node: &BusNode, spec: &Spec) -> Result<event::PortFactory<ipc::Service>> {
     node.service_builder(&service_name(spec)?).event().open().map_err(refused("open", spec.name))
 }
 
 impl Notifier {
-    pub(crate) fn open(node: &BusNode, spec: &Spec) -> Result<Self, BusError> {
+    pub(crate) fn open(node: &BusNode, spec: &Spec) -> Result<Self> {
         let notifier = event(node, spec)?.notifier_builder().create();
         Ok(notifier.map_err(refused("write", spec.name))?.into())
     }
 
     #[inline(never)]
-    pub(crate) fn wake(&self, topic: &'static str) -> Result<(), BusError> {
+    pub(crate) fn wake(&self, topic: &'static str) -> Result {
         self.notify().map(drop).map_err(refused("wake the readers of", topic))
     }
 }
@@ -322,8 +314,8 @@ impl Listener {
     pub(crate) fn open(
         node: &BusNode,
         spec: &Spec,
-        admit: impl FnOnce(usize) -> Result<(), BusError>,
-    ) -> Result<Self, BusError> {
+        admit: impl FnOnce(usize) -> Result,
+    ) -> Result<Self> {
         let service = event(node, spec)?;
         admit(service.dynamic_config().number_of_listeners())?;
         let listener = service.listener_builder().create();
@@ -331,7 +323,7 @@ impl Listener {
     }
 
     /// Clear the notifications. Returns whether there was one.
-    pub(crate) fn drain(&self) -> Result<bool, BusError> {
+    pub(crate) fn drain(&self) -> Result<bool> {
         self.try_wait(|_| {}).map(|events| events > 0).map_err(refused("listen to", "a topic"))
     }
 }

@@ -13,7 +13,7 @@ use iceoryx2::prelude::{ServiceName, ZeroCopySend};
 
 use super::*;
 use crate::{
-    AnyTopic, Bus, Logged, Rate, Stamp, Stamped, Topic,
+    AnyTopic, Bus, BusError, Logged, Rate, Stamp, Stamped, Topic,
     bus_instance::BusInstance,
     clock::MissionTime,
     domain::{Domain, SHARED_MEMORY},

@@ -19,7 +19,7 @@ use serde::Serialize;
 
 use crate::{
     arduino_words::{Request, Requests},
-    error::SimError,
+    error::Result,
     radio::Radio,
     robot::{Heard, Robot},
     transport::{Source, Way},
@@ -119,7 +119,7 @@ impl Session {
         (way, laser_way): (Way, Option<Way>),
         ground_truth: Option<Box<dyn Write + Send>>,
         checkpoint: Option<Checkpoint>,
-    ) -> Result<Self, SimError> {
+    ) -> Result<Self> {
         let (listening, laser) = (way.address(), laser_way.as_ref().map(Way::address));
         let radio = Radio::new(mission.simulation.physics().radio, mission.seed);
         let mut session = Self {
@@ -144,7 +144,7 @@ impl Session {
         Ok(session)
     }
 
-    fn save(&mut self) -> Result<(), SimError> {
+    fn save(&mut self) -> Result {
         if let Some(checkpoint) = &mut self.checkpoint {
             checkpoint.save(&self.robot.saved_state())?;
         }
@@ -152,7 +152,7 @@ impl Session {
     }
 
     /// The process ends, and with it all commands: the robot comes to rest.
-    pub(super) fn end(mut self) -> Result<(), SimError> {
+    pub(super) fn end(mut self) -> Result {
         self.robot.come_to_rest();
         self.save()
     }
@@ -199,7 +199,7 @@ impl Session {
         buffer: &mut [u8],
         most: usize,
         now: impl Fn() -> Option<f64>,
-    ) -> Result<(), SimError> {
+    ) -> Result {
         while let Some((source, bytes)) =
             self.laser_way.as_mut().map(|way| way.receive(buffer)).transpose()?.flatten()
         {
@@ -238,7 +238,7 @@ impl Session {
     }
 
     /// Lets all that is due by mission time `now` happen, in order.
-    pub(super) fn pass(&mut self, now: f64) -> Result<(), SimError> {
+    pub(super) fn pass(&mut self, now: f64) -> Result {
         // A delay of more than a period is not made up for, because the shell lets the clock wait.
         let now = now.min(self.next_tick_s() + self.robot.period_s());
         loop {
@@ -260,7 +260,7 @@ impl Session {
     }
 
     /// To the next tick: its ground truth is written and its frames sent.
-    fn tick(&mut self) -> Result<(), SimError> {
+    fn tick(&mut self) -> Result {
         let frames = self.measured()?;
         self.peer()?;
         self.send(&frames);
@@ -269,7 +269,7 @@ impl Session {
 
     /// If the radio loses the frames, the host sends no next command, so mission time passes by itself until the
     /// radio delivers again.
-    fn tick_until_heard(&mut self) -> Result<(), SimError> {
+    fn tick_until_heard(&mut self) -> Result {
         for _ in 0..MOST_UNHEARD {
             let frames = self.measured()?;
             let now = self.robot.time_s();
@@ -288,7 +288,7 @@ impl Session {
     }
 
     /// The frames of the next tick; its ground truth is written, its state saved.
-    fn measured(&mut self) -> Result<Vec<u8>, SimError> {
+    fn measured(&mut self) -> Result<Vec<u8>> {
         self.robot.advance_to_next_tick();
         self.send_measured();
         self.write_tick();
@@ -298,7 +298,7 @@ impl Session {
         Ok(frames)
     }
 
-    fn hear(&mut self, source: Source, bytes: &[u8]) -> Result<(), SimError> {
+    fn hear(&mut self, source: Source, bytes: &[u8]) -> Result {
         let known = self.decoders.iter().position(|heard| heard.source == source);
         let mut heard = known.map_or_else(
             || SourceDecoder { source, words: Words::of(self.protocol) },
@@ -336,7 +336,7 @@ impl Session {
         Ok(())
     }
 
-    fn on_said(&mut self, source: Source, said: Said<'_>) -> Result<(), SimError> {
+    fn on_said(&mut self, source: Source, said: Said<'_>) -> Result {
         if !self.serves(source) {
             return Ok(());
         }
@@ -383,7 +383,7 @@ impl Session {
     }
 
     /// A host that is connected and has sent nothing yet is the peer.
-    fn peer(&mut self) -> Result<Option<Source>, SimError> {
+    fn peer(&mut self) -> Result<Option<Source>> {
         if let Some(connected) = self.way.connected()? {
             self.peer = Some(connected);
         }

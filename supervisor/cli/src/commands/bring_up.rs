@@ -15,7 +15,7 @@ use common::{
 };
 use console::{
     consent,
-    failure::{Failure, Refused},
+    failure::{Refused, Result},
     missions,
     output::{print_text, write_stderr},
 };
@@ -35,7 +35,7 @@ use super::calibrate::drive::{Carried, Setting};
 /// Put the robot on a free floor, 1 to 2 m before a wall, with walls or things around it. It stands, turns one and a half times to each
 /// side, drives 0.3 m there and back, and turns to and fro: about a minute.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// A mission file with the robot. By default the simulated X80.
     mission: Option<String>,
     /// Write a mission for a new robot that speaks this protocol to --out: x80, json, arduino or ros2.
@@ -66,7 +66,7 @@ fn protocol(word: &str) -> Result<Protocol, ValueError> {
 
 const SIMULATED: &str = "target = [1.5, 0]\nsimulation.realism = 'measured'\nsensors = 'all'\n[perimeter]\nwidth_m = 6.0\ncentre = [0.0, 0.0]\n[[world.wall]]\npoints = [[1.3, -1.6], [1.3, 1.2], [-0.4, 1.6], [-1.5, 0.4], [-1.2, -1.6], [1.3, -1.6]]\n";
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     arguments.setting.log("bring-up.log")?;
     if let (Some(protocol), Some(address)) = (arguments.protocol, &arguments.address) {
         return write_new(protocol, address, &arguments.out);
@@ -126,7 +126,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// Writes a mission for a robot that nobody described yet.
-fn write_new(protocol: Protocol, address: &str, out: &Path) -> Result<(), Failure> {
+fn write_new(protocol: Protocol, address: &str, out: &Path) -> Result {
     let text = written::new_robot(protocol, address);
     missions::parsed(&text, "bring-up", &[])?;
     let place = out.display();

@@ -1,4 +1,4 @@
-pub(super) mod drive;
+pub mod drive;
 mod ends;
 mod response;
 mod written;
@@ -9,7 +9,7 @@ use calibration::{loops, shell::Drive, squares, wall::State};
 use clap::Args;
 use common::{
     mission::{CalibrationPlan, Mission, Procedure, SensorKind},
-    signals::{SIGHUP, SIGINT, SIGTERM, Signals},
+    signals::Signals,
 };
 
 use self::{
@@ -17,7 +17,7 @@ use self::{
     written::Found,
 };
 use console::{
-    failure::{Failure, Refused},
+    failure::{Failure, Refused, Result},
     missions,
 };
 
@@ -26,7 +26,7 @@ use console::{
 /// Put the robot 0.5 to 2 m before the middle of a flat wall 3 m wide, facing it, with 3 m of free floor behind it. It drives loops until
 /// the values are good enough, and writes them into a file, which a mission names as robot.calibration.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// A mission whose robot is calibrated. By default the simulated one with measured realism.
     mission: Option<String>,
     #[command(flatten)]
@@ -62,7 +62,7 @@ const SIMULATED: &str = "target = [3, 0]\nsimulation.realism = 'measured'";
 /// A metre before the robot.
 const WALL: &str = "[[wall]]\npoints = [[1.0, -2.5], [1.0, 2.5]]";
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     let plan = CalibrationPlan {
         procedure: match arguments {
             Arguments { response: true, .. } => Procedure::Turns,
@@ -84,7 +84,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
 
 impl Arguments {
     /// The robot of the named mission, and nothing else of it.
-    fn mission(&self, plan: CalibrationPlan) -> Result<Mission, Failure> {
+    fn mission(&self, plan: CalibrationPlan) -> Result<Mission> {
         let named = match &self.mission {
             Some(name) => missions::load(name, &self.setting.set)?,
             None => missions::parsed(SIMULATED, "calibration", &self.setting.set)?,
@@ -108,7 +108,7 @@ fn refused(message: &str) -> Failure {
     Refused::new("not-calibrated", format!("nothing was written: {message}")).into()
 }
 
-fn by_wall(arguments: &Arguments, plan: CalibrationPlan) -> Result<Found, Failure> {
+fn by_wall(arguments: &Arguments, plan: CalibrationPlan) -> Result<Found> {
     let mission = arguments.mission(plan)?;
     let body = mission.body();
     let before = mission.robot.odometry.clone();
@@ -146,8 +146,8 @@ fn noise_of_its_own(mission: &mut Mission, number: u32) {
     mission.seed = mission.seed.wrapping_add(u64::from(number) << 32);
 }
 
-fn by_squares(arguments: &Arguments, plan: CalibrationPlan) -> Result<Found, Failure> {
-    let mut signals = Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?;
+fn by_squares(arguments: &Arguments, plan: CalibrationPlan) -> Result<Found> {
+    let mut signals = Signals::that_end()?;
     let mut driven = Vec::new();
     let (mut metres, mut seconds) = (0.0, 0.0);
     let base = arguments.mission(plan)?;

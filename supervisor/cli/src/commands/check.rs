@@ -2,14 +2,14 @@ use clap::Args;
 use link::failsafe::stop_distance::{self, Stop};
 
 use console::{
-    failure::Failure,
+    failure::Result,
     output::{print_text, write_stderr},
 };
 
 /// Check a mission as `run` does. An error is reported with its line, its key and the remedy; of a mission without one, the way from each
 /// fault to rest is printed.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// A mission file, or a shipped mission (`firsthand missions`).
     mission: String,
     /// Set a key of the mission, as often as needed: `--set start.heading_deg=90`.
@@ -17,7 +17,7 @@ pub(crate) struct Arguments {
     set: Vec<String>,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     let mission = super::run::ready(&arguments.mission, &arguments.set)?;
     for remark in &mission.remarks {
         write_stderr(&format!("firsthand: {remark}\n"));

@@ -3,11 +3,11 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::Args;
 use recording::{Recording, replay::diff};
 
-use console::{failure::Failure, output::print};
+use console::{failure::Result, output::print};
 
 /// Find the first tick, topic and field in which two recordings differ. Exits with 1 if they do.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// The first recording, or the directory of its run.
     #[arg(value_name = "A|A.mcap")]
     first: PathBuf,
@@ -19,7 +19,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     let first = Recording::open(&arguments.first)?;
     let second = Recording::open(&arguments.second)?;
     let parting = diff::diff(&first, &second)?;

@@ -2,12 +2,12 @@ use clap::Args;
 use common::{domain::RobotName, samples::TargetPoint};
 use mission_control::operator;
 
-use console::failure::{Failure, Refused};
+use console::failure::{Refused, Result};
 
 /// Send a robot that drives to another target, or to several in turn; it goes on without a stop. Fails if the supervisor
 /// refuses: a place in a believed hazard or outside the perimeter, a robot that an operator stopped.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// X and Y of each target, metres in the mission frame.
     #[arg(required = true, value_names = ["X", "Y"], num_args = 2.., allow_negative_numbers = true)]
     places: Vec<f64>,
@@ -22,7 +22,7 @@ pub(crate) struct Arguments {
     robot: RobotName,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     let mut points = points(&arguments.places)?;
     if let (Some(last), Some(heading)) = (points.last_mut(), arguments.heading) {
         (last.heading_rad, last.has_heading) = (heading.to_radians(), 1);
@@ -31,7 +31,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// Of pairs of numbers.
-pub(super) fn points(places: &[f64]) -> Result<Vec<TargetPoint>, Refused> {
+pub fn points(places: &[f64]) -> Result<Vec<TargetPoint>, Refused> {
     let (places, rest) = places.as_chunks::<2>();
     if !rest.is_empty() {
         let message = format!("{} is an X without a Y; give two numbers for each place", rest[0]);

@@ -5,11 +5,11 @@ use std::{
 
 use clap::{Args, Command, error::ErrorKind};
 
-use console::{failure::Failure, output::print_text};
+use console::{failure::Result, output::print_text};
 
 /// Print a page of the guide, or the options of a subcommand; without a name, list both.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// A page of the guide, or the words of a subcommand: `stage kill`.
     page: Vec<String>,
 }
@@ -63,12 +63,12 @@ fn page(name: &str) -> Option<&'static Page> {
     GUIDE.iter().find(|page| page.file.eq_ignore_ascii_case(name))
 }
 
-pub(crate) fn page_names() -> Vec<String> {
+pub fn page_names() -> Vec<String> {
     GUIDE.iter().map(Page::name).collect()
 }
 
 /// One a line, for the help of the whole command line.
-pub(crate) fn pages() -> String {
+pub fn pages() -> String {
     let mut list = String::from("Guide (firsthand help PAGE):\n");
     for page in GUIDE {
         // Writing to a String cannot fail.
@@ -77,7 +77,7 @@ pub(crate) fn pages() -> String {
     list
 }
 
-pub(crate) fn main(arguments: &Arguments, mut whole: Command) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments, mut whole: Command) -> Result {
     if let [name] = &arguments.page[..]
         && let Some(page) = page(name)
     {

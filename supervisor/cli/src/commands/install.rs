@@ -13,7 +13,7 @@ use thiserror::Error;
 
 use console::{
     consent,
-    failure::{Failure, Refused},
+    failure::{Refused, Result},
     output::print_text,
 };
 
@@ -21,7 +21,7 @@ use console::{
 ///
 /// Each file is named before it is written. Nothing is enabled or started.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// Only print every file, each after its path.
     #[arg(long)]
     print: bool,
@@ -77,7 +77,7 @@ struct InstallError {
     source: io::Error,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     let executable = std::env::current_exe()?;
     if !arguments.print {
         refuse_hidden(&executable)?;

@@ -10,7 +10,7 @@ use common::domain::RobotName;
 
 use self::merged::Logs;
 use console::{
-    failure::{Failure, Refused},
+    failure::{Refused, Result},
     operator,
     robots::Robot,
     runs,
@@ -20,7 +20,7 @@ use console::{
 
 /// Print the logs of all processes of a run, merged by time.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// Only the log of this process: a stage, `supervisor` or `x80-sim`.
     stage: Option<String>,
     /// Print also what is logged from now on, in this run and the robot's next ones, until Ctrl-C.
@@ -37,7 +37,7 @@ pub(crate) struct Arguments {
     run: Option<PathBuf>,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     let mut stream = Stream::open()?;
     if arguments.follow {
         return follow(arguments, &mut stream);
@@ -63,7 +63,7 @@ fn newest(arguments: &Arguments) -> Option<PathBuf> {
 }
 
 /// `directory` must have the requested log.
-fn opened(arguments: &Arguments, directory: &Path) -> Result<Logs, Failure> {
+fn opened(arguments: &Arguments, directory: &Path) -> Result<Logs> {
     let stage = arguments.stage.as_deref();
     let unreadable = |error| format!("cannot read logs in {}: {error}", directory.display());
     let processes = Logs::processes(directory).map_err(unreadable)?;
@@ -75,7 +75,7 @@ fn opened(arguments: &Arguments, directory: &Path) -> Result<Logs, Failure> {
     Ok(Logs::of(directory, stage))
 }
 
-fn follow(arguments: &Arguments, stream: &mut Stream) -> Result<(), Failure> {
+fn follow(arguments: &Arguments, stream: &mut Stream) -> Result {
     // The log of a stage may not be there yet.
     if let Some(stage) = arguments.stage.as_deref()
         && !OTHERS.contains(&stage)

@@ -5,14 +5,14 @@ use std::io;
 use clap::{Args, Command};
 use clap_mangen::Man;
 
-use console::{failure::Failure, output::print_text};
+use console::{failure::Result, output::print_text};
 
 /// Print the manual page, with all subcommands: `firsthand man > ~/.local/share/man/man1/firsthand.1`.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {}
+pub struct Arguments {}
 
 /// `whole` is the command line of the executable.
-pub(crate) fn main(_: &Arguments, whole: Command) -> Result<(), Failure> {
+pub fn main(_: &Arguments, whole: Command) -> Result {
     Ok(print_text(&String::from_utf8_lossy(&page(whole)?))?)
 }
 

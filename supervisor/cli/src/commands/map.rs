@@ -5,13 +5,13 @@ use common::{grid::Replica, topics};
 use recording::Recording;
 
 use console::{
-    failure::{Failure, Refused},
+    failure::{Refused, Result},
     output::print_text,
 };
 
 /// Maps of the ROS map_server. A mission starts from one with `map = "office.yaml"`.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     #[command(subcommand)]
     action: Action,
 }
@@ -29,7 +29,7 @@ enum Action {
     },
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     let Action::Save { run, out } = &arguments.action;
     let mut grid = Replica::default();
     // A run that was resumed has several recordings. The last has its last map.

@@ -1,20 +1,20 @@
 use clap::Args;
 
 use console::{
-    failure::Failure,
+    failure::Result,
     missions::{self, LookupError, SHIPPED},
     output::print_text,
 };
 
 /// List the missions that ship with the program; with a name, print its file to start your own from.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// A shipped mission.
     #[arg(id = "mission", value_name = "NAME")]
     name: Option<String>,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     if let Some(name) = &arguments.name {
         let text =
             missions::shipped(name).ok_or_else(|| LookupError::Unknown { name: name.clone() })?;

@@ -2,12 +2,12 @@ use clap::Args;
 use common::{domain::RobotName, samples::TargetPoint};
 use mission_control::operator;
 
-use console::failure::Failure;
+use console::failure::Result;
 
 /// Tell a robot that stands where it is: its pose becomes that, and what it sensed before is forgotten. Fails if the supervisor
 /// refuses: a robot that drives, a place outside the perimeter.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// Metres in the mission frame.
     #[arg(allow_negative_numbers = true)]
     x: f64,
@@ -28,7 +28,7 @@ pub(crate) struct Arguments {
     robot: RobotName,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     let Arguments { x, y, heading, sigma, sigma_heading, robot } = arguments;
     let heading_rad = heading.to_radians();
     let point = TargetPoint { x_m: *x, y_m: *y, heading_rad, has_heading: 1 };

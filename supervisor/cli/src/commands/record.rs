@@ -11,7 +11,7 @@ use clap::Args;
 use common::{
     domain::{Domain, RobotName},
     poll,
-    signals::{SIGHUP, SIGINT, SIGTERM, Signals},
+    signals::Signals,
     start::become_child,
     topics::{self, AnyTopic},
 };
@@ -21,13 +21,13 @@ use recording::{
 };
 
 use console::{
-    failure::Failure,
+    failure::Result,
     output::{print_text, write_stderr},
 };
 
 /// Record what a robot's processes publish, from run to run, until Ctrl-C. `run` starts one by itself.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// Name of the robot; it need not run yet.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
@@ -53,7 +53,7 @@ pub(crate) struct Arguments {
 
 /// Bytes that all recordings together may take.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct DiskBudget(pub(crate) u64);
+pub struct DiskBudget(pub u64);
 
 impl FromStr for DiskBudget {
     type Err = String;
@@ -84,8 +84,8 @@ fn topic(name: &str) -> Result<&'static dyn AnyTopic, String> {
     })
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
-    let mut signals = Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?;
+pub fn main(arguments: &Arguments) -> Result {
+    let mut signals = Signals::that_end()?;
     if let Some(supervisor) = arguments.supervisor {
         become_child("recorder", supervisor)?;
     }

@@ -2,7 +2,7 @@ use std::{path::PathBuf, process::ExitCode};
 
 use clap::Args;
 use common::clock::MissionTime;
-use console::{failure::Failure, operator, output::print};
+use console::{failure::Result, operator, output::print};
 use recording::{
     Recording,
     replay::{self, Options},
@@ -11,7 +11,7 @@ use recording::{
 /// Replay a recording: give each generation of each stage its recorded inputs, and compare its outputs with the recorded ones to
 /// the bit. Exits with 1 if something differs.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// The directory of a run that was recorded, or a recording.
     #[arg(value_name = "RUN|F.mcap")]
     recording: PathBuf,
@@ -26,7 +26,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     for name in &arguments.stage {
         operator::known_stage(name)?;
     }

@@ -2,11 +2,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use console::{failure::Failure, output::print_text};
+use console::{failure::Result, output::print_text};
 
 /// Write the robot's page with the recording of a run in it, one file without references to others. `run` does this at its end.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// The directory of a run that was recorded, or a recording.
     #[arg(value_name = "RUN|F.mcap")]
     run: PathBuf,
@@ -15,7 +15,7 @@ pub(crate) struct Arguments {
     out: Option<PathBuf>,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     let page = report::write(&arguments.run, arguments.out.as_deref())?;
     Ok(print_text(&format!("{}\n", page.display()))?)
 }

@@ -3,16 +3,16 @@ use common::domain::RobotName;
 
 use mission_control::operator;
 
-use console::failure::Failure;
+use console::failure::Result;
 
 /// Let a stopped robot go on.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// Name of the robot.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     Ok(operator::resume(&arguments.robot)?)
 }

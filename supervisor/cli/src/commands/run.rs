@@ -1,4 +1,4 @@
-pub(crate) mod recorder;
+pub mod recorder;
 mod summary_file;
 
 use std::{
@@ -30,7 +30,7 @@ use summary::{Hearer, Summary};
 use self::{recorder::RunRecorder, summary_file::SummaryFile};
 use super::{record::DiskBudget, run_report, stage::OTHER_PLANNERS};
 use console::{
-    failure::{Failure, Refused},
+    failure::{Refused, Result},
     logging, missions,
     output::{print_text, write_stderr},
     progress_line::{LINE_EVERY, ProgressLine},
@@ -41,7 +41,7 @@ use console::{
 
 /// Carry out a mission: start a robot's stages, let it drive, summarise.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// A shipped mission (`firsthand missions`) or a mission file.
     #[arg(default_value = "obstacle-course")]
     mission: String,
@@ -114,7 +114,7 @@ impl Default for Arguments {
     }
 }
 
-fn options(arguments: &Arguments) -> Result<Options, Failure> {
+fn options(arguments: &Arguments) -> Result<Options> {
     if let Some(directory) = &arguments.resume {
         let found = fs::canonicalize(directory).map_err(|error| {
             let directory = directory.display();
@@ -189,7 +189,7 @@ fn tell_place(place: Option<&(PlaceSample, f64)>, stands: bool) {
     write_stderr(&format!("firsthand: {place}; `firsthand place` corrects it{until}\n"));
 }
 
-fn resumed(arguments: &Arguments, directory: PathBuf) -> Result<Options, Failure> {
+fn resumed(arguments: &Arguments, directory: PathBuf) -> Result<Options> {
     let recovered = RecoveredRun::load(&directory)?;
     let mut mission = recovered.run.mission.clone();
     planner_executable::resolve(&mut mission, OTHER_PLANNERS)?;
@@ -209,7 +209,7 @@ fn starter(arguments: &Arguments) -> Starter {
     if arguments.watch_only { Starter::External } else { Starter::Supervisor }
 }
 
-fn mission(arguments: &Arguments) -> Result<Mission, Failure> {
+fn mission(arguments: &Arguments) -> Result<Mission> {
     let stay = arguments.stay.then(|| "stay=true".to_owned());
     let set: Vec<_> = arguments.set.iter().cloned().chain(stay).collect();
     let mut mission = ready(&arguments.mission, &set)?;
@@ -227,7 +227,7 @@ fn mission(arguments: &Arguments) -> Result<Mission, Failure> {
 
 /// The mission `name` with `set`, which can be carried out here: this executable speaks to its robot, and its devices and planner are
 /// there.
-pub(super) fn ready(name: &str, set: &[String]) -> Result<Mission, Failure> {
+pub fn ready(name: &str, set: &[String]) -> Result<Mission> {
     let mut mission = missions::load(name, set)?;
     refuse_unspoken(&mission)?;
     let address = mission.robot.address.as_ref().and_then(|text| text.parse().ok());
@@ -253,7 +253,7 @@ fn refuse_unspoken(mission: &Mission) -> Result<(), Refused> {
     Err(Refused::new("mission", message))
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     let signals = mission_control::end_signals()?;
     if let Some(parent) = arguments.parent {
         become_child("firsthand", parent)?;
@@ -328,7 +328,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
 }
 
 /// Begins the log in the run directory, reserves room for the summary, and reports the mission's remarks.
-fn prepare(options: &Options) -> Result<SummaryFile, Failure> {
+fn prepare(options: &Options) -> Result<SummaryFile> {
     let log = options.directory.join(SUPERVISOR_LOG);
     logging::to_file(&log, "info")
         .map_err(|error| format!("cannot log to {}: {error}", log.display()))?;

@@ -15,14 +15,14 @@ use picture::{Facts, Scene};
 use summary::{Hearer, Summary};
 
 /// Name and file, or why there is none.
-pub(crate) type Written = Result<(&'static str, PathBuf), String>;
+pub type Written = Result<(&'static str, PathBuf), String>;
 
-pub(crate) fn report(options: &Options) -> Written {
+pub fn report(options: &Options) -> Written {
     let page = report::write(&options.directory, None);
     Ok(("report", page.map_err(|error| format!("no report of this run: {error}"))?))
 }
 
-pub(crate) fn picture(
+pub fn picture(
     options: &Options,
     finished: &Finished,
     heard: &Hearer,

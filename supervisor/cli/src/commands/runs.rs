@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::diff;
 use console::{
-    failure::Failure,
+    failure::Result,
     output::{json_lines, print_text},
     runs::{self, Ended, Outcome, RunDirectory, Target},
     table::Table,
@@ -21,7 +21,7 @@ use console::{
 /// List runs, remove the oldest, find where two differ. Without a subcommand: `firsthand runs list`.
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     #[command(subcommand)]
     command: Option<Command>,
     #[command(flatten)]
@@ -64,7 +64,7 @@ struct Listed<'a> {
     size_bytes: u64,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.command {
         None => list(&arguments.list),
         Some(Command::List(arguments)) => list(arguments),
@@ -72,7 +72,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
 }
 
-fn list(arguments: &List) -> Result<ExitCode, Failure> {
+fn list(arguments: &List) -> Result<ExitCode> {
     let runs = &arguments.runs;
     if !runs.is_dir() {
         return Err(

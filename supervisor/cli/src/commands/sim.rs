@@ -9,13 +9,13 @@ use common::{
 use x80_sim::{SimError, SimOptions};
 
 use console::{
-    failure::{Failure, Refused},
+    failure::{Failure, Refused, Result},
     missions,
 };
 
 /// Be a simulated X80 in a mission's world, for `run` or for any other software that drives an X80.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// A shipped mission or a mission file.
     mission: String,
     /// Address to listen on; port 0 takes a free one.
@@ -62,7 +62,7 @@ impl From<Transport> for x80_sim::Transport {
     }
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     let mut mission = missions::load(&arguments.mission, &arguments.set)?;
     if let Some(seed) = arguments.seed {
         mission.seed = seed;

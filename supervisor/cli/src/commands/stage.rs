@@ -1,7 +1,7 @@
 mod fault;
 mod process;
 
-pub(crate) use self::process::OTHER_PLANNERS;
+pub use self::process::OTHER_PLANNERS;
 
 use std::ffi::OsString;
 
@@ -10,14 +10,14 @@ use common::domain::RobotName;
 use rustix::process::Signal;
 
 use super::table;
-use console::{failure::Failure, operator, output::print_text};
+use console::{failure::Result, operator, output::print_text};
 
 /// List, kill, freeze, restart and break the stages of a robot; or be one of them.
 ///
 /// `firsthand stage NAME [--robot R]` is the process of the stage NAME. The supervisor starts these, unless it was given
 /// --watch-only: then you do, or systemd. Without a subcommand: `firsthand stage list`.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     #[command(subcommand)]
     command: Option<Command>,
 }
@@ -62,12 +62,12 @@ struct StageProcess {
 }
 
 impl Arguments {
-    pub(crate) const fn is_process(&self) -> bool {
+    pub const fn is_process(&self) -> bool {
         matches!(self.command, Some(Command::Process(_)))
     }
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     match arguments.command.as_ref().unwrap_or(&Command::List) {
         Command::List => print_text(&table::stages())?,
         Command::Kill { process, signal } => process.send(*signal)?,
@@ -83,7 +83,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl StageProcess {
-    fn send(&self, signal: Signal) -> Result<(), Failure> {
+    fn send(&self, signal: Signal) -> Result {
         operator::send(&self.robot, &self.stage, signal)
     }
 }

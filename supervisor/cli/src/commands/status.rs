@@ -22,7 +22,7 @@ use robot_state::{Feed, RobotState};
 use serde::Serialize;
 
 use console::{
-    failure::Failure,
+    failure::Result,
     output::print,
     stream::{LOOK_EVERY, Stream},
     table::Table,
@@ -32,7 +32,7 @@ use console::{
 
 /// Show the stages of a robot that runs here: pid, generation, uptime, restarts, ages; its link and its batteries.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// Name of the robot.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
@@ -137,7 +137,7 @@ const LINK_PATIENCE: Duration = Duration::from_millis(400);
 /// The least time between two statuses that are followed.
 const SHOWN_EVERY: Duration = Duration::from_millis(20);
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     match arguments {
         Arguments { all: true, .. } => all::print(arguments.json),
         Arguments { follow: true, .. } => follow(arguments),
@@ -157,7 +157,7 @@ fn is_complete(robot: &RobotState, waited: Duration) -> bool {
     robot.supervisor.is_some() && (all || waited >= LINK_PATIENCE)
 }
 
-fn print_one(arguments: &Arguments) -> Result<(), Failure> {
+fn print_one(arguments: &Arguments) -> Result {
     let bus = roster::join(&Domain::of(arguments.robot.clone()), "status")?;
     let mut feed = Feed::open(&bus, &WANTED)?;
     let mut waiter = Waiter::default();
@@ -185,7 +185,7 @@ fn print_one(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// Print a status after each change, from run to run.
-fn follow(arguments: &Arguments) -> Result<(), Failure> {
+fn follow(arguments: &Arguments) -> Result {
     let mut stream = Stream::with_usual_priority()?;
     let domain = Domain::of(arguments.robot.clone());
     let mut follower = Follower::new(domain, "status", WANTED[0], |bus| Feed::open(bus, &WANTED))

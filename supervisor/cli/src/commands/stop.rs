@@ -1,14 +1,14 @@
 use clap::Args;
 use common::domain::{Domain, RobotName};
 
-use console::{failure::Failure, operator};
+use console::{failure::Result, operator};
 
 /// Let the robot stand until `firsthand resume`; the mission goes on then. Fails unless the encoders confirm that it rests.
 ///
 /// The link obeys directly, whatever is wrong with the supervisor or with shared memory. Where no link is left, this command
 /// tells the robot of the last run to stand.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// Name of the robot.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
@@ -20,7 +20,7 @@ pub(crate) struct Arguments {
     through_supervisor: Option<u64>,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     if arguments.cut_off && !Domain::of(arguments.robot.clone()).run_directory().exists() {
         return Ok(());
     }

@@ -1,6 +1,6 @@
 //! Tables as Markdown, as the guide shows them.
 
-pub(crate) mod stored;
+pub mod stored;
 
 use clap::{Args, Subcommand};
 use common::{
@@ -11,11 +11,11 @@ use common::{
 use link::failsafe::{self, monitor::Clears};
 use processes::stages;
 
-use console::{failure::Failure, item::item, output::print_text};
+use console::{failure::Result, item::item, output::print_text};
 
 /// Print a table of the guide.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     #[command(subcommand)]
     table: Table,
 }
@@ -32,7 +32,7 @@ enum Table {
     Capabilities,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     Ok(print_text(&match arguments.table {
         Table::Failsafe => failsafe(),
         Table::Faults => faults(),
@@ -43,7 +43,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
 
 /// A page of the guide shows it behind `<!-- table NAME SECTION -->`; none of an unknown name.
 #[cfg(test)]
-pub(crate) fn shown(name: &str, section: Option<&str>) -> Option<String> {
+pub fn shown(name: &str, section: Option<&str>) -> Option<String> {
     match name {
         "topics" => Some(topics()),
         "stages" => Some(stages()),
@@ -54,7 +54,7 @@ pub(crate) fn shown(name: &str, section: Option<&str>) -> Option<String> {
     }
 }
 
-pub(super) fn topics() -> String {
+pub fn topics() -> String {
     topics::TABLE.iter().map(|topic| topic_row(*topic)).collect()
 }
 
@@ -87,7 +87,7 @@ fn topic_row(topic: &dyn AnyTopic) -> String {
     ))
 }
 
-pub(super) fn stages() -> String {
+pub fn stages() -> String {
     let list = |topics: &[Topics]| {
         let topics = topics.iter().copied().flatten();
         let names: Vec<_> = topics.map(|topic| format!("`{}`", topic.spec().name)).collect();

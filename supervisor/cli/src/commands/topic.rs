@@ -6,12 +6,12 @@ mod sample_text;
 use clap::{Args, Subcommand};
 
 use super::table;
-use console::{failure::Failure, output::print_text};
+use console::{failure::Result, output::print_text};
 
 /// List the topics, print their samples as they come, count their rates. Without a subcommand: `firsthand topic list`.
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     #[command(subcommand)]
     command: Option<Command>,
     #[command(flatten)]
@@ -33,7 +33,7 @@ struct List {
     python: bool,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     match &arguments.command {
         None => list(&arguments.list),
         Some(Command::List(arguments)) => list(arguments),
@@ -42,6 +42,6 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-fn list(arguments: &List) -> Result<(), Failure> {
+fn list(arguments: &List) -> Result {
     Ok(print_text(&if arguments.python { python::module() } else { table::topics() })?)
 }

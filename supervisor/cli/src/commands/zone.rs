@@ -3,12 +3,12 @@ use common::domain::RobotName;
 use mission_control::operator;
 
 use super::goto::points;
-use console::failure::Failure;
+use console::failure::Result;
 
 /// Add a keep-out zone to a robot that runs: a polygon where its body may not go. Its sensors see nothing of it, and the mission
 /// file stays as it is. Fails if the robot stands there.
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// X and Y of each corner, metres in the mission frame.
     #[arg(required = true, value_names = ["X", "Y"], num_args = 2.., allow_negative_numbers = true)]
     places: Vec<f64>,
@@ -20,7 +20,7 @@ pub(crate) struct Arguments {
     robot: RobotName,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     let Arguments { places, remove, robot } = arguments;
     Ok(operator::change_zones(robot, &points(places)?, *remove)?)
 }

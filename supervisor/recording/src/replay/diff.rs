@@ -6,7 +6,7 @@ use common::topics::AnyTopic;
 use serde::Serialize;
 
 use crate::{
-    Message, Recording, RecordingError,
+    Message, Recording, Result,
     replay::samples::{COMPARED, First, difference, is_keyframe, tick_of},
 };
 
@@ -22,7 +22,7 @@ pub struct Parting {
 }
 
 /// Find the first difference of `first` and `second`.
-pub fn diff(first: &Recording, second: &Recording) -> Result<Parting, RecordingError> {
+pub fn diff(first: &Recording, second: &Recording) -> Result<Parting> {
     let mut parting =
         Parting { run: run_differences(&first.run_text, &second.run_text), ..Parting::default() };
     if first.build != second.build {
@@ -63,8 +63,8 @@ struct Ticks<I> {
     slices: bool,
 }
 
-impl<I: Iterator<Item = Result<Message, RecordingError>>> Ticks<I> {
-    fn tick(&mut self) -> Result<Option<Message>, RecordingError> {
+impl<I: Iterator<Item = Result<Message>>> Ticks<I> {
+    fn tick(&mut self) -> Result<Option<Message>> {
         let mut last = self.next.take();
         for message in self.messages.by_ref() {
             let message = message?;
@@ -89,8 +89,8 @@ fn first_in(
     topic: &'static dyn AnyTopic,
     first: &Recording,
     second: &Recording,
-) -> Result<(Option<First>, u64), RecordingError> {
-    let ticks = |recording: &Recording| -> Result<_, RecordingError> {
+) -> Result<(Option<First>, u64)> {
+    let ticks = |recording: &Recording| -> Result<_> {
         Ok(Ticks {
             messages: recording.messages(&[topic.spec().name])?,
             next: None,

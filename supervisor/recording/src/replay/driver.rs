@@ -12,7 +12,7 @@ use common::{
 use processes::stages::{self, Stage};
 
 use crate::{
-    End, Message, Recording, RecordingError,
+    End, Message, Recording, RecordingError, Result,
     replay::{
         generation::{Generation, Setting},
         report::Report,
@@ -34,7 +34,7 @@ pub struct Options {
 /// Topics that the link's process computes outside its step. They are not compared.
 const NOT_COMPUTED: [&str; 1] = ["link"];
 
-pub fn replay(recording: &Recording, options: &Options) -> Result<Report, RecordingError> {
+pub fn replay(recording: &Recording, options: &Options) -> Result<Report> {
     let counts = &recording.counts;
     let recorded = |topic: &str| counts.contains_key(topic);
     let cut = match &recording.end {

@@ -16,7 +16,7 @@ use self::live::{Live, LiveError};
 use clap::Parser;
 use common::{
     domain::{Domain, RobotName},
-    signals::{SIGHUP, SIGINT, SIGTERM, Signals},
+    signals::Signals,
 };
 use console::{executable, failure::Failure, output::print_text, stream::let_stages_go_first};
 
@@ -48,7 +48,7 @@ pub fn main() -> ExitCode {
 
 fn serve(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let_stages_go_first();
-    let mut signals = Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?;
+    let mut signals = Signals::that_end()?;
     let listen = arguments.listen;
     let (live, address) = Live::open(&arguments.robot, listen, &arguments.origins)?;
     if !listen.ip().is_loopback() {

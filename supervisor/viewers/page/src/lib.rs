@@ -33,10 +33,7 @@ mod tests;
 use std::{net::SocketAddr, process::ExitCode, sync::Arc};
 
 use clap::Parser;
-use common::{
-    domain::RobotName,
-    signals::{SIGHUP, SIGINT, SIGTERM, Signals},
-};
+use common::{domain::RobotName, signals::Signals};
 
 use console::{executable, failure::Failure, output::print_text, stream::let_stages_go_first};
 
@@ -75,7 +72,7 @@ pub fn main() -> ExitCode {
 
 fn serve(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let_stages_go_first();
-    let mut signals = Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?;
+    let mut signals = Signals::that_end()?;
     let Arguments { robot, listen, behind_proxy } = arguments;
     let options = Options { robot: robot.clone(), listen: *listen, proxy: behind_proxy.clone() };
     let page = Page::open(&options, Arc::new(RobotOperator { robot: robot.clone() }))?;

@@ -34,11 +34,7 @@ mod topics;
 use std::{net::Ipv4Addr, process::ExitCode};
 
 use clap::{Parser, Subcommand};
-use common::{
-    address::domain_of_environment,
-    domain::RobotName,
-    signals::{SIGHUP, SIGINT, SIGTERM, Signals},
-};
+use common::{address::domain_of_environment, domain::RobotName, signals::Signals};
 
 use console::{
     executable, failure::Failure, item::item, output::print_text, stream::let_stages_go_first,
@@ -119,7 +115,7 @@ fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
         print_text(&topics())?;
         return Ok(ExitCode::SUCCESS);
     }
-    let mut signals = Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?;
+    let mut signals = Signals::that_end()?;
     let domain = arguments.domain.map_or_else(domain_of_environment, Ok)?;
     if let Some(Command::Planner(options)) = &arguments.command {
         let network = (domain, arguments.interface, arguments.namespace.as_str());

@@ -27,7 +27,7 @@ use common::{
     domain::{Domain, RobotName},
     follower::{Event, Follower},
     poll,
-    signals::{SIGHUP, SIGINT, SIGTERM, Signals},
+    signals::Signals,
     topics,
 };
 use ratatui::DefaultTerminal;
@@ -83,7 +83,7 @@ fn show_on_terminal(arguments: &Arguments) -> Result<ExitCode, Failure> {
 
 /// Show `robot` until q is pressed, a signal comes, or the terminal is closed.
 fn show(robot: &RobotName) -> Result<(), TopError> {
-    let mut signals = Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?;
+    let mut signals = Signals::that_end()?;
     let mut terminal = ratatui::try_init()?;
     let shown = run(robot, &mut signals, &mut terminal);
     if terminal.show_cursor().is_err() {

@@ -2,7 +2,7 @@
 
 use std::{
     ffi::OsString,
-    fs::{self, File},
+    fs,
     os::unix::process::CommandExt as _,
     path::{Path, PathBuf},
     process::{Command, Stdio},
@@ -11,7 +11,7 @@ use std::{
 };
 
 use clap::Args;
-use common::{domain::RobotName, start::become_child};
+use common::{domain::RobotName, file::append, start::become_child};
 use processes::{
     death::log_tail,
     executable,
@@ -134,7 +134,7 @@ impl Running {
         if self.consumer.name == RECORD {
             command.arg("--out").arg(directory.join(format!("record-{}.mcap", self.starts)));
         }
-        let said = File::options().create(true).append(true).open(&self.said);
+        let said = append(&self.said);
         command.stderr(said.or_cannot("write what a consumer says")?);
         self.process = Some(Process::spawn(command).or_cannot("start a consumer")?);
         report.consumer(&self.consumer.name).started += 1;

@@ -1,11 +1,11 @@
 //! Mission files for new robots, and keys in those of others, whose comments stay.
 
 use common::mission::Protocol;
-use console::failure::Failure;
+use console::failure::Result;
 use toml_edit::{DocumentMut, Item, Table, value};
 
 /// The text of a mission for a robot that speaks `protocol` at `address`.
-pub(super) fn new_robot(protocol: Protocol, address: &str) -> String {
+pub fn new_robot(protocol: Protocol, address: &str) -> String {
     let (name, keys) = match protocol {
         Protocol::X80 => ("x80", ""),
         Protocol::Json => ("json", "counts_per_turn = 3600.0\n"),
@@ -44,7 +44,7 @@ pub(super) fn new_robot(protocol: Protocol, address: &str) -> String {
 ///
 /// # Errors
 /// The text is no TOML, or a key lies below something that is no table.
-pub(super) fn with_keys(text: &str, keys: &[&(String, String)]) -> Result<String, Failure> {
+pub fn with_keys(text: &str, keys: &[&(String, String)]) -> Result<String> {
     let mut document: DocumentMut = text.parse()?;
     for (path, new) in keys {
         let words: Vec<&str> = path.split('.').collect();

@@ -15,7 +15,7 @@ use mission_control::{Options, Progress, outcome::Outcome};
 use processes::Starter;
 
 use console::{
-    failure::{Failure, Refused},
+    failure::{Refused, Result},
     logging, missions,
     output::write_stderr,
     progress_line::{LINE_EVERY, ProgressLine},
@@ -26,7 +26,7 @@ use crate::commands::run::recorder::RunRecorder;
 
 /// What every procedure of a robot is told.
 #[derive(Debug, Args)]
-pub(in crate::commands) struct Setting {
+pub struct Setting {
     /// Name of the robot, which also names its shared memory.
     #[arg(long, default_value = "x80")]
     pub robot: RobotName,
@@ -49,7 +49,7 @@ pub(in crate::commands) struct Setting {
 
 impl Setting {
     /// One log for all runs of a command.
-    pub(in crate::commands) fn log(&self, name: &str) -> Result<(), Failure> {
+    pub fn log(&self, name: &str) -> Result {
         fs::create_dir_all(&self.runs)
             .map_err(|error| format!("cannot make {}: {error}", self.runs.display()))?;
         Ok(logging::to_file(&self.runs.join(name), "info")?)
@@ -57,12 +57,12 @@ impl Setting {
 
     /// The robot of `named`, and nothing else of it, in a procedure that alone ends the run. The controller drives it at `speed_m_s` or as
     /// fast as it can.
-    pub(in crate::commands) fn procedure(
+    pub fn procedure(
         &self,
         named: &Mission,
         plan: CalibrationPlan,
         speed_m_s: f64,
-    ) -> Result<Mission, Failure> {
+    ) -> Result<Mission> {
         let body = named.body();
         if body.steering.is_some() {
             return Err("a car does not turn on the spot, which the procedure is made of".into());
@@ -89,11 +89,7 @@ impl Setting {
     }
 
     /// Fails if the procedure does not come to its end.
-    pub(in crate::commands) fn carry_out(
-        &self,
-        mission: &Mission,
-        title: &str,
-    ) -> Result<Carried, Failure> {
+    pub fn carry_out(&self, mission: &Mission, title: &str) -> Result<Carried> {
         // It is checked like one that a person wrote.
         let mission = missions::parsed(&toml::to_string(mission)?, &mission.name, &[])?;
         let directory = runs::numbered(&self.runs, &mission.name)?;
@@ -167,7 +163,7 @@ impl Setting {
     }
 }
 
-pub(in crate::commands) struct Carried {
+pub struct Carried {
     pub directory: PathBuf,
     pub seconds: f64,
     pub counts: Vec<[u16; 2]>,

@@ -8,7 +8,7 @@ use std::{
 use common::{poll, signals::Signals};
 use glam::DVec2;
 
-use console::{failure::Failure, output::write_stderr};
+use console::{failure::Result, output::write_stderr};
 
 const LONGEST_LINE: u64 = 200;
 const FARTHEST_M: f64 = 10.0;
@@ -16,7 +16,7 @@ const FARTHEST_M: f64 = 10.0;
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 
 /// A person puts the robot on its mark. Who gives a file has nobody to wait for.
-pub(super) fn await_robot(title: &str, signals: &mut Signals) -> Result<(), Failure> {
+pub fn await_robot(title: &str, signals: &mut Signals) -> Result {
     if io::stdin().is_terminal() {
         write_stderr(&format!("{title}: put the robot on its mark, then press Enter\n"));
         line(signals)?;
@@ -25,7 +25,7 @@ pub(super) fn await_robot(title: &str, signals: &mut Signals) -> Result<(), Fail
 }
 
 /// A line that is no end is asked for again.
-pub(super) fn next(title: &str, signals: &mut Signals) -> Result<DVec2, Failure> {
+pub fn next(title: &str, signals: &mut Signals) -> Result<DVec2> {
     loop {
         write_stderr(&format!("{title}: where is it? metres ahead and to the left of the mark: "));
         if let Some(end) = end(&line(signals)?) {
@@ -35,7 +35,7 @@ pub(super) fn next(title: &str, signals: &mut Signals) -> Result<DVec2, Failure>
     }
 }
 
-fn line(signals: &mut Signals) -> Result<String, Failure> {
+fn line(signals: &mut Signals) -> Result<String> {
     let mut line = String::new();
     while !poll::is_readable(io::stdin(), LOOK_EVERY)? {
         if signals.came() {

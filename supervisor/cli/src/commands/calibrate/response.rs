@@ -7,9 +7,9 @@ use recording::Recording;
 use serde_json::json;
 
 use super::{Arguments, drive::Carried, refused};
-use console::{failure::Failure, output::print_text};
+use console::{failure::Result, output::print_text};
 
-pub(super) fn measure(arguments: &Arguments, plan: CalibrationPlan) -> Result<(), Failure> {
+pub fn measure(arguments: &Arguments, plan: CalibrationPlan) -> Result {
     let mission = arguments.mission(plan)?;
     let body = mission.body();
     let Carried { directory, .. } = arguments.setting.carry_out(&mission, "turns")?;

@@ -9,9 +9,9 @@ use common::{
 };
 use serde_json::json;
 
-use console::{failure::Failure, logging::today, output::print_text};
+use console::{failure::Result, logging::today, output::print_text};
 
-pub(super) struct Found {
+pub struct Found {
     pub robot: String,
     pub method: &'static str,
     pub before: Odometry,
@@ -22,7 +22,7 @@ pub(super) struct Found {
 
 impl Found {
     /// Writes the calibration, and prints it. A kill leaves the old file or the new one.
-    pub(super) fn write(&self, file: &Path, as_json: bool) -> Result<(), Failure> {
+    pub fn write(&self, file: &Path, as_json: bool) -> Result {
         let it = &self.estimate;
         let mut odometry = it.odometry(&self.before);
         odometry.calibrated = Some(Provenance {

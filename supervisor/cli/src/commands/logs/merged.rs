@@ -13,7 +13,7 @@ const LONGEST_LINE: u64 = 64 << 10;
 const TIME: usize = 27;
 
 #[derive(Debug)]
-pub(crate) struct Logs {
+pub struct Logs {
     directory: PathBuf,
     /// `None` reads all.
     process: Option<String>,
@@ -33,7 +33,7 @@ struct Log {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Line {
+pub struct Line {
     /// UTC, as the process wrote it. A line without a time has that of the line before.
     pub time: String,
     /// A stage, `supervisor`, `x80-sim`.
@@ -49,7 +49,7 @@ impl std::fmt::Display for Line {
 }
 
 impl Logs {
-    pub(crate) fn of(directory: &Path, process: Option<&str>) -> Self {
+    pub fn of(directory: &Path, process: Option<&str>) -> Self {
         Self {
             directory: directory.to_path_buf(),
             process: process.map(str::to_owned),
@@ -57,7 +57,7 @@ impl Logs {
         }
     }
 
-    pub(crate) fn processes(directory: &Path) -> io::Result<Vec<String>> {
+    pub fn processes(directory: &Path) -> io::Result<Vec<String>> {
         let mut processes = Vec::new();
         for entry in fs::read_dir(directory)? {
             let path = entry?.path();
@@ -73,7 +73,7 @@ impl Logs {
     }
 
     /// A round begins: [`Logs::next_line`] reads what the logs hold now. Later lines belong to the next round.
-    pub(crate) fn look(&mut self) -> io::Result<()> {
+    pub fn look(&mut self) -> io::Result<()> {
         for process in Self::processes(&self.directory)? {
             let wanted = self.process.as_ref().is_none_or(|only| *only == process);
             if wanted && self.logs.iter().all(|log| log.process != process) {
@@ -88,7 +88,7 @@ impl Logs {
         self.logs.iter_mut().try_for_each(Log::advance)
     }
 
-    pub(crate) fn next_line(&mut self) -> io::Result<Option<Line>> {
+    pub fn next_line(&mut self) -> io::Result<Option<Line>> {
         let with_line = self.logs.iter_mut().filter(|log| log.head.is_some());
         let time = |log: &&mut Log| log.head.as_ref().map(|line| line.time.clone());
         let Some(log) = with_line.min_by_key(time) else {

@@ -1,14 +1,13 @@
 //! The recorder of a run: a consumer in a process of its own, without which the mission goes on.
 
 use std::{
-    fs::File,
     io::{self, Read as _, Write as _},
     os::fd::AsFd as _,
     process::{ChildStdin, ChildStdout, Stdio},
     time::Duration,
 };
 
-use common::{clock::Pace, poll, signals::Signals};
+use common::{clock::Pace, file::append, poll, signals::Signals};
 use mission_control::{Consumer, Options};
 use processes::process::{Process, firsthand};
 
@@ -37,7 +36,7 @@ const fn patience(options: &Options) -> Patience {
     }
 }
 
-pub(crate) struct RunRecorder<'a> {
+pub struct RunRecorder<'a> {
     options: &'a Options,
     budget: Option<DiskBudget>,
     patience: Patience,
@@ -47,13 +46,13 @@ pub(crate) struct RunRecorder<'a> {
 }
 
 impl<'a> RunRecorder<'a> {
-    pub(crate) const fn new(options: &'a Options, budget: Option<DiskBudget>) -> Self {
+    pub const fn new(options: &'a Options, budget: Option<DiskBudget>) -> Self {
         Self { options, budget, patience: patience(options), process: None, pipes: None }
     }
 
     fn spawn(&self) -> io::Result<Process> {
         let Options { directory, robot, .. } = self.options;
-        let log = File::options().create(true).append(true).open(directory.join("recorder.log"))?;
+        let log = append(directory.join("recorder.log"))?;
         let mut command = firsthand(&["record", "--robot", &robot.to_string()]);
         // A resumed run may have a recording already.
         command.arg("--out").arg(recording::next_place(directory));

@@ -24,18 +24,18 @@ const RUN_ROOM: u64 = 2 << 20;
 const CELL_ROOM: u64 = 16;
 
 /// A new run needs it, with a map of so many `cells`.
-pub(crate) const fn room_of_run(cells: usize) -> u64 {
+pub const fn room_of_run(cells: usize) -> u64 {
     RUN_ROOM + CELL_ROOM * cells as u64
 }
 
-pub(crate) struct SummaryFile {
+pub struct SummaryFile {
     file: File,
     directory: PathBuf,
 }
 
 impl SummaryFile {
     /// Fails unless `needed` bytes more are free in `directory`.
-    pub(crate) fn reserve(directory: &Path, needed: u64) -> Result<Self, Refused> {
+    pub fn reserve(directory: &Path, needed: u64) -> Result<Self, Refused> {
         let path = directory.join(UNFINISHED);
         // A resumed run has its room.
         let opened = File::options().create(true).truncate(false).write(true).open(&path);
@@ -64,7 +64,7 @@ impl SummaryFile {
         Ok(Self { file, directory: directory.to_path_buf() })
     }
 
-    pub(crate) fn write(mut self, text: &str) -> Result<(), String> {
+    pub fn write(mut self, text: &str) -> Result<(), String> {
         let (from, to) = (self.directory.join(UNFINISHED), self.directory.join(SUMMARY));
         let written = self.file.write_all(text.as_bytes());
         // The rest of the reserved room is released.

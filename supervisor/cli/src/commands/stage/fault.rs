@@ -15,14 +15,14 @@ use common::{
 use mission_control::operator::{PATIENCE, find, new_id};
 
 use console::{
-    failure::{Failure, Refused},
+    failure::{Refused, Result},
     operator::known,
 };
 
 /// Break something in a running stage on purpose, to see what the others do.
 #[derive(Debug, Args)]
 #[command(after_help = table())]
-pub(super) struct Arguments {
+pub struct Arguments {
     /// The stage (`firsthand stage list`).
     stage: String,
     /// The fault; see below.
@@ -44,7 +44,7 @@ fn real_robot(robot: &RobotName) -> Refused {
     Refused::new("real-robot", message)
 }
 
-pub(super) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     let stage = known(&arguments.stage)?;
     let Some(fault) = faults::find(stage, &arguments.fault) else {
         let known: Vec<_> = faults::of(stage).map(|fault| fault.name).collect();
@@ -83,11 +83,7 @@ pub(super) fn main(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// The next heartbeats of the stage have the answer; none if it does not answer.
-fn request_fault(
-    bus: &Bus,
-    stage: &str,
-    request: FaultSample,
-) -> Result<Option<FaultAnswer>, Failure> {
+fn request_fault(bus: &Bus, stage: &str, request: FaultSample) -> Result<Option<FaultAnswer>> {
     let mut health = bus.reader(&topics::HEALTH)?;
     let mut waiter = Waiter::default();
     waiter.on(bus.wakeup(&topics::HEALTH)?);

@@ -19,14 +19,14 @@ use processes::{
 use crate::companions::{self, LABORATORY};
 
 use console::{
-    failure::{Failure, Refused},
+    failure::{Refused, Result},
     operator,
 };
 
 /// Names that are more alike than this are probably meant for each other.
 const NEAR: f64 = 0.8;
 
-pub(super) fn run(words: &[OsString]) -> Result<(), Failure> {
+pub fn run(words: &[OsString]) -> Result {
     let (name, options) = words.split_first().ok_or("name a stage")?;
     let name = name.to_string_lossy();
     if name == STOP_GUARD {
@@ -60,13 +60,9 @@ pub(super) fn run(words: &[OsString]) -> Result<(), Failure> {
 }
 
 /// In place of `firsthand`'s own planner: two to compare with, and the one of `firsthand calibrate`.
-pub(crate) const OTHER_PLANNERS: &[&str] = &["wavefront", "bug", calibration::PLANNER];
+pub const OTHER_PLANNERS: &[&str] = &["wavefront", "bug", calibration::PLANNER];
 
-fn become_executable(
-    stage: &Stage,
-    mission: &Mission,
-    options: &[OsString],
-) -> Result<(), Failure> {
+fn become_executable(stage: &Stage, mission: &Mission, options: &[OsString]) -> Result {
     let Some(executable) = stage.executable(mission) else {
         return Ok(());
     };

@@ -11,7 +11,7 @@ use common::{
 use serde::Serialize;
 
 use console::{
-    failure::Failure,
+    failure::Result,
     output::{json_lines, print_text, write_stderr},
     robots::{self, Robot},
     table::Table,
@@ -31,7 +31,7 @@ struct Listed {
     run: Option<PathBuf>,
 }
 
-pub(super) fn print(json: bool) -> Result<(), Failure> {
+pub fn print(json: bool) -> Result {
     let listed: Vec<_> = robots::own().into_iter().map(listed).collect();
     if json {
         print_text(&json_lines(&listed)?)?;

@@ -26,7 +26,7 @@ static FILES: &[(&str, &str)] = stored! {
 };
 
 /// Rows of some sections (`a,b`) or of all; none where there is no such file or section.
-pub(crate) fn markdown(name: &str, section: Option<&str>) -> Option<String> {
+pub fn markdown(name: &str, section: Option<&str>) -> Option<String> {
     let (_, text) = FILES.iter().find(|(file, _)| *file == name)?;
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let header = reader.headers().ok()?.clone();
@@ -48,7 +48,7 @@ pub(crate) fn markdown(name: &str, section: Option<&str>) -> Option<String> {
     })
 }
 
-pub(crate) fn results() -> String {
+pub fn results() -> String {
     let of_results = FILES.iter().filter(|(name, _)| *name != "capabilities");
     let printed =
         of_results.filter_map(|(name, _)| Some(format!("{name}\n\n{}", markdown(name, None)?)));
@@ -95,7 +95,7 @@ fn table<'a>(header: impl Iterator<Item = &'a str>, rows: &[Vec<String>]) -> Str
 
 /// Text, verdict, names of tests.
 #[cfg(test)]
-pub(crate) fn capabilities() -> Vec<[String; 3]> {
+pub fn capabilities() -> Vec<[String; 3]> {
     let (_, text) = FILES[0];
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let rows = reader.deserialize::<(String, String, String, String)>();

@@ -7,14 +7,14 @@ use common::{
 
 use super::sample_text;
 use console::{
-    failure::{Failure, Refused},
+    failure::{Refused, Result},
     stream::{LOOK_EVERY, Stream},
     waiting::Waiting,
 };
 
 /// Print the samples of a topic as they come, from run to run of the robot, until Ctrl-C.
 #[derive(Debug, Args)]
-pub(super) struct Arguments {
+pub struct Arguments {
     /// The topic (`firsthand topic list`).
     topic: String,
     /// Name of the robot.
@@ -31,7 +31,7 @@ pub(super) struct Arguments {
     number: Option<u64>,
 }
 
-pub(super) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     let topic = readable(&arguments.topic)?;
     let mut stream = Stream::open()?;
     let domain = Domain::of(arguments.robot.clone());
@@ -67,7 +67,7 @@ pub(super) fn main(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-pub(super) fn readable(name: &str) -> Result<&'static dyn AnyTopic, Failure> {
+pub fn readable(name: &str) -> Result<&'static dyn AnyTopic> {
     let mut all = topics::TABLE.iter();
     all.find(|topic| topic.spec().name == name).copied().ok_or_else(|| {
         let names: Vec<_> = topics::TABLE.iter().map(|topic| topic.spec().name).collect();

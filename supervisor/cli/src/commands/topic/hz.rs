@@ -10,7 +10,7 @@ use common::{
 
 use super::echo::readable;
 use console::{
-    failure::Failure,
+    failure::Result,
     output::json_lines,
     rates::{self, TopicRates},
     stream::{LOOK_EVERY, Stream},
@@ -19,7 +19,7 @@ use console::{
 
 /// Print each second how often topics are published: rates, longest gaps and ages, against the table of topics.
 #[derive(Debug, Args)]
-pub(super) struct Arguments {
+pub struct Arguments {
     /// Only this topic (`firsthand topic list`).
     topic: Option<String>,
     /// Name of the robot.
@@ -65,7 +65,7 @@ impl Readers {
     }
 }
 
-pub(super) fn main(arguments: &Arguments) -> Result<(), Failure> {
+pub fn main(arguments: &Arguments) -> Result {
     let topics = match &arguments.topic {
         Some(name) => vec![readable(name)?],
         None => topics::TABLE.to_vec(),

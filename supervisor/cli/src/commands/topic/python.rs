@@ -8,7 +8,7 @@ use common::{
 };
 
 /// Structs whose layouts are checked when the module is loaded, and a follower.
-pub(super) fn module() -> String {
+pub fn module() -> String {
     let mut module = include_str!("topics.py").to_owned();
     let (mut known, mut table) = (BTreeSet::new(), String::new());
     for topic in topics::TABLE {

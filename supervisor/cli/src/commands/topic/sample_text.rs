@@ -14,7 +14,7 @@ const ELEMENTS: &str = "elements";
 const SHOWN: usize = 16;
 
 /// The fields of a struct stand below its name. Arrays of more than 16 elements are cut, unless `whole`.
-pub(super) fn text(fields: &Fields, whole: bool) -> String {
+pub fn text(fields: &Fields, whole: bool) -> String {
     let most = if whole { usize::MAX } else { SHOWN };
     let mut text = String::new();
     for (name, value) in fields {
@@ -24,14 +24,14 @@ pub(super) fn text(fields: &Fields, whole: bool) -> String {
 }
 
 /// A whole sample. A number that is not finite is null.
-pub(super) fn json(fields: Fields) -> serde_json::Result<String> {
+pub fn json(fields: Fields) -> serde_json::Result<String> {
     serde_json::to_string(&Json(&Value::Struct(fields)))
 }
 
-pub(super) type Fields = Vec<(&'static str, Value)>;
+pub type Fields = Vec<(&'static str, Value)>;
 
 /// Header, and the elements of the slice if there is one.
-pub(super) fn fields(header: Value, elements: Option<Vec<Value>>) -> Fields {
+pub fn fields(header: Value, elements: Option<Vec<Value>>) -> Fields {
     let mut fields = match header {
         Value::Struct(fields) => fields,
         other => vec![("value", other)],
