@@ -567,11 +567,12 @@ impl Mission {
         self.robot.body()
     }
 
-    /// Whether somebody measured or stated all of the base's response. Of all models only X80s were measured.
+    /// Whether the mission or its model states the base's response.
     pub fn states_response(&self) -> bool {
         let ResponseKeys { delay_s, acceleration_m_s2, .. } = self.robot.response;
-        let is_stated = delay_s.is_some() && acceleration_m_s2.is_some();
-        is_stated || !self.robot.protocol().has_scans()
+        let is_written = delay_s.is_some() && acceleration_m_s2.is_some();
+        let is_of_model = self.robot.preset().response.acceleration_m_s2.is_some();
+        is_written || is_of_model || !self.robot.protocol().has_scans()
     }
 
     /// What the base is trusted to do: what is stated, and for the rest no more than a late and heavy base does. The link finds out

@@ -354,12 +354,13 @@ impl Reference {
         let beam = (bearing / seen_from.step_rad).round() as i32;
         let beside_rad = BESIDE_RAD.max(gate / way.length().max(gate));
         let beside = (beside_rad / seen_from.step_rad).ceil() as i32;
-        // A scan of 1,081 beams has more than are needed.
+        // A scan of 1,081 beams has more than are needed. Those that are taken lie alike to both sides: otherwise each point would be laid
+        // on a line to the same side, which turned a Jackal between walls at its reach by .1 rad in 15 m.
         let stride = (beside / 6).max(1);
         let whole_turn = (std::f64::consts::TAU / seen_from.step_rad).round().max(1.0) as i32;
         let near = |line: &Line| line.point.distance_squared(at);
-        (0..=2 * beside / stride)
-            .map(|step| (beam - beside + step * stride).rem_euclid(whole_turn) as usize)
+        (-(beside / stride)..=beside / stride)
+            .map(|step| (beam + step * stride).rem_euclid(whole_turn) as usize)
             .filter_map(|beam| *self.lines.get(beam)?)
             .min_by(|a, b| near(a).total_cmp(&near(b)))
             .filter(|line| near(line) <= gate * gate)
