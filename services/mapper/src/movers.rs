@@ -7,7 +7,10 @@
 //!
 //! While something moves, a beam stands if an earlier scan, by the time that movers need to go away, saw something at its end, too.
 
-use std::{collections::VecDeque, f64::consts::FRAC_PI_4};
+use std::{
+    collections::VecDeque,
+    f64::consts::{FRAC_PI_4, TAU},
+};
 
 use common::{
     geometry::wrap_angle,
@@ -44,10 +47,13 @@ const WIDEST_M: f64 = 1.6;
 /// Nothing is expected to be faster, m/s; and the way between two middles of a thing that stands, metres.
 const FASTEST_M_S: f64 = 2.5;
 const NEAR_M: f64 = 0.15;
-/// A thing is known by its newest places, and forgotten after so many seconds out of sight.
+/// A thing is known by its newest places. One that is not where it was foreseen is forgotten after so many seconds, and a mover whose
+/// foreseen place the laser does not see after so many. Its doubt grows so fast meanwhile, m/s.
 const PLACES: usize = 8;
 const LEAST_PLACES: usize = 4;
 const FORGOTTEN_S: f64 = 1.0;
+const HIDDEN_S: f64 = 6.0;
+const HIDDEN_M_S: f64 = 0.2;
 /// A mover is at least so fast: m/s, and deviations of its velocity. It came in this share of its places.
 const LEAST_M_S: f64 = 0.25;
 const SURE: f64 = 3.0;
@@ -116,7 +122,7 @@ impl Movers {
         let moved = self.moves(at_s);
         let is_next = scans.back().is_none_or(|(newest, ..)| at_s - newest >= APART_S);
         if is_next {
-            self.follow(things(&fan, older(CAME_S).as_ref(), at_s));
+            self.follow(things(&fan, older(CAME_S).as_ref(), at_s), &fan, at_s);
         }
         let moves = self.moves(at_s);
         let mut beams = scan.beams.clone();
@@ -140,9 +146,12 @@ impl Movers {
         self.seen_s.is_some_and(|seen_s| at_s - seen_s <= MOVES_FOR_S)
     }
 
-    fn follow(&mut self, things: Vec<Thing>) {
-        let Some(at_s) = things.first().map(|thing| thing.at_s) else { return };
-        self.tracks.retain(|track| track.age_s(at_s) <= FORGOTTEN_S);
+    fn follow(&mut self, things: Vec<Thing>, fan: &Fan<'_>, at_s: f64) {
+        let is_known = |track: &Track| {
+            let age_s = track.age_s(at_s);
+            age_s <= FORGOTTEN_S || age_s <= HIDDEN_S && track.is_hidden(fan, at_s)
+        };
+        self.tracks.retain(is_known);
         let off_m = |track: &Track, thing: &Thing| track.at(at_s).distance(thing.middle);
         let track_of = |thing: &Thing| {
             let off = |it: &usize| off_m(&self.tracks[*it], thing);
@@ -171,8 +180,9 @@ impl Movers {
         let [x, y, turn] = pose.map_from_odom;
         let (at_s, turned) = (pose.stamp.time().seconds(), DVec2::from_angle(turn));
         let mover = |track: &Track| {
-            let motion = track.motion.filter(|_| track.age_s(at_s) <= FORGOTTEN_S);
+            let motion = track.motion.filter(|_| track.age_s(at_s) <= HIDDEN_S);
             let Motion { velocity, doubt_m, doubt_m_s, .. } = motion?;
+            let unseen_s = (track.age_s(at_s) - CAME_S).max(0.0);
             // The ends on a disc lie before its middle, by so much on average.
             let middle = track.at(at_s) + FRAC_PI_4 * track.radius_m * track.along;
             let (at, velocity) = (turned.rotate(middle), turned.rotate(velocity));
@@ -182,7 +192,7 @@ impl Movers {
                 vx_m_s: velocity.x as f32,
                 vy_m_s: velocity.y as f32,
                 radius_m: track.radius_m as f32,
-                doubt_m: doubt_m as f32,
+                doubt_m: (doubt_m + HIDDEN_M_S * unseen_s) as f32,
                 doubt_m_s: doubt_m_s as f32,
             })
         };
@@ -208,6 +218,15 @@ impl Track {
             (Some(motion), _) => motion.middle + self.age_s(at_s) * motion.velocity,
             (None, newest) => newest.map_or(DVec2::ZERO, |newest| newest.middle),
         }
+    }
+
+    /// Whether `fan` does not reach to the foreseen place of a mover: it lies beside the fan, or something stands before it.
+    fn is_hidden(&self, fan: &Fan<'_>, at_s: f64) -> bool {
+        let way = self.at(at_s) - fan.origin;
+        let bearing = wrap_angle(way.to_angle() - fan.first_rad);
+        let beam = (bearing.rem_euclid(TAU) / fan.step_rad).round() as usize;
+        let range = fan.beams.get(beam).map_or(0.0, |range| f64::from(*range));
+        self.motion.is_some() && range < way.length() - self.radius_m - GAP_M
     }
 
     fn most_off_m(&self, at_s: f64) -> f64 {
@@ -316,7 +335,7 @@ impl Difference {
     fn of(before: &Fan<'_>, end: DVec2) -> Self {
         let way = end - before.origin;
         let bearing = wrap_angle(way.to_angle() - before.first_rad);
-        let beam = (bearing.rem_euclid(std::f64::consts::TAU) / before.step_rad).round() as usize;
+        let beam = (bearing.rem_euclid(TAU) / before.step_rad).round() as usize;
         let count = before.beams.len();
         let by = |beside: usize| {
             let beam = beam + count + beside - 1;

@@ -1,34 +1,43 @@
 //! The robot is not where things that move will be.
 //!
 //! Ways of some seconds are foreseen as controller and base would follow them: the one that the field advises, those in all directions
-//! around, back, and to stand. Movers are foreseen as discs that go straight on and grow with their doubt. Advice that meets none is
-//! followed. Otherwise the robot goes the way that meets none and comes farthest along the advice, or, if there is none, the way that
-//! meets one last. It stands when it could not be at rest by then: what runs into a robot at rest is not that robot's fault.
+//! around, back if a laser looks there, and to stand. Movers are foreseen as discs that go straight on. What the robot would come near to
+//! is a danger, the less the later. Advice without danger is followed. Otherwise the robot goes the way with the greatest gain along the
+//! advice less its danger, so it steps aside early. It goes only where it could brake after the next tick and be at rest before it meets
+//! something: what runs into a robot at rest is not that robot's fault.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use common::{
+    geometry::wrap_angle,
     kinematics::{FACES_COSINE, LEAST_SPEED_M_S, TURN_GAIN},
-    mission::{Mission, Response, SensorKind},
+    mission::{Mission, Response, Sensor, SensorKind},
     samples::{GuidanceStatus, Mover, PoseSample},
 };
 use glam::DVec2;
 
 use crate::view::View;
 
-const AHEAD_S: f64 = 3.0;
+const AHEAD_S: f64 = 5.0;
 const STEP_S: f64 = 0.1;
 const DIRECTIONS: u32 = 16;
 /// Shares of the top speed.
 const SPEEDS: [f64; 2] = [1.0, 0.5];
-/// The least distance from a mover, metres, and its growth for a robot in motion and at rest, m/s: movers turn and change their speed.
+/// A robot in motion meets what comes nearer than this, metres, and its growth, m/s: movers turn and change their speed.
 const APART_M: f64 = 0.1;
 const GROWS_M_S: f64 = 0.15;
-const GROWS_AT_REST_M_S: f64 = 0.05;
+/// Danger is 1 at a touch now, and falls by a factor of e in so many metres and seconds. The doubt of a velocity counts up to m/s.
+const NEAR_M: f64 = 0.3;
+const SOON_S: f64 = 4.0;
+const MOST_DOUBT_M_S: f64 = 0.4;
+const MOST_DANGER: f64 = 3.0;
+/// Less changes no advice. The gain of the way at top speed along the advice outweighs so much less danger.
+const LEAST_DANGER: f64 = 0.1;
+const GAIN: f64 = 1.0 / 3.0;
 /// Hazard this near to a mover may be its own, metres, because its trace fades within two scans.
 const TRACE_M: f64 = 0.4;
-/// The robot brakes so many ticks before it must.
-const EARLIER_TICKS: f64 = 2.0;
+/// A way leads to no hazard for so long.
+const CLEAR_S: f64 = 1.0;
 
 /// Status, direction and speed limit of the guidance.
 pub(crate) type Advice = (GuidanceStatus, DVec2, f64);
@@ -49,6 +58,8 @@ pub(crate) struct Evasion {
     turns: f64,
     response: Response,
     period_s: f64,
+    /// A laser looks there.
+    backs: bool,
 }
 
 /// A mover.
@@ -57,15 +68,17 @@ struct Disc {
     at: DVec2,
     velocity: DVec2,
     radius: f64,
-    /// The least distance from the robot's centre at first, metres, and its growth, m/s.
-    apart_m: f64,
+    /// The distance from the robot's centre at a touch, metres.
+    touches_m: f64,
     doubt_m_s: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Foreseen {
-    /// When something is met; infinite for never.
+    /// When the robot meets something that moves, while it moves itself, and when it is at a hazard; infinite for never.
     meets_s: f64,
+    hazard_s: f64,
+    danger: f64,
     /// The way along the advice.
     gain_m: f64,
 }
@@ -86,6 +99,7 @@ impl Evasion {
             turns: hurry.turns_beyond_deg.to_radians().cos(),
             response: body.response,
             period_s: 1.0 / mission.robot.rate_hz,
+            backs: mission.lasers().iter().any(|(_, laser)| looks_back(laser)),
         })
     }
 
@@ -98,26 +112,30 @@ impl Evasion {
         advice: Advice,
     ) -> Advice {
         let discs: Vec<_> = movers.iter().map(|mover| self.disc(mover)).collect();
-        let foresee = |to: Advice| self.foresee(view, &discs, pose, to, advice.1);
-        if discs.is_empty() || foresee(advice).meets_s.is_infinite() {
+        let foresee = |to: Advice, for_s| self.foresee(view, &discs, pose, (to, for_s), advice.1);
+        let is_safe = |to: Advice| {
+            let brakes = foresee(to, self.period_s);
+            brakes.meets_s.is_infinite() && brakes.hazard_s.is_infinite()
+        };
+        let (status, along, limit) = advice;
+        if discs.is_empty() || foresee(advice, AHEAD_S).danger < LEAST_DANGER && is_safe(advice) {
             return advice;
         }
         let around = (0..DIRECTIONS)
             .map(|step| DVec2::from_angle(TAU * f64::from(step) / f64::from(DIRECTIONS)));
-        let ways = std::iter::once(advice.1).chain(around).map(|to| (to, 1.0));
-        let ways = ways.chain([(pose.pose().axis(), -1.0)]).flat_map(|(to, sign)| {
+        let back = self.backs.then(|| (pose.pose().axis(), -1.0));
+        let ways = around.map(|to| (to, 1.0)).chain(back).flat_map(|(to, sign)| {
             SPEEDS.map(|share| (GuidanceStatus::Along, to, sign * share * self.speed))
         });
-        let foreseen = ways.chain([STAND]).map(|to| (to, foresee(to)));
-        let best = foreseen.max_by(|(_, one), (_, other)| {
-            let later = one.meets_s.total_cmp(&other.meets_s);
-            later.then(one.gain_m.total_cmp(&other.gain_m))
+        let advised = SPEEDS.map(|share| (status, along, share * limit));
+        let open = advised.into_iter().chain(ways).filter_map(|to| {
+            let it = foresee(to, AHEAD_S);
+            (it.hazard_s >= CLEAR_S && is_safe(to)).then_some((to, it))
         });
-        let Response { acceleration_m_s2, turn_acceleration_rad_s2, .. } = self.response;
-        let brakes_s = (pose.v_m_s.abs() / acceleration_m_s2)
-            .max(pose.omega_rad_s.abs() / turn_acceleration_rad_s2);
-        let stops_s = self.response.dead_time_s() + brakes_s + EARLIER_TICKS * self.period_s;
-        best.filter(|(_, it)| it.meets_s > stops_s).map_or(STAND, |(to, _)| to)
+        let score = |it: &Foreseen| GAIN * it.gain_m / (self.speed * AHEAD_S) - it.danger;
+        let all = open.chain([(STAND, foresee(STAND, AHEAD_S))]);
+        all.max_by(|(_, one), (_, other)| score(one).total_cmp(&score(other)))
+            .map_or(STAND, |(to, _)| to)
     }
 
     fn disc(&self, mover: &Mover) -> Disc {
@@ -126,18 +144,19 @@ impl Evasion {
             at: DVec2::new(x_m.into(), y_m.into()),
             velocity: DVec2::new(vx_m_s.into(), vy_m_s.into()),
             radius: radius_m.into(),
-            apart_m: self.radius + APART_M + f64::from(radius_m) + f64::from(doubt_m),
+            touches_m: self.radius + f64::from(radius_m) + f64::from(doubt_m),
             doubt_m_s: doubt_m_s.into(),
         }
     }
 
-    /// How the robot fares that follows `to`. From where it is too near by now, it may go away.
+    /// How the robot fares that follows `to` for `for_s` seconds and stands then, or before a hazard. From where it is too near by now,
+    /// it may go away.
     fn foresee(
         &self,
         view: &View<'_>,
         discs: &[Disc],
         sample: &PoseSample,
-        to: Advice,
+        (to, for_s): (Advice, f64),
         along: DVec2,
     ) -> Foreseen {
         let start = sample.pose();
@@ -149,32 +168,42 @@ impl Evasion {
             (view.is_hazard(at) || view.has_hazard(at, self.rest_m)) && !discs.iter().any(is_its)
         };
         let mut is_inside = is_hazard(start.position);
-        let mut meets_s = f64::INFINITY;
+        let (mut meets_s, mut hazard_s, mut danger) = (f64::INFINITY, f64::INFINITY, 0.0_f64);
+        let dead_s = self.response.dead_time_s();
         for step in 1..=(AHEAD_S / STEP_S) as u32 {
             let at_s = STEP_S * f64::from(step);
-            if at_s > self.response.dead_time_s() {
-                let [wanted_v, wanted_omega] = self.command(pose.axis(), to);
+            if at_s > dead_s {
+                let follows = hazard_s.is_infinite() && at_s <= for_s + dead_s;
+                let wanted = if follows { self.command(pose.axis(), to) } else { [0.0; 2] };
                 let near = |now: f64, wanted: f64, most: f64| {
                     now + (wanted - now).clamp(-most * STEP_S, most * STEP_S)
                 };
-                v = near(v, wanted_v, self.response.acceleration_m_s2);
-                omega = near(omega, wanted_omega, self.response.turn_acceleration_rad_s2);
+                v = near(v, wanted[0], self.response.acceleration_m_s2);
+                omega = near(omega, wanted[1], self.response.turn_acceleration_rad_s2);
             }
             let moves = v != 0.0 || omega != 0.0;
-            pose = pose.along_arc(v * STEP_S, omega * STEP_S);
-            let grows_m_s = if moves { GROWS_M_S } else { GROWS_AT_REST_M_S };
-            let is_met = |disc: &Disc| {
-                let apart_m = disc.apart_m + (grows_m_s + disc.doubt_m_s) * at_s;
+            let next = pose.along_arc(v * STEP_S, omega * STEP_S);
+            let is_there = moves && is_hazard(next.position);
+            is_inside &= !moves || is_there;
+            if is_there && !is_inside {
+                (hazard_s, v) = (hazard_s.min(at_s), 0.0);
+            } else {
+                pose = next;
+            }
+            for disc in discs {
                 let at = disc.at + disc.velocity * at_s;
-                at.distance(pose.position) < apart_m.min(disc.at.distance(start.position))
-            };
-            is_inside &= is_hazard(pose.position);
-            if discs.iter().any(is_met) || moves && !is_inside && is_hazard(pose.position) {
-                meets_s = at_s;
-                break;
+                let gap_m = at.distance(pose.position) - disc.touches_m;
+                let least_m = APART_M + (GROWS_M_S + disc.doubt_m_s) * at_s;
+                let first_m = disc.at.distance(start.position) - disc.touches_m;
+                if moves && gap_m < least_m.min(first_m) {
+                    meets_s = meets_s.min(at_s);
+                }
+                let doubt_m = disc.doubt_m_s.min(MOST_DOUBT_M_S) * at_s;
+                let near = ((doubt_m - gap_m) / NEAR_M).exp().min(MOST_DANGER);
+                danger = danger.max(near * (-at_s / SOON_S).exp());
             }
         }
-        Foreseen { meets_s, gain_m: (pose.position - start.position).dot(along) }
+        Foreseen { meets_s, hazard_s, danger, gain_m: (pose.position - start.position).dot(along) }
     }
 
     /// The controller's speed ahead, m/s, and turn rate, rad/s.
@@ -194,4 +223,10 @@ impl Evasion {
             [0.0, (TURN_GAIN * angle).min(self.look).min(most) * sine.signum()]
         }
     }
+}
+
+fn looks_back(laser: &Sensor) -> bool {
+    let (first_rad, step_rad) = laser.fan();
+    let behind_rad = wrap_angle(PI - laser.mount.looks_rad()).abs();
+    laser.used && behind_rad <= first_rad.abs() + step_rad
 }

@@ -589,11 +589,16 @@ fn a_long_body_is_not_turned_to_a_targets_heading_where_it_would_touch() {
     }
 }
 
-/// The guidance of a Kobuki at the origin that drives at 0.4 m/s along x, which is its way, in the middle of a hall whose ground was
+/// The guidance of a robot at the origin that drives at 0.4 m/s along x, which is its way, in the middle of a hall whose ground was
 /// scanned, beside a mover at `at` with `velocity`.
 fn guidance_beside(at: DVec2, velocity: DVec2) -> (GuidanceSample, f64) {
-    let text = "target = [4, 0]\nrobot.model = 'kobuki'\nperimeter = { width_m = 12, cells = 120 }";
-    let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
+    guidance_of("kobuki", at, velocity)
+}
+
+fn guidance_of(model: &str, at: DVec2, velocity: DVec2) -> (GuidanceSample, f64) {
+    let hall = "target = [4, 0]\nperimeter = { width_m = 12, cells = 120 }";
+    let text = format!("{hall}\nrobot.model = '{model}'");
+    let mission = Mission::parse(&text, Path::new("test.toml")).unwrap();
     let mut planner = sent(&mission);
     let (mut header, mut cells) = keyframe_of(mission.grid_frame(), 1, |_| false);
     let free = cells.iter_mut().filter(|cell| **cell == CellState::Free as u8);
@@ -626,6 +631,23 @@ fn a_robot_gets_out_of_the_way_of_what_comes() {
     let (guidance, speed) = guidance_beside(DVec2::new(2.5, 0.1), DVec2::new(-0.8, 0.0));
     let aside = guidance.ey.abs() > 0.3 || guidance.speed_limit_m_s < 0.0;
     assert!(aside && status(&guidance) == GuidanceStatus::Along, "{speed}: {guidance:?}");
+}
+
+#[test]
+fn a_robot_steps_aside_while_what_comes_is_far_off() {
+    let (guidance, _) = guidance_beside(DVec2::new(4.5, 0.1), DVec2::new(-1.2, 0.0));
+    assert!(status(&guidance) == GuidanceStatus::Along && guidance.ey.abs() > 0.3, "{guidance:?}");
+}
+
+#[test]
+fn a_robot_backs_only_where_a_laser_looks() {
+    let backs = |model| {
+        (2..30).any(|decimetres| {
+            let at = DVec2::new(0.1 * f64::from(decimetres), 0.0);
+            guidance_of(model, at, DVec2::new(-0.8, 0.0)).0.speed_limit_m_s < 0.0
+        })
+    };
+    assert_eq!(["kobuki", "jackal"].map(backs), [true, false]);
 }
 
 #[test]
