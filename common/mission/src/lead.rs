@@ -4,7 +4,7 @@
 
 use crate::{
     Mission, ModelledSpeed, Response,
-    kinematics::{DifferentialDrive, Pose2, TURN_GAIN, Twist},
+    kinematics::{DifferentialDrive, Drive, Pose2, TURN_GAIN, Twist},
 };
 
 /// A proportional law is well damped up to this product of its gain and the dead time; it oscillates for ever from pi / 2 on.
@@ -26,12 +26,11 @@ impl Lead {
         let body = mission.body();
         let dead_time_s = body.response.dead_time_s();
         let Response { acceleration_m_s2, turn_acceleration_rad_s2, .. } = body.response;
-        (body.steering.is_none() && dead_time_s * TURN_GAIN > DAMPED).then(|| Self {
-            drive: DifferentialDrive::new(
-                body.wheel_radius_m,
-                body.track_m,
-                body.top_speed_m_s / body.wheel_radius_m,
-            ),
+        let Drive::Differential(drive) = body.drive() else {
+            return None;
+        };
+        (dead_time_s * TURN_GAIN > DAMPED).then(|| Self {
+            drive,
             dead_time_s,
             v: ModelledSpeed::new(dead_time_s, acceleration_m_s2),
             omega: ModelledSpeed::new(dead_time_s, turn_acceleration_rad_s2),

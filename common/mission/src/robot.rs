@@ -178,13 +178,19 @@ const CREEP_M_S: f64 = 0.1;
 
 impl Body {
     pub fn drive(&self) -> Drive {
-        let top = self.top_speed_m_s / self.wheel_radius_m;
+        let &Self { wheel_radius_m, track_m, .. } = self;
         match self.ackermann() {
             Some(ackermann) => Drive::Ackermann(ackermann),
             None => {
-                Drive::Differential(DifferentialDrive::new(self.wheel_radius_m, self.track_m, top))
+                let top_rad_s = self.top_rad_s();
+                Drive::Differential(DifferentialDrive::new(wheel_radius_m, track_m, top_rad_s))
             }
         }
+    }
+
+    /// Of a wheel at top speed, rad/s.
+    pub fn top_rad_s(&self) -> f64 {
+        self.top_speed_m_s / self.wheel_radius_m
     }
 
     /// The speeds of the left and right wheel, rad/s, that a tick reaches on the way from the `told` to the `wanted` ones: they grow no
@@ -217,7 +223,7 @@ impl Body {
             self.wheel_radius_m,
             steering.wheelbase_m,
             steering.limit_rad,
-            self.top_speed_m_s / self.wheel_radius_m,
+            self.top_rad_s(),
             CREEP_M_S,
         ))
     }

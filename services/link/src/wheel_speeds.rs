@@ -35,12 +35,13 @@ impl WheelSpeeds {
     }
 
     /// Speeds of the two wheels, or of a car's wheel and steering, for `command` at `share` of its speed, counts/s; `wheels` are the
-    /// newest counts. Wheels that would be too fast are slower together, so that the curve stays. Steering is driven towards its angle by a speed loop like a wheel's, so a timed command ends its motion too.
+    /// newest counts. Wheels that would be too fast are slower together, so that the curve stays. Steering is driven towards its angle by
+    /// a speed loop like a wheel's, so a timed command ends its motion too.
     pub(crate) fn of(&self, command: &CommandSample, share: f64, wheels: &WheelSample) -> [i16; 2] {
         let Some(steering) = self.body.steering else {
             let wanted = [command.left_rad_s, command.right_rad_s].map(|speed| share * speed);
-            let fastest = wanted.map(f64::abs).into_iter().fold(self.top_rad_s(), f64::max);
-            let slower = if self.keeps_curve { self.top_rad_s() / fastest } else { 1.0 };
+            let fastest = wanted.map(f64::abs).into_iter().fold(self.body.top_rad_s(), f64::max);
+            let slower = if self.keeps_curve { self.body.top_rad_s() / fastest } else { 1.0 };
             let wanted = wanted.map(|speed| slower * speed);
             let told = self.told.map(|it| f64::from(it) / self.counts_per_radian());
             let reached = self.body.reached(told, wanted, self.rate_hz);
@@ -52,10 +53,6 @@ impl WheelSpeeds {
         let top = steering.counts(steering.rate_rad_s);
         let rate = (left * STEERING_GAIN * self.rate_hz).clamp(-top, top);
         [driven, whole(rate)]
-    }
-
-    fn top_rad_s(&self) -> f64 {
-        self.body.top_speed_m_s / self.body.wheel_radius_m
     }
 
     fn counts_per_radian(&self) -> f64 {
@@ -121,7 +118,7 @@ mod tests {
         for (protocol, ratio) in [("json", 0.8), ("x80", 1.0)] {
             let text = format!("target = [3, 0]\nrobot.protocol = '{protocol}'");
             let speeds = WheelSpeeds::new(&Mission::parse(&text, Path::new("m.toml")).unwrap());
-            let top = speeds.top_rad_s();
+            let top = speeds.body.top_rad_s();
             let command = CommandSample {
                 left_rad_s: 0.8 * top,
                 right_rad_s: top,

@@ -45,7 +45,7 @@ impl Body {
         let body = mission.body();
         let track = body.track_m * track_scale;
         let pose = mission.start_pose();
-        let top = body.top_speed_m_s / body.wheel_radius_m;
+        let top = body.top_rad_s();
         let mut it = Self {
             drive: DifferentialDrive::new(body.wheel_radius_m, track, top),
             wheel_radius: body.wheel_radius_m,

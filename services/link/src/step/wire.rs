@@ -138,8 +138,8 @@ impl Link {
         }
     }
 
-    /// All counts are plausible in lockstep, because a simulated robot does not restart. `judge_tick` judges of those that begin a
-    /// tick: how many more frames come depends on the machine.
+    /// In lockstep all counts are plausible, because a simulated robot does not restart. There the motion is judged once, as its tick begins:
+    /// how many more frames come depends on the machine.
     fn judge_counts(&mut self, motion: &Motion, now_ns: u64, effects: &mut Vec<Effect>) -> Counts {
         if self.in_ticks() {
             return Counts::Follow;
@@ -163,7 +163,7 @@ impl Link {
         }
     }
 
-    /// Contacts, the wheels' shares and an unstated response are judged in lockstep too, by the motion that begins a tick.
+    /// In lockstep the motion that begins a tick shows contacts, the wheels' shares, and a response that is not stated.
     pub(super) fn judge_tick(&mut self, motion: &Motion, now_ns: u64, effects: &mut Vec<Effect>) {
         let now = self.moment(now_ns);
         let odometry = &mut self.failsafe.monitors.odometry;
@@ -256,7 +256,7 @@ impl Link {
     }
 }
 
-/// Counts of a robot that has some wrap as on the wire.
+/// The robot's own counts wrap as on the wire; those of a robot that reports angles are endless.
 fn cyclic(motion: &Motion) -> WheelCounts {
     match WheelCounts::of(&motion.wheels, motion.endless.as_ref()) {
         WheelCounts::Cyclic(counts) => counts.map(|count| count % COUNT_CYCLE).into(),
