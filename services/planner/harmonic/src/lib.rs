@@ -36,7 +36,7 @@
 //!   does not depend on the range of u but grows with the square of the passages' width.
 //!
 //! # Verification
-//! No field is handed out unless every cell was checked: the relative residual of its equation is at most 2e-4, and one of
+//! No field is handed out unless every cell was checked: the relative residual of its equation is at most 2e-5, and one of
 //! its neighbours has a larger u. The first is relative to u of that cell, since a norm over the map says nothing about
 //! cells where u is 1e-50; the second makes steepest ascent end at the target. And in every tile of 64 x 64 cells the sum of
 //! the residuals is at most a hundredth of what bends the field there: small residuals of one sign would turn all directions
@@ -62,7 +62,7 @@
 //!     .with_screening(&Screening::cells(8.0))?;
 //! let mut solver = Solver::default();
 //! let mut field = solver.solve(&domain, &Cancellation::new())?;
-//! assert!(field.verification().worst_residual < 2e-4);
+//! assert!(field.verification().worst_residual < 2e-5);
 //! assert!(matches!(field.guidance(3.2, 5.0), Guidance::Along([x, _]) if x > 0.9));
 //!
 //! // An obstacle appears; the map is solved again.

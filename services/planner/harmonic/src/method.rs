@@ -10,7 +10,7 @@ pub enum Method {
     MultigridSingle,
     /// Multigrid in single precision, and multifrontal factorisation of the passages in which u is below its range.
     MultigridAndMultifrontal,
-    /// Multigrid in double precision: for halls of some 3000 cells and more, and a few maps in a thousand of scattered obstacles, both
+    /// Multigrid in double precision: for halls of some 3000 cells and more, and one map in a hundred of scattered obstacles, both
     /// too wide to be factorised.
     MultigridDouble,
     /// Multigrid in single precision, one band of u after the other, each with an exponent of its own.

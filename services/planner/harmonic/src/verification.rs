@@ -195,14 +195,14 @@ mod tests {
     #[test]
     fn a_field_solved_with_screening_does_not_pass_for_one_without_though_its_residuals_are_small()
     {
-        for (side, k) in [(512, 1.9e-4_f64), (512, 2e-5), (128, 1.9e-4)] {
+        for (side, k) in [(512, 5e-6_f64), (512, 2e-4), (128, 2e-4)] {
             let domain = hall(side);
             let screened = domain.clone().with_screening(&Screening::cells(0.5 / k.sqrt()));
             let mut solver = Solver::default();
             let wrong = solver.solve(&screened.unwrap(), &Cancellation::new()).unwrap();
             let threads = NonZeroUsize::MIN;
             let found = check(&domain, &wrong.store, threads);
-            assert!(found.worst_residual < RESIDUAL_LIMIT || k > 1.8e-4, "{found:?}");
+            assert!(found.worst_residual < RESIDUAL_LIMIT || k > 1e-4, "{found:?}");
             assert!(found.worst_tile > TILE_LIMIT, "{found:?}");
             let right = solver.solve(&domain, &Cancellation::new()).unwrap();
             let found = check(&domain, &right.store, threads);

@@ -3,7 +3,7 @@
 use crate::real::Real;
 
 /// Largest componentwise relative residual of a published field.
-pub(super) const RESIDUAL_LIMIT: f64 = 2e-4;
+pub(super) const RESIDUAL_LIMIT: f64 = 2e-5;
 
 /// Largest [`Verification::worst_tile`](super::Verification::worst_tile) of a published field.
 pub(super) const TILE_LIMIT: f64 = 0.01;
