@@ -237,11 +237,14 @@ impl StallWatch {
         }
         // The map may be older than this supervisor.
         self.epoch = self.epoch.max(guidance.epoch);
-        let target = Some(guidance.target_number);
-        if self.target.is_some() && self.target != target {
+        // A fresh planner knows no target yet.
+        let target = Some(guidance.target_number).filter(|number| *number != 0);
+        if let Some(before) = self.target
+            && target.is_some_and(|target| target != before)
+        {
             self.on_new_target(pose.stamp.tick);
         }
-        self.target = target;
+        self.target = target.or(self.target);
         if held {
             self.hold(pose.stamp.tick);
             return None;

@@ -17,6 +17,11 @@ use super::{
 const LONGER_SHARE: f64 = 1.3;
 const LONGER_M: f64 = 0.02;
 
+/// Whether a way to stop is longer than that of the stated response, metres.
+pub(super) fn is_longer(stops_within_m: f64, stated_m: f64) -> bool {
+    stops_within_m > LONGER_SHARE * stated_m + LONGER_M
+}
+
 #[derive(Clone, Debug)]
 pub struct BaseResponse {
     /// Or what the base is trusted to do, if nothing is stated.
@@ -90,8 +95,8 @@ impl Monitor for BaseResponse {
     fn observe(&mut self, what: &Observation<'_>, now: Moment) {
         match *what {
             Observation::Responds(response) => {
-                let most_m = LONGER_SHARE * self.stops_within_m(self.stated) + LONGER_M;
-                let is_slower = self.stops_within_m(response) > most_m;
+                let stated_m = self.stops_within_m(self.stated);
+                let is_slower = is_longer(self.stops_within_m(response), stated_m);
                 if is_slower || !self.is_stated {
                     self.found = Some(response);
                     (self.told_from, self.is_followed) = (now.time, !is_slower);

@@ -33,6 +33,7 @@ use common::{
 };
 
 use super::{
+    base_response::is_longer,
     contact::{Contacts, HELD_AFTER},
     monitor::{Condition, Counts, Moment, Monitor, Observation},
     response_fit::{ResponseFit, Suspected},
@@ -177,8 +178,10 @@ pub struct Odometry {
     counts_per_m: f64,
     steers: bool,
     response: Response,
-    /// Nobody stated the response.
+    /// Whether it looks for the response as it drives.
     searches: bool,
+    /// The response is stated, and no motion has contradicted it.
+    believes_stated: bool,
     is_known: bool,
     top_speed_m_s: f64,
     /// The commands, as far as the base's acceleration has reached them, counts/s.
@@ -260,7 +263,7 @@ impl Odometry {
         self.shares.ratio()
     }
 
-    /// Nobody stated how the base answers.
+    /// Whether it looks for the base's response as the robot drives.
     pub(crate) const fn searches(&self) -> bool {
         self.searches
     }
@@ -347,20 +350,29 @@ impl Odometry {
             return;
         }
         self.looked = now;
-        let is_new = |found: &Response| {
-            let change = self.stops_within_m(*found) / self.stops_within_m(self.response);
-            !self.is_known || !UNCHANGED.contains(&change)
-        };
-        let found = self.fit.later(self.response, self.steers).or_else(|| {
-            let searched = self.searches.then(|| self.fit.slowest(self.top_speed_m_s, self.steers));
-            searched.flatten().filter(is_new)
-        });
+        let found = self.searched().or_else(|| self.fit.later(self.response, self.steers));
         if let Some(found) = found {
             self.is_known = true;
             self.adopt(found);
             self.found = Some(found);
             self.clear_evidence();
         }
+    }
+
+    /// What is found of a base of which nobody stated how it answers, or which stops later than stated whatever explains its motion.
+    fn searched(&mut self) -> Option<Response> {
+        if !self.searches {
+            return None;
+        }
+        let found = self.fit.alike(self.top_speed_m_s, self.steers)?;
+        let now_m = self.stops_within_m(self.response);
+        if self.believes_stated {
+            self.believes_stated = !is_longer(found.stops_within_m, now_m);
+            return (!self.believes_stated).then_some(found.slowest);
+        }
+        let change = self.stops_within_m(found.slowest) / now_m;
+        let is_new = !self.is_known || !UNCHANGED.contains(&change);
+        (found.are_told_apart && is_new).then_some(found.slowest)
     }
 
     /// A suspicion ends when a response explains the motion that raised it, because the motion after it, until the robot stands, tells
@@ -381,9 +393,10 @@ impl Odometry {
         let suspected = Suspected { channel, from_s: since.seconds() - JUDGED.as_secs_f64() };
         if let Some(found) = self.fit.explain(self.response, self.steers, suspected) {
             // A moment explains less than all that was seen, from which the search takes what is slow enough.
-            let is_news =
-                !self.searches || self.stops_within_m(found) > self.stops_within_m(self.response);
+            let is_news = self.believes_stated
+                || self.stops_within_m(found) > self.stops_within_m(self.response);
             if found != self.response && is_news {
+                self.believes_stated &= !self.searches;
                 self.adopt(found);
                 self.found = Some(found);
             }
@@ -453,10 +466,12 @@ impl Monitor for Odometry {
         let counts_per_m = 1.0 / body.metres_per_count();
         let response = mission.trusted_response();
         let change = response.acceleration_m_s2 * counts_per_m;
+        let has_scans = mission.robot.protocol().has_scans();
         Self {
             counts_per_m,
             response,
-            searches: !mission.states_response(),
+            searches: !mission.states_response() || has_scans && mission.brakes_by_response(),
+            believes_stated: mission.states_response(),
             is_known: mission.states_response(),
             top_speed_m_s: body.top_speed_m_s,
             reached: [(); 2].map(|()| ModelledSpeed::new(0.0, change)),

@@ -73,6 +73,17 @@ pub(super) struct Suspected {
     pub(super) from_s: f64,
 }
 
+/// Responses that explain a motion alike.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Alike {
+    /// The one that stops last from top speed.
+    pub(super) slowest: Response,
+    /// The way to stop of the one that stops first, metres.
+    pub(super) stops_within_m: f64,
+    /// They differ little: delay and acceleration, which both make a start late, are told apart by more motion.
+    pub(super) are_told_apart: bool,
+}
+
 /// Dead times, seconds, and accelerations, m/s^2.
 fn candidates() -> impl Iterator<Item = (f64, f64)> {
     (0..DEAD_TIMES).flat_map(|step| {
@@ -195,9 +206,8 @@ impl ResponseFit {
         is_later.then_some(Response { delay_s: stated.delay_s + later_s, ..stated })
     }
 
-    /// Of the responses that explain the wheels' motion about as well as the best one does, the one that stops last from `top_speed_m_s`.
-    /// None as long as they differ much: delay and acceleration, which both make a start late, are told apart by more of them.
-    pub(super) fn slowest(&self, top_speed_m_s: f64, steers: bool) -> Option<Response> {
+    /// The responses that explain the wheels' motion about as well as the best one does. None if none explains it.
+    pub(super) fn alike(&self, top_speed_m_s: f64, steers: bool) -> Option<Alike> {
         let ((first_s, _), (last_s, _)) = (self.turned.front()?, self.turned.back()?);
         let intervals = self.turned.iter().filter(|(_, turned)| turned.is_some()).count();
         // Squares of counts in an interval to squares of m/s, times seconds.
@@ -221,10 +231,14 @@ impl ResponseFit {
         });
         let fits: Vec<_> = fits.collect();
         let (least, best_m, _) = *fits.iter().min_by(|one, other| one.0.total_cmp(&other.0))?;
-        let near = fits.iter().filter(|(unlike, ..)| *unlike <= BETTER * least + ALIKE);
-        let (_, slowest_m, slowest) = near.max_by(|one, other| one.1.total_cmp(&other.1))?;
+        let near = || fits.iter().filter(|(unlike, ..)| *unlike <= BETTER * least + ALIKE);
+        let (_, slowest_m, slowest) = *near().max_by(|one, other| one.1.total_cmp(&other.1))?;
         let most_m = TOLD_APART * best_m + TOLD_APART_S * top_speed_m_s;
-        (*slowest_m <= most_m).then_some(*slowest)
+        Some(Alike {
+            slowest,
+            stops_within_m: near().fold(slowest_m, |least, (_, stops_m, _)| least.min(*stops_m)),
+            are_told_apart: slowest_m <= most_m,
+        })
     }
 
     /// The least share of a channel's motion that the response explains; none if a channel moved by no factor of it, or
@@ -382,23 +396,24 @@ mod tests {
         fit
     }
 
+    fn slowest(fit: &ResponseFit) -> Option<Response> {
+        fit.alike(0.5, false).filter(|found| found.are_told_apart).map(|found| found.slowest)
+    }
+
     #[test]
     fn delay_and_acceleration_of_a_base_of_which_nobody_stated_them_are_found_together_and_on_the_slow_side()
      {
         let stops_m = |[delay_s, acceleration]: [f64; 2]| 0.5 * delay_s + 0.125 / acceleration;
         for response in [[0.4, 0.3], [0.25, 0.6], [0.1, 0.3], [0.4, 3.0], [0.1, f64::INFINITY]] {
-            let found = driven(response, 0.78, 45, |turned| turned).slowest(0.5, false).unwrap();
+            let found = slowest(&driven(response, 0.78, 45, |turned| turned)).unwrap();
             let found_m = stops_m([found.dead_time_s(), found.acceleration_m_s2]);
             let share = found_m / (stops_m(response) + 0.02);
             assert!((0.9..1.7).contains(&share), "{response:?} {found:?}: {share}");
         }
         let ramp = driven([0.4, 0.3], 0.78, 8, |turned| turned);
-        assert!(ramp.slowest(0.5, false).is_none_or(|found| found.acceleration_m_s2 <= 0.3));
-        assert_eq!(driven([0.1, 0.6], 1.0, 45, |_| [0.0; 2]).slowest(0.5, false), None);
-        assert_eq!(
-            driven([0.1, 0.6], 1.0, 45, |[_, right]| [0.0, right]).slowest(0.5, false),
-            None
-        );
+        assert!(slowest(&ramp).is_none_or(|found| found.acceleration_m_s2 <= 0.3));
+        assert_eq!(slowest(&driven([0.1, 0.6], 1.0, 45, |_| [0.0; 2])), None);
+        assert_eq!(slowest(&driven([0.1, 0.6], 1.0, 45, |[_, right]| [0.0, right])), None);
     }
 
     #[test]

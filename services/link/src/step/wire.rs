@@ -169,7 +169,7 @@ impl Link {
         let odometry = &mut self.failsafe.monitors.odometry;
         odometry.observe(&Observation::Currents(motion.currents), now);
         odometry.observe(&Observation::Motor(cyclic(motion), Counts::Follow), now);
-        // A simulated robot answers as stated, if that is stated.
+        // A simulated X80 answers as stated.
         if odometry.searches() {
             self.tell_response(now_ns, effects);
         }

@@ -367,3 +367,16 @@ fn a_robot_that_stands_and_is_elsewhere_forgets_its_map_at_once_and_nothing_else
     let driving = PoseSample { relocations: 6, ..pose(63.0, 0.0) };
     assert_eq!(step(&mut watch, driving, guidance(Along, 4)), None);
 }
+
+#[test]
+fn a_fresh_planner_that_knows_no_target_yet_does_not_make_the_next_stall_the_first() {
+    let mut watch = watch();
+    let steps = (0..10).map(|second| {
+        let target_number = [1, 0, 0][second as usize % 3];
+        let guidance = GuidanceSample { target_number, ..guidance(Waiting, 0) };
+        let stall = watch.step(&pose(f64::from(second), 0.0), &guidance, false, true);
+        stall.unwrap().recovery()
+    });
+    let steps: Vec<_> = steps.collect();
+    assert_eq!(steps[..3], [Replan, Replan, Reset], "{steps:?}");
+}
