@@ -364,11 +364,12 @@ impl Odometry {
         if !self.searches {
             return None;
         }
-        let found = self.fit.alike(self.top_speed_m_s, self.steers)?;
+        let found = self.fit.alike(self.response, self.top_speed_m_s, self.steers)?;
         let now_m = self.stops_within_m(self.response);
         if self.believes_stated {
-            self.believes_stated = !is_longer(found.stops_within_m, now_m);
-            return (!self.believes_stated).then_some(found.slowest);
+            let contradicts = found.are_far_better && is_longer(found.stops_within_m, now_m);
+            self.believes_stated = !contradicts;
+            return contradicts.then_some(found.slowest);
         }
         let change = self.stops_within_m(found.slowest) / now_m;
         let is_new = !self.is_known || !UNCHANGED.contains(&change);

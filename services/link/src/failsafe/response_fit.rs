@@ -82,6 +82,13 @@ pub(super) struct Alike {
     pub(super) stops_within_m: f64,
     /// They differ little: delay and acceleration, which both make a start late, are told apart by more motion.
     pub(super) are_told_apart: bool,
+    /// The stated response is far less like the motion.
+    pub(super) are_far_better: bool,
+}
+
+/// Whether so much that is not as one response says, and so much more that is not as another says, tells them apart.
+fn is_far_better(unlike: f64, other: f64) -> bool {
+    other > (unlike + LEAST_BETTER).max(BETTER * (unlike + NOISE))
 }
 
 /// Dead times, seconds, and accelerations, m/s^2.
@@ -200,23 +207,30 @@ impl ResponseFit {
         let prompt = fit(0)?.0;
         let later = (1..=LATER_STEPS).filter_map(fit);
         let (unlike, later_s, explains) = later.min_by(|one, other| one.0.total_cmp(&other.0))?;
-        let is_later = explains
-            && later_s >= LEAST_LATER_S
-            && prompt > (unlike + LEAST_BETTER).max(BETTER * (unlike + NOISE));
+        let is_later = explains && later_s >= LEAST_LATER_S && is_far_better(unlike, prompt);
         is_later.then_some(Response { delay_s: stated.delay_s + later_s, ..stated })
     }
 
     /// The responses that explain the wheels' motion about as well as the best one does. None if none explains it.
-    pub(super) fn alike(&self, top_speed_m_s: f64, steers: bool) -> Option<Alike> {
+    pub(super) fn alike(
+        &self,
+        stated: Response,
+        top_speed_m_s: f64,
+        steers: bool,
+    ) -> Option<Alike> {
         let ((first_s, _), (last_s, _)) = (self.turned.front()?, self.turned.back()?);
         let intervals = self.turned.iter().filter(|(_, turned)| turned.is_some()).count();
         // Squares of counts in an interval to squares of m/s, times seconds.
         let scale = intervals as f64 / (last_s - first_s) / self.counts_per_m.powi(2);
-        let fits = candidates().filter_map(|(dead_time_s, acceleration)| {
+        // What is not as this response says, all, and the factor.
+        let fit = |dead_time_s: f64, acceleration: f64| {
             let [[left, right, _], _] = self.motions(dead_time_s, acceleration, *first_s)?;
             let wheels = if steers { left } else { left.with(&right) };
             let factor = (wheels.both / wheels.model).clamp(*FACTORS.start(), *FACTORS.end());
-            let (unlike, all) = (scale * wheels.unlike(factor), scale * wheels.turned);
+            Some((scale * wheels.unlike(factor), scale * wheels.turned, factor))
+        };
+        let fits = candidates().filter_map(|(dead_time_s, acceleration)| {
+            let (unlike, all, factor) = fit(dead_time_s, acceleration)?;
             // Wheels that reach less of a speed reach it sooner.
             let acceleration_m_s2 = acceleration * factor;
             let response = Response {
@@ -234,10 +248,12 @@ impl ResponseFit {
         let near = || fits.iter().filter(|(unlike, ..)| *unlike <= BETTER * least + ALIKE);
         let (_, slowest_m, slowest) = *near().max_by(|one, other| one.1.total_cmp(&other.1))?;
         let most_m = TOLD_APART * best_m + TOLD_APART_S * top_speed_m_s;
+        let (as_stated, ..) = fit(stated.dead_time_s(), stated.acceleration_m_s2)?;
         Some(Alike {
             slowest,
             stops_within_m: near().fold(slowest_m, |least, (_, stops_m, _)| least.min(*stops_m)),
             are_told_apart: slowest_m <= most_m,
+            are_far_better: is_far_better(least, as_stated),
         })
     }
 
@@ -397,7 +413,9 @@ mod tests {
     }
 
     fn slowest(fit: &ResponseFit) -> Option<Response> {
-        fit.alike(0.5, false).filter(|found| found.are_told_apart).map(|found| found.slowest)
+        fit.alike(Response::X80, 0.5, false)
+            .filter(|found| found.are_told_apart)
+            .map(|found| found.slowest)
     }
 
     #[test]
@@ -414,6 +432,20 @@ mod tests {
         assert!(slowest(&ramp).is_none_or(|found| found.acceleration_m_s2 <= 0.3));
         assert_eq!(slowest(&driven([0.1, 0.6], 1.0, 45, |_| [0.0; 2])), None);
         assert_eq!(slowest(&driven([0.1, 0.6], 1.0, 45, |[_, right]| [0.0, right])), None);
+    }
+
+    #[test]
+    fn a_base_that_stops_later_than_stated_contradicts_that_and_one_that_is_as_stated_does_not() {
+        let stated = Response { acceleration_m_s2: 1.0, ..Response::X80 };
+        let contradicts = |base: [f64; 2]| {
+            driven(base, 0.78, 45, |turned| turned)
+                .alike(stated, 0.5, false)
+                .is_some_and(|found| found.are_far_better && found.stops_within_m > 0.4)
+        };
+        assert!(contradicts([0.4, 0.3]));
+        assert!(contradicts([0.25, 0.3]));
+        assert!(!contradicts([stated.dead_time_s(), 1.0]));
+        assert!(!contradicts([0.1, f64::INFINITY]));
     }
 
     #[test]
