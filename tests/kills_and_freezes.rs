@@ -44,7 +44,7 @@ const FAST: &[&str] = &["--pace", "4"];
 const LONG: &[&str] = &["--pace", "4", "--set", "controller.speed_m_s=0.1"];
 /// Among drums a car touches one in some 3 of 100 missions, killed or not: it cannot look around. So it drives in an empty room.
 const CAR: &[&str] =
-    &["--pace", "4", "--set", "robot.model=\"car\"", "--set", "controller.speed_m_s=0.1"];
+    &["--pace", "4", "--set", "robot.model=\"car\"", "--set", "controller.speed_m_s=0.05"];
 /// At this speed a mission in lockstep has thousands of ticks, which take seconds. That is time enough for the signals.
 const LOCKSTEP: &[&str] = &["--set", "controller.speed_m_s=0.006", "--timeout", "80000"];
 
