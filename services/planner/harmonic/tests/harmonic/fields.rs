@@ -217,7 +217,7 @@ fn a_narrow_passage_beside_a_wide_one_is_right_where_its_far_end_takes_over() {
 #[test]
 fn double_precision_solves_what_fails_verification_in_single_precision_and_has_no_memory_to_be_factorised()
  {
-    let noise = Kind::Noise { density: 0.198_829_310_110_751_31 };
+    let noise = Kind::Noise { density: 0.198_829_310_110_751_3 };
     let domain = Map::generate(noise, 299, 261, 1236).domain().expect("a valid map");
     let mut solver = Solver::new(Settings { memory_limit: 16 << 20, ..Settings::default() });
     let field = solver.solve(&domain, &Cancellation::new()).expect("the map has a field");
