@@ -320,7 +320,8 @@ impl Odometry {
             self.turn.weigh((right - left, gap_s), least, false, settles, now);
             let from_s = now.seconds() - gap_s - settles.settled_s - self.limit.as_secs_f64();
             let speeds = turned.map(|counts| counts / gap_s);
-            let is_untold = self.fit.is_untold(speeds, from_s, least, self.steers);
+            let change = self.response.acceleration_m_s2 * self.counts_per_m;
+            let is_untold = self.fit.is_untold(speeds, (from_s, change), least, self.steers);
             self.untold_s = (self.untold_s + if is_untold { gap_s } else { -gap_s }).max(0.0);
         }
         self.look_for_contact(now);

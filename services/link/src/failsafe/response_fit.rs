@@ -136,17 +136,21 @@ impl ResponseFit {
         keep(&mut self.turned, (now.seconds(), counts), KEPT_S);
     }
 
-    /// Whether a channel's speed is beyond every command since `from_s`, and beyond 0, by `least` and a share of the fastest; counts/s.
+    /// Whether a channel's speed is beyond every command since `from_s`, beyond what is left of an earlier one where wheels slow down by
+    /// `change` counts/s in a second, and beyond 0, by `least` and a share of the fastest; counts/s.
     pub(super) fn is_untold(
         &self,
         speeds: [f64; 2],
-        from_s: f64,
+        (from_s, change): (f64, f64),
         least: f64,
         steers: bool,
     ) -> bool {
         let told = |channel: usize, sign: f64| {
-            let recent = self.commands.iter().filter(|(at, _)| *at >= from_s);
-            recent.fold(0.0_f64, |most, (_, told)| most.max(sign * channels(*told)[channel]))
+            let left = |(at, told): &(f64, [f64; 2])| {
+                let slowed = if *at < from_s { change * (from_s - at) } else { 0.0 };
+                sign * channels(*told)[channel] - slowed
+            };
+            self.commands.iter().map(left).fold(0.0, f64::max)
         };
         let fastest = [0, 1].map(|wheel| told(wheel, 1.0).max(told(wheel, -1.0)));
         let fastest = fastest[0].max(fastest[1]);
@@ -461,6 +465,19 @@ mod tests {
         }
         let slips = explained([0.2, 0.6], |turned| turned.map(|counts| 0.8 * counts));
         assert!(slips.is_some());
+    }
+
+    #[test]
+    fn wheels_that_still_slow_down_from_an_older_command_turn_as_told_and_faster_ones_do_not() {
+        let mut fit = ResponseFit::new(1000.0);
+        fit.commanded([500.0, 500.0], MissionTime::from_seconds(1.0));
+        fit.commanded([0.0, 0.0], MissionTime::from_seconds(1.25));
+        fit.commanded([100.0, 100.0], MissionTime::from_seconds(2.9));
+        // At 3 s, a second after what the base has answered; it slows down by 0.3 m/s in a second.
+        let is_untold = |speed, change| fit.is_untold([speed; 2], (2.0, change), 100.0, false);
+        assert!(!is_untold(240.0, 300.0));
+        assert!(is_untold(420.0, 300.0));
+        assert!(is_untold(260.0, f64::INFINITY));
     }
 
     #[test]
