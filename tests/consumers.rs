@@ -157,7 +157,7 @@ fn a_logger_follows_its_robot_through_five_runs_one_of_them_killed_and_harms_non
 fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_notices() {
     in_own_process(|| {
         // Slow enough not to arrive before its stages run again.
-        let slowly = ["--pace", "2", "--set", "controller.speed_m_s=0.1"];
+        let slowly = ["--pace", "1", "--set", "controller.speed_m_s=0.1"];
         let mut run = Run::under_way("greedy", "open-room", &slowly, 0.5);
         let bus = Bus::join(&support::domain("greedy"), "greedy").unwrap();
         let mut grids = bus.reader(&topics::GRID).unwrap();
