@@ -16,7 +16,7 @@ use crate::support::{
 
 #[test]
 fn a_robot_with_a_laser_arrives_though_each_stage_is_killed_and_replays_to_the_bit() {
-    let robot = ["--pace", "2", "--set", "robot.model='kobuki'", "--set", "robot.rate_hz=20"];
+    let robot = ["--pace", "1", "--set", "robot.model='kobuki'", "--set", "robot.rate_hz=20"];
     // The robot is slow enough not to arrive between two kills.
     let slow = ["--set", "controller.speed_m_s=0.35"];
     let mut run =
