@@ -238,13 +238,12 @@ impl StallWatch {
         // The map may be older than this supervisor.
         self.epoch = self.epoch.max(guidance.epoch);
         // A fresh planner knows no target yet.
-        let target = Some(guidance.target_number).filter(|number| *number != 0);
-        if let Some(before) = self.target
-            && target.is_some_and(|target| target != before)
+        if guidance.target_number != 0
+            && let Some(before) = self.target.replace(guidance.target_number)
+            && before != guidance.target_number
         {
             self.on_new_target(pose.stamp.tick);
         }
-        self.target = target.or(self.target);
         if held {
             self.hold(pose.stamp.tick);
             return None;

@@ -115,6 +115,15 @@ impl From<Response> for Settles {
     }
 }
 
+/// Where the response is from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Known {
+    Unknown,
+    /// No motion has contradicted what is stated.
+    Stated,
+    Found,
+}
+
 #[derive(Clone, Copy, Debug, Default)]
 struct Evidence {
     asked: [f64; 2],
@@ -180,9 +189,7 @@ pub struct Odometry {
     response: Response,
     /// Whether it looks for the response as it drives.
     searches: bool,
-    /// The response is stated, and no motion has contradicted it.
-    believes_stated: bool,
-    is_known: bool,
+    known: Known,
     top_speed_m_s: f64,
     /// The commands, as far as the base's acceleration has reached them, counts/s.
     reached: [ModelledSpeed; 2],
@@ -250,9 +257,14 @@ impl Odometry {
     /// Respond to commands by `response` from now on.
     fn adopt(&mut self, response: Response) {
         self.response = response;
-        let change = response.acceleration_m_s2 * self.counts_per_m;
+        let change = self.most_change();
         self.reached = [(); 2].map(|()| ModelledSpeed::new(0.0, change));
         self.shares.adopt(response);
+    }
+
+    /// Counts/s, in a second.
+    fn most_change(&self) -> f64 {
+        self.response.acceleration_m_s2 * self.counts_per_m
     }
 
     fn stops_within_m(&self, response: Response) -> f64 {
@@ -320,8 +332,8 @@ impl Odometry {
             self.turn.weigh((right - left, gap_s), least, false, settles, now);
             let from_s = now.seconds() - gap_s - settles.settled_s - self.limit.as_secs_f64();
             let speeds = turned.map(|counts| counts / gap_s);
-            let change = self.response.acceleration_m_s2 * self.counts_per_m;
-            let is_untold = self.fit.is_untold(speeds, (from_s, change), least, self.steers);
+            let slows = (from_s, self.most_change());
+            let is_untold = self.fit.is_untold(speeds, slows, least, self.steers);
             self.untold_s = (self.untold_s + if is_untold { gap_s } else { -gap_s }).max(0.0);
         }
         self.look_for_contact(now);
@@ -353,27 +365,33 @@ impl Odometry {
         self.looked = now;
         let found = self.searched().or_else(|| self.fit.later(self.response, self.steers));
         if let Some(found) = found {
-            self.is_known = true;
+            if self.known == Known::Unknown {
+                self.known = Known::Found;
+            }
             self.adopt(found);
             self.found = Some(found);
             self.clear_evidence();
         }
     }
 
-    /// What is found of a base of which nobody stated how it answers, or which stops later than stated whatever explains its motion.
+    /// A base of which nobody stated how it answers shows it as it drives; so does one that stops later than stated, whatever explains
+    /// its motion.
     fn searched(&mut self) -> Option<Response> {
         if !self.searches {
             return None;
         }
-        let found = self.fit.alike(self.response, self.top_speed_m_s, self.steers)?;
+        let believed = (self.known == Known::Stated).then_some(self.response);
+        let found = self.fit.alike(believed, self.top_speed_m_s, self.steers)?;
         let now_m = self.stops_within_m(self.response);
-        if self.believes_stated {
-            let contradicts = found.are_far_better && is_longer(found.stops_within_m, now_m);
-            self.believes_stated = !contradicts;
+        if believed.is_some() {
+            let contradicts = is_longer(found.stops_within_m, now_m);
+            if contradicts {
+                self.known = Known::Found;
+            }
             return contradicts.then_some(found.slowest);
         }
         let change = self.stops_within_m(found.slowest) / now_m;
-        let is_new = !self.is_known || !UNCHANGED.contains(&change);
+        let is_new = self.known == Known::Unknown || !UNCHANGED.contains(&change);
         (found.are_told_apart && is_new).then_some(found.slowest)
     }
 
@@ -395,10 +413,12 @@ impl Odometry {
         let suspected = Suspected { channel, from_s: since.seconds() - JUDGED.as_secs_f64() };
         if let Some(found) = self.fit.explain(self.response, self.steers, suspected) {
             // A moment explains less than all that was seen, from which the search takes what is slow enough.
-            let is_news = self.believes_stated
+            let is_news = self.known == Known::Stated
                 || self.stops_within_m(found) > self.stops_within_m(self.response);
             if found != self.response && is_news {
-                self.believes_stated &= !self.searches;
+                if self.searches && self.known == Known::Stated {
+                    self.known = Known::Found;
+                }
                 self.adopt(found);
                 self.found = Some(found);
             }
@@ -473,8 +493,7 @@ impl Monitor for Odometry {
             counts_per_m,
             response,
             searches: !mission.states_response() || has_scans && mission.brakes_by_response(),
-            believes_stated: mission.states_response(),
-            is_known: mission.states_response(),
+            known: if mission.states_response() { Known::Stated } else { Known::Unknown },
             top_speed_m_s: body.top_speed_m_s,
             reached: [(); 2].map(|()| ModelledSpeed::new(0.0, change)),
             fit: ResponseFit::new(counts_per_m),

@@ -82,11 +82,9 @@ pub(super) struct Alike {
     pub(super) stops_within_m: f64,
     /// They differ little: delay and acceleration, which both make a start late, are told apart by more motion.
     pub(super) are_told_apart: bool,
-    /// The stated response is far less like the motion.
-    pub(super) are_far_better: bool,
 }
 
-/// Whether so much that is not as one response says, and so much more that is not as another says, tells them apart.
+/// Whether a response that leaves `unlike` unexplained is far more like the motion than one that leaves `other`.
 fn is_far_better(unlike: f64, other: f64) -> bool {
     other > (unlike + LEAST_BETTER).max(BETTER * (unlike + NOISE))
 }
@@ -194,15 +192,12 @@ impl ResponseFit {
         if intervals < LEAST_INTERVALS {
             return None;
         }
-        // Squares of counts in an interval to squares of m/s, times seconds.
-        let scale = intervals as f64 / (last_s - from_s) / self.counts_per_m.powi(2);
+        let scale = self.scale(intervals, last_s - from_s);
         let fit = |step: u32| {
             let later_s = f64::from(step) * LATER_STEP_S;
             let dead_time_s = stated.dead_time_s() + later_s;
-            let [_, [left, right, turn]] =
-                self.motions(dead_time_s, stated.acceleration_m_s2, *from_s)?;
-            let wheels = if steers { left } else { left.with(&right) };
-            let factor = (wheels.both / wheels.model).clamp(*FACTORS.start(), *FACTORS.end());
+            let [_, channels] = self.motions(dead_time_s, stated.acceleration_m_s2, *from_s)?;
+            let ((wheels, factor), turn) = (of_wheels(&channels, steers), &channels[TURN]);
             let unlike = wheels.unlike(factor);
             let turns = turn.both * turn.both.abs() >= TURN_EXPLAINED * turn.model * turn.turned;
             let explains = unlike <= LATER_UNEXPLAINED * wheels.turned && (steers || turns);
@@ -215,24 +210,31 @@ impl ResponseFit {
         is_later.then_some(Response { delay_s: stated.delay_s + later_s, ..stated })
     }
 
-    /// The responses that explain the wheels' motion about as well as the best one does. None if none explains it.
+    /// The responses that explain the wheels' motion about as well as the best one does. None if none explains it, or not far better
+    /// than the response that is `believed`.
     pub(super) fn alike(
         &self,
-        stated: Response,
+        believed: Option<Response>,
         top_speed_m_s: f64,
         steers: bool,
     ) -> Option<Alike> {
         let ((first_s, _), (last_s, _)) = (self.turned.front()?, self.turned.back()?);
         let intervals = self.turned.iter().filter(|(_, turned)| turned.is_some()).count();
-        // Squares of counts in an interval to squares of m/s, times seconds.
-        let scale = intervals as f64 / (last_s - first_s) / self.counts_per_m.powi(2);
+        let scale = self.scale(intervals, last_s - first_s);
         // What is not as this response says, all, and the factor.
         let fit = |dead_time_s: f64, acceleration: f64| {
-            let [[left, right, _], _] = self.motions(dead_time_s, acceleration, *first_s)?;
-            let wheels = if steers { left } else { left.with(&right) };
-            let factor = (wheels.both / wheels.model).clamp(*FACTORS.start(), *FACTORS.end());
+            let [channels, _] = self.motions(dead_time_s, acceleration, *first_s)?;
+            let (wheels, factor) = of_wheels(&channels, steers);
             Some((scale * wheels.unlike(factor), scale * wheels.turned, factor))
         };
+        let believed = match believed {
+            Some(it) => Some(fit(it.dead_time_s(), it.acceleration_m_s2)?.0),
+            None => None,
+        };
+        // Most robots answer as stated, and nothing is far better than that.
+        if believed.is_some_and(|believed| !is_far_better(0.0, believed)) {
+            return None;
+        }
         let fits = candidates().filter_map(|(dead_time_s, acceleration)| {
             let (unlike, all, factor) = fit(dead_time_s, acceleration)?;
             // Wheels that reach less of a speed reach it sooner.
@@ -249,15 +251,16 @@ impl ResponseFit {
         });
         let fits: Vec<_> = fits.collect();
         let (least, best_m, _) = *fits.iter().min_by(|one, other| one.0.total_cmp(&other.0))?;
+        if believed.is_some_and(|believed| !is_far_better(least, believed)) {
+            return None;
+        }
         let near = || fits.iter().filter(|(unlike, ..)| *unlike <= BETTER * least + ALIKE);
         let (_, slowest_m, slowest) = *near().max_by(|one, other| one.1.total_cmp(&other.1))?;
         let most_m = TOLD_APART * best_m + TOLD_APART_S * top_speed_m_s;
-        let (as_stated, ..) = fit(stated.dead_time_s(), stated.acceleration_m_s2)?;
         Some(Alike {
             slowest,
             stops_within_m: near().fold(slowest_m, |least, (_, stops_m, _)| least.min(*stops_m)),
             are_told_apart: slowest_m <= most_m,
-            are_far_better: is_far_better(least, as_stated),
         })
     }
 
@@ -291,6 +294,11 @@ impl ResponseFit {
             }
         }
         least
+    }
+
+    /// Squares of counts in one of so many intervals to squares of m/s, times seconds.
+    fn scale(&self, intervals: usize, in_s: f64) -> f64 {
+        intervals as f64 / in_s / self.counts_per_m.powi(2)
     }
 
     /// The channels' motion with this response: all, and from then on.
@@ -369,6 +377,13 @@ impl Motion {
     }
 }
 
+/// The motion of all wheels that drive, and the factor by which it is that of the model.
+fn of_wheels([left, right, _]: &[Motion; CHANNELS], steers: bool) -> (Motion, f64) {
+    let wheels = if steers { *left } else { left.with(right) };
+    let factor = (wheels.both / wheels.model).clamp(*FACTORS.start(), *FACTORS.end());
+    (wheels, factor)
+}
+
 fn keep<T>(kept: &mut VecDeque<(f64, T)>, new: (f64, T), for_s: f64) {
     let now = new.0;
     kept.push_back(new);
@@ -417,9 +432,7 @@ mod tests {
     }
 
     fn slowest(fit: &ResponseFit) -> Option<Response> {
-        fit.alike(Response::X80, 0.5, false)
-            .filter(|found| found.are_told_apart)
-            .map(|found| found.slowest)
+        fit.alike(None, 0.5, false).filter(|found| found.are_told_apart).map(|found| found.slowest)
     }
 
     #[test]
@@ -443,8 +456,8 @@ mod tests {
         let stated = Response { acceleration_m_s2: 1.0, ..Response::X80 };
         let contradicts = |base: [f64; 2]| {
             driven(base, 0.78, 45, |turned| turned)
-                .alike(stated, 0.5, false)
-                .is_some_and(|found| found.are_far_better && found.stops_within_m > 0.4)
+                .alike(Some(stated), 0.5, false)
+                .is_some_and(|found| found.stops_within_m > 0.4)
         };
         assert!(contradicts([0.4, 0.3]));
         assert!(contradicts([0.25, 0.3]));
