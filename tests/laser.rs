@@ -136,6 +136,25 @@ fn a_long_robot_passes_a_gap_narrower_than_its_length_and_turns_behind_it() {
 }
 
 #[test]
+fn a_heavy_rectangle_passes_the_loose_end_of_a_wall_untouched_as_stated_and_as_found() {
+    let text = "target = [7.05, -0.44]\nstart.heading_deg = -76.5\ntimeout_s = 144\n\
+        perimeter = { width_m = 10.7, centre = [3.53, 0.12] }\nrobot.model = 'jackal'\n\
+        simulation.wheels = { acceleration_m_s2 = 0.3, delay_s = 0.1 }\n\
+        [world]\ndrum = [{ at = [2.604, -0.51], radius_m = 0.254 }, { at = [3.682, -0.471], radius_m = 0.234 }]\n\
+        wall = [{ points = [[-1.2, -1.897], [8.25, -1.897], [8.25, 1.897], [-1.2, 1.897], [-1.2, -1.897]] },\n\
+                { points = [[1.894, 0.466], [2.344, 2.141]] }]";
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("heavy.toml");
+    std::fs::write(&file, text).unwrap();
+    let stated = ["--set", "robot.response={delay_s=0.1,acceleration_m_s2=0.3}"];
+    for (robot, more) in [("heavy-stated", &stated[..]), ("heavy-found", &[])] {
+        let arguments = [&["--seed", "3"], more].concat();
+        let (code, summary) = run(robot, file.to_str().unwrap(), &arguments);
+        assert_eq!((code, &summary["collisions"]), (Some(0), &0.into()), "{summary}");
+    }
+}
+
+#[test]
 fn a_long_robot_refuses_to_turn_to_its_heading_in_a_corridor_and_touches_nothing() {
     let walls = "[{ points = [[0.8, 0.4], [3.2, 0.4], [3.2, -0.4], [0.8, -0.4]] }]";
     let (_, summary) = long_robot("long-corridor", "[[2.2, 0, 90]]", walls);

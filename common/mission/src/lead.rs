@@ -2,8 +2,11 @@
 //! towards what is near, if each command is computed for the pose that was seen: the commands that it has not answered yet are foreseen
 //! by its response. A base that answers soon goes by the pose that was seen: a Jackal was a sixth slower with the lead.
 
+use std::collections::VecDeque;
+
 use crate::{
-    Mission, ModelledSpeed, Response,
+    Base, Mission,
+    geometry::wrap_angle,
     kinematics::{DifferentialDrive, Drive, Pose2, TURN_GAIN, Twist},
 };
 
@@ -12,12 +15,23 @@ const DAMPED: f64 = 0.5;
 /// Steps in which the way ahead is integrated, seconds.
 const STEP_S: f64 = 0.02;
 
+/// Commands that are remembered at most; the oldest acts at once where more are given.
+const MOST_PENDING: usize = 256;
+
 #[derive(Clone, Debug)]
 pub struct Lead {
     drive: DifferentialDrive,
+    base: Base,
     dead_time_s: f64,
-    v: ModelledSpeed,
-    omega: ModelledSpeed,
+    /// When they act, and the commands that do not act yet.
+    pending: VecDeque<(f64, Twist)>,
+    wanted: Twist,
+    twist: Twist,
+    at_s: f64,
+    /// The first pose and its time, until the next one tells how the robot moved when the model began.
+    first: Option<(Pose2, f64)>,
+    /// It is known how the robot moves.
+    has_begun: bool,
 }
 
 impl Lead {
@@ -25,15 +39,19 @@ impl Lead {
     pub fn new(mission: &Mission) -> Option<Self> {
         let body = mission.body();
         let dead_time_s = body.response.dead_time_s();
-        let Response { acceleration_m_s2, turn_acceleration_rad_s2, .. } = body.response;
         let Drive::Differential(drive) = body.drive() else {
             return None;
         };
         (dead_time_s * TURN_GAIN > DAMPED).then(|| Self {
             drive,
+            base: Base::new(body.response, body.track_m),
             dead_time_s,
-            v: ModelledSpeed::new(dead_time_s, acceleration_m_s2),
-            omega: ModelledSpeed::new(dead_time_s, turn_acceleration_rad_s2),
+            pending: VecDeque::new(),
+            wanted: Twist::default(),
+            twist: Twist::default(),
+            at_s: f64::NEG_INFINITY,
+            first: None,
+            has_begun: false,
         })
     }
 
@@ -41,23 +59,66 @@ impl Lead {
         self.dead_time_s
     }
 
-    /// The pose at which a command acts that is given at the time `now_s` of `pose`.
-    pub fn pose(&mut self, pose: Pose2, now_s: f64) -> Pose2 {
-        self.v.go_on(now_s);
-        self.omega.go_on(now_s);
-        let Self { dead_time_s, mut v, mut omega, .. } = self.clone();
-        let steps = (dead_time_s / STEP_S).ceil();
-        (1..=steps as u32).fold(pose, |pose, step| {
-            let until_s = now_s + dead_time_s * f64::from(step) / steps;
-            pose.along_arc(v.go_on(until_s), omega.go_on(until_s))
-        })
+    /// The pose at which a command acts that is given at the time `now_s` of `pose`, and the motion there.
+    pub fn foresee(&mut self, pose: Pose2, now_s: f64) -> (Pose2, Twist) {
+        self.go_on(pose, now_s);
+        self.begin(pose, now_s);
+        let mut ahead = self.clone();
+        let pose = ahead.go_on(pose, now_s + self.dead_time_s);
+        (pose, ahead.twist)
+    }
+
+    /// The robot may be on its way when its response is found, or when a stage runs again.
+    fn begin(&mut self, pose: Pose2, now_s: f64) {
+        let Some((first, first_s)) = self.first else {
+            self.first = Some((pose, now_s));
+            return;
+        };
+        let for_s = now_s - first_s;
+        if !self.has_begun && for_s > 0.0 {
+            self.has_begun = true;
+            let v = (pose.position - first.position).dot(pose.axis()) / for_s;
+            let omega = wrap_angle(pose.heading - first.heading) / for_s;
+            self.twist = self.drive.twist(self.drive.wheels(Twist { v, omega }));
+            self.wanted = self.twist;
+        }
     }
 
     /// `twist` was commanded for a pose of that time. Its curve is driven no faster than the wheels turn.
     pub fn command(&mut self, twist: Twist, now_s: f64) {
         let twist = self.drive.twist(self.drive.wheels(twist));
-        self.v.command(now_s, twist.v);
-        self.omega.command(now_s, twist.omega);
+        if self.pending.len() == MOST_PENDING
+            && let Some((_, oldest)) = self.pending.pop_front()
+        {
+            self.wanted = oldest;
+        }
+        self.pending.push_back((now_s + self.dead_time_s, twist));
+    }
+
+    /// Go on to the time `until_s`. Returns where the robot is then that is at `pose` now.
+    fn go_on(&mut self, mut pose: Pose2, until_s: f64) -> Pose2 {
+        // Before the first call no time has passed.
+        self.at_s = if self.at_s.is_finite() { self.at_s } else { until_s };
+        while self.at_s < until_s || self.pending.front().is_some_and(|next| next.0 <= until_s) {
+            let acts_s = self.pending.front().map_or(f64::INFINITY, |next| next.0);
+            let to_s = (self.at_s + STEP_S).min(until_s).min(acts_s).max(self.at_s);
+            let for_s = to_s - self.at_s;
+            let before = self.twist;
+            self.twist = self.base.approach(before, self.wanted, for_s);
+            let [v, omega] =
+                [[before.v, self.twist.v], [before.omega, self.twist.omega]].map(|[from, to]| {
+                    if self.base.is_limited() { f64::midpoint(from, to) } else { to }
+                });
+            pose = pose.along_arc(v * for_s, omega * for_s);
+            self.at_s = to_s;
+            if acts_s <= to_s
+                && let Some((_, wanted)) = self.pending.pop_front()
+            {
+                self.wanted = wanted;
+                self.has_begun = true;
+            }
+        }
+        pose
     }
 }
 
@@ -78,7 +139,7 @@ mod tests {
     fn a_late_base_is_foreseen_on_the_curve_of_the_commands_that_it_has_not_answered_yet() {
         assert!(lead("").is_none());
         let mut lead = lead("robot.response = { delay_s = 0.4, lag_s = 0.1 }").unwrap();
-        let at = |lead: &mut Lead, now_s| lead.pose(Pose2::default(), now_s);
+        let at = |lead: &mut Lead, now_s| lead.foresee(Pose2::default(), now_s).0;
         assert_eq!(at(&mut lead, 0.0), Pose2::default());
         lead.command(Twist { v: 0.2, omega: 0.5 }, 0.0);
         lead.command(Twist { v: 0.0, omega: 0.0 }, 0.4);
@@ -91,5 +152,14 @@ mod tests {
         let Pose2 { position, heading } = at(&mut lead, 1.5);
         assert!(heading > 0.1 && position.length() < 0.26, "{position} {heading}");
         close(position.x, heading.sin());
+    }
+
+    #[test]
+    fn a_robot_that_is_on_its_way_when_the_model_begins_goes_on() {
+        let mut lead = lead("robot.response = { delay_s = 0.4, lag_s = 0.1 }").unwrap();
+        let at = |x| Pose2 { position: glam::DVec2::new(x, 0.0), heading: 0.0 };
+        lead.foresee(at(0.0), 1.0);
+        let (pose, twist) = lead.foresee(at(0.03), 1.1);
+        assert!((twist.v - 0.3).abs() < 1e-9 && (pose.position.x - 0.18).abs() < 1e-9, "{pose:?}");
     }
 }

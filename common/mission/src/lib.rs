@@ -63,7 +63,7 @@ pub use error::MissionError;
 pub use footprint::Footprint;
 pub use lead::Lead;
 pub use odometry::{Calibration, CalibrationPlan, Odometry, Procedure, Provenance};
-pub use response::{ModelledSpeed, Response, ResponseKeys};
+pub use response::{Base, ModelledSpeed, Response, ResponseKeys};
 pub use robot::{BatteryLimits, Body, Channel, Model, Protocol, RobotConfig, Steering};
 pub use ros2::Ros2Topics;
 pub use sensor::{

@@ -3,6 +3,8 @@
 
 use std::collections::VecDeque;
 
+use crate::kinematics::Twist;
+
 keys! {
     /// The keys of `[robot.response]`; those that are not written are the model's.
     #[derive(Copy)]
@@ -89,6 +91,40 @@ impl Response {
             return f64::INFINITY;
         }
         (2.0 * self.turn_acceleration_rad_s2 * angle_rad).max(0.0).sqrt()
+    }
+}
+
+/// How two wheels bring a body to what it is told: each gains and loses speed at a limited rate, and so does the turn. So a base that is
+/// told to turn on the spot hardly brakes, and one that gains speed as fast as it can goes on turning as before.
+#[derive(Clone, Copy, Debug)]
+pub struct Base {
+    response: Response,
+    /// From the middle of the body, metres.
+    wheel_m: f64,
+}
+
+impl Base {
+    pub const fn new(response: Response, track_m: f64) -> Self {
+        Self { response, wheel_m: track_m / 2.0 }
+    }
+
+    /// Whether the rate is known.
+    pub const fn is_limited(&self) -> bool {
+        self.response.acceleration_m_s2.is_finite()
+    }
+
+    /// The twist `for_s` seconds after `now`, if `wanted` acts.
+    pub fn approach(&self, now: Twist, wanted: Twist, for_s: f64) -> Twist {
+        if !self.is_limited() {
+            return wanted;
+        }
+        let near = |now: f64, wanted: f64, most: f64| now + (wanted - now).clamp(-most, most);
+        let most_rad_s = self.response.turn_acceleration_rad_s2 * for_s;
+        let most_m_s = self.response.acceleration_m_s2 * for_s;
+        let [left, right] = [-self.wheel_m, self.wheel_m]
+            .map(|at| near(now.v + at * now.omega, wanted.v + at * wanted.omega, most_m_s));
+        let omega = (right - left) / (2.0 * self.wheel_m);
+        Twist { v: f64::midpoint(left, right), omega: near(now.omega, omega, most_rad_s) }
     }
 }
 
@@ -225,5 +261,21 @@ mod tests {
         at_once.go_on(1.0);
         at_once.command(1.0, 0.5);
         assert_eq!((at_once.go_on(2.0), at_once.speed()), (0.5, 0.5));
+    }
+
+    #[test]
+    fn a_base_that_is_told_to_turn_on_the_spot_brakes_no_more_than_its_wheels() {
+        let response =
+            Response { acceleration_m_s2: 0.3, turn_acceleration_rad_s2: 1.6, ..Response::X80 };
+        let base = Base::new(response, 0.375);
+        let (now, spot) = (Twist { v: 0.3, omega: 0.0 }, Twist { v: 0.0, omega: 2.0 });
+        let turns = base.approach(now, spot, 0.5);
+        assert!((turns.v - 0.2625).abs() < 1e-9 && turns.omega > 0.5, "{turns:?}");
+        let stands = base.approach(now, Twist::default(), 0.5);
+        assert!((stands.v - 0.15).abs() < 1e-9 && stands.omega == 0.0, "{stands:?}");
+        let curve = Twist { v: 0.5, omega: 1.0 };
+        let gains = base.approach(curve, Twist { v: 2.0, omega: 0.0 }, 0.5);
+        assert!(gains.omega > 0.99, "both wheels gain speed: {gains:?}");
+        assert_eq!(Base::new(Response::X80, 0.26).approach(curve, spot, 0.1), spot);
     }
 }

@@ -177,7 +177,7 @@ impl Controller {
         let sane = is_sent && unit && distance.is_finite() && pose.heading.is_finite();
         let time_s = MissionTime(guidance.pose_ns).seconds();
         let acts_at = match &mut self.lead {
-            Some(lead) if sane => lead.pose(pose, time_s),
+            Some(lead) if sane => lead.foresee(pose, time_s).0,
             _ => pose,
         };
         let alignment = Alignment::of(acts_at.axis(), direction);

@@ -4,7 +4,8 @@
 //! reading says nothing.
 //!
 //! A scan counts once for a cell, which many beams cross near the laser. It is occupied where a fifth of them end and the others pass: a
-//! post, or a thing's edge, fills part of it. Fewer ends are noise of a surface behind, which must not close a gap.
+//! post, or a thing's edge, fills part of it. Fewer ends may be noise of a surface behind, which must not close a gap. Neighbours that end
+//! farther before what is behind than noise explains are a thing too: the edge of a wall along which the laser looks.
 //!
 //! Where beams are no farther apart than a cell, the passed cells are the polygon of their ends, filled row by row. Farther away, and
 //! beside a beam without a reading, beams are followed one by one.
@@ -23,6 +24,8 @@ use crate::{
 const HIT: i8 = 6;
 /// Weight of beams that all pass a cell. Two scans free a cell that many filled.
 const PASS: i8 = 6;
+/// The same where the thing goes on behind the cell: beams along a wall's face may all miss its edge.
+const PASS_ALONG: i8 = 1;
 
 /// A beam that ends this near behind a cell is no evidence against a thing in it, metres: along a slanted wall most beams pass a part of
 /// it before they end in the next.
@@ -32,6 +35,11 @@ const FARTHEST: f64 = 1e6;
 
 /// The most passing beams for each that ends in an occupied cell.
 const PASS_FOR_ONE_THAT_ENDS: u32 = 4;
+
+/// So many neighbours that end in one cell are no stray beams.
+const NEIGHBOURS: u32 = 2;
+/// Noise hardly exceeds so many standard deviations.
+const NOISE_DEVIATIONS: f64 = 3.0;
 
 /// Marks of a cell: a beam ended in it, passed it, passed it and ended far behind.
 const ENDED: u8 = 1;
@@ -74,11 +82,24 @@ impl EvidenceGrid {
             let change = match scan.is_thing(cell, *mark) {
                 true if lattice.centre_of(cell).distance(robot) <= radius => continue,
                 true => HIT,
-                false if mark & (ENDED | PASSED_FAR) == PASSED_FAR => -PASS,
-                false => 0,
+                false if mark & (ENDED | PASSED_FAR) != PASSED_FAR => 0,
+                false if self.goes_on_behind(cell, fan.origin) => -PASS_ALONG,
+                false => -PASS,
             };
             self.weigh_seen(cell, change);
         }
+    }
+}
+
+impl EvidenceGrid {
+    /// Whether a laser at `origin` looks along the thing in this cell.
+    fn goes_on_behind(&self, cell: Cell, origin: DVec2) -> bool {
+        let lattice = self.ground.lattice;
+        let at = lattice.centre_of(cell);
+        let along = (at - origin).normalize_or_zero() * lattice.resolution_m;
+        let is_thing =
+            |at| lattice.cell_at(at).is_some_and(|cell| self.is_occupied(lattice.index(cell)));
+        is_thing(at) && (is_thing(at + along) || is_thing(at + 2.0 * along))
     }
 }
 
@@ -153,7 +174,8 @@ impl<'a> Scan<'a> {
         let turn = std::f64::consts::TAU / self.fan.step_rad;
         let middle = (offset.to_angle() - self.fan.first_rad) / self.fan.step_rad;
         let first = (middle - half).rem_euclid(turn);
-        let (mut ended, mut passed) = (0_u32, 0_u32);
+        let (mut ended, mut passed, mut passed_by_noise) = (0_u32, 0_u32, 0_u32);
+        let (mut run, mut neighbours) = (0_u32, 0_u32);
         for step in 0..=(2.0 * half).ceil() as usize {
             let beam = (first + step as f64).rem_euclid(turn) as usize;
             let Some(Beam { along, range, ends }) = self.beams.get(beam).copied() else {
@@ -166,10 +188,22 @@ impl<'a> Scan<'a> {
             // The cell's far sides, as the beam meets them.
             let leaves = ((offset + 0.5 * along.signum()) / along).min_element();
             let is_here = || (range * along - offset).abs().max_element() <= 0.5;
-            ended += u32::from(ends && is_here());
-            passed += u32::from(leaves < range);
+            let ends_here = ends && is_here();
+            run = if ends_here { run + 1 } else { 0 };
+            neighbours = neighbours.max(run);
+            ended += u32::from(ends_here);
+            let behind = range - leaves;
+            passed += u32::from(behind > 0.0);
+            passed_by_noise += u32::from(behind > 0.0 && behind <= self.noise(range));
         }
-        ended > 0 && ended * PASS_FOR_ONE_THAT_ENDS >= passed
+        let is_enough = |passed| ended > 0 && ended * PASS_FOR_ONE_THAT_ENDS >= passed;
+        is_enough(passed) || neighbours >= NEIGHBOURS && is_enough(passed_by_noise)
+    }
+
+    /// The most by which noise brings the end of a beam nearer, cells.
+    fn noise(&self, range: f64) -> f64 {
+        let (least_m, share) = self.fan.noise;
+        NOISE_DEVIATIONS * (least_m / self.lattice.resolution_m + share * range)
     }
 
     fn index(&self, cell: IVec2) -> Option<usize> {
@@ -302,6 +336,29 @@ mod tests {
         let grid = after(&[vec![f32::NAN, f32::NEG_INFINITY]]);
         assert!(grid.news.flips.is_empty() && !grid.is_scanned(index(1.0, 0.0)));
         assert!(after(&[vec![f32::INFINITY]]).is_scanned(index(2.4, 0.0)));
+    }
+
+    #[test]
+    fn a_wall_keeps_its_edge_while_the_laser_looks_along_it_and_a_trail_fades() {
+        let far_first = (0..20).rev().flat_map(|cell| vec![vec![1.0 + 0.05 * cell as f32]; 3]);
+        let seen: Vec<_> = far_first.collect();
+        let along = |scans: usize| {
+            let scans: Vec<_> = seen.iter().cloned().chain(vec![vec![2.3]; scans]).collect();
+            after(&scans)
+        };
+        assert!(along(5).is_occupied(index(1.0, 0.0)));
+        assert!(!along(5).is_occupied(index(1.95, 0.0)), "nothing goes on behind it");
+        assert!(!along(12).is_occupied(index(1.0, 0.0)));
+    }
+
+    #[test]
+    fn two_neighbours_that_end_before_noise_explains_it_are_a_thing_among_many_that_pass() {
+        let beams = |near: usize| {
+            let beam = |number: usize| if (5..5 + near).contains(&number) { 0.3 } else { 1.5 };
+            vec![(0..14).map(beam).collect::<Vec<f32>>()]
+        };
+        let place = index(0.3 * 5.5_f64.to_radians().cos(), 0.3 * 5.5_f64.to_radians().sin());
+        assert!(!after(&beams(1)).is_occupied(place) && after(&beams(2)).is_occupied(place));
     }
 
     #[test]

@@ -10,13 +10,16 @@ use std::f64::consts::{PI, TAU};
 
 use common::{
     geometry::wrap_angle,
-    kinematics::{FACES_COSINE, LEAST_SPEED_M_S, TURN_GAIN},
-    mission::{Mission, Response, Sensor, SensorKind},
+    kinematics::Twist,
+    mission::{Mission, Sensor, SensorKind},
     samples::{GuidanceStatus, Mover, PoseSample},
 };
 use glam::DVec2;
 
-use crate::view::View;
+use crate::{
+    motion::{Advice, MotionModel, Moving, STAND},
+    view::View,
+};
 
 const AHEAD_S: f64 = 5.0;
 const STEP_S: f64 = 0.1;
@@ -39,11 +42,6 @@ const TRACE_M: f64 = 0.4;
 /// A way leads to no hazard for so long.
 const CLEAR_S: f64 = 1.0;
 
-/// Status, direction and speed limit of the guidance.
-pub(crate) type Advice = (GuidanceStatus, DVec2, f64);
-
-const STAND: Advice = (GuidanceStatus::Waiting, DVec2::ZERO, 0.0);
-
 #[derive(Clone, Debug)]
 pub(crate) struct Evasion {
     radius: f64,
@@ -51,12 +49,8 @@ pub(crate) struct Evasion {
     inflated_m: f64,
     rest_m: f64,
     speed: f64,
-    turn: f64,
-    look: f64,
-    /// The controller's cosines for full speed, and for turns on the spot.
-    full_speed: f64,
-    turns: f64,
-    response: Response,
+    motion: MotionModel,
+    dead_s: f64,
     period_s: f64,
     /// A laser looks there.
     backs: bool,
@@ -86,18 +80,15 @@ struct Foreseen {
 impl Evasion {
     /// None for a robot that does not see what moves, and for one that cannot turn on the spot.
     pub(crate) fn new(mission: &Mission) -> Option<Self> {
-        let (body, hurry) = (mission.body(), mission.hurry());
+        let body = mission.body();
         let half_width = mission.outline().map_or(body.radius_m, |it| it.half_width_m());
         (mission.looks_first() && mission.used(SensorKind::Scan) > 0).then(|| Self {
             radius: body.radius_m,
             inflated_m: half_width + mission.mapper.clearance_m,
             rest_m: body.radius_m - half_width,
             speed: mission.speed_m_s(),
-            turn: mission.turn_rad_s(),
-            look: hurry.look_rad_s,
-            full_speed: hurry.full_speed_within_deg.to_radians().cos(),
-            turns: hurry.turns_beyond_deg.to_radians().cos(),
-            response: body.response,
+            motion: MotionModel::new(mission),
+            dead_s: mission.trusted_response().dead_time_s(),
             period_s: 1.0 / mission.robot.rate_hz,
             backs: mission.lasers().iter().any(|(_, laser)| looks_back(laser)),
         })
@@ -160,7 +151,8 @@ impl Evasion {
         along: DVec2,
     ) -> Foreseen {
         let start = sample.pose();
-        let (mut pose, mut v, mut omega) = (start, sample.v_m_s, sample.omega_rad_s);
+        let twist = Twist { v: sample.v_m_s, omega: sample.omega_rad_s };
+        let mut now = Moving { pose: start, twist };
         let is_hazard = |at: DVec2| {
             let is_its = |disc: &Disc| {
                 disc.at.distance(at) <= disc.radius + self.inflated_m + self.rest_m + TRACE_M
@@ -169,30 +161,23 @@ impl Evasion {
         };
         let mut is_inside = is_hazard(start.position);
         let (mut meets_s, mut hazard_s, mut danger) = (f64::INFINITY, f64::INFINITY, 0.0_f64);
-        let dead_s = self.response.dead_time_s();
         for step in 1..=(AHEAD_S / STEP_S) as u32 {
             let at_s = STEP_S * f64::from(step);
-            if at_s > dead_s {
-                let follows = hazard_s.is_infinite() && at_s <= for_s + dead_s;
-                let wanted = if follows { self.command(pose.axis(), to) } else { [0.0; 2] };
-                let near = |now: f64, wanted: f64, most: f64| {
-                    now + (wanted - now).clamp(-most * STEP_S, most * STEP_S)
-                };
-                v = near(v, wanted[0], self.response.acceleration_m_s2);
-                omega = near(omega, wanted[1], self.response.turn_acceleration_rad_s2);
-            }
-            let moves = v != 0.0 || omega != 0.0;
-            let next = pose.along_arc(v * STEP_S, omega * STEP_S);
-            let is_there = moves && is_hazard(next.position);
+            let follows = hazard_s.is_infinite() && at_s <= for_s + self.dead_s;
+            let acts = (at_s > self.dead_s).then_some(if follows { to } else { STAND });
+            let next = self.motion.next(now, STEP_S, acts);
+            let moves = !next.is_at_rest();
+            let is_there = moves && is_hazard(next.pose.position);
             is_inside &= !moves || is_there;
             if is_there && !is_inside {
-                (hazard_s, v) = (hazard_s.min(at_s), 0.0);
+                hazard_s = hazard_s.min(at_s);
+                now.twist = Twist { v: 0.0, ..next.twist };
             } else {
-                pose = next;
+                now = next;
             }
             for disc in discs {
                 let at = disc.at + disc.velocity * at_s;
-                let gap_m = at.distance(pose.position) - disc.touches_m;
+                let gap_m = at.distance(now.pose.position) - disc.touches_m;
                 let least_m = APART_M + (GROWS_M_S + disc.doubt_m_s) * at_s;
                 let first_m = disc.at.distance(start.position) - disc.touches_m;
                 if moves && gap_m < least_m.min(first_m) {
@@ -203,24 +188,11 @@ impl Evasion {
                 danger = danger.max(near * (-at_s / SOON_S).exp());
             }
         }
-        Foreseen { meets_s, hazard_s, danger, gain_m: (pose.position - start.position).dot(along) }
-    }
-
-    /// The controller's speed ahead, m/s, and turn rate, rad/s.
-    fn command(&self, axis: DVec2, (status, to, limit): Advice) -> [f64; 2] {
-        let (cosine, sine) = (axis.dot(to), axis.perp_dot(to));
-        let angle = sine.atan2(cosine).abs();
-        let most = self.response.turn_to_stop_within(angle);
-        let drives = matches!(status, GuidanceStatus::Along | GuidanceStatus::WayOut);
-        let sharp = ((cosine - self.turns) / (self.full_speed - self.turns)).min(1.0);
-        if drives && limit < 0.0 {
-            [limit, 0.0]
-        } else if drives && sharp > 0.0 && limit >= LEAST_SPEED_M_S {
-            [(self.speed * sharp).min(limit), (self.turn * sine).clamp(-most, most)]
-        } else if drives && cosine > FACES_COSINE {
-            [0.0; 2]
-        } else {
-            [0.0, (TURN_GAIN * angle).min(self.look).min(most) * sine.signum()]
+        Foreseen {
+            meets_s,
+            hazard_s,
+            danger,
+            gain_m: (now.pose.position - start.position).dot(along),
         }
     }
 }

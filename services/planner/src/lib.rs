@@ -9,6 +9,7 @@ mod background_solver;
 mod evasion;
 mod fault;
 mod field_publisher;
+mod motion;
 mod near_echoes;
 mod outline;
 pub mod shell;

@@ -150,6 +150,11 @@ impl Outline {
         self.touching(view, pose, 0.0).next().is_some()
     }
 
+    /// A thing is nearer than `apart_m` and the inflation's margin.
+    pub(crate) fn comes_near(&self, view: &View<'_>, pose: &Pose2, apart_m: f64) -> bool {
+        self.touching(view, pose, -apart_m.min(self.half_width)).next().is_some()
+    }
+
     /// The covering circle does not fit.
     pub(crate) fn is_narrow(&self, view: &View<'_>, at: DVec2) -> bool {
         view.has_hazard(at, self.covers - self.half_width)

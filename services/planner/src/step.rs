@@ -25,6 +25,7 @@ use crate::aim;
 use crate::arcs::Arcs;
 use crate::evasion::Evasion;
 use crate::fault::lead_astray;
+use crate::motion::{Advice as Advised, MotionModel, Moving, STAND};
 use crate::outline::Passage;
 use crate::view::field_cell;
 use live::{Live, Robot, is_hazard};
@@ -69,6 +70,8 @@ pub struct Planner {
     advisor: Advisor,
     /// None for a robot that does not see what moves.
     evasion: Option<Evasion>,
+    /// None for a base whose wheels are not known to gain and lose speed at a limited rate.
+    motion: Option<MotionModel>,
     /// None for a base that answers soon enough.
     lead: Option<Lead>,
     solver: Solver,
@@ -94,6 +97,7 @@ impl Planner {
             robot: Robot::new(mission),
             advisor: Advisor::new(mission),
             evasion: Evasion::new(mission),
+            motion: MotionModel::of_limited(mission),
             lead: Lead::new(mission),
             solver: Solver::new(Settings::default()),
             grid: Replica::default(),
@@ -129,6 +133,7 @@ impl Planner {
         if let Some(mission) = self.found.changed(found, &self.mission) {
             self.advisor = Advisor::new(&mission);
             self.evasion = Evasion::new(&mission);
+            self.motion = MotionModel::of_limited(&mission);
             self.lead = Lead::new(&mission);
         }
         Work::None
@@ -317,14 +322,16 @@ impl Planner {
     /// The guidance for a robot at that pose. A small map is solved first if its field must not be followed there.
     pub fn answer(&mut self, sample: &PoseSample) -> Result<(Work, GuidanceSample), SolveError> {
         let (pose, time_s) = (sample.pose(), sample.stamp.time().seconds());
-        let acts_at = self.lead.as_mut().map_or(pose, |lead| lead.pose(pose, time_s));
+        let twist = Twist { v: sample.v_m_s, omega: sample.omega_rad_s };
+        let foreseen = self.lead.as_mut().map(|lead| lead.foresee(pose, time_s));
+        let (acts_at, twist) = foreseen.unwrap_or((pose, twist));
         let mut work = Work::None;
         let mut followed = self.follow_field(&acts_at);
         if followed.is_none() && self.is_solved_here() {
             work = self.solve_newest()?;
             followed = self.follow_field(&acts_at);
         }
-        Ok((work, self.guide(sample, acts_at, followed)))
+        Ok((work, self.guide(sample, Moving { pose: acts_at, twist }, followed)))
     }
 
     /// None where the field must not be followed.
@@ -336,21 +343,22 @@ impl Planner {
     fn guide(
         &mut self,
         sample: &PoseSample,
-        pose: Pose2,
+        acts_at: Moving,
         followed: Option<(GuidanceStatus, DVec2)>,
     ) -> GuidanceSample {
         let (status, direction) = followed.unwrap_or((GuidanceStatus::Waiting, DVec2::ZERO));
         let (status, direction, limit) = if self.on_a_saddle {
             (GuidanceStatus::Along, DVec2::ZERO, 0.0)
         } else {
-            let advice = self.advise(&pose, status, direction);
-            match (&self.live, &self.evasion) {
+            let advice = self.advise(&acts_at.pose, status, direction);
+            let advice = match (&self.live, &self.evasion) {
                 (Some(live), Some(evasion)) if advice.0 != GuidanceStatus::AtTarget => {
                     let view = live.view(self.grid.cells());
                     evasion.advise(&view, self.belief.movers(), sample, advice)
                 }
                 _ => advice,
-            }
+            };
+            self.within_motion(acts_at, advice)
         };
         GuidanceSample {
             ex: direction.x,
@@ -361,6 +369,23 @@ impl Planner {
             full_solves: self.full_solves,
             ..GuidanceSample::for_pose(sample, &self.belief, &self.target.unwrap_or_default())
         }
+    }
+
+    /// `advice` as far as the base can follow it: it stands where it would not come to rest without a touch after one more tick.
+    fn within_motion(&self, acts_at: Moving, advice: Advised) -> Advised {
+        let (Some(live), Some(motion), Advisor::LookFirst(sensing)) =
+            (&self.live, &self.motion, &self.advisor)
+        else {
+            return advice;
+        };
+        let view = live.view(self.grid.cells());
+        let touches = |at: &Pose2, doubt_m| match &sensing.outline {
+            Some(outline) => outline.comes_near(&view, at, doubt_m),
+            None => view.is_hazard(at.position),
+        };
+        let dead_s = if self.lead.is_some() { 0.0 } else { motion.dead_s() };
+        let advice = motion.turns_too(acts_at, dead_s, advice);
+        if motion.rests(acts_at, (advice, dead_s), touches) { advice } else { STAND }
     }
 
     /// The checked advice for the field's `status` and `direction`, with a speed limit.
