@@ -1,5 +1,7 @@
 //! What the sensors of a robot said since the last tick, whichever driver heard them. A laser may be stuck or blind.
 
+mod robot_time;
+
 use std::f64::consts::TAU;
 
 use common::{
@@ -9,6 +11,7 @@ use common::{
     mission::{Body, Mission, Sensor, SensorKind},
     samples::{RangeReading, RangeStatus},
 };
+use robot_time::RobotTime;
 
 /// A laser is stuck if its scans stay the same to the bit while a wheel turns this far, radians.
 const STUCK_RAD: f64 = 1.0;
@@ -24,6 +27,7 @@ pub(crate) struct Sensors {
     newest: Vec<RangeReading>,
     lasers: Vec<Laser>,
     ticks: u64,
+    robot_time: RobotTime,
     /// The newest counts, and the angles that the wheels have turned by then.
     counts: Option<WheelCounts>,
     turned: [f64; 2],
@@ -40,6 +44,7 @@ impl Sensors {
             lasers: lasers.map(|(row, sensor)| Laser::new(row, sensor.clone())).collect(),
             table,
             ticks: 0,
+            robot_time: RobotTime::default(),
             counts: None,
             turned: [0.0; 2],
         }
@@ -86,13 +91,18 @@ impl Sensors {
                 *reading = RangeReading { sensor: reading.sensor, ..RangeReading::default() };
             }
         }
+        if let Some(stamp_ns) = motion.stamp_ns {
+            self.robot_time.tick(stamp_ns, now);
+        }
         let taken = |laser: &mut Laser| {
             let (mut scan, own_wire) = laser.scan.take()?;
             let first_beam_ns = &mut scan.sweep.first_beam_ns;
-            match (own_wire, scan.stamp_ns, motion.stamp_ns) {
-                (Some(came), ..) => *first_beam_ns -= now.since(came).as_nanos() as i64,
-                (None, Some(scan_ns), Some(tick_ns)) => *first_beam_ns = scan_ns - tick_ns,
-                (None, ..) => {}
+            let stamp_ns = scan.stamp_ns.filter(|_| motion.stamp_ns.is_some());
+            let stated_ns = stamp_ns.and_then(|stamp_ns| self.robot_time.since_tick_ns(stamp_ns));
+            match (own_wire, stated_ns) {
+                (Some(came), _) => *first_beam_ns -= now.since(came).as_nanos() as i64,
+                (None, Some(stated_ns)) => *first_beam_ns = stated_ns,
+                (None, None) => {}
             }
             Some(scan)
         };

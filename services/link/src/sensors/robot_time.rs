@@ -1,0 +1,71 @@
+//! When something was measured, by the robot's stamps between those of its ticks.
+//!
+//! On a busy machine messages wait and come together, so ticks are not as far apart as the motions that began them. The wheels' way between
+//! two ticks is known as evenly spread over the time between, so what was stamped between their stamps has its share of that time.
+
+use std::collections::VecDeque;
+
+use common::clock::MissionTime;
+
+const MOST_TICKS: usize = 32;
+
+#[derive(Clone, Debug, Default)]
+pub(super) struct RobotTime {
+    /// Stamps and times of the newest ticks, both rising.
+    ticks: VecDeque<(i64, MissionTime)>,
+}
+
+impl RobotTime {
+    pub(super) fn tick(&mut self, stamp_ns: i64, now: MissionTime) {
+        if self.ticks.back().is_some_and(|(stamp, time)| *stamp >= stamp_ns || *time >= now) {
+            // The robot's clock was set.
+            self.ticks.clear();
+        }
+        if self.ticks.len() == MOST_TICKS {
+            self.ticks.pop_front();
+        }
+        self.ticks.push_back((stamp_ns, now));
+    }
+
+    /// Nanoseconds from the newest tick to what was stamped so; by the stamps alone before the oldest tick and after the newest.
+    pub(super) fn since_tick_ns(&self, stamp_ns: i64) -> Option<i64> {
+        let (newest_ns, newest) = *self.ticks.back()?;
+        let before_ns = |time: MissionTime| -(newest.since(time).as_nanos() as i64);
+        let after = self.ticks.partition_point(|(stamp, _)| *stamp <= stamp_ns);
+        let next = self.ticks.get(after);
+        let last = after.checked_sub(1).and_then(|last| self.ticks.get(last));
+        Some(match (last, next) {
+            (Some((from_ns, from)), Some((to_ns, to))) => {
+                let share = (stamp_ns - from_ns) as f64 / (to_ns - from_ns) as f64;
+                before_ns(*from) + (share * to.since(*from).as_nanos() as f64) as i64
+            }
+            (None, Some((oldest_ns, oldest))) => {
+                before_ns(*oldest).saturating_sub(oldest_ns.saturating_sub(stamp_ns))
+            }
+            _ => stamp_ns.saturating_sub(newest_ns),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_stamped_between_two_ticks_has_its_share_of_the_time_between_whenever_they_came() {
+        let ms = |ms: i64| ms * 1_000_000;
+        let time = |ms: u64| MissionTime(ms * 1_000_000);
+        let mut robot = RobotTime::default();
+        assert_eq!(robot.since_tick_ns(ms(70_000)), None);
+        // The second tick came late, and the third right after it.
+        for (stamp, at) in [(70_000, 5_000), (70_100, 5_180), (70_200, 5_200)] {
+            robot.tick(ms(stamp), time(at));
+        }
+        let since = |stamp| robot.since_tick_ns(ms(stamp)).unwrap();
+        assert_eq!([70_200, 70_100, 70_000].map(since), [0, ms(-20), ms(-200)]);
+        assert_eq!([70_150, 70_050].map(since), [ms(-10), ms(-110)]);
+        assert_eq!([70_230, 69_990].map(since), [ms(30), ms(-210)], "by the stamps alone");
+        robot.tick(ms(10), time(5_300));
+        assert_eq!(robot.since_tick_ns(ms(0)), Some(ms(-10)), "the robot's clock was set");
+    }
+}
