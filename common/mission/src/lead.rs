@@ -15,6 +15,8 @@ const DAMPED: f64 = 0.5;
 /// Steps in which the way ahead is integrated, seconds.
 const STEP_S: f64 = 0.02;
 
+/// A longer time is not followed in steps, seconds.
+const LONGEST_S: f64 = 60.0;
 /// Commands that are remembered at most; the oldest acts at once where more are given.
 const MOST_PENDING: usize = 256;
 
@@ -99,6 +101,14 @@ impl Lead {
     fn go_on(&mut self, mut pose: Pose2, until_s: f64) -> Pose2 {
         // Before the first call no time has passed.
         self.at_s = if self.at_s.is_finite() { self.at_s } else { until_s };
+        if until_s - self.at_s > LONGEST_S {
+            // Whatever it was told long ago, it does by now. Samples may say any time.
+            self.twist =
+                self.pending.drain(..).next_back().map_or(self.wanted, |(_, newest)| newest);
+            self.wanted = self.twist;
+            self.has_begun = true;
+            self.at_s = until_s;
+        }
         while self.at_s < until_s || self.pending.front().is_some_and(|next| next.0 <= until_s) {
             let acts_s = self.pending.front().map_or(f64::INFINITY, |next| next.0);
             let to_s = (self.at_s + STEP_S).min(until_s).min(acts_s).max(self.at_s);
@@ -161,5 +171,14 @@ mod tests {
         lead.foresee(at(0.0), 1.0);
         let (pose, twist) = lead.foresee(at(0.03), 1.1);
         assert!((twist.v - 0.3).abs() < 1e-9 && (pose.position.x - 0.18).abs() < 1e-9, "{pose:?}");
+    }
+
+    #[test]
+    fn a_time_that_is_ages_ahead_is_not_followed_step_by_step() {
+        let mut lead = lead("robot.response = { delay_s = 0.4, lag_s = 0.1 }").unwrap();
+        lead.foresee(Pose2::default(), 0.0);
+        lead.command(Twist { v: 0.2, omega: 0.0 }, 0.0);
+        let (pose, twist) = lead.foresee(Pose2::default(), 1.8e10);
+        assert!((twist.v - 0.2).abs() < 1e-9 && (pose.position.x - 0.1).abs() < 1e-4, "{pose:?}");
     }
 }
