@@ -98,9 +98,9 @@ impl Response {
 /// told to turn on the spot hardly brakes, and one that gains speed as fast as it can goes on turning as before.
 #[derive(Clone, Copy, Debug)]
 pub struct Base {
-    response: Response,
-    /// From the middle of the body, metres.
-    wheel_m: f64,
+    pub response: Response,
+    /// Of a wheel from the middle between both, metres.
+    pub wheel_m: f64,
 }
 
 impl Base {

@@ -95,11 +95,14 @@ impl EvidenceGrid {
     /// Whether a laser at `origin` looks along the thing in this cell.
     fn goes_on_behind(&self, cell: Cell, origin: DVec2) -> bool {
         let lattice = self.ground.lattice;
+        let is_thing = |cell| self.is_occupied(lattice.index(cell));
+        // Most cells are free.
+        if !is_thing(cell) {
+            return false;
+        }
         let at = lattice.centre_of(cell);
         let along = (at - origin).normalize_or_zero() * lattice.resolution_m;
-        let is_thing =
-            |at| lattice.cell_at(at).is_some_and(|cell| self.is_occupied(lattice.index(cell)));
-        is_thing(at) && (is_thing(at + along) || is_thing(at + 2.0 * along))
+        [1.0, 2.0].iter().any(|cells| lattice.cell_at(at + cells * along).is_some_and(is_thing))
     }
 }
 

@@ -17,12 +17,11 @@ use common::{
 use glam::DVec2;
 
 use crate::{
-    motion::{Advice, MotionModel, Moving, STAND},
+    motion::{Advice, MotionModel, Moving, STAND, STEP_S},
     view::View,
 };
 
 const AHEAD_S: f64 = 5.0;
-const STEP_S: f64 = 0.1;
 const DIRECTIONS: u32 = 16;
 /// Shares of the top speed.
 const SPEEDS: [f64; 2] = [1.0, 0.5];
@@ -48,10 +47,7 @@ pub(crate) struct Evasion {
     /// Hazards are inflated by this, and the rest of the body's radius.
     inflated_m: f64,
     rest_m: f64,
-    speed: f64,
     motion: MotionModel,
-    dead_s: f64,
-    period_s: f64,
     /// A laser looks there.
     backs: bool,
 }
@@ -86,10 +82,7 @@ impl Evasion {
             radius: body.radius_m,
             inflated_m: half_width + mission.mapper.clearance_m,
             rest_m: body.radius_m - half_width,
-            speed: mission.speed_m_s(),
             motion: MotionModel::new(mission),
-            dead_s: mission.trusted_response().dead_time_s(),
-            period_s: 1.0 / mission.robot.rate_hz,
             backs: mission.lasers().iter().any(|(_, laser)| looks_back(laser)),
         })
     }
@@ -105,7 +98,7 @@ impl Evasion {
         let discs: Vec<_> = movers.iter().map(|mover| self.disc(mover)).collect();
         let foresee = |to: Advice, for_s| self.foresee(view, &discs, pose, (to, for_s), advice.1);
         let is_safe = |to: Advice| {
-            let brakes = foresee(to, self.period_s);
+            let brakes = foresee(to, self.motion.period_s);
             brakes.meets_s.is_infinite() && brakes.hazard_s.is_infinite()
         };
         let (status, along, limit) = advice;
@@ -116,14 +109,14 @@ impl Evasion {
             .map(|step| DVec2::from_angle(TAU * f64::from(step) / f64::from(DIRECTIONS)));
         let back = self.backs.then(|| (pose.pose().axis(), -1.0));
         let ways = around.map(|to| (to, 1.0)).chain(back).flat_map(|(to, sign)| {
-            SPEEDS.map(|share| (GuidanceStatus::Along, to, sign * share * self.speed))
+            SPEEDS.map(|share| (GuidanceStatus::Along, to, sign * share * self.motion.speed))
         });
         let advised = SPEEDS.map(|share| (status, along, share * limit));
         let open = advised.into_iter().chain(ways).filter_map(|to| {
             let it = foresee(to, AHEAD_S);
             (it.hazard_s >= CLEAR_S && is_safe(to)).then_some((to, it))
         });
-        let score = |it: &Foreseen| GAIN * it.gain_m / (self.speed * AHEAD_S) - it.danger;
+        let score = |it: &Foreseen| GAIN * it.gain_m / (self.motion.speed * AHEAD_S) - it.danger;
         let all = open.chain([(STAND, foresee(STAND, AHEAD_S))]);
         all.max_by(|(_, one), (_, other)| score(one).total_cmp(&score(other)))
             .map_or(STAND, |(to, _)| to)
@@ -161,10 +154,11 @@ impl Evasion {
         };
         let mut is_inside = is_hazard(start.position);
         let (mut meets_s, mut hazard_s, mut danger) = (f64::INFINITY, f64::INFINITY, 0.0_f64);
+        let dead_s = self.motion.dead_s();
         for step in 1..=(AHEAD_S / STEP_S) as u32 {
             let at_s = STEP_S * f64::from(step);
-            let follows = hazard_s.is_infinite() && at_s <= for_s + self.dead_s;
-            let acts = (at_s > self.dead_s).then_some(if follows { to } else { STAND });
+            let follows = hazard_s.is_infinite() && at_s <= for_s + dead_s;
+            let acts = (at_s > dead_s).then_some(if follows { to } else { STAND });
             let next = self.motion.next(now, STEP_S, acts);
             let moves = !next.is_at_rest();
             let is_there = moves && is_hazard(next.pose.position);

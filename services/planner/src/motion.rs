@@ -3,7 +3,7 @@
 
 use common::{
     kinematics::{FACES_COSINE, LEAST_SPEED_M_S, Pose2, TURN_GAIN, Twist},
-    mission::{Base, Mission, Response},
+    mission::{Base, Mission},
     samples::GuidanceStatus,
 };
 use glam::DVec2;
@@ -13,7 +13,8 @@ pub(crate) type Advice = (GuidanceStatus, DVec2, f64);
 
 pub(crate) const STAND: Advice = (GuidanceStatus::Waiting, DVec2::ZERO, 0.0);
 
-const STEP_S: f64 = 0.1;
+/// Motions are foreseen in steps of so many seconds.
+pub(crate) const STEP_S: f64 = 0.1;
 /// A way to rest is followed for so long.
 const RESTS_WITHIN_S: f64 = 12.0;
 /// A base that brakes within half a cell of the map stands at once as far as the map knows, metres.
@@ -38,19 +39,16 @@ impl Moving {
 
 #[derive(Clone, Debug)]
 pub(crate) struct MotionModel {
-    speed: f64,
+    pub(crate) speed: f64,
     turn: f64,
     look: f64,
     /// The controller's cosines for full speed, and for turns on the spot.
     full_speed: f64,
     turns: f64,
-    response: Response,
     base: Base,
-    /// From the middle of the body, metres.
-    wheel_m: f64,
-    /// From the middle of the wheels, metres.
+    /// The body's, from the middle between the wheels, metres.
     reach_m: f64,
-    period_s: f64,
+    pub(crate) period_s: f64,
 }
 
 impl MotionModel {
@@ -62,9 +60,7 @@ impl MotionModel {
             look: hurry.look_rad_s,
             full_speed: hurry.full_speed_within_deg.to_radians().cos(),
             turns: hurry.turns_beyond_deg.to_radians().cos(),
-            response: mission.trusted_response(),
             base: Base::new(mission.trusted_response(), body.track_m),
-            wheel_m: body.track_m / 2.0,
             reach_m: body.radius_m,
             period_s: 1.0 / mission.robot.rate_hz,
         }
@@ -77,7 +73,7 @@ impl MotionModel {
     }
 
     pub(crate) fn dead_s(&self) -> f64 {
-        self.response.dead_time_s()
+        self.base.response.dead_time_s()
     }
 
     /// `advice` no faster than the wheels may go that turn as the controller asks: wheels that gain speed as fast as they can do not turn
@@ -89,8 +85,8 @@ impl MotionModel {
             return advice;
         }
         let wanted = self.command(now.pose.axis(), advice);
-        let gains_m_s = self.response.acceleration_m_s2 * (dead_s + self.period_s);
-        let turns_m_s = self.wheel_m * (wanted.omega - now.twist.omega).abs();
+        let gains_m_s = self.base.response.acceleration_m_s2 * (dead_s + self.period_s);
+        let turns_m_s = self.base.wheel_m * (wanted.omega - now.twist.omega).abs();
         if turns_m_s < LEAST_SHARE * gains_m_s {
             return advice;
         }
@@ -110,11 +106,12 @@ impl MotionModel {
         let command = self.command(start.pose.axis(), to);
         // A wheel that is to turn ahead does not brake.
         let on_the_spot = command.v == 0.0 && command.omega != 0.0;
-        if on_the_spot && v > self.response.acceleration_m_s2 * self.period_s {
+        if on_the_spot && v > self.base.response.acceleration_m_s2 * self.period_s {
             return false;
         }
         let motion_m_s = v.abs() + self.reach_m * omega.abs();
-        let rests_s = (v.abs() + self.wheel_m * omega.abs()) / self.response.acceleration_m_s2;
+        let rests_s =
+            (v.abs() + self.base.wheel_m * omega.abs()) / self.base.response.acceleration_m_s2;
         if motion_m_s * rests_s / 2.0 < LEAST_WAY_M || touches(&start.pose, 0.0) {
             return true;
         }
@@ -149,7 +146,7 @@ impl MotionModel {
     fn command(&self, axis: DVec2, (status, to, limit): Advice) -> Twist {
         let (cosine, sine) = (axis.dot(to), axis.perp_dot(to));
         let angle = sine.atan2(cosine).abs();
-        let most = self.response.turn_to_stop_within(angle);
+        let most = self.base.response.turn_to_stop_within(angle);
         let drives = matches!(status, GuidanceStatus::Along | GuidanceStatus::WayOut);
         let sharp = ((cosine - self.turns) / (self.full_speed - self.turns)).min(1.0);
         let (v, omega) = if to == DVec2::ZERO {

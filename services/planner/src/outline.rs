@@ -147,7 +147,7 @@ impl Outline {
     }
 
     pub(crate) fn touches(&self, view: &View<'_>, pose: &Pose2) -> bool {
-        self.touching(view, pose, 0.0).next().is_some()
+        self.comes_near(view, pose, 0.0)
     }
 
     /// A thing is nearer than `apart_m` and the inflation's margin.
