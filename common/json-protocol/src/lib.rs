@@ -25,6 +25,10 @@ pub struct Report {
     /// Rad/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speeds: Option<[f64; 2]>,
+    /// The robot's clock, whose zero is its own, when it read `wheels` or `odometry`. Where lines wait on their way, what is measured is
+    /// placed by it. `scan_age_s` then counts back from it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clock_s: Option<f64>,
     /// The robot's own odometry, sent instead of `wheels`: x, y and heading.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub odometry: Option<[f64; 3]>,

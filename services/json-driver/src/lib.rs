@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, time::Duration};
 
 use common::{
     driver::{
-        Base, Driver, Heard, LaserScan, Memory, StopMethod, WireTally, beam,
+        Base, Driver, Heard, LaserScan, Memory, Motion, StopMethod, WireTally, beam,
         odometry::{Odometry, motion, twist, wheel_speeds},
         range_reading,
     },
@@ -14,6 +14,8 @@ use common::{
     samples::{LONGEST_SWEEP_NS, RangeReading, Sweep},
 };
 
+/// No clock of a robot says more, seconds either way: twice the time since 1970.
+const MOST_CLOCK_S: f64 = 4e9;
 /// Orders that count as answered by one report.
 const MOST_ANSWERED: usize = 64;
 
@@ -51,7 +53,14 @@ impl Json {
     /// A refused report has no effect; the error says why.
     fn take(&mut self, report: &Report, heard: &mut Heard) -> Result<(), String> {
         let readings = self.readings_of(&report.ranges)?;
-        let scans = self.scans_of(report)?;
+        if report.clock_s.is_some_and(|clock| clock.abs() > MOST_CLOCK_S) {
+            return Err("a clock_s that no clock says: say seconds".to_owned());
+        }
+        let stamp_ns = report.clock_s.map(|clock| (clock * 1e9).round() as i64);
+        let mut scans = self.scans_of(report)?;
+        for scan in &mut scans {
+            scan.stamp_ns = stamp_ns.map(|stamp_ns| stamp_ns + scan.sweep.first_beam_ns);
+        }
         let touched = report.touched.iter().map(|(name, feels)| {
             let row = self.touches.iter().position(|row| row.name == *name);
             Ok((row.ok_or_else(|| format!("no row of robot.touch is called {name:?}"))?, *feels))
@@ -72,7 +81,9 @@ impl Json {
         heard.readings.extend(readings);
         if let (Some(turned), Some(speeds)) = (turned, report.speeds) {
             let held = report.held.unwrap_or_default();
-            heard.motion = Some(motion(&self.body, turned, speeds, held));
+            let motion = motion(&self.body, turned, speeds, held);
+            heard.motion = Some(Motion { stamp_ns, ..motion });
+            heard.stamp_ns = stamp_ns.or(heard.stamp_ns);
         }
         heard.scans.extend(scans);
         heard.touched.extend(touched);
@@ -353,6 +364,25 @@ mod tests {
         for wrong in ["\"scan_age_s\":-0.1", "\"scan_time_s\":2.1", "\"scan_age_s\":200"] {
             assert_eq!(sweep(&format!(",{wrong}")), None, "{wrong}");
         }
+    }
+
+    #[test]
+    fn a_robot_that_says_its_clock_has_its_wheels_and_scans_stamped_by_it_and_one_that_no_clock_says_is_refused()
+     {
+        let text = "target = [3, 0]\nrobot.model = 'kobuki'";
+        let mut driver = Json::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
+        let mut stamps = |words: &str| {
+            let beams = vec!["1"; 360].join(",");
+            let line = format!("{{\"wheels\":[0,0],\"speeds\":[0,0],\"scan\":[{beams}]{words}}}");
+            let heard = heard(&mut driver, &line);
+            let scan = heard.scans.first()?.stamp_ns;
+            Some([heard.stamp_ns, heard.motion.and_then(|motion| motion.stamp_ns), scan])
+        };
+        let clock = 1_500_000_000;
+        let stamped = [clock, clock, clock - 300_000_000].map(Some);
+        assert_eq!(stamps(",\"clock_s\":1.5,\"scan_age_s\":0.3"), Some(stamped));
+        assert_eq!(stamps(",\"scan_age_s\":0.3"), Some([None; 3]));
+        assert_eq!(stamps(",\"clock_s\":1e300"), None);
     }
 
     #[test]

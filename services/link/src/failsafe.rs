@@ -9,6 +9,7 @@ pub mod commander;
 mod contact;
 mod deafness;
 pub mod latency_monitor;
+mod lost_echo;
 pub mod monitor;
 pub mod odometry;
 pub mod orders;

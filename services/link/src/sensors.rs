@@ -9,7 +9,7 @@ use common::{
     driver::{Heard, LaserScan, Motion, counts::WheelCounts, odometry::drive},
     kinematics::WheelSpeeds,
     mission::{Body, Mission, Sensor, SensorKind},
-    samples::{RangeReading, RangeStatus},
+    samples::{LONGEST_SWEEP_NS, RangeReading, RangeStatus},
 };
 use robot_time::RobotTime;
 
@@ -99,6 +99,8 @@ impl Sensors {
             let first_beam_ns = &mut scan.sweep.first_beam_ns;
             let stamp_ns = scan.stamp_ns.filter(|_| motion.stamp_ns.is_some());
             let stated_ns = stamp_ns.and_then(|stamp_ns| self.robot_time.since_tick_ns(stamp_ns));
+            // Between its scan and this tick the robot's clock may have been set.
+            let stated_ns = stated_ns.filter(|ns| ns.abs() <= LONGEST_SWEEP_NS);
             match (own_wire, stated_ns) {
                 (Some(came), _) => *first_beam_ns -= now.since(came).as_nanos() as i64,
                 (None, Some(stated_ns)) => *first_beam_ns = stated_ns,

@@ -102,6 +102,7 @@ impl JsonWords {
             None => (None, [None; 2]),
         };
         let report = Report {
+            clock_s: None,
             heard: Some(self.heard),
             wheels: Some(of(&|channel| turned(motor, motors, channel))),
             speeds: Some(of(&|channel| f64::from(motor.encoders[channel].velocity()))),

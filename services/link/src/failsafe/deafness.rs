@@ -22,6 +22,34 @@ const MISSING: [f64; 2] = [6.0, 12.0];
 /// Sensors that were surely deaf so often, and heard again whenever the robot stood, are deaf in motion.
 const SPELLS: u32 = 3;
 
+/// What should have been read, summed up while nothing is.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Missing {
+    sum: f64,
+    spells: u32,
+}
+
+impl Missing {
+    pub(super) fn add(&mut self, more: f64, sure: f64) {
+        let was_sure = self.sum >= sure;
+        self.sum += more;
+        self.spells += u32::from(!was_sure && self.sum >= sure);
+    }
+
+    /// Something was read.
+    pub(super) fn end(&mut self) {
+        self.sum = 0.0;
+    }
+
+    pub(super) fn is(self, least: f64) -> bool {
+        self.sum >= least || self.is_in_motion()
+    }
+
+    fn is_in_motion(self) -> bool {
+        self.spells >= SPELLS
+    }
+}
+
 #[derive(Clone, Debug, Default)]
 pub(super) struct Deafness {
     /// Row and reach, metres.
@@ -33,9 +61,8 @@ pub(super) struct Deafness {
     mean_ends: f64,
     /// Since a reading came.
     frames: u32,
-    missing: f64,
+    missing: Missing,
     way_m: f64,
-    spells: u32,
 }
 
 impl Deafness {
@@ -66,15 +93,14 @@ impl Deafness {
     pub(super) fn went(&mut self, way_m: f64) {
         if self.hears {
             self.mean_ends += (self.ends - self.mean_ends) / MEAN_OF;
-            (self.frames, self.missing, self.way_m) = (0, 0.0, 0.0);
+            self.missing.end();
+            (self.frames, self.way_m) = (0, 0.0);
         } else if self.answers {
-            let was_sure = self.missing >= MISSING[1];
             self.frames += 1;
             self.way_m += way_m.abs();
             if self.mean_ends >= LEAST_ENDS {
-                self.missing += self.mean_ends;
+                self.missing.add(self.mean_ends, MISSING[1]);
             }
-            self.spells += u32::from(!was_sure && self.missing >= MISSING[1]);
         }
         (self.answers, self.hears, self.ends) = (false, false, 0.0);
     }
@@ -83,12 +109,11 @@ impl Deafness {
     pub(super) fn judged(&self, sure: bool) -> Option<String> {
         let reach_m = self.sensors.iter().fold(0.0, |most: f64, (_, reach_m)| most.max(*reach_m));
         let is_open = !sure && self.way_m > reach_m;
-        let is_in_motion = self.spells >= SPELLS;
-        if self.missing < MISSING[usize::from(sure)] && !is_in_motion && !is_open {
+        if !self.missing.is(MISSING[usize::from(sure)]) && !is_open {
             return None;
         }
         let Self { frames, way_m, .. } = self;
-        let when = match is_in_motion {
+        let when = match self.missing.is_in_motion() {
             true => format!("has heard anything while the robot moved, {SPELLS} times"),
             false => format!("has heard anything in {frames} frames and {way_m:.1} m"),
         };

@@ -23,6 +23,7 @@ use common::{
 
 use super::{
     deafness::Deafness,
+    lost_echo::LostEcho,
     monitor::{Condition, Counts, Moment, Monitor, Observation},
     range_motion::RangeMotion,
     scan_motion::ScanMotion,
@@ -211,6 +212,7 @@ pub struct Range {
     scans: Vec<ScanMotion>,
     undetected: Option<UndetectedSurface>,
     deafness: Deafness,
+    lost_echo: LostEcho,
     motion: RangeMotion,
 }
 
@@ -246,6 +248,7 @@ impl Range {
         let surface = surface.zip(front).map(|(surface, front)| surface.explain(&front.name));
         surface
             .or_else(|| self.scans.iter().find_map(|scans| scans.judged(sure)))
+            .or_else(|| self.lost_echo.judged(sure))
             .or_else(|| self.deafness.judged(sure))
             .or_else(|| self.motion.judged(sure))
     }
@@ -257,6 +260,7 @@ impl Range {
         }
         self.scans.iter_mut().for_each(ScanMotion::reset);
         self.deafness.reset();
+        self.lost_echo.reset();
         self.motion.reset();
         if let Some(undetected) = &mut self.undetected {
             undetected.reset();
@@ -282,6 +286,7 @@ impl Monitor for Range {
             scans: lasers.into_iter().map(|(row, sensor)| ScanMotion::new(row, sensor)).collect(),
             undetected: UndetectedSurface::of(mission),
             deafness: Deafness::of(mission),
+            lost_echo: LostEcho::of(mission),
             motion: RangeMotion::of(mission),
         }
     }
@@ -300,6 +305,7 @@ impl Monitor for Range {
                     undetected.take(readings);
                 }
                 self.deafness.take(readings);
+                self.lost_echo.take(readings, self.pose, now.time.seconds());
                 self.motion.take(readings, now.time.seconds());
             }
             Observation::Scan(scan, at_s) => {

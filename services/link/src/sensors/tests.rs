@@ -2,7 +2,10 @@ use std::path::Path;
 
 use common::{
     driver::odometry::motion,
-    samples::RangeStatus::{self, Absent, Invalid, Measured, Nothing},
+    samples::{
+        RangeStatus::{self, Absent, Invalid, Measured, Nothing},
+        Sweep,
+    },
 };
 
 use super::*;
@@ -76,4 +79,26 @@ fn a_reading_counts_for_one_tick_and_only_as_often_as_its_sensor_measures_and_of
         }
         assert_eq!(sensors.for_tick(&motion, MissionTime::default()).0[0].status(), Absent);
     }
+}
+
+#[test]
+fn a_stamped_scan_is_placed_by_the_clocks_of_ticks_and_by_its_age_alone_once_the_clock_was_set() {
+    let mission = mission("robot.model = 'kobuki'");
+    let (row, laser) = mission.laser().unwrap();
+    let mut sensors = Sensors::new(&mission);
+    let still = motion(&mission.body(), [0.0; 2], [0.0; 2], [false; 2]);
+    let mut placed_ms = |tick: [i64; 2], scan_ms: i64| {
+        let ns = |ms: i64| ms * 1_000_000;
+        let sweep = Sweep { first_beam_ns: ns(-30), ..Sweep::default() };
+        let beams = vec![f32::INFINITY; laser.beams];
+        let scan = LaserScan { row, beams, sweep, stamp_ns: Some(ns(scan_ms)) };
+        let motion = Motion { stamp_ns: Some(ns(tick[0])), ..still };
+        let mut heard = Heard { motion: Some(motion), scans: vec![scan], ..Heard::default() };
+        sensors.take_heard(&mut heard, None);
+        let now = MissionTime(ns(tick[1]) as u64);
+        sensors.for_tick(&motion, now).1[0].sweep.first_beam_ns / 1_000_000
+    };
+    assert_eq!(placed_ms([70_000, 5_000], 70_000), 0);
+    assert_eq!(placed_ms([70_100, 5_200], 70_050), -100);
+    assert_eq!(placed_ms([10, 5_300], 70_190), -30, "the clock was set");
 }

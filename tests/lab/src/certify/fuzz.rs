@@ -28,7 +28,7 @@ use crate::{
 const X80: &str = include_str!("../../../../common/x80-protocol/fuzz/decoder-corpus.hex");
 const RECORDING: &[u8] = include_bytes!("../../../golden/open-room.mcap");
 const PGM: &str = "P5\n4 4\n255\n0123456789abcdef";
-const JSON: &str = "{\"wheels\":[1.5,2],\"speeds\":[0,1],\"ranges\":{\"front\":null,\"left\":1e308},\"scan\":[1,null,-1],\"scan_age_s\":0.1,\"scan_time_s\":0.1,\"heard\":1}\n{\"odometry\":[0,1,2],\"held\":[true,false],\"touched\":{\"bumper\":true},\"battery_v\":12,\"scans\":{\"a\":{\"ranges\":[1]}}}\n";
+const JSON: &str = "{\"clock_s\":12.5,\"wheels\":[1.5,2],\"speeds\":[0,1],\"ranges\":{\"front\":null,\"left\":1e308},\"scan\":[1,null,-1],\"scan_age_s\":0.1,\"scan_time_s\":0.1,\"heard\":1}\n{\"odometry\":[0,1,2],\"held\":[true,false],\"touched\":{\"bumper\":true},\"battery_v\":12,\"scans\":{\"a\":{\"ranges\":[1]}}}\n";
 const ARDUINO: &str = "e 100 -100\r\n123 456\r\nOK\r\n";
 const ROS_MAP: &str = "image: map.pgm\nresolution: 0.05\norigin: [0.0, -1.5, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\nmode: trinary\n";
 const MOVING_AI: &str = "type octile\nheight 2\nwidth 3\nmap\n.@.\n..T\n";
