@@ -33,7 +33,7 @@ from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist
 from nav_msgs.msg import OccupancyGrid, Odometry, Path
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import BatteryState, LaserScan, Range
@@ -276,7 +276,7 @@ def main(firsthand):
         heard.messages.clear()
 
         # The requests are a goal, a place and a stop.
-        bridged = bridge("--accept", "goals,pose,stop")
+        bridged = bridge("--accept", "goals,pose,hand,stop")
         run = mission("asked", "--timeout", "600")
         heard.until("range, battery", lambda: heard.messages.get("range/front") and heard.messages.get("battery_state"))
         heard.until("movement", lambda: heard.newest("odom").twist.twist.linear.x > 0.1)
@@ -348,6 +348,28 @@ def main(firsthand):
         place.pose.covariance[35] = 0.0685
         places.publish(place)
         heard.until("the place", lambda: heard.newest("pose").pose.pose.position.y < -1.5)
+        run.terminate()
+        heard.until("the end of the mission", lambda: run.poll() is not None, 60)
+
+        # A hand drives a robot that stays, and it stands when the hand has gone.
+        run = mission("by-hand", "--stay", "--set", "target=[0.4,0]")
+        heard.messages.clear()
+        here = lambda: heard.newest("pose").pose.pose.position.x if heard.messages.get("pose") else 0.0
+        heard.until("its target", lambda: here() > 0.2 and status(firsthand)["link"]["at_rest"])
+        hands = node.create_publisher(Twist, "teleop", 10)
+        heard.until("a reader of hands", lambda: hands.get_subscription_count() > 0)
+        push, at = Twist(), time.monotonic()
+        push.linear.x = 0.3
+
+        def pushed():
+            nonlocal at
+            if time.monotonic() - at > 0.05:
+                at = time.monotonic()
+                hands.publish(push)
+            return here() > 0.9
+
+        heard.until("the way of the hand", pushed)
+        heard.until("rest", lambda: status(firsthand)["link"]["at_rest"])
         print("every topic of the bridge was decoded, and what it lets in was done")
     finally:
         # A mission that is asked to end leaves no shared memory; nodes of rclpy may hang when they are asked.

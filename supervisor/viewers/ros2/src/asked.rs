@@ -1,7 +1,8 @@
 //! The requests of nodes by topics: messages in, their meaning out. Each message is taken, or refused as a whole with a
 //! reason.
 
-use common::samples::TargetPoint;
+use common::{mission::Mission, samples::TargetPoint};
+use glam::DVec2;
 use ros2::cdr::Reader;
 
 use crate::shown::MAP;
@@ -35,6 +36,16 @@ pub(crate) fn place(payload: &[u8]) -> Result<(TargetPoint, [f64; 2]), String> {
     let all: [f64; 36] = reader.f64s()?;
     let variances = [f64::midpoint(all[0], all[7]), all[35]];
     Ok((place, variances.map(|variance| variance.sqrt().max(LEAST_SIGMA))))
+}
+
+/// Where a hand pushes by a `geometry_msgs/Twist`: ahead and to the left, in shares of the mission's speeds.
+pub(crate) fn stick(payload: &[u8], mission: &Mission) -> Result<DVec2, String> {
+    let [ahead, _, _, _, _, left]: [f64; 6] = Reader::new(payload)?.f64s()?;
+    let stick = DVec2::new(ahead / mission.speed_m_s(), left / mission.turn_rad_s());
+    match stick.is_finite() {
+        true => Ok(stick.clamp(DVec2::NEG_ONE, DVec2::ONE)),
+        false => Err("a speed that is no number; give m/s and rad/s".to_owned()),
+    }
 }
 
 /// The value of a `std_msgs/Bool`.

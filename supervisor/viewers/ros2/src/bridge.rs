@@ -216,6 +216,13 @@ impl Bridge {
                 let (place, deviations) = asked::place(&message.payload)?;
                 self.orders.give(Order::Place(place, deviations));
             }
+            Id::Teleop => {
+                // Without a robot there is nothing to drive.
+                if let Some(shown) = &self.shown {
+                    let stick = asked::stick(&message.payload, shown.mission())?;
+                    self.orders.give(Order::Hand(stick, Instant::now()));
+                }
+            }
             Id::Stop if asked::flag(&message.payload)? => {
                 self.orders.give(Order::Stand { is_cancel: false });
             }
@@ -278,7 +285,10 @@ impl Bridge {
             }
             // A robot that did not obey is not reported to stand.
             Order::Stand { is_cancel: true } => self.server.goals.end(Status::Aborted),
-            Order::Stand { is_cancel: false } | Order::Resume | Order::Place(..) => {}
+            Order::Stand { is_cancel: false }
+            | Order::Resume
+            | Order::Place(..)
+            | Order::Hand(..) => {}
         }
     }
 

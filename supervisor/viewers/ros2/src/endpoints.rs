@@ -3,7 +3,7 @@
 use std::{io, net::Ipv4Addr};
 
 use crate::{
-    node::{LATCHED, Node, SURE},
+    node::{LATCHED, NEWEST, Node, SURE},
     topics::{Accept, Id, Spec, TABLE, spec},
 };
 
@@ -22,7 +22,9 @@ pub(crate) fn open(
             None => write_to(&mut node, row.id, row, "")?,
             Some(by) if accepted.contains(&by) => {
                 let name = topic_name(namespace, row, "");
-                node.read_from(row.id, [&name, row.type_name], SURE)?;
+                // A hand's old pushes are not sent again.
+                let quality = if row.id == Id::Teleop { NEWEST } else { SURE };
+                node.read_from(row.id, [&name, row.type_name], quality)?;
             }
             Some(_) => {}
         }

@@ -18,6 +18,9 @@ pub(crate) const SURE: Quality = Quality { is_reliable: true, is_latched: false,
 /// The quality that stores the newest message for readers that join later.
 pub(crate) const LATCHED: Quality = Quality { is_reliable: true, is_latched: true, depth: 1 };
 
+/// The quality of messages of which only the newest counts, from senders of either reliability.
+pub(crate) const NEWEST: Quality = Quality { is_reliable: false, is_latched: false, depth: 1 };
+
 /// The services of an action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Call {

@@ -5,9 +5,14 @@ use std::{
     io,
     sync::mpsc::{Receiver, Sender, SyncSender, TrySendError, channel, sync_channel},
     thread,
+    time::Instant,
 };
 
-use common::{domain::RobotName, samples::TargetPoint};
+use common::{
+    domain::RobotName,
+    samples::{DEAD_MAN, TargetPoint},
+};
+use glam::DVec2;
 use mission_control::operator::{self, OperatorError};
 use ros2::participant::Request;
 
@@ -32,6 +37,8 @@ pub(crate) enum Order {
     Resume,
     /// The robot is there, with deviations in metres and radians.
     Place(TargetPoint, [f64; 2]),
+    /// A hand pushed so at this time.
+    Hand(DVec2, Instant),
 }
 
 /// The sender of a target.
@@ -53,6 +60,7 @@ pub(crate) type Done = (Order, Result<(), String>);
 pub(crate) struct Orders {
     targets: SyncSender<Order>,
     stops: SyncSender<Order>,
+    hands: SyncSender<Order>,
     done: Receiver<Done>,
     refused: Sender<Done>,
 }
@@ -61,8 +69,8 @@ impl Orders {
     /// Orders for `robot`.
     pub(crate) fn new(robot: &RobotName) -> io::Result<Self> {
         let (refused, done) = channel();
-        let worker = |name: &str| {
-            let (orders, waiting) = sync_channel::<Order>(MOST_WAITING);
+        let worker = |name: &str, most| {
+            let (orders, waiting) = sync_channel::<Order>(most);
             let (robot, done) = (robot.clone(), refused.clone());
             thread::Builder::new().name(name.to_owned()).spawn(move || {
                 for order in waiting {
@@ -74,7 +82,8 @@ impl Orders {
             })?;
             Ok::<_, io::Error>(orders)
         };
-        Ok(Self { targets: worker("targets")?, stops: worker("stops")?, done, refused })
+        let [targets, stops] = ["targets", "stops"].map(|name| worker(name, MOST_WAITING));
+        Ok(Self { targets: targets?, stops: stops?, hands: worker("hands", 1)?, done, refused })
     }
 
     /// Have `order` carried out.
@@ -82,6 +91,8 @@ impl Orders {
         let worker = match order {
             Order::Go { .. } | Order::Place(..) => &self.targets,
             Order::Stand { .. } | Order::Resume => &self.stops,
+            // A hand pushes again at once.
+            Order::Hand(..) => return drop(self.hands.try_send(order)),
         };
         if let Err(TrySendError::Full(order) | TrySendError::Disconnected(order)) =
             worker.try_send(order)
@@ -113,5 +124,7 @@ fn perform(robot: &RobotName, order: &Order) -> Result<(), OperatorError> {
         Order::Stand { .. } => operator::stand(robot).map(|_| ()),
         Order::Resume => operator::resume(robot),
         Order::Place(place, deviations) => operator::place(robot, *place, *deviations),
+        Order::Hand(_, at) if at.elapsed() > DEAD_MAN => Ok(()),
+        Order::Hand(stick, _) => operator::drive_by_hand(robot, *stick),
     }
 }

@@ -61,6 +61,10 @@ impl Shown {
         }
     }
 
+    pub(crate) const fn mission(&self) -> &Mission {
+        &self.mission
+    }
+
     /// The topics of the sensors that the mission uses.
     pub(crate) fn sensor_topics(&self) -> impl Iterator<Item = (Id, &str)> {
         let used = self.sensors.iter().enumerate().filter(|(_, sensor)| sensor.used);

@@ -135,6 +135,20 @@ fn a_place_is_taken_with_the_deviations_of_its_covariance() {
 }
 
 #[test]
+fn a_twist_is_a_stick_in_shares_of_the_missions_speeds_and_one_that_is_no_number_is_refused() {
+    let text = "controller = { speed_m_s = 0.4, turn_rad_s = 1.6 }\nstay = true";
+    let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
+    let stick = |ahead, left| {
+        let twist = Writer::default().f64s(&[ahead, 9.0, 9.0, 9.0, 9.0, left]).take();
+        asked::stick(&twist, &mission).map(<[f64; 2]>::from)
+    };
+    assert_eq!(stick(0.2, 0.8), Ok([0.5, 0.5]));
+    assert_eq!(stick(-7.0, -1.6), Ok([-1.0, -1.0]));
+    assert!(stick(f64::NAN, 0.0).unwrap_err().contains("m/s"));
+    assert!(asked::stick(&[0, 1, 0, 0, 1], &mission).is_err());
+}
+
+#[test]
 fn a_goal_of_the_action_is_reached_with_its_own_target_only() {
     let mut goals = with_a_goal();
     goals.command(&arrival(4));

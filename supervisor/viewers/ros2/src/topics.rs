@@ -22,6 +22,7 @@ pub(crate) enum Id {
     Diagnostics,
     GoalPose,
     InitialPose,
+    Teleop,
     Stop,
 }
 
@@ -32,6 +33,8 @@ pub(crate) enum Accept {
     Goals,
     /// Say where it is: `initialpose`.
     Pose,
+    /// Drive it by hand: `teleop`.
+    Hand,
     /// Let it stand and go on: `stop`.
     Stop,
 }
@@ -97,6 +100,8 @@ table! {
         "where to go, as RViz's button sends it; the action `navigate_to_pose` (`nav2_msgs/NavigateToPose`) is taken too";
     Id::InitialPose => "initialpose", geometry_msgs / PoseWithCovarianceStamped, false, Some(Accept::Pose),
         "where the robot, which stands, is, as RViz's button sends it: its pose is set, and its map reset";
+    Id::Teleop => "teleop", geometry_msgs / Twist, false, Some(Accept::Hand),
+        "drive by hand a robot that stays, into no hazard that is believed, until 0.3 s pass without a message; it turns around to go back";
     Id::Stop => "stop", std_msgs / Bool, false, Some(Accept::Stop),
         "true: the robot stands; false: it goes on";
 }
