@@ -225,8 +225,10 @@ impl Track {
         let way = self.at(at_s) - fan.origin;
         let bearing = wrap_angle(way.to_angle() - fan.first_rad);
         let beam = (bearing.rem_euclid(TAU) / fan.step_rad).round() as usize;
-        let range = fan.beams.get(beam).map_or(0.0, |range| f64::from(*range));
-        self.motion.is_some() && range < way.length() - self.radius_m - GAP_M
+        // Beside the fan, or too near, there is no reading.
+        let range = fan.beams.get(beam).map_or(f64::NAN, |range| f64::from(*range));
+        let is_seen = range >= way.length() - self.radius_m - GAP_M;
+        self.motion.is_some() && !is_seen
     }
 
     fn most_off_m(&self, at_s: f64) -> f64 {
@@ -405,6 +407,23 @@ mod tests {
             self.movers.place(&robot);
             (scan, taken)
         }
+    }
+
+    #[test]
+    fn a_mover_is_hidden_right_behind_a_laser_too_and_not_where_the_laser_sees_through() {
+        let text = "target = [3, 0]\nrobot.model = 'jackal'";
+        let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
+        let (rows, beams) = (Rows::new(&mission), mission.laser().unwrap().1.beams);
+        let is_hidden = |x_m: f64, range_m: f32| {
+            let beams = vec![range_m; beams];
+            let fan = rows.scan(0, Pose2::default(), &beams).unwrap();
+            let middle = fan.origin + DVec2::new(x_m, 0.0);
+            let motion = Motion { middle, velocity: DVec2::Y, doubt_m: 0.1, doubt_m_s: 0.1 };
+            let track = Track { motion: Some(motion), radius_m: 0.4, ..Track::default() };
+            track.is_hidden(&fan, 0.0)
+        };
+        assert!([-0.6, -3.0].iter().all(|behind| is_hidden(*behind, 8.0)));
+        assert!(is_hidden(3.0, 1.0) && !is_hidden(3.0, 8.0) && !is_hidden(0.6, 8.0));
     }
 
     #[test]
