@@ -27,9 +27,9 @@ const INNER: f64 = 0.67;
 const OUTER: f64 = 1.2;
 /// A reading that differs by no more is of the same thing, metres.
 const SAME_M: f64 = 0.12;
-/// How much less likely a place is that does not fit a reading, and one that was not heard.
+/// How much less likely a place is that does not fit a reading, and one that a reading missed.
 const UNFIT: f64 = 0.2;
-const UNHEARD: f64 = 0.7;
+const MISSED: f64 = 0.7;
 /// A smooth surface answers within this of the direction from which it was heard, radians.
 const TURNED_RAD: f64 = 0.21;
 /// So many readings make an echo known. A reading is of it with the first likelihood, and misses it with the second.
@@ -53,15 +53,20 @@ struct Echo {
 }
 
 impl Echo {
-    fn share(&self, is_so: impl Fn(DVec2) -> bool) -> f64 {
-        self.places.iter().filter(|(place, _)| is_so(*place)).map(|(_, share)| share).sum()
+    fn are(&self, is_so: impl Fn(DVec2) -> bool) -> [bool; PLACES] {
+        self.places.map(|(place, _)| is_so(place))
     }
 
-    fn weigh(&mut self, factor: f64, is_so: impl Fn(DVec2) -> bool) {
-        for (_, share) in self.places.iter_mut().filter(|(place, _)| is_so(*place)) {
-            *share *= factor;
+    /// The likelihood of these places.
+    fn share(&self, of: [bool; PLACES]) -> f64 {
+        self.places.iter().zip(of).filter(|(_, of)| *of).map(|((_, share), _)| share).sum()
+    }
+
+    fn weigh(&mut self, factor: f64, of: [bool; PLACES]) {
+        for ((_, share), of) in self.places.iter_mut().zip(of) {
+            *share *= if of { factor } else { 1.0 };
         }
-        let sum = self.share(|_| true);
+        let sum = self.share([true; PLACES]);
         self.places.iter_mut().for_each(|(_, share)| *share /= sum);
     }
 }
@@ -71,13 +76,18 @@ impl Echo {
 struct Listener {
     from: Pose2,
     half_rad: f64,
+    /// The cosines of what is well within its cone, and of what may still answer.
+    inner: f64,
+    outer: f64,
     reach_m: f64,
 }
 
 impl Listener {
     fn at(sensor: &Sensor, robot: Pose2) -> Self {
         let half_rad = sensor.field_of_view_deg.to_radians() / 2.0;
-        Self { from: sensor.mount.on(robot), half_rad, reach_m: sensor.reach_m }
+        let [inner, outer] = [INNER, OUTER].map(|share| (share * half_rad).cos());
+        let (from, reach_m) = (sensor.mount.on(robot), sensor.reach_m);
+        Self { from, half_rad, inner, outer, reach_m }
     }
 
     fn echo(&self, range_m: f64, at_s: f64) -> Echo {
@@ -90,22 +100,22 @@ impl Listener {
         Echo { places: std::array::from_fn(place), from, at_s, readings: 1 }
     }
 
-    /// Whether a place is within this share of the cone.
-    fn sees(&self, place: DVec2, share: f64) -> bool {
+    /// Whether the angle from its axis to a place has a greater cosine.
+    fn sees(&self, place: DVec2, cosine: f64) -> bool {
         let way = place - self.from.position;
-        way.dot(self.from.axis()) > (share * self.half_rad).cos() * way.length()
+        way.dot(self.from.axis()) > cosine * way.length()
     }
 
     fn fits(&self, place: DVec2, range_m: f64) -> bool {
         let off_m = place.distance(self.from.position) - range_m;
-        off_m.abs() < SAME_M && self.sees(place, OUTER)
+        off_m.abs() < SAME_M && self.sees(place, self.outer)
     }
 
     /// Whether what was heard from there and lies nearer than this must be heard.
     fn must_hear(&self, place: DVec2, heard_from: DVec2, nearer_m: f64) -> bool {
         let turned = (place - heard_from).angle_to(place - self.from.position);
         place.distance(self.from.position) < nearer_m
-            && self.sees(place, INNER)
+            && self.sees(place, self.inner)
             && turned.abs() < TURNED_RAD
     }
 }
@@ -175,14 +185,15 @@ impl LostEcho {
 fn hears(echoes: &mut Vec<Echo>, listener: Listener, range_m: f64, at_s: f64) {
     let is_before = |echo: &Echo| {
         let nearer_m = range_m - SAME_M;
-        echo.share(|place| listener.must_hear(place, echo.from, nearer_m)) > LIKELY[1]
+        let must = echo.are(|place| listener.must_hear(place, echo.from, nearer_m));
+        echo.share(must) > LIKELY[1]
     };
     echoes.retain(|echo| !is_before(echo));
-    let fits = |place: DVec2| listener.fits(place, range_m);
-    let shares = echoes.iter_mut().map(|echo| (echo.share(fits), echo));
+    let fitting = |echo: &Echo| echo.are(|place| listener.fits(place, range_m));
+    let shares = echoes.iter_mut().map(|echo| (echo.share(fitting(echo)), echo));
     match shares.max_by(|(one, _), (other, _)| one.total_cmp(other)) {
         Some((share, echo)) if share > LIKELY[0] => {
-            echo.weigh(UNFIT, |place| !fits(place));
+            echo.weigh(UNFIT, fitting(echo).map(|fits| !fits));
             (echo.from, echo.at_s) = (listener.from.position, at_s);
             echo.readings += 1;
         }
@@ -199,12 +210,12 @@ fn hears(echoes: &mut Vec<Echo>, listener: Listener, range_m: f64, at_s: f64) {
 fn misses(echoes: &mut [Echo], listener: Listener) -> f64 {
     let mut likely = 0.0_f64;
     for echo in echoes {
-        let from = echo.from;
-        let must = |place| listener.must_hear(place, from, SURE * listener.reach_m);
+        let nearer_m = SURE * listener.reach_m;
+        let must = echo.are(|place| listener.must_hear(place, echo.from, nearer_m));
         if echo.readings >= KNOWN {
             likely = likely.max(echo.share(must));
         }
-        echo.weigh(UNHEARD, must);
+        echo.weigh(MISSED, must);
     }
     if likely > LIKELY[1] { likely } else { 0.0 }
 }
@@ -232,7 +243,8 @@ mod tests {
                 .map(|sensor| {
                     let listener = Listener::at(&lost.sonars[usize::from(sensor)].1, robot);
                     let post = DVec2::new(1.2, 0.1);
-                    let hears = listener.sees(post, 1.0) && is_heard(tick, sensor);
+                    let hears =
+                        listener.sees(post, listener.half_rad.cos()) && is_heard(tick, sensor);
                     let status = if hears { RangeStatus::Measured } else { RangeStatus::Nothing };
                     let range_m = post.distance(listener.from.position) - 0.1;
                     RangeReading { range_m, sensor, raw: 0, status: status.into() }
