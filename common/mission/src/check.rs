@@ -131,7 +131,12 @@ fn remarks(text: &str, origin: &Path, tree: &DeTable<'_>, mission: &Mission) -> 
         let text = "its values replace those of robot.odometry; remove one of them";
         remark("robot.calibration", text.to_owned())
     });
-    car.into_iter().chain(twice).collect()
+    let sight = mission.sight_speed_m_s();
+    let blind = mission.controller.speed_m_s.filter(|asked| *asked > sight).map(|asked| {
+        let text = format!("{asked} is more than the robot's sight allows: it drives at {sight:.2} m/s at most, from which it rests on ground that it has seen though its sensors fall silent");
+        remark("controller.speed_m_s", text)
+    });
+    [car, twice, blind].into_iter().flatten().collect()
 }
 
 /// A list in the file that is longer than what was `read` of it: where it is, its key, and the problem.

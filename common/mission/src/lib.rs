@@ -53,7 +53,7 @@ mod simulation;
 pub mod sonar;
 mod touch;
 
-use std::path::PathBuf;
+use std::{f64::consts::FRAC_PI_4, path::PathBuf};
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -383,13 +383,30 @@ impl Mission {
     }
 
     /// vd: `controller.speed_m_s`, or by default 0.5 for a robot that looks first, 0.7 with infrared rangers, the
-    /// body's top speed with a laser; else the paper's 0.25.
+    /// body's top speed with a laser; else the paper's 0.25. Never more than [`Mission::sight_speed_m_s`].
     pub fn speed_m_s(&self) -> f64 {
-        self.controller.speed_m_s.unwrap_or_else(|| match self.looks_first() {
+        let asked = self.controller.speed_m_s.unwrap_or_else(|| match self.looks_first() {
             false => 0.25,
             true if self.used(SensorKind::Scan) > 0 => self.body().top_speed_m_s,
             true if self.used(SensorKind::Ray) > 0 => 0.7,
             true => 0.5,
+        });
+        asked.min(self.sight_speed_m_s())
+    }
+
+    /// The greatest speed from which the robot rests on ground that it has seen though all that looks ahead falls silent, m/s: ISO 3691-4
+    /// wants the way to rest within the range of detection in the worst condition. Infinite where nothing looks ahead.
+    pub fn sight_speed_m_s(&self) -> f64 {
+        let response = self.trusted_response();
+        let after_s = self.robot.silent_after_s() + response.dead_time_s();
+        let looks_ahead = |sensor: &Sensor| {
+            let is_wide = sensor.kind == SensorKind::Scan;
+            sensor.used && (is_wide || sensor.mount.bearing_rad.abs() <= FRAC_PI_4)
+        };
+        let table = self.sensor_table();
+        let reach_m = table.iter().filter(|sensor| looks_ahead(sensor)).map(|it| it.reach_m);
+        reach_m.reduce(f64::max).map_or(f64::INFINITY, |reach_m| {
+            response.speed_to_stop_within(reach_m - self.body().radius_m, after_s)
         })
     }
 

@@ -237,7 +237,15 @@ impl Body {
 static MODELS: LazyLock<BTreeMap<Model, RobotConfig>> =
     LazyLock::new(|| toml::from_str(include_str!("models.toml")).unwrap_or_default());
 
+/// Silence until a robot is lost, in command limits: longer than a short fade of the radio, and its last command has expired.
+const SILENT_LIMITS: f64 = 3.0;
+
 impl RobotConfig {
+    /// A robot or a sensor that says nothing for so long is silent, seconds.
+    pub fn silent_after_s(&self) -> f64 {
+        SILENT_LIMITS * self.command_limit_s
+    }
+
     /// The presets of the model.
     pub(crate) fn preset(&self) -> &Self {
         MODELS.get(&self.model).unwrap_or(self)

@@ -236,7 +236,7 @@ pub const TABLE: &[Rule] = {
             C::RangeSilent,
             Stop,
             |all| &all.streams,
-            Some(|mission| mission.robot.command_limit_s * f64::from(presence::SILENT_LIMITS)),
+            Some(|mission| mission.robot.silent_after_s()),
             "a sensor that the mission uses has given no valid reading for three times `robot.command_limit_s`, and it is not a single infrared ranger without which the robot goes on; `link.log` names it. Nothing in range is a reading",
         ),
         Rule {

@@ -5,7 +5,7 @@ use std::{cell::RefCell, collections::BTreeMap, rc::Rc};
 use common::{
     grid::Replica,
     latency::Histogram,
-    samples::{FieldCell, GuidanceSample, LinkSample},
+    samples::{Action, Cause, FieldCell, GuidanceSample, LinkSample},
 };
 use mission_control::{Heard, Listener};
 
@@ -15,11 +15,39 @@ use crate::totals::{LookTotals, Totals, WheelTotals};
 pub struct Hearer {
     /// The newest state of each generation of the link.
     links: BTreeMap<u32, LinkSample>,
+    pub(crate) interruptions: Interruptions,
     solves: BTreeMap<u32, u64>,
     pub(crate) looks: Totals<LookTotals>,
     pub(crate) wheels: Totals<WheelTotals>,
     pub(crate) full_solves: Histogram,
     pub field: Replica<FieldCell>,
+}
+
+/// How often each cause of the failsafe took a robot that had gone to standing or to half speed.
+#[derive(Debug, Default)]
+pub(crate) struct Interruptions {
+    has_gone: bool,
+    newest: Option<(Action, Cause)>,
+    pub(crate) stops: BTreeMap<String, u32>,
+    pub(crate) slowed: BTreeMap<String, u32>,
+}
+
+impl Interruptions {
+    fn hear(&mut self, link: &LinkSample) {
+        let (action, cause) = (link.action(), link.cause());
+        self.has_gone |= action == Action::Go;
+        let began = self.newest.replace((action, cause)) != Some((action, cause));
+        // A robot that waits or has arrived is not interrupted.
+        let of_mission = matches!(cause, Cause::None | Cause::NotOrdered | Cause::MissionOver);
+        let counts = match action {
+            Action::Go => return,
+            Action::Slow => &mut self.slowed,
+            Action::Stop | Action::End => &mut self.stops,
+        };
+        if self.has_gone && began && !of_mission {
+            *counts.entry(cause.name().to_owned()).or_default() += 1;
+        }
+    }
 }
 
 impl Hearer {
@@ -40,6 +68,7 @@ impl Hearer {
                 self.field.apply(part, cells);
             }
             Heard::Link(link) => {
+                self.interruptions.hear(link);
                 self.links.insert(link.stamp.generation, **link);
             }
         }
@@ -70,5 +99,31 @@ impl Hearer {
             all.add(&link.latency_histogram, link.latency_max_ns);
         }
         all
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_time_the_failsafe_stops_or_slows_a_robot_that_had_gone_is_counted_once_by_its_cause() {
+        let mut interruptions = Interruptions::default();
+        for (action, cause) in [
+            (Action::Stop, Cause::PoseStale),
+            (Action::Go, Cause::None),
+            (Action::Slow, Cause::RangeDoubtful),
+            (Action::Slow, Cause::RangeDoubtful),
+            (Action::Stop, Cause::RangeImplausible),
+            (Action::Go, Cause::None),
+            (Action::Slow, Cause::RangeDoubtful),
+            (Action::End, Cause::MissionOver),
+        ] {
+            let (action, cause) = (action.into(), cause.into());
+            interruptions.hear(&LinkSample { action, cause, ..LinkSample::default() });
+        }
+        let counted = |cause: Cause, times| BTreeMap::from([(cause.name().to_owned(), times)]);
+        assert_eq!(interruptions.stops, counted(Cause::RangeImplausible, 1));
+        assert_eq!(interruptions.slowed, counted(Cause::RangeDoubtful, 2));
     }
 }

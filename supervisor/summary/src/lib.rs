@@ -82,6 +82,11 @@ pub struct Summary {
     pub wheel_range_rad_s: Option<f64>,
     pub ticks: u64,
     pub restarts: BTreeMap<String, u32>,
+    /// How often each cause of the failsafe made a robot that had gone stand, and go at half speed, in the last supervisor's part.
+    #[serde(default)]
+    pub stops: BTreeMap<String, u32>,
+    #[serde(default)]
+    pub slowed: BTreeMap<String, u32>,
     /// Times another supervisor went on with the run. Clearance, solves and latencies are then those of its part; the path is the
     /// believed one.
     pub resumes: u32,
@@ -158,6 +163,8 @@ impl Summary {
                 .and_then(|tick| heard.wheels.at(tick).range_rad_s()),
             ticks: last_tick.map_or(0, |tick| tick + 1),
             restarts: restarts.map(|(stage, times)| ((*stage).to_owned(), *times)).collect(),
+            stops: heard.interruptions.stops.clone(),
+            slowed: heard.interruptions.slowed.clone(),
             resumes: *resumes,
             replans: finished.replans,
             resets: finished.resets,

@@ -8,7 +8,7 @@ use std::{
 };
 
 use clap::Args;
-use common::mission::Mission;
+use common::{clock::Pace, mission::Mission};
 use console::{missions, output::write_stderr};
 use glam::DVec2;
 use processes::planner_executable;
@@ -77,6 +77,9 @@ pub struct Arguments {
     /// A further setting to compare with the first on the same worlds: KEY=VALUE over it, several with commas.
     #[arg(long, value_name = "KEY=VALUE,...")]
     versus: Vec<String>,
+    /// Drive on a wall clock, R times as fast: causes that only it has may stop the robot. Such missions do not repeat to the bit.
+    #[arg(long, value_name = "R", default_value = "max")]
+    pace: Pace,
     /// Missions at once; by default one for each processor.
     #[arg(long)]
     jobs: Option<NonZero<usize>>,
@@ -123,6 +126,7 @@ pub fn main(arguments: &Arguments) -> Result {
         repeats: arguments.repeats,
         noise: NoiseSeeds::Derived(seed),
         jobs: arguments.jobs,
+        pace: arguments.pace,
         pictured_seed: None,
         calibrates: arguments.calibrate,
     };

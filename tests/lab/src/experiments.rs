@@ -12,6 +12,7 @@ mod table;
 use std::{num::NonZero, path::PathBuf};
 
 use clap::Args;
+use common::clock::Pace;
 use console::output::write_stderr;
 
 use crate::{
@@ -68,6 +69,7 @@ pub fn main(arguments: &Arguments) -> Result {
         }
         let its = chosen.iter().filter(|it| it.is_run_by(method));
         let plan = Plan {
+            pace: Pace::Max,
             calibrates: false,
             trials: its.map(|it| it.trial()).collect::<Result<_>>()?,
             settings: vec![Setting { name: method.to_owned(), planner: HARMONIC.to_owned(), set }],

@@ -167,6 +167,27 @@ fn a_car_that_is_to_look_first_is_remarked_on_with_its_turning_radius() {
 }
 
 #[test]
+fn no_robot_is_faster_than_it_rests_within_its_sight_and_one_that_is_to_be_is_remarked_on() {
+    let mission = |text: &str| {
+        let text = format!("target = [3, 0]\n{text}");
+        Mission::parse(&text, Path::new("m.toml")).unwrap()
+    };
+    let heavy = "robot.response = { delay_s = 0.2, acceleration_m_s2 = 0.2 }\n";
+    let fast = mission(&format!("{heavy}controller.speed_m_s = 1"));
+    let (speed, radius_m) = (fast.speed_m_s(), fast.body().radius_m);
+    // A sonar of 2.55 m, silent after 0.75 s.
+    let way_m = fast.body().response.way_to_stop_m(speed, 0.75 + 0.2 + fast.body().response.lag_s);
+    assert!((way_m - (2.55 - radius_m)).abs() < 1e-9 && speed > 0.5, "{speed} {way_m}");
+    assert!(fast.remarks[0].starts_with("m.toml:3: controller.speed_m_s: 1 is more than"));
+    let slow = mission(&format!("{heavy}controller.speed_m_s = 0.4"));
+    assert_eq!((slow.speed_m_s(), slow.remarks.len()), (0.4, 0));
+    let blind = mission("sensing = false\nmethod = 'paper'\ncontroller.speed_m_s = 1");
+    assert_eq!(blind.speed_m_s(), 1.0);
+    let laser = mission("robot.model = 'jackal'");
+    assert_eq!(laser.speed_m_s(), 2.0);
+}
+
+#[test]
 fn a_footprint_makes_the_radius_that_covers_it_and_a_radius_alone_makes_a_disc() {
     let parse = |robot: &str| {
         let text = format!("target = [3, 0]\n[robot]\n{robot}");

@@ -7,8 +7,6 @@ use common::{clock::Pace, mission::Mission, samples::Cause};
 use super::monitor::{Condition, Moment, Monitor, Observation};
 use crate::backoff::{Backoff, has_passed};
 
-/// Silence until a robot is lost, in command limits: longer than a short fade of the radio, and its last command has expired.
-pub(crate) const SILENT_LIMITS: u32 = 3;
 /// Machine time: any process may be delayed by so much at any pace.
 const LEAST_SILENCE: Duration = Duration::from_millis(100);
 const FIRST_PAUSE: Duration = Duration::from_millis(200);
@@ -33,7 +31,7 @@ pub(crate) struct Silence {
 
 impl Silence {
     pub(crate) fn new(mission: &Mission) -> Self {
-        let limit = Duration::from_secs_f64(mission.robot.command_limit_s) * SILENT_LIMITS;
+        let limit = Duration::from_secs_f64(mission.robot.silent_after_s());
         Self { mission: limit, machine: limit }
     }
 

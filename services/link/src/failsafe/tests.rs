@@ -388,7 +388,8 @@ fn the_words_of_the_table_say_the_numbers_that_hold() {
         assert!(rule.when.contains(words), "{words} in {rule:?}");
     };
     says(Cause::RobotLost, "three times");
-    assert_eq!(presence::SILENT_LIMITS, 3);
+    let robot = mission().robot;
+    assert_eq!(robot.silent_after_s(), 3.0 * robot.command_limit_s);
     let seconds = |span: Duration| format!("{} s", span.as_secs_f64());
     says(Cause::SupervisorSilent, &seconds(orders::SUPERVISOR_SILENT));
     assert_eq!(common::topics::RESTATE * 5, Duration::from_secs(1));

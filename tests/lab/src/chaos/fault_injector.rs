@@ -10,13 +10,19 @@ use crate::{chaos::robot_fault::RobotFault, random::Random};
 mod words;
 
 pub(super) const LATE: Duration = Duration::from_secs(2);
-const LATE_FROM_BOOT: Duration = Duration::from_millis(500);
-const RANGE_LATE: Duration = Duration::from_secs(1);
+/// Of frames that are late and not lost, seconds; each mission draws from such a range.
+const A_LITTLE_LATE_S: [f64; 2] = [0.25, 1.0];
+const RANGE_LATE_S: [f64; 2] = [0.3, 2.0];
 const OLD: Duration = Duration::from_secs(3);
 const AGAIN_EVERY: Duration = Duration::from_secs(2);
 /// Period of slow messages: three a second.
 const SLOW: Duration = Duration::from_millis(333);
-const RUNS_COUNTS_S: f64 = 150.0;
+/// The share of its counts that an encoder counts.
+const LOW: [f64; 2] = [0.97, 0.90];
+const LOWER: [f64; 2] = [0.90, 0.65];
+const RUNS_COUNTS_S: [f64; 2] = [50.0, 300.0];
+/// The noise of readings near a frozen one, metres; of beams it is this share of a tenth.
+const NEAR_M: [f64; 2] = [0.005, 0.05];
 /// The greatest of random speeds, counts/s.
 const RANDOM_COUNTS_S: f64 = 1000.0;
 /// The greatest of random readings, metres.
@@ -45,6 +51,8 @@ pub struct FaultInjector {
     began: Option<Duration>,
     chance: Random,
     channel: usize,
+    /// How great the fault of this mission is, from 0 to 1.
+    size: f64,
     words: Words,
     /// The last message with wheels before the fault.
     base: Option<Said>,
@@ -64,12 +72,14 @@ impl FaultInjector {
     pub fn new(fault: RobotFault, protocol: Protocol, seed: u64) -> Self {
         let mut chance = Random::new(seed, 13);
         let channel = chance.below(2);
+        let size = chance.share();
         Self {
             fault,
             faulty: false,
             began: None,
             chance,
             channel,
+            size,
             words: Words::of(protocol),
             base: None,
             newest: Report::default(),
@@ -104,7 +114,9 @@ impl FaultInjector {
         }
         let late = match self.fault {
             RobotFault::FramesLate => LATE,
-            RobotFault::LateFromBoot | RobotFault::LateMidway => LATE_FROM_BOOT,
+            RobotFault::LateFromBoot | RobotFault::LateMidway => {
+                Duration::from_secs_f64(self.drawn(A_LITTLE_LATE_S))
+            }
             _ => Duration::ZERO,
         };
         let mut passed = vec![Late { at: now + late, bytes: out }];
@@ -115,6 +127,11 @@ impl FaultInjector {
         }
         passed.retain(|late| !late.bytes.is_empty());
         passed
+    }
+
+    /// The size of this mission's fault between that of the least and the greatest.
+    fn drawn(&self, [least, greatest]: [f64; 2]) -> f64 {
+        least + self.size * (greatest - least)
     }
 
     /// The newest of the messages `of_kind` that are `age` old.
@@ -192,7 +209,8 @@ impl FaultInjector {
             }
             F::RangeLate => {
                 let kind = said.readings();
-                let old = self.old(now, RANGE_LATE, |old| old.readings() == kind);
+                let age = Duration::from_secs_f64(self.drawn(RANGE_LATE_S));
+                let old = self.old(now, age, |old| old.readings() == kind);
                 if let Some(old) = old.filter(|_| kind.contains(&true)) {
                     said = said.with_readings_of(old.clone());
                 }
@@ -219,6 +237,7 @@ impl FaultInjector {
     /// Change the readings of `said`.
     fn misread(&mut self, said: &mut Said) {
         use RobotFault as F;
+        let near_m = self.drawn(NEAR_M);
         let (fault, chance) = (self.fault, &mut self.chance);
         let [stuck_m, least_m] = said.stuck_and_least_m();
         let Report { ranges, scan, scans, .. } = &mut said.report;
@@ -233,8 +252,10 @@ impl FaultInjector {
         }
         let mut told = |read: Option<f64>, is_beam: bool| match fault {
             F::RangeFrozen => read,
-            F::RangeNear if is_beam => read.map(|beam| beam * chance.within(0.995, 1.005)),
-            F::RangeNear => read.map(|range| range + chance.within(-0.03, 0.03)),
+            F::RangeNear if is_beam => {
+                read.map(|beam| beam * (1.0 + chance.within(-near_m, near_m) / 10.0))
+            }
+            F::RangeNear => read.map(|range| range + chance.within(-near_m, near_m)),
             F::RangeRandom => Some(chance.within(least_m, RANDOM_M)),
             F::RangeStuck => Some(stuck_m),
             F::RangeInvalid => Some(NO_READING),
@@ -259,6 +280,7 @@ impl FaultInjector {
         }
         let before = base.report.wheels.unwrap_or(angles);
         let since_s = now.saturating_sub(*self.began.get_or_insert(now)).as_secs_f64();
+        let [low, lower, runs] = [LOW, LOWER, RUNS_COUNTS_S].map(|range| self.drawn(range));
         let (channel, chance) = (self.channel, &mut self.chance);
         let turned = [0, 1].map(|wheel| angles[wheel] - before[wheel]);
         let mut counts_share = |share: f64| {
@@ -268,15 +290,15 @@ impl FaultInjector {
         match self.fault {
             F::EncoderDead => counts_share(0.0),
             F::EncoderReversed => counts_share(-1.0),
-            F::EncoderLow => counts_share(0.95),
-            F::EncoderLower => counts_share(0.8),
+            F::EncoderLow => counts_share(low),
+            F::EncoderLower => counts_share(lower),
             F::EncodersSwapped => {
                 angles = [0, 1].map(|wheel| before[wheel] + turned[1 - wheel]);
                 speeds.reverse();
             }
             F::EncoderRuns => {
-                angles[channel] += RUNS_COUNTS_S * COUNT_RAD * since_s;
-                speeds[channel] += RUNS_COUNTS_S * COUNT_RAD;
+                angles[channel] += runs * COUNT_RAD * since_s;
+                speeds[channel] += runs * COUNT_RAD;
             }
             F::CountsRandom => {
                 let mut random = |least, most| chance.within(least, most) * COUNT_RAD;

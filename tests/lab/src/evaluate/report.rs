@@ -19,6 +19,9 @@ use crate::{
 
 /// The share of collisions in which the robot was in motion; in the others it was run into at rest.
 const AT_FAULT: &str = "at_fault_collision";
+/// The shares of missions in which the failsafe made the robot stand, or go at half speed, once it had gone.
+const STOPPED: &str = "stopped_by_failsafe";
+const SLOWED: &str = "slowed_by_failsafe";
 
 /// Metrics beside the shares. With `median_` the key is of the median of a column over the successes, otherwise of the mean over all
 /// missions.
@@ -57,6 +60,8 @@ fn totals(setting: &str, rows: &[Row]) -> Value {
     };
     OUTCOMES.into_iter().for_each(|name| add(name, &|row| row.outcome_name() == name));
     add(AT_FAULT, &Row::is_at_fault);
+    add(STOPPED, &|row| !row.stops.is_empty());
+    add(SLOWED, &|row| !row.slowed.is_empty());
     for key in METRICS {
         let value = match key.strip_prefix("median_") {
             Some(column) => {

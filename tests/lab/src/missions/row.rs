@@ -1,5 +1,7 @@
 //! One mission's result: a row of the table.
 
+use std::collections::BTreeMap;
+
 use mission_control::outcome::Outcome as Reported;
 use serde::{Deserialize, Serialize};
 use summary::Summary;
@@ -74,6 +76,11 @@ pub struct Row {
     pub full_solves: u64,
     /// The speed of the faster wheel in the tick before the contact, m/s.
     pub contact_speed_m_s: Option<f64>,
+    /// The causes by which the failsafe made a robot that had gone stand, and go at half speed, each with how often.
+    #[serde(default)]
+    pub stops: String,
+    #[serde(default)]
+    pub slowed: String,
 }
 
 /// A robot that is faster at a contact, by its faster wheel, is at fault, m/s; a slower one was run into.
@@ -136,6 +143,8 @@ impl Row {
             resets: summary.resets,
             full_solves: summary.full_solves,
             contact_speed_m_s: summary.contact_speed_m_s,
+            stops: causes(&summary.stops),
+            slowed: causes(&summary.slowed),
         }
     }
 
@@ -162,6 +171,11 @@ impl Row {
             _ => serde_json::to_value(self).ok()?.get(column)?.as_f64(),
         }
     }
+}
+
+fn causes(times: &BTreeMap<String, u32>) -> String {
+    let each: Vec<_> = times.iter().map(|(cause, times)| format!("{cause} {times}x")).collect();
+    each.join(", ")
 }
 
 impl Record for Row {

@@ -11,6 +11,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use common::clock::Pace;
 use console::progress_line::ProgressLine;
 use summary::Summary;
 
@@ -42,6 +43,7 @@ pub struct Plan {
     pub pictured_seed: Option<u64>,
     /// Missions at once; by default one for each processor.
     pub jobs: Option<NonZero<usize>>,
+    pub pace: Pace,
     /// Whether the robot of each mission is calibrated before, as its owner would do it. If that fails the mission runs without.
     pub calibrates: bool,
 }
@@ -205,11 +207,12 @@ impl Job<'_> {
         }
         let run = |records| {
             let mut command = self.firsthand("run", worker);
+            command.args(["--pace", &plan.pace.to_string()]);
             command.args(calibrated.iter().flat_map(|key| ["--set", key]));
             command.arg("--out").arg(&directory);
             Run::start(command, &directory, records)?.wait(LINE_EVERY, || ())
         };
-        let summary = run(false)?.summary();
+        let summary = run(plan.pace != Pace::Max)?.summary();
         let has_summary = summary.is_ok();
         let summary = summary.unwrap_or_else(|reason| {
             let reason = reason.to_string();
@@ -223,9 +226,11 @@ impl Job<'_> {
             let _ = fs::rename(directory.join(PICTURE), &kept);
         }
         if !matches!(row.outcome, Outcome::Success | Outcome::Aborted) {
-            // The mission can be run again, to the bit, and recordings of all missions would take too much room.
-            let _ = fs::remove_dir_all(&directory);
-            run(true)?;
+            // In lockstep the mission can be run again, to the bit, and recordings of all missions would take too much room.
+            if plan.pace == Pace::Max {
+                let _ = fs::remove_dir_all(&directory);
+                run(true)?;
+            }
             let _ = fs::rename(directory.join(PAGE), kept.with_extension("html"));
         }
         let _ = fs::remove_dir_all(&files);
