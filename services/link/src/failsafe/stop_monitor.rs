@@ -41,6 +41,8 @@ pub struct StopMonitor {
     counts_per_m: f64,
     longest_gap: Duration,
     response: Response,
+    /// Found while it was told to stand: a robot that does not stop looks like a base that brakes slowly, until it rests.
+    found: Option<Response>,
     /// The greater of the speeds of the wheels by the newest command to move, counts/s.
     driven: f64,
     told_to_stand: Option<MissionTime>,
@@ -92,6 +94,9 @@ impl StopMonitor {
         } else {
             Duration::ZERO
         };
+        if self.resting >= AT_REST_AFTER {
+            self.response = self.found.take().unwrap_or(self.response);
+        }
         self.moves = moves;
         let comes_to_rest = self.comes_to_rest();
         let due = |told: MissionTime| now.since(told).saturating_sub(gap) >= comes_to_rest;
@@ -149,6 +154,7 @@ impl Monitor for StopMonitor {
             counts_per_m: 1.0 / mission.body().metres_per_count(),
             longest_gap: Duration::from_secs_f64(2.0 / mission.robot.rate_hz),
             response: mission.trusted_response(),
+            found: None,
             driven: 0.0,
             told_to_stand: None,
             frame: None,
@@ -163,6 +169,9 @@ impl Monitor for StopMonitor {
     fn observe(&mut self, what: &Observation<'_>, now: Moment) {
         match *what {
             Observation::Commanded(counts) => self.commanded(counts, now.time),
+            Observation::Responds(response) if self.told_to_stand.is_some() => {
+                self.found = Some(response);
+            }
             Observation::Responds(response) => self.response = response,
             Observation::Motor(counts, Counts::Follow) => self.heard(counts, now.time),
             Observation::Motor(_, Counts::Restarted { .. } | Counts::Elsewhere) => {

@@ -63,6 +63,29 @@ fn a_robot_that_rolls_on_disobeys_within_one_and_a_half_seconds_and_is_not_at_re
 }
 
 #[test]
+fn a_robot_that_does_not_stop_is_not_taken_for_a_base_that_brakes_slowly_before_it_was_seen_at_rest()
+ {
+    let slow = Response { acceleration_m_s2: 0.2, ..Response::X80 };
+    let (mut monitor, mut rolled) = (stop_monitor(), 0.0);
+    monitor.commanded([900, 900], MissionTime::default());
+    let mut after = |speed: f64, ticks: std::ops::Range<u32>, monitor: &mut StopMonitor| {
+        for tick in ticks {
+            rolled += PERIOD * speed;
+            let now = MissionTime::from_seconds(f64::from(tick) * PERIOD);
+            monitor.heard([rolled as u16; 2], now);
+            monitor.commanded([0, 0], now);
+        }
+        monitor.condition(Cause::RobotDoesNotStop, Moment::default())
+    };
+    after(700.0, 0..4, &mut monitor);
+    monitor.observe(&Observation::Responds(slow), Moment::default());
+    assert_eq!(after(700.0, 4..11, &mut monitor), Condition::Holds);
+    assert_eq!(monitor.response, Response::X80);
+    after(0.0, 11..15, &mut monitor);
+    assert_eq!(monitor.response, slow);
+}
+
+#[test]
 fn a_robot_that_did_not_obey_does_when_it_has_been_seen_at_rest() {
     let (watch, did_not_stop) = told_to_stand(|since| if since < 3.0 { 560.0 } else { 0.0 });
     assert!(did_not_stop.is_some() && !watch.does_not_stop);
