@@ -147,9 +147,10 @@ fn a_frozen_supervisor_leads_to_a_robot_at_rest_and_a_thawed_one_lets_it_go_on()
     run.wait_until_under_way(0.5);
     tap.next_that(|heard| heard.moving);
     run.signal(Signal::STOP);
-    let froze = Instant::now();
-    let at_rest = tap.next_that(|heard| !heard.moving && heard.at > froze);
-    println!("at rest {} ms after the freeze", (at_rest.at - froze).as_millis());
+    // Until then it may stand for a moment, and go on.
+    let is_silent = Instant::now() + Duration::from_secs(2);
+    let at_rest = tap.next_that(|heard| !heard.moving && heard.at > is_silent);
+    println!("at rest {} ms after the supervisor is silent", (at_rest.at - is_silent).as_millis());
     for _ in 0..10 {
         let heard = tap.next();
         assert!(!heard.moving, "{heard:?}");

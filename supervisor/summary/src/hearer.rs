@@ -37,8 +37,11 @@ impl Interruptions {
         let (action, cause) = (link.action(), link.cause());
         self.has_gone |= action == Action::Go;
         let began = self.newest.replace((action, cause)) != Some((action, cause));
-        // A robot that waits or has arrived is not interrupted.
-        let of_mission = matches!(cause, Cause::None | Cause::NotOrdered | Cause::MissionOver);
+        // A robot that waits, has arrived or stands for its operator is not interrupted.
+        let of_mission = matches!(
+            cause,
+            Cause::None | Cause::NotOrdered | Cause::MissionOver | Cause::OperatorStop
+        );
         let counts = match action {
             Action::Go => return,
             Action::Slow => &mut self.slowed,
