@@ -73,6 +73,26 @@ fn wheels_and_sonar_as_measured_under_a_fading_radio_touch_nothing() {
 }
 
 #[test]
+fn a_robot_with_a_gyro_and_wheels_that_nobody_calibrated_knows_its_place() {
+    // One by one these are given after the mission's own, which are those of calibrated wheels.
+    let wheels = [
+        "--set=robot.odometry={}",
+        "--set=simulation.wheels={}",
+        "--set=robot.protocol='json'",
+        "--set=robot.gyro=true",
+    ];
+    for seed in 1..=6 {
+        let seed = seed.to_string();
+        let summary = arrives_untouched(
+            "gyro",
+            "obstacle-course",
+            &[&wheels[..], &["--seed", &seed]].concat(),
+        );
+        assert!(summary["pose_error_m"].as_f64().unwrap() < 0.3, "{summary}");
+    }
+}
+
+#[test]
 fn mission_time_and_timeout_count_the_time_in_which_nobody_hears_the_robot() {
     let out = ["--set", "simulation.radio.outage_share=0.2"];
     let (_, summary) = run("silences", "obstacle-course", &out);

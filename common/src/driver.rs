@@ -2,6 +2,7 @@
 //! own. A driver knows neither wire nor clock: bytes come in, what they say goes out.
 
 pub mod counts;
+pub mod gyro;
 pub mod odometry;
 
 use std::{fmt, time::Duration};

@@ -32,6 +32,10 @@ pub struct Report {
     /// The robot's own odometry, sent instead of `wheels`: x, y and heading.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub odometry: Option<[f64; 3]>,
+    /// The angle by which the robot has turned since it started, counter-clockwise, by its gyro, without a cycle; read with `wheels` or
+    /// `odometry`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gyro: Option<f64>,
     /// Something holds the wheel: its motor draws the current of a stall.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held: Option<[bool; 2]>,

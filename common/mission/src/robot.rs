@@ -100,6 +100,8 @@ keys! {
         right: Channel = Channel { channel: 1, reversed: false },
         /// The link makes good that the wheels turn slower than commanded; without it [`crate::Mission::speed_trim`].
         speed_trim: Option<bool>,
+        /// Whether the simulated robot has a gyro, by default as its model has; any robot of JSON may say `gyro`.
+        gyro: Option<bool>,
         /// Age at which a command no longer moves the robot.
         command_limit_s: f64 = 0.25,
         low_battery_v: BatteryLimits,
@@ -249,6 +251,10 @@ impl RobotConfig {
     /// The presets of the model.
     pub(crate) fn preset(&self) -> &Self {
         MODELS.get(&self.model).unwrap_or(self)
+    }
+
+    pub fn gyro(&self) -> bool {
+        self.gyro.or(self.preset().gyro).unwrap_or_default()
     }
 
     pub fn protocol(&self) -> Protocol {

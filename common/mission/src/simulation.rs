@@ -20,6 +20,7 @@ keys! {
         sonar: SonarKeys,
         infrared: InfraredKeys,
         laser: LaserKeys,
+        gyro: GyroKeys,
         wheels: WheelKeys,
         heights: HeightKeys,
         battery: BatteryKeys,
@@ -250,6 +251,18 @@ section! {
 }
 
 section! {
+    /// The gyro of a robot that has one and speaks JSON. The bias does not change within a mission.
+    GyroPhysics, written as GyroKeys in "simulation.gyro" {
+        /// Standard deviation of the angle, degrees per square root of a second.
+        noise_deg_sqrt_s in 0.0..=10.0 => 0.0, 0.015, 0.05;
+        /// Greatest bias, evenly drawn from the seed, degrees per second.
+        bias_spread_deg_s in 0.0..=10.0 => 0.0, 0.02, 0.05;
+        /// Greatest error of the scale, as a share of it, evenly drawn from the seed.
+        scale_spread in 0.0..=0.5 => 0.0, 0.005, 0.01;
+    }
+}
+
+section! {
     /// The wheels' speed loops and how they meet the ground.
     WheelPhysics, written as WheelKeys in "simulation.wheels" {
         /// Steady speed over commanded speed.
@@ -375,6 +388,7 @@ physics! {
     sonar: SonarPhysics,
     infrared: InfraredPhysics,
     laser: LaserTiming,
+    gyro: GyroPhysics,
     wheels: WheelPhysics,
     heights: Heights,
     battery: BatteryPhysics,

@@ -36,6 +36,8 @@ pub(crate) struct ErrorModel {
     systematic: [f64; 3],
     track_m: f64,
     steers: bool,
+    /// Variance of a tick's turn by what its counts leave open, rad^2: each reading of either wheel is off by half a count.
+    counted: f64,
 }
 
 /// The factor of the error before a motion, and the covariance that it adds.
@@ -55,6 +57,7 @@ impl ErrorModel {
             ],
             track_m: body.track_m,
             steers: body.steering.is_some(),
+            counted: (body.metres_per_count() / body.track_m).powi(2),
         }
     }
 
@@ -127,6 +130,13 @@ impl ErrorModel {
         let mut noise: Matrix = slips.iter().map(|slip| slip * slip.transpose()).sum();
         noise[(BIAS, BIAS)] += BIAS_WALK * BIAS_WALK * seconds;
         Transition { carried, noise }
+    }
+
+    /// The variance of a tick's turn that a gyro shows to be an error of the counts, rad^2. What one tick has too much the next has too
+    /// little, so without a gyro it does not add up. Counts that stay are at rest, as far as an eighth of a count.
+    pub(crate) fn counted(&self, by_counts: Twist) -> f64 {
+        let rests = by_counts.v == 0.0 && by_counts.omega == 0.0;
+        if rests { self.counted / 64.0 } else { self.counted }
     }
 
     /// The covariance of a motion that nobody measured: each wheel rolled up to `farthest` metres either way. The robot may have turned

@@ -129,7 +129,10 @@ impl Filter {
         let moved = self.moved(motions, tick);
         let Transition { carried, noise } =
             motions.errors.transition(self.pose, moved, tick.seconds);
-        let noise = noise + motions.errors.lost(tick.lost_m);
+        let mut noise = noise + motions.errors.lost(tick.lost_m);
+        if tick.gyro.is_some() {
+            noise[(2, 2)] += motions.errors.counted(tick.moved());
+        }
         let before = self.covariance.0;
         self.pose = motions.along(self.pose, moved);
         self.covariance = Covariance(carried * before * carried.transpose() + noise);

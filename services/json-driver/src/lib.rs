@@ -2,9 +2,11 @@
 
 use std::{collections::BTreeMap, time::Duration};
 
+mod gyro;
+
 use common::{
     driver::{
-        Base, Driver, Heard, LaserScan, Memory, Motion, StopMethod, WireTally, beam,
+        Base, Driver, Heard, LaserScan, Memory, Motion, StopMethod, Turn, WireTally, beam,
         odometry::{Odometry, motion, twist, wheel_speeds},
         range_reading,
     },
@@ -13,6 +15,8 @@ use common::{
     mission::{Body, Mission, Sensor, TouchRow},
     samples::{LONGEST_SWEEP_NS, RangeReading, Sweep},
 };
+
+use self::gyro::Gyro;
 
 /// No clock of a robot says more, seconds either way: twice the time since 1970.
 const MOST_CLOCK_S: f64 = 4e9;
@@ -31,6 +35,7 @@ pub struct Json {
     /// The count before the newest line, if that line counts less: an old one, or of a robot that has restarted, as the next one tells.
     fell_from: Option<u64>,
     odometry: Odometry,
+    gyro: Gyro,
     tally: WireTally,
 }
 
@@ -46,6 +51,7 @@ impl Json {
             answered: None,
             fell_from: None,
             odometry: Odometry::default(),
+            gyro: Gyro::default(),
             tally: WireTally::default(),
         }
     }
@@ -78,8 +84,13 @@ impl Json {
         if turned.is_some() && report.speeds.is_none() {
             return Err("wheels or odometry without speeds: say both".to_owned());
         }
+        if report.gyro.is_some() && turned.is_none() {
+            return Err("gyro without wheels or odometry: say both".to_owned());
+        }
         heard.readings.extend(readings);
         if let (Some(turned), Some(speeds)) = (turned, report.speeds) {
+            let why = self.gyro.take(report.gyro, turned, &self.body, 1e9 / self.rate_hz);
+            heard.refused = why.or(heard.refused.take());
             let held = report.held.unwrap_or_default();
             let motion = motion(&self.body, turned, speeds, held);
             heard.motion = Some(Motion { stamp_ns, ..motion });
@@ -206,6 +217,10 @@ impl Base for Json {
         let wheels = wheel_speeds(&self.body, counts);
         let Twist { v, omega } = twist(&self.body, counts);
         line(&Order::Drive { wheels, twist: [v, omega], for_s: limit.as_secs_f64() })
+    }
+
+    fn turn_for_tick(&mut self) -> Option<Turn> {
+        self.gyro.for_tick(self.rate_hz)
     }
 
     fn memory(&self) -> Option<Memory> {

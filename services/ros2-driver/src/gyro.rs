@@ -4,23 +4,20 @@
 //! goes on at the newest rate until there. The next message corrects the error of that, because each turn is the
 //! difference of two angles.
 
-use common::{driver::Turn, geometry::wrap_angle};
+use common::{
+    driver::{
+        Turn,
+        gyro::{Compared, NOISE},
+    },
+    geometry::wrap_angle,
+};
 
 use crate::messages::{Imu, ImuTurn, NO_GROWTH, is_repeated};
 
 /// The turn is known if messages, and odometry and the newest message, are no farther apart.
 const LONGEST_GAP_NS: i64 = 100_000_000;
-/// Noise of a turn whose message states less or none, rad per square root of a second. Nominal: several times that of
-/// robots' gyros, such as the BMI160's 0.007 degrees.
-const NOISE: f64 = 5e-4;
 /// The turn rate changes no faster from the newest message to the tick, rad/s^2. Nominal.
 const CHANGES_BY: f64 = 5.0;
-/// Gyro and odometry are compared after such a turn. It takes at most [`COMPARED_NS`], in which no bias adds up to
-/// that, and both agree within [`AGREES_WITHIN`]: wheels slip in turns, but not more.
-const COMPARED_RAD: f64 = 0.2;
-const COMPARED_NS: i64 = 10_000_000_000;
-const AGREES_WITHIN: f64 = 2.0;
-
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Gyro {
     newest: Option<Newest>,
@@ -48,14 +45,6 @@ struct Turned {
     variance: f64,
     /// Variance of the part after the newest message.
     ahead: f64,
-}
-
-#[derive(Clone, Copy, Debug, Default)]
-struct Compared {
-    since_ns: i64,
-    /// Turns since then by odometry and by the gyro, radians.
-    turned: [f64; 2],
-    agrees: bool,
 }
 
 impl Gyro {
@@ -105,12 +94,13 @@ impl Gyro {
             ..self.turned
         };
         self.now = Some(now);
-        self.compared.take(stamp_ns, [by_odometry, now.angle - before?.angle])
+        let why = self.compared.take(stamp_ns, [by_odometry, now.angle - before?.angle])?;
+        Some(format!("{why}; publish rad/s about an axis that points up"))
     }
 
     /// After a gap the turn only says where the next one begins.
     pub(crate) fn for_tick(&mut self) -> Option<Turn> {
-        let now = self.now.filter(|_| self.compared.agrees);
+        let now = self.now.filter(|_| self.compared.agrees());
         let before = std::mem::replace(&mut self.told, now);
         let now = now?;
         self.sequence += if before.is_some() { 1 } else { 2 };
@@ -139,24 +129,5 @@ fn turn(before: &Imu, now: &Imu) -> Option<(f64, f64, f64)> {
             Some((turn, turn / gap_s, nominal))
         }
         _ => None,
-    }
-}
-
-impl Compared {
-    /// Turns up to `now_ns`. Returns their difference if they agreed or were not compared before.
-    fn take(&mut self, now_ns: i64, turns: [f64; 2]) -> Option<String> {
-        if !(0..COMPARED_NS).contains(&(now_ns - self.since_ns)) {
-            (self.since_ns, self.turned) = (now_ns, [0.0; 2]);
-        }
-        self.turned = [0, 1].map(|of| self.turned[of] + turns[of]);
-        let [odometry, gyro] = self.turned;
-        if odometry.abs() < COMPARED_RAD {
-            return None;
-        }
-        (self.since_ns, self.turned) = (now_ns, [0.0; 2]);
-        self.agrees = (1.0 / AGREES_WITHIN..=AGREES_WITHIN).contains(&(gyro / odometry));
-        (!self.agrees).then(|| {
-            format!("a turn of {gyro:.2} rad where odometry has {odometry:.2}, so it is not used; publish rad/s about an axis that points up")
-        })
     }
 }

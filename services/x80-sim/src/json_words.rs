@@ -75,6 +75,7 @@ impl JsonWords {
         lasers: &[Laser],
         touched: BTreeMap<String, bool>,
         motors: &[Motor; 6],
+        gyro: Option<f64>,
     ) -> Vec<u8> {
         let of = |value: &dyn Fn(usize) -> f64| {
             self.wheels
@@ -103,6 +104,7 @@ impl JsonWords {
         };
         let report = Report {
             clock_s: None,
+            gyro,
             heard: Some(self.heard),
             wheels: Some(of(&|channel| turned(motor, motors, channel))),
             speeds: Some(of(&|channel| f64::from(motor.encoders[channel].velocity()))),

@@ -44,6 +44,7 @@ pub mod body;
 mod car;
 mod drivetrain;
 mod error;
+mod gyro;
 pub mod infrared;
 mod json_words;
 mod laser;

@@ -12,6 +12,7 @@ pub enum Source {
     WheelErrors = 6,
     Silence = 7,
     Laser = 8,
+    Gyro = 9,
 }
 
 #[derive(Clone, Debug)]

@@ -19,6 +19,7 @@ use crate::{
     body::{Body, Wheels},
     car::Car,
     drivetrain::{self, Drivetrain},
+    gyro::Gyro,
     json_words::JsonWords,
     laser::Laser,
     motor::Motor,
@@ -78,6 +79,7 @@ pub struct Robot {
     motor: MotorSensors,
     /// None for an X80.
     json: Option<JsonWords>,
+    gyro: Option<Gyro>,
     arduino: Option<ArduinoWords>,
     /// Their scans come with the robot's frames.
     lasers: Vec<Laser>,
@@ -140,6 +142,7 @@ impl Robot {
             custom: CustomSensors::default(),
             motor: MotorSensors::default(),
             json: (mission.robot.protocol() == Protocol::Json).then(|| JsonWords::new(mission)),
+            gyro: mission.robot.gyro().then(|| Gyro::new(mission, seed)),
             arduino: (mission.robot.protocol() == Protocol::Arduino)
                 .then(|| ArduinoWords::new(mission)),
             lasers: Laser::all(mission, seed),
@@ -492,6 +495,9 @@ impl Robot {
         self.motor.pots = [sensors::MIDDLE; 6];
         (self.standard, self.custom) =
             self.ranging.measure(&self.world, &self.body, self.time, &self.physics);
+        if let Some(gyro) = &mut self.gyro {
+            gyro.read(self.time, self.body.pose().heading);
+        }
         self.told = std::mem::take(&mut self.felt);
         self.feel();
         for laser in &mut self.lasers {
@@ -516,7 +522,8 @@ impl Robot {
             let sensors = (&self.standard, &self.custom, &self.motor);
             let touched = self.touches.iter().map(|row| row.name.clone()).zip(self.told.clone());
             let touched = touched.collect();
-            out.extend(json.report(sensors, &self.lasers, touched, &self.motors));
+            let gyro = self.gyro.as_ref().map(Gyro::angle);
+            out.extend(json.report(sensors, &self.lasers, touched, &self.motors, gyro));
             return;
         }
         if self.arduino.is_some() {

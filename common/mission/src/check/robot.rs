@@ -67,6 +67,12 @@ pub(super) fn check(mission: &Mission) -> Result {
         format!("a command would go stale before the next tick: {limit_s} s at {rate_hz} Hz"),
         "raise robot.command_limit_s or robot.rate_hz",
     )?;
+    refuse_if(
+        robot.gyro == Some(true) && robot.protocol() != Protocol::Json,
+        "robot.gyro",
+        "only the lines of JSON have a word for a gyro",
+        "give robot.ros2.imu to a robot of ROS 2, or remove it",
+    )?;
     let (left, right) = (robot.left.channel, robot.right.channel);
     refuse_if(
         left > 1 || right > 1 || left == right,

@@ -1,0 +1,42 @@
+//! What drivers of robots with a gyro share.
+
+/// Noise of a turn whose message states less or none, rad per square root of a second. Nominal: several times that of
+/// robots' gyros, such as the BMI160's 0.007 degrees.
+pub const NOISE: f64 = 5e-4;
+/// Gyro and odometry are compared after such a turn. It takes at most [`COMPARED_NS`], in which no bias adds up to
+/// that, and both agree within [`AGREES_WITHIN`]: wheels slip in turns, but not more.
+const COMPARED_RAD: f64 = 0.2;
+const COMPARED_NS: i64 = 10_000_000_000;
+const AGREES_WITHIN: f64 = 2.0;
+
+/// Whether a gyro turns as the robot's odometry does. It is not used before the two were seen to agree.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Compared {
+    since_ns: i64,
+    /// Turns since then by odometry and by the gyro, radians.
+    turned: [f64; 2],
+    agrees: bool,
+}
+
+impl Compared {
+    pub const fn agrees(&self) -> bool {
+        self.agrees
+    }
+
+    /// Turns by odometry and by the gyro up to `now_ns`, radians. Returns their difference if they agreed or were not compared before.
+    pub fn take(&mut self, now_ns: i64, turns: [f64; 2]) -> Option<String> {
+        if !(0..COMPARED_NS).contains(&(now_ns - self.since_ns)) {
+            (self.since_ns, self.turned) = (now_ns, [0.0; 2]);
+        }
+        self.turned = [0, 1].map(|of| self.turned[of] + turns[of]);
+        let [odometry, gyro] = self.turned;
+        if odometry.abs() < COMPARED_RAD {
+            return None;
+        }
+        (self.since_ns, self.turned) = (now_ns, [0.0; 2]);
+        self.agrees = (1.0 / AGREES_WITHIN..=AGREES_WITHIN).contains(&(gyro / odometry));
+        (!self.agrees).then(|| {
+            format!("the gyro has a turn of {gyro:.2} rad where odometry has {odometry:.2}, so it is not used")
+        })
+    }
+}

@@ -1,0 +1,85 @@
+//! The gyro of a robot: the angle that it has turned by, with noise, a bias and an error of its scale.
+
+use common::{geometry::wrap_angle, mission::Mission};
+
+use crate::noise::{Noise, Source};
+
+#[derive(Clone, Debug)]
+pub(crate) struct Gyro {
+    noise_rad_sqrt_s: f64,
+    bias_rad_s: f64,
+    scale: f64,
+    noise: Noise,
+    /// The time and the true heading of the newest reading.
+    newest: Option<(f64, f64)>,
+    angle: f64,
+}
+
+impl Gyro {
+    /// Bias and scale belong to the robot, so they follow from the mission's seed; the noise follows from `seed`.
+    pub(crate) fn new(mission: &Mission, seed: u64) -> Self {
+        let physics = mission.simulation.physics().gyro;
+        let mut errors = Noise::of_nth(mission.seed, Source::Gyro, 1);
+        let mut off = |spread: f64| spread * (2.0 * errors.uniform() - 1.0);
+        Self {
+            noise_rad_sqrt_s: physics.noise_deg_sqrt_s.to_radians(),
+            bias_rad_s: off(physics.bias_spread_deg_s).to_radians(),
+            scale: 1.0 + off(physics.scale_spread),
+            noise: Noise::new(seed, Source::Gyro),
+            newest: None,
+            angle: 0.0,
+        }
+    }
+
+    /// The robot has this heading, radians.
+    pub(crate) fn read(&mut self, time_s: f64, heading: f64) {
+        if let Some((before_s, before)) = self.newest.replace((time_s, heading)) {
+            let passed_s = time_s - before_s;
+            self.angle += self.scale * wrap_angle(heading - before)
+                + self.bias_rad_s * passed_s
+                + self.noise.normal(self.noise_rad_sqrt_s * passed_s.sqrt());
+        }
+    }
+
+    pub(crate) const fn angle(&self) -> f64 {
+        self.angle
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn a_gyro_is_off_by_its_bias_and_scale_and_by_noise_that_grows_with_the_root_of_time() {
+        let read = |seed: u64, keys: &str| {
+            let text = format!("target = [3, 0]\nseed = {seed}\n[simulation.gyro]\n{keys}");
+            let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+            let mut gyro = Gyro::new(&mission, seed);
+            (0..=1000).for_each(|tick| {
+                gyro.read(f64::from(tick) / 10.0, f64::from(tick) / 100.0);
+            });
+            gyro.angle() - 10.0
+        };
+        let none = "noise_deg_sqrt_s = 0\nbias_spread_deg_s = 0\nscale_spread = 0";
+        assert!(read(1, none).abs() < 1e-9);
+        let mean_square = |keys: &str| {
+            let keys = format!("{none}\n")
+                .replace(&format!("{} = 0\n", keys.split(' ').next().unwrap()), "")
+                + keys;
+            (1..=300).map(|seed| read(seed, &keys).powi(2)).sum::<f64>() / 300.0
+        };
+        // 0.1 degrees per root of a second in 100 s; an even distribution has a third of the square of its greatest.
+        let of = |degrees: f64| degrees.to_radians().powi(2);
+        for (keys, want) in [
+            ("noise_deg_sqrt_s = 0.1", of(1.0)),
+            ("bias_spread_deg_s = 0.1", of(10.0) / 3.0),
+            ("scale_spread = 0.1", 1.0 / 3.0),
+        ] {
+            let got = mean_square(keys);
+            assert!((0.8..1.2).contains(&(got / want)), "{keys}: {got} {want}");
+        }
+    }
+}
