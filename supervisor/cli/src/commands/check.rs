@@ -1,13 +1,19 @@
 use clap::Args;
-use link::failsafe::stop_distance::{self, Stop};
-
+use common::mission::{Mission, SensorKind};
 use console::{
     failure::Result,
     output::{print_text, write_stderr},
 };
+use link::failsafe::stop_distance::{self, Stop};
+use mission_control::outcome::RIGHT_PLACE_M;
+
+/// A way among things is longer than the straight line by this.
+const DETOUR: f64 = 1.25;
+/// A smaller share of missions is not told.
+const LEAST_SHARE: f64 = 0.02;
 
 /// Check a mission as `run` does. An error is reported with its line, its key and the remedy; of a mission without one, the way from each
-/// fault to rest is printed.
+/// fault to rest is printed, and how often it ends in a wrong place if its wheels alone hold its heading.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// A mission file, or a shipped mission (`firsthand missions`).
@@ -38,5 +44,53 @@ pub fn main(arguments: &Arguments) -> Result {
             cause.name()
         );
     }
+    if let Some(share) = wrong_places(&mission).filter(|share| *share >= LEAST_SHARE) {
+        text += &format!(
+            "Its wheels alone hold its heading, and are known to {} %: of 100 such missions about {:.0} end more than {RIGHT_PLACE_M} m from the target. Run `firsthand calibrate`, or give the robot a gyro.\n",
+            100.0 * mission.robot.odometry.diameter_ratio_sd,
+            100.0 * share
+        );
+    }
     Ok(print_text(&text)?)
+}
+
+/// The expected share of missions that end in a wrong place, because the robot turns by what the diameters of its wheels differ more than
+/// it knows: over a way d that turns it by d/W of that share, and takes it aside by half of d times the turn. None if something else
+/// holds its heading. Errors of the track cancel where turns do.
+fn wrong_places(mission: &Mission) -> Option<f64> {
+    let robot = &mission.robot;
+    let is_held = robot.gyro() || robot.ros2.imu.is_some() || mission.used(SensorKind::Scan) > 0;
+    if is_held || mission.body().steering.is_some() {
+        return None;
+    }
+    let way_m = DETOUR * mission.straight_m();
+    let aside_m = robot.odometry.diameter_ratio_sd * way_m * way_m / (2.0 * mission.body().track_m);
+    Some(libm::erfc(RIGHT_PLACE_M / (aside_m * std::f64::consts::SQRT_2)))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn a_far_target_a_narrow_track_and_unknown_wheels_mean_wrong_places_and_a_gyro_or_a_laser_none()
+    {
+        let share = |text: &str| {
+            let text = format!("{text}\nperimeter.width_m = 30");
+            let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+            wrong_places(&mission)
+        };
+        let six_m = share("target = [6, 0]").unwrap();
+        // 41 of 100 on the default course, and 40 of 100 in rooms.
+        assert!((0.25..0.45).contains(&six_m), "{six_m}");
+        assert!(share("target = [9, 0]").unwrap() > six_m + 0.2);
+        assert!(share("target = [6, 0]\nrobot.track_m = 0.6").unwrap() < six_m - 0.2);
+        let calibrated = share("target = [6, 0]\nrobot.odometry.diameter_ratio_sd = 0.0005");
+        assert!(calibrated.unwrap() < 0.001);
+        for held in ["protocol = 'json'\nrobot.gyro = true", "model = 'kobuki'", "model = 'car'"] {
+            assert_eq!(share(&format!("target = [6, 0]\nrobot.{held}")), None, "{held}");
+        }
+    }
 }
