@@ -36,7 +36,7 @@ impl Compared {
         (self.since_ns, self.turned) = (now_ns, [0.0; 2]);
         self.agrees = (1.0 / AGREES_WITHIN..=AGREES_WITHIN).contains(&(gyro / odometry));
         (!self.agrees).then(|| {
-            format!("the gyro has a turn of {gyro:.2} rad where odometry has {odometry:.2}, so it is not used")
+            format!("a turn of {gyro:.2} rad where odometry has {odometry:.2}, so it is not used")
         })
     }
 }

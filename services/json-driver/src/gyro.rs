@@ -47,7 +47,7 @@ impl Gyro {
         let rolled = (right - right_before) - (left - left_before);
         let by_wheels = rolled * body.wheel_radius_m / body.track_m;
         let why = self.compared.take(self.now_ns as i64, [by_wheels, turned])?;
-        Some(format!("{why}; say radians counter-clockwise"))
+        Some(format!("gyro: {why}; say radians counter-clockwise"))
     }
 
     /// After a gap the turn only says where the next one begins.
