@@ -406,7 +406,7 @@ impl Mission {
         let table = self.sensor_table();
         let reach_m = table.iter().filter(|sensor| looks_ahead(sensor)).map(|it| it.reach_m);
         reach_m.reduce(f64::max).map_or(f64::INFINITY, |reach_m| {
-            response.speed_to_stop_within(reach_m - self.body().radius_m, after_s)
+            response.speed_to_stop_within((reach_m - self.body().radius_m).max(0.0), after_s)
         })
     }
 

@@ -100,7 +100,8 @@ keys! {
         right: Channel = Channel { channel: 1, reversed: false },
         /// The link makes good that the wheels turn slower than commanded; without it [`crate::Mission::speed_trim`].
         speed_trim: Option<bool>,
-        /// Whether the simulated robot has a gyro, by default as its model has; any robot of JSON may say `gyro`.
+        /// The robot says the angle of its gyro: the simulated one then has a gyro, and `firsthand check` counts on it. A robot of JSON may say
+        /// it without the key.
         gyro: Option<bool>,
         /// Age at which a command no longer moves the robot.
         command_limit_s: f64 = 0.25,
@@ -254,7 +255,7 @@ impl RobotConfig {
     }
 
     pub fn gyro(&self) -> bool {
-        self.gyro.or(self.preset().gyro).unwrap_or_default()
+        self.gyro.unwrap_or_default()
     }
 
     pub fn protocol(&self) -> Protocol {

@@ -9,6 +9,34 @@ const COMPARED_RAD: f64 = 0.2;
 const COMPARED_NS: i64 = 10_000_000_000;
 const AGREES_WITHIN: f64 = 2.0;
 
+/// The turns of ticks follow on each other, and one after a gap only says where the next one begins.
+#[derive(Clone, Copy, Debug)]
+pub struct Turns<T> {
+    /// Where the newest turn ended; none if something is missing since.
+    told: Option<T>,
+    sequence: u64,
+}
+
+impl<T> Default for Turns<T> {
+    fn default() -> Self {
+        Self { told: None, sequence: 0 }
+    }
+}
+
+impl<T: Copy> Turns<T> {
+    pub fn interrupt(&mut self) {
+        self.told = None;
+    }
+
+    /// The number of the turn that ends at `now`, and where it began; none, and a gap, without `now`.
+    pub fn until(&mut self, now: Option<T>) -> Option<(u64, T)> {
+        let before = std::mem::replace(&mut self.told, now);
+        let now = now?;
+        self.sequence += if before.is_some() { 1 } else { 2 };
+        Some((self.sequence, before.unwrap_or(now)))
+    }
+}
+
 /// Whether a gyro turns as the robot's odometry does. It is not used before the two were seen to agree.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Compared {

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use common::{
     driver::{
         Turn,
-        gyro::{Compared, NOISE},
+        gyro::{Compared, NOISE, Turns},
     },
     mission::Body,
 };
@@ -17,9 +17,7 @@ const SCALE: f64 = 0.01;
 pub(crate) struct Gyro {
     /// The newest angle of the gyro and those of the wheels, radians.
     newest: Option<(f64, [f64; 2])>,
-    /// The newest angle that a tick was given; none if something is missing since.
-    told: Option<f64>,
-    sequence: u64,
+    turns: Turns<f64>,
     now_ns: f64,
     compared: Compared,
 }
@@ -41,7 +39,7 @@ impl Gyro {
         let turned = angle - angle_before;
         if turned.abs() > PI {
             // It begins anew.
-            self.told = None;
+            self.turns.interrupt();
             return None;
         }
         let rolled = (right - right_before) - (left - left_before);
@@ -53,12 +51,10 @@ impl Gyro {
     /// After a gap the turn only says where the next one begins.
     pub(crate) fn for_tick(&mut self, rate_hz: f64) -> Option<Turn> {
         let now = self.newest.filter(|_| self.compared.agrees()).map(|(angle, _)| angle);
-        let before = std::mem::replace(&mut self.told, now);
-        let now = now?;
-        self.sequence += if before.is_some() { 1 } else { 2 };
-        let turn_rad = now - before.unwrap_or(now);
+        let (sequence, before) = self.turns.until(now)?;
+        let turn_rad = now? - before;
         let variance_rad2 = NOISE * NOISE / rate_hz + (SCALE * turn_rad).powi(2);
-        Some(Turn { sequence: self.sequence, turn_rad, variance_rad2 })
+        Some(Turn { sequence, turn_rad, variance_rad2 })
     }
 }
 

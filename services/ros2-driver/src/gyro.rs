@@ -7,7 +7,7 @@
 use common::{
     driver::{
         Turn,
-        gyro::{Compared, NOISE},
+        gyro::{Compared, NOISE, Turns},
     },
     geometry::wrap_angle,
 };
@@ -25,9 +25,7 @@ pub(crate) struct Gyro {
     turned: Turned,
     /// The turn up to the odometry of the newest tick, if the gyro has given it.
     now: Option<Turned>,
-    /// The last turn that a tick was given; none if something is missing since.
-    told: Option<Turned>,
-    sequence: u64,
+    turns: Turns<Turned>,
     /// It was reported that no message is near the newest odometry.
     is_missed: bool,
     compared: Compared,
@@ -65,7 +63,10 @@ impl Gyro {
                 self.turned.variance += variance;
             }
             // The turn since the message before is not known.
-            None => (self.told, self.now) = (None, None),
+            None => {
+                self.turns.interrupt();
+                self.now = None;
+            }
         }
         self.newest = Some(Newest { imu, rate });
         Ok(())
@@ -78,7 +79,7 @@ impl Gyro {
         let since_ns = stamp_ns - newest.imu.stamp_ns;
         let before = self.now.take();
         if since_ns.abs() > LONGEST_GAP_NS {
-            self.told = None;
+            self.turns.interrupt();
             let is_new = !std::mem::replace(&mut self.is_missed, true);
             let apart_s = since_ns as f64 / 1e9;
             return is_new.then(|| {
@@ -101,12 +102,10 @@ impl Gyro {
     /// After a gap the turn only says where the next one begins.
     pub(crate) fn for_tick(&mut self) -> Option<Turn> {
         let now = self.now.filter(|_| self.compared.agrees());
-        let before = std::mem::replace(&mut self.told, now);
+        let (sequence, before) = self.turns.until(now)?;
         let now = now?;
-        self.sequence += if before.is_some() { 1 } else { 2 };
-        let before = before.unwrap_or(now);
         let variance_rad2 = now.variance - before.variance + now.ahead + before.ahead;
-        Some(Turn { sequence: self.sequence, turn_rad: now.angle - before.angle, variance_rad2 })
+        Some(Turn { sequence, turn_rad: now.angle - before.angle, variance_rad2 })
     }
 }
 

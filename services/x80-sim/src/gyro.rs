@@ -54,8 +54,11 @@ mod tests {
 
     #[test]
     fn a_gyro_is_off_by_its_bias_and_scale_and_by_noise_that_grows_with_the_root_of_time() {
-        let read = |seed: u64, keys: &str| {
-            let text = format!("target = [3, 0]\nseed = {seed}\n[simulation.gyro]\n{keys}");
+        let read = |seed: u64, [noise, bias, scale]: [f64; 3]| {
+            let text = format!(
+                "target = [3, 0]\nseed = {seed}\n[simulation.gyro]\nnoise_deg_sqrt_s = {noise:?}\n\
+                 bias_spread_deg_s = {bias:?}\nscale_spread = {scale:?}"
+            );
             let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
             let mut gyro = Gyro::new(&mission, seed);
             (0..=1000).for_each(|tick| {
@@ -63,23 +66,18 @@ mod tests {
             });
             gyro.angle() - 10.0
         };
-        let none = "noise_deg_sqrt_s = 0\nbias_spread_deg_s = 0\nscale_spread = 0";
-        assert!(read(1, none).abs() < 1e-9);
-        let mean_square = |keys: &str| {
-            let keys = format!("{none}\n")
-                .replace(&format!("{} = 0\n", keys.split(' ').next().unwrap()), "")
-                + keys;
-            (1..=300).map(|seed| read(seed, &keys).powi(2)).sum::<f64>() / 300.0
-        };
+        assert!(read(1, [0.0; 3]).abs() < 1e-9);
+        let mean_square =
+            |errors| (1..=300).map(|seed| read(seed, errors).powi(2)).sum::<f64>() / 300.0;
         // 0.1 degrees per root of a second in 100 s; an even distribution has a third of the square of its greatest.
         let of = |degrees: f64| degrees.to_radians().powi(2);
-        for (keys, want) in [
-            ("noise_deg_sqrt_s = 0.1", of(1.0)),
-            ("bias_spread_deg_s = 0.1", of(10.0) / 3.0),
-            ("scale_spread = 0.1", 1.0 / 3.0),
+        for (errors, want) in [
+            ([0.1, 0.0, 0.0], of(1.0)),
+            ([0.0, 0.1, 0.0], of(10.0) / 3.0),
+            ([0.0, 0.0, 0.1], 1.0 / 3.0),
         ] {
-            let got = mean_square(keys);
-            assert!((0.8..1.2).contains(&(got / want)), "{keys}: {got} {want}");
+            let got = mean_square(errors);
+            assert!((0.8..1.2).contains(&(got / want)), "{errors:?}: {got} {want}");
         }
     }
 }

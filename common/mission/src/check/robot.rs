@@ -68,7 +68,7 @@ pub(super) fn check(mission: &Mission) -> Result {
         "raise robot.command_limit_s or robot.rate_hz",
     )?;
     refuse_if(
-        robot.gyro == Some(true) && robot.protocol() != Protocol::Json,
+        robot.gyro() && robot.protocol() != Protocol::Json,
         "robot.gyro",
         "only the lines of JSON have a word for a gyro",
         "give robot.ros2.imu to a robot of ROS 2, or remove it",

@@ -185,6 +185,9 @@ fn no_robot_is_faster_than_it_rests_within_its_sight_and_one_that_is_to_be_is_re
     assert_eq!(blind.speed_m_s(), 1.0);
     let laser = mission("robot.model = 'jackal'");
     assert_eq!(laser.speed_m_s(), 2.0);
+    let text = format!("target = [3, 0]\n{heavy}controller.speed_m_s = 2");
+    let beyond_top = Mission::parse(&text, Path::new("m.toml")).unwrap_err().to_string();
+    assert!(beyond_top.contains("2 m/s is out of range"), "{beyond_top}");
 }
 
 #[test]
