@@ -1,9 +1,11 @@
 //! What moves, by a laser, and what stands.
 //!
-//! Runs of beams without a gap are things, and their middles are followed from scan to scan, in the frame of odometry, which no fix moves.
-//! A thing is a mover once its way is beyond the doubt of its middles, and it was seen whole where an earlier scan saw through, or not as
-//! far. The middle of a thing that is partly hidden slides along it, so its doubt is half the width. Only what is nearest to each other
-//! belongs together; otherwise tracks would change from post to post.
+//! Runs of beams without a gap are things, and their middles are followed from scan to scan by a filter for what goes straight on, in the
+//! frame of odometry, which no fix moves. A thing is a mover once its velocity and its way are beyond their doubt, and it was seen whole
+//! where an earlier scan saw through, or not as far. The middle of a thing that is partly hidden slides along it, so its doubt is half the
+//! width; that of a mover whose width was seen lies as far from the end that is its own. Only what is nearest to each other belongs
+//! together; otherwise tracks would change from post to post. A mover that is not where it was foreseen may have turned round: it is the
+//! nearest thing that belongs to none.
 //!
 //! While something moves, a beam stands if an earlier scan, by the time that movers need to go away, saw something at its end, too.
 
@@ -47,52 +49,57 @@ const WIDEST_M: f64 = 1.6;
 /// Nothing is expected to be faster, m/s; and the way between two middles of a thing that stands, metres.
 const FASTEST_M_S: f64 = 2.5;
 const NEAR_M: f64 = 0.15;
-/// A thing is known by its newest places. One that is not where it was foreseen is forgotten after so many seconds, and a mover whose
-/// foreseen place the laser does not see after so many. Its doubt grows so fast meanwhile, m/s.
-const PLACES: usize = 8;
-const LEAST_PLACES: usize = 4;
+/// A thing that is not where it was foreseen is forgotten after so many seconds, and a mover whose foreseen place the laser does not see
+/// after so many. The doubt of its place grows so fast meanwhile, m/s.
 const FORGOTTEN_S: f64 = 1.0;
 const HIDDEN_S: f64 = 6.0;
 const HIDDEN_M_S: f64 = 0.2;
-/// A mover is at least so fast: m/s, and deviations of its velocity. It came in this share of its places.
+/// The deviation of a velocity of which nothing is known, m/s, and its growth with time: a variance a second.
+const FIRST_M_S: f64 = 1.2;
+const GROWS: f64 = 0.1;
+/// A mover is at least so fast: m/s, and deviations of its velocity. It was seen so often, and came in this share of its newest places.
 const LEAST_M_S: f64 = 0.25;
 const SURE: f64 = 3.0;
+const LEAST_PLACES: u32 = 3;
 const CAME_SHARE: f64 = 0.3;
+/// One place counts so much among the newest.
+const NEWEST: f64 = 0.15;
 /// The deviation of a middle that is seen whole, metres: its surface is not known.
 const MIDDLE_M: f64 = 0.03;
 /// So much of a radius that was seen is left in the next scan, which may see a part of it.
-const RADIUS_LEFT: f64 = 0.9;
+const RADIUS_LEFT: f64 = 0.98;
 
 #[derive(Clone, Copy, Debug)]
 struct Thing {
     at_s: f64,
     /// The laser's place.
     origin: DVec2,
-    /// Of the ends on it.
-    middle: DVec2,
+    /// Its first and last end, if they are its own: nothing before it hides the rest.
+    own: [Option<DVec2>; 2],
+    /// Of the ends on it, and how far the nearest is.
+    mean: DVec2,
+    nearest_m: f64,
     half_width_m: f64,
-    doubt_m: f64,
+    /// The deviation of a middle of which nothing is hidden.
+    noise_m: f64,
     came: bool,
 }
 
-#[derive(Clone, Debug, Default)]
-struct Track {
-    /// Oldest first.
-    places: VecDeque<Thing>,
-    radius_m: f64,
-    /// From the laser, a unit vector.
-    along: DVec2,
-    /// None for a thing that may stand.
-    motion: Option<Motion>,
-}
-
-/// At the time of the newest place.
 #[derive(Clone, Copy, Debug)]
-struct Motion {
+struct Track {
+    /// The first place and its doubt.
+    first: (DVec2, f64),
+    seen_s: f64,
+    places: u32,
+    /// The share of its newest places in which it came.
+    came: f64,
+    radius_m: f64,
+    is_mover: bool,
+    /// At `seen_s`.
     middle: DVec2,
     velocity: DVec2,
-    doubt_m: f64,
-    doubt_m_s: f64,
+    /// Along any axis: of the middle, of both, of the velocity.
+    variance: [f64; 3],
 }
 
 /// It is not saved: the next process knows what moves within a second.
@@ -122,7 +129,15 @@ impl Movers {
         let moved = self.moves(at_s);
         let is_next = scans.back().is_none_or(|(newest, ..)| at_s - newest >= APART_S);
         if is_next {
-            self.follow(things(&fan, older(CAME_S).as_ref(), at_s), &fan, at_s);
+            // At first there is none so old.
+            let came_s = scans.front().map_or(CAME_S, |(first_s, ..)| at_s - first_s);
+            let came_s = came_s.clamp(0.5 * CAME_S, CAME_S);
+            let before = older(came_s);
+            let then_s = scans.iter().rev().find(|(then, ..)| at_s - then >= came_s);
+            let laser = before.zip(then_s).map_or(DVec2::ZERO, |(before, (then_s, ..))| {
+                (fan.origin - before.origin) / (at_s - then_s)
+            });
+            self.follow(&things(&fan, before.as_ref(), at_s), &fan, at_s, laser);
         }
         let moves = self.moves(at_s);
         let mut beams = scan.beams.clone();
@@ -146,31 +161,36 @@ impl Movers {
         self.seen_s.is_some_and(|seen_s| at_s - seen_s <= MOVES_FOR_S)
     }
 
-    fn follow(&mut self, things: Vec<Thing>, fan: &Fan<'_>, at_s: f64) {
-        let is_known = |track: &Track| {
-            let age_s = track.age_s(at_s);
+    fn follow(&mut self, things: &[Thing], fan: &Fan<'_>, at_s: f64, laser: DVec2) {
+        self.tracks.retain(|track| {
+            let age_s = at_s - track.seen_s;
             age_s <= FORGOTTEN_S || age_s <= HIDDEN_S && track.is_hidden(fan, at_s)
-        };
-        self.tracks.retain(is_known);
-        let off_m = |track: &Track, thing: &Thing| track.at(at_s).distance(thing.middle);
-        let track_of = |thing: &Thing| {
-            let off = |it: &usize| off_m(&self.tracks[*it], thing);
-            let nearest = |one: &usize, other: &usize| off(one).total_cmp(&off(other));
-            let track = (0..self.tracks.len()).min_by(nearest)?;
-            let least_m = off(&track);
-            let has_nearer = |other: &Thing| off_m(&self.tracks[track], other) < least_m;
-            let is_its = least_m <= self.tracks[track].most_off_m(at_s);
-            (is_its && !things.iter().any(has_nearer)).then_some(track)
-        };
-        let tracks: Vec<_> = things.iter().map(track_of).collect();
-        for (thing, track) in things.into_iter().zip(tracks) {
-            let track = track.unwrap_or_else(|| {
-                self.tracks.push(Track::default());
-                self.tracks.len() - 1
-            });
-            self.tracks[track].see(thing);
+        });
+        let mut is_free = vec![true; things.len()];
+        for turns in [false, true] {
+            let mut pairs = Vec::new();
+            for (index, track) in self.tracks.iter().enumerate() {
+                if track.seen_s < at_s && (track.is_mover || !turns) {
+                    let most_m = track.most_off_m(at_s, turns);
+                    let near = things.iter().enumerate().filter(|(thing, _)| is_free[*thing]);
+                    let near = near.map(|(thing, it)| {
+                        (it.middle(track).0.distance(track.at(at_s)), index, thing)
+                    });
+                    pairs.extend(near.filter(|(off_m, ..)| *off_m <= most_m));
+                }
+            }
+            pairs.sort_by(|one, other| one.0.total_cmp(&other.0));
+            for (_, track, thing) in pairs {
+                let track = &mut self.tracks[track];
+                if track.seen_s < at_s && is_free[thing] {
+                    track.see(&things[thing], laser, turns);
+                    is_free[thing] = false;
+                }
+            }
         }
-        if self.tracks.iter().any(|track| track.motion.is_some()) {
+        let new = things.iter().zip(is_free).filter(|(_, is_free)| *is_free);
+        self.tracks.extend(new.map(|(thing, _)| Track::new(thing)));
+        if self.tracks.iter().any(|track| track.is_mover) {
             self.seen_s = Some(at_s);
         }
     }
@@ -179,24 +199,22 @@ impl Movers {
     pub(crate) fn place(&mut self, pose: &PoseSample) {
         let [x, y, turn] = pose.map_from_odom;
         let (at_s, turned) = (pose.stamp.time().seconds(), DVec2::from_angle(turn));
+        let movers = self.tracks.iter().filter(|it| it.is_mover && at_s - it.seen_s <= HIDDEN_S);
         let mover = |track: &Track| {
-            let motion = track.motion.filter(|_| track.age_s(at_s) <= HIDDEN_S);
-            let Motion { velocity, doubt_m, doubt_m_s, .. } = motion?;
-            let unseen_s = (track.age_s(at_s) - CAME_S).max(0.0);
-            // The ends on a disc lie before its middle, by so much on average.
-            let middle = track.at(at_s) + FRAC_PI_4 * track.radius_m * track.along;
-            let (at, velocity) = (turned.rotate(middle), turned.rotate(velocity));
-            Some(Mover {
+            let unseen_s = (at_s - track.seen_s - CAME_S).max(0.0);
+            let [place, _, velocity] = track.variance.map(f64::sqrt);
+            let (at, toward) = (turned.rotate(track.at(at_s)), turned.rotate(track.velocity));
+            Mover {
                 x_m: (at.x + x) as f32,
                 y_m: (at.y + y) as f32,
-                vx_m_s: velocity.x as f32,
-                vy_m_s: velocity.y as f32,
+                vx_m_s: toward.x as f32,
+                vy_m_s: toward.y as f32,
                 radius_m: track.radius_m as f32,
-                doubt_m: (doubt_m + HIDDEN_M_S * unseen_s) as f32,
-                doubt_m_s: doubt_m_s as f32,
-            })
+                doubt_m: (place + HIDDEN_M_S * unseen_s) as f32,
+                doubt_m_s: velocity as f32,
+            }
         };
-        self.placed = self.tracks.iter().filter_map(mover).collect();
+        self.placed = movers.map(mover).collect();
     }
 
     pub(crate) fn fill(&self, header: &mut GridHeader) {
@@ -208,16 +226,37 @@ impl Movers {
 }
 
 impl Track {
-    fn age_s(&self, at_s: f64) -> f64 {
-        self.places.back().map_or(0.0, |newest| at_s - newest.at_s)
+    fn new(thing: &Thing) -> Self {
+        let mut track = Self {
+            first: (DVec2::ZERO, 0.0),
+            seen_s: thing.at_s,
+            places: 1,
+            came: f64::from(u8::from(thing.came)),
+            radius_m: thing.half_width_m,
+            is_mover: false,
+            middle: DVec2::ZERO,
+            velocity: DVec2::ZERO,
+            variance: [0.0; 3],
+        };
+        track.first = thing.middle(&track);
+        track.middle = track.first.0;
+        track.variance = [track.first.1.powi(2), 0.0, FIRST_M_S.powi(2)];
+        track
     }
 
     /// The middle, foreseen.
     fn at(&self, at_s: f64) -> DVec2 {
-        match (self.motion, self.places.back()) {
-            (Some(motion), _) => motion.middle + self.age_s(at_s) * motion.velocity,
-            (None, newest) => newest.map_or(DVec2::ZERO, |newest| newest.middle),
-        }
+        self.middle + (at_s - self.seen_s) * self.velocity
+    }
+
+    fn variance_at(&self, at_s: f64) -> [f64; 3] {
+        let (for_s, [place, both, velocity]) = (at_s - self.seen_s, self.variance);
+        let grown = GROWS * for_s;
+        [
+            place + for_s * (2.0 * both + for_s * (velocity + grown / 3.0)),
+            both + for_s * (velocity + grown / 2.0),
+            velocity + grown,
+        ]
     }
 
     /// Whether `fan` does not reach to the foreseen place of a mover: it lies beside the fan, or something stands before it.
@@ -228,55 +267,65 @@ impl Track {
         // Beside the fan, or too near, there is no reading.
         let range = fan.beams.get(beam).map_or(f64::NAN, |range| f64::from(*range));
         let is_seen = range >= way.length() - self.radius_m - GAP_M;
-        self.motion.is_some() && !is_seen
+        self.is_mover && !is_seen
     }
 
-    fn most_off_m(&self, at_s: f64) -> f64 {
-        let most_m_s = self.motion.map_or(FASTEST_M_S, |motion| SURE * motion.doubt_m_s);
-        NEAR_M + most_m_s * self.age_s(at_s)
+    /// How far from the foreseen place it may be seen, also if it `turns`.
+    fn most_off_m(&self, at_s: f64, turns: bool) -> f64 {
+        let way_m = if turns { 2.0 * FASTEST_M_S * (at_s - self.seen_s).min(CAME_S) } else { 0.0 };
+        NEAR_M + (SURE * self.variance_at(at_s)[0].sqrt()).max(way_m).min(WIDEST_M)
     }
 
-    fn see(&mut self, thing: Thing) {
-        if self.places.len() == PLACES {
-            self.places.pop_front();
-        }
-        self.places.push_back(thing);
+    /// It is seen, by a laser that goes at a velocity.
+    fn see(&mut self, thing: &Thing, laser: DVec2, turns: bool) {
+        let (middle, doubt_m) = thing.middle(self);
+        let off = middle - self.at(thing.at_s);
+        let [place, both, velocity] = self.variance_at(thing.at_s);
+        let velocity = if turns { FIRST_M_S.powi(2) } else { velocity };
+        let both = if turns { place.sqrt() * FIRST_M_S } else { both };
+        let gain = [place, both].map(|it| it / (place + doubt_m.powi(2)));
+        self.middle = self.at(thing.at_s) + gain[0] * off;
+        self.velocity += gain[1] * off;
+        self.variance =
+            [(1.0 - gain[0]) * place, (1.0 - gain[0]) * both, velocity - gain[1] * both];
+        self.seen_s = thing.at_s;
+        self.places += 1;
+        self.came += NEWEST.max(1.0 / f64::from(self.places)) * (f64::from(u8::from(thing.came)) - self.came);
         self.radius_m = thing.half_width_m.max(RADIUS_LEFT * self.radius_m);
-        self.along = (thing.middle - thing.origin).normalize_or_zero();
-        self.motion = self.fit(&thing);
-    }
-
-    /// The straight way through the places, by least squares; none if a thing that stands may look like it.
-    fn fit(&self, newest: &Thing) -> Option<Motion> {
-        let (count, first) = (self.places.len() as f64, self.places.front()?);
-        let mean = |of: &dyn Fn(&Thing) -> f64| self.places.iter().map(of).sum::<f64>() / count;
-        let mean_s = mean(&|it| it.at_s);
-        let spread = count * mean(&|it| (it.at_s - mean_s).powi(2));
-        let line = |of: fn(&Thing) -> DVec2| {
-            let slope: DVec2 = self.places.iter().map(|it| (it.at_s - mean_s) * of(it)).sum();
-            (self.places.iter().map(of).sum::<DVec2>() / count, slope / spread)
-        };
-        let (middle, velocity) = line(|it| it.middle);
-        let off = |it: &Thing| it.middle - middle - velocity * (it.at_s - mean_s);
-        let rest = mean(&|it| off(it).length_squared());
-        // The fit takes two of the places along each axis.
-        let variance = (0.5 * rest * count / (count - 2.0)).max(mean(&|it| it.doubt_m.powi(2)));
-        let (doubt_m_s, since_s) = ((variance / spread).sqrt(), newest.at_s - mean_s);
+        let deviation_m_s = self.variance[2].sqrt();
         // What glass throws back comes from where the laser is square to it, and goes along it as the robot does.
-        let aside = self.along.perp();
-        let glint = aside * aside.dot(line(|it| it.origin).1);
-        let way_m = velocity.length() * (newest.at_s - first.at_s);
-        let moves = self.places.len() >= LEAST_PLACES
-            && mean(&|it| f64::from(u8::from(it.came))) >= CAME_SHARE
-            && velocity.length() > LEAST_M_S.max(SURE * doubt_m_s)
-            && way_m > first.doubt_m + newest.doubt_m
-            && velocity.distance(glint) > SURE * doubt_m_s;
-        moves.then(|| Motion {
-            middle: middle + velocity * since_s,
-            velocity,
-            doubt_m: (variance / count + (doubt_m_s * since_s).powi(2)).sqrt(),
-            doubt_m_s,
-        })
+        let aside = (thing.mean - thing.origin).normalize_or_zero().perp();
+        let glint = aside * aside.dot(laser);
+        let speed = self.velocity.length();
+        self.is_mover = if self.is_mover {
+            speed > 0.5 * LEAST_M_S
+        } else {
+            self.places >= LEAST_PLACES
+                && self.came >= CAME_SHARE
+                && speed > LEAST_M_S.max(SURE * deviation_m_s)
+                && self.middle.distance(self.first.0) > self.first.1 + doubt_m
+                && self.velocity.distance(glint) > SURE * deviation_m_s
+        };
+    }
+}
+
+impl Thing {
+    /// The middle and its deviation, as a part of `track`: of a disc, the ends lie before it.
+    fn middle(&self, track: &Track) -> (DVec2, f64) {
+        let along = (self.mean - self.origin).normalize_or_zero();
+        let hidden = self.own.iter().filter(|it| it.is_none()).count() as f64;
+        let radius_m = if hidden == 0.0 { self.half_width_m } else { track.radius_m };
+        let whole = self.mean + FRAC_PI_4 * radius_m * along;
+        match self.own {
+            [Some(end), None] | [None, Some(end)] if track.is_mover => {
+                let aside = along.perp() * along.perp().dot(self.mean - end).signum();
+                let middle = along * (self.nearest_m + radius_m)
+                    + aside * (aside.dot(end - self.origin) + radius_m);
+                let hidden_m = (radius_m - self.half_width_m).max(0.0);
+                (self.origin + middle, self.noise_m + 0.5 * hidden_m)
+            }
+            _ => (whole, self.noise_m + hidden * self.half_width_m),
+        }
     }
 }
 
@@ -305,24 +354,27 @@ fn things(fan: &Fan<'_>, before: Option<&Fan<'_>>, at_s: f64) -> Vec<Thing> {
         };
         let next = (is_circle || last + 1 < count).then_some(last + 1);
         let former = if is_circle { Some(first + count - 1) } else { first.checked_sub(1) };
-        let hidden = [(first, former), (last, next)].into_iter().filter(|it| !is_own(it.0, it.1));
-        let hidden = hidden.count() as f64;
+        let [from_own, to_own] = [is_own(first, former), is_own(last, next)];
         first = last + 1;
         let [Some(from), Some(to)] = [points.first(), points.last()] else { continue };
         let (width_m, number) = (from.distance(*to), points.len() as f64);
         if width_m > WIDEST_M {
             continue;
         }
-        let middle = points.iter().sum::<DVec2>() / number;
-        let spacing_m = fan.step_rad * middle.distance(fan.origin);
+        let mean = points.iter().sum::<DVec2>() / number;
+        let spacing_m = fan.step_rad * mean.distance(fan.origin);
         let half_width_m = 0.5 * (width_m + spacing_m);
-        let noise_m = fan.deviation_m(middle) / number.sqrt();
+        let noise_m = MIDDLE_M + 0.5 * spacing_m + fan.deviation_m(mean) / number.sqrt();
+        let nearest = points.iter().map(|it| it.distance(fan.origin)).fold(f64::INFINITY, f64::min);
         let came = before.is_some_and(|before| {
             let came = points.iter().filter(|it| Difference::of(before, **it).is_other());
-            hidden == 0.0 && points.len() >= LEAST_BEAMS && came.count() * OF_BEAMS >= points.len()
+            let is_whole = from_own && to_own && points.len() >= LEAST_BEAMS;
+            is_whole && came.count() * OF_BEAMS >= points.len()
         });
-        let doubt_m = MIDDLE_M + 0.5 * spacing_m + noise_m + hidden * half_width_m;
-        things.push(Thing { at_s, origin: fan.origin, middle, half_width_m, doubt_m, came });
+        let own = [from_own.then_some(*from), to_own.then_some(*to)];
+        let origin = fan.origin;
+        let nearest_m = nearest;
+        things.push(Thing { at_s, origin, own, mean, nearest_m, half_width_m, noise_m, came });
     }
     things
 }

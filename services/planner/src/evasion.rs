@@ -10,7 +10,7 @@ use std::f64::consts::{PI, TAU};
 
 use common::{
     geometry::wrap_angle,
-    kinematics::Twist,
+    kinematics::{Pose2, Twist},
     mission::{Mission, Sensor, SensorKind},
     samples::{GuidanceStatus, Mover, PoseSample},
 };
@@ -38,8 +38,16 @@ const LEAST_DANGER: f64 = 0.1;
 const GAIN: f64 = 1.0 / 3.0;
 /// Hazard this near to a mover may be its own, metres, because its trace fades within two scans.
 const TRACE_M: f64 = 0.4;
-/// A way leads to no hazard for so long.
-const CLEAR_S: f64 = 1.0;
+/// A way has legs that end after so many seconds. So many are gone on from, no two of which end alike.
+const LEGS_S: [f64; 5] = [0.5, 1.0, 2.0, 3.5, AHEAD_S];
+const KEPT: usize = 16;
+const ALIKE_M: f64 = 0.25;
+const ALIKE_M_S: f64 = 0.3;
+/// A robot that stands when it is asked first does so for some seconds, to see what moves. It is at rest below so many m/s.
+const WATCHES_S: f64 = 0.5;
+const RESTS_M_S: f64 = 0.02;
+/// What is farther away is no danger, metres.
+const FAR_M: f64 = 1.5;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Evasion {
@@ -50,6 +58,8 @@ pub(crate) struct Evasion {
     motion: MotionModel,
     /// A laser looks there.
     backs: bool,
+    /// When it was asked first.
+    first_s: Option<f64>,
 }
 
 /// A mover.
@@ -64,12 +74,17 @@ struct Disc {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Foreseen {
+struct Way {
+    first: Advice,
+    last: Advice,
+    now: Moving,
+    steps: u32,
+    is_inside: bool,
     /// When the robot meets something that moves, while it moves itself, and when it is at a hazard; infinite for never.
     meets_s: f64,
     hazard_s: f64,
     danger: f64,
-    /// The way along the advice.
+    /// The way along the field.
     gain_m: f64,
 }
 
@@ -84,42 +99,57 @@ impl Evasion {
             rest_m: body.radius_m - half_width,
             motion: MotionModel::new(mission),
             backs: mission.lasers().iter().any(|(_, laser)| looks_back(laser)),
+            first_s: None,
         })
     }
 
     /// The field's `advice` for a robot at `pose`, or another one because of `movers`.
     pub(crate) fn advise(
-        &self,
+        &mut self,
         view: &View<'_>,
         movers: &[Mover],
         pose: &PoseSample,
         advice: Advice,
     ) -> Advice {
-        let discs: Vec<_> = movers.iter().map(|mover| self.disc(mover)).collect();
-        let foresee = |to: Advice, for_s| self.foresee(view, &discs, pose, (to, for_s), advice.1);
+        let (is_at_rest, at_s) = (pose.v_m_s.abs() < RESTS_M_S, pose.stamp.time().seconds());
+        if is_at_rest && at_s - *self.first_s.get_or_insert(at_s) < WATCHES_S {
+            return STAND;
+        }
+        let scene = Scene::new(self, view, movers, pose.pose());
+        let start = scene.start(pose);
         let is_safe = |to: Advice| {
-            let brakes = foresee(to, self.motion.period_s);
-            brakes.meets_s.is_infinite() && brakes.hazard_s.is_infinite()
+            let driven = scene.go(start, to, self.motion.period_s);
+            let rests = scene.go(driven, STAND, AHEAD_S);
+            rests.meets_s.is_infinite() && rests.hazard_s.is_infinite()
         };
-        let (status, along, limit) = advice;
-        if discs.is_empty() || foresee(advice, AHEAD_S).danger < LEAST_DANGER && is_safe(advice) {
+        let is_clear = || scene.go(start, advice, AHEAD_S).danger < LEAST_DANGER;
+        if scene.discs.is_empty() || is_clear() && is_safe(advice) {
             return advice;
         }
-        let around = (0..DIRECTIONS)
-            .map(|step| DVec2::from_angle(TAU * f64::from(step) / f64::from(DIRECTIONS)));
-        let back = self.backs.then(|| (pose.pose().axis(), -1.0));
-        let ways = around.map(|to| (to, 1.0)).chain(back).flat_map(|(to, sign)| {
-            SPEEDS.map(|share| (GuidanceStatus::Along, to, sign * share * self.motion.speed))
-        });
+        let (status, along, limit) = advice;
+        let speed = self.motion.speed;
         let advised = SPEEDS.map(|share| (status, along, share * limit));
-        let open = advised.into_iter().chain(ways).filter_map(|to| {
-            let it = foresee(to, AHEAD_S);
-            (it.hazard_s >= CLEAR_S && is_safe(to)).then_some((to, it))
-        });
-        let score = |it: &Foreseen| GAIN * it.gain_m / (self.motion.speed * AHEAD_S) - it.danger;
-        let all = open.chain([(STAND, foresee(STAND, AHEAD_S))]);
-        all.max_by(|(_, one), (_, other)| score(one).total_cmp(&score(other)))
-            .map_or(STAND, |(to, _)| to)
+        let back = SPEEDS.map(|share| (GuidanceStatus::Along, pose.pose().axis(), -share * speed));
+        let back = back.into_iter().filter(|_| self.backs);
+        let all = SPEEDS.into_iter().flat_map(|share| around(DIRECTIONS, share * speed));
+        let open = advised.into_iter().chain(all).chain(back).filter(|to| is_safe(*to));
+        let first = open.map(|to| Way { first: to, ..scene.go(start, to, LEGS_S[0]) });
+        let first = first.filter(|way| way.hazard_s.is_infinite());
+        let stand = Way { first: STAND, ..scene.go(start, STAND, LEGS_S[0]) };
+        let mut ways: Vec<_> = first.chain([stand]).collect();
+        let score = |way: &Way| GAIN * way.gain_m / (speed * AHEAD_S) - way.danger;
+        for until_s in &LEGS_S[1..] {
+            let next = best(ways, score).into_iter().flat_map(|way| {
+                let field = scene.field(way.now.pose.position);
+                let field = field.map(|to| (GuidanceStatus::Along, to, speed));
+                let legs = around(DIRECTIONS / 2, speed).chain(field).chain([STAND, way.last]);
+                let scene = &scene;
+                legs.map(move |to| scene.go(way, to, *until_s))
+            });
+            ways = next.collect();
+        }
+        let best = ways.iter().max_by(|one, other| score(one).total_cmp(&score(other)));
+        best.map_or(STAND, |way| way.first)
     }
 
     fn disc(&self, mover: &Mover) -> Disc {
@@ -133,60 +163,134 @@ impl Evasion {
         }
     }
 
-    /// How the robot fares that follows `to` for `for_s` seconds and stands then, or before a hazard. From where it is too near by now,
-    /// it may go away.
-    fn foresee(
-        &self,
-        view: &View<'_>,
-        discs: &[Disc],
-        sample: &PoseSample,
-        (to, for_s): (Advice, f64),
-        along: DVec2,
-    ) -> Foreseen {
-        let start = sample.pose();
-        let twist = Twist { v: sample.v_m_s, omega: sample.omega_rad_s };
-        let mut now = Moving { pose: start, twist };
-        let is_hazard = |at: DVec2| {
-            let is_its = |disc: &Disc| {
-                disc.at.distance(at) <= disc.radius + self.inflated_m + self.rest_m + TRACE_M
-            };
-            (view.is_hazard(at) || view.has_hazard(at, self.rest_m)) && !discs.iter().any(is_its)
+}
+
+fn around(directions: u32, speed: f64) -> impl Iterator<Item = Advice> {
+    (0..directions).map(move |step| {
+        let angle = TAU * f64::from(step) / f64::from(directions);
+        (GuidanceStatus::Along, DVec2::from_angle(angle), speed)
+    })
+}
+
+/// The best ways, no two of them alike.
+fn best(mut ways: Vec<Way>, score: impl Fn(&Way) -> f64) -> Vec<Way> {
+    ways.sort_by(|one, other| score(other).total_cmp(&score(one)));
+    let mut kept: Vec<Way> = Vec::with_capacity(KEPT);
+    for way in ways {
+        let is_alike = |other: &Way| {
+            let apart_m = other.now.pose.position.distance(way.now.pose.position);
+            let apart_m_s = (other.now.twist.v - way.now.twist.v).abs();
+            apart_m < ALIKE_M && apart_m_s < ALIKE_M_S
         };
-        let mut is_inside = is_hazard(start.position);
-        let (mut meets_s, mut hazard_s, mut danger) = (f64::INFINITY, f64::INFINITY, 0.0_f64);
-        let dead_s = self.motion.dead_s();
-        for step in 1..=(AHEAD_S / STEP_S) as u32 {
-            let at_s = STEP_S * f64::from(step);
-            let follows = hazard_s.is_infinite() && at_s <= for_s + dead_s;
-            let acts = (at_s > dead_s).then_some(if follows { to } else { STAND });
-            let next = self.motion.next(now, STEP_S, acts);
-            let moves = !next.is_at_rest();
-            let is_there = moves && is_hazard(next.pose.position);
-            is_inside &= !moves || is_there;
-            if is_there && !is_inside {
-                hazard_s = hazard_s.min(at_s);
-                now.twist = Twist { v: 0.0, ..next.twist };
-            } else {
-                now = next;
-            }
-            for disc in discs {
-                let at = disc.at + disc.velocity * at_s;
-                let gap_m = at.distance(now.pose.position) - disc.touches_m;
-                let least_m = APART_M + (GROWS_M_S + disc.doubt_m_s) * at_s;
-                let first_m = disc.at.distance(start.position) - disc.touches_m;
-                if moves && gap_m < least_m.min(first_m) {
-                    meets_s = meets_s.min(at_s);
-                }
-                let doubt_m = disc.doubt_m_s.min(MOST_DOUBT_M_S) * at_s;
-                let near = ((doubt_m - gap_m) / NEAR_M).exp().min(MOST_DANGER);
-                danger = danger.max(near * (-at_s / SOON_S).exp());
-            }
+        if kept.len() < KEPT && !kept.iter().any(is_alike) {
+            kept.push(way);
         }
-        Foreseen {
-            meets_s,
-            hazard_s,
-            danger,
-            gain_m: (now.pose.position - start.position).dot(along),
+    }
+    kept
+}
+
+/// What moves, around a robot that starts somewhere.
+struct Scene<'a> {
+    evasion: &'a Evasion,
+    view: &'a View<'a>,
+    discs: Vec<Disc>,
+    start: Pose2,
+}
+
+impl<'a> Scene<'a> {
+    /// Movers that the robot does not meet by then are left out.
+    fn new(evasion: &'a Evasion, view: &'a View<'a>, movers: &[Mover], start: Pose2) -> Self {
+        let reach_m = AHEAD_S * evasion.motion.speed + FAR_M;
+        let comes = |disc: &Disc| {
+            let way = AHEAD_S * disc.velocity;
+            let share = (start.position - disc.at).dot(way) / way.length_squared();
+            let nearest = disc.at + if share.is_nan() { DVec2::ZERO } else { share.clamp(0.0, 1.0) * way };
+            nearest.distance(start.position) <= reach_m + disc.touches_m
+        };
+        let discs = movers.iter().map(|mover| evasion.disc(mover)).filter(comes).collect();
+        Self { evasion, view, discs, start }
+    }
+
+    fn start(&self, sample: &PoseSample) -> Way {
+        let twist = Twist { v: sample.v_m_s, omega: sample.omega_rad_s };
+        Way {
+            first: STAND,
+            last: STAND,
+            now: Moving { pose: self.start, twist },
+            steps: 0,
+            is_inside: self.is_hazard(self.start.position),
+            meets_s: f64::INFINITY,
+            hazard_s: f64::INFINITY,
+            danger: 0.0,
+            gain_m: 0.0,
+        }
+    }
+
+    fn is_hazard(&self, at: DVec2) -> bool {
+        let Evasion { inflated_m, rest_m, .. } = *self.evasion;
+        let is_its =
+            |disc: &Disc| disc.at.distance(at) <= disc.radius + inflated_m + rest_m + TRACE_M;
+        (self.view.is_hazard(at) || self.view.has_hazard(at, rest_m))
+            && !self.discs.iter().any(is_its)
+    }
+
+    fn field(&self, at: DVec2) -> Option<DVec2> {
+        match self.view.guidance(at) {
+            harmonic::Guidance::Along(to) => Some(to.into()),
+            _ => None,
+        }
+    }
+
+    /// How the robot fares that follows `to` on from `way` until `until_s`, and stands before a hazard. From where it is too near by now,
+    /// it may go away.
+    fn go(&self, way: Way, to: Advice, until_s: f64) -> Way {
+        let motion = &self.evasion.motion;
+        let dead_s = motion.dead_s();
+        let mut way = Way { last: to, ..way };
+        let until = (until_s / STEP_S).ceil() as u32;
+        while way.steps < until {
+            way.steps += 1;
+            let at_s = STEP_S * f64::from(way.steps);
+            let to = if way.hazard_s.is_infinite() { to } else { STAND };
+            let from = way.now.pose.position;
+            let next = motion.next(way.now, STEP_S, (at_s > dead_s).then_some(to));
+            let moves = !next.is_at_rest();
+            let is_there = moves && self.is_hazard(next.pose.position);
+            way.is_inside &= !moves || is_there;
+            if is_there && !way.is_inside {
+                way.hazard_s = way.hazard_s.min(at_s);
+                way.now.twist = Twist { v: 0.0, ..next.twist };
+            } else {
+                way.now = next;
+            }
+            let at = way.now.pose.position;
+            if at != from {
+                let along = self.field(from).unwrap_or(DVec2::ZERO);
+                way.gain_m += (at - from).dot(along);
+            }
+            self.meet(&mut way, at_s, moves);
+        }
+        way
+    }
+
+    /// The robot on its `way` is where something may be after `at_s` seconds.
+    fn meet(&self, way: &mut Way, at_s: f64, moves: bool) {
+        let at = way.now.pose.position;
+        for disc in &self.discs {
+            let doubt_m = disc.doubt_m_s.min(MOST_DOUBT_M_S) * at_s;
+            let there = disc.at + disc.velocity * at_s;
+            let far_m = disc.touches_m + doubt_m + FAR_M;
+            if there.distance_squared(at) > far_m * far_m {
+                continue;
+            }
+            let gap_m = there.distance(at) - disc.touches_m;
+            let least_m = APART_M + (GROWS_M_S + disc.doubt_m_s) * at_s;
+            let first_m = disc.at.distance(self.start.position) - disc.touches_m;
+            if moves && gap_m < least_m.min(first_m) {
+                way.meets_s = way.meets_s.min(at_s);
+            }
+            let near = ((doubt_m - gap_m) / NEAR_M).exp().min(MOST_DANGER);
+            way.danger = way.danger.max(near * (-at_s / SOON_S).exp());
         }
     }
 }
