@@ -290,7 +290,8 @@ impl Track {
             [(1.0 - gain[0]) * place, (1.0 - gain[0]) * both, velocity - gain[1] * both];
         self.seen_s = thing.at_s;
         self.places += 1;
-        self.came += NEWEST.max(1.0 / f64::from(self.places)) * (f64::from(u8::from(thing.came)) - self.came);
+        self.came += NEWEST.max(1.0 / f64::from(self.places))
+            * (f64::from(u8::from(thing.came)) - self.came);
         self.radius_m = thing.half_width_m.max(RADIUS_LEFT * self.radius_m);
         let deviation_m_s = self.variance[2].sqrt();
         // What glass throws back comes from where the laser is square to it, and goes along it as the robot does.
@@ -461,6 +462,19 @@ mod tests {
         }
     }
 
+    fn thing_at(middle: DVec2) -> Thing {
+        Thing {
+            at_s: 0.0,
+            origin: DVec2::ZERO,
+            own: [None; 2],
+            mean: middle,
+            nearest_m: middle.length(),
+            half_width_m: 0.3,
+            noise_m: 0.05,
+            came: true,
+        }
+    }
+
     #[test]
     fn a_mover_is_hidden_right_behind_a_laser_too_and_not_where_the_laser_sees_through() {
         let text = "target = [3, 0]\nrobot.model = 'jackal'";
@@ -470,8 +484,8 @@ mod tests {
             let beams = vec![range_m; beams];
             let fan = rows.scan(0, Pose2::default(), &beams).unwrap();
             let middle = fan.origin + DVec2::new(x_m, 0.0);
-            let motion = Motion { middle, velocity: DVec2::Y, doubt_m: 0.1, doubt_m_s: 0.1 };
-            let track = Track { motion: Some(motion), radius_m: 0.4, ..Track::default() };
+            let thing = Thing { half_width_m: 0.4, ..thing_at(middle) };
+            let track = Track { middle, is_mover: true, ..Track::new(&thing) };
             track.is_hidden(&fan, 0.0)
         };
         assert!([-0.6, -3.0].iter().all(|behind| is_hidden(*behind, 8.0)));

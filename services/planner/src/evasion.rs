@@ -1,10 +1,10 @@
 //! The robot is not where things that move will be.
 //!
-//! Ways of some seconds are foreseen as controller and base would follow them: the one that the field advises, those in all directions
+//! Ways of some seconds are foreseen as controller and base would follow them, leg after leg: as the field advises, in all directions
 //! around, back if a laser looks there, and to stand. Movers are foreseen as discs that go straight on. What the robot would come near to
-//! is a danger, the less the later. Advice without danger is followed. Otherwise the robot goes the way with the greatest gain along the
-//! advice less its danger, so it steps aside early. It goes only where it could brake after the next tick and be at rest before it meets
-//! something: what runs into a robot at rest is not that robot's fault.
+//! is a danger, the less the later. Advice without danger is followed. Otherwise the robot begins the way with the greatest gain along the
+//! field less its danger, so it steps aside early. It goes only where it could brake after the next tick and be at rest before it meets
+//! something, or where the whole way meets nothing: what runs into a robot at rest is not that robot's fault.
 
 use std::f64::consts::{PI, TAU};
 
@@ -43,9 +43,10 @@ const LEGS_S: [f64; 5] = [0.5, 1.0, 2.0, 3.5, AHEAD_S];
 const KEPT: usize = 16;
 const ALIKE_M: f64 = 0.25;
 const ALIKE_M_S: f64 = 0.3;
-/// A robot that stands when it is asked first does so for some seconds, to see what moves. It is at rest below so many m/s.
+/// At the beginning of a run the robot stands for some seconds, to see what moves.
 const WATCHES_S: f64 = 0.5;
-const RESTS_M_S: f64 = 0.02;
+/// Wheels that lag are as good as at rest, m/s.
+const FADED_M_S: f64 = 0.05;
 /// What is farther away is no danger, metres.
 const FAR_M: f64 = 1.5;
 
@@ -56,10 +57,10 @@ pub(crate) struct Evasion {
     inflated_m: f64,
     rest_m: f64,
     motion: MotionModel,
+    /// The wheels of a robot that is at rest by the model, whose lag is a delay, turn on for so long.
+    fades_s: f64,
     /// A laser looks there.
     backs: bool,
-    /// When it was asked first.
-    first_s: Option<f64>,
 }
 
 /// A mover.
@@ -73,12 +74,19 @@ struct Disc {
     doubt_m_s: f64,
 }
 
+/// A way so far.
 #[derive(Clone, Copy, Debug)]
 struct Way {
+    /// Its first and its newest leg.
     first: Advice,
     last: Advice,
+    /// Whether the robot comes to rest without a touch if it brakes after the next tick.
+    rests: bool,
     now: Moving,
     steps: u32,
+    /// When the robot moved last.
+    moved_s: f64,
+    /// Since the start it is too near to a hazard.
     is_inside: bool,
     /// When the robot meets something that moves, while it moves itself, and when it is at a hazard; infinite for never.
     meets_s: f64,
@@ -93,35 +101,32 @@ impl Evasion {
     pub(crate) fn new(mission: &Mission) -> Option<Self> {
         let body = mission.body();
         let half_width = mission.outline().map_or(body.radius_m, |it| it.half_width_m());
+        let lags = (mission.speed_m_s() / FADED_M_S).ln() - 1.0;
         (mission.looks_first() && mission.used(SensorKind::Scan) > 0).then(|| Self {
             radius: body.radius_m,
             inflated_m: half_width + mission.mapper.clearance_m,
             rest_m: body.radius_m - half_width,
             motion: MotionModel::new(mission),
+            fades_s: lags.max(0.0) * mission.trusted_response().lag_s,
             backs: mission.lasers().iter().any(|(_, laser)| looks_back(laser)),
-            first_s: None,
         })
     }
 
     /// The field's `advice` for a robot at `pose`, or another one because of `movers`.
     pub(crate) fn advise(
-        &mut self,
+        &self,
         view: &View<'_>,
         movers: &[Mover],
         pose: &PoseSample,
         advice: Advice,
     ) -> Advice {
-        let (is_at_rest, at_s) = (pose.v_m_s.abs() < RESTS_M_S, pose.stamp.time().seconds());
-        if is_at_rest && at_s - *self.first_s.get_or_insert(at_s) < WATCHES_S {
+        if pose.stamp.time().seconds() < WATCHES_S {
             return STAND;
         }
         let scene = Scene::new(self, view, movers, pose.pose());
         let start = scene.start(pose);
-        let is_safe = |to: Advice| {
-            let driven = scene.go(start, to, self.motion.period_s);
-            let rests = scene.go(driven, STAND, AHEAD_S);
-            rests.meets_s.is_infinite() && rests.hazard_s.is_infinite()
-        };
+        let acts_until_s = self.motion.dead_s() + self.motion.period_s;
+        let is_safe = |to: Advice| scene.rests(scene.go(start, to, acts_until_s));
         let is_clear = || scene.go(start, advice, AHEAD_S).danger < LEAST_DANGER;
         if scene.discs.is_empty() || is_clear() && is_safe(advice) {
             return advice;
@@ -132,10 +137,11 @@ impl Evasion {
         let back = SPEEDS.map(|share| (GuidanceStatus::Along, pose.pose().axis(), -share * speed));
         let back = back.into_iter().filter(|_| self.backs);
         let all = SPEEDS.into_iter().flat_map(|share| around(DIRECTIONS, share * speed));
-        let open = advised.into_iter().chain(all).chain(back).filter(|to| is_safe(*to));
-        let first = open.map(|to| Way { first: to, ..scene.go(start, to, LEGS_S[0]) });
+        let open = advised.into_iter().chain(all).chain(back);
+        let first =
+            open.map(|to| Way { first: to, rests: is_safe(to), ..scene.go(start, to, LEGS_S[0]) });
         let first = first.filter(|way| way.hazard_s.is_infinite());
-        let stand = Way { first: STAND, ..scene.go(start, STAND, LEGS_S[0]) };
+        let stand = Way { first: STAND, rests: true, ..scene.go(start, STAND, LEGS_S[0]) };
         let mut ways: Vec<_> = first.chain([stand]).collect();
         let score = |way: &Way| GAIN * way.gain_m / (speed * AHEAD_S) - way.danger;
         for until_s in &LEGS_S[1..] {
@@ -148,7 +154,8 @@ impl Evasion {
             });
             ways = next.collect();
         }
-        let best = ways.iter().max_by(|one, other| score(one).total_cmp(&score(other)));
+        let open = ways.iter().filter(|way| way.rests || way.meets_s.is_infinite());
+        let best = open.max_by(|one, other| score(one).total_cmp(&score(other)));
         best.map_or(STAND, |way| way.first)
     }
 
@@ -162,7 +169,6 @@ impl Evasion {
             doubt_m_s: doubt_m_s.into(),
         }
     }
-
 }
 
 fn around(directions: u32, speed: f64) -> impl Iterator<Item = Advice> {
@@ -204,8 +210,9 @@ impl<'a> Scene<'a> {
         let comes = |disc: &Disc| {
             let way = AHEAD_S * disc.velocity;
             let share = (start.position - disc.at).dot(way) / way.length_squared();
-            let nearest = disc.at + if share.is_nan() { DVec2::ZERO } else { share.clamp(0.0, 1.0) * way };
-            nearest.distance(start.position) <= reach_m + disc.touches_m
+            // The share is no number for what stands.
+            let share = if share > 0.0 { share.min(1.0) } else { 0.0 };
+            (disc.at + share * way).distance(start.position) <= reach_m + disc.touches_m
         };
         let discs = movers.iter().map(|mover| evasion.disc(mover)).filter(comes).collect();
         Self { evasion, view, discs, start }
@@ -215,9 +222,11 @@ impl<'a> Scene<'a> {
         let twist = Twist { v: sample.v_m_s, omega: sample.omega_rad_s };
         Way {
             first: STAND,
+            rests: true,
             last: STAND,
             now: Moving { pose: self.start, twist },
             steps: 0,
+            moved_s: f64::NEG_INFINITY,
             is_inside: self.is_hazard(self.start.position),
             meets_s: f64::INFINITY,
             hazard_s: f64::INFINITY,
@@ -268,9 +277,27 @@ impl<'a> Scene<'a> {
                 let along = self.field(from).unwrap_or(DVec2::ZERO);
                 way.gain_m += (at - from).dot(along);
             }
-            self.meet(&mut way, at_s, moves);
+            way.moved_s = if moves { at_s } else { way.moved_s };
+            let may_move = self.may_move(&way);
+            self.meet(&mut way, at_s, may_move);
         }
         way
+    }
+
+    fn may_move(&self, way: &Way) -> bool {
+        STEP_S * f64::from(way.steps) <= way.moved_s + self.evasion.fades_s
+    }
+
+    /// Whether the robot that brakes now comes to rest before it meets anything.
+    fn rests(&self, mut way: Way) -> bool {
+        while way.meets_s.is_infinite() && way.hazard_s.is_infinite() {
+            let next_s = STEP_S * f64::from(way.steps + 1);
+            if next_s > AHEAD_S || !self.may_move(&way) {
+                return true;
+            }
+            way = self.go(way, STAND, next_s);
+        }
+        false
     }
 
     /// The robot on its `way` is where something may be after `at_s` seconds.

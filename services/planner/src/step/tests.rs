@@ -1,5 +1,6 @@
 use super::*;
 use common::{
+    bus::Stamp,
     grid::{CellState, Part},
     samples::{BaseResponseSample, ClearBeam, Mover, TargetPoint},
 };
@@ -18,8 +19,11 @@ fn mission_of(cells: u32) -> Mission {
 }
 
 impl Planner {
+    /// The guidance a minute later, when the robot has seen what moves.
     fn ask(&mut self, pose: &PoseSample) -> GuidanceSample {
-        self.answer(pose).unwrap().1
+        let stamp_ns = pose.stamp.stamp_ns + 60_000_000_000;
+        let pose = PoseSample { stamp: Stamp { stamp_ns, ..pose.stamp }, ..*pose };
+        self.answer(&pose).unwrap().1
     }
 }
 
@@ -628,7 +632,8 @@ fn what_goes_away_or_passes_far_off_changes_no_guidance() {
 
 #[test]
 fn a_robot_gets_out_of_the_way_of_what_comes() {
-    let (guidance, speed) = guidance_beside(DVec2::new(2.5, 0.1), DVec2::new(-0.8, 0.0));
+    let (at, velocity) = (DVec2::new(2.5, 0.1), DVec2::new(-0.8, 0.0));
+    let (guidance, speed) = guidance_of("jackal", at, velocity);
     let aside = guidance.ey.abs() > 0.3 || guidance.speed_limit_m_s < 0.0;
     assert!(aside && status(&guidance) == GuidanceStatus::Along, "{speed}: {guidance:?}");
 }
@@ -636,7 +641,8 @@ fn a_robot_gets_out_of_the_way_of_what_comes() {
 #[test]
 fn a_robot_steps_aside_while_what_comes_is_far_off() {
     let (guidance, _) = guidance_beside(DVec2::new(4.5, 0.1), DVec2::new(-1.2, 0.0));
-    assert!(status(&guidance) == GuidanceStatus::Along && guidance.ey.abs() > 0.3, "{guidance:?}");
+    let aside = guidance.ey.abs() > 0.3 || guidance.speed_limit_m_s < 0.0;
+    assert!(aside && status(&guidance) == GuidanceStatus::Along, "{guidance:?}");
 }
 
 #[test]
