@@ -85,6 +85,7 @@ struct Thing {
     came: bool,
 }
 
+/// A thing that is followed, as what goes straight on, by a filter of Kalman's; accelerations are its noise.
 #[derive(Clone, Copy, Debug)]
 struct Track {
     /// The first place and its doubt.
@@ -510,6 +511,22 @@ mod tests {
         let off_m = there.distance(DVec2::new(mover.x_m.into(), mover.y_m.into()));
         let off_m_s = velocity.distance(DVec2::new(mover.vx_m_s.into(), mover.vy_m_s.into()));
         assert!(off_m < 0.1 && off_m_s < 0.15, "{mover:?} {off_m} {off_m_s}");
+    }
+
+    #[test]
+    fn a_mover_that_turns_round_stays_known_and_its_velocity_is_right_within_a_second() {
+        let velocity = DVec2::new(0.0, -1.5);
+        let mut room = Room::new(&[(DVec2::new(3.0, 2.0), velocity, 0.3)]);
+        (0..8).for_each(|tick| drop(room.tick(tick)));
+        let turned = room.discs[0].0 + 2.0 * velocity * 7.0 * PERIOD_S;
+        room.discs[0] = (turned, -velocity, 0.3);
+        for tick in 8..16 {
+            room.tick(tick);
+            assert_eq!(room.movers.placed.len(), 1, "{tick}: {:?}", room.movers.placed);
+        }
+        let mover = room.movers.placed[0];
+        let off_m_s = DVec2::new(mover.vx_m_s.into(), mover.vy_m_s.into()).distance(-velocity);
+        assert!(off_m_s < 0.3, "{mover:?}");
     }
 
     #[test]

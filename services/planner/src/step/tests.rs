@@ -661,3 +661,19 @@ fn a_robot_that_cannot_get_out_of_the_way_of_what_comes_stands() {
     let (guidance, _) = guidance_beside(DVec2::new(1.2, 0.0), DVec2::new(-1.5, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Waiting, "{guidance:?}");
 }
+
+#[test]
+fn a_robot_with_a_laser_stands_for_half_a_second_at_first_to_see_what_moves_and_others_do_not() {
+    let answer = |robot: &str, stamp_ns| {
+        let text = format!("target = [1, 0]\n{robot}");
+        let mut planner = sent(&Mission::parse(&text, Path::new("test.toml")).unwrap());
+        let (header, cells) = keyframe(1, |_| false);
+        planner.take_grid(&header, &cells).unwrap();
+        let stamp = Stamp { stamp_ns, ..Stamp::default() };
+        status(&planner.answer(&PoseSample { stamp, ..PoseSample::default() }).unwrap().1)
+    };
+    let (early, later) = (300_000_000, 600_000_000);
+    assert_eq!(answer("robot.model = 'kobuki'", early), GuidanceStatus::Waiting);
+    assert_ne!(answer("robot.model = 'kobuki'", later), GuidanceStatus::Waiting);
+    assert_ne!(answer("", early), GuidanceStatus::Waiting);
+}
