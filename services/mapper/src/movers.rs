@@ -57,10 +57,12 @@ const HIDDEN_M_S: f64 = 0.2;
 /// The deviation of a velocity of which nothing is known, m/s, and its growth with time: a variance a second.
 const FIRST_M_S: f64 = 1.2;
 const GROWS: f64 = 0.1;
-/// A mover is at least so fast: m/s, and deviations of its velocity. It was seen so often, and came in this share of its newest places.
+/// A mover is at least so fast: m/s, and deviations of its velocity. It was seen so often, for so many seconds, and came in this share of
+/// its newest places.
 const LEAST_M_S: f64 = 0.25;
 const SURE: f64 = 3.0;
 const LEAST_PLACES: u32 = 3;
+const FOLLOWED_S: f64 = 0.25;
 const CAME_SHARE: f64 = 0.3;
 /// One place counts so much among the newest.
 const NEWEST: f64 = 0.15;
@@ -88,9 +90,11 @@ struct Thing {
 /// A thing that is followed, as what goes straight on, by a filter of Kalman's; accelerations are its noise.
 #[derive(Clone, Copy, Debug)]
 struct Track {
-    /// The first place and its doubt.
+    /// The first place and its doubt, and when.
     first: (DVec2, f64),
+    since_s: f64,
     seen_s: f64,
+    was_whole: bool,
     places: u32,
     /// The share of its newest places in which it came.
     came: f64,
@@ -230,7 +234,9 @@ impl Track {
     fn new(thing: &Thing) -> Self {
         let mut track = Self {
             first: (DVec2::ZERO, 0.0),
+            since_s: thing.at_s,
             seen_s: thing.at_s,
+            was_whole: thing.is_whole(),
             places: 1,
             came: f64::from(u8::from(thing.came)),
             radius_m: thing.half_width_m,
@@ -279,6 +285,11 @@ impl Track {
 
     /// It is seen, by a laser that goes at a velocity.
     fn see(&mut self, thing: &Thing, laser: DVec2, turns: bool) {
+        // What comes into view seems to move until it is whole.
+        if !self.was_whole && thing.is_whole() {
+            *self = Self::new(thing);
+            return;
+        }
         let (middle, doubt_m) = thing.middle(self);
         let off = middle - self.at(thing.at_s);
         let [place, both, velocity] = self.variance_at(thing.at_s);
@@ -303,6 +314,7 @@ impl Track {
             speed > 0.5 * LEAST_M_S
         } else {
             self.places >= LEAST_PLACES
+                && thing.at_s - self.since_s >= FOLLOWED_S
                 && self.came >= CAME_SHARE
                 && speed > LEAST_M_S.max(SURE * deviation_m_s)
                 && self.middle.distance(self.first.0) > self.first.1 + doubt_m
@@ -312,6 +324,10 @@ impl Track {
 }
 
 impl Thing {
+    fn is_whole(&self) -> bool {
+        self.own.iter().all(Option::is_some)
+    }
+
     /// The middle and its deviation, as a part of `track`: of a disc, the ends lie before it.
     fn middle(&self, track: &Track) -> (DVec2, f64) {
         let along = (self.mean - self.origin).normalize_or_zero();
