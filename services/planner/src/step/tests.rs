@@ -640,9 +640,9 @@ fn a_robot_gets_out_of_the_way_of_what_comes() {
 
 #[test]
 fn a_robot_steps_aside_while_what_comes_is_far_off() {
-    let (guidance, _) = guidance_beside(DVec2::new(4.5, 0.1), DVec2::new(-1.2, 0.0));
-    let aside = guidance.ey.abs() > 0.3 || guidance.speed_limit_m_s < 0.0;
-    assert!(aside && status(&guidance) == GuidanceStatus::Along, "{guidance:?}");
+    // A Jackal cannot back, because its laser does not look there.
+    let (guidance, _) = guidance_of("jackal", DVec2::new(4.5, 0.1), DVec2::new(-1.2, 0.0));
+    assert!(status(&guidance) == GuidanceStatus::Along && guidance.ey.abs() > 0.3, "{guidance:?}");
 }
 
 #[test]
