@@ -127,9 +127,11 @@ impl Movers {
             return (scan.beams.clone(), false);
         };
         let scans = std::mem::take(&mut self.scans);
+        // How long ago, and the scan.
         let older = |by_s: f64| {
             let older = scans.iter().rev().find(|(then, ..)| at_s - then >= by_s);
-            older.and_then(|(_, robot, beams)| rows.scan(scan.row, *robot, beams))
+            let (then_s, robot, beams) = older?;
+            Some((at_s - then_s, rows.scan(scan.row, *robot, beams)?))
         };
         let moved = self.moves(at_s);
         let is_next = scans.back().is_none_or(|(newest, ..)| at_s - newest >= APART_S);
@@ -138,18 +140,18 @@ impl Movers {
             let came_s = scans.front().map_or(CAME_S, |(first_s, ..)| at_s - first_s);
             let came_s = came_s.clamp(0.5 * CAME_S, CAME_S);
             let before = older(came_s);
-            let then_s = scans.iter().rev().find(|(then, ..)| at_s - then >= came_s);
-            let laser = before.zip(then_s).map_or(DVec2::ZERO, |(before, (then_s, ..))| {
-                (fan.origin - before.origin) / (at_s - then_s)
-            });
+            let laser =
+                before.map_or(DVec2::ZERO, |(ago_s, before)| (fan.origin - before.origin) / ago_s);
+            let before = before.map(|(_, before)| before);
             self.follow(&things(&fan, before.as_ref(), at_s), &fan, at_s, laser);
         }
         let moves = self.moves(at_s);
         let mut beams = scan.beams.clone();
         if moves {
             let before = older(STANDS_S);
-            let stands =
-                |end: DVec2| before.is_some_and(|before| Difference::of(&before, end).has_same());
+            let stands = |end: DVec2| {
+                before.is_some_and(|(_, before)| Difference::of(&before, end).has_same())
+            };
             for (beam, end) in beams.iter_mut().zip(fan.ends()) {
                 *beam = if end.is_some_and(stands) { *beam } else { f32::NAN };
             }
