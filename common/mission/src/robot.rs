@@ -40,6 +40,9 @@ pub enum Model {
     Create3,
     /// Yujin's Kobuki. Source: its user guide; its accelerations are those of its ROS velocity smoother.
     Kobuki,
+    /// A Kobuki with a depth camera beside the laser, as a TurtleBot 2 has one.
+    #[serde(rename = "turtlebot2")]
+    TurtleBot2,
     /// A small car on the X80's boards. Nominal, no product: the size of a model car of about 1:14.
     Car,
 }
@@ -297,9 +300,9 @@ mod tests {
     fn every_model_has_a_body_and_no_other_is_preset() {
         use Model as M;
         let models = [
-            [M::X80, M::X80sv, M::Jackal],
-            [M::TurtleBot3Burger, M::TurtleBot3Waffle, M::TurtleBot4],
-            [M::Create3, M::Kobuki, M::Car],
+            &[M::X80, M::X80sv, M::Jackal][..],
+            &[M::TurtleBot3Burger, M::TurtleBot3Waffle, M::TurtleBot4],
+            &[M::Create3, M::Kobuki, M::TurtleBot2, M::Car],
         ];
         assert_eq!(MODELS.keys().copied().collect::<Vec<_>>(), models.concat());
         for model in models.concat() {

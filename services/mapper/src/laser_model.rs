@@ -82,6 +82,9 @@ impl EvidenceGrid {
             let change = match scan.is_thing(cell, *mark) {
                 true if lattice.centre_of(cell).distance(robot) <= radius => continue,
                 true => HIT,
+                false if lattice.centre_of(cell).distance(fan.origin) < fan.clears_from_m => {
+                    continue;
+                }
                 false if mark & (ENDED | PASSED_FAR) != PASSED_FAR => 0,
                 false if self.goes_on_behind(cell, fan.origin) => -PASS_ALONG,
                 false => -PASS,
@@ -297,6 +300,10 @@ mod tests {
 
     /// A grid after these scans of a laser at the centre, whose beams are a degree apart from bearing 0 on.
     fn after(scans: &[Vec<f32>]) -> EvidenceGrid {
+        after_clearing_from(0.0, scans)
+    }
+
+    fn after_clearing_from(clears_from_m: f64, scans: &[Vec<f32>]) -> EvidenceGrid {
         let mut grid = EvidenceGrid::new(Ground { lattice: LATTICE, radius: 0.2 });
         for beams in scans {
             let (first_rad, step_rad) = (0.0, 1_f64.to_radians());
@@ -306,6 +313,7 @@ mod tests {
                 step_rad,
                 reach_m: 8.0,
                 noise: (0.0, 0.0),
+                clears_from_m,
                 beams,
             };
             grid.take_scan(&fan, DVec2::ZERO);
@@ -332,6 +340,16 @@ mod tests {
         let gone = [vec![1.0], vec![1.0], vec![1.0], far.clone(), far.clone()];
         assert!(after(&gone[..4]).is_occupied(index(1.0, 0.0)), "one scan may be wrong");
         assert!(!after(&gone).is_occupied(index(1.0, 0.0)));
+    }
+
+    #[test]
+    fn a_depth_camera_keeps_what_it_looks_over_and_takes_no_ground_before_it_for_scanned() {
+        let approach = [vec![0.5], vec![0.5], vec![2.0], vec![2.0], vec![2.0], vec![2.0]];
+        let grid = |from_m| after_clearing_from(from_m, &approach);
+        assert!(!grid(0.0).is_occupied(index(0.5, 0.0)), "a laser");
+        assert!(grid(0.6).is_occupied(index(0.5, 0.0)));
+        let scanned = [0.4, 0.7].map(|x| grid(0.6).is_scanned(index(x, 0.0)));
+        assert_eq!(scanned, [false, true]);
     }
 
     #[test]
@@ -385,8 +403,15 @@ mod tests {
         let beams: Vec<f32> = (0..1440).map(beam).collect();
         let origin = DVec2::new(0.013, -0.021);
         let (first_rad, step_rad) = (0.0, 0.25_f64.to_radians());
-        let fan =
-            Fan { origin, first_rad, step_rad, reach_m: 8.0, noise: (0.0, 0.0), beams: &beams };
+        let fan = Fan {
+            origin,
+            first_rad,
+            step_rad,
+            reach_m: 8.0,
+            noise: (0.0, 0.0),
+            clears_from_m: 0.0,
+            beams: &beams,
+        };
         let mut scan = Scan::new(&LATTICE, &fan).unwrap();
         scan.pass(5.0, PASSED);
         let mut passed = vec![false; LATTICE.area()];

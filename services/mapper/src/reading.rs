@@ -33,6 +33,8 @@ struct Row {
     /// The bearing of the first beam from the laser's own, and the angle from beam to beam.
     fan: (f64, f64),
     noise: (f64, f64),
+    /// Metres, from which a laser's beams pass things; 0 but for a depth camera.
+    clears_from_m: f64,
     /// None for other kinds.
     cone: Option<SonarModel>,
 }
@@ -46,6 +48,7 @@ impl Rows {
                 kind: sensor.kind,
                 fan: sensor.fan(),
                 noise: sensor.model.beam_noise(),
+                clears_from_m: sensor.model.clears_from_m(),
                 cone: (sensor.kind == SensorKind::Cone).then(|| SonarModel::of(&sensor)),
             })
         };
@@ -85,11 +88,19 @@ impl Rows {
 
     /// None without beams.
     pub(crate) fn scan<'a>(&self, row: usize, robot: Pose2, beams: &'a [f32]) -> Option<Fan<'a>> {
-        let Row { mount, reach_m, fan: (first, step_rad), noise, .. } =
+        let Row { mount, reach_m, fan: (first, step_rad), noise, clears_from_m, .. } =
             self.laser(row).filter(|_| !beams.is_empty())?;
         let mount = mount.on(robot);
         let first_rad = mount.heading + first;
-        Some(Fan { origin: mount.position, first_rad, step_rad, reach_m, noise, beams })
+        Some(Fan {
+            origin: mount.position,
+            first_rad,
+            step_rad,
+            reach_m,
+            noise,
+            clears_from_m,
+            beams,
+        })
     }
 
     pub(crate) fn uses(&self, reading: &RangeReading) -> bool {
@@ -178,6 +189,8 @@ pub(crate) struct Fan<'a> {
     pub(crate) reach_m: f64,
     /// Deviation of a range: metres, and a share of it.
     pub(crate) noise: (f64, f64),
+    /// A beam says nothing of the ground nearer than this, metres.
+    pub(crate) clears_from_m: f64,
     /// Metres: infinite for nothing in reach, not a number for no reading.
     pub(crate) beams: &'a [f32],
 }

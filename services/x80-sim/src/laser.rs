@@ -1,4 +1,5 @@
-//! A laser: each beam ends at the first thing that stands at its height and is no pane of glass at a slant.
+//! A laser: each beam ends at the first thing that stands at its height and is no pane of glass at a slant. A beam of a depth camera, which
+//! widens upright with its range, ends at the first thing in it that the body can touch.
 //!
 //! A beam that ends at a black surface too far away brings nothing back, so the reading is "nothing in reach", as
 //! drivers publish it: infinity by ROS's REP 117 ("no return") and in Slamtec's `rplidar_ros`. A beam through glass
@@ -10,7 +11,7 @@ use common::{
     geometry::Light,
     json_wire::Scan,
     kinematics::Pose2,
-    mission::{LaserTiming, Mission, Sensor},
+    mission::{LaserTiming, Mission, Physics, Sensor},
 };
 use glam::DVec2;
 
@@ -33,6 +34,8 @@ const FASTEST_M_S: f64 = 5.0;
 #[derive(Clone, Debug)]
 pub(crate) struct Laser {
     sensor: Sensor,
+    /// Above the floor.
+    height_m: f64,
     timing: LaserTiming,
     /// The body's newest poses with their times, seconds, as far back as a scan goes.
     poses: VecDeque<(f64, Pose2)>,
@@ -44,21 +47,24 @@ pub(crate) struct Laser {
 impl Laser {
     /// Those whose scans come with the robot's frames; their noise follows from `seed`.
     pub(crate) fn all(mission: &Mission, seed: u64) -> Vec<Self> {
-        let (lasers, timing) = (mission.lasers_of_base(), mission.simulation.physics().laser);
-        let laser = |(nth, (_, sensor))| Self::new(sensor, timing, (seed, nth));
+        let (lasers, physics) = (mission.lasers_of_base(), mission.simulation.physics());
+        let laser = |(nth, (_, sensor))| Self::new(sensor, &physics, (seed, nth));
         lasers.into_iter().enumerate().map(laser).collect()
     }
 
     /// One that says each measurement by itself, up to a tick late.
     pub(crate) fn with_own_wire(sensor: Sensor, mission: &Mission, seed: u64) -> Self {
-        let timing = mission.simulation.physics().laser;
-        let timing = LaserTiming { delay_s: 0.0, sweep_s: 1.0 / mission.robot.rate_hz, ..timing };
-        Self::new(sensor, timing, (seed, 0))
+        let mut physics = mission.simulation.physics();
+        physics.laser.delay_s = 0.0;
+        physics.laser.sweep_s = 1.0 / mission.robot.rate_hz;
+        Self::new(sensor, &physics, (seed, 0))
     }
 
-    fn new(sensor: Sensor, timing: LaserTiming, (seed, nth): (u64, usize)) -> Self {
+    fn new(sensor: Sensor, physics: &Physics, (seed, nth): (u64, usize)) -> Self {
         let noise = Noise::of_nth(seed, Source::Laser, nth);
-        Self { sensor, timing, poses: VecDeque::new(), noise, scan: Vec::new() }
+        let height_m = sensor.height_m.unwrap_or(physics.heights.infrared_m);
+        let timing = physics.laser;
+        Self { sensor, height_m, timing, poses: VecDeque::new(), noise, scan: Vec::new() }
     }
 
     /// Measure for this tick, if the laser does.
@@ -106,8 +112,8 @@ impl Laser {
     /// What a robot at `pose` has in the laser's reach, and a little more for poses before.
     pub(crate) fn near(&self, world: &World, pose: Pose2) -> Vec<Solid> {
         let position = self.sensor.mount.on(pose).position;
-        let height_m = self.sensor.height_m.unwrap_or(world.heights().infrared_m);
-        world.near(position, self.sensor.reach_m + self.went_m(), height_m)
+        let reach_m = self.sensor.reach_m + self.went_m();
+        world.near(position, reach_m, self.height_m, self.sensor.model.rise())
     }
 
     /// The way that the robot makes at most during a scan, until it is sent.
@@ -143,9 +149,14 @@ impl Laser {
         let (noise_m, noise_share) = self.sensor.model.beam_noise();
         let black_reach_m = self.sensor.model.black_reach_m();
         let along = DVec2::from_angle(heading);
+        let rise = self.sensor.model.rise();
+        let is_in_beam =
+            |solid: &Solid, range: f64| solid.profile.height_gap(self.height_m) <= rise * range;
         let hit = near
             .iter()
-            .filter_map(|solid| end(solid, from, along))
+            .filter_map(|solid| {
+                end(solid, from, along).filter(|(range, _)| is_in_beam(solid, *range))
+            })
             .min_by(|(a, _), (b, _)| a.total_cmp(b))
             .filter(|&(range, light)| light != Light::Black || range <= black_reach_m);
         let lost = self.noise.chance(LOST_OF_1000 / 1000.0);
@@ -264,6 +275,27 @@ mod tests {
             panic!("no times");
         };
         assert!((age_s - 0.3).abs() < 1e-9 && time_s == 0.1);
+    }
+
+    #[test]
+    fn a_depth_camera_sees_what_is_low_or_hangs_and_is_touched_from_where_its_picture_shows_it_and_nothing_near()
+     {
+        let ahead = |x: f64, heights: &str| {
+            let text = format!(
+                "target = [0, -5]\nrobot.model = 'turtlebot2'\nworld.box = [{{ at = [{}, 0], size_m = [0.2, 2], {heights} }}]",
+                x + 0.2
+            );
+            let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+            let mut camera = Laser::all(&mission, 1).remove(1);
+            camera.scan(&World::new(&mission), Pose2::default(), 0.0)[87]
+        };
+        // The camera is 0.1 m ahead of the robot's centre, and the face as far ahead of the box's.
+        is_near(ahead(1.0, "top_m = 0.05"), 1.0);
+        is_near(ahead(1.0, "bottom_m = 0.24"), 1.0);
+        assert_eq!(ahead(1.0, "top_m = 0.02"), None, "a sill is not touched");
+        assert_eq!(ahead(1.0, "bottom_m = 0.3"), None, "a table top is not touched");
+        assert_eq!(ahead(0.2, "top_m = 0.25"), Some(-1.0), "nearer than 0.3 m it reads nothing");
+        assert_eq!(ahead(3.5, "top_m = 0.25"), None, "too far away");
     }
 
     /// The readings of a UST-10LX on a Jackal at the origin in a world, by the angle of the beam, degrees from straight ahead.

@@ -183,9 +183,15 @@ impl World {
 }
 
 impl World {
-    pub fn near(&self, point: DVec2, reach_m: f64, height_m: f64) -> Vec<Solid> {
+    /// What a beam within `reach_m` may end at that starts at `height_m`: a level one at what stands there, one that rises and falls by
+    /// `rise` a metre at what the body can touch.
+    pub fn near(&self, point: DVec2, reach_m: f64, height_m: f64, rise: f64) -> Vec<Solid> {
+        let Heights { ground_clearance_m, body_top_m, .. } = self.heights;
+        let is_touched =
+            |solid: &Solid| rise == 0.0 || solid.profile.is_between(ground_clearance_m, body_top_m);
         self.solids()
-            .filter(|solid| solid.profile.height_gap(height_m) == 0.0)
+            .filter(is_touched)
+            .filter(|solid| solid.profile.height_gap(height_m) <= rise * reach_m)
             .filter(|solid| solid.surface.distance(point) <= reach_m)
             .collect()
     }

@@ -1,5 +1,5 @@
 use clap::Args;
-use common::mission::{Mission, SensorKind};
+use common::mission::{Mission, Sensor, SensorKind};
 use console::{
     failure::Result,
     output::{print_text, write_stderr},
@@ -11,9 +11,16 @@ use mission_control::outcome::RIGHT_PLACE_M;
 const DETOUR: f64 = 1.25;
 /// A smaller share of missions is not told.
 const LEAST_SHARE: f64 = 0.02;
+/// The distance before a sensor at which heights are compared, metres: what is seen farther away is remembered.
+const AHEAD_M: f64 = 0.3;
+/// Sensors that look within this of straight ahead see what is ahead, degrees.
+const BESIDE_AHEAD_DEG: f64 = 30.0;
+/// Heights that are told, metres.
+const LEAST_UNSEEN_M: f64 = 0.01;
 
 /// Check a mission as `run` does. An error is reported with its line, its key and the remedy; of a mission without one, the way from each
-/// fault to rest is printed, and how often it ends in a wrong place if its wheels alone hold its heading.
+/// fault to rest is printed, how often it ends in a wrong place if its wheels alone hold its heading, and at which heights its body touches
+/// what its sensors do not see.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// A mission file, or a shipped mission (`firsthand missions`).
@@ -51,7 +58,47 @@ pub fn main(arguments: &Arguments) -> Result {
             100.0 * share
         );
     }
+    text += &unseen(&mission).unwrap_or_default();
     Ok(print_text(&text)?)
+}
+
+/// What stands or hangs ahead at heights that the body can touch, and no sensor sees at [`AHEAD_M`]: one remark. The heights are those that
+/// the simulator is told.
+fn unseen(mission: &Mission) -> Option<String> {
+    let heights = mission.simulation.physics().heights;
+    let looks_ahead = |sensor: &Sensor| {
+        let half_deg = (sensor.field_of_view_deg / 2.0).max(BESIDE_AHEAD_DEG);
+        sensor.used && mission.sensing && sensor.mount.looks_rad().abs() <= half_deg.to_radians()
+    };
+    let band = |sensor: Sensor| {
+        let (height_m, rise) = match sensor.kind {
+            SensorKind::Cone => {
+                (heights.sonar_m, (sensor.field_of_view_deg / 2.0).to_radians().tan())
+            }
+            SensorKind::Ray => (heights.infrared_m, 0.0),
+            SensorKind::Scan => {
+                (sensor.height_m.unwrap_or(heights.infrared_m), sensor.model.rise())
+            }
+        };
+        [height_m - rise * AHEAD_M, height_m + rise * AHEAD_M]
+    };
+    let mut bands: Vec<_> =
+        mission.sensor_table().into_iter().filter(looks_ahead).map(band).collect();
+    bands.sort_by(|[a, _], [b, _]| a.total_cmp(b));
+    let (mut unseen, mut seen_to) = (Vec::new(), heights.ground_clearance_m);
+    let top = [heights.body_top_m, f64::INFINITY];
+    for [from, to] in bands.into_iter().chain([top]) {
+        if from - seen_to > LEAST_UNSEEN_M {
+            unseen.push(format!("from {seen_to:.2} to {:.2} m", from.min(heights.body_top_m)));
+        }
+        seen_to = seen_to.max(to);
+    }
+    (!unseen.is_empty()).then(|| {
+        format!(
+            "What stands or hangs {} above the floor is not seen {AHEAD_M} m ahead of its sensors, but touched: a low board, a shelf. A depth camera (model = \"d435\") sees it, bumpers feel it, and a lower controller.speed_m_s makes the touch softer.\n",
+            unseen.join(" and ")
+        )
+    })
 }
 
 /// The expected share of missions that end in a wrong place, because the robot turns by what the diameters of its wheels differ more than
@@ -92,5 +139,18 @@ mod tests {
         for held in ["protocol = 'json'\nrobot.gyro = true", "model = 'kobuki'", "model = 'car'"] {
             assert_eq!(share(&format!("target = [6, 0]\nrobot.{held}")), None, "{held}");
         }
+    }
+
+    #[test]
+    fn heights_that_the_body_touches_and_no_sensor_sees_ahead_are_told_and_a_depth_camera_leaves_none()
+     {
+        let unseen = |robot: &str| {
+            let text = format!("target = [3, 0]\nrobot.{robot}");
+            unseen(&Mission::parse(&text, Path::new("m.toml")).unwrap()).unwrap_or_default()
+        };
+        let laser = unseen("model = 'kobuki'");
+        assert!(laser.contains("from 0.03 to 0.18 m and from 0.18 to 0.26 m"), "{laser}");
+        assert!(unseen("model = 'x80'").contains("hangs from 0.03 to 0.10 m above"));
+        assert_eq!(unseen("model = 'turtlebot2'"), "");
     }
 }
