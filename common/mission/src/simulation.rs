@@ -30,6 +30,8 @@ keys! {
         ring: Vec<Ranger>,
         #[serde(rename = "thing", skip_serializing_if = "Vec::is_empty")]
         things: Vec<Thing>,
+        #[serde(rename = "person", skip_serializing_if = "Vec::is_empty")]
+        people: Vec<Person>,
         #[serde(rename = "hole", skip_serializing_if = "Vec::is_empty")]
         holes: Vec<Hole>,
         /// A contact does not end the mission.
@@ -86,6 +88,29 @@ pub struct Thing {
     /// Positions in order of time, with straight lines between them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub moves: Vec<Move>,
+}
+
+/// Somebody who walks to one goal after the other, again and again, and gives way as people do.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Person {
+    /// At the start.
+    pub at: DVec2,
+    pub goals: Vec<DVec2>,
+    /// That it wants; 1.34 is the mean of people (Helbing and Molnar, 1995).
+    #[serde(default = "walking_m_s")]
+    pub speed_m_s: f64,
+    /// Of a cylinder; nominal.
+    #[serde(default = "person_radius_m")]
+    pub radius_m: f64,
+}
+
+const fn walking_m_s() -> f64 {
+    1.34
+}
+
+const fn person_radius_m() -> f64 {
+    0.25
 }
 
 /// A rectangle without floor. A wheel over it is a contact.

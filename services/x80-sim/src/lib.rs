@@ -50,6 +50,7 @@ mod json_words;
 mod laser;
 pub mod motor;
 pub mod noise;
+mod people;
 pub mod radio;
 pub mod robot;
 mod rplidar;

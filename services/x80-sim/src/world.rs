@@ -6,6 +6,8 @@ use common::{
 };
 use glam::DVec2;
 
+use crate::people::People;
+
 /// A sensor this near to a surface touches it.
 const TOUCHES_M: f64 = 1e-3;
 
@@ -106,6 +108,7 @@ fn solids_of(shapes: &Shapes) -> Vec<Solid> {
 pub struct World {
     standing: Vec<Solid>,
     things: Vec<Visitor>,
+    people: People,
     holes: Vec<Hole>,
     heights: Heights,
 }
@@ -130,6 +133,7 @@ impl World {
         let mut world = Self {
             standing: solids_of(&mission.world),
             things: mission.simulation.things.iter().map(visitor).collect(),
+            people: People::new(&mission.simulation.people),
             holes: mission.simulation.holes.clone(),
             heights: mission.simulation.physics().heights,
         };
@@ -146,6 +150,7 @@ impl World {
                 && visitor.thing.until_s.is_none_or(|until| time < until);
             visitor.present = due && (visitor.present || visitor.is_clear_of(centre, radius));
         }
+        self.people.advance(time, (centre, radius), &self.standing);
     }
 
     pub fn is_hole(&self, point: DVec2) -> bool {
@@ -158,7 +163,8 @@ impl World {
 
     pub fn solids(&self) -> impl Iterator<Item = Solid> + '_ {
         let visiting = self.things.iter().filter(|visitor| visitor.present);
-        self.standing.iter().copied().chain(visiting.flat_map(Visitor::now))
+        let visiting = visiting.flat_map(Visitor::now).chain(self.people.solids());
+        self.standing.iter().copied().chain(visiting)
     }
 
     pub fn touchable(&self) -> impl Iterator<Item = Surface> + '_ {

@@ -7,6 +7,7 @@ mod files;
 mod floor;
 mod furnished;
 mod moving;
+mod people;
 mod rooms;
 mod shapes;
 mod traps;
@@ -46,7 +47,7 @@ const fn kind(stream: u64, name: &'static str, draw: fn(&mut Random, usize) -> S
     Kind { stream, name, draw, rules: Rules::PLAIN }
 }
 
-static KINDS: [Kind; 10] = [
+static KINDS: [Kind; 11] = [
     kind(1, "rooms", |random, number| rooms::draw(random, number, Doors::Some)),
     kind(2, "doors", |random, number| rooms::draw(random, number, Doors::All)),
     kind(3, "traps", traps::draw),
@@ -58,6 +59,7 @@ static KINDS: [Kind; 10] = [
     kind(9, "rotated-doors", |random, number| rooms::rotated(random, number, Doors::All)),
     kind(10, "glazed", rooms::glazed),
     Kind { rules: moving::RULES, ..kind(11, "moving-cylinders", moving::draw) },
+    kind(12, "people", people::draw),
 ];
 
 impl FromStr for Worlds {

@@ -1,8 +1,9 @@
 use super::{Checker, MAX_TIMEOUT_S, Result, all_within, point, refuse_if, within};
-use crate::simulation::{Block, Ranger, Simulation, Thing};
+use crate::simulation::{Block, Person, Ranger, Simulation, Thing};
 
 /// More than these are a mistake.
 const MAX_THINGS: usize = 1000;
+const MAX_PEOPLE: usize = 100;
 const MAX_BLOCKS: usize = 100;
 const MAX_MOVES: usize = 1000;
 
@@ -22,6 +23,10 @@ impl Checker {
         for thing in &simulation.things {
             self.thing(thing)?;
         }
+        let are_many = simulation.people.len() > MAX_PEOPLE;
+        let problem = format!("more than {MAX_PEOPLE} people walk");
+        refuse_if(are_many, "simulation.person", problem, "give fewer")?;
+        simulation.people.iter().try_for_each(person)?;
         let are_many = simulation.holes.len() > MAX_THINGS;
         refuse_if(
             are_many,
@@ -53,6 +58,19 @@ impl Checker {
         }
         Ok(())
     }
+}
+
+fn person(person: &Person) -> Result {
+    const KEY: &str = "simulation.person";
+    let problem = format!("{} goals of one person", person.goals.len());
+    let are_some = (1..=MAX_MOVES).contains(&person.goals.len());
+    refuse_if(!are_some, KEY, problem, format!("give 1 to {MAX_MOVES}"))?;
+    point(KEY, person.at)?;
+    person.goals.iter().try_for_each(|goal| point(KEY, *goal))?;
+    all_within([
+        (KEY, person.speed_m_s, 0.05..=5.0, "m/s of speed_m_s"),
+        (KEY, person.radius_m, 0.05..=1.0, "m of radius_m"),
+    ])
 }
 
 fn span(key: &'static str, from_s: f64, until_s: Option<f64>) -> Result {
@@ -128,6 +146,14 @@ mod tests {
             (
                 "[[simulation.thing]]\nshape.drum = [{ at = [2, 0], radius_m = 1, bottom_m = 0.3, top_m = 0.2 }]",
                 "m.toml:2: simulation.thing: top_m = 0.2 is not above bottom_m = 0.3",
+            ),
+            (
+                "[[simulation.person]]\nat = [1, 0]\ngoals = []",
+                "m.toml:2: simulation.person: 0 goals of one person",
+            ),
+            (
+                "[[simulation.person]]\nat = [1, 0]\ngoals = [[1, 0]]\nspeed_m_s = nan",
+                "m.toml:2: simulation.person: NaN m/s of speed_m_s",
             ),
             (
                 "[[simulation.block]]\nwheels = 'left'\nfrom_s = 3\nuntil_s = 2",

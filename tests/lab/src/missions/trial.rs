@@ -2,7 +2,7 @@
 
 use common::{
     geometry::Shapes,
-    mission::{Heights, Mission, Realism, Thing},
+    mission::{Heights, Mission, Person, Realism, Thing},
 };
 use glam::DVec2;
 use mission_control::outcome::RIGHT_PLACE_M;
@@ -55,6 +55,8 @@ pub struct Scene {
     pub shapes: Shapes,
     /// The things that move in the world; the shortest path does not regard them.
     pub things: Vec<Thing>,
+    /// Likewise.
+    pub people: Vec<Person>,
     pub start: DVec2,
     /// Heading at the start, radians counter-clockwise from x.
     pub heading: f64,
@@ -117,6 +119,10 @@ fn mission(world: &str, scene: &Scene) -> Result<Mission> {
     let placed = scene.things.iter().cloned();
     mission.simulation.things =
         placed.map(|it| Thing { shape: moved(&it.shape, -scene.start), ..it }).collect();
+    mission.simulation.people = scene.people.clone();
+    for person in &mut mission.simulation.people {
+        std::iter::once(&mut person.at).chain(&mut person.goals).for_each(|at| *at -= scene.start);
+    }
     Ok(mission)
 }
 

@@ -97,10 +97,10 @@ fn scene(drums: Vec<Drum>) -> Scene {
     let sides = [(left, SIDES_END_M), (left, BEHIND_M), (right, BEHIND_M), (right, SIDES_END_M)];
     Scene {
         shapes: Shapes { drums, ..walls([wall(sides.map(DVec2::from))]) },
-        things: Vec::new(),
         start: START,
         heading: FRAC_PI_2,
         target: GOAL,
+        ..Scene::default()
     }
 }
 

@@ -141,7 +141,7 @@ fn add_map(found: &mut Found, file: &Path, asked: Asked) -> Result {
             found.unsolvable += 1;
             continue;
         }
-        let scene = Scene { shapes, things: Vec::new(), start, heading, target };
+        let scene = Scene { shapes, start, heading, target, ..Scene::default() };
         let world = format!("{}-{number}", name.display());
         found.add(Trial::new(world, &scene, Rules::PLAIN, asked.swept_m)?);
     }

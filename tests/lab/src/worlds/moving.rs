@@ -65,6 +65,7 @@ pub fn draw(random: &mut Random, number: usize) -> Scene {
         start: START,
         heading: PI,
         target: GOAL,
+        ..Scene::default()
     }
 }
 
