@@ -41,6 +41,13 @@ fn the_default_mission_reaches_its_target_untouched_for_seeds_1_to_10() {
 }
 
 #[test]
+fn a_hall_that_five_people_cross_is_crossed_untouched_for_seeds_1_to_10() {
+    for seed in 1..=10 {
+        arrives_untouched("walkers", "walkers", &["--seed", &seed.to_string()]);
+    }
+}
+
+#[test]
 fn by_the_papers_method_it_does_for_seeds_1_to_8() {
     // The way is twice as long, so with measured wheels the arrival would be unsure. Those of the laboratory are better.
     let wheels =

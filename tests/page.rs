@@ -259,6 +259,39 @@ fn a_recorded_run_is_scrubbed_and_played_in_windows_of_both_widths() {
 }
 
 #[test]
+fn what_moves_is_drawn_on_a_page_that_is_played_once_it_is_known() {
+    if !has_browser() {
+        return not_run("movers on a recorded page", "chromium and chromedriver are missing");
+    }
+    let (code, summary, directory) = Run::at_own_speed("page-movers", "walkers", &[]).finish_in();
+    assert_eq!(code, Some(0), "{summary}");
+    let browser = Browser::open(1280);
+    let page = directory.path().join("run/report/report.html");
+    browser.go(&format!("file://{}", page.display()));
+    browser.wait_until("document.querySelectorAll('#metrics tr').length > 10");
+    let drawn = |at: &str| {
+        browser.run(&format!("const time = document.getElementById('time'); time.value = {at}; time.dispatchEvent(new Event('input'))"));
+        browser.wait_until(&format!(
+            "document.getElementById('now').textContent === Number({at}).toFixed(1) + ' s'"
+        ));
+        let pixels = browser.run("const map = document.getElementById('map');
+            const { data } = map.getContext('2d').getImageData(0, 0, map.width, map.height);
+            const hex = getComputedStyle(document.documentElement).getPropertyValue('--mover').trim();
+            const colour = [1, 3, 5].map((from) => parseInt(hex.slice(from, from + 2), 16));
+            let count = 0;
+            for (let from = 0; from < data.length; from += 4) {
+              if (colour.every((part, at) => Math.abs(part - data[from + at]) < 12)) count++;
+            }
+            return count");
+        pixels.as_u64().unwrap()
+    };
+    assert_eq!(drawn("document.getElementById('time').min"), 0, "nothing is known yet");
+    assert!(drawn("5") > 50, "five people walk");
+    assert!(browser.text("legend").contains("moving"));
+    browser.assert_legible();
+}
+
+#[test]
 fn a_page_of_dark_colours_is_printed_in_light_ones() {
     if !has_browser() {
         return not_run("a printed page", "chromium and chromedriver are missing");

@@ -165,6 +165,31 @@ impl GridHeader {
     pub fn movers(&self) -> &[Mover] {
         counted(&self.movers, self.mover_count)
     }
+
+    /// Movers that can be drawn: any process may have written the numbers of a sample.
+    pub fn drawn_movers(&self) -> impl Iterator<Item = &Mover> {
+        self.movers().iter().filter(|mover| {
+            let Mover { x_m, y_m, vx_m_s, vy_m_s, radius_m, doubt_m, doubt_m_s } = **mover;
+            let lengths = [radius_m, doubt_m, doubt_m_s];
+            let is_finite = [x_m, y_m, vx_m_s, vy_m_s].into_iter().all(f32::is_finite);
+            is_finite && lengths.into_iter().all(|it| (0.0..f32::INFINITY).contains(&it))
+        })
+    }
+}
+
+impl Mover {
+    pub fn place(&self) -> DVec2 {
+        DVec2::new(self.x_m.into(), self.y_m.into())
+    }
+
+    pub fn velocity(&self) -> DVec2 {
+        DVec2::new(self.vx_m_s.into(), self.vy_m_s.into())
+    }
+
+    /// Its place is within so many metres of its surface with 95 %, along any axis: two deviations.
+    pub fn reach_m(&self) -> f64 {
+        f64::from(self.radius_m) + 2.0 * f64::from(self.doubt_m)
+    }
 }
 
 /// The first `count` of `all`; the count comes from shared memory and may be any number.

@@ -11,8 +11,8 @@ macro_rules! shipped {
     };
 }
 
-pub static SHIPPED: [(&str, &str); 5] =
-    shipped!("open-room", "obstacle-course", "trap", "passage", "one-drum");
+pub static SHIPPED: [(&str, &str); 6] =
+    shipped!("open-room", "obstacle-course", "trap", "passage", "one-drum", "walkers");
 
 #[derive(Debug, Error)]
 pub enum LookupError {

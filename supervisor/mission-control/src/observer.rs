@@ -43,6 +43,7 @@ pub(crate) struct Published {
 pub enum Heard<'a> {
     Command(&'a CommandSample),
     Guidance(&'a GuidanceSample),
+    Grid(&'a GridHeader),
     Field(&'a Part, &'a [FieldCell]),
     Link(&'a LinkSample),
 }
@@ -143,6 +144,7 @@ impl Observer {
         }
         while let Some(grid) = self.grid.next_slice()? {
             stages.on_output(topics::GRID.spec().writer, grid.header().stamp.tick);
+            listener(Heard::Grid(grid.header()));
             let epoch = grid.header().epoch;
             let applied = record.grid.apply(&grid.header().part, &grid);
             if epoch > record.published.grid_epoch {

@@ -42,5 +42,6 @@ pub fn about(run: &Run) -> Value {
         "steers": mission.body().steering.is_some(),
         "known": mission.known,
         "world": simulated.then_some(&mission.world),
+        "things": simulated.then_some(&mission.simulation.things),
     })
 }

@@ -10,7 +10,7 @@ const GRAB = 26;
 const ACTIONS = 70;
 // The names of the colours of the states of a cell.
 const CELLS = [null, "sensed", "known", "rim", "scanned", "margin"];
-const LEGEND = [["sensed", "believed hazard"], ["margin", "its margin"], ["known", "known before"], ["scanned", "scanned"], ["way", "way"], ["beam", "beams"], ["target", "target"]];
+const LEGEND = [["sensed", "believed hazard"], ["margin", "its margin"], ["known", "known before"], ["scanned", "scanned"], ["way", "way"], ["beam", "beams"], ["target", "target"], ["mover", "moving: arrow to its place in 1 s, ring of doubt"]];
 
 const colours = new Map();
 
@@ -184,10 +184,14 @@ export class MapView {
     if (field && this.fieldMode === "lines") this.drawLines(field);
     this.drawPerimeter();
     this.drawShapes(store.about.known, "known", [4, 3]);
-    if (this.showsTruth && store.about.world) this.drawShapes(store.about.world, "shape", []);
+    if (this.showsTruth && store.about.world) {
+      this.drawShapes(store.about.world, "shape", []);
+      this.drawThings(t);
+    }
     this.drawWays(at);
     this.drawBeams(at);
     this.drawTargets(t);
+    this.drawMovers(at);
     this.drawRobot(at);
     this.drawScale();
   }
@@ -284,6 +288,72 @@ export class MapView {
       this.path(wall.points);
       this.stroke(name, 2.5, dash);
     }
+  }
+
+  /// The simulated things that come, go and move, where they really are.
+  drawThings(t) {
+    for (const { shape, from_s: from, until_s: until, moves = [] } of this.store.about.things ?? []) {
+      if (t < from || t >= (until ?? Infinity)) continue;
+      const next = moves.findIndex((station) => station.at_s > t);
+      // Before the first station it is there, and after the last one, too, whose index is then -1.
+      const after = moves.at(next);
+      const before = moves[next - 1] ?? after;
+      const share = before === after ? 0 : (t - before.at_s) / (after.at_s - before.at_s);
+      const [x, y] = after ? [0, 1].map((axis) => before.by[axis] + share * (after.by[axis] - before.by[axis])) : [0, 0];
+      this.context.save();
+      this.context.translate(x * this.scale, -y * this.scale);
+      this.drawShapes(shape, "shape", []);
+      this.context.restore();
+    }
+  }
+
+  /// What moves, by the laser: a disc, a ring for the doubt of its place, an arrow to where it will be in 1 s, and its speed in words.
+  drawMovers(at) {
+    const { context } = this;
+    const texts = [];
+    for (const [x, y, vx, vy, radius, reach] of this.store.movers[at] ?? []) {
+      const [px, py] = this.pixels(x, y);
+      const [qx, qy] = this.pixels(x + vx, y + vy);
+      const ring = (metres) => {
+        context.beginPath();
+        context.arc(px, py, metres * this.scale, 0, TAU);
+      };
+      ring(reach);
+      context.globalAlpha = 0.45;
+      this.stroke("mover", 1.2);
+      context.globalAlpha = 1;
+      ring(radius);
+      this.solid("mover", []);
+      const heading = Math.atan2(qy - py, qx - px);
+      context.beginPath();
+      context.moveTo(px, py);
+      context.lineTo(qx, qy);
+      for (const side of [-2.6, 2.6]) {
+        context.moveTo(qx, qy);
+        context.lineTo(qx + 8 * Math.cos(heading + side), qy + 8 * Math.sin(heading + side));
+      }
+      this.stroke("mover", 2);
+      texts.push([`${this.width < 500 ? "" : "moving, "}${Math.hypot(vx, vy).toFixed(1)} m/s`, px + reach * this.scale + 4, py + 4]);
+    }
+    // A text that would lie over another one is lower.
+    texts.forEach(([text, left, bottom], nth) => {
+      const wide = 7 * text.length;
+      const lies = ([, x, y]) => Math.abs(x - left) < wide && Math.abs(y - bottom) < 14;
+      while (texts.slice(0, nth).some(lies)) bottom += 7;
+      texts[nth][2] = bottom;
+      this.label(text, left, bottom);
+    });
+  }
+
+  /// A text that is legible over any colour.
+  label(text, left, bottom) {
+    const { context } = this;
+    context.font = "12px system-ui, sans-serif";
+    context.lineWidth = 3;
+    context.strokeStyle = colour("map");
+    context.strokeText(text, left, bottom);
+    context.fillStyle = colour("ink");
+    context.fillText(text, left, bottom);
   }
 
   solid(name, dash) {
@@ -415,18 +485,12 @@ export class MapView {
     this.context.moveTo(left, bottom);
     this.context.lineTo(left + metres * this.scale, bottom);
     this.stroke("ink", 2);
-    this.context.font = "12px system-ui, sans-serif";
-    const text = `${metres} m`;
-    this.context.lineWidth = 3;
-    this.context.strokeStyle = colour("map");
-    this.context.strokeText(text, left, bottom - 6);
-    this.context.fillStyle = colour("ink");
-    this.context.fillText(text, left, bottom - 6);
+    this.label(`${metres} m`, left, bottom - 6);
   }
 
   /// The colours and their meanings.
   legend(list) {
-    const rows = this.store.about?.world ? [...LEGEND, ["truth", "true way"], ["shape", "what stands there"]] : LEGEND;
+    const rows = this.store.about?.world ? [...LEGEND, ["truth", "true way"], ["shape", "what is really there"]] : LEGEND;
     list.replaceChildren(...rows.map(([name, text]) => {
       const item = document.createElement("li");
       const sample = document.createElement("i");

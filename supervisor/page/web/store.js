@@ -39,6 +39,7 @@ export class Store {
     this.fields = [];
     this.preview = null;
     this.ranges = [];
+    this.movers = [];
     this.running = false;
     this.problem = "";
     this.heard = null;
@@ -80,9 +81,10 @@ export class Store {
     const names = this.about.columns;
     names.forEach((name, at) => this.columns[name].push(row[at]));
     this.ranges.forEach((range, at) => range.push(row[names.length + at] ?? null));
+    this.movers.push(row[names.length + this.ranges.length] ?? []);
     if (this.isBounded && this.times.length > MOST_ROWS * 1.1) {
       const surplus = this.times.length - MOST_ROWS;
-      for (const list of [...Object.values(this.columns), ...this.ranges]) list.splice(0, surplus);
+      for (const list of [...Object.values(this.columns), ...this.ranges, this.movers]) list.splice(0, surplus);
     }
   }
 

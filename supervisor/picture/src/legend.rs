@@ -7,6 +7,7 @@ use super::{
     bands::Levels,
     cells::BelievedHazard,
     motion::{self, Motion},
+    movers::{self, Movers},
     page::{PLOT_LEFT, PLOT_SIDE, PLOT_TOP, Path, Px, View, ink, round_up, text},
     streamlines::arrowhead,
     world::Outline,
@@ -21,6 +22,7 @@ pub(super) struct Legend<'a> {
     pub(super) hazard: Option<&'a BelievedHazard>,
     pub(super) world: &'a Shapes,
     pub(super) motion: &'a Motion<'a>,
+    pub(super) movers: &'a Movers<'a>,
 }
 
 const COLUMN: f64 = PLOT_LEFT + PLOT_SIDE + 30.0;
@@ -81,6 +83,16 @@ impl Legend<'_> {
                 let mut path = Path::default();
                 path.circle(at, 9.0);
                 path.element(&motion::region_style())
+            });
+        }
+        if !self.movers.is_empty() {
+            column.row("way of what moves", line(movers::line()));
+        }
+        if let Some(seconds) = self.movers.period_s() {
+            column.row(&format!("it and the robot at {seconds} s"), |at: DVec2| {
+                let mut path = Path::default();
+                path.circle(at, 9.0);
+                path.element(&movers::disc()) + &movers::number(at, seconds)
             });
         }
         column.row("start", motion::start_mark);

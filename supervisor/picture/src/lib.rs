@@ -9,6 +9,7 @@
 //! | `cells` | hazard cells of the map |
 //! | `world` | real obstacles |
 //! | `motion` | trajectories, bodies, start, target |
+//! | `movers` | ways of things that moved |
 //! | `margin`, `legend` | title, axes, captions; symbols |
 //! | `page`, `lattice` | the page, and cells on it |
 //! | [`Scene`] | the data of a picture |
@@ -25,6 +26,7 @@ mod legend;
 mod map;
 mod margin;
 mod motion;
+mod movers;
 mod page;
 mod scene;
 mod streamlines;
@@ -41,7 +43,7 @@ pub use self::{
     chart::{Chart, Mark, Series},
     map::{FieldOnMap, map_svg},
     page::escape,
-    scene::{Facts, Scene},
+    scene::{Facts, Scene, Trail},
 };
 
 use self::{
@@ -50,6 +52,7 @@ use self::{
     lattice::Lattice,
     legend::Legend,
     motion::Motion,
+    movers::Movers,
     page::{PLOT_LEFT, PLOT_SIDE, PLOT_TOP, View, ink},
 };
 
@@ -79,6 +82,7 @@ pub fn svg(scene: &Scene<'_>) -> String {
         .map(|(frame, cells)| streamlines::layer(&lattice(frame), cells, &streamlines::MISSION));
     let hazard = grid.map(|(frame, cells)| BelievedHazard::of(&lattice(frame), cells));
     let motion = Motion::of(scene);
+    let movers = Movers::of(scene, &motion);
     let legend = Legend {
         view: &view,
         levels: bands.as_ref().map(|bands| bands.levels),
@@ -87,6 +91,7 @@ pub fn svg(scene: &Scene<'_>) -> String {
         hazard: hazard.as_ref(),
         world: &scene.mission.world,
         motion: &motion,
+        movers: &movers,
     };
 
     let layers = [
@@ -95,6 +100,7 @@ pub fn svg(scene: &Scene<'_>) -> String {
         hazard.as_ref().map(BelievedHazard::layer),
         Some(world::layer(&view, &scene.mission.world)),
         Some(motion.layer(&view)),
+        Some(movers.layer(&view)),
     ];
     let drawn: String = layers.into_iter().flatten().collect();
     let plot = format!(

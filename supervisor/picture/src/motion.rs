@@ -56,6 +56,16 @@ impl<'a> Motion<'a> {
         self.every.map(|(seconds, _)| seconds)
     }
 
+    /// Every second one of the times at which the robot's body is drawn, at most so many, and the robot.
+    pub(super) fn instants(&self, most: usize) -> Vec<(f64, &'a Pose2)> {
+        let Some((seconds, stride)) = self.every else {
+            return Vec::new();
+        };
+        let way = self.way();
+        let pose = |nth: f64| Some((nth * seconds, way.get((nth * stride).round() as usize)?));
+        (1..=most).map_while(|nth| pose(2.0 * nth as f64)).collect()
+    }
+
     pub(super) fn layer(&self, view: &View) -> String {
         let radius = view.px(self.scene.mission.body().radius_m);
         let start = self.scene.mission.start_pose();

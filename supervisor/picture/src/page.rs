@@ -17,7 +17,7 @@ const OVERHANG: f64 = 20.0;
 /// Shorter steps of a line cannot be seen.
 const FINEST: f64 = 0.6;
 
-/// Hue tells belief (orange, violet) from motion (black, magenta); the field stays pale below both.
+/// Hue tells belief (orange, violet) from motion (black, magenta) and that of others (red); the field stays pale below both.
 pub(super) mod ink {
     pub(crate) const TEXT: &str = "#1f2933";
     pub(crate) const QUIET: &str = "#5b6773";
@@ -30,6 +30,7 @@ pub(super) mod ink {
     pub(crate) const WORLD: &str = "#27313b";
     pub(crate) const TRUTH: &str = "#0b0f14";
     pub(crate) const BELIEVED: &str = "#d1126f";
+    pub(crate) const MOVER: &str = "#b3261e";
     pub(crate) const TARGET: &str = "#087f4b";
     pub(crate) const FAILURE: &str = "#c0271c";
 }

@@ -10,7 +10,7 @@ use common::{
 };
 use glam::DVec2;
 
-use super::{Facts, Scene, svg};
+use super::{Facts, Scene, Trail, svg};
 
 /// The owned data of a run.
 struct Run {
@@ -35,6 +35,7 @@ impl Run {
             covariance: Some([0.04, 0.03, 0.09]),
             truth: &self.truth,
             targets: &[],
+            trails: &[],
             facts: Facts {
                 outcome: "reached",
                 reached: true,
@@ -180,6 +181,12 @@ fn any_scene_makes_well_formed_xml_without_nan() {
         scene.facts.mission_time_s = dice.number();
         scene.facts.path_length_m = dice.number();
         scene.facts.straight_m = 0.0;
+        let mut places: Vec<_> =
+            dice.poses().iter().map(|pose| (dice.number(), pose.position)).collect();
+        places.sort_by(|one, other| one.0.total_cmp(&other.0));
+        let radius_m = dice.number();
+        let trails = [Trail { places: &places, radius_m }];
+        scene.trails = &trails;
         let picture = svg(&scene);
         assert_well_formed(&picture);
     }
@@ -268,4 +275,31 @@ fn the_region_of_the_believed_end_is_the_covariances_ellipse_of_95_percent() {
     assert!(diagonal.contains(&axes) && diagonal.contains("rotate(-45)"));
     scene.covariance = None;
     assert!(!svg(&scene).contains("<ellipse"));
+}
+
+#[test]
+fn what_moved_is_on_its_way_where_it_was_at_the_numbered_places_of_the_robot() {
+    let run = three_drums();
+    let mut scene = run.scene();
+    let without = svg(&scene);
+    assert!(!without.contains("what moves"), "there is no clutter without movers");
+    // It crosses in front of the robot, which takes 14 s, and a glimpse of something else is left out.
+    let at = |nth: u32| (f64::from(nth) * 0.5, DVec2::new(2.0, 2.0 - 0.2 * f64::from(nth)));
+    let places: Vec<_> = (0..16).map(at).collect();
+    let trails = [&places[..], &places[..2]].map(|places| Trail { places, radius_m: 0.25 });
+    scene.trails = &trails;
+    let picture = svg(&scene);
+    assert_well_formed(&picture);
+    assert!(picture.contains("way of what moves"));
+    let numbers =
+        |picture: &str, number: &str| picture.matches(&format!(">{number}</text>")).count();
+    let drawn = |number: &str| numbers(&picture, number) - numbers(&without, number);
+    // Bodies are 1 s apart, and every second one is numbered: twice while it is there and in the legend, then on the robot alone.
+    assert_eq!(["2", "4", "6", "8"].map(drawn), [3, 2, 2, 1]);
+    // At 4 s it is at (2, 0.4).
+    let view = super::View::of(&run.mission.grid_frame());
+    let centre = view.place(DVec2::new(2.0, 0.4));
+    let (x, y) = (super::page::Px(centre.x), super::page::Px(centre.y + 4.0));
+    let label = format!("<text x=\"{x}\" y=\"{y}\" text-anchor=\"middle\" font-size=\"12\"");
+    assert!(picture.contains(&label), "{label}");
 }

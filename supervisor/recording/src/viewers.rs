@@ -8,7 +8,7 @@ use common::{
     grid::{Cell, CellState, GridFrame},
     kinematics::Pose2,
     mission::{Mission, Sensor, SensorKind},
-    samples::{GridHeader, PoseSample, RangeReading, RangeStatus, RangesHeader, ScanHeader},
+    samples::{GridHeader, Mover, PoseSample, RangeReading, RangeStatus, RangesHeader, ScanHeader},
     topics::{self, AnyTopic},
 };
 use robot_state::{RobotState, Sample};
@@ -20,6 +20,7 @@ const POSE: &str = "foxglove/pose";
 const ODOMETRY: &str = "foxglove/odometry";
 const GRID: &str = "foxglove/grid";
 const SCENE: &str = "foxglove/scene";
+const MOVERS: &str = "foxglove/movers";
 /// The channel of log lines.
 pub const LOG: &str = "log";
 
@@ -69,6 +70,7 @@ pub fn channels(mission: Option<&Mission>) -> Vec<Channel> {
         channel!(ODOMETRY, "Odometry"),
         channel!(GRID, "Grid"),
         channel!(SCENE, "SceneUpdate"),
+        channel!(MOVERS, "SceneUpdate"),
         channel!(LOG, "Log"),
     ];
     let sensors = mission.map(Mission::sensor_table).unwrap_or_default();
@@ -87,6 +89,7 @@ pub struct Drawn {
     state: RobotState,
     grid_ns: Option<u64>,
     scene_ns: Option<u64>,
+    has_movers: bool,
 }
 
 impl Drawn {
@@ -98,6 +101,7 @@ impl Drawn {
             mission,
             grid_ns: None,
             scene_ns: None,
+            has_movers: false,
         }
     }
 
@@ -133,6 +137,11 @@ impl Drawn {
         {
             sink(GRID, grid(frame, map.cells(), time).bytes());
         }
+        let movers: Vec<_> = header.drawn_movers().collect();
+        // Without movers the entity is sent once more, empty, and takes the place of the last ones.
+        if std::mem::replace(&mut self.has_movers, !movers.is_empty()) || self.has_movers {
+            sink(MOVERS, Message::default().part(2, &drawn_movers(&movers, time)).bytes());
+        }
     }
 
     fn ranges(
@@ -164,9 +173,7 @@ impl Drawn {
 
     /// A `SceneUpdate`: the trajectory, the targets, the body, and its place within two standard deviations.
     fn scene(&self, time: &Message) -> Message {
-        // A `SceneEntity` that moves with its frame.
-        let entity =
-            |id: &str, frame: &str| framed(time, frame).text(3, id).integer(5, true.into());
+        let entity = |id: &str, frame: &str| entity(time, id, frame);
         // A `LinePrimitive` through all points.
         let trajectory = Message::default()
             .part(2, &pose(Pose2::default()))
@@ -192,6 +199,43 @@ impl Drawn {
         entities.push(entity("robot", BASE).parts(10, discs));
         Message::default().parts(2, entities)
     }
+}
+
+/// A `SceneEntity` that moves with its frame.
+fn entity(time: &Message, id: &str, frame: &str) -> Message {
+    framed(time, frame).text(3, id).integer(5, true.into())
+}
+
+/// A `SceneEntity` of what moves: discs, arrows to where they will be in 1 s, discs within which their surfaces are, and speeds.
+fn drawn_movers(movers: &[&Mover], time: &Message) -> Message {
+    let at =
+        |mover: &Mover| Pose2 { position: mover.place(), heading: mover.velocity().to_angle() };
+    let arrow = |mover: &&Mover| {
+        Message::default()
+            .part(1, &pose(at(mover)))
+            .number(2, 0.8 * mover.velocity().length())
+            .number(3, 0.06)
+            .number(4, 0.2 * mover.velocity().length())
+            .number(5, 0.15)
+            .part(6, &vector([0.7, 0.1, 0.1, 1.0]))
+    };
+    let discs = movers.iter().flat_map(|mover| {
+        let disc =
+            |radius_m: f64, alpha| disc(at(mover), [2.0 * radius_m; 2], [0.8, 0.1, 0.1, alpha]);
+        [disc(mover.radius_m.into(), 0.6), disc(mover.reach_m(), 0.2)]
+    });
+    let speed = |mover: &&Mover| {
+        Message::default()
+            .part(1, &pose(at(mover)))
+            .integer(2, true.into())
+            .number(3, 0.2)
+            .part(5, &vector([0.5, 0.0, 0.0, 1.0]))
+            .text(6, &format!("{:.1} m/s", mover.velocity().length()))
+    };
+    entity(time, "movers", MAP)
+        .parts(7, movers.iter().map(arrow))
+        .parts(10, discs)
+        .parts(13, movers.iter().map(speed))
 }
 
 fn draw_pose(sample: &PoseSample, time: &Message, sink: Sink<'_>) {

@@ -9,7 +9,10 @@ use common::{
 };
 use mission_control::{Heard, Listener};
 
-use crate::totals::{LookTotals, Totals, WheelTotals};
+use crate::{
+    totals::{LookTotals, Totals, WheelTotals},
+    trails::{Trail, Trails},
+};
 
 #[derive(Default)]
 pub struct Hearer {
@@ -21,6 +24,7 @@ pub struct Hearer {
     pub(crate) wheels: Totals<WheelTotals>,
     pub(crate) full_solves: Histogram,
     pub field: Replica<FieldCell>,
+    trails: Trails,
 }
 
 /// How often each cause of the failsafe took a robot that had gone to standing or to half speed.
@@ -70,6 +74,7 @@ impl Hearer {
             Heard::Field(part, cells) => {
                 self.field.apply(part, cells);
             }
+            Heard::Grid(grid) => self.trails.hear(grid),
             Heard::Link(link) => {
                 self.interruptions.hear(link);
                 self.links.insert(link.stamp.generation, **link);
@@ -85,6 +90,11 @@ impl Hearer {
             self.full_solves.record(guidance.full_solve_ns);
         }
         self.looks.add(stamp.tick, |totals| totals.with(guidance));
+    }
+
+    /// The ways of what moved, the oldest first.
+    pub fn trails(&self) -> &[Trail] {
+        &self.trails.0
     }
 
     /// Full solves of all generations of the planner, up to the sample `last`.

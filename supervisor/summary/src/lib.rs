@@ -2,6 +2,7 @@
 
 mod hearer;
 mod totals;
+mod trails;
 
 use std::{collections::BTreeMap, fmt};
 
@@ -10,8 +11,8 @@ use common::{
 };
 use serde::{Deserialize, Serialize};
 
-pub use self::hearer::Hearer;
 use self::totals::LookTotals;
+pub use self::{hearer::Hearer, trails::Trail};
 
 use mission_control::{
     Finished,

@@ -35,6 +35,7 @@ static GUIDE: &[Page] = guide! {
     "method",
     "mission-file",
     "simulation",
+    "what-moves",
     "your-robot",
     "operate",
     "attach",

@@ -11,7 +11,7 @@ use mission_control::{
     outcome::Outcome,
     target_list::{TargetOutcome, TargetResult},
 };
-use picture::{Facts, Scene};
+use picture::{Facts, Scene, Trail};
 use summary::{Hearer, Summary};
 
 /// Name and file, or why there is none.
@@ -55,6 +55,9 @@ fn svg(mission: &Mission, finished: &Finished, heard: &Hearer, summary: &Summary
         .filter(tried)
         .map(|target| DVec2::new(target.x_m, target.y_m))
         .collect();
+    let trails = heard.trails().iter();
+    let trails: Vec<_> =
+        trails.map(|it| Trail { places: &it.places, radius_m: it.radius_m }).collect();
     picture::svg(&Scene {
         mission,
         grid: record.grid.frame().map(|frame| (frame, record.grid.cells())),
@@ -66,6 +69,7 @@ fn svg(mission: &Mission, finished: &Finished, heard: &Hearer, summary: &Summary
         }),
         truth: &true_poses(&finished.truth),
         targets: &targets,
+        trails: &trails,
         facts: Facts {
             outcome: summary.outcome.as_str(),
             reached: summary.outcome == Outcome::Reached,

@@ -14,7 +14,7 @@ use common::{
     bus::{encode_sample, encode_slice},
     grid::{CellState, Part},
     mission::Mission,
-    samples::{GridHeader, PoseSample, RangeReading, RangeStatus, RangesHeader},
+    samples::{GridHeader, Mover, PoseSample, RangeReading, RangeStatus, RangesHeader},
 };
 use foxglove::{
     Decode, Encode, Schema,
@@ -65,7 +65,9 @@ fn sent() -> Sent {
     };
     slice("ranges", &mut |to| encode_slice(&RangesHeader::default(), &[reading], to));
     let frame = mission.grid_frame();
-    let header = GridHeader { part: Part::whole(frame, 1), ..GridHeader::default() };
+    let mut header = GridHeader { part: Part::whole(frame, 1), ..GridHeader::default() };
+    let mover = Mover { x_m: 3.0, vy_m_s: 0.5, radius_m: 0.25, doubt_m: 0.1, ..Mover::default() };
+    (header.movers[0], header.mover_count) = (mover, 1);
     let cells = vec![CellState::Sensed as u8; frame.area()];
     slice("grid", &mut |to| encode_slice(&header, &cells, to));
     viewers::log("mapper", "12.5  WARN missed a grid version", 7_000_000_009, &mut sink);
@@ -133,6 +135,17 @@ fn messages_have_what_viewers_draw() {
     assert_eq!(scene.entities[1].cylinders[0].pose.unwrap().position.unwrap().x, 4.0);
     assert_eq!(scene.entities[2].cylinders[0].size.unwrap().x, 0.8);
     assert_eq!(scene.entities[2].cylinders[0].color.unwrap().a, 0.4);
+    let movers: SceneUpdate = decoded(&sent, "foxglove/movers");
+    let [mover] = &movers.entities[..] else { panic!("{movers:?}") };
+    let turned = mover.arrows[0].pose.unwrap().orientation.unwrap();
+    assert!((2.0 * turned.z.atan2(turned.w) - FRAC_PI_2).abs() < 1e-12);
+    assert_eq!(mover.arrows[0].shaft_length + mover.arrows[0].head_length, 0.5, "of 1 s");
+    let widths = mover.cylinders.iter().map(|disc| disc.size.unwrap().x);
+    assert!(widths.zip([0.5, 0.9]).all(|(width, wanted)| (width - wanted).abs() < 1e-6));
+    assert_eq!(
+        (&*mover.texts[0].text, mover.cylinders[0].pose.unwrap().position.unwrap().x),
+        ("0.5 m/s", 3.0)
+    );
     let log: Log = decoded(&sent, "log");
     assert_eq!((log.level, &*log.name), (3, "mapper"));
     assert_eq!(log.message, "12.5  WARN missed a grid version");

@@ -5,8 +5,8 @@ use common::{
     kinematics::Pose2,
     mission::{Mission, Sensor, SensorKind},
     samples::{
-        Action, Cause, FieldCell, FieldHeader, GridHeader, PoseSample, RangeReading, RangeStatus,
-        RosterEntry, ScanHeader, StageState, TargetPoint, name_str,
+        Action, Cause, FieldCell, FieldHeader, GridHeader, Mover, PoseSample, RangeReading,
+        RangeStatus, RosterEntry, ScanHeader, StageState, TargetPoint, name_str,
     },
 };
 use glam::DVec2;
@@ -45,6 +45,7 @@ pub(crate) struct Shown {
     pub(crate) state: RobotState,
     /// The version of the last whole map that was published, and its time.
     map: Option<(u64, u64)>,
+    has_movers: bool,
     diagnosed: Option<(Vec<Status>, u64)>,
 }
 
@@ -57,6 +58,7 @@ impl Shown {
             state: RobotState::of_mission(&mission),
             mission,
             map: None,
+            has_movers: false,
             diagnosed: None,
         }
     }
@@ -150,7 +152,7 @@ impl Shown {
         }
     }
 
-    fn grid(&self, header: &GridHeader, cells: &[u8], now_ns: u64, sink: Sink<'_>) {
+    fn grid(&mut self, header: &GridHeader, cells: &[u8], now_ns: u64, sink: Sink<'_>) {
         let window = header.part.window();
         let is_whole = header.part.frame().whole() == window;
         if self.map.is_some() && !is_whole && window.area() > 0 {
@@ -158,6 +160,11 @@ impl Shown {
             let (first, size) = ([window.col, window.row], [window.width, window.height]);
             let header = Header(now_ns, MAP);
             sink(Id::MapUpdates, messages::map_update(header, first, size, &occupied));
+        }
+        let movers: Vec<_> = (0..).zip(header.drawn_movers()).flat_map(mover).collect();
+        // Without movers an empty array is published once more, which deletes the last ones.
+        if std::mem::replace(&mut self.has_movers, !movers.is_empty()) || self.has_movers {
+            sink(Id::Movers, messages::markers(Header(now_ns, MAP), &movers));
         }
     }
 
@@ -324,6 +331,28 @@ fn way(frame: GridFrame, cells: &[FieldCell], from: DVec2, to: DVec2) -> Vec<Pos
     let heading = way.last().map_or(0.0, |last| last[2]);
     way.push([at.x, at.y, heading]);
     way
+}
+
+fn mover((id, mover): (i32, &Mover)) -> [Marker; 3] {
+    let at = mover.place();
+    let disc = |namespace, radius_m: f64, alpha| Marker {
+        namespace,
+        id,
+        pose: [at.x, at.y, 0.0],
+        scale: [2.0 * radius_m, 2.0 * radius_m, 0.01],
+        color: [0.8, 0.1, 0.1, alpha],
+        ..Marker::default()
+    };
+    let way = Marker {
+        namespace: "in 1 s",
+        id,
+        shape: Shape::Lines,
+        scale: [0.05, 0.0, 0.0],
+        color: [0.8, 0.1, 0.1, 1.0],
+        points: vec![at.to_array(), (at + mover.velocity()).to_array()],
+        ..Marker::default()
+    };
+    [disc("movers", mover.radius_m.into(), 0.6), disc("doubt", mover.reach_m(), 0.2), way]
 }
 
 /// The direction of each cell that has one.

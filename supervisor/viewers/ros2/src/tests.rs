@@ -10,7 +10,7 @@ use common::{
     mission::Mission,
     samples::{
         CommandSample, CommandState, DirectiveSample, FieldCell, FieldHeader, GridHeader,
-        HoldReason, PoseSample, ScanHeader, TargetPoint, TargetSample,
+        HoldReason, Mover, PoseSample, ScanHeader, TargetPoint, TargetSample,
     },
 };
 use glam::DVec2;
@@ -362,4 +362,44 @@ fn a_path_leads_along_the_field_and_ends_where_there_is_no_direction() {
     let ends = frame.centre_of(Cell { col: 12, row: 10 }).x;
     assert!((path(&cells)[0] - ends).abs() < 0.06, "{:?}", path(&cells));
     assert_eq!(path(&vec![FieldCell { ex: f32::NAN, ..ahead }; 400]), [0.0; 2]);
+}
+
+#[test]
+fn what_moves_is_markers_of_its_disc_doubt_and_way_and_they_are_deleted_when_it_is_gone() {
+    let mut shown = shown();
+    let mut header = GridHeader {
+        part: Part::whole(GridFrame { cells: 10, resolution_m: 0.1, centre: DVec2::ZERO }, 1),
+        ..GridHeader::default()
+    };
+    let mut published_of = |header: &GridHeader| {
+        let sample = Sample::Grid(*header, vec![CellState::Free as u8; 100]);
+        published(|sink| shown.sample(&sample, 0, sink))
+    };
+    assert!(published_of(&header).is_empty(), "no robot without a laser has the topic");
+    let mover = Mover { x_m: 3.0, vy_m_s: 0.5, radius_m: 0.25, doubt_m: 0.1, ..Mover::default() };
+    header.movers[..2].copy_from_slice(&[mover, Mover { x_m: f32::NAN, ..mover }]);
+    header.mover_count = 2;
+    let disc = |namespace, width_m: f64, alpha| Marker {
+        namespace,
+        pose: [3.0, 0.0, 0.0],
+        scale: [width_m, width_m, 0.01],
+        color: [0.8, 0.1, 0.1, alpha],
+        ..Marker::default()
+    };
+    let way = Marker {
+        namespace: "in 1 s",
+        shape: Shape::Lines,
+        scale: [0.05, 0.0, 0.0],
+        color: [0.8, 0.1, 0.1, 1.0],
+        points: vec![[3.0, 0.0], [3.0, 0.5]],
+        ..Marker::default()
+    };
+    let reach_m = mover.reach_m();
+    let wanted = [disc("movers", 0.5, 0.6), disc("doubt", 2.0 * reach_m, 0.2), way];
+    let markers =
+        |wanted: &[Marker]| vec![(Id::Movers, messages::markers(Header(0, "map"), wanted))];
+    assert_eq!(published_of(&header), markers(&wanted));
+    header.mover_count = 0;
+    assert_eq!(published_of(&header), markers(&[]));
+    assert!(published_of(&header).is_empty());
 }

@@ -14,6 +14,7 @@ pub(crate) enum Id {
     MapUpdates,
     Path,
     Field,
+    Movers,
     /// The sensor in this row of the mission; in the table, any.
     Scan(usize),
     /// Likewise.
@@ -88,6 +89,8 @@ table! {
         "the way along the field from the robot to its target";
     Id::Field => "field", visualization_msgs / MarkerArray, false, None,
         "the field's directions, one for several cells, and the targets";
+    Id::Movers => "movers", visualization_msgs / MarkerArray, false, None,
+        "what moves, by the laser: its disc and its way of the next second; paler, where it is within two deviations";
     Id::Scan(0) => "scan/SENSOR", sensor_msgs / LaserScan, false, None,
         "the beams of each laser that the mission uses; `scan` of one alone";
     Id::Range(0) => "range/SENSOR", sensor_msgs / Range, false, None,
