@@ -233,23 +233,26 @@ impl Around<'_> {
         let start = self.start(from)?;
         let side = self.frame.cells as usize;
         let mut costs = vec![u32::MAX; self.frame.area()];
-        let mut next = BinaryHeap::from([Reverse((0, self.frame.index(start)))]);
+        // No way over the cells to the circle around the beacon costs less: the search goes there first.
+        let least_cost = |at: DVec2| {
+            let way_m = (at.distance(self.beacon) - distance_m).max(0.0);
+            (way_m / self.frame.resolution_m * 9.8) as u32
+        };
+        let mut next = BinaryHeap::from([Reverse((0, 0, self.frame.index(start)))]);
         costs[self.frame.index(start)] = 0;
         let mut best: Option<(f64, DVec2)> = None;
-        while let Some(Reverse((cost, index))) = next.pop() {
+        while let Some(Reverse((_, cost, index))) = next.pop() {
             if cost > costs[index] {
                 continue;
             }
             let cell = Cell { col: (index % side) as u32, row: (index / side) as u32 };
             let at = self.frame.centre_of(cell);
             let off_m = at.distance(self.beacon);
-            if cost == 0 || off_m >= self.least_m {
-                if off_m <= distance_m && self.sees(at) {
-                    return Some(at);
-                }
-                if best.is_none_or(|(least_m, _)| off_m < least_m) {
-                    best = Some((off_m, at));
-                }
+            if off_m <= distance_m && self.sees(at) {
+                return Some(at);
+            }
+            if best.is_none_or(|(least_m, _)| off_m < least_m) {
+                best = Some((off_m, at));
             }
             for (col, row, step) in NEXT {
                 let (Some(col), Some(row)) =
@@ -264,7 +267,8 @@ impl Around<'_> {
                 let index = self.frame.index(cell);
                 if cost + step < costs[index] {
                     costs[index] = cost + step;
-                    next.push(Reverse((cost + step, index)));
+                    let whole = cost + step + least_cost(self.frame.centre_of(cell));
+                    next.push(Reverse((whole, cost + step, index)));
                 }
             }
         }

@@ -351,7 +351,11 @@ impl fmt::Display for Status<'_> {
             )?;
             match following.refusal {
                 Some(why) => {
-                    writeln!(f, "; {} samples refused, the newest: {why}", following.refused)?;
+                    writeln!(
+                        f,
+                        "; samples refused: {}, the newest because {why}",
+                        following.refused
+                    )?;
                 }
                 None => writeln!(f)?,
             }
