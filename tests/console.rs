@@ -92,6 +92,8 @@ fn echo_prints_every_topic_with_the_fields_of_its_layout() {
             "scan_fix",
             "fix",
             "turn",
+            "beacon",
+            "following",
             "imu_turn",
             "deaths",
             "stalls",

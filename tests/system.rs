@@ -20,6 +20,7 @@ mod failsafe;
 mod faults;
 mod field;
 mod fixes;
+mod follow;
 mod foreign_payload;
 mod goto;
 mod held_wheels;

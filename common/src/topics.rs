@@ -71,6 +71,10 @@ macro_rules! topics {
 topics! {
     /// Where the robot is sent: the current target, and those after it.
     TARGET "target": TargetSample, SUPERVISOR, on_change(RESTATE);
+    /// Where the thing is that the robot follows. Any consumer may publish it.
+    BEACON "beacon": BeaconSample, OPERATOR, Rate::WhenItHappens;
+    /// How the robot follows the beacon, from the first request to do so on.
+    FOLLOWING "following": FollowingSample, SUPERVISOR, on_change(RESTATE);
     /// The keep-out zones, if operators changed those of the mission.
     ZONES "zones": ZonesHeader ZoneCorner, SUPERVISOR, on_change(RESTATE), limits: Limits::slices(MOST_ZONES * MOST_CORNERS);
     /// Readings of the sonars and infrared rangers, one for each row of the mission's sensors.

@@ -53,6 +53,33 @@ payloads! {
     }
 }
 
+payloads! {
+    /// Where a source outside heard or saw the thing that the robot follows.
+    "firsthand.Beacon" BeaconSample {
+        /// Mission time of the measurement, nanoseconds; at most 1 s ago.
+        capture_ns: u64,
+        source: Name,
+        /// The middle of the thing, metres in the mission frame.
+        x_m: f64,
+        y_m: f64,
+        /// Standard deviation of x as of y, metres.
+        deviation_m: f64,
+    }
+}
+
+wire_enum! {
+    /// The reason why the supervisor did not use a sample of the beacon.
+    BeaconRefusal, unknown = None, text = words {
+        None = 0 "none",
+        Late = 1 "it is more than 1 s old, or older than the one before; publish it sooner",
+        /// More than a tick after now.
+        Future = 2 "its capture time is in the future; give mission time",
+        NotFinite = 3 "it has a number that is not finite, or a negative deviation",
+        Doubtful = 4 "its deviation is more than 0.25 m",
+        Outside = 5 "it is outside the perimeter",
+    }
+}
+
 wire_enum! {
     /// The reason why dead reckoning did not use a fix.
     FixRefusal, unknown = None, text = words {

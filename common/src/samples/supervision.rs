@@ -113,6 +113,8 @@ wire_enum! {
         Ending = 4,
         /// There is no target: the robot waits for the next one.
         Waiting = 5,
+        /// What the robot follows was not heard for a while, or not yet: it goes on when it is.
+        Lost = 6,
     }
 }
 
@@ -297,6 +299,63 @@ impl Serialize for StallSample {
     }
 }
 
+wire_enum! {
+    FollowState, unknown = Lost {
+        /// The following is over.
+        Ended = 0,
+        Heard = 1,
+        /// Not heard for 1 s, or not yet: the robot stands.
+        Lost = 2,
+    }
+}
+
+payloads! {
+    /// How the robot follows a beacon, and how it followed the last one.
+    "firsthand.Following" FollowingSample {
+        /// A [`FollowState`].
+        state: u8,
+        /// A [`BeaconRefusal`](super::BeaconRefusal), the newest.
+        refusal: u8,
+        /// The distance that the robot keeps between its centre and the beacon, metres.
+        distance_m: f64,
+        /// The newest beacon that was used, metres in the mission frame.
+        x_m: f64,
+        y_m: f64,
+        /// Mission time at which that was captured, nanoseconds; u64::MAX for never.
+        heard_ns: u64,
+        /// Samples of the beacon.
+        used: u64,
+        refused: u64,
+        /// Times that the beacon was lost after it was heard.
+        lost: u64,
+        /// The way and the time of the robot meanwhile.
+        followed_m: f64,
+        followed_s: f64,
+    }
+}
+
+impl FollowingSample {
+    pub const fn state(&self) -> FollowState {
+        FollowState::from_byte(self.state)
+    }
+
+    /// Seconds at mission time `now_s` since the beacon was heard; none if it never was.
+    pub fn heard_ago_s(&self, now_s: f64) -> Option<f64> {
+        (self.heard_ns != u64::MAX).then(|| (now_s - self.heard_ns as f64 * 1e-9).max(0.0))
+    }
+
+    /// The result of the following so far.
+    pub fn result(&self) -> String {
+        let lost = match self.lost {
+            0 => "never lost".to_owned(),
+            1 => "lost once".to_owned(),
+            2 => "lost twice".to_owned(),
+            times => format!("lost {times} times"),
+        };
+        format!("followed {:.0} m for {:.0} s, {lost}", self.followed_m, self.followed_s)
+    }
+}
+
 /// A robot that a hand drives stands so long after the hand's last request.
 pub const DEAD_MAN: Duration = Duration::from_millis(300);
 
@@ -320,6 +379,10 @@ wire_enum! {
         /// Driven by hand: towards the target, which is ahead and to the left of the robot, in shares of full speed. It stands without
         /// another such request within [`DEAD_MAN`].
         Hand = 9,
+        /// Follow the beacon, at the distance that is the first of the deviations.
+        Follow = 10,
+        /// Follow no longer, and wait for a target.
+        EndFollow = 11,
     }
 }
 
@@ -340,7 +403,9 @@ wire_enum! {
         NoZone = 11 "a zone has 3 to 16 corners, and there are 16 zones at most",
         ZoneHere = 12 "the robot stands in that zone, or reaches into it; drive away first",
         NotInZone = 13 "no zone is there",
-        NotStaying = 14 "a hand drives a robot that stays; start it with `--stay`",
+        NotStaying = 14 "only a robot that stays is driven by hand or follows; start it with `--stay`",
+        TooNear = 15 "at that distance the robot could touch what it follows; give 0.3 m more than its radius, or more, and 10 m at most",
+        NotFollowing = 16 "the robot follows nothing",
     }
 }
 
@@ -358,7 +423,7 @@ payloads! {
         /// A [`RequestAnswer`], in `orders`.
         answer: u8,
         targets: [TargetPoint; MOST_TARGETS],
-        /// Standard deviations of a place, metres, and its heading, radians.
+        /// Standard deviations of a place, metres, and its heading, radians. Of a following the first is its distance, metres.
         deviations: [f64; 2],
     }
 }

@@ -8,6 +8,7 @@ pub const fn order(order: Order, reason: HoldReason) -> &'static str {
             HoldReason::Operator => "stopped by an operator",
             HoldReason::StageHeld => "stopped, a stage is held",
             HoldReason::Waiting => "waiting for a target",
+            HoldReason::Lost => "lost what it follows",
             HoldReason::Starting | HoldReason::None | HoldReason::Ending => "starting",
         },
         Order::Drive => "driving",

@@ -11,8 +11,9 @@ use common::{
     clock::MissionTime,
     mission::{MOST_CORNERS, MOST_ZONES},
     samples::{
-        DeathSample, DirectiveSample, PlaceSample, RequestAnswer, RequestSample, RosterEntry,
-        RosterHeader, StallSample, TargetSample, TickLimitSample, ZoneCorner, ZonesHeader,
+        BeaconSample, DeathSample, DirectiveSample, FollowingSample, PlaceSample, RequestAnswer,
+        RequestSample, RosterEntry, RosterHeader, StallSample, TargetSample, TickLimitSample,
+        ZoneCorner, ZonesHeader,
     },
     topics,
     waiter::Waiter,
@@ -30,6 +31,7 @@ pub(crate) struct BusEndpoints {
     pub waiter: Waiter,
     pub target: Writer<TargetSample>,
     pub place: Writer<PlaceSample>,
+    pub following: Writer<FollowingSample>,
     pub zones: Writer<ZonesHeader, ZoneCorner>,
     directive: Writer<DirectiveSample>,
     pub tick_limit: Writer<TickLimitSample>,
@@ -38,6 +40,7 @@ pub(crate) struct BusEndpoints {
     stalls: Writer<StallSample>,
     orders: Writer<RequestSample>,
     pub requests: Reader<RequestSample>,
+    pub beacon: Reader<BeaconSample>,
     /// The request that was answered last, and the answer, which the roster has; 0 for none.
     pub last_request: (u64, RequestAnswer),
     published: Option<Instant>,
@@ -60,11 +63,13 @@ impl BusEndpoints {
         let mut waiter = Waiter::default();
         let observer = Observer::new(&bus, &mut waiter, record)?;
         waiter.on(bus.wakeup(&topics::REQUESTS)?);
+        waiter.on(bus.wakeup(&topics::BEACON)?);
         Ok(Self {
             observer,
             waiter,
             target: bus.writer(&topics::TARGET, 1)?,
             place: bus.writer(&topics::PLACE, 1)?,
+            following: bus.writer(&topics::FOLLOWING, 1)?,
             zones: bus.slice_writer(&topics::ZONES, 1, MOST_ZONES * MOST_CORNERS)?,
             directive: bus.writer(&topics::DIRECTIVE, 1)?,
             tick_limit: bus.writer(&topics::TICK_LIMIT, 1)?,
@@ -73,6 +78,7 @@ impl BusEndpoints {
             stalls: bus.writer(&topics::STALLS, 1)?,
             orders: bus.writer(&topics::ORDERS, 1)?,
             requests: bus.reader(&topics::REQUESTS)?,
+            beacon: bus.reader(&topics::BEACON)?,
             last_request,
             published: None,
             bus,

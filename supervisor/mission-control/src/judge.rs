@@ -130,7 +130,7 @@ impl Snapshot<'_> {
     fn stuck(&self, now: Now) -> Option<Ending> {
         let may_wait = match self.reason {
             HoldReason::None => self.may_be_away,
-            HoldReason::Operator | HoldReason::Waiting => true,
+            HoldReason::Operator | HoldReason::Waiting | HoldReason::Lost => true,
             // In wall-clock time the mission's timeout ends such a mission.
             HoldReason::StageHeld => !self.in_ticks,
             HoldReason::Starting | HoldReason::Ending => false,

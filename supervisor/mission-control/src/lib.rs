@@ -31,6 +31,7 @@
 //! | `recovery_step` | when a recovery step is carried out, and in lockstep how far the link may go meanwhile, pure |
 //! | `run`, `shutdown` | a run from start to end; the robot to rest and the stages stopped |
 //! | [`target_list`], `requests` | the robot's targets, pure; operators' requests, and the next target |
+//! | `following`, `follow` | how a beacon is followed, pure; its samples, and the target that moves with it |
 //! | [`operator`] | requests of an operator, in any process |
 //! | `bus_endpoints`, `observer` | what the supervisor reads from and writes to the bus |
 //! | `long_record` | records of each tick that stay bounded, pure |
@@ -43,6 +44,8 @@
 mod bus_endpoints;
 mod decisive;
 mod error;
+mod follow;
+mod following;
 mod judge;
 mod long_record;
 mod observer;

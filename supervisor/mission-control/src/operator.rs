@@ -71,6 +71,8 @@ const fn code(answer: RequestAnswer) -> &'static str {
         RequestAnswer::ZoneHere => "zone-here",
         RequestAnswer::NotInZone => "not-in-zone",
         RequestAnswer::NotStaying => "not-staying",
+        RequestAnswer::TooNear => "too-near",
+        RequestAnswer::NotFollowing => "not-following",
     }
 }
 
@@ -101,7 +103,7 @@ pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
     let run = Run::load(&domain.run_directory());
     if link.is_none() && run.is_err() {
         request_stop(robot, asked_ns)?;
-        return await_rest(robot).map(|()| None);
+        return await_rest(robot, stopped_for_good).map(|()| None);
     }
     let supervisor = tell_supervisor(robot, asked_ns)?;
     let rests = match (link, run) {
@@ -115,7 +117,7 @@ pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
         Err(why) if rests => Ok(Some(why.to_string())),
         Err(why) => Err(why),
         Ok(()) if rests => Ok(None),
-        Ok(()) => await_rest(robot).map(|()| None),
+        Ok(()) => await_rest(robot, stopped_for_good).map(|()| None),
     }
 }
 
@@ -176,8 +178,8 @@ fn told(mut teller: Child) -> Result<(), OperatorError> {
     }
 }
 
-/// Wait until the link says that it stopped the robot, and the encoders say that the robot rests.
-fn await_rest(robot: &RobotName) -> Result<(), OperatorError> {
+/// Wait until the link says that it stopped the robot, and the encoders say that the robot rests, as `rests` says of what it tells.
+fn await_rest(robot: &RobotName, rests: impl Fn(&LinkSample) -> bool) -> Result<(), OperatorError> {
     let bus = roster::join(&Domain::of(robot.clone()), "operator")?;
     let mut links = bus.reader(&topics::LINK)?;
     let mut waiter = Waiter::default();
@@ -186,7 +188,7 @@ fn await_rest(robot: &RobotName) -> Result<(), OperatorError> {
     let mut newest = None;
     while began.elapsed() < REST_PATIENCE {
         newest = links.newest()?.or(newest);
-        if newest.as_ref().is_some_and(rests) {
+        if newest.as_ref().is_some_and(&rests) {
             return Ok(());
         }
         waiter.wait(topics::LINK.spec().restated_every())?;
@@ -207,7 +209,7 @@ fn await_rest(robot: &RobotName) -> Result<(), OperatorError> {
 }
 
 /// Whether the link stops the robot for the operator, or ends the mission, and the robot rests.
-fn rests(link: &LinkSample) -> bool {
+fn stopped_for_good(link: &LinkSample) -> bool {
     let stopped = link.cause() == Cause::OperatorStop || link.action() == Action::End;
     stopped && link.at_rest == 1
 }
@@ -262,6 +264,17 @@ pub fn drive_by_hand(robot: &RobotName, stick: DVec2) -> Result<(), OperatorErro
     ask_with(robot, RequestKind::Hand, &[TargetPoint::at(stick)], [0.0; 2])
 }
 
+/// Follow the beacon at `distance_m`, 0 for the robot's own default.
+pub fn follow(robot: &RobotName, distance_m: f64) -> Result<(), OperatorError> {
+    ask_with(robot, RequestKind::Follow, &[], [distance_m, 0.0])
+}
+
+/// Follow the beacon no longer. Returns when the robot rests.
+pub fn end_follow(robot: &RobotName) -> Result<(), OperatorError> {
+    ask_with(robot, RequestKind::EndFollow, &[], [0.0; 2])?;
+    await_rest(robot, |link| link.stopped() && link.at_rest == 1)
+}
+
 /// Add the keep-out zone with these corners, or remove those that hold a place.
 pub fn change_zones(
     robot: &RobotName,
@@ -304,8 +317,10 @@ fn ask(robot: &RobotName, request: RequestSample) -> Result<(), OperatorError> {
     // The roster is opened first, so that the answer is not missed.
     let mut roster = Roster::open(&bus)?;
     let mut requests = bus.writer(&topics::REQUESTS, 1)?;
-    let goes =
-        matches!(RequestKind::from_byte(request.kind), RequestKind::Goto | RequestKind::Append);
+    let goes = matches!(
+        RequestKind::from_byte(request.kind),
+        RequestKind::Goto | RequestKind::Append | RequestKind::Follow
+    );
     if goes {
         // A supervisor that starts does not read yet. A hand's requests come too often to wait for a roster each time.
         roster.find(PATIENCE, |_, _| Some(()))?;

@@ -15,6 +15,8 @@ pub(crate) struct Snapshot {
     pub stage_held: bool,
     /// The robot has no target any more.
     pub waits: bool,
+    /// The robot follows something that it does not hear.
+    pub lost: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,7 +37,8 @@ impl Decision {
             HoldReason::Starting
             | HoldReason::Operator
             | HoldReason::StageHeld
-            | HoldReason::Waiting => Order::Hold,
+            | HoldReason::Waiting
+            | HoldReason::Lost => Order::Hold,
         }
     }
 }
@@ -50,6 +53,8 @@ pub(crate) const fn decide(snapshot: &Snapshot) -> Decision {
         HoldReason::Operator
     } else if snapshot.stage_held {
         HoldReason::StageHeld
+    } else if snapshot.lost {
+        HoldReason::Lost
     } else if snapshot.waits {
         HoldReason::Waiting
     } else {
@@ -71,6 +76,7 @@ mod tests {
         operator_stop: false,
         stage_held: false,
         waits: false,
+        lost: false,
     };
     /// The robot has driven, and now nothing is as it should be.
     const ALL_LOST: Snapshot = Snapshot {
@@ -92,6 +98,7 @@ mod tests {
             ("once ready stays ready", ALL_LOST, HoldReason::None),
             ("an operator's stop holds", Snapshot { operator_stop: true, ..CAN_START }, HoldReason::Operator),
             ("a robot without a target waits", Snapshot { waits: true, ..CAN_START }, HoldReason::Waiting),
+            ("a robot that lost what it follows holds", Snapshot { lost: true, waits: true, ..CAN_START }, HoldReason::Lost),
             ("a held stage holds", Snapshot { stage_held: true, ..CAN_START }, HoldReason::StageHeld),
             ("starting comes before an operator's stop",
              Snapshot { field_known: false, operator_stop: true, ..CAN_START }, HoldReason::Starting),
@@ -112,6 +119,7 @@ mod tests {
             (HoldReason::Operator, Order::Hold),
             (HoldReason::StageHeld, Order::Hold),
             (HoldReason::Waiting, Order::Hold),
+            (HoldReason::Lost, Order::Hold),
             (HoldReason::Ending, Order::Stop),
         ];
         for (reason, order) in rows {

@@ -17,7 +17,7 @@ use dead_reckoning::{saved_place, saved_state};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::target_list::TargetList;
+use crate::{following::Following, target_list::TargetList};
 
 /// Room for the encoded [`SupervisorState`], bytes: its targets and their results take under 10,000, its zones 5,000.
 const CAPACITY: usize = 18 << 10;
@@ -32,6 +32,7 @@ pub struct SupervisorState {
     pub operator_stopped_s: f64,
     pub resumes: u32,
     pub(crate) targets: Option<TargetList>,
+    pub(crate) following: Option<Following>,
     /// The newest that an operator set; number 0 for none.
     pub(crate) place: PlaceSample,
     /// Those that operators left, and how often they changed them; none for the mission's.

@@ -18,7 +18,7 @@ use crate::{
     error::Result,
     outcome::{Ending, Outcome, allowed_m},
     supervisor::Supervisor,
-    target_list,
+    target_list::{self, TargetOutcome},
 };
 
 /// A hand's target is so much farther ahead than the robot slows down, metres: it moves on with each request.
@@ -69,6 +69,8 @@ impl Supervisor<'_> {
                 return self.send_robot(request, kind == RequestKind::Append, first_tick);
             }
             RequestKind::Place => return self.place_robot(request),
+            RequestKind::Follow => return self.follow(request),
+            RequestKind::EndFollow => return self.end_follow(),
             RequestKind::Hand => return self.drive_by_hand(request, first_tick),
             kind @ (RequestKind::AddZone | RequestKind::RemoveZone) => {
                 return self.change_zones(request, kind == RequestKind::AddZone);
@@ -88,7 +90,10 @@ impl Supervisor<'_> {
         if !self.options.mission.contains(point.position()) {
             return RequestAnswer::Outside;
         }
-        let stands_by = matches!(self.decision.reason, HoldReason::Operator | HoldReason::Waiting);
+        let stands_by = matches!(
+            self.decision.reason,
+            HoldReason::Operator | HoldReason::Waiting | HoldReason::Lost
+        );
         let link = self.bus.observer.record.link;
         if !stands_by || link.is_none_or(|link| link.rest() != Rest::AtRest) {
             return RequestAnswer::Moves;
@@ -156,6 +161,7 @@ impl Supervisor<'_> {
     }
 
     fn replace_targets(&mut self, points: &[TargetPoint], first_tick: u64) {
+        self.end_following(TargetOutcome::Followed);
         let limit = self.recovery_steps.limit();
         let since_tick = limit.map_or(first_tick, |limit| limit.last_tick + 1);
         let arrival = self.bus.observer.record.sure_arrival(&self.options.mission);
@@ -202,7 +208,7 @@ impl Supervisor<'_> {
     }
 
     /// The link may obey an operator before the supervisor does.
-    fn why_held(&self) -> HoldReason {
+    pub(crate) fn why_held(&self) -> HoldReason {
         let link = self.bus.observer.record.link;
         let stopped = self.state_file.state.operator_stop
             || link.is_some_and(|link| link.cause() == Cause::OperatorStop);
@@ -224,7 +230,9 @@ impl Supervisor<'_> {
             reason = ending.reason,
             "the robot waits for its next target"
         );
-        self.targets.settle(ending.outcome, now_s, arrival);
+        if !self.end_following(TargetOutcome::Unreachable) {
+            self.targets.settle(ending.outcome, now_s, arrival);
+        }
         self.stall_watch.settle();
         self.await_target();
         true
@@ -265,7 +273,7 @@ impl Supervisor<'_> {
         tracing::info!(number, last, x_m, y_m, "the robot is sent to its next target");
     }
 
-    fn on_new_target(&mut self) {
+    pub(crate) fn on_new_target(&mut self) {
         self.bus.observer.record.target_number = self.targets.number();
         self.bus.observer.record.arrival = None;
         self.arrived = None;

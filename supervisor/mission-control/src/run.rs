@@ -15,7 +15,7 @@ use crate::{
     outcome::{Ending, Wheels, allowed_m},
     progress::Progress,
     supervisor::{Options, Supervisor},
-    target_list::{self, TargetResult},
+    target_list::{self, TargetOutcome, TargetResult},
 };
 
 pub struct Finished {
@@ -126,6 +126,7 @@ pub fn run<'a>(
     turns.end();
     let ending = ending?;
     let wheels = stopped?;
+    supervisor.end_following(TargetOutcome::Followed);
     let end_by_stall = supervisor.end_by_stall();
     let deadline = supervisor.deadline();
     let mut truth = supervisor.robot.truth().to_vec();

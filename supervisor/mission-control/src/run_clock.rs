@@ -46,6 +46,14 @@ impl RunClock {
         matches!(self.clock, MissionClock::Ticks { .. })
     }
 
+    /// The tick at mission time `at_ns`; none in wall-clock time.
+    pub(crate) fn tick_at(&self, at_ns: u64) -> Option<u64> {
+        match self.clock {
+            MissionClock::Ticks { period_ns } => at_ns.checked_div(period_ns),
+            MissionClock::Wall { .. } => None,
+        }
+    }
+
     /// The tick that a new generation of a stage starts from: the one after `newest`, the newest tick of any sample.
     pub(crate) fn first_tick(&self, newest: Option<u64>) -> u64 {
         // The link publishes tick 0 before its first tick.

@@ -60,7 +60,7 @@ impl Supervisor<'_> {
         let stopped =
             record.link.is_none_or(|link| link.stopped() && link.cause() != Cause::WheelsHeld);
         // In lockstep mission time stands still while something holds the robot.
-        let held = !in_ticks && (stopped || !self.stages.all_running());
+        let held = !in_ticks && (stopped || !self.stages.all_running()) || self.stands_beside();
         if held {
             self.stall_watch.forget_motion();
         }
@@ -120,7 +120,12 @@ impl Supervisor<'_> {
     pub(crate) fn publish_tick_limit(&mut self) -> Result {
         let target_number = self.targets.number();
         let limit = self.recovery_steps.limit();
-        let limit = limit.map(|limit| TickLimitSample { target_number, ..limit });
+        let beacon = self.beacon_limit().unwrap_or(u64::MAX);
+        let limit = limit.map(|limit| TickLimitSample {
+            target_number,
+            last_tick: limit.last_tick.min(beacon),
+            ..limit
+        });
         if std::mem::replace(&mut self.published_limit, limit) != limit
             && let Some(limit) = limit
         {

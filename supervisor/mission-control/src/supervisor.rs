@@ -30,6 +30,8 @@ use crate::{
     bus_endpoints::BusEndpoints,
     decisive,
     error::Result,
+    follow::Beacon,
+    following::Following,
     judge::{self, Arrival, Deadline, StopClock, TickProgress},
     observer::Listener,
     order::{self, Decision},
@@ -41,7 +43,7 @@ use crate::{
     run_clock::RunClock,
     simulator::{Simulator, SimulatorError},
     stall::StallWatch,
-    target_list::TargetList,
+    target_list::{TargetList, TargetOutcome},
 };
 
 pub struct Options {
@@ -116,6 +118,7 @@ pub(crate) struct Supervisor<'a> {
     pub targets: TargetList,
     /// Then the hand that drives the robot is missed.
     pub hand_until: Option<Instant>,
+    pub beacon: Beacon,
     /// The time when the arrival was first seen.
     pub arrived: Option<Now>,
     stop_clock: StopClock,
@@ -163,6 +166,7 @@ impl<'a> Supervisor<'a> {
         let mut targets = targets.unwrap_or_else(|| TargetList::of(mission));
         // A hand that drove the robot before must push again.
         targets.release();
+        state_file.state.following.iter_mut().for_each(Following::resumed);
         let mut supervisor = Self {
             options,
             stages: StageProcesses::new(directory.clone(), options.starter, mission),
@@ -177,6 +181,7 @@ impl<'a> Supervisor<'a> {
             tick_progress: TickProgress::new(Now::ZERO),
             targets,
             hand_until: None,
+            beacon: Beacon::default(),
             arrived: None,
             stop_clock: StopClock::default(),
             stall_watch: StallWatch::new(mission),
@@ -227,6 +232,7 @@ impl<'a> Supervisor<'a> {
         let mut catch_up_at = self.clock.in_ticks().then_some(0);
         loop {
             if signals.came() {
+                self.end_following(TargetOutcome::Followed);
                 let (outcome, reason) = match self.targets.outcome_while_waiting() {
                     Some(outcome) => (outcome, "stopped by a signal while it waited for a target"),
                     None => (Outcome::Aborted, "stopped by a signal"),
@@ -258,7 +264,7 @@ impl<'a> Supervisor<'a> {
 
     fn iterate(&mut self) -> Result<Option<Ending>> {
         let roster_changed = self.bus.observer.read_all(&mut self.stages, &mut self.listener)?;
-        let next = self.take_arrival() | self.miss_hand();
+        let next = self.take_arrival() | self.miss_hand() | self.take_beacon()?;
         let first_tick = self.first_tick();
         let asked = self.take_requests(first_tick)?;
         let died = self.poll_processes(first_tick)?;
@@ -306,6 +312,7 @@ impl<'a> Supervisor<'a> {
             operator_stop: self.state_file.state.operator_stop,
             stage_held: !self.stages.held().is_empty(),
             waits: self.targets.waits(),
+            lost: self.state_file.state.following.is_some_and(|following| following.is_lost()),
         });
         if decision.ready && !self.decision.ready {
             tracing::info!("all stages ready");
@@ -326,7 +333,9 @@ impl<'a> Supervisor<'a> {
         let record = &self.bus.observer.record;
         let target = self.targets.current().position();
         let newest_m = record.pose.map(|pose| target.distance(pose.pose().position));
-        let arrival = record.arrival.filter(|_| self.targets.is_last()).map(|command| Arrival {
+        // A robot that follows goes on when the beacon does.
+        let ends = self.targets.is_last() && !self.targets.follows();
+        let arrival = record.arrival.filter(|_| ends).map(|command| Arrival {
             distance_m: newest_m.unwrap_or(command.distance_m),
             since: *self.arrived.get_or_insert(now),
         });
@@ -360,9 +369,9 @@ impl<'a> Supervisor<'a> {
         self.clock.now(self.bus.observer.record.pose.as_ref(), self.robot.truth().last())
     }
 
-    /// The deadline of the current target; a robot that waits for a target has any time.
+    /// The deadline of the current target; a robot that waits for a target, or follows one, has any time.
     pub(crate) const fn deadline(&self) -> Deadline {
-        let timeout_s = match self.targets.waits() {
+        let timeout_s = match self.targets.waits() || self.targets.follows() {
             true => f64::INFINITY,
             false => self.options.mission.timeout_s,
         };
@@ -397,6 +406,9 @@ impl<'a> Supervisor<'a> {
         let (tick, time) = self.published_as_of();
         // A stage that is told to drive already knows the target.
         self.bus.target.publish(tick, time, self.targets.sample())?;
+        if let Some(following) = self.beacon.told {
+            self.bus.following.publish(tick, time, following)?;
+        }
         let place = self.state_file.state.place;
         if place.number > 0 {
             self.bus.place.publish(tick, time, place)?;

@@ -5,6 +5,7 @@ use common::{
     mission::Mission,
     samples::{CommandSample, HoldReason, MOST_TARGETS, RequestAnswer, TargetPoint, TargetSample},
 };
+use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -34,6 +35,17 @@ pub enum TargetOutcome {
     Missed,
     /// The run ended before the robot was sent to it.
     NotTried,
+    /// The robot followed a beacon, which was there at last.
+    Followed,
+}
+
+/// How the robot followed a beacon.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Followed {
+    pub way_m: f64,
+    pub time_s: f64,
+    /// Times that it lost the beacon.
+    pub lost: u64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -48,6 +60,8 @@ pub struct TargetResult {
     pub distance_m: Option<f64>,
     /// The distance by the ground truth of a simulated robot.
     pub truth_m: Option<f64>,
+    /// Of a beacon alone.
+    pub followed: Option<Followed>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -71,6 +85,8 @@ pub struct TargetList {
     waits: bool,
     /// The current target is a hand's, and has no result.
     by_hand: bool,
+    /// The current target moves with a beacon; one result tells of all its places.
+    follows: bool,
 }
 
 impl TargetList {
@@ -89,6 +105,7 @@ impl TargetList {
             results: Vec::new(),
             waits,
             by_hand: false,
+            follows: false,
         }
     }
 
@@ -110,7 +127,37 @@ impl TargetList {
 
     /// Whether there is a target that has a result when it ends.
     pub(crate) const fn has_target(&self) -> bool {
-        !self.waits && !self.by_hand
+        !self.waits && !self.by_hand && !self.follows
+    }
+
+    pub(crate) const fn follows(&self) -> bool {
+        self.follows
+    }
+
+    /// Follow a beacon from now on. There is no target before the beacon is heard.
+    pub(crate) fn follow(&mut self, now_s: f64, arrival: Option<(CommandSample, bool)>) {
+        self.replace(&[], (0, now_s), arrival);
+        (self.waits, self.by_hand, self.follows) = (true, false, true);
+    }
+
+    /// The target moves to `place` with the beacon.
+    pub(crate) fn move_to(&mut self, place: DVec2, since_tick: u64) {
+        self.number += 1;
+        (self.current, self.since_tick) = (TargetPoint::at(place), since_tick);
+        self.waits = false;
+    }
+
+    /// The beacon, which was at `place` at last, is not followed any more at `now_s`, and the robot waits.
+    pub(crate) fn end_following(
+        &mut self,
+        (outcome, followed): (TargetOutcome, Followed),
+        place: DVec2,
+        now_s: f64,
+    ) {
+        let result = self.result_of(0, &TargetPoint::at(place), outcome);
+        let (at_s, followed) = (Some(now_s), Some(followed));
+        self.store(TargetResult { at_s, followed, ..result }, None);
+        (self.waits, self.follows) = (true, false);
     }
 
     pub(crate) const fn take_in_hand(&mut self) {
@@ -132,7 +179,7 @@ impl TargetList {
         self.waits.then_some(match newest {
             Some(TargetOutcome::Unreachable) => Outcome::Unreachable,
             Some(TargetOutcome::TimedOut) => Outcome::Timeout,
-            None => Outcome::Waited,
+            None | Some(TargetOutcome::Followed) => Outcome::Waited,
             _ => Outcome::Reached,
         })
     }
@@ -179,7 +226,7 @@ impl TargetList {
             self.number += 1;
             (self.current, self.ahead) = (*first, ahead.to_vec());
             (self.since_tick, self.began_s) = (since_tick, now_s);
-            (self.waits, self.by_hand) = (false, false);
+            (self.waits, self.by_hand, self.follows) = (false, false, false);
         }
     }
 
@@ -245,6 +292,7 @@ impl TargetList {
             at_s: None,
             distance_m: None,
             truth_m: None,
+            followed: None,
         }
     }
 
@@ -344,6 +392,15 @@ pub(crate) fn of_all(ending: Ending, results: &[TargetResult]) -> Ending {
     first.unwrap_or(ending)
 }
 
+/// The reason why a robot that is held for `reason` is not sent anywhere; none if it may be.
+pub(crate) const fn held_refusal(reason: HoldReason) -> Option<RequestAnswer> {
+    match reason {
+        HoldReason::Starting | HoldReason::Ending => Some(RequestAnswer::NotRunning),
+        HoldReason::Operator => Some(RequestAnswer::Stopped),
+        HoldReason::None | HoldReason::StageHeld | HoldReason::Waiting | HoldReason::Lost => None,
+    }
+}
+
 /// The reason why the robot is not sent to `points`; none if it is.
 pub(crate) fn refusal(
     points: Option<&[TargetPoint]>,
@@ -351,10 +408,8 @@ pub(crate) fn refusal(
     mission: &Mission,
     record: &Record,
 ) -> Option<RequestAnswer> {
-    match reason {
-        HoldReason::Starting | HoldReason::Ending => return Some(RequestAnswer::NotRunning),
-        HoldReason::Operator => return Some(RequestAnswer::Stopped),
-        HoldReason::None | HoldReason::StageHeld | HoldReason::Waiting => {}
+    if let Some(answer) = held_refusal(reason) {
+        return Some(answer);
     }
     let Some(points) = points else {
         return Some(RequestAnswer::Malformed);

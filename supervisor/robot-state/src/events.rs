@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 use common::samples::{
     Cause, CommandSample, CommandState, DeathSample, DirectiveSample, FaultKind, FaultSample,
-    HoldReason, LinkSample, Order, RequestAnswer, RequestKind, RequestSample, RosterEntry,
-    StageState, StallSample, TargetSample, name_str,
+    FollowState, FollowingSample, HoldReason, LinkSample, Order, RequestAnswer, RequestKind,
+    RequestSample, RosterEntry, StageState, StallSample, TargetSample, name_str,
 };
 use serde::Serialize;
 
@@ -63,6 +63,8 @@ pub(crate) struct Events {
     target: u64,
     last: u64,
     arrived: u64,
+    /// Whether the target moves with a beacon.
+    follows: bool,
     /// The generation of each stage that was seen to run.
     running: Vec<(String, u32)>,
     /// Mission time of the newest pose, seconds. A process that has just started knows no mission time.
@@ -90,6 +92,7 @@ impl Events {
         match sample {
             Sample::Pose(pose) => self.now_s = self.now_s.max(pose.stamp.time().seconds()),
             Sample::Command(command) => self.command(command),
+            Sample::Following(following) => self.following(following),
             Sample::Target(target) => self.target(target),
             Sample::Roster(_, entries) => self.roster(entries),
             Sample::Death(death) => self.death(death),
@@ -186,7 +189,7 @@ impl Events {
 
     fn target(&mut self, target: &TargetSample) {
         self.last = target.last;
-        if std::mem::replace(&mut self.target, target.number) == target.number {
+        if std::mem::replace(&mut self.target, target.number) == target.number || self.follows {
             return;
         }
         let at = target.target.position();
@@ -194,9 +197,16 @@ impl Events {
         self.add("supervisor", Kind::Note, text);
     }
 
+    fn following(&mut self, following: &FollowingSample) {
+        let follows = following.state() != FollowState::Ended;
+        if std::mem::replace(&mut self.follows, follows) && !follows {
+            self.add("supervisor", Kind::Note, following.result());
+        }
+    }
+
     fn command(&mut self, command: &CommandSample) {
         let arrived = CommandState::from_byte(command.state) == CommandState::Arrived;
-        if arrived && self.arrived != command.target_number {
+        if arrived && self.arrived != command.target_number && !self.follows {
             self.arrived = command.target_number;
             let text = format!("target {} is reached", command.target_number);
             self.add("controller", Kind::Good, text);

@@ -4,9 +4,9 @@ use common::{
     bus::{AnyReader, Bus, BusError, decode_sample, decode_slice},
     samples::{
         CommandSample, DeathSample, DirectiveSample, FaultSample, FieldCell, FieldHeader,
-        GridHeader, GuidanceSample, LinkSample, PoseSample, PowerSample, RangeReading,
-        RangesHeader, RequestSample, RosterEntry, RosterHeader, ScanHeader, StallSample,
-        TargetSample, WheelSample,
+        FollowingSample, GridHeader, GuidanceSample, LinkSample, PoseSample, PowerSample,
+        RangeReading, RangesHeader, RequestSample, RosterEntry, RosterHeader, ScanHeader,
+        StallSample, TargetSample, WheelSample,
     },
     topics::{self, AnyTopic, OPERATOR, Spec},
 };
@@ -45,6 +45,7 @@ samples! {
     Command(CommandSample): COMMAND by one,
     Guidance(GuidanceSample): GUIDANCE by one,
     Target(TargetSample): TARGET by one,
+    Following(FollowingSample): FOLLOWING by one,
     Power(PowerSample): POWER by one,
     Grid(GridHeader, Vec<u8>): GRID by slice,
     Field(FieldHeader, Vec<FieldCell>): FIELD by slice,

@@ -6,9 +6,9 @@ use common::{
     grid::{Applied, Replica},
     mission::Mission,
     samples::{
-        CommandSample, DeathSample, FieldCell, FieldHeader, GridHeader, GuidanceSample,
-        GuidanceStatus, HoldReason, LinkSample, PoseSample, PowerSample, RosterEntry, RosterHeader,
-        TargetPoint, TargetSample, name_str,
+        CommandSample, DeathSample, FieldCell, FieldHeader, FollowState, FollowingSample,
+        GridHeader, GuidanceSample, GuidanceStatus, HoldReason, LinkSample, PoseSample,
+        PowerSample, RosterEntry, RosterHeader, TargetPoint, TargetSample, name_str,
     },
 };
 use glam::DVec2;
@@ -41,6 +41,8 @@ pub struct RobotState {
     pub field: Replica<FieldCell>,
     pub field_header: FieldHeader,
     pub target: Option<TargetSample>,
+    /// How it follows a beacon, or followed the last one.
+    pub following: Option<FollowingSample>,
     pub guidance: Option<GuidanceSample>,
     pub command: Option<CommandSample>,
     pub link: Option<LinkSample>,
@@ -66,6 +68,7 @@ impl RobotState {
             Sample::Command(command) => self.command = Some(*command),
             Sample::Guidance(guidance) => self.guidance = Some(*guidance),
             Sample::Target(target) => self.target = Some(*target),
+            Sample::Following(following) => self.following = Some(*following),
             Sample::Power(power) => self.power = Some(*power),
             Sample::Link(link) => self.link = Some(*link),
             Sample::Stall(_) => self.stalls += 1,
@@ -145,6 +148,7 @@ impl RobotState {
                 return (Kind::Warn, "the robot starts".to_owned());
             }
             (_, HoldReason::Waiting) => (Kind::Warn, "the robot waits for a target".to_owned()),
+            (_, HoldReason::Lost) => (Kind::Warn, self.lost()),
             (Some(link), _) => (self.events.kind(link), failsafe_in_words(link)),
         };
         let link = self.link.unwrap_or_default();
@@ -160,8 +164,23 @@ impl RobotState {
 
     /// The target to which the robot is sent; none while it waits for one.
     pub fn target(&self) -> Option<&TargetSample> {
-        let waits = |it: RosterHeader| HoldReason::from_byte(it.reason) == HoldReason::Waiting;
+        let waits = |it: RosterHeader| {
+            matches!(HoldReason::from_byte(it.reason), HoldReason::Waiting | HoldReason::Lost)
+        };
         self.target.as_ref().filter(|_| !self.supervisor.is_some_and(waits))
+    }
+
+    /// How the robot follows a beacon; none if it follows none.
+    pub fn following(&self) -> Option<&FollowingSample> {
+        self.following.as_ref().filter(|following| following.state() != FollowState::Ended)
+    }
+
+    fn lost(&self) -> String {
+        let ago_s = self.following().and_then(|it| it.heard_ago_s(self.now_s()));
+        match ago_s {
+            Some(ago_s) => format!("the robot lost what it follows, last seen {ago_s:.0} s ago"),
+            None => "the robot has not seen yet what it follows".to_owned(),
+        }
     }
 
     /// How far the target is by the robot's own pose, metres.
@@ -173,6 +192,11 @@ impl RobotState {
     /// The way to go in words, and the number of the target; none while there is none.
     pub fn way_to_go(&self) -> Option<String> {
         let TargetSample { number, last, .. } = self.target()?;
+        if let Some(following) = self.following() {
+            let beacon = DVec2::new(following.x_m, following.y_m);
+            let off_m = self.pose?.pose().position.distance(beacon);
+            return Some(format!("follows {off_m:.1} m behind a beacon"));
+        }
         Some(format!("{:.1} m to target {number} of {last}", self.to_go_m()?))
     }
 }

@@ -39,7 +39,9 @@ impl Orders {
     /// The robot stands by and its ticks go on: it is known where it is, also if it is carried.
     pub fn stands_by(&self) -> bool {
         self.by_operator()
-            || self.newest.is_some_and(|directive| directive.reason == HoldReason::Waiting)
+            || self.newest.is_some_and(|directive| {
+                matches!(directive.reason, HoldReason::Waiting | HoldReason::Lost)
+            })
     }
 
     pub const fn stopped_here(&self) -> bool {

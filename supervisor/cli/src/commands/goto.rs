@@ -1,3 +1,5 @@
+mod follow;
+
 use clap::Args;
 use common::{domain::RobotName, samples::TargetPoint};
 use mission_control::operator;
@@ -5,11 +7,12 @@ use mission_control::operator;
 use console::failure::{Refused, Result};
 
 /// Send a robot that drives to another target, or to several in turn; it goes on without a stop. Fails if the supervisor
-/// refuses: a place in a believed hazard or outside the perimeter, a robot that an operator stopped.
+/// refuses: a place in a believed hazard or outside the perimeter, a robot that an operator stopped. With `--follow` a robot that stays
+/// follows a beacon until Ctrl-C, and stands while it does not hear it.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// X and Y of each target, metres in the mission frame.
-    #[arg(required = true, value_names = ["X", "Y"], num_args = 2.., allow_negative_numbers = true)]
+    #[arg(required_unless_present = "follow", value_names = ["X", "Y"], num_args = 2.., allow_negative_numbers = true)]
     places: Vec<f64>,
     /// Turn to this heading at the last target, degrees counter-clockwise from x.
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
@@ -17,12 +20,24 @@ pub struct Arguments {
     /// After the targets that the robot has, instead of them.
     #[arg(long)]
     append: bool,
+    /// Follow what is published on topic `beacon`, or that robot of this machine.
+    #[arg(long, value_name = "ROBOT", num_args = 0..=1, conflicts_with_all = ["places", "heading", "append"])]
+    follow: Option<Option<RobotName>>,
+    /// Metres between the middles of the robot and of what it follows; by default they leave 0.5 m between the robot and a person.
+    #[arg(long, value_name = "M", requires = "follow")]
+    distance: Option<f64>,
+    /// The pose of the followed robot's mission frame in this robot's: metres, and degrees counter-clockwise from x.
+    #[arg(long, value_names = ["X", "Y", "DEG"], num_args = 3, requires = "follow", allow_negative_numbers = true)]
+    frame: Vec<f64>,
     /// Name of the robot.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
 }
 
 pub fn main(arguments: &Arguments) -> Result {
+    if let Some(followed) = &arguments.follow {
+        return follow::main(arguments, followed.as_ref());
+    }
     let mut points = points(&arguments.places)?;
     if let (Some(last), Some(heading)) = (points.last_mut(), arguments.heading) {
         (last.heading_rad, last.has_heading) = (heading.to_radians(), 1);

@@ -12,8 +12,8 @@ use common::{
     geometry::wrap_angle,
     roster,
     samples::{
-        Action, HoldReason, LinkSample, Order, PowerSample, RosterEntry, StageState, TargetSample,
-        name_str,
+        Action, BeaconRefusal, FollowState, HoldReason, LinkSample, Order, PowerSample,
+        RosterEntry, StageState, TargetSample, name_str,
     },
     topics::{self, AnyTopic},
     waiter::Waiter,
@@ -57,6 +57,8 @@ struct Status<'a> {
     /// The target; none if the robot waits for one, or none is published.
     target: Option<TargetStatus>,
     /// Where the robot believes it is; none if it is not published.
+    /// How the robot follows a beacon; none if it does not.
+    following: Option<FollowingStatus>,
     pose: Option<PoseStatus>,
     /// The link; none if no link publishes.
     link: Option<LinkStatus>,
@@ -74,6 +76,20 @@ struct TargetStatus {
     y_m: f64,
     /// How far the robot is from it; none if no pose is published.
     to_go_m: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct FollowingStatus {
+    lost: bool,
+    /// How long ago the beacon was seen; none if it never was.
+    seen_ago_s: Option<f64>,
+    distance_m: f64,
+    used: u64,
+    refused: u64,
+    /// The reason of the newest refusal; none without one.
+    refusal: Option<&'static str>,
+    /// The result so far.
+    result: String,
 }
 
 #[derive(Serialize)]
@@ -146,8 +162,14 @@ pub fn main(arguments: &Arguments) -> Result {
 }
 
 /// The topics of a status. The supervisor publishes the target before its roster.
-static WANTED: [&dyn AnyTopic; 5] =
-    [&topics::ROSTER, &topics::LINK, &topics::POWER, &topics::TARGET, &topics::POSE];
+static WANTED: [&dyn AnyTopic; 6] = [
+    &topics::ROSTER,
+    &topics::LINK,
+    &topics::POWER,
+    &topics::FOLLOWING,
+    &topics::TARGET,
+    &topics::POSE,
+];
 
 /// Whether `robot` is complete after `waited`. A robot without a link, batteries or a pose is so after a while.
 fn is_complete(robot: &RobotState, waited: Duration) -> bool {
@@ -238,6 +260,18 @@ fn status<'a>(
             y_m: target.y_m,
             to_go_m: robot.to_go_m(),
         }),
+        following: robot.following().map(|following| FollowingStatus {
+            lost: following.state() == FollowState::Lost,
+            seen_ago_s: following.heard_ago_s(header.stamp.time().seconds()),
+            distance_m: following.distance_m,
+            used: following.used,
+            refused: following.refused,
+            refusal: match BeaconRefusal::from_byte(following.refusal) {
+                BeaconRefusal::None => None,
+                refusal => Some(refusal.words()),
+            },
+            result: following.result(),
+        }),
         pose: robot.pose.map(|pose| PoseStatus {
             x_m: pose.x_m,
             y_m: pose.y_m,
@@ -304,6 +338,27 @@ impl fmt::Display for Status<'_> {
         if let Some(TargetStatus { number, last, x_m, y_m, to_go_m }) = &self.target {
             write!(f, "target {number} of {last}: ({x_m:.2}, {y_m:.2})")?;
             writeln!(f, "{}", to_go_m.map_or(String::new(), |m| format!(", {m:.2} m to go")))?;
+        }
+        if let Some(following) = &self.following {
+            let seen = following.seen_ago_s.map(|ago_s| age(Some(ago_s)) + " ago");
+            let (what, seen) =
+                (if following.lost { "LOST what it follows" } else { "follows" }, seen);
+            let seen = seen.as_deref().unwrap_or("never");
+            write!(
+                f,
+                "{what} at {:.2} m, seen {seen}; {}",
+                following.distance_m, following.result
+            )?;
+            match following.refusal {
+                Some(why) => {
+                    writeln!(
+                        f,
+                        "; samples refused: {}, the newest because {why}",
+                        following.refused
+                    )?;
+                }
+                None => writeln!(f)?,
+            }
         }
         if let Some(PoseStatus { x_m, y_m, heading_deg, within_m }) = &self.pose {
             writeln!(

@@ -1,0 +1,116 @@
+//! Following a beacon in the foreground. The pose of another robot is published as the beacon as long as the command lives.
+
+use std::time::Duration;
+
+use common::{
+    bus::{Bus, BusError, Reader, Writer},
+    domain::{Domain, RobotName},
+    follower::{Event, Follower},
+    kinematics::Pose2,
+    samples::{BeaconSample, FollowState, FollowingSample, PoseSample, name},
+    signals::Signals,
+    topics,
+};
+use console::{
+    failure::{Refused, Result},
+    output::print_text,
+};
+use glam::DVec2;
+use mission_control::operator;
+
+use super::Arguments;
+
+/// How soon a signal ends the following.
+const LOOK_EVERY: Duration = Duration::from_millis(100);
+
+struct Own {
+    following: Reader<FollowingSample>,
+    poses: Reader<PoseSample>,
+    beacon: Writer<BeaconSample>,
+}
+
+fn open(bus: &Bus) -> Result<Own, BusError> {
+    Ok(Own {
+        following: bus.reader(&topics::FOLLOWING)?,
+        poses: bus.reader(&topics::POSE)?,
+        beacon: bus.writer(&topics::BEACON, 1)?,
+    })
+}
+
+pub fn main(arguments: &Arguments, followed: Option<&RobotName>) -> Result {
+    let robot = &arguments.robot;
+    let frame = frame(&arguments.frame)?;
+    let distance_m = arguments.distance.unwrap_or(0.0);
+    if !(distance_m > 0.0 || arguments.distance.is_none()) {
+        let message = format!("--distance {distance_m} is none; give metres, more than 0");
+        return Err(Refused::new("too-near", message).into());
+    }
+    if followed == Some(robot) {
+        let message = format!("robot {robot} cannot follow itself; name another with --robot");
+        return Err(Refused::new("follows-itself", message).into());
+    }
+    let mut signals = Signals::that_end()?;
+    operator::follow(robot, distance_m)?;
+    let mut other = followed.map(|other| {
+        Follower::new(Domain::of(other.clone()), "follow", &topics::POSE, |bus| {
+            bus.reader(&topics::POSE)
+        })
+    });
+    let mut own = Follower::new(Domain::of(robot.clone()), "follow", &topics::FOLLOWING, open);
+    let (mut newest, mut pose) = (None::<FollowingSample>, PoseSample::default());
+    while !signals.came() {
+        let seen = match &mut other {
+            Some(other) => match other.wait(LOOK_EVERY)? {
+                Event::Samples(poses) => poses.newest()?,
+                _ => None,
+            },
+            None => None,
+        };
+        // The other robot's pose wakes this loop, or else its own supervisor.
+        let patience = if other.is_some() { Duration::ZERO } else { LOOK_EVERY };
+        if matches!(own.wait(patience)?, Event::Disconnected) {
+            break;
+        }
+        let Some(Own { following, poses, beacon }) = own.topics() else { continue };
+        pose = poses.newest()?.unwrap_or(pose);
+        if let Some(seen) = seen {
+            beacon.publish(pose.stamp.tick, pose.stamp.time(), sample(&pose, &seen, frame))?;
+        }
+        newest = following.newest()?.or(newest);
+        if newest.is_some_and(|newest| newest.state() == FollowState::Ended) {
+            break;
+        }
+    }
+    let ended = newest.is_some_and(|newest| newest.state() == FollowState::Ended);
+    if !ended && own.topics().is_some() {
+        operator::end_follow(robot)?;
+        if let Some(Own { following, .. }) = own.topics() {
+            newest = following.newest()?.or(newest);
+        }
+    }
+    let result = newest.unwrap_or_default().result();
+    Ok(print_text(&format!("{result}\n"))?)
+}
+
+/// The beacon that follows from the pose `seen` of the other robot, for a robot at `own`: it was measured when that pose was.
+fn sample(own: &PoseSample, seen: &PoseSample, frame: Pose2) -> BeaconSample {
+    let place = frame.position + frame.axis().rotate(seen.pose().position);
+    BeaconSample {
+        capture_ns: own.stamp.stamp_ns,
+        source: name("robot"),
+        x_m: place.x,
+        y_m: place.y,
+        deviation_m: seen.position_within_m() / 2.0,
+        ..BeaconSample::default()
+    }
+}
+
+fn frame(numbers: &[f64]) -> Result<Pose2, Refused> {
+    match *numbers {
+        [] => Ok(Pose2::default()),
+        [x, y, heading] if [x, y, heading].iter().all(|number| number.is_finite()) => {
+            Ok(Pose2 { position: DVec2::new(x, y), heading: heading.to_radians() })
+        }
+        _ => Err(Refused::new("no-frame", "--frame is no pose; give three finite numbers")),
+    }
+}

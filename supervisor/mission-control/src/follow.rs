@@ -1,0 +1,186 @@
+//! The part of the loop that follows a beacon: it takes its samples, and moves the target with it.
+
+use crate::{
+    error::Result,
+    following::{Following, SILENT, kept_m},
+    supervisor::Supervisor,
+    target_list::{self, TargetOutcome},
+};
+use common::{
+    clock::MissionTime,
+    samples::{
+        BeaconRefusal, BeaconSample, FollowState, FollowingSample, RequestAnswer, RequestSample,
+    },
+};
+
+/// What the loop knows of the beacon beside the [`Following`] that is saved.
+#[derive(Debug, Default)]
+pub(crate) struct Beacon {
+    /// The newest sample before a following waits for it, and in lockstep each until all stages have answered the tick of its capture.
+    waiting: Option<BeaconSample>,
+    /// In lockstep the robot goes so far before the next sample, so that the same samples lead to the same run.
+    last_tick: u64,
+    /// What is published of the following, also of the last one.
+    pub told: Option<FollowingSample>,
+}
+
+impl Supervisor<'_> {
+    pub(crate) fn follow(&mut self, request: &RequestSample) -> RequestAnswer {
+        let mission = &self.options.mission;
+        let record = &self.bus.observer.record;
+        if let Some(answer) = target_list::held_refusal(self.why_held()) {
+            return answer;
+        }
+        if !mission.stay {
+            return RequestAnswer::NotStaying;
+        }
+        let Some(distance_m) = kept_m(request.deviations[0], mission) else {
+            return RequestAnswer::TooNear;
+        };
+        let pose = record.pose;
+        let arrival = record.sure_arrival(mission);
+        self.end_following(TargetOutcome::Followed);
+        let now = self.beacon_time();
+        self.targets.follow(now.seconds(), arrival);
+        let is_late = |it: &mut BeaconSample| now.since(MissionTime(it.capture_ns)) > SILENT;
+        self.beacon.waiting.take_if(is_late);
+        self.state_file.state.following = Some(Following::new(distance_m, now, pose.as_ref()));
+        self.beacon.last_tick = self.bus.observer.record.newest_tick().unwrap_or_default();
+        self.await_target();
+        tracing::info!(distance_m, "the robot follows the beacon");
+        self.tell_following();
+        RequestAnswer::Taken
+    }
+
+    pub(crate) fn end_follow(&mut self) -> RequestAnswer {
+        match self.end_following(TargetOutcome::Followed) {
+            true => RequestAnswer::Taken,
+            false => RequestAnswer::NotFollowing,
+        }
+    }
+
+    /// Let the robot wait if it follows something. Returns whether it did.
+    pub(crate) fn end_following(&mut self, outcome: TargetOutcome) -> bool {
+        let Some(following) = self.state_file.state.following.take() else { return false };
+        let (now, pose) = (self.beacon_time(), self.bus.observer.record.pose);
+        let followed = following.followed(now, pose.as_ref());
+        self.targets.end_following((outcome, followed), following.place(), now.seconds());
+        self.await_target();
+        let sample = following.sample(now, pose.as_ref());
+        tracing::info!(outcome = ?outcome, "{}", sample.result());
+        self.beacon.told = Some(FollowingSample { state: FollowState::Ended.into(), ..sample });
+        true
+    }
+
+    /// Take the samples of the beacon. Returns whether there is something to publish.
+    pub(crate) fn take_beacon(&mut self) -> Result<bool> {
+        let mut changed = false;
+        if self.state_file.state.following.is_none() {
+            self.beacon.waiting = self.bus.beacon.newest()?.or(self.beacon.waiting);
+            return Ok(false);
+        }
+        while let Some(beacon) = match self.beacon.waiting.take() {
+            Some(beacon) => Some(beacon),
+            None => self.bus.beacon.next_sample()?,
+        } {
+            if self.is_early(&beacon) {
+                self.beacon.waiting = Some(beacon);
+                break;
+            }
+            changed |= self.follow_to(&beacon);
+        }
+        let now = self.beacon_time();
+        if let Some(following) = &mut self.state_file.state.following
+            && following.loses(now)
+        {
+            tracing::warn!("the robot lost what it follows, and stands");
+            changed = true;
+        }
+        self.tell_following();
+        Ok(changed)
+    }
+
+    /// Mission time. In lockstep it is the newest pose's, so that nothing depends on the machine.
+    fn beacon_time(&self) -> MissionTime {
+        match self.clock.in_ticks() {
+            true => self.clock.pose_time(self.bus.observer.record.pose.as_ref()),
+            false => self.mission_time(),
+        }
+    }
+
+    /// Whether the stages, in lockstep, have not answered the tick in which `beacon` was captured.
+    fn is_early(&self, beacon: &BeaconSample) -> bool {
+        let (Some(following), Some(captured)) =
+            (&self.state_file.state.following, self.clock.tick_at(beacon.capture_ns))
+        else {
+            return false;
+        };
+        let record = &self.bus.observer.record;
+        let newest = record.pose.map(|pose| pose.stamp.tick);
+        let begins = newest.is_none() && following.is_new();
+        // A sample of a still later tick is of the future, and refused.
+        let next = newest.map_or(0, |tick| tick + 1);
+        !begins && captured <= next && record.published.tick < Some(captured)
+    }
+
+    /// Returns whether the robot is sent elsewhere.
+    fn follow_to(&mut self, beacon: &BeaconSample) -> bool {
+        let now = self.beacon_time();
+        let mission = &self.options.mission;
+        let Some(following) = &mut self.state_file.state.following else { return false };
+        let was_lost = following.is_lost();
+        let taken = following.take(beacon, now, mission);
+        let record = &self.bus.observer.record;
+        if let (Some(captured), Some(pose)) = (self.clock.tick_at(beacon.capture_ns), record.pose) {
+            self.beacon.last_tick = self.beacon.last_tick.max(captured.min(pose.stamp.tick) + 1);
+        }
+        if let Err(refusal) = taken {
+            let BeaconSample { x_m, y_m, deviation_m, .. } = *beacon;
+            self.log_refusal(refusal, [x_m, y_m, deviation_m]);
+            return false;
+        }
+        if was_lost {
+            tracing::info!("the robot hears what it follows");
+        }
+        let here = record.pose.map_or(mission.start.at, |pose| {
+            let rolls_m = pose.v_m_s * mission.trusted_response().dead_time_s();
+            pose.pose().position + pose.pose().axis() * rolls_m
+        });
+        let current = (!self.targets.waits()).then(|| self.targets.current().position());
+        let arrived = record.arrival.is_some();
+        let next = following.next_place(&record.grid, mission, (here, current), arrived);
+        // In lockstep no tick follows an arrival before another target.
+        let again = current.filter(|_| self.clock.in_ticks() && arrived);
+        let Some(place) = next.or(again) else { return was_lost };
+        self.targets.move_to(place, self.first_tick());
+        self.on_new_target();
+        true
+    }
+
+    fn log_refusal(&mut self, refusal: BeaconRefusal, beacon: [f64; 3]) {
+        let [x_m, y_m, deviation_m] = beacon;
+        // A source may send thousands of them: one of each kind in a row is told.
+        if self.beacon.told.is_none_or(|told| told.refusal != u8::from(refusal)) {
+            let why = refusal.words();
+            tracing::warn!(x_m, y_m, deviation_m, "a sample of the beacon is refused: {why}");
+        }
+        self.tell_following();
+    }
+
+    fn tell_following(&mut self) {
+        if let Some(following) = &self.state_file.state.following {
+            let now = self.beacon_time();
+            self.beacon.told = Some(following.sample(now, self.bus.observer.record.pose.as_ref()));
+        }
+    }
+
+    /// The last tick of a robot in lockstep that waits for its beacon; none if it does not.
+    pub(crate) fn beacon_limit(&self) -> Option<u64> {
+        self.state_file.state.following.map(|_| self.beacon.last_tick)
+    }
+
+    /// Whether the robot follows something and is as near to it as it is to be.
+    pub(crate) fn stands_beside(&self) -> bool {
+        self.targets.follows() && self.bus.observer.record.arrival.is_some()
+    }
+}

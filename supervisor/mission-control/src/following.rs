@@ -1,0 +1,302 @@
+//! What the robot follows, a beacon, and where it goes for that. Pure.
+//!
+//! The thing followed is a body, not a place: where it stands the sensors see a hazard, so the robot is sent to a free place beside it.
+//! Of the places that are as near to the beacon as the robot is to keep, and that see it, it is the one with the shortest way from the
+//! robot. The field leads there as to any other target.
+
+use std::{cmp::Reverse, collections::BinaryHeap, time::Duration};
+
+use common::{
+    clock::MissionTime,
+    grid::{Cell, CellState, GridFrame, Replica},
+    mission::Mission,
+    samples::{BeaconRefusal, BeaconSample, FollowState, FollowingSample, PoseSample},
+};
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+use crate::target_list::Followed;
+
+/// The robot stands when it has not heard the beacon for so long: a person walks 1 m meanwhile, as far as the robot stays away, and a
+/// source of ten samples a second may lose several in a row.
+pub(crate) const SILENT: Duration = Duration::from_secs(1);
+/// Two deviations are the room that the robot keeps by default between the bodies, metres.
+const MOST_DEVIATION_M: f64 = 0.25;
+/// The radius of the thing followed, metres: a person, or a robot of an X80's size.
+const BODY_M: f64 = 0.3;
+/// The room between the bodies by default, metres.
+const ROOM_M: f64 = 0.5;
+/// What the sensors see within so much of the thing's body is taken for the thing itself, metres: echoes spread.
+const SPREAD_M: f64 = 0.15;
+const MOST_DISTANCE_M: f64 = 10.0;
+
+/// The least distance between the middles at which the bodies do not touch, metres.
+fn least_m(mission: &Mission) -> f64 {
+    BODY_M + mission.body().radius_m
+}
+
+/// The distance that the robot keeps if it is asked for `distance_m`, 0 for the default; none if that is too near or too far.
+pub(crate) fn kept_m(distance_m: f64, mission: &Mission) -> Option<f64> {
+    let least_m = least_m(mission);
+    let wanted_m = if distance_m == 0.0 { least_m + ROOM_M } else { distance_m };
+    (least_m..=MOST_DISTANCE_M).contains(&wanted_m).then_some(wanted_m)
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Following {
+    distance_m: f64,
+    began: MissionTime,
+    /// The way of the robot by then, metres.
+    began_m: f64,
+    /// The newest sample that was used: its time and its place.
+    heard: Option<(MissionTime, DVec2)>,
+    is_lost: bool,
+    used: u64,
+    refused: u64,
+    refusal: u8,
+    lost: u64,
+}
+
+impl Following {
+    pub(crate) fn new(distance_m: f64, now: MissionTime, pose: Option<&PoseSample>) -> Self {
+        Self {
+            distance_m,
+            began: now,
+            began_m: pose.map_or(0.0, |pose| pose.travelled_m),
+            heard: None,
+            is_lost: true,
+            used: 0,
+            refused: 0,
+            refusal: 0,
+            lost: 0,
+        }
+    }
+
+    /// Whether no sample came so far.
+    pub(crate) const fn is_new(&self) -> bool {
+        self.used + self.refused == 0
+    }
+
+    pub(crate) const fn is_lost(&self) -> bool {
+        self.is_lost
+    }
+
+    /// Where the beacon was heard at last.
+    pub(crate) fn place(&self) -> DVec2 {
+        self.heard.map_or(DVec2::ZERO, |(_, place)| place)
+    }
+
+    /// Take a sample at `now`. Returns why it is not used.
+    pub(crate) fn take(
+        &mut self,
+        beacon: &BeaconSample,
+        now: MissionTime,
+        mission: &Mission,
+    ) -> Result<(), BeaconRefusal> {
+        let taken = self.heard_by(beacon, now, mission);
+        match taken {
+            Ok(heard) => {
+                (self.heard, self.is_lost) = (Some(heard), false);
+                self.used += 1;
+            }
+            Err(refusal) => {
+                self.refusal = refusal.into();
+                self.refused += 1;
+            }
+        }
+        taken.map(|_| ())
+    }
+
+    fn heard_by(
+        &self,
+        beacon: &BeaconSample,
+        now: MissionTime,
+        mission: &Mission,
+    ) -> Result<(MissionTime, DVec2), BeaconRefusal> {
+        let BeaconSample { capture_ns, x_m, y_m, deviation_m, .. } = *beacon;
+        let (captured, place) = (MissionTime(capture_ns), DVec2::new(x_m, y_m));
+        let tick_ns = (1e9 / mission.robot.rate_hz) as u64;
+        // Samples may hold anything.
+        if !(place.is_finite() && deviation_m.is_finite() && deviation_m >= 0.0) {
+            Err(BeaconRefusal::NotFinite)
+        } else if capture_ns > now.0.saturating_add(tick_ns) {
+            Err(BeaconRefusal::Future)
+        } else if now.since(captured) > SILENT || self.heard.is_some_and(|(at, _)| captured < at) {
+            Err(BeaconRefusal::Late)
+        } else if deviation_m > MOST_DEVIATION_M {
+            Err(BeaconRefusal::Doubtful)
+        } else if !mission.contains(place) {
+            Err(BeaconRefusal::Outside)
+        } else {
+            Ok((captured, place))
+        }
+    }
+
+    /// Whether the beacon is lost at `now` and was not before.
+    pub(crate) fn loses(&mut self, now: MissionTime) -> bool {
+        let silent = self.heard.is_none_or(|(at, _)| now.since(at) > SILENT);
+        let loses = silent && !self.is_lost;
+        self.is_lost |= silent;
+        self.lost += u64::from(loses);
+        loses
+    }
+
+    /// The supervisor was another one before, so the beacon must be heard again.
+    pub(crate) const fn resumed(&mut self) {
+        self.is_lost = true;
+    }
+
+    pub(crate) fn followed(&self, now: MissionTime, pose: Option<&PoseSample>) -> Followed {
+        let travelled_m = pose.map_or(self.began_m, |pose| pose.travelled_m);
+        Followed {
+            way_m: travelled_m - self.began_m,
+            time_s: now.since(self.began).as_secs_f64(),
+            lost: self.lost,
+        }
+    }
+
+    pub(crate) fn sample(&self, now: MissionTime, pose: Option<&PoseSample>) -> FollowingSample {
+        let Followed { way_m, time_s, lost } = self.followed(now, pose);
+        let place = self.place();
+        FollowingSample {
+            state: if self.is_lost { FollowState::Lost } else { FollowState::Heard }.into(),
+            refusal: self.refusal,
+            distance_m: self.distance_m,
+            x_m: place.x,
+            y_m: place.y,
+            heard_ns: self.heard.map_or(u64::MAX, |(at, _)| at.0),
+            used: self.used,
+            refused: self.refused,
+            lost,
+            followed_m: way_m,
+            followed_s: time_s,
+            ..FollowingSample::default()
+        }
+    }
+
+    /// The place to send the robot to, which would come to rest at `rest`; none if it goes on to `current`, where it has `arrived` or not.
+    pub(crate) fn next_place(
+        &self,
+        grid: &Replica<u8>,
+        mission: &Mission,
+        (rest, current): (DVec2, Option<DVec2>),
+        arrived: bool,
+    ) -> Option<DVec2> {
+        let (_, beacon) = self.heard?;
+        let least_m = least_m(mission);
+        let around = Around { frame: grid.frame()?, cells: grid.cells(), beacon, least_m };
+        let most_m = self.distance_m + around.frame.resolution_m / 2.0;
+        let is_near = |at: DVec2| at.distance(beacon) <= most_m && around.sees(at);
+        let stays = |at: DVec2| at.distance(beacon) >= least_m && around.is_free(at) && is_near(at);
+        let goes_on = if is_near(rest) { arrived } else { current.is_some_and(stays) };
+        if goes_on {
+            return None;
+        }
+        let next = around.nearest(rest, self.distance_m)?;
+        let moves = |current: DVec2| current.distance(next) >= around.frame.resolution_m / 2.0;
+        current.is_none_or(moves).then_some(next)
+    }
+}
+
+/// The map around a beacon.
+struct Around<'a> {
+    frame: GridFrame,
+    cells: &'a [u8],
+    beacon: DVec2,
+    least_m: f64,
+}
+
+impl Around<'_> {
+    fn is_free(&self, at: DVec2) -> bool {
+        self.frame.cell_at(at).is_some_and(|cell| self.is_free_cell(cell))
+    }
+
+    fn is_free_cell(&self, cell: Cell) -> bool {
+        let byte = self.cells.get(self.frame.index(cell)).copied();
+        byte.is_some_and(|byte| !CellState::from_byte(byte).is_hazard())
+    }
+
+    /// Whether nothing stands between `at` and the thing's own body.
+    fn sees(&self, at: DVec2) -> bool {
+        let way_m = at.distance(self.beacon) - self.least_m - SPREAD_M;
+        let steps = (way_m / self.frame.resolution_m).ceil().max(0.0) as u32;
+        let towards = (self.beacon - at).normalize_or_zero();
+        (1..=steps).all(|step| {
+            let along_m = (f64::from(step) * self.frame.resolution_m).min(way_m);
+            self.is_free(at + towards * along_m)
+        })
+    }
+
+    /// The place within `distance_m` that sees the beacon, with the shortest way over free cells from `from`. Where there is none, the
+    /// place nearest to the beacon that has a way.
+    fn nearest(&self, from: DVec2, distance_m: f64) -> Option<DVec2> {
+        let start = self.start(from)?;
+        let side = self.frame.cells as usize;
+        let mut costs = vec![u32::MAX; self.frame.area()];
+        // No way over the cells to the circle around the beacon costs less: the search goes there first.
+        let least_cost = |at: DVec2| {
+            let way_m = (at.distance(self.beacon) - distance_m).max(0.0);
+            (way_m / self.frame.resolution_m * 9.8) as u32
+        };
+        let mut next = BinaryHeap::from([Reverse((0, 0, self.frame.index(start)))]);
+        costs[self.frame.index(start)] = 0;
+        let mut best: Option<(f64, DVec2)> = None;
+        while let Some(Reverse((_, cost, index))) = next.pop() {
+            if cost > costs[index] {
+                continue;
+            }
+            let cell = Cell { col: (index % side) as u32, row: (index / side) as u32 };
+            let at = self.frame.centre_of(cell);
+            let off_m = at.distance(self.beacon);
+            if off_m <= distance_m && self.sees(at) {
+                return Some(at);
+            }
+            if best.is_none_or(|(least_m, _)| off_m < least_m) {
+                best = Some((off_m, at));
+            }
+            for (col, row, step) in NEXT {
+                let (Some(col), Some(row)) =
+                    (cell.col.checked_add_signed(col), cell.row.checked_add_signed(row))
+                else {
+                    continue;
+                };
+                let cell = Cell { col, row };
+                if col >= self.frame.cells || row >= self.frame.cells || !self.is_free_cell(cell) {
+                    continue;
+                }
+                let index = self.frame.index(cell);
+                if cost + step < costs[index] {
+                    costs[index] = cost + step;
+                    let whole = cost + step + least_cost(self.frame.centre_of(cell));
+                    next.push(Reverse((whole, cost + step, index)));
+                }
+            }
+        }
+        best.map(|(_, at)| at)
+    }
+
+    /// The free cell nearest to `from`: the robot may stand in the margin of a hazard.
+    fn start(&self, from: DVec2) -> Option<Cell> {
+        let own = self.frame.cell_at(from).filter(|cell| self.is_free_cell(*cell));
+        own.or_else(|| {
+            let free = self.frame.whole().cells().filter(|cell| self.is_free_cell(*cell));
+            let off = |cell: &Cell| self.frame.centre_of(*cell).distance_squared(from);
+            free.min_by(|one, other| off(one).total_cmp(&off(other)))
+        })
+    }
+}
+
+/// The cells beside a cell, and the costs of the ways there, tenths of a cell.
+const NEXT: [(i32, i32, u32); 8] = [
+    (1, 0, 10),
+    (-1, 0, 10),
+    (0, 1, 10),
+    (0, -1, 10),
+    (1, 1, 14),
+    (1, -1, 14),
+    (-1, 1, 14),
+    (-1, -1, 14),
+];
+
+#[cfg(test)]
+mod tests;
