@@ -137,8 +137,14 @@ impl Evidential {
         // The scans first, and then the rays: what they show explains echoes.
         for (row, fan) in scans {
             let laser = self.lasers.iter().position(|laser| *laser == row);
-            if let Some(grid) = laser.and_then(|laser| map.grids().nth(laser)) {
-                grid.take_scan(&fan, robot);
+            match laser {
+                Some(0) => map.evidence.take_scan(&fan, robot, None),
+                Some(further) => {
+                    if let Some(grid) = map.others.get_mut(further - 1) {
+                        grid.take_scan(&fan, robot, Some(&map.evidence));
+                    }
+                }
+                None => {}
             }
         }
         let (grid, by_lasers): (_, Vec<&EvidenceGrid>) = match map.others.split_last_mut() {

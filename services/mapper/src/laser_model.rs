@@ -66,8 +66,9 @@ struct Scan<'a> {
 }
 
 impl EvidenceGrid {
-    /// Take a scan of a robot at `robot`.
-    pub(crate) fn take_scan(&mut self, fan: &Fan<'_>, robot: DVec2) {
+    /// Take a scan of a robot at `robot`. What another laser has `seen` is left to that by a depth camera, which does not see it go away
+    /// from before its feet.
+    pub(crate) fn take_scan(&mut self, fan: &Fan<'_>, robot: DVec2, seen: Option<&Self>) {
         let Ground { lattice, radius } = self.ground;
         let Some(mut scan) = Scan::new(&lattice, fan) else {
             return;
@@ -81,6 +82,9 @@ impl EvidenceGrid {
             let cell = Cell { col: index % side, row: index / side };
             let change = match scan.is_thing(cell, *mark) {
                 true if lattice.centre_of(cell).distance(robot) <= radius => continue,
+                true if fan.clears_from_m > 0.0 && seen.is_some_and(|it| it.is_thing_at(cell)) => {
+                    continue;
+                }
                 true => HIT,
                 false if lattice.centre_of(cell).distance(fan.origin) < fan.clears_from_m => {
                     continue;
@@ -95,6 +99,14 @@ impl EvidenceGrid {
 }
 
 impl EvidenceGrid {
+    /// In this cell, or in one beside it.
+    fn is_thing_at(&self, cell: Cell) -> bool {
+        let lattice = self.ground.lattice;
+        let at = lattice.centre_of(cell);
+        let beside = lattice.between(at - lattice.resolution_m, at + lattice.resolution_m);
+        beside.cells().any(|cell| self.is_occupied(lattice.index(cell)))
+    }
+
     /// Whether a laser at `origin` looks along the thing in this cell.
     fn goes_on_behind(&self, cell: Cell, origin: DVec2) -> bool {
         let lattice = self.ground.lattice;
@@ -300,10 +312,14 @@ mod tests {
 
     /// A grid after these scans of a laser at the centre, whose beams are a degree apart from bearing 0 on.
     fn after(scans: &[Vec<f32>]) -> EvidenceGrid {
-        after_clearing_from(0.0, scans)
+        after_clearing_from(0.0, None, scans)
     }
 
-    fn after_clearing_from(clears_from_m: f64, scans: &[Vec<f32>]) -> EvidenceGrid {
+    fn after_clearing_from(
+        clears_from_m: f64,
+        seen: Option<&EvidenceGrid>,
+        scans: &[Vec<f32>],
+    ) -> EvidenceGrid {
         let mut grid = EvidenceGrid::new(Ground { lattice: LATTICE, radius: 0.2 });
         for beams in scans {
             let (first_rad, step_rad) = (0.0, 1_f64.to_radians());
@@ -316,7 +332,7 @@ mod tests {
                 clears_from_m,
                 beams,
             };
-            grid.take_scan(&fan, DVec2::ZERO);
+            grid.take_scan(&fan, DVec2::ZERO, seen);
         }
         grid
     }
@@ -345,11 +361,14 @@ mod tests {
     #[test]
     fn a_depth_camera_keeps_what_it_looks_over_and_takes_no_ground_before_it_for_scanned() {
         let approach = [vec![0.5], vec![0.5], vec![2.0], vec![2.0], vec![2.0], vec![2.0]];
-        let grid = |from_m| after_clearing_from(from_m, &approach);
+        let grid = |from_m| after_clearing_from(from_m, None, &approach);
         assert!(!grid(0.0).is_occupied(index(0.5, 0.0)), "a laser");
         assert!(grid(0.6).is_occupied(index(0.5, 0.0)));
         let scanned = [0.4, 0.7].map(|x| grid(0.6).is_scanned(index(x, 0.0)));
         assert_eq!(scanned, [false, true]);
+        let by_laser = after(&approach[..1]);
+        let grid = after_clearing_from(0.6, Some(&by_laser), &approach);
+        assert!(!grid.is_occupied(index(0.5, 0.0)), "the laser sees it too, and sees it go");
     }
 
     #[test]
