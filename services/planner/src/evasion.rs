@@ -33,9 +33,10 @@ const NEAR_M: f64 = 0.3;
 const SOON_S: f64 = 4.0;
 const MOST_DOUBT_M_S: f64 = 0.4;
 const MOST_DANGER: f64 = 3.0;
-/// Less changes no advice. The gain of the way at top speed along the advice outweighs so much less danger.
+/// Less changes no advice. The gain of the way at top speed along the advice outweighs so much less danger: with a third of that a
+/// robot of 0.7 m/s hardly got on among people who give way to it.
 const LEAST_DANGER: f64 = 0.1;
-const GAIN: f64 = 1.0 / 3.0;
+const GAIN: f64 = 1.0;
 /// Hazard this near to a mover may be its own, metres, because its trace fades within two scans.
 const TRACE_M: f64 = 0.4;
 /// A way has legs that end after so many seconds. So many are gone on from, no two of which end alike.
