@@ -323,7 +323,7 @@ impl DeadReckoning {
         let Err(Refused { why, there }) = taken else {
             state.fixes += 1;
             state.contradictions = Contradictions::default();
-            if sample.shared[1] <= 0.0 {
+            if fix.is_ok_and(|fix| fix.is_apart_from_wheels()) {
                 state.doubt.place_by_others();
             }
             return Taken::Used;
