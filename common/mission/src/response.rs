@@ -163,9 +163,9 @@ impl ModelledSpeed {
         self.speed
     }
 
-    /// The commands that it does not act on yet, oldest first.
-    pub fn pending(&self) -> impl Iterator<Item = f64> {
-        self.pending.iter().map(|(_, speed)| *speed)
+    /// The commands that it does not act on yet, oldest first, with the times at which it will.
+    pub fn pending(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.pending.iter().copied()
     }
 
     /// What the speed is still to gain.

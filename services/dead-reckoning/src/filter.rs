@@ -104,12 +104,13 @@ impl Fix {
         0.5 * (self.covariance[0] + self.covariance[3])
     }
 
-    /// Whether it says where the robot is without leaning on the wheels. The scan matcher, the only source that shares an error of the
-    /// heading, begins at the pose by the wheels and stays there where a scan shows too little. What its fix does not share says so.
+    /// Whether a fix of the scan matcher, the only source that shares an error of the heading, says where the robot is without leaning on
+    /// the wheels. The matcher begins at the pose by the wheels and stays there where a scan shows too little; what its fix does not share
+    /// says so.
     pub(crate) fn is_apart_from_wheels(&self) -> bool {
         let [place, heading] = self.shared;
         let own = [2.0 * (self.variance() - place), self.covariance[5] - heading];
-        heading <= 0.0 || own.iter().zip(LEANS).all(|(own, leans)| *own <= leans * leans)
+        own.iter().zip(LEANS).all(|(own, leans)| *own <= leans * leans)
     }
 }
 

@@ -331,9 +331,9 @@ fn wheels_that_count_unequal_shares_of_what_they_are_told_make_the_pose_unsure_u
 
 #[test]
 fn a_doubt_of_the_wheels_is_settled_by_a_scan_that_says_where_the_robot_is_and_by_no_other() {
-    let deviation = |own: [f64; 2]| {
+    let deviation = |own: [f64; 2], contradicts: bool| {
         let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
-        for _ in 0..80 {
+        for tick in 0..80 {
             let wheels = WheelSample { told_ratio: 0.965, ..robot.wind() };
             // All fixes share 1 cm and 0.01 rad.
             let [place, heading] = own.map(|own| own * own + 1e-4);
@@ -343,14 +343,18 @@ fn a_doubt_of_the_wheels_is_settled_by_a_scan_that_says_where_the_robot_is_and_b
                 shared: [1e-4; 2],
                 ..robot.fix()
             };
+            let aside_m = if contradicts && tick == 20 { 2.0 } else { 0.0 };
+            let fix = FixSample { x_m: fix.x_m + aside_m, ..fix };
             reckoning.given(&wheels, &[fix], &[]);
         }
         reckoning.sample().covariance[3].sqrt()
     };
-    assert!(deviation([0.05, 0.03]) < 0.1);
+    assert!(deviation([0.05, 0.03], false) < 0.1);
+    // It may have begun anew where the wheels said.
+    assert!(deviation([0.05, 0.03], true) > 0.5);
     // A hall without anything near, and a round room.
     for own in [[0.3, 0.03], [0.05, 0.2]] {
-        assert!(deviation(own) > 0.5, "{own:?}");
+        assert!(deviation(own, false) > 0.5, "{own:?}");
     }
 }
 
