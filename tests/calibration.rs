@@ -41,6 +41,30 @@ fn unknown_wheels_are_found_within_three_deviations_and_written() {
 }
 
 #[test]
+fn a_gyro_finds_ratio_and_track_in_less_than_a_minute_and_a_robot_without_one_is_told_so() {
+    let robot = |gyro: &str| {
+        let json = format!("robot={{protocol='json',gyro={gyro}}}");
+        calibrated("gyro", &["--seed", "3", "--gyro", "--set", &json])
+    };
+    let (said, out, _folder) = robot("true");
+    let said: Value = serde_json::from_slice(&said.stdout).unwrap();
+    let found = Calibration::parse(&std::fs::read_to_string(out).unwrap()).unwrap();
+    for (value, sd, truth, most_sd) in [
+        (found.diameter_ratio, found.diameter_ratio_sd, 1.006, 0.003),
+        (found.track_scale, found.track_scale_sd, 0.985, 0.012),
+    ] {
+        assert!((value - truth).abs() <= 3.0 * sd, "{value} +- {sd}, not {truth}: {said}");
+        assert!(sd > 0.0 && sd <= most_sd, "{sd}: {said}");
+    }
+    assert_eq!(found.calibrated.unwrap().method, "gyro");
+    assert!(said["seconds"].as_f64().unwrap() < 60.0, "{said}");
+    let (said, out, _folder) = robot("false");
+    assert!(!said.status.success() && !out.exists());
+    let error = String::from_utf8_lossy(&said.stderr);
+    assert!(error.contains("no gyro") && error.contains("gyro = true"), "{error}");
+}
+
+#[test]
 fn the_response_of_a_stated_base_is_found_again() {
     let folder = directory_of("response");
     let folder_name = folder.path().to_str().unwrap();

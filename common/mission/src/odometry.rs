@@ -31,7 +31,7 @@ pub struct Provenance {
     /// Year-month-day, UTC.
     pub date: String,
     pub robot: String,
-    /// `wall` or `squares`.
+    /// `wall`, `squares` or `gyro`.
     pub method: String,
     /// The way that the wheels rolled, on average.
     pub metres: f64,
@@ -59,6 +59,8 @@ pub enum Procedure {
     RightSquare,
     /// To and fro on the spot.
     Turns,
+    /// Ahead, around, back and around, for a gyro.
+    Gyro,
     /// All that `firsthand bring-up` looks at.
     BringUp,
 }

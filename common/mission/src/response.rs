@@ -163,6 +163,11 @@ impl ModelledSpeed {
         self.speed
     }
 
+    /// The commands that it does not act on yet, oldest first, with the times at which it will.
+    pub fn pending(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.pending.iter().copied()
+    }
+
     /// What the speed is still to gain.
     pub fn left(&self) -> f64 {
         self.target - self.speed

@@ -6,8 +6,8 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 /// The wheels' ratio is off if it is so many of its deviations, and so much, from 1. In 240 missions of X80s and Kobukis with even wheels,
-/// half of them on a busy machine, it came to at most 0.89 of the greater of both; an encoder that counts 4 % too little in half of a
-/// mission comes to 1.05.
+/// half of them on a busy machine, it came to at most 0.89 of the greater of both, and in 320 of Jackals, Kobukis and X80s, most of them among
+/// what moves, to at most 0.64; an encoder that counts 4 % too little in half of a mission comes to 1.05.
 const DEVIATIONS: f64 = 2.5;
 const LEAST_OFF: f64 = 0.018;
 /// A doubt of the place is told from here on, metres.

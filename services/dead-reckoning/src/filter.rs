@@ -32,6 +32,9 @@ pub(crate) const GATES: [f64; 2] = [13.8, 16.3];
 const LEAST_VARIANCE: f64 = 25e-6;
 /// The least variance of the heading, rad^2: a tenth of a degree.
 const LEAST_HEADING_VARIANCE: f64 = 3e-6;
+/// A fix of the scan matcher that is less sure by its scan than this, metres and radians, may lean on the pose by the wheels: the matcher
+/// holds its match at that pose with these deviations, and states the match alone several times as unsure as it is.
+const LEANS: [f64; 2] = [0.1, 0.05];
 /// The gyro's assumed scale error, a share.
 const GYRO_SCALE: f64 = 0.005;
 
@@ -99,6 +102,15 @@ impl Fix {
 
     pub(crate) fn variance(&self) -> f64 {
         0.5 * (self.covariance[0] + self.covariance[3])
+    }
+
+    /// Whether a fix of the scan matcher, the only source that shares an error of the heading, says where the robot is without leaning on
+    /// the wheels. The matcher begins at the pose by the wheels and stays there where a scan shows too little; what its fix does not share
+    /// says so.
+    pub(crate) fn is_apart_from_wheels(&self) -> bool {
+        let [place, heading] = self.shared;
+        let own = [2.0 * (self.variance() - place), self.covariance[5] - heading];
+        own.iter().zip(LEANS).all(|(own, leans)| *own <= leans * leans)
     }
 }
 

@@ -323,7 +323,11 @@ impl DeadReckoning {
         let Err(Refused { why, there }) = taken else {
             state.fixes += 1;
             state.contradictions = Contradictions::default();
-            if sample.shared[1] <= 0.0 {
+            let is_of_matcher = sample.shared[1] > 0.0;
+            // A matcher that contradicted the wheels' pose may have begun anew at that pose.
+            let is_apart = !is_of_matcher
+                || state.fixes_refused == 0 && fix.is_ok_and(|fix| fix.is_apart_from_wheels());
+            if is_apart {
                 state.doubt.place_by_others();
             }
             return Taken::Used;

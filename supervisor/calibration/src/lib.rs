@@ -10,11 +10,13 @@
 //! | `ways` | nominal ways from counts |
 //! | `normal` | the wall's normal from a sweep |
 //! | [`loops`] | ratio, track and slip from loops, and refusals |
+//! | [`gyro`] | ratio and track from a gyro |
 //! | [`squares`] | ratio and track from the ends of squares, measured by tape |
 //! | [`script`] | the procedures of a bring-up, of turns and of squares |
 //! | [`response`] | delay and acceleration from turns to and fro |
 //! | [`shell`] | the process in the planner's place |
 
+pub mod gyro;
 pub mod loops;
 mod normal;
 pub mod response;

@@ -136,6 +136,14 @@ pub enum Refusal {
         "what was held out contradicts the others by {deviations:.1} deviations, over {AGREES}; repeat the calibration"
     )]
     Contradicted { deviations: f64 },
+    #[error(
+        "the robot stood for {seconds:.1} s before it moved, too short for the gyro's bias; repeat it on a machine that has less to do"
+    )]
+    NoRest { seconds: f64 },
+    #[error(
+        "the robot drove {driven_m:.1} m and turned by {turned_deg:.0} degrees, too little; clear 2.5 m of floor ahead of it and 0.5 m around it"
+    )]
+    Short { driven_m: f64, turned_deg: f64 },
     #[error("the loops cannot be fitted; repeat the calibration")]
     Singular,
 }
@@ -221,6 +229,15 @@ impl Estimate {
         let numbers = found.values.iter().chain(&found.covariance).chain([&slip, &slip_sd]);
         let is_finite = numbers.copied().all(f64::is_finite);
         is_finite.then_some(found).ok_or(Refusal::Singular)
+    }
+
+    /// # Errors
+    /// The residuals are greater than the noise explains.
+    pub(crate) fn unless_scattered(self) -> Result<Self, Refusal> {
+        match self.chi2_per_dof > MOST_CHI2 {
+            true => Err(Refusal::Scattered { chi2_per_dof: self.chi2_per_dof }),
+            false => Ok(self),
+        }
     }
 
     /// rho: right over left.
@@ -324,11 +341,7 @@ pub fn checked(
     for held_out in held_out {
         by_others.agrees_with(&by_loops(&[*held_out]))?;
     }
-    let estimate = Estimate::of(&by_loops(&used))?;
-    if estimate.chi2_per_dof > MOST_CHI2 {
-        return Err(Refusal::Scattered { chi2_per_dof: estimate.chi2_per_dof });
-    }
-    Ok((estimate, used))
+    Ok((Estimate::of(&by_loops(&used))?.unless_scattered()?, used))
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Procedures that are a list of legs: a bring-up, turns to and fro, squares.
+//! Procedures that are a list of legs: a bring-up, turns to and fro, squares, ways and turns for a gyro.
 //!
 //! In a bring-up the robot stands, turns on the spot to both sides, drives a short way and back, and turns to and fro. A leg ends when the
 //! wheels have counted its way in either direction, because a wheel of a new robot may count backwards, or after a time.
@@ -25,8 +25,9 @@ const ASIDE_RAD: f64 = 1.2;
 /// The speed of the way there and back, m/s.
 const SLOWLY_M_S: f64 = 0.15;
 const WAY_M: f64 = 0.3;
-/// Nearer things ahead end a leg, metres.
+/// Nearer things ahead end a leg, metres; those ahead of a robot that is to drive metres away from where it was put are to be farther.
 const NEAR_M: f64 = 0.2;
+const AHEAD_M: f64 = 0.5;
 /// One and a half turns: what was seen in the first third is seen again.
 const TURN_RAD: f64 = 3.0 * PI;
 /// Longer than a slow base needs for [`TURN_RAD`] at its speed.
@@ -61,6 +62,24 @@ const PARTS: [Leg; 12] = [
     Leg::Turn(-PI),
 ];
 
+/// The link uses a gyro that it saw to agree with the wheels in a turn. Its bias shows in the longest rest, the ratio of the wheels on the
+/// ways, the track in the turns.
+const WITH_GYRO: [Leg; 13] = [
+    STILL,
+    Leg::Turn(FRAC_PI_2),
+    STILL,
+    Leg::Turn(-FRAC_PI_2),
+    Leg::Stand(5.0),
+    Leg::Drive,
+    STILL,
+    Leg::Turn(PI),
+    STILL,
+    Leg::Drive,
+    STILL,
+    Leg::Turn(-PI),
+    STILL,
+];
+
 /// The procedure in the planner's place.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Script {
@@ -75,7 +94,7 @@ pub struct Script {
 }
 
 impl Script {
-    /// Every procedure but that before a wall; squares have this side.
+    /// Every procedure but that before a wall; squares have this side, and the ways for a gyro this length.
     #[must_use]
     pub fn new(procedure: Procedure, side_m: f64, rate_hz: f64) -> Self {
         let (from, ways) = (Ways::default(), Ways::default());
@@ -90,6 +109,7 @@ impl Script {
         };
         match self.procedure {
             Procedure::Turns => to_and_fro(0),
+            Procedure::Gyro => WITH_GYRO.get(self.leg as usize).copied(),
             Procedure::BringUp => {
                 let part = PARTS.get(self.leg as usize).copied();
                 part.or_else(|| to_and_fro(PARTS.len() as u32))
@@ -103,7 +123,7 @@ impl Script {
         if self.leg().is_none() { State::Finished } else { State::Running }
     }
 
-    /// `echo_m` is the front sonar's: a robot that drives where it is told to turn ends its leg before what is there.
+    /// `echo_m` is the front sonar's, or a laser's for a gyro: a robot that drives where it is told to turn ends its leg before what is there.
     pub fn step(&mut self, counts: [u16; 2], echo_m: Option<f64>, body: &Body) -> Order {
         self.ways.step(counts, body);
         let (from, ways) = (self.from, self.ways);
@@ -112,20 +132,29 @@ impl Script {
         let heading = side * Wheels::NOMINAL.turned(ways.left_m, ways.right_m, body.track_m);
         let left = |leg: u32| FRAC_PI_2 * f64::from(leg.div_ceil(2)) - heading;
         let seconds = f64::from(self.ticks) / self.rate_hz;
+        let (way_m, way_m_s, ahead_m) = match self.procedure {
+            Procedure::Gyro => (self.side_m, SPEED_M_S, AHEAD_M),
+            _ => (WAY_M, SLOWLY_M_S, NEAR_M),
+        };
         let is_over = match self.leg() {
             Some(Leg::Stand(least_s)) => seconds >= least_s,
             Some(Leg::Turn(angle)) => {
                 rolled_m >= angle.abs() * body.track_m / 2.0 || seconds >= LONGEST_TURN_S
             }
-            Some(Leg::Drive) => rolled_m >= WAY_M || seconds >= 3.0 * WAY_M / SLOWLY_M_S,
+            Some(Leg::Drive) => rolled_m >= way_m || seconds >= 3.0 * way_m / way_m_s,
             Some(Leg::ToAndFro(_)) => seconds >= LEG_S,
             Some(Leg::Side) => (ways.arc_m() - from.arc_m()).abs() >= self.side_m,
             Some(Leg::Corner) => left(self.leg) <= TURNED_RAD,
             None => false,
         };
-        let is_near = echo_m.is_some_and(|it| it < NEAR_M);
+        let nearer_than = |limit_m| echo_m.is_some_and(|it| it < limit_m);
+        let is_near = match self.leg() {
+            Some(Leg::Turn(_)) => nearer_than(NEAR_M),
+            Some(Leg::Drive) => nearer_than(ahead_m),
+            _ => false,
+        };
         self.ticks = self.ticks.saturating_add(1);
-        if is_over || is_near && matches!(self.leg(), Some(Leg::Turn(_) | Leg::Drive)) {
+        if is_over || is_near {
             (self.leg, self.ticks, self.from) = (self.leg + 1, 1, ways);
         }
         let left = left(self.leg);
@@ -135,7 +164,7 @@ impl Script {
             Some(Leg::Turn(side) | Leg::ToAndFro(side)) => {
                 (GuidanceStatus::Look, ASIDE_RAD.copysign(side), 0.0)
             }
-            Some(Leg::Drive) => (GuidanceStatus::Along, 0.0, SLOWLY_M_S),
+            Some(Leg::Drive) => (GuidanceStatus::Along, 0.0, way_m_s),
             Some(Leg::Side) => {
                 (GuidanceStatus::Along, side * left.clamp(-FAST_RAD, FAST_RAD), SPEED_M_S)
             }

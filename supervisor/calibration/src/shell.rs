@@ -1,4 +1,4 @@
-//! `pose` and `ranges` in, `guidance` out, in the planner's place. The state is saved before the guidance is
+//! `pose`, `ranges` and `scan` in, `guidance` out, in the planner's place. The state is saved before the guidance is
 //! published.
 
 use std::path::Path;
@@ -7,15 +7,15 @@ use common::{
     bus::Reader,
     checkpoint::{Checkpoint, CheckpointError},
     kinematics::Pose2,
-    mission::{Body, CalibrationPlan, Procedure},
+    mission::{Body, CalibrationPlan, Procedure, SensorKind},
     outputs::Outputs,
     readers, run,
     samples::{
         GridHeader, GuidanceSample, GuidanceStatus, PoseSample, RangeReading, RangesHeader,
-        TargetSample,
+        ScanHeader, TargetSample,
     },
     shell::{Context, Process, Progress, StageError},
-    topics::{GUIDANCE, POSE, RANGES},
+    topics::{GUIDANCE, POSE, RANGES, SCAN},
     wiring::{Persists, Topics},
 };
 use glam::DVec2;
@@ -26,6 +26,7 @@ use crate::{
     wall::{Order, Wall, echo_m},
 };
 
+const SCAN_HOLDS_S: f64 = 0.5;
 /// Encoded: two legs of 200 readings, and 64 loops.
 pub(crate) const STATE_BYTES: usize = 16 << 10;
 
@@ -66,7 +67,36 @@ readers! {
         inputs {
             pose: Reader<PoseSample> = POSE,
             ranges: Reader<RangesHeader, RangeReading> = RANGES,
+            scan: Reader<ScanHeader, f32> = SCAN,
         }
+    }
+}
+
+/// What a laser sees ahead of a robot whose way it watches.
+#[derive(Debug, Default)]
+struct FreeByScan {
+    half_width_m: f64,
+    /// When it saw that, and the free way before the body, metres.
+    seen: Option<(f64, f64)>,
+}
+
+impl FreeByScan {
+    fn take(&mut self, at_s: f64, header: &ScanHeader, beams: &[f32]) {
+        let place = DVec2::new(header.x_m, header.y_m);
+        let ends = beams.iter().enumerate().filter(|(_, range)| range.is_finite());
+        let free_m = ends
+            .map(|(beam, range)| {
+                let along = DVec2::from_angle(header.first_rad + header.step_rad * beam as f64);
+                place + f64::from(*range) * along
+            })
+            .filter(|end| end.x > 0.0 && end.y.abs() <= self.half_width_m)
+            .fold(f64::INFINITY, |free_m, end| free_m.min(end.x - self.half_width_m));
+        self.seen = Some((at_s, free_m));
+    }
+
+    /// Ground that no scan has seen for [`SCAN_HOLDS_S`] is not free.
+    fn free_m(&self, now_s: f64) -> f64 {
+        self.seen.filter(|(at_s, _)| now_s - at_s <= SCAN_HOLDS_S).map_or(0.0, |(_, free_m)| free_m)
     }
 }
 
@@ -80,6 +110,7 @@ pub struct Shell {
     drive: Drive,
     /// The newest tick with readings, and the front sonar's echo, metres.
     newest: Option<(u64, Option<f64>)>,
+    scan: Option<FreeByScan>,
     answered: Option<GuidanceSample>,
     progress: Progress,
 }
@@ -96,6 +127,10 @@ impl Process for Shell {
         let plan = mission.planner.calibration.clone().unwrap_or_default();
         let (body, front) = (mission.body(), mission.front_row());
         let target = TargetSample::first(mission);
+        let is_watched =
+            plan.procedure == Procedure::Gyro && mission.front_sonar().kind == SensorKind::Scan;
+        let half_width_m = body.radius_m;
+        let scan = is_watched.then(|| FreeByScan { half_width_m, ..FreeByScan::default() });
         let mut drive = Drive::new(plan, mission.robot.rate_hz);
         if let Some(state) = context.saved_state()? {
             drive = state;
@@ -109,6 +144,7 @@ impl Process for Shell {
             target,
             drive,
             newest: None,
+            scan,
             answered: None,
             progress: Progress::default(),
         })
@@ -131,7 +167,14 @@ impl Process for Shell {
                 self.newest = Some((ranges.header().stamp.tick, front.and_then(echo_m)));
             }
             let readings = self.newest.filter(|(tick, _)| *tick == pose.stamp.tick);
-            self.answer(&pose, readings.and_then(|(_, echo_m)| echo_m))?;
+            let mut echo_m = readings.and_then(|(_, echo_m)| echo_m);
+            if let Some(free) = &mut self.scan {
+                while let Some(scan) = self.inputs.scan.next_slice()? {
+                    free.take(scan.header().stamp.time().seconds(), scan.header(), &scan);
+                }
+                echo_m = Some(free.free_m(pose.stamp.time().seconds()));
+            }
+            self.answer(&pose, echo_m)?;
         }
         Ok(self.progress)
     }

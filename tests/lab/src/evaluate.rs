@@ -65,7 +65,7 @@ pub struct Arguments {
     /// laboratory, measured or harsh.
     #[arg(long, default_value = "measured")]
     realism: String,
-    /// Calibrate the robot of each mission before it, by `firsthand calibrate`. Where that fails the mission runs as it is.
+    /// Calibrate the robot of each mission before it, by `firsthand calibrate`. Where that fails, standard error says why, and the mission runs as it is.
     #[arg(long)]
     calibrate: bool,
     /// The robot's model.

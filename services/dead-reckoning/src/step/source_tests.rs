@@ -329,6 +329,35 @@ fn wheels_that_count_unequal_shares_of_what_they_are_told_make_the_pose_unsure_u
     assert!(deviation(0.965, true).0 < 0.1);
 }
 
+#[test]
+fn a_doubt_of_the_wheels_is_settled_by_a_scan_that_says_where_the_robot_is_and_by_no_other() {
+    let deviation = |own: [f64; 2], contradicts: bool| {
+        let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
+        for tick in 0..80 {
+            let wheels = WheelSample { told_ratio: 0.965, ..robot.wind() };
+            // All fixes share 1 cm and 0.01 rad.
+            let [place, heading] = own.map(|own| own * own + 1e-4);
+            let fix = FixSample {
+                heading_rad: robot.truth.heading,
+                covariance: [place, 0.0, 0.0, place, 0.0, heading],
+                shared: [1e-4; 2],
+                ..robot.fix()
+            };
+            let aside_m = if contradicts && tick == 20 { 2.0 } else { 0.0 };
+            let fix = FixSample { x_m: fix.x_m + aside_m, ..fix };
+            reckoning.given(&wheels, &[fix], &[]);
+        }
+        reckoning.sample().covariance[3].sqrt()
+    };
+    assert!(deviation([0.05, 0.03], false) < 0.1);
+    // It may have begun anew where the wheels said.
+    assert!(deviation([0.05, 0.03], true) > 0.5);
+    // A hall without anything near, and a round room.
+    for own in [[0.3, 0.03], [0.05, 0.2]] {
+        assert!(deviation(own, false) > 0.5, "{own:?}");
+    }
+}
+
 /// The error of the heading after 20 s at rest and 60 s of driving, with a gyro of this bias that says how often it is off.
 fn heading_error(bias: f64, mut gyro: impl FnMut(u64, f64) -> Vec<TurnSample>) -> f64 {
     let (mut robot, mut reckoning) = (Robot::new(0.01), x80());

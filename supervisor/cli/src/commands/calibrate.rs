@@ -1,5 +1,6 @@
 pub mod drive;
 mod ends;
+mod gyro;
 mod response;
 mod written;
 
@@ -34,6 +35,18 @@ pub struct Arguments {
     /// Squares to both sides, whose ends are measured by tape, instead of loops before a wall. The ends of a simulated robot are known.
     #[arg(long)]
     squares: bool,
+    /// By the robot's gyro instead: a way ahead, a turn, the way back and a turn, in half a minute. Its scale is known with this standard
+    /// deviation, a share, which becomes that of the track.
+    #[arg(
+        long,
+        value_name = "SHARE",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "0.01",
+        value_parser = share,
+        conflicts_with_all = ["squares", "response"]
+    )]
+    gyro: Option<f64>,
     /// The delay and the acceleration of the base, by ten seconds of turns on the spot. Prints the keys of [robot.response].
     #[arg(long, conflicts_with = "squares")]
     response: bool,
@@ -46,7 +59,7 @@ pub struct Arguments {
     /// Stop after so many loops, however good the values are; each takes about a minute.
     #[arg(long, value_name = "N", default_value_t = CalibrationPlan::default().loops)]
     loops: u32,
-    /// The way from the wall, or the side of a square, metres.
+    /// The way from the wall, or for a gyro, or the side of a square, metres.
     #[arg(long, value_name = "M", default_value_t = CalibrationPlan::default().drive_m)]
     drive: f64,
     /// The file to write.
@@ -67,6 +80,7 @@ pub fn main(arguments: &Arguments) -> Result {
         procedure: match arguments {
             Arguments { response: true, .. } => Procedure::Turns,
             Arguments { squares: true, .. } => Procedure::LeftSquare,
+            Arguments { gyro: Some(_), .. } => Procedure::Gyro,
             _ => Procedure::Wall,
         },
         ratio_sd: arguments.sd,
@@ -77,8 +91,11 @@ pub fn main(arguments: &Arguments) -> Result {
     if arguments.response {
         return response::measure(arguments, plan);
     }
-    let found =
-        if arguments.squares { by_squares(arguments, plan) } else { by_wall(arguments, plan) }?;
+    let found = match arguments.gyro {
+        Some(scale_sd) => gyro::measure(arguments, plan, scale_sd),
+        None if arguments.squares => by_squares(arguments, plan),
+        None => by_wall(arguments, plan),
+    }?;
     found.write(&arguments.out, arguments.setting.json)
 }
 
@@ -91,7 +108,7 @@ impl Arguments {
         };
         let is_wall = plan.procedure == Procedure::Wall;
         if is_wall && named.front_sonar().kind != SensorKind::Cone {
-            return Err("the wall is measured by a front sonar, and this robot has none: calibrate along squares".into());
+            return Err("the wall is measured by a front sonar, and this robot has none: calibrate along squares, or with --gyro if it has a gyro".into());
         }
         let (loops, drive_m) = (f64::from(plan.loops), plan.drive_m);
         let mut mission = self.setting.procedure(&named, plan, 0.35)?;
@@ -102,6 +119,11 @@ impl Arguments {
         }
         Ok(mission)
     }
+}
+
+fn share(text: &str) -> std::result::Result<f64, String> {
+    let share = text.parse().ok().filter(|share| (0.0..=0.1).contains(share));
+    share.ok_or_else(|| "give a share from 0 to 0.1: 0.01 is 1 %".to_owned())
 }
 
 fn refused(message: &str) -> Failure {

@@ -12,7 +12,7 @@ use std::{
 };
 
 use common::clock::Pace;
-use console::progress_line::ProgressLine;
+use console::{output::write_stderr, progress_line::ProgressLine};
 use summary::Summary;
 
 use super::{
@@ -44,7 +44,7 @@ pub struct Plan {
     /// Missions at once; by default one for each processor.
     pub jobs: Option<NonZero<usize>>,
     pub pace: Pace,
-    /// Whether the robot of each mission is calibrated before, as its owner would do it. If that fails the mission runs without.
+    /// Whether the robot of each mission is calibrated before, as its owner would do it. If that fails, that is said and the mission runs without.
     pub calibrates: bool,
 }
 
@@ -199,10 +199,18 @@ impl Job<'_> {
             let (runs, file) = (files.join("calibration"), files.join("calibration.toml"));
             let mut calibrate = self.firsthand("calibrate", worker);
             calibrate.arg("--runs").arg(runs).arg("--out").arg(&file);
-            let ended = calibrate.stdout(Stdio::null()).stderr(Stdio::null()).status();
-            if ended.or_cannot("start a calibration")?.success() {
+            let ended =
+                calibrate.stdout(Stdio::null()).output().or_cannot("start a calibration")?;
+            if ended.status.success() {
                 let file = toml::Value::from(file.to_string_lossy().into_owned());
                 calibrated = Some(format!("robot.calibration={file}"));
+            } else {
+                let said = String::from_utf8_lossy(&ended.stderr);
+                let why = said.lines().last().unwrap_or("it said nothing");
+                let (world, seed) = (&trial.world, self.seed);
+                write_stderr(&format!(
+                    "\n{world}, seed {seed}: not calibrated, and driven as it is: {why}\n"
+                ));
             }
         }
         let run = |records| {

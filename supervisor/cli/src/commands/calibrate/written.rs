@@ -43,7 +43,7 @@ impl Found {
         } else {
             let (loops, minutes) = (it.residuals.len(), self.seconds / 60.0);
             format!(
-                "{text}# {loops} loops or squares in {minutes:.1} min; name it in a mission: robot.calibration = {file:?}\n"
+                "{text}# {loops} loops, squares or motions in {minutes:.1} min; name it in a mission: robot.calibration = {file:?}\n"
             )
         };
         Ok(print_text(&said)?)

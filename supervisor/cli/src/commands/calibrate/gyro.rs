@@ -1,0 +1,83 @@
+//! Ratio and track by the robot's gyro, from the recording of two ways and two turns.
+
+use bring_up::{Trace, trace::Told};
+use calibration::gyro::{Motion, checked};
+use common::mission::{CalibrationPlan, Mission, Odometry};
+use recording::Recording;
+
+use super::{Arguments, drive::Carried, refused, written::Found};
+use console::failure::Result;
+
+/// A robot that was told to stand for so long rests at the end, seconds.
+const RESTS_AFTER_S: f64 = 0.8;
+
+pub fn measure(arguments: &Arguments, plan: CalibrationPlan, scale_sd: f64) -> Result<Found> {
+    let mut mission = arguments.mission(plan)?;
+    if !(mission.robot.gyro() || mission.robot.ros2.imu.is_some()) {
+        return Err("this robot has no gyro: write `gyro = true` below [robot] if its lines of JSON say the angle of one, or name its topic as robot.ros2.imu; or calibrate before a wall or along squares".into());
+    }
+    let carried = arguments.setting.carry_out(&mission, "calibration")?;
+    let Carried { directory, seconds, .. } = carried;
+    let recording = Recording::open(&directory.join("recording.mcap"))?;
+    let before = std::mem::take(&mut mission.robot.odometry);
+    // Nominal ways are those of wheels that nobody calibrated.
+    mission.robot.odometry = Odometry::default();
+    let trace = Trace::read(&mission, &recording)?;
+    let (at_rest, motions) = motions(&mission, &trace).map_err(|why| refused(&why))?;
+    let estimate = checked(&at_rest, &motions, scale_sd, mission.body().track_m)
+        .map_err(|refusal| refused(&refusal.to_string()))?;
+    let robot = arguments.setting.robot.to_string();
+    let metres = motions.iter().map(|it| it.rolled_m).sum::<f64>() / 2.0;
+    Ok(Found { robot, method: "gyro", before, estimate, metres, seconds })
+}
+
+/// Seconds and turns, radians.
+type Increments = Vec<(f64, f64)>;
+
+/// The gyro's increments in the longest rest, and the motions after it, from rest to rest.
+fn motions(
+    mission: &Mission,
+    trace: &Trace,
+) -> std::result::Result<(Increments, Vec<Motion>), String> {
+    let mut rests = trace.legs();
+    rests.retain(|leg| leg.told == Told::Stand && leg.seconds() >= RESTS_AFTER_S);
+    let longest = rests.iter().max_by(|one, other| one.seconds().total_cmp(&other.seconds()));
+    let Some(longest) = longest.copied() else {
+        return Err("the robot never stood; look at the logs of the run".to_owned());
+    };
+    let from_s = longest.from_s + RESTS_AFTER_S;
+    let near_s = 0.25 / mission.robot.rate_hz;
+    let (mut at_rest, mut motions, mut motion) = (Vec::new(), Vec::new(), Motion::default());
+    let mut gyro = trace.gyro.iter().peekable();
+    let (mut ticks, mut silent) = (0, 0);
+    for pair in trace.rolled.windows(2).filter(|pair| pair[0].0 >= from_s) {
+        let [(then_s, then), (at_s, now)] = [pair[0], pair[1]];
+        while gyro.next_if(|(gyro_s, _)| *gyro_s < at_s - near_s).is_some() {}
+        let turn = gyro.next_if(|(gyro_s, _)| *gyro_s <= at_s + near_s);
+        ticks += 1;
+        silent += u32::from(turn.is_none());
+        let (seconds, turn) = (at_s - then_s, turn.map_or(0.0, |(_, turn)| *turn));
+        if at_s <= longest.until_s {
+            at_rest.push((seconds, turn));
+            continue;
+        }
+        // A leg begins with a command, which the tick before it led to.
+        if rests.iter().any(|rest| (then_s - near_s..at_s - near_s).contains(&rest.until_s)) {
+            motions.push(std::mem::take(&mut motion));
+        }
+        let [left_m, right_m] = [0, 1].map(|wheel| now[wheel] - then[wheel]);
+        motion.left_m += left_m;
+        motion.right_m += right_m;
+        motion.rolled_m += left_m.abs() + right_m.abs();
+        motion.turned_rad += turn;
+        motion.seconds += seconds;
+    }
+    motions.push(motion);
+    motions.retain(|motion| motion.rolled_m > 0.0);
+    match silent > 0 {
+        true => Err(format!(
+            "the gyro says nothing in {silent} of {ticks} ticks: look at it with `firsthand bring-up`, or repeat this on a machine that has less to do"
+        )),
+        false => Ok((at_rest, motions)),
+    }
+}
