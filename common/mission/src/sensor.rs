@@ -95,10 +95,9 @@ pub(crate) struct Product {
     /// A sensor that is no laser has 1.
     beams: usize,
     noise: (f64, f64),
+    /// The upright field of view of a depth camera, degrees; 0 of others.
+    tall_deg: f64,
 }
-
-/// The upright field of view of a [`SensorModel::D435`], degrees.
-const D435_TALL_DEG: f64 = 58.0;
 
 impl SensorModel {
     pub(crate) const fn product(self) -> Product {
@@ -112,7 +111,8 @@ impl SensorModel {
             Self::Lds02 => (Scan, 360.0, 8.0, 0.16, 360, (0.0075, 0.025)),
             Self::D435 => (Scan, 87.0, 3.0, 0.3, 175, (0.005, 0.01)),
         };
-        Product { kind, field_of_view_deg, reach_m, least_m, beams, noise }
+        let tall_deg = if matches!(self, Self::D435) { 58.0 } else { 0.0 };
+        Product { kind, field_of_view_deg, reach_m, least_m, beams, noise, tall_deg }
     }
 
     /// An A1 measures 8,000 times a second, of which its line carries 2,304 in a standard scan: it says one in four.
@@ -165,12 +165,13 @@ impl SensorModel {
 
     /// The rise of its highest beam, and the fall of its lowest, a metre; 0 for a laser, whose beams are level.
     pub fn rise(self) -> f64 {
-        if self == Self::D435 { (0.5 * D435_TALL_DEG).to_radians().tan() } else { 0.0 }
+        (0.5 * self.product().tall_deg).to_radians().tan()
     }
 
     /// The range from which a beam passes no thing that the body can touch, metres: a depth camera looks over and under what is nearer.
     pub fn clears_from_m(self) -> f64 {
-        if self == Self::D435 { self.least_m() } else { 0.0 }
+        let Product { least_m, tall_deg, .. } = self.product();
+        if tall_deg > 0.0 { least_m } else { 0.0 }
     }
 
     /// Standard deviation of a range: metres, and a share of it. The manuals give 15 mm up to half a metre and 5 %

@@ -97,10 +97,10 @@ pub struct Person {
     /// At the start.
     pub at: DVec2,
     pub goals: Vec<DVec2>,
-    /// That it wants; 1.34 is the mean of people (Helbing and Molnar, 1995).
+    /// The speed at which somebody walks whom nothing hinders; 1.34 is the mean of people (Helbing and Molnar, 1995).
     #[serde(default = "walking_m_s")]
     pub speed_m_s: f64,
-    /// Of a cylinder; nominal.
+    /// The person is a cylinder of this radius; nominal.
     #[serde(default = "person_radius_m")]
     pub radius_m: f64,
 }

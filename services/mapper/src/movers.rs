@@ -526,8 +526,8 @@ mod tests {
         (0..=7).for_each(|tick| drop(room.tick(tick)));
         let [mover] = room.movers.placed[..] else { panic!("{:?}", room.movers.placed) };
         let there = walker.0 + velocity * 7.0 * PERIOD_S;
-        let off_m = there.distance(DVec2::new(mover.x_m.into(), mover.y_m.into()));
-        let off_m_s = velocity.distance(DVec2::new(mover.vx_m_s.into(), mover.vy_m_s.into()));
+        let off_m = there.distance(mover.place());
+        let off_m_s = velocity.distance(mover.velocity());
         assert!(off_m < 0.1 && off_m_s < 0.15, "{mover:?} {off_m} {off_m_s}");
     }
 
@@ -543,7 +543,7 @@ mod tests {
             assert_eq!(room.movers.placed.len(), 1, "{tick}: {:?}", room.movers.placed);
         }
         let mover = room.movers.placed[0];
-        let off_m_s = DVec2::new(mover.vx_m_s.into(), mover.vy_m_s.into()).distance(-velocity);
+        let off_m_s = mover.velocity().distance(-velocity);
         assert!(off_m_s < 0.3, "{mover:?}");
     }
 

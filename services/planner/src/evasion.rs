@@ -161,10 +161,10 @@ impl Evasion {
     }
 
     fn disc(&self, mover: &Mover) -> Disc {
-        let &Mover { x_m, y_m, vx_m_s, vy_m_s, radius_m, doubt_m, doubt_m_s } = mover;
+        let &Mover { radius_m, doubt_m, doubt_m_s, .. } = mover;
         Disc {
-            at: DVec2::new(x_m.into(), y_m.into()),
-            velocity: DVec2::new(vx_m_s.into(), vy_m_s.into()),
+            at: mover.place(),
+            velocity: mover.velocity(),
             radius: radius_m.into(),
             touches_m: self.radius + f64::from(radius_m) + f64::from(doubt_m),
             doubt_m_s: doubt_m_s.into(),

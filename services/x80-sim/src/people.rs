@@ -16,7 +16,7 @@ use crate::world::{Solid, Surface};
 const RELAXES_S: f64 = 0.5;
 /// The potential that others have, m^2/s^2, and the distance over which it falls, metres.
 const OF_OTHERS: (f64, f64) = (2.1, 0.3);
-/// The same of what stands.
+/// The potential of walls and other things that stand, and its distance.
 const OF_WALLS: (f64, f64) = (10.0, 0.2);
 /// The step of another that a person keeps clear of, seconds.
 const STEP_S: f64 = 2.0;

@@ -17,30 +17,18 @@ impl Checker {
         let silence = simulation.stops_when_silent_s.unwrap_or(1.0);
         within("simulation.stops_when_silent_s", silence, 0.01..=3600.0, "s")?;
         simulation.ring.iter().try_for_each(ranger)?;
-        let problem = format!("more than {MAX_THINGS} things come and go");
-        let are_many = simulation.things.len() > MAX_THINGS;
-        refuse_if(are_many, "simulation.thing", problem, "give fewer")?;
+        at_most("simulation.thing", simulation.things.len(), MAX_THINGS, "things come and go")?;
         for thing in &simulation.things {
             self.thing(thing)?;
         }
-        let are_many = simulation.people.len() > MAX_PEOPLE;
-        let problem = format!("more than {MAX_PEOPLE} people walk");
-        refuse_if(are_many, "simulation.person", problem, "give fewer")?;
+        at_most("simulation.person", simulation.people.len(), MAX_PEOPLE, "people walk")?;
         simulation.people.iter().try_for_each(person)?;
-        let are_many = simulation.holes.len() > MAX_THINGS;
-        refuse_if(
-            are_many,
-            "simulation.hole",
-            format!("more than {MAX_THINGS} holes"),
-            "give fewer",
-        )?;
+        at_most("simulation.hole", simulation.holes.len(), MAX_THINGS, "holes")?;
         for hole in &simulation.holes {
             point("simulation.hole", hole.at)?;
             point("simulation.hole", hole.size_m)?;
         }
-        let problem = format!("more than {MAX_BLOCKS} blocks of wheels");
-        let are_many = simulation.blocks.len() > MAX_BLOCKS;
-        refuse_if(are_many, "simulation.block", problem, "give fewer")?;
+        at_most("simulation.block", simulation.blocks.len(), MAX_BLOCKS, "blocks of wheels")?;
         simulation.blocks.iter().try_for_each(block)
     }
 
@@ -48,8 +36,7 @@ impl Checker {
         const KEY: &str = "simulation.thing";
         self.shapes(KEY, &thing.shape)?;
         span(KEY, thing.from_s, thing.until_s)?;
-        let problem = format!("more than {MAX_MOVES} moves of one thing");
-        refuse_if(thing.moves.len() > MAX_MOVES, KEY, problem, "give fewer")?;
+        at_most(KEY, thing.moves.len(), MAX_MOVES, "moves of one thing")?;
         let mut earliest = 0.0;
         for station in &thing.moves {
             within(KEY, station.at_s, earliest..=MAX_TIMEOUT_S, "s of at_s, in order,")?;
@@ -58,6 +45,10 @@ impl Checker {
         }
         Ok(())
     }
+}
+
+fn at_most(key: &'static str, count: usize, most: usize, what: &str) -> Result {
+    refuse_if(count > most, key, format!("more than {most} {what}"), "give fewer")
 }
 
 fn person(person: &Person) -> Result {

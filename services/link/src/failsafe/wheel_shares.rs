@@ -82,7 +82,7 @@ impl Sums {
     }
 }
 
-/// Of ways or speeds, left and right: the logarithm of their ratio.
+/// The logarithm of the ratio of the right way or speed to the left one.
 fn curve([left, right]: [f64; 2]) -> f64 {
     (right / left).abs().ln()
 }
