@@ -52,6 +52,16 @@ fn a_robot_with_an_arduino_arrives_in_lockstep_on_the_same_way_each_time() {
 }
 
 #[test]
+fn the_gyro_of_an_arduino_keeps_the_heading_of_wheels_that_nobody_calibrated() {
+    let keys = ["robot.gyro=true", "simulation.realism='measured'"].map(|key| ["--set", key]);
+    for seed in ["1", "2", "3", "4", "5", "6"] {
+        let arguments = [&keys.concat()[..], &["--pace", "max", "--seed", seed]].concat();
+        let summary = Run::start("arduino-gyro", MISSION, &arguments).arrives();
+        assert!(summary["pose_error_m"].as_f64().unwrap() < 0.15, "{seed}: {summary}");
+    }
+}
+
+#[test]
 fn a_simulated_robot_with_an_arduino_arrives_and_replays_to_the_bit() {
     let (_, directory) = Run::start("arduino-sim", MISSION, &["--pace", "4"]).arrives_in();
     replayed_in(&directory);

@@ -103,8 +103,8 @@ keys! {
         right: Channel = Channel { channel: 1, reversed: false },
         /// The link makes good that the wheels turn slower than commanded; without it [`crate::Mission::speed_trim`].
         speed_trim: Option<bool>,
-        /// The robot says the angle of its gyro: the simulated one then has a gyro, and `firsthand check` counts on it. A robot of JSON may say
-        /// it without the key.
+        /// The robot says the angle of its gyro: the simulated one then has a gyro, and `firsthand check` counts on it. A robot of JSON or
+        /// an Arduino may say it without the key.
         gyro: Option<bool>,
         /// Age at which a command no longer moves the robot.
         command_limit_s: f64 = 0.25,

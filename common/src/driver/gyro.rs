@@ -1,5 +1,9 @@
 //! What drivers of robots with a gyro share.
 
+use std::f64::consts::PI;
+
+use crate::{driver::Turn, mission::Body};
+
 /// Noise of a turn whose message states less or none, rad per square root of a second. Nominal: several times that of
 /// robots' gyros, such as the BMI160's 0.007 degrees.
 pub const NOISE: f64 = 5e-4;
@@ -66,5 +70,54 @@ impl Compared {
         (!self.agrees).then(|| {
             format!("a turn of {gyro:.2} rad where odometry has {odometry:.2}, so it is not used")
         })
+    }
+}
+
+/// Share by which the scale of a cheap gyro may be off, such as the MPU-6050's.
+const SCALE: f64 = 0.01;
+
+/// From the angle that a robot says of its gyro to the turn of each tick.
+#[derive(Clone, Debug, Default)]
+pub struct Angle {
+    /// The newest angle of the gyro and those of the wheels, radians.
+    newest: Option<(f64, [f64; 2])>,
+    turns: Turns<f64>,
+    now_ns: f64,
+    compared: Compared,
+}
+
+impl Angle {
+    /// A report has this angle of the gyro, if any, and of the wheels. Returns a new fault of the gyro.
+    pub fn take(
+        &mut self,
+        angle: Option<f64>,
+        wheels: [f64; 2],
+        body: &Body,
+        period_ns: f64,
+    ) -> Option<String> {
+        self.now_ns += period_ns;
+        let newest = angle.map(|angle| (angle, wheels));
+        let before = std::mem::replace(&mut self.newest, newest);
+        let ((angle, [left, right]), (angle_before, [left_before, right_before])) =
+            newest.zip(before)?;
+        let turned = angle - angle_before;
+        if turned.abs() > PI {
+            // It begins anew.
+            self.turns.interrupt();
+            return None;
+        }
+        let rolled = (right - right_before) - (left - left_before);
+        let by_wheels = rolled * body.wheel_radius_m / body.track_m;
+        let why = self.compared.take(self.now_ns as i64, [by_wheels, turned])?;
+        Some(format!("gyro: {why}; say its angle counter-clockwise, in the unit of the protocol"))
+    }
+
+    /// After a gap the turn only says where the next one begins.
+    pub fn for_tick(&mut self, rate_hz: f64) -> Option<Turn> {
+        let now = self.newest.filter(|_| self.compared.agrees()).map(|(angle, _)| angle);
+        let (sequence, before) = self.turns.until(now)?;
+        let turn_rad = now? - before;
+        let variance_rad2 = NOISE * NOISE / rate_hz + (SCALE * turn_rad).powi(2);
+        Some(Turn { sequence, turn_rad, variance_rad2 })
     }
 }

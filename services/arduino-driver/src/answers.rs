@@ -7,8 +7,9 @@ pub(crate) enum Answer {
     Done,
     /// `Invalid Command`: none came, or a garbled one.
     Invalid,
-    /// Two numbers, left and right. No other request is answered so.
-    Counts([i32; 2]),
+    /// Two numbers, left and right, and a third of a board with a gyro: the angle that it has turned by, ten thousandths of a radian
+    /// counter-clockwise. No other request is answered so.
+    Counts([i32; 2], Option<i32>),
     /// A number greater than any range.
     Baud,
     /// A smaller number, a range if a sonar was asked.
@@ -29,7 +30,11 @@ impl Answer {
         }
         let whole = |word: &str| word.parse::<i32>().map_err(|_| none());
         if let Some((left, right)) = text.split_once(' ') {
-            return Ok(Self::Counts([whole(left)?, whole(right)?]));
+            let (right, gyro) = match right.split_once(' ') {
+                Some((right, gyro)) => (right, Some(whole(gyro)?)),
+                None => (right, None),
+            };
+            return Ok(Self::Counts([whole(left)?, whole(right)?], gyro));
         }
         match u32::try_from(whole(text)?) {
             Ok(rate) if rate >= LEAST_BAUD => Ok(Self::Baud),
@@ -48,7 +53,8 @@ mod tests {
         for (line, answer) in [
             ("OK\r", Answer::Done),
             ("Invalid Command\r", Answer::Invalid),
-            ("-12 2147483647\r", Answer::Counts([-12, i32::MAX])),
+            ("-12 2147483647\r", Answer::Counts([-12, i32::MAX], None)),
+            ("5 6 -31416\r", Answer::Counts([5, 6], Some(-31_416))),
             (" 57600\r", Answer::Baud),
             ("19200", Answer::Baud),
             ("17241\r", Answer::Centimetres(17_241)),
@@ -61,9 +67,18 @@ mod tests {
     #[test]
     fn a_line_that_lost_or_gained_bytes_is_refused() {
         // Two ranges that lost the line feed between them keep the carriage return, so they are no counts.
-        for line in
-            ["12\r34\r", "12 34 56\r", "2147483648 0", "-1", "1.5", "O", "1  2", "12OK", "", "\r\r"]
-        {
+        for line in [
+            "12\r34\r",
+            "12 34 56 78\r",
+            "2147483648 0",
+            "-1",
+            "1.5",
+            "O",
+            "1  2",
+            "12OK",
+            "",
+            "\r\r",
+        ] {
             assert!(Answer::parse(line.as_bytes()).unwrap_err().contains("no answer"), "{line:?}");
         }
         assert!(Answer::parse(b"\xff\xfe 1").is_err());

@@ -2,7 +2,8 @@
 //! the requests.
 //!
 //! The board says nothing unasked. At each poll the driver asks it for a round: the range of each sonar, `p PIN`, and
-//! then the encoder counts, `e`, with which a tick begins. Answers carry no name and bytes may be lost, so these
+//! then the encoder counts, `e`, with which a tick begins. A board with a gyro says its angle after
+//! the counts. Answers carry no name and bytes may be lost, so these
 //! rules keep an answer from being taken for that of another request:
 //!
 //! 1. A round is asked for when nothing before it is unanswered. Its ranges count only when as many came as were
@@ -22,9 +23,9 @@ mod answers;
 use std::time::Duration;
 
 use common::{
-    driver::{Base, Driver, Heard, Motion, WireTally, range_reading},
+    driver::{Base, Driver, Heard, Motion, Turn, WireTally, gyro, range_reading},
     json_wire::Lines,
-    mission::{Mission, Sensor},
+    mission::{Body, Mission, Sensor},
     samples::WheelSample,
     wire::COUNT_CYCLE,
 };
@@ -35,6 +36,8 @@ use self::answers::Answer;
 const MOST_AT_ONCE: usize = 64;
 /// The board waits for an echo for one second at most.
 const LATEST_S: f64 = 2.0;
+/// The unit of the gyro's angle, radians.
+const GYRO_RAD: f64 = 1e-4;
 /// A greater multiple of a wheel's top speed is no speed.
 const IMPLAUSIBLE: f64 = 1.5;
 
@@ -54,6 +57,7 @@ enum Waits {
 
 #[derive(Clone, Debug)]
 pub struct Arduino {
+    body: Body,
     pid_rate_hz: f64,
     rate_hz: f64,
     most_counts_s: f64,
@@ -67,6 +71,7 @@ pub struct Arduino {
     polls: u64,
     /// The newest counts, the poll at which they were asked for, and the speeds up to them, counts/s.
     counts: Option<([i32; 2], u64, [i32; 2])>,
+    gyro: gyro::Angle,
     /// The link has not heard yet why the newest round was dropped.
     dropped: Option<String>,
     tally: WireTally,
@@ -79,6 +84,7 @@ impl Arduino {
             Some((*robot.arduino.sonars.get(&sensor.name)?, row, sensor))
         };
         Self {
+            body,
             pid_rate_hz: robot.arduino.pid_rate_hz,
             rate_hz: robot.rate_hz,
             most_counts_s: IMPLAUSIBLE * body.top_speed_m_s / body.metres_per_count(),
@@ -89,6 +95,7 @@ impl Arduino {
             waits: Waits::Baud { since: None },
             polls: 0,
             counts: None,
+            gyro: gyro::Angle::default(),
             dropped: None,
             tally: WireTally::default(),
         }
@@ -108,7 +115,7 @@ impl Arduino {
             {
                 ranges.push(range);
             }
-            (Answer::Counts(counts), Waits::Round { since, ranges })
+            (Answer::Counts(counts, gyro), Waits::Round { since, ranges })
                 if ranges.len() == self.sonars.len() =>
             {
                 let (since, ranges) = (*since, std::mem::take(ranges));
@@ -118,6 +125,11 @@ impl Arduino {
                     let range = (centimetres > 0).then(|| f64::from(centimetres) / 100.0);
                     heard.readings.push(range_reading(*row, sensor, range));
                 }
+                let wheels = counts.map(|count| {
+                    f64::from(count) * self.body.metres_per_count() / self.body.wheel_radius_m
+                });
+                let angle = gyro.map(|angle| f64::from(angle) * GYRO_RAD);
+                heard.refused = self.gyro.take(angle, wheels, &self.body, 1e9 / self.rate_hz);
                 heard.motion = Some(self.motion(counts, since));
             }
             (Answer::Invalid, _) => {
@@ -201,6 +213,10 @@ impl Driver for Arduino {
 impl Base for Arduino {
     fn is_polled(&self) -> bool {
         true
+    }
+
+    fn turn_for_tick(&mut self) -> Option<Turn> {
+        self.gyro.for_tick(self.rate_hz)
     }
 
     fn poll(&mut self) -> Vec<u8> {

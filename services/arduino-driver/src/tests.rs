@@ -248,3 +248,20 @@ fn a_board_acknowledges_each_velocity_and_owes_nothing_for_what_it_is_asked() {
     let asked = driver.poll();
     assert_eq!(driver.owed(&asked), 0);
 }
+
+#[test]
+fn a_third_number_is_the_angle_of_a_gyro_which_gives_the_turn_of_each_tick() {
+    let mut driver = driver();
+    let body = mission("").body();
+    let mut turns = Vec::new();
+    for tick in 0..6 {
+        let side = 0.05 * f64::from(tick) * body.track_m / body.metres_per_count();
+        let said = round(
+            &mut driver,
+            &format!("0\r\n0\r\n{} {side:.0} {}\r\n", -side as i32, 1100 * tick),
+        );
+        assert_eq!(said.refused, None);
+        turns.extend(driver.turn_for_tick().map(|turn| (turn.turn_rad * 1e6).round() / 1e6));
+    }
+    assert_eq!(turns, [0.0, 0.11, 0.11]);
+}

@@ -1,12 +1,13 @@
 //! Robots that speak lines of JSON: [`common::json_wire`] is the protocol.
 
-use std::{collections::BTreeMap, time::Duration};
+#[cfg(test)]
+mod gyro_tests;
 
-mod gyro;
+use std::{collections::BTreeMap, time::Duration};
 
 use common::{
     driver::{
-        Base, Driver, Heard, LaserScan, Memory, Motion, StopMethod, Turn, WireTally, beam,
+        Base, Driver, Heard, LaserScan, Memory, Motion, StopMethod, Turn, WireTally, beam, gyro,
         odometry::{Odometry, motion, twist, wheel_speeds},
         range_reading,
     },
@@ -15,8 +16,6 @@ use common::{
     mission::{Body, Mission, Sensor, TouchRow},
     samples::{LONGEST_SWEEP_NS, RangeReading, Sweep},
 };
-
-use self::gyro::Gyro;
 
 /// No clock of a robot says more, seconds either way: twice the time since 1970.
 const MOST_CLOCK_S: f64 = 4e9;
@@ -35,7 +34,7 @@ pub struct Json {
     /// The count before the newest line, if that line counts less: an old one, or of a robot that has restarted, as the next one tells.
     fell_from: Option<u64>,
     odometry: Odometry,
-    gyro: Gyro,
+    gyro: gyro::Angle,
     tally: WireTally,
 }
 
@@ -51,7 +50,7 @@ impl Json {
             answered: None,
             fell_from: None,
             odometry: Odometry::default(),
-            gyro: Gyro::default(),
+            gyro: gyro::Angle::default(),
             tally: WireTally::default(),
         }
     }

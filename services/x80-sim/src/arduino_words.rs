@@ -118,12 +118,14 @@ impl ArduinoWords {
         request: Request,
         sensors: &StandardSensors,
         motors: &[Motor; 6],
+        gyro: Option<f64>,
     ) -> (String, Option<Command>) {
         let mut command = None;
         let text = match request {
             Request::Counts => {
                 let [left, right] = self.counts(motors);
-                format!("{left} {right}")
+                let gyro = gyro.map_or_else(String::new, |rad| format!(" {}", (rad * 1e4) as i32));
+                format!("{left} {right}{gyro}")
             }
             Request::Reset => {
                 self.zero = self.turned(motors);

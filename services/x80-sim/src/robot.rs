@@ -312,7 +312,11 @@ impl Robot {
             return Heard::Foreign;
         };
         if arduino.hears(self.time, &self.motors) {
-            let (answer, command) = arduino.answer(request, &self.standard, &self.motors);
+            let gyro = self.gyro.as_mut().map(|gyro| {
+                gyro.read(self.time, self.body.pose().heading);
+                gyro.angle()
+            });
+            let (answer, command) = arduino.answer(request, &self.standard, &self.motors, gyro);
             replies.extend(answer.into_bytes());
             self.heard_at = self.time;
             command.into_iter().for_each(|command| self.take(command));

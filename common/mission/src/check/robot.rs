@@ -68,9 +68,9 @@ pub(super) fn check(mission: &Mission) -> Result {
         "raise robot.command_limit_s or robot.rate_hz",
     )?;
     refuse_if(
-        robot.gyro() && robot.protocol() != Protocol::Json,
+        robot.gyro() && !matches!(robot.protocol(), Protocol::Json | Protocol::Arduino),
         "robot.gyro",
-        "only the lines of JSON have a word for a gyro",
+        "only the lines of JSON and of an Arduino have a word for a gyro",
         "give robot.ros2.imu to a robot of ROS 2, or remove it",
     )?;
     let (left, right) = (robot.left.channel, robot.right.channel);
