@@ -16,7 +16,7 @@ use recording::{
 use rustix::process::Signal;
 use serde_json::Value;
 
-use crate::support::{self, Run, json_of, operate, output, refused};
+use crate::support::{self, Run, json_of, operate, output, records, refused};
 
 /// Mission time runs this many times as fast as the wall clock.
 const PACE: [&str; 2] = ["--pace", "2"];
@@ -230,10 +230,13 @@ fn a_run_that_stays_waits_before_between_and_after_its_targets_and_none_ends_it(
     operate("goto-stay", &["goto", "0.5", "-1.0"]);
     run.wait_until("it drives again", |status| status["order"] == "driving");
     run.wait_until("it waits at last", waits);
+    assert_eq!(run.records("targets.jsonl").len(), 4, "each has its record while the run goes on");
     run.signal(Signal::INT);
-    let (code, summary) = run.finish();
+    let (code, summary, directory) = run.finish_in();
     assert_eq!(outcomes(&summary), ["reached", "reached", "unreachable", "reached"], "{summary}");
     assert_eq!(code, Some(0), "{summary}");
+    let recorded = records(&directory.path().join("run/targets.jsonl"));
+    assert_eq!(summary["targets"].as_array(), Some(&recorded), "each once");
     support::assert_nothing_left("goto-stay");
 }
 

@@ -9,6 +9,8 @@ use std::{
 
 use common::{domain::RobotName, file, run};
 use mission_control::recovery::SUMMARY;
+use processes::records;
+use recording::log_files::Tail;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -17,6 +19,8 @@ use super::{
     robots::{Robot, entries},
 };
 
+/// Results of 20,000 targets.
+const LARGEST_TARGETS: u64 = 4 << 20;
 /// A summary takes 2 kB; a larger file is not read.
 const LARGEST_SUMMARY: u64 = 1 << 20;
 
@@ -54,6 +58,26 @@ pub struct Target {
     pub y_m: f64,
     pub outcome: String,
     pub at_s: Option<f64>,
+    #[serde(default)]
+    pub distance_m: Option<f64>,
+    #[serde(default)]
+    pub truth_m: Option<f64>,
+}
+
+/// The results of the targets of the run in `directory` so far, the newest [`LARGEST_TARGETS`] bytes of them.
+pub fn targets(directory: &Path) -> Vec<Target> {
+    let file = directory.join(records::TARGETS);
+    let mut tail = Tail::default();
+    tail.skip(&file, LARGEST_TARGETS);
+    let mut targets = Vec::new();
+    loop {
+        let lines = tail.lines(&file);
+        if lines.is_empty() {
+            return targets;
+        }
+        // The line at which it begins may be cut.
+        targets.extend(lines.lines().filter_map(|line| serde_json::from_str(line).ok()));
+    }
 }
 
 pub fn list(runs: &Path) -> Vec<RunDirectory> {

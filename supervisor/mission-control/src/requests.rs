@@ -13,6 +13,7 @@ use common::{
 };
 
 use glam::DVec2;
+use processes::records;
 
 use crate::{
     error::Result,
@@ -249,7 +250,11 @@ impl Supervisor<'_> {
     pub(crate) fn take_arrival(&mut self) -> bool {
         let mission = &self.options.mission;
         let record = &self.bus.observer.record;
-        self.targets.compare(record, self.robot.truth(), allowed_m(mission));
+        let truth = self.robot.truth();
+        self.targets.compare(record, truth, allowed_m(mission));
+        for result in self.targets.take_known(!truth.is_empty()) {
+            records::append(&self.options.directory, records::TARGETS, &result);
+        }
         let arrival = record.sure_arrival(mission).filter(|_| !self.targets.is_last());
         let Some(arrival) = arrival else { return false };
         let stamp = arrival.0.stamp;

@@ -6,6 +6,7 @@ use common::{domain::Domain, ground_truth::GroundTruthTick, samples::Cause, sign
 use processes::{
     domain::DomainLock,
     last_resort::{self, Turns},
+    records,
 };
 
 use crate::{
@@ -148,7 +149,11 @@ pub fn run<'a>(
     let (ended, at_rest) = (truth.last(), record.pose.as_ref());
     let place = targets.current().position();
     let ending = decided.ending.checked(&options.mission, place, ended, at_rest);
+    let recorded = targets.recorded();
     let targets = targets.results(&ending, decided.last_tick, record.arrival.as_ref(), ended);
+    for result in targets.iter().skip(recorded) {
+        records::append(&options.directory, records::TARGETS, result);
+    }
     let ending = target_list::of_all(ending, &targets);
     let finished = Finished {
         duration_s: supervisor.clock.duration_s(decided.last_tick, &record, &truth),

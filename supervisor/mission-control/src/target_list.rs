@@ -14,7 +14,7 @@ use crate::{
     outcome::{Ending, Outcome},
 };
 
-/// The most results that are stored; the oldest are dropped.
+/// The most results that are stored; the oldest are dropped, and remain in the file of records.
 const MOST_RESULTS: usize = 128;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -81,6 +81,8 @@ pub struct TargetList {
     began_s: f64,
     ahead: Vec<TargetPoint>,
     results: Vec<Stored>,
+    /// How many of them, the oldest, are in the file of records.
+    recorded: usize,
     /// The current target has its result, and the robot waits for the next one.
     waits: bool,
     /// The current target is a hand's, and has no result.
@@ -103,6 +105,7 @@ impl TargetList {
             began_s: 0.0,
             ahead: points.collect(),
             results: Vec::new(),
+            recorded: 0,
             waits,
             by_hand: false,
             follows: false,
@@ -119,6 +122,10 @@ impl TargetList {
 
     pub(crate) const fn began_s(&self) -> f64 {
         self.began_s
+    }
+
+    pub(crate) const fn recorded(&self) -> usize {
+        self.recorded
     }
 
     pub(crate) const fn waits(&self) -> bool {
@@ -309,8 +316,18 @@ impl TargetList {
     fn store(&mut self, result: TargetResult, tick: Option<u64>) {
         if self.results.len() == MOST_RESULTS {
             self.results.remove(0);
+            self.recorded = self.recorded.saturating_sub(1);
         }
         self.results.push(Stored { result, tick });
+    }
+
+    /// The results that are to be recorded now, in their order: where there `is_truth`, arrivals wait for it.
+    pub(crate) fn take_known(&mut self, is_truth: bool) -> Vec<TargetResult> {
+        let is_known = |it: &&Stored| !is_truth || it.tick.is_none() || it.result.truth_m.is_some();
+        let known = self.results.iter().skip(self.recorded).take_while(is_known);
+        let known: Vec<_> = known.map(|stored| stored.result).collect();
+        self.recorded += known.len();
+        known
     }
 
     /// Complete the results of arrivals by the ground truth as far as that is known, with `allowed_m` as the greatest error.

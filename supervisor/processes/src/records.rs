@@ -12,6 +12,8 @@ use serde::Serialize;
 
 pub const DEATHS: &str = "deaths.jsonl";
 pub const STALLS: &str = "stalls.jsonl";
+/// The results of targets, each once it is known.
+pub const TARGETS: &str = "targets.jsonl";
 
 pub fn append(directory: &Path, name: &str, record: &impl Serialize) {
     if let Err(error) = append_line(&directory.join(name), record) {

@@ -32,6 +32,14 @@ pub struct Arguments {
 enum Command {
     List(List),
     Diff(diff::Arguments),
+    /// List the targets of a run, also of one that goes on: place, outcome, mission time, distance by the robot and by the ground truth.
+    Targets {
+        /// The directory of the run.
+        run: PathBuf,
+        /// One JSON object a line.
+        #[arg(long)]
+        json: bool,
+    },
 }
 
 /// List the runs, the newest last, with outcome and size; or first remove the oldest.
@@ -69,7 +77,32 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
         None => list(&arguments.list),
         Some(Command::List(arguments)) => list(arguments),
         Some(Command::Diff(arguments)) => diff::main(arguments),
+        Some(Command::Targets { run, json }) => targets(run, *json),
     }
+}
+
+fn targets(run: &Path, json: bool) -> Result<ExitCode> {
+    let targets = runs::targets(run);
+    if targets.is_empty() {
+        return Err(format!("no target of {} has a result", run.display()).into());
+    }
+    let mut table = Table::new([">target", ">x", ">y", "outcome", ">at", ">off", ">in truth"]);
+    let with = |value: Option<f64>, unit: &str| {
+        value.map_or("-".to_owned(), |value| format!("{value:.2} {unit}"))
+    };
+    for target in &targets {
+        table.row([
+            &target.number.to_string(),
+            &with(Some(target.x_m), "m"),
+            &with(Some(target.y_m), "m"),
+            &target.outcome.replace('_', " "),
+            &with(target.at_s, "s"),
+            &with(target.distance_m, "m"),
+            &with(target.truth_m, "m"),
+        ]);
+    }
+    print_text(&if json { json_lines(&targets)? } else { table.to_string() })?;
+    Ok(ExitCode::SUCCESS)
 }
 
 fn list(arguments: &List) -> Result<ExitCode> {
@@ -105,13 +138,14 @@ fn listed(run: &RunDirectory) -> Listed<'_> {
         Outcome::Ended(ended) => ended,
     };
     let began = run.began.duration_since(UNIX_EPOCH).unwrap_or_default();
+    let so_far = runs::targets(&run.directory);
     Listed {
         run: &run.directory,
         robot: &run.robot,
         mission: run.mission.as_deref(),
         outcome,
         mission_time_s,
-        targets,
+        targets: if so_far.is_empty() { targets } else { so_far },
         began_s: began.as_secs_f64(),
         size_bytes: run.size(),
     }
