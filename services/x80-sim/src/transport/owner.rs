@@ -10,6 +10,7 @@ use std::{
 /// A sender's port may be another user's later.
 const ASKED_AGAIN: Duration = Duration::from_millis(500);
 const MOST_SENDERS: usize = 16;
+const READINGS: usize = 3;
 
 /// Admits senders of this user on this machine only.
 #[derive(Debug, Default)]
@@ -20,13 +21,17 @@ pub(super) struct OwnUser {
 
 impl OwnUser {
     pub(super) fn admits(&mut self, sender: SocketAddr) -> bool {
-        self.senders.retain(|(_, asked, _)| asked.elapsed() < ASKED_AGAIN);
-        if let Some((_, _, own)) = self.senders.iter().find(|(known, ..)| *known == sender) {
-            return *own;
-        }
-        let own = sender.ip().is_loopback() && is_own(sender);
+        let known = self.senders.iter().position(|(known, ..)| *known == sender);
+        let known = known.and_then(|known| self.senders.remove(known));
+        let (asked, own) = match known {
+            Some((_, asked, own)) if asked.elapsed() < ASKED_AGAIN => (asked, own),
+            before => {
+                let found = if sender.ip().is_loopback() { is_own(sender) } else { Some(false) };
+                (Instant::now(), found.unwrap_or(before.is_some_and(|(.., own)| own)))
+            }
+        };
         self.senders.truncate(MOST_SENDERS - 1);
-        self.senders.push_front((sender, Instant::now(), own));
+        self.senders.push_front((sender, asked, own));
         if !own && !self.told {
             self.told = true;
             tracing::warn!(%sender, "another user sends to the simulated robot of this run; its datagrams are ignored");
@@ -35,11 +40,16 @@ impl OwnUser {
     }
 }
 
-/// All sockets of the sender's port are this user's. A system that hides its sockets shows none of another user.
-fn is_own(sender: SocketAddr) -> bool {
+/// Whether all sockets of the sender's port are this user's; none if no reading of the table shows one. While sockets come and go a reading
+/// may leave out others, and a sender may have ended. A system that hides its sockets shows none of another user.
+fn is_own(sender: SocketAddr) -> Option<bool> {
+    (0..READINGS).find_map(|_| read(sender))
+}
+
+fn read(sender: SocketAddr) -> Option<bool> {
     let table = if sender.is_ipv4() { "/proc/net/udp" } else { "/proc/net/udp6" };
     let Ok(table) = fs::read_to_string(table) else {
-        return true;
+        return Some(true);
     };
     let user = rustix::process::geteuid().as_raw().to_string();
     let port = format!(":{:04X}", sender.port());
@@ -51,5 +61,24 @@ fn is_own(sender: SocketAddr) -> bool {
             local.ends_with(&port).then(|| columns.nth(5)).flatten()
         })
         .collect();
-    !users.is_empty() && users.iter().all(|found| *found == user)
+    (!users.is_empty()).then(|| users.iter().all(|found| *found == user))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::UdpSocket;
+
+    use super::*;
+
+    #[test]
+    fn a_sender_that_no_reading_of_the_table_shows_is_whose_it_was() {
+        let mut own = OwnUser::default();
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let sender = socket.local_addr().unwrap();
+        assert!(own.admits(sender));
+        drop(socket);
+        own.senders[0].1 -= 2 * ASKED_AGAIN;
+        assert!(own.admits(sender));
+        assert!(!OwnUser::default().admits(sender), "it was nobody's");
+    }
 }
