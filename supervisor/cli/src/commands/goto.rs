@@ -1,10 +1,20 @@
 mod follow;
 
+use std::{path::Path, process::ExitCode, thread, time::Duration};
+
 use clap::Args;
 use common::{domain::RobotName, samples::TargetPoint};
 use mission_control::operator;
 
-use console::failure::{Refused, Result};
+use console::{
+    failure::{Refused, Result},
+    output::print_text,
+    robots::Robot,
+    runs,
+};
+
+/// Time between looks for the result of a target.
+const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 /// Send a robot that drives to another target, or to several in turn; it goes on without a stop. Fails if the supervisor
 /// refuses: a place in a believed hazard or outside the perimeter, a robot that an operator stopped. With `--follow` a robot that stays
@@ -29,20 +39,60 @@ pub struct Arguments {
     /// The pose of the followed robot's mission frame in this robot's: metres, and degrees counter-clockwise from x.
     #[arg(long, value_names = ["X", "Y", "DEG"], num_args = 3, requires = "follow", allow_negative_numbers = true)]
     frame: Vec<f64>,
+    /// Wait for the result of the last of these targets and print it: 0 is reached, 3 unreachable, 4 too late, 9 a wrong place, 11 unsure,
+    /// 1 anything else.
+    #[arg(long, conflicts_with = "follow")]
+    wait: bool,
     /// Name of the robot.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
 }
 
-pub fn main(arguments: &Arguments) -> Result {
+pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     if let Some(followed) = &arguments.follow {
-        return follow::main(arguments, followed.as_ref());
+        follow::main(arguments, followed.as_ref())?;
+        return Ok(ExitCode::SUCCESS);
     }
     let mut points = points(&arguments.places)?;
     if let (Some(last), Some(heading)) = (points.last_mut(), arguments.heading) {
         (last.heading_rad, last.has_heading) = (heading.to_radians(), 1);
     }
-    Ok(operator::send_to(&arguments.robot, &points, arguments.append)?)
+    let run = Robot::find(arguments.robot.clone()).run.filter(|_| arguments.wait);
+    let before = run.as_deref().map_or(0, |run| runs::targets(run).len());
+    operator::send_to(&arguments.robot, &points, arguments.append)?;
+    match (run, points.last()) {
+        (Some(run), Some(last)) => await_result(&arguments.robot, &run, before, last),
+        _ => Ok(ExitCode::SUCCESS),
+    }
+}
+
+/// Wait for the result of `target`, which is not among those `before`, in the records of `run`.
+fn await_result(
+    robot: &RobotName,
+    run: &Path,
+    before: usize,
+    target: &TargetPoint,
+) -> Result<ExitCode> {
+    loop {
+        let goes_on = Robot::find(robot.clone()).run.as_deref() == Some(run);
+        let results = runs::targets(run);
+        let mut newer = results.iter().skip(before);
+        if let Some(result) = newer.find(|it| (it.x_m, it.y_m) == (target.x_m, target.y_m)) {
+            print_text(&format!("{}\n", result.outcome.replace('_', " ")))?;
+            return Ok(ExitCode::from(match result.outcome.as_str() {
+                "reached" => 0,
+                "unreachable" => 3,
+                "timed_out" => 4,
+                "wrong_place" => 9,
+                "reached_unsure" => 11,
+                _ => 1,
+            }));
+        }
+        if !goes_on {
+            return Err(format!("the run of robot {robot} ended without a result").into());
+        }
+        thread::sleep(LOOK_EVERY);
+    }
 }
 
 /// Of pairs of numbers.
