@@ -36,7 +36,12 @@ pub struct Arguments {
     /// browsers are not.
     #[arg(long = "origin", value_name = "ORIGIN", default_value = gate::FOXGLOVE)]
     origins: Vec<String>,
+    /// Print a layout for Foxglove or Lichtblick, to be imported there, and nothing else: map, field, speeds, log.
+    #[arg(long)]
+    layout: bool,
 }
+
+const LAYOUT: &str = include_str!("../layout.json");
 
 /// Run the executable.
 pub fn main() -> ExitCode {
@@ -47,6 +52,10 @@ pub fn main() -> ExitCode {
 }
 
 fn serve(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    if arguments.layout {
+        print_text(LAYOUT)?;
+        return Ok(ExitCode::SUCCESS);
+    }
     let_stages_go_first();
     let mut signals = Signals::that_end()?;
     let listen = arguments.listen;

@@ -25,7 +25,7 @@ use foxglove::{
 };
 use recording::viewers::{self, Drawn};
 
-use crate::live::Live;
+use crate::{LAYOUT, live::Live};
 
 /// The topics of messages and the messages.
 type Sent = BTreeMap<String, Vec<u8>>;
@@ -171,4 +171,21 @@ fn a_web_page_of_another_origin_is_refused_and_a_viewer_is_served() {
         stream.read_exact(&mut answer).unwrap();
         assert_eq!(std::str::from_utf8(&answer[9..]).unwrap(), status, "{origin}");
     }
+}
+
+#[test]
+fn the_layout_shows_topics_that_there_are() {
+    let text = "target = [4, 0]\nrobot.model = 'kobuki'";
+    let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
+    let channels: Vec<_> =
+        viewers::channels(Some(&mission)).into_iter().map(|channel| channel.topic).collect();
+    let bus = common::topics::TABLE.iter().map(|topic| topic.spec().name.to_owned());
+    let known: Vec<_> = channels.into_iter().map(|topic| topic.to_string()).chain(bus).collect();
+    let words = LAYOUT.split('"');
+    let shown: Vec<_> = words
+        .filter(|word| word.contains('/') && !word.contains(' ') || word.starts_with("command."))
+        .map(|word| word.split_once('.').map_or(word, |(topic, _)| topic))
+        .collect();
+    assert!(shown.len() > 6, "{shown:?}");
+    assert!(shown.iter().all(|topic| known.iter().any(|it| it == topic)), "{shown:?}");
 }

@@ -67,12 +67,17 @@ pub struct Arguments {
     /// Print the table of its topics, and nothing else.
     #[arg(long)]
     topics: bool,
+    /// Print a configuration for RViz, and nothing else; the topics there have no namespace.
+    #[arg(long)]
+    rviz: bool,
     /// What others may do.
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     accept: Vec<Accept>,
     #[command(subcommand)]
     command: Option<Command>,
 }
+
+const RVIZ: &str = include_str!("../firsthand.rviz");
 
 #[derive(Debug, Subcommand)]
 enum Command {
@@ -113,6 +118,10 @@ pub fn topics() -> String {
 fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if arguments.topics {
         print_text(&topics())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    if arguments.rviz {
+        print_text(RVIZ)?;
         return Ok(ExitCode::SUCCESS);
     }
     let mut signals = Signals::that_end()?;

@@ -18,12 +18,13 @@ use robot_state::Sample;
 use ros2::cdr::{Reader, Writer};
 
 use crate::{
+    RVIZ,
     action::Server,
     asked,
     goals::Status,
     messages::{self, Header, Level, Marker, Shape},
     shown::Shown,
-    topics::Id,
+    topics::{Id, TABLE},
 };
 
 const PATH: &str = "000100000c0000000065cd1d040000006d617000010000000c0000000065cd1d040000006d61700000000000000000000000f03f00000000000000400000000000000000000000000000000000000000000000000000000000000000000000000000f03f";
@@ -402,4 +403,13 @@ fn what_moves_is_markers_of_its_disc_doubt_and_way_and_they_are_deleted_when_it_
     header.mover_count = 0;
     assert_eq!(published_of(&header), markers(&[]));
     assert!(published_of(&header).is_empty());
+}
+
+#[test]
+fn the_configuration_of_rviz_names_topics_that_the_bridge_has() {
+    let named = RVIZ.lines().filter_map(|line| line.trim().strip_prefix("Value: "));
+    let named: Vec<_> = named.collect();
+    assert_eq!(named.len(), 9);
+    let is_known = |name: &str| TABLE.iter().any(|spec| spec.name.starts_with(name));
+    assert!(named.iter().all(|name| is_known(name)), "{named:?}");
 }
