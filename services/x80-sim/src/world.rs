@@ -104,11 +104,21 @@ fn solids_of(shapes: &Shapes) -> Vec<Solid> {
     drums.chain(walls).chain(shapes.boxes.iter().flat_map(boxes)).collect()
 }
 
+/// The other robot of a world, at the time that its place was told for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Other {
+    pub solid: Solid,
+    /// Metres a second.
+    pub velocity: DVec2,
+    pub time_s: f64,
+}
+
 #[derive(Clone, Debug)]
 pub struct World {
     standing: Vec<Solid>,
     things: Vec<Visitor>,
     people: People,
+    other: Option<Other>,
     holes: Vec<Hole>,
     heights: Heights,
 }
@@ -134,6 +144,7 @@ impl World {
             standing: solids_of(&mission.world),
             things: mission.simulation.things.iter().map(visitor).collect(),
             people: People::new(&mission.simulation.people),
+            other: None,
             holes: mission.simulation.holes.clone(),
             heights: mission.simulation.physics().heights,
         };
@@ -150,7 +161,17 @@ impl World {
                 && visitor.thing.until_s.is_none_or(|until| time < until);
             visitor.present = due && (visitor.present || visitor.is_clear_of(centre, radius));
         }
+        if let Some(other) = &mut self.other {
+            let by = (time - other.time_s) * other.velocity;
+            other.solid.surface = other.solid.surface.moved(by);
+            other.time_s = time;
+        }
         self.people.advance(time, (centre, radius), &self.standing);
+    }
+
+    /// It goes on from there at its velocity.
+    pub fn set_other(&mut self, other: Option<Other>) {
+        self.other = other;
     }
 
     pub fn is_hole(&self, point: DVec2) -> bool {
@@ -164,6 +185,7 @@ impl World {
     pub fn solids(&self) -> impl Iterator<Item = Solid> + '_ {
         let visiting = self.things.iter().filter(|visitor| visitor.present);
         let visiting = visiting.flat_map(Visitor::now).chain(self.people.solids());
+        let visiting = visiting.chain(self.other.map(|other| other.solid));
         self.standing.iter().copied().chain(visiting)
     }
 

@@ -63,6 +63,7 @@ impl Sim {
             own_user_only: false,
             keep: None,
             ground_truth: Some(Box::new(truth_writer)),
+            meeting: None,
         };
         let thread = std::thread::spawn(move || run(options, stopped));
         let (line, ground_truth) = channel();
