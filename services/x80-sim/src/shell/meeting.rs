@@ -15,13 +15,19 @@ use std::{
     time::{Duration, Instant},
 };
 
-use common::{geometry::Profile, ground_truth::GroundTruthTick, mission::Mission, poll};
+use common::{
+    geometry::{Light, Profile},
+    ground_truth::GroundTruthTick,
+    kinematics::{Pose2, Twist},
+    mission::{Footprint, Mission},
+    poll,
+};
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
     error::{Result, SimError},
-    world::{Other, Solid, Surface},
+    world::Other,
 };
 
 /// A tick waits so long for the other robot, by the machine's clock: less than a run without a tick is given up after.
@@ -33,18 +39,22 @@ const SAME_S: f64 = 1e-6;
 /// A robot that said nothing for longer stands at its last place, seconds of mission time.
 const FRESH_S: f64 = 0.5;
 /// A larger datagram is no place.
-const LONGEST: usize = 1024;
+const LONGEST: usize = 4096;
 /// The most datagrams taken at once.
 const MOST_AT_ONCE: usize = 64;
 
 /// Metres and seconds of the mission frame, which both missions share.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Place {
     time_s: f64,
     at: DVec2,
-    velocity: DVec2,
+    heading: f64,
+    v: f64,
+    omega: f64,
     radius_m: f64,
+    /// The corners of a body that is no disc; none of a disc.
+    footprint: Vec<DVec2>,
     bottom_m: f64,
     top_m: f64,
     /// The robot's run is over, and it stays where it is.
@@ -55,7 +65,9 @@ impl Place {
     fn parse(datagram: &[u8]) -> Option<Self> {
         let place: Self = serde_json::from_slice(datagram).ok()?;
         let is_sound = place.at.abs().max_element() < 1e6
-            && place.velocity.length() < 100.0
+            && place.heading.abs() < 1e6
+            && place.v.abs().max(place.omega.abs()) < 100.0
+            && (place.footprint.is_empty() || Footprint::new(&place.footprint).is_ok())
             && (0.01..=10.0).contains(&place.radius_m)
             && (0.0..=10.0).contains(&place.bottom_m)
             && (place.bottom_m..=10.0).contains(&place.top_m)
@@ -64,11 +76,16 @@ impl Place {
     }
 
     fn other(&self, now_s: f64) -> Other {
-        let Self { time_s, at, velocity, radius_m, bottom_m, top_m, .. } = *self;
-        let velocity = if now_s - time_s < FRESH_S { velocity } else { DVec2::ZERO };
-        let profile = Profile { bottom_m, top_m, echo: 1.0, light: Default::default() };
-        let surface = Surface::Drum { at, radius: radius_m };
-        Other { solid: Solid { surface, profile }, velocity, time_s }
+        let Self { time_s, at, heading, v, omega, radius_m, bottom_m, top_m, .. } = *self;
+        let goes = if now_s - time_s < FRESH_S { 1.0 } else { 0.0 };
+        Other {
+            time_s,
+            pose: Pose2 { position: at, heading },
+            twist: Twist { v: goes * v, omega: goes * omega },
+            radius_m,
+            footprint: Footprint::new(&self.footprint).ok(),
+            profile: Profile { bottom_m, top_m, echo: 1.0, light: Light::default() },
+        }
     }
 }
 
@@ -112,6 +129,7 @@ impl Meeting {
         };
         let (socket, stop) =
             listen().map_err(|source| SimError::Meet { socket: own.clone(), source })?;
+        let body = mission.body();
         let heights = mission.simulation.physics().heights;
         Ok(Self {
             socket,
@@ -122,8 +140,11 @@ impl Meeting {
             own: Place {
                 time_s: 0.0,
                 at: DVec2::ZERO,
-                velocity: DVec2::ZERO,
-                radius_m: mission.body().radius_m,
+                heading: 0.0,
+                v: 0.0,
+                omega: 0.0,
+                radius_m: body.radius_m,
+                footprint: body.footprint.map_or_else(Vec::new, |it| it.corners().to_vec()),
                 bottom_m: heights.ground_clearance_m,
                 top_m: heights.body_top_m,
                 ended: false,
@@ -157,7 +178,7 @@ impl Meeting {
                 break;
             }
         }
-        Ok(self.newest.map(|newest| newest.other(now_s)))
+        Ok(self.newest.as_ref().map(|newest| newest.other(now_s)))
     }
 
     fn knows(&self, now_s: f64) -> bool {
@@ -168,7 +189,7 @@ impl Meeting {
     /// Takes what came, up to the first place that is later than `now_s`.
     fn take(&mut self, now_s: f64) {
         for _ in 0..MOST_AT_ONCE {
-            if self.next.is_some_and(|next| next.time_s > now_s + SAME_S && self.waits) {
+            if self.next.as_ref().is_some_and(|next| self.waits && next.time_s > now_s + SAME_S) {
                 return;
             }
             if let Some(next) = self.next.take() {
@@ -197,9 +218,11 @@ impl Meeting {
             return;
         }
         let ended = ended || (truth.contacts > 0 && !self.goes_on_after_contact);
-        let velocity = if ended { 0.0 } else { truth.v } * DVec2::from_angle(truth.heading);
-        let at = DVec2::new(truth.x, truth.y);
-        self.own = Place { time_s: truth.time_s, at, velocity, ended, ..self.own };
+        let goes = if ended { 0.0 } else { 1.0 };
+        let own = &mut self.own;
+        (own.time_s, own.at, own.heading) =
+            (truth.time_s, DVec2::new(truth.x, truth.y), truth.heading);
+        (own.v, own.omega, own.ended) = (goes * truth.v, goes * truth.omega, ended);
         self.send();
     }
 
@@ -230,10 +253,9 @@ mod tests {
     }
 
     fn x_and_speed(other: Option<Other>) -> Option<(f64, f64)> {
-        let Other { solid, velocity, .. } = other?;
-        let Surface::Drum { at, radius } = solid.surface else { return None };
-        assert_eq!((radius, solid.profile.bottom_m, solid.profile.top_m), (0.19, 0.03, 0.255));
-        Some((at.x, velocity.x))
+        let Other { pose, twist, profile, radius_m, .. } = other?;
+        assert_eq!((radius_m, profile.bottom_m, profile.top_m), (0.19, 0.03, 0.255));
+        Some((pose.position.x, twist.v))
     }
 
     #[test]
@@ -250,13 +272,14 @@ mod tests {
             ("4.0", "1e300"),
             ("0.19", "0"),
             ("0.255", "0.01"),
+            ("[]", "[[0.0,0.0],[1.0,0.0]]"),
             ("}", ",\"more\":1}"),
         ] {
             assert!(sound.contains(key), "{sound}");
             one.socket.send_to(sound.replace(key, value).as_bytes(), &one.other).unwrap();
         }
         assert_eq!(x_and_speed(two.other_at(0.2).unwrap()), Some((4.0, 0.5)));
-        assert_eq!(two.refused, 9);
+        assert_eq!(two.refused, 10);
     }
 
     #[test]
