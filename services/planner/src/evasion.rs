@@ -9,7 +9,7 @@
 use std::f64::consts::{PI, TAU};
 
 use common::{
-    geometry::wrap_angle,
+    geometry::{nearest_on_segment, wrap_angle},
     kinematics::{Pose2, Twist},
     mission::{Mission, Sensor, SensorKind},
     samples::{GuidanceStatus, Mover, PoseSample},
@@ -37,8 +37,9 @@ const MOST_DANGER: f64 = 3.0;
 /// robot of 0.7 m/s hardly got on among people who give way to it.
 const LEAST_DANGER: f64 = 0.1;
 const GAIN: f64 = 1.0;
-/// Hazard this near to a mover may be its own, metres, because its trace fades within two scans.
-const TRACE_M: f64 = 0.4;
+/// Hazard this near to where a mover was within so many seconds may be its own, metres, because its trace fades within two scans.
+const TRACE_M: f64 = 0.1;
+const TRACE_S: f64 = 0.3;
 /// A way has legs that end after so many seconds. So many are gone on from, no two of which end alike.
 const LEGS_S: [f64; 5] = [0.5, 1.0, 2.0, 3.5, AHEAD_S];
 const KEPT: usize = 16;
@@ -238,8 +239,11 @@ impl<'a> Scene<'a> {
 
     fn is_hazard(&self, at: DVec2) -> bool {
         let Evasion { inflated_m, rest_m, .. } = *self.evasion;
-        let is_its =
-            |disc: &Disc| disc.at.distance(at) <= disc.radius + inflated_m + rest_m + TRACE_M;
+        let is_its = |disc: &Disc| {
+            let was = disc.at - TRACE_S * disc.velocity;
+            let apart_m = nearest_on_segment(at, was, disc.at).distance(at);
+            apart_m <= disc.radius + inflated_m + rest_m + TRACE_M
+        };
         (self.view.is_hazard(at) || self.view.has_hazard(at, rest_m))
             && !self.discs.iter().any(is_its)
     }
