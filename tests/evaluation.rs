@@ -46,6 +46,30 @@ fn an_evaluation_that_was_cut_off_goes_on_and_another_is_not_mixed_with_it() {
 }
 
 #[test]
+fn two_robots_that_meet_have_a_row_each_and_the_same_rows_twice() {
+    let directory = tempfile::tempdir().unwrap();
+    let rows = |name: &str, more: &[&str]| {
+        let out = directory.path().join(name);
+        let robots = ["--robot", "turtlebot2", "--set", "robot.rate_hz=10", "--seed", "3"];
+        let meeting = ["evaluate", "--json", "--worlds", "meeting", "--count", "2", "--out"];
+        printed(&[&meeting[..], &[out.to_str().unwrap()], &robots, more].concat());
+        std::fs::read_to_string(out.join("rows.csv")).unwrap()
+    };
+    let first = rows("first", &[]);
+    let worlds = ["0000", "0000-oncoming", "0001", "0001-oncoming"];
+    let named = first.lines().skip(1).map(|row| row.split(',').next().unwrap());
+    assert!(named.eq(worlds.map(|world| format!("meeting-3-{world}"))), "{first}");
+    assert_eq!(first.matches(",success,").count(), 4, "{first}");
+    assert_eq!(first, rows("second", &[]));
+
+    // The row of one robot was lost: both drive again.
+    let kept = first.lines().filter(|row| !row.contains("0001-oncoming"));
+    let kept: String = kept.map(|row| format!("{row}\n")).collect();
+    std::fs::write(directory.path().join("first/rows.csv"), kept).unwrap();
+    assert_eq!(first, rows("first", &["--resume"]));
+}
+
+#[test]
 fn a_failure_of_an_evaluation_is_opened_as_the_page_of_its_run() {
     let out = tempfile::tempdir().unwrap();
     let name = out.path().join("late");

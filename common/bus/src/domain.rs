@@ -170,6 +170,11 @@ impl Domain {
         self.directory.join("stop")
     }
 
+    /// The socket at which the simulated robot hears where another in its world is.
+    pub fn place_socket(&self) -> PathBuf {
+        self.directory.join("place")
+    }
+
     /// A link to the middleware's configuration of the current [`BusInstance`](crate::bus_instance::BusInstance). A consumer in any
     /// language loads it first.
     pub fn middleware_config(&self) -> PathBuf {

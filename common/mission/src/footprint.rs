@@ -81,7 +81,7 @@ impl Footprint {
         })
     }
 
-    fn edges(&self) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
+    pub fn edges(&self) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
         let corners = self.corners();
         corners.iter().zip(corners.iter().cycle().skip(1)).map(|(from, to)| (*from, *to))
     }

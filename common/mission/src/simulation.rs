@@ -32,6 +32,9 @@ keys! {
         things: Vec<Thing>,
         #[serde(rename = "person", skip_serializing_if = "Vec::is_empty")]
         people: Vec<Person>,
+        /// The name of another robot on this machine, which runs in the same world: a mission with the same frame that names this one.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        other: Option<String>,
         #[serde(rename = "hole", skip_serializing_if = "Vec::is_empty")]
         holes: Vec<Hole>,
         /// A contact does not end the mission.

@@ -9,7 +9,7 @@
 use std::f64::consts::{PI, TAU};
 
 use common::{
-    geometry::wrap_angle,
+    geometry::{nearest_on_segment, wrap_angle},
     kinematics::{Pose2, Twist},
     mission::{Mission, Sensor, SensorKind},
     samples::{GuidanceStatus, Mover, PoseSample},
@@ -37,8 +37,9 @@ const MOST_DANGER: f64 = 3.0;
 /// robot of 0.7 m/s hardly got on among people who give way to it.
 const LEAST_DANGER: f64 = 0.1;
 const GAIN: f64 = 1.0;
-/// Hazard this near to a mover may be its own, metres, because its trace fades within two scans.
-const TRACE_M: f64 = 0.4;
+/// Hazard this near to where a mover was within so many seconds may be its own, metres, because its trace fades within two scans.
+const TRACE_M: f64 = 0.1;
+const TRACE_S: f64 = 0.3;
 /// A way has legs that end after so many seconds. So many are gone on from, no two of which end alike.
 const LEGS_S: [f64; 5] = [0.5, 1.0, 2.0, 3.5, AHEAD_S];
 const KEPT: usize = 16;
@@ -75,6 +76,14 @@ struct Disc {
     doubt_m_s: f64,
 }
 
+/// The body is free at any heading, may touch a hazard with its corners, or touches it with its sides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Near {
+    Free,
+    Corners,
+    Sides,
+}
+
 /// A way so far.
 #[derive(Clone, Copy, Debug)]
 struct Way {
@@ -87,8 +96,8 @@ struct Way {
     steps: u32,
     /// When the robot moved last.
     moved_s: f64,
-    /// Since the start it is too near to a hazard.
-    is_inside: bool,
+    /// As near to a hazard it has been since the start.
+    near: Near,
     /// When the robot meets something that moves, while it moves itself, and when it is at a hazard; infinite for never.
     meets_s: f64,
     hazard_s: f64,
@@ -228,7 +237,7 @@ impl<'a> Scene<'a> {
             now: Moving { pose: self.start, twist },
             steps: 0,
             moved_s: f64::NEG_INFINITY,
-            is_inside: self.is_hazard(self.start.position),
+            near: self.near(self.start.position),
             meets_s: f64::INFINITY,
             hazard_s: f64::INFINITY,
             danger: 0.0,
@@ -236,12 +245,19 @@ impl<'a> Scene<'a> {
         }
     }
 
-    fn is_hazard(&self, at: DVec2) -> bool {
+    fn near(&self, at: DVec2) -> Near {
         let Evasion { inflated_m, rest_m, .. } = *self.evasion;
-        let is_its =
-            |disc: &Disc| disc.at.distance(at) <= disc.radius + inflated_m + rest_m + TRACE_M;
-        (self.view.is_hazard(at) || self.view.has_hazard(at, rest_m))
-            && !self.discs.iter().any(is_its)
+        let is_its = |disc: &Disc| {
+            let was = disc.at - TRACE_S * disc.velocity;
+            let apart_m = nearest_on_segment(at, was, disc.at).distance(at);
+            apart_m <= disc.radius + inflated_m + rest_m + TRACE_M
+        };
+        let near = match self.view.is_hazard(at) {
+            true => Near::Sides,
+            false if self.view.has_hazard(at, rest_m) => Near::Corners,
+            false => Near::Free,
+        };
+        if self.discs.iter().any(is_its) { Near::Free } else { near }
     }
 
     fn field(&self, at: DVec2) -> Option<DVec2> {
@@ -252,7 +268,7 @@ impl<'a> Scene<'a> {
     }
 
     /// How the robot fares that follows `to` on from `way` until `until_s`, and stands before a hazard. From where it is too near by now,
-    /// it may go away.
+    /// it may go away, and no nearer.
     fn go(&self, way: Way, to: Advice, until_s: f64) -> Way {
         let motion = &self.evasion.motion;
         let dead_s = motion.dead_s();
@@ -265,9 +281,10 @@ impl<'a> Scene<'a> {
             let from = way.now.pose.position;
             let next = motion.next(way.now, STEP_S, (at_s > dead_s).then_some(to));
             let moves = !next.is_at_rest();
-            let is_there = moves && self.is_hazard(next.pose.position);
-            way.is_inside &= !moves || is_there;
-            if is_there && !way.is_inside {
+            let near = if moves { self.near(next.pose.position) } else { way.near };
+            let is_there = near > way.near;
+            way.near = way.near.min(near);
+            if is_there {
                 way.hazard_s = way.hazard_s.min(at_s);
                 way.now.twist = Twist { v: 0.0, ..next.twist };
             } else {

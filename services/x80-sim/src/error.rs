@@ -19,6 +19,10 @@ pub enum SimError {
     Keep(#[from] CheckpointError),
     #[error("the simulated robot cannot have {file} to itself: {source}; give another file")]
     Lock { file: PathBuf, source: io::Error },
+    #[error(
+        "the simulated robot cannot tell the other where it is at {socket}: {source}; see that its directory is this user's"
+    )]
+    Meet { socket: PathBuf, source: io::Error },
     #[error("the simulated robot cannot wait for its socket: {0}; start it again")]
     Wait(#[source] io::Error),
 }

@@ -29,7 +29,7 @@ use crate::{
     sensors::{self, Ranging},
     streams::Streams,
     wheel_errors::WheelErrors,
-    world::World,
+    world::{Other, World},
 };
 
 const STEP_S: f64 = 0.005;
@@ -203,6 +203,11 @@ impl Robot {
     fn is_moving(&self) -> bool {
         let ordered = self.motors.iter().any(|motor| motor.ends_at().is_some());
         ordered || self.rims() != Wheels::default()
+    }
+
+    /// The other robot of its world, from now on.
+    pub fn meet(&mut self, other: Option<Other>) {
+        self.world.set_other(other);
     }
 
     pub fn time_s(&self) -> f64 {

@@ -1,5 +1,6 @@
 //! The process around [`crate::robot`]: a socket, a pace and the ground truth.
 
+mod meeting;
 mod session;
 
 use std::{
@@ -19,7 +20,7 @@ use common::{
     poll,
 };
 
-use self::session::Session;
+use self::{meeting::Meeting, session::Session};
 use crate::{
     error::{Result, SimError},
     robot::Robot,
@@ -50,12 +51,14 @@ pub struct SimOptions {
     /// JSON object a line, each in one write. The robot waits for a slow reader, and goes on without one that is
     /// gone.
     pub ground_truth: Option<Box<dyn Write + Send>>,
+    /// The sockets over which this robot and the other in its world tell where they are.
+    pub meeting: Option<[PathBuf; 2]>,
 }
 
 /// Run until `stop` becomes readable (or its other end is closed). Fails when it cannot listen, the transport fails,
 /// or its state cannot be saved.
 pub fn run(options: SimOptions, stop: impl AsFd) -> Result {
-    let SimOptions { mission, pace, listen, transport, own_user_only, keep, ground_truth } =
+    let SimOptions { mission, pace, listen, transport, own_user_only, keep, ground_truth, meeting } =
         options;
     let way = Way::open(transport, listen, own_user_only)?;
     tracing::info!(address = way.address(), %pace, "a simulated X80 listens");
@@ -84,8 +87,11 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result {
         }
     };
     let mut clock = SimClock::new(pace, 1.0 / mission.robot.rate_hz, robot.time_s());
+    let meeting = meeting
+        .map(|sockets| Meeting::open(&mission, sockets, &stop, pace == Pace::Max))
+        .transpose()?;
     let mut session =
-        Session::new(&mission, robot, pace, (way, laser_way), ground_truth, checkpoint)?;
+        Session::new(&mission, robot, pace, (way, laser_way), (ground_truth, meeting), checkpoint)?;
     let mut buffer = vec![0; 65_536];
     loop {
         let timeout = clock.wait_for(session.next_due_s(), monotonic_ns());

@@ -2,7 +2,8 @@
 
 use common::{
     geometry::{Box2, Profile, Shapes, Wall, nearest_on_segment},
-    mission::{Heights, Hole, Mission, Thing},
+    kinematics::{Pose2, Twist},
+    mission::{Footprint, Heights, Hole, Mission, Thing},
 };
 use glam::DVec2;
 
@@ -104,11 +105,43 @@ fn solids_of(shapes: &Shapes) -> Vec<Solid> {
     drums.chain(walls).chain(shapes.boxes.iter().flat_map(boxes)).collect()
 }
 
+/// The other robot of a world, as it was at `time_s`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Other {
+    pub time_s: f64,
+    pub pose: Pose2,
+    pub twist: Twist,
+    pub radius_m: f64,
+    /// In place of the disc.
+    pub footprint: Option<Footprint>,
+    pub profile: Profile,
+}
+
+impl Other {
+    /// At another time, if it went on as it did.
+    fn solids_at(&self, time: f64) -> Vec<Solid> {
+        let for_s = time - self.time_s;
+        let pose = self.pose.along_arc(self.twist.v * for_s, self.twist.omega * for_s);
+        let surfaces = match &self.footprint {
+            None => vec![Surface::Drum { at: pose.position, radius: self.radius_m }],
+            Some(footprint) => {
+                let placed = |corner| pose.position + pose.axis().rotate(corner);
+                let face = |(from, to)| Surface::Face { from: placed(from), to: placed(to) };
+                footprint.edges().map(face).collect()
+            }
+        };
+        surfaces.into_iter().map(|surface| Solid { surface, profile: self.profile }).collect()
+    }
+}
+
 #[derive(Clone, Debug)]
 pub struct World {
     standing: Vec<Solid>,
     things: Vec<Visitor>,
     people: People,
+    other: Option<Other>,
+    /// The other robot now.
+    met: Vec<Solid>,
     holes: Vec<Hole>,
     heights: Heights,
 }
@@ -134,6 +167,8 @@ impl World {
             standing: solids_of(&mission.world),
             things: mission.simulation.things.iter().map(visitor).collect(),
             people: People::new(&mission.simulation.people),
+            other: None,
+            met: Vec::new(),
             holes: mission.simulation.holes.clone(),
             heights: mission.simulation.physics().heights,
         };
@@ -150,7 +185,13 @@ impl World {
                 && visitor.thing.until_s.is_none_or(|until| time < until);
             visitor.present = due && (visitor.present || visitor.is_clear_of(centre, radius));
         }
+        self.met = self.other.map_or_else(Vec::new, |other| other.solids_at(time));
         self.people.advance(time, (centre, radius), &self.standing);
+    }
+
+    /// It goes on from there as it did.
+    pub fn set_other(&mut self, other: Option<Other>) {
+        self.other = other;
     }
 
     pub fn is_hole(&self, point: DVec2) -> bool {
@@ -164,6 +205,7 @@ impl World {
     pub fn solids(&self) -> impl Iterator<Item = Solid> + '_ {
         let visiting = self.things.iter().filter(|visitor| visitor.present);
         let visiting = visiting.flat_map(Visitor::now).chain(self.people.solids());
+        let visiting = visiting.chain(self.met.iter().copied());
         self.standing.iter().copied().chain(visiting)
     }
 

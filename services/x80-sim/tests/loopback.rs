@@ -167,6 +167,7 @@ fn a_port_in_use_is_named_with_its_remedy() {
         own_user_only: false,
         keep: None,
         ground_truth: None,
+        meeting: None,
     };
     let error = run(options, stop).expect_err("the port was free after all");
     assert!(matches!(error, SimError::Bind { address, .. } if address == listen));
@@ -192,6 +193,7 @@ fn a_robot_whose_truth_nobody_reads_goes_on() {
         own_user_only: false,
         keep: None,
         ground_truth: Some(Box::new(writer)),
+        meeting: None,
     };
     let sim = std::thread::spawn(move || run(options, stopped));
     let host = UdpSocket::bind("127.0.0.1:0").unwrap();

@@ -12,6 +12,7 @@ use std::{
 
 use common::{
     clock::Pace,
+    domain::RobotName,
     file::append,
     ground_truth::{GROUND_TRUTH, GroundTruthHeader, GroundTruthTick},
     mission::Mission,
@@ -60,10 +61,11 @@ struct GroundTruth {
 }
 
 impl Simulator {
-    /// Start a simulator in the world of `mission` and wait until it listens, or `given_up` is readable. `firsthand` starts that
+    /// Start the simulator of `robot`, if it has a name, in the world of `mission` and wait until it listens, or `given_up` is readable. `firsthand` starts that
     /// executable. The simulator goes on from an earlier one's checkpoint in `directory`.
     pub fn start(
         mut firsthand: Command,
+        robot: Option<&RobotName>,
         directory: &Path,
         mission: &Mission,
         pace: Pace,
@@ -89,6 +91,7 @@ impl Simulator {
             "--supervisor",
             &std::process::id().to_string(),
         ]);
+        firsthand.args(robot.iter().flat_map(|robot| ["--robot".to_owned(), robot.to_string()]));
         firsthand.arg("--keep").arg(checkpoint);
         firsthand.stdout(Stdio::piped()).stderr(log);
         let mut process = Process::spawn(firsthand).map_err(system("start"))?;

@@ -75,6 +75,7 @@ impl Robot {
         }
         let started = Simulator::start(
             processes::process::firsthand(&[]),
+            Some(&options.robot),
             &options.directory,
             &options.mission,
             options.pace,

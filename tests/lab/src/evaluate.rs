@@ -32,7 +32,7 @@ use crate::{
 /// Worlds and noise follow from the seed.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// rooms, doors, rotated-rooms, rotated-doors, traps, corridors, straight-corridors, furnished, glazed, moving-cylinders, people; a mission file, a ROS map (.yaml), a BARN .world or
+    /// rooms, doors, rotated-rooms, rotated-doors, traps, corridors, straight-corridors, furnished, glazed, moving-cylinders, people, meeting; a mission file, a ROS map (.yaml), a BARN .world or
     /// cylinders.csv; a folder of such files.
     #[arg(long, default_value = "rooms")]
     worlds: Worlds,

@@ -54,7 +54,7 @@ pub fn mission(
 /// A simulated robot in the world of `mission`, which does not end with its supervisor. Its files are in `directory`.
 pub fn simulated(directory: &Path, mission: &Mission, pace: Pace) -> Result<Simulator> {
     fs::create_dir_all(directory).or_cannot_file("make", directory)?;
-    Ok(Simulator::start(firsthand(&[]), directory, mission, pace, None)?)
+    Ok(Simulator::start(firsthand(&[]), None, directory, mission, pace, None)?)
 }
 
 /// A run in a process that ends with this one.

@@ -6,6 +6,7 @@ pub mod ends;
 mod files;
 mod floor;
 mod furnished;
+mod meeting;
 mod moving;
 mod people;
 mod rooms;
@@ -47,7 +48,7 @@ const fn kind(stream: u64, name: &'static str, draw: fn(&mut Random, usize) -> S
     Kind { stream, name, draw, rules: Rules::PLAIN }
 }
 
-static KINDS: [Kind; 11] = [
+static KINDS: [Kind; 12] = [
     kind(1, "rooms", |random, number| rooms::draw(random, number, Doors::Some)),
     kind(2, "doors", |random, number| rooms::draw(random, number, Doors::All)),
     kind(3, "traps", traps::draw),
@@ -60,6 +61,7 @@ static KINDS: [Kind; 11] = [
     kind(10, "glazed", rooms::glazed),
     Kind { rules: moving::RULES, ..kind(11, "moving-cylinders", moving::draw) },
     kind(12, "people", people::draw),
+    kind(13, "meeting", |random, _| meeting::draw(random)),
 ];
 
 impl FromStr for Worlds {

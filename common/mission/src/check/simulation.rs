@@ -23,6 +23,12 @@ impl Checker {
         }
         at_most("simulation.person", simulation.people.len(), MAX_PEOPLE, "people walk")?;
         simulation.people.iter().try_for_each(person)?;
+        if let Some(name) = &simulation.other {
+            let allowed = |byte: u8| matches!(byte, b'a'..=b'z' | b'0'..=b'9' | b'-');
+            let is_name = (1..=16).contains(&name.len()) && name.bytes().all(allowed);
+            let problem = format!("{name:?} cannot name a robot");
+            refuse_if(!is_name, "simulation.other", problem, "use 1 to 16 of a-z, 0-9 and '-'")?;
+        }
         at_most("simulation.hole", simulation.holes.len(), MAX_THINGS, "holes")?;
         for hole in &simulation.holes {
             point("simulation.hole", hole.at)?;
@@ -146,6 +152,7 @@ mod tests {
                 "[[simulation.person]]\nat = [1, 0]\ngoals = [[1, 0]]\nspeed_m_s = nan",
                 "m.toml:2: simulation.person: NaN m/s of speed_m_s",
             ),
+            ("[simulation]\nother = '../b'", "m.toml:3: simulation.other: "),
             (
                 "[[simulation.block]]\nwheels = 'left'\nfrom_s = 3\nuntil_s = 2",
                 "m.toml:2: simulation.block: 2 s of until_s is out of range",

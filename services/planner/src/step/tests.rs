@@ -600,11 +600,18 @@ fn guidance_beside(at: DVec2, velocity: DVec2) -> (GuidanceSample, f64) {
 }
 
 fn guidance_of(model: &str, at: DVec2, velocity: DVec2) -> (GuidanceSample, f64) {
+    guidance_between(6.0, model, at, velocity)
+}
+
+/// Likewise between two walls, each so far from the robot's way, metres.
+fn guidance_between(wall_m: f64, model: &str, at: DVec2, velocity: DVec2) -> (GuidanceSample, f64) {
     let hall = "target = [4, 0]\nperimeter = { width_m = 12, cells = 120 }";
     let text = format!("{hall}\nrobot.model = '{model}'");
     let mission = Mission::parse(&text, Path::new("test.toml")).unwrap();
     let mut planner = sent(&mission);
-    let (mut header, mut cells) = keyframe_of(mission.grid_frame(), 1, |_| false);
+    let frame = mission.grid_frame();
+    let is_wall = |at: DVec2| at.y.abs() > wall_m;
+    let (mut header, mut cells) = keyframe_of(frame, 1, is_wall);
     let free = cells.iter_mut().filter(|cell| **cell == CellState::Free as u8);
     free.for_each(|cell| *cell = CellState::Scanned as u8);
     header.movers[0] = Mover {
@@ -643,6 +650,19 @@ fn a_robot_steps_aside_while_what_comes_is_far_off() {
     // A Jackal cannot back, because its laser does not look there.
     let (guidance, _) = guidance_of("jackal", DVec2::new(4.5, 0.1), DVec2::new(-1.2, 0.0));
     assert!(status(&guidance) == GuidanceStatus::Along && guidance.ey.abs() > 0.3, "{guidance:?}");
+}
+
+#[test]
+fn a_robot_does_not_take_a_wall_beside_what_comes_for_its_trace_and_does_not_step_aside_into_it() {
+    let slowly = DVec2::new(-0.4, 0.0);
+    let aside = |wall_m| {
+        (13..19).any(|decimetres| {
+            let at = DVec2::new(0.1 * f64::from(decimetres), 0.0);
+            let guidance = guidance_between(wall_m, "jackal", at, slowly).0;
+            guidance.ey.abs() > 0.3 && guidance.speed_limit_m_s > 0.0
+        })
+    };
+    assert_eq!([6.0, 0.1].map(aside), [true, false]);
 }
 
 #[test]

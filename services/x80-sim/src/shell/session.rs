@@ -17,6 +17,7 @@ use common::{
 use rplidar_protocol::START;
 use serde::Serialize;
 
+use super::meeting::Meeting;
 use crate::{
     arduino_words::{Request, Requests},
     error::Result,
@@ -60,6 +61,7 @@ pub(super) struct Session {
     gathered_s: f64,
     protocol: Protocol,
     ground_truth: Option<Box<dyn Write + Send>>,
+    meeting: Option<Meeting>,
     checkpoint: Option<Checkpoint>,
 }
 
@@ -117,7 +119,7 @@ impl Session {
         robot: Robot,
         pace: Pace,
         (way, laser_way): (Way, Option<Way>),
-        ground_truth: Option<Box<dyn Write + Send>>,
+        (ground_truth, meeting): (Option<Box<dyn Write + Send>>, Option<Meeting>),
         checkpoint: Option<Checkpoint>,
     ) -> Result<Self> {
         let (listening, laser) = (way.address(), laser_way.as_ref().map(Way::address));
@@ -136,6 +138,7 @@ impl Session {
             gathered_s: 0.0,
             protocol: mission.robot.protocol(),
             ground_truth,
+            meeting,
             checkpoint,
         };
         session.write(&GroundTruthHeader { listening, laser });
@@ -154,6 +157,9 @@ impl Session {
     /// The process ends, and with it all commands: the robot comes to rest.
     pub(super) fn end(mut self) -> Result {
         self.robot.come_to_rest();
+        if let Some(meeting) = &mut self.meeting {
+            meeting.tell(&self.robot.ground_truth(), true);
+        }
         self.save()
     }
 
@@ -237,8 +243,16 @@ impl Session {
         Ok(())
     }
 
+    fn meet(&mut self) -> Result {
+        if let Some(meeting) = &mut self.meeting {
+            self.robot.meet(meeting.other_at(self.robot.time_s())?);
+        }
+        Ok(())
+    }
+
     /// Lets all that is due by mission time `now` happen, in order.
     pub(super) fn pass(&mut self, now: f64) -> Result {
+        self.meet()?;
         // A delay of more than a period is not made up for, because the shell lets the clock wait.
         let now = now.min(self.next_tick_s() + self.robot.period_s());
         loop {
@@ -289,6 +303,7 @@ impl Session {
 
     /// The frames of the next tick; its ground truth is written, its state saved.
     fn measured(&mut self) -> Result<Vec<u8>> {
+        self.meet()?;
         self.robot.advance_to_next_tick();
         self.send_measured();
         self.write_tick();
@@ -426,6 +441,9 @@ impl Session {
         let mut ground_truth = self.robot.ground_truth();
         let now = ground_truth.time_s;
         ground_truth.radio = self.radio.as_mut().map(|radio| radio.ground_truth(now));
+        if let Some(meeting) = &mut self.meeting {
+            meeting.tell(&ground_truth, false);
+        }
         self.write(&ground_truth);
     }
 

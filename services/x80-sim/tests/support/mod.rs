@@ -12,7 +12,7 @@ use std::{
     io::{BufRead, BufReader},
     net::{SocketAddr, UdpSocket},
     os::unix::net::UnixStream,
-    path::Path,
+    path::{Path, PathBuf},
     sync::mpsc::{Receiver, channel},
     thread::JoinHandle,
     time::Duration,
@@ -53,6 +53,16 @@ impl Sim {
     }
 
     pub(crate) fn start_on(text: &str, pace: Pace, transport: Transport) -> Self {
+        Self::start_with(text, pace, transport, None)
+    }
+
+    /// In a world with another robot; the sockets are this robot's and the other's.
+    pub(crate) fn start_with(
+        text: &str,
+        pace: Pace,
+        transport: Transport,
+        meeting: Option<[PathBuf; 2]>,
+    ) -> Self {
         let (truth_reader, truth_writer) = UnixStream::pair().unwrap();
         let (stop, stopped) = UnixStream::pair().unwrap();
         let options = SimOptions {
@@ -63,6 +73,7 @@ impl Sim {
             own_user_only: false,
             keep: None,
             ground_truth: Some(Box::new(truth_writer)),
+            meeting,
         };
         let thread = std::thread::spawn(move || run(options, stopped));
         let (line, ground_truth) = channel();

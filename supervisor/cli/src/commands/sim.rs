@@ -3,6 +3,7 @@ use std::{net::SocketAddr, path::PathBuf};
 use clap::{Args, ValueEnum};
 use common::{
     clock::Pace,
+    domain::{Domain, RobotName},
     signals::{SIGINT, SIGTERM, Signals},
     start::become_child,
 };
@@ -39,6 +40,9 @@ pub struct Arguments {
     /// Write the ground truth to standard output, a JSON object a line.
     #[arg(long)]
     ground_truth: bool,
+    /// The name of this robot, by which another in its world finds it.
+    #[arg(long, default_value = "x80")]
+    robot: RobotName,
     /// End when this process, the parent, ends.
     #[arg(long, hide = true)]
     supervisor: Option<u32>,
@@ -71,7 +75,11 @@ pub fn main(arguments: &Arguments) -> Result {
     if let Some(supervisor) = arguments.supervisor {
         become_child("x80-sim", supervisor)?;
     }
+    let other = mission.simulation.other.as_deref().map(str::parse::<RobotName>).transpose()?;
+    let own = &arguments.robot;
+    let meeting = other.map(|other| [own.clone(), other].map(|it| Domain::of(it).place_socket()));
     let options = SimOptions {
+        meeting,
         mission,
         pace: arguments.pace,
         listen: arguments.listen,

@@ -246,6 +246,7 @@ mod tests {
                 clock_after_departure: optimal_time_s.is_some(),
                 ..Rules::PLAIN
             },
+            oncoming: None,
         }
     }
 

@@ -101,15 +101,19 @@ pub fn run(plan: &Plan, results: &mut Results, title: &str) -> Result {
     let done: BTreeSet<_> = settled.map(Row::key).collect();
     let (mut all, mut left) = (0, Vec::new());
     for (number, trial) in (0..).zip(&plan.trials) {
-        let file = directory.join("worlds").join(format!("{}.toml", trial.world));
-        fs::write(&file, toml::to_string(&trial.mission)?).or_cannot_file("write", &file)?;
+        for Trial { world, mission, .. } in trial.robots() {
+            let file = world_file(&directory, world);
+            fs::write(&file, toml::to_string(mission)?).or_cannot_file("write", &file)?;
+        }
         for repeat in 0..plan.repeats {
             let seed = plan.noise.seed(number, plan.repeats, repeat);
             for setting in &plan.settings {
                 all += 1;
-                if !done.contains(&(trial.world.clone(), seed, setting.name.clone())) {
-                    let (file, directory) = (file.clone(), &*directory);
-                    left.push(Job { plan, trial, setting, seed, file, directory });
+                let is_done = |(noise, robot): (u64, &Trial)| {
+                    done.contains(&(robot.world.clone(), noise, setting.name.clone()))
+                };
+                if !noises(seed).zip(trial.robots()).all(is_done) {
+                    left.push(Job { plan, trial, setting, seed, directory: &directory });
                 }
             }
         }
@@ -120,16 +124,19 @@ pub fn run(plan: &Plan, results: &mut Results, title: &str) -> Result {
     let (began, mut ended, mut line) = (Instant::now(), 0, ProgressLine::new(LINE_EVERY));
     let run = |job: &Job<'_>, thread| {
         let ended = match job.run(thread) {
-            Ok((row, _)) if row.outcome == Outcome::Aborted => job.run(thread),
+            Ok(rows) if rows.iter().any(|(row, _)| row.outcome == Outcome::Aborted) => {
+                job.run(thread)
+            }
             ended => ended,
         };
         ended.map_err(|error| error.to_string())
     };
     let kept = in_parallel(left, threads, run, |given| {
-        let (row, latency) = given?;
-        // Latencies are written first, so that a mission with a row has both.
-        latency.map_or(Ok(()), |latency| results.latencies.add(latency))?;
-        results.rows.add(row)?;
+        for (row, latency) in given? {
+            // Latencies are written first, so that a mission with a row has both.
+            latency.map_or(Ok(()), |latency| results.latencies.add(latency))?;
+            results.rows.add(row)?;
+        }
         ended += 1;
         let shown = || {
             let each_s = began.elapsed().as_secs_f64() / ended as f64;
@@ -141,6 +148,16 @@ pub fn run(plan: &Plan, results: &mut Results, title: &str) -> Result {
     });
     line.end();
     kept
+}
+
+/// The noise seeds of the robots of a mission with noise `seed`.
+fn noises(seed: u64) -> impl Iterator<Item = u64> {
+    (0..).map(move |robot| seed.wrapping_add(robot))
+}
+
+/// The mission file of `world` in the `directory` of all.
+fn world_file(directory: &Path, world: &str) -> PathBuf {
+    directory.join("worlds").join(format!("{world}.toml"))
 }
 
 /// Do `jobs` by so many numbered threads, and take their results as they come.
@@ -173,76 +190,126 @@ struct Job<'a> {
     trial: &'a Trial,
     setting: &'a Setting,
     seed: u64,
-    /// The mission, and the directory of all.
-    file: PathBuf,
+    /// The directory of all.
     directory: &'a Path,
 }
 
-impl Job<'_> {
-    fn firsthand(&self, subcommand: &str, worker: usize) -> Command {
-        let robot = format!("evaluate{}-{worker}", std::process::id());
-        let mut command = robot::mission(subcommand, &self.file, &robot, &self.setting.set);
+/// A robot of a mission, whose run has processes of its own.
+struct Robot<'a> {
+    job: &'a Job<'a>,
+    trial: &'a Trial,
+    seed: u64,
+    name: &'a str,
+    /// The other robot in its world.
+    other: Option<&'a str>,
+    /// The directory of its run.
+    directory: PathBuf,
+    /// The assignment of its calibration file, if it was calibrated.
+    calibrated: Option<String>,
+}
+
+impl Robot<'_> {
+    fn firsthand(&self, subcommand: &str) -> Command {
+        let file = world_file(self.job.directory, &self.trial.world);
+        let mut command = robot::mission(subcommand, &file, self.name, &self.job.setting.set);
         command.args(["--seed", &self.seed.to_string()]);
         command
     }
 
-    /// Run the mission, in processes of its own. Without a summary it has no latencies.
-    fn run(&self, worker: usize) -> Result<(Row, Option<Latency>)> {
-        let Self { plan, trial, setting, seed, directory: all, .. } = *self;
+    fn calibrate(&mut self) -> Result {
+        let beside = |extension| self.directory.with_extension(extension);
+        let (runs, file) = (beside("calibration"), beside("calibration.toml"));
+        let mut calibrate = self.firsthand("calibrate");
+        calibrate.args(["--set", "simulation.other='none'"]);
+        calibrate.arg("--runs").arg(runs).arg("--out").arg(&file);
+        let ended = calibrate.stdout(Stdio::null()).output().or_cannot("start a calibration")?;
+        if ended.status.success() {
+            let file = toml::Value::from(file.to_string_lossy().into_owned());
+            self.calibrated = Some(format!("robot.calibration={file}"));
+        } else {
+            let said = String::from_utf8_lossy(&ended.stderr);
+            let why = said.lines().last().unwrap_or("it said nothing");
+            let (world, seed) = (&self.trial.world, self.seed);
+            write_stderr(&format!(
+                "\n{world}, seed {seed}: not calibrated, and driven as it is: {why}\n"
+            ));
+        }
+        Ok(())
+    }
+
+    fn start(&self, records: bool) -> Result<Run> {
+        let mut command = self.firsthand("run");
+        command.args(["--pace", &self.job.plan.pace.to_string()]);
+        let other = self.other.map(|other| format!("simulation.other='{other}'"));
+        command.args(other.iter().flat_map(|key| ["--set", key]));
+        command.args(self.calibrated.iter().flat_map(|key| ["--set", key]));
+        command.arg("--out").arg(&self.directory);
+        Run::start(command, &self.directory, records)
+    }
+}
+
+impl Job<'_> {
+    /// Run the mission of each robot, all at once. A robot without a summary has no latencies.
+    fn run(&self, worker: usize) -> Result<Vec<(Row, Option<Latency>)>> {
+        let Self { plan, trial, setting, seed, directory: all } = *self;
         let files = all.join(format!("run-{worker}"));
         // A worker that was killed left its files.
         let _ = fs::remove_dir_all(&files);
         fs::create_dir(&files).or_cannot_file("make", &files)?;
-        let directory = files.join("run");
-        let mut calibrated = None;
+        let names =
+            ["evaluate", "oncoming"].map(|robot| format!("{robot}{}-{worker}", std::process::id()));
+        let mut robots: Vec<Robot<'_>> = Vec::new();
+        for (at, (trial, seed)) in trial.robots().zip(noises(seed)).enumerate() {
+            robots.push(Robot {
+                job: self,
+                trial,
+                seed,
+                name: &names[at],
+                other: self.trial.oncoming.is_some().then_some(&names[1 - at]),
+                directory: files.join(&names[at]),
+                calibrated: None,
+            });
+        }
         if plan.calibrates {
-            let (runs, file) = (files.join("calibration"), files.join("calibration.toml"));
-            let mut calibrate = self.firsthand("calibrate", worker);
-            calibrate.arg("--runs").arg(runs).arg("--out").arg(&file);
-            let ended =
-                calibrate.stdout(Stdio::null()).output().or_cannot("start a calibration")?;
-            if ended.status.success() {
-                let file = toml::Value::from(file.to_string_lossy().into_owned());
-                calibrated = Some(format!("robot.calibration={file}"));
-            } else {
-                let said = String::from_utf8_lossy(&ended.stderr);
-                let why = said.lines().last().unwrap_or("it said nothing");
-                let (world, seed) = (&trial.world, self.seed);
-                write_stderr(&format!(
-                    "\n{world}, seed {seed}: not calibrated, and driven as it is: {why}\n"
-                ));
-            }
+            robots.iter_mut().try_for_each(Robot::calibrate)?;
         }
-        let run = |records| {
-            let mut command = self.firsthand("run", worker);
-            command.args(["--pace", &plan.pace.to_string()]);
-            command.args(calibrated.iter().flat_map(|key| ["--set", key]));
-            command.arg("--out").arg(&directory);
-            Run::start(command, &directory, records)?.wait(LINE_EVERY, || ())
+        let run = |records| -> Result<Vec<Run>> {
+            let started: Result<Vec<_>> = robots.iter().map(|robot| robot.start(records)).collect();
+            started?.into_iter().map(|run| run.wait(LINE_EVERY, || ())).collect()
         };
-        let summary = run(plan.pace != Pace::Max)?.summary();
-        let has_summary = summary.is_ok();
-        let summary = summary.unwrap_or_else(|reason| {
-            let reason = reason.to_string();
-            Summary { reason, ..Summary::default() }
-        });
-        let row = Row::new(trial, seed, setting, &summary);
-        let latency = has_summary.then(|| Latency::new(&row, &summary));
-        let kept = all.join(picture(&row));
-        if !row.is_success() || plan.pictured_seed == Some(seed) {
-            // A mission that could not start has no picture.
-            let _ = fs::rename(directory.join(PICTURE), &kept);
+        let mut rows = Vec::new();
+        for (robot, run) in robots.iter().zip(run(plan.pace != Pace::Max)?) {
+            let summary = run.summary();
+            let has_summary = summary.is_ok();
+            let summary = summary.unwrap_or_else(|reason| {
+                let reason = reason.to_string();
+                Summary { reason, ..Summary::default() }
+            });
+            let row = Row::new(robot.trial, robot.seed, setting, &summary);
+            let latency = has_summary.then(|| Latency::new(&row, &summary));
+            if !row.is_success() || plan.pictured_seed == Some(seed) {
+                // A mission that could not start has no picture.
+                let _ = fs::rename(robot.directory.join(PICTURE), all.join(picture(&row)));
+            }
+            rows.push((row, latency));
         }
-        if !matches!(row.outcome, Outcome::Success | Outcome::Aborted) {
+        let has_page = |row: &Row| !matches!(row.outcome, Outcome::Success | Outcome::Aborted);
+        if rows.iter().any(|(row, _)| has_page(row)) {
             // In lockstep the mission can be run again, to the bit, and recordings of all missions would take too much room.
             if plan.pace == Pace::Max {
-                let _ = fs::remove_dir_all(&directory);
+                for robot in &robots {
+                    let _ = fs::remove_dir_all(&robot.directory);
+                }
                 run(true)?;
             }
-            let _ = fs::rename(directory.join(PAGE), kept.with_extension("html"));
+            for (robot, (row, _)) in robots.iter().zip(&rows).filter(|(_, (row, _))| has_page(row))
+            {
+                let kept = all.join(picture(row)).with_extension("html");
+                let _ = fs::rename(robot.directory.join(PAGE), kept);
+            }
         }
         let _ = fs::remove_dir_all(&files);
-        Ok((row, latency))
+        Ok(rows)
     }
 }
 

@@ -61,6 +61,8 @@ pub struct Scene {
     /// Heading at the start, radians counter-clockwise from x.
     pub heading: f64,
     pub target: DVec2,
+    /// Heading at the start of another robot, which goes from the target to the start.
+    pub oncoming: Option<f64>,
 }
 
 #[derive(Clone, Debug)]
@@ -72,6 +74,8 @@ pub struct Trial {
     /// Length of the body's shortest path, metres.
     pub shortest_m: f64,
     pub rules: Rules,
+    /// The other robot's trial, in the same frame.
+    pub oncoming: Option<Box<Self>>,
 }
 
 impl Trial {
@@ -85,14 +89,32 @@ impl Trial {
         // Four times the time of a robot at 0.25 m/s, and half a minute.
         let timeout_s = (30.0 + 16.0 * shortest_m).round();
         mission.timeout_s = rules.most_s.map_or(timeout_s, |it| it + BEFORE_CLOCK_S);
-        Ok(Some(Self { world, mission, shortest_m, rules }))
+        let mut trial = Self { world, mission, shortest_m, rules, oncoming: None };
+        trial.oncoming = scene.oncoming.map(|heading| Box::new(trial.reversed(heading)));
+        Ok(Some(trial))
     }
 
     /// The trial `world` of an unchanged `mission`, if a body can get from start to target in its world.
     pub fn of_mission(world: String, mission: Mission, swept_m: f64) -> Option<Self> {
         let start = mission.start_pose().position;
         let shortest_m = shortest_path(&mission.obstacles(), start, mission.target, swept_m)?;
-        Some(Self { world, mission, shortest_m, rules: Rules::PLAIN })
+        Some(Self { world, mission, shortest_m, rules: Rules::PLAIN, oncoming: None })
+    }
+
+    /// The trial of each robot of the world.
+    pub fn robots(&self) -> impl Iterator<Item = &Self> {
+        std::iter::once(self).chain(self.oncoming.as_deref())
+    }
+
+    /// The trial of a robot that goes the other way.
+    fn reversed(&self, heading: f64) -> Self {
+        let mut trial = self.clone();
+        trial.world = format!("{}-oncoming", self.world);
+        trial.mission.name.clone_from(&trial.world);
+        trial.mission.start.at = self.mission.target;
+        trial.mission.start.heading_deg = heading.to_degrees();
+        trial.mission.target = self.mission.start.at;
+        trial
     }
 }
 

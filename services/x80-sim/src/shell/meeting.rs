@@ -1,0 +1,304 @@
+//! The other robot of this robot's world, a whole run of its own: each simulator tells the other where its robot is after every tick, over
+//! a datagram socket in the robot's directory. No stage hears of it.
+//!
+//! In lockstep a tick waits for the other's place at the tick before, so that a pair repeats to the bit. Within a tick the other goes on at
+//! the velocity that it told.
+
+use std::{
+    fs::{self, DirBuilder},
+    io::ErrorKind,
+    os::{
+        fd::{AsFd, OwnedFd},
+        unix::{fs::DirBuilderExt as _, net::UnixDatagram},
+    },
+    path::PathBuf,
+    time::{Duration, Instant},
+};
+
+use common::{
+    geometry::{Light, Profile},
+    ground_truth::GroundTruthTick,
+    kinematics::{Pose2, Twist},
+    mission::{Footprint, Mission},
+    poll,
+};
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    error::{Result, SimError},
+    world::Other,
+};
+
+/// A tick waits so long for the other robot, by the machine's clock: less than a run without a tick is given up after.
+const PATIENCE: Duration = Duration::from_secs(10);
+/// A place that did not get through, because the other did not listen yet, is sent again after this.
+const AGAIN: Duration = Duration::from_millis(20);
+/// Times this near are one, seconds.
+const SAME_S: f64 = 1e-6;
+/// A robot that said nothing for longer stands at its last place, seconds of mission time.
+const FRESH_S: f64 = 0.5;
+/// A larger datagram is no place.
+const LONGEST: usize = 4096;
+/// The most datagrams taken at once.
+const MOST_AT_ONCE: usize = 64;
+
+/// Metres and seconds of the mission frame, which both missions share.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Place {
+    time_s: f64,
+    at: DVec2,
+    heading: f64,
+    v: f64,
+    omega: f64,
+    radius_m: f64,
+    /// The corners of a body that is no disc; none of a disc.
+    footprint: Vec<DVec2>,
+    bottom_m: f64,
+    top_m: f64,
+    /// The robot's run is over, and it stays where it is.
+    ended: bool,
+}
+
+impl Place {
+    fn parse(datagram: &[u8]) -> Option<Self> {
+        let place: Self = serde_json::from_slice(datagram).ok()?;
+        let is_sound = place.at.abs().max_element() < 1e6
+            && place.heading.abs() < 1e6
+            && place.v.abs().max(place.omega.abs()) < 100.0
+            && (place.footprint.is_empty() || Footprint::new(&place.footprint).is_ok())
+            && (0.01..=10.0).contains(&place.radius_m)
+            && (0.0..=10.0).contains(&place.bottom_m)
+            && (place.bottom_m..=10.0).contains(&place.top_m)
+            && place.time_s >= 0.0;
+        is_sound.then_some(place)
+    }
+
+    fn other(&self, now_s: f64) -> Other {
+        let Self { time_s, at, heading, v, omega, radius_m, bottom_m, top_m, .. } = *self;
+        let goes = if now_s - time_s < FRESH_S { 1.0 } else { 0.0 };
+        Other {
+            time_s,
+            pose: Pose2 { position: at, heading },
+            twist: Twist { v: goes * v, omega: goes * omega },
+            radius_m,
+            footprint: Footprint::new(&self.footprint).ok(),
+            profile: Profile { bottom_m, top_m, echo: 1.0, light: Light::default() },
+        }
+    }
+}
+
+pub(super) struct Meeting {
+    socket: UnixDatagram,
+    other: PathBuf,
+    stop: OwnedFd,
+    waits: bool,
+    goes_on_after_contact: bool,
+    /// This robot's, with the size of its body.
+    own: Place,
+    is_told: bool,
+    /// The other's at this robot's time or before it, and the one after.
+    newest: Option<Place>,
+    next: Option<Place>,
+    /// It was waited for in vain.
+    is_missed: bool,
+    refused: u64,
+}
+
+impl Meeting {
+    /// `own` and `other` are the robots' sockets. Once `stop` is readable nobody is waited for. Fails if it cannot listen.
+    pub(super) fn open(
+        mission: &Mission,
+        [own, other]: [PathBuf; 2],
+        stop: &impl AsFd,
+        waits: bool,
+    ) -> Result<Self> {
+        let listen = || {
+            if let Some(directory) = own.parent() {
+                DirBuilder::new().recursive(true).mode(0o700).create(directory)?;
+            }
+            // It may be an earlier simulator's.
+            match fs::remove_file(&own) {
+                Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
+                _ => {}
+            }
+            let socket = UnixDatagram::bind(&own)?;
+            socket.set_nonblocking(true)?;
+            Ok((socket, stop.as_fd().try_clone_to_owned()?))
+        };
+        let (socket, stop) =
+            listen().map_err(|source| SimError::Meet { socket: own.clone(), source })?;
+        let body = mission.body();
+        let heights = mission.simulation.physics().heights;
+        Ok(Self {
+            socket,
+            other,
+            stop,
+            waits,
+            goes_on_after_contact: mission.simulation.goes_on_after_contact,
+            own: Place {
+                time_s: 0.0,
+                at: DVec2::ZERO,
+                heading: 0.0,
+                v: 0.0,
+                omega: 0.0,
+                radius_m: body.radius_m,
+                footprint: body.footprint.map_or_else(Vec::new, |it| it.corners().to_vec()),
+                bottom_m: heights.ground_clearance_m,
+                top_m: heights.body_top_m,
+                ended: false,
+            },
+            is_told: false,
+            newest: None,
+            next: None,
+            is_missed: false,
+            refused: 0,
+        })
+    }
+
+    /// The other robot as this one at `now_s` knows it.
+    pub(super) fn other_at(&mut self, now_s: f64) -> Result<Option<Other>> {
+        let began = Instant::now();
+        loop {
+            self.take(now_s);
+            if !self.is_told {
+                self.send();
+            }
+            if !self.waits || self.is_missed || self.knows(now_s) {
+                break;
+            }
+            if began.elapsed() > PATIENCE {
+                self.is_missed = true;
+                tracing::warn!(other = %self.other.display(), last = ?self.newest, "the other robot does not say where it is; it stays at its last place, and this one goes on");
+                break;
+            }
+            let came = poll::readable(&[self.socket.as_fd(), self.stop.as_fd()], Some(AGAIN));
+            if came.map_err(SimError::Wait)?.get(1) == Some(&true) {
+                break;
+            }
+        }
+        Ok(self.newest.as_ref().map(|newest| newest.other(now_s)))
+    }
+
+    fn knows(&self, now_s: f64) -> bool {
+        let has = |place: &Place| place.ended || place.time_s > now_s - SAME_S;
+        self.next.is_some() || self.newest.as_ref().is_some_and(has)
+    }
+
+    /// Takes what came, up to the first place that is later than `now_s`.
+    fn take(&mut self, now_s: f64) {
+        for _ in 0..MOST_AT_ONCE {
+            if self.next.as_ref().is_some_and(|next| self.waits && next.time_s > now_s + SAME_S) {
+                return;
+            }
+            if let Some(next) = self.next.take() {
+                self.is_missed &= !next.ended && next.time_s < now_s - SAME_S;
+                self.newest = Some(next);
+            }
+            let mut bytes = [0; LONGEST];
+            let Ok(length) = self.socket.recv(&mut bytes) else {
+                return;
+            };
+            self.next = bytes.get(..length).and_then(Place::parse);
+            // On a wall clock the two missions began at different times.
+            if let Some(next) = self.next.as_mut().filter(|_| !self.waits) {
+                next.time_s = now_s;
+            }
+            if self.next.is_none() {
+                self.refused += 1;
+                tracing::warn!(refused = self.refused, "a datagram is not the place of a robot");
+            }
+        }
+    }
+
+    /// Tells the other robot where this one is. A contact ends its mission, and it stays there.
+    pub(super) fn tell(&mut self, truth: &GroundTruthTick, ended: bool) {
+        if self.own.ended {
+            return;
+        }
+        let ended = ended || (truth.contacts > 0 && !self.goes_on_after_contact);
+        let goes = if ended { 0.0 } else { 1.0 };
+        let own = &mut self.own;
+        (own.time_s, own.at, own.heading) =
+            (truth.time_s, DVec2::new(truth.x, truth.y), truth.heading);
+        (own.v, own.omega, own.ended) = (goes * truth.v, goes * truth.omega, ended);
+        self.send();
+    }
+
+    fn send(&mut self) {
+        let bytes = serde_json::to_vec(&self.own).unwrap_or_default();
+        self.is_told = self.socket.send_to(&bytes, &self.other).is_ok();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::{os::unix::net::UnixStream, path::Path};
+
+    /// Two that meet; `waits` is in lockstep.
+    fn pair(folder: &Path, waits: bool) -> [Meeting; 2] {
+        let mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
+        let sockets = ["one", "two"].map(|robot| folder.join(robot));
+        // The other end is closed, so a wait ends at once.
+        let (stop, _) = UnixStream::pair().unwrap();
+        [[0, 1], [1, 0]].map(|order| {
+            Meeting::open(&mission, order.map(|at| sockets[at].clone()), &stop, waits).unwrap()
+        })
+    }
+
+    fn truth(time_s: f64, x: f64) -> GroundTruthTick {
+        GroundTruthTick { time_s, x, v: 0.5, ..GroundTruthTick::default() }
+    }
+
+    fn x_and_speed(other: Option<Other>) -> Option<(f64, f64)> {
+        let Other { pose, twist, profile, radius_m, .. } = other?;
+        assert_eq!((radius_m, profile.bottom_m, profile.top_m), (0.19, 0.03, 0.255));
+        Some((pose.position.x, twist.v))
+    }
+
+    #[test]
+    fn a_malformed_datagram_is_refused_and_counted_and_the_place_before_it_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let [mut one, mut two] = pair(folder.path(), false);
+        one.tell(&truth(0.1, 4.0), false);
+        for hostile in ["", "{}", "\0\0", &"[".repeat(5000)] {
+            one.socket.send_to(hostile.as_bytes(), &one.other).unwrap();
+        }
+        let sound = serde_json::to_string(&one.own).unwrap();
+        for (key, value) in [
+            ("\"time_s\":0.1", "\"time_s\":-1"),
+            ("4.0", "1e300"),
+            ("0.19", "0"),
+            ("0.255", "0.01"),
+            ("[]", "[[0.0,0.0],[1.0,0.0]]"),
+            ("}", ",\"more\":1}"),
+        ] {
+            assert!(sound.contains(key), "{sound}");
+            one.socket.send_to(sound.replace(key, value).as_bytes(), &one.other).unwrap();
+        }
+        assert_eq!(x_and_speed(two.other_at(0.2).unwrap()), Some((4.0, 0.5)));
+        assert_eq!(two.refused, 10);
+    }
+
+    #[test]
+    fn in_lockstep_a_place_of_a_later_time_waits_until_then_and_one_that_ended_is_not_waited_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let [mut one, mut two] = pair(folder.path(), true);
+        assert_eq!(two.other_at(0.0).unwrap(), None, "nothing was told");
+        assert!(!two.knows(0.0));
+        for (time_s, x) in [(0.0, 4.0), (0.1, 3.95)] {
+            one.tell(&truth(time_s, x), false);
+        }
+        assert_eq!(x_and_speed(two.other_at(0.0).unwrap()), Some((4.0, 0.5)));
+        assert_eq!(x_and_speed(two.other_at(0.1).unwrap()), Some((3.95, 0.5)));
+        two.other_at(0.2).unwrap();
+        assert!(!two.knows(0.2));
+        one.tell(&GroundTruthTick { contacts: 1, ..truth(0.2, 3.9) }, false);
+        one.tell(&truth(0.3, 3.8), false);
+        assert_eq!(x_and_speed(two.other_at(0.2).unwrap()), Some((3.9, 0.0)), "it stays there");
+        two.other_at(9.0).unwrap();
+        assert!(two.knows(9.0));
+    }
+}
