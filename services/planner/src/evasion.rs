@@ -5,6 +5,9 @@
 //! is a danger, the less the later. Advice without danger is followed. Otherwise the robot begins the way with the greatest gain along the
 //! field less its danger, so it steps aside early. It goes only where it could brake after the next tick and be at rest before it meets
 //! something, or where the whole way meets nothing: what runs into a robot at rest is not that robot's fault.
+//!
+//! A robot that was kept from its way for long stops evading: among people who give way it would stand and back off until its time runs
+//! out. It still goes only where it could rest in time.
 
 use std::f64::consts::{PI, TAU};
 
@@ -51,6 +54,12 @@ const WATCHES_S: f64 = 0.5;
 const FADED_M_S: f64 = 0.05;
 /// What is farther away is no danger, metres.
 const FAR_M: f64 = 1.5;
+/// A robot that movers kept from its way for so long, seconds, less the time for which they did not, evades them no longer in this run.
+const PATIENCE_S: f64 = 16.0;
+/// It goes on with these shares of the advised speed. A slow robot rests soon.
+const PATIENT_SPEEDS: [f64; 3] = [1.0, 0.5, 0.25];
+/// The longest time between two answers that counts, seconds.
+const LONGEST_TICK_S: f64 = 1.0;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Evasion {
@@ -63,6 +72,9 @@ pub(crate) struct Evasion {
     fades_s: f64,
     /// A laser looks there.
     backs: bool,
+    /// The newest answer's time, and how long movers kept the robot from its way, seconds.
+    answered_s: f64,
+    kept_s: f64,
 }
 
 /// A mover.
@@ -119,20 +131,36 @@ impl Evasion {
             motion: MotionModel::new(mission),
             fades_s: lags.max(0.0) * mission.trusted_response().lag_s,
             backs: mission.lasers().iter().any(|(_, laser)| looks_back(laser)),
+            answered_s: 0.0,
+            kept_s: 0.0,
         })
     }
 
     /// The field's `advice` for a robot at `pose`, or another one because of `movers`.
     pub(crate) fn advise(
-        &self,
+        &mut self,
         view: &View<'_>,
         movers: &[Mover],
         pose: &PoseSample,
         advice: Advice,
     ) -> Advice {
-        if pose.stamp.time().seconds() < WATCHES_S {
+        let at_s = pose.stamp.time().seconds();
+        let for_s = (at_s - self.answered_s).clamp(0.0, LONGEST_TICK_S);
+        self.answered_s = at_s;
+        if at_s < WATCHES_S {
             return STAND;
         }
+        let safe = self.safe(view, movers, pose, advice);
+        if self.kept_s < PATIENCE_S {
+            // A limit that is no number is one that is kept, too.
+            let is_same = safe.2.total_cmp(&advice.2).is_eq();
+            let follows = (safe.0, safe.1) == (advice.0, advice.1) && is_same;
+            self.kept_s = (self.kept_s + if follows { -for_s } else { for_s }).max(0.0);
+        }
+        safe
+    }
+
+    fn safe(&self, view: &View<'_>, movers: &[Mover], pose: &PoseSample, advice: Advice) -> Advice {
         let scene = Scene::new(self, view, movers, pose.pose());
         let start = scene.start(pose);
         let acts_until_s = self.motion.dead_s() + self.motion.period_s;
@@ -143,6 +171,10 @@ impl Evasion {
         }
         let (status, along, limit) = advice;
         let speed = self.motion.speed;
+        if self.kept_s >= PATIENCE_S {
+            let slower = PATIENT_SPEEDS.map(|share| (status, along, share * limit));
+            return slower.into_iter().find(|to| is_safe(*to)).unwrap_or(STAND);
+        }
         let advised = SPEEDS.map(|share| (status, along, share * limit));
         let back = SPEEDS.map(|share| (GuidanceStatus::Along, pose.pose().axis(), -share * speed));
         let back = back.into_iter().filter(|_| self.backs);

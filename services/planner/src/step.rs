@@ -351,7 +351,7 @@ impl Planner {
             (GuidanceStatus::Along, DVec2::ZERO, 0.0)
         } else {
             let advice = self.advise(&acts_at.pose, status, direction);
-            let advice = match (&self.live, &self.evasion) {
+            let advice = match (&self.live, &mut self.evasion) {
                 (Some(live), Some(evasion)) if advice.0 != GuidanceStatus::AtTarget => {
                     let view = live.view(self.grid.cells());
                     evasion.advise(&view, self.belief.movers(), sample, advice)

@@ -605,27 +605,59 @@ fn guidance_of(model: &str, at: DVec2, velocity: DVec2) -> (GuidanceSample, f64)
 
 /// Likewise between two walls, each so far from the robot's way, metres.
 fn guidance_between(wall_m: f64, model: &str, at: DVec2, velocity: DVec2) -> (GuidanceSample, f64) {
-    let hall = "target = [4, 0]\nperimeter = { width_m = 12, cells = 120 }";
-    let text = format!("{hall}\nrobot.model = '{model}'");
-    let mission = Mission::parse(&text, Path::new("test.toml")).unwrap();
-    let mut planner = sent(&mission);
-    let frame = mission.grid_frame();
-    let is_wall = |at: DVec2| at.y.abs() > wall_m;
-    let (mut header, mut cells) = keyframe_of(frame, 1, is_wall);
-    let free = cells.iter_mut().filter(|cell| **cell == CellState::Free as u8);
-    free.for_each(|cell| *cell = CellState::Scanned as u8);
-    header.movers[0] = Mover {
-        x_m: at.x as f32,
-        y_m: at.y as f32,
-        vx_m_s: velocity.x as f32,
-        vy_m_s: velocity.y as f32,
-        radius_m: 0.3,
-        ..Mover::default()
+    let mut hall = Hall::new(wall_m, model);
+    let pose = PoseSample { v_m_s: 0.4, ..PoseSample::default() };
+    (hall.guidance(&pose, at, velocity), hall.mission.speed_m_s())
+}
+
+struct Hall {
+    mission: Mission,
+    planner: Planner,
+    header: GridHeader,
+    cells: Vec<u8>,
+}
+
+impl Hall {
+    fn new(wall_m: f64, model: &str) -> Self {
+        let hall = "target = [4, 0]\nperimeter = { width_m = 12, cells = 120 }";
+        let text = format!("{hall}\nrobot.model = '{model}'");
+        let mission = Mission::parse(&text, Path::new("test.toml")).unwrap();
+        let (header, mut cells) = keyframe_of(mission.grid_frame(), 1, |at| at.y.abs() > wall_m);
+        let free = cells.iter_mut().filter(|cell| **cell == CellState::Free as u8);
+        free.for_each(|cell| *cell = CellState::Scanned as u8);
+        Self { planner: sent(&mission), mission, header, cells }
+    }
+
+    fn guidance(&mut self, pose: &PoseSample, at: DVec2, velocity: DVec2) -> GuidanceSample {
+        self.header.movers[0] = Mover {
+            x_m: at.x as f32,
+            y_m: at.y as f32,
+            vx_m_s: velocity.x as f32,
+            vy_m_s: velocity.y as f32,
+            radius_m: 0.3,
+            ..Mover::default()
+        };
+        self.header.mover_count = 1;
+        self.planner.take_grid(&self.header, &self.cells).unwrap();
+        self.planner.ask(pose)
+    }
+}
+
+#[test]
+fn a_robot_that_movers_kept_from_its_way_for_long_goes_on_where_it_rests_in_time_and_steps_aside_no_more()
+ {
+    let mut hall = Hall::new(6.0, "jackal");
+    let mut guidance = |second: u64, x_m: f64| {
+        let stamp = Stamp { stamp_ns: second * 1_000_000_000, ..Stamp::default() };
+        let pose = PoseSample { stamp, ..PoseSample::default() };
+        hall.guidance(&pose, DVec2::new(x_m, 0.1), DVec2::new(-1.2, 0.0))
     };
-    header.mover_count = 1;
-    planner.take_grid(&header, &cells).unwrap();
-    let guidance = planner.ask(&PoseSample { v_m_s: 0.4, ..PoseSample::default() });
-    (guidance, mission.speed_m_s())
+    let first: Vec<_> = (1..=16).map(|second| guidance(second, 4.5)).collect();
+    assert!(first.iter().all(|it| it.ey.abs() > 0.3), "{first:?}");
+    guidance(17, 4.5);
+    let (far, near) = (guidance(18, 4.5), guidance(19, 1.0));
+    assert!(far.ex > 0.99 && far.speed_limit_m_s > 0.0, "{far:?}");
+    assert_eq!(status(&near), GuidanceStatus::Waiting, "{near:?}");
 }
 
 #[test]
