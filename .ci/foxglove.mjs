@@ -110,7 +110,7 @@ class Seen {
     const rooted = (frame) => frame === "map" || (this.parents.has(frame) && rooted(this.parents.get(frame)));
     const apart = (axis) => Math.max(...this.poses.map(axis)) - Math.min(...this.poses.map(axis));
     const wanted = {
-      "the transforms map -> base -> sensor": this.parents.get("base") === "map" && this.parents.get(sensor) === "base",
+      "the transforms map -> base_link -> sensor": this.parents.get("base_link") === "map" && this.parents.get(sensor) === "base_link",
       "a transform for each frame": [...this.frames].every(rooted),
       "a pose that moves": this.poses.length > 1 && Math.hypot(apart((p) => p.x), apart((p) => p.y)) > 0.1,
       "a covariance": this.variance > 0,

@@ -27,7 +27,7 @@ pub const LOG: &str = "log";
 /// The mission's frame.
 const MAP: &str = "map";
 /// The frame of the robot: its centre, x ahead. Each sensor has a frame of its name.
-const BASE: &str = "base";
+const BASE: &str = "base_link";
 /// Mission time between scenes and between maps, nanoseconds.
 const EVERY_NS: u64 = 1_000_000_000;
 /// The most cells a side of a drawn map; in a larger one a cell stands for several.

@@ -112,7 +112,7 @@ fn messages_have_what_viewers_draw() {
         (odometry.velocity_covariance.len(), odometry.linear_velocity.unwrap().x),
         (36, 0.5)
     );
-    assert_eq!(odometry.body_frame_id, "base");
+    assert_eq!(odometry.body_frame_id, "base_link");
     let mounts: FrameTransforms = decoded(&sent, "foxglove/transforms");
     let sensors: Vec<_> = mission().sensor_table().into_iter().map(|sensor| sensor.name).collect();
     let frames = mounts.transforms.iter().map(|mount| mount.child_frame_id.clone());
