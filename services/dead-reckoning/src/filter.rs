@@ -126,11 +126,37 @@ pub(crate) struct Filter {
     shares: [f64; 3],
     bias: f64,
     pub(crate) covariance: Covariance,
+    anchor: Anchor,
+}
+
+/// What a source apart from the scan matcher found out: variances of x, y and the heading right after its newest fix, and those that the
+/// matcher's fixes shared then. What they share more since is drift; the rest is known.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Anchor {
+    variances: Option<[f64; 3]>,
+    shared: [f64; 3],
+    /// Of the matcher's newest fix.
+    newest: [f64; 3],
+}
+
+impl Anchor {
+    /// The variances below which a fix that shares so much does not make the estimate, or which a fix that shares nothing left.
+    fn floor(&mut self, [place, heading]: [f64; 2], variances: [f64; 3]) -> [f64; 3] {
+        let shared = [place, place, heading];
+        if shared == [0.0; 3] {
+            (self.variances, self.shared) = (Some(variances), self.newest);
+            return shared;
+        }
+        self.newest = shared;
+        let Some(known) = self.variances else { return shared };
+        let drift = |part: usize| (shared[part] - self.shared[part]).max(0.0);
+        [0, 1, 2].map(|part| shared[part].min(known[part] + drift(part)))
+    }
 }
 
 impl Filter {
-    pub(crate) const fn new(pose: Pose2, covariance: Covariance) -> Self {
-        Self { pose, shares: [0.0; 3], bias: 0.0, covariance }
+    pub(crate) fn new(pose: Pose2, covariance: Covariance) -> Self {
+        Self { pose, shares: [0.0; 3], bias: 0.0, covariance, anchor: Anchor::default() }
     }
 
     pub(crate) fn moved(&self, motions: &Motions, tick: &Tick) -> Twist {
@@ -198,8 +224,8 @@ impl Filter {
         };
         if let Some((error, mut covariance)) = taken {
             self.correct(&error);
-            let [place, heading] = fix.shared;
-            for (part, least) in [place, place, heading].into_iter().enumerate() {
+            let variances = [0, 1, 2].map(|part| covariance[(part, part)]);
+            for (part, least) in self.anchor.floor(fix.shared, variances).into_iter().enumerate() {
                 // A greater diagonal keeps the matrix positive.
                 covariance[(part, part)] = covariance[(part, part)].max(least);
             }

@@ -33,6 +33,8 @@ use thiserror::Error;
 
 /// The patience with a roster, which comes five times a second.
 pub const PATIENCE: Duration = Duration::from_secs(2);
+/// A request that a run refuses because it starts is made again after this.
+const AGAIN_AFTER: Duration = Duration::from_millis(100);
 
 #[derive(Debug, Error)]
 pub enum OperatorError {
@@ -336,7 +338,7 @@ fn ask(robot: &RobotName, request: RequestSample) -> Result<(), OperatorError> {
             RequestAnswer::Taken => return Ok(()),
             // So answers a run that starts, or one whose supervisor missed a part of the map and waits for the next whole one.
             RequestAnswer::NotRunning if goes && began.elapsed() < PATIENCE => {
-                roster.find(PATIENCE, |_, _| Some(()))?;
+                roster.find(AGAIN_AFTER, |_, _| None::<()>)?;
             }
             answer => return Err(refused(robot, answer)),
         }

@@ -504,3 +504,21 @@ fn an_operator_sets_the_pose_once_with_its_deviations_and_the_way_goes_on_from_t
     let way = pose.pose().position - dvec2(7.0, -2.0);
     assert!((way - DVec2::from_angle(3.0)).length() < 0.02, "{way}");
 }
+
+#[test]
+fn a_camera_holds_the_pose_that_a_scan_matcher_would_take_along_and_makes_it_sure() {
+    let mut robot = Robot::new(0.0);
+    let mut reckoning = x80();
+    let drifted = |robot: &mut Robot| {
+        let (fix, heading_rad) = (robot.fix(), robot.truth.heading);
+        let covariance = [0.18, 0.0, 0.0, 0.18, 0.0, 0.02];
+        let matched =
+            FixSample { y_m: fix.y_m + 0.3, heading_rad, covariance, shared: [0.09, 0.01], ..fix };
+        let camera = robot.tick.is_multiple_of(10).then_some(fix);
+        camera.into_iter().chain([matched]).collect()
+    };
+    rms(&mut robot, &mut reckoning, 100, drifted);
+    let off_m = rms(&mut robot, &mut reckoning, 200, drifted);
+    let [xx, _, _, yy, ..] = reckoning.sample().covariance;
+    assert!(off_m < 0.1 && xx.max(yy) < 0.02, "{off_m} m off, {xx} {yy}");
+}
