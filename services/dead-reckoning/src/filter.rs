@@ -141,10 +141,15 @@ struct Anchor {
 
 impl Anchor {
     /// The variances below which a fix that shares so much does not make the estimate, or which a fix that shares nothing left.
-    fn floor(&mut self, [place, heading]: [f64; 2], variances: [f64; 3]) -> [f64; 3] {
+    fn floor(&mut self, fix: &Fix, variances: [f64; 3]) -> [f64; 3] {
+        let [place, heading] = fix.shared;
         let shared = [place, place, heading];
         if shared == [0.0; 3] {
-            (self.variances, self.shared) = (Some(variances), self.newest);
+            // One fix after another says the same of what the matcher holds, and no more.
+            let [xx, _, _, yy, _, tt] = fix.covariance;
+            let own = [xx, yy, tt];
+            let known = [0, 1, 2].map(|part| own[part].max(variances[part]));
+            (self.variances, self.shared) = (Some(known), self.newest);
             return shared;
         }
         self.newest = shared;
@@ -225,7 +230,7 @@ impl Filter {
         if let Some((error, mut covariance)) = taken {
             self.correct(&error);
             let variances = [0, 1, 2].map(|part| covariance[(part, part)]);
-            for (part, least) in self.anchor.floor(fix.shared, variances).into_iter().enumerate() {
+            for (part, least) in self.anchor.floor(fix, variances).into_iter().enumerate() {
                 // A greater diagonal keeps the matrix positive.
                 covariance[(part, part)] = covariance[(part, part)].max(least);
             }
