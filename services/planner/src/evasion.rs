@@ -108,7 +108,7 @@ struct Way {
     steps: u32,
     /// When the robot moved last.
     moved_s: f64,
-    /// As near to a hazard it has been since the start.
+    /// The least that the robot was near to a hazard since the start: it goes no nearer.
     near: Near,
     /// When the robot meets something that moves, while it moves itself, and when it is at a hazard; infinite for never.
     meets_s: f64,

@@ -189,7 +189,7 @@ impl World {
         self.people.advance(time, (centre, radius), &self.standing);
     }
 
-    /// It goes on from there as it did.
+    /// The other robot goes on from there as it did.
     pub fn set_other(&mut self, other: Option<Other>) {
         self.other = other;
     }

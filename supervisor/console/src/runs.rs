@@ -66,17 +66,35 @@ pub struct Target {
 
 /// The results of the targets of the run in `directory` so far, the newest [`LARGEST_TARGETS`] bytes of them.
 pub fn targets(directory: &Path) -> Vec<Target> {
-    let file = directory.join(records::TARGETS);
-    let mut tail = Tail::default();
-    tail.skip(&file, LARGEST_TARGETS);
-    let mut targets = Vec::new();
-    loop {
-        let lines = tail.lines(&file);
-        if lines.is_empty() {
-            return targets;
+    Results::of(directory, LARGEST_TARGETS).take()
+}
+
+/// Reads the results of a run's targets as they are recorded.
+#[derive(Debug)]
+pub struct Results {
+    file: PathBuf,
+    tail: Tail,
+}
+
+impl Results {
+    /// The newest `most` bytes of those of the run in `directory`, and what comes.
+    pub fn of(directory: &Path, most: u64) -> Self {
+        let (file, mut tail) = (directory.join(records::TARGETS), Tail::default());
+        tail.skip(&file, most);
+        Self { file, tail }
+    }
+
+    /// The results since the last call.
+    pub fn take(&mut self) -> Vec<Target> {
+        let mut targets = Vec::new();
+        loop {
+            let lines = self.tail.lines(&self.file);
+            if lines.is_empty() {
+                return targets;
+            }
+            // The line at which it begins may be cut.
+            targets.extend(lines.lines().filter_map(|line| serde_json::from_str(line).ok()));
         }
-        // The line at which it begins may be cut.
-        targets.extend(lines.lines().filter_map(|line| serde_json::from_str(line).ok()));
     }
 }
 

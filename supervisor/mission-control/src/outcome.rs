@@ -36,6 +36,20 @@ pub enum Outcome {
 }
 
 impl Outcome {
+    /// The exit code of a run that ends so.
+    pub const fn exit_code(self) -> u8 {
+        match self {
+            Self::Reached | Self::Waited => 0,
+            Self::Unreachable => 3,
+            Self::Timeout => 4,
+            Self::Collision => 5,
+            Self::Aborted => 6,
+            Self::WrongPlace => 9,
+            Self::CouldNotBeStopped => 10,
+            Self::ReachedUnsure => 11,
+        }
+    }
+
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::Reached => "reached",

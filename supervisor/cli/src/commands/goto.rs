@@ -4,13 +4,13 @@ use std::{path::Path, process::ExitCode, thread, time::Duration};
 
 use clap::Args;
 use common::{domain::RobotName, samples::TargetPoint};
-use mission_control::operator;
+use mission_control::{operator, outcome::Outcome};
 
 use console::{
     failure::{Refused, Result},
     output::print_text,
     robots::Robot,
-    runs,
+    runs::{Results, Target},
 };
 
 /// Time between looks for the result of a target.
@@ -58,35 +58,36 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
         (last.heading_rad, last.has_heading) = (heading.to_radians(), 1);
     }
     let run = Robot::find(arguments.robot.clone()).run.filter(|_| arguments.wait);
-    let before = run.as_deref().map_or(0, |run| runs::targets(run).len());
+    let results = run.as_deref().map(|run| Results::of(run, 0));
     operator::send_to(&arguments.robot, &points, arguments.append)?;
-    match (run, points.last()) {
-        (Some(run), Some(last)) => await_result(&arguments.robot, &run, before, last),
+    match (run, results, points.last()) {
+        (Some(run), Some(results), Some(last)) => {
+            await_result(&arguments.robot, &run, results, last)
+        }
         _ => Ok(ExitCode::SUCCESS),
     }
 }
 
-/// Wait for the result of `target`, which is not among those `before`, in the records of `run`.
+/// Wait for the result of `target` among the `results` of `run` that come.
 fn await_result(
     robot: &RobotName,
     run: &Path,
-    before: usize,
+    mut results: Results,
     target: &TargetPoint,
 ) -> Result<ExitCode> {
     loop {
         let goes_on = Robot::find(robot.clone()).run.as_deref() == Some(run);
-        let results = runs::targets(run);
-        let mut newer = results.iter().skip(before);
-        if let Some(result) = newer.find(|it| (it.x_m, it.y_m) == (target.x_m, target.y_m)) {
+        let is_its = |it: &Target| (it.x_m, it.y_m) == (target.x_m, target.y_m);
+        if let Some(result) = results.take().into_iter().find(is_its) {
             print_text(&format!("{}\n", result.outcome.replace('_', " ")))?;
-            return Ok(ExitCode::from(match result.outcome.as_str() {
-                "reached" => 0,
-                "unreachable" => 3,
-                "timed_out" => 4,
-                "wrong_place" => 9,
-                "reached_unsure" => 11,
-                _ => 1,
-            }));
+            return Ok(match result.outcome.as_str() {
+                "reached" => Outcome::Reached.exit_code().into(),
+                "unreachable" => Outcome::Unreachable.exit_code().into(),
+                "timed_out" => Outcome::Timeout.exit_code().into(),
+                "wrong_place" => Outcome::WrongPlace.exit_code().into(),
+                "reached_unsure" => Outcome::ReachedUnsure.exit_code().into(),
+                _ => ExitCode::FAILURE,
+            });
         }
         if !goes_on {
             return Err(format!("the run of robot {robot} ended without a result").into());

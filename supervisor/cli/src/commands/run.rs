@@ -21,7 +21,7 @@ use glam::DVec2;
 use link::transport::SPEAKS_ROS2;
 use mission_control::{
     Consumer, Finished, Options, Progress,
-    outcome::{Ending, Outcome},
+    outcome::Ending,
     recovery::{self, RecoveredRun},
 };
 use processes::{Starter, planner_executable};
@@ -364,16 +364,7 @@ fn exit_code(summary: &Summary, ending: &Ending) -> ExitCode {
     if ending.asked_for && summary.outcome == ending.outcome {
         return ExitCode::SUCCESS;
     }
-    ExitCode::from(match summary.outcome {
-        Outcome::Reached | Outcome::Waited => 0,
-        Outcome::Unreachable => 3,
-        Outcome::Timeout => 4,
-        Outcome::Collision => 5,
-        Outcome::Aborted => 6,
-        Outcome::WrongPlace => 9,
-        Outcome::CouldNotBeStopped => 10,
-        Outcome::ReachedUnsure => 11,
-    })
+    summary.outcome.exit_code().into()
 }
 
 fn print_removed(directory: &Path) -> Result<(), String> {
