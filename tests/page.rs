@@ -109,6 +109,7 @@ fn operate(robot: &str, width: u32) {
         status["target"]["number"].as_u64() > Some(1)
     });
     assert_eq!(sent["order"], "driving");
+    browser.wait_until(&says("results", "target 1(4.00, 0.00): replaced"));
 
     browser.tap("stop", 0, 0);
     browser.wait_until(&says("answer", "stop: the robot rests"));

@@ -1,9 +1,31 @@
-//! The first message of a page.
+//! The first message of a page, and the results of targets.
 
 use common::{mission::SensorKind, run::Run};
+use robot_state::{Event, Kind};
 use serde_json::{Value, json};
 
 use crate::collector::COLUMNS;
+
+/// The result of a target, a line of the run's records, as an event at the time at which it was known.
+pub fn result(target: &Value) -> Value {
+    let outcome = target["outcome"].as_str().unwrap_or_default();
+    let kind = match outcome {
+        "reached" => Kind::Good,
+        "replaced" | "not_tried" | "followed" => Kind::Note,
+        _ => Kind::Bad,
+    };
+    let [x, y] = ["x_m", "y_m"].map(|key| target[key].as_f64().unwrap_or(f64::NAN));
+    let off = |key: &str, by: &str| {
+        target[key].as_f64().map_or(String::new(), |off_m| format!(", {off_m:.2} m off by {by}"))
+    };
+    let (pose, truth) = (off("distance_m", "its pose"), off("truth_m", "the ground truth"));
+    json!(Event {
+        t: target["at_s"].as_f64().unwrap_or_default(),
+        of: format!("target {}", target["number"]),
+        kind,
+        text: format!("({x:.2}, {y:.2}): {}{pose}{truth}", outcome.replace('_', " ")),
+    })
+}
 
 /// The first message of a page, which describes `run`.
 pub fn about(run: &Run) -> Value {

@@ -15,6 +15,6 @@ pub mod blob;
 mod collector;
 mod recorded;
 
-pub use about::about;
+pub use about::{about, result};
 pub use collector::Collector;
 pub use recorded::Recorded;

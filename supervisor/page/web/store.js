@@ -35,6 +35,7 @@ export class Store {
     this.sensors = [];
     this.states = [];
     this.events = [];
+    this.results = [];
     this.maps = [];
     this.fields = [];
     this.preview = null;
@@ -69,6 +70,7 @@ export class Store {
     if ("problem" in message) this.problem = message.problem;
     for (const row of message.rows ?? []) this.row(row);
     for (const event of message.events ?? []) this.events.push(event);
+    for (const result of message.results ?? []) this.results.push(result);
     if (message.metrics) this.summary = message;
     if (message.state) this.states.push(message.state);
     if (message.state || message.rows) this.heard = performance.now();

@@ -12,7 +12,7 @@ export class Timeline {
     this.follows = isLive;
     this.plays = isLive;
     this.t = 0;
-    this.listed = "";
+    this.listed = {};
     this.at = null;
     byId("time").addEventListener("input", ({ target }) => this.go(Number(target.value)));
     byId("live").addEventListener("click", () => this.follow());
@@ -62,7 +62,10 @@ export class Timeline {
     byId("play").textContent = this.plays ? "Pause" : "Play";
     byId("live").setAttribute("aria-pressed", this.follows);
     this.drawStages();
-    this.drawEvents();
+    const shows = byId("logs").checked;
+    this.drawList("events", this.store.events.filter((event) => shows || event.kind !== "log"));
+    byId("results-part").hidden = !this.store.results.length;
+    this.drawList("results", this.store.results);
   }
 
   drawStages() {
@@ -109,14 +112,14 @@ export class Timeline {
     return row;
   }
 
-  drawEvents() {
-    const shows = byId("logs").checked;
-    const events = this.store.events.filter((event) => shows || event.kind !== "log").slice(-MOST_LISTED);
+  /// Draw the newest of `all` first; each leads to its time.
+  drawList(id, all) {
+    const events = all.slice(-MOST_LISTED);
     const last = events[events.length - 1];
-    const key = `${shows} ${this.store.events.length} ${last?.t} ${last?.text}`;
-    const list = byId("events");
-    if (key !== this.listed) {
-      this.listed = key;
+    const key = `${all.length} ${last?.t} ${last?.text}`;
+    const list = byId(id);
+    if (key !== this.listed[id]) {
+      this.listed[id] = key;
       list.replaceChildren(...events.reverse().map((event) => this.eventItem(event)));
     }
     for (const item of list.children) item.classList.toggle("later", Number(item.dataset.t) > this.t + 1e-6);

@@ -208,14 +208,10 @@ impl Content {
         }
         let about = self.about.iter().map(|(name, value)| json!([name, value, ""]));
         let targets = self.summary.get("targets").and_then(Value::as_array).into_iter().flatten();
-        let targets = targets.map(|it| {
-            let place = format!("({:.2}, {:.2})", number(&it["x_m"]), number(&it["y_m"]));
-            let at = it["at_s"].as_f64().map_or(String::new(), |at_s| format!(" at {at_s:.1} s"));
-            let outcome = it["outcome"].as_str().unwrap_or_default().replace('_', " ");
-            json!([format!("target {}", it["number"]), format!("{place}: {outcome}{at}"), ""])
-        });
+        let results: Vec<_> = targets.map(page::result).collect();
         self.page.text(&json!({
-            "metrics": metrics.into_iter().chain(targets).chain(about).collect::<Vec<_>>(),
+            "metrics": metrics.into_iter().chain(about).collect::<Vec<_>>(),
+            "results": results,
             "outcome": self.ended(),
             "kind": self.kind(),
             "remarks": self.remarks,
@@ -253,10 +249,6 @@ impl Content {
     pub(crate) fn duration_s(&self) -> f64 {
         self.measured.time_s
     }
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or(f64::NAN)
 }
 
 /// The ground truth of a simulated robot's run in `directory`.

@@ -18,6 +18,7 @@ use common::{
 };
 use glam::DVec2;
 use planner::step::Planner;
+use processes::records;
 use recording::log_files::{LogFiles, Tail};
 
 use page::{Collector, about, blob};
@@ -45,6 +46,7 @@ struct Reading {
     logs_read: Instant,
     /// What a simulated robot writes about itself.
     truth: (PathBuf, Tail),
+    results: (PathBuf, Tail),
     packed: Option<Instant>,
 }
 
@@ -59,16 +61,19 @@ impl Reading {
             logs: LogFiles::follow(&directory, true),
             logs_read: Instant::now(),
             truth: (directory.join(GROUND_TRUTH), Tail::default()),
+            results: (directory.join(records::TARGETS), Tail::default()),
             packed: None,
         })
     }
 
     /// Give browsers the new data.
     fn publish(&mut self, shared: &Shared) {
-        let Self { collector, processes, logs, logs_read, packed, .. } = self;
+        let Self { collector, processes, logs, logs_read, results, packed, .. } = self;
+        let mut ended = String::new();
         if logs_read.elapsed() >= LOGS_EVERY {
             *logs_read = Instant::now();
             logs.take(&mut |process, line| collector.state.log(process, line));
+            ended = results.1.lines(&results.0);
         }
         let usage = processes.look(&collector.processes(), Instant::now());
         collector.used(usage);
@@ -92,6 +97,9 @@ impl Reading {
         rows.iter().for_each(|row| shown.row(row));
         for event in events {
             shown.event(&serde_json::json!(event));
+        }
+        for target in ended.lines().filter_map(|line| serde_json::from_str(line).ok()) {
+            shown.result(&page::result(&target));
         }
         if let Some(state) = state {
             shown.state.set(state.to_string().into());

@@ -75,6 +75,7 @@ pub(crate) struct Shown {
     pub(crate) link: (bool, String),
     rows: Ring,
     events: Ring,
+    results: Ring,
     pub(crate) state: Newest<Arc<str>>,
     pub(crate) map: Newest<Bytes>,
     pub(crate) field: Newest<Bytes>,
@@ -104,6 +105,11 @@ impl Shown {
     pub(crate) fn event(&mut self, event: &Value) {
         self.events.push(event, MOST_EVENTS);
     }
+
+    /// The result of a target, as an event.
+    pub(crate) fn result(&mut self, result: &Value) {
+        self.results.push(result, MOST_EVENTS);
+    }
 }
 
 #[derive(Debug, Default)]
@@ -131,6 +137,7 @@ struct Sent {
     problem: String,
     rows: u64,
     events: u64,
+    results: u64,
     state: u64,
     map: u64,
     field: u64,
@@ -175,7 +182,8 @@ impl Cursor {
         }
         let rows = shown.rows.after(&mut sent.rows);
         let events = shown.events.after(&mut sent.events);
-        for (name, items) in [("rows", rows), ("events", events)] {
+        let results = shown.results.after(&mut sent.results);
+        for (name, items) in [("rows", rows), ("events", events), ("results", results)] {
             if !items.is_empty() {
                 let mut part = format!("\"{name}\":[");
                 for (at, item) in items.iter().enumerate() {
