@@ -9,6 +9,7 @@ use std::{collections::BTreeMap, fmt};
 use common::{
     ground_truth::GroundTruthTick, latency::Histogram, mission::Mission, samples::PoseSample,
 };
+use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use self::totals::LookTotals;
@@ -256,8 +257,11 @@ fn straight_m(mission: &Mission, targets: &[TargetResult]) -> f64 {
     legs.sum()
 }
 
+/// By square roots, which are the same on every processor; `hypot` of the C library is not.
 fn path_length(truth: &[GroundTruthTick]) -> f64 {
-    truth.windows(2).map(|pair| (pair[1].x - pair[0].x).hypot(pair[1].y - pair[0].y)).sum()
+    let places =
+        truth.windows(2).map(|pair| [&pair[0], &pair[1]].map(|tick| DVec2::new(tick.x, tick.y)));
+    places.map(|[from, to]| from.distance(to)).sum()
 }
 
 fn contact_speed_m_s(truth: &[GroundTruthTick], track_m: f64) -> Option<f64> {
