@@ -100,6 +100,11 @@ impl Fix {
         SMatrix::from([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])
     }
 
+    fn shares(&self) -> [f64; 3] {
+        let [place, heading] = self.shared;
+        [place, place, heading]
+    }
+
     pub(crate) fn variance(&self) -> f64 {
         0.5 * (self.covariance[0] + self.covariance[3])
     }
@@ -137,25 +142,63 @@ struct Anchor {
     shared: [f64; 3],
     /// Of the matcher's newest fix.
     newest: [f64; 3],
+    /// The matcher's frame in the estimate's: what such a source corrects of the pose, it corrects of the frame. Without this the
+    /// matcher, which holds the pose at where it once was, would undo each correction.
+    frame: Pose2,
 }
 
 impl Anchor {
-    /// The variances below which a fix that shares so much does not make the estimate, or which a fix that shares nothing left.
-    fn floor(&mut self, fix: &Fix, variances: [f64; 3]) -> [f64; 3] {
-        let [place, heading] = fix.shared;
-        let shared = [place, place, heading];
+    fn drift(&self, shared: [f64; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|part| (shared[part] - self.shared[part]).max(0.0))
+    }
+
+    /// `fix` as it is used: one of the matcher in the estimate's frame, and as unsure as it is beside the drift.
+    fn laid(&self, fix: &Fix) -> Fix {
+        let shared = fix.shares();
+        if shared == [0.0; 3] || self.variances.is_none() {
+            return *fix;
+        }
+        let drift = self.drift(shared);
+        let least = [LEAST_VARIANCE, LEAST_VARIANCE, LEAST_HEADING_VARIANCE];
+        let stated = fix.noise();
+        // Deviations shrink and correlations stay, so the matrix stays positive.
+        let shrunk = SVector::from([0, 1, 2].map(|part| {
+            let all = stated[(part, part)];
+            ((all - shared[part] + drift[part]).max(least[part]) / all).sqrt()
+        }));
+        let turned = DVec2::from_angle(self.frame.heading);
+        let DVec2 { x: cos, y: sin } = turned;
+        let turn = SMatrix::<f64, 3, 3>::from([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]);
+        let laid = turn * SMatrix::from_diagonal(&shrunk);
+        let own = laid * stated * laid.transpose();
+        let covariance =
+            [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|at: (usize, usize)| own[at]);
+        Fix {
+            position: self.frame.position + turned.rotate(fix.position),
+            heading: fix.heading.map(|heading| heading + self.frame.heading),
+            covariance,
+            ..*fix
+        }
+    }
+
+    /// The variances below which `fix` does not make the estimate, which it corrected at `pose` by `error` and left with `variances`.
+    fn floor(&mut self, fix: &Fix, pose: Pose2, error: &Error, variances: [f64; 3]) -> [f64; 3] {
+        let shared = fix.shares();
         if shared == [0.0; 3] {
             // One fix after another says the same of what the matcher holds, and no more.
             let [xx, _, _, yy, _, tt] = fix.covariance;
             let own = [xx, yy, tt];
             let known = [0, 1, 2].map(|part| own[part].max(variances[part]));
             (self.variances, self.shared) = (Some(known), self.newest);
+            let arm = DVec2::from_angle(error[2]).rotate(self.frame.position - pose.position);
+            self.frame.position = pose.position + DVec2::new(error[0], error[1]) + arm;
+            self.frame.heading += error[2];
             return shared;
         }
         self.newest = shared;
         let Some(known) = self.variances else { return shared };
-        let drift = |part: usize| (shared[part] - self.shared[part]).max(0.0);
-        [0, 1, 2].map(|part| shared[part].min(known[part] + drift(part)))
+        let drift = self.drift(shared);
+        [0, 1, 2].map(|part| shared[part].min(known[part] + drift[part]))
     }
 }
 
@@ -211,12 +254,36 @@ impl Filter {
 
     /// Use a fix measured at `there`. Returns whether it agrees.
     fn take(&mut self, fix: &Fix, there: Pose2) -> bool {
+        let laid = self.anchor.laid(fix);
+        let mut taken = self.updated(&laid, there);
+        if taken.is_none() && laid != *fix {
+            // The matcher began anew at the estimate.
+            taken = self.updated(fix, there);
+            if taken.is_some() {
+                self.anchor = Anchor::default();
+            }
+        }
+        if let Some((error, mut covariance)) = taken {
+            let variances = [0, 1, 2].map(|part| covariance[(part, part)]);
+            let floor = self.anchor.floor(fix, self.pose, &error, variances);
+            self.correct(&error);
+            for (part, least) in floor.into_iter().enumerate() {
+                // A greater diagonal keeps the matrix positive.
+                covariance[(part, part)] = covariance[(part, part)].max(least);
+            }
+            self.covariance = Covariance(covariance);
+        }
+        taken.is_some()
+    }
+
+    /// The correction by a fix measured at `there`, and the covariance afterwards. None if it contradicts the estimate.
+    fn updated(&self, fix: &Fix, there: Pose2) -> Option<(Error, SMatrix<f64, PARTS, PARTS>)> {
         let lever = self.pose.position - there.position;
         let mut seen = SMatrix::<f64, 3, PARTS>::identity();
         (seen[(0, 2)], seen[(1, 2)]) = (lever.y, -lever.x);
         let [x, y] = (fix.position - there.position).to_array();
         let (covariance, noise) = (&self.covariance.0, fix.noise());
-        let taken = match fix.heading {
+        match fix.heading {
             Some(heading) => {
                 let residual = SVector::from([x, y, wrapped(heading - there.heading)]);
                 update(covariance, &seen, residual, noise, GATES[1])
@@ -226,17 +293,7 @@ impl Filter {
                 let seen = seen.fixed_rows::<2>(0).into_owned();
                 update(covariance, &seen, SVector::from([x, y]), noise, GATES[0])
             }
-        };
-        if let Some((error, mut covariance)) = taken {
-            self.correct(&error);
-            let variances = [0, 1, 2].map(|part| covariance[(part, part)]);
-            for (part, least) in self.anchor.floor(fix, variances).into_iter().enumerate() {
-                // A greater diagonal keeps the matrix positive.
-                covariance[(part, part)] = covariance[(part, part)].max(least);
-            }
-            self.covariance = Covariance(covariance);
         }
-        taken.is_some()
     }
 
     fn correct(&mut self, error: &Error) {
@@ -248,7 +305,7 @@ impl Filter {
         self.bias += error[BIAS];
     }
 
-    /// The estimate moved to `pose` with these variances; wheel and gyro errors stay.
+    /// The estimate moved to `pose` with these variances, where the scan matcher begins anew; wheel and gyro errors stay.
     pub(crate) fn moved_to(mut self, pose: Pose2, position: f64, heading: f64) -> Self {
         let covariance = &mut self.covariance.0;
         for (part, variance) in [position, position, heading].into_iter().enumerate() {
@@ -256,7 +313,7 @@ impl Filter {
             covariance.column_mut(part).fill(0.0);
             covariance[(part, part)] = variance;
         }
-        Self { pose, ..self }
+        Self { pose, anchor: Anchor::default(), ..self }
     }
 }
 

@@ -522,3 +522,20 @@ fn a_camera_holds_the_pose_that_a_scan_matcher_would_take_along_and_makes_it_sur
     let [xx, _, _, yy, ..] = reckoning.sample().covariance;
     assert!(off_m < 0.1 && xx.max(yy) < 0.02, "{off_m} m off, {xx} {yy}");
 }
+
+#[test]
+fn a_camera_holds_the_pose_whose_scan_matcher_drifts_farther_than_it_says() {
+    let mut robot = Robot::new(0.0);
+    let mut reckoning = x80();
+    let drifting = |robot: &mut Robot| {
+        let (fix, heading_rad) = (robot.fix(), robot.truth.heading);
+        let covariance = [0.11, 0.0, 0.0, 0.11, 0.0, 0.02];
+        let y_m = fix.y_m + 0.002 * robot.tick as f64;
+        let matched = FixSample { y_m, heading_rad, covariance, shared: [0.09, 0.01], ..fix };
+        let camera = robot.tick.is_multiple_of(10).then_some(fix);
+        camera.into_iter().chain([matched]).collect()
+    };
+    rms(&mut robot, &mut reckoning, 700, drifting);
+    let off_m = rms(&mut robot, &mut reckoning, 100, drifting);
+    assert!(off_m < 0.1 && reckoning.sample().relocations == 0, "{off_m} m off");
+}
