@@ -5,7 +5,10 @@
 use common::samples::{
     CommandSample, CommandState, DirectiveSample, HoldReason, PoseSample, TargetPoint, TargetSample,
 };
-use ros2::cdr::{Reader, Writer};
+use ros2::{
+    cdr::{Reader, Writer},
+    participant::Request,
+};
 
 use crate::{
     asked::goal_of,
@@ -24,6 +27,36 @@ pub(crate) struct Aim {
     waits: bool,
     /// The number of the newest target that is older than the goal.
     after: u64,
+    /// Why the goal was not reached.
+    why: Refusal,
+    /// How often the result of its target was awaited in vain.
+    awaited: u32,
+}
+
+/// The most times that the bridge looks for the result of a target, some 50 ms apart, before a goal is told without it.
+const MOST_AWAITED: u32 = 20;
+
+/// Why a goal is not reached: an error code of Nav2, and its words.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Refusal {
+    pub(crate) code: u16,
+    pub(crate) text: String,
+}
+
+/// The codes of Nav2: those of `NavigateToPose`, and those of its planner, which `NavigateToPose` passes on.
+pub(crate) mod code {
+    pub(crate) const UNKNOWN: u16 = 9000;
+    pub(crate) const TF_ERROR: u16 = 9002;
+    pub(crate) const TIMEOUT: u16 = 9003;
+    pub(crate) const GOAL_OUTSIDE_MAP: u16 = 204;
+    pub(crate) const GOAL_OCCUPIED: u16 = 206;
+    pub(crate) const NO_VALID_PATH: u16 = 208;
+}
+
+impl<T: ToString> From<T> for Refusal {
+    fn from(text: T) -> Self {
+        Self { code: code::UNKNOWN, text: text.to_string() }
+    }
 }
 
 /// The server's goals.
@@ -42,17 +75,33 @@ pub(crate) struct Sent {
 }
 
 impl Server {
-    /// The goal that a client sends. The error says why the payload is none.
-    pub(crate) fn read_goal(payload: &[u8]) -> Result<Sent, String> {
+    /// The id of the goal that a client sends, and where to go or why not there. The error says why the payload is none.
+    pub(crate) fn read_goal(
+        payload: &[u8],
+    ) -> Result<(Uuid, Result<TargetPoint, Refusal>), String> {
         let mut reader = Reader::new(payload)?;
-        let id = uuid(&mut reader)?;
-        Ok(Sent { id, point: goal_of(&mut reader)? })
+        Ok((uuid(&mut reader)?, goal_of(&mut reader)))
     }
 
     /// Take a goal that the supervisor accepted; its target comes after the one with the number `after`.
     pub(crate) fn accept(&mut self, sent: Sent, after: u64, now_ns: u64) {
+        self.abort("a newer goal took its place");
         let aim = Aim { point: sent.point, after, ..Aim::default() };
         self.goals.accept(sent.id, aim, now_ns);
+    }
+
+    /// Take a goal that has ended before it began; another one goes on.
+    pub(crate) fn refuse(&mut self, id: Uuid, why: &Refusal, now_ns: u64) {
+        let aim = Aim { why: why.clone(), ..Aim::default() };
+        self.goals.add(id, Status::Aborted, aim, now_ns);
+    }
+
+    /// End the goal that is not over.
+    pub(crate) fn abort(&mut self, why: &str) {
+        if let Some(goal) = self.goals.current() {
+            goal.known.why = why.into();
+        }
+        self.goals.end(Status::Aborted);
     }
 
     pub(crate) fn target(&mut self, target: &TargetSample) {
@@ -67,7 +116,7 @@ impl Server {
             {
                 aim.number = Some(target.number);
             }
-            Some(number) if target.number > number => self.goals.end(Status::Aborted),
+            Some(number) if target.number > number => self.abort("the robot was sent elsewhere"),
             _ => {}
         }
     }
@@ -88,15 +137,47 @@ impl Server {
             && std::mem::replace(&mut goal.known.waits, waits)
             && waits
         {
-            self.goals.end(Status::Aborted);
+            self.abort("the robot gave it up");
         }
+    }
+
+    /// Take the recorded result of a target: it says why a goal was given up.
+    pub(crate) fn recorded(&mut self, number: u64, outcome: &str) {
+        for goal in self.goals.aborted().filter(|goal| goal.known.number == Some(number)) {
+            let (code, text) = match outcome {
+                "unreachable" => (code::NO_VALID_PATH, "the robot found no way to it"),
+                "timed_out" => (code::TIMEOUT, "the robot was not there in the mission's time"),
+                "reached" => {
+                    (goal.status, goal.known.why) = (Status::Succeeded, Refusal::default());
+                    continue;
+                }
+                _ => (code::UNKNOWN, goal.known.why.text.as_str()),
+            };
+            goal.known.why = Refusal { code, text: text.to_owned() };
+            goal.known.awaited = MOST_AWAITED;
+        }
+    }
+
+    /// No further results of the targets of earlier goals come.
+    pub(crate) fn forget_targets(&mut self) {
+        self.newest_target = 0;
+        self.goals.aborted().for_each(|goal| goal.known.number = None);
+    }
+
+    /// The requests for the results of goals that are over.
+    pub(crate) fn answerable(&mut self) -> Vec<(Request, Uuid)> {
+        self.goals.aborted().for_each(|goal| goal.known.awaited += 1);
+        self.goals.answerable(|status, aim| {
+            status != Status::Aborted as u8
+                || aim.is_none_or(|aim| aim.number.is_none() || aim.awaited > MOST_AWAITED)
+        })
     }
 
     /// The result of a goal; none while it is not over.
     pub(crate) fn result(&self, id: Uuid) -> Option<Vec<u8>> {
-        let (status, _) = self.goals.over(id)?;
-        // There is no error code, and no text of one.
-        Some(Writer::default().u8(status).u16(0).text("").take())
+        let (status, aim) = self.goals.over(id)?;
+        let Refusal { code, text } = aim.map(|aim| aim.why.clone()).unwrap_or_default();
+        Some(Writer::default().u8(status).u16(code).text(&text).take())
     }
 
     /// The progress of the robot with its goal; none without a goal.

@@ -71,10 +71,15 @@ impl<T> Goals<T> {
     /// Take a goal; it ends the one before.
     pub(crate) fn accept(&mut self, id: Uuid, known: T, now_ns: u64) {
         self.end(Status::Aborted);
+        self.add(id, Status::Executing, known, now_ns);
+    }
+
+    /// Add a goal in this state.
+    pub(crate) fn add(&mut self, id: Uuid, status: Status, known: T, now_ns: u64) {
         if self.goals.len() == MOST_GOALS {
             self.goals.pop_front();
         }
-        self.goals.push_back(Goal { id, at_ns: now_ns, status: Status::Executing, known });
+        self.goals.push_back(Goal { id, at_ns: now_ns, status, known });
         self.is_changed = true;
     }
 
@@ -86,9 +91,9 @@ impl<T> Goals<T> {
         }
     }
 
-    /// The newest goal, if it is not over.
+    /// The goal that is not over.
     pub(crate) fn current(&mut self) -> Option<&mut Goal<T>> {
-        self.goals.back_mut().filter(|goal| !goal.status.is_final())
+        self.goals.iter_mut().rev().find(|goal| !goal.status.is_final())
     }
 
     /// Take a request to cancel. Returns the reply, and whether a goal is canceled.
@@ -141,10 +146,18 @@ impl<T> Goals<T> {
         }
     }
 
-    /// The requests whose goals are over; the others still wait.
-    pub(crate) fn answerable(&mut self) -> Vec<(Request, Uuid)> {
+    pub(crate) fn aborted(&mut self) -> impl Iterator<Item = &mut Goal<T>> {
+        self.goals.iter_mut().filter(|goal| goal.status == Status::Aborted)
+    }
+
+    /// The requests whose goals are over and whose results `are_known`; the others still wait.
+    pub(crate) fn answerable(
+        &mut self,
+        are_known: impl Fn(u8, Option<&T>) -> bool,
+    ) -> Vec<(Request, Uuid)> {
         let waiting = std::mem::take(&mut self.waiting);
-        let (over, waiting) = waiting.into_iter().partition(|(_, id)| self.over(*id).is_some());
+        let is_over = |id| self.over(id).is_some_and(|(status, known)| are_known(status, known));
+        let (over, waiting) = waiting.into_iter().partition(|(_, id)| is_over(*id));
         self.waiting = waiting;
         over
     }
