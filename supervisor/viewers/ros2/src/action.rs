@@ -9,6 +9,7 @@ use ros2::{
     cdr::{Reader, Writer},
     participant::Request,
 };
+use serde::{Deserialize, Serialize};
 
 use crate::{
     asked::goal_of,
@@ -18,7 +19,7 @@ use crate::{
 };
 
 /// The target of a goal.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Aim {
     point: TargetPoint,
     /// The number of the goal's target, once the supervisor has published it.
@@ -30,6 +31,7 @@ pub(crate) struct Aim {
     /// Why the goal was not reached.
     why: Refusal,
     /// How often the result of its target was awaited in vain.
+    #[serde(skip)]
     awaited: u32,
 }
 
@@ -37,7 +39,7 @@ pub(crate) struct Aim {
 const MOST_AWAITED: u32 = 20;
 
 /// Why a goal is not reached: an error code of Nav2, and its words.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Refusal {
     pub(crate) code: u16,
     pub(crate) text: String,
@@ -60,7 +62,7 @@ impl<T: ToString> From<T> for Refusal {
 }
 
 /// The server's goals.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Server {
     pub(crate) goals: Goals<Aim>,
     /// The number of the newest target, which the target of a goal that is sent now follows; another run counts from 1.
@@ -141,13 +143,17 @@ impl Server {
         }
     }
 
-    /// Take the recorded result of a target: it says why a goal was given up.
+    /// Take the recorded result of a target: it says why a goal was given up, or how it ended while nobody looked.
     pub(crate) fn recorded(&mut self, number: u64, outcome: &str) {
-        for goal in self.goals.aborted().filter(|goal| goal.known.number == Some(number)) {
+        let is_of = |aim: &Aim| aim.number == Some(number);
+        if self.goals.current().is_some_and(|goal| is_of(&goal.known)) {
+            self.abort("the robot was sent elsewhere, or the run ended");
+        }
+        for goal in self.goals.aborted().filter(|goal| is_of(&goal.known)) {
             let (code, text) = match outcome {
                 "unreachable" => (code::NO_VALID_PATH, "the robot found no way to it"),
                 "timed_out" => (code::TIMEOUT, "the robot was not there in the mission's time"),
-                "reached" => {
+                "reached" | "reached_unsure" | "wrong_place" => {
                     (goal.status, goal.known.why) = (Status::Succeeded, Refusal::default());
                     continue;
                 }

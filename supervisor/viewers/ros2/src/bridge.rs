@@ -1,8 +1,9 @@
 //! The bridge: it follows one robot from run to run, publishes its samples, and has the permitted requests of nodes carried out.
 
 use std::{
-    io,
+    fs, io,
     net::Ipv4Addr,
+    path::PathBuf,
     time::{Duration, Instant, SystemTime, UNIX_EPOCH},
 };
 
@@ -10,6 +11,7 @@ use common::{
     bus::{Bus, BusError},
     clock::MissionClock,
     domain::{Domain, RobotName},
+    file,
     follower::{Event, Follower},
     samples::{RequestKind, TargetPoint},
     signals::{SIGCONT, Signals},
@@ -41,6 +43,13 @@ const FEEDBACK_EVERY: Duration = Duration::from_millis(100);
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
 /// Transforms of other nodes that are older are of no use.
 const OLD_AFTER: Duration = Duration::from_secs(1);
+/// The time within which clients know the writers of a bridge that starts.
+const KNOWN_AFTER: Duration = Duration::from_secs(2);
+/// The file of the robot that has the goals of the action with the directory of their run.
+const GOALS: &str = "ros2-goals.json";
+/// The most bytes of results of targets that are read for goals of an earlier bridge.
+const MOST_RECORDED: u64 = 1 << 20;
+const RUN_ENDED: &str = "the run ended before the robot arrived";
 /// The least interval between reports of refusals.
 const TELL_EVERY: Duration = Duration::from_secs(1);
 
@@ -85,8 +94,13 @@ struct Bridge {
     orders: Orders,
     shown: Option<Shown>,
     server: Server,
-    /// The results of the targets of the run.
-    results: Option<Results>,
+    /// The directory of the run, with the results of its targets.
+    run: Option<(PathBuf, Results)>,
+    /// The goals as they are stored for a bridge that comes after this one.
+    stored: String,
+    goals_file: PathBuf,
+    /// Clients do not know the writers of this bridge before.
+    answers_from: Instant,
     feedback_at: Instant,
     /// The number of stops that were asked for since the robot was ordered to stand for a canceled goal, that order included. None if the
     /// robot does not stand for one.
@@ -106,12 +120,16 @@ pub(crate) fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Resul
         orders: Orders::new(robot).map_err(BridgeError::System)?,
         shown: None,
         server: Server::default(),
-        results: None,
+        run: None,
+        stored: String::new(),
+        goals_file: PathBuf::new(),
+        answers_from: Instant::now() + KNOWN_AFTER,
         feedback_at: Instant::now(),
         stands_for_cancel: None,
         told_at: None,
     };
     let robot_domain = Domain::of(robot.clone());
+    bridge.restore(&robot_domain);
     let open = |bus: &Bus| Feed::open(bus, TOPICS);
     let follow = || Follower::new(robot_domain.clone(), "ros2", &topics::LINK, open);
     let mut follower = follow();
@@ -141,6 +159,7 @@ pub(crate) fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Resul
             bridge.done(done);
         }
         bridge.publish();
+        bridge.store();
         if let Err(error) = taken {
             tracing::error!(%error, "the robot cannot be shown; it is tried again");
             std::thread::park_timeout(AGAIN_AFTER);
@@ -186,14 +205,55 @@ impl Bridge {
             self.tell(&format!("the topics of the robot cannot be opened: {error}"));
         }
         self.shown = Some(shown);
-        self.server.forget_targets();
-        self.results = Some(Results::of(&directory, 0));
+        if self.run.as_ref().is_none_or(|(before, _)| *before != directory) {
+            self.server.abort(RUN_ENDED);
+            self.server.forget_targets();
+            let results = Results::of(&directory, 0);
+            self.run = Some((directory, results));
+        }
         Ok(())
+    }
+
+    /// Go on with the goals of an earlier bridge: their clients still wait.
+    fn restore(&mut self, domain: &Domain) {
+        self.goals_file = domain.run_directory().with_file_name(GOALS);
+        let text = fs::read_to_string(&self.goals_file).unwrap_or_default();
+        let Ok((directory, server)) = serde_json::from_str::<(PathBuf, Server)>(&text) else {
+            return;
+        };
+        let goes_on = newest_run(domain).is_some_and(|(newest, _)| newest == directory);
+        let results = Results::of(&directory, MOST_RECORDED);
+        (self.server, self.run, self.stored) = (server, Some((directory, results)), text);
+        self.read_results();
+        if !goes_on {
+            self.server.abort(RUN_ENDED);
+        }
+    }
+
+    fn read_results(&mut self) {
+        for target in self.run.iter_mut().flat_map(|(_, results)| results.take()) {
+            self.server.recorded(target.number, &target.outcome);
+        }
+    }
+
+    /// Store the goals for a later bridge if they have changed.
+    fn store(&mut self) {
+        let Some((directory, _)) = self.run.as_ref().filter(|_| self.server.goals.are_any()) else {
+            return;
+        };
+        // JSON has everything that is in them.
+        let text = serde_json::to_string(&(directory, &self.server)).unwrap_or_default();
+        if text != self.stored {
+            if let Err(error) = file::replace(&self.goals_file, &text) {
+                tracing::warn!(%error, "the goals of the action cannot be stored");
+            }
+            self.stored = text;
+        }
     }
 
     /// Note that the run has ended: no goal is reached any more.
     fn end(&mut self) {
-        self.server.abort("the run ended before the robot arrived");
+        self.server.abort(RUN_ENDED);
         self.server.newest_target = 0;
         (self.shown, self.stands_for_cancel) = (None, None);
     }
@@ -335,6 +395,11 @@ impl Bridge {
                             let reply = Goals::<Aim>::reply(true, now_ns);
                             self.node.reply(0, Call::SendGoal, &request, &reply);
                             self.server.accept(sent, after, now_ns);
+                            // Its target may have come before the supervisor's answer.
+                            if let Some(target) = self.shown.as_ref().and_then(|it| it.state.target)
+                            {
+                                self.server.target(&target);
+                            }
                         }
                         Err(why) => self.refuse(&request, sent.id, &why),
                     }
@@ -357,16 +422,16 @@ impl Bridge {
     /// Publish the samples that are due.
     fn publish(&mut self) {
         let now_ns = self.now_ns();
+        self.read_results();
         let (node, server) = (&self.node, &mut self.server);
         if let Some(status) = server.goals.take_status() {
             node.publish_status(0, status);
         }
-        for target in self.results.iter_mut().flat_map(Results::take) {
-            server.recorded(target.number, &target.outcome);
-        }
-        for (request, id) in server.answerable() {
-            let result = server.result(id).unwrap_or_default();
-            node.reply(0, Call::GetResult, &request, &result);
+        if Instant::now() >= self.answers_from {
+            for (request, id) in server.answerable() {
+                let result = server.result(id).unwrap_or_default();
+                node.reply(0, Call::GetResult, &request, &result);
+            }
         }
         let Some(shown) = &mut self.shown else {
             return;

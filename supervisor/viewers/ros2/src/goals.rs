@@ -8,6 +8,7 @@ use ros2::{
     cdr::{Reader, Writer},
     participant::Request,
 };
+use serde::{Deserialize, Serialize};
 
 /// The id that a client gave its goal.
 pub(crate) type Uuid = [u8; 16];
@@ -18,7 +19,7 @@ const MOST_GOALS: usize = 16;
 const MOST_RESULTS: usize = 32;
 
 /// A `action_msgs/GoalStatus`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum Status {
     Executing = 2,
     Canceling = 3,
@@ -43,7 +44,7 @@ enum Cancel {
 }
 
 /// A goal that was accepted, with what its action knows of it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Goal<T> {
     pub(crate) id: Uuid,
     /// The time when the goal was accepted, nanoseconds since 1970.
@@ -53,7 +54,7 @@ pub(crate) struct Goal<T> {
 }
 
 /// A server's goals.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Goals<T> {
     goals: VecDeque<Goal<T>>,
     /// Whether the states have changed since they were last published.
@@ -81,6 +82,10 @@ impl<T> Goals<T> {
         }
         self.goals.push_back(Goal { id, at_ns: now_ns, status, known });
         self.is_changed = true;
+    }
+
+    pub(crate) fn are_any(&self) -> bool {
+        !self.goals.is_empty()
     }
 
     /// Let the goal that is not over end with `status`.

@@ -223,6 +223,19 @@ fn a_goal_that_ends_says_why_by_the_recorded_result_of_its_target() {
 }
 
 #[test]
+fn a_goal_of_an_earlier_bridge_has_the_result_of_its_target_that_came_meanwhile() {
+    for (outcome, status) in
+        [("reached", Status::Succeeded), ("missed", Status::Aborted), ("replaced", Status::Aborted)]
+    {
+        let stored = serde_json::to_string(&with_a_goal()).unwrap();
+        let mut later: Server = serde_json::from_str(&stored).unwrap();
+        assert_eq!(state(&later, 1), None, "it is not over");
+        later.recorded(5, outcome);
+        assert_eq!(state(&later, 1), Some(status as u8), "{outcome}");
+    }
+}
+
+#[test]
 fn a_goal_of_the_action_whose_target_is_given_up_ends_though_the_run_stays() {
     let waits =
         DirectiveSample { reason: HoldReason::Waiting.into(), ..DirectiveSample::default() };
