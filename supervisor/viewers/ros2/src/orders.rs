@@ -74,7 +74,7 @@ impl Orders {
             let (robot, done) = (robot.clone(), refused.clone());
             thread::Builder::new().name(name.to_owned()).spawn(move || {
                 for order in waiting {
-                    let result = perform(&robot, &order).map_err(refusal);
+                    let result = perform(&robot, &order).map_err(|error| refusal(&error));
                     if done.send((order, result)).is_err() {
                         break;
                     }
@@ -107,8 +107,8 @@ impl Orders {
     }
 }
 
-fn refusal(error: OperatorError) -> Refusal {
-    let code = match &error {
+fn refusal(error: &OperatorError) -> Refusal {
+    let code = match error {
         OperatorError::Refused { code: "target-outside", .. } => code::GOAL_OUTSIDE_MAP,
         OperatorError::Refused { code: "target-in-hazard", .. } => code::GOAL_OCCUPIED,
         _ => code::UNKNOWN,
