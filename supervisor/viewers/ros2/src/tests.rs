@@ -389,7 +389,7 @@ fn the_covariance_of_odometry_grows_with_the_way_and_is_large_on_what_no_wheel_m
 }
 
 #[test]
-fn speeds_and_the_times_of_beams_are_in_the_time_of_the_stamps_at_every_pace() {
+fn speeds_are_in_the_time_of_the_stamps_at_every_pace() {
     let mut shown = shown();
     shown.pace = 4.0;
     let pose = PoseSample { v_m_s: 0.1, omega_rad_s: -0.2, ..PoseSample::default() };
@@ -433,7 +433,8 @@ fn a_scan_is_stamped_when_its_first_beam_was_measured_and_says_the_time_between_
     let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
     let (row, laser) = mission.laser().unwrap();
     let mut shown = Shown::new("tb4".to_owned(), mission);
-    let mut told = |first_beam, beam_ns| {
+    let mut told = |pace, first_beam, beam_ns| {
+        shown.pace = pace;
         let sweep = Sweep { first_beam_ns: -90_000_000, beam_ns, first_beam };
         let header = ScanHeader::of(row, &laser).swept(sweep);
         let scan = Sample::Scan(header, vec![1.0; 360]);
@@ -443,9 +444,10 @@ fn a_scan_is_stamped_when_its_first_beam_was_measured_and_says_the_time_between_
         let numbers: Vec<_> = (0..5).map(|_| reader.f32().unwrap()).collect();
         (stamp, numbers[3])
     };
-    assert_eq!(told(0, 250_000), (910_000_000, 0.00025));
+    assert_eq!(told(1.0, 0, 250_000), (910_000_000, 0.00025));
+    assert_eq!(told(2.0, 0, 250_000), (955_000_000, 0.000_125));
     // One that turns clockwise has its beams in another order: the stamp is that of the middle.
-    assert_eq!(told(0, -250_000), (955_000_000, 0.0));
+    assert_eq!(told(1.0, 0, -250_000), (955_000_000, 0.0));
 }
 
 #[test]
