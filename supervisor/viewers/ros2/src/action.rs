@@ -66,6 +66,7 @@ impl<T: ToString> From<T> for Refusal {
 pub(crate) struct Server {
     pub(crate) goals: Goals<Aim>,
     /// The number of the newest target, which the target of a goal that is sent now follows; another run counts from 1.
+    #[serde(skip)]
     pub(crate) newest_target: u64,
 }
 
@@ -166,7 +167,6 @@ impl Server {
 
     /// No further results of the targets of earlier goals come.
     pub(crate) fn forget_targets(&mut self) {
-        self.newest_target = 0;
         self.goals.aborted().for_each(|goal| goal.known.number = None);
     }
 

@@ -54,15 +54,13 @@ impl Drift {
     }
 
     fn grow(&mut self, model: &Odometry, track_m: f64, at: Pose2, [arc, turn]: [f64; 2]) {
-        let (ahead_y, ahead_x) = (at.heading - turn / 2.0).sin_cos();
+        let (y, x) = (at.heading - turn / 2.0).sin_cos();
         let effect = |arc_error: f64, turn_error: f64| {
             let aside = 0.5 * arc * turn_error;
-            let [x, y] = [ahead_x, ahead_y];
             DVec3::new(arc_error * x - aside * y, arc_error * y + aside * x, turn_error)
         };
         // An error of the heading turns what comes after it.
-        let carried =
-            DMat3::from_cols(DVec3::X, DVec3::Y, DVec3::new(-arc * ahead_y, arc * ahead_x, 1.0));
+        let carried = DMat3::from_cols(DVec3::X, DVec3::Y, DVec3::new(-arc * y, arc * x, 1.0));
         self.slipped = carried * self.slipped * carried.transpose();
         for side in [-1.0, 1.0] {
             let rolled = arc + side * turn * track_m / 2.0;

@@ -149,11 +149,6 @@ pub(crate) fn range(
     writer.take()
 }
 
-/// A `rosgraph_msgs/Clock`.
-pub(crate) fn clock(ns: u64) -> Vec<u8> {
-    Writer::default().time(ns).take()
-}
-
 /// A `rcl_interfaces/Log` of a part of the robot, with its severity.
 pub(crate) fn log(ns: u64, severity: u8, name: &str, text: &str) -> Vec<u8> {
     Writer::default().time(ns).u8(severity).text(name).text(text).text("").text("").u32(0).take()

@@ -6,12 +6,12 @@ use common::{
     mission::{Mission, Sensor, SensorKind},
     samples::{
         Action, Cause, FieldCell, FieldHeader, GridHeader, Mover, PoseSample, RangeReading,
-        RangeStatus, RosterEntry, ScanHeader, StageState, TargetPoint, name_str,
+        RangeStatus, RosterEntry, ScanHeader, StageState, Sweep, TargetPoint, name_str,
     },
 };
 use glam::{DAffine2, DVec2};
 use robot_state::{Kind, RobotState, Sample, death_in_words, failsafe_in_words};
-use ros2::parts::Pose;
+use ros2::{cdr::Writer, parts::Pose};
 
 use crate::{
     drift::Drift,
@@ -139,7 +139,7 @@ impl Shown {
         let header = Header(now_ns, ODOM);
         let message = messages::odometry(header, BASE, (odom, &of_pose), (speeds, &of_speeds));
         sink(Id::Odom, message);
-        sink(Id::Clock, messages::clock(sample.stamp.stamp_ns));
+        sink(Id::Clock, Writer::default().time(sample.stamp.stamp_ns).take());
     }
 
     fn ranges(&self, readings: &[RangeReading], now_ns: u64, sink: Sink<'_>) {
@@ -170,14 +170,15 @@ impl Shown {
         if let Some(sensor) = self.sensors.get(row) {
             let period_s = sensor.every_ticks as f64 / self.mission.robot.rate_hz / self.pace;
             // A message has its beams in the order in which they were measured, or does not tell their times.
-            let (sweep, count) = (header.sweep(), beams.len());
-            let is_told = sweep.is_plausible(count) && sweep.beam_ns > 0 && sweep.first_beam == 0;
-            let after_tick_ns = match sweep.is_plausible(count) {
-                true if is_told => sweep.first_beam_ns,
-                true => sweep.middle_ns(count),
-                false => 0,
-            };
-            let beam_s = if is_told { sweep.beam_ns as f64 * 1e-9 / self.pace } else { 0.0 };
+            let mut sweep = header.sweep();
+            if !sweep.is_plausible(beams.len()) {
+                sweep = Sweep::default();
+            }
+            let (mut after_tick_ns, mut beam_ns) = (sweep.first_beam_ns, sweep.beam_ns);
+            if beam_ns < 0 || sweep.first_beam > 0 {
+                (after_tick_ns, beam_ns) = (sweep.middle_ns(beams.len()), 0);
+            }
+            let beam_s = beam_ns as f64 * 1e-9 / self.pace;
             let at_ns = now_ns.saturating_add_signed((after_tick_ns as f64 / self.pace) as i64);
             let fan = [header.first_rad - sensor.mount.looks_rad(), header.step_rad];
             let limits = [sensor.model.least_m(), header.reach_m];
