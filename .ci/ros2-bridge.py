@@ -2,8 +2,8 @@
 
     python3 .ci/ros2-bridge.py EXECUTABLE
 
-The types of tf2, map and nav2 are not packed for pip, so they are declared here for Cyclone DDS, whose service header stands in the
-payload. A client of Fast DDS cancels a goal.
+The types of tf2 and map are not packed for pip, so they are declared here for Cyclone DDS. Nav2's own client, nav2_simple_commander, sends
+goals; .ci/ros2-messages.py builds its messages.
 """
 
 import json
@@ -24,18 +24,20 @@ os.environ["CYCLONEDDS_URI"] = f"<CycloneDDS><Domain><General>{LOOPBACK}</Genera
 
 import rclpy
 from action_msgs.msg import GoalStatusArray
-from action_msgs.srv import CancelGoal
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import array, float32, float64, int8, int16, int32, int64, sequence, uint8, uint16, uint32, uint64
+from cyclonedds.idl.types import float64, int8, int32, sequence, uint32
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist
+from nav2_simple_commander.robot_navigator import BasicNavigator, TaskResult
 from nav_msgs.msg import OccupancyGrid, Odometry, Path
+from rcl_interfaces.msg import Log
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import BatteryState, LaserScan, Range
 from std_msgs.msg import Bool
 from visualization_msgs.msg import MarkerArray
@@ -91,51 +93,6 @@ class OccupancyGridUpdate(IdlStruct, typename="map_msgs::msg::dds_::OccupancyGri
     data: sequence[int8]
 
 
-@dataclass
-class SendGoal(IdlStruct, typename="nav2_msgs::action::dds_::NavigateToPose_SendGoal_Request_"):
-    client: uint64
-    number: int64
-    goal_id: array[uint8, 16]
-    header: Header
-    pose: Plane
-    behavior_tree: str = ""
-
-
-@dataclass
-class SendGoalReply(IdlStruct, typename="nav2_msgs::action::dds_::NavigateToPose_SendGoal_Response_"):
-    client: uint64
-    number: int64
-    accepted: bool
-    stamp: Time
-
-
-@dataclass
-class GetResult(IdlStruct, typename="nav2_msgs::action::dds_::NavigateToPose_GetResult_Request_"):
-    client: uint64
-    number: int64
-    goal_id: array[uint8, 16]
-
-
-@dataclass
-class GetResultReply(IdlStruct, typename="nav2_msgs::action::dds_::NavigateToPose_GetResult_Response_"):
-    client: uint64
-    number: int64
-    status: int8
-    error_code: uint16
-    error_msg: str
-
-
-@dataclass
-class Feedback(IdlStruct, typename="nav2_msgs::action::dds_::NavigateToPose_FeedbackMessage_"):
-    goal_id: array[uint8, 16]
-    header: Header
-    pose: Plane
-    navigation_time: Time
-    remaining: Time
-    recoveries: int16
-    distance_remaining: float32
-
-
 def cyclone_qos(latched=False):
     durability = Policy.Durability.TransientLocal if latched else Policy.Durability.Volatile
     return Qos(Policy.Reliability.Reliable(1_000_000_000), durability, Policy.History.KeepLast(100))
@@ -157,6 +114,8 @@ class Heard:
             ("range/front", Range, 10),
             ("battery_state", BatteryState, 10),
             ("diagnostics", DiagnosticArray, 10),
+            ("/rosout", Log, QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)),
+            ("/clock", Clock, 10),
             ("navigate_to_pose/_action/status", GoalStatusArray, LATCHED),
         ]:
             keep = lambda message, name=name: self.messages.setdefault(name, []).append(message)
@@ -166,14 +125,7 @@ class Heard:
             "tf": self.reader("rt/tf", TFMessage),
             "tf_static": self.reader("rt/tf_static", TFMessage, True),
             "map_updates": self.reader("rt/map_updates", OccupancyGridUpdate),
-            "feedback": self.reader("rt/navigate_to_pose/_action/feedback", Feedback),
-            "sent": self.reader("rr/navigate_to_pose/_action/send_goalReply", SendGoalReply),
-            "result": self.reader("rr/navigate_to_pose/_action/get_resultReply", GetResultReply),
         }
-        request = lambda name, kind: DataWriter(
-            self.participant, Topic(self.participant, f"rq/navigate_to_pose/_action/{name}Request", kind), cyclone_qos()
-        )
-        self.send_goal, self.get_result = request("send_goal", SendGoal), request("get_result", GetResult)
 
     def reader(self, name, kind, latched=False):
         return DataReader(self.participant, Topic(self.participant, name, kind), cyclone_qos(latched))
@@ -259,7 +211,13 @@ def main(firsthand):
         check_map(heard)
         names = {status.name for status in heard.newest("diagnostics").status}
         assert names >= {"firsthand: failsafe", "firsthand: planner"}, names
+        odometry = heard.newest("odom")
+        assert odometry.pose.covariance[0] > 0 and odometry.pose.covariance[14] == odometry.twist.covariance[14] == 1e6
         scan = heard.newest("scan")
+        # REP 117: too near, too far, and no measurement.
+        special = lambda range: math.isinf(range) or math.isnan(range)
+        odd = [range for range in scan.ranges if not special(range) and not scan.range_min <= range <= scan.range_max]
+        assert not odd, (odd, scan.range_min, scan.range_max)
         assert len(scan.ranges) > 100 and scan.header.frame_id == "laser"
         goals = node.create_publisher(PoseStamped, "goal_pose", 10)
         goal = PoseStamped()
@@ -297,41 +255,41 @@ def main(firsthand):
         stops.publish(Bool(data=False))
         heard.until("movement again", lambda: not status(firsthand)["link"]["stopped"])
 
-        # The action: a goal is sent, canceled, sent again, and reached.
-        client, number = 0x1234, 0
+        # Nav2's client: a goal is canceled, two are refused with reasons, one is reached.
+        navigator = BasicNavigator()
 
-        def call(writer, reply, request):
-            nonlocal number
-            number += 1
-            heard.messages[reply] = []
-            writer.write(request(client, number))
-            of_this = lambda: [r for r in heard.messages[reply] if (r.client, r.number) == (client, number)]
-            return heard.until(reply, of_this)[0]
+        def go(x, y, frame="map"):
+            goal.header.frame_id, goal.pose.position.x, goal.pose.position.y = frame, x, y
+            assert navigator.goToPose(goal)
 
-        def send(goal_id, x, y):
-            ask = lambda client, number: SendGoal(client, number, [goal_id] * 16, Header(), Plane(x=x, y=y))
-            return call(heard.send_goal, "sent", ask)
+        def result():
+            heard.until("the end of the goal", navigator.isTaskComplete)
+            return navigator.getResult(), *navigator.getTaskError()
 
-        heard.until("the action's server", lambda: heard.send_goal.get_matched_subscriptions())
-        assert send(1, 3.0, -0.8).accepted
+        go(3.0, -0.8)
         heard.until("its path", lambda: is_at(heard, 3.0, -0.8))
-        feedback = heard.until("feedback", lambda: heard.newest("feedback"))
-        assert list(feedback.goal_id) == [1] * 16 and feedback.distance_remaining > 0
-        cancel = node.create_client(CancelGoal, "navigate_to_pose/_action/cancel_goal")
-        heard.until("the service", cancel.service_is_ready)
-        answer = cancel.call_async(CancelGoal.Request())
-        heard.until("the answer of the service", answer.done)
-        assert [list(goal.goal_id.uuid) for goal in answer.result().goals_canceling] == [[1] * 16], answer.result()
-        heard.until("rest", lambda: status(firsthand)["link"]["cause"] == "stopped by an operator")
-        ask = lambda goal_id: lambda client, number: GetResult(client, number, [goal_id] * 16)
-        assert call(heard.get_result, "result", ask(1)).status == 5
-        assert not send(2, 90.0, 0.0).accepted
-        assert send(3, 3.0, 0.5).accepted
-        assert call(heard.get_result, "result", ask(3)).status == 4
-        of = lambda message: {int(goal.goal_info.goal_id.uuid[0]): goal.status for goal in message.status_list}
-        heard.until("its states", lambda: of(heard.newest("navigate_to_pose/_action/status")) == {1: 5, 3: 4})
+        heard.until("feedback", lambda: navigator.isTaskComplete() or navigator.getFeedback())
+        assert navigator.getFeedback().distance_remaining > 0
+        navigator.cancelTask()
+        assert result() == (TaskResult.CANCELED, 0, "")
+        assert status(firsthand)["link"]["cause"] == "stopped by an operator"
+        canceled = navigator.goal_handle
+        for x, frame, code, words in [(90.0, "map", 204, "outside the perimeter"), (1.0, "odom", 9002, 'give it in "map"')]:
+            go(x, 0.0, frame)
+            ended, was, text = result()
+            assert (ended, was) == (TaskResult.FAILED, code) and words in text, text
+        of = lambda message: [goal.status for goal in message.status_list]
+        heard.until("their states", lambda: of(heard.newest("navigate_to_pose/_action/status")) == [5, 6, 6])
+        told = {(log.name, log.level[0] if isinstance(log.level, bytes) else log.level) for log in heard.messages["/rosout"]}
+        assert told >= {("supervisor", 20), ("failsafe", 40)}, told
+        # The client of a goal that ends while there is no bridge has its result from the next one.
+        go(3.0, 0.5)
+        heard.until("its path", lambda: is_at(heard, 3.0, 0.5))
+        bridged.send_signal(signal.SIGKILL)
         heard.until("the end of the mission", lambda: run.poll() is not None, 120)
-        assert json.loads(run.stdout.read())["outcome"] == "reached"
+        assert json.loads(run.stdout.read())["outcome"] == "reached" and not navigator.isTaskComplete()
+        bridged = bridge("--accept", "goals,pose,hand,stop")
+        assert result() == (TaskResult.SUCCEEDED, 0, "")
 
         # A robot that stands and is said to be elsewhere believes that.
         run = mission("placed")
@@ -370,6 +328,39 @@ def main(firsthand):
 
         heard.until("the way of the hand", pushed)
         heard.until("rest", lambda: status(firsthand)["link"]["at_rest"])
+        run.terminate()
+        heard.until("the end of the mission", lambda: run.poll() is not None, 60)
+
+        # Another node has the robot's odometry, and time is the mission's.
+        bridged.terminate()
+        heard.until("the end of the bridge", lambda: bridged.poll() is not None)
+        again = bridge("--frames", "map", "--clock", "--accept", "goals")
+        heard.messages.clear()
+        run = mission("beside", "--stay", "--set", "target=[0.4,0]")
+        others = DataWriter(heard.participant, Topic(heard.participant, "rt/tf", TFMessage), cyclone_qos())
+        place = TransformStamped(Header(frame_id="odom"), "base_link", Plane(x=7.0, y=-4.0, k=math.sin(-0.25), w=math.cos(-0.25)))
+
+        def is_whole():
+            others.write(TFMessage([place]))
+            own = [message for message in heard.messages.get("tf", []) if message.transforms[0].child_frame_id == "odom"]
+            assert all(len(message.transforms) == 1 for message in own)
+            if not own or not heard.messages.get("pose"):
+                return False
+            origin, at = own[-1].transforms[0].transform, heard.newest("pose").pose.pose.position
+            angle = turned(origin)
+            x = origin.x + math.cos(angle) * 7.0 - math.sin(angle) * -4.0
+            y = origin.y + math.sin(angle) * 7.0 + math.cos(angle) * -4.0
+            return math.hypot(at.x - x, at.y - y) < 0.05
+
+        heard.until("the frame of the map that makes up the pose", is_whole)
+        ticks = lambda: [(message.clock.sec, message.clock.nanosec) for message in heard.messages.get("/clock", [])]
+        stamp = lambda: heard.newest("pose").header.stamp
+        heard.until("stamps of the clock", lambda: (stamp().sec, stamp().nanosec) in ticks())
+        assert ticks() == sorted(ticks()) and ticks()[-1] < (60, 0), ticks()
+        # Goals of two bridges before are remembered.
+        asked = canceled.get_result_async()
+        heard.until("the answer", lambda: rclpy.spin_once(navigator, timeout_sec=0.01) or asked.done(), 5)
+        assert asked.result().status == 5
         print("every topic of the bridge was decoded, and what it lets in was done")
     finally:
         # A mission that is asked to end leaves no shared memory; nodes of rclpy may hang when they are asked.

@@ -16,11 +16,15 @@ pub fn begin(Header(ns, frame): Header<'_>) -> Writer {
     writer
 }
 
-/// A `nav_msgs/Odometry` that states no covariance.
-pub fn odometry(header: Header<'_>, child: &str, pose: Pose, [v, omega]: [f64; 2]) -> Vec<u8> {
-    let unknown = [0.0; COVARIANCE];
-    let twist = [v, 0.0, 0.0, 0.0, 0.0, omega];
-    begin(header).text(child).pose(pose).f64s(&unknown).f64s(&twist).f64s(&unknown).take()
+/// A `nav_msgs/Odometry`, with the covariances of the pose and of the speeds.
+pub fn odometry(
+    header: Header<'_>,
+    child: &str,
+    (pose, of_pose): (Pose, &[f64; COVARIANCE]),
+    ([v, omega], of_speeds): ([f64; 2], &[f64; COVARIANCE]),
+) -> Vec<u8> {
+    let speeds = [v, 0.0, 0.0, 0.0, 0.0, omega];
+    begin(header).text(child).pose(pose).f64s(of_pose).f64s(&speeds).f64s(of_speeds).take()
 }
 
 /// A `sensor_msgs/LaserScan`; `times_s` are those from beam to beam and from scan to scan.

@@ -26,6 +26,7 @@ use rustix::{
     event::{EventfdFlags, eventfd},
     io::{read, write},
 };
+use serde::{Deserialize, Serialize};
 
 use crate::{cdr::ENCAPSULATION, topic::Topic};
 
@@ -195,8 +196,8 @@ impl Participant {
 /// it.
 const CYCLONE_HEADER: usize = 16;
 
-/// Fast DDS names the sender beside the message, as the standard has it, Cyclone DDS in the message.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Fast DDS names the sender beside the message, as the standard has it, Cyclone DDS in the message. A later process may reply to it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Request {
     identity: SampleIdentity,
     /// Repeated in the reply; empty for Fast DDS.

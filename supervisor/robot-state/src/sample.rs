@@ -2,6 +2,7 @@
 
 use common::{
     bus::{AnyReader, Bus, BusError, decode_sample, decode_slice},
+    clock::MissionTime,
     samples::{
         CommandSample, DeathSample, DirectiveSample, FaultSample, FieldCell, FieldHeader,
         FollowingSample, GridHeader, GuidanceSample, LinkSample, PoseSample, PowerSample,
@@ -28,6 +29,10 @@ macro_rules! samples {
                     return samples!(@$decode $name, message);
                 })*
                 None
+            }
+
+            pub const fn time(&self) -> MissionTime {
+                match self { $(Self::$name(sample, ..) => sample.stamp.time()),* }
             }
         }
     };

@@ -28,7 +28,7 @@ use console::{
 };
 use ros2::{
     cdr,
-    messages::{Header, battery, odometry, scan},
+    messages::{COVARIANCE, Header, battery, odometry, scan},
     participant::{Participant, Quality, Reader, Writer},
 };
 use ros2_driver::topics::{Content, Topics};
@@ -233,7 +233,13 @@ impl Program {
                 let pose = [position.x, position.y, heading];
                 let header = Header(now_ns, "odom");
                 report.wheels?;
-                Some(odometry(header, "base_footprint", pose, [v, self.turns * omega]))
+                let unknown = [0.0; COVARIANCE];
+                Some(odometry(
+                    header,
+                    "base_footprint",
+                    (pose, &unknown),
+                    ([v, self.turns * omega], &unknown),
+                ))
             }
             Content::Scan(row) => self.scan(row, report, now_ns),
             Content::Battery => report.battery_v.map(|volts| battery(Header(now_ns, ""), volts)),

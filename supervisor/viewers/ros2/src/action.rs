@@ -5,7 +5,11 @@
 use common::samples::{
     CommandSample, CommandState, DirectiveSample, HoldReason, PoseSample, TargetPoint, TargetSample,
 };
-use ros2::cdr::{Reader, Writer};
+use ros2::{
+    cdr::{Reader, Writer},
+    participant::Request,
+};
+use serde::{Deserialize, Serialize};
 
 use crate::{
     asked::goal_of,
@@ -15,7 +19,7 @@ use crate::{
 };
 
 /// The target of a goal.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Aim {
     point: TargetPoint,
     /// The number of the goal's target, once the supervisor has published it.
@@ -24,13 +28,45 @@ pub(crate) struct Aim {
     waits: bool,
     /// The number of the newest target that is older than the goal.
     after: u64,
+    /// Why the goal was not reached.
+    why: Refusal,
+    /// How often the result of its target was awaited in vain.
+    #[serde(skip)]
+    awaited: u32,
+}
+
+/// The most times that the bridge looks for the result of a target, some 50 ms apart, before a goal is told without it.
+const MOST_AWAITED: u32 = 20;
+
+/// Why a goal is not reached: an error code of Nav2, and its words.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Refusal {
+    pub(crate) code: u16,
+    pub(crate) text: String,
+}
+
+/// The codes of Nav2: those of `NavigateToPose`, and those of its planner, which `NavigateToPose` passes on.
+pub(crate) mod code {
+    pub(crate) const UNKNOWN: u16 = 9000;
+    pub(crate) const TF_ERROR: u16 = 9002;
+    pub(crate) const TIMEOUT: u16 = 9003;
+    pub(crate) const GOAL_OUTSIDE_MAP: u16 = 204;
+    pub(crate) const GOAL_OCCUPIED: u16 = 206;
+    pub(crate) const NO_VALID_PATH: u16 = 208;
+}
+
+impl<T: ToString> From<T> for Refusal {
+    fn from(text: T) -> Self {
+        Self { code: code::UNKNOWN, text: text.to_string() }
+    }
 }
 
 /// The server's goals.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Server {
     pub(crate) goals: Goals<Aim>,
     /// The number of the newest target, which the target of a goal that is sent now follows; another run counts from 1.
+    #[serde(skip)]
     pub(crate) newest_target: u64,
 }
 
@@ -42,17 +78,33 @@ pub(crate) struct Sent {
 }
 
 impl Server {
-    /// The goal that a client sends. The error says why the payload is none.
-    pub(crate) fn read_goal(payload: &[u8]) -> Result<Sent, String> {
+    /// The id of the goal that a client sends, and where to go or why not there. The error says why the payload is none.
+    pub(crate) fn read_goal(
+        payload: &[u8],
+    ) -> Result<(Uuid, Result<TargetPoint, Refusal>), String> {
         let mut reader = Reader::new(payload)?;
-        let id = uuid(&mut reader)?;
-        Ok(Sent { id, point: goal_of(&mut reader)? })
+        Ok((uuid(&mut reader)?, goal_of(&mut reader)))
     }
 
     /// Take a goal that the supervisor accepted; its target comes after the one with the number `after`.
     pub(crate) fn accept(&mut self, sent: Sent, after: u64, now_ns: u64) {
+        self.abort("a newer goal took its place");
         let aim = Aim { point: sent.point, after, ..Aim::default() };
         self.goals.accept(sent.id, aim, now_ns);
+    }
+
+    /// Take a goal that has ended before it began; another one goes on.
+    pub(crate) fn refuse(&mut self, id: Uuid, why: &Refusal, now_ns: u64) {
+        let aim = Aim { why: why.clone(), ..Aim::default() };
+        self.goals.add(id, Status::Aborted, aim, now_ns);
+    }
+
+    /// End the goal that is not over.
+    pub(crate) fn abort(&mut self, why: &str) {
+        if let Some(goal) = self.goals.current() {
+            goal.known.why = why.into();
+        }
+        self.goals.end(Status::Aborted);
     }
 
     pub(crate) fn target(&mut self, target: &TargetSample) {
@@ -67,7 +119,7 @@ impl Server {
             {
                 aim.number = Some(target.number);
             }
-            Some(number) if target.number > number => self.goals.end(Status::Aborted),
+            Some(number) if target.number > number => self.abort("the robot was sent elsewhere"),
             _ => {}
         }
     }
@@ -88,15 +140,50 @@ impl Server {
             && std::mem::replace(&mut goal.known.waits, waits)
             && waits
         {
-            self.goals.end(Status::Aborted);
+            self.abort("the robot gave it up");
         }
+    }
+
+    /// Take the recorded result of a target: it says why a goal was given up, or how it ended while nobody looked.
+    pub(crate) fn recorded(&mut self, number: u64, outcome: &str) {
+        let is_of = |aim: &Aim| aim.number == Some(number);
+        if self.goals.current().is_some_and(|goal| is_of(&goal.known)) {
+            self.abort("the robot was sent elsewhere, or the run ended");
+        }
+        for goal in self.goals.aborted().filter(|goal| is_of(&goal.known)) {
+            let (code, text) = match outcome {
+                "unreachable" => (code::NO_VALID_PATH, "the robot found no way to it"),
+                "timed_out" => (code::TIMEOUT, "the robot was not there in the mission's time"),
+                "reached" | "reached_unsure" | "wrong_place" => {
+                    (goal.status, goal.known.why) = (Status::Succeeded, Refusal::default());
+                    continue;
+                }
+                _ => (code::UNKNOWN, goal.known.why.text.as_str()),
+            };
+            goal.known.why = Refusal { code, text: text.to_owned() };
+            goal.known.awaited = MOST_AWAITED;
+        }
+    }
+
+    /// No further results of the targets of earlier goals come.
+    pub(crate) fn forget_targets(&mut self) {
+        self.goals.aborted().for_each(|goal| goal.known.number = None);
+    }
+
+    /// The requests for the results of goals that are over.
+    pub(crate) fn answerable(&mut self) -> Vec<(Request, Uuid)> {
+        self.goals.aborted().for_each(|goal| goal.known.awaited += 1);
+        self.goals.answerable(|status, aim| {
+            status != Status::Aborted as u8
+                || aim.is_none_or(|aim| aim.number.is_none() || aim.awaited > MOST_AWAITED)
+        })
     }
 
     /// The result of a goal; none while it is not over.
     pub(crate) fn result(&self, id: Uuid) -> Option<Vec<u8>> {
-        let (status, _) = self.goals.over(id)?;
-        // There is no error code, and no text of one.
-        Some(Writer::default().u8(status).u16(0).text("").take())
+        let (status, aim) = self.goals.over(id)?;
+        let Refusal { code, text } = aim.map(|aim| aim.why.clone()).unwrap_or_default();
+        Some(Writer::default().u8(status).u16(code).text(&text).take())
     }
 
     /// The progress of the robot with its goal; none without a goal.

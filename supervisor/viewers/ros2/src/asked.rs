@@ -5,26 +5,30 @@ use common::{mission::Mission, samples::TargetPoint};
 use glam::DVec2;
 use ros2::cdr::Reader;
 
-use crate::shown::MAP;
+use crate::{
+    action::{Refusal, code},
+    shown::MAP,
+};
 
 /// The least deviations of a place, metres and radians, whatever its covariance says.
 const LEAST_SIGMA: f64 = 0.05;
 
 /// The target of a `geometry_msgs/PoseStamped`.
 pub(crate) fn goal(payload: &[u8]) -> Result<TargetPoint, String> {
-    goal_of(&mut Reader::new(payload)?)
+    goal_of(&mut Reader::new(payload)?).map_err(|why| why.text)
 }
 
 /// The target of a `geometry_msgs/PoseStamped` that is a part of a message, in the mission's frame.
-pub(crate) fn goal_of(reader: &mut Reader<'_>) -> Result<TargetPoint, String> {
+pub(crate) fn goal_of(reader: &mut Reader<'_>) -> Result<TargetPoint, Refusal> {
     let (_stamp_ns, frame) = reader.header()?;
     if !(frame.is_empty() || frame.trim_start_matches('/') == MAP) {
-        return Err(format!("a pose in the frame {frame:?}; give it in {MAP:?}"));
+        let text = format!("a pose in the frame {frame:?}; give it in {MAP:?}");
+        return Err(Refusal { code: code::TF_ERROR, text });
     }
     let ([x_m, y_m], heading) = reader.pose()?;
     let heading_rad = heading.ok_or("an orientation that is no rotation; fill orientation.w")?;
     if !(x_m.is_finite() && y_m.is_finite()) {
-        return Err("a position that is no number; give metres".to_owned());
+        return Err("a position that is no number; give metres".into());
     }
     Ok(TargetPoint { x_m, y_m, heading_rad, has_heading: 1 })
 }
@@ -32,7 +36,7 @@ pub(crate) fn goal_of(reader: &mut Reader<'_>) -> Result<TargetPoint, String> {
 /// The place of a `geometry_msgs/PoseWithCovarianceStamped`, and its deviations, metres and radians.
 pub(crate) fn place(payload: &[u8]) -> Result<(TargetPoint, [f64; 2]), String> {
     let mut reader = Reader::new(payload)?;
-    let place = goal_of(&mut reader)?;
+    let place = goal_of(&mut reader).map_err(|why| why.text)?;
     let all: [f64; 36] = reader.f64s()?;
     let variances = [f64::midpoint(all[0], all[7]), all[35]];
     Ok((place, variances.map(|variance| variance.sqrt().max(LEAST_SIGMA))))

@@ -1,32 +1,38 @@
 //! The bridge: it follows one robot from run to run, publishes its samples, and has the permitted requests of nodes carried out.
 
 use std::{
-    io,
+    fs, io,
     net::Ipv4Addr,
+    path::PathBuf,
     time::{Duration, Instant, SystemTime, UNIX_EPOCH},
 };
 
 use common::{
     bus::{Bus, BusError},
+    clock::MissionClock,
     domain::{Domain, RobotName},
+    file,
     follower::{Event, Follower},
     samples::{RequestKind, TargetPoint},
     signals::{SIGCONT, Signals},
     topics,
 };
+use console::runs::Results;
 use robot_state::{Feed, Sample, TOPICS, newest_run};
-use ros2::participant::Message;
+use ros2::participant::{Message, Request};
 use thiserror::Error;
 
 use crate::{
-    action::{Aim, Server},
-    asked, endpoints,
-    goals::{Goals, Status},
+    action::{Aim, Refusal, Sent, Server},
+    asked,
+    endpoints::{self, is_of_robot},
+    frames::Frames as Transforms,
+    goals::{Goals, Status, Uuid},
     node::{Call, Node},
     orders::{Done, Order, Orders, Why},
     overlap::overlap,
-    shown::Shown,
-    topics::{Accept, Id},
+    shown::{BASE, ODOM, Shown},
+    topics::{Accept, Frames, Id},
 };
 
 /// The interval at which requests, a run that has ended or begun, or the end of this process is noticed when nothing is published.
@@ -35,6 +41,15 @@ const LOOK_EVERY: Duration = Duration::from_millis(50);
 const FEEDBACK_EVERY: Duration = Duration::from_millis(100);
 /// The time after which a bus that cannot be used is tried again.
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
+/// Transforms of other nodes that are older are of no use.
+const OLD_AFTER: Duration = Duration::from_secs(1);
+/// The time within which clients know the writers of a bridge that starts.
+const KNOWN_AFTER: Duration = Duration::from_secs(2);
+/// The file of the robot that has the goals of the action with the directory of their run.
+const GOALS: &str = "ros2-goals.json";
+/// The most bytes of results of targets that are read for goals of an earlier bridge.
+const MOST_RECORDED: u64 = 1 << 20;
+const RUN_ENDED: &str = "the run ended before the robot arrived";
 /// The least interval between reports of refusals.
 const TELL_EVERY: Duration = Duration::from_secs(1);
 
@@ -50,6 +65,9 @@ pub(crate) struct Options {
     pub(crate) namespace: String,
     /// The requests of others that are permitted.
     pub(crate) accepted: Vec<Accept>,
+    pub(crate) frames: Frames,
+    /// Stamps are mission time, which is published.
+    pub(crate) clock: bool,
 }
 
 /// The bridge cannot be opened.
@@ -60,7 +78,7 @@ pub(crate) enum BridgeError {
     )]
     Join { domain: u16, source: io::Error },
     #[error(
-        "the robot's own link reads {topic} in domain {domain} as its robot's, so the bridge does not publish it; give a namespace, such as --namespace firsthand"
+        "the robot's own link reads {topic} in domain {domain} as its robot's, so the bridge does not publish it; give a namespace, such as --namespace firsthand, or leave the robot its topics with --frames map"
     )]
     Overlap { topic: String, domain: u16 },
     #[error("cannot start a thread or catch a signal: {0}")]
@@ -69,11 +87,20 @@ pub(crate) enum BridgeError {
 
 /// The state of the bridge.
 struct Bridge {
-    robot: RobotName,
+    options: Options,
     node: Node<Id>,
+    /// The transforms of other nodes.
+    transforms: Transforms,
     orders: Orders,
     shown: Option<Shown>,
     server: Server,
+    /// The directory of the run, with the results of its targets.
+    run: Option<(PathBuf, Results)>,
+    /// The goals as they are stored for a bridge that comes after this one.
+    stored: String,
+    goals_file: PathBuf,
+    /// Clients do not know the writers of this bridge before.
+    answers_from: Instant,
     feedback_at: Instant,
     /// The number of stops that were asked for since the robot was ordered to stand for a canceled goal, that order included. None if the
     /// robot does not stand for one.
@@ -83,23 +110,26 @@ struct Bridge {
 
 /// Bridge a robot, from run to run, until `ended` returns true.
 pub(crate) fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), BridgeError> {
-    let Options { robot, domain, interface, namespace, accepted } = options;
-    let join = || {
-        endpoints::open(*domain, *interface, namespace, accepted)
-            .map_err(|source| BridgeError::Join { domain: *domain, source })
-    };
+    let (robot, domain) = (&options.robot, options.domain);
+    let join = || endpoints::open(options).map_err(|source| BridgeError::Join { domain, source });
     let mut continued = Signals::catch(&[SIGCONT]).map_err(BridgeError::System)?;
     let mut bridge = Bridge {
-        robot: robot.clone(),
+        options: options.clone(),
         node: join()?,
+        transforms: Transforms::default(),
         orders: Orders::new(robot).map_err(BridgeError::System)?,
         shown: None,
         server: Server::default(),
+        run: None,
+        stored: String::new(),
+        goals_file: PathBuf::new(),
+        answers_from: Instant::now() + KNOWN_AFTER,
         feedback_at: Instant::now(),
         stands_for_cancel: None,
         told_at: None,
     };
     let robot_domain = Domain::of(robot.clone());
+    bridge.restore(&robot_domain);
     let open = |bus: &Bus| Feed::open(bus, TOPICS);
     let follow = || Follower::new(robot_domain.clone(), "ros2", &topics::LINK, open);
     let mut follower = follow();
@@ -112,7 +142,9 @@ pub(crate) fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Resul
         }
         let taken = match follower.wait(LOOK_EVERY) {
             Ok(Event::Samples(bus)) => {
-                bridge.begin(&robot_domain, (*domain, namespace))?;
+                bridge.begin(&robot_domain)?;
+                // Transforms of the same tick have come by now.
+                bridge.hear();
                 bridge.take_samples(bus)
             }
             Ok(Event::Disconnected) => {
@@ -127,6 +159,7 @@ pub(crate) fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Resul
             bridge.done(done);
         }
         bridge.publish();
+        bridge.store();
         if let Err(error) = taken {
             tracing::error!(%error, "the robot cannot be shown; it is tried again");
             std::thread::park_timeout(AGAIN_AFTER);
@@ -146,39 +179,96 @@ impl Bridge {
     ///
     /// # Errors
     /// When the link of the run reads what would be published.
-    fn begin(&mut self, domain: &Domain, (ros, namespace): (u16, &str)) -> Result<(), BridgeError> {
+    fn begin(&mut self, domain: &Domain) -> Result<(), BridgeError> {
         if self.shown.is_some() {
             return Ok(());
         }
-        let Some((_, run)) = newest_run(domain) else {
+        let Some((directory, run)) = newest_run(domain) else {
             return Ok(());
         };
-        let shown = Shown::new(self.robot.to_string(), run.mission.clone());
-        if let Some(topic) = overlap((ros, namespace), &run, shown.sensor_topics()) {
-            return Err(BridgeError::Overlap { topic, domain: ros });
+        let Options { robot, domain, namespace, frames, clock, .. } = &self.options;
+        let mut shown = Shown::new(robot.to_string(), run.mission.clone());
+        let own = overlap((*domain, namespace), &run, shown.sensor_topics());
+        let is_left = |id| *frames == Frames::Map && is_of_robot(id);
+        if let Some((_, topic)) = own.iter().find(|(id, _)| !is_left(*id)) {
+            return Err(BridgeError::Overlap { topic: topic.clone(), domain: *domain });
         }
-        if let Err(error) = endpoints::open_sensors(&mut self.node, shown.sensor_topics()) {
-            self.tell(&format!("the topics of the sensors cannot be opened: {error}"));
+        let topics = [(Id::Odom, ""), (Id::Battery, "")].into_iter().chain(shown.sensor_topics());
+        let topics = topics.filter(|(id, _)| !own.iter().any(|(own, _)| own == id));
+        let opened = endpoints::open_robot(&mut self.node, topics);
+        if let (MissionClock::Wall { rate, .. }, false) = (run.clock, clock) {
+            shown.pace = rate;
         }
-        shown.mounting(now_ns(), &mut |id, payload| self.node.publish(id, payload));
+        let at_ns = if *clock { 0 } else { now_ns() };
+        shown.mounting(at_ns, &mut |id, payload| self.node.publish(id, payload));
+        if let Err(error) = opened {
+            self.tell(&format!("the topics of the robot cannot be opened: {error}"));
+        }
         self.shown = Some(shown);
+        if self.run.as_ref().is_none_or(|(before, _)| *before != directory) {
+            self.server.abort(RUN_ENDED);
+            self.server.forget_targets();
+            let results = Results::of(&directory, 0);
+            self.run = Some((directory, results));
+        }
         Ok(())
+    }
+
+    /// Go on with the goals of an earlier bridge: their clients still wait.
+    fn restore(&mut self, domain: &Domain) {
+        self.goals_file = domain.run_directory().with_file_name(GOALS);
+        let text = fs::read_to_string(&self.goals_file).unwrap_or_default();
+        let Ok((directory, server)) = serde_json::from_str::<(PathBuf, Server)>(&text) else {
+            return;
+        };
+        let goes_on = newest_run(domain).is_some_and(|(newest, _)| newest == directory);
+        let results = Results::of(&directory, MOST_RECORDED);
+        (self.server, self.run, self.stored) = (server, Some((directory, results)), text);
+        self.read_results();
+        if !goes_on {
+            self.server.abort(RUN_ENDED);
+        }
+    }
+
+    fn read_results(&mut self) {
+        for target in self.run.iter_mut().flat_map(|(_, results)| results.take()) {
+            self.server.recorded(target.number, &target.outcome);
+        }
+    }
+
+    /// Store the goals for a later bridge if they have changed.
+    fn store(&mut self) {
+        let Some((directory, _)) = self.run.as_ref().filter(|_| self.server.goals.are_any()) else {
+            return;
+        };
+        // JSON has everything that is in them.
+        let text = serde_json::to_string(&(directory, &self.server)).unwrap_or_default();
+        if text != self.stored {
+            if let Err(error) = file::replace(&self.goals_file, &text) {
+                tracing::warn!(%error, "the goals of the action cannot be stored");
+            }
+            self.stored = text;
+        }
     }
 
     /// Note that the run has ended: no goal is reached any more.
     fn end(&mut self) {
-        self.server.goals.end(Status::Aborted);
+        self.server.abort(RUN_ENDED);
         self.server.newest_target = 0;
         (self.shown, self.stands_for_cancel) = (None, None);
     }
 
     /// Take all samples that were published on the robot's bus.
     fn take_samples(&mut self, feed: &mut Feed) -> Result<(), BusError> {
-        let Self { node, shown, server, stands_for_cancel, .. } = self;
+        let Self { node, shown, server, stands_for_cancel, options, transforms, .. } = self;
         let Some(shown) = shown else {
             return Ok(());
         };
         let now_ns = now_ns();
+        shown.others_odom = (options.frames == Frames::Map).then(|| {
+            let since = Instant::now().checked_sub(OLD_AFTER);
+            transforms.find(BASE, ODOM, since).ok()
+        });
         feed.read(&mut |sample| {
             match &sample {
                 Sample::Target(target) => server.target(target),
@@ -191,8 +281,17 @@ impl Bridge {
                 }
                 _ => {}
             }
-            shown.sample(&sample, now_ns, &mut |id, payload| node.publish(id, payload));
+            let at_ns = if options.clock { sample.time().0 } else { now_ns };
+            shown.sample(&sample, at_ns, &mut |id, payload| node.publish(id, payload));
         })
+    }
+
+    /// The time for stamps.
+    fn now_ns(&self) -> u64 {
+        match &self.shown {
+            Some(shown) if self.options.clock => (shown.state.now_s() * 1e9) as u64,
+            _ => now_ns(),
+        }
     }
 
     /// Take the messages that nodes have sent.
@@ -227,6 +326,7 @@ impl Bridge {
                 self.orders.give(Order::Stand { is_cancel: false });
             }
             Id::Stop => self.orders.give(Order::Resume),
+            Id::Tf => self.transforms.take(&message.payload, Some(Instant::now()))?,
             _ => {}
         }
         Ok(())
@@ -243,11 +343,20 @@ impl Bridge {
         let payload = request.without_header(&message.payload);
         match call {
             Call::SendGoal => {
-                let sent = Server::read_goal(&payload).inspect_err(|_| {
+                let (id, point) = Server::read_goal(&payload).inspect_err(|_| {
                     self.node.reply(0, call, request, &Goals::<Aim>::reply(false, now_ns()));
                 })?;
-                let after = self.server.newest_target;
-                self.go(sent.point, Why::Action { request: request.clone(), sent, after });
+                match point {
+                    Ok(point) => {
+                        let (request, sent) = (request.clone(), Sent { id, point });
+                        let after = self.server.newest_target;
+                        self.go(point, Why::Action { request, sent, after });
+                    }
+                    Err(refusal) => {
+                        self.refuse(request, id, &refusal);
+                        return Err(refusal.text);
+                    }
+                }
             }
             Call::CancelGoal => {
                 let (reply, stands) = self.server.goals.cancel(&payload)?;
@@ -262,10 +371,17 @@ impl Bridge {
         Ok(())
     }
 
+    /// Accept a goal and end it with the reason against it, as Nav2 does: a goal that is rejected has no result to say why.
+    fn refuse(&mut self, request: &Request, id: Uuid, why: &Refusal) {
+        let now_ns = self.now_ns();
+        self.node.reply(0, Call::SendGoal, request, &Goals::<Aim>::reply(true, now_ns));
+        self.server.refuse(id, why, now_ns);
+    }
+
     /// Take an order with its result.
     fn done(&mut self, (order, result): Done) {
         if let Err(why) = &result {
-            self.tell(&format!("what was asked is not done: {why}"));
+            self.tell(&format!("what was asked is not done: {}", why.text));
         }
         match order {
             Order::Go { why, resumes, .. } => {
@@ -273,10 +389,19 @@ impl Bridge {
                     self.stands_for_cancel = None;
                 }
                 if let Why::Action { request, sent, after } = why {
-                    let reply = Goals::<Aim>::reply(result.is_ok(), now_ns());
-                    self.node.reply(0, Call::SendGoal, &request, &reply);
-                    if result.is_ok() {
-                        self.server.accept(sent, after, now_ns());
+                    let now_ns = self.now_ns();
+                    match result {
+                        Ok(()) => {
+                            let reply = Goals::<Aim>::reply(true, now_ns);
+                            self.node.reply(0, Call::SendGoal, &request, &reply);
+                            self.server.accept(sent, after, now_ns);
+                            // Its target may have come before the supervisor's answer.
+                            if let Some(target) = self.shown.as_ref().and_then(|it| it.state.target)
+                            {
+                                self.server.target(&target);
+                            }
+                        }
+                        Err(why) => self.refuse(&request, sent.id, &why),
                     }
                 }
             }
@@ -284,7 +409,9 @@ impl Bridge {
                 self.server.goals.end(Status::Canceled);
             }
             // A robot that did not obey is not reported to stand.
-            Order::Stand { is_cancel: true } => self.server.goals.end(Status::Aborted),
+            Order::Stand { is_cancel: true } => {
+                self.server.abort("the robot did not stand when it was canceled");
+            }
             Order::Stand { is_cancel: false }
             | Order::Resume
             | Order::Place(..)
@@ -294,14 +421,17 @@ impl Bridge {
 
     /// Publish the samples that are due.
     fn publish(&mut self) {
-        let now_ns = now_ns();
+        let now_ns = self.now_ns();
+        self.read_results();
         let (node, server) = (&self.node, &mut self.server);
         if let Some(status) = server.goals.take_status() {
             node.publish_status(0, status);
         }
-        for (request, id) in server.goals.answerable() {
-            let result = server.result(id).unwrap_or_default();
-            node.reply(0, Call::GetResult, &request, &result);
+        if Instant::now() >= self.answers_from {
+            for (request, id) in server.answerable() {
+                let result = server.result(id).unwrap_or_default();
+                node.reply(0, Call::GetResult, &request, &result);
+            }
         }
         let Some(shown) = &mut self.shown else {
             return;

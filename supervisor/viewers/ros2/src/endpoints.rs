@@ -1,24 +1,28 @@
 //! The bridge's node, made from the table of topics.
 
-use std::{io, net::Ipv4Addr};
+use std::io;
+
+use ros2::participant::Quality;
 
 use crate::{
+    bridge::Options,
     node::{LATCHED, NEWEST, Node, SURE},
-    topics::{Accept, Id, Spec, TABLE, spec},
+    topics::{Accept, Frames, Id, Spec, TABLE, spec},
 };
 
-/// Join `domain` by the interface `only`, with topics below `namespace`.
-pub(crate) fn open(
-    domain: u16,
-    only: Option<Ipv4Addr>,
-    namespace: &str,
-    accepted: &[Accept],
-) -> io::Result<Node<Id>> {
-    let mut node = Node::join(domain, only, namespace, "firsthand")?;
+/// Transforms come from many nodes, of either reliability.
+const TRANSFORMS: Quality = Quality { is_reliable: false, is_latched: false, depth: 100 };
+
+/// Join the domain by the interface of `options`, with topics below the namespace there.
+pub(crate) fn open(options: &Options) -> io::Result<Node<Id>> {
+    let Options { domain, interface, namespace, accepted, .. } = options;
+    let mut node = Node::join(*domain, *interface, namespace, "firsthand")?;
+    if options.frames == Frames::Map {
+        node.read_from(Id::Tf, ["tf", "tf2_msgs::msg::dds_::TFMessage_"], TRANSFORMS)?;
+    }
     for row in TABLE {
         match row.accepted_by {
-            // The topics of sensors are opened for each robot.
-            None if matches!(row.id, Id::Range(_) | Id::Scan(_)) => {}
+            None if is_of_robot(row.id) || (row.id == Id::Clock && !options.clock) => {}
             None => write_to(&mut node, row.id, row, "")?,
             Some(by) if accepted.contains(&by) => {
                 let name = topic_name(namespace, row, "");
@@ -36,13 +40,18 @@ pub(crate) fn open(
     Ok(node)
 }
 
-/// Open the topics of a robot's sensors, and close those of the robot before.
-pub(crate) fn open_sensors<'a>(
+/// Whether the topic is opened for each robot: a robot that speaks ROS 2 may publish it itself.
+pub(crate) const fn is_of_robot(id: Id) -> bool {
+    matches!(id, Id::Odom | Id::Battery | Id::Range(_) | Id::Scan(_))
+}
+
+/// Open the topics of a robot, and close those of the robot before.
+pub(crate) fn open_robot<'a>(
     node: &mut Node<Id>,
-    sensors: impl Iterator<Item = (Id, &'a str)>,
+    topics: impl Iterator<Item = (Id, &'a str)>,
 ) -> io::Result<()> {
-    node.retain_writers(|id| !matches!(id, Id::Range(_) | Id::Scan(_)));
-    for (id, sensor) in sensors {
+    node.retain_writers(|id| !is_of_robot(id));
+    for (id, sensor) in topics {
         if let Some(row) = spec(id) {
             write_to(node, id, row, sensor)?;
         }
@@ -53,7 +62,13 @@ pub(crate) fn open_sensors<'a>(
 
 fn write_to(node: &mut Node<Id>, id: Id, row: &Spec, sensor: &str) -> io::Result<()> {
     let name = topic_name(&node.namespace, row, sensor);
-    node.write_to(id, [&name, row.type_name], if row.is_latched { LATCHED } else { SURE })
+    let quality = match id {
+        // Who joins later is told what happened before, as by other nodes.
+        Id::Rosout => Quality { depth: 100, ..LATCHED },
+        _ if row.is_latched => LATCHED,
+        _ => SURE,
+    };
+    node.write_to(id, [&name, row.type_name], quality)
 }
 
 /// The name of the topic of `row` below `namespace`, from the root.
@@ -61,6 +76,7 @@ pub(crate) fn topic_name(namespace: &str, row: &Spec, sensor: &str) -> String {
     let name = row.name.replace("SENSOR", &ros_name(sensor));
     let name = name.trim_end_matches('/');
     match namespace.trim_matches('/') {
+        _ if name.starts_with('/') => name.to_owned(),
         "" => format!("/{name}"),
         namespace => format!("/{namespace}/{name}"),
     }

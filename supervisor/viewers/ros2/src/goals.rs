@@ -8,6 +8,7 @@ use ros2::{
     cdr::{Reader, Writer},
     participant::Request,
 };
+use serde::{Deserialize, Serialize};
 
 /// The id that a client gave its goal.
 pub(crate) type Uuid = [u8; 16];
@@ -18,7 +19,7 @@ const MOST_GOALS: usize = 16;
 const MOST_RESULTS: usize = 32;
 
 /// A `action_msgs/GoalStatus`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum Status {
     Executing = 2,
     Canceling = 3,
@@ -43,7 +44,7 @@ enum Cancel {
 }
 
 /// A goal that was accepted, with what its action knows of it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Goal<T> {
     pub(crate) id: Uuid,
     /// The time when the goal was accepted, nanoseconds since 1970.
@@ -53,7 +54,7 @@ pub(crate) struct Goal<T> {
 }
 
 /// A server's goals.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Goals<T> {
     goals: VecDeque<Goal<T>>,
     /// Whether the states have changed since they were last published.
@@ -71,11 +72,20 @@ impl<T> Goals<T> {
     /// Take a goal; it ends the one before.
     pub(crate) fn accept(&mut self, id: Uuid, known: T, now_ns: u64) {
         self.end(Status::Aborted);
+        self.add(id, Status::Executing, known, now_ns);
+    }
+
+    /// Add a goal in this state.
+    pub(crate) fn add(&mut self, id: Uuid, status: Status, known: T, now_ns: u64) {
         if self.goals.len() == MOST_GOALS {
             self.goals.pop_front();
         }
-        self.goals.push_back(Goal { id, at_ns: now_ns, status: Status::Executing, known });
+        self.goals.push_back(Goal { id, at_ns: now_ns, status, known });
         self.is_changed = true;
+    }
+
+    pub(crate) fn are_any(&self) -> bool {
+        !self.goals.is_empty()
     }
 
     /// Let the goal that is not over end with `status`.
@@ -86,9 +96,9 @@ impl<T> Goals<T> {
         }
     }
 
-    /// The newest goal, if it is not over.
+    /// The goal that is not over.
     pub(crate) fn current(&mut self) -> Option<&mut Goal<T>> {
-        self.goals.back_mut().filter(|goal| !goal.status.is_final())
+        self.goals.iter_mut().rev().find(|goal| !goal.status.is_final())
     }
 
     /// Take a request to cancel. Returns the reply, and whether a goal is canceled.
@@ -141,10 +151,18 @@ impl<T> Goals<T> {
         }
     }
 
-    /// The requests whose goals are over; the others still wait.
-    pub(crate) fn answerable(&mut self) -> Vec<(Request, Uuid)> {
+    pub(crate) fn aborted(&mut self) -> impl Iterator<Item = &mut Goal<T>> {
+        self.goals.iter_mut().filter(|goal| goal.status == Status::Aborted)
+    }
+
+    /// The requests whose goals are over and whose results `are_known`; the others still wait.
+    pub(crate) fn answerable(
+        &mut self,
+        are_known: impl Fn(u8, Option<&T>) -> bool,
+    ) -> Vec<(Request, Uuid)> {
         let waiting = std::mem::take(&mut self.waiting);
-        let (over, waiting) = waiting.into_iter().partition(|(_, id)| self.over(*id).is_some());
+        let is_over = |id| self.over(id).is_some_and(|(status, known)| are_known(status, known));
+        let (over, waiting) = waiting.into_iter().partition(|(_, id)| is_over(*id));
         self.waiting = waiting;
         over
     }

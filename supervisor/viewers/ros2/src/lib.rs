@@ -6,6 +6,8 @@
 //! | `topics` | THE table of topics |
 //! | `shown` | samples of the robot's bus to messages, pure |
 //! | `asked` | messages that ask for something to what they ask, pure |
+//! | `drift` | the covariances of odometry, pure |
+//! | `frames` | the frames of `/tf`, pure |
 //! | `goals` | the goals of any action, pure |
 //! | `action` | the server of the action `navigate_to_pose`, pure |
 //! | `messages` | the messages that are written |
@@ -19,7 +21,9 @@
 mod action;
 mod asked;
 mod bridge;
+mod drift;
 mod endpoints;
+mod frames;
 mod goals;
 mod messages;
 mod node;
@@ -42,7 +46,7 @@ use console::{
 
 use self::{
     bridge::{Options, serve},
-    topics::{Accept, Spec, TABLE},
+    topics::{Accept, Frames, Spec, TABLE},
 };
 
 /// Show a robot in ROS 2: to RViz, to other nodes, to other machines. `--topics` lists its topics.
@@ -64,6 +68,13 @@ pub struct Arguments {
     /// The namespace of all topics, `tf` too. A robot that speaks ROS 2 itself publishes `/tf` and `/odom`, so give it one.
     #[arg(long, global = true, default_value = "", value_parser = namespace)]
     namespace: String,
+    /// What `tf` has: all frames, or that of the map alone where another node publishes `odom` to `base_link`. Topics that the robot's
+    /// own link reads are then left to the robot.
+    #[arg(long, value_enum, default_value_t)]
+    frames: Frames,
+    /// Stamp all messages with mission time, and publish it as `/clock`: for nodes with `use_sim_time` beside a simulated robot.
+    #[arg(long)]
+    clock: bool,
     /// Print the table of its topics, and nothing else.
     #[arg(long)]
     topics: bool,
@@ -138,6 +149,8 @@ fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
         interface: arguments.interface,
         namespace: arguments.namespace.clone(),
         accepted: arguments.accept.clone(),
+        frames: arguments.frames,
+        clock: arguments.clock,
     };
     serve(&options, &mut || signals.came())?;
     Ok(ExitCode::SUCCESS)

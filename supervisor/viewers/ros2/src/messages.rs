@@ -121,6 +121,17 @@ fn marker(writer: &mut Writer, Header(ns, frame): Header<'_>, marker: &Marker, a
     writer.text("").text("").text("").length(0).u8(0);
 }
 
+/// A range as REP 117 has it: nearer than `least` and farther than `most` are infinite, and no measurement is not a number.
+pub(crate) fn within([least, most]: [f64; 2], range: f64) -> f64 {
+    if range < least {
+        f64::NEG_INFINITY
+    } else if range > most {
+        f64::INFINITY
+    } else {
+        range
+    }
+}
+
 /// A `sensor_msgs/Range` of a sonar, or of an infrared ranger.
 pub(crate) fn range(
     header: Header<'_>,
@@ -136,6 +147,11 @@ pub(crate) fn range(
         writer.f32(number as f32);
     }
     writer.take()
+}
+
+/// A `rcl_interfaces/Log` of a part of the robot, with its severity.
+pub(crate) fn log(ns: u64, severity: u8, name: &str, text: &str) -> Vec<u8> {
+    Writer::default().time(ns).u8(severity).text(name).text(text).text("").text("").u32(0).take()
 }
 
 /// The severity of a `diagnostic_msgs/DiagnosticStatus`.

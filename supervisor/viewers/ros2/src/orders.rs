@@ -16,7 +16,7 @@ use glam::DVec2;
 use mission_control::operator::{self, OperatorError};
 use ros2::participant::Request;
 
-use crate::action::Sent;
+use crate::action::{Refusal, Sent, code};
 
 /// The most orders that wait.
 const MOST_WAITING: usize = 16;
@@ -54,7 +54,7 @@ pub(crate) enum Why {
 }
 
 /// An order, and the reason if it was not carried out.
-pub(crate) type Done = (Order, Result<(), String>);
+pub(crate) type Done = (Order, Result<(), Refusal>);
 
 /// Threads that carry out orders in turn.
 pub(crate) struct Orders {
@@ -74,7 +74,7 @@ impl Orders {
             let (robot, done) = (robot.clone(), refused.clone());
             thread::Builder::new().name(name.to_owned()).spawn(move || {
                 for order in waiting {
-                    let result = perform(&robot, &order).map_err(|error| error.to_string());
+                    let result = perform(&robot, &order).map_err(|error| refusal(&error));
                     if done.send((order, result)).is_err() {
                         break;
                     }
@@ -97,7 +97,7 @@ impl Orders {
         if let Err(TrySendError::Full(order) | TrySendError::Disconnected(order)) =
             worker.try_send(order)
         {
-            let _ = self.refused.send((order, Err("too many orders wait already".to_owned())));
+            let _ = self.refused.send((order, Err("too many orders wait already".into())));
         }
     }
 
@@ -105,6 +105,15 @@ impl Orders {
     pub(crate) fn done(&self) -> Option<Done> {
         self.done.try_recv().ok()
     }
+}
+
+fn refusal(error: &OperatorError) -> Refusal {
+    let code = match error {
+        OperatorError::Refused { code: "target-outside", .. } => code::GOAL_OUTSIDE_MAP,
+        OperatorError::Refused { code: "target-in-hazard", .. } => code::GOAL_OCCUPIED,
+        _ => code::UNKNOWN,
+    };
+    Refusal { code, text: error.to_string() }
 }
 
 fn perform(robot: &RobotName, order: &Order) -> Result<(), OperatorError> {

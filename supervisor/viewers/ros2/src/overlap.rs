@@ -12,25 +12,22 @@ use crate::{
     topics::{Id, TABLE, spec},
 };
 
-/// The first topic of a bridge in `domain` and `namespace` that the link of `run` reads, with the topics of these sensors.
+/// Those topics of a bridge in `domain` and `namespace` that the link of `run` reads, with the topics of these sensors.
 pub(crate) fn overlap<'a>(
     (domain, namespace): (u16, &str),
     run: &Run,
     sensors: impl Iterator<Item = (Id, &'a str)>,
-) -> Option<String> {
-    let Address::Ros2(read_in) = run.address else {
-        return None;
+) -> Vec<(Id, String)> {
+    let reads = match run.address {
+        Address::Ros2(read_in) => read_in.unwrap_or_default() == domain,
+        _ => false,
     };
-    if read_in.unwrap_or_default() != domain {
-        return None;
-    }
-    let read: Vec<_> = read(&run.mission).collect();
-    let written = TABLE
-        .iter()
-        .filter(|row| row.accepted_by.is_none() && !matches!(row.id, Id::Range(_) | Id::Scan(_)))
-        .map(|row| topic_name(namespace, row, ""));
-    let sensed = sensors.filter_map(|(id, sensor)| Some(topic_name(namespace, spec(id)?, sensor)));
-    written.chain(sensed).find(|name| read.contains(name))
+    let read: Vec<_> = read(&run.mission).filter(|_| reads).collect();
+    let is_sensor = |id| matches!(id, Id::Range(_) | Id::Scan(_));
+    let written = TABLE.iter().filter(|row| row.accepted_by.is_none() && !is_sensor(row.id));
+    let topics = written.map(|row| (row.id, "")).chain(sensors);
+    let named = topics.filter_map(|(id, name)| Some((id, topic_name(namespace, spec(id)?, name))));
+    named.filter(|(_, name)| read.contains(name)).collect()
 }
 
 /// The names of the topics that a link reads as its robot's.
@@ -63,6 +60,9 @@ mod tests {
             mission,
         };
         overlap((domain, namespace), &run, sensors.into_iter())
+            .into_iter()
+            .map(|(_, name)| name)
+            .next()
     }
 
     #[test]

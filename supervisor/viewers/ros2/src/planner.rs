@@ -3,7 +3,6 @@
 //! | module | holds |
 //! |---|---|
 //! | `costmap` | a map, and what of it is blocked, pure |
-//! | `frames` | the frames of `/tf`, pure |
 //! | `planning` | map, start and goals to a path, pure |
 //! | `calls` | the messages of the actions, pure |
 //!
@@ -11,7 +10,6 @@
 
 mod calls;
 mod costmap;
-mod frames;
 mod planning;
 #[cfg(test)]
 mod tests;
@@ -41,11 +39,11 @@ use ros2::participant::{Message, Quality};
 use self::{
     calls::{Asked, Outcome, Placed},
     costmap::{Body, Costmap},
-    frames::Frames,
     planning::{Failure, Planner, Reason},
 };
 use crate::{
     bridge::{BridgeError, now_ns},
+    frames::Frames,
     goals::{Goals, Status, Uuid},
     messages::{self, Header},
     node::{Call, LATCHED, Node, SURE},
@@ -263,7 +261,7 @@ impl<'a> Server<'a> {
             if let Some(status) = goals.take_status() {
                 self.node.publish_status(action, status);
             }
-            for (request, id) in goals.answerable() {
+            for (request, id) in goals.answerable(|_, _| true) {
                 if let Some((state, plan)) = goals.over(id) {
                     let unknown = Outcome::default();
                     let outcome = plan.map_or(&unknown, |plan| &plan.outcome);

@@ -6,22 +6,23 @@ use common::{
     mission::{Mission, Sensor, SensorKind},
     samples::{
         Action, Cause, FieldCell, FieldHeader, GridHeader, Mover, PoseSample, RangeReading,
-        RangeStatus, RosterEntry, ScanHeader, StageState, TargetPoint, name_str,
+        RangeStatus, RosterEntry, ScanHeader, StageState, Sweep, TargetPoint, name_str,
     },
 };
-use glam::DVec2;
-use robot_state::{RobotState, Sample, death_in_words, failsafe_in_words};
-use ros2::parts::Pose;
+use glam::{DAffine2, DVec2};
+use robot_state::{Kind, RobotState, Sample, death_in_words, failsafe_in_words};
+use ros2::{cdr::Writer, parts::Pose};
 
 use crate::{
-    messages::{self, Header, Level, Marker, Shape, Status},
+    drift::Drift,
+    messages::{self, Header, Level, Marker, Shape, Status, within},
     topics::Id,
 };
 
 /// The mission's frame, that of odometry, and the robot's, whose x is ahead.
 pub(crate) const MAP: &str = "map";
-const ODOM: &str = "odom";
-const BASE: &str = "base_link";
+pub(crate) const ODOM: &str = "odom";
+pub(crate) const BASE: &str = "base_link";
 
 /// Wall-clock time between whole maps, and between diagnostics that have not changed, nanoseconds.
 const EVERY_NS: u64 = 1_000_000_000;
@@ -47,6 +48,11 @@ pub(crate) struct Shown {
     map: Option<(u64, u64)>,
     has_movers: bool,
     diagnosed: Option<(Vec<Status>, u64)>,
+    drift: Drift,
+    /// Mission time over the time of stamps.
+    pub(crate) pace: f64,
+    /// The frame `odom` by another node, which has the robot in it; none of these before it is heard.
+    pub(crate) others_odom: Option<Option<DAffine2>>,
 }
 
 impl Shown {
@@ -60,6 +66,9 @@ impl Shown {
             map: None,
             has_movers: false,
             diagnosed: None,
+            drift: Drift::NONE,
+            pace: 1.0,
+            others_odom: None,
         }
     }
 
@@ -109,15 +118,28 @@ impl Shown {
         }
     }
 
-    fn pose(&self, sample: &PoseSample, now_ns: u64, sink: Sink<'_>) {
+    fn pose(&mut self, sample: &PoseSample, now_ns: u64, sink: Sink<'_>) {
         let pose = plane(sample.pose());
         let origin = sample.map_from_odom;
-        let odom = seen_from(origin, pose);
-        let frames = [(MAP, ODOM, origin), (ODOM, BASE, odom)];
-        sink(Id::Tf, messages::transforms(now_ns, &frames));
+        let odom = plane(sample.odometry());
+        match self.others_odom {
+            None => {
+                let frames = [(MAP, ODOM, origin), (ODOM, BASE, odom)];
+                sink(Id::Tf, messages::transforms(now_ns, &frames));
+            }
+            Some(Some(robot)) => {
+                let origin = origin_of(robot, sample.pose());
+                sink(Id::Tf, messages::transforms(now_ns, &[(MAP, ODOM, origin)]));
+            }
+            Some(None) => {}
+        }
         sink(Id::Pose, messages::pose(Header(now_ns, MAP), pose, &sample.covariance_6x6()));
-        let speeds = [sample.v_m_s, sample.omega_rad_s];
-        sink(Id::Odom, messages::odometry(Header(now_ns, ODOM), BASE, odom, speeds));
+        let [of_pose, of_speeds] = self.drift.after(sample, &self.mission, self.pace);
+        let speeds = [sample.v_m_s, sample.omega_rad_s].map(|speed| speed * self.pace);
+        let header = Header(now_ns, ODOM);
+        let message = messages::odometry(header, BASE, (odom, &of_pose), (speeds, &of_speeds));
+        sink(Id::Odom, message);
+        sink(Id::Clock, Writer::default().time(sample.stamp.stamp_ns).take());
     }
 
     fn ranges(&self, readings: &[RangeReading], now_ns: u64, sink: Sink<'_>) {
@@ -127,15 +149,17 @@ impl Shown {
                 continue;
             };
             let range = match reading.status() {
-                RangeStatus::Measured | RangeStatus::AtContact => reading.range_m,
+                RangeStatus::Measured => reading.range_m,
+                RangeStatus::AtContact => f64::NEG_INFINITY,
                 RangeStatus::Nothing => f64::INFINITY,
-                RangeStatus::Absent | RangeStatus::Invalid => continue,
+                RangeStatus::Invalid => f64::NAN,
+                RangeStatus::Absent => continue,
             };
             if sensor.kind != SensorKind::Scan {
                 let is_sonar = sensor.kind == SensorKind::Cone;
                 let view = sensor.field_of_view_deg.to_radians();
                 let limits = [sensor.model.least_m(), sensor.reach_m];
-                let header = Header(now_ns, &sensor.name);
+                let (header, range) = (Header(now_ns, &sensor.name), within(limits, range));
                 sink(Id::Range(row), messages::range(header, is_sonar, view, limits, range));
             }
         }
@@ -144,11 +168,24 @@ impl Shown {
     fn scan(&self, header: &ScanHeader, beams: &[f32], now_ns: u64, sink: Sink<'_>) {
         let row = usize::try_from(header.sensor).unwrap_or(usize::MAX);
         if let Some(sensor) = self.sensors.get(row) {
-            let period_s = sensor.every_ticks as f64 / self.mission.robot.rate_hz;
+            let period_s = sensor.every_ticks as f64 / self.mission.robot.rate_hz / self.pace;
+            // A message has its beams in the order in which they were measured, or does not tell their times.
+            let mut sweep = header.sweep();
+            if !sweep.is_plausible(beams.len()) {
+                sweep = Sweep::default();
+            }
+            let (mut after_tick_ns, mut beam_ns) = (sweep.first_beam_ns, sweep.beam_ns);
+            if beam_ns < 0 || sweep.first_beam > 0 {
+                (after_tick_ns, beam_ns) = (sweep.middle_ns(beams.len()), 0);
+            }
+            let beam_s = beam_ns as f64 * 1e-9 / self.pace;
+            let at_ns = now_ns.saturating_add_signed((after_tick_ns as f64 / self.pace) as i64);
             let fan = [header.first_rad - sensor.mount.looks_rad(), header.step_rad];
             let limits = [sensor.model.least_m(), header.reach_m];
-            let header = Header(now_ns, &sensor.name);
-            sink(Id::Scan(row), messages::scan(header, fan, limits, [0.0, period_s], beams));
+            let header = Header(at_ns, &sensor.name);
+            let told: Vec<_> =
+                beams.iter().map(|range| within(limits, f64::from(*range)) as f32).collect();
+            sink(Id::Scan(row), messages::scan(header, fan, limits, [beam_s, period_s], &told));
         }
     }
 
@@ -213,9 +250,18 @@ impl Shown {
         (0..).zip(self.state.targets()).map(target).collect()
     }
 
-    /// Publish the messages that depend on time: the map, and diagnostics if they have changed or are due.
+    /// Publish the messages that depend on time: the map, what happened, and diagnostics if they have changed or are due.
     pub(crate) fn tick(&mut self, now_ns: u64, sink: Sink<'_>) {
         self.map(now_ns, sink);
+        for event in self.state.take_events() {
+            let severity = match event.kind {
+                Kind::Bad => 40,
+                Kind::Warn => 30,
+                Kind::Good | Kind::Note => 20,
+                Kind::Log => 10,
+            };
+            sink(Id::Rosout, messages::log(now_ns, severity, &event.of, &event.text));
+        }
         let statuses = self.statuses();
         let is_due = self.diagnosed.as_ref().is_none_or(|(before, at_ns)| {
             let age_ns = now_ns.saturating_sub(*at_ns);
@@ -307,10 +353,12 @@ const fn plane(Pose2 { position, heading }: Pose2) -> Pose {
     [position.x, position.y, heading]
 }
 
-/// `pose` in the frame whose pose is `origin`.
-fn seen_from([x, y, turned]: Pose, [at_x, at_y, heading]: Pose) -> Pose {
-    let way = DVec2::from_angle(-turned).rotate(DVec2::new(at_x - x, at_y - y));
-    [way.x, way.y, heading - turned]
+/// The frame in which `robot` is where `pose` says that it is.
+fn origin_of(robot: DAffine2, pose: Pose2) -> Pose {
+    let pose = DAffine2::from_angle_translation(pose.heading, pose.position);
+    let origin = pose * robot.inverse();
+    let [x, y] = origin.translation.to_array();
+    [x, y, origin.matrix2.x_axis.to_angle()]
 }
 
 /// The way along the directions of `cells` from `from` to `to`, in steps of half a cell. It ends where there is no direction.

@@ -10,16 +10,17 @@ use common::{
     mission::Mission,
     samples::{
         CommandSample, CommandState, DirectiveSample, FieldCell, FieldHeader, GridHeader,
-        HoldReason, Mover, PoseSample, ScanHeader, TargetPoint, TargetSample,
+        HoldReason, Mover, PoseSample, RangeReading, RangeStatus, RangesHeader, ScanHeader,
+        StallSample, Sweep, TargetPoint, TargetSample,
     },
 };
-use glam::DVec2;
+use glam::{DAffine2, DVec2};
 use robot_state::Sample;
 use ros2::cdr::{Reader, Writer};
 
 use crate::{
     RVIZ,
-    action::Server,
+    action::{Sent, Server, code},
     asked,
     goals::Status,
     messages::{self, Header, Level, Marker, Shape},
@@ -98,6 +99,22 @@ fn call(id: u8, rest: &[u8]) -> Vec<u8> {
     Writer::default().raw(&[id; 16]).raw(rest).take()
 }
 
+/// The goal `id` to (1, 2).
+fn sent(id: u8) -> Sent {
+    let (id, point) = Server::read_goal(&call(id, &goal("map")[4..])).unwrap();
+    Sent { id, point: point.unwrap() }
+}
+
+/// The state of the goal `id`, its error code and the words of that.
+fn told(goals: &Server, id: u8) -> (u8, u16, String) {
+    let result = goals.result([id; 16]).unwrap();
+    let mut reader = Reader::new(&result).unwrap();
+    let head = [reader.u8().unwrap(), reader.u8().unwrap()];
+    assert_eq!(head[1], 0, "it pads the code");
+    let code = u16::from_le_bytes(reader.raw(2).unwrap().try_into().unwrap());
+    (head[0], code, reader.text().unwrap().to_owned())
+}
+
 /// The state of the goal `id` by its result; none while it is not over.
 fn state(goals: &Server, id: u8) -> Option<u8> {
     let result = goals.result([id; 16])?;
@@ -108,8 +125,7 @@ fn state(goals: &Server, id: u8) -> Option<u8> {
 fn with_a_goal() -> Server {
     let mut goals = Server::default();
     goals.target(&TargetSample { number: 4, ..TargetSample::default() });
-    let sent = Server::read_goal(&call(1, &goal("map")[4..])).unwrap();
-    goals.accept(sent, goals.newest_target, 7);
+    goals.accept(sent(1), goals.newest_target, 7);
     goals.target(&target(5));
     goals
 }
@@ -165,9 +181,58 @@ fn a_goal_of_the_action_ends_when_the_robot_is_sent_elsewhere() {
     goals.target(&TargetSample { number: 6, ..TargetSample::default() });
     assert_eq!(state(&goals, 1), Some(Status::Aborted as u8));
     let mut goals = with_a_goal();
-    let sent = Server::read_goal(&call(2, &goal("map")[4..])).unwrap();
-    goals.accept(sent, goals.newest_target, 8);
+    goals.accept(sent(2), goals.newest_target, 8);
     assert_eq!((state(&goals, 1), state(&goals, 2)), (Some(Status::Aborted as u8), None));
+}
+
+#[test]
+fn a_goal_that_is_refused_has_nav2s_error_code_and_words_and_the_one_before_goes_on() {
+    let (id, point) = Server::read_goal(&call(2, &goal("odom")[4..])).unwrap();
+    let mut goals = with_a_goal();
+    goals.refuse(id, &point.unwrap_err(), 8);
+    let (status, code, text) = told(&goals, 2);
+    assert_eq!((status, code), (Status::Aborted as u8, code::TF_ERROR));
+    assert!(text.contains("give it in \"map\""), "{text}");
+    goals.command(&arrival(5));
+    assert_eq!(told(&goals, 1), (Status::Succeeded as u8, 0, String::new()));
+}
+
+#[test]
+fn a_goal_that_ends_says_why_by_the_recorded_result_of_its_target() {
+    let waits =
+        DirectiveSample { reason: HoldReason::Waiting.into(), ..DirectiveSample::default() };
+    for (outcome, status, code, words) in [
+        ("unreachable", Status::Aborted, 208, "no way"),
+        ("timed_out", Status::Aborted, 9003, "not there"),
+        ("missed", Status::Aborted, 9000, "gave it up"),
+        ("reached", Status::Succeeded, 0, ""),
+    ] {
+        let mut goals = with_a_goal();
+        goals.directive(&waits);
+        goals.directive(&waits);
+        goals.recorded(4, "unreachable");
+        assert!(told(&goals, 1).2.contains("gave it up"), "the record is another target's");
+        goals.recorded(5, outcome);
+        let (is, was, text) = told(&goals, 1);
+        assert_eq!((is, was), (status as u8, code), "{outcome}");
+        assert!(text.contains(words), "{text}");
+    }
+    let mut goals = with_a_goal();
+    goals.accept(sent(2), goals.newest_target, 8);
+    assert_eq!(told(&goals, 1).2, "a newer goal took its place");
+}
+
+#[test]
+fn a_goal_of_an_earlier_bridge_has_the_result_of_its_target_that_came_meanwhile() {
+    for (outcome, status) in
+        [("reached", Status::Succeeded), ("missed", Status::Aborted), ("replaced", Status::Aborted)]
+    {
+        let stored = serde_json::to_string(&with_a_goal()).unwrap();
+        let mut later: Server = serde_json::from_str(&stored).unwrap();
+        assert_eq!(state(&later, 1), None, "it is not over");
+        later.recorded(5, outcome);
+        assert_eq!(state(&later, 1), Some(status as u8), "{outcome}");
+    }
 }
 
 #[test]
@@ -195,8 +260,7 @@ fn goals_of_the_action_are_reached_one_after_the_other_in_a_run_that_stays() {
     let (waits, drives) = (directive(HoldReason::Waiting), directive(HoldReason::None));
     let mut goals = Server::default();
     for nth in 1..=20 {
-        let sent = Server::read_goal(&call(nth, &goal("map")[4..])).unwrap();
-        goals.accept(sent, goals.newest_target, 7);
+        goals.accept(sent(nth), goals.newest_target, 7);
         goals.target(&target(nth.into()));
         // The supervisor tells of the target before it orders the robot to drive.
         for said in [waits, drives, drives, waits] {
@@ -248,7 +312,8 @@ fn odometry_and_its_origin_make_up_the_pose() {
         ..PoseSample::default()
     };
     let sent = published(|sink| shown().sample(&Sample::Pose(pose), 0, sink));
-    assert_eq!(sent.iter().map(|(id, _)| *id).collect::<Vec<_>>(), [Id::Tf, Id::Pose, Id::Odom]);
+    let ids: Vec<_> = sent.iter().map(|(id, _)| *id).collect();
+    assert_eq!(ids, [Id::Tf, Id::Pose, Id::Odom, Id::Clock]);
     let mut reader = Reader::new(&sent[2].1).unwrap();
     reader.time().unwrap();
     assert_eq!((reader.text().unwrap(), reader.text().unwrap()), ("odom", "base_link"));
@@ -256,6 +321,150 @@ fn odometry_and_its_origin_make_up_the_pose() {
     let back = DVec2::from_angle(0.25).rotate(DVec2::new(x, y)) + DVec2::new(0.5, -0.5);
     assert!(back.distance(DVec2::new(1.0, 2.0)) < 1e-12);
     assert!((heading.unwrap() - 0.5).abs() < 1e-12);
+}
+
+/// The pose of the frame in the first transform of a message, and the names of parent and frame.
+fn first_transform(payload: &[u8]) -> ([String; 2], ([f64; 2], Option<f64>)) {
+    let mut reader = Reader::new(payload).unwrap();
+    assert_eq!(reader.u32().unwrap(), 1, "one transform");
+    let (_, parent) = reader.header().unwrap();
+    let names = [parent, reader.text().unwrap()].map(str::to_owned);
+    (names, reader.pose().unwrap())
+}
+
+#[test]
+fn where_another_node_has_the_robot_in_odom_the_map_alone_is_told_so_that_both_make_up_the_pose() {
+    let sample = |x_m, heading_rad| {
+        Sample::Pose(PoseSample { x_m, y_m: 2.0, heading_rad, ..PoseSample::default() })
+    };
+    let mut shown = shown();
+    shown.others_odom = Some(None);
+    let sent = published(|sink| shown.sample(&sample(1.0, 0.75), 0, sink));
+    assert!(sent.iter().all(|(id, _)| *id != Id::Tf), "the other node has not said it yet");
+    for (x_m, heading) in [(1.0, 0.75), (-3.0, 2.5)] {
+        let robot = DAffine2::from_angle_translation(-0.5, DVec2::new(7.0, -4.0));
+        shown.others_odom = Some(Some(robot));
+        let sent = published(|sink| shown.sample(&sample(x_m, heading), 0, sink));
+        let (names, (at, turned)) = first_transform(&sent[0].1);
+        assert_eq!(names, ["map", "odom"]);
+        let both = DAffine2::from_angle_translation(turned.unwrap(), at.into()) * robot;
+        assert!(both.translation.distance(DVec2::new(x_m, 2.0)) < 1e-12);
+        assert!((both.matrix2.x_axis.to_angle() - heading).abs() < 1e-12);
+    }
+}
+
+/// The pose covariance, the speeds and their covariance of an odometry.
+fn read_odometry(payload: &[u8]) -> ([f64; 36], [f64; 6], [f64; 36]) {
+    let mut reader = Reader::new(payload).unwrap();
+    reader.header().unwrap();
+    reader.text().unwrap();
+    reader.pose().unwrap();
+    (reader.f64s().unwrap(), reader.f64s().unwrap(), reader.f64s().unwrap())
+}
+
+#[test]
+fn the_covariance_of_odometry_grows_with_the_way_and_is_large_on_what_no_wheel_measures() {
+    let mut shown = shown();
+    let mut drive = |tick: u64| {
+        let mut pose = PoseSample { x_m: 0.01 * tick as f64, v_m_s: 0.1, ..PoseSample::default() };
+        (pose.stamp.tick, pose.stamp.stamp_ns) = (tick, tick * 100_000_000);
+        let sent = published(|sink| shown.sample(&Sample::Pose(pose), 0, sink));
+        read_odometry(&sent.iter().find(|(id, _)| *id == Id::Odom).unwrap().1)
+    };
+    let start = drive(0).0;
+    assert_eq!((start[0], start[7], start[35]), (0.0, 0.0, 0.0));
+    let (at_10_m, speeds, of_speeds) = (1..=1000).map(&mut drive).last().unwrap();
+    assert_eq!((speeds[0], speeds[5]), (0.1, 0.0));
+    // 1 % of the way by the mean diameter, and slip of 1 mm per root of a metre of two wheels.
+    assert!((at_10_m[0].sqrt() - 0.1).abs() < 0.001, "{}", at_10_m[0].sqrt());
+    // Half the ratio's deviation times the way squared, over the track, aside.
+    assert!(at_10_m[7].sqrt() > 0.5 && at_10_m[35].sqrt() > 0.1, "{at_10_m:?}");
+    assert!((at_10_m[11] - at_10_m[31]).abs() < 1e-12 && at_10_m[11] > 0.0);
+    for covariance in [at_10_m, of_speeds] {
+        assert!([14, 21, 28].iter().all(|part| covariance[*part] == 1e6));
+    }
+    assert!(
+        of_speeds[0] > 0.0 && of_speeds[0] < 1e-2 && of_speeds[35] > 0.0 && of_speeds[35] < 1.0
+    );
+}
+
+#[test]
+fn speeds_are_in_the_time_of_the_stamps_at_every_pace() {
+    let mut shown = shown();
+    shown.pace = 4.0;
+    let pose = PoseSample { v_m_s: 0.1, omega_rad_s: -0.2, ..PoseSample::default() };
+    let sent = published(|sink| shown.sample(&Sample::Pose(pose), 0, sink));
+    let (_, speeds, fast) = read_odometry(&sent[2].1);
+    assert_eq!((speeds[0], speeds[5]), (0.4, -0.8));
+    shown.pace = 1.0;
+    let sent = published(|sink| shown.sample(&Sample::Pose(pose), 0, sink));
+    let slow = read_odometry(&sent[2].1).2;
+    assert!((fast[0] / slow[0] - 16.0).abs() < 1e-9 && fast[14] == slow[14]);
+}
+
+#[test]
+fn ranges_too_far_too_near_and_not_measured_are_those_of_rep_117() {
+    let limits = [0.06, 4.0];
+    assert_eq!(messages::within(limits, 4.01), f64::INFINITY);
+    assert_eq!(messages::within(limits, 0.05), f64::NEG_INFINITY);
+    assert_eq!(messages::within(limits, 1.0), 1.0);
+    assert!(messages::within(limits, f64::NAN).is_nan());
+    // The X80's sonars.
+    let mut shown = shown();
+    for (status, is) in [
+        (RangeStatus::AtContact, Some(f32::NEG_INFINITY)),
+        (RangeStatus::Nothing, Some(f32::INFINITY)),
+        (RangeStatus::Measured, Some(1.5)),
+        (RangeStatus::Absent, None),
+    ] {
+        let reading =
+            RangeReading { range_m: 1.5, status: status.into(), ..RangeReading::default() };
+        let ranges = Sample::Ranges(RangesHeader::default(), vec![reading]);
+        let sent = published(|sink| shown.sample(&ranges, 0, sink));
+        let told = sent.first().map(|(_, payload)| payload[payload.len() - 8..].to_vec());
+        let told = told.map(|last| f32::from_le_bytes(last[..4].try_into().unwrap()));
+        assert_eq!(told, is);
+    }
+}
+
+#[test]
+fn a_scan_is_stamped_when_its_first_beam_was_measured_and_says_the_time_between_beams() {
+    let text = "target = [4, 0]\nrobot.model = 'turtlebot4'";
+    let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
+    let (row, laser) = mission.laser().unwrap();
+    let mut shown = Shown::new("tb4".to_owned(), mission);
+    let mut told = |pace, first_beam, beam_ns| {
+        shown.pace = pace;
+        let sweep = Sweep { first_beam_ns: -90_000_000, beam_ns, first_beam };
+        let header = ScanHeader::of(row, &laser).swept(sweep);
+        let scan = Sample::Scan(header, vec![1.0; 360]);
+        let sent = published(|sink| shown.sample(&scan, 1_000_000_000, sink));
+        let mut reader = Reader::new(&sent[0].1).unwrap();
+        let stamp = reader.header().unwrap().0;
+        let numbers: Vec<_> = (0..5).map(|_| reader.f32().unwrap()).collect();
+        (stamp, numbers[3])
+    };
+    assert_eq!(told(1.0, 0, 250_000), (910_000_000, 0.00025));
+    assert_eq!(told(2.0, 0, 250_000), (955_000_000, 0.000_125));
+    // One that turns clockwise has its beams in another order: the stamp is that of the middle.
+    assert_eq!(told(1.0, 0, -250_000), (955_000_000, 0.0));
+}
+
+#[test]
+fn what_happens_is_logged_with_its_severity_and_clocks_are_mission_time() {
+    let mut shown = shown();
+    let mut pose = PoseSample::default();
+    pose.stamp.stamp_ns = 2_500_000_000;
+    let sent = published(|sink| shown.sample(&Sample::Pose(pose), 7, sink));
+    assert_eq!(sent[3], (Id::Clock, Writer::default().time(2_500_000_000).take()));
+    shown.sample(&Sample::Stall(StallSample::default()), 7, &mut |_, _| {});
+    let sent = published(|sink| shown.tick(9, sink));
+    let logs: Vec<_> = sent.iter().filter(|(id, _)| *id == Id::Rosout).collect();
+    let mut reader = Reader::new(&logs[0].1).unwrap();
+    assert_eq!((reader.time().unwrap(), reader.u8().unwrap()), (9, 40));
+    assert_eq!(reader.text().unwrap(), "stalls");
+    assert!(reader.text().unwrap().contains("no progress"));
+    assert_eq!(logs.len(), 1);
 }
 
 #[test]

@@ -21,6 +21,8 @@ pub(crate) enum Id {
     Range(usize),
     Battery,
     Diagnostics,
+    Rosout,
+    Clock,
     GoalPose,
     InitialPose,
     Teleop,
@@ -38,6 +40,16 @@ pub(crate) enum Accept {
     Hand,
     /// Let it stand and go on: `stop`.
     Stop,
+}
+
+/// The transforms that are published.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Frames {
+    /// `map` to `odom` to `base_link`.
+    #[default]
+    All,
+    /// `map` to `odom`.
+    Map,
 }
 
 /// A row of the table.
@@ -74,13 +86,13 @@ macro_rules! table {
 
 table! {
     Id::Tf => "tf", tf2_msgs / TFMessage, false, None,
-        "`map` to `odom` to `base_link`, as REP 105 has them";
+        "`map` to `odom` to `base_link`, as REP 105 has them; with `--frames map` the first alone, by the robot's place in the second";
     Id::TfStatic => "tf_static", tf2_msgs / TFMessage, true, None,
         "`base_link` to a frame of each sensor's name";
     Id::Pose => "pose", geometry_msgs / PoseWithCovarianceStamped, false, None,
         "where the robot believes it is";
     Id::Odom => "odom", nav_msgs / Odometry, false, None,
-        "the pose without what fixes corrected, and the speeds; it states no covariance";
+        "the pose without what fixes corrected, and the speeds, with covariances by the mission's `[robot.odometry]`";
     Id::Map => "map", nav_msgs / OccupancyGrid, true, None,
         "the safety map, at most once a second: 100 a hazard, 99 its margin, 0 seen free, -1 not looked at";
     Id::MapUpdates => "map_updates", map_msgs / OccupancyGridUpdate, false, None,
@@ -94,11 +106,15 @@ table! {
     Id::Scan(0) => "scan/SENSOR", sensor_msgs / LaserScan, false, None,
         "the beams of each laser that the mission uses; `scan` of one alone";
     Id::Range(0) => "range/SENSOR", sensor_msgs / Range, false, None,
-        "each sonar and infrared ranger that the mission uses; infinite for nothing";
+        "each sonar and infrared ranger that the mission uses; as in scans, too far and too near are infinite (REP 117)";
     Id::Battery => "battery_state", sensor_msgs / BatteryState, false, None,
         "the voltage of the battery that the motors drive on";
     Id::Diagnostics => "diagnostics", diagnostic_msgs / DiagnosticArray, false, None,
         "the failsafe, each stage with its generation and its last death, the battery";
+    Id::Rosout => "/rosout", rcl_interfaces / Log, true, None,
+        "what happens: deaths and stalls are errors, orders and arrivals are information";
+    Id::Clock => "/clock", rosgraph_msgs / Clock, false, None,
+        "with `--clock`: mission time, which the stamps of all messages are then";
     Id::GoalPose => "goal_pose", geometry_msgs / PoseStamped, false, Some(Accept::Goals),
         "where to go, as RViz's button sends it; the action `navigate_to_pose` (`nav2_msgs/NavigateToPose`) is taken too";
     Id::InitialPose => "initialpose", geometry_msgs / PoseWithCovarianceStamped, false, Some(Accept::Pose),

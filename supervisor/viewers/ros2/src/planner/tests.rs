@@ -17,10 +17,10 @@ use self::figures::{Grid, RESOLUTION_M};
 use super::{
     calls::{self, Outcome},
     costmap::{Body, Costmap},
-    frames::Frames,
     inscribed,
     planning::{Failure, Planner, Reason},
 };
+use crate::frames::Frames;
 
 const BODY: Body = Body { radius_m: 0.22, occupied: 99, enters_unknown: true };
 

@@ -19,11 +19,11 @@ struct Place {
 
 /// Frames by their names.
 #[derive(Debug, Default)]
-pub(super) struct Frames(BTreeMap<String, Place>);
+pub(crate) struct Frames(BTreeMap<String, Place>);
 
 impl Frames {
     /// Take a `tf2_msgs/TFMessage` that was `heard` then, or is of frames that stay. The error says why it is refused.
-    pub(super) fn take(&mut self, payload: &[u8], heard: Option<Instant>) -> Result<(), String> {
+    pub(crate) fn take(&mut self, payload: &[u8], heard: Option<Instant>) -> Result<(), String> {
         let mut reader = Reader::new(payload)?;
         for _ in 0..reader.length(MOST_FRAMES)? {
             let (_stamp_ns, parent) = reader.header()?;
@@ -40,7 +40,7 @@ impl Frames {
     }
 
     /// The pose of `frame` in `root`, from transforms that are not older than `since`. The error says what is missing.
-    pub(super) fn find(
+    pub(crate) fn find(
         &self,
         frame: &str,
         root: &str,
