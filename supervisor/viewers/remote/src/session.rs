@@ -124,7 +124,7 @@ fn open(config: &Value) -> Result<Session> {
 
 /// An error of zenoh, as one of ours.
 pub(crate) fn failed(error: zenoh::Error) -> Failure {
-    Failure::from(format!("{error}"))
+    error
 }
 
 /// `at` as zenoh writes it: `tls/HOST:PORT` or `tcp/HOST:PORT`, of which the first and the last part may be left out.

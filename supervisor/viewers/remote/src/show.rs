@@ -87,7 +87,7 @@ pub(crate) fn show(arguments: &Arguments) -> Result {
             if hello.id != 0
                 && let Some(run) = asker.run()?
             {
-                mirror = Some(Mirror::open(domain.clone(), run, hello.id, &place)?);
+                mirror = Some(Mirror::open(&domain, run, hello.id, &place)?);
                 stream.write("showing\n")?;
             }
         }
@@ -213,7 +213,7 @@ impl Drop for RunDirectory {
 impl Mirror {
     /// # Errors
     /// If a robot of that name runs here, or shared memory is full.
-    pub(crate) fn open(domain: Domain, mut run: Run, id: u64, place: &str) -> Result<Self> {
+    pub(crate) fn open(domain: &Domain, mut run: Run, id: u64, place: &str) -> Result<Self> {
         let cells = run.mission.grid_frame().area();
         run.robot = domain.robot.clone();
         // No robot's name has a point.

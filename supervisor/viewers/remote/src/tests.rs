@@ -32,7 +32,7 @@ fn run() -> Run {
 
 fn mirror(name: &str) -> (Domain, Mirror) {
     let domain = Domain::of(format!("{name}-{}", std::process::id()).parse().unwrap());
-    let mirror = Mirror::open(domain.clone(), run(), 7, "tls/far:7447").unwrap();
+    let mirror = Mirror::open(&domain, run(), 7, "tls/far:7447").unwrap();
     (domain, mirror)
 }
 
