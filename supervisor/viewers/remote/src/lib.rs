@@ -32,7 +32,7 @@ use console::{executable, failure::Result};
 /// Show a robot of another machine on this one, to all viewers: `serve` on the robot's machine, `show` on the other.
 #[derive(Debug, Parser)]
 #[command(name = "firsthand-remote", version)]
-struct Arguments {
+pub struct Arguments {
     #[command(subcommand)]
     what: What,
 }
